@@ -1,0 +1,374 @@
+/*
+ * drape.h: all that a user of the library needs: context, scene, model, sim, observers.
+ *
+ * Units are SI: metres, kilograms, seconds, newtons, joules, radians. Axes are right-handed with Y up;
+ * gravity is explicit. Vectors of nodes are interleaved: x0 y0 z0 x1 y1 z1 ... in double precision.
+ *
+ * Errors. Functions that can fail return a drape_status; drape_context_message() then says what, where, which
+ * value, and what would be right. The library never prints, exits or aborts.
+ *
+ * Ownership. An object is made by _create, _load or _parse and freed by _destroy, which takes the address of
+ * the handle, writes NULL there and does nothing to a NULL handle. A context outlives what was made from it;
+ * a model outlives its sims.
+ *
+ * Threads. A context and a scene belong to one thread at a time. A model is read-only: several threads may
+ * read it and run sims on it, each thread with a context of its own. A sim belongs to one thread at a time.
+ */
+#ifndef DRAPE_DRAPE_H
+#define DRAPE_DRAPE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "export.h"
+
+DRAPE_C_BEGIN
+
+/* ---- Status
+ * ------------------------------------------------------------------------------------------------------ */
+
+/* The sign says who acts: 0 done; > 0 a smaller step may succeed; < 0 it will not, stop and explain. */
+typedef enum drape_status {
+    DRAPE_OK = 0,
+    DRAPE_RETRY_NONLINEAR = 1,   /* the nonlinear solver did not reach its tolerance */
+    DRAPE_RETRY_LINEAR = 2,      /* the linear solver failed: singular matrix, no memory for its fill-in */
+    DRAPE_RETRY_NONFINITE = 3,   /* a residual, a Jacobian entry or a result is not a finite number */
+    DRAPE_RETRY_DEGENERATE = 4,  /* an element collapsed: edge length, altitude, hinge angle */
+    DRAPE_RETRY_REJECTED = 5,    /* the step controller or the error test refused the step */
+    DRAPE_E_ARGUMENT = -1,       /* a wrong argument, scene value or command line */
+    DRAPE_E_MEMORY = -2,         /* an allocation failed */
+    DRAPE_E_FILE = -3,           /* a file cannot be opened, read or written */
+    DRAPE_E_PARSE = -4,          /* the text of a scene or mesh is not of its format */
+    DRAPE_E_STEP_TOO_SMALL = -5, /* the step fell below dt_min; the state stays the last accepted one */
+    DRAPE_E_SOLVER = -6,  /* a step failed and no smaller step may be tried, or the solver cannot be set up */
+    DRAPE_E_VERSION = -7, /* a struct or a file of another version of Drape */
+    DRAPE_E_STOPPED = -8  /* an observer asked to stop */
+} drape_status;
+
+/* The status' name in lower case without the prefix: "ok", "retry_nonlinear", "e_step_too_small"; "unknown"
+ * for no status. */
+DRAPE_API const char *drape_status_name(drape_status status);
+
+/* "0.1.0": the version of the library that is linked, to compare with the DRAPE_VERSION_* of the header. */
+DRAPE_API const char *drape_version(void);
+
+/* ---- Context
+ * ----------------------------------------------------------------------------------------------------- */
+
+typedef struct drape_context drape_context;
+
+/* Severity of a log line. */
+typedef enum drape_log_level { DRAPE_LOG_INFO = 0, DRAPE_LOG_WARNING = 1 } drape_log_level;
+
+/* Settings of a context. Initialise with drape_context_def_init. */
+typedef struct drape_context_def {
+    size_t struct_size; /* set by drape_context_def_init; a def with 0 here is refused */
+    /* Allocator of all memory of Drape's own; both functions or neither. allocate returns NULL on failure and
+     * memory aligned for any type; release takes what allocate gave, never NULL. Default: malloc and free.
+     * SUNDIALS and KLU use malloc. */
+    void *(*allocate)(void *user, size_t size);
+    void (*release)(void *user, void *memory);
+    void *allocator_user;
+    /* Receives log lines without a newline. Default NULL: nothing is logged. */
+    void (*log)(void *user, drape_log_level level, const char *text);
+    void *log_user;
+} drape_context_def;
+
+/* Fills *def with the defaults. struct_size is sizeof(drape_context_def) of the caller. */
+DRAPE_API void drape_context_def_init(drape_context_def *def, size_t struct_size);
+
+/* Makes a context. def NULL: the defaults. Errors: DRAPE_E_ARGUMENT (def not initialised, out NULL),
+ * DRAPE_E_MEMORY. */
+DRAPE_API drape_status drape_context_create(const drape_context_def *def, drape_context **out);
+DRAPE_API void drape_context_destroy(drape_context **ctx);
+
+/* What the last failed call had to say, one line without newline; "" before any failure. Valid until the next
+ * call with this context or with an object made from it. NULL ctx: a fixed text. */
+DRAPE_API const char *drape_context_message(const drape_context *ctx);
+
+/* ---- Scene in memory: what a host fills instead of a scene file
+ * ---------------------------------------------------- */
+
+/* One parameter by name. Numbers, integers and booleans (0, 1) go into number with text NULL; choices go into
+ * text. */
+typedef struct drape_setting {
+    const char *name;
+    double number;
+    const char *text;
+} drape_setting;
+
+/* A row of one of Drape's tables by name, with the parameters that differ from their defaults. `drape list`
+ * shows all. */
+typedef struct drape_row_def {
+    const char *type;
+    const drape_setting *settings; /* setting_count of them; NULL for none */
+    size_t setting_count;
+} drape_row_def;
+
+/* A triangle mesh: one of three sources. Exactly one of grid.type, file, positions is set. */
+typedef struct drape_mesh_def {
+    drape_row_def grid;       /* a row of the grids: "equilateral", "square" */
+    const char *file;         /* an OBJ or PLY file, by its ending */
+    const double *positions;  /* node_count x 3 [m], copied */
+    const int32_t *triangles; /* triangle_count x 3, 0-based, copied */
+    size_t node_count, triangle_count;
+    double scale[3];     /* default 1 1 1; applied first */
+    double rotate[4];    /* axis x y z and angle [degrees]; default none; applied second */
+    double translate[3]; /* [m]; default 0; applied last */
+} drape_mesh_def;
+
+/* Displacement of pinned nodes from their rest positions as a piecewise linear function of time, constant
+ * before the first and after the last key. */
+typedef struct drape_track_key {
+    double time;            /* [s], strictly increasing from key to key */
+    double displacement[3]; /* [m] */
+} drape_track_key;
+
+/* Nodes of one cloth held fixed, or moved along a track. Exactly one of nodes, corner, edge, row (>= 0),
+ * has_box selects them. corner, edge and row exist on grids only. */
+typedef struct drape_pin_def {
+    const int32_t *nodes; /* node_count node numbers of this cloth */
+    size_t node_count;
+    const char
+        *corner; /* "top-left", "top-right", "bottom-left", "bottom-right"; top is row 0, left is column 0 */
+    const char *edge; /* "top", "bottom", "left", "right" */
+    int32_t row;      /* -1: not selected by row */
+    bool has_box;
+    double box_min[3], box_max[3]; /* [m], rest coordinates after the transform; boundary included */
+    const drape_track_key *track;  /* key_count keys; NULL: fixed */
+    size_t key_count;
+} drape_pin_def;
+
+/* One piece of cloth. */
+typedef struct drape_cloth_def {
+    const char *name; /* NULL: "cloth0", "cloth1" ... */
+    drape_mesh_def mesh;
+    const drape_setting
+        *material; /* young_modulus, poisson_ratio, thickness, density ...: `drape list` shows all */
+    size_t material_count;
+    const drape_row_def *terms; /* rows of the terms that are modelled */
+    size_t term_count;
+    const drape_pin_def *pins;
+    size_t pin_count;
+    double velocity[3]; /* [m/s] of every node at t = 0 */
+} drape_cloth_def;
+
+/* A whole scene. Initialise with drape_scene_def_init; everything pointed to need only live until
+ * drape_model_create returns. */
+typedef struct drape_scene_def {
+    size_t struct_size; /* set by drape_scene_def_init */
+    const drape_cloth_def *cloths;
+    size_t cloth_count;
+    double gravity[3];          /* [m/s2]; default 0 -9.81 0 */
+    drape_row_def integrator;   /* default "be"; keys of any integrator row are accepted, those of other rows
+                                   are ignored */
+    drape_row_def controller;   /* default "halving" */
+    double duration;            /* [s], required > 0 when run from the command line; default 1 */
+    double frame_rate;          /* [1/s] of frame events; default 60 */
+    const char *const *formats; /* frame formats of `drape run`, rows of the exporters; default none */
+    size_t format_count;
+    const char *folder; /* folder that relative mesh files are in; NULL: the working directory */
+} drape_scene_def;
+
+/* Fill a def with the defaults above. */
+DRAPE_API void drape_scene_def_init(drape_scene_def *def, size_t struct_size);
+DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
+DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
+DRAPE_API void drape_pin_def_init(drape_pin_def *def, size_t struct_size);
+
+/* ---- Scene from text
+ * ----------------------------------------------------------------------------------------------- */
+
+/* A parsed scene file, open to changes before it is compiled. */
+typedef struct drape_scene drape_scene;
+
+/* Reads a scene file, or the text of one (name stands for the file in messages; relative mesh files are
+ * sought in the working directory). Only the syntax of JSON is checked here; keys and values are checked by
+ * drape_scene_compile, after changes. Errors: DRAPE_E_FILE, DRAPE_E_PARSE, DRAPE_E_MEMORY; message
+ * "scene.json:LINE:COLUMN: what". */
+DRAPE_API drape_status drape_scene_load(drape_context *ctx, const char *path, drape_scene **out);
+DRAPE_API drape_status drape_scene_parse(drape_context *ctx, const char *text, const char *name,
+                                         drape_scene **out);
+
+/* Sets the value at a JSON pointer ("/integrator/dt") to a JSON text ("0.001", "\"ida\"", "[0,0,0]"; a text
+ * that is not JSON is taken as a string, so ida may stand without quotes). Missing objects on the way are
+ * made. "-" appends to an array. Errors: DRAPE_E_ARGUMENT (not a pointer, a step into a number or past an
+ * array), DRAPE_E_MEMORY. */
+DRAPE_API drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char *value);
+DRAPE_API void drape_scene_destroy(drape_scene **scene);
+
+/* ---- Model
+ * ---------------------------------------------------------------------------------------------------------
+ */
+
+/* A compiled scene: rest geometry, masses, elements, parameters, sparsity. Immutable. */
+typedef struct drape_model drape_model;
+
+/* Compiles a scene. Errors: DRAPE_E_ARGUMENT, DRAPE_E_PARSE, DRAPE_E_FILE, DRAPE_E_MEMORY; the message starts
+ * with the place: "scene.json:LINE:COLUMN: /pointer: what, value, range" for scenes from text, "/pointer:
+ * ..." for scenes in memory, where the pointer names the value as it would stand in a file. *out is NULL on
+ * failure. */
+DRAPE_API drape_status drape_scene_compile(drape_scene *scene, drape_model **out);
+DRAPE_API drape_status drape_model_create(drape_context *ctx, const drape_scene_def *def, drape_model **out);
+/* drape_scene_load and drape_scene_compile in one call. */
+DRAPE_API drape_status drape_model_load(drape_context *ctx, const char *scene_path, drape_model **out);
+DRAPE_API void drape_model_destroy(drape_model **model);
+
+/* Sizes. A NULL model has none of anything. dofs: unknowns, 3 a free node; nonzeros: of the full dofs x dofs
+ * Jacobian. */
+DRAPE_API int32_t drape_model_node_count(const drape_model *model);
+DRAPE_API int32_t drape_model_triangle_count(const drape_model *model);
+DRAPE_API int64_t drape_model_dof_count(const drape_model *model);
+DRAPE_API int64_t drape_model_nonzero_count(const drape_model *model);
+
+/* Arrays of the model, valid as long as it lives: triangles (triangle_count x 3, node numbers of the whole
+ * model), rest positions (node_count x 3 [m]), lumped masses (node_count [kg]), pinned flags (node_count, 1
+ * pinned). */
+DRAPE_API const int32_t *drape_model_triangles(const drape_model *model);
+DRAPE_API const double *drape_model_rest_positions(const drape_model *model);
+DRAPE_API const double *drape_model_masses(const drape_model *model);
+DRAPE_API const uint8_t *drape_model_pinned(const drape_model *model);
+
+/* The pieces of cloth: each owns a contiguous range of nodes and of triangles, in scene order. */
+typedef struct drape_cloth_range {
+    const char *name;
+    int32_t first_node, node_count;
+    int32_t first_triangle, triangle_count;
+} drape_cloth_range;
+DRAPE_API int32_t drape_model_cloth_count(const drape_model *model);
+DRAPE_API drape_cloth_range drape_model_cloth(const drape_model *model, int32_t index);
+
+/* The scene's own duration [s] and frame rate [1/s]. */
+DRAPE_API double drape_model_duration(const drape_model *model);
+DRAPE_API double drape_model_frame_rate(const drape_model *model);
+
+/* ---- Sim
+ * -----------------------------------------------------------------------------------------------------------
+ */
+
+/* A running simulation: the state, the integrator, the controller and their workspace. */
+typedef struct drape_sim drape_sim;
+
+/* How to run. Initialise with drape_sim_def_init; what is left at its default is the scene's own. */
+typedef struct drape_sim_def {
+    size_t struct_size;
+    const char *integrator;                   /* a row of the integrators; NULL: the scene's */
+    const drape_setting *integrator_settings; /* override the scene's settings */
+    size_t integrator_setting_count;
+    const char *controller; /* a row of the controllers; NULL: the scene's */
+    const drape_setting *controller_settings;
+    size_t controller_setting_count;
+    double dt;         /* [s]; 0: the scene's */
+    double dt_min;     /* [s]; 0: the scene's */
+    double frame_rate; /* [1/s] of frame events; 0: the scene's */
+    int threads; /* threads that evaluate elements, 1 to 256; default 1; the result does not depend on it */
+} drape_sim_def;
+
+DRAPE_API void drape_sim_def_init(drape_sim_def *def, size_t struct_size);
+
+/* Makes a sim at t = 0 in the model's rest positions and initial velocities. NULL def: the scene's integrator
+ * and controller. All heap memory of Drape's own is taken here: none in a step. The messages of the sim go to
+ * ctx, which may differ from the model's. Errors: DRAPE_E_ARGUMENT (unknown row, setting out of range),
+ * DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
+DRAPE_API drape_status drape_sim_create(drape_context *ctx, const drape_model *model,
+                                        const drape_sim_def *def, drape_sim **out);
+DRAPE_API void drape_sim_destroy(drape_sim **sim);
+
+/* Advances to t_end [s]. Steps end at t0 + k dt; only the last one is cut to end at t_end, and a remainder
+ * below 1e-9 dt joins the step before. A t_end not after the present time does nothing. On failure the state
+ * is that of the last accepted step. Errors: DRAPE_E_STEP_TOO_SMALL (halving gave up), DRAPE_E_SOLVER (a step
+ * failed under the controller "fixed"), DRAPE_E_STOPPED (an observer asked), DRAPE_E_ARGUMENT (t_end not
+ * finite); the message names time, step, reason and worst element. */
+DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);
+
+/* The last accepted state: time [s], positions [m] and velocities [m/s], node_count x 3; valid until the next
+ * call that changes the sim. */
+DRAPE_API double drape_sim_time(const drape_sim *sim);
+DRAPE_API const double *drape_sim_positions(const drape_sim *sim);
+DRAPE_API const double *drape_sim_velocities(const drape_sim *sim);
+DRAPE_API const drape_model *drape_sim_model(const drape_sim *sim);
+
+/* A 64-bit hash of time, positions, velocities and internal variables of the last accepted state, nothing
+ * else. */
+DRAPE_API uint64_t drape_sim_hash(const drape_sim *sim);
+
+/* Energies of the last accepted state [J]. gravity: the potential, zero at the origin. dissipated: the work
+ * that damping and drag terms took since t = 0. numerical: what is missing otherwise, the integrator's own
+ * dissipation (negative: gain), after the work of moving pins. */
+typedef struct drape_energy {
+    double kinetic, elastic, gravity, contact, dissipated, numerical;
+} drape_energy;
+DRAPE_API drape_energy drape_sim_energy(drape_sim *sim);
+
+/* Work done since the sim was made. Times in seconds of wall clock; newton times are parts of steps. */
+typedef struct drape_statistics {
+    int64_t steps_accepted, steps_rejected;
+    double h_min, h_max; /* [s] of accepted steps; 0 before the first */
+    int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
+    double wall_setup, wall_steps, wall_residual, wall_jacobian, wall_factor, wall_solve, wall_contact;
+    double strain_min, strain_max; /* |e|/L - 1 over all edges and accepted steps */
+} drape_statistics;
+DRAPE_API drape_statistics drape_sim_statistics(const drape_sim *sim);
+
+/* Reasons for which attempts were rejected, with their counts: "max_iterations", "line_search",
+ * "edge_collapse" ... index runs from 0; *count is 0 and the result NULL past the last. */
+DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t *count);
+
+/* ---- Observers
+ * ----------------------------------------------------------------------------------------------------- */
+
+/* The element or node that an attempt has most to say about. */
+typedef struct drape_worst {
+    const char
+        *what; /* "residual", "edge length / rest length", "altitude / rest altitude" ...; "" for none */
+    const char *term;    /* the row that found it, "" for a node */
+    int32_t element;     /* element number in that term of that cloth; -1 for a node */
+    int32_t node[4];     /* its nodes, numbers of the whole model; -1 past the last */
+    int32_t cloth;       /* index of its cloth; -1 for none */
+    double value, limit; /* in the unit of what */
+} drape_worst;
+
+/* One attempted step. */
+typedef struct drape_attempt {
+    int64_t index;       /* counts attempts from 0 */
+    double t, h;         /* start and size [s] */
+    drape_status status; /* > 0 with accepted: on_failure "accept" took an unconverged state */
+    const char *reason;  /* "converged", "max_iterations", ...: a short token, static */
+    bool accepted;
+    int iterations;   /* Newton iterations */
+    double residual;  /* of the free nodes at the end of the attempt, in the norm of the integrator [N] */
+    double tolerance; /* that it was to reach [N] */
+    drape_worst worst;
+} drape_attempt;
+
+typedef enum drape_event_kind {
+    DRAPE_EVENT_ATTEMPT, /* after each attempt was judged; the sim's state is the one kept */
+    DRAPE_EVENT_FRAME    /* a frame time was reached: t = 0 at the first advance, then k / frame_rate */
+} drape_event_kind;
+
+/* What an observer is told. Valid during the call. */
+typedef struct drape_event {
+    drape_event_kind kind;
+    drape_sim *sim;
+    const drape_attempt *attempt; /* ATTEMPT only */
+    int64_t frame;                /* FRAME: its number from 0 */
+    double time;                  /* FRAME [s] */
+    const double *positions;      /* FRAME: node_count x 3 [m]; cubic Hermite between the steps around it */
+} drape_event;
+
+/* Called within drape_sim_advance. Returns 0 to go on, anything else to stop: the advance then returns
+ * DRAPE_E_STOPPED if the value was > 0, else that status, with the message that the observer may have set by
+ * drape_context_set_message. An observer must not advance or destroy the sim. */
+typedef drape_status drape_observer(void *user, const drape_event *event);
+
+/* Adds an observer; they are called in the order in which they were added, at most 8. Errors:
+ * DRAPE_E_ARGUMENT. */
+DRAPE_API drape_status drape_sim_observe(drape_sim *sim, drape_observer *observer, void *user);
+
+/* For observers: sets what drape_context_message will say, printf style. */
+DRAPE_API void drape_context_set_message(drape_context *ctx, const char *format, ...) DRAPE_PRINTF(2, 3);
+
+DRAPE_C_END
+
+#endif

@@ -1,0 +1,25 @@
+/* export.h: symbol visibility, C/C++ brackets, version. The only place that knows about C++ or visibility. */
+#ifndef DRAPE_EXPORT_H
+#define DRAPE_EXPORT_H
+
+#define DRAPE_VERSION_MAJOR 0
+#define DRAPE_VERSION_MINOR 1
+#define DRAPE_VERSION_PATCH 0
+
+#if defined(__GNUC__)
+#define DRAPE_API                 __attribute__((visibility("default")))
+#define DRAPE_PRINTF(text, first) __attribute__((format(printf, text, first)))
+#else
+#define DRAPE_API
+#define DRAPE_PRINTF(text, first)
+#endif
+
+#ifdef __cplusplus
+#define DRAPE_C_BEGIN extern "C" {
+#define DRAPE_C_END   }
+#else
+#define DRAPE_C_BEGIN
+#define DRAPE_C_END
+#endif
+
+#endif

@@ -1,0 +1,194 @@
+/*
+ * extend.h: all that an author of a term needs: parameter lists, the view of a cloth, the ops table of a
+ * term.
+ *
+ * A term is a sum over elements of one cloth. Its author writes, for a range of elements in local
+ * coordinates, one of measure      a scalar strain measure q(x) with gradient and Hessian; the library makes
+ * E = 1/2 k (q - q0)^2 of it, energy       any energy E(x) with gradient and Hessian, dissipation  a force
+ * g(x, v), positive against the motion, with its derivatives, law          a force along the strain measures
+ * of the other terms of its cloth, such as a damping. The library owns the loops, the sparsity, the scatter,
+ * the projection, boundary conditions and threads.
+ *
+ * Thread-safety: every function of a row may be called from several threads at once on different ranges; it
+ * must not allocate and must read nothing but its arguments. The exception is build, called once per cloth
+ * while a model is compiled.
+ */
+#ifndef DRAPE_EXTEND_H
+#define DRAPE_EXTEND_H
+
+#include "drape.h"
+
+DRAPE_C_BEGIN
+
+/* ---- Parameters of a row
+ * ------------------------------------------------------------------------------------------- */
+
+typedef enum drape_param_kind {
+    DRAPE_PARAM_NUMBER,
+    DRAPE_PARAM_INTEGER,
+    DRAPE_PARAM_BOOLEAN, /* 0 or 1 */
+    DRAPE_PARAM_CHOICE   /* the index of one of choices */
+} drape_param_kind;
+
+/* One parameter. All values travel as doubles: integers exact, booleans 0 or 1, choices by index. */
+typedef struct drape_param {
+    const char *name;
+    drape_param_kind kind;
+    const char *unit;     /* "N/m", "s", "1" for none */
+    double default_value; /* NaN: there is none, see derived */
+    const char
+        *derived; /* with a NaN default: what is taken instead, in words; NULL: the parameter is required */
+    double min, max;            /* closed range; ignored by booleans and choices */
+    bool open_min, open_max;    /* the bound itself is excluded */
+    const char *const *choices; /* NULL-ended list of words */
+    const char *help;           /* what it is and what it does, one line */
+} drape_param;
+
+#define DRAPE_MAX_PARAMS 24
+
+/* ---- What a term is built from
+ * --------------------------------------------------------------------------------------- */
+
+/* Stiffness and mass of a sheet, resolved. SI units. */
+typedef struct drape_material {
+    double young_modulus, poisson_ratio, thickness; /* [Pa], [1], [m] */
+    double areal_density;      /* [kg/m2]; total mass over area where the mass is uniform */
+    double membrane_stiffness; /* E h [N/m] */
+    double flexural_rigidity;  /* D = E h^3 / (12 (1 - nu^2)) [N m] */
+} drape_material;
+
+/* One cloth at rest. Node numbers are local to the cloth. All arrays are const and live as long as the model
+ * is compiled. */
+typedef struct drape_cloth_view {
+    int32_t node_count, triangle_count, edge_count, hinge_count;
+    const double *rest;           /* (node_count x 3) rest positions [m] */
+    const int32_t *triangle;      /* (triangle_count x 3) */
+    const double *triangle_area;  /* (triangle_count) [m2] */
+    const int32_t *edge;          /* (edge_count x 2) */
+    const int32_t *edge_triangle; /* (edge_count x 2) triangles beside the edge; second -1 on the boundary */
+    const double *edge_length;    /* (edge_count) [m] */
+    const int32_t *hinge; /* (hinge_count x 4) x0 x1 the shared edge, x2 x3 the apices of its two triangles */
+    const int32_t *hinge_edge; /* (hinge_count) */
+    const double *node_area;   /* (node_count) lumped, a third of each triangle [m2] */
+    const double *node_mass;   /* (node_count) lumped [kg] */
+    int32_t rows, columns;     /* of a grid, in nodes; 0 on other meshes */
+    drape_material material;
+    double gravity[3]; /* [m/s2] */
+} drape_cloth_view;
+
+/* Receives the elements of a term while its cloth is compiled. Opaque. */
+typedef struct drape_term_builder drape_term_builder;
+
+/* Announces the elements of a term; called once, first, by build. nodes: of an element, 1 to
+ * DRAPE_MAX_ELEMENT_NODES; rest_count: numbers of rest data an element. Errors: DRAPE_E_MEMORY,
+ * DRAPE_E_ARGUMENT. */
+DRAPE_API drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count);
+
+/* Sets element `element`: its nodes (local to the cloth) and its rest data. Measures keep k [J] in rest[0]
+ * and q0 in rest[1]. */
+DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes,
+                              const double *rest);
+
+/* Refuses to build: the reason is reported at the place of the term in the scene. Returns DRAPE_E_ARGUMENT.
+ */
+DRAPE_API drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
+    DRAPE_PRINTF(2, 3);
+
+#define DRAPE_MAX_ELEMENT_NODES 4
+#define DRAPE_MAX_ELEMENT_DOFS  (3 * DRAPE_MAX_ELEMENT_NODES)
+
+/* The elements of one term on one cloth, const after compile. */
+typedef struct drape_elements {
+    int32_t count;
+    int nodes;            /* nodes an element */
+    int rest_count;       /* numbers of rest data an element */
+    const int32_t *node;  /* (count x nodes) node numbers of the whole model */
+    const double *rest;   /* (rest_count x count): item k of element e is rest[k * count + e] */
+    const double *params; /* values in the order of the row's parameter list */
+} drape_elements;
+
+/* What a check found, for the message of a rejected step. */
+typedef struct drape_fault {
+    const char *reason; /* short token: "edge_collapse"; static text */
+    const char *what;   /* "edge length / rest length"; static text */
+    int32_t element;
+    double value, limit;
+} drape_fault;
+
+/* ---- The ops table of a term
+ * ----------------------------------------------------------------------------------------- */
+
+/*
+ * A row. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first + count
+ * - 1; outputs are element-major: item i belongs to element first + i. d = 3 * nodes. Gradients have the sign
+ * of dE/dx, so a force is minus that. x, v: (nodes of the model x 3). internal: (element_count) internal
+ * variables of the last accepted state, of rows that have them, else NULL. An output pointer that is NULL is
+ * not wanted.
+ */
+typedef struct drape_term_ops {
+    size_t struct_size; /* sizeof(drape_term_ops) of the author */
+    const char *name;   /* "bend.hinge" */
+    const char *summary;
+    const char *reference; /* paper and equation of the formula */
+    const drape_param *params;
+    int param_count;
+    const char *element_name;  /* "edge", "hinge", "node": for messages */
+    int nodes;                 /* nodes an element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
+    bool linear;               /* energy: its Hessian is zero and takes no sparsity */
+    bool potential_of_gravity; /* energy: counts as gravity, not as elastic */
+    bool has_internal;         /* one internal variable an element */
+
+    /* Adds the elements of one cloth. Called once a cloth. Errors: what the builder returned. */
+    drape_status (*build)(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder);
+
+    /* q [q] (count), dq (count x d), ddq (count x d x d, symmetric). */
+    void (*measure)(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                    const double *internal, double *q, double *dq, double *ddq);
+
+    /* e [J] (count), g [N] (count x d), hess [N/m] (count x d x d, symmetric). */
+    void (*energy)(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                   const double *internal, double *e, double *g, double *hess);
+
+    /* g [N] (count x d), dg_dx [N/m], dg_dv [N s/m] (count x d x d each). */
+    void (*dissipation)(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                        const double *v, double *g, double *dg_dx, double *dg_dv);
+
+    /* For one element with stiffness k [J], strain = q - q0 and rate = q' [q/s]: the generalised force [J/q]
+     * on q, its derivative by strain and by rate, and the energy [J] if it has one, else 0. dissipative: the
+     * force takes work, without an energy. */
+    void (*law)(const double *params, double k, double strain, double rate, double *force,
+                double *dforce_dstrain, double *dforce_drate, double *energy);
+    bool dissipative;
+
+    /* The internal variable of elements after a step was accepted: from those before and the new positions.
+     */
+    void (*commit)(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                   const double *before, double *after);
+
+    /* The internal variable of elements at rest, x the rest positions. after and before are indexed by
+     * element, like internal. */
+    void (*initial)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *after);
+
+    /* Looks for a degenerate element: DRAPE_OK, or DRAPE_RETRY_DEGENERATE with *fault filled for the worst.
+     * NULL: none can be. */
+    drape_status (*check)(const drape_elements *el, const double *x, const double *internal,
+                          drape_fault *fault);
+} drape_term_ops;
+
+/* Registers a term of the host's own: scenes compiled with this context may name it from then on. ops must
+ * outlive the context and every model compiled with it. Errors: DRAPE_E_ARGUMENT (not well formed, name
+ * taken, more than 32), DRAPE_E_VERSION (struct_size). */
+DRAPE_API drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *ops);
+
+/* Makes a range function out of a function for one element. x (d) and v (d) are local coordinates; writes
+ * what is not NULL. Use as static void my_energy(const drape_elements *el, int32_t first, int32_t count,
+ * const double *x, const double *internal, double *e, double *g, double *hess) { drape_energy_range(el,
+ * first, count, x, e, g, hess, my_element); } */
+typedef void drape_element_energy(const drape_elements *el, int32_t element, const double *x, double *e,
+                                  double *g, double *hess);
+DRAPE_API void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                                  double *e, double *g, double *hess, drape_element_energy *one);
+
+DRAPE_C_END
+
+#endif

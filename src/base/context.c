@@ -1,0 +1,176 @@
+/* context.c: see context.h. The message is composed in place, so that a failure of an allocation can be told
+ * without allocating. */
+#include "base/context.h"
+
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void *default_allocate(void *user, size_t size)
+{
+    (void)user;
+    return malloc(size);
+}
+
+static void default_release(void *user, void *memory)
+{
+    (void)user;
+    free(memory);
+}
+
+void drape_context_def_init(drape_context_def *def, size_t struct_size)
+{
+    memset(def, 0, struct_size);
+    def->struct_size = struct_size;
+}
+
+drape_status drape_context_create(const drape_context_def *def, drape_context **out)
+{
+    drape_context_def d;
+    drape_context_def_init(&d, sizeof d);
+    if (!out)
+        return DRAPE_E_ARGUMENT;
+    *out = NULL;
+    if (def) {
+        if (def->struct_size == 0 || def->struct_size > sizeof d || !def->allocate != !def->release)
+            return DRAPE_E_ARGUMENT;
+        memcpy(&d, def, def->struct_size);
+    }
+    if (!d.allocate) {
+        d.allocate = default_allocate;
+        d.release = default_release;
+    }
+    drape_context *ctx = d.allocate(d.allocator_user, sizeof *ctx);
+    if (!ctx)
+        return DRAPE_E_MEMORY;
+    memset(ctx, 0, sizeof *ctx);
+    ctx->def = d;
+    *out = ctx;
+    return DRAPE_OK;
+}
+
+void drape_context_destroy(drape_context **ctx)
+{
+    if (!ctx || !*ctx)
+        return;
+    drape_context_def d = (*ctx)->def;
+    d.release(d.allocator_user, *ctx);
+    *ctx = NULL;
+}
+
+const char *drape_context_message(const drape_context *ctx)
+{
+    return ctx ? ctx->message : "no context";
+}
+
+void *drape_alloc(drape_context *ctx, size_t count, size_t size)
+{
+    size_t bytes = 0;
+    void *memory = NULL;
+    if (!__builtin_mul_overflow(count, size, &bytes) && bytes <= PTRDIFF_MAX)
+        memory = ctx->def.allocate(ctx->def.allocator_user, bytes ? bytes : 1);
+    else
+        bytes = SIZE_MAX;
+    if (memory)
+        memset(memory, 0, bytes);
+    else
+        drape_fail_memory(ctx, bytes);
+    return memory;
+}
+
+void drape_free(drape_context *ctx, void *memory)
+{
+    if (memory)
+        ctx->def.release(ctx->def.allocator_user, memory);
+}
+
+char *drape_copy_text(drape_context *ctx, const char *text)
+{
+    size_t size = strlen(text) + 1;
+    char *copy = drape_alloc(ctx, size, 1);
+    if (copy)
+        memcpy(copy, text, size);
+    return copy;
+}
+
+/* A message is one line: what stands in a file or an argument may hold anything. */
+static void make_one_line(char *text)
+{
+    for (; *text; text++)
+        if ((unsigned char)*text < ' ' || *text == 127)
+            *text = '?';
+}
+
+static drape_status fail(drape_context *ctx, drape_status status, const char *pointer, const char *format,
+                         va_list args)
+{
+    locale_t old = drape_locale_enter();
+    vsnprintf(ctx->text, sizeof ctx->text, format, args);
+    make_one_line(ctx->text);
+    snprintf(ctx->pointer, sizeof ctx->pointer, "%s", pointer);
+    make_one_line(ctx->pointer);
+    snprintf(ctx->message, sizeof ctx->message, "%s%s%.700s", ctx->pointer, *pointer ? ": " : "", ctx->text);
+    drape_locale_leave(old);
+    return status;
+}
+
+drape_status drape_fail(drape_context *ctx, drape_status status, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    fail(ctx, status, "", format, args);
+    va_end(args);
+    return status;
+}
+
+drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *pointer, const char *format,
+                           ...)
+{
+    va_list args;
+    va_start(args, format);
+    fail(ctx, status, pointer, format, args);
+    va_end(args);
+    return status;
+}
+
+drape_status drape_fail_memory(drape_context *ctx, size_t bytes)
+{
+    return drape_fail(ctx, DRAPE_E_MEMORY, "out of memory: an allocation of %zu bytes failed", bytes);
+}
+
+void drape_context_set_message(drape_context *ctx, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    fail(ctx, DRAPE_OK, "", format, args);
+    va_end(args);
+}
+
+void drape_log(drape_context *ctx, drape_log_level level, const char *format, ...)
+{
+    char text[DRAPE_MESSAGE_SIZE];
+    if (!ctx->def.log)
+        return;
+    locale_t old = drape_locale_enter();
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    drape_locale_leave(old);
+    ctx->def.log(ctx->def.log_user, level, text);
+}
+
+/* newlocale on the predefined "C" needs no memory in glibc: it returns its static object. */
+locale_t drape_locale_enter(void)
+{
+    locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    return c ? uselocale(c) : (locale_t)0;
+}
+
+void drape_locale_leave(locale_t old)
+{
+    if (old)
+        freelocale(uselocale(old));
+}

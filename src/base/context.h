@@ -1,0 +1,43 @@
+/* context.h: allocator, last message, log, terms of the host. Every function that can fail reports through
+ * its context. */
+#ifndef DRAPE_BASE_CONTEXT_H
+#define DRAPE_BASE_CONTEXT_H
+
+#include <locale.h>
+
+#include "drape/extend.h"
+
+#define DRAPE_MESSAGE_SIZE   1024
+#define DRAPE_MAX_HOST_TERMS 32
+
+struct drape_context {
+    drape_context_def def;
+    char message[DRAPE_MESSAGE_SIZE];
+    char pointer[256]; /* JSON pointer of the last fault, "" for none: the scene reader finds line and column
+                          by it */
+    char text[DRAPE_MESSAGE_SIZE]; /* the message without its place */
+    const drape_term_ops *host_terms[DRAPE_MAX_HOST_TERMS];
+    int host_term_count;
+};
+
+/* count x size bytes, zeroed, aligned for any type; NULL with a message on failure or overflow. 0 bytes give
+ * a valid pointer. */
+void *drape_alloc(drape_context *ctx, size_t count, size_t size);
+void drape_free(drape_context *ctx, void *memory); /* NULL is fine */
+char *drape_copy_text(drape_context *ctx, const char *text);
+
+/* Set the message and return status. drape_fail_at names a place by its JSON pointer: message "pointer:
+ * text". */
+drape_status drape_fail(drape_context *ctx, drape_status status, const char *format, ...) DRAPE_PRINTF(3, 4);
+drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *pointer, const char *format,
+                           ...) DRAPE_PRINTF(4, 5);
+drape_status drape_fail_memory(drape_context *ctx, size_t bytes);
+
+void drape_log(drape_context *ctx, drape_log_level level, const char *format, ...) DRAPE_PRINTF(3, 4);
+
+/* The C locale for all reading and writing of numbers, whatever the host's is: old = drape_locale_enter();
+ * ... drape_locale_leave(old). */
+locale_t drape_locale_enter(void);
+void drape_locale_leave(locale_t old);
+
+#endif

@@ -1,0 +1,199 @@
+/* param.c: see param.h. */
+#include "base/param.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define LONGEST_WORD 63
+
+int drape_param_find(const drape_param *params, int param_count, const char *name)
+{
+    for (int i = 0; i < param_count; i++)
+        if (strcmp(params[i].name, name) == 0)
+            return i;
+    return -1;
+}
+
+/* Levenshtein distance by one row of the table; words longer than LONGEST_WORD are never meant. */
+static size_t edit_distance(const char *a, const char *b)
+{
+    size_t na = strlen(a), nb = strlen(b), row[LONGEST_WORD + 1];
+    if (na > LONGEST_WORD || nb > LONGEST_WORD)
+        return LONGEST_WORD;
+    for (size_t j = 0; j <= nb; j++)
+        row[j] = j;
+    for (size_t i = 1; i <= na; i++) {
+        size_t diagonal = row[0];
+        row[0] = i;
+        for (size_t j = 1; j <= nb; j++) {
+            size_t best = diagonal + (a[i - 1] != b[j - 1]);
+            diagonal = row[j];
+            if (row[j - 1] + 1 < best)
+                best = row[j - 1] + 1;
+            if (row[j] + 1 < best)
+                best = row[j] + 1;
+            row[j] = best;
+        }
+    }
+    return row[nb];
+}
+
+const char *drape_did_you_mean(const char *word, const char *const *candidates, size_t count)
+{
+    const char *best = NULL;
+    size_t best_distance = 1 + strlen(word) / 3; /* a third of the letters may be wrong */
+    for (size_t i = 0; i < count; i++) {
+        size_t distance = edit_distance(word, candidates[i]);
+        if (distance <= best_distance && (!best || distance < best_distance)) {
+            best = candidates[i];
+            best_distance = distance;
+        }
+    }
+    return best;
+}
+
+static void choices_text(const drape_param *param, char *text, size_t size)
+{
+    size_t used = (size_t)snprintf(text, size, "one of: ");
+    for (int i = 0; param->choices[i] && used < size; i++)
+        used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", param->choices[i]);
+}
+
+void drape_param_range_text(const drape_param *param, char *text, size_t size)
+{
+    const char *unit = strcmp(param->unit, "1") == 0 ? "" : param->unit;
+    switch (param->kind) {
+    case DRAPE_PARAM_BOOLEAN:
+        snprintf(text, size, "true or false");
+        return;
+    case DRAPE_PARAM_CHOICE:
+        choices_text(param, text, size);
+        return;
+    case DRAPE_PARAM_NUMBER:
+    case DRAPE_PARAM_INTEGER:
+        snprintf(text, size, "%c%.10g, %.10g%c%s%s", param->open_min ? '(' : '[', param->min, param->max,
+                 param->open_max ? ')' : ']', *unit ? " " : "", unit);
+    }
+}
+
+void drape_param_value_text(const drape_param *param, double value, char *text, size_t size)
+{
+    switch (param->kind) {
+    case DRAPE_PARAM_BOOLEAN:
+        snprintf(text, size, "%s", value != 0 ? "true" : "false");
+        return;
+    case DRAPE_PARAM_CHOICE:
+        snprintf(text, size, "%s", param->choices[(int)value]);
+        return;
+    case DRAPE_PARAM_NUMBER:
+    case DRAPE_PARAM_INTEGER:
+        if (isnan(value))
+            snprintf(text, size, "%s", param->derived ? param->derived : "required");
+        else
+            snprintf(text, size, "%.10g", value);
+    }
+}
+
+static drape_status refuse(drape_context *ctx, const char *pointer, const drape_param *param,
+                           const char *given)
+{
+    char range[256];
+    drape_param_range_text(param, range, sizeof range);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%.100s is not allowed; %s is %s", given,
+                         param->name, range);
+}
+
+static drape_status refuse_number(drape_context *ctx, const char *pointer, const drape_param *param,
+                                  double number)
+{
+    char given[40];
+    snprintf(given, sizeof given, "%.17g", number);
+    double shorter = 0; /* the shortest of the two that says the same */
+    char brief[40];
+    snprintf(brief, sizeof brief, "%.10g", number);
+    if (sscanf(brief, "%lf", &shorter) == 1 && shorter == number)
+        return refuse(ctx, pointer, param, brief);
+    return refuse(ctx, pointer, param, given);
+}
+
+static drape_status choice_value(drape_context *ctx, const char *pointer, const drape_param *param,
+                                 const char *word, double *value)
+{
+    size_t count = 0;
+    for (; param->choices[count]; count++)
+        if (strcmp(param->choices[count], word) == 0) {
+            *value = (double)count;
+            return DRAPE_OK;
+        }
+    char range[256];
+    choices_text(param, range, sizeof range);
+    const char *meant = drape_did_you_mean(word, param->choices, count);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%.60s\" is not allowed; %s is %s%s%s%s", word,
+                         param->name, range, meant ? "; did you mean \"" : "", meant ? meant : "",
+                         meant ? "\"?" : "");
+}
+
+drape_status drape_param_value(drape_context *ctx, const char *pointer, const drape_param *param,
+                               const drape_setting *setting, double *value)
+{
+    if (param->kind == DRAPE_PARAM_CHOICE)
+        return setting->text ? choice_value(ctx, pointer, param, setting->text, value)
+                             : refuse_number(ctx, pointer, param, setting->number);
+    if (setting->text) {
+        char given[80];
+        snprintf(given, sizeof given, "\"%.60s\"", setting->text);
+        return refuse(ctx, pointer, param, given);
+    }
+    double number = setting->number;
+    bool good = isfinite(number);
+    if (param->kind == DRAPE_PARAM_BOOLEAN)
+        good = number == 0 || number == 1;
+    else if (good)
+        good = (param->open_min ? number > param->min : number >= param->min) &&
+               (param->open_max ? number < param->max : number <= param->max) &&
+               (param->kind != DRAPE_PARAM_INTEGER || number == floor(number));
+    if (!good)
+        return refuse_number(ctx, pointer, param, number);
+    *value = number;
+    return DRAPE_OK;
+}
+
+static drape_status unknown_name(drape_context *ctx, const char *pointer, const drape_param *params,
+                                 int param_count, const char *name)
+{
+    const char *names[DRAPE_MAX_PARAMS];
+    for (int i = 0; i < param_count; i++)
+        names[i] = params[i].name;
+    const char *meant = drape_did_you_mean(name, names, (size_t)param_count);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown key \"%.60s\"%s%s%s", name,
+                         meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+}
+
+drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_param *params,
+                                  int param_count, const drape_setting *settings, size_t setting_count,
+                                  double *values)
+{
+    bool given[DRAPE_MAX_PARAMS] = {false};
+    for (int i = 0; i < param_count; i++)
+        values[i] = params[i].default_value;
+    for (size_t s = 0; s < setting_count; s++) {
+        char at[256];
+        snprintf(at, sizeof at, "%s/%.80s", pointer, settings[s].name);
+        int i = drape_param_find(params, param_count, settings[s].name);
+        if (i < 0)
+            return unknown_name(ctx, at, params, param_count, settings[s].name);
+        drape_status status = drape_param_value(ctx, at, &params[i], &settings[s], &values[i]);
+        if (status)
+            return status;
+        given[i] = true;
+    }
+    for (int i = 0; i < param_count; i++)
+        if (!given[i] && isnan(values[i]) && !params[i].derived) {
+            char range[256];
+            drape_param_range_text(&params[i], range, sizeof range);
+            return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%s\" is missing: %s, %s", params[i].name,
+                                 params[i].help, range);
+        }
+    return DRAPE_OK;
+}

@@ -1,0 +1,30 @@
+/* param.h: resolves the settings of a row against its parameter list: names, kinds, ranges, defaults. */
+#ifndef DRAPE_BASE_PARAM_H
+#define DRAPE_BASE_PARAM_H
+
+#include "base/context.h"
+
+/* Values of params in their order: the default where no setting names it (NaN where the default is derived).
+ * Faults are reported at "pointer/name". A setting of a name that the list does not have is a fault, with a
+ * "did you mean". */
+drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_param *params,
+                                  int param_count, const drape_setting *settings, size_t setting_count,
+                                  double *values);
+
+/* Checks one setting against its parameter and converts it. */
+drape_status drape_param_value(drape_context *ctx, const char *pointer, const drape_param *param,
+                               const drape_setting *setting, double *value);
+
+/* The index of a name; -1 if it is not in the list. */
+int drape_param_find(const drape_param *params, int param_count, const char *name);
+
+/* "(0, 1e9] N/m" or "one of: a, b": the range of a parameter in words. */
+void drape_param_range_text(const drape_param *param, char *text, size_t size);
+
+/* A value of a parameter in words: "0.001", "true", "report". */
+void drape_param_value_text(const drape_param *param, double value, char *text, size_t size);
+
+/* The candidate nearest to word by edit distance, NULL if none is near enough to be meant. */
+const char *drape_did_you_mean(const char *word, const char *const *candidates, size_t count);
+
+#endif

@@ -1,0 +1,40 @@
+/* vec3.h: vectors of three doubles, inline. */
+#ifndef DRAPE_BASE_VEC3_H
+#define DRAPE_BASE_VEC3_H
+
+#include <math.h>
+
+static inline void vec3_sub(const double *a, const double *b, double *out)
+{
+    out[0] = a[0] - b[0];
+    out[1] = a[1] - b[1];
+    out[2] = a[2] - b[2];
+}
+
+static inline double vec3_dot(const double *a, const double *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline void vec3_cross(const double *a, const double *b, double *out)
+{
+    double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
+    out[0] = x;
+    out[1] = y;
+    out[2] = z;
+}
+
+static inline double vec3_norm(const double *a)
+{
+    return sqrt(vec3_dot(a, a));
+}
+
+/* out += s a */
+static inline void vec3_add_scaled(double s, const double *a, double *out)
+{
+    out[0] += s * a[0];
+    out[1] += s * a[1];
+    out[2] += s * a[2];
+}
+
+#endif
