@@ -1,0 +1,72 @@
+/* grid.c: see grid.h; and makes a mesh by the row of the grids that a def names. */
+#include "mesh/grid.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "base/param.h"
+
+#define MAX_GRID_NAMES 64
+
+drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_t rows, int32_t columns,
+                                 drape_mesh *mesh)
+{
+    const drape_mesh_source source = {.pointer = pointer};
+    mesh->rows = rows;
+    mesh->columns = columns;
+    return drape_mesh_allocate(ctx, &source, (size_t)rows * (size_t)columns,
+                               2 * (size_t)(rows - 1) * (size_t)(columns - 1), mesh);
+}
+
+static int32_t *put(int32_t *triangle, int32_t a, int32_t b, int32_t c, bool flip)
+{
+    triangle[0] = a;
+    triangle[1] = flip ? c : b;
+    triangle[2] = flip ? b : c;
+    return triangle + 3;
+}
+
+void drape_grid_triangulate(drape_mesh *mesh, const bool falling[2][2], bool flip)
+{
+    int32_t *next = mesh->triangle;
+    for (int32_t row = 0; row + 1 < mesh->rows; row++)
+        for (int32_t column = 0; column + 1 < mesh->columns; column++) {
+            const int32_t a = row * mesh->columns + column, b = a + 1;
+            const int32_t c = a + mesh->columns, d = c + 1;
+            const bool from_a_to_d = falling[row % 2][column % 2];
+            next = put(next, a, b, from_a_to_d ? d : c, flip);
+            next = put(next, from_a_to_d ? a : b, d, c, flip);
+        }
+}
+
+static drape_status unknown_grid(drape_context *ctx, const char *pointer, const char *type)
+{
+    const char *names[MAX_GRID_NAMES];
+    char place[sizeof ctx->pointer], known[256];
+    size_t count = 0, used = 0;
+    for (; drape_grids[count] && count < MAX_GRID_NAMES; count++) {
+        names[count] = drape_grids[count]->name;
+        if (used < sizeof known)
+            used +=
+                (size_t)snprintf(known + used, sizeof known - used, "%s%s", count ? ", " : "", names[count]);
+    }
+    const char *meant = drape_did_you_mean(type, names, count);
+    snprintf(place, sizeof place, "%s/grid", pointer);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "unknown grid \"%.60s\"; known are %s%s%s%s", type,
+                         known, meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+}
+
+drape_status drape_mesh_from_grid(drape_context *ctx, const char *pointer, const drape_row_def *grid,
+                                  drape_mesh *mesh)
+{
+    const drape_grid_ops *const *row = drape_grids;
+    while (*row && strcmp((*row)->name, grid->type) != 0)
+        row++;
+    if (!*row)
+        return unknown_grid(ctx, pointer, grid->type);
+
+    double values[DRAPE_MAX_PARAMS];
+    const drape_status status = drape_params_resolve(ctx, pointer, (*row)->params, (*row)->param_count,
+                                                     grid->settings, grid->setting_count, values);
+    return status ? status : (*row)->generate(ctx, pointer, values, mesh);
+}

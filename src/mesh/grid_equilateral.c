@@ -1,0 +1,61 @@
+/*
+ * grid_equilateral.c: a sheet of equilateral triangles, in the plane y = 0, normal +y. With e edges of length
+ * l on each side, node (r, c) is at
+ *
+ *     x = (c + (r odd ? 1/2 : 0)) l,    z = -r sqrt(3)/2 l,    0 <= r, c <= e.
+ *
+ * A row lies half an edge right or left of the row before, so the short diagonal of its cells changes with
+ * the row: B-C from an even to an odd row, A-D from an odd to an even one (letters: grid.h). Of the cloth
+ * that results every edge has length l; it has 2 e^2 triangles, e (3 e + 2) edges and e (3 e - 2) hinges.
+ */
+#include <math.h>
+
+#include "mesh/grid.h"
+
+enum { EDGES, EDGE_LENGTH, PARAM_COUNT };
+
+static const drape_param params[PARAM_COUNT] = {
+    [EDGES] = {.name = "edges",
+               .kind = DRAPE_PARAM_INTEGER,
+               .unit = "1",
+               .default_value = NAN,
+               .min = 1,
+               .max = 16383, /* (max + 1)^2 = DRAPE_MAX_NODES */
+               .help = "edges along each side; the sheet has (edges + 1)^2 nodes, at most 2^28"},
+    [EDGE_LENGTH] = {.name = "edge_length",
+                     .kind = DRAPE_PARAM_NUMBER,
+                     .unit = "m",
+                     .default_value = NAN,
+                     .min = 0,
+                     .max = 1e9,
+                     .open_min = true,
+                     .help = "length of every edge"},
+};
+
+static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
+{
+    static const bool falling[2][2] = {{false, false}, {true, true}};
+    const int32_t side = (int32_t)values[EDGES] + 1;
+    const double length = values[EDGE_LENGTH];
+
+    const drape_status status = drape_grid_allocate(ctx, pointer, side, side, mesh);
+    if (status)
+        return status;
+    double *x = mesh->x;
+    for (int32_t row = 0; row < side; row++)
+        for (int32_t column = 0; column < side; column++, x += 3) {
+            x[0] = (column + (row % 2 ? 0.5 : 0.0)) * length;
+            x[1] = 0;
+            x[2] = -row * (sqrt(3.0) / 2 * length);
+        }
+    drape_grid_triangulate(mesh, falling, false);
+    return DRAPE_OK;
+}
+
+const drape_grid_ops drape_grid_equilateral = {
+    .name = "equilateral",
+    .summary = "equilateral triangles in rows, every second row shifted by half an edge",
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .generate = generate,
+};

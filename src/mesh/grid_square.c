@@ -1,0 +1,114 @@
+/*
+ * grid_square.c: a rectangle of columns x rows nodes. With u = c width / (columns - 1) and w = r height /
+ * (rows - 1), node (r, c) is at
+ *
+ *     horizontal: (u, 0, -w), normal +y        vertical: (u, -w, 0), normal +z.
+ *
+ * The diagonals of its cells are parallel, from (r, c) to (r+1, c+1), or alternate with r + c, beginning with
+ * that one: alternating ones do not make the sheet stiffer along one diagonal than along the other.
+ */
+#include <math.h>
+#include <stdio.h>
+
+#include "mesh/grid.h"
+
+enum { COLUMNS, ROWS, WIDTH, HEIGHT, DIAGONALS, ORIENTATION, PARAM_COUNT };
+enum { ALTERNATING, PARALLEL };
+enum { HORIZONTAL, VERTICAL };
+
+static const char *const diagonals[] = {[ALTERNATING] = "alternating", [PARALLEL] = "parallel", NULL};
+static const char *const orientations[] = {[HORIZONTAL] = "horizontal", [VERTICAL] = "vertical", NULL};
+
+static const drape_param params[PARAM_COUNT] = {
+    [COLUMNS] = {.name = "columns",
+                 .kind = DRAPE_PARAM_INTEGER,
+                 .unit = "1",
+                 .default_value = NAN,
+                 .min = 2,
+                 .max = DRAPE_MAX_NODES / 2,
+                 .help = "nodes along the width; columns x rows is at most 2^28"},
+    [ROWS] = {.name = "rows",
+              .kind = DRAPE_PARAM_INTEGER,
+              .unit = "1",
+              .default_value = NAN,
+              .min = 2,
+              .max = DRAPE_MAX_NODES / 2,
+              .help = "nodes along the height"},
+    [WIDTH] = {.name = "width",
+               .kind = DRAPE_PARAM_NUMBER,
+               .unit = "m",
+               .default_value = NAN,
+               .min = 0,
+               .max = 1e9,
+               .open_min = true,
+               .help = "size along x"},
+    [HEIGHT] = {.name = "height",
+                .kind = DRAPE_PARAM_NUMBER,
+                .unit = "m",
+                .default_value = NAN,
+                .min = 0,
+                .max = 1e9,
+                .open_min = true,
+                .help = "size along -z, or along -y if vertical"},
+    [DIAGONALS] = {.name = "diagonals",
+                   .kind = DRAPE_PARAM_CHOICE,
+                   .unit = "1",
+                   .default_value = ALTERNATING,
+                   .choices = diagonals,
+                   .help = "how the cells are split into triangles"},
+    [ORIENTATION] = {.name = "orientation",
+                     .kind = DRAPE_PARAM_CHOICE,
+                     .unit = "1",
+                     .default_value = HORIZONTAL,
+                     .choices = orientations,
+                     .help = "the plane of the sheet: y = 0 or z = 0"},
+};
+
+static drape_status check_node_count(drape_context *ctx, const char *pointer, int64_t columns, int64_t rows)
+{
+    if (columns * rows <= DRAPE_MAX_NODES)
+        return DRAPE_OK;
+    char place[sizeof ctx->pointer];
+    snprintf(place, sizeof place, "%s/columns", pointer);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
+                         "%lld columns x %lld rows are %lld nodes; at most %d are allowed",
+                         (long long)columns, (long long)rows, (long long)(columns * rows), DRAPE_MAX_NODES);
+}
+
+static void place_nodes(drape_mesh *mesh, double width, double height, bool vertical)
+{
+    double *x = mesh->x;
+    for (int32_t row = 0; row < mesh->rows; row++)
+        for (int32_t column = 0; column < mesh->columns; column++, x += 3) {
+            const double down = -row * height / (mesh->rows - 1);
+            x[0] = column * width / (mesh->columns - 1);
+            x[1] = vertical ? down : 0;
+            x[2] = vertical ? 0 : down;
+        }
+}
+
+static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
+{
+    static const bool falling[][2][2] = {
+        [ALTERNATING] = {{true, false}, {false, true}}, [PARALLEL] = {{true, true}, {true, true}}};
+    const int32_t columns = (int32_t)values[COLUMNS], rows = (int32_t)values[ROWS];
+    const bool vertical = values[ORIENTATION] == VERTICAL;
+
+    drape_status status = check_node_count(ctx, pointer, columns, rows);
+    if (!status)
+        status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
+    if (status)
+        return status;
+    place_nodes(mesh, values[WIDTH], values[HEIGHT], vertical);
+    /* Rows of a vertical sheet go down where those of grid.h go up. */
+    drape_grid_triangulate(mesh, falling[(int)values[DIAGONALS]], vertical);
+    return DRAPE_OK;
+}
+
+const drape_grid_ops drape_grid_square = {
+    .name = "square",
+    .summary = "a rectangle of columns x rows nodes, horizontal or vertical",
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .generate = generate,
+};

@@ -1,0 +1,127 @@
+/* import.c: reads a mesh file whole into memory and hands it to the row of the imports that its ending names.
+ */
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "mesh/mesh.h"
+
+#define LARGEST_FILE INT32_MAX /* [bytes] */
+
+typedef struct contents {
+    char *data; /* size bytes and a 0 byte */
+    size_t size;
+} contents;
+
+static drape_status unknown_ending(drape_context *ctx, const char *pointer, const char *file)
+{
+    char known[256] = "";
+    size_t used = 0;
+    for (int i = 0; drape_imports[i] && used < sizeof known; i++)
+        used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", i ? ", " : "",
+                                 drape_imports[i]->ending);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s: unknown ending; known are %s", file, known);
+}
+
+static const drape_import_ops *find_import(const char *file)
+{
+    const size_t length = strlen(file);
+    for (int i = 0; drape_imports[i]; i++) {
+        const size_t ending = strlen(drape_imports[i]->ending);
+        if (length > ending && strcasecmp(file + length - ending, drape_imports[i]->ending) == 0)
+            return drape_imports[i];
+    }
+    return NULL;
+}
+
+/* folder/file, or file alone where it is absolute or there is no folder; NULL with a message. */
+static char *join(drape_context *ctx, const char *folder, const char *file)
+{
+    if (!folder || !*folder || *file == '/')
+        return drape_copy_text(ctx, file);
+    const size_t size = strlen(folder) + strlen(file) + 2;
+    char *path = drape_alloc(ctx, size, 1);
+    if (path)
+        snprintf(path, size, "%s/%s", folder, file);
+    return path;
+}
+
+static drape_status fail_file(drape_context *ctx, const char *pointer, const char *path, const char *reason)
+{
+    return drape_fail_at(ctx, DRAPE_E_FILE, pointer, "%s: cannot be read: %s", path, reason);
+}
+
+/* Reads until the announced size or, where the file shrank meanwhile, its end. */
+static drape_status read_descriptor(drape_context *ctx, const char *pointer, const char *path, int descriptor,
+                                    contents *file)
+{
+    const size_t announced = file->size;
+    file->size = 0;
+    while (file->size < announced) {
+        const ssize_t got = read(descriptor, file->data + file->size, announced - file->size);
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got < 0)
+            return fail_file(ctx, pointer, path, strerror(errno));
+        if (got == 0)
+            break;
+        file->size += (size_t)got;
+    }
+    file->data[file->size] = 0;
+    return DRAPE_OK;
+}
+
+static drape_status read_open_file(drape_context *ctx, const char *pointer, const char *path, int descriptor,
+                                   contents *file)
+{
+    struct stat about;
+    if (fstat(descriptor, &about) != 0)
+        return fail_file(ctx, pointer, path, strerror(errno));
+    if (S_ISDIR(about.st_mode))
+        return fail_file(ctx, pointer, path, strerror(EISDIR));
+    if (!S_ISREG(about.st_mode))
+        return fail_file(ctx, pointer, path, "Not a regular file");
+    if (about.st_size > LARGEST_FILE)
+        return drape_fail_at(ctx, DRAPE_E_FILE, pointer, "%s: has %lld bytes; at most %lld can be read", path,
+                             (long long)about.st_size, (long long)LARGEST_FILE);
+    file->size = (size_t)about.st_size;
+    file->data = drape_alloc(ctx, file->size + 1, 1);
+    return file->data ? read_descriptor(ctx, pointer, path, descriptor, file) : DRAPE_E_MEMORY;
+}
+
+/* O_NONBLOCK: to open a pipe that nobody writes to would wait for ever. */
+static drape_status read_whole_file(drape_context *ctx, const char *pointer, const char *path, contents *file)
+{
+    const int descriptor = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    if (descriptor < 0)
+        return fail_file(ctx, pointer, path, strerror(errno));
+    const drape_status status = read_open_file(ctx, pointer, path, descriptor, file);
+    close(descriptor);
+    return status;
+}
+
+drape_status drape_mesh_from_file(drape_context *ctx, const char *pointer, const char *folder,
+                                  const char *file, drape_mesh *mesh)
+{
+    char place[sizeof ctx->pointer];
+    snprintf(place, sizeof place, "%s/file", pointer);
+    const drape_import_ops *import = find_import(file);
+    if (!import)
+        return unknown_ending(ctx, place, file);
+
+    const locale_t old = drape_locale_enter();
+    const drape_mesh_source source = {.pointer = place, .file = file};
+    contents whole = {0};
+    char *path = join(ctx, folder, file);
+    drape_status status = path ? read_whole_file(ctx, place, path, &whole) : DRAPE_E_MEMORY;
+    if (!status)
+        status = import->read(ctx, &source, whole.data, whole.size, mesh);
+    drape_free(ctx, whole.data);
+    drape_free(ctx, path);
+    drape_locale_leave(old);
+    return status;
+}

@@ -1,0 +1,493 @@
+/*
+ * import_ply.c: the Stanford polygon format (Turk 1994, "The PLY Polygon File Format"), ascii and binary. A
+ * header lists elements (vertex, face, others) with their properties; the items of each element follow in
+ * that order, all in text or all in bytes. Taken are x, y, z of vertex and the list vertex_indices (or
+ * vertex_index) of face; all else is passed over.
+ *
+ * The data are read twice: the first time only counts triangles, since a face may have any number of corners.
+ */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "mesh/mesh.h"
+#include "mesh/text.h"
+
+#define MAX_ELEMENTS   32
+#define MAX_PROPERTIES 256
+
+typedef enum ply_type { NO_TYPE, INT8, UINT8, INT16, UINT16, INT32, UINT32, FLOAT32, FLOAT64 } ply_type;
+
+static const struct {
+    const char *name, *sized_name;
+    size_t size; /* bytes */
+} types[] = {
+    [NO_TYPE] = {"", "", 0},
+    [INT8] = {"char", "int8", 1},
+    [UINT8] = {"uchar", "uint8", 1},
+    [INT16] = {"short", "int16", 2},
+    [UINT16] = {"ushort", "uint16", 2},
+    [INT32] = {"int", "int32", 4},
+    [UINT32] = {"uint", "uint32", 4},
+    [FLOAT32] = {"float", "float32", 4},
+    [FLOAT64] = {"double", "float64", 8},
+};
+
+typedef enum ply_role { X, Y, Z, CORNERS, PASSED_OVER } ply_role;
+#define ROLE_COUNT PASSED_OVER
+
+typedef struct ply_property {
+    ply_type count_type; /* of a list; else NO_TYPE */
+    ply_type type;
+    ply_role role;
+} ply_property;
+
+typedef struct ply_element {
+    drape_word name;
+    int64_t line; /* of the header */
+    int64_t count;
+    int first_property, property_count;
+} ply_element;
+
+typedef enum ply_format { NO_FORMAT, ASCII, LITTLE_ENDIAN_BYTES, BIG_ENDIAN_BYTES } ply_format;
+
+typedef struct ply_reader {
+    drape_context *ctx;
+    const drape_mesh_source *source;
+    drape_mesh *mesh;
+    drape_text text; /* the header; then the data of either kind */
+    ply_format format;
+    ply_element elements[MAX_ELEMENTS];
+    ply_property properties[MAX_PROPERTIES];
+    int element_count, property_count;
+    bool has_role[ROLE_COUNT];
+    /* while the data are read: */
+    const ply_element *element;
+    int64_t item;
+    bool counting;    /* the first time: nothing is written */
+    size_t triangles; /* so far */
+} ply_reader;
+
+/* A fault at the present place: a line, or an item where there are no lines. */
+static drape_status fail(const ply_reader *reader, const char *format, ...) DRAPE_PRINTF(2, 3);
+
+static drape_status fail(const ply_reader *reader, const char *format, ...)
+{
+    char text[512];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    if (!reader->element || reader->format == ASCII)
+        return drape_mesh_fail(reader->ctx, reader->source, reader->text.line, "%s", text);
+    return drape_mesh_fail(reader->ctx, reader->source, 0, "%.*s %lld: %s",
+                           drape_word_shown(reader->element->name), reader->element->name.start,
+                           (long long)reader->item, text);
+}
+
+/* Header */
+
+/* Takes the next word of a header line; what it is stands in the message if there is none. */
+static drape_status take(ply_reader *reader, const char *what, drape_word *word)
+{
+    if (drape_text_next_word(&reader->text, word))
+        return DRAPE_OK;
+    return fail(reader, "the line ends before %s", what);
+}
+
+static drape_status read_format(ply_reader *reader)
+{
+    static const char *const names[] = {[ASCII] = "ascii",
+                                        [LITTLE_ENDIAN_BYTES] = "binary_little_endian",
+                                        [BIG_ENDIAN_BYTES] = "binary_big_endian"};
+    drape_word name, version;
+    drape_status status = take(reader, "the name of the format", &name);
+    if (!status)
+        status = take(reader, "the version of the format", &version);
+    if (status)
+        return status;
+    reader->format = NO_FORMAT;
+    for (int format = ASCII; format <= BIG_ENDIAN_BYTES; format++)
+        if (drape_word_is(name, names[format]))
+            reader->format = (ply_format)format;
+    if (reader->format == NO_FORMAT)
+        return fail(reader, "format \"%.*s\"; it must be one of: %s, %s, %s", drape_word_shown(name),
+                    name.start, names[ASCII], names[LITTLE_ENDIAN_BYTES], names[BIG_ENDIAN_BYTES]);
+    if (!drape_word_is(version, "1.0"))
+        return fail(reader, "version \"%.*s\" of the format; it must be 1.0", drape_word_shown(version),
+                    version.start);
+    return DRAPE_OK;
+}
+
+static const ply_element *find_element(const ply_reader *reader, const char *name)
+{
+    for (int i = 0; i < reader->element_count; i++)
+        if (drape_word_is(reader->elements[i].name, name))
+            return &reader->elements[i];
+    return NULL;
+}
+
+static drape_status read_element(ply_reader *reader)
+{
+    ply_element element = {.line = reader->text.line, .first_property = reader->property_count};
+    drape_word count;
+    drape_status status = take(reader, "the name of the element", &element.name);
+    if (!status)
+        status = take(reader, "the count of the element", &count);
+    if (status)
+        return status;
+    if (!drape_word_integer(count, &element.count) || element.count < 0)
+        return fail(reader, "count \"%.*s\"; it must be a whole number from 0", drape_word_shown(count),
+                    count.start);
+    for (int i = 0; i < reader->element_count; i++)
+        if (reader->elements[i].name.length == element.name.length &&
+            memcmp(reader->elements[i].name.start, element.name.start, element.name.length) == 0)
+            return fail(reader, "element %.*s is defined twice", drape_word_shown(element.name),
+                        element.name.start);
+    if (reader->element_count == MAX_ELEMENTS)
+        return fail(reader, "more than %d elements", MAX_ELEMENTS);
+    reader->elements[reader->element_count++] = element;
+    return DRAPE_OK;
+}
+
+static drape_status take_type(ply_reader *reader, drape_word word, ply_type *type)
+{
+    for (int i = INT8; i <= FLOAT64; i++)
+        if (drape_word_is(word, types[i].name) || drape_word_is(word, types[i].sized_name)) {
+            *type = (ply_type)i;
+            return DRAPE_OK;
+        }
+    return fail(reader, "unknown type \"%.*s\"", drape_word_shown(word), word.start);
+}
+
+static bool is_integer(ply_type type)
+{
+    return type >= INT8 && type <= UINT32;
+}
+
+static ply_role role_of(drape_word element, drape_word name, bool list)
+{
+    static const char *const axes[] = {"x", "y", "z"};
+    if (!list && drape_word_is(element, "vertex"))
+        for (int axis = 0; axis < 3; axis++)
+            if (drape_word_is(name, axes[axis]))
+                return (ply_role)axis;
+    const bool corners = drape_word_is(name, "vertex_indices") || drape_word_is(name, "vertex_index");
+    return list && corners && drape_word_is(element, "face") ? CORNERS : PASSED_OVER;
+}
+
+static drape_status add_property(ply_reader *reader, ply_property property, drape_word name)
+{
+    const bool list = property.count_type != NO_TYPE;
+    ply_element *element = &reader->elements[reader->element_count - 1];
+    property.role = role_of(element->name, name, list);
+    if (list && !is_integer(property.count_type))
+        return fail(reader, "the count of a list is %s; it must be an integer type",
+                    types[property.count_type].name);
+    if (property.role == CORNERS && !is_integer(property.type))
+        return fail(reader, "%.*s are %s; they must be of an integer type", drape_word_shown(name),
+                    name.start, types[property.type].name);
+    if (property.role != PASSED_OVER && reader->has_role[property.role])
+        return fail(reader, "property %.*s is defined twice", drape_word_shown(name), name.start);
+    if (reader->property_count == MAX_PROPERTIES)
+        return fail(reader, "more than %d properties", MAX_PROPERTIES);
+    if (property.role != PASSED_OVER)
+        reader->has_role[property.role] = true;
+    reader->properties[reader->property_count++] = property;
+    element->property_count++;
+    return DRAPE_OK;
+}
+
+static drape_status read_property(ply_reader *reader)
+{
+    ply_property property = {.count_type = NO_TYPE};
+    drape_word word;
+    if (reader->element_count == 0)
+        return fail(reader, "a property before the first element");
+    drape_status status = take(reader, "the type of the property", &word);
+    if (!status && drape_word_is(word, "list")) {
+        status = take(reader, "the type of the list's count", &word);
+        if (!status)
+            status = take_type(reader, word, &property.count_type);
+        if (!status)
+            status = take(reader, "the type of the list's values", &word);
+    }
+    if (!status)
+        status = take_type(reader, word, &property.type);
+    if (!status)
+        status = take(reader, "the name of the property", &word);
+    return status ? status : add_property(reader, property, word);
+}
+
+static drape_status read_header_line(ply_reader *reader, drape_word keyword)
+{
+    if (drape_word_is(keyword, "format"))
+        return read_format(reader);
+    if (drape_word_is(keyword, "element"))
+        return read_element(reader);
+    if (drape_word_is(keyword, "property"))
+        return read_property(reader);
+    if (drape_word_is(keyword, "comment") || drape_word_is(keyword, "obj_info"))
+        return DRAPE_OK;
+    return fail(reader, "unknown keyword \"%.*s\"", drape_word_shown(keyword), keyword.start);
+}
+
+static drape_status check_contents(const ply_reader *reader)
+{
+    static const char *const names[ROLE_COUNT] = {"x", "y", "z", "vertex_indices"};
+    if (reader->format == NO_FORMAT)
+        return fail(reader, "the header has no format");
+    if (!find_element(reader, "vertex") || !find_element(reader, "face"))
+        return fail(reader, "the header has no element %s",
+                    find_element(reader, "vertex") ? "face" : "vertex");
+    for (int role = 0; role < ROLE_COUNT; role++)
+        if (!reader->has_role[role])
+            return fail(reader, "element %s has no %s %s", role == CORNERS ? "face" : "vertex",
+                        role == CORNERS ? "list" : "property", names[role]);
+    return DRAPE_OK;
+}
+
+/* Goes through the lines up to end_header; the text then stands at the data. */
+static drape_status read_header(ply_reader *reader)
+{
+    drape_word word;
+    if (!drape_text_next_word(&reader->text, &word) || !drape_word_is(word, "ply"))
+        return fail(reader, "the first line must be \"ply\"");
+    while (drape_text_next_line(&reader->text)) {
+        if (!drape_text_next_word(&reader->text, &word))
+            continue;
+        if (drape_word_is(word, "end_header")) {
+            const drape_status status = check_contents(reader);
+            drape_text_next_line(&reader->text);
+            return status;
+        }
+        const drape_status status = read_header_line(reader, word);
+        if (status)
+            return status;
+    }
+    return fail(reader, "the header has no end_header");
+}
+
+/* The fewest bytes that an item of the element takes: in text a digit and a blank a value. */
+static int64_t least_bytes(const ply_reader *reader, const ply_element *element)
+{
+    int64_t bytes = 0;
+    for (int i = 0; i < element->property_count; i++) {
+        const ply_property *property = &reader->properties[element->first_property + i];
+        const ply_type first = property->count_type ? property->count_type : property->type;
+        bytes += reader->format == ASCII ? 2 : (int64_t)types[first].size;
+    }
+    return bytes;
+}
+
+/* Counts come from a file: none is believed, no memory taken for it, that the rest of the file cannot hold.
+ */
+static drape_status check_counts(ply_reader *reader)
+{
+    /* the last line of a text may lack its end */
+    const int64_t left = reader->text.end - reader->text.at + (reader->format == ASCII);
+    for (int i = 0; i < reader->element_count; i++) {
+        const ply_element *element = &reader->elements[i];
+        const int64_t least = least_bytes(reader, element);
+        if (least > 0 && element->count > left / least)
+            return drape_mesh_fail(reader->ctx, reader->source, element->line,
+                                   "%lld items of %.*s; the %lld bytes after the header hold at most %lld",
+                                   (long long)element->count, drape_word_shown(element->name),
+                                   element->name.start, (long long)(reader->text.end - reader->text.at),
+                                   (long long)(left / least));
+    }
+    return DRAPE_OK;
+}
+
+/* Data */
+
+static double decode(ply_type type, const unsigned char *bytes, bool big_endian)
+{
+    const size_t size = types[type].size;
+    uint64_t bits = 0;
+    for (size_t i = 0; i < size; i++)
+        bits = bits << 8 | bytes[big_endian ? i : size - 1 - i];
+    const uint64_t sign = UINT64_C(1) << (8 * size - 1);
+    if (type == INT8 || type == INT16 || type == INT32) /* two's complement */
+        return (double)(int64_t)(bits & (sign - 1)) - (double)(bits & sign);
+    if (type == FLOAT32) {
+        const uint32_t half = (uint32_t)bits;
+        float value;
+        memcpy(&value, &half, sizeof value);
+        return (double)value;
+    }
+    if (type == FLOAT64) {
+        double value;
+        memcpy(&value, &bits, sizeof value);
+        return value;
+    }
+    return (double)bits;
+}
+
+/* The next value; value NULL: passed over. */
+static drape_status read_value(ply_reader *reader, ply_type type, double *value)
+{
+    drape_text *text = &reader->text;
+    if (reader->format == ASCII) {
+        drape_word word;
+        if (!drape_text_next_word(text, &word))
+            return fail(reader, "the line ends before all values of its %.*s",
+                        drape_word_shown(reader->element->name), reader->element->name.start);
+        if (value && !drape_word_number(word, value))
+            return fail(reader, "value \"%.*s\"; it must be a finite number", drape_word_shown(word),
+                        word.start);
+        return DRAPE_OK;
+    }
+    if ((size_t)(text->end - text->at) < types[type].size)
+        return fail(reader, "the data end within it");
+    if (value)
+        *value = decode(type, (const unsigned char *)text->at, reader->format == BIG_ENDIAN_BYTES);
+    text->at += types[type].size;
+    return DRAPE_OK;
+}
+
+static drape_status read_corner(ply_reader *reader, ply_type type, int32_t *node)
+{
+    double value = 0;
+    const drape_status status = read_value(reader, type, &value);
+    if (status)
+        return status;
+    if (!(value >= 0 && value < reader->mesh->node_count && value == floor(value)))
+        return fail(reader, "there is no vertex %.10g; there are %d, counted from 0", value,
+                    reader->mesh->node_count);
+    *node = (int32_t)value;
+    return DRAPE_OK;
+}
+
+static drape_status read_polygon(ply_reader *reader, ply_type type, int64_t corners)
+{
+    int32_t first = 0, last = 0, node = 0;
+    for (int64_t corner = 0; corner < corners; corner++) {
+        const drape_status status = read_corner(reader, type, &node);
+        if (status)
+            return status;
+        if (corner == 0)
+            first = node;
+        if (corner >= 2) {
+            int32_t *triangle = reader->mesh->triangle + 3 * reader->triangles++;
+            triangle[0] = first;
+            triangle[1] = last;
+            triangle[2] = node;
+        }
+        last = node;
+    }
+    return DRAPE_OK;
+}
+
+static drape_status skip_values(ply_reader *reader, ply_type type, int64_t count)
+{
+    drape_status status = DRAPE_OK;
+    for (int64_t i = 0; i < count && !status; i++)
+        status = read_value(reader, type, NULL);
+    return status;
+}
+
+static drape_status read_list(ply_reader *reader, const ply_property *property)
+{
+    double length = 0;
+    drape_status status = read_value(reader, property->count_type, &length);
+    if (status)
+        return status;
+    if (!(length >= 0 && length <= UINT32_MAX && length == floor(length)))
+        return fail(reader, "a list of %.10g values; it must be a whole number from 0", length);
+    const int64_t count = (int64_t)length;
+    if (property->role == CORNERS && count < 3)
+        return fail(reader, "a face with %d corners; it needs at least 3", (int)count);
+    if (property->role == CORNERS && !reader->counting)
+        return read_polygon(reader, property->type, count);
+    status = skip_values(reader, property->type, count);
+    if (!status && property->role == CORNERS)
+        reader->triangles += (size_t)count - 2;
+    return status;
+}
+
+static drape_status read_property_value(ply_reader *reader, const ply_property *property)
+{
+    if (property->count_type)
+        return read_list(reader, property);
+    const bool taken = property->role != PASSED_OVER && !reader->counting;
+    double *x = taken ? &reader->mesh->x[3 * (size_t)reader->item + (size_t)property->role] : NULL;
+    return read_value(reader, property->type, x);
+}
+
+/* In text an item is a line; empty lines are passed over. */
+static drape_status find_item_line(ply_reader *reader)
+{
+    drape_word word;
+    for (;;) {
+        drape_text ahead = reader->text;
+        if (drape_text_next_word(&ahead, &word))
+            return DRAPE_OK;
+        if (!drape_text_next_line(&reader->text))
+            return fail(reader, "the file ends before %.*s %lld of %lld",
+                        drape_word_shown(reader->element->name), reader->element->name.start,
+                        (long long)reader->item, (long long)reader->element->count);
+    }
+}
+
+static drape_status end_item_line(ply_reader *reader)
+{
+    drape_word word;
+    if (drape_text_next_word(&reader->text, &word))
+        return fail(reader, "\"%.*s\" after the last value of its %.*s", drape_word_shown(word), word.start,
+                    drape_word_shown(reader->element->name), reader->element->name.start);
+    drape_text_next_line(&reader->text);
+    return DRAPE_OK;
+}
+
+static drape_status read_item(ply_reader *reader)
+{
+    const ply_property *property = reader->properties + reader->element->first_property;
+    drape_status status = reader->format == ASCII ? find_item_line(reader) : DRAPE_OK;
+    for (int i = 0; i < reader->element->property_count && !status; i++)
+        status = read_property_value(reader, &property[i]);
+    if (!status && reader->format == ASCII)
+        status = end_item_line(reader);
+    return status;
+}
+
+/* Reads the items of all elements, from where the text stands. */
+static drape_status read_items(ply_reader *reader, bool counting)
+{
+    drape_status status = DRAPE_OK;
+    reader->counting = counting;
+    reader->triangles = 0;
+    for (int i = 0; i < reader->element_count && !status; i++) {
+        reader->element = &reader->elements[i];
+        if (reader->element->property_count == 0) /* such items take no byte and no line */
+            continue;
+        for (reader->item = 0; reader->item < reader->element->count && !status; reader->item++)
+            status = read_item(reader);
+    }
+    return status;
+}
+
+static drape_status read_ply(drape_context *ctx, const drape_mesh_source *source, const char *data,
+                             size_t size, drape_mesh *mesh)
+{
+    ply_reader reader = {.ctx = ctx, .source = source, .mesh = mesh, .text = drape_text_open(data, size)};
+    drape_status status = read_header(&reader);
+    if (!status)
+        status = check_counts(&reader);
+    const drape_text items = reader.text;
+    if (!status)
+        status = read_items(&reader, true);
+    if (!status)
+        status = drape_mesh_allocate(ctx, source, (size_t)find_element(&reader, "vertex")->count,
+                                     reader.triangles, mesh);
+    reader.text = items;
+    return status ? status : read_items(&reader, false);
+}
+
+const drape_import_ops drape_import_ply = {
+    .name = "ply",
+    .ending = ".ply",
+    .summary = "Stanford PLY, ascii or binary of either byte order; polygons become fans of triangles",
+    .read = read_ply,
+};

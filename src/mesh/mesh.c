@@ -1,0 +1,144 @@
+/* mesh.c: makes a mesh from its def, stage by stage, and frees it. */
+#include "mesh/mesh.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+drape_status drape_mesh_fail(drape_context *ctx, const drape_mesh_source *source, int64_t line,
+                             const char *format, ...)
+{
+    char text[DRAPE_MESSAGE_SIZE];
+    const locale_t old = drape_locale_enter();
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    drape_locale_leave(old);
+
+    if (!source->file)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, source->pointer, "%s", text);
+    if (line == 0)
+        return drape_fail_at(ctx, DRAPE_E_PARSE, source->pointer, "%s: %s", source->file, text);
+    return drape_fail_at(ctx, DRAPE_E_PARSE, source->pointer, "%s:%lld: %s", source->file, (long long)line,
+                         text);
+}
+
+drape_status drape_mesh_allocate(drape_context *ctx, const drape_mesh_source *source, size_t node_count,
+                                 size_t triangle_count, drape_mesh *mesh)
+{
+    if (node_count > DRAPE_MAX_NODES)
+        return drape_mesh_fail(ctx, source, 0, "%zu nodes; at most %d are allowed", node_count,
+                               DRAPE_MAX_NODES);
+    if (triangle_count > DRAPE_MAX_TRIANGLES)
+        return drape_mesh_fail(ctx, source, 0, "%zu triangles; at most %d are allowed", triangle_count,
+                               DRAPE_MAX_TRIANGLES);
+    mesh->x = drape_alloc(ctx, node_count, 3 * sizeof *mesh->x);
+    mesh->triangle = drape_alloc(ctx, triangle_count, 3 * sizeof *mesh->triangle);
+    if (!mesh->x || !mesh->triangle)
+        return DRAPE_E_MEMORY;
+    mesh->node_count = (int32_t)node_count;
+    mesh->triangle_count = (int32_t)triangle_count;
+    return DRAPE_OK;
+}
+
+drape_status drape_mesh_from_arrays(drape_context *ctx, const char *pointer, const double *x,
+                                    size_t node_count, const int32_t *triangle, size_t triangle_count,
+                                    drape_mesh *mesh)
+{
+    const drape_mesh_source source = {.pointer = pointer};
+    if (!x || !triangle)
+        return drape_mesh_fail(ctx, &source, 0, "\"%s\" is missing: a mesh needs positions and triangles",
+                               x ? "triangles" : "positions");
+    const drape_status status = drape_mesh_allocate(ctx, &source, node_count, triangle_count, mesh);
+    if (status)
+        return status;
+    memcpy(mesh->x, x, 3 * node_count * sizeof *x);
+    memcpy(mesh->triangle, triangle, 3 * triangle_count * sizeof *triangle);
+    return DRAPE_OK;
+}
+
+static drape_status check_one_source(drape_context *ctx, const char *pointer, const drape_mesh_def *def)
+{
+    const bool arrays = def->positions || def->triangles;
+    const int count = (def->grid.type != NULL) + (def->file != NULL) + arrays;
+    if (count == 1)
+        return DRAPE_OK;
+    return drape_fail_at(
+        ctx, DRAPE_E_ARGUMENT, pointer, "%d sources%s%s%s; a mesh has exactly one of grid, file, positions",
+        count, def->grid.type ? ", grid" : "", def->file ? ", file" : "", arrays ? ", positions" : "");
+}
+
+static drape_status take_from_source(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
+                                     const char *folder, drape_mesh *mesh)
+{
+    if (def->grid.type)
+        return drape_mesh_from_grid(ctx, pointer, &def->grid, mesh);
+    if (def->file)
+        return drape_mesh_from_file(ctx, pointer, folder, def->file, mesh);
+    return drape_mesh_from_arrays(ctx, pointer, def->positions, def->node_count, def->triangles,
+                                  def->triangle_count, mesh);
+}
+
+/* Positions are checked before, too: a rotation spreads one coordinate that is not a number to all three. */
+static drape_status place_nodes(drape_context *ctx, const char *pointer, const drape_mesh_source *source,
+                                const drape_mesh_def *def, drape_mesh *mesh)
+{
+    char place[sizeof ctx->pointer];
+    snprintf(place, sizeof place, "%s/transform", pointer);
+    const drape_mesh_source transform = {.pointer = place};
+
+    const drape_status status = drape_mesh_validate_positions(ctx, source, mesh);
+    if (status)
+        return status;
+    drape_mesh_transform(mesh, def->scale, def->rotate, def->translate);
+    return drape_mesh_validate_positions(ctx, &transform, mesh);
+}
+
+static drape_status complete(drape_context *ctx, const drape_mesh_source *source, drape_mesh *mesh)
+{
+    drape_status status = drape_mesh_validate_triangles(ctx, source, mesh);
+    if (!status)
+        status = drape_mesh_connect(ctx, source, mesh);
+    if (!status)
+        status = drape_mesh_validate_nodes(ctx, source, mesh);
+    if (!status)
+        status = drape_mesh_measure(ctx, mesh);
+    return status;
+}
+
+drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
+                             const char *folder, drape_mesh *mesh)
+{
+    char place[sizeof ctx->pointer];
+    snprintf(place, sizeof place, "%s%s", pointer, def->file ? "/file" : "");
+    const drape_mesh_source source = {.pointer = place, .file = def->file};
+
+    *mesh = (drape_mesh){0};
+    drape_status status = check_one_source(ctx, pointer, def);
+    if (!status)
+        status = drape_mesh_check_transform(ctx, pointer, def->scale, def->rotate, def->translate);
+    if (!status)
+        status = take_from_source(ctx, pointer, def, folder, mesh);
+    if (!status)
+        status = place_nodes(ctx, pointer, &source, def, mesh);
+    if (!status)
+        status = complete(ctx, &source, mesh);
+    if (status)
+        drape_mesh_free(ctx, mesh);
+    return status;
+}
+
+void drape_mesh_free(drape_context *ctx, drape_mesh *mesh)
+{
+    drape_free(ctx, mesh->x);
+    drape_free(ctx, mesh->triangle);
+    drape_free(ctx, mesh->edge);
+    drape_free(ctx, mesh->edge_triangle);
+    drape_free(ctx, mesh->hinge);
+    drape_free(ctx, mesh->hinge_edge);
+    drape_free(ctx, mesh->triangle_area);
+    drape_free(ctx, mesh->edge_length);
+    drape_free(ctx, mesh->node_area);
+    *mesh = (drape_mesh){0};
+}

@@ -1,0 +1,41 @@
+/* order.c: radix sort: one stable counting sort a part of the key, from the last part to the first.
+ * O(parts (count + limit)) for any input, where a hash table or quicksort would have bad ones. */
+#include "mesh/order.h"
+
+/* Sorts from by part into to; start (limit + 1) is workspace: the place of the next item of each value. */
+static void sort_by_part(const int32_t *key, int parts, int part, int32_t count, int32_t limit,
+                         const int32_t *from, int32_t *to, int32_t *start)
+{
+    for (int32_t value = 0; value <= limit; value++)
+        start[value] = 0;
+    for (int32_t i = 0; i < count; i++)
+        start[key[(size_t)i * (size_t)parts + (size_t)part] + 1]++;
+    for (int32_t value = 0; value < limit; value++)
+        start[value + 1] += start[value];
+    for (int32_t i = 0; i < count; i++)
+        to[start[key[(size_t)from[i] * (size_t)parts + (size_t)part]]++] = from[i];
+}
+
+int32_t *drape_order_by_keys(drape_context *ctx, const int32_t *key, int parts, int32_t count, int32_t limit)
+{
+    int32_t *order = drape_alloc(ctx, (size_t)count, sizeof *order);
+    int32_t *other = drape_alloc(ctx, (size_t)count, sizeof *other);
+    int32_t *start = drape_alloc(ctx, (size_t)limit + 1, sizeof *start);
+    const bool complete = order && other && start;
+    if (complete) {
+        for (int32_t i = 0; i < count; i++)
+            order[i] = i;
+        for (int part = parts - 1; part >= 0; part--) {
+            sort_by_part(key, parts, part, count, limit, order, other, start);
+            int32_t *sorted = other;
+            other = order;
+            order = sorted;
+        }
+    }
+    drape_free(ctx, start);
+    drape_free(ctx, other);
+    if (complete)
+        return order;
+    drape_free(ctx, order);
+    return NULL;
+}

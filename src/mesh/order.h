@@ -1,0 +1,12 @@
+/* order.h: sorting by small whole numbers in linear time. */
+#ifndef DRAPE_MESH_ORDER_H
+#define DRAPE_MESH_ORDER_H
+
+#include "base/context.h"
+
+/* The numbers 0 .. count - 1 in the order of their keys; equal keys keep the order of their numbers. Item i
+ * has the key key[i * parts] ... key[i * parts + parts - 1], compared from its first part; each part is in 0
+ * .. limit - 1. The result is freed by drape_free; NULL with a message when memory is out. */
+int32_t *drape_order_by_keys(drape_context *ctx, const int32_t *key, int parts, int32_t count, int32_t limit);
+
+#endif

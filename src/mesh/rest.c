@@ -1,0 +1,45 @@
+/* rest.c: measures a mesh at rest: areas of triangles |(x1 - x0) x (x2 - x0)| / 2, lengths of edges, and the
+ * area that is lumped to each node, a third of each triangle around it (so their sum is the sheet's area). */
+#include "base/vec3.h"
+#include "mesh/mesh.h"
+
+static double area(const drape_mesh *mesh, const int32_t *n)
+{
+    double u[3], v[3], normal[3];
+    vec3_sub(mesh->x + 3 * (size_t)n[1], mesh->x + 3 * (size_t)n[0], u);
+    vec3_sub(mesh->x + 3 * (size_t)n[2], mesh->x + 3 * (size_t)n[0], v);
+    vec3_cross(u, v, normal);
+    return vec3_norm(normal) / 2;
+}
+
+static void measure_triangles(drape_mesh *mesh)
+{
+    for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
+        const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
+        mesh->triangle_area[triangle] = area(mesh, n);
+        for (int k = 0; k < 3; k++)
+            mesh->node_area[n[k]] += mesh->triangle_area[triangle] / 3;
+    }
+}
+
+static void measure_edges(drape_mesh *mesh)
+{
+    for (int32_t edge = 0; edge < mesh->edge_count; edge++) {
+        const int32_t *n = mesh->edge + 2 * (size_t)edge;
+        double along[3];
+        vec3_sub(mesh->x + 3 * (size_t)n[1], mesh->x + 3 * (size_t)n[0], along);
+        mesh->edge_length[edge] = vec3_norm(along);
+    }
+}
+
+drape_status drape_mesh_measure(drape_context *ctx, drape_mesh *mesh)
+{
+    mesh->triangle_area = drape_alloc(ctx, (size_t)mesh->triangle_count, sizeof *mesh->triangle_area);
+    mesh->edge_length = drape_alloc(ctx, (size_t)mesh->edge_count, sizeof *mesh->edge_length);
+    mesh->node_area = drape_alloc(ctx, (size_t)mesh->node_count, sizeof *mesh->node_area);
+    if (!mesh->triangle_area || !mesh->edge_length || !mesh->node_area)
+        return DRAPE_E_MEMORY;
+    measure_triangles(mesh);
+    measure_edges(mesh);
+    return DRAPE_OK;
+}

@@ -1,0 +1,106 @@
+/* topology.c: unique edges, the triangles beside them, and hinges. Each triangle has three sides; the sides
+ * sorted by (lower node, higher node) stand in runs, and a run is an edge: of one side on the boundary, of
+ * two inside, where it is a hinge. */
+#include "mesh/mesh.h"
+#include "mesh/order.h"
+
+/* Side s = 3 t + k of triangle t lies between its nodes k and k + 1: lower node first. (3 T x 2) */
+static int32_t *list_sides(drape_context *ctx, const drape_mesh *mesh)
+{
+    const size_t count = 3 * (size_t)mesh->triangle_count;
+    int32_t *side = drape_alloc(ctx, count, 2 * sizeof *side);
+    if (!side)
+        return NULL;
+    for (size_t s = 0; s < count; s++) {
+        const int32_t a = mesh->triangle[s], b = mesh->triangle[s % 3 == 2 ? s - 2 : s + 1];
+        side[2 * s] = a < b ? a : b;
+        side[2 * s + 1] = a < b ? b : a;
+    }
+    return side;
+}
+
+/* Length of the run of equal sides that begins at place `first` of the order. */
+static int32_t run_length(const int32_t *side, const int32_t *order, int32_t first, int32_t count)
+{
+    const int32_t *edge = side + 2 * (size_t)order[first];
+    int32_t next = first + 1;
+    while (next < count && side[2 * (size_t)order[next]] == edge[0] &&
+           side[2 * (size_t)order[next] + 1] == edge[1])
+        next++;
+    return next - first;
+}
+
+static drape_status count_edges(drape_context *ctx, const drape_mesh_source *source, const int32_t *side,
+                                const int32_t *order, drape_mesh *mesh)
+{
+    const int32_t count = 3 * mesh->triangle_count;
+    mesh->edge_count = 0;
+    mesh->hinge_count = 0;
+    for (int32_t first = 0, length; first < count; first += length) {
+        length = run_length(side, order, first, count);
+        const int32_t *same = order + first, *edge = side + 2 * (size_t)same[0];
+        if (length > 2)
+            return drape_mesh_fail(ctx, source, 0,
+                                   "edge %d %d is shared by triangles %d, %d and %d; at most two "
+                                   "may share an edge",
+                                   edge[0], edge[1], same[0] / 3, same[1] / 3, same[2] / 3);
+        mesh->edge_count++;
+        mesh->hinge_count += length == 2;
+    }
+    return DRAPE_OK;
+}
+
+static drape_status allocate_edges(drape_context *ctx, drape_mesh *mesh)
+{
+    mesh->edge = drape_alloc(ctx, (size_t)mesh->edge_count, 2 * sizeof *mesh->edge);
+    mesh->edge_triangle = drape_alloc(ctx, (size_t)mesh->edge_count, 2 * sizeof *mesh->edge_triangle);
+    mesh->hinge = drape_alloc(ctx, (size_t)mesh->hinge_count, 4 * sizeof *mesh->hinge);
+    mesh->hinge_edge = drape_alloc(ctx, (size_t)mesh->hinge_count, sizeof *mesh->hinge_edge);
+    const bool complete = mesh->edge && mesh->edge_triangle && mesh->hinge && mesh->hinge_edge;
+    return complete ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+/* The node of its triangle that side s does not touch. */
+static int32_t apex(const drape_mesh *mesh, int32_t s)
+{
+    return mesh->triangle[s % 3 == 0 ? s + 2 : s - 1];
+}
+
+static void fill_edges(const int32_t *side, const int32_t *order, drape_mesh *mesh)
+{
+    const int32_t count = 3 * mesh->triangle_count;
+    int32_t *hinge = mesh->hinge, *hinge_edge = mesh->hinge_edge;
+    int32_t edge = 0;
+    for (int32_t first = 0, length; first < count; first += length, edge++) {
+        length = run_length(side, order, first, count);
+        const int32_t *same = order + first, *ends = side + 2 * (size_t)same[0];
+        mesh->edge[2 * (size_t)edge] = ends[0];
+        mesh->edge[2 * (size_t)edge + 1] = ends[1];
+        mesh->edge_triangle[2 * (size_t)edge] = same[0] / 3;
+        mesh->edge_triangle[2 * (size_t)edge + 1] = length == 2 ? same[1] / 3 : -1;
+        if (length == 2) {
+            *hinge_edge++ = edge;
+            *hinge++ = ends[0];
+            *hinge++ = ends[1];
+            *hinge++ = apex(mesh, same[0]);
+            *hinge++ = apex(mesh, same[1]);
+        }
+    }
+}
+
+drape_status drape_mesh_connect(drape_context *ctx, const drape_mesh_source *source, drape_mesh *mesh)
+{
+    drape_status status = DRAPE_E_MEMORY;
+    int32_t *side = list_sides(ctx, mesh), *order = NULL;
+    if (side)
+        order = drape_order_by_keys(ctx, side, 2, 3 * mesh->triangle_count, mesh->node_count);
+    if (order)
+        status = count_edges(ctx, source, side, order, mesh);
+    if (!status)
+        status = allocate_edges(ctx, mesh);
+    if (!status)
+        fill_edges(side, order, mesh);
+    drape_free(ctx, order);
+    drape_free(ctx, side);
+    return status;
+}

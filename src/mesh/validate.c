@@ -1,0 +1,202 @@
+/* validate.c: refuses meshes that are no sheet of cloth, and names the place: what would otherwise divide by
+ * zero in a term, make the mass matrix singular or join what does not touch. */
+#include <math.h>
+
+#include "base/vec3.h"
+#include "mesh/mesh.h"
+#include "mesh/order.h"
+
+#define FARTHEST          1e9   /* [m]: beyond, neighbouring doubles lie more than 1e-7 m apart */
+#define THINNEST_TRIANGLE 1e-12 /* altitude / longest edge: rounding of positions is 1e-16 of it */
+
+drape_status drape_mesh_validate_positions(drape_context *ctx, const drape_mesh_source *source,
+                                           const drape_mesh *mesh)
+{
+    for (int32_t node = 0; node < mesh->node_count; node++) {
+        const double *x = mesh->x + 3 * (size_t)node;
+        if (!(fabs(x[0]) <= FARTHEST && fabs(x[1]) <= FARTHEST && fabs(x[2]) <= FARTHEST))
+            return drape_mesh_fail(ctx, source, 0,
+                                   "node %d is at (%g, %g, %g) m; coordinates must be finite and within %g m",
+                                   node, x[0], x[1], x[2], FARTHEST);
+    }
+    return DRAPE_OK;
+}
+
+static drape_status check_indices(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh)
+{
+    for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
+        const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
+        for (int k = 0; k < 3; k++)
+            if (n[k] < 0 || n[k] >= mesh->node_count)
+                return drape_mesh_fail(ctx, source, 0,
+                                       "triangle %d (nodes %d %d %d): there is no node %d, range is 0 to %d",
+                                       triangle, n[0], n[1], n[2], n[k], mesh->node_count - 1);
+        if (n[0] == n[1] || n[1] == n[2] || n[2] == n[0])
+            return drape_mesh_fail(ctx, source, 0, "triangle %d (nodes %d %d %d) uses a node twice", triangle,
+                                   n[0], n[1], n[2]);
+    }
+    return DRAPE_OK;
+}
+
+/* altitude over the longest edge l is (2 area / l) / l; 0 where the triangle is too small to be measured */
+static double thinness(const drape_mesh *mesh, const int32_t *n)
+{
+    double side[3][3], normal[3], longest_squared = 0;
+    for (int k = 0; k < 3; k++) {
+        vec3_sub(mesh->x + 3 * (size_t)n[(k + 1) % 3], mesh->x + 3 * (size_t)n[k], side[k]);
+        longest_squared = fmax(longest_squared, vec3_dot(side[k], side[k]));
+    }
+    vec3_cross(side[0], side[1], normal);
+    return longest_squared > 0 ? vec3_norm(normal) / longest_squared : 0;
+}
+
+static drape_status check_shapes(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh)
+{
+    for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
+        const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
+        const double ratio = thinness(mesh, n);
+        if (!(ratio >= THINNEST_TRIANGLE))
+            return drape_mesh_fail(ctx, source, 0,
+                                   "triangle %d (nodes %d %d %d) is degenerate: altitude / longest "
+                                   "edge is %g, at least %g is needed",
+                                   triangle, n[0], n[1], n[2], ratio, THINNEST_TRIANGLE);
+    }
+    return DRAPE_OK;
+}
+
+/* The nodes of each triangle in ascending order. (triangle_count x 3) */
+static int32_t *sort_corners(drape_context *ctx, const drape_mesh *mesh)
+{
+    int32_t *sorted = drape_alloc(ctx, (size_t)mesh->triangle_count, 3 * sizeof *sorted);
+    if (!sorted)
+        return NULL;
+    for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
+        const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
+        int32_t *out = sorted + 3 * (size_t)triangle;
+        const int low = n[0] < n[1] ? (n[0] < n[2] ? 0 : 2) : (n[1] < n[2] ? 1 : 2);
+        const int32_t a = n[(low + 1) % 3], b = n[(low + 2) % 3];
+        out[0] = n[low];
+        out[1] = a < b ? a : b;
+        out[2] = a < b ? b : a;
+    }
+    return sorted;
+}
+
+static drape_status compare_neighbours(drape_context *ctx, const drape_mesh_source *source,
+                                       const int32_t *corners, const int32_t *order, int32_t count)
+{
+    for (int32_t i = 1; i < count; i++) {
+        const int32_t *a = corners + 3 * (size_t)order[i - 1], *b = corners + 3 * (size_t)order[i];
+        if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2])
+            return drape_mesh_fail(ctx, source, 0, "triangles %d and %d have the same nodes %d %d %d",
+                                   order[i - 1], order[i], a[0], a[1], a[2]);
+    }
+    return DRAPE_OK;
+}
+
+static drape_status check_duplicates(drape_context *ctx, const drape_mesh_source *source,
+                                     const drape_mesh *mesh)
+{
+    drape_status status = DRAPE_E_MEMORY;
+    int32_t *corners = sort_corners(ctx, mesh), *order = NULL;
+    if (corners)
+        order = drape_order_by_keys(ctx, corners, 3, mesh->triangle_count, mesh->node_count);
+    if (order)
+        status = compare_neighbours(ctx, source, corners, order, mesh->triangle_count);
+    drape_free(ctx, order);
+    drape_free(ctx, corners);
+    return status;
+}
+
+drape_status drape_mesh_validate_triangles(drape_context *ctx, const drape_mesh_source *source,
+                                           const drape_mesh *mesh)
+{
+    if (mesh->node_count == 0 || mesh->triangle_count == 0)
+        return drape_mesh_fail(ctx, source, 0, "the mesh has no %s",
+                               mesh->node_count == 0 ? "nodes" : "triangles");
+    drape_status status = check_indices(ctx, source, mesh);
+    if (!status)
+        status = check_shapes(ctx, source, mesh);
+    if (!status)
+        status = check_duplicates(ctx, source, mesh);
+    return status;
+}
+
+/* Union-find over corners (corner 3 t + k is node k of triangle t): the lowest corner of a set stands for it;
+ * path halving (Tarjan and van Leeuwen 1984, doi:10.1145/62.2160, section 2). */
+static int32_t find(int32_t *parent, int32_t corner)
+{
+    while (parent[corner] != corner) {
+        parent[corner] = parent[parent[corner]];
+        corner = parent[corner];
+    }
+    return corner;
+}
+
+static void unite(int32_t *parent, int32_t a, int32_t b)
+{
+    a = find(parent, a);
+    b = find(parent, b);
+    if (a < b)
+        parent[b] = a;
+    else
+        parent[a] = b;
+}
+
+static int32_t corner_at(const drape_mesh *mesh, int32_t triangle, int32_t node)
+{
+    const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
+    return 3 * triangle + (n[0] == node ? 0 : n[1] == node ? 1 : 2);
+}
+
+/* Joins, at both ends of every inner edge, the corners of its two triangles: the sets are the fans. */
+static void join_fans(const drape_mesh *mesh, int32_t *parent)
+{
+    for (int32_t corner = 0; corner < 3 * mesh->triangle_count; corner++)
+        parent[corner] = corner;
+    for (int32_t edge = 0; edge < mesh->edge_count; edge++) {
+        const int32_t *beside = mesh->edge_triangle + 2 * (size_t)edge;
+        for (int end = 0; end < 2 && beside[1] >= 0; end++) {
+            const int32_t node = mesh->edge[2 * (size_t)edge + (size_t)end];
+            unite(parent, corner_at(mesh, beside[0], node), corner_at(mesh, beside[1], node));
+        }
+    }
+}
+
+/* fan (node_count): workspace, the first fan found at each node, -1 before. */
+static drape_status check_fans(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh,
+                               const int32_t *parent, int32_t *fan)
+{
+    for (int32_t node = 0; node < mesh->node_count; node++)
+        fan[node] = -1;
+    for (int32_t corner = 0; corner < 3 * mesh->triangle_count; corner++) {
+        const int32_t node = mesh->triangle[corner];
+        if (parent[corner] != corner)
+            continue;
+        if (fan[node] >= 0)
+            return drape_mesh_fail(ctx, source, 0,
+                                   "triangles %d and %d touch only at node %d; the triangles "
+                                   "around a node must be joined by edges",
+                                   fan[node] / 3, corner / 3, node);
+        fan[node] = corner;
+    }
+    for (int32_t node = 0; node < mesh->node_count; node++)
+        if (fan[node] < 0)
+            return drape_mesh_fail(ctx, source, 0, "node %d belongs to no triangle", node);
+    return DRAPE_OK;
+}
+
+drape_status drape_mesh_validate_nodes(drape_context *ctx, const drape_mesh_source *source,
+                                       const drape_mesh *mesh)
+{
+    drape_status status = DRAPE_E_MEMORY;
+    int32_t *parent = drape_alloc(ctx, 3 * (size_t)mesh->triangle_count, sizeof *parent);
+    int32_t *fan = drape_alloc(ctx, (size_t)mesh->node_count, sizeof *fan);
+    if (parent && fan) {
+        join_fans(mesh, parent);
+        status = check_fans(ctx, source, mesh, parent, fan);
+    }
+    drape_free(ctx, fan);
+    drape_free(ctx, parent);
+    return status;
+}
