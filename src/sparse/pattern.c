@@ -1,0 +1,176 @@
+/* pattern.c: see pattern.h. Neighbours are counted, listed with repeats, then each column is sorted and made
+ * unique. */
+#include "sparse/pattern.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Neighbour lists with repeats: entries start[j] ... start[j+1] - 1 of row. */
+typedef struct neighbours {
+    int64_t *start, *next;
+    int32_t *row;
+} neighbours;
+
+static void free_neighbours(drape_context *ctx, neighbours *list)
+{
+    drape_free(ctx, list->start);
+    drape_free(ctx, list->next);
+    drape_free(ctx, list->row);
+}
+
+/* Calls visit for every (row, column) of every coupling, in order. */
+typedef void visit_pair(neighbours *list, int32_t row, int32_t column);
+
+static void visit_couplings(const drape_coupling *couplings, int coupling_count, const int32_t *block_of_node,
+                            neighbours *list, visit_pair *visit)
+{
+    for (int c = 0; c < coupling_count; c++)
+        for (int32_t e = 0; e < couplings[c].count; e++) {
+            const int32_t *node = couplings[c].node + (size_t)e * (size_t)couplings[c].nodes;
+            for (int a = 0; a < couplings[c].nodes; a++)
+                for (int b = 0; b < couplings[c].nodes; b++)
+                    if (a != b && block_of_node[node[a]] >= 0 && block_of_node[node[b]] >= 0)
+                        visit(list, block_of_node[node[a]], block_of_node[node[b]]);
+        }
+}
+
+static void count_pair(neighbours *list, int32_t row, int32_t column)
+{
+    (void)row;
+    list->start[column + 1]++;
+}
+
+static void store_pair(neighbours *list, int32_t row, int32_t column)
+{
+    list->row[list->next[column]++] = row;
+}
+
+static drape_status list_neighbours(drape_context *ctx, int32_t block_count, const int32_t *block_of_node,
+                                    const drape_coupling *couplings, int coupling_count, neighbours *list)
+{
+    size_t count = (size_t)block_count;
+    list->start = drape_alloc(ctx, count + 1, sizeof *list->start);
+    list->next = drape_alloc(ctx, count, sizeof *list->next);
+    if (!list->start || !list->next)
+        return DRAPE_E_MEMORY;
+    visit_couplings(couplings, coupling_count, block_of_node, list, count_pair);
+    for (size_t j = 0; j < count; j++) {
+        list->start[j + 1] += list->start[j] + 1; /* + 1: the diagonal */
+        list->next[j] = list->start[j];
+    }
+    list->row = drape_alloc(ctx, (size_t)list->start[count], sizeof *list->row);
+    if (!list->row)
+        return DRAPE_E_MEMORY;
+    for (int32_t j = 0; j < block_count; j++)
+        store_pair(list, j, j);
+    visit_couplings(couplings, coupling_count, block_of_node, list, store_pair);
+    return DRAPE_OK;
+}
+
+static int compare_rows(const void *a, const void *b)
+{
+    int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Sorts each list and drops repeats, in place; next[j] becomes the number that stays. Returns the sum. */
+static int64_t make_unique(neighbours *list, int32_t block_count)
+{
+    int64_t total = 0;
+    for (int32_t j = 0; j < block_count; j++) {
+        int32_t *row = list->row + list->start[j];
+        int64_t length = list->start[j + 1] - list->start[j], kept = 0;
+        qsort(row, (size_t)length, sizeof *row, compare_rows);
+        for (int64_t i = 0; i < length; i++)
+            if (i == 0 || row[i] != row[kept - 1])
+                row[kept++] = row[i];
+        list->next[j] = kept;
+        total += kept;
+    }
+    return total;
+}
+
+static drape_status allocate(drape_context *ctx, drape_pattern *pattern, int32_t block_count, int64_t blocks)
+{
+    if (blocks > INT32_MAX)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT,
+                          "the Jacobian has %lld blocks of 3 x 3, at most 2147483647 are allowed",
+                          (long long)blocks);
+    pattern->block_count = block_count;
+    pattern->n = 3 * (int64_t)block_count;
+    pattern->nonzeros = 9 * blocks;
+    pattern->block_start = drape_alloc(ctx, (size_t)block_count + 1, sizeof *pattern->block_start);
+    pattern->block_row = drape_alloc(ctx, (size_t)blocks, sizeof *pattern->block_row);
+    pattern->diagonal = drape_alloc(ctx, (size_t)block_count, sizeof *pattern->diagonal);
+    pattern->column = drape_alloc(ctx, (size_t)pattern->n + 1, sizeof *pattern->column);
+    pattern->row = drape_alloc(ctx, (size_t)pattern->nonzeros, sizeof *pattern->row);
+    bool good =
+        pattern->block_start && pattern->block_row && pattern->diagonal && pattern->column && pattern->row;
+    return good ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+static void fill_blocks(drape_pattern *pattern, const neighbours *list)
+{
+    for (int32_t j = 0; j < pattern->block_count; j++) {
+        int32_t first = pattern->block_start[j], length = (int32_t)list->next[j];
+        pattern->block_start[j + 1] = first + length;
+        memcpy(pattern->block_row + first, list->row + list->start[j], (size_t)length * sizeof *list->row);
+        pattern->diagonal[j] = drape_pattern_find(pattern, j, j);
+    }
+}
+
+static void fill_scalars(drape_pattern *pattern)
+{
+    int64_t next = 0;
+    for (int32_t j = 0; j < pattern->block_count; j++)
+        for (int c = 0; c < 3; c++) {
+            pattern->column[3 * (int64_t)j + c] = next;
+            for (int32_t k = pattern->block_start[j]; k < pattern->block_start[j + 1]; k++)
+                for (int r = 0; r < 3; r++)
+                    pattern->row[next++] = 3 * (int64_t)pattern->block_row[k] + r;
+        }
+    pattern->column[pattern->n] = next;
+}
+
+drape_status drape_pattern_build(drape_context *ctx, int32_t block_count, const int32_t *block_of_node,
+                                 const drape_coupling *couplings, int coupling_count, drape_pattern *pattern)
+{
+    neighbours list = {0};
+    memset(pattern, 0, sizeof *pattern);
+    drape_status status = list_neighbours(ctx, block_count, block_of_node, couplings, coupling_count, &list);
+    if (!status)
+        status = allocate(ctx, pattern, block_count, make_unique(&list, block_count));
+    if (!status) {
+        fill_blocks(pattern, &list);
+        fill_scalars(pattern);
+    }
+    free_neighbours(ctx, &list);
+    if (status)
+        drape_pattern_free(ctx, pattern);
+    return status;
+}
+
+void drape_pattern_free(drape_context *ctx, drape_pattern *pattern)
+{
+    drape_free(ctx, pattern->block_start);
+    drape_free(ctx, pattern->block_row);
+    drape_free(ctx, pattern->diagonal);
+    drape_free(ctx, pattern->column);
+    drape_free(ctx, pattern->row);
+    memset(pattern, 0, sizeof *pattern);
+}
+
+int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t column)
+{
+    if (row < 0 || column < 0)
+        return -1;
+    int32_t low = pattern->block_start[column], high = pattern->block_start[column + 1];
+    while (high - low > 1) {
+        int32_t middle = low + (high - low) / 2;
+        if (pattern->block_row[middle] <= row)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}

@@ -1,0 +1,50 @@
+/*
+ * pattern.h: the sparsity of a symmetric matrix of 3x3 blocks, in compressed sparse columns (CSC) of scalars,
+ * and where each block of an element lies in it. Built once; assembling is then adding at known places.
+ *
+ * Block column j holds the blocks block_start[j] ... block_start[j+1] - 1, rows ascending. Its three scalar
+ * columns are equally long, so block k of column j starts at value 9 * block_start[j] + 3 * (k -
+ * block_start[j]), and its next column lies stride = 3 * (blocks in column j) values further.
+ */
+#ifndef DRAPE_SPARSE_PATTERN_H
+#define DRAPE_SPARSE_PATTERN_H
+
+#include "base/context.h"
+
+typedef struct drape_pattern {
+    int32_t block_count;  /* block columns */
+    int64_t n, nonzeros;  /* scalars: n = 3 block_count */
+    int32_t *block_start; /* (block_count + 1) */
+    int32_t *block_row;   /* (blocks) */
+    int32_t *diagonal;    /* (block_count) the block on the diagonal of each column */
+    int64_t *column;      /* (n + 1) CSC column pointers */
+    int64_t *row;         /* (nonzeros) CSC rows */
+} drape_pattern;
+
+/* Elements that couple all their nodes: node (count x nodes), numbers that block_of_node maps to block
+ * columns or -1. */
+typedef struct drape_coupling {
+    int32_t count;
+    int nodes;
+    const int32_t *node;
+} drape_coupling;
+
+/* The union of the diagonal and all couplings. Errors: DRAPE_E_MEMORY, DRAPE_E_ARGUMENT (more than 2^31 - 1
+ * blocks). */
+drape_status drape_pattern_build(drape_context *ctx, int32_t block_count, const int32_t *block_of_node,
+                                 const drape_coupling *couplings, int coupling_count, drape_pattern *pattern);
+void drape_pattern_free(drape_context *ctx, drape_pattern *pattern);
+
+/* The block at (row, column); -1 if either is -1. It must be in the pattern. */
+int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t column);
+
+/* The first value of a block and the distance to its next column. */
+static inline double *drape_pattern_at(const drape_pattern *pattern, double *values, int32_t column,
+                                       int32_t block, int64_t *stride)
+{
+    int64_t start = pattern->block_start[column];
+    *stride = 3 * (pattern->block_start[column + 1] - start);
+    return values + 9 * start + 3 * (block - start);
+}
+
+#endif
