@@ -1,0 +1,105 @@
+/* model.c: what can be asked of a compiled scene. */
+#include "model/model.h"
+
+#include "model/track.h"
+
+void drape_model_destroy(drape_model **model)
+{
+    if (!model || !*model)
+        return;
+    drape_model *m = *model;
+    drape_context *ctx = m->ctx;
+    for (int32_t c = 0; c < m->cloth_count; c++)
+        drape_mesh_free(ctx, &m->cloths[c].mesh);
+    drape_pattern_free(ctx, &m->pattern);
+    drape_arena_free(&m->arena, ctx);
+    drape_free(ctx, m);
+    *model = NULL;
+}
+
+int32_t drape_model_node_count(const drape_model *model)
+{
+    return model ? model->node_count : 0;
+}
+
+int32_t drape_model_triangle_count(const drape_model *model)
+{
+    return model ? model->triangle_count : 0;
+}
+
+int64_t drape_model_dof_count(const drape_model *model)
+{
+    return model ? 3 * (int64_t)model->free_count : 0;
+}
+
+int64_t drape_model_nonzero_count(const drape_model *model)
+{
+    return model ? model->pattern.nonzeros : 0;
+}
+
+const int32_t *drape_model_triangles(const drape_model *model)
+{
+    return model ? model->triangle : NULL;
+}
+
+const double *drape_model_rest_positions(const drape_model *model)
+{
+    return model ? model->rest : NULL;
+}
+
+const double *drape_model_masses(const drape_model *model)
+{
+    return model ? model->mass : NULL;
+}
+
+const uint8_t *drape_model_pinned(const drape_model *model)
+{
+    return model ? model->pinned : NULL;
+}
+
+int32_t drape_model_cloth_count(const drape_model *model)
+{
+    return model ? model->cloth_count : 0;
+}
+
+drape_cloth_range drape_model_cloth(const drape_model *model, int32_t index)
+{
+    if (!model || index < 0 || index >= model->cloth_count)
+        return (drape_cloth_range){.name = ""};
+    const drape_cloth *cloth = &model->cloths[index];
+    return (drape_cloth_range){.name = cloth->name,
+                               .first_node = cloth->first_node,
+                               .node_count = cloth->mesh.node_count,
+                               .first_triangle = cloth->first_triangle,
+                               .triangle_count = cloth->mesh.triangle_count};
+}
+
+double drape_model_duration(const drape_model *model)
+{
+    return model ? model->duration : 0;
+}
+
+double drape_model_frame_rate(const drape_model *model)
+{
+    return model ? model->frame_rate : 0;
+}
+
+void drape_model_place_pins(const drape_model *model, double t, double *x)
+{
+    for (int32_t i = 0; i < model->moved_count; i++) {
+        const drape_track *track = &model->tracks[model->moved_track[i]];
+        size_t at = 3 * (size_t)model->moved_node[i];
+        double displacement[3];
+        drape_track_displacement(track->keys, track->key_count, t, displacement);
+        for (int k = 0; k < 3; k++)
+            x[at + k] = model->rest[at + k] + displacement[k];
+    }
+}
+
+int32_t drape_model_cloth_of(const drape_model *model, int32_t node)
+{
+    int32_t c = 0;
+    while (c + 1 < model->cloth_count && model->cloths[c + 1].first_node <= node)
+        c++;
+    return c;
+}

@@ -1,0 +1,87 @@
+/* model.h: the compiled scene. Everything in it is constant once drape_compile has made it; the state is
+ * elsewhere. */
+#ifndef DRAPE_MODEL_MODEL_H
+#define DRAPE_MODEL_MODEL_H
+
+#include "base/arena.h"
+#include "mesh/mesh.h"
+#include "sparse/pattern.h"
+
+/* One row of the terms on one cloth. */
+typedef struct drape_term {
+    const drape_term_ops *ops;
+    int32_t cloth;
+    double params[DRAPE_MAX_PARAMS];
+    drape_elements elements; /* node numbers of the whole model */
+    int32_t *block; /* (count x nodes x nodes) block of each node pair in the pattern, -1 pinned; NULL: no
+                       sparsity */
+    int64_t first_internal;               /* its internal variables in a state; -1 for none */
+    int64_t first_measure;                /* its measures in the list of all measures; -1 for none */
+    const struct drape_term *const *laws; /* laws of the cloth, on this measure */
+    int law_count;
+} drape_term;
+
+/* One cloth: its mesh at rest, and what the scene said of it. */
+typedef struct drape_cloth {
+    char *name;
+    drape_mesh mesh;
+    drape_material material;
+    double *node_mass;  /* (mesh.node_count) [kg] */
+    double velocity[3]; /* [m/s] at t = 0 */
+    int32_t first_node, first_triangle;
+    const struct drape_term **laws; /* (law_count) */
+    int law_count;
+} drape_cloth;
+
+/* A row that was chosen by name, with all its parameter values. */
+typedef struct drape_choice {
+    char *type;
+    drape_setting *settings; /* as the scene gave them: checked against the union of the rows, resolved when a
+                                sim is made */
+    size_t setting_count;
+} drape_choice;
+
+typedef struct drape_track {
+    drape_track_key *keys;
+    size_t key_count;
+} drape_track;
+
+struct drape_model {
+    drape_arena arena; /* holds all that is below but the meshes and the pattern */
+    drape_context *ctx;
+    int32_t cloth_count, term_count, node_count, triangle_count, edge_count;
+    drape_cloth *cloths;
+    drape_term *terms;     /* (term_count) in scene order; gravity last of each cloth */
+    double *rest;          /* (node_count x 3) [m] */
+    double *velocity;      /* (node_count x 3) [m/s] at t = 0 */
+    double *mass;          /* (node_count) [kg] */
+    int32_t *triangle;     /* (triangle_count x 3) */
+    int32_t *edge;         /* (edge_count x 2) */
+    double *edge_length;   /* (edge_count) [m] */
+    uint8_t *pinned;       /* (node_count) */
+    int32_t *free_of_node; /* (node_count) number among the free nodes, -1 pinned */
+    int32_t *node_of_free; /* (free_count) */
+    int32_t free_count;
+    int32_t *moved_node;  /* (moved_count) pinned nodes with a track */
+    int32_t *moved_track; /* (moved_count) */
+    int32_t moved_count, track_count;
+    drape_track *tracks;
+    int64_t internal_count, measure_count;
+    bool has_laws;        /* some term needs the rates of measures */
+    bool has_dissipation; /* some term takes energy out */
+    drape_pattern pattern;
+    double length;     /* diagonal of the rest bounding box [m], > 0 */
+    double gravity[3]; /* [m/s2] */
+    drape_choice integrator, controller;
+    double duration, frame_rate;
+    char **formats;
+    size_t format_count;
+};
+
+/* Writes the positions that tracks give pinned nodes at time t; other entries of x (node_count x 3) stay. */
+void drape_model_place_pins(const drape_model *model, double t, double *x);
+
+/* The cloth that a node belongs to. */
+int32_t drape_model_cloth_of(const drape_model *model, int32_t node);
+
+#endif

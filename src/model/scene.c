@@ -1,0 +1,590 @@
+/* scene.c: the scene object: a text, its JSON tree, and what was set in the tree since. */
+#include "model/scene.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "model/scene_json.h"
+#include "model/scene_text.h"
+
+#define LARGEST_FILE                                                                                         \
+    ((size_t)1 << 30) /* jansson counts in int, and its tree takes some ten times the text                   \
+                       */
+#define FIRST_READ   ((size_t)1 << 16)
+#define LONGEST_NAME 300 /* of a file in messages */
+#define LONGEST_SET  80  /* of a value in messages, in "--set /pointer=value" */
+#define LOAD_FLAGS                                                                                           \
+    (JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL) /* integers beyond int64 are numbers too */
+
+/* A value that drape_scene_set gave. */
+typedef struct override {
+    struct override *before;
+    char *pointer; /* of the value, with an index where "-" appended */
+    char *shown;   /* "--set /integrator/dt=-1" */
+} override;
+
+struct drape_scene {
+    drape_context *ctx;
+    char *text;       /* as it was read */
+    char *name;       /* of the text in messages, one line */
+    char *folder;     /* of mesh files; NULL: the working directory */
+    json_t *root;     /* an object */
+    override *last;   /* the latest of the overrides */
+    drape_arena kept; /* name, folder, overrides */
+    drape_arena defs; /* arrays of the last drape_scene_to_def */
+};
+
+/* ---- Making and freeing ------------------------------------------------------------------------------ */
+
+void drape_scene_destroy(drape_scene **scene)
+{
+    if (!scene || !*scene)
+        return;
+    drape_scene *s = *scene;
+    json_decref(s->root);
+    drape_arena_free(&s->defs, s->ctx);
+    drape_arena_free(&s->kept, s->ctx);
+    drape_free(s->ctx, s->text);
+    drape_free(s->ctx, s);
+    *scene = NULL;
+}
+
+drape_context *drape_scene_context(drape_scene *scene)
+{
+    return scene->ctx;
+}
+
+/* Messages are one line, and a place must leave room for what is said of it: of a long path the end is kept.
+ */
+static char *shown_name(drape_scene *scene, const char *name)
+{
+    size_t length = strlen(name);
+    char text[LONGEST_NAME + 4];
+    const char *end = length > LONGEST_NAME ? name + length - LONGEST_NAME : name;
+    while (end > name && ((unsigned char)*end & 0xC0) == 0x80)
+        end++;
+    snprintf(text, sizeof text, "%s%s", end > name ? "..." : "", end);
+    for (char *p = text; *p; p++)
+        if ((unsigned char)*p < ' ' || *p == 127)
+            *p = '?';
+    return drape_arena_text(&scene->kept, scene->ctx, text);
+}
+
+/* "a/b.json" -> "a", "/b.json" -> "/", "b.json" -> NULL. */
+static drape_status keep_folder(drape_scene *scene, const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    if (!slash)
+        return DRAPE_OK;
+    scene->folder = drape_arena_text(&scene->kept, scene->ctx, path);
+    if (!scene->folder)
+        return DRAPE_E_MEMORY;
+    scene->folder[slash == path ? 1 : slash - path] = 0;
+    return DRAPE_OK;
+}
+
+static drape_status new_scene(drape_context *ctx, const char *name, drape_scene **out)
+{
+    drape_scene *scene = drape_alloc(ctx, 1, sizeof *scene);
+    if (!scene)
+        return DRAPE_E_MEMORY;
+    scene->ctx = ctx;
+    scene->name = shown_name(scene, name);
+    if (!scene->name)
+        drape_scene_destroy(&scene);
+    *out = scene;
+    return scene ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+/* ---- Reading a file ---------------------------------------------------------------------------------- */
+
+static drape_status cannot_read(drape_scene *scene, const char *why)
+{
+    return drape_fail(scene->ctx, DRAPE_E_FILE, "%s: cannot read the scene: %s", scene->name, why);
+}
+
+/* Twice the room, keeping used bytes. */
+static drape_status grow(drape_scene *scene, size_t used, size_t *room)
+{
+    char *larger = drape_alloc(scene->ctx, 2 * *room + 1, 1);
+    if (!larger)
+        return DRAPE_E_MEMORY;
+    memcpy(larger, scene->text, used);
+    drape_free(scene->ctx, scene->text);
+    scene->text = larger;
+    *room *= 2;
+    return DRAPE_OK;
+}
+
+/* Reads to the end: what a pipe holds is known only then, and a file may grow while it is read. */
+static drape_status read_all(drape_scene *scene, FILE *file, size_t room, size_t *size)
+{
+    *size = 0;
+    scene->text = drape_alloc(scene->ctx, room + 1, 1);
+    drape_status status = scene->text ? DRAPE_OK : DRAPE_E_MEMORY;
+    while (!status && !feof(file)) {
+        if (*size == room)
+            status = grow(scene, *size, &room);
+        if (status)
+            break;
+        errno = 0;
+        *size += fread(scene->text + *size, 1, room - *size, file);
+        if (ferror(file))
+            status = cannot_read(scene, strerror(errno));
+        else if (*size > LARGEST_FILE)
+            status = cannot_read(scene, "it is larger than 1 GiB");
+    }
+    if (!status)
+        scene->text[*size] = 0;
+    return status;
+}
+
+static drape_status read_file(drape_scene *scene, const char *path, size_t *size)
+{
+    struct stat info;
+    FILE *file = fopen(path, "rb");
+    if (!file)
+        return cannot_read(scene, strerror(errno));
+    drape_status status = DRAPE_OK;
+    size_t room = FIRST_READ;
+    if (fstat(fileno(file), &info) == 0) {
+        if (S_ISDIR(info.st_mode))
+            status = cannot_read(scene, "it is a folder");
+        else if (S_ISREG(info.st_mode) && info.st_size > (off_t)LARGEST_FILE)
+            status = cannot_read(scene, "it is larger than 1 GiB");
+        else if (S_ISREG(info.st_mode))
+            room = (size_t)info.st_size + 1; /* one more, so that its end is seen without growing */
+    }
+    if (!status)
+        status = read_all(scene, file, room, size);
+    fclose(file);
+    return status;
+}
+
+/* ---- Parsing ----------------------------------------------------------------------------------------- */
+
+static drape_status parse_fault(drape_scene *scene, size_t offset, const char *what)
+{
+    size_t line, column;
+    drape_text_place(scene->text, offset, &line, &column);
+    return drape_fail(scene->ctx, DRAPE_E_PARSE, "%s:%zu:%zu: %s", scene->name, line, column, what);
+}
+
+/* jansson's message at the token that it is about. */
+static drape_status syntax_fault(drape_scene *scene, json_error_t *error)
+{
+    size_t consumed = (size_t)error->position;
+    bool at_end = strstr(error->text, "near end of file") != NULL;
+    char what[80];
+    switch (json_error_code(error)) {
+    case json_error_invalid_utf8:
+        snprintf(what, sizeof what, "byte 0x%02x is not UTF-8", (unsigned char)scene->text[consumed]);
+        return parse_fault(scene, consumed, what);
+    case json_error_null_character:
+        return parse_fault(scene, drape_text_token(scene->text, consumed, false), "\\u0000 is not allowed");
+    case json_error_stack_overflow:
+        return parse_fault(scene, drape_text_token(scene->text, consumed, false), "nested too deeply");
+    case json_error_out_of_memory:
+        return drape_fail_memory(scene->ctx, consumed);
+    default:
+        break;
+    }
+    const char *text = error->text;
+    if (!*text)
+        return drape_fail_memory(scene->ctx, consumed);
+    if (strncmp(text, "'[' or ", 7) == 0) /* what jansson takes at the top, and a scene does not */
+        text += 7;
+    drape_text_mend_end(error->text);
+    return parse_fault(scene, drape_text_token(scene->text, consumed, at_end), text);
+}
+
+static drape_status parse_blanked(drape_scene *scene, char *blanked, size_t size)
+{
+    json_error_t error;
+    size_t offset;
+    if (!drape_text_blank_comments(blanked, &offset))
+        return parse_fault(scene, offset, "this comment is not closed");
+    if (blanked[strspn(blanked, " \t\r\n")] == 0)
+        return drape_fail(scene->ctx, DRAPE_E_PARSE, "%s: the scene is empty", scene->name);
+    scene->root = json_loadb(blanked, size, LOAD_FLAGS, &error);
+    if (!scene->root)
+        return syntax_fault(scene, &error);
+    if (!json_is_object(scene->root)) {
+        drape_text_find(scene->text, "", &offset);
+        return parse_fault(scene, offset, "a scene is an object, {...}");
+    }
+    return DRAPE_OK;
+}
+
+static drape_status parse_text(drape_scene *scene, size_t size)
+{
+    const char *zero = memchr(scene->text, 0, size);
+    if (zero)
+        return parse_fault(scene, (size_t)(zero - scene->text), "byte 0x00 is not allowed in a scene");
+    if (size > LARGEST_FILE)
+        return drape_fail(scene->ctx, DRAPE_E_PARSE, "%s: the scene is larger than 1 GiB", scene->name);
+    char *blanked = drape_copy_text(scene->ctx, scene->text);
+    if (!blanked)
+        return DRAPE_E_MEMORY;
+    drape_status status = parse_blanked(scene, blanked, size);
+    drape_free(scene->ctx, blanked);
+    return status;
+}
+
+/* Hands out the scene, or frees it. */
+static drape_status finish(drape_scene *scene, drape_status status, drape_scene **out)
+{
+    if (status)
+        drape_scene_destroy(&scene);
+    *out = scene;
+    return status;
+}
+
+drape_status drape_scene_load(drape_context *ctx, const char *path, drape_scene **out)
+{
+    drape_scene *scene = NULL;
+    size_t size = 0;
+    if (out)
+        *out = NULL;
+    if (!ctx)
+        return DRAPE_E_ARGUMENT;
+    if (!path || !out)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_scene_load: path and out are needed");
+    locale_t old = drape_locale_enter();
+    drape_status status = new_scene(ctx, path, &scene);
+    if (!status)
+        status = keep_folder(scene, path);
+    if (!status)
+        status = read_file(scene, path, &size);
+    if (!status)
+        status = parse_text(scene, size);
+    drape_locale_leave(old);
+    return finish(scene, status, out);
+}
+
+drape_status drape_scene_parse(drape_context *ctx, const char *text, const char *name, drape_scene **out)
+{
+    drape_scene *scene = NULL;
+    if (out)
+        *out = NULL;
+    if (!ctx)
+        return DRAPE_E_ARGUMENT;
+    if (!text || !out)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_scene_parse: text and out are needed");
+    locale_t old = drape_locale_enter();
+    drape_status status = new_scene(ctx, name ? name : "scene", &scene);
+    if (!status) {
+        scene->text = drape_copy_text(ctx, text);
+        status = scene->text ? parse_text(scene, strlen(text)) : DRAPE_E_MEMORY;
+    }
+    drape_locale_leave(old);
+    return finish(scene, status, out);
+}
+
+/* ---- Setting values ---------------------------------------------------------------------------------- */
+
+/* Where a pointer leads to in the tree. */
+typedef struct landing {
+    json_t *container;            /* of the last key, or of the first that is not there */
+    char key[DRAPE_POINTER_SIZE]; /* that key */
+    const char *rest;             /* what follows it in the pointer */
+    drape_pointer path;           /* the pointer up to the key, with an index where "-" appends */
+} landing;
+
+static drape_status cannot_set(drape_scene *scene, const char *pointer, const char *at, const char *why)
+{
+    return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "cannot set %s: %s%s%s", pointer, *at ? at : "the scene",
+                      *why ? " " : "", why);
+}
+
+/* 1 text is UTF-8, 0 it is not, -1 no memory: jansson says NULL to both. */
+static int is_utf8(const char *text)
+{
+    json_t *checked = json_string(text), *any = json_string_nocheck(text);
+    int answer = checked ? 1 : any ? 0 : -1;
+    json_decref(checked);
+    json_decref(any);
+    return answer;
+}
+
+static drape_status check_pointer(drape_scene *scene, const char *pointer)
+{
+    char key[DRAPE_POINTER_SIZE];
+    const char *rest = pointer;
+    int utf8 = is_utf8(pointer);
+    if (utf8 < 0)
+        return drape_fail_memory(scene->ctx, strlen(pointer));
+    if (!utf8)
+        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "a JSON pointer is UTF-8, this one is not");
+    if (strlen(pointer) >= DRAPE_POINTER_SIZE)
+        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "a JSON pointer of %zu bytes is too long; at most %d",
+                          strlen(pointer), DRAPE_POINTER_SIZE - 1);
+    while (*rest) {
+        rest = drape_pointer_next(rest, key);
+        if (!rest)
+            return drape_fail(scene->ctx, DRAPE_E_ARGUMENT,
+                              "\"%s\" is not a JSON pointer, as \"/integrator/dt\" is one%s", pointer,
+                              *pointer == '/' ? "; in it ~ is written ~0" : "");
+    }
+    return DRAPE_OK;
+}
+
+/* The JSON value that a text says, else the text as a string. */
+static drape_status parse_value(drape_scene *scene, const char *text, json_t **value)
+{
+    json_error_t error;
+    *value = json_loads(text, LOAD_FLAGS | JSON_DECODE_ANY, &error);
+    if (*value)
+        return DRAPE_OK;
+    int utf8 = is_utf8(text);
+    if (utf8 == 0)
+        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "a value is UTF-8, this one is not");
+    bool no_memory = !*error.text || json_error_code(&error) == json_error_out_of_memory;
+    *value = no_memory ? NULL : json_string(text);
+    return *value ? DRAPE_OK : drape_fail_memory(scene->ctx, strlen(text));
+}
+
+/* The element of an array that a key names; *element stays NULL for "-". */
+static drape_status find_element(drape_scene *scene, const char *pointer, const landing *at, json_t **element)
+{
+    size_t index, size = json_array_size(at->container);
+    char why[80];
+    if (strcmp(at->key, "-") == 0)
+        return DRAPE_OK;
+    if (!drape_pointer_index(at->key, &index))
+        return cannot_set(scene, pointer, at->path.text,
+                          "is an array: its elements have numbers, \"-\" appends");
+    *element = json_array_get(at->container, index);
+    if (*element)
+        return DRAPE_OK;
+    snprintf(why, sizeof why, "is an array of %zu; \"-\" appends", size);
+    return cannot_set(scene, pointer, at->path.text, why);
+}
+
+static drape_status find_child(drape_scene *scene, const char *pointer, const landing *at, json_t **child)
+{
+    char given[80], why[120];
+    *child = NULL;
+    if (json_is_array(at->container))
+        return find_element(scene, pointer, at, child);
+    if (json_is_object(at->container)) {
+        *child = json_object_get(at->container, at->key);
+        return DRAPE_OK;
+    }
+    drape_json_describe(at->container, given, sizeof given);
+    snprintf(why, sizeof why, "is %s, no object or array", given);
+    return cannot_set(scene, pointer, at->path.text, why);
+}
+
+static void extend_path(landing *at)
+{
+    if (json_is_array(at->container) && strcmp(at->key, "-") == 0)
+        drape_pointer_push_index(&at->path, json_array_size(at->container));
+    else
+        drape_pointer_push(&at->path, at->key);
+}
+
+/* Follows a pointer, which is not empty, as far as it leads; changes nothing. */
+static drape_status land(drape_scene *scene, const char *pointer, landing *at)
+{
+    json_t *child = scene->root;
+    at->rest = pointer;
+    do {
+        at->container = child;
+        at->rest = drape_pointer_next(at->rest, at->key);
+        drape_status status = find_child(scene, pointer, at, &child);
+        if (status)
+            return status;
+        extend_path(at);
+    } while (child && *at->rest);
+    return DRAPE_OK;
+}
+
+/* Puts a value, which it takes over, into a container; -1: no memory. */
+static int put(json_t *container, const char *key, json_t *value)
+{
+    size_t index;
+    if (json_is_object(container))
+        return json_object_set_new(container, key, value);
+    return drape_pointer_index(key, &index) ? json_array_set_new(container, index, value)
+                                            : json_array_append_new(container, value);
+}
+
+/* The value, which it takes over, inside of what the keys of `rest` stand for, made from the inside out: "-"
+ * is an element of an array, others are members of objects. NULL: no memory. */
+static json_t *wrap(const char *rest, json_t *value)
+{
+    char left[DRAPE_POINTER_SIZE], key[DRAPE_POINTER_SIZE];
+    snprintf(left, sizeof left, "%s", rest);
+    for (char *slash; value && (slash = strrchr(left, '/')); *slash = 0) {
+        drape_pointer_next(slash, key);
+        json_t *container = strcmp(key, "-") == 0 ? json_array() : json_object();
+        if (!container)
+            json_decref(value);
+        else if (put(container, key, value)) {
+            json_decref(container);
+            container = NULL;
+        }
+        value = container;
+    }
+    return value;
+}
+
+/* Remembers a value that is about to be set. */
+static drape_status new_override(drape_scene *scene, const char *path, const char *pointer, const char *text,
+                                 override **out)
+{
+    char some[LONGEST_SET + 1], shown[LONGEST_SET + DRAPE_POINTER_SIZE + 16];
+    snprintf(some, sizeof some, "%s", text);
+    drape_text_mend_end(some);
+    snprintf(shown, sizeof shown, "--set %s=%s%s", pointer, some, strlen(some) < strlen(text) ? "..." : "");
+    for (char *p = shown; *p; p++)
+        if ((unsigned char)*p < ' ' || *p == 127)
+            *p = ' ';
+    override *o = drape_arena_take(&scene->kept, scene->ctx, 1, sizeof *o);
+    if (!o || !(o->pointer = drape_arena_text(&scene->kept, scene->ctx, path)) ||
+        !(o->shown = drape_arena_text(&scene->kept, scene->ctx, shown)))
+        return DRAPE_E_MEMORY;
+    o->before = scene->last;
+    *out = o;
+    return DRAPE_OK;
+}
+
+/* Takes the value over. */
+static drape_status replace_root(drape_scene *scene, json_t *value)
+{
+    if (!json_is_object(value)) {
+        json_decref(value);
+        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "cannot set the whole scene to what is no object");
+    }
+    json_decref(scene->root);
+    scene->root = value;
+    return DRAPE_OK;
+}
+
+/* Takes the value over. */
+static drape_status insert(drape_scene *scene, landing *at, json_t *value)
+{
+    value = wrap(at->rest, value);
+    return value && put(at->container, at->key, value) == 0 ? DRAPE_OK : drape_fail_memory(scene->ctx, 1);
+}
+
+/* All that can fail but for memory comes before the first change. */
+static drape_status set_value(drape_scene *scene, const char *pointer, const char *text)
+{
+    landing at = {.container = NULL};
+    override *o = NULL;
+    json_t *value = NULL;
+    drape_status status = check_pointer(scene, pointer);
+    if (!status && *pointer)
+        status = land(scene, pointer, &at);
+    for (const char *rest = at.rest;
+         !status && rest && *rest;) { /* what is not there yet belongs to its place */
+        char key[DRAPE_POINTER_SIZE];
+        rest = drape_pointer_next(rest, key);
+        drape_pointer_push(&at.path, strcmp(key, "-") == 0 ? "0" : key);
+    }
+    if (!status)
+        status = new_override(scene, at.path.text, pointer, text, &o);
+    if (!status)
+        status = parse_value(scene, text, &value);
+    if (!status)
+        status = *pointer ? insert(scene, &at, value) : replace_root(scene, value);
+    if (!status)
+        scene->last = o;
+    return status;
+}
+
+drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char *value)
+{
+    if (!scene)
+        return DRAPE_E_ARGUMENT;
+    if (!pointer || !value)
+        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "drape_scene_set: pointer and value are needed");
+    locale_t old = drape_locale_enter();
+    drape_arena_free(&scene->defs, scene->ctx); /* the defs of before point into values that may go */
+    drape_status status = set_value(scene, pointer, value);
+    drape_locale_leave(old);
+    return status;
+}
+
+/* ---- Defs and faults --------------------------------------------------------------------------------- */
+
+drape_status drape_scene_to_def(drape_scene *scene, drape_scene_def *def)
+{
+    locale_t old = drape_locale_enter();
+    drape_arena_free(&scene->defs, scene->ctx);
+    drape_status status = drape_scene_read(scene->ctx, &scene->defs, scene->root, def);
+    def->folder = scene->folder;
+    drape_locale_leave(old);
+    if (status)
+        drape_scene_locate_fault(scene);
+    return status;
+}
+
+/* Whether a pointer is the other or leads to it. */
+static bool leads_to(const char *pointer, const char *other)
+{
+    size_t length = strlen(pointer);
+    return strncmp(pointer, other, length) == 0 && (other[length] == 0 || other[length] == '/');
+}
+
+static const override *override_above(const drape_scene *scene, const char *pointer)
+{
+    const override *o = scene->last;
+    while (o && !leads_to(o->pointer, pointer))
+        o = o->before;
+    return o;
+}
+
+/* What was set inside of the part of a pointer that the text does not have: the latest. */
+static const override *override_beside(const drape_scene *scene, const char *pointer)
+{
+    char missing[DRAPE_POINTER_SIZE];
+    size_t offset;
+    snprintf(missing, sizeof missing, "%s", pointer);
+    for (char *slash; (slash = strrchr(missing, '/'));) {
+        *slash = 0;
+        if (drape_text_find(scene->text, missing, &offset)) {
+            *slash = '/';
+            break;
+        }
+    }
+    const override *o = scene->last;
+    while (o && !leads_to(missing, o->pointer))
+        o = o->before;
+    return o;
+}
+
+/* A value is where it was set last; else where it is in the text; else, where something was set in what the
+ * text does not have; else, because it is missing, where its nearest ancestor is. */
+static void place_of(const drape_scene *scene, const char *pointer, char *place, size_t size)
+{
+    size_t offset, line, column;
+    const override *o = override_above(scene, pointer);
+    bool found = drape_text_find(scene->text, pointer, &offset);
+    if (!o && !found)
+        o = override_beside(scene, pointer);
+    drape_text_place(scene->text, offset, &line, &column);
+    if (!*pointer)
+        snprintf(place, size, "%s", scene->name);
+    else if (o)
+        snprintf(place, size, "%s", o->shown);
+    else
+        snprintf(place, size, "%s:%zu:%zu", scene->name, line, column);
+}
+
+void drape_scene_locate_fault(drape_scene *scene)
+{
+    drape_context *ctx = scene->ctx;
+    char place[DRAPE_MESSAGE_SIZE / 2];
+    locale_t old = drape_locale_enter();
+    place_of(scene, ctx->pointer, place, sizeof place);
+    int used = snprintf(ctx->message, sizeof ctx->message, "%s: %s%s", place, ctx->pointer,
+                        *ctx->pointer ? ": " : "");
+    snprintf(ctx->message + used, sizeof ctx->message - (size_t)used, "%s", ctx->text);
+    drape_text_mend_end(ctx->message);
+    drape_locale_leave(old);
+}

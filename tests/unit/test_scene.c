@@ -1,0 +1,1108 @@
+/* test_scene.c: the text of a scene becomes the right defs, or one line that says what is wrong and where. */
+#include <jansson.h>
+#include <locale.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "model/scene.h"
+#include "model/scene_text.h"
+#include "support/failing_allocator.h"
+#include "support/suite.h"
+
+static drape_context *ctx;
+static drape_scene *scene;
+static drape_scene_def def;
+
+static const char *message(void)
+{
+    return drape_context_message(ctx);
+}
+
+/* Texts of tests are written with ' for ", which C would have escaped. */
+static char *with_quotes(const char *text)
+{
+    static char quoted[1 << 16];
+    ck_assert_uint_lt(strlen(text), sizeof quoted);
+    strcpy(quoted, text);
+    for (char *p = quoted; *p; p++)
+        if (*p == '\'')
+            *p = '"';
+    return quoted;
+}
+
+/* Parses text and reads its defs. */
+static drape_status read_text(const char *text)
+{
+    drape_scene_destroy(&scene);
+    drape_status status = drape_scene_parse(ctx, text, "s.json", &scene);
+    ck_assert(!status == (scene != NULL));
+    return status ? status : drape_scene_to_def(scene, &def);
+}
+
+static drape_status read_quoted(const char *text)
+{
+    return read_text(with_quotes(text));
+}
+
+static void open_context(void)
+{
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+}
+
+static void close_context(void)
+{
+    drape_scene_destroy(&scene);
+    drape_context_destroy(&ctx);
+}
+
+static void check_one_line(const char *text)
+{
+    ck_assert(*text);
+    for (; *text; text++)
+        ck_assert_msg((unsigned char)*text >= ' ' && *text != 127, "control character %d", *text);
+}
+
+/* ---- Defs -------------------------------------------------------------------------------------------- */
+
+static const char example[] =
+    "{ 'drape': 1,\n"
+    "  'description': 'a sheet',\n"
+    "  'cloth': [{\n"
+    "    'name': 'sheet',\n"
+    "    'mesh': {'grid': 'equilateral', 'edges': 22, 'edge_length': 0.05},\n"
+    "    'material': {'young_modulus': 1e6, 'poisson_ratio': 0.3, 'thickness': 1e-3, 'density': 200},\n"
+    "    'terms': ['stretch.edge', {'type': 'bend.hinge', 'stiffness': 'report'},\n"
+    "              {'type': 'damp.kelvin_voigt', 'beta': 1e-3}],\n"
+    "    'pins': [{'nodes': [0, 506]}, {'corner': 'top-left'},\n"
+    "             {'row': 0, 'track': [[0, [0,0,0]], [1, [0,0.2,0]]]}],\n"
+    "    'velocity': [0, 0, 0.25] }],\n"
+    "  'gravity': [0, -9.81, 0],\n"
+    "  'integrator': {'method': 'ida', 'dt': 0.01, 'tolerance': 1e-6, 'max_iterations': 50,\n"
+    "                 'linear_solver': 'klu', 'accept': true},\n"
+    "  'controller': {'type': 'fixed', 'dt_min': 1e-7},\n"
+    "  'duration': 5, 'frame_rate': 30,\n"
+    "  'output': {'formats': ['npy', 'obj']} }\n";
+
+static void check_setting(const drape_setting *setting, const char *name, double number, const char *text)
+{
+    ck_assert_str_eq(setting->name, name);
+    ck_assert_double_eq(setting->number, number);
+    ck_assert_pstr_eq(setting->text, text);
+}
+
+static void check_vector(const double *vector, double x, double y, double z)
+{
+    ck_assert_double_eq(vector[0], x);
+    ck_assert_double_eq(vector[1], y);
+    ck_assert_double_eq(vector[2], z);
+}
+
+START_TEST(test_example_scene)
+{
+    open_context();
+    ck_assert_msg(read_quoted(example) == DRAPE_OK, "%s", message());
+    ck_assert_uint_eq(def.struct_size, sizeof def);
+    check_vector(def.gravity, 0, -9.81, 0);
+    ck_assert_double_eq(def.duration, 5);
+    ck_assert_double_eq(def.frame_rate, 30);
+    ck_assert_ptr_null(def.folder);
+    ck_assert_uint_eq(def.format_count, 2);
+    ck_assert_str_eq(def.formats[0], "npy");
+    ck_assert_str_eq(def.formats[1], "obj");
+    ck_assert_str_eq(def.integrator.type, "ida");
+    ck_assert_uint_eq(def.integrator.setting_count, 5);
+    check_setting(&def.integrator.settings[0], "dt", 0.01, NULL);
+    check_setting(&def.integrator.settings[2], "max_iterations", 50, NULL);
+    check_setting(&def.integrator.settings[3], "linear_solver", 0, "klu");
+    check_setting(&def.integrator.settings[4], "accept", 1, NULL);
+    ck_assert_str_eq(def.controller.type, "fixed");
+    check_setting(&def.controller.settings[0], "dt_min", 1e-7, NULL);
+    close_context();
+}
+END_TEST
+
+START_TEST(test_example_cloth)
+{
+    open_context();
+    ck_assert_int_eq(read_quoted(example), DRAPE_OK);
+    ck_assert_uint_eq(def.cloth_count, 1);
+    const drape_cloth_def *cloth = &def.cloths[0];
+    ck_assert_str_eq(cloth->name, "sheet");
+    ck_assert_str_eq(cloth->mesh.grid.type, "equilateral");
+    ck_assert_uint_eq(cloth->mesh.grid.setting_count, 2);
+    check_setting(&cloth->mesh.grid.settings[0], "edges", 22, NULL);
+    check_setting(&cloth->mesh.grid.settings[1], "edge_length", 0.05, NULL);
+    ck_assert_ptr_null(cloth->mesh.file);
+    check_vector(cloth->mesh.scale, 1, 1, 1);
+    ck_assert_uint_eq(cloth->material_count, 4);
+    check_setting(&cloth->material[3], "density", 200, NULL);
+    ck_assert_uint_eq(cloth->term_count, 3);
+    ck_assert_str_eq(cloth->terms[0].type, "stretch.edge");
+    ck_assert_uint_eq(cloth->terms[0].setting_count, 0);
+    ck_assert_str_eq(cloth->terms[1].type, "bend.hinge");
+    check_setting(&cloth->terms[1].settings[0], "stiffness", 0, "report");
+    check_setting(&cloth->terms[2].settings[0], "beta", 1e-3, NULL);
+    check_vector(cloth->velocity, 0, 0, 0.25);
+    close_context();
+}
+END_TEST
+
+START_TEST(test_example_pins)
+{
+    open_context();
+    ck_assert_int_eq(read_quoted(example), DRAPE_OK);
+    const drape_pin_def *pins = def.cloths[0].pins;
+    ck_assert_uint_eq(def.cloths[0].pin_count, 3);
+    ck_assert_uint_eq(pins[0].node_count, 2);
+    ck_assert_int_eq(pins[0].nodes[1], 506);
+    ck_assert_int_eq(pins[0].row, -1);
+    ck_assert_ptr_null(pins[0].corner);
+    ck_assert_uint_eq(pins[0].key_count, 0);
+    ck_assert_str_eq(pins[1].corner, "top-left");
+    ck_assert_int_eq(pins[1].row, -1);
+    ck_assert_int_eq(pins[2].row, 0);
+    ck_assert_uint_eq(pins[2].key_count, 2);
+    ck_assert_double_eq(pins[2].track[1].time, 1);
+    check_vector(pins[2].track[1].displacement, 0, 0.2, 0);
+    close_context();
+}
+END_TEST
+
+#define MESH_SCENE(mesh)       "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': " mesh "}]}"
+#define TRANSFORMED(transform) MESH_SCENE("{'file': 'a/b.obj', 'transform': {" transform "}}")
+
+START_TEST(test_transforms)
+{
+    open_context();
+    ck_assert_int_eq(read_quoted(TRANSFORMED("'translate': [1, 2, 3], 'rotate': [0, 1, 0, 90], 'scale': 2")),
+                     0);
+    const drape_mesh_def *mesh = &def.cloths[0].mesh;
+    ck_assert_str_eq(mesh->file, "a/b.obj");
+    ck_assert_ptr_null(mesh->grid.type);
+    check_vector(mesh->translate, 1, 2, 3);
+    check_vector(mesh->rotate, 0, 1, 0);
+    ck_assert_double_eq(mesh->rotate[3], 90);
+    check_vector(mesh->scale, 2, 2, 2);
+    ck_assert_int_eq(read_quoted(TRANSFORMED("'rotate': [0, -30, 40], 'scale': [1, -2, 1e-3]")), 0);
+    mesh = &def.cloths[0].mesh;
+    check_vector(mesh->rotate, 0, -30, 40);
+    ck_assert_double_eq(mesh->rotate[3], 50);
+    check_vector(mesh->scale, 1, -2, 1e-3);
+    ck_assert_int_eq(read_quoted(TRANSFORMED("'rotate': [0, 0, 0]")), 0);
+    ck_assert_double_eq(def.cloths[0].mesh.rotate[3], 0);
+    close_context();
+}
+END_TEST
+
+START_TEST(test_defaults)
+{
+    open_context();
+    ck_assert_int_eq(
+        read_quoted("{'drape': 1, 'duration': 1e9, 'cloth': [{'mesh': {'grid': 'g'}, 'pins': [], "
+                    "'terms': []}], 'integrator': {'dt': -0}}"),
+        DRAPE_OK);
+    check_vector(def.gravity, 0, -9.81, 0);
+    ck_assert_double_eq(def.frame_rate, 60);
+    ck_assert_str_eq(def.integrator.type, "be");
+    check_setting(&def.integrator.settings[0], "dt", -0.0, NULL);
+    ck_assert_str_eq(def.controller.type, "halving");
+    ck_assert_uint_eq(def.controller.setting_count, 0);
+    ck_assert_uint_eq(def.format_count, 0);
+    ck_assert_ptr_null(def.cloths[0].name);
+    ck_assert_uint_eq(def.cloths[0].pin_count + def.cloths[0].term_count + def.cloths[0].material_count, 0);
+    close_context();
+}
+END_TEST
+
+START_TEST(test_numbers)
+{
+    open_context();
+    ck_assert_int_eq(
+        read_quoted("{'drape': 1.0, 'duration': 5, 'cloth': [{'mesh': {'grid': 'g'}, 'material': "
+                    "{'a': 1e308, 'b': 9007199254740993, 'c': 123456789012345678901234567890, "
+                    "'d': -0.0, 'e': 4e-324, 'f': 1e-999, 'g': false},"
+                    "'pins': [{'nodes': [2147483647, 3.0, 0]}, {'box': [[-1, 0, 2.5], [1, 1, 3]]}]}]}"),
+        DRAPE_OK);
+    const double values[] = {1e308, 9007199254740992.0, 123456789012345678901234567890.0, -0.0, 4e-324, 0, 0};
+    for (size_t i = 0; i < 7; i++)
+        ck_assert_double_eq(def.cloths[0].material[i].number, values[i]);
+    const drape_pin_def *pins = def.cloths[0].pins;
+    ck_assert_int_eq(pins[0].nodes[0], INT32_MAX);
+    ck_assert_int_eq(pins[0].nodes[1], 3);
+    ck_assert(pins[1].has_box && !pins[0].has_box);
+    check_vector(pins[1].box_min, -1, 0, 2.5);
+    check_vector(pins[1].box_max, 1, 1, 3);
+    close_context();
+}
+END_TEST
+
+/* A caller of an older header has shorter structs: nothing beyond them is written. */
+START_TEST(test_def_sizes)
+{
+    struct {
+        drape_scene_def def;
+        char beyond;
+    } longer;
+    memset(&def, 7, sizeof def);
+    drape_scene_def_init(&def, offsetof(drape_scene_def, duration));
+    ck_assert_uint_eq(def.struct_size, offsetof(drape_scene_def, duration));
+    ck_assert_str_eq(def.controller.type, "halving");
+    ck_assert_int_eq(*(unsigned char *)&def.duration, 7);
+    memset(&longer, 7, sizeof longer);
+    drape_scene_def_init(&longer.def, sizeof longer);
+    ck_assert_uint_eq(longer.def.struct_size, sizeof longer);
+    ck_assert_int_eq(longer.beyond, 0);
+    drape_cloth_def cloth;
+    drape_cloth_def_init(&cloth, sizeof cloth);
+    check_vector(cloth.mesh.scale, 1, 1, 1);
+    drape_pin_def_init(NULL, sizeof(drape_pin_def));
+}
+END_TEST
+
+/* ---- Comments ---------------------------------------------------------------------------------------- */
+
+START_TEST(test_comments)
+{
+    open_context();
+    ck_assert_int_eq(read_quoted("\xEF\xBB\xBF// first\r\n{/**/'drape'/* a * / ' */: 1, // 'drape': 2\r\n"
+                                 "'description': 'no // comment, /* nor \\' here */',\n"
+                                 "'duration': 2/* \xff */,'cloth':[{'mesh':{'grid':'//'}}]} // last"),
+                     DRAPE_OK);
+    ck_assert_double_eq(def.duration, 2);
+    ck_assert_str_eq(def.cloths[0].mesh.grid.type, "//");
+    close_context();
+}
+END_TEST
+
+/* ---- Places ------------------------------------------------------------------------------------------ */
+
+static const char places[] =
+    "// \xC3\xA9\n"
+    "{ 'drape': 1, /* two\n"
+    "lines \xC3\xA9\xC3\xA9 */ 'duration': 1,\t'cl\\u006fth': [{'mesh': {'grid': 'g', 'n': 1}, 'pins': [\n"
+    "    {'row': 0},\n"
+    "    /* \xF0\x9F\x99\x82 */ {'nodes': [1, 2,3 , 4]} ]},{'name':'\xC3\xA9 \\\\', 'x/y~': {'': [[], "
+    "[[7]]]}}]}";
+
+static const struct {
+    const char *pointer;
+    bool found;
+    size_t line, column;
+} place_table[] = {
+    {"", true, 2, 1},
+    {"/drape", true, 2, 3},
+    {"/duration", true, 3, 13},
+    {"/cloth", true, 3, 28},
+    {"/cloth/0", true, 3, 43},
+    {"/cloth/0/mesh", true, 3, 44},
+    {"/cloth/0/mesh/grid", true, 3, 53},
+    {"/cloth/0/mesh/n", true, 3, 66},
+    {"/cloth/0/pins", true, 3, 75},
+    {"/cloth/0/pins/0", true, 4, 5},
+    {"/cloth/0/pins/0/row", true, 4, 6},
+    {"/cloth/0/pins/1", true, 5, 13},
+    {"/cloth/0/pins/1/nodes", true, 5, 14},
+    {"/cloth/0/pins/1/nodes/0", true, 5, 24},
+    {"/cloth/0/pins/1/nodes/2", true, 5, 29},
+    {"/cloth/0/pins/1/nodes/3", true, 5, 33},
+    {"/cloth/1", true, 5, 40},
+    {"/cloth/1/name", true, 5, 41},
+    {"/cloth/1/x~1y~0", true, 5, 56},
+    {"/cloth/1/x~1y~0/", true, 5, 65},
+    {"/cloth/1/x~1y~0//1/0/0", true, 5, 76},
+    {"/gravity", false, 2, 1},
+    {"/cloth/0/mesh/edges", false, 3, 44},
+    {"/cloth/0/pins/1/track/0", false, 5, 13},
+    {"/cloth/0/pins/1/nodes/4", false, 5, 14},
+    {"/cloth/0/pins/1/nodes/-", false, 5, 14},
+    {"/cloth/0/pins/1/nodes/01", false, 5, 14},
+    {"/cloth/2", false, 3, 28},
+    {"/drape/x", false, 2, 3},
+    {"/cloth/1/x~2", false, 5, 40},
+    {"drape", false, 2, 1},
+};
+
+START_TEST(test_places)
+{
+    for (size_t i = 0; i < sizeof place_table / sizeof *place_table; i++) {
+        const char *text = with_quotes(places);
+        size_t offset, line, column;
+        bool found = drape_text_find(text, place_table[i].pointer, &offset);
+        drape_text_place(text, offset, &line, &column);
+        ck_assert_msg(found == place_table[i].found && line == place_table[i].line &&
+                          column == place_table[i].column,
+                      "%s: found %d at %zu:%zu", place_table[i].pointer, found, line, column);
+    }
+}
+END_TEST
+
+START_TEST(test_mend_end)
+{
+    const struct {
+        const char *text, *mended;
+    } table[] = {{"", ""},
+                 {"a", "a"},
+                 {"\xC3\xA9", "\xC3\xA9"},
+                 {"a\xC3", "a"},
+                 {"a\xE2\x82", "a"},
+                 {"a\xF0\x9F\x99", "a"},
+                 {"\xC3", ""},
+                 {"\xF0\x9F\x99\x82", "\xF0\x9F\x99\x82"}};
+    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
+        char text[16];
+        strcpy(text, table[i].text);
+        drape_text_mend_end(text);
+        ck_assert_str_eq(text, table[i].mended);
+    }
+}
+END_TEST
+
+/* ---- Wrong scenes ------------------------------------------------------------------------------------ */
+
+/* What is wrong stands in line 2. */
+#define ROOT(members)  "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g'}}],\n" members "}"
+#define CLOTH(members) "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g'},\n" members "}]}"
+#define MESH(mesh)     "{'drape': 1, 'duration': 1, 'cloth': [{'mesh':\n" mesh "}]}"
+
+static const struct {
+    const char *text, *message;
+} wrong_scenes[] = {
+    /* syntax */
+    {"", "s.json: the scene is empty"},
+    {"  \n", "s.json: the scene is empty"},
+    {"'text'", "s.json:1:1: '{' expected near '\"text\"'"},
+    {"[1, 2]", "s.json:1:1: a scene is an object, {...}"},
+    {"{'drape': 1", "s.json:1:12: '}' expected near end of file"},
+    {"{'drape': 1\n", "s.json:1:12: '}' expected near end of file"},
+    {"{'drape': 1,}", "s.json:1:13: string or '}' expected near '}'"},
+    {"{'drape': 1 'duration': 1}", "s.json:1:13: '}' expected near '\"duration\"'"},
+    {"{'drape' 1}", "s.json:1:10: ':' expected near '1'"},
+    {"{drape: 1}", "s.json:1:2: string or '}' expected near 'drape'"},
+    {"{'drape': 1}\n}", "s.json:2:1: end of file expected near '}'"},
+    {"{'drape': 1, 'drape': 1}", "s.json:1:14: duplicate object key near '\"drape\"'"},
+    {"{'drape': NaN}", "s.json:1:11: invalid token near 'NaN'"},
+    {"{'drape': -Infinity}", "s.json:1:11: invalid token near '-'"},
+    {"{'drape': 01}", "s.json:1:11: invalid token near '0'"},
+    {"{'drape': +1}", "s.json:1:11: invalid token near '+'"},
+    {"{'drape': 1.}", "s.json:1:11: invalid token near '1.'"},
+    {"{'drape': 1,\n 'duration': 1e999}", "s.json:2:14: real number overflow near '1e999'"},
+    {"{'drape': 'one\n}", "s.json:1:11: unexpected newline near '\"one'"},
+    {"{'drape': 'one", "s.json:1:11: premature end of input near '\"one'"},
+    {"{'drape': '\\q'}", "s.json:1:11: invalid escape near '\"\\q'"},
+    {"{'description': 'a\\u0000b'}", "s.json:1:17: \\u0000 is not allowed"},
+    {"{'description': '\\ud800'}", "s.json:1:17: invalid Unicode '\\uD800' near '\"\\ud800\"'"},
+    {"{'description': '\tb'}", "s.json:1:17: control character 0x9 near '\"'"},
+    {"{'description': 'ab\xff'}", "s.json:1:20: byte 0xff is not UTF-8"},
+    {"{'description': '\xc3\xa9\xc0\x80"
+     "'}",
+     "s.json:1:19: byte 0xc0 is not UTF-8"},
+    {"{ /* open\n 'drape': 1}", "s.json:1:3: this comment is not closed"},
+    {"{'drape': 1 /}", "s.json:1:13: '}' expected near '/'"},
+    {"{'drape': nul}", "s.json:1:11: invalid token near 'nul'"},
+    {"{'drape': True}", "s.json:1:11: invalid token near 'True'"},
+    {"\xff\xfe"
+     "{",
+     "s.json:1:1: byte 0xff is not UTF-8"},
+    {"{'drape': [1, 2}", "s.json:1:16: ']' expected near '}'"},
+    {"// only a remark", "s.json: the scene is empty"},
+    /* the scene */
+    {"{}", "s.json:1:1: /drape: \"drape\" is missing: the version of this form of scenes; the number 1"},
+    {"{'drape': 2, 'newer': 1}", "s.json:1:2: /drape: a scene of version 2; this library reads version 1"},
+    {"{'drape': '1'}", "s.json:1:2: /drape: \"1\" is not allowed; drape is the number 1"},
+    {"{'drape': null}", "s.json:1:2: /drape: null is not allowed; drape is the number 1"},
+    {"{'drape': 1}",
+     "s.json:1:1: /cloth: \"cloth\" is missing: the pieces of cloth; an array of objects, at least one"},
+    {"{'drape': 1, 'cloth': []}",
+     "s.json:1:14: /cloth: an empty array is not allowed; cloth is an array of objects, at least one"},
+    {"{'drape': 1, 'cloth': {}}",
+     "s.json:1:14: /cloth: an object is not allowed; cloth is an array of objects, at least one"},
+    {"{'drape': 1, 'cloth': [{'mesh': {'grid': 'g'}}]}",
+     "s.json:1:1: /duration: \"duration\" is missing: the simulated time; a number in (0, 1000000000] s"},
+    {"{'drape': 1, 'cloth': [1]}", "s.json:1:24: /cloth/0: 1 is not allowed; an element is an object"},
+    {"{'drape': 1, 'cloth': [{}]}",
+     "s.json:1:24: /cloth/0/mesh: \"mesh\" is missing: a grid or a file; an object"},
+    {"{'drape': 1, 'durration': 1}",
+     "s.json:1:14: /durration: unknown key \"durration\"; did you mean \"duration\"?"},
+    {ROOT("'colliders': []"), "s.json:2:1: /colliders: unknown key \"colliders\"; known: drape, description, "
+                              "cloth, gravity, integrator, controller, duration, frame_rate, output"},
+    {ROOT("'self_contact': {}"),
+     "s.json:2:1: /self_contact: unknown key \"self_contact\"; known: drape, description, cloth, gravity, "
+     "integrator, controller, duration, frame_rate, output"},
+    {ROOT("'Gravity': [0, 0, 0]"),
+     "s.json:2:1: /Gravity: unknown key \"Gravity\"; did you mean \"gravity\"?"},
+    {ROOT("'a/b~c': 1"), "s.json:2:1: /a~1b~0c: unknown key \"a/b~c\"; known: drape, description, cloth, "
+                         "gravity, integrator, controller, duration, frame_rate, output"},
+    {ROOT("'': 1"), "s.json:2:1: /: unknown key \"\"; known: drape, description, cloth, gravity, integrator, "
+                    "controller, duration, frame_rate, output"},
+    {ROOT("'\xc3\xa9\\n': 1"), "s.json:1:1: /é?: unknown key \"é?\"; known: drape, description, cloth, "
+                               "gravity, integrator, controller, duration, frame_rate, output"},
+    {ROOT("'description': 1"), "s.json:2:1: /description: 1 is not allowed; description is a string"},
+    {ROOT("'gravity': 9.81"),
+     "s.json:2:1: /gravity: 9.81 is not allowed; gravity is three numbers, [x, y, z], in m/s2"},
+    {ROOT("'gravity': [0, -9.81]"),
+     "s.json:2:1: /gravity: an array of 2 is not allowed; gravity is three numbers, [x, y, z], in m/s2"},
+    {ROOT("'gravity': [0, '-9.81', 0]"),
+     "s.json:2:16: /gravity/1: \"-9.81\" is not allowed; an element is a number"},
+    {ROOT("'integrator': 'be'"), "s.json:2:1: /integrator: \"be\" is not allowed; integrator is an object"},
+    {ROOT("'integrator': {'method': 1}"),
+     "s.json:2:16: /integrator/method: 1 is not allowed; method is a string, not empty"},
+    {ROOT("'integrator': {'method': ''}"),
+     "s.json:2:16: /integrator/method: \"\" is not allowed; method is a string, not empty"},
+    {ROOT("'integrator': {'dt': [1]}"), "s.json:2:16: /integrator/dt: an array of 1 is not allowed; a "
+                                        "setting is a number, true, false or a string"},
+    {ROOT("'controller': {'dt_min': null}"),
+     "s.json:2:16: /controller/dt_min: null is not allowed; a setting is a number, true, false or a string"},
+    {ROOT("'controller': []"),
+     "s.json:2:1: /controller: an empty array is not allowed; controller is an object"},
+    {"{'drape': 1, 'duration': 0, 'cloth': [{'mesh': {'grid': 'g'}}]}",
+     "s.json:1:14: /duration: 0 is not allowed; duration is a number in (0, 1000000000] s"},
+    {"{'drape': 1, 'duration': -0.1, 'cloth': [{'mesh': {'grid': 'g'}}]}",
+     "s.json:1:14: /duration: -0.1 is not allowed; duration is a number in (0, 1000000000] s"},
+    {"{'drape': 1, 'duration': 1000000001, 'cloth': [{'mesh': {'grid': 'g'}}]}",
+     "s.json:1:14: /duration: 1000000001 is not allowed; duration is a number in (0, 1000000000] s"},
+    {"{'drape': 1, 'duration': '5', 'cloth': [{'mesh': {'grid': 'g'}}]}",
+     "s.json:1:14: /duration: \"5\" is not allowed; duration is a number in (0, 1000000000] s"},
+    {ROOT("'frame_rate': 0"),
+     "s.json:2:1: /frame_rate: 0 is not allowed; frame_rate is a number in (0, 1000000] 1/s"},
+    {ROOT("'frame_rate': 1e7"),
+     "s.json:2:1: /frame_rate: 1e+07 is not allowed; frame_rate is a number in (0, 1000000] 1/s"},
+    {ROOT("'frame_rate': true"),
+     "s.json:2:1: /frame_rate: true is not allowed; frame_rate is a number in (0, 1000000] 1/s"},
+    {ROOT("'output': ['npy']"), "s.json:2:1: /output: an array of 1 is not allowed; output is an object"},
+    {ROOT("'output': {'format': ['npy']}"),
+     "s.json:2:12: /output/format: unknown key \"format\"; did you mean \"formats\"?"},
+    {ROOT("'output': {'formats': 'npy'}"),
+     "s.json:2:12: /output/formats: \"npy\" is not allowed; formats is an array of strings, none empty"},
+    {ROOT("'output': {'formats': ['npy', '']}"),
+     "s.json:2:31: /output/formats/1: \"\" is not allowed; an element is a string, not empty"},
+    {ROOT("'output': {'formats': [1]}"),
+     "s.json:2:24: /output/formats/0: 1 is not allowed; an element is a string, not empty"},
+    /* cloth */
+    {CLOTH("'name': ''"), "s.json:2:1: /cloth/0/name: \"\" is not allowed; name is a string, not empty"},
+    {CLOTH("'name': 3"), "s.json:2:1: /cloth/0/name: 3 is not allowed; name is a string, not empty"},
+    {CLOTH("'nam': 'x'"), "s.json:2:1: /cloth/0/nam: unknown key \"nam\"; did you mean \"name\"?"},
+    {CLOTH("'material': []"),
+     "s.json:2:1: /cloth/0/material: an empty array is not allowed; material is an object"},
+    {CLOTH("'material': {'density': {}}"), "s.json:2:14: /cloth/0/material/density: an object is not "
+                                           "allowed; a setting is a number, true, false or a string"},
+    {CLOTH("'material': {'a/b': [1]}"), "s.json:2:14: /cloth/0/material/a~1b: an array of 1 is not allowed; "
+                                        "a setting is a number, true, false or a string"},
+    {CLOTH("'terms': 'stretch.edge'"), "s.json:2:1: /cloth/0/terms: \"stretch.edge\" is not allowed; terms "
+                                       "is an array of names, or objects with a \"type\""},
+    {CLOTH("'terms': ['']"), "s.json:2:11: /cloth/0/terms/0: \"\" is not allowed; an element is a name, or "
+                             "an object with a \"type\""},
+    {CLOTH("'terms': [3]"),
+     "s.json:2:11: /cloth/0/terms/0: 3 is not allowed; an element is a name, or an object with a \"type\""},
+    {CLOTH("'terms': ['stretch.edge', {'stiffness': 1}]"),
+     "s.json:2:27: /cloth/0/terms/1/type: \"type\" is missing: a row of the terms; a string, not empty"},
+    {CLOTH("'terms': [{'type': 'bend.hinge', 'stiffness': null}]"),
+     "s.json:2:34: /cloth/0/terms/0/stiffness: null is not allowed; a setting is a number, true, false or a "
+     "string"},
+    {CLOTH("'velocity': [1, 2, 3, 4]"), "s.json:2:1: /cloth/0/velocity: an array of 4 is not allowed; "
+                                        "velocity is three numbers, [x, y, z], in m/s"},
+    {CLOTH("'velocity': [null, 2, 3]"),
+     "s.json:2:14: /cloth/0/velocity/0: null is not allowed; an element is a number"},
+    {CLOTH("'pins': []}, {'name': 'cloth0', 'mesh': {'grid': 'g'}"),
+     "s.json:2:15: /cloth/1/name: \"cloth0\" is the name of another cloth"},
+    {CLOTH("'name': 'a'}, {'mesh': {'grid': 'g'}}, {'name': 'a', 'mesh': {'grid': 'g'}"),
+     "s.json:2:41: /cloth/2/name: \"a\" is the name of another cloth"},
+    /* mesh */
+    {MESH("[]"), "s.json:1:40: /cloth/0/mesh: an empty array is not allowed; mesh is an object"},
+    {MESH("{}"), "s.json:1:40: /cloth/0/mesh: exactly one of grid, file is needed; given: none"},
+    {MESH("{'edges': 22}"),
+     "s.json:2:2: /cloth/0/mesh/edges: unknown key \"edges\" without \"grid\"; known: grid, file, transform"},
+    {MESH("{'gird': 'square', 'rows': 3}"),
+     "s.json:2:2: /cloth/0/mesh/gird: unknown key \"gird\"; did you mean \"grid\"?"},
+    {MESH("{'grid': 'square', 'file': 'x.obj'}"),
+     "s.json:1:40: /cloth/0/mesh: exactly one of grid, file is needed; given: grid, file"},
+    {MESH("{'file': 'x.obj', 'rows': 3}"),
+     "s.json:2:19: /cloth/0/mesh/rows: unknown key \"rows\" without \"grid\"; known: grid, file, transform"},
+    {MESH("{'grid': 5}"), "s.json:2:2: /cloth/0/mesh/grid: 5 is not allowed; grid is a string, not empty"},
+    {MESH("{'file': ''}"),
+     "s.json:2:2: /cloth/0/mesh/file: \"\" is not allowed; file is a string, not empty"},
+    {MESH("{'grid': 'g', 'rows': [3]}"), "s.json:2:15: /cloth/0/mesh/rows: an array of 1 is not allowed; a "
+                                         "setting is a number, true, false or a string"},
+    {MESH("{'grid': 'g', 'transform': []}"),
+     "s.json:2:15: /cloth/0/mesh/transform: an empty array is not allowed; transform is an object"},
+    {MESH("{'grid': 'g', 'transform': {'translation': [0, 0, 0]}}"),
+     "s.json:2:29: /cloth/0/mesh/transform/translation: unknown key \"translation\"; did you mean "
+     "\"translate\"?"},
+    {MESH("{'grid': 'g', 'transform': {'translate': 1}}"),
+     "s.json:2:29: /cloth/0/mesh/transform/translate: 1 is not allowed; translate is three numbers, [x, y, "
+     "z], in m"},
+    {MESH("{'grid': 'g', 'transform': {'rotate': 90}}"),
+     "s.json:2:29: /cloth/0/mesh/transform/rotate: 90 is not allowed; rotate is axis and angle, [x, y, z, "
+     "angle], or a rotation vector, [x, y, z], in degrees"},
+    {MESH("{'grid': 'g', 'transform': {'rotate': [0, 90]}}"),
+     "s.json:2:29: /cloth/0/mesh/transform/rotate: an array of 2 is not allowed; rotate is axis and angle, "
+     "[x, y, z, angle], or a rotation vector, [x, y, z], in degrees"},
+    {MESH("{'grid': 'g', 'transform': {'rotate': [0, 1, 0, '90']}}"),
+     "s.json:2:49: /cloth/0/mesh/transform/rotate/3: \"90\" is not allowed; an element is a number"},
+    {MESH("{'grid': 'g', 'transform': {'rotate': [1e308, 1e308, 1e308]}}"),
+     "s.json:2:29: /cloth/0/mesh/transform/rotate: the rotation vector is too long"},
+    {MESH("{'grid': 'g', 'transform': {'scale': '2'}}"),
+     "s.json:2:29: /cloth/0/mesh/transform/scale: \"2\" is not allowed; scale is a number, or three, [x, y, "
+     "z]"},
+    {MESH("{'grid': 'g', 'transform': {'scale': [1, 2]}}"),
+     "s.json:2:29: /cloth/0/mesh/transform/scale: an array of 2 is not allowed; scale is a number, or three, "
+     "[x, y, z]"},
+    /* pins */
+    {CLOTH("'pins': {}"), "s.json:2:1: /cloth/0/pins: an object is not allowed; pins is an array of objects"},
+    {CLOTH("'pins': ['top']"),
+     "s.json:2:10: /cloth/0/pins/0: \"top\" is not allowed; an element is an object"},
+    {CLOTH("'pins': [{}]"),
+     "s.json:2:10: /cloth/0/pins/0: exactly one of nodes, corner, edge, row, box is needed; given: none"},
+    {CLOTH("'pins': [{'node': 1}]"),
+     "s.json:2:11: /cloth/0/pins/0/node: unknown key \"node\"; did you mean \"nodes\"?"},
+    {CLOTH("'pins': [{'row': 0, 'nodes': [1]}]"), "s.json:2:10: /cloth/0/pins/0: exactly one of nodes, "
+                                                  "corner, edge, row, box is needed; given: nodes, row"},
+    {CLOTH("'pins': [{'nodes': 1}]"), "s.json:2:11: /cloth/0/pins/0/nodes: 1 is not allowed; nodes is an "
+                                      "array of integers in [0, 2147483647], at least one"},
+    {CLOTH("'pins': [{'nodes': []}]"), "s.json:2:11: /cloth/0/pins/0/nodes: an empty array is not allowed; "
+                                       "nodes is an array of integers in [0, 2147483647], at least one"},
+    {CLOTH("'pins': [{'nodes': [0, 1.5]}]"),
+     "s.json:2:24: /cloth/0/pins/0/nodes/1: 1.5 is not allowed; an element is an integer in [0, 2147483647]"},
+    {CLOTH("'pins': [{'nodes': [0, 2147483648]}]"), "s.json:2:24: /cloth/0/pins/0/nodes/1: 2147483648 is not "
+                                                    "allowed; an element is an integer in [0, 2147483647]"},
+    {CLOTH("'pins': [{'nodes': [-1]}]"),
+     "s.json:2:21: /cloth/0/pins/0/nodes/0: -1 is not allowed; an element is an integer in [0, 2147483647]"},
+    {CLOTH("'pins': [{'nodes': ['a']}]"), "s.json:2:21: /cloth/0/pins/0/nodes/0: \"a\" is not allowed; an "
+                                          "element is an integer in [0, 2147483647]"},
+    {CLOTH("'pins': [{'row': -1}]"),
+     "s.json:2:11: /cloth/0/pins/0/row: -1 is not allowed; row is an integer in [0, 2147483647]"},
+    {CLOTH("'pins': [{'row': 0.5}]"),
+     "s.json:2:11: /cloth/0/pins/0/row: 0.5 is not allowed; row is an integer in [0, 2147483647]"},
+    {CLOTH("'pins': [{'row': '0'}]"),
+     "s.json:2:11: /cloth/0/pins/0/row: \"0\" is not allowed; row is an integer in [0, 2147483647]"},
+    {CLOTH("'pins': [{'row': 99999999999999999999}]"),
+     "s.json:2:11: /cloth/0/pins/0/row: 1e+20 is not allowed; row is an integer in [0, 2147483647]"},
+    {CLOTH("'pins': [{'corner': 0}]"),
+     "s.json:2:11: /cloth/0/pins/0/corner: 0 is not allowed; corner is a string, not empty"},
+    {CLOTH("'pins': [{'edge': ['top']}]"),
+     "s.json:2:11: /cloth/0/pins/0/edge: an array of 1 is not allowed; edge is a string, not empty"},
+    {CLOTH("'pins': [{'box': [0, 1]}]"),
+     "s.json:2:19: /cloth/0/pins/0/box/0: 0 is not allowed; a corner is three numbers, [x, y, z]"},
+    {CLOTH("'pins': [{'box': [[0, 0, 0]]}]"), "s.json:2:11: /cloth/0/pins/0/box: an array of 1 is not "
+                                              "allowed; box is two corners, [[x, y, z], [x, y, z]], in m"},
+    {CLOTH("'pins': [{'box': [[0, 0, 0], [1, 1]]}]"), "s.json:2:30: /cloth/0/pins/0/box/1: an array of 2 is "
+                                                      "not allowed; a corner is three numbers, [x, y, z]"},
+    {CLOTH("'pins': [{'box': [[0, 0, 0], [1, true, 1]]}]"),
+     "s.json:2:34: /cloth/0/pins/0/box/1/1: true is not allowed; an element is a number"},
+    {CLOTH("'pins': [{'row': 0, 'track': []}]"),
+     "s.json:2:21: /cloth/0/pins/0/track: an empty array is not allowed; track is an array of [time, [x, y, "
+     "z]], in s and m, at least one"},
+    {CLOTH("'pins': [{'row': 0, 'track': 'up'}]"),
+     "s.json:2:21: /cloth/0/pins/0/track: \"up\" is not allowed; track is an array of [time, [x, y, z]], in "
+     "s and m, at least one"},
+    {CLOTH("'pins': [{'row': 0, 'track': [[0]]}]"), "s.json:2:31: /cloth/0/pins/0/track/0: an array of 1 is "
+                                                    "not allowed; a key of a track is [time, [x, y, z]]"},
+    {CLOTH("'pins': [{'row': 0, 'track': [['0', [0, 0, 0]]]}]"),
+     "s.json:2:32: /cloth/0/pins/0/track/0/0: \"0\" is not allowed; the time of a key is a number"},
+    {CLOTH("'pins': [{'row': 0, 'track': [[0, [0, 0]]]}]"),
+     "s.json:2:35: /cloth/0/pins/0/track/0/1: an array of 2 is not allowed; a displacement is three numbers, "
+     "[x, y, z]"},
+    {CLOTH("'pins': [{'row': 0, 'track': [[0, [0, 0, {}]]]}]"),
+     "s.json:2:42: /cloth/0/pins/0/track/0/1/2: an object is not allowed; an element is a number"},
+    {CLOTH("'pins': [{'row': 0, 'track': [[0, [0, 0, 0]], [0, [1, 0, 0]]]}]"),
+     "s.json:2:48: /cloth/0/pins/0/track/1/0: 0 is not allowed; the time of a key is greater than that of "
+     "the key before, 0"},
+    {CLOTH("'pins': [{'row': 0, 'track': [[1.5, [0, 0, 0]], [-1, [1, 0, 0]]]}]"),
+     "s.json:2:50: /cloth/0/pins/0/track/1/0: -1 is not allowed; the time of a key is greater than that of "
+     "the key before, 1.5"},
+    {CLOTH("'pins': [{'row': 0, 'tracks': []}]"),
+     "s.json:2:21: /cloth/0/pins/0/tracks: unknown key \"tracks\"; did you mean \"track\"?"},
+};
+
+START_TEST(test_wrong_scenes)
+{
+    open_context();
+    for (size_t i = 0; i < sizeof wrong_scenes / sizeof *wrong_scenes; i++) {
+        drape_status status = read_quoted(wrong_scenes[i].text);
+        ck_assert_msg(status < 0, "accepted: %s", wrong_scenes[i].text);
+        ck_assert_str_eq(message(), wrong_scenes[i].message);
+        check_one_line(message());
+    }
+    ck_assert_int_eq(read_quoted("{'drape': 2}"), DRAPE_E_VERSION);
+    ck_assert_int_eq(read_quoted("{'drape'}"), DRAPE_E_PARSE);
+    ck_assert_int_eq(read_quoted("{'drape': 1}"), DRAPE_E_ARGUMENT);
+    close_context();
+}
+END_TEST
+
+/* Long names, keys and strings leave room for what is said of them, and are cut between characters. */
+START_TEST(test_long_texts)
+{
+    static char name[2000], text[4000];
+    open_context();
+    for (size_t i = 0; i + 2 < sizeof name; i += 2)
+        memcpy(name + i, "\xC3\xA9", 2);
+    for (int shift = 0; shift < 2; shift++) {
+        snprintf(text, sizeof text, "{\"drape\": 1, \"%s%s\": 1}", shift ? "x" : "", name);
+        ck_assert_int_eq(drape_scene_parse(ctx, text, name + 0, &scene), DRAPE_OK);
+        ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
+        ck_assert_ptr_nonnull(strstr(message(), ":1:1: /"));
+        ck_assert_ptr_nonnull(strstr(message(), ": unknown key \""));
+        json_t *utf8 = json_string(message());
+        ck_assert_ptr_nonnull(utf8);
+        json_decref(utf8);
+        drape_scene_destroy(&scene);
+    }
+    close_context();
+}
+END_TEST
+
+START_TEST(test_deep_nesting)
+{
+    static char text[200000];
+    open_context();
+    memset(text, '[', sizeof text - 1);
+    memcpy(text, "{\"a\":", 5);
+    ck_assert_int_eq(read_text(text), DRAPE_E_PARSE);
+    ck_assert_ptr_nonnull(strstr(message(), ": nested too deeply"));
+    close_context();
+}
+END_TEST
+
+/* Every beginning of a scene, and scenes with one byte changed: a result or one line. */
+START_TEST(test_truncations)
+{
+    open_context();
+    char *text = strdup(with_quotes(example));
+    for (size_t length = strlen(text); length-- > 0;) {
+        text[length] = 0;
+        if (read_text(text) != DRAPE_OK)
+            check_one_line(message());
+        else
+            ck_assert_uint_eq(length, sizeof example - 2); /* without the last newline */
+    }
+    free(text);
+    close_context();
+}
+END_TEST
+
+static uint32_t next_random(uint64_t *state)
+{
+    *state = *state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407); /* Knuth's MMIX */
+    return (uint32_t)(*state >> 33);
+}
+
+START_TEST(test_mutations)
+{
+    uint64_t state = 2385;
+    open_context();
+    char *good = strdup(with_quotes(example)), *text = strdup(good);
+    for (int i = 0; i < 2000; i++) {
+        strcpy(text, good);
+        text[next_random(&state) % strlen(good)] = (char)(next_random(&state) % 256);
+        if (read_text(text) != DRAPE_OK)
+            check_one_line(message());
+    }
+    free(good);
+    free(text);
+    close_context();
+}
+END_TEST
+
+/* ---- Values that are set ----------------------------------------------------------------------------- */
+
+/* Each on the example: message NULL for those that are fine. */
+static const struct {
+    const char *pointer, *value, *message;
+} sets[] = {
+    {"/integrator/dt", "0.5", NULL},
+    {"/integrator/method", "verlet", NULL},
+    {"/integrator/method", "'verlet'", NULL},
+    {"/self", "1",
+     "--set /self=1: /self: unknown key \"self\"; known: drape, description, cloth, gravity, "
+     "integrator, controller, duration, frame_rate, output"},
+    {"/cloth/0/pins/-", "{'edge': 'top'}", NULL},
+    {"/cloth/0/pins/-/edge", "top", NULL},
+    {"/cloth/0/pins", "[]", NULL},
+    {"/output/formats/-", "vtp", NULL},
+    {"/cloth/0/mesh/transform/rotate", "[0, 0, 90]", NULL},
+    {"/cloth/0/material/a~1b~0", "1", NULL},
+    {"/controller", "{}", NULL},
+    {"", "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g'}}]}", NULL},
+    {"/duration", "-1",
+     "--set /duration=-1: /duration: -1 is not allowed; duration is a number in (0, 1000000000] s"},
+    {"/duration", "",
+     "--set /duration=: /duration: \"\" is not allowed; duration is a number in (0, 1000000000] s"},
+    {"/duration", "1e999",
+     "--set /duration=1e999: /duration: \"1e999\" is not allowed; duration is a number in (0, 1000000000] s"},
+    {"/gravity", "[0, 0]",
+     "--set /gravity=[0, 0]: /gravity: an array of 2 is not allowed; gravity is three "
+     "numbers, [x, y, z], in m/s2"},
+    {"/gravity", "[0, 0",
+     "--set /gravity=[0, 0: /gravity: \"[0, 0\" is not allowed; gravity is three numbers, "
+     "[x, y, z], in m/s2"},
+    {"/gravity/1", "down",
+     "--set /gravity/1=down: /gravity/1: \"down\" is not allowed; an element is a number"},
+    {"/gravity/-", "1",
+     "s.json:12:3: /gravity: an array of 4 is not allowed; gravity is three numbers, "
+     "[x, y, z], in m/s2"},
+    {"/cloth/0/pins/-", "{'edge': 'top',\n'row': 0}",
+     "--set /cloth/0/pins/-={\"edge\": \"top\", \"row\": 0}: /cloth/0/pins/3: exactly one of nodes, corner, "
+     "edge, "
+     "row, box is needed; given: edge, row"},
+    {"/cloth/0/pins/1/row", "0",
+     "s.json:9:35: /cloth/0/pins/1: exactly one of nodes, corner, edge, row, box is "
+     "needed; given: corner, row"},
+    {"/cloth/0/mesh", "{}",
+     "--set /cloth/0/mesh={}: /cloth/0/mesh: exactly one of grid, file is needed; given: "
+     "none"},
+    {"/integrater/dt", "1",
+     "--set /integrater/dt=1: /integrater: unknown key \"integrater\"; did you mean "
+     "\"integrator\"?"},
+    {"/cloth/0/terms/-/beta", "1",
+     "--set /cloth/0/terms/-/beta=1: /cloth/0/terms/3/type: \"type\" is missing: a "
+     "row of the terms; a string, not empty"},
+    {"", "{}", "--set ={}: /drape: \"drape\" is missing: the version of this form of scenes; the number 1"},
+    {"", "3", "cannot set the whole scene to what is no object"},
+    {"integrator", "1", "\"integrator\" is not a JSON pointer, as \"/integrator/dt\" is one"},
+    {"/a~2", "1", "\"/a~2\" is not a JSON pointer, as \"/integrator/dt\" is one; in it ~ is written ~0"},
+    {"/duration/x", "1", "cannot set /duration/x: /duration is 5, no object or array"},
+    {"/cloth/0/terms/0/k", "1",
+     "cannot set /cloth/0/terms/0/k: /cloth/0/terms/0 is \"stretch.edge\", no object or "
+     "array"},
+    {"/cloth/1/name", "x", "cannot set /cloth/1/name: /cloth is an array of 1; \"-\" appends"},
+    {"/cloth/0/pins/3", "{}", "cannot set /cloth/0/pins/3: /cloth/0/pins is an array of 3; \"-\" appends"},
+    {"/cloth/name", "x",
+     "cannot set /cloth/name: /cloth is an array: its elements have numbers, \"-\" appends"},
+    {"/cloth/00/name", "x",
+     "cannot set /cloth/00/name: /cloth is an array: its elements have numbers, \"-\" appends"},
+    {"/\xff", "1", "a JSON pointer is UTF-8, this one is not"},
+    {"/duration", "\xff", "a value is UTF-8, this one is not"},
+};
+
+START_TEST(test_sets)
+{
+    open_context();
+    for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
+        ck_assert_int_eq(read_quoted(example), DRAPE_OK);
+        drape_status status = drape_scene_set(scene, sets[i].pointer, with_quotes(sets[i].value));
+        if (!status)
+            status = drape_scene_to_def(scene, &def);
+        if (!sets[i].message) {
+            ck_assert_msg(status == DRAPE_OK, "%s: %s", sets[i].pointer, message());
+            continue;
+        }
+        ck_assert_int_eq(status, DRAPE_E_ARGUMENT);
+        ck_assert_str_eq(message(), sets[i].message);
+    }
+    close_context();
+}
+END_TEST
+
+START_TEST(test_set_values)
+{
+    open_context();
+    ck_assert_int_eq(read_quoted(example), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/integrator", "{\"method\": \"be\"}"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/integrator/max_iterations", "7"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/cloth/0/pins/-/nodes/-", "5"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/cloth/0/pins/3/nodes/-", "6"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/cloth/0/terms/0", "drag"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_OK);
+    ck_assert_str_eq(def.integrator.type, "be");
+    ck_assert_uint_eq(def.integrator.setting_count, 1);
+    check_setting(&def.integrator.settings[0], "max_iterations", 7, NULL);
+    ck_assert_uint_eq(def.cloths[0].pin_count, 4);
+    ck_assert_uint_eq(def.cloths[0].pins[3].node_count, 2);
+    ck_assert_int_eq(def.cloths[0].pins[3].nodes[1], 6);
+    ck_assert_str_eq(def.cloths[0].terms[0].type, "drag");
+    close_context();
+}
+END_TEST
+
+/* A failed set leaves the scene as it was; the latest of two sets is the one that is named. */
+START_TEST(test_set_order)
+{
+    open_context();
+    ck_assert_int_eq(read_quoted(example), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/cloth/0/new/0/x/-", "1"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/cloth/0/new/0/x/7/y", "1"), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
+    ck_assert_str_eq(message(), "--set /cloth/0/new/0/x/-=1: /cloth/0/new: unknown key \"new\"; known: name, "
+                                "mesh, material, terms, pins, velocity");
+    ck_assert_int_eq(read_quoted(example), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/output/formats/0", "1"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/output", "{\"formats\": [2]}"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
+    ck_assert_str_eq(message(),
+                     "--set /output={\"formats\": [2]}: /output/formats/0: 2 is not allowed; an element is "
+                     "a string, not empty");
+    char pointer[2 * DRAPE_POINTER_SIZE];
+    memset(pointer, '/', sizeof pointer);
+    pointer[DRAPE_POINTER_SIZE] = 0;
+    ck_assert_int_eq(drape_scene_set(scene, pointer, "1"), DRAPE_E_ARGUMENT);
+    ck_assert_str_eq(message(), "a JSON pointer of 256 bytes is too long; at most 255");
+    pointer[DRAPE_POINTER_SIZE - 1] = 0;
+    ck_assert_int_eq(drape_scene_set(scene, pointer, "1"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
+    close_context();
+}
+END_TEST
+
+/* ---- Faults of others -------------------------------------------------------------------------------- */
+
+START_TEST(test_locate_fault)
+{
+    open_context();
+    ck_assert_int_eq(read_quoted(example), DRAPE_OK);
+    ck_assert_ptr_eq(drape_scene_context(scene), ctx);
+    drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/cloth/0/pins/0/nodes/1", "506 is too large");
+    for (int twice = 0; twice < 2; twice++) {
+        drape_scene_locate_fault(scene);
+        ck_assert_str_eq(message(), "s.json:9:28: /cloth/0/pins/0/nodes/1: 506 is too large");
+    }
+    drape_fail(ctx, DRAPE_E_ARGUMENT, "the mesh is too large");
+    drape_scene_locate_fault(scene);
+    ck_assert_str_eq(message(), "s.json: the mesh is too large");
+    close_context();
+}
+END_TEST
+
+/* ---- Files ------------------------------------------------------------------------------------------- */
+
+static void write_file(const char *path, const void *data, size_t size)
+{
+    FILE *file = fopen(path, "wb");
+    ck_assert_ptr_nonnull(file);
+    ck_assert_uint_eq(fwrite(data, 1, size, file), size);
+    fclose(file);
+}
+
+static void check_load(const char *path, drape_status expected, const char *text)
+{
+    ck_assert_int_eq(drape_scene_load(ctx, path, &scene), expected);
+    ck_assert_ptr_null(scene);
+    ck_assert_str_eq(message(), text);
+}
+
+START_TEST(test_files)
+{
+    char folder[] = "/tmp/drape-scene-XXXXXX";
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    ck_assert_int_eq(chdir(folder), 0);
+    open_context();
+    ck_assert_int_eq(mkdir("sub", 0700), 0);
+    const char *text = with_quotes(example);
+    write_file("sub/a.json", text, strlen(text));
+    ck_assert_int_eq(drape_scene_load(ctx, "sub/a.json", &scene), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_OK);
+    ck_assert_str_eq(def.folder, "sub");
+    drape_scene_destroy(&scene);
+    check_load("sub", DRAPE_E_FILE, "sub: cannot read the scene: it is a folder");
+    check_load("none.json", DRAPE_E_FILE, "none.json: cannot read the scene: No such file or directory");
+    check_load("", DRAPE_E_FILE, ": cannot read the scene: No such file or directory");
+    write_file("empty.json", "", 0);
+    check_load("empty.json", DRAPE_E_PARSE, "empty.json: the scene is empty");
+    write_file("zero.json", "{\n \0}", 5);
+    check_load("zero.json", DRAPE_E_PARSE, "zero.json:2:2: byte 0x00 is not allowed in a scene");
+    write_file("bad.json", "{\"a\"}", 5);
+    check_load("bad.json", DRAPE_E_PARSE, "bad.json:1:5: ':' expected near '}'");
+    ck_assert_int_eq(truncate("bad.json", (off_t)(1 << 30) + 1), 0); /* no blocks: it is sparse */
+    check_load("bad.json", DRAPE_E_FILE, "bad.json: cannot read the scene: it is larger than 1 GiB");
+    for (const char *const *path =
+             (const char *const[]){"sub/a.json", "empty.json", "zero.json", "bad.json", NULL};
+         *path; path++)
+        unlink(*path);
+    ck_assert_int_eq(rmdir("sub") | chdir("/") | rmdir(folder), 0);
+    close_context();
+}
+END_TEST
+
+/* A pipe says no size: the text comes in pieces. */
+START_TEST(test_pipe)
+{
+    char folder[] = "/tmp/drape-scene-XXXXXX", path[64];
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/pipe", folder);
+    ck_assert_int_eq(mkfifo(path, 0600), 0);
+    pid_t writer = fork();
+    ck_assert_int_ge(writer, 0);
+    if (writer == 0) {
+        FILE *pipe = fopen(path, "wb");
+        fprintf(pipe, "%300000s%s", "", with_quotes(ROOT("'frame_rate': 24")));
+        fclose(pipe);
+        _exit(0);
+    }
+    open_context();
+    ck_assert_msg(drape_scene_load(ctx, path, &scene) == DRAPE_OK, "%s", message());
+    ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_OK);
+    ck_assert_double_eq(def.frame_rate, 24);
+    ck_assert_str_eq(def.folder, folder);
+    ck_assert_int_eq(waitpid(writer, NULL, 0), writer);
+    ck_assert_int_eq(unlink(path) | rmdir(folder), 0);
+    close_context();
+}
+END_TEST
+
+START_TEST(test_arguments)
+{
+    open_context();
+    ck_assert_int_eq(drape_scene_load(NULL, "a", &scene), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_load(ctx, NULL, &scene), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_load(ctx, "a", NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_parse(NULL, "{}", "a", &scene), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_parse(ctx, NULL, "a", &scene), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_parse(ctx, "{}", "a", NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_set(NULL, "/a", "1"), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_parse(ctx, "{}", NULL, &scene), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, NULL, "1"), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_set(scene, "/a", NULL), DRAPE_E_ARGUMENT);
+    drape_scene_destroy(&scene);
+    drape_scene_destroy(&scene);
+    drape_scene_destroy(NULL);
+    close_context();
+}
+END_TEST
+
+/* ---- Size, locale, memory ---------------------------------------------------------------------------- */
+
+START_TEST(test_many_nodes)
+{
+    enum { COUNT = 1000000 };
+    open_context();
+    char *text = malloc(8 * COUNT + 200), *p = text;
+    p += sprintf(
+        p,
+        "{\"drape\": 1, \"duration\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"g\"}, \"pins\": [{\"nodes\": [");
+    for (int i = 0; i < COUNT; i++)
+        p += sprintf(p, "%s%d", i ? "," : "", i);
+    sprintf(p, "]}]}]}");
+    ck_assert_int_eq(read_text(text), DRAPE_OK);
+    ck_assert_uint_eq(def.cloths[0].pins[0].node_count, COUNT);
+    ck_assert_int_eq(def.cloths[0].pins[0].nodes[COUNT - 1], COUNT - 1);
+    free(text);
+    close_context();
+}
+END_TEST
+
+/* A host's decimal comma must not reach the numbers. Where no such locale is installed there is nothing to
+ * see. */
+START_TEST(test_locale)
+{
+    const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "C"};
+    size_t i = 0;
+    while (!setlocale(LC_ALL, names[i]))
+        i++;
+    open_context();
+    ck_assert_int_eq(read_quoted(ROOT("'gravity': [0, -1.5, 0]")), DRAPE_OK);
+    ck_assert_double_eq(def.gravity[1], -1.5);
+    ck_assert_int_eq(drape_scene_set(scene, "/duration", "-0.5"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(message(), "/duration: -0.5 is not allowed"));
+    setlocale(LC_ALL, "C");
+    close_context();
+}
+END_TEST
+
+/* Parse, set, read: each allocation in turn fails. */
+static drape_status whole_life(drape_context *context)
+{
+    drape_scene *one = NULL;
+    drape_status status = drape_scene_parse(context, with_quotes(example), "folder/scene.json", &one);
+    ck_assert(!status == (one != NULL));
+    if (!status)
+        status = drape_scene_set(one, "/cloth/0/pins/-/nodes/-", "3");
+    if (!status)
+        status = drape_scene_set(one, "/integrator/method", "verlet");
+    if (!status)
+        status = drape_scene_to_def(one, &def);
+    drape_scene_destroy(&one);
+    return status;
+}
+
+START_TEST(test_no_memory)
+{
+    failing_allocator counter = {0};
+    ctx = failing_context(&counter);
+    ck_assert_int_eq(whole_life(ctx), DRAPE_OK);
+    const long calls = counter.calls;
+    drape_context_destroy(&ctx);
+    ck_assert_int_eq(counter.live, 0);
+    ck_assert_int_gt(calls, 10);
+    for (long n = 1; n <= calls; n++) {
+        failing_allocator memory = {.fail_at = n};
+        ctx = failing_context(&memory);
+        ck_assert_int_eq(whole_life(ctx), DRAPE_E_MEMORY);
+        ck_assert_ptr_nonnull(strstr(message(), "out of memory"));
+        drape_context_destroy(&ctx);
+        ck_assert_int_eq(memory.live, 0);
+    }
+}
+END_TEST
+
+static long json_calls, json_fail_at, json_live;
+
+static void *json_allocate(size_t size)
+{
+    if (++json_calls == json_fail_at)
+        return NULL;
+    json_live++;
+    return malloc(size);
+}
+
+static void json_release(void *memory)
+{
+    json_live -= memory != NULL;
+    free(memory);
+}
+
+/* The same with the memory of jansson, which is malloc's. It does not tell all of its failures from wrong
+ * syntax (strings): a scene is then refused for the wrong reason, but nothing is lost. */
+START_TEST(test_no_memory_for_json)
+{
+    open_context();
+    json_set_alloc_funcs(json_allocate, json_release);
+    json_fail_at = 0;
+    ck_assert_int_eq(whole_life(ctx), DRAPE_OK);
+    const long calls = json_calls;
+    long memory_count = 0;
+    for (long n = 1; n <= calls; n++) {
+        json_calls = 0;
+        json_fail_at = n;
+        drape_status status = whole_life(ctx);
+        if (status)
+            check_one_line(message());
+        memory_count += status == DRAPE_E_MEMORY;
+        ck_assert_int_eq(json_live, 0);
+    }
+    json_set_alloc_funcs(malloc, free);
+    ck_assert_int_gt(memory_count, calls / 2);
+    close_context();
+}
+END_TEST
+
+/* What describes the form of a scene walks these tables. */
+static void check_form(const drape_scene_object *object)
+{
+    ck_assert_ptr_nonnull(object->name);
+    ck_assert_uint_le(object->key_count, 16);
+    for (size_t i = 0; i < object->key_count; i++) {
+        const drape_scene_key *key = &object->keys[i];
+        ck_assert_msg(key->help && *key->help, "%s has no help", key->name);
+        ck_assert_msg((key->kind >= DRAPE_SCENE_OBJECT) == (key->child != NULL), "%s: child", key->name);
+        if (key->child)
+            check_form(key->child);
+        if (key->kind == DRAPE_SCENE_ROWS)
+            ck_assert_str_eq(key->child->keys[0].name, "type");
+    }
+}
+
+START_TEST(test_form)
+{
+    check_form(&drape_scene_form);
+    ck_assert_str_eq(drape_scene_form.keys[0].name, "drape");
+}
+END_TEST
+
+SUITE("scene", test_example_scene, test_example_cloth, test_example_pins, test_transforms, test_defaults,
+      test_numbers, test_def_sizes, test_comments, test_places, test_mend_end, test_wrong_scenes,
+      test_long_texts, test_deep_nesting, test_truncations, test_mutations, test_sets, test_set_values,
+      test_set_order, test_locate_fault, test_files, test_pipe, test_arguments, test_many_nodes, test_locale,
+      test_no_memory, test_no_memory_for_json, test_form)
