@@ -1,0 +1,45 @@
+/*
+ * damp.kelvin_voigt: a dashpot beside the spring of every strain measure of its cloth: generalised force beta
+ * k q', so that the force on the nodes is beta k q' grad q(x). It vanishes exactly on rigid motion, on which
+ * q' = 0. Step methods take q' as a difference of q, IDA as grad q . v
+ */
+#include "terms/terms.h"
+
+#include <math.h>
+
+enum { PARAM_BETA, PARAM_COUNT };
+
+static const drape_param params[PARAM_COUNT] = {
+    [PARAM_BETA] = {.name = "beta",
+                    .kind = DRAPE_PARAM_NUMBER,
+                    .unit = "s",
+                    .default_value = NAN,
+                    .min = 0,
+                    .max = 1e6,
+                    .help =
+                        "retardation time: damping stiffness over elastic stiffness of every strain measure"},
+};
+
+static void law(const double *values, double k, double strain, double rate, double *force,
+                double *dforce_dstrain, double *dforce_drate, double *energy)
+{
+    (void)strain;
+    double c = values[PARAM_BETA] * k;
+    *force = c * rate;
+    *dforce_dstrain = 0;
+    *dforce_drate = c;
+    *energy = 0;
+}
+
+const drape_term_ops drape_term_damp_kelvin_voigt = {
+    .struct_size = sizeof(drape_term_ops),
+    .name = "damp.kelvin_voigt",
+    .summary =
+        "internal damping: force beta k q' grad q on every strain measure q of the cloth's other terms",
+    .reference = "Kelvin-Voigt solid: spring and dashpot side by side",
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .element_name = "measure",
+    .law = law,
+    .dissipative = true,
+};

@@ -1,0 +1,61 @@
+/*
+ * drag.viscous: a medium at rest that slows every node: g = c A v with the node's share A of the area. It
+ * acts on rigid motion by design; for damping that does not, see damp.kelvin_voigt. dg/dv = c A I, dg/dx = 0.
+ */
+#include "terms/terms.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { PARAM_COEFFICIENT, PARAM_COUNT };
+
+static const drape_param params[PARAM_COUNT] = {
+    [PARAM_COEFFICIENT] =
+        {.name = "coefficient",
+         .kind = DRAPE_PARAM_NUMBER,
+         .unit = "kg/(m2 s)",
+         .default_value = NAN,
+         .min = 0,
+         .max = 1e9,
+         .help = "drag per area and speed: a node loses speed at the rate coefficient / areal density"},
+};
+
+static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+{
+    drape_status status = drape_term_reserve(builder, cloth->node_count, 1);
+    for (int32_t i = 0; !status && i < cloth->node_count; i++) {
+        double rest = values[PARAM_COEFFICIENT] * cloth->node_area[i];
+        drape_term_set(builder, i, &i, &rest);
+    }
+    return status;
+}
+
+static void dissipation(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                        const double *v, double *g, double *dg_dx, double *dg_dv)
+{
+    (void)x;
+    for (int32_t i = 0; i < count; i++) {
+        double c = el->rest[first + i];
+        for (int k = 0; k < 3; k++)
+            g[3 * (size_t)i + (size_t)k] = c * v[3 * (size_t)el->node[first + i] + (size_t)k];
+        if (dg_dv)
+            for (int k = 0; k < 9; k++)
+                dg_dv[9 * (size_t)i + (size_t)k] = k % 4 == 0 ? c : 0;
+    }
+    if (dg_dx)
+        memset(dg_dx, 0, 9 * (size_t)count * sizeof *dg_dx);
+}
+
+const drape_term_ops drape_term_drag_viscous = {
+    .struct_size = sizeof(drape_term_ops),
+    .name = "drag.viscous",
+    .summary = "viscous drag of a medium at rest on every node: force -c A v",
+    .reference = "linear drag; Boson's air drag is this with c A = 0.3 kg/s a node",
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .element_name = "node",
+    .nodes = 1,
+    .build = build,
+    .dissipation = dissipation,
+    .dissipative = true,
+};

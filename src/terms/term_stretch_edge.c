@@ -1,0 +1,144 @@
+/*
+ * stretch.edge: a spring along each edge. With u = (x1 - x0)/|x1 - x0| and rest length L:
+ *     q = |x1 - x0|/L - 1,   dq/dx1 = -dq/dx0 = u/L,   d2q/dx1 dx1 = (I - u u')/(L |x1 - x0|),   E = 1/2 k
+ * q^2.
+ *
+ * consistent: k = E h (A1 + A2), that is the spring constant K = k/L^2 = E h (A1 + A2)/L^2 of Van Gelder
+ * (1998); each triangle owns half a spring, so a boundary edge has K/2. On an equilateral mesh K = sqrt(3)/2
+ * E h, and the lattice is the constant-strain triangle of a sheet with nu = 1/3 exactly. report: the DEP
+ * report's code, whose number k_s = sqrt(3)/2 E h L^2 [J] is used as a force [N]: E = 1/2 k_s L q^2, too soft
+ * by one edge length, and boundary edges as stiff as the others. Kept so that its trajectories can be
+ * reproduced.
+ */
+#include "base/vec3.h"
+#include "terms/terms.h"
+
+#include <math.h>
+
+enum { PARAM_STIFFNESS, PARAM_COLLAPSE, PARAM_COUNT };
+enum { STIFFNESS_CONSISTENT, STIFFNESS_REPORT };
+enum { REST_K, REST_Q0, REST_INVERSE_LENGTH, REST_COUNT };
+
+static const char *const stiffness_choices[] = {"consistent", "report", NULL};
+
+static const drape_param params[PARAM_COUNT] = {
+    [PARAM_STIFFNESS] =
+        {.name = "stiffness",
+         .kind = DRAPE_PARAM_CHOICE,
+         .unit = "1",
+         .default_value = STIFFNESS_CONSISTENT,
+         .choices = stiffness_choices,
+         .help =
+             "consistent: E h (A1 + A2)/L^2 as a spring constant; report: as the DEP report's code, one edge "
+             "length too soft"},
+    [PARAM_COLLAPSE] =
+        {.name = "min_length",
+         .kind = DRAPE_PARAM_NUMBER,
+         .unit = "1",
+         .default_value = 1e-6,
+         .min = 0,
+         .max = 1,
+         .open_max = true,
+         .help = "a step that leaves an edge shorter than this share of its rest length is rejected"},
+};
+
+static double element_stiffness(const drape_cloth_view *cloth, int32_t edge, double choice)
+{
+    double length = cloth->edge_length[edge], membrane = cloth->material.membrane_stiffness;
+    const int32_t *beside = cloth->edge_triangle + 2 * (size_t)edge;
+    if (choice == STIFFNESS_REPORT)
+        return sqrt(3.0) / 2 * membrane * length * length * length;
+    double area = cloth->triangle_area[beside[0]];
+    if (beside[1] >= 0)
+        area += cloth->triangle_area[beside[1]];
+    return membrane * area;
+}
+
+static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+{
+    drape_status status = drape_term_reserve(builder, cloth->edge_count, REST_COUNT);
+    for (int32_t e = 0; !status && e < cloth->edge_count; e++) {
+        double rest[REST_COUNT] = {[REST_K] = element_stiffness(cloth, e, values[PARAM_STIFFNESS]),
+                                   [REST_Q0] = 0,
+                                   [REST_INVERSE_LENGTH] = 1 / cloth->edge_length[e]};
+        drape_term_set(builder, e, cloth->edge + 2 * (size_t)e, rest);
+    }
+    return status;
+}
+
+/* dq = (-u, u)/L */
+static void gradient(const double u[3], double inverse_length, double *dq)
+{
+    for (int i = 0; i < 3; i++) {
+        dq[3 + i] = u[i] * inverse_length;
+        dq[i] = -dq[3 + i];
+    }
+}
+
+/* ddq = [P -P; -P P] with P = (I - u u')/(L |e|) */
+static void hessian(const double u[3], double inverse_length, double length, double *ddq)
+{
+    double scale = inverse_length / length;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            double p = scale * ((i == j) - u[i] * u[j]);
+            ddq[6 * i + j] = ddq[6 * (3 + i) + 3 + j] = p;
+            ddq[6 * i + 3 + j] = ddq[6 * (3 + i) + j] = -p;
+        }
+}
+
+static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                    const double *internal, double *q, double *dq, double *ddq)
+{
+    (void)internal;
+    const double *inverse = el->rest + (size_t)REST_INVERSE_LENGTH * (size_t)el->count + first;
+    for (int32_t i = 0; i < count; i++) {
+        const int32_t *node = el->node + 2 * (size_t)(first + i);
+        double u[3];
+        vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], u);
+        double length = vec3_norm(u);
+        q[i] = length * inverse[i] - 1;
+        for (int k = 0; k < 3; k++)
+            u[k] /= length;
+        if (dq)
+            gradient(u, inverse[i], dq + 6 * (size_t)i);
+        if (ddq)
+            hessian(u, inverse[i], length, ddq + 36 * (size_t)i);
+    }
+}
+
+static drape_status check(const drape_elements *el, const double *x, const double *internal,
+                          drape_fault *fault)
+{
+    (void)internal;
+    const double *inverse = el->rest + (size_t)REST_INVERSE_LENGTH * (size_t)el->count;
+    *fault = (drape_fault){.reason = "edge_collapse",
+                           .what = "edge length / rest length",
+                           .element = -1,
+                           .value = INFINITY,
+                           .limit = el->params[PARAM_COLLAPSE]};
+    for (int32_t e = 0; e < el->count; e++) {
+        double d[3];
+        vec3_sub(x + 3 * (size_t)el->node[2 * (size_t)e + 1], x + 3 * (size_t)el->node[2 * (size_t)e], d);
+        double ratio = vec3_norm(d) * inverse[e];
+        if (ratio < fault->value) {
+            fault->value = ratio;
+            fault->element = e;
+        }
+    }
+    return fault->value < fault->limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
+}
+
+const drape_term_ops drape_term_stretch_edge = {
+    .struct_size = sizeof(drape_term_ops),
+    .name = "stretch.edge",
+    .summary = "stretching of every edge: E = 1/2 k (|e|/L - 1)^2",
+    .reference = "Van Gelder 1998; DEP report (Grinspun et al. 2003, Discrete Shells)",
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .element_name = "edge",
+    .nodes = 2,
+    .build = build,
+    .measure = measure,
+    .check = check,
+};
