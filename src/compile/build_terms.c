@@ -1,0 +1,260 @@
+/* build_terms.c: rows by name, their parameters, their elements; laws are tied to the measures of their
+ * cloth. */
+#include "compile/stages.h"
+#include "terms/terms.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#define MAX_NAMES 128
+
+struct drape_term_builder {
+    drape_model *model;
+    drape_term *term;
+    const char *pointer;
+    int32_t first_node, node_count;
+    int32_t *node; /* the elements' arrays while they are filled */
+    double *rest;
+};
+
+drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count)
+{
+    drape_elements *el = &builder->term->elements;
+    drape_arena *arena = &builder->model->arena;
+    if (element_count < 0 || rest_count < 0 || el->node)
+        return drape_term_refuse(builder,
+                                 "the term announced %d elements with %d numbers of rest data, or twice",
+                                 (int)element_count, rest_count);
+    el->count = element_count;
+    el->nodes = builder->term->ops->nodes;
+    el->rest_count = rest_count;
+    el->params = builder->term->params;
+    el->node = builder->node = drape_arena_take(
+        arena, builder->model->ctx, (size_t)element_count * (size_t)el->nodes, sizeof *builder->node);
+    el->rest = builder->rest = drape_arena_take(
+        arena, builder->model->ctx, (size_t)element_count * (size_t)rest_count, sizeof *builder->rest);
+    return builder->node && builder->rest ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes, const double *rest)
+{
+    const drape_elements *el = &builder->term->elements;
+    for (int a = 0; a < el->nodes; a++)
+        builder->node[(size_t)element * (size_t)el->nodes + (size_t)a] = builder->first_node + nodes[a];
+    for (int k = 0; k < el->rest_count; k++)
+        builder->rest[(size_t)k * (size_t)el->count + (size_t)element] = rest[k];
+}
+
+drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
+{
+    char text[512];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    return drape_fail_at(builder->model->ctx, DRAPE_E_ARGUMENT, builder->pointer, "%s", text);
+}
+
+/* Row i of the built-in rows followed by the host's; NULL past the last. */
+static const drape_term_ops *row(const drape_context *ctx, int i)
+{
+    int built_in = 0;
+    while (drape_terms[built_in])
+        built_in++;
+    if (i < built_in)
+        return drape_terms[i];
+    return i - built_in < ctx->host_term_count ? ctx->host_terms[i - built_in] : NULL;
+}
+
+static drape_status find_row(drape_context *ctx, const char *pointer, const char *name,
+                             const drape_term_ops **out)
+{
+    const char *names[MAX_NAMES];
+    size_t count = 0;
+    for (int i = 0; (*out = row(ctx, i)) != NULL; i++) {
+        if (strcmp((*out)->name, name) == 0)
+            return DRAPE_OK;
+        if (count < MAX_NAMES)
+            names[count++] = (*out)->name;
+    }
+    const char *meant = drape_did_you_mean(name, names, count);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
+                         "there is no term \"%.60s\"%s%s%s; `drape list` shows all", name,
+                         meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+}
+
+static drape_cloth_view view_of(const drape_model *model, const drape_cloth *cloth)
+{
+    const drape_mesh *m = &cloth->mesh;
+    return (drape_cloth_view){.node_count = m->node_count,
+                              .triangle_count = m->triangle_count,
+                              .edge_count = m->edge_count,
+                              .hinge_count = m->hinge_count,
+                              .rest = m->x,
+                              .triangle = m->triangle,
+                              .triangle_area = m->triangle_area,
+                              .edge = m->edge,
+                              .edge_triangle = m->edge_triangle,
+                              .edge_length = m->edge_length,
+                              .hinge = m->hinge,
+                              .hinge_edge = m->hinge_edge,
+                              .node_area = m->node_area,
+                              .node_mass = cloth->node_mass,
+                              .rows = m->rows,
+                              .columns = m->columns,
+                              .material = cloth->material,
+                              .gravity = {model->gravity[0], model->gravity[1], model->gravity[2]}};
+}
+
+static drape_status check_elements(drape_term_builder *builder)
+{
+    const drape_elements *el = &builder->term->elements;
+    int32_t first = builder->first_node, last = first + builder->node_count - 1;
+    for (size_t i = 0; i < (size_t)el->count * (size_t)el->nodes; i++)
+        if (el->node[i] < first || el->node[i] > last)
+            return drape_term_refuse(builder, "element %zu of %s has node %d; the cloth's are 0 to %d",
+                                     i / (size_t)el->nodes, builder->term->ops->name,
+                                     (int)(el->node[i] - first), (int)(last - first));
+    return DRAPE_OK;
+}
+
+static drape_status build_term(drape_model *model, int32_t c, const char *pointer, const drape_row_def *def)
+{
+    drape_term *term = &model->terms[model->term_count];
+    drape_cloth *cloth = &model->cloths[c];
+    drape_status status = find_row(model->ctx, pointer, def->type, &term->ops);
+    for (int32_t i = 0; !status && i < model->term_count; i++)
+        if (model->terms[i].cloth == c && model->terms[i].ops == term->ops)
+            status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "the term \"%s\" is named twice",
+                                   def->type);
+    if (!status)
+        status = drape_params_resolve(model->ctx, pointer, term->ops->params, term->ops->param_count,
+                                      def->settings, def->setting_count, term->params);
+    if (status)
+        return status;
+    term->cloth = c;
+    term->first_internal = term->first_measure = -1;
+    model->term_count++;
+    model->has_dissipation = model->has_dissipation || term->ops->dissipative;
+    if (term->ops->law) {
+        cloth->laws[cloth->law_count++] = term;
+        return DRAPE_OK;
+    }
+    drape_term_builder builder = {.model = model,
+                                  .term = term,
+                                  .pointer = pointer,
+                                  .first_node = cloth->first_node,
+                                  .node_count = cloth->mesh.node_count};
+    drape_cloth_view view = view_of(model, cloth);
+    status = term->ops->build(&view, term->params, &builder);
+    return status ? status : check_elements(&builder);
+}
+
+/* The terms that the scene names, then gravity if there is any. */
+static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth_def *def)
+{
+    const double *g = model->gravity;
+    drape_status status = DRAPE_OK;
+    char pointer[128];
+    model->cloths[c].laws = drape_arena_take(&model->arena, model->ctx, def->term_count,
+                                             sizeof *model->cloths[c].laws);
+    if (!model->cloths[c].laws)
+        return DRAPE_E_MEMORY;
+    for (size_t i = 0; !status && i < def->term_count; i++) {
+        snprintf(pointer, sizeof pointer, "/cloth/%d/terms/%zu", (int)c, i);
+        if (strcmp(def->terms[i].type, "gravity") == 0)
+            status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
+                                   "gravity is modelled where the scene's \"gravity\" is not zero; "
+                                   "leave it out of the terms");
+        else
+            status = build_term(model, c, pointer, &def->terms[i]);
+    }
+    if (!status && (g[0] != 0 || g[1] != 0 || g[2] != 0))
+        status = build_term(model, c, "/gravity", &(drape_row_def){.type = "gravity"});
+    return status;
+}
+
+/* Places in the lists of measures and internal variables; laws onto the measures of their cloth. */
+static drape_status tie(drape_model *model, int32_t c)
+{
+    drape_cloth *cloth = &model->cloths[c];
+    bool measured = false;
+    for (int32_t i = 0; i < model->term_count; i++) {
+        drape_term *term = &model->terms[i];
+        if (term->cloth != c)
+            continue;
+        if (term->ops->has_internal) {
+            term->first_internal = model->internal_count;
+            model->internal_count += term->elements.count;
+        }
+        if (term->ops->measure) {
+            measured = true;
+            term->first_measure = model->measure_count;
+            model->measure_count += term->elements.count;
+            term->laws = cloth->laws;
+            term->law_count = cloth->law_count;
+        }
+    }
+    model->has_laws = model->has_laws || cloth->law_count > 0;
+    char pointer[64];
+    snprintf(pointer, sizeof pointer, "/cloth/%d/terms", (int)c);
+    if (cloth->law_count > 0 && !measured)
+        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
+                             "\"%s\" has nothing to act on: no other term here has a strain measure",
+                             cloth->laws[0]->ops->name);
+    return DRAPE_OK;
+}
+
+drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def)
+{
+    size_t count = 0;
+    drape_status status = DRAPE_OK;
+    for (size_t c = 0; c < def->cloth_count; c++)
+        count += def->cloths[c].term_count + 1; /* + 1: gravity */
+    model->terms = drape_arena_take(&model->arena, model->ctx, count, sizeof *model->terms);
+    if (!model->terms)
+        return DRAPE_E_MEMORY;
+    for (int32_t c = 0; !status && c < model->cloth_count; c++) {
+        status = build_cloth(model, c, &def->cloths[c]);
+        if (!status)
+            status = tie(model, c);
+    }
+    return status;
+}
+
+static bool well_formed(const drape_term_ops *ops)
+{
+    int kinds =
+        (ops->measure != NULL) + (ops->energy != NULL) + (ops->dissipation != NULL) + (ops->law != NULL);
+    bool sized =
+        ops->law ? ops->nodes == 0 : ops->nodes >= 1 && ops->nodes <= DRAPE_MAX_ELEMENT_NODES && ops->build;
+    bool internal = !ops->has_internal || (ops->commit && ops->initial);
+    return ops->name && ops->summary && ops->reference && ops->element_name && kinds == 1 && sized &&
+           internal && ops->param_count >= 0 && ops->param_count <= DRAPE_MAX_PARAMS;
+}
+
+drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *ops)
+{
+    if (!ctx || !ops)
+        return DRAPE_E_ARGUMENT;
+    if (ops->struct_size != sizeof *ops)
+        return drape_fail(ctx, DRAPE_E_VERSION, "the ops of a term have %zu bytes; this library's have %zu",
+                          ops->struct_size, sizeof *ops);
+    if (!well_formed(ops))
+        return drape_fail(ctx, DRAPE_E_ARGUMENT,
+                          "the ops of term \"%s\" are not well formed: name, summary, reference, "
+                          "element_name, exactly one of measure, "
+                          "energy, dissipation, law; nodes 1 to %d and build but for a law; commit and "
+                          "initial with has_internal",
+                          ops->name ? ops->name : "?", DRAPE_MAX_ELEMENT_NODES);
+    const drape_term_ops *other = NULL;
+    for (int i = 0; (other = row(ctx, i)) != NULL; i++)
+        if (strcmp(other->name, ops->name) == 0)
+            return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a term \"%s\" already", ops->name);
+    if (ctx->host_term_count == DRAPE_MAX_HOST_TERMS)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "term \"%s\": a context holds at most %d terms of the host",
+                          ops->name, DRAPE_MAX_HOST_TERMS);
+    ctx->host_terms[ctx->host_term_count++] = ops;
+    return DRAPE_OK;
+}

@@ -1,0 +1,237 @@
+/* compile.c: the stages of a compilation, in order: cloths, whole-model arrays, pins, terms, pattern. */
+#include "compile/compile.h"
+
+#include "compile/stages.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static drape_status copy_choice(drape_model *model, const drape_row_def *def, const char *fallback,
+                                drape_choice *choice)
+{
+    choice->type = drape_arena_text(&model->arena, model->ctx, def->type ? def->type : fallback);
+    choice->settings =
+        drape_arena_take(&model->arena, model->ctx, def->setting_count, sizeof *choice->settings);
+    if (!choice->type || !choice->settings)
+        return DRAPE_E_MEMORY;
+    for (size_t i = 0; i < def->setting_count; i++) {
+        const drape_setting *from = &def->settings[i];
+        drape_setting *to = &choice->settings[i];
+        to->number = from->number;
+        to->name = drape_arena_text(&model->arena, model->ctx, from->name);
+        to->text = from->text ? drape_arena_text(&model->arena, model->ctx, from->text) : NULL;
+        if (!to->name || (from->text && !to->text))
+            return DRAPE_E_MEMORY;
+    }
+    choice->setting_count = def->setting_count;
+    return DRAPE_OK;
+}
+
+static drape_status copy_formats(drape_model *model, const drape_scene_def *def)
+{
+    model->formats =
+        drape_arena_take(&model->arena, model->ctx, def->format_count, sizeof *model->formats);
+    if (!model->formats)
+        return DRAPE_E_MEMORY;
+    for (; model->format_count < def->format_count; model->format_count++) {
+        char *copy = drape_arena_text(&model->arena, model->ctx, def->formats[model->format_count]);
+        if (!copy)
+            return DRAPE_E_MEMORY;
+        model->formats[model->format_count] = copy;
+    }
+    return DRAPE_OK;
+}
+
+static drape_status check_number(drape_context *ctx, const char *pointer, double value, double max)
+{
+    if (value > 0 && value <= max)
+        return DRAPE_OK;
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%.10g is not allowed; it is in (0, %g]", value,
+                         max);
+}
+
+static drape_status check_vector(drape_context *ctx, const char *pointer, const double v[3], double max)
+{
+    for (int k = 0; k < 3; k++)
+        if (!(fabs(v[k]) <= max))
+            return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "component %d is %.10g; it is in [%g, %g]",
+                                 k, v[k], -max, max);
+    return DRAPE_OK;
+}
+
+static drape_status copy_scene(drape_model *model, const drape_scene_def *def)
+{
+    drape_context *ctx = model->ctx;
+    drape_status status = check_vector(ctx, "/gravity", def->gravity, 1e9);
+    if (!status)
+        status = check_number(ctx, "/duration", def->duration, 1e9);
+    if (!status)
+        status = check_number(ctx, "/frame_rate", def->frame_rate, 1e6);
+    memcpy(model->gravity, def->gravity, sizeof model->gravity);
+    model->duration = def->duration;
+    model->frame_rate = def->frame_rate;
+    if (!status)
+        status = copy_choice(model, &def->integrator, "be", &model->integrator);
+    if (!status)
+        status = copy_choice(model, &def->controller, "halving", &model->controller);
+    return status ? status : copy_formats(model, def);
+}
+
+static drape_status name_cloth(drape_model *model, int32_t c, const drape_cloth_def *def)
+{
+    char pointer[64], name[32];
+    snprintf(name, sizeof name, "cloth%d", (int)c);
+    snprintf(pointer, sizeof pointer, "/cloth/%d/name", (int)c);
+    const char *wanted = def->name ? def->name : name;
+    for (int32_t i = 0; i < c; i++)
+        if (strcmp(model->cloths[i].name, wanted) == 0)
+            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "two cloths have the name \"%.60s\"",
+                                 wanted);
+    model->cloths[c].name = drape_arena_text(&model->arena, model->ctx, wanted);
+    return model->cloths[c].name ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+static drape_status compile_cloth(drape_model *model, int32_t c, const drape_scene_def *scene)
+{
+    const drape_cloth_def *def = &scene->cloths[c];
+    drape_cloth *cloth = &model->cloths[c];
+    char pointer[64], at[96];
+    snprintf(pointer, sizeof pointer, "/cloth/%d", (int)c);
+    drape_status status = name_cloth(model, c, def);
+    snprintf(at, sizeof at, "%s/mesh", pointer);
+    if (!status)
+        status = drape_mesh_make(model->ctx, at, &def->mesh, scene->folder, &cloth->mesh);
+    if (!status)
+        status = drape_compile_material(model, pointer, def, cloth);
+    snprintf(at, sizeof at, "%s/velocity", pointer);
+    if (!status)
+        status = check_vector(model->ctx, at, def->velocity, 1e9);
+    memcpy(cloth->velocity, def->velocity, sizeof cloth->velocity);
+    return status;
+}
+
+/* Gives every cloth its range of nodes and triangles. */
+static drape_status count_all(drape_model *model)
+{
+    int64_t nodes = 0, triangles = 0, edges = 0;
+    for (int32_t c = 0; c < model->cloth_count; c++) {
+        model->cloths[c].first_node = (int32_t)nodes;
+        model->cloths[c].first_triangle = (int32_t)triangles;
+        nodes += model->cloths[c].mesh.node_count;
+        triangles += model->cloths[c].mesh.triangle_count;
+        edges += model->cloths[c].mesh.edge_count;
+        if (nodes > DRAPE_MAX_NODES)
+            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/cloth",
+                                 "the cloths have more than %d nodes together", DRAPE_MAX_NODES);
+    }
+    model->node_count = (int32_t)nodes;
+    model->triangle_count = (int32_t)triangles;
+    model->edge_count = (int32_t)edges;
+    return DRAPE_OK;
+}
+
+static void copy_numbers(int32_t *to, const int32_t *from, size_t count, int32_t first)
+{
+    for (size_t i = 0; i < count; i++)
+        to[i] = from[i] + first;
+}
+
+static void gather_cloth(drape_model *model, const drape_cloth *cloth, size_t first_edge)
+{
+    const drape_mesh *mesh = &cloth->mesh;
+    size_t nodes = (size_t)mesh->node_count, first = (size_t)cloth->first_node,
+           edges = (size_t)mesh->edge_count;
+    memcpy(model->rest + 3 * first, mesh->x, 3 * nodes * sizeof *mesh->x);
+    memcpy(model->mass + first, cloth->node_mass, nodes * sizeof *cloth->node_mass);
+    for (size_t i = 0; i < 3 * nodes; i++)
+        model->velocity[3 * first + i] = cloth->velocity[i % 3];
+    copy_numbers(model->triangle + 3 * (size_t)cloth->first_triangle, mesh->triangle,
+                 3 * (size_t)mesh->triangle_count, cloth->first_node);
+    copy_numbers(model->edge + 2 * first_edge, mesh->edge, 2 * edges, cloth->first_node);
+    memcpy(model->edge_length + first_edge, mesh->edge_length, edges * sizeof *mesh->edge_length);
+}
+
+static double bounding_diagonal(const double *x, int32_t node_count)
+{
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 0; i < 3 * (size_t)node_count; i++) {
+        low[i % 3] = fmin(low[i % 3], x[i]);
+        high[i % 3] = fmax(high[i % 3], x[i]);
+    }
+    return sqrt(pow(high[0] - low[0], 2) + pow(high[1] - low[1], 2) + pow(high[2] - low[2], 2));
+}
+
+/* The arrays of all cloths one after another. */
+static drape_status gather(drape_model *model)
+{
+    drape_arena *arena = &model->arena;
+    size_t nodes = (size_t)model->node_count, edges = (size_t)model->edge_count, first_edge = 0;
+    model->rest = drape_arena_take(arena, model->ctx, 3 * nodes, sizeof *model->rest);
+    model->velocity = drape_arena_take(arena, model->ctx, 3 * nodes, sizeof *model->velocity);
+    model->mass = drape_arena_take(arena, model->ctx, nodes, sizeof *model->mass);
+    model->triangle =
+        drape_arena_take(arena, model->ctx, 3 * (size_t)model->triangle_count, sizeof *model->triangle);
+    model->edge = drape_arena_take(arena, model->ctx, 2 * edges, sizeof *model->edge);
+    model->edge_length = drape_arena_take(arena, model->ctx, edges, sizeof *model->edge_length);
+    if (!model->rest || !model->velocity || !model->mass || !model->triangle || !model->edge ||
+        !model->edge_length)
+        return DRAPE_E_MEMORY;
+    for (int32_t c = 0; c < model->cloth_count; c++) {
+        gather_cloth(model, &model->cloths[c], first_edge);
+        first_edge += (size_t)model->cloths[c].mesh.edge_count;
+    }
+    model->length = bounding_diagonal(model->rest, model->node_count);
+    return DRAPE_OK;
+}
+
+static drape_status compile_cloths(drape_model *model, const drape_scene_def *def)
+{
+    if (def->cloth_count == 0 || def->cloth_count > 1 << 20)
+        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/cloth",
+                             "the scene has %zu cloths; it has 1 to %d", def->cloth_count, 1 << 20);
+    model->cloths =
+        drape_arena_take(&model->arena, model->ctx, def->cloth_count, sizeof *model->cloths);
+    if (!model->cloths)
+        return DRAPE_E_MEMORY;
+    drape_status status = DRAPE_OK;
+    for (size_t c = 0; !status && c < def->cloth_count; c++) {
+        status = compile_cloth(model, (int32_t)c, def);
+        model->cloth_count = (int32_t)c + 1; /* an unfinished one is freed too */
+    }
+    if (!status)
+        status = count_all(model);
+    return status ? status : gather(model);
+}
+
+/* Pinned nodes start at rest or with their track: the initial velocity is of the free ones. */
+static void stop_pinned(drape_model *model)
+{
+    for (int32_t i = 0; i < model->node_count; i++)
+        if (model->pinned[i])
+            memset(model->velocity + 3 * (size_t)i, 0, 3 * sizeof *model->velocity);
+}
+
+drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape_model **out)
+{
+    *out = NULL;
+    drape_model *model = drape_alloc(ctx, 1, sizeof *model);
+    if (!model)
+        return DRAPE_E_MEMORY;
+    model->ctx = ctx;
+    drape_status status = copy_scene(model, def);
+    if (!status)
+        status = compile_cloths(model, def);
+    if (!status)
+        status = drape_compile_pins(model, def);
+    if (!status)
+        status = drape_compile_terms(model, def);
+    if (!status)
+        status = drape_compile_pattern(model);
+    if (!status)
+        stop_pinned(model);
+    if (status)
+        drape_model_destroy(&model);
+    *out = model;
+    return status;
+}

@@ -1,0 +1,129 @@
+/*
+ * material.c: from Young's modulus, Poisson's ratio, thickness and a density to membrane stiffness E h,
+ * flexural rigidity D = E h^3/(12 (1 - nu^2)) and lumped masses.
+ */
+#include "compile/stages.h"
+
+#include <math.h>
+#include <stdio.h>
+
+enum { MASS_AREA, MASS_UNIFORM };
+static const char *const mass_choices[] = {"area", "uniform", NULL};
+
+const drape_param drape_material_params[DRAPE_MATERIAL_PARAM_COUNT] = {
+    [DRAPE_MATERIAL_YOUNG_MODULUS] = {.name = "young_modulus",
+                                      .unit = "Pa",
+                                      .default_value = NAN,
+                                      .min = 0,
+                                      .max = 1e15,
+                                      .open_min = true,
+                                      .help = "Young's modulus E of the sheet"},
+    [DRAPE_MATERIAL_POISSON_RATIO] = {.name = "poisson_ratio",
+                                      .unit = "1",
+                                      .default_value = 1.0 / 3.0,
+                                      .min = -1,
+                                      .max = 0.5,
+                                      .open_min = true,
+                                      .help =
+                                          "Poisson's ratio nu; stretch.edge has 1/3 whatever is said here"},
+    [DRAPE_MATERIAL_THICKNESS] = {.name = "thickness",
+                                  .unit = "m",
+                                  .default_value = NAN,
+                                  .min = 0,
+                                  .max = 10,
+                                  .open_min = true,
+                                  .help = "thickness h of the sheet"},
+    [DRAPE_MATERIAL_DENSITY] = {.name = "density",
+                                .unit = "kg/m3",
+                                .default_value = NAN,
+                                .derived = "from areal_density or total_mass",
+                                .min = 0,
+                                .max = 1e9,
+                                .open_min = true,
+                                .help = "mass per volume; times thickness is the areal density"},
+    [DRAPE_MATERIAL_AREAL_DENSITY] = {.name = "areal_density",
+                                      .unit = "kg/m2",
+                                      .default_value = NAN,
+                                      .derived = "from density or total_mass",
+                                      .min = 0,
+                                      .max = 1e9,
+                                      .open_min = true,
+                                      .help = "mass per area, in place of density"},
+    [DRAPE_MATERIAL_TOTAL_MASS] = {.name = "total_mass",
+                                   .unit = "kg",
+                                   .default_value = NAN,
+                                   .derived = "from density or areal_density",
+                                   .min = 0,
+                                   .max = 1e12,
+                                   .open_min = true,
+                                   .help = "mass of the whole cloth, in place of density"},
+    [DRAPE_MATERIAL_MASS] =
+        {.name = "mass",
+         .kind = DRAPE_PARAM_CHOICE,
+         .unit = "1",
+         .default_value = MASS_AREA,
+         .choices = mass_choices,
+         .help = "area: lumped, a third of each triangle to each node; uniform: the same on every node"},
+};
+
+static double total_area(const drape_mesh *mesh)
+{
+    double area = 0;
+    for (int32_t t = 0; t < mesh->triangle_count; t++)
+        area += mesh->triangle_area[t];
+    return area;
+}
+
+static drape_status total_mass(drape_context *ctx, const char *pointer, const double *values, double area,
+                               double *mass)
+{
+    double density = values[DRAPE_MATERIAL_DENSITY], areal = values[DRAPE_MATERIAL_AREAL_DENSITY];
+    double total = values[DRAPE_MATERIAL_TOTAL_MASS];
+    int given = !isnan(density) + !isnan(areal) + !isnan(total);
+    if (given != 1)
+        return drape_fail_at(
+            ctx, DRAPE_E_ARGUMENT, pointer,
+            "%d of \"density\", \"areal_density\", \"total_mass\" are given; exactly one is needed", given);
+    *mass =
+        !isnan(total) ? total : area * (!isnan(areal) ? areal : density * values[DRAPE_MATERIAL_THICKNESS]);
+    return DRAPE_OK;
+}
+
+static drape_material resolve(const double *values, double mass, double area)
+{
+    drape_material m = {.young_modulus = values[DRAPE_MATERIAL_YOUNG_MODULUS],
+                        .poisson_ratio = values[DRAPE_MATERIAL_POISSON_RATIO],
+                        .thickness = values[DRAPE_MATERIAL_THICKNESS],
+                        .areal_density = mass / area};
+    m.membrane_stiffness = m.young_modulus * m.thickness;
+    m.flexural_rigidity =
+        m.young_modulus * pow(m.thickness, 3) / (12 * (1 - m.poisson_ratio * m.poisson_ratio));
+    return m;
+}
+
+drape_status drape_compile_material(drape_model *model, const char *pointer, const drape_cloth_def *def,
+                                    drape_cloth *cloth)
+{
+    char at[256];
+    double values[DRAPE_MATERIAL_PARAM_COUNT], mass = 0;
+    snprintf(at, sizeof at, "%s/material", pointer);
+    drape_status status =
+        drape_params_resolve(model->ctx, at, drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, def->material,
+                             def->material_count, values);
+    double area = total_area(&cloth->mesh);
+    if (!status)
+        status = total_mass(model->ctx, at, values, area, &mass);
+    if (status)
+        return status;
+    int32_t count = cloth->mesh.node_count;
+    cloth->node_mass =
+        drape_arena_take(&model->arena, model->ctx, (size_t)count, sizeof *cloth->node_mass);
+    if (!cloth->node_mass)
+        return DRAPE_E_MEMORY;
+    cloth->material = resolve(values, mass, area);
+    for (int32_t i = 0; i < count; i++)
+        cloth->node_mass[i] = values[DRAPE_MATERIAL_MASS] == MASS_UNIFORM
+                                  ? mass / count
+                                  : cloth->material.areal_density * cloth->mesh.node_area[i];
+    return DRAPE_OK;
+}

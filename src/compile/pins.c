@@ -1,0 +1,272 @@
+/* pins.c: which nodes are pinned, along which track; numbers of the free nodes. Pinned nodes leave the system
+ * altogether. */
+#include "compile/stages.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* One pin under construction: where it stands in the scene, and which cloth it pins. */
+typedef struct pin_place {
+    drape_model *model;
+    const drape_cloth *cloth;
+    const drape_pin_def *def;
+    char pointer[128];
+    int32_t track;          /* number of its track, -1: fixed */
+    int32_t *track_of_node; /* (node_count): -1 fixed or free */
+    int32_t taken;          /* nodes pinned so far by this pin */
+} pin_place;
+
+static drape_status refuse(const pin_place *pin, const char *key, const char *text)
+{
+    char at[192];
+    snprintf(at, sizeof at, "%s%s", pin->pointer, key);
+    return drape_fail_at(pin->model->ctx, DRAPE_E_ARGUMENT, at, "%s", text);
+}
+
+static drape_status take_node(pin_place *pin, const char *key, int32_t local)
+{
+    int32_t node = pin->cloth->first_node + local;
+    if (pin->model->pinned[node] && pin->track_of_node[node] != pin->track) {
+        char text[128];
+        snprintf(text, sizeof text, "node %d is pinned twice, along different tracks", (int)local);
+        return refuse(pin, key, text);
+    }
+    pin->model->pinned[node] = 1;
+    pin->track_of_node[node] = pin->track;
+    pin->taken++;
+    return DRAPE_OK;
+}
+
+static drape_status take_list(pin_place *pin)
+{
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < pin->def->node_count; i++) {
+        char key[48], text[96];
+        int32_t node = pin->def->nodes[i];
+        snprintf(key, sizeof key, "/nodes/%zu", i);
+        snprintf(text, sizeof text, "node %d is not in the mesh; its nodes are 0 to %d", (int)node,
+                 (int)pin->cloth->mesh.node_count - 1);
+        status = node < 0 || node >= pin->cloth->mesh.node_count ? refuse(pin, key, text)
+                                                                 : take_node(pin, key, node);
+    }
+    return status;
+}
+
+/* Nodes (row, column) of a grid within [first, last] ranges. */
+static drape_status take_range(pin_place *pin, const char *key, int32_t first_row, int32_t last_row,
+                               int32_t first_column, int32_t last_column)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t r = first_row; r <= last_row; r++)
+        for (int32_t c = first_column; !status && c <= last_column; c++)
+            status = take_node(pin, key, r * pin->cloth->mesh.columns + c);
+    return status;
+}
+
+/* Where a word such as "top" or "top-left" puts a pin: sets the range of rows or columns that it names. */
+static bool apply_word(const char *word, size_t length, const drape_mesh *mesh, int32_t range[4])
+{
+    static const struct {
+        const char *name;
+        int side; /* index in range: first row, last row, first column, last column */
+    } words[] = {{"top", 1}, {"bottom", 0}, {"left", 3}, {"right", 2}};
+    const int32_t pinned_to[4] = {mesh->rows - 1, 0, mesh->columns - 1, 0};
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (strlen(words[i].name) == length && strncmp(words[i].name, word, length) == 0) {
+            range[words[i].side] = pinned_to[words[i].side];
+            return true;
+        }
+    return false;
+}
+
+static drape_status refuse_word(const pin_place *pin, const char *key, const char *word,
+                                const char *const *choices)
+{
+    size_t count = 0;
+    while (choices[count])
+        count++;
+    char text[256];
+    const char *meant = drape_did_you_mean(word, choices, count);
+    snprintf(text, sizeof text, "\"%.60s\" is not allowed; one of: %s, %s, %s, %s%s%s%s", word, choices[0],
+             choices[1], choices[2], choices[3], meant ? "; did you mean \"" : "", meant ? meant : "",
+             meant ? "\"?" : "");
+    return refuse(pin, key, text);
+}
+
+static drape_status take_corner(pin_place *pin)
+{
+    static const char *const choices[] = {"top-left", "top-right", "bottom-left", "bottom-right", NULL};
+    const drape_mesh *mesh = &pin->cloth->mesh;
+    int32_t range[4] = {0, mesh->rows - 1, 0, mesh->columns - 1};
+    const char *word = pin->def->corner, *dash = strchr(word, '-');
+    bool known = false;
+    for (int i = 0; choices[i]; i++)
+        known = known || strcmp(choices[i], word) == 0;
+    if (!known || !apply_word(word, (size_t)(dash - word), mesh, range) ||
+        !apply_word(dash + 1, strlen(dash + 1), mesh, range))
+        return refuse_word(pin, "/corner", word, choices);
+    return take_range(pin, "/corner", range[0], range[1], range[2], range[3]);
+}
+
+static drape_status take_edge(pin_place *pin)
+{
+    static const char *const choices[] = {"top", "bottom", "left", "right", NULL};
+    const drape_mesh *mesh = &pin->cloth->mesh;
+    int32_t range[4] = {0, mesh->rows - 1, 0, mesh->columns - 1};
+    if (!apply_word(pin->def->edge, strlen(pin->def->edge), mesh, range))
+        return refuse_word(pin, "/edge", pin->def->edge, choices);
+    return take_range(pin, "/edge", range[0], range[1], range[2], range[3]);
+}
+
+static drape_status take_row(pin_place *pin)
+{
+    const drape_mesh *mesh = &pin->cloth->mesh;
+    if (pin->def->row >= mesh->rows) {
+        char text[96];
+        snprintf(text, sizeof text, "row %d is not in the mesh; its rows are 0 to %d", (int)pin->def->row,
+                 (int)mesh->rows - 1);
+        return refuse(pin, "/row", text);
+    }
+    return take_range(pin, "/row", pin->def->row, pin->def->row, 0, mesh->columns - 1);
+}
+
+static drape_status take_box(pin_place *pin)
+{
+    const double *low = pin->def->box_min, *high = pin->def->box_max;
+    for (int k = 0; k < 3; k++)
+        if (!(low[k] <= high[k]))
+            return refuse(pin, "/box", "min must not be above max in any coordinate");
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; !status && i < pin->cloth->mesh.node_count; i++) {
+        const double *x = pin->cloth->mesh.x + 3 * (size_t)i;
+        bool inside = true;
+        for (int k = 0; k < 3; k++)
+            inside = inside && low[k] <= x[k] && x[k] <= high[k];
+        if (inside)
+            status = take_node(pin, "/box", i);
+    }
+    if (!status && pin->taken == 0)
+        status = refuse(pin, "/box", "no node lies in the box");
+    return status;
+}
+
+static drape_status take_selection(pin_place *pin)
+{
+    const drape_pin_def *def = pin->def;
+    const char *on_grid = def->corner ? "/corner" : def->edge ? "/edge" : def->row >= 0 ? "/row" : NULL;
+    int given =
+        (def->nodes != NULL) + (def->corner != NULL) + (def->edge != NULL) + (def->row >= 0) + def->has_box;
+    if (given != 1)
+        return refuse(pin, "", "exactly one of \"nodes\", \"corner\", \"edge\", \"row\", \"box\" is needed");
+    if (on_grid && pin->cloth->mesh.rows == 0)
+        return refuse(pin, on_grid,
+                      "only a grid has rows, corners and edges; use \"nodes\" or \"box\" for this mesh");
+    if (def->nodes)
+        return take_list(pin);
+    if (def->corner)
+        return take_corner(pin);
+    if (def->edge)
+        return take_edge(pin);
+    return def->has_box ? take_box(pin) : take_row(pin);
+}
+
+static drape_status check_keys(const pin_place *pin)
+{
+    const drape_track_key *keys = pin->def->track;
+    for (size_t k = 0; k < pin->def->key_count; k++) {
+        char key[48];
+        snprintf(key, sizeof key, "/track/%zu", k);
+        bool finite = isfinite(keys[k].time);
+        for (int i = 0; i < 3; i++)
+            finite = finite && fabs(keys[k].displacement[i]) <= 1e9;
+        if (!finite)
+            return refuse(pin, key, "time and displacement must be finite, the displacement within 1e9 m");
+        if (k > 0 && !(keys[k].time > keys[k - 1].time))
+            return refuse(pin, key, "times must increase from key to key");
+    }
+    return DRAPE_OK;
+}
+
+static drape_status keep_track(pin_place *pin)
+{
+    pin->track = -1;
+    drape_status status = check_keys(pin);
+    if (status || pin->def->key_count == 0)
+        return status;
+    drape_model *model = pin->model;
+    drape_track *track = &model->tracks[model->track_count];
+    track->key_count = pin->def->key_count;
+    track->keys =
+        drape_arena_take(&model->arena, model->ctx, track->key_count, sizeof *track->keys);
+    if (!track->keys)
+        return DRAPE_E_MEMORY;
+    memcpy(track->keys, pin->def->track, track->key_count * sizeof *track->keys);
+    pin->track = model->track_count++;
+    return DRAPE_OK;
+}
+
+static drape_status pin_cloths(drape_model *model, const drape_scene_def *def, int32_t *track_of_node)
+{
+    drape_status status = DRAPE_OK;
+    for (int32_t c = 0; c < model->cloth_count; c++)
+        for (size_t p = 0; !status && p < def->cloths[c].pin_count; p++) {
+            pin_place pin = {.model = model,
+                             .cloth = &model->cloths[c],
+                             .def = &def->cloths[c].pins[p],
+                             .track_of_node = track_of_node};
+            snprintf(pin.pointer, sizeof pin.pointer, "/cloth/%d/pins/%zu", (int)c, p);
+            status = keep_track(&pin);
+            if (!status)
+                status = take_selection(&pin);
+        }
+    return status;
+}
+
+/* Numbers the free nodes in order and lists the moved ones. */
+static drape_status number_nodes(drape_model *model, const int32_t *track_of_node)
+{
+    for (int32_t i = 0; i < model->node_count; i++) {
+        model->free_of_node[i] = model->pinned[i] ? -1 : model->free_count++;
+        model->moved_count += track_of_node[i] >= 0;
+    }
+    model->node_of_free = drape_arena_take(&model->arena, model->ctx, (size_t)model->free_count,
+                                           sizeof *model->node_of_free);
+    model->moved_node = drape_arena_take(&model->arena, model->ctx, (size_t)model->moved_count,
+                                         sizeof *model->moved_node);
+    model->moved_track = drape_arena_take(&model->arena, model->ctx, (size_t)model->moved_count,
+                                          sizeof *model->moved_track);
+    if (!model->node_of_free || !model->moved_node || !model->moved_track)
+        return DRAPE_E_MEMORY;
+    int32_t moved = 0;
+    for (int32_t i = 0; i < model->node_count; i++) {
+        if (model->free_of_node[i] >= 0)
+            model->node_of_free[model->free_of_node[i]] = i;
+        if (track_of_node[i] >= 0) {
+            model->moved_node[moved] = i;
+            model->moved_track[moved++] = track_of_node[i];
+        }
+    }
+    return DRAPE_OK;
+}
+
+drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
+{
+    size_t pin_count = 0, nodes = (size_t)model->node_count;
+    for (size_t c = 0; c < def->cloth_count; c++)
+        pin_count += def->cloths[c].pin_count;
+    model->tracks = drape_arena_take(&model->arena, model->ctx, pin_count, sizeof *model->tracks);
+    model->pinned = drape_arena_take(&model->arena, model->ctx, nodes, sizeof *model->pinned);
+    model->free_of_node =
+        drape_arena_take(&model->arena, model->ctx, nodes, sizeof *model->free_of_node);
+    int32_t *track_of_node = drape_alloc(model->ctx, nodes, sizeof *track_of_node);
+    drape_status status = DRAPE_E_MEMORY;
+    if (model->tracks && model->pinned && model->free_of_node && track_of_node) {
+        memset(track_of_node, 0xff, nodes * sizeof *track_of_node); /* all -1 */
+        status = pin_cloths(model, def, track_of_node);
+        if (!status)
+            status = number_nodes(model, track_of_node);
+    }
+    drape_free(model->ctx, track_of_node);
+    return status;
+}

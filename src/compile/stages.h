@@ -1,0 +1,22 @@
+/* stages.h: the stages of drape_compile, one file each. All take the model under construction and report at
+ * JSON pointers. */
+#ifndef DRAPE_COMPILE_STAGES_H
+#define DRAPE_COMPILE_STAGES_H
+
+#include "base/param.h"
+#include "compile/compile.h"
+
+/* Resolves the material of a cloth whose mesh stands, and lumps its mass. pointer: "/cloth/0". */
+drape_status drape_compile_material(drape_model *model, const char *pointer, const drape_cloth_def *def,
+                                    drape_cloth *cloth);
+
+/* Marks the pinned nodes of all cloths, numbers the free ones, keeps the tracks. */
+drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def);
+
+/* Builds the terms of all cloths and gives measures and internal variables their places. */
+drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def);
+
+/* The Jacobian's pattern from all terms, and the block of each node pair of each element. */
+drape_status drape_compile_pattern(drape_model *model);
+
+#endif
