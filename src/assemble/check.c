@@ -1,0 +1,340 @@
+/*
+ * check.c: see check.h. Per term: the functions that its author wrote, element by element, one coordinate at
+ * a time. Then the assembled Jacobian along random directions, as step methods and as IDA use it. Errors are
+ * relative to the largest entry; a Hessian's also to the gradient over the element's size, because a linear
+ * term has none.
+ *
+ * The step of the differences is 1e-5 of the element's size: truncation is about its square, 1e-10, rounding
+ * 1e-16/1e-5.
+ */
+#include "assemble/check.h"
+
+#include <math.h>
+#include <string.h>
+
+#define D                DRAPE_MAX_ELEMENT_DOFS
+#define SAMPLE           200 /* elements of a term that are looked at */
+#define DIRECTIONS       8
+#define DEFORMATION      0.08 /* of the mean edge length, a coordinate */
+#define DIFFERENCE_STEP  1e-5 /* of the mean edge length */
+#define GRADIENT_LIMIT   1e-7
+#define HESSIAN_LIMIT    1e-6
+#define INVARIANCE_LIMIT 1e-9
+
+typedef struct checker {
+    drape_system *system;
+    const drape_model *model;
+    uint64_t random;
+    double size, step; /* [m] */
+    double *x, *v, *internal, *history;
+    double *x2, *v2, *g1, *g2, *direction; /* scratch, nodes */
+    double *values;                        /* a Jacobian */
+    drape_check_row *rows;
+    int row_count;
+} checker;
+
+/* In [-1, 1]; a linear congruential generator (Knuth's MMIX), so that every machine sees the same state. */
+static double uniform(checker *c)
+{
+    c->random = c->random * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return (double)(c->random >> 11) / 4503599627370496.0 - 1;
+}
+
+static void report(checker *c, const char *term, const char *what, double error, double limit)
+{
+    if (c->row_count < DRAPE_MAX_CHECK_ROWS)
+        c->rows[c->row_count++] = (drape_check_row){
+            .term = term, .what = what, .error = error, .limit = limit, .pass = error <= limit};
+}
+
+static double largest(const double *a, size_t n)
+{
+    double max = 0;
+    for (size_t i = 0; i < n; i++)
+        max = isnan(a[i]) ? INFINITY : fmax(max, fabs(a[i]));
+    return max;
+}
+
+static double largest_difference(const double *a, const double *b, size_t n)
+{
+    double max = 0;
+    for (size_t i = 0; i < n; i++)
+        max = isnan(a[i] - b[i]) ? INFINITY : fmax(max, fabs(a[i] - b[i]));
+    return max;
+}
+
+static double ratio(double difference, double scale)
+{
+    return difference == 0 ? 0 : difference / scale;
+}
+
+/* ---- The state
+ * ------------------------------------------------------------------------------------------------------ */
+
+/* Rotation by 0.7 rad about (1, 2, 3)/sqrt(14), Rodrigues' formula. */
+static void rotate(const double a[3], double out[3])
+{
+    const double k[3] = {1 / sqrt(14.0), 2 / sqrt(14.0), 3 / sqrt(14.0)}, cosine = cos(0.7), sine = sin(0.7);
+    double along = k[0] * a[0] + k[1] * a[1] + k[2] * a[2];
+    const double cross[3] = {k[1] * a[2] - k[2] * a[1], k[2] * a[0] - k[0] * a[2], k[0] * a[1] - k[1] * a[0]};
+    for (int i = 0; i < 3; i++)
+        out[i] = cosine * a[i] + sine * cross[i] + (1 - cosine) * along * k[i];
+}
+
+static void make_state(checker *c, const drape_state *rest)
+{
+    const drape_model *m = c->model;
+    for (size_t i = 0; i < (size_t)m->node_count; i++) {
+        double deformed[3];
+        for (int k = 0; k < 3; k++) {
+            deformed[k] = rest->x[3 * i + (size_t)k] + DEFORMATION * c->size * uniform(c);
+            c->v[3 * i + (size_t)k] = c->size * uniform(c);
+        }
+        rotate(deformed, c->x + 3 * i);
+    }
+    memcpy(c->internal, rest->internal, (size_t)m->internal_count * sizeof *c->internal);
+    for (int64_t i = 0; i < m->measure_count; i++)
+        c->history[i] = uniform(c);
+}
+
+static double mean_edge(const drape_model *m)
+{
+    double sum = 0;
+    for (int32_t e = 0; e < m->edge_count; e++)
+        sum += m->edge_length[e];
+    return m->edge_count > 0 ? sum / m->edge_count : m->length;
+}
+
+/* ---- One term, element by element
+ * ------------------------------------------------------------------------------------- */
+
+/* What an author's function returns for one element: a scalar, its gradient, the Hessian. */
+typedef struct local {
+    double scalar, gradient[D], hessian[D * D], velocity[D * D];
+} local;
+
+static void evaluate(const drape_term *term, int32_t e, const double *x, const double *v,
+                     const double *internal, local *out)
+{
+    const double *own = term->first_internal >= 0 ? internal + term->first_internal : NULL;
+    memset(out, 0, sizeof *out);
+    if (term->ops->measure)
+        term->ops->measure(&term->elements, e, 1, x, own, &out->scalar, out->gradient, out->hessian);
+    else if (term->ops->energy)
+        term->ops->energy(&term->elements, e, 1, x, own, &out->scalar, out->gradient,
+                          term->ops->linear ? NULL : out->hessian);
+    else
+        term->ops->dissipation(&term->elements, e, 1, x, v, out->gradient, out->hessian, out->velocity);
+}
+
+/* Moves coordinate i of an element by +- step in array (positions or velocities) and evaluates. */
+static void evaluate_beside(checker *c, const drape_term *term, int32_t e, int i, double *array, local *plus,
+                            local *minus)
+{
+    size_t at = 3 * (size_t)term->elements.node[(size_t)e * (size_t)term->elements.nodes + (size_t)(i / 3)] +
+                (size_t)(i % 3);
+    double kept = array[at];
+    array[at] = kept + c->step;
+    evaluate(term, e, c->x, c->v, c->internal, plus);
+    array[at] = kept - c->step;
+    evaluate(term, e, c->x, c->v, c->internal, minus);
+    array[at] = kept;
+}
+
+typedef struct errors {
+    double gradient, hessian, velocity, symmetry;
+} errors;
+
+static void compare_element(checker *c, const drape_term *term, int32_t e, errors *worst)
+{
+    int d = 3 * term->elements.nodes;
+    local here, plus, minus;
+    double dg[D], dh[D * D], dv[D * D] = {0};
+    evaluate(term, e, c->x, c->v, c->internal, &here);
+    for (int i = 0; i < d; i++) {
+        evaluate_beside(c, term, e, i, c->x, &plus, &minus);
+        dg[i] = (plus.scalar - minus.scalar) / (2 * c->step);
+        for (int j = 0; j < d; j++)
+            dh[d * j + i] = (plus.gradient[j] - minus.gradient[j]) / (2 * c->step);
+        if (term->ops->dissipation)
+            evaluate_beside(c, term, e, i, c->v, &plus, &minus);
+        for (int j = 0; term->ops->dissipation && j < d; j++)
+            dv[d * j + i] = (plus.gradient[j] - minus.gradient[j]) / (2 * c->step);
+    }
+    double g = largest(here.gradient, (size_t)d),
+           h = fmax(largest(here.hessian, (size_t)(d * d)), g / c->size);
+    double v = fmax(largest(here.velocity, (size_t)(d * d)), g / c->size);
+    worst->gradient = fmax(worst->gradient, ratio(largest_difference(dg, here.gradient, (size_t)d), g));
+    worst->hessian = fmax(worst->hessian, ratio(largest_difference(dh, here.hessian, (size_t)(d * d)), h));
+    worst->velocity = fmax(worst->velocity, ratio(largest_difference(dv, here.velocity, (size_t)(d * d)), v));
+    for (int i = 0; i < d; i++)
+        for (int j = 0; j < i; j++)
+            worst->symmetry =
+                fmax(worst->symmetry, ratio(fabs(here.hessian[d * i + j] - here.hessian[d * j + i]), h));
+}
+
+static void check_elements(checker *c, const drape_term *term)
+{
+    errors worst = {0};
+    int32_t stride = term->elements.count / SAMPLE + 1;
+    for (int32_t e = 0; e < term->elements.count; e += stride)
+        compare_element(c, term, e, &worst);
+    if (term->ops->dissipation) {
+        report(c, term->ops->name, "force by position", worst.hessian, HESSIAN_LIMIT);
+        report(c, term->ops->name, "force by velocity", worst.velocity, HESSIAN_LIMIT);
+        return;
+    }
+    report(c, term->ops->name, term->ops->measure ? "gradient of measure" : "gradient", worst.gradient,
+           GRADIENT_LIMIT);
+    report(c, term->ops->name, term->ops->measure ? "Hessian of measure" : "Hessian", worst.hessian,
+           HESSIAN_LIMIT);
+    report(c, term->ops->name, "symmetry", worst.symmetry, INVARIANCE_LIMIT);
+}
+
+/* Net force and net torque of a measure's term, over the sum of magnitudes: internal forces have neither. */
+static void check_invariance(checker *c, int32_t t)
+{
+    const drape_term *term = &c->model->terms[t];
+    const drape_point point = {.x = c->x, .v = c->v, .internal = c->internal};
+    double net[6] = {0}, scale = 0, size = 0;
+    size_t n = (size_t)c->model->node_count;
+    memset(c->g1, 0, 3 * n * sizeof *c->g1);
+    drape_system_term(c->system, t, &point, NULL, c->g1, NULL);
+    for (size_t i = 0; i < n; i++) {
+        const double *x = c->x + 3 * i, *g = c->g1 + 3 * i;
+        for (int k = 0; k < 3; k++) {
+            int a = (k + 1) % 3, b = (k + 2) % 3;
+            net[k] += g[k];
+            net[3 + k] += x[a] * g[b] - x[b] * g[a];
+            scale += fabs(g[k]);
+            size = fmax(size, fabs(x[k]));
+        }
+    }
+    report(c, term->ops->name, "net force", ratio(largest(net, 3), scale), INVARIANCE_LIMIT);
+    report(c, term->ops->name, "net torque", ratio(largest(net + 3, 3), scale * size), INVARIANCE_LIMIT);
+}
+
+static void check_law(checker *c, const drape_term *law)
+{
+    const double k = 2.385, strain = 0.117, rate = -0.731, h = 1e-6;
+    double f, fs, fr, e, plus, minus, by_strain, by_rate, energy, e2[2], x;
+    law->ops->law(law->params, k, strain, rate, &f, &fs, &fr, &e);
+    law->ops->law(law->params, k, strain + h, rate, &plus, &x, &x, &e2[0]);
+    law->ops->law(law->params, k, strain - h, rate, &minus, &x, &x, &e2[1]);
+    by_strain = (plus - minus) / (2 * h);
+    energy = (e2[0] - e2[1]) / (2 * h);
+    law->ops->law(law->params, k, strain, rate + h, &plus, &x, &x, &x);
+    law->ops->law(law->params, k, strain, rate - h, &minus, &x, &x, &x);
+    by_rate = (plus - minus) / (2 * h);
+    double scale = fmax(fmax(fabs(fs), fabs(fr)), fabs(f));
+    report(c, law->ops->name, "force by strain", ratio(fabs(by_strain - fs), scale), HESSIAN_LIMIT);
+    report(c, law->ops->name, "force by rate", ratio(fabs(by_rate - fr), scale), HESSIAN_LIMIT);
+    if (!law->ops->dissipative)
+        report(c, law->ops->name, "force of energy", ratio(fabs(energy - f), scale), GRADIENT_LIMIT);
+}
+
+/* ---- The assembled Jacobian
+ * ---------------------------------------------------------------------------------------------- */
+
+/* x2, v2 = the state moved by s along direction on the free nodes; v moves by w times that. */
+static void move(checker *c, double s, double weight)
+{
+    const drape_model *m = c->model;
+    for (size_t i = 0; i < 3 * (size_t)m->node_count; i++) {
+        double p = m->pinned[i / 3] ? 0 : c->direction[i];
+        c->x2[i] = c->x[i] + s * p;
+        c->v2[i] = c->v[i] + weight * s * p;
+    }
+}
+
+/* y = J p over the free DOFs, into y (nodes). */
+static void multiply(const checker *c, double *y)
+{
+    const drape_model *m = c->model;
+    memset(y, 0, 3 * (size_t)m->node_count * sizeof *y);
+    for (int64_t j = 0; j < m->pattern.n; j++) {
+        double p = c->direction[3 * (int64_t)m->node_of_free[j / 3] + j % 3];
+        for (int64_t k = m->pattern.column[j]; k < m->pattern.column[j + 1]; k++) {
+            int64_t i = m->pattern.row[k];
+            y[3 * (int64_t)m->node_of_free[i / 3] + i % 3] += c->values[k] * p;
+        }
+    }
+}
+
+static double jacobian_error(checker *c, double weight, const double *history)
+{
+    const drape_model *m = c->model;
+    size_t n = 3 * (size_t)m->node_count;
+    drape_point point = {.x = c->x, .v = c->v, .internal = c->internal, .weight = weight, .history = history};
+    double worst = 0;
+    drape_system_jacobian(c->system, &point, 0, false, c->values);
+    for (int r = 0; r < DIRECTIONS; r++) {
+        for (size_t i = 0; i < n; i++)
+            c->direction[i] = uniform(c);
+        point.x = c->x2;
+        point.v = c->v2;
+        move(c, c->step, weight);
+        drape_system_force(c->system, &point, c->g1);
+        move(c, -c->step, weight);
+        drape_system_force(c->system, &point, c->g2);
+        for (size_t i = 0; i < n; i++)
+            c->g1[i] = m->pinned[i / 3] ? 0 : (c->g1[i] - c->g2[i]) / (2 * c->step);
+        multiply(c, c->g2);
+        double scale = fmax(largest(c->g2, n), largest(c->g1, n));
+        worst = fmax(worst, ratio(largest_difference(c->g1, c->g2, n), scale));
+    }
+    return worst;
+}
+
+/* ---- All of it
+ * ------------------------------------------------------------------------------------------------------------
+ */
+
+static bool allocate(checker *c, drape_context *ctx, drape_arena *arena)
+{
+    size_t n = 3 * (size_t)c->model->node_count, measures = (size_t)c->model->measure_count;
+    double **arrays[] = {&c->x, &c->v, &c->x2, &c->v2, &c->g1, &c->g2, &c->direction};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
+        if (!(*arrays[i] = drape_arena_take(arena, ctx, n, sizeof(double))))
+            return false;
+    c->internal = drape_arena_take(arena, ctx, (size_t)c->model->internal_count, sizeof(double));
+    c->history = drape_arena_take(arena, ctx, measures, sizeof(double));
+    c->values = drape_arena_take(arena, ctx, (size_t)c->model->pattern.nonzeros, sizeof(double));
+    return c->internal && c->history && c->values;
+}
+
+static void check_terms(checker *c)
+{
+    for (int32_t t = 0; t < c->model->term_count; t++) {
+        const drape_term *term = &c->model->terms[t];
+        if (term->ops->law)
+            check_law(c, term);
+        else
+            check_elements(c, term);
+        if (term->ops->measure)
+            check_invariance(c, t);
+    }
+}
+
+drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, unsigned seed,
+                                     drape_check_row *rows, int *row_count)
+{
+    const drape_model *model = drape_system_model(system);
+    drape_arena arena = {0};
+    drape_state rest;
+    checker c = {.system = system, .model = model, .random = seed, .size = mean_edge(model), .rows = rows};
+    c.step = DIFFERENCE_STEP * c.size;
+    *row_count = 0;
+    drape_status status = drape_state_create(ctx, &arena, model, &rest);
+    if (!status && !allocate(&c, ctx, &arena))
+        status = DRAPE_E_MEMORY;
+    if (!status) {
+        make_state(&c, &rest);
+        check_terms(&c);
+        report(&c, "assembled", "Jacobian in a step", jacobian_error(&c, 60, c.history), HESSIAN_LIMIT);
+        report(&c, "assembled", "Jacobian in continuous time", jacobian_error(&c, 60, NULL), HESSIAN_LIMIT);
+        *row_count = c.row_count;
+    }
+    drape_arena_free(&arena, ctx);
+    return status;
+}

@@ -1,0 +1,22 @@
+/* state.h: what changes in time: t, x, v and the internal variables of the terms that have some. */
+#ifndef DRAPE_ASSEMBLE_STATE_H
+#define DRAPE_ASSEMBLE_STATE_H
+
+#include "model/model.h"
+
+typedef struct drape_state {
+    double t;         /* [s] */
+    double *x, *v;    /* (node_count x 3) [m], [m/s] */
+    double *internal; /* (internal_count) */
+} drape_state;
+
+/* A state in the rest positions and initial velocities at t = 0, with pins where their tracks begin. */
+drape_status drape_state_create(drape_context *ctx, drape_arena *arena, const drape_model *model,
+                                drape_state *state);
+
+/* after.internal from before.internal and after.x: what the terms remember of an accepted step. */
+void drape_state_commit(const drape_model *model, const drape_state *before, drape_state *after);
+
+uint64_t drape_state_hash(const drape_model *model, const drape_state *state);
+
+#endif

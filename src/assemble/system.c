@@ -1,0 +1,419 @@
+/* system.c: see system.h. A block of elements is evaluated into a buffer (evaluate_*), then added to the
+ * result (add_*). */
+#include "assemble/system.h"
+
+#include "assemble/project.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#define BLOCK 32 /* elements evaluated at once: their Hessians (36 KiB for hinges) stay in the cache */
+#define D     DRAPE_MAX_ELEMENT_DOFS
+
+/* What a sum over a term is wanted for. */
+typedef struct request {
+    const drape_point *point;
+    bool energy, hessian;
+    bool conservative, dissipative; /* which parts of the forces */
+    bool project;
+} request;
+
+/* Results of a block, element-major with the d of its term, and scratch. */
+typedef struct block_buffer {
+    int32_t first, count;
+    double energy[BLOCK], gradient[BLOCK * D], hessian[BLOCK * D * D];
+    double q[BLOCK], dq[BLOCK * D], velocity[BLOCK * D * D];
+} block_buffer;
+
+struct drape_system {
+    drape_context *ctx;
+    const drape_model *model;
+    int threads;
+    block_buffer *buffers; /* (threads) */
+};
+
+drape_status drape_system_create(drape_context *ctx, const drape_model *model, int threads,
+                                 drape_system **out)
+{
+    drape_system *system = drape_alloc(ctx, 1, sizeof *system);
+    *out = system;
+    if (!system)
+        return DRAPE_E_MEMORY;
+    *system = (drape_system){.ctx = ctx, .model = model, .threads = threads};
+    system->buffers = drape_alloc(ctx, (size_t)threads, sizeof *system->buffers);
+    if (!system->buffers)
+        drape_system_destroy(out);
+    return *out ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+void drape_system_destroy(drape_system **system)
+{
+    if (!*system)
+        return;
+    drape_context *ctx = (*system)->ctx;
+    drape_free(ctx, (*system)->buffers);
+    drape_free(ctx, *system);
+    *system = NULL;
+}
+
+const drape_model *drape_system_model(const drape_system *system)
+{
+    return system->model;
+}
+
+size_t drape_system_bytes(const drape_system *system)
+{
+    return sizeof *system + (size_t)system->threads * sizeof *system->buffers;
+}
+
+/* ---- Evaluating a block
+ * ---------------------------------------------------------------------------------------- */
+
+/* Generalised force on one measure and its derivatives, summed over elasticity and laws. */
+typedef struct stress {
+    double force, by_strain, by_rate, energy;
+} stress;
+
+static stress stress_of(const drape_term *term, const request *want, double k, double strain, double rate)
+{
+    stress s = {0};
+    if (want->conservative)
+        s = (stress){.force = k * strain, .by_strain = k, .energy = 0.5 * k * strain * strain};
+    for (int i = 0; i < term->law_count; i++) {
+        const drape_term *law = term->laws[i];
+        stress one;
+        if (law->ops->dissipative ? !want->dissipative : !want->conservative)
+            continue;
+        law->ops->law(law->params, k, strain, rate, &one.force, &one.by_strain, &one.by_rate, &one.energy);
+        s.force += one.force;
+        s.by_strain += one.by_strain;
+        s.by_rate += one.by_rate;
+        s.energy += one.energy;
+    }
+    return s;
+}
+
+static void gather(const drape_elements *el, int32_t element, const double *from, double *local)
+{
+    const int32_t *node = el->node + (size_t)element * (size_t)el->nodes;
+    for (int a = 0; a < el->nodes; a++)
+        memcpy(local + 3 * a, from + 3 * (size_t)node[a], 3 * sizeof *local);
+}
+
+/* h, which holds the Hessian of q on entry, becomes
+ *     H = f ddq + (df/dq + w df/dq') dq dq'                       step methods: q' = w q + history
+ *     H = f ddq + df/dq dq dq' + df/dq' dq (ddq v + w dq)'        continuous time: q' = dq . v
+ */
+static void measure_hessian(int d, const drape_point *point, const stress *s, const double *dq,
+                            const double *v, double *h)
+{
+    double along[D] = {0};
+    if (!point->history && s->by_rate != 0)
+        for (int i = 0; i < d; i++)
+            for (int j = 0; j < d; j++)
+                along[i] += s->by_rate * h[d * i + j] * v[j];
+    double weight = s->by_strain + point->weight * s->by_rate;
+    for (int i = 0; i < d; i++)
+        for (int j = 0; j < d; j++)
+            h[d * i + j] = s->force * h[d * i + j] + dq[i] * (weight * dq[j] + along[j]);
+}
+
+static double dot(int d, const double *a, const double *b)
+{
+    double sum = 0;
+    for (int i = 0; i < d; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
+
+static void evaluate_measure(const drape_term *term, const request *want, block_buffer *b)
+{
+    const drape_elements *el = &term->elements;
+    const drape_point *point = want->point;
+    int d = 3 * el->nodes;
+    const double *internal = term->first_internal >= 0 ? point->internal + term->first_internal : NULL;
+    bool rates = term->law_count > 0;
+    term->ops->measure(el, b->first, b->count, point->x, internal, b->q, b->dq,
+                       want->hessian ? b->hessian : NULL);
+    for (int32_t i = 0; i < b->count; i++) {
+        int32_t e = b->first + i;
+        double k = el->rest[e], strain = b->q[i] - el->rest[(size_t)el->count + (size_t)e], rate = 0, v[D];
+        double *dq = b->dq + (size_t)i * (size_t)d;
+        if (rates && point->history)
+            rate = point->weight * b->q[i] + point->history[term->first_measure + e];
+        else if (rates) {
+            gather(el, e, point->v, v);
+            rate = dot(d, dq, v);
+        }
+        stress s = stress_of(term, want, k, strain, rate);
+        b->energy[i] = s.energy;
+        for (int j = 0; j < d; j++)
+            b->gradient[i * d + j] = s.force * dq[j];
+        if (want->hessian)
+            measure_hessian(d, point, &s, dq, v, b->hessian + (size_t)i * (size_t)(d * d));
+    }
+}
+
+static void evaluate_energy(const drape_term *term, const request *want, block_buffer *b)
+{
+    const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
+    term->ops->energy(&term->elements, b->first, b->count, want->point->x, internal, b->energy, b->gradient,
+                      want->hessian ? b->hessian : NULL);
+}
+
+static void evaluate_dissipation(const drape_term *term, const request *want, block_buffer *b)
+{
+    int d = 3 * term->elements.nodes;
+    bool hessian = want->hessian;
+    memset(b->energy, 0, (size_t)b->count * sizeof *b->energy);
+    term->ops->dissipation(&term->elements, b->first, b->count, want->point->x, want->point->v, b->gradient,
+                           hessian ? b->hessian : NULL, hessian ? b->velocity : NULL);
+    for (int i = 0; hessian && i < b->count * d * d; i++)
+        b->hessian[i] += want->point->weight * b->velocity[i];
+}
+
+static void evaluate(const drape_term *term, const request *want, block_buffer *b)
+{
+    if (term->ops->measure)
+        evaluate_measure(term, want, b);
+    else if (term->ops->energy)
+        evaluate_energy(term, want, b);
+    else
+        evaluate_dissipation(term, want, b);
+    int d = 3 * term->elements.nodes;
+    for (int32_t i = 0; want->hessian && want->project && i < b->count; i++)
+        drape_project(d, b->hessian + (size_t)i * (size_t)(d * d));
+}
+
+/* ---- Adding a block
+ * -------------------------------------------------------------------------------------------- */
+
+/* Where sums go; NULL: not wanted. */
+typedef struct sums {
+    double *energy, *g, *values;
+} sums;
+
+static void add_gradients(const drape_elements *el, const block_buffer *b, double *g)
+{
+    for (int32_t i = 0; i < b->count; i++) {
+        const int32_t *node = el->node + (size_t)(b->first + i) * (size_t)el->nodes;
+        const double *from = b->gradient + (size_t)i * 3 * (size_t)el->nodes;
+        for (int a = 0; a < el->nodes; a++)
+            for (int k = 0; k < 3; k++)
+                g[3 * (size_t)node[a] + (size_t)k] += from[3 * a + k];
+    }
+}
+
+static void add_block(const double *from, int d, double *to, int64_t stride)
+{
+    for (int c = 0; c < 3; c++)
+        for (int r = 0; r < 3; r++)
+            to[c * stride + r] += from[d * r + c];
+}
+
+static void add_hessians(const drape_model *model, const drape_term *term, const block_buffer *b,
+                         double *values)
+{
+    const drape_elements *el = &term->elements;
+    int n = el->nodes, d = 3 * n;
+    for (int32_t i = 0; i < b->count; i++) {
+        size_t e = (size_t)(b->first + i);
+        const int32_t *node = el->node + e * (size_t)n, *block = term->block + e * (size_t)(n * n);
+        const double *h = b->hessian + (size_t)i * (size_t)(d * d);
+        for (int r = 0; r < n; r++)
+            for (int c = 0; c < n; c++) {
+                int64_t stride;
+                if (block[n * r + c] < 0)
+                    continue;
+                double *to = drape_pattern_at(&model->pattern, values, model->free_of_node[node[c]],
+                                              block[n * r + c], &stride);
+                add_block(h + 3 * (d * r + c), d, to, stride);
+            }
+    }
+}
+
+static void add(const drape_model *model, const drape_term *term, const block_buffer *b, const sums *to)
+{
+    for (int32_t i = 0; to->energy && i < b->count; i++)
+        *to->energy += b->energy[i];
+    if (to->g)
+        add_gradients(&term->elements, b, to->g);
+    if (to->values)
+        add_hessians(model, term, b, to->values);
+}
+
+/* ---- Sums over terms
+ * --------------------------------------------------------------------------------------------- */
+
+static bool contributes(const drape_term *term, const request *want, const sums *to)
+{
+    if (term->ops->law || (to->values && !to->g && !to->energy && term->ops->linear))
+        return false;
+    if (term->ops->measure)
+        return want->conservative || term->law_count > 0;
+    return term->ops->dissipation ? want->dissipative : want->conservative;
+}
+
+static void sum_term(drape_system *system, const drape_term *term, const request *want, const sums *to)
+{
+    int32_t count = term->elements.count;
+    int32_t blocks = (count + BLOCK - 1) / BLOCK;
+#ifdef _OPENMP
+#pragma omp parallel for ordered schedule(static, 1)                                                         \
+    num_threads(system->threads) if (system->threads > 1 && blocks > 1)
+#endif
+    for (int32_t k = 0; k < blocks; k++) {
+        int thread = 0;
+#ifdef _OPENMP
+        thread = omp_get_thread_num();
+#endif
+        block_buffer *b = &system->buffers[thread];
+        b->first = k * BLOCK;
+        b->count = count - b->first < BLOCK ? count - b->first : BLOCK;
+        evaluate(term, want, b);
+#ifdef _OPENMP
+#pragma omp ordered
+#endif
+        add(system->model, term, b, to);
+    }
+}
+
+static void sum_terms(drape_system *system, const request *want, const sums *to)
+{
+    for (int32_t i = 0; i < system->model->term_count; i++)
+        if (contributes(&system->model->terms[i], want, to))
+            sum_term(system, &system->model->terms[i], want, to);
+}
+
+void drape_system_force(drape_system *system, const drape_point *point, double *g)
+{
+    memset(g, 0, 3 * (size_t)system->model->node_count * sizeof *g);
+    sum_terms(system, &(request){.point = point, .conservative = true, .dissipative = true}, &(sums){.g = g});
+}
+
+void drape_system_dissipation(drape_system *system, const drape_point *point, double *g)
+{
+    memset(g, 0, 3 * (size_t)system->model->node_count * sizeof *g);
+    sum_terms(system, &(request){.point = point, .dissipative = true}, &(sums){.g = g});
+}
+
+static void add_masses(const drape_model *model, double mass_weight, double *values)
+{
+    for (int32_t j = 0; j < model->free_count; j++) {
+        int64_t stride;
+        double *to = drape_pattern_at(&model->pattern, values, j, model->pattern.diagonal[j], &stride);
+        for (int c = 0; c < 3; c++)
+            to[c * stride + c] += mass_weight * model->mass[model->node_of_free[j]];
+    }
+}
+
+void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, bool project,
+                           double *values)
+{
+    const request want = {
+        .point = point, .hessian = true, .conservative = true, .dissipative = true, .project = project};
+    memset(values, 0, (size_t)system->model->pattern.nonzeros * sizeof *values);
+    sum_terms(system, &want, &(sums){.values = values});
+    add_masses(system->model, mass_weight, values);
+}
+
+void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity)
+{
+    const request want = {.point = point, .energy = true, .conservative = true};
+    *elastic = *gravity = 0;
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        const sums to = {.energy = term->ops->potential_of_gravity ? gravity : elastic};
+        if (contributes(term, &want, &to))
+            sum_term(system, term, &want, &to);
+    }
+}
+
+void drape_system_term(drape_system *system, int32_t term, const drape_point *point, double *energy,
+                       double *g, double *values)
+{
+    const drape_term *t = &system->model->terms[term];
+    const request want = {
+        .point = point, .energy = energy, .hessian = values, .conservative = true, .dissipative = true};
+    const sums to = {.energy = energy, .g = g, .values = t->block ? values : NULL};
+    if (energy)
+        *energy = 0;
+    if (!t->ops->law)
+        sum_term(system, t, &want, &to);
+}
+
+void drape_system_measures(drape_system *system, const drape_point *point, double *q)
+{
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        if (!term->ops->measure)
+            continue;
+        const double *internal = term->first_internal >= 0 ? point->internal + term->first_internal : NULL;
+        term->ops->measure(&term->elements, 0, term->elements.count, point->x, internal,
+                           q + term->first_measure, NULL, NULL);
+    }
+}
+
+/* ---- Finding what is wrong
+ * ---------------------------------------------------------------------------------------- */
+
+static drape_worst worst_element(const drape_term *term, const drape_fault *fault)
+{
+    const drape_elements *el = &term->elements;
+    drape_worst worst = {.what = fault->what,
+                         .term = term->ops->name,
+                         .element = fault->element,
+                         .node = {-1, -1, -1, -1},
+                         .cloth = term->cloth,
+                         .value = fault->value,
+                         .limit = fault->limit};
+    for (int a = 0; fault->element >= 0 && a < el->nodes; a++)
+        worst.node[a] = el->node[(size_t)fault->element * (size_t)el->nodes + (size_t)a];
+    return worst;
+}
+
+drape_status drape_system_check(const drape_system *system, const double *x, const double *internal,
+                                const char **reason, drape_worst *worst)
+{
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        drape_fault fault;
+        if (!term->ops->check)
+            continue;
+        const double *own = term->first_internal >= 0 ? internal + term->first_internal : NULL;
+        drape_status status = term->ops->check(&term->elements, x, own, &fault);
+        if (status) {
+            *reason = fault.reason;
+            *worst = worst_element(term, &fault);
+            return status;
+        }
+    }
+    return DRAPE_OK;
+}
+
+drape_worst drape_system_worst_dof(const drape_system *system, const double *free_vector, const char *what,
+                                   double limit)
+{
+    const drape_model *model = system->model;
+    int64_t worst = 0;
+    for (int64_t i = 0; i < 3 * (int64_t)model->free_count; i++) {
+        if (!isfinite(free_vector[i])) {
+            worst = i;
+            break;
+        }
+        if (fabs(free_vector[i]) > fabs(free_vector[worst]))
+            worst = i;
+    }
+    int32_t node = model->free_count > 0 ? model->node_of_free[worst / 3] : -1;
+    return (drape_worst){.what = what,
+                         .term = "",
+                         .element = -1,
+                         .node = {node, -1, -1, -1},
+                         .cloth = node >= 0 ? drape_model_cloth_of(model, node) : -1,
+                         .value = model->free_count > 0 ? fabs(free_vector[worst]) : 0,
+                         .limit = limit};
+}
