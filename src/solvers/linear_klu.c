@@ -1,0 +1,126 @@
+/*
+ * klu: sparse LU by KLU (Davis & Palamadai Natarajan 2010), the reference solver. AMD ordering, because the
+ * pattern is symmetric; no block triangular form, because the mesh is connected. The first factorisation
+ * chooses pivots; later ones keep them (refactor), which takes no heap, and are done afresh where the kept
+ * pivots turn out to be too small.
+ */
+#include "solvers/linear.h"
+
+#include <klu.h>
+#include <math.h>
+
+#define ORDER_AMD 0
+#define MIN_RCOND 1e-15 /* below: singular to working precision; a fresh choice of pivots is tried first */
+
+typedef struct klu_state {
+    drape_context *ctx;
+    const drape_pattern *pattern;
+    klu_l_common common;
+    klu_l_symbolic *symbolic;
+    klu_l_numeric *numeric; /* NULL before the first and after a failed factorisation */
+} klu_state;
+
+_Static_assert(sizeof(SuiteSparse_long) == sizeof(int64_t),
+               "the pattern's indices are passed to KLU as they are");
+
+/* KLU takes its index arrays without const and does not write them. */
+static SuiteSparse_long *indices(const int64_t *array)
+{
+    return (SuiteSparse_long *)(uintptr_t)array;
+}
+
+static void destroy(void **state)
+{
+    klu_state *s = *state;
+    if (!s)
+        return;
+    klu_l_free_numeric(&s->numeric, &s->common);
+    klu_l_free_symbolic(&s->symbolic, &s->common);
+    drape_free(s->ctx, s);
+    *state = NULL;
+}
+
+static drape_status create(drape_context *ctx, const drape_pattern *pattern, void **state)
+{
+    klu_state *s = drape_alloc(ctx, 1, sizeof *s);
+    *state = s;
+    if (!s)
+        return DRAPE_E_MEMORY;
+    s->ctx = ctx;
+    s->pattern = pattern;
+    klu_l_defaults(&s->common);
+    s->common.ordering = ORDER_AMD;
+    s->common.btf = 0;
+    s->symbolic = klu_l_analyze(pattern->n, indices(pattern->column), indices(pattern->row), &s->common);
+    if (s->symbolic)
+        return DRAPE_OK;
+    drape_status status = s->common.status == KLU_OUT_OF_MEMORY ? DRAPE_E_MEMORY : DRAPE_E_SOLVER;
+    int code = (int)s->common.status;
+    destroy(state);
+    return drape_fail(ctx, status, "KLU cannot analyse the %lld x %lld Jacobian: status %d",
+                      (long long)pattern->n, (long long)pattern->n, code);
+}
+
+/* A NaN anywhere in the factors makes rcond NaN or 0, so the comparison is false. */
+static bool well_conditioned(klu_state *s)
+{
+    return klu_l_rcond(s->symbolic, s->numeric, &s->common) && s->common.rcond > MIN_RCOND;
+}
+
+static bool refactor(klu_state *s, double *values)
+{
+    const drape_pattern *p = s->pattern;
+    return s->numeric &&
+           klu_l_refactor(indices(p->column), indices(p->row), values, s->symbolic, s->numeric, &s->common) &&
+           s->common.status == KLU_OK && well_conditioned(s);
+}
+
+static bool factor_afresh(klu_state *s, double *values)
+{
+    const drape_pattern *p = s->pattern;
+    klu_l_free_numeric(&s->numeric, &s->common);
+    s->numeric = klu_l_factor(indices(p->column), indices(p->row), values, s->symbolic, &s->common);
+    return s->numeric && s->common.status == KLU_OK && well_conditioned(s);
+}
+
+static drape_status factor(void *state, const double *values)
+{
+    klu_state *s = state;
+    double *v = (double *)(uintptr_t)values; /* not written either */
+    if (refactor(s, v) || factor_afresh(s, v))
+        return DRAPE_OK;
+    klu_l_free_numeric(&s->numeric, &s->common);
+    return DRAPE_RETRY_LINEAR;
+}
+
+static drape_status solve(void *state, const double *b, double *x)
+{
+    klu_state *s = state;
+    double sum = 0;
+    if (!s->numeric)
+        return DRAPE_RETRY_LINEAR;
+    for (int64_t i = 0; i < s->pattern->n; i++)
+        x[i] = b[i];
+    if (!klu_l_solve(s->symbolic, s->numeric, s->pattern->n, 1, x, &s->common))
+        return DRAPE_RETRY_LINEAR;
+    for (int64_t i = 0; i < s->pattern->n; i++)
+        sum += x[i];
+    return isfinite(sum) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
+}
+
+static size_t bytes(const void *state)
+{
+    const klu_state *s = state;
+    return s->common.mempeak > 0 ? (size_t)s->common.memusage : 0;
+}
+
+const drape_linear_ops drape_linear_klu = {
+    .name = "klu",
+    .summary = "sparse LU with AMD ordering; pivots are kept from step to step",
+    .reference = "Davis & Palamadai Natarajan 2010, Algorithm 907: KLU",
+    .create = create,
+    .factor = factor,
+    .solve = solve,
+    .destroy = destroy,
+    .bytes = bytes,
+};

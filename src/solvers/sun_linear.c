@@ -1,0 +1,107 @@
+/* sun_linear.c: see sun_linear.h. */
+#include "solvers/sun_linear.h"
+
+#include "base/clock.h"
+
+#include <nvector/nvector_serial.h>
+
+static SUNMatrix_ID matrix_id(SUNMatrix matrix)
+{
+    (void)matrix;
+    return SUNMATRIX_CUSTOM;
+}
+
+static int keep_matrix(SUNMatrix matrix)
+{
+    (void)matrix;
+    return 0;
+}
+
+static SUNLinearSolver_Type solver_type(SUNLinearSolver solver)
+{
+    (void)solver;
+    return SUNLINEARSOLVER_DIRECT;
+}
+
+static SUNLinearSolver_ID solver_id(SUNLinearSolver solver)
+{
+    (void)solver;
+    return SUNLINEARSOLVER_CUSTOM;
+}
+
+static int keep_solver(SUNLinearSolver solver)
+{
+    (void)solver;
+    return 0;
+}
+
+/* SUNDIALS wants 0, > 0 recoverable, < 0 fatal: the signs of drape_status. */
+static int setup(SUNLinearSolver solver, SUNMatrix matrix)
+{
+    (void)matrix;
+    drape_sun_linear *linear = solver->content;
+    double start = drape_clock_seconds();
+    linear->status = linear->ops->factor(linear->state, linear->values);
+    linear->factor_seconds += drape_clock_seconds() - start;
+    linear->factorizations++;
+    return linear->status;
+}
+
+static int solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, sunrealtype tolerance)
+{
+    (void)matrix, (void)tolerance;
+    drape_sun_linear *linear = solver->content;
+    double start = drape_clock_seconds();
+    linear->status = linear->ops->solve(linear->state, N_VGetArrayPointer(b), N_VGetArrayPointer(x));
+    linear->solve_seconds += drape_clock_seconds() - start;
+    linear->solves++;
+    return linear->status;
+}
+
+drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const drape_linear_ops *ops,
+                                     const drape_pattern *pattern, drape_sun_linear **out)
+{
+    drape_sun_linear *linear = drape_alloc(ctx, 1, sizeof *linear);
+    *out = linear;
+    if (!linear)
+        return DRAPE_E_MEMORY;
+    linear->ctx = ctx;
+    linear->ops = ops;
+    linear->values = drape_alloc(ctx, (size_t)pattern->nonzeros, sizeof *linear->values);
+    linear->solver = SUNLinSolNewEmpty(sun);
+    linear->matrix = SUNMatNewEmpty(sun);
+    drape_status status = linear->values ? DRAPE_OK : DRAPE_E_MEMORY;
+    if (!status && (!linear->solver || !linear->matrix))
+        status = drape_fail_memory(ctx, sizeof *linear->solver);
+    if (!status)
+        status = ops->create(ctx, pattern, &linear->state);
+    if (status) {
+        drape_sun_linear_destroy(out);
+        return status;
+    }
+    linear->solver->content = linear;
+    linear->solver->ops->gettype = solver_type;
+    linear->solver->ops->getid = solver_id;
+    linear->solver->ops->initialize = keep_solver;
+    linear->solver->ops->setup = setup;
+    linear->solver->ops->solve = solve;
+    linear->matrix->ops->getid = matrix_id;
+    linear->matrix->ops->zero = keep_matrix;
+    return DRAPE_OK;
+}
+
+void drape_sun_linear_destroy(drape_sun_linear **out)
+{
+    drape_sun_linear *linear = *out;
+    if (!linear)
+        return;
+    if (linear->state)
+        linear->ops->destroy(&linear->state);
+    if (linear->solver)
+        SUNLinSolFreeEmpty(linear->solver);
+    if (linear->matrix)
+        SUNMatFreeEmpty(linear->matrix);
+    drape_free(linear->ctx, linear->values);
+    drape_free(linear->ctx, linear);
+    *out = NULL;
+}

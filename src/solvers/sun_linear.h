@@ -1,0 +1,32 @@
+/*
+ * sun_linear.h: a row of the linear solvers as SUNDIALS sees it: a custom SUNLinearSolver and a custom
+ * SUNMatrix over our own values. SUNDIALS initialises the solver at each solve, clears the matrix before each
+ * Jacobian; for ours both do nothing, so analysis and pattern are kept for good and nothing allocates
+ * (solvers.md of the design notes: KLU's own wrapper analyses afresh at each KINSol).
+ */
+#ifndef DRAPE_SOLVERS_SUN_LINEAR_H
+#define DRAPE_SOLVERS_SUN_LINEAR_H
+
+#include "solvers/linear.h"
+#include "solvers/sundials_compat.h"
+
+#include <sundials/sundials_linearsolver.h>
+#include <sundials/sundials_matrix.h>
+
+typedef struct drape_sun_linear {
+    drape_context *ctx;
+    const drape_linear_ops *ops;
+    void *state;
+    double *values; /* (nonzeros) where the Jacobian is assembled */
+    SUNLinearSolver solver;
+    SUNMatrix matrix;
+    int64_t factorizations, solves;
+    double factor_seconds, solve_seconds;
+    drape_status status; /* of the last factor or solve */
+} drape_sun_linear;
+
+drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const drape_linear_ops *ops,
+                                     const drape_pattern *pattern, drape_sun_linear **out);
+void drape_sun_linear_destroy(drape_sun_linear **linear);
+
+#endif

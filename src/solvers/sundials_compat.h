@@ -1,0 +1,47 @@
+/* sundials_compat.h: the only file that knows the difference between SUNDIALS 6 and 7. */
+#ifndef DRAPE_SOLVERS_SUNDIALS_COMPAT_H
+#define DRAPE_SOLVERS_SUNDIALS_COMPAT_H
+
+#include <stdint.h>
+#include <sundials/sundials_config.h>
+#include <sundials/sundials_context.h>
+#include <sundials/sundials_types.h>
+
+#if SUNDIALS_VERSION_MAJOR < 6
+#error "Drape needs SUNDIALS 6 or later"
+#endif
+
+_Static_assert(sizeof(sunindextype) == sizeof(int64_t), "Drape needs SUNDIALS with 64-bit indices");
+
+#if SUNDIALS_VERSION_MAJOR >= 7
+#include <sundials/sundials_errors.h>
+static inline void drape_sundials_quiet(int line, const char *function, const char *file, const char *message,
+                                        SUNErrCode code, void *data, SUNContext context)
+{
+    (void)line, (void)function, (void)file, (void)message, (void)code, (void)data, (void)context;
+}
+/* A SUNDIALS context that prints nothing: what went wrong is read from return codes. 0 on success. */
+static inline int drape_sundials_context(SUNContext *out)
+{
+    int code = SUNContext_Create(SUN_COMM_NULL, out);
+    if (!code) {
+        SUNContext_ClearErrHandlers(*out);
+        SUNContext_PushErrHandler(*out, drape_sundials_quiet, NULL);
+    }
+    return code;
+}
+#define DRAPE_KINSOL_QUIET(kin) ((void)0)
+#else
+static inline int drape_sundials_context(SUNContext *out)
+{
+    return SUNContext_Create(NULL, out);
+}
+static inline void drape_kinsol_quiet(int code, const char *module, const char *function, char *message,
+                                      void *data)
+{
+    (void)code, (void)module, (void)function, (void)message, (void)data;
+}
+#define DRAPE_KINSOL_QUIET(kin) KINSetErrHandlerFn(kin, drape_kinsol_quiet, NULL)
+#endif
+
+#endif
