@@ -1,0 +1,49 @@
+/*
+ * integrator.h: time integrators as rows of one table. A row is the constant drape_integrator_<word> of
+ * <word>.c. step(in, out) never writes in: rejecting a step is forgetting out.
+ */
+#ifndef DRAPE_INTEGRATORS_INTEGRATOR_H
+#define DRAPE_INTEGRATORS_INTEGRATOR_H
+
+#include "assemble/system.h"
+#include "base/param.h"
+
+/* What a step has to say of itself. */
+typedef struct drape_step_info {
+    const char *reason; /* "converged", or why not; static text */
+    int iterations;
+    double residual, tolerance; /* [N] */
+    bool usable; /* with a status > 0: the caller asked to go on with what there is (on_failure accept) */
+    double dissipated; /* [J] work that dissipative terms took in this step */
+    double pin_work;   /* [J] work that moving pins put in */
+    drape_worst worst;
+} drape_step_info;
+
+/* Work done so far. */
+typedef struct drape_work {
+    int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
+    double residual_seconds, jacobian_seconds, factor_seconds, solve_seconds;
+} drape_work;
+
+typedef struct drape_integrator_ops {
+    const char *name, *summary, *reference;
+    int order;                 /* of convergence in h */
+    const drape_param *params; /* one of them is dt */
+    int param_count;
+    /* values in the order of params. Takes all memory that stepping needs. */
+    drape_status (*create)(drape_context *ctx, drape_system *system, const double *values, void **state);
+    /* From in to out, whose t is set: h = the nominal size of the step, exact where out->t - in->t has
+     * rounding. Fills out->x and out->v. */
+    drape_status (*step)(void *state, const drape_state *in, drape_state *out, double h,
+                         drape_step_info *info);
+    /* The next step starts anew from a state that this integrator did not make, or after a rejection. */
+    void (*restart)(void *state, const drape_state *from);
+    drape_work (*work)(const void *state);
+    size_t (*bytes)(const void *state);
+    void (*destroy)(void **state);
+} drape_integrator_ops;
+
+extern const drape_integrator_ops *const drape_integrators[]; /* NULL-ended */
+extern const char *const drape_integrators_words[];
+
+#endif
