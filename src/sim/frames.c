@@ -1,0 +1,49 @@
+/*
+ * frames.c: frame times are k / frame_rate. No step is shortened for a frame: between the states of a step,
+ * positions are the cubic Hermite interpolant of both positions and velocities, of fourth order in h for
+ * smooth motion.
+ */
+#include "sim/sim.h"
+
+#include <math.h>
+#include <string.h>
+
+#define SAME_TIME 1e-9 /* of the step: a frame nearer than this to a state is that state */
+
+static void interpolate(const drape_state *a, const drape_state *b, double t, size_t n, double *x)
+{
+    double h = b->t - a->t, s = (t - a->t) / h;
+    double h00 = (1 + 2 * s) * (1 - s) * (1 - s), h10 = s * (1 - s) * (1 - s);
+    double h01 = s * s * (3 - 2 * s), h11 = s * s * (s - 1);
+    for (size_t i = 0; i < n; i++)
+        x[i] = h00 * a->x[i] + h10 * h * a->v[i] + h01 * b->x[i] + h11 * h * b->v[i];
+}
+
+static drape_status emit(drape_sim *sim, double time, const double *x)
+{
+    drape_event event = {
+        .kind = DRAPE_EVENT_FRAME, .sim = sim, .frame = sim->next_frame, .time = time, .positions = x};
+    sim->next_frame++;
+    return drape_sim_tell(sim, &event);
+}
+
+drape_status drape_sim_emit_frames(drape_sim *sim, const drape_state *before)
+{
+    const drape_state *now = drape_sim_state(sim);
+    size_t n = 3 * (size_t)sim->model->node_count;
+    double near = before ? SAME_TIME * (now->t - before->t) : 0;
+    drape_status status = DRAPE_OK;
+    while (!status) {
+        double time = (double)sim->next_frame / sim->frame_rate;
+        if (time > now->t + near)
+            return DRAPE_OK;
+        if (!before || time > now->t - near)
+            status = emit(sim, now->t, now->x);
+        else {
+            interpolate(before, now, time, n, sim->frame);
+            drape_model_place_pins(sim->model, time, sim->frame);
+            status = emit(sim, time, sim->frame);
+        }
+    }
+    return status;
+}

@@ -1,0 +1,59 @@
+/* load.c: from a scene to a model whose integrator and controller are known to be good. */
+#include "compile/compile.h"
+#include "model/scene.h"
+#include "sim/choose.h"
+
+#include <string.h>
+
+static drape_status compile(drape_context *ctx, const drape_scene_def *def, drape_model **out)
+{
+    drape_chosen chosen;
+    drape_status status = drape_compile(ctx, def, out);
+    if (!status)
+        status = drape_choose(ctx, *out, NULL, &chosen);
+    if (status)
+        drape_model_destroy(out);
+    return status;
+}
+
+drape_status drape_model_create(drape_context *ctx, const drape_scene_def *given, drape_model **out)
+{
+    drape_scene_def def;
+    if (!ctx || !out)
+        return DRAPE_E_ARGUMENT;
+    *out = NULL;
+    if (!given || given->struct_size == 0 || given->struct_size > sizeof def)
+        return drape_fail(ctx, DRAPE_E_VERSION,
+                          "the scene def was not initialised by drape_scene_def_init of this version");
+    drape_scene_def_init(&def, sizeof def);
+    memcpy(&def, given, given->struct_size);
+    def.struct_size = sizeof def;
+    return compile(ctx, &def, out);
+}
+
+drape_status drape_scene_compile(drape_scene *scene, drape_model **out)
+{
+    drape_scene_def def;
+    if (!scene || !out)
+        return DRAPE_E_ARGUMENT;
+    *out = NULL;
+    drape_status status = drape_scene_to_def(scene, &def);
+    if (!status)
+        status = compile(drape_scene_context(scene), &def, out);
+    if (status && status != DRAPE_E_MEMORY)
+        drape_scene_locate_fault(scene);
+    return status;
+}
+
+drape_status drape_model_load(drape_context *ctx, const char *scene_path, drape_model **out)
+{
+    drape_scene *scene = NULL;
+    if (!ctx || !out)
+        return DRAPE_E_ARGUMENT;
+    *out = NULL;
+    drape_status status = drape_scene_load(ctx, scene_path, &scene);
+    if (!status)
+        status = drape_scene_compile(scene, out);
+    drape_scene_destroy(&scene);
+    return status;
+}

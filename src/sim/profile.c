@@ -1,0 +1,305 @@
+/* profile.c: see profile.h. */
+#include "sim/profile.h"
+
+#include "base/clock.h"
+#include "solvers/linear.h"
+
+#include <math.h>
+#include <string.h>
+
+#define BUDGET       0.02 /* [s] for the repeats of one measurement */
+#define MOST_REPEATS 200
+#define DEFORMATION  1e-3 /* displacement of the nodes, as a share of the scene's mean edge */
+
+/* Where everything is evaluated, and room for the results. */
+typedef struct bench {
+    drape_context *ctx;
+    const drape_sim *sim;
+    drape_arena arena;
+    double *x, *v, *g; /* nodes */
+    double *history;   /* measures; NULL where no law wants rates */
+    double *values;    /* of the Jacobian */
+    double *b, *d;     /* free DOFs */
+    drape_point point;
+    double mass_weight;
+    int32_t term; /* that is measured */
+    const drape_linear_ops *linear;
+    void *solver;
+    drape_status status; /* of the last factor or solve */
+} bench;
+
+/* ---- The state
+ * --------------------------------------------------------------------------------------------- */
+
+/* Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX): the same everywhere. */
+static double next_random(uint64_t *seed)
+{
+    *seed = *seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return (double)(*seed >> 11) / 4503599627370496.0 - 1;
+}
+
+static double mean_edge(const drape_model *model)
+{
+    double sum = 0;
+    for (int32_t e = 0; e < model->edge_count; e++)
+        sum += model->edge_length[e];
+    return model->edge_count > 0 ? sum / model->edge_count : model->length;
+}
+
+static void deform(bench *s, double dt)
+{
+    const drape_model *model = s->sim->model;
+    const drape_state *from = drape_sim_state(s->sim);
+    double size = DEFORMATION * mean_edge(model);
+    uint64_t seed = 1;
+    for (size_t i = 0; i < 3 * (size_t)model->node_count; i++) {
+        double d = model->pinned[i / 3] ? 0 : size * next_random(&seed);
+        s->x[i] = from->x[i] + d;
+        s->v[i] = from->v[i] + d / dt;
+    }
+    for (int64_t i = 0; i < 3 * (int64_t)model->free_count; i++)
+        s->b[i] = next_random(&seed);
+}
+
+/* As in a step of size dt from the state of the sim. */
+static void set_point(bench *s, double dt)
+{
+    const drape_state *from = drape_sim_state(s->sim);
+    deform(s, dt);
+    if (s->history) {
+        drape_system_measures(s->sim->system, &(drape_point){.x = from->x, .internal = from->internal},
+                              s->history);
+        for (int64_t i = 0; i < s->sim->model->measure_count; i++)
+            s->history[i] /= -dt;
+    }
+    s->mass_weight = 1 / (dt * dt);
+    s->point = (drape_point){
+        .x = s->x, .v = s->v, .internal = from->internal, .weight = 1 / dt, .history = s->history};
+}
+
+static drape_status create(bench *s, bool implicit)
+{
+    const drape_model *model = s->sim->model;
+    size_t nodes = 3 * (size_t)model->node_count, dofs = 3 * (size_t)model->free_count;
+    s->x = drape_arena_take(&s->arena, s->ctx, nodes, sizeof *s->x);
+    s->v = drape_arena_take(&s->arena, s->ctx, nodes, sizeof *s->v);
+    s->g = drape_arena_take(&s->arena, s->ctx, nodes, sizeof *s->g);
+    s->b = drape_arena_take(&s->arena, s->ctx, dofs, sizeof *s->b);
+    s->d = drape_arena_take(&s->arena, s->ctx, dofs, sizeof *s->d);
+    if (!s->x || !s->v || !s->g || !s->b || !s->d)
+        return DRAPE_E_MEMORY;
+    if (model->has_laws &&
+        !(s->history = drape_arena_take(&s->arena, s->ctx, (size_t)model->measure_count, sizeof(double))))
+        return DRAPE_E_MEMORY;
+    if (implicit && !(s->values = drape_arena_take(&s->arena, s->ctx, (size_t)model->pattern.nonzeros,
+                                                   sizeof *s->values)))
+        return DRAPE_E_MEMORY;
+    return DRAPE_OK;
+}
+
+/* ---- Measuring
+ * --------------------------------------------------------------------------------------------- */
+
+static void term_residual(bench *s)
+{
+    drape_system_term(s->sim->system, s->term, &s->point, NULL, s->g, NULL);
+}
+
+static void term_jacobian(bench *s)
+{
+    drape_system_term(s->sim->system, s->term, &s->point, NULL, NULL, s->values);
+}
+
+static void whole_residual(bench *s)
+{
+    drape_system_force(s->sim->system, &s->point, s->g);
+}
+
+static void whole_jacobian(bench *s)
+{
+    drape_system_jacobian(s->sim->system, &s->point, s->mass_weight, false, s->values);
+}
+
+static void factor(bench *s)
+{
+    s->status = s->linear->factor(s->solver, s->values);
+}
+
+static void solve(bench *s)
+{
+    s->status = s->linear->solve(s->solver, s->b, s->d);
+}
+
+/* The shortest time of a call; the first one, which warms the caches, counts where it is the only one. */
+static double shortest(bench *s, void (*call)(bench *s))
+{
+    double begin = drape_clock_seconds(), best = INFINITY, now = begin;
+    for (int i = 0; i < MOST_REPEATS && (i == 0 || now - begin < BUDGET); i++) {
+        double start = drape_clock_seconds();
+        call(s);
+        now = drape_clock_seconds();
+        best = fmin(best, now - start);
+    }
+    return best;
+}
+
+/* ---- Terms
+ * ------------------------------------------------------------------------------------------------- */
+
+/* seen: a mark for each block of the pattern. */
+static int64_t count_nonzeros(const drape_term *term, unsigned char *seen, size_t blocks)
+{
+    const drape_elements *el = &term->elements;
+    int64_t count = 0;
+    memset(seen, 0, blocks);
+    for (size_t i = 0; term->block && i < (size_t)el->count * (size_t)(el->nodes * el->nodes); i++) {
+        int32_t block = term->block[i];
+        if (block >= 0 && !seen[block]) {
+            seen[block] = 1;
+            count += 9;
+        }
+    }
+    return count;
+}
+
+static size_t term_bytes(const drape_term *term)
+{
+    const drape_elements *el = &term->elements;
+    size_t nodes = (size_t)el->nodes,
+           one = nodes * sizeof *el->node + (size_t)el->rest_count * sizeof *el->rest;
+    if (term->block)
+        one += nodes * nodes * sizeof *term->block;
+    if (term->first_internal >= 0)
+        one += 2 * sizeof(double); /* in both states */
+    return (size_t)el->count * one;
+}
+
+static int64_t count_measures(const drape_model *model, int32_t cloth)
+{
+    int64_t count = 0;
+    for (int32_t i = 0; i < model->term_count; i++)
+        if (model->terms[i].cloth == cloth && model->terms[i].ops->measure)
+            count += model->terms[i].elements.count;
+    return count;
+}
+
+static drape_status measure_terms(bench *s, bool implicit, drape_profile_term *terms)
+{
+    const drape_model *model = s->sim->model;
+    size_t blocks = (size_t)model->pattern.block_start[model->pattern.block_count];
+    unsigned char *seen = drape_arena_take(&s->arena, s->ctx, blocks, 1);
+    if (!seen)
+        return DRAPE_E_MEMORY;
+    for (s->term = 0; s->term < model->term_count; s->term++) {
+        const drape_term *term = &model->terms[s->term];
+        drape_profile_term *p = &terms[s->term];
+        *p = (drape_profile_term){.nonzeros = count_nonzeros(term, seen, blocks), .bytes = term_bytes(term)};
+        if (term->ops->law)
+            p->acts_on = count_measures(model, term->cloth);
+        else
+            p->residual_seconds = shortest(s, term_residual);
+        if (implicit && term->block)
+            p->jacobian_seconds = shortest(s, term_jacobian);
+    }
+    return DRAPE_OK;
+}
+
+/* ---- The whole
+ * --------------------------------------------------------------------------------------------- */
+
+static size_t mesh_bytes(const drape_model *model)
+{
+    size_t sum = 0;
+    for (int32_t c = 0; c < model->cloth_count; c++) {
+        const drape_mesh *m = &model->cloths[c].mesh;
+        sum += (size_t)m->node_count * (3 * sizeof *m->x + sizeof *m->node_area);
+        sum += (size_t)m->triangle_count * (3 * sizeof *m->triangle + sizeof *m->triangle_area);
+        sum += (size_t)m->edge_count *
+               (2 * sizeof *m->edge + 2 * sizeof *m->edge_triangle + sizeof *m->edge_length);
+        sum += (size_t)m->hinge_count * (4 * sizeof *m->hinge + sizeof *m->hinge_edge);
+    }
+    return sum;
+}
+
+static size_t pattern_bytes(const drape_pattern *p)
+{
+    size_t blocks = (size_t)p->block_start[p->block_count], columns = (size_t)p->block_count;
+    return (columns + 1) * sizeof *p->block_start + blocks * sizeof *p->block_row +
+           columns * sizeof *p->diagonal + ((size_t)p->n + 1) * sizeof *p->column +
+           (size_t)p->nonzeros * sizeof *p->row;
+}
+
+static void count_bytes(const drape_sim *sim, drape_profile *out)
+{
+    out->model_bytes = sim->model->arena.bytes;
+    out->mesh_bytes = mesh_bytes(sim->model);
+    out->pattern_bytes = pattern_bytes(&sim->model->pattern);
+    out->system_bytes = drape_system_bytes(sim->system);
+    out->integrator_bytes = sim->chosen.integrator->bytes(sim->integrator);
+    out->state_bytes = sizeof *sim + sim->arena.bytes;
+}
+
+/* The integrator's solver has no factors before the first step: ours, of the same pattern, says what they
+ * will take. */
+static drape_status measure_solver(bench *s, drape_profile *out)
+{
+    drape_status status = s->linear->create(s->ctx, &s->sim->model->pattern, &s->solver);
+    if (status)
+        return status;
+    size_t before = s->linear->bytes(s->solver);
+    out->factor_seconds = shortest(s, factor);
+    out->factor_status = s->status;
+    if (!s->status) {
+        out->integrator_bytes += s->linear->bytes(s->solver) - before;
+        out->solve_seconds = shortest(s, solve);
+    }
+    s->linear->destroy(&s->solver);
+    return DRAPE_OK;
+}
+
+static const drape_linear_ops *linear_of(const drape_chosen *chosen)
+{
+    double row = drape_chosen_integrator_value(chosen, "linear_solver", -1);
+    return row >= 0 ? drape_linears[(int)row] : NULL;
+}
+
+static drape_status measure(bench *s, drape_profile *out)
+{
+    drape_status status = create(s, out->implicit);
+    if (status)
+        return status;
+    set_point(s, out->dt);
+    status = measure_terms(s, out->implicit, out->terms);
+    if (status)
+        return status;
+    out->residual_seconds = shortest(s, whole_residual);
+    if (!out->implicit)
+        return DRAPE_OK;
+    out->jacobian_seconds = shortest(s, whole_jacobian);
+    return s->sim->model->free_count > 0 ? measure_solver(s, out) : DRAPE_OK;
+}
+
+drape_status drape_profile_measure(drape_context *ctx, const drape_sim *sim, drape_profile_term *terms,
+                                   drape_profile *out)
+{
+    bench s = {.ctx = ctx, .sim = sim, .linear = linear_of(&sim->chosen)};
+    *out = (drape_profile){.terms = terms,
+                           .implicit = s.linear != NULL,
+                           .linear_solver = s.linear ? s.linear->name : "",
+                           .dt = drape_chosen_integrator_value(&sim->chosen, "dt", 1.0 / 60)};
+    count_bytes(sim, out);
+    drape_status status = measure(&s, out);
+    drape_arena_free(&s.arena, ctx);
+    return status;
+}
+
+double drape_profile_seconds(const drape_profile *p)
+{
+    return p->residual_seconds + p->jacobian_seconds + p->factor_seconds + p->solve_seconds;
+}
+
+size_t drape_profile_bytes(const drape_profile *p)
+{
+    return p->model_bytes + p->mesh_bytes + p->pattern_bytes + p->system_bytes + p->integrator_bytes +
+           p->state_bytes;
+}

@@ -1,0 +1,206 @@
+/* sim.c: making, freeing and asking a sim. */
+#include "sim/sim.h"
+
+#include "base/clock.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MAX_THREADS 256
+
+void drape_sim_def_init(drape_sim_def *def, size_t struct_size)
+{
+    memset(def, 0, struct_size);
+    def->struct_size = struct_size;
+    if (struct_size >= sizeof *def)
+        def->threads = 1;
+}
+
+/* Reads a def of this or an older, shorter version. */
+static drape_status read_def(drape_context *ctx, const drape_sim_def *given, drape_sim_def *def)
+{
+    drape_sim_def_init(def, sizeof *def);
+    if (!given)
+        return DRAPE_OK;
+    if (given->struct_size == 0 || given->struct_size > sizeof *def)
+        return drape_fail(
+            ctx, DRAPE_E_VERSION,
+            "the sim def was not initialised by drape_sim_def_init of this version: struct_size %zu",
+            given->struct_size);
+    memcpy(def, given, given->struct_size);
+    def->struct_size = sizeof *def;
+    if (def->threads < 1 || def->threads > MAX_THREADS)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "threads = %d; it is 1 to %d", def->threads, MAX_THREADS);
+    if (!(def->frame_rate >= 0 && def->frame_rate <= 1e6))
+        return drape_fail(ctx, DRAPE_E_ARGUMENT,
+                          "frame_rate = %g; it is in (0, 1e6] 1/s, or 0 for the scene's", def->frame_rate);
+    return DRAPE_OK;
+}
+
+static drape_status create_states(drape_sim *sim)
+{
+    drape_status status = drape_state_create(sim->ctx, &sim->arena, sim->model, &sim->states[0]);
+    if (!status)
+        status = drape_state_create(sim->ctx, &sim->arena, sim->model, &sim->states[1]);
+    sim->frame =
+        drape_arena_take(&sim->arena, sim->ctx, 3 * (size_t)sim->model->node_count, sizeof *sim->frame);
+    return status ? status : sim->frame ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+static drape_status create_parts(drape_sim *sim, const drape_sim_def *def)
+{
+    drape_status status = drape_choose(sim->ctx, sim->model, def, &sim->chosen);
+    if (!status)
+        status = create_states(sim);
+    if (!status)
+        status = drape_system_create(sim->ctx, sim->model, def->threads, &sim->system);
+    if (!status)
+        status = sim->chosen.integrator->create(sim->ctx, sim->system, sim->chosen.integrator_values,
+                                                &sim->integrator);
+    return status;
+}
+
+drape_status drape_sim_create(drape_context *ctx, const drape_model *model, const drape_sim_def *given,
+                              drape_sim **out)
+{
+    drape_sim_def def;
+    double start = drape_clock_seconds();
+    if (!out || !ctx)
+        return DRAPE_E_ARGUMENT;
+    *out = NULL;
+    if (!model)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_sim_create: there is no model");
+    drape_status status = read_def(ctx, given, &def);
+    if (status)
+        return status;
+    drape_sim *sim = drape_alloc(ctx, 1, sizeof *sim);
+    if (!sim)
+        return DRAPE_E_MEMORY;
+    *sim = (drape_sim){
+        .ctx = ctx, .model = model, .frame_rate = def.frame_rate > 0 ? def.frame_rate : model->frame_rate};
+    status = create_parts(sim, &def);
+    if (status) {
+        drape_sim_destroy(&sim);
+        return status;
+    }
+    drape_schedule_init(&sim->schedule, drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
+    drape_energy e = drape_sim_energy(sim);
+    sim->start_energy = e.kinetic + e.elastic + e.gravity;
+    sim->energy_known = false;
+    sim->statistics.wall_setup = drape_clock_seconds() - start;
+    *out = sim;
+    return DRAPE_OK;
+}
+
+void drape_sim_destroy(drape_sim **out)
+{
+    if (!out || !*out)
+        return;
+    drape_sim *sim = *out;
+    if (sim->integrator)
+        sim->chosen.integrator->destroy(&sim->integrator);
+    drape_system_destroy(&sim->system);
+    drape_arena_free(&sim->arena, sim->ctx);
+    drape_free(sim->ctx, sim);
+    *out = NULL;
+}
+
+double drape_sim_time(const drape_sim *sim)
+{
+    return sim ? drape_sim_state(sim)->t : 0;
+}
+
+const double *drape_sim_positions(const drape_sim *sim)
+{
+    return sim ? drape_sim_state(sim)->x : NULL;
+}
+
+const double *drape_sim_velocities(const drape_sim *sim)
+{
+    return sim ? drape_sim_state(sim)->v : NULL;
+}
+
+const drape_model *drape_sim_model(const drape_sim *sim)
+{
+    return sim ? sim->model : NULL;
+}
+
+uint64_t drape_sim_hash(const drape_sim *sim)
+{
+    return sim ? drape_state_hash(sim->model, drape_sim_state(sim)) : 0;
+}
+
+static double kinetic(const drape_model *model, const double *v)
+{
+    double sum = 0;
+    for (size_t i = 0; i < (size_t)model->node_count; i++)
+        sum += model->mass[i] *
+               (v[3 * i] * v[3 * i] + v[3 * i + 1] * v[3 * i + 1] + v[3 * i + 2] * v[3 * i + 2]);
+    return 0.5 * sum;
+}
+
+drape_energy drape_sim_energy(drape_sim *sim)
+{
+    if (!sim)
+        return (drape_energy){0};
+    const drape_state *state = drape_sim_state(sim);
+    if (sim->energy_known)
+        return sim->energy;
+    drape_energy e = {.kinetic = kinetic(sim->model, state->v), .dissipated = sim->dissipated};
+    const drape_point point = {.x = state->x, .v = state->v, .internal = state->internal};
+    drape_system_energy(sim->system, &point, &e.elastic, &e.gravity);
+    e.numerical = sim->start_energy + sim->pin_work - e.dissipated - (e.kinetic + e.elastic + e.gravity);
+    sim->energy = e;
+    sim->energy_known = true;
+    return e;
+}
+
+drape_statistics drape_sim_statistics(const drape_sim *sim)
+{
+    if (!sim)
+        return (drape_statistics){0};
+    drape_statistics s = sim->statistics;
+    drape_work work = sim->chosen.integrator->work(sim->integrator);
+    s.newton_iterations = work.newton_iterations;
+    s.jacobians = work.jacobians;
+    s.factorizations = work.factorizations;
+    s.linear_iterations = work.linear_iterations;
+    s.residuals = work.residuals;
+    s.wall_residual = work.residual_seconds;
+    s.wall_jacobian = work.jacobian_seconds;
+    s.wall_factor = work.factor_seconds;
+    s.wall_solve = work.solve_seconds;
+    return s;
+}
+
+const char *drape_sim_reason(const drape_sim *sim, int index, int64_t *count)
+{
+    bool there = sim && index >= 0 && index < sim->reason_count;
+    if (count)
+        *count = there ? sim->reasons[index].count : 0;
+    return there ? sim->reasons[index].reason : NULL;
+}
+
+drape_status drape_sim_observe(drape_sim *sim, drape_observer *observer, void *user)
+{
+    if (!sim || !observer)
+        return DRAPE_E_ARGUMENT;
+    if (sim->observer_count == DRAPE_MAX_OBSERVERS)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "a sim has at most %d observers", DRAPE_MAX_OBSERVERS);
+    sim->observers[sim->observer_count] = observer;
+    sim->observer_users[sim->observer_count++] = user;
+    return DRAPE_OK;
+}
+
+drape_status drape_sim_tell(drape_sim *sim, const drape_event *event)
+{
+    for (int i = 0; i < sim->observer_count; i++) {
+        drape_status status = sim->observers[i](sim->observer_users[i], event);
+        if (status > 0)
+            return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: an observer asked to stop",
+                              drape_sim_state(sim)->t);
+        if (status < 0)
+            return status;
+    }
+    return DRAPE_OK;
+}

@@ -1,0 +1,54 @@
+/* sim.h: a running simulation. */
+#ifndef DRAPE_SIM_SIM_H
+#define DRAPE_SIM_SIM_H
+
+#include "base/arena.h"
+#include "sim/choose.h"
+#include "sim/schedule.h"
+
+#define DRAPE_MAX_OBSERVERS 8
+#define DRAPE_MAX_REASONS   32
+
+typedef struct drape_reason {
+    const char *reason; /* static text */
+    int64_t count;
+} drape_reason;
+
+struct drape_sim {
+    drape_context *ctx;
+    drape_arena arena;
+    const drape_model *model;
+    drape_chosen chosen;
+    drape_system *system;
+    void *integrator; /* state of chosen.integrator */
+    drape_state states[2];
+    int now; /* states[now] is the last accepted one, the other is being made */
+    drape_schedule schedule;
+    double frame_rate;
+    int64_t next_frame;
+    double *frame; /* (node_count x 3) interpolated positions */
+    drape_observer *observers[DRAPE_MAX_OBSERVERS];
+    void *observer_users[DRAPE_MAX_OBSERVERS];
+    int observer_count;
+    int64_t attempts;
+    drape_statistics statistics; /* what the driver counts; the integrator has the rest */
+    drape_reason reasons[DRAPE_MAX_REASONS];
+    int reason_count;
+    double start_energy, dissipated, pin_work;
+    drape_energy energy;
+    bool energy_known; /* of the present state */
+};
+
+static inline const drape_state *drape_sim_state(const drape_sim *sim)
+{
+    return &sim->states[sim->now];
+}
+
+/* Tells the observers. 0 to go on, else the negative status to stop with. */
+drape_status drape_sim_tell(drape_sim *sim, const drape_event *event);
+
+/* The frames that are due up to the present state, reached by a step from before. before NULL: the first, at
+ * the present time. */
+drape_status drape_sim_emit_frames(drape_sim *sim, const drape_state *before);
+
+#endif

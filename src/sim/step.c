@@ -1,0 +1,211 @@
+/*
+ * step.c: the driver. An advance is a loop of propose, attempt, check, judge, accept or reject, each a
+ * function here. The step is made in the other of two states: rejecting is forgetting it, accepting is
+ * changing which one counts.
+ */
+#include "base/clock.h"
+#include "sim/sim.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static drape_state *next_state(drape_sim *sim)
+{
+    return &sim->states[1 - sim->now];
+}
+
+/* ---- Check
+ * ------------------------------------------------------------------------------------------------------- */
+
+static bool finite(const double *a, size_t n)
+{
+    double probe = 0;
+    for (size_t i = 0; i < n; i++)
+        probe += 0 * a[i];
+    return probe == 0;
+}
+
+static drape_status check(drape_sim *sim, drape_step_info *info)
+{
+    const drape_state *next = next_state(sim);
+    size_t n = 3 * (size_t)sim->model->node_count;
+    if (!finite(next->x, n) || !finite(next->v, n)) {
+        info->reason = "nonfinite";
+        return DRAPE_RETRY_NONFINITE;
+    }
+    return drape_system_check(sim->system, next->x, drape_sim_state(sim)->internal, &info->reason,
+                              &info->worst);
+}
+
+/* ---- Attempt
+ * ------------------------------------------------------------------------------------------------------ */
+
+static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info *info)
+{
+    drape_state *next = next_state(sim);
+    next->t = t1;
+    info->worst = (drape_worst){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
+    drape_status status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
+    if (status && !info->usable)
+        return status;
+    drape_status degenerate = check(sim, info);
+    if (degenerate)
+        info->usable = false;
+    return degenerate ? degenerate : status;
+}
+
+/* ---- Accept and reject
+ * --------------------------------------------------------------------------------------------- */
+
+static void measure_strain(drape_sim *sim, const double *x)
+{
+    const drape_model *m = sim->model;
+    drape_statistics *s = &sim->statistics;
+    bool first = s->steps_accepted == 0;
+    double low = first ? INFINITY : s->strain_min, high = first ? -INFINITY : s->strain_max;
+    for (int32_t e = 0; e < m->edge_count; e++) {
+        const double *a = x + 3 * (size_t)m->edge[2 * (size_t)e],
+                     *b = x + 3 * (size_t)m->edge[2 * (size_t)e + 1];
+        double dx = b[0] - a[0], dy = b[1] - a[1], dz = b[2] - a[2];
+        double strain = sqrt(dx * dx + dy * dy + dz * dz) / m->edge_length[e] - 1;
+        low = strain < low ? strain : low;
+        high = strain > high ? strain : high;
+    }
+    s->strain_min = low;
+    s->strain_max = high;
+}
+
+static void accept(drape_sim *sim, double h, const drape_step_info *info)
+{
+    drape_statistics *s = &sim->statistics;
+    drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
+    sim->now = 1 - sim->now;
+    sim->energy_known = false;
+    sim->dissipated += info->dissipated;
+    sim->pin_work += info->pin_work;
+    measure_strain(sim, drape_sim_state(sim)->x);
+    s->h_min = s->steps_accepted == 0 || h < s->h_min ? h : s->h_min;
+    s->h_max = h > s->h_max ? h : s->h_max;
+    s->steps_accepted++;
+    drape_schedule_accept(&sim->schedule);
+}
+
+static void count_reason(drape_sim *sim, const char *reason)
+{
+    int i = 0;
+    while (i < sim->reason_count && strcmp(sim->reasons[i].reason, reason) != 0)
+        i++;
+    if (i == DRAPE_MAX_REASONS)
+        return;
+    if (i == sim->reason_count)
+        sim->reasons[sim->reason_count++] = (drape_reason){.reason = reason};
+    sim->reasons[i].count++;
+}
+
+static void reject(drape_sim *sim, const drape_step_info *info)
+{
+    sim->statistics.steps_rejected++;
+    count_reason(sim, info->reason);
+    sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+}
+
+/* ---- Telling
+ * -------------------------------------------------------------------------------------------------------- */
+
+/* "bend.hinge 37 (nodes 4 5 9 10 of sheet): altitude / rest altitude = 3e-09, limit 1e-06" */
+static void describe_worst(const drape_model *model, const drape_worst *worst, char *text, size_t size)
+{
+    size_t used = 0;
+    text[0] = 0;
+    if (worst->node[0] < 0)
+        return;
+    if (worst->element >= 0)
+        used = (size_t)snprintf(text, size, "; %s %d (nodes", worst->term, (int)worst->element);
+    else
+        used = (size_t)snprintf(text, size, "; worst at (node");
+    const drape_cloth *cloth = &model->cloths[worst->cloth];
+    for (int a = 0; a < 4 && worst->node[a] >= 0 && used < size; a++)
+        used += (size_t)snprintf(text + used, size - used, " %d", (int)(worst->node[a] - cloth->first_node));
+    if (used < size)
+        snprintf(text + used, size - used, " of %s): %s = %.4g, limit %.4g", cloth->name, worst->what,
+                 worst->value, worst->limit);
+}
+
+static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
+{
+    char worst[400];
+    describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
+    return drape_fail(
+        sim->ctx, stop,
+        "t=%.9g h=%.4g: %s (%s) after %d iterations, residual %.4g N for a tolerance of %.4g N%s", attempt->t,
+        attempt->h, attempt->reason, drape_status_name(attempt->status), attempt->iterations,
+        attempt->residual, attempt->tolerance, worst);
+}
+
+static drape_status tell_attempt(drape_sim *sim, const drape_attempt *attempt)
+{
+    drape_event event = {.kind = DRAPE_EVENT_ATTEMPT, .sim = sim, .attempt = attempt};
+    return drape_sim_tell(sim, &event);
+}
+
+/* ---- One step, and all of them
+ * --------------------------------------------------------------------------------------- */
+
+/* One attempt from proposal to verdict. *stop: the negative status that ends the advance, 0 to go on. */
+static drape_verdict try_step(drape_sim *sim, double t1, double h, drape_attempt *record, drape_status *stop)
+{
+    drape_step_info info = {.reason = "converged"};
+    double t = drape_sim_state(sim)->t;
+    drape_status status = attempt(sim, t1, h, &info);
+    *record = (drape_attempt){.index = sim->attempts++,
+                              .t = t,
+                              .h = h,
+                              .status = status,
+                              .reason = info.reason,
+                              .iterations = info.iterations,
+                              .residual = info.residual,
+                              .tolerance = info.tolerance,
+                              .worst = info.worst};
+    *stop = status;
+    drape_verdict verdict = sim->chosen.controller->judge(sim->chosen.controller_values, t, h, &info, stop);
+    record->accepted = verdict == DRAPE_ACCEPT;
+    if (verdict == DRAPE_ACCEPT)
+        accept(sim, h, &info);
+    else
+        reject(sim, &info);
+    if (verdict == DRAPE_HALVE)
+        drape_schedule_halve(&sim->schedule);
+    if (verdict != DRAPE_STOP)
+        *stop = DRAPE_OK;
+    return verdict;
+}
+
+static drape_status step(drape_sim *sim, double t1, double h)
+{
+    drape_attempt record;
+    drape_status stop = DRAPE_OK;
+    double start = drape_clock_seconds();
+    drape_verdict verdict = try_step(sim, t1, h, &record, &stop);
+    sim->statistics.wall_steps += drape_clock_seconds() - start;
+    drape_status told = tell_attempt(sim, &record);
+    if (told)
+        return told;
+    if (verdict == DRAPE_STOP)
+        return explain(sim, stop, &record);
+    return verdict == DRAPE_ACCEPT ? drape_sim_emit_frames(sim, next_state(sim)) : DRAPE_OK;
+}
+
+drape_status drape_sim_advance(drape_sim *sim, double t_end)
+{
+    double t1, h;
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    if (!isfinite(t_end))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_advance: t_end is not finite");
+    drape_status status = sim->next_frame == 0 ? drape_sim_emit_frames(sim, NULL) : DRAPE_OK;
+    drape_schedule_aim(&sim->schedule, drape_sim_state(sim)->t, t_end);
+    while (!status && drape_schedule_next(&sim->schedule, &t1, &h))
+        status = step(sim, t1, h);
+    return status;
+}
