@@ -1,0 +1,102 @@
+/* export.c: see export.h. */
+#include "io/export.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "base/param.h"
+
+#define MAX_NAMES  32 /* that a message lists */
+#define NAME_ROOM  64 /* longest name of a frame's file */
+#define FRAME_WORD "frame_"
+
+static drape_status unknown_format(drape_context *ctx, const char *pointer, const char *name)
+{
+    const char *names[MAX_NAMES];
+    char list[512] = "";
+    size_t count = 0, used = 0;
+    for (; count < MAX_NAMES && drape_exporters[count] && used < sizeof list; count++) {
+        names[count] = drape_exporters[count]->name;
+        used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", count ? ", " : "", names[count]);
+    }
+    const char *meant = drape_did_you_mean(name, names, count);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown format \"%.60s\"; formats are %s%s%s%s",
+                         name, list, meant ? "; did you mean \"" : "", meant ? meant : "",
+                         meant ? "\"?" : "");
+}
+
+drape_status drape_exporter_find(drape_context *ctx, const char *pointer, const char *name,
+                                 const drape_exporter_ops **out)
+{
+    *out = NULL;
+    for (int i = 0; drape_exporters[i]; i++)
+        if (strcmp(drape_exporters[i]->name, name) == 0) {
+            *out = drape_exporters[i];
+            return DRAPE_OK;
+        }
+    return unknown_format(ctx, pointer, name);
+}
+
+/* frame_, six digits or more, a dot, the ending; or that with ".part", which a killed run left. */
+static bool is_frame_file(const char *name, const char *ending)
+{
+    size_t word = strlen(FRAME_WORD);
+    if (strncmp(name, FRAME_WORD, word) != 0)
+        return false;
+    size_t digits = strspn(name + word, "0123456789");
+    const char *rest = name + word + digits;
+    size_t length = strlen(ending);
+    if (digits < 6 || *rest != '.' || strncmp(rest + 1, ending, length) != 0)
+        return false;
+    rest += 1 + length;
+    return !*rest || strcmp(rest, DRAPE_FILE_PART) == 0;
+}
+
+static drape_status remove_old_frames(drape_context *ctx, const char *folder, const char *ending)
+{
+    DIR *dir = opendir(folder);
+    if (!dir)
+        return drape_file_fail(ctx, "read the folder", folder, errno);
+    drape_status status = DRAPE_OK;
+    struct dirent *entry;
+    while (errno = 0, !status && (entry = readdir(dir))) {
+        if (is_frame_file(entry->d_name, ending) && unlinkat(dirfd(dir), entry->d_name, 0) && errno != ENOENT)
+            status = drape_file_fail(ctx, "remove the old frame", entry->d_name, errno);
+    }
+    if (!status && errno)
+        status = drape_file_fail(ctx, "read the folder", folder, errno);
+    closedir(dir);
+    return status;
+}
+
+drape_status drape_frame_files_open(drape_context *ctx, const drape_model *model, const char *folder,
+                                    const char *ending, drape_frame_files *frames)
+{
+    frames->model = model;
+    frames->folder = folder;
+    frames->ending = ending;
+    drape_status status = drape_file_create(ctx, strlen(folder) + NAME_ROOM, &frames->file);
+    return status ? status : remove_old_frames(ctx, folder, ending);
+}
+
+drape_status drape_frame_files_begin(drape_frame_files *frames, int64_t frame)
+{
+    drape_file_name(&frames->file, "%s/" FRAME_WORD "%06" PRId64 ".%s", frames->folder, frame,
+                    frames->ending);
+    return drape_file_begin(&frames->file);
+}
+
+drape_status drape_frame_files_end(drape_frame_files *frames)
+{
+    return drape_file_finish(&frames->file);
+}
+
+void drape_frame_files_close(drape_frame_files *frames)
+{
+    drape_file_destroy(&frames->file);
+}

@@ -1,0 +1,100 @@
+/*
+ * export_npy.c: folder/positions.npy: frames x nodes x 3, float64, C order, little endian.
+ *
+ * NPY format version 1.0 (numpy.lib.format; NEP 1): magic, version, length of the header, a Python dict
+ * padded by blanks so that the data start at a multiple of 64 bytes. The header has the same length for any
+ * number of frames, and the count in it is raised after the frame's data are written: at any moment the file
+ * holds what its header says.
+ */
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "io/export.h"
+
+#define FILE_NAME   "positions.npy"
+#define HEADER_SIZE 128 /* the dict takes at most 92 bytes with counts of 19 and 10 digits */
+#define MAGIC_SIZE  10  /* magic, version, length */
+
+typedef struct npy_state {
+    drape_file file;
+    int32_t node_count;
+    int64_t frames; /* whole ones in the file */
+} npy_state;
+
+static void make_header(int64_t frames, int32_t node_count, char header[HEADER_SIZE])
+{
+    const int length = HEADER_SIZE - MAGIC_SIZE;
+    memset(header, ' ', HEADER_SIZE);
+    memcpy(header, "\x93NUMPY\x01", 8); /* with version 1.0: the 0 is the string's end */
+    header[8] = (char)(length & 0xff);
+    header[9] = (char)(length >> 8);
+    int used = snprintf(header + MAGIC_SIZE, (size_t)length,
+                        "{'descr': '<f8', 'fortran_order': False, 'shape': (%" PRId64 ", %" PRId32 ", 3), }",
+                        frames, node_count);
+    header[MAGIC_SIZE + used] = ' ';
+    header[HEADER_SIZE - 1] = '\n';
+}
+
+static drape_status npy_open(drape_context *ctx, const drape_model *model, const char *folder, void *state)
+{
+    npy_state *npy = state;
+    char header[HEADER_SIZE];
+    npy->node_count = drape_model_node_count(model);
+    drape_status status = drape_file_create(ctx, strlen(folder) + sizeof FILE_NAME, &npy->file);
+    if (status)
+        return status;
+    drape_file_name(&npy->file, "%s/" FILE_NAME, folder);
+    status = drape_file_begin(&npy->file);
+    if (status)
+        return status;
+    make_header(0, npy->node_count, header);
+    drape_file_put(&npy->file, header, sizeof header);
+    return drape_file_publish(&npy->file);
+}
+
+static drape_status write_count(npy_state *npy, int64_t frames)
+{
+    char header[HEADER_SIZE];
+    make_header(frames, npy->node_count, header);
+    return drape_file_overwrite(&npy->file, 0, header, sizeof header);
+}
+
+static drape_status npy_write(drape_context *ctx, void *state, int64_t frame, double time,
+                              const double *positions)
+{
+    npy_state *npy = state;
+    off_t before = npy->file.kept;
+    (void)ctx;
+    (void)frame;
+    (void)time;
+    drape_file_put_doubles(&npy->file, positions, 3 * (size_t)npy->node_count);
+    drape_status status = drape_file_keep(&npy->file);
+    if (status)
+        return status;
+    status = write_count(npy, npy->frames + 1);
+    if (status)
+        drape_file_cut(&npy->file, before);
+    else
+        npy->frames++;
+    return status;
+}
+
+static drape_status npy_close(drape_context *ctx, void *state)
+{
+    npy_state *npy = state;
+    (void)ctx;
+    drape_status status = drape_file_close(&npy->file);
+    drape_file_destroy(&npy->file);
+    return status;
+}
+
+const drape_exporter_ops drape_exporter_npy = {
+    .name = "npy",
+    .summary = "positions.npy: one array, frames x nodes x 3, float64; valid after every frame",
+    .reference = "NPY format version 1.0, numpy.lib.format",
+    .state_size = sizeof(npy_state),
+    .open = npy_open,
+    .write = npy_write,
+    .close = npy_close,
+};

@@ -1,0 +1,68 @@
+/*
+ * export_obj.c: folder/frame_000000.obj, ...: a Wavefront OBJ file a frame: per cloth `o name`, `v x y z`
+ * [m], `f a b c` with nodes counted from 1 over the whole file. 17 digits, so that a reader gets the same
+ * doubles. Format: Wavefront Advanced Visualizer manual, appendix B1.
+ */
+#include <inttypes.h>
+
+#include "io/export.h"
+
+static drape_status obj_open(drape_context *ctx, const drape_model *model, const char *folder, void *state)
+{
+    return drape_frame_files_open(ctx, model, folder, "obj", state);
+}
+
+/* A name may hold anything; a line may not hold its end. */
+static void put_object(drape_file *file, const char *name)
+{
+    drape_file_put_text(file, "o ");
+    for (; *name; name++)
+        drape_file_put(file, (unsigned char)*name < ' ' ? "_" : name, 1);
+    drape_file_put_text(file, "\n");
+}
+
+static void put_cloth(drape_file *file, const drape_model *model, const drape_cloth_range *cloth,
+                      const double *positions)
+{
+    const double *x = positions + 3 * (size_t)cloth->first_node;
+    const int32_t *node = drape_model_triangles(model) + 3 * (size_t)cloth->first_triangle;
+    put_object(file, cloth->name);
+    for (int32_t i = 0; i < cloth->node_count; i++, x += 3)
+        drape_file_print(file, "v %.17g %.17g %.17g\n", x[0], x[1], x[2]);
+    for (int32_t i = 0; i < cloth->triangle_count; i++, node += 3)
+        drape_file_print(file, "f %" PRId32 " %" PRId32 " %" PRId32 "\n", node[0] + 1, node[1] + 1,
+                         node[2] + 1);
+}
+
+static drape_status obj_write(drape_context *ctx, void *state, int64_t frame, double time,
+                              const double *positions)
+{
+    drape_frame_files *frames = state;
+    (void)ctx;
+    drape_status status = drape_frame_files_begin(frames, frame);
+    if (status)
+        return status;
+    drape_file_print(&frames->file, "# Drape frame %" PRId64 ", t = %.17g s\n", frame, time);
+    for (int32_t i = 0; i < drape_model_cloth_count(frames->model); i++) {
+        drape_cloth_range cloth = drape_model_cloth(frames->model, i);
+        put_cloth(&frames->file, frames->model, &cloth, positions);
+    }
+    return drape_frame_files_end(frames);
+}
+
+static drape_status obj_close(drape_context *ctx, void *state)
+{
+    (void)ctx;
+    drape_frame_files_close(state);
+    return DRAPE_OK;
+}
+
+const drape_exporter_ops drape_exporter_obj = {
+    .name = "obj",
+    .summary = "frame_000000.obj ...: a Wavefront OBJ file a frame, an object a cloth, 17 digits",
+    .reference = "Wavefront Advanced Visualizer manual, appendix B1",
+    .state_size = sizeof(drape_frame_files),
+    .open = obj_open,
+    .write = obj_write,
+    .close = obj_close,
+};

@@ -1,0 +1,70 @@
+/*
+ * export_ply.c: folder/frame_000000.ply, ...: a binary PLY file a frame, little endian: vertices as double x
+ * y z [m], faces as lists of int, counted from 0; all cloths in one mesh. Format: G. Turk, The PLY Polygon
+ * File Format, 1994.
+ */
+#include <inttypes.h>
+
+#include "io/export.h"
+
+#define FACE_SIZE 13 /* the count 3 in a byte, three nodes in four */
+
+static drape_status ply_open(drape_context *ctx, const drape_model *model, const char *folder, void *state)
+{
+    return drape_frame_files_open(ctx, model, folder, "ply", state);
+}
+
+static void put_header(drape_file *file, const drape_model *model, int64_t frame, double time)
+{
+    drape_file_print(file,
+                     "ply\nformat binary_little_endian 1.0\ncomment Drape frame %" PRId64 ", t = %.17g s\n",
+                     frame, time);
+    drape_file_print(file,
+                     "element vertex %" PRId32 "\nproperty double x\nproperty double y\nproperty double z\n",
+                     drape_model_node_count(model));
+    drape_file_print(file, "element face %" PRId32 "\nproperty list uchar int vertex_indices\nend_header\n",
+                     drape_model_triangle_count(model));
+}
+
+static void put_face(drape_file *file, const int32_t *node)
+{
+    unsigned char bytes[FACE_SIZE] = {3};
+    for (int i = 0; i < 3; i++)
+        for (int b = 0; b < 4; b++)
+            bytes[1 + 4 * i + b] = (unsigned char)((uint32_t)node[i] >> 8 * b);
+    drape_file_put(file, bytes, sizeof bytes);
+}
+
+static drape_status ply_write(drape_context *ctx, void *state, int64_t frame, double time,
+                              const double *positions)
+{
+    drape_frame_files *frames = state;
+    const drape_model *model = frames->model;
+    const int32_t *node = drape_model_triangles(model);
+    (void)ctx;
+    drape_status status = drape_frame_files_begin(frames, frame);
+    if (status)
+        return status;
+    put_header(&frames->file, model, frame, time);
+    drape_file_put_doubles(&frames->file, positions, 3 * (size_t)drape_model_node_count(model));
+    for (int32_t i = 0; i < drape_model_triangle_count(model); i++, node += 3)
+        put_face(&frames->file, node);
+    return drape_frame_files_end(frames);
+}
+
+static drape_status ply_close(drape_context *ctx, void *state)
+{
+    (void)ctx;
+    drape_frame_files_close(state);
+    return DRAPE_OK;
+}
+
+const drape_exporter_ops drape_exporter_ply = {
+    .name = "ply",
+    .summary = "frame_000000.ply ...: a binary PLY file a frame, double precision",
+    .reference = "G. Turk, The PLY Polygon File Format, 1994",
+    .state_size = sizeof(drape_frame_files),
+    .open = ply_open,
+    .write = ply_write,
+    .close = ply_close,
+};

@@ -1,0 +1,263 @@
+/* recorder.c: see recorder.h. */
+#include "io/recorder.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "io/export.h"
+#include "io/steps.h"
+
+/* Times that differ by rounding only: k / frame_rate against a sum of steps. Steps are longer than this. */
+#define SAME_TIME 1e-12
+
+typedef struct output {
+    const drape_exporter_ops *ops;
+    void *state;
+    bool open;
+} output;
+
+struct drape_recorder {
+    drape_context *ctx;
+    drape_sim *sim;
+    char *folder; /* without a slash at its end */
+    output *outputs;
+    size_t output_count;
+    drape_file steps;
+    int64_t frames;
+    double last_time; /* [s] of the last frame */
+    bool moved;       /* a step was accepted after the last frame */
+    bool finished;
+    double seconds;
+    drape_status failure; /* the first one; DRAPE_OK for none */
+    char message[DRAPE_MESSAGE_SIZE];
+};
+
+/* All output happens in the C locale and is timed. */
+typedef struct scope {
+    locale_t locale;
+    double start;
+} scope;
+
+static scope scope_enter(void)
+{
+    return (scope){.start = drape_clock_seconds(), .locale = drape_locale_enter()};
+}
+
+static void scope_leave(drape_recorder *r, scope s)
+{
+    drape_locale_leave(s.locale);
+    r->seconds += drape_clock_seconds() - s.start;
+}
+
+/* The first failure stands for all after it. */
+static void note(drape_recorder *r, drape_status status)
+{
+    if (!status || r->failure)
+        return;
+    r->failure = status;
+    snprintf(r->message, sizeof r->message, "%s", drape_context_message(r->ctx));
+}
+
+static drape_status report(drape_recorder *r)
+{
+    return r->failure ? drape_fail(r->ctx, r->failure, "%s", r->message) : DRAPE_OK;
+}
+
+/* ---- Frames and rows */
+
+static void write_frame(drape_recorder *r, double time, const double *positions)
+{
+    for (size_t i = 0; i < r->output_count && !r->failure; i++)
+        note(r, r->outputs[i].ops->write(r->ctx, r->outputs[i].state, r->frames, time, positions));
+    if (r->failure)
+        return;
+    r->frames++;
+    r->last_time = time;
+    r->moved = false;
+}
+
+static void write_attempt(drape_recorder *r, const drape_attempt *attempt)
+{
+    drape_energy energy = drape_sim_energy(r->sim);
+    r->moved = r->moved || attempt->accepted;
+    note(r, drape_steps_write(&r->steps, attempt, &energy));
+}
+
+static drape_status observe(void *user, const drape_event *event)
+{
+    drape_recorder *r = user;
+    if (r->finished)
+        return DRAPE_OK;
+    if (r->failure)
+        return report(r);
+    scope s = scope_enter();
+    switch (event->kind) {
+    case DRAPE_EVENT_ATTEMPT:
+        write_attempt(r, event->attempt);
+        break;
+    case DRAPE_EVENT_FRAME:
+        write_frame(r, event->time, event->positions);
+        break;
+    }
+    scope_leave(r, s);
+    return report(r);
+}
+
+/* ---- Opening */
+
+static drape_status check_def(drape_context *ctx, const drape_sim *sim, const drape_recorder_def *def)
+{
+    if (!sim || !def || !def->folder || !*def->folder)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "a recorder needs a sim and the name of a folder");
+    if (def->format_count && !def->formats)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "a recorder of %zu formats needs their names",
+                          def->format_count);
+    return DRAPE_OK;
+}
+
+static bool is_chosen(const drape_recorder *r, const drape_exporter_ops *ops)
+{
+    for (size_t i = 0; i < r->output_count; i++)
+        if (r->outputs[i].ops == ops)
+            return true;
+    return false;
+}
+
+static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *def)
+{
+    r->outputs = drape_alloc(r->ctx, def->format_count, sizeof *r->outputs);
+    if (!r->outputs)
+        return DRAPE_E_MEMORY;
+    for (size_t i = 0; i < def->format_count; i++) {
+        const drape_exporter_ops *ops;
+        drape_status status = drape_exporter_find(r->ctx, "", def->formats[i], &ops);
+        if (status)
+            return status;
+        if (is_chosen(r, ops))
+            continue;
+        output *o = &r->outputs[r->output_count++];
+        o->ops = ops;
+        o->state = drape_alloc(r->ctx, 1, ops->state_size);
+        if (!o->state)
+            return DRAPE_E_MEMORY;
+    }
+    return DRAPE_OK;
+}
+
+static drape_status make_folder(drape_recorder *r, const char *folder)
+{
+    r->folder = drape_copy_text(r->ctx, folder);
+    if (!r->folder)
+        return DRAPE_E_MEMORY;
+    for (size_t n = strlen(r->folder); n > 1 && r->folder[n - 1] == '/'; n--)
+        r->folder[n - 1] = 0;
+    return drape_folder_make(r->ctx, r->folder);
+}
+
+static drape_status open_files(drape_recorder *r)
+{
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; i < r->output_count && !status; i++) {
+        output *o = &r->outputs[i];
+        o->open = true; /* close is due after an open that failed, too */
+        status = o->ops->open(r->ctx, drape_sim_model(r->sim), r->folder, o->state);
+    }
+    return status ? status : drape_steps_open(r->ctx, r->folder, &r->steps);
+}
+
+static drape_status set_up(drape_recorder *r, const drape_recorder_def *def)
+{
+    drape_status status = choose_outputs(r, def);
+    if (!status)
+        status = make_folder(r, def->folder);
+    if (!status)
+        status = open_files(r);
+    if (!status) /* last: a sim cannot be left */
+        status = drape_sim_observe(r->sim, observe, r);
+    return status;
+}
+
+static void close_files(drape_recorder *r)
+{
+    for (size_t i = 0; i < r->output_count; i++) {
+        output *o = &r->outputs[i];
+        if (o->open)
+            note(r, o->ops->close(r->ctx, o->state));
+        o->open = false;
+    }
+    note(r, drape_file_close(&r->steps));
+}
+
+drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
+                                   drape_recorder **out)
+{
+    if (!out)
+        return DRAPE_E_ARGUMENT;
+    *out = NULL;
+    drape_status status = check_def(ctx, sim, def);
+    if (status)
+        return status;
+    drape_recorder *r = drape_alloc(ctx, 1, sizeof *r);
+    if (!r)
+        return DRAPE_E_MEMORY;
+    r->ctx = ctx;
+    r->sim = sim;
+    scope s = scope_enter();
+    note(r, set_up(r, def));
+    scope_leave(r, s);
+    if (r->failure) {
+        close_files(r);
+        status = report(r); /* the first failure, not one of closing */
+        drape_recorder_destroy(&r);
+    }
+    *out = r;
+    return status;
+}
+
+/* ---- Closing */
+
+static bool last_frame_is_due(const drape_recorder *r)
+{
+    double t = drape_sim_time(r->sim);
+    return r->frames == 0 || r->moved || fabs(t - r->last_time) > SAME_TIME * fabs(t);
+}
+
+drape_status drape_recorder_finish(drape_recorder *r)
+{
+    if (r->finished)
+        return report(r);
+    scope s = scope_enter();
+    if (!r->failure && last_frame_is_due(r))
+        write_frame(r, drape_sim_time(r->sim), drape_sim_positions(r->sim));
+    close_files(r);
+    r->finished = true;
+    scope_leave(r, s);
+    return report(r);
+}
+
+void drape_recorder_destroy(drape_recorder **recorder)
+{
+    if (!recorder || !*recorder)
+        return;
+    drape_recorder *r = *recorder;
+    close_files(r);
+    for (size_t i = 0; i < r->output_count; i++)
+        drape_free(r->ctx, r->outputs[i].state);
+    drape_free(r->ctx, r->outputs);
+    drape_file_destroy(&r->steps);
+    drape_free(r->ctx, r->folder);
+    drape_free(r->ctx, r);
+    *recorder = NULL;
+}
+
+double drape_recorder_seconds(const drape_recorder *recorder)
+{
+    return recorder ? recorder->seconds : 0;
+}
+
+int64_t drape_recorder_frames(const drape_recorder *recorder)
+{
+    return recorder ? recorder->frames : 0;
+}

@@ -1,0 +1,189 @@
+/*
+ * summary.c: see summary.h. The keys are a contract with whoever reads summaries: add, do not rename.
+ *
+ * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere below ends
+ * as a NULL at the top.
+ */
+#include "io/summary.h"
+
+#include <inttypes.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "io/file.h"
+
+typedef struct real_item {
+    const char *key;
+    double value;
+} real_item;
+
+typedef struct count_item {
+    const char *key;
+    int64_t value;
+} count_item;
+
+#define LENGTH(array) (sizeof(array) / sizeof *(array))
+
+/* Takes both references. The object, or NULL if it or the value is not there. */
+static json_t *with(json_t *object, const char *key, json_t *value)
+{
+    if (json_object_set_new(object, key, value) == 0)
+        return object;
+    json_decref(object);
+    return NULL;
+}
+
+/* JSON has no NaN and no infinity. */
+static json_t *number(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
+static json_t *with_reals(json_t *object, const real_item *items, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        object = with(object, items[i].key, number(items[i].value));
+    return object;
+}
+
+static json_t *with_counts(json_t *object, const count_item *items, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        object = with(object, items[i].key, json_integer((json_int_t)items[i].value));
+    return object;
+}
+
+/* A message may hold the name of a file, in any encoding, or be cut within a letter: where it is not UTF-8,
+ * all that is not ASCII becomes a question mark. */
+static json_t *text(const char *bytes)
+{
+    char copy[DRAPE_MESSAGE_SIZE];
+    json_t *string = json_string(bytes);
+    if (string)
+        return string;
+    snprintf(copy, sizeof copy, "%s", bytes);
+    for (char *c = copy; *c; c++)
+        if ((unsigned char)*c > 127)
+            *c = '?';
+    return json_string(copy);
+}
+
+static json_t *reasons(const drape_sim *sim)
+{
+    json_t *object = json_object();
+    int64_t count = 0;
+    const char *reason;
+    for (int i = 0; (reason = drape_sim_reason(sim, i, &count)); i++)
+        object = with(object, reason, json_integer((json_int_t)count));
+    return object;
+}
+
+static json_t *steps(const drape_sim *sim, const drape_statistics *s)
+{
+    const count_item counts[] = {{"accepted", s->steps_accepted}, {"rejected", s->steps_rejected}};
+    const real_item sizes[] = {{"h_min", s->h_min}, {"h_max", s->h_max}};
+    json_t *object = with_counts(json_object(), counts, LENGTH(counts));
+    return with(with_reals(object, sizes, LENGTH(sizes)), "reasons", reasons(sim));
+}
+
+static json_t *newton(const drape_statistics *s)
+{
+    const count_item counts[] = {{"iterations", s->newton_iterations},
+                                 {"jacobians", s->jacobians},
+                                 {"factorizations", s->factorizations},
+                                 {"linear_iterations", s->linear_iterations},
+                                 {"residuals", s->residuals}};
+    return with_counts(json_object(), counts, LENGTH(counts));
+}
+
+static json_t *wall(const drape_summary_def *def, const drape_statistics *s)
+{
+    const real_item times[] = {
+        {"total", def->wall_total},     {"setup", s->wall_setup},       {"steps", s->wall_steps},
+        {"residual", s->wall_residual}, {"jacobian", s->wall_jacobian}, {"factor", s->wall_factor},
+        {"solve", s->wall_solve},       {"contact", s->wall_contact},   {"output", def->wall_output}};
+    return with_reals(json_object(), times, LENGTH(times));
+}
+
+static json_t *energy(drape_sim *sim)
+{
+    drape_energy e = drape_sim_energy(sim);
+    const real_item parts[] = {{"kinetic", e.kinetic},       {"elastic", e.elastic},
+                               {"gravity", e.gravity},       {"contact", e.contact},
+                               {"dissipated", e.dissipated}, {"numerical", e.numerical}};
+    return with_reals(json_object(), parts, LENGTH(parts));
+}
+
+static json_t *strain(const drape_statistics *s)
+{
+    const real_item bounds[] = {{"min", s->strain_min}, {"max", s->strain_max}};
+    return with_reals(json_object(), bounds, LENGTH(bounds));
+}
+
+static json_t *hash(const drape_sim *sim)
+{
+    char digits[17];
+    snprintf(digits, sizeof digits, "%016" PRIx64, drape_sim_hash(sim));
+    return json_string(digits);
+}
+
+static json_t *summary(drape_sim *sim, const drape_summary_def *def)
+{
+    const drape_model *model = drape_sim_model(sim);
+    const drape_statistics s = drape_sim_statistics(sim);
+    const count_item sizes[] = {{"nodes", drape_model_node_count(model)},
+                                {"dofs", drape_model_dof_count(model)},
+                                {"nnz", drape_model_nonzero_count(model)},
+                                {"frames", def->frames}};
+    json_t *object = with(json_object(), "status", json_string(drape_status_name(def->status)));
+    object = with(object, "message", text(def->message ? def->message : ""));
+    object = with(object, "version", json_string(drape_version()));
+    object = with_counts(object, sizes, LENGTH(sizes));
+    object = with(object, "time", number(drape_sim_time(sim)));
+    object = with(object, "steps", steps(sim, &s));
+    object = with(object, "newton", newton(&s));
+    object = with(object, "wall_s", wall(def, &s));
+    object = with(object, "energy", energy(sim));
+    object = with(object, "strain", strain(&s));
+    return with(object, "hash", hash(sim));
+}
+
+static int put(const char *bytes, size_t size, void *file)
+{
+    drape_file_put(file, bytes, size);
+    return 0; /* the file remembers its failures */
+}
+
+static drape_status write_json(drape_context *ctx, const json_t *json, const char *path, drape_file *file)
+{
+    drape_status status = drape_file_create(ctx, strlen(path), file);
+    if (status)
+        return status;
+    drape_file_name(file, "%s", path);
+    status = drape_file_begin(file);
+    if (status)
+        return status;
+    if (json_dump_callback(json, put, file, JSON_INDENT(2) | JSON_REAL_PRECISION(17)))
+        return drape_fail(ctx, DRAPE_E_MEMORY, "out of memory for the summary \"%.500s\"", path);
+    drape_file_put_text(file, "\n");
+    return drape_file_finish(file);
+}
+
+drape_status drape_summary_write(drape_context *ctx, drape_sim *sim, const drape_summary_def *def,
+                                 const char *path)
+{
+    if (!sim || !def || !path)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "a summary needs a sim, a def and a path");
+    drape_file file = {0};
+    locale_t old = drape_locale_enter();
+    json_t *json = summary(sim, def);
+    drape_status status =
+        json ? write_json(ctx, json, path, &file)
+             : drape_fail(ctx, DRAPE_E_MEMORY, "out of memory for the summary \"%.500s\"", path);
+    json_decref(json);
+    drape_file_destroy(&file);
+    drape_locale_leave(old);
+    return status;
+}

@@ -1,0 +1,1055 @@
+/* test_io.c: what the recorder and the summary write is read back and compared to the digit; and no failure,
+ * not even a kill, leaves a file that cannot be read. */
+#include <dirent.h>
+#include <errno.h>
+#include <inttypes.h>
+#include <jansson.h>
+#include <locale.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "../support/suite.h"
+#include "drape/drape.h"
+#include "io/export.h"
+#include "io/recorder.h"
+#include "io/steps.h"
+#include "io/summary.h"
+
+/* Two cloths; frames of 1/40 s fall on and between the steps of 1/100 s. */
+#define COLUMNS     8
+#define ROWS        6
+#define NODES       (2 * COLUMNS * ROWS)
+#define TRIANGLES   (2 * 2 * (COLUMNS - 1) * (ROWS - 1))
+#define FRAME_SIZE  (NODES * 3 * sizeof(double))
+#define DT          0.01
+#define RATE        40.0
+#define HEADER_SIZE 128
+#define MAX_SEEN    64
+
+static const char *const cloth_names[2] = {"left", "right, \"large\""};
+
+/* What an observer of the test's own saw, to compare the files with. */
+typedef struct seen {
+    int frames, attempts;
+    double time[MAX_SEEN], x[MAX_SEEN][NODES * 3];
+    drape_attempt attempt[MAX_SEEN];
+    drape_energy energy[MAX_SEEN];
+} seen;
+
+typedef struct world {
+    drape_context *ctx;
+    drape_model *model;
+    drape_sim *sim;
+    char folder[256], out[300];
+    seen seen;
+} world;
+
+static drape_status watch(void *user, const drape_event *event)
+{
+    seen *s = user;
+    if (event->kind == DRAPE_EVENT_FRAME && s->frames < MAX_SEEN) {
+        s->time[s->frames] = event->time;
+        memcpy(s->x[s->frames++], event->positions, FRAME_SIZE);
+    }
+    if (event->kind == DRAPE_EVENT_ATTEMPT && s->attempts < MAX_SEEN) {
+        s->energy[s->attempts] = drape_sim_energy(event->sim);
+        s->attempt[s->attempts++] = *event->attempt;
+    }
+    return DRAPE_OK;
+}
+
+static void make_model(world *w)
+{
+    const drape_setting grid[] = {
+        {"columns", COLUMNS, NULL}, {"rows", ROWS, NULL}, {"width", 0.3, NULL}, {"height", 0.2, NULL}};
+    const drape_setting material[] = {
+        {"young_modulus", 1e5, NULL}, {"thickness", 1e-3, NULL}, {"density", 200, NULL}};
+    const drape_setting be[] = {{"dt", DT, NULL}};
+    const drape_row_def term = {"stretch.edge", NULL, 0};
+    drape_pin_def pin;
+    drape_pin_def_init(&pin, sizeof pin);
+    pin.corner = "top-left";
+    drape_cloth_def cloth[2];
+    for (int i = 0; i < 2; i++) {
+        drape_cloth_def_init(&cloth[i], sizeof cloth[i]);
+        cloth[i].name = cloth_names[i];
+        cloth[i].mesh.grid = (drape_row_def){"square", grid, 4};
+        cloth[i].mesh.translate[0] = i / 3.0;
+        cloth[i].material = material;
+        cloth[i].material_count = 3;
+        cloth[i].terms = &term;
+        cloth[i].term_count = 1;
+        cloth[i].pins = &pin;
+        cloth[i].pin_count = 1;
+    }
+    drape_scene_def scene;
+    drape_scene_def_init(&scene, sizeof scene);
+    scene.cloths = cloth;
+    scene.cloth_count = 2;
+    scene.integrator = (drape_row_def){"be", be, 1};
+    scene.frame_rate = RATE;
+    drape_status status = drape_model_create(w->ctx, &scene, &w->model);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(w->ctx));
+}
+
+static void set_up(world *w)
+{
+    const char *tmp = getenv("TMPDIR");
+    memset(w, 0, sizeof *w);
+    snprintf(w->folder, sizeof w->folder, "%.200s/drape_io_XXXXXX", tmp ? tmp : "/tmp");
+    ck_assert_ptr_nonnull(mkdtemp(w->folder));
+    snprintf(w->out, sizeof w->out, "%s/a/out", w->folder);
+    ck_assert_int_eq(drape_context_create(NULL, &w->ctx), DRAPE_OK);
+    make_model(w);
+    ck_assert_int_eq(drape_sim_create(w->ctx, w->model, NULL, &w->sim), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_observe(w->sim, watch, &w->seen), DRAPE_OK);
+}
+
+static void remove_all(const char *path)
+{
+    struct stat info;
+    if (lstat(path, &info))
+        return;
+    if (S_ISDIR(info.st_mode)) {
+        DIR *dir = opendir(path);
+        struct dirent *entry;
+        while ((entry = readdir(dir))) {
+            char name[700];
+            snprintf(name, sizeof name, "%.400s/%.255s", path, entry->d_name);
+            if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
+                remove_all(name);
+        }
+        closedir(dir);
+    }
+    remove(path);
+}
+
+static void tear_down(world *w)
+{
+    drape_sim_destroy(&w->sim);
+    drape_model_destroy(&w->model);
+    drape_context_destroy(&w->ctx);
+    remove_all(w->folder);
+}
+
+static drape_status record(world *w, drape_context *ctx, const char *format, drape_recorder **out)
+{
+    const char *const formats[] = {format};
+    const drape_recorder_def def = {.folder = w->out, .formats = formats, .format_count = format ? 1 : 0};
+    return drape_recorder_create(ctx, w->sim, &def, out);
+}
+
+/* Runs to t_end with one format; all must go well. */
+static void run(world *w, const char *format, double t_end)
+{
+    drape_recorder *recorder;
+    drape_status status = record(w, w->ctx, format, &recorder);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(w->ctx));
+    status = drape_sim_advance(w->sim, t_end);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(w->ctx));
+    ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
+    ck_assert(drape_recorder_seconds(recorder) > 0);
+    drape_recorder_destroy(&recorder);
+    ck_assert_ptr_null(recorder);
+}
+
+static const char *in_folder(const char *folder, const char *name)
+{
+    static char path[600];
+    snprintf(path, sizeof path, "%.300s/%.200s", folder, name);
+    return path;
+}
+
+static bool exists(const char *folder, const char *name)
+{
+    struct stat info;
+    return lstat(in_folder(folder, name), &info) == 0;
+}
+
+static void write_text(const char *path, const char *text)
+{
+    FILE *file = fopen(path, "w");
+    ck_assert_ptr_nonnull(file);
+    fputs(text, file);
+    fclose(file);
+}
+
+/* The whole file with a 0 behind it, to be freed. */
+static char *slurp(const char *path, size_t *size)
+{
+    FILE *file = fopen(path, "rb");
+    ck_assert_msg(file != NULL, "%s is not there", path);
+    size_t room = 1 << 20;
+    char *data = malloc(room + 1);
+    *size = fread(data, 1, room, file);
+    data[*size] = 0;
+    fclose(file);
+    return data;
+}
+
+static int count_files(const char *folder, const char *ending)
+{
+    int count = 0;
+    DIR *dir = opendir(folder);
+    ck_assert_ptr_nonnull(dir);
+    struct dirent *entry;
+    while ((entry = readdir(dir))) {
+        size_t n = strlen(entry->d_name), m = strlen(ending);
+        count += n >= m && strcmp(entry->d_name + n - m, ending) == 0;
+    }
+    closedir(dir);
+    return count;
+}
+
+/* Checks the header to the byte; the number of frames that it states, whose data must be there. *data is to
+ * be freed. */
+static int64_t read_npy(const char *folder, char **data)
+{
+    size_t size;
+    int64_t frames = -1;
+    char expected[HEADER_SIZE + 1], dict[HEADER_SIZE];
+    *data = slurp(in_folder(folder, "positions.npy"), &size);
+    ck_assert_uint_ge(size, HEADER_SIZE);
+    ck_assert_int_eq(memcmp(*data, "\x93NUMPY\x01\x00\x76\x00", 10), 0);
+    ck_assert_int_eq(
+        sscanf(*data + 10, "{'descr': '<f8', 'fortran_order': False, 'shape': (%" SCNd64 ",", &frames), 1);
+    snprintf(dict, sizeof dict, "{'descr': '<f8', 'fortran_order': False, 'shape': (%" PRId64 ", %d, 3), }",
+             frames, NODES);
+    snprintf(expected, sizeof expected, "%-117s\n", dict);
+    ck_assert_int_eq(memcmp(*data + 10, expected, HEADER_SIZE - 10), 0);
+    ck_assert_uint_ge(size, HEADER_SIZE + (size_t)frames * FRAME_SIZE);
+    return frames;
+}
+
+static size_t file_size(const char *folder, const char *name)
+{
+    struct stat info;
+    ck_assert_int_eq(stat(in_folder(folder, name), &info), 0);
+    return (size_t)info.st_size;
+}
+
+/* ---- Frames */
+
+START_TEST(npy_is_exact)
+{
+    world w;
+    char *data;
+    set_up(&w);
+    run(&w, "npy", 0.11);
+    ck_assert_int_eq(w.seen.frames, 5); /* 0, 1/40 ... 4/40 */
+    int64_t frames = read_npy(w.out, &data);
+    ck_assert_int_eq(frames, 6); /* and 0.11 */
+    ck_assert_uint_eq(file_size(w.out, "positions.npy"), HEADER_SIZE + 6 * FRAME_SIZE);
+    for (int k = 0; k < 5; k++) {
+        ck_assert_double_eq_tol(w.seen.time[k], k / RATE, 1e-15);
+        ck_assert_int_eq(memcmp(data + HEADER_SIZE + k * FRAME_SIZE, w.seen.x[k], FRAME_SIZE), 0);
+    }
+    ck_assert_int_eq(memcmp(data + HEADER_SIZE + 5 * FRAME_SIZE, drape_sim_positions(w.sim), FRAME_SIZE), 0);
+    ck_assert_int_eq(memcmp(data + HEADER_SIZE, drape_model_rest_positions(w.model), FRAME_SIZE), 0);
+    ck_assert_int_ne(memcmp(w.seen.x[0], w.seen.x[1], FRAME_SIZE), 0);
+    ck_assert_int_eq(count_files(w.out, ".part"), 0);
+    free(data);
+    tear_down(&w);
+}
+END_TEST
+
+static drape_status read_during_run(void *user, const drape_event *event)
+{
+    char *data;
+    if (event->kind != DRAPE_EVENT_FRAME)
+        return DRAPE_OK;
+    const world *w = user;
+    int64_t frames = read_npy(w->out, &data);
+    ck_assert_int_eq(frames, event->frame + 1);
+    ck_assert_int_eq(
+        memcmp(data + HEADER_SIZE + (size_t)event->frame * FRAME_SIZE, event->positions, FRAME_SIZE), 0);
+    free(data);
+    return DRAPE_OK;
+}
+
+START_TEST(npy_is_valid_after_each_frame)
+{
+    world w;
+    char *data;
+    drape_recorder *recorder;
+    set_up(&w);
+    ck_assert_int_eq(record(&w, w.ctx, "npy", &recorder), DRAPE_OK);
+    ck_assert_int_eq(read_npy(w.out, &data), 0);
+    free(data);
+    ck_assert_int_eq(drape_sim_observe(w.sim, read_during_run, &w), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(w.sim, 0.21), DRAPE_OK);
+    ck_assert_int_eq(drape_recorder_frames(recorder), 9);
+    drape_recorder_destroy(&recorder); /* without a last frame */
+    ck_assert_int_eq(read_npy(w.out, &data), 9);
+    free(data);
+    tear_down(&w);
+}
+END_TEST
+
+START_TEST(the_last_frame_comes_once)
+{
+    world w;
+    char *data;
+    drape_recorder *recorder;
+    set_up(&w);
+    run(&w, "npy", 0.1); /* ends on a frame */
+    ck_assert_int_eq(read_npy(w.out, &data), 5);
+    free(data);
+    tear_down(&w);
+
+    set_up(&w); /* never advanced: the start is the end */
+    run(&w, "npy", 0);
+    ck_assert_int_eq(read_npy(w.out, &data), 1);
+    free(data);
+    tear_down(&w);
+
+    set_up(&w); /* several advances; what comes after finish is not recorded */
+    ck_assert_int_eq(record(&w, w.ctx, "npy", &recorder), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(w.sim, 0.03), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(w.sim, 0.06), DRAPE_OK);
+    ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
+    ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(w.sim, 0.09), DRAPE_OK);
+    ck_assert_int_eq(read_npy(w.out, &data), 4);
+    free(data);
+    drape_recorder_destroy(&recorder);
+    drape_recorder_destroy(&recorder);
+    drape_recorder_destroy(NULL);
+    tear_down(&w);
+}
+END_TEST
+
+/* Names, positions and triangles of an OBJ file against x. */
+static void check_obj(const world *w, const char *name, const double *x)
+{
+    char line[256];
+    int cloths = 0, nodes = 0, triangles = 0;
+    const int32_t *expected = drape_model_triangles(w->model);
+    FILE *file = fopen(in_folder(w->out, name), "r");
+    ck_assert_ptr_nonnull(file);
+    while (fgets(line, sizeof line, file)) {
+        double v[3];
+        int f[3];
+        if (strncmp(line, "o ", 2) == 0) {
+            line[strcspn(line, "\n")] = 0;
+            ck_assert_str_eq(line + 2, cloth_names[cloths++]);
+            ck_assert_int_eq(nodes, drape_model_cloth(w->model, cloths - 1).first_node);
+        } else if (sscanf(line, "v %lf %lf %lf", &v[0], &v[1], &v[2]) == 3)
+            ck_assert_int_eq(memcmp(v, x + 3 * (size_t)nodes++, sizeof v), 0);
+        else if (sscanf(line, "f %d %d %d", &f[0], &f[1], &f[2]) == 3) {
+            for (int i = 0; i < 3; i++)
+                ck_assert_int_eq(f[i], expected[3 * triangles + i] + 1);
+            triangles++;
+        } else
+            ck_assert_int_eq(line[0], '#');
+    }
+    fclose(file);
+    ck_assert_int_eq(cloths, 2);
+    ck_assert_int_eq(nodes, NODES);
+    ck_assert_int_eq(triangles, TRIANGLES);
+}
+
+START_TEST(obj_parses_back)
+{
+    world w;
+    set_up(&w);
+    run(&w, "obj", 0.06);
+    ck_assert_int_eq(count_files(w.out, ".obj"), 4);
+    check_obj(&w, "frame_000000.obj", w.seen.x[0]);
+    check_obj(&w, "frame_000001.obj", w.seen.x[1]);
+    check_obj(&w, "frame_000002.obj", w.seen.x[2]);
+    check_obj(&w, "frame_000003.obj", drape_sim_positions(w.sim));
+    ck_assert_int_eq(count_files(w.out, ".part"), 0);
+    tear_down(&w);
+}
+END_TEST
+
+static void check_ply(const world *w, const char *name, const double *x)
+{
+    size_t size;
+    const int32_t *expected = drape_model_triangles(w->model);
+    char *data = slurp(in_folder(w->out, name), &size), header[256];
+    snprintf(header, sizeof header,
+             "element vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
+             "element face %d\nproperty list uchar int vertex_indices\nend_header\n",
+             NODES, TRIANGLES);
+    ck_assert_int_eq(strncmp(data, "ply\nformat binary_little_endian 1.0\ncomment ", 44), 0);
+    const char *body = strstr(data, header);
+    ck_assert_ptr_nonnull(body);
+    body += strlen(header);
+    ck_assert_uint_eq(size, (size_t)(body - data) + FRAME_SIZE + TRIANGLES * 13);
+    ck_assert_int_eq(memcmp(body, x, FRAME_SIZE), 0); /* tests run on little endian machines */
+    body += FRAME_SIZE;
+    for (int i = 0; i < TRIANGLES; i++, body += 13) {
+        ck_assert_int_eq(body[0], 3);
+        ck_assert_int_eq(memcmp(body + 1, expected + 3 * (size_t)i, 12), 0);
+    }
+    free(data);
+}
+
+START_TEST(ply_parses_back)
+{
+    world w;
+    set_up(&w);
+    ck_assert_int_eq(drape_model_node_count(w.model), NODES);
+    ck_assert_int_eq(drape_model_triangle_count(w.model), TRIANGLES);
+    run(&w, "ply", 0.03);
+    ck_assert_int_eq(count_files(w.out, ".ply"), 3);
+    check_ply(&w, "frame_000000.ply", w.seen.x[0]);
+    check_ply(&w, "frame_000001.ply", w.seen.x[1]);
+    check_ply(&w, "frame_000002.ply", drape_sim_positions(w.sim));
+    tear_down(&w);
+}
+END_TEST
+
+START_TEST(every_row_writes_the_same_frames)
+{
+    world w;
+    const char *formats[32];
+    size_t count = 0;
+    char *data;
+    drape_recorder *recorder;
+    set_up(&w);
+    for (; drape_exporters[count]; count++) {
+        ck_assert(*drape_exporters[count]->summary && *drape_exporters[count]->reference);
+        formats[count] = drape_exporters[count]->name;
+    }
+    formats[count] = formats[0]; /* twice counts once */
+    const drape_recorder_def def = {w.out, formats, count + 1};
+    ck_assert_int_eq(drape_recorder_create(w.ctx, w.sim, &def, &recorder), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(w.sim, 0.03), DRAPE_OK);
+    ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
+    ck_assert_int_eq(drape_recorder_frames(recorder), 3);
+    ck_assert_int_eq(read_npy(w.out, &data), 3);
+    free(data);
+    ck_assert_int_eq(count_files(w.out, ".obj"), 3);
+    ck_assert_int_eq(count_files(w.out, ".ply"), 3);
+    ck_assert_int_eq(count_files(w.out, ".npy"), 1);
+    drape_recorder_destroy(&recorder);
+    tear_down(&w);
+}
+END_TEST
+
+START_TEST(old_frames_are_removed_and_nothing_else)
+{
+    static const char *const old[] = {"frame_000001.obj", "frame_000123.obj", "frame_1234567.obj",
+                                      "frame_000124.obj.part"};
+    static const char *const other[] = {"frame_12345.obj",     "frame_000123.objx", "my_frame_000123.obj",
+                                        "frame_000123.ply",    "frame_00012x.obj",  "frame_000123.obj.bak",
+                                        "frame_000123.OBJ.png"};
+    world w;
+    set_up(&w);
+    run(&w, NULL, 0);
+    for (size_t i = 0; i < sizeof old / sizeof *old; i++)
+        write_text(in_folder(w.out, old[i]), "old");
+    for (size_t i = 0; i < sizeof other / sizeof *other; i++)
+        write_text(in_folder(w.out, other[i]), "other");
+    drape_sim_destroy(&w.sim);
+    ck_assert_int_eq(drape_sim_create(w.ctx, w.model, NULL, &w.sim), DRAPE_OK);
+    run(&w, "obj", 0);
+    ck_assert_uint_gt(file_size(w.out, "frame_000000.obj"), 100);
+    for (size_t i = 0; i < sizeof old / sizeof *old; i++)
+        ck_assert_msg(!exists(w.out, old[i]), "%s", old[i]);
+    for (size_t i = 0; i < sizeof other / sizeof *other; i++)
+        ck_assert_msg(exists(w.out, other[i]), "%s", other[i]);
+    tear_down(&w);
+}
+END_TEST
+
+/* ---- Step log */
+
+/* Splits a row of CSV as RFC 4180 says, in place; the number of fields. Ends *next at the row after. */
+static int split(char *row, char **field, int room, char **next)
+{
+    int count = 0;
+    char *in = row;
+    for (bool more = true; more && count < room; in++) {
+        char *out = in;
+        field[count++] = out;
+        bool quoted = *in == '"';
+        in += quoted;
+        while (*in && (quoted || (*in != ',' && *in != '\n'))) {
+            if (*in == '"' && quoted && *++in != '"') {
+                quoted = false;
+                continue;
+            }
+            *out++ = *in++;
+        }
+        more = *in == ',';
+        *out = 0;
+    }
+    *next = in;
+    return count;
+}
+
+#define FIELDS 21
+static const char columns[] =
+    "attempt,t,h,accepted,status,reason,iterations,residual,tolerance,kinetic,elastic,gravity,contact,"
+    "dissipated,numerical,worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit\n";
+
+static void check_number(const char *text, double expected)
+{
+    char *end;
+    double value = strtod(text, &end);
+    ck_assert_msg(*text && *end == 0, "\"%s\" is not a number", text);
+    ck_assert(value == expected || (isnan(value) && isnan(expected)));
+}
+
+static void check_worst(char *const *field, const drape_worst *worst)
+{
+    if (!worst->what || !*worst->what) {
+        for (int i = 0; i < 6; i++)
+            ck_assert_str_eq(field[i], "");
+        return;
+    }
+    ck_assert_str_eq(field[0], worst->what);
+    ck_assert_str_eq(field[1], worst->term ? worst->term : "");
+    if (worst->element < 0)
+        ck_assert_str_eq(field[2], "");
+    else
+        check_number(field[2], worst->element);
+    char *at = field[3];
+    for (int i = 0; i < 4 && worst->node[i] >= 0; i++)
+        ck_assert_int_eq(strtol(at, &at, 10), worst->node[i]);
+    ck_assert_int_eq(*at, 0);
+    check_number(field[4], worst->value);
+    check_number(field[5], worst->limit);
+}
+
+static void check_row(char *const *field, const drape_attempt *a, const drape_energy *e)
+{
+    const double energies[] = {e->kinetic, e->elastic, e->gravity, e->contact, e->dissipated, e->numerical};
+    check_number(field[0], (double)a->index);
+    check_number(field[1], a->t);
+    check_number(field[2], a->h);
+    check_number(field[3], a->accepted);
+    ck_assert_str_eq(field[4], drape_status_name(a->status));
+    ck_assert_str_eq(field[5], a->reason);
+    check_number(field[6], a->iterations);
+    check_number(field[7], a->residual);
+    check_number(field[8], a->tolerance);
+    for (int i = 0; i < 6; i++)
+        check_number(field[9 + i], energies[i]);
+    check_worst(field + 15, &a->worst);
+}
+
+START_TEST(steps_has_a_row_for_each_attempt)
+{
+    world w;
+    size_t size;
+    set_up(&w);
+    run(&w, NULL, 0.11);
+    ck_assert_int_ge(w.seen.attempts, 11);
+    char *data = slurp(in_folder(w.out, "steps.csv"), &size), *row = data + strlen(columns);
+    ck_assert_int_eq(strncmp(data, columns, strlen(columns)), 0);
+    for (int i = 0; i < w.seen.attempts; i++) {
+        char *field[FIELDS + 1];
+        ck_assert_int_eq(split(row, field, FIELDS + 1, &row), FIELDS);
+        check_row(field, &w.seen.attempt[i], &w.seen.energy[i]);
+    }
+    ck_assert_ptr_eq(row, data + size);
+    free(data);
+    tear_down(&w);
+}
+END_TEST
+
+START_TEST(steps_quotes_and_keeps_digits)
+{
+    const drape_attempt attempt = {
+        .index = INT64_C(9007199254740991),
+        .t = 2.385 / 7,
+        .h = 1e-7 / 3,
+        .status = DRAPE_RETRY_DEGENERATE,
+        .reason = "edge_collapse",
+        .iterations = 50,
+        .residual = -NAN,
+        .tolerance = INFINITY,
+        .worst = {"ratio, \"worst\"", "host\nterm", 7, {1, 23, 456, -1}, 0, 5e-324, -1 / 3.0}};
+    drape_attempt calm = attempt;
+    calm.worst = (drape_worst){"", "", -1, {-1, -1, -1, -1}, -1, 0, 0};
+    drape_attempt node = attempt;
+    node.worst = (drape_worst){"residual", "", -1, {381, -1, -1, -1}, 0, 1, 2};
+    const drape_attempt *const rows[] = {&attempt, &calm, &node};
+    const drape_energy energy = {1 / 3.0, 1e300, -1e-300, 0, 2.5, -0.1};
+    world w;
+    size_t size;
+    drape_file file;
+    set_up(&w);
+    ck_assert_int_eq(drape_steps_open(w.ctx, w.folder, &file), DRAPE_OK);
+    for (int i = 0; i < 3; i++)
+        ck_assert_int_eq(drape_steps_write(&file, rows[i], &energy), DRAPE_OK);
+    ck_assert_int_eq(drape_file_close(&file), DRAPE_OK);
+    drape_file_destroy(&file);
+    char *data = slurp(in_folder(w.folder, "steps.csv"), &size), *row = data + strlen(columns);
+    ck_assert_ptr_nonnull(strstr(data, ",nan,inf,"));
+    ck_assert_ptr_nonnull(strstr(data, ",\"ratio, \"\"worst\"\"\",\"host\nterm\",7,1 23 456,"));
+    for (int i = 0; i < 3; i++) {
+        char *field[FIELDS + 1];
+        ck_assert_int_eq(split(row, field, FIELDS + 1, &row), FIELDS);
+        check_row(field, rows[i], &energy);
+    }
+    free(data);
+    tear_down(&w);
+}
+END_TEST
+
+/* ---- Failures */
+
+/* No file may grow past size from here on: a full disk. Nothing is asserted until free_disk(). */
+static void fill_disk(size_t size, struct rlimit *old)
+{
+    signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, old);
+    setrlimit(RLIMIT_FSIZE, &(struct rlimit){(rlim_t)size, old->rlim_max});
+}
+
+static void free_disk(const struct rlimit *old)
+{
+    setrlimit(RLIMIT_FSIZE, old);
+}
+
+/* Advances on a disk that takes files of `size` bytes: it stops there with a message that names the file, and
+ * finish says so again. */
+static void run_on_small_disk(world *w, const char *format, size_t size, const char *name)
+{
+    char message[2][1024];
+    struct rlimit old;
+    drape_recorder *recorder;
+    ck_assert_int_eq(record(w, w->ctx, format, &recorder), DRAPE_OK);
+    fill_disk(size, &old);
+    drape_status advance = drape_sim_advance(w->sim, 0.3);
+    snprintf(message[0], sizeof message[0], "%s", drape_context_message(w->ctx));
+    drape_context_set_message(w->ctx, "something else");
+    drape_status finish = drape_recorder_finish(recorder);
+    snprintf(message[1], sizeof message[1], "%s", drape_context_message(w->ctx));
+    free_disk(&old);
+    ck_assert_int_eq(advance, DRAPE_E_FILE);
+    ck_assert_int_eq(finish, DRAPE_E_FILE);
+    ck_assert(drape_sim_time(w->sim) < 0.3);
+    for (int i = 0; i < 2; i++) {
+        ck_assert_msg(strstr(message[i], in_folder(w->out, name)) != NULL, "%s", message[i]);
+        ck_assert_msg(strstr(message[i], strerror(EFBIG)) != NULL, "%s", message[i]);
+        ck_assert_ptr_null(strchr(message[i], '\n'));
+    }
+    drape_recorder_destroy(&recorder);
+    ck_assert_int_eq(count_files(w->out, ".part"), 0);
+}
+
+START_TEST(full_disk_leaves_a_valid_npy)
+{
+    world w;
+    char *data;
+    set_up(&w);
+    run_on_small_disk(&w, "npy", HEADER_SIZE + 5 * FRAME_SIZE / 2, "positions.npy");
+    ck_assert_int_eq(read_npy(w.out, &data), 2);
+    ck_assert_uint_eq(file_size(w.out, "positions.npy"), HEADER_SIZE + 2 * FRAME_SIZE);
+    for (int k = 0; k < 2; k++)
+        ck_assert_int_eq(memcmp(data + HEADER_SIZE + k * FRAME_SIZE, w.seen.x[k], FRAME_SIZE), 0);
+    free(data);
+    tear_down(&w);
+}
+END_TEST
+
+START_TEST(full_disk_leaves_whole_rows)
+{
+    world w;
+    size_t size;
+    set_up(&w);
+    run_on_small_disk(&w, NULL, 1000, "steps.csv");
+    char *data = slurp(in_folder(w.out, "steps.csv"), &size);
+    ck_assert_uint_gt(size, strlen(columns));
+    ck_assert_uint_le(size, 1000);
+    ck_assert_int_eq(data[size - 1], '\n');
+    free(data);
+    tear_down(&w);
+}
+END_TEST
+
+START_TEST(full_disk_leaves_no_half_frame)
+{
+    world w;
+    set_up(&w);
+    run_on_small_disk(&w, "obj", 500, "frame_000000.obj");
+    ck_assert_int_eq(count_files(w.out, ".obj"), 0);
+    tear_down(&w);
+    set_up(&w);
+    run_on_small_disk(&w, "ply", 500, "frame_000000.ply");
+    ck_assert_int_eq(count_files(w.out, ".ply"), 0);
+    tear_down(&w);
+}
+END_TEST
+
+static void refuse(world *w, const char *format, drape_status expected, const char *part)
+{
+    drape_recorder *recorder = (drape_recorder *)w; /* anything but NULL: it must become that */
+    ck_assert_int_eq(record(w, w->ctx, format, &recorder), expected);
+    ck_assert_ptr_null(recorder);
+    ck_assert_msg(strstr(drape_context_message(w->ctx), part) != NULL, "\"%s\" does not say \"%s\"",
+                  drape_context_message(w->ctx), part);
+}
+
+START_TEST(a_disk_full_from_the_start_is_told_at_once)
+{
+    world w;
+    set_up(&w);
+    run(&w, NULL, 0);
+    ck_assert_int_eq(symlink("/dev/full", in_folder(w.out, "positions.npy")), 0);
+    refuse(&w, "npy", DRAPE_E_FILE, "/positions.npy\": No space left on device");
+    ck_assert(exists(w.out, "positions.npy"));
+    unlink(in_folder(w.out, "steps.csv"));
+    ck_assert_int_eq(symlink("/dev/full", in_folder(w.out, "steps.csv")), 0);
+    refuse(&w, NULL, DRAPE_E_FILE, "/steps.csv\": No space left on device");
+    tear_down(&w);
+}
+END_TEST
+
+START_TEST(bad_folders_are_refused)
+{
+    world w;
+    set_up(&w);
+    write_text(in_folder(w.folder, "file"), "");
+    snprintf(w.out, sizeof w.out, "%s/file", w.folder);
+    refuse(&w, "npy", DRAPE_E_FILE, "/file\": Not a directory");
+    snprintf(w.out, sizeof w.out, "%s/file/below", w.folder);
+    refuse(&w, "npy", DRAPE_E_FILE, "Not a directory");
+    snprintf(w.out, sizeof w.out, "%s", "");
+    refuse(&w, "npy", DRAPE_E_ARGUMENT, "folder");
+    memset(w.out, 'x', sizeof w.out - 1);
+    w.out[sizeof w.out - 1] = 0;
+    refuse(&w, "npy", DRAPE_E_FILE, "File name too long");
+    snprintf(w.out, sizeof w.out, "%s/closed", w.folder);
+    ck_assert_int_eq(mkdir(w.out, 0555), 0);
+    if (geteuid() != 0) /* root may write anywhere */
+        refuse(&w, "npy", DRAPE_E_FILE, "Permission denied");
+    snprintf(w.out, sizeof w.out, "%s", "/proc/drape/out"); /* nobody makes a folder there */
+    refuse(&w, "npy", DRAPE_E_FILE, "cannot make the folder \"/proc/drape");
+    snprintf(w.out, sizeof w.out, "%s/", w.folder); /* a slash at the end is fine */
+    run(&w, "npy", 0);
+    ck_assert(exists(w.folder, "positions.npy"));
+    tear_down(&w);
+}
+END_TEST
+
+START_TEST(unknown_formats_are_refused_before_anything_is_made)
+{
+    world w;
+    set_up(&w);
+    refuse(&w, "npz", DRAPE_E_ARGUMENT, "did you mean \"npy\"?");
+    refuse(&w, "holography", DRAPE_E_ARGUMENT, "formats are npy, obj, ply");
+    ck_assert(!exists(w.folder, "a"));
+    tear_down(&w);
+}
+END_TEST
+
+START_TEST(too_many_observers_are_told)
+{
+    world w;
+    set_up(&w);
+    while (drape_sim_observe(w.sim, watch, &w.seen) == DRAPE_OK)
+        continue;
+    refuse(&w, "npy", DRAPE_E_ARGUMENT, "");
+    tear_down(&w);
+}
+END_TEST
+
+static drape_status kill_at_frame_5(void *user, const drape_event *event)
+{
+    (void)user;
+    if (event->kind == DRAPE_EVENT_FRAME && event->frame == 5)
+        raise(SIGKILL);
+    return DRAPE_OK;
+}
+
+START_TEST(a_killed_run_leaves_whole_files)
+{
+    world w;
+    char *data;
+    size_t size;
+    set_up(&w);
+    pid_t child = fork();
+    if (child == 0) {
+        drape_recorder *recorder;
+        const char *const formats[] = {"npy", "obj"};
+        const drape_recorder_def def = {w.out, formats, 2};
+        if (drape_recorder_create(w.ctx, w.sim, &def, &recorder) == DRAPE_OK &&
+            drape_sim_observe(w.sim, kill_at_frame_5, NULL) == DRAPE_OK)
+            drape_sim_advance(w.sim, 1);
+        _exit(1);
+    }
+    int end = 0;
+    ck_assert_int_eq(waitpid(child, &end, 0), child);
+    ck_assert(WIFSIGNALED(end) && WTERMSIG(end) == SIGKILL);
+    ck_assert_int_eq(read_npy(w.out, &data), 6);
+    free(data);
+    ck_assert_int_eq(count_files(w.out, ".obj"), 6);
+    data = slurp(in_folder(w.out, "steps.csv"), &size);
+    ck_assert_uint_gt(size, strlen(columns));
+    ck_assert_int_eq(data[size - 1], '\n');
+    free(data);
+    tear_down(&w);
+}
+END_TEST
+
+/* ---- Memory */
+
+/* Counts, and fails from the call after the left ones on. */
+typedef struct meter {
+    int left, taken, held;
+} meter;
+
+static void *meter_allocate(void *user, size_t size)
+{
+    meter *m = user;
+    if (m->left-- <= 0)
+        return NULL;
+    m->taken++;
+    m->held++;
+    return malloc(size);
+}
+
+static void meter_release(void *user, void *memory)
+{
+    ((meter *)user)->held--;
+    free(memory);
+}
+
+static drape_context *metered_context(meter *m)
+{
+    drape_context *ctx;
+    drape_context_def def;
+    drape_context_def_init(&def, sizeof def);
+    def.allocate = meter_allocate;
+    def.release = meter_release;
+    def.allocator_user = m;
+    m->left = 1;
+    ck_assert_int_eq(drape_context_create(&def, &ctx), DRAPE_OK);
+    return ctx;
+}
+
+START_TEST(each_allocation_may_fail)
+{
+    world w;
+    meter m = {0};
+    set_up(&w);
+    drape_context *ctx = metered_context(&m);
+    drape_recorder *recorder = NULL;
+    const char *const formats[] = {"npy", "obj", "ply"};
+    const drape_recorder_def def = {w.out, formats, 3};
+    drape_status status = DRAPE_E_MEMORY;
+    for (int n = 0; status; n++) {
+        ck_assert_int_lt(n, 100);
+        m.left = n;
+        status = drape_recorder_create(ctx, w.sim, &def, &recorder);
+        if (status) {
+            ck_assert_int_eq(status, DRAPE_E_MEMORY);
+            ck_assert_ptr_nonnull(strstr(drape_context_message(ctx), "memory"));
+            ck_assert_int_eq(m.held, 1); /* the context */
+        }
+    }
+    /* From here on there is no memory at all, and none is needed. */
+    m.left = 0;
+    ck_assert_int_eq(drape_sim_advance(w.sim, 0.11), DRAPE_OK);
+    ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
+    ck_assert_int_eq(drape_recorder_frames(recorder), 6);
+    const drape_summary_def summary = {.status = DRAPE_OK};
+    ck_assert_int_eq(drape_summary_write(ctx, w.sim, &summary, in_folder(w.out, "summary.json")),
+                     DRAPE_E_MEMORY);
+    ck_assert(!exists(w.out, "summary.json"));
+    drape_recorder_destroy(&recorder);
+    ck_assert_int_eq(m.held, 1);
+    drape_context_destroy(&ctx);
+    tear_down(&w);
+}
+END_TEST
+
+/* ---- Summary */
+
+static json_t *load_summary(const char *path)
+{
+    json_error_t error;
+    json_t *json = json_load_file(path, JSON_REJECT_DUPLICATES, &error);
+    ck_assert_msg(json != NULL, "%s: %s", path, error.text);
+    return json;
+}
+
+/* The keys of an object in their order, with a blank after each. */
+static void check_keys(const json_t *object, const char *expected)
+{
+    char keys[512] = "";
+    const char *key;
+    json_t *value;
+    ck_assert(json_is_object(object));
+    json_object_foreach((json_t *)object, key, value)
+    {
+        strcat(strcat(keys, key), " ");
+    }
+    ck_assert_str_eq(keys, expected);
+}
+
+static double real(const json_t *json, const char *group, const char *key)
+{
+    const json_t *value = json_object_get(group ? json_object_get(json, group) : json, key);
+    ck_assert_msg(json_is_number(value), "%s/%s is not a number", group ? group : "", key);
+    return json_number_value(value);
+}
+
+static void check_values(const json_t *json, world *w)
+{
+    char hash[17];
+    drape_energy energy = drape_sim_energy(w->sim);
+    drape_statistics s = drape_sim_statistics(w->sim);
+    snprintf(hash, sizeof hash, "%016" PRIx64, drape_sim_hash(w->sim));
+    ck_assert_str_eq(json_string_value(json_object_get(json, "hash")), hash);
+    ck_assert_str_eq(json_string_value(json_object_get(json, "version")), drape_version());
+    ck_assert_double_eq(real(json, NULL, "nodes"), NODES);
+    ck_assert_double_eq(real(json, NULL, "dofs"), (double)drape_model_dof_count(w->model));
+    ck_assert_double_eq(real(json, NULL, "nnz"), (double)drape_model_nonzero_count(w->model));
+    ck_assert_double_eq(real(json, NULL, "time"), drape_sim_time(w->sim));
+    ck_assert_double_eq(real(json, "steps", "accepted"), (double)s.steps_accepted);
+    ck_assert_double_eq(real(json, "steps", "rejected"), (double)s.steps_rejected);
+    ck_assert_double_eq(real(json, "steps", "h_min"), s.h_min);
+    ck_assert_double_eq(real(json, "steps", "h_max"), s.h_max);
+    ck_assert_double_eq(real(json, "newton", "iterations"), (double)s.newton_iterations);
+    ck_assert_double_eq(real(json, "newton", "residuals"), (double)s.residuals);
+    ck_assert_double_eq(real(json, "wall_s", "setup"), s.wall_setup);
+    ck_assert_double_eq(real(json, "wall_s", "steps"), s.wall_steps);
+    ck_assert_double_eq(real(json, "energy", "kinetic"), energy.kinetic);
+    ck_assert_double_eq(real(json, "energy", "elastic"), energy.elastic);
+    ck_assert_double_eq(real(json, "energy", "gravity"), energy.gravity);
+    ck_assert_double_eq(real(json, "energy", "numerical"), energy.numerical);
+    ck_assert_double_eq(real(json, "strain", "min"), s.strain_min);
+    ck_assert_double_eq(real(json, "strain", "max"), s.strain_max);
+}
+
+static void check_reasons(const json_t *reasons, const world *w)
+{
+    int64_t count;
+    size_t i = 0;
+    const char *reason;
+    for (; (reason = drape_sim_reason(w->sim, (int)i, &count)); i++)
+        ck_assert_int_eq(json_integer_value(json_object_get(reasons, reason)), count);
+    ck_assert_uint_eq(json_object_size(reasons), i);
+}
+
+START_TEST(summary_is_complete)
+{
+    world w;
+    set_up(&w);
+    run(&w, NULL, 0.11);
+    const drape_summary_def def = {DRAPE_E_STEP_TOO_SMALL, "t = 0.1: worst edge \"7\"", 6, 1.25, 0.1};
+    const char *path = in_folder(w.out, "summary.json");
+    ck_assert_int_eq(drape_summary_write(w.ctx, w.sim, &def, path), DRAPE_OK);
+    json_t *json = load_summary(path);
+    check_keys(json,
+               "status message version nodes dofs nnz frames time steps newton wall_s energy strain hash ");
+    check_keys(json_object_get(json, "steps"), "accepted rejected h_min h_max reasons ");
+    check_keys(json_object_get(json, "newton"),
+               "iterations jacobians factorizations linear_iterations residuals ");
+    check_keys(json_object_get(json, "wall_s"),
+               "total setup steps residual jacobian factor solve contact output ");
+    check_keys(json_object_get(json, "energy"), "kinetic elastic gravity contact dissipated numerical ");
+    check_keys(json_object_get(json, "strain"), "min max ");
+    ck_assert_str_eq(json_string_value(json_object_get(json, "status")), "e_step_too_small");
+    ck_assert_str_eq(json_string_value(json_object_get(json, "message")), def.message);
+    ck_assert_double_eq(real(json, NULL, "frames"), 6);
+    ck_assert_double_eq(real(json, "wall_s", "total"), 1.25);
+    ck_assert_double_eq(real(json, "wall_s", "output"), 0.1);
+    check_values(json, &w);
+    check_reasons(json_object_get(json_object_get(json, "steps"), "reasons"), &w);
+    ck_assert_int_eq(count_files(w.out, ".part"), 0);
+    json_decref(json);
+    tear_down(&w);
+}
+END_TEST
+
+START_TEST(summary_is_always_json)
+{
+    world w;
+    set_up(&w);
+    const drape_summary_def def = {DRAPE_OK, "n\xc3\xa4he \xff.json", 0, NAN, INFINITY};
+    const drape_summary_def plain = {DRAPE_OK, NULL, 0, 0, 0};
+    const char *path = in_folder(w.folder, "s.json");
+    ck_assert_int_eq(drape_summary_write(w.ctx, w.sim, &def, path), DRAPE_OK);
+    json_t *json = load_summary(path);
+    ck_assert(json_is_null(json_object_get(json_object_get(json, "wall_s"), "total")));
+    ck_assert(json_is_null(json_object_get(json_object_get(json, "wall_s"), "output")));
+    ck_assert_str_eq(json_string_value(json_object_get(json, "message")), "n??he ?.json");
+    json_decref(json);
+    ck_assert_int_eq(drape_summary_write(w.ctx, w.sim, &plain, path), DRAPE_OK);
+    json = load_summary(path);
+    ck_assert_str_eq(json_string_value(json_object_get(json, "message")), "");
+    ck_assert_str_eq(json_string_value(json_object_get(json, "status")), "ok");
+    json_decref(json);
+    tear_down(&w);
+}
+END_TEST
+
+START_TEST(summary_fails_whole)
+{
+    world w;
+    struct rlimit old;
+    size_t size;
+    const drape_summary_def def = {DRAPE_OK, NULL, 0, 0, 0};
+    set_up(&w);
+    const char *path = in_folder(w.folder, "s.json");
+    write_text(path, "before");
+    fill_disk(100, &old);
+    drape_status status = drape_summary_write(w.ctx, w.sim, &def, path);
+    free_disk(&old);
+    ck_assert_int_eq(status, DRAPE_E_FILE);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(w.ctx), "s.json\": File too large"));
+    char *data = slurp(path, &size);
+    ck_assert_str_eq(data, "before");
+    free(data);
+    ck_assert_int_eq(count_files(w.folder, ".part"), 0);
+    ck_assert_int_eq(drape_summary_write(w.ctx, w.sim, &def, in_folder(w.folder, "no/s.json")), DRAPE_E_FILE);
+    ck_assert_int_eq(drape_summary_write(w.ctx, w.sim, &def, w.folder), DRAPE_E_FILE);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(w.ctx), "Is a directory"));
+    ck_assert_int_eq(symlink("/dev/full", in_folder(w.folder, "full")), 0);
+    ck_assert_int_eq(drape_summary_write(w.ctx, w.sim, &def, in_folder(w.folder, "full")), DRAPE_E_FILE);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(w.ctx), "No space left on device"));
+    ck_assert(exists(w.folder, "full"));
+    ck_assert_int_eq(drape_summary_write(w.ctx, w.sim, &def, "/dev/null"), DRAPE_OK);
+    tear_down(&w);
+}
+END_TEST
+
+/* A host that speaks German writes 0,5: the files must not. Nothing to see where no such locale is installed.
+ */
+START_TEST(numbers_do_not_follow_the_locale)
+{
+    world w;
+    size_t size;
+    const drape_summary_def def = {DRAPE_OK, NULL, 0, 0.5, 0};
+    bool comma = setlocale(LC_ALL, "de_DE.UTF-8") || setlocale(LC_ALL, "fr_FR.UTF-8");
+    set_up(&w);
+    run(&w, "obj", 0.03);
+    ck_assert_int_eq(drape_summary_write(w.ctx, w.sim, &def, in_folder(w.out, "s.json")), DRAPE_OK);
+    ck_assert(!comma || strcmp(localeconv()->decimal_point, ",") == 0);
+    setlocale(LC_ALL, "C");
+    check_obj(&w, "frame_000001.obj", w.seen.x[1]);
+    json_t *json = load_summary(in_folder(w.out, "s.json"));
+    ck_assert_double_eq(real(json, "wall_s", "total"), 0.5);
+    json_decref(json);
+    char *data = slurp(in_folder(w.out, "steps.csv"), &size), *row = data + strlen(columns),
+         *field[FIELDS + 1];
+    ck_assert_int_eq(split(row, field, FIELDS + 1, &row), FIELDS);
+    check_number(field[2], w.seen.attempt[0].h);
+    free(data);
+    tear_down(&w);
+}
+END_TEST
+
+SUITE("io", npy_is_exact, npy_is_valid_after_each_frame, the_last_frame_comes_once, obj_parses_back,
+      ply_parses_back, every_row_writes_the_same_frames, old_frames_are_removed_and_nothing_else,
+      steps_has_a_row_for_each_attempt, steps_quotes_and_keeps_digits, full_disk_leaves_a_valid_npy,
+      full_disk_leaves_whole_rows, full_disk_leaves_no_half_frame, a_disk_full_from_the_start_is_told_at_once,
+      bad_folders_are_refused, unknown_formats_are_refused_before_anything_is_made,
+      too_many_observers_are_told, a_killed_run_leaves_whole_files, each_allocation_may_fail,
+      summary_is_complete, summary_is_always_json, summary_fails_whole, numbers_do_not_follow_the_locale)
