@@ -20,6 +20,7 @@ typedef struct request {
     bool energy, hessian;
     bool conservative, dissipative; /* which parts of the forces */
     bool project;
+    bool velocity; /* the Hessian wanted is dg/dv alone */
 } request;
 
 /* Results of a block, element-major with the d of its term, and scratch. */
@@ -104,6 +105,14 @@ static void gather(const drape_elements *el, int32_t element, const double *from
         memcpy(local + 3 * a, from + 3 * (size_t)node[a], 3 * sizeof *local);
 }
 
+/* dg/dv of one measure: df/dq' dq dq' */
+static void measure_damping(int d, const stress *s, const double *dq, double *h)
+{
+    for (int i = 0; i < d; i++)
+        for (int j = 0; j < d; j++)
+            h[d * i + j] = s->by_rate * dq[i] * dq[j];
+}
+
 /* h, which holds the Hessian of q on entry, becomes
  *     H = f ddq + (df/dq + w df/dq') dq dq'                       step methods: q' = w q + history
  *     H = f ddq + df/dq dq dq' + df/dq' dq (ddq v + w dq)'        continuous time: q' = dq . v
@@ -138,7 +147,7 @@ static void evaluate_measure(const drape_term *term, const request *want, block_
     const double *internal = term->first_internal >= 0 ? point->internal + term->first_internal : NULL;
     bool rates = term->law_count > 0;
     term->ops->measure(el, b->first, b->count, point->x, internal, b->q, b->dq,
-                       want->hessian ? b->hessian : NULL);
+                       want->hessian && !want->velocity ? b->hessian : NULL);
     for (int32_t i = 0; i < b->count; i++) {
         int32_t e = b->first + i;
         double k = el->rest[e], strain = b->q[i] - el->rest[(size_t)el->count + (size_t)e], rate = 0, v[D];
@@ -153,7 +162,9 @@ static void evaluate_measure(const drape_term *term, const request *want, block_
         b->energy[i] = s.energy;
         for (int j = 0; j < d; j++)
             b->gradient[i * d + j] = s.force * dq[j];
-        if (want->hessian)
+        if (want->velocity)
+            measure_damping(d, &s, dq, b->hessian + (size_t)i * (size_t)(d * d));
+        else if (want->hessian)
             measure_hessian(d, point, &s, dq, v, b->hessian + (size_t)i * (size_t)(d * d));
     }
 }
@@ -173,7 +184,8 @@ static void evaluate_dissipation(const drape_term *term, const request *want, bl
     term->ops->dissipation(&term->elements, b->first, b->count, want->point->x, want->point->v, b->gradient,
                            hessian ? b->hessian : NULL, hessian ? b->velocity : NULL);
     for (int i = 0; hessian && i < b->count * d * d; i++)
-        b->hessian[i] += want->point->weight * b->velocity[i];
+        b->hessian[i] =
+            want->velocity ? b->velocity[i] : b->hessian[i] + want->point->weight * b->velocity[i];
 }
 
 static void evaluate(const drape_term *term, const request *want, block_buffer *b)
@@ -319,6 +331,13 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
     memset(values, 0, (size_t)system->model->pattern.nonzeros * sizeof *values);
     sum_terms(system, &want, &(sums){.values = values});
     add_masses(system->model, mass_weight, values);
+}
+
+void drape_system_damping(drape_system *system, const drape_point *point, double *values)
+{
+    const request want = {.point = point, .hessian = true, .velocity = true, .dissipative = true};
+    memset(values, 0, (size_t)system->model->pattern.nonzeros * sizeof *values);
+    sum_terms(system, &want, &(sums){.values = values});
 }
 
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity)

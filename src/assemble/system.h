@@ -36,6 +36,9 @@ void drape_system_force(drape_system *system, const drape_point *point, double *
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, bool project,
                            double *values);
 
+/* values (pattern.nonzeros) = D = dg/dv over the free nodes, in continuous time. */
+void drape_system_damping(drape_system *system, const drape_point *point, double *values);
+
 /* The part of g that takes energy out: laws and terms that are dissipative. */
 void drape_system_dissipation(drape_system *system, const drape_point *point, double *g);
 

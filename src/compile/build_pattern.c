@@ -11,8 +11,7 @@ static drape_status place_term(drape_model *model, drape_term *term)
 {
     const drape_elements *el = &term->elements;
     size_t pairs = (size_t)(el->nodes * el->nodes);
-    int32_t *block =
-        drape_arena_take(&model->arena, model->ctx, (size_t)el->count * pairs, sizeof *block);
+    int32_t *block = drape_arena_take(&model->arena, model->ctx, (size_t)el->count * pairs, sizeof *block);
     if (!block)
         return DRAPE_E_MEMORY;
     term->block = block;

@@ -157,8 +157,8 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
     const double *g = model->gravity;
     drape_status status = DRAPE_OK;
     char pointer[128];
-    model->cloths[c].laws = drape_arena_take(&model->arena, model->ctx, def->term_count,
-                                             sizeof *model->cloths[c].laws);
+    model->cloths[c].laws =
+        drape_arena_take(&model->arena, model->ctx, def->term_count, sizeof *model->cloths[c].laws);
     if (!model->cloths[c].laws)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; !status && i < def->term_count; i++) {

@@ -30,8 +30,7 @@ static drape_status copy_choice(drape_model *model, const drape_row_def *def, co
 
 static drape_status copy_formats(drape_model *model, const drape_scene_def *def)
 {
-    model->formats =
-        drape_arena_take(&model->arena, model->ctx, def->format_count, sizeof *model->formats);
+    model->formats = drape_arena_take(&model->arena, model->ctx, def->format_count, sizeof *model->formats);
     if (!model->formats)
         return DRAPE_E_MEMORY;
     for (; model->format_count < def->format_count; model->format_count++) {
@@ -190,8 +189,7 @@ static drape_status compile_cloths(drape_model *model, const drape_scene_def *de
     if (def->cloth_count == 0 || def->cloth_count > 1 << 20)
         return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/cloth",
                              "the scene has %zu cloths; it has 1 to %d", def->cloth_count, 1 << 20);
-    model->cloths =
-        drape_arena_take(&model->arena, model->ctx, def->cloth_count, sizeof *model->cloths);
+    model->cloths = drape_arena_take(&model->arena, model->ctx, def->cloth_count, sizeof *model->cloths);
     if (!model->cloths)
         return DRAPE_E_MEMORY;
     drape_status status = DRAPE_OK;

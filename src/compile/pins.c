@@ -197,8 +197,7 @@ static drape_status keep_track(pin_place *pin)
     drape_model *model = pin->model;
     drape_track *track = &model->tracks[model->track_count];
     track->key_count = pin->def->key_count;
-    track->keys =
-        drape_arena_take(&model->arena, model->ctx, track->key_count, sizeof *track->keys);
+    track->keys = drape_arena_take(&model->arena, model->ctx, track->key_count, sizeof *track->keys);
     if (!track->keys)
         return DRAPE_E_MEMORY;
     memcpy(track->keys, pin->def->track, track->key_count * sizeof *track->keys);
@@ -230,12 +229,12 @@ static drape_status number_nodes(drape_model *model, const int32_t *track_of_nod
         model->free_of_node[i] = model->pinned[i] ? -1 : model->free_count++;
         model->moved_count += track_of_node[i] >= 0;
     }
-    model->node_of_free = drape_arena_take(&model->arena, model->ctx, (size_t)model->free_count,
-                                           sizeof *model->node_of_free);
-    model->moved_node = drape_arena_take(&model->arena, model->ctx, (size_t)model->moved_count,
-                                         sizeof *model->moved_node);
-    model->moved_track = drape_arena_take(&model->arena, model->ctx, (size_t)model->moved_count,
-                                          sizeof *model->moved_track);
+    model->node_of_free =
+        drape_arena_take(&model->arena, model->ctx, (size_t)model->free_count, sizeof *model->node_of_free);
+    model->moved_node =
+        drape_arena_take(&model->arena, model->ctx, (size_t)model->moved_count, sizeof *model->moved_node);
+    model->moved_track =
+        drape_arena_take(&model->arena, model->ctx, (size_t)model->moved_count, sizeof *model->moved_track);
     if (!model->node_of_free || !model->moved_node || !model->moved_track)
         return DRAPE_E_MEMORY;
     int32_t moved = 0;
@@ -257,8 +256,7 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
         pin_count += def->cloths[c].pin_count;
     model->tracks = drape_arena_take(&model->arena, model->ctx, pin_count, sizeof *model->tracks);
     model->pinned = drape_arena_take(&model->arena, model->ctx, nodes, sizeof *model->pinned);
-    model->free_of_node =
-        drape_arena_take(&model->arena, model->ctx, nodes, sizeof *model->free_of_node);
+    model->free_of_node = drape_arena_take(&model->arena, model->ctx, nodes, sizeof *model->free_of_node);
     int32_t *track_of_node = drape_alloc(model->ctx, nodes, sizeof *track_of_node);
     drape_status status = DRAPE_E_MEMORY;
     if (model->tracks && model->pinned && model->free_of_node && track_of_node) {

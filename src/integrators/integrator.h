@@ -11,6 +11,7 @@
 /* What a step has to say of itself. */
 typedef struct drape_step_info {
     const char *reason; /* "converged", or why not; static text */
+    double h;           /* [s] the step that was taken; a row that chooses its own sets it */
     int iterations;
     double residual, tolerance; /* [N] */
     bool usable; /* with a status > 0: the caller asked to go on with what there is (on_failure accept) */
@@ -32,12 +33,17 @@ typedef struct drape_integrator_ops {
     int param_count;
     /* values in the order of params. Takes all memory that stepping needs. */
     drape_status (*create)(drape_context *ctx, drape_system *system, const double *values, void **state);
+    /* The row chooses its own steps: h is the way to the end of the advance or, after a rejection, an upper bound,
+     * out->t the end of the advance, which a step may reach and not pass; the row sets out->t to where it came. */
+    bool own_steps;
     /* From in to out, whose t is set: h = the nominal size of the step, exact where out->t - in->t has
      * rounding. Fills out->x and out->v. */
     drape_status (*step)(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info);
     /* The next step starts anew from a state that this integrator did not make, or after a rejection. */
     void (*restart)(void *state, const drape_state *from);
+    /* Positions (node_count x 3) at a time within the last step. NULL: cubic Hermite between the states serves. */
+    void (*interpolate)(void *state, double t, double *x);
     drape_work (*work)(const void *state);
     size_t (*bytes)(const void *state);
     void (*destroy)(void **state);

@@ -10,7 +10,8 @@
 #include "model/scene_text.h"
 
 #define LARGEST_FILE                                                                                         \
-    ((size_t)1 << 30) /* jansson counts in int, and its tree takes some ten times the text                   \
+    ((size_t)1                                                                                               \
+     << 30) /* jansson counts in int, and its tree takes some ten times the text                   \
                        */
 #define FIRST_READ   ((size_t)1 << 16)
 #define LONGEST_NAME 300 /* of a file in messages */

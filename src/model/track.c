@@ -24,3 +24,13 @@ void drape_track_displacement(const drape_track_key *keys, size_t key_count, dou
         displacement[i] =
             keys[a].displacement[i] + share * (keys[b].displacement[i] - keys[a].displacement[i]);
 }
+
+void drape_track_velocity(const drape_track_key *keys, size_t key_count, double t, double velocity[3])
+{
+    int64_t k = key_before(keys, key_count, t);
+    bool inside = k >= 0 && k + 1 < (int64_t)key_count;
+    for (int i = 0; i < 3; i++)
+        velocity[i] = inside ? (keys[k + 1].displacement[i] - keys[k].displacement[i]) /
+                                   (keys[k + 1].time - keys[k].time)
+                             : 0;
+}

@@ -8,4 +8,7 @@
 void drape_track_displacement(const drape_track_key *keys, size_t key_count, double t,
                               double displacement[3]);
 
+/* Its slope [m/s] at a time between two keys; 0 before the first and after the last. */
+void drape_track_velocity(const drape_track_key *keys, size_t key_count, double t, double velocity[3]);
+
 #endif

@@ -10,13 +10,27 @@
 
 #define SAME_TIME 1e-9 /* of the step: a frame nearer than this to a state is that state */
 
-static void interpolate(const drape_state *a, const drape_state *b, double t, size_t n, double *x)
+static void hermite(const drape_state *a, const drape_state *b, double t, size_t n, double *x)
 {
     double h = b->t - a->t, s = (t - a->t) / h;
     double h00 = (1 + 2 * s) * (1 - s) * (1 - s), h10 = s * (1 - s) * (1 - s);
     double h01 = s * s * (3 - 2 * s), h11 = s * s * (s - 1);
     for (size_t i = 0; i < n; i++)
         x[i] = h00 * a->x[i] + h10 * h * a->v[i] + h01 * b->x[i] + h11 * h * b->v[i];
+}
+
+/* Into sim->frame: the integrator's own dense output where it has one. */
+static void interpolate(drape_sim *sim, const drape_state *before, double t)
+{
+    const drape_state *now = drape_sim_state(sim);
+    size_t n = 3 * (size_t)sim->model->node_count;
+    if (sim->chosen.integrator->interpolate) {
+        memcpy(sim->frame, now->x, n * sizeof *sim->frame);
+        sim->chosen.integrator->interpolate(sim->integrator, t, sim->frame);
+        return;
+    }
+    hermite(before, now, t, n, sim->frame);
+    drape_model_place_pins(sim->model, t, sim->frame);
 }
 
 static drape_status emit(drape_sim *sim, double time, const double *x)
@@ -30,7 +44,6 @@ static drape_status emit(drape_sim *sim, double time, const double *x)
 drape_status drape_sim_emit_frames(drape_sim *sim, const drape_state *before)
 {
     const drape_state *now = drape_sim_state(sim);
-    size_t n = 3 * (size_t)sim->model->node_count;
     double near = before ? SAME_TIME * (now->t - before->t) : 0;
     drape_status status = DRAPE_OK;
     while (!status) {
@@ -40,8 +53,7 @@ drape_status drape_sim_emit_frames(drape_sim *sim, const drape_state *before)
         if (!before || time > now->t - near)
             status = emit(sim, now->t, now->x);
         else {
-            interpolate(before, now, time, n, sim->frame);
-            drape_model_place_pins(sim->model, time, sim->frame);
+            interpolate(sim, before, time);
             status = emit(sim, time, sim->frame);
         }
     }

@@ -8,7 +8,7 @@
 
 void drape_schedule_init(drape_schedule *s, double dt, double start)
 {
-    *s = (drape_schedule){.dt = dt, .start = start};
+    *s = (drape_schedule){.dt = dt, .start = start, .now = start, .limit = INFINITY};
 }
 
 void drape_schedule_aim(drape_schedule *s, double now, double end)
@@ -42,6 +42,11 @@ static void open_interval(drape_schedule *s)
 
 bool drape_schedule_next(drape_schedule *s, double *t1, double *h)
 {
+    if (s->dt == 0) {
+        *t1 = s->end;
+        *h = fmin(s->end - s->now, s->limit);
+        return s->end > s->now;
+    }
     if (s->part == 0) {
         if (!(s->end - interval_time(s, s->count) > JOIN * s->dt))
             return false;
@@ -66,8 +71,12 @@ static void close_interval(drape_schedule *s)
 }
 
 /* A level is left as soon as the parts done make whole parts of the level below. */
-void drape_schedule_accept(drape_schedule *s)
+void drape_schedule_accept(drape_schedule *s, double t1)
 {
+    s->now = t1;
+    s->limit = INFINITY;
+    if (s->dt == 0)
+        return;
     s->part++;
     bool whole = s->part == (int64_t)1 << s->level;
     if (s->level > 0 && s->part % 2 == 0) {
@@ -78,8 +87,9 @@ void drape_schedule_accept(drape_schedule *s)
         close_interval(s);
 }
 
-void drape_schedule_halve(drape_schedule *s)
+void drape_schedule_halve(drape_schedule *s, double h)
 {
+    s->limit = h / 2;
     s->level++;
     s->part *= 2;
 }

@@ -11,12 +11,13 @@
 #include <stdint.h>
 
 typedef struct drape_schedule {
-    double dt;
-    double start;  /* [s] intervals are counted from here */
-    int64_t count; /* intervals done since start */
-    int level;     /* the interval has 2^level parts */
-    int64_t part;  /* parts of it done */
-    double end;    /* [s] of this advance */
+    double dt;         /* [s] 0: the integrator chooses its own steps */
+    double now, limit; /* where it came with them; an upper bound after a rejection */
+    double start;      /* [s] intervals are counted from here */
+    int64_t count;     /* intervals done since start */
+    int level;         /* the interval has 2^level parts */
+    int64_t part;      /* parts of it done */
+    double end;        /* [s] of this advance */
     double interval_start, interval_end, interval_size;
     bool cut; /* the interval is shorter than dt: the next count starts at its end */
 } drape_schedule;
@@ -30,7 +31,10 @@ void drape_schedule_aim(drape_schedule *schedule, double now, double end);
 /* The next step: its end and its size. False when the end is reached. */
 bool drape_schedule_next(drape_schedule *schedule, double *t1, double *h);
 
-void drape_schedule_accept(drape_schedule *schedule);
-void drape_schedule_halve(drape_schedule *schedule);
+/* A step to t1 was accepted. */
+void drape_schedule_accept(drape_schedule *schedule, double t1);
+
+/* A step of size h was rejected. */
+void drape_schedule_halve(drape_schedule *schedule, double h);
 
 #endif

@@ -83,7 +83,8 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
         drape_sim_destroy(&sim);
         return status;
     }
-    drape_schedule_init(&sim->schedule, drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
+    bool own = sim->chosen.integrator->own_steps;
+    drape_schedule_init(&sim->schedule, own ? 0 : drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
     drape_energy e = drape_sim_energy(sim);
     sim->start_energy = e.kinetic + e.elastic + e.gravity;
     sim->energy_known = false;

@@ -76,7 +76,7 @@ static void measure_strain(drape_sim *sim, const double *x)
     s->strain_max = high;
 }
 
-static void accept(drape_sim *sim, double h, const drape_step_info *info)
+static void accept(drape_sim *sim, const drape_step_info *info)
 {
     drape_statistics *s = &sim->statistics;
     drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
@@ -85,10 +85,10 @@ static void accept(drape_sim *sim, double h, const drape_step_info *info)
     sim->dissipated += info->dissipated;
     sim->pin_work += info->pin_work;
     measure_strain(sim, drape_sim_state(sim)->x);
-    s->h_min = s->steps_accepted == 0 || h < s->h_min ? h : s->h_min;
-    s->h_max = h > s->h_max ? h : s->h_max;
+    s->h_min = s->steps_accepted == 0 ? info->h : fmin(info->h, s->h_min);
+    s->h_max = fmax(info->h, s->h_max);
     s->steps_accepted++;
-    drape_schedule_accept(&sim->schedule);
+    drape_schedule_accept(&sim->schedule, drape_sim_state(sim)->t);
 }
 
 static void count_reason(drape_sim *sim, const char *reason)
@@ -107,7 +107,6 @@ static void reject(drape_sim *sim, const drape_step_info *info)
 {
     sim->statistics.steps_rejected++;
     count_reason(sim, info->reason);
-    sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
 }
 
 /* ---- Telling
@@ -155,12 +154,12 @@ static drape_status tell_attempt(drape_sim *sim, const drape_attempt *attempt)
 /* One attempt from proposal to verdict. *stop: the negative status that ends the advance, 0 to go on. */
 static drape_verdict try_step(drape_sim *sim, double t1, double h, drape_attempt *record, drape_status *stop)
 {
-    drape_step_info info = {.reason = "converged"};
+    drape_step_info info = {.reason = "converged", .h = h};
     double t = drape_sim_state(sim)->t;
     drape_status status = attempt(sim, t1, h, &info);
     *record = (drape_attempt){.index = sim->attempts++,
                               .t = t,
-                              .h = h,
+                              .h = info.h,
                               .status = status,
                               .reason = info.reason,
                               .iterations = info.iterations,
@@ -168,14 +167,15 @@ static drape_verdict try_step(drape_sim *sim, double t1, double h, drape_attempt
                               .tolerance = info.tolerance,
                               .worst = info.worst};
     *stop = status;
-    drape_verdict verdict = sim->chosen.controller->judge(sim->chosen.controller_values, t, h, &info, stop);
+    drape_verdict verdict =
+        sim->chosen.controller->judge(sim->chosen.controller_values, t, info.h, &info, stop);
     record->accepted = verdict == DRAPE_ACCEPT;
     if (verdict == DRAPE_ACCEPT)
-        accept(sim, h, &info);
+        accept(sim, &info);
     else
         reject(sim, &info);
     if (verdict == DRAPE_HALVE)
-        drape_schedule_halve(&sim->schedule);
+        drape_schedule_halve(&sim->schedule, info.h);
     if (verdict != DRAPE_STOP)
         *stop = DRAPE_OK;
     return verdict;

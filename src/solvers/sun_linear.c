@@ -47,15 +47,19 @@ static int setup(SUNLinearSolver solver, SUNMatrix matrix)
     return linear->status;
 }
 
-static int solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, sunrealtype tolerance)
+drape_status drape_sun_linear_solve(drape_sun_linear *linear, const double *b, double *x)
 {
-    (void)matrix, (void)tolerance;
-    drape_sun_linear *linear = solver->content;
     double start = drape_clock_seconds();
-    linear->status = linear->ops->solve(linear->state, N_VGetArrayPointer(b), N_VGetArrayPointer(x));
+    linear->status = linear->ops->solve(linear->state, b, x);
     linear->solve_seconds += drape_clock_seconds() - start;
     linear->solves++;
     return linear->status;
+}
+
+static int solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, sunrealtype tolerance)
+{
+    (void)matrix, (void)tolerance;
+    return drape_sun_linear_solve(solver->content, N_VGetArrayPointer(b), N_VGetArrayPointer(x));
 }
 
 drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const drape_linear_ops *ops,

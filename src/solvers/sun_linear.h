@@ -17,6 +17,7 @@ typedef struct drape_sun_linear {
     drape_context *ctx;
     const drape_linear_ops *ops;
     void *state;
+    void *owner;    /* of an integrator that reduces its system to this one before it solves */
     double *values; /* (nonzeros) where the Jacobian is assembled */
     SUNLinearSolver solver;
     SUNMatrix matrix;
@@ -28,5 +29,8 @@ typedef struct drape_sun_linear {
 drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const drape_linear_ops *ops,
                                      const drape_pattern *pattern, drape_sun_linear **out);
 void drape_sun_linear_destroy(drape_sun_linear **linear);
+
+/* x = A^-1 b with the factors there are, time and work counted: what the SUNLinearSolver does. */
+drape_status drape_sun_linear_solve(drape_sun_linear *linear, const double *b, double *x);
 
 #endif

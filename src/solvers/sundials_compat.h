@@ -31,17 +31,19 @@ static inline int drape_sundials_context(SUNContext *out)
     return code;
 }
 #define DRAPE_KINSOL_QUIET(kin) ((void)0)
+#define DRAPE_IDA_QUIET(ida)    ((void)0)
 #else
 static inline int drape_sundials_context(SUNContext *out)
 {
     return SUNContext_Create(NULL, out);
 }
-static inline void drape_kinsol_quiet(int code, const char *module, const char *function, char *message,
-                                      void *data)
+static inline void drape_sundials_quiet(int code, const char *module, const char *function, char *message,
+                                        void *data)
 {
     (void)code, (void)module, (void)function, (void)message, (void)data;
 }
-#define DRAPE_KINSOL_QUIET(kin) KINSetErrHandlerFn(kin, drape_kinsol_quiet, NULL)
+#define DRAPE_KINSOL_QUIET(kin) KINSetErrHandlerFn(kin, drape_sundials_quiet, NULL)
+#define DRAPE_IDA_QUIET(ida)    IDASetErrHandlerFn(ida, drape_sundials_quiet, NULL)
 #endif
 
 #endif

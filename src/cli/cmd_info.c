@@ -1,0 +1,161 @@
+/* cmd_info.c: `drape info`: what a scene models and what it costs. */
+#include "cli/info.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+typedef struct info_request {
+    cli_command command;
+    bool json;
+} info_request;
+
+void cli_chosen_rows(const drape_sim *sim, cli_chosen_row rows[CLI_CHOSEN_ROWS])
+{
+    const drape_integrator_ops *integrator = sim->chosen.integrator;
+    const drape_controller_ops *controller = sim->chosen.controller;
+    rows[0] = (cli_chosen_row){"integrator",
+                               integrator->name,
+                               integrator->summary,
+                               integrator->params,
+                               integrator->param_count,
+                               sim->chosen.integrator_values,
+                               &sim->model->integrator,
+                               drape_chosen_ignores_integrator};
+    rows[1] = (cli_chosen_row){"controller",
+                               controller->name,
+                               controller->summary,
+                               controller->params,
+                               controller->param_count,
+                               sim->chosen.controller_values,
+                               &sim->model->controller,
+                               drape_chosen_ignores_controller};
+}
+
+bool cli_is_given(const drape_choice *choice, const char *name)
+{
+    for (size_t i = 0; i < choice->setting_count; i++)
+        if (strcmp(choice->settings[i].name, name) == 0)
+            return true;
+    return false;
+}
+
+double cli_share(const cli_info *info, double seconds)
+{
+    double whole = drape_profile_seconds(&info->profile);
+    return whole > 0 ? seconds / whole : 0;
+}
+
+/* Single measurements may add up to more than the whole did. */
+double cli_other_residual_seconds(const cli_info *info)
+{
+    double other = info->profile.residual_seconds;
+    for (int32_t i = 0; i < info->model->term_count; i++)
+        other -= info->profile.terms[i].residual_seconds;
+    return fmax(other, 0);
+}
+
+double cli_other_jacobian_seconds(const cli_info *info)
+{
+    double other = info->profile.jacobian_seconds;
+    for (int32_t i = 0; i < info->model->term_count; i++)
+        other -= info->profile.terms[i].jacobian_seconds;
+    return fmax(other, 0);
+}
+
+static cli_cloth_info cloth_info(const drape_model *model, const drape_cloth *cloth)
+{
+    cli_cloth_info info = {0};
+    int32_t first = cloth->first_node, last = first + cloth->mesh.node_count - 1;
+    for (int32_t i = first; i <= last; i++) {
+        info.mass += model->mass[i];
+        info.pinned += model->pinned[i];
+    }
+    for (int32_t i = 0; i < model->moved_count; i++)
+        info.moved += model->moved_node[i] >= first && model->moved_node[i] <= last;
+    for (int32_t t = 0; t < cloth->mesh.triangle_count; t++)
+        info.area += cloth->mesh.triangle_area[t];
+    return info;
+}
+
+/* The frames at k / rate up to the end, and one at the end where none of them is there. */
+static int64_t count_frames(const drape_model *model)
+{
+    double intervals = model->duration * model->frame_rate, whole = floor(intervals + 1e-9);
+    return (int64_t)whole + (intervals - whole > 1e-9 ? 2 : 1);
+}
+
+static drape_status gather(const cli_scene *in, cli_info *info)
+{
+    const drape_model *model = in->model;
+    drape_profile_term *terms = drape_alloc(in->ctx, (size_t)model->term_count, sizeof *terms);
+    info->profile.terms = terms;
+    info->cloths = drape_alloc(in->ctx, (size_t)model->cloth_count, sizeof *info->cloths);
+    if (!terms || !info->cloths)
+        return DRAPE_E_MEMORY;
+    info->model = model;
+    info->sim = in->sim;
+    info->frames = count_frames(model);
+    for (int32_t c = 0; c < model->cloth_count; c++)
+        info->cloths[c] = cloth_info(model, &model->cloths[c]);
+    return drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
+}
+
+static int print_json(const cli_info *info)
+{
+    json_t *json = cli_info_json(info);
+    int failed = !json || json_dumpf(json, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(15));
+    fputc('\n', stdout);
+    json_decref(json);
+    return failed && !ferror(stdout) ? CLI_FAILED : CLI_DONE;
+}
+
+static int print_info(const info_request *request, const cli_scene *in)
+{
+    cli_info info = {.path = request->command.operand};
+    int code = CLI_DONE;
+    if (gather(in, &info)) {
+        fprintf(stderr, "%s\n", drape_context_message(in->ctx));
+        code = CLI_FAILED;
+    } else if (request->json) {
+        code = print_json(&info);
+    } else {
+        cli_info_text(&info);
+    }
+    drape_free(in->ctx, info.profile.terms);
+    drape_free(in->ctx, info.cloths);
+    return code;
+}
+
+static const cli_option options[] = {
+    {"json", CLI_FLAG, NULL, "the same as JSON", offsetof(info_request, json), 0, NULL},
+};
+
+static int main_info(int argc, char **argv);
+
+const drape_verb drape_verb_info = {
+    .name = "info",
+    .operand = "SCENE",
+    .takes_scene = true,
+    .summary = "what a scene models and what it costs",
+    .details =
+        "Shows what a scene models, every parameter with its value, and what each part costs: elements,\n"
+        "nonzeros, bytes, and its share of one Newton iteration, measured at a slightly deformed state.",
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .run = main_info,
+};
+
+static int main_info(int argc, char **argv)
+{
+    info_request request = {.json = false};
+    cli_scene in = {.ctx = NULL};
+    int code = cli_parse(&drape_verb_info, argc, argv, &request.command);
+    if (code == CLI_GO_ON)
+        code = cli_scene_load(&request.command, &in);
+    if (code == CLI_GO_ON)
+        code = print_info(&request, &in);
+    cli_scene_free(&in);
+    cli_command_free(&request.command);
+    return code;
+}

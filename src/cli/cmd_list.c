@@ -1,0 +1,264 @@
+/* cmd_list.c: `drape list`: the tables of the library, as text, as Markdown, and as the schema of a scene. */
+#include "cli/cli.h"
+#include "cli/schema.h"
+#include "cli/tables.h"
+
+#include "base/param.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define MAX_NAMES 256
+
+typedef struct list_request {
+    cli_command command;
+    bool markdown, schema;
+} list_request;
+
+/* How a table is printed. */
+typedef struct list_style {
+    void (*table)(const cli_table *table);
+    void (*rows_begin)(void);
+    void (*row)(const cli_row *row);
+    void (*params_begin)(const cli_table *table);
+    void (*param)(const cli_row *row, const drape_param *param);
+    bool params_apart; /* in a table of their own, after all rows */
+} list_style;
+
+typedef struct param_text {
+    char range[256], value[128], unit[64];
+} param_text;
+
+static param_text text_of(const drape_param *param)
+{
+    param_text text;
+    drape_param plain = *param;
+    plain.unit = "1"; /* the range without its unit, which has a place of its own */
+    drape_param_range_text(&plain, text.range, sizeof text.range);
+    drape_param_value_text(param, param->default_value, text.value, sizeof text.value);
+    snprintf(text.unit, sizeof text.unit, "%s", strcmp(param->unit, "1") == 0 ? "" : param->unit);
+    return text;
+}
+
+/* ---- As text
+ * ----------------------------------------------------------------------------------------------- */
+
+static void nothing(void) {}
+
+static void no_params(const cli_table *table)
+{
+    (void)table;
+}
+
+static void text_table(const cli_table *table)
+{
+    printf("%s (%s)%s%s\n", table->title, table->name, table->place ? ": " : "",
+           table->place ? table->place : "");
+}
+
+static void text_row(const cli_row *row)
+{
+    printf("\n  %-20s %s\n", row->name, row->summary);
+    if (row->reference && strcmp(row->reference, "-") != 0)
+        printf("  %-20s [%s]\n", "", row->reference);
+}
+
+static void text_param(const cli_row *row, const drape_param *param)
+{
+    (void)row;
+    const param_text text = text_of(param);
+    printf("    %-18s %s\n", param->name, param->help);
+    printf("    %-18s %s%s%s; %s%s\n", "", text.range, *text.unit ? " " : "", text.unit,
+           isnan(param->default_value) ? "" : "default ", text.value);
+}
+
+/* ---- As Markdown
+ * ------------------------------------------------------------------------------------------- */
+
+/* A cell: what would end it is written as it must be. */
+static void cell(const char *text)
+{
+    fputs(" ", stdout);
+    for (; *text; text++) {
+        if (*text == '|')
+            fputc('\\', stdout);
+        fputc(*text, stdout);
+    }
+    fputs(" |", stdout);
+}
+
+static void markdown_table(const cli_table *table)
+{
+    printf("### %s\n", table->title);
+    if (table->place)
+        printf("\nIn a scene: %s.\n", table->place);
+}
+
+static void markdown_rows_begin(void)
+{
+    puts("\n| name | what | reference |\n|---|---|---|");
+}
+
+static void code_cell(const char *text)
+{
+    char code[160];
+    snprintf(code, sizeof code, "`%s`", text);
+    cell(code);
+}
+
+static void markdown_row(const cli_row *row)
+{
+    fputs("|", stdout);
+    code_cell(row->name);
+    cell(row->summary);
+    cell(row->reference && strcmp(row->reference, "-") != 0 ? row->reference : "");
+    fputc('\n', stdout);
+}
+
+static void markdown_params_begin(const cli_table *table)
+{
+    (void)table;
+    puts("\n| of | parameter | unit | default | range | what |\n|---|---|---|---|---|---|");
+}
+
+static void markdown_param(const cli_row *row, const drape_param *param)
+{
+    const param_text text = text_of(param);
+    fputs("|", stdout);
+    code_cell(row->name);
+    code_cell(param->name);
+    cell(text.unit);
+    cell(text.value);
+    cell(text.range);
+    cell(param->help);
+    fputc('\n', stdout);
+}
+
+static const list_style text_style = {text_table, nothing, text_row, no_params, text_param, false};
+static const list_style markdown_style = {markdown_table,        markdown_rows_begin, markdown_row,
+                                          markdown_params_begin, markdown_param,      true};
+
+/* ---- What is printed
+ * --------------------------------------------------------------------------------------- */
+
+static bool has_params(const cli_table *table, const char *only)
+{
+    cli_row row;
+    for (int i = 0; table->row(i, &row); i++)
+        if (row.param_count > 0 && (!only || strcmp(only, row.name) == 0))
+            return true;
+    return false;
+}
+
+static void print_params(const list_style *style, const cli_row *row)
+{
+    for (int p = 0; p < row->param_count; p++)
+        style->param(row, &row->params[p]);
+}
+
+/* only: the name of one row; NULL: all. */
+static void print_table(const list_style *style, const cli_table *table, const char *only)
+{
+    cli_row row;
+    style->table(table);
+    style->rows_begin();
+    for (int i = 0; table->row(i, &row); i++)
+        if (!only || strcmp(only, row.name) == 0) {
+            style->row(&row);
+            if (!style->params_apart)
+                print_params(style, &row);
+        }
+    if (style->params_apart && has_params(table, only)) {
+        style->params_begin(table);
+        for (int i = 0; table->row(i, &row); i++)
+            if (!only || strcmp(only, row.name) == 0)
+                print_params(style, &row);
+    }
+}
+
+static bool has_row(const cli_table *table, const char *name)
+{
+    cli_row row;
+    for (int i = 0; table->row(i, &row); i++)
+        if (strcmp(row.name, name) == 0)
+            return true;
+    return false;
+}
+
+static int unknown_name(const char *name)
+{
+    const char *names[MAX_NAMES];
+    size_t count = 0;
+    cli_row row;
+    for (int t = 0; cli_tables[t] && count < MAX_NAMES; t++) {
+        names[count++] = cli_tables[t]->name;
+        for (int i = 0; cli_tables[t]->row(i, &row) && count < MAX_NAMES; i++)
+            names[count++] = row.name;
+    }
+    const char *meant = drape_did_you_mean(name, names, count);
+    return cli_misuse("list", "there is no table and no row \"%.60s\"%s%s%s; `drape list` shows all", name,
+                      meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+}
+
+/* name: of a table or of a row; NULL: all tables. */
+static int print_tables(const list_style *style, const char *name)
+{
+    int printed = 0;
+    for (int t = 0; cli_tables[t]; t++) {
+        const cli_table *table = cli_tables[t];
+        bool whole = !name || strcmp(name, table->name) == 0;
+        if (!whole && !has_row(table, name))
+            continue;
+        if (printed++)
+            fputc('\n', stdout);
+        print_table(style, table, whole ? NULL : name);
+    }
+    return printed ? CLI_DONE : unknown_name(name);
+}
+
+static int print_schema(void)
+{
+    json_t *schema = cli_schema();
+    int failed = !schema || json_dumpf(schema, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(15));
+    fputc('\n', stdout);
+    json_decref(schema);
+    return failed && !ferror(stdout) ? cli_misuse("list", "out of memory for the schema") : CLI_DONE;
+}
+
+static int print_request(const list_request *request)
+{
+    if (request->schema && (request->command.operand || request->markdown))
+        return cli_misuse("list", "--schema stands alone: it is the form of a whole scene");
+    if (request->schema)
+        return print_schema();
+    return print_tables(request->markdown ? &markdown_style : &text_style, request->command.operand);
+}
+
+static const cli_option options[] = {
+    {"markdown", CLI_FLAG, NULL, "tables for a README", offsetof(list_request, markdown), 0, NULL},
+    {"schema", CLI_FLAG, NULL, "the JSON Schema of a scene", offsetof(list_request, schema), 0, NULL},
+};
+
+static int main_list(int argc, char **argv);
+
+const drape_verb drape_verb_list = {
+    .name = "list",
+    .operand = "[TABLE|ROW]",
+    .operand_optional = true,
+    .summary = "every row of every table: parameters, units, defaults, references",
+    .details = "Prints all that a scene can choose from, or one table, or one row.",
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .run = main_list,
+};
+
+static int main_list(int argc, char **argv)
+{
+    list_request request = {.markdown = false};
+    int code = cli_parse(&drape_verb_list, argc, argv, &request.command);
+    if (code == CLI_GO_ON)
+        code = print_request(&request);
+    cli_command_free(&request.command);
+    return code;
+}

@@ -1,0 +1,250 @@
+/* cmd_run.c: `drape run`: simulates a scene; frames, step log and summary into a folder. */
+#include "cli/cli.h"
+#include "cli/progress.h"
+#include "cli/signals.h"
+
+#include "base/clock.h"
+#include "io/recorder.h"
+#include "io/summary.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+typedef struct run_request {
+    cli_command command;
+    const char *out, *summary;
+} run_request;
+
+typedef struct run {
+    const run_request *request;
+    cli_scene in;
+    drape_recorder *recorder; /* NULL without --out */
+    char *summary_path;       /* in the folder of --out; NULL without it */
+    cli_progress progress;
+    double start; /* [s] of the clock */
+    drape_status status;
+    char message[DRAPE_MESSAGE_SIZE];
+} run;
+
+/* The first failure is the one that is told. */
+static void note(run *r, drape_status status)
+{
+    if (!status || r->status)
+        return;
+    r->status = status;
+    snprintf(r->message, sizeof r->message, "%s", drape_context_message(r->in.ctx));
+}
+
+/* ---- Output
+ * ------------------------------------------------------------------------------------------------ */
+
+/* A run that is killed must not leave the summary of the one before. What is no regular file stays: a
+ * summary is written through it. */
+static void remove_old_summary(const char *path)
+{
+    struct stat info;
+    if (lstat(path, &info) == 0 && S_ISREG(info.st_mode))
+        remove(path); /* if it stays, it is replaced at the end, or that failure is told */
+}
+
+static drape_status begin_output(run *r)
+{
+    const drape_model *model = r->in.model;
+    const char *folder = r->request->out;
+    if (!folder)
+        return DRAPE_OK;
+    size_t size = strlen(folder) + sizeof "/summary.json";
+    r->summary_path = drape_alloc(r->in.ctx, size, 1);
+    if (!r->summary_path)
+        return DRAPE_E_MEMORY;
+    snprintf(r->summary_path, size, "%s/summary.json", folder);
+    const drape_recorder_def def = {.folder = folder,
+                                    .formats = (const char *const *)model->formats,
+                                    .format_count = model->format_count};
+    drape_status status = drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder);
+    if (!status)
+        remove_old_summary(r->summary_path);
+    return status;
+}
+
+static void write_summary(run *r, const char *path)
+{
+    if (!path)
+        return;
+    const drape_summary_def def = {.status = r->status,
+                                   .message = r->message,
+                                   .frames = drape_recorder_frames(r->recorder),
+                                   .wall_total = drape_clock_seconds() - r->start,
+                                   .wall_output = drape_recorder_seconds(r->recorder)};
+    note(r, drape_summary_write(r->in.ctx, r->in.sim, &def, path));
+}
+
+/* ---- Results on stdout
+ * ------------------------------------------------------------------------------------- */
+
+static void print_steps(const run *r, const drape_statistics *s)
+{
+    int64_t count = 0;
+    const char *reason;
+    printf("steps     %lld accepted, %lld rejected", (long long)s->steps_accepted,
+           (long long)s->steps_rejected);
+    for (int i = 0; (reason = drape_sim_reason(r->in.sim, i, &count)); i++)
+        printf("%s%s %lld", i ? ", " : " (", reason, (long long)count);
+    fputs(s->steps_rejected > 0 ? ")" : "", stdout);
+    if (s->steps_accepted > 0)
+        printf("; %.4g to %.4g s", s->h_min, s->h_max);
+    fputc('\n', stdout);
+}
+
+static void print_newton(const drape_statistics *s)
+{
+    int64_t attempts = s->steps_accepted + s->steps_rejected;
+    printf(
+        "newton    %lld iterations, %.3g an attempt; %lld residuals, %lld Jacobians, %lld factorizations\n",
+        (long long)s->newton_iterations, attempts ? (double)s->newton_iterations / (double)attempts : 0.0,
+        (long long)s->residuals, (long long)s->jacobians, (long long)s->factorizations);
+}
+
+static void print_energy(const run *r)
+{
+    drape_energy e = drape_sim_energy(r->in.sim);
+    const struct {
+        const char *name;
+        double value;
+    } parts[] = {{"kinetic", e.kinetic}, {"elastic", e.elastic},       {"gravity", e.gravity},
+                 {"contact", e.contact}, {"dissipated", e.dissipated}, {"numerical", e.numerical}};
+    fputs("energy   ", stdout);
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
+        printf("%s %s %.5g J", i ? "," : "", parts[i].name, parts[i].value);
+    fputc('\n', stdout);
+}
+
+static void print_wall(const run *r, const drape_statistics *s)
+{
+    const struct {
+        const char *name;
+        double seconds;
+    } parts[] = {{"residual", s->wall_residual},
+                 {"Jacobian", s->wall_jacobian},
+                 {"factor", s->wall_factor},
+                 {"solve", s->wall_solve}};
+    double steps = s->wall_steps > 0 ? s->wall_steps : 1;
+    printf("wall      %.4g s; %.4g ms a step", drape_clock_seconds() - r->start,
+           s->steps_accepted ? 1e3 * s->wall_steps / (double)s->steps_accepted : 0.0);
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
+        printf("%s %s %.0f %%", i ? "," : ":", parts[i].name, 100 * parts[i].seconds / steps);
+    fputc('\n', stdout);
+}
+
+static void print_results(const run *r)
+{
+    const drape_model *model = r->in.model;
+    const drape_statistics s = drape_sim_statistics(r->in.sim);
+    printf("status    %s\n", drape_status_name(r->status));
+    printf("model     %d nodes, %lld degrees of freedom, %lld nonzeros\n", (int)drape_model_node_count(model),
+           (long long)drape_model_dof_count(model), (long long)drape_model_nonzero_count(model));
+    printf("time      %.9g of %.9g s\n", drape_sim_time(r->in.sim), drape_model_duration(model));
+    print_steps(r, &s);
+    print_newton(&s);
+    printf("strain    %.5g to %.5g\n", s.strain_min, s.strain_max);
+    print_energy(r);
+    print_wall(r, &s);
+    if (r->recorder)
+        printf("output    %lld frames, steps.csv and summary.json in %s\n",
+               (long long)drape_recorder_frames(r->recorder), r->request->out);
+}
+
+/* ---- The run
+ * ----------------------------------------------------------------------------------------------- */
+
+/* Comes after the recorder, so that the step in which the signal came is logged. */
+static drape_status watch(void *user, const drape_event *event)
+{
+    run *r = user;
+    if (event->kind != DRAPE_EVENT_ATTEMPT)
+        return DRAPE_OK;
+    if (r->progress.on)
+        cli_progress_show(&r->progress, drape_sim_time(event->sim),
+                          drape_sim_statistics(event->sim).steps_rejected);
+    if (!cli_interrupted())
+        return DRAPE_OK;
+    drape_context_set_message(r->in.ctx, "t=%.9g: interrupted", drape_sim_time(event->sim));
+    return DRAPE_E_STOPPED;
+}
+
+static void simulate(run *r)
+{
+    double end = drape_model_duration(r->in.model);
+    cli_catch_signals();
+    note(r, begin_output(r));
+    if (!r->status)
+        note(r, drape_sim_observe(r->in.sim, watch, r));
+    if (!r->status) {
+        cli_progress_begin(&r->progress, end);
+        note(r, drape_sim_advance(r->in.sim, end));
+        cli_progress_clear(&r->progress);
+    }
+    if (r->recorder)
+        note(r, drape_recorder_finish(r->recorder));
+    write_summary(r, r->summary_path);
+    write_summary(r, r->request->summary);
+}
+
+/* A signal that came after the last step has nothing left to stop. */
+static int conclude(const run *r)
+{
+    print_results(r);
+    if (!r->status)
+        return CLI_DONE;
+    fflush(stdout);
+    fprintf(stderr, "%s\n", r->message);
+    return r->status == DRAPE_E_STOPPED ? CLI_INTERRUPTED : CLI_FAILED;
+}
+
+static int load_and_run(const run_request *request)
+{
+    run r = {.request = request, .start = drape_clock_seconds()};
+    int code = cli_scene_load(&request->command, &r.in);
+    if (code == CLI_GO_ON) {
+        simulate(&r);
+        code = conclude(&r);
+        drape_recorder_destroy(&r.recorder);
+        drape_free(r.in.ctx, r.summary_path);
+    }
+    cli_scene_free(&r.in);
+    return code;
+}
+
+static const cli_option options[] = {
+    {"out", CLI_TEXT, "DIR", "folder for frames, steps.csv and summary.json; made if it is not there",
+     offsetof(run_request, out), 0, NULL},
+    {"summary", CLI_TEXT, "FILE", "write the summary there, too", offsetof(run_request, summary), 0, NULL},
+};
+
+static int main_run(int argc, char **argv);
+
+const drape_verb drape_verb_run = {
+    .name = "run",
+    .operand = "SCENE",
+    .takes_scene = true,
+    .summary = "simulate a scene; frames, step log and summary into a folder",
+    .details = "Simulates a scene. Without --out nothing is written but the results on the standard output.\n"
+               "Ctrl-C ends the run after the step in progress and keeps what was written.",
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .run = main_run,
+};
+
+static int main_run(int argc, char **argv)
+{
+    run_request request = {.out = NULL};
+    int code = cli_parse(&drape_verb_run, argc, argv, &request.command);
+    if (code == CLI_GO_ON)
+        code = load_and_run(&request);
+    cli_command_free(&request.command);
+    return code;
+}

@@ -1,0 +1,50 @@
+/* info.h: what `drape info` knows of a scene, for both of its forms. */
+#ifndef DRAPE_CLI_INFO_H
+#define DRAPE_CLI_INFO_H
+
+#include "cli/cli.h"
+#include "sim/profile.h"
+
+#include <jansson.h>
+
+typedef struct cli_cloth_info {
+    double mass, area;     /* [kg], [m2] */
+    int32_t pinned, moved; /* nodes; moved ones are pinned, too */
+} cli_cloth_info;
+
+typedef struct cli_info {
+    const char *path;
+    const drape_model *model;
+    const drape_sim *sim;
+    drape_profile profile;
+    int64_t frames;         /* of a whole run */
+    cli_cloth_info *cloths; /* one for each of the model */
+} cli_info;
+
+/* A row that was chosen by name. */
+typedef struct cli_chosen_row {
+    const char *title, *name, *summary; /* "integrator", "be" */
+    const drape_param *params;
+    int param_count;
+    const double *values;
+    const drape_choice *choice; /* what the scene said */
+    bool (*ignores)(const drape_chosen *chosen, const char *name);
+} cli_chosen_row;
+
+#define CLI_CHOSEN_ROWS 2
+void cli_chosen_rows(const drape_sim *sim, cli_chosen_row rows[CLI_CHOSEN_ROWS]);
+
+/* Whether the scene gave the parameter. */
+bool cli_is_given(const drape_choice *choice, const char *name);
+
+/* A share of the residual, Jacobian, factor and solve of one Newton iteration [1]. */
+double cli_share(const cli_info *info, double seconds);
+
+/* What assembling takes beside the terms: clearing, masses. */
+double cli_other_residual_seconds(const cli_info *info);
+double cli_other_jacobian_seconds(const cli_info *info);
+
+void cli_info_text(const cli_info *info);    /* on stdout */
+json_t *cli_info_json(const cli_info *info); /* a new reference; NULL: out of memory */
+
+#endif

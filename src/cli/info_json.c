@@ -1,0 +1,199 @@
+/* info_json.c: `drape info --json`. As in info_text.c, what a scene does not model has no key.
+ *
+ * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere below ends
+ * as a NULL at the top. */
+#include "cli/info.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Takes both references. The container, or NULL if it or the value is not there. */
+static json_t *with(json_t *object, const char *key, json_t *value)
+{
+    if (json_object_set_new(object, key, value) == 0)
+        return object;
+    json_decref(object);
+    return NULL;
+}
+
+static json_t *and_also(json_t *array, json_t *value)
+{
+    if (json_array_append_new(array, value) == 0)
+        return array;
+    json_decref(array);
+    return NULL;
+}
+
+static json_t *number(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
+static json_t *count(int64_t value)
+{
+    return json_integer((json_int_t)value);
+}
+
+/* A name from a scene is UTF-8; a path need not be. */
+static json_t *text(const char *bytes)
+{
+    json_t *string = json_string(bytes);
+    return string ? string : json_string("(not UTF-8)");
+}
+
+static json_t *vector(const double v[3])
+{
+    return and_also(and_also(and_also(json_array(), number(v[0])), number(v[1])), number(v[2]));
+}
+
+/* ---- Parameters
+ * -------------------------------------------------------------------------------------------- */
+
+static json_t *value_of(const drape_param *param, double value)
+{
+    if (param->kind == DRAPE_PARAM_BOOLEAN)
+        return json_boolean(value != 0);
+    if (param->kind == DRAPE_PARAM_CHOICE)
+        return json_string(param->choices[(int)value]);
+    if (isnan(value) && param->derived)
+        return json_string(param->derived);
+    return param->kind == DRAPE_PARAM_INTEGER ? count((int64_t)value) : number(value);
+}
+
+static json_t *params_of(const drape_param *params, int param_count, const double *values,
+                         const drape_choice *choice)
+{
+    json_t *object = json_object();
+    for (int p = 0; p < param_count; p++) {
+        json_t *one = with(json_object(), "value", value_of(&params[p], values[p]));
+        one = with(one, "unit", json_string(params[p].unit));
+        if (choice)
+            one = with(one, "default", json_boolean(!cli_is_given(choice, params[p].name)));
+        object = with(object, params[p].name, one);
+    }
+    return object;
+}
+
+static json_t *chosen(const cli_chosen_row *row, const drape_chosen *all)
+{
+    json_t *ignored = json_array();
+    for (size_t i = 0; i < row->choice->setting_count; i++)
+        if (row->ignores(all, row->choice->settings[i].name))
+            ignored = and_also(ignored, text(row->choice->settings[i].name));
+    json_t *object = with(json_object(), "type", json_string(row->name));
+    object = with(object, "parameters", params_of(row->params, row->param_count, row->values, row->choice));
+    return with(object, "ignored", ignored);
+}
+
+/* ---- Cloths and terms
+ * -------------------------------------------------------------------------------------- */
+
+static json_t *material(const drape_material *m)
+{
+    json_t *object = with(json_object(), "young_modulus", number(m->young_modulus));
+    object = with(object, "poisson_ratio", number(m->poisson_ratio));
+    object = with(object, "thickness", number(m->thickness));
+    object = with(object, "areal_density", number(m->areal_density));
+    object = with(object, "membrane_stiffness", number(m->membrane_stiffness));
+    return with(object, "flexural_rigidity", number(m->flexural_rigidity));
+}
+
+static json_t *cloth(const cli_info *info, int32_t c)
+{
+    const drape_cloth *from = &info->model->cloths[c];
+    const cli_cloth_info *more = &info->cloths[c];
+    json_t *object = with(json_object(), "name", text(from->name));
+    object = with(object, "nodes", count(from->mesh.node_count));
+    object = with(object, "triangles", count(from->mesh.triangle_count));
+    object = with(object, "edges", count(from->mesh.edge_count));
+    object = with(object, "mass", number(more->mass));
+    object = with(object, "area", number(more->area));
+    object = with(object, "pinned", count(more->pinned));
+    object = with(object, "moved", count(more->moved));
+    object = with(object, "velocity", vector(from->velocity));
+    return with(object, "material", material(&from->material));
+}
+
+static json_t *term(const cli_info *info, int32_t i)
+{
+    const drape_term *from = &info->model->terms[i];
+    const drape_profile_term *cost = &info->profile.terms[i];
+    json_t *object = with(json_object(), "name", json_string(from->ops->name));
+    object = with(object, "cloth", text(info->model->cloths[from->cloth].name));
+    if (from->ops->law)
+        object = with(object, "acts_on", count(cost->acts_on));
+    object = with(object, "element", json_string(from->ops->element_name));
+    object = with(object, "elements", count(from->elements.count));
+    object = with(object, "nodes_an_element", count(from->elements.nodes));
+    object = with(object, "nonzeros", count(cost->nonzeros));
+    object = with(object, "bytes", count((int64_t)cost->bytes));
+    object = with(object, "residual_s", number(cost->residual_seconds));
+    object = with(object, "jacobian_s", number(cost->jacobian_seconds));
+    object = with(object, "share", number(cli_share(info, cost->residual_seconds + cost->jacobian_seconds)));
+    return with(object, "parameters",
+                params_of(from->ops->params, from->ops->param_count, from->params, NULL));
+}
+
+/* ---- Costs
+ * ------------------------------------------------------------------------------------------------- */
+
+static json_t *iteration(const cli_info *info)
+{
+    const drape_profile *p = &info->profile;
+    json_t *object = with(json_object(), "residual_s", number(p->residual_seconds));
+    object = with(object, "jacobian_s", number(p->jacobian_seconds));
+    object = with(object, "factor_s", number(p->factor_seconds));
+    object = with(object, "solve_s", number(p->solve_seconds));
+    object = with(object, "total_s", number(drape_profile_seconds(p)));
+    object = with(object, "factored", json_boolean(p->implicit && !p->factor_status));
+    return with(object, "linear_solver", json_string(p->linear_solver));
+}
+
+static json_t *bytes(const cli_info *info)
+{
+    const drape_profile *p = &info->profile;
+    size_t sum = drape_profile_bytes(p);
+    json_t *object = with(json_object(), "model", count((int64_t)p->model_bytes));
+    object = with(object, "meshes", count((int64_t)p->mesh_bytes));
+    object = with(object, "sparsity", count((int64_t)p->pattern_bytes));
+    object = with(object, "evaluation", count((int64_t)p->system_bytes));
+    object = with(object, "integrator", count((int64_t)p->integrator_bytes));
+    object = with(object, "state", count((int64_t)p->state_bytes));
+    object = with(object, "total", count((int64_t)sum));
+    return with(object, "a_node", number((double)sum / info->model->node_count));
+}
+
+static json_t *formats(const drape_model *model)
+{
+    json_t *array = json_array();
+    for (size_t i = 0; i < model->format_count; i++)
+        array = and_also(array, text(model->formats[i]));
+    return array;
+}
+
+json_t *cli_info_json(const cli_info *info)
+{
+    const drape_model *model = info->model;
+    cli_chosen_row rows[CLI_CHOSEN_ROWS];
+    json_t *cloths = json_array(), *terms = json_array();
+    for (int32_t c = 0; c < model->cloth_count; c++)
+        cloths = and_also(cloths, cloth(info, c));
+    for (int32_t i = 0; i < model->term_count; i++)
+        terms = and_also(terms, term(info, i));
+    json_t *object = with(json_object(), "scene", text(info->path));
+    object = with(object, "duration", number(model->duration));
+    object = with(object, "frame_rate", number(model->frame_rate));
+    object = with(object, "frames", count(info->frames));
+    object = with(object, "formats", formats(model));
+    object = with(object, "gravity", vector(model->gravity));
+    object = with(object, "nodes", count(model->node_count));
+    object = with(object, "dofs", count(model->pattern.n));
+    object = with(object, "nnz", count(model->pattern.nonzeros));
+    object = with(object, "cloths", cloths);
+    cli_chosen_rows(info->sim, rows);
+    for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
+        object = with(object, rows[i].title, chosen(&rows[i], &info->sim->chosen));
+    object = with(object, "terms", terms);
+    object = with(object, "iteration", iteration(info));
+    return with(object, "bytes", bytes(info));
+}

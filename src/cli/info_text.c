@@ -1,0 +1,226 @@
+/* info_text.c: `drape info` for people. What a scene does not model is not mentioned: a mesh always has, for
+ * instance, pairs of neighbouring triangles, but they are named by the term that uses them alone. */
+#include "cli/info.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define MOST_NODES 12 /* that are listed by number */
+
+/* ---- Scene and cloths
+ * -------------------------------------------------------------------------------------- */
+
+static void print_scene(const cli_info *info)
+{
+    const drape_model *m = info->model;
+    printf("scene       %s\n", info->path);
+    printf("duration    %.9g s, %lld frames at %.9g a second\n", m->duration, (long long)info->frames,
+           m->frame_rate);
+    printf("formats    ");
+    for (size_t i = 0; i < m->format_count; i++)
+        printf(" %s", m->formats[i]);
+    printf("%s\n", m->format_count ? "" : " none");
+    printf("gravity     %.9g %.9g %.9g m/s2\n", m->gravity[0], m->gravity[1], m->gravity[2]);
+    printf("nodes       %d, %d of them free\n", (int)m->node_count, (int)m->free_count);
+    printf("unknowns    %lld degrees of freedom, %lld nonzeros in their Jacobian\n", (long long)m->pattern.n,
+           (long long)m->pattern.nonzeros);
+}
+
+static void print_pins(const drape_model *model, const drape_cloth *cloth, const cli_cloth_info *info)
+{
+    int listed = 0;
+    printf("  pins      %d node%s, %d moved", (int)info->pinned, info->pinned == 1 ? "" : "s",
+           (int)info->moved);
+    for (int32_t i = 0; i < cloth->mesh.node_count && listed < MOST_NODES; i++)
+        if (model->pinned[cloth->first_node + i])
+            printf("%s%d", listed++ ? " " : ": ", (int)i);
+    printf("%s\n", info->pinned > listed ? " ..." : "");
+}
+
+static void print_material(const drape_material *m)
+{
+    const struct {
+        const char *name, *unit;
+        double value;
+    } lines[] = {{"young_modulus", "Pa", m->young_modulus},
+                 {"poisson_ratio", "1", m->poisson_ratio},
+                 {"thickness", "m", m->thickness},
+                 {"areal_density", "kg/m2", m->areal_density},
+                 {"E h", "N/m, membrane stiffness", m->membrane_stiffness},
+                 {"D", "N m, flexural rigidity E h^3/(12 (1 - nu^2))", m->flexural_rigidity}};
+    puts("  material");
+    for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
+        printf("    %-16s %.9g %s\n", lines[i].name, lines[i].value, lines[i].unit);
+}
+
+static void print_cloth(const cli_info *info, int32_t c)
+{
+    const drape_cloth *cloth = &info->model->cloths[c];
+    const drape_mesh *mesh = &cloth->mesh;
+    printf("\ncloth %s\n", cloth->name);
+    printf("  mesh      %d nodes, %d triangles, %d edges", (int)mesh->node_count, (int)mesh->triangle_count,
+           (int)mesh->edge_count);
+    if (mesh->rows)
+        printf("; a grid of %d rows and %d columns of nodes", (int)mesh->rows, (int)mesh->columns);
+    printf("\n  mass      %.9g kg on %.9g m2\n", info->cloths[c].mass, info->cloths[c].area);
+    printf("  velocity  %.9g %.9g %.9g m/s\n", cloth->velocity[0], cloth->velocity[1], cloth->velocity[2]);
+    print_pins(info->model, cloth, &info->cloths[c]);
+    print_material(&cloth->material);
+}
+
+/* ---- Integrator and controller
+ * ----------------------------------------------------------------------------- */
+
+static void print_ignored(const cli_chosen_row *row, const drape_chosen *chosen)
+{
+    bool any = false;
+    for (size_t i = 0; i < row->choice->setting_count; i++)
+        if (row->ignores(chosen, row->choice->settings[i].name)) {
+            printf("%s %s", any ? "," : "  ignored by it:", row->choice->settings[i].name);
+            any = true;
+        }
+    fputs(any ? "\n" : "", stdout);
+}
+
+static void print_chosen(const cli_chosen_row *row, const drape_chosen *chosen)
+{
+    printf("\n%s %s: %s\n", row->title, row->name, row->summary);
+    for (int p = 0; p < row->param_count; p++) {
+        const drape_param *param = &row->params[p];
+        char value[128];
+        drape_param_value_text(param, row->values[p], value, sizeof value);
+        printf("  %-16s %s%s%s%s\n", param->name, value, strcmp(param->unit, "1") ? " " : "",
+               strcmp(param->unit, "1") ? param->unit : "",
+               cli_is_given(row->choice, param->name) ? "" : " (default)");
+    }
+    print_ignored(row, chosen);
+}
+
+/* ---- Terms
+ * ------------------------------------------------------------------------------------------------- */
+
+static void print_term(const cli_info *info, int32_t i)
+{
+    const drape_term *term = &info->model->terms[i];
+    const drape_profile_term *cost = &info->profile.terms[i];
+    printf("  %-20s of %s: ", term->ops->name, info->model->cloths[term->cloth].name);
+    if (term->ops->law)
+        printf("acts on %lld strain measures, its time is in theirs", (long long)cost->acts_on);
+    else
+        printf("%d %s elements of %d node%s", (int)term->elements.count, term->ops->element_name,
+               term->elements.nodes, term->elements.nodes == 1 ? "" : "s");
+    for (int p = 0; p < term->ops->param_count; p++) {
+        const drape_param *param = &term->ops->params[p];
+        char value[128];
+        drape_param_value_text(param, term->params[p], value, sizeof value);
+        printf("; %s %s%s%s", param->name, value, strcmp(param->unit, "1") ? " " : "",
+               strcmp(param->unit, "1") ? param->unit : "");
+    }
+    fputc('\n', stdout);
+}
+
+static void print_terms(const cli_info *info)
+{
+    puts("\nterms");
+    for (int32_t i = 0; i < info->model->term_count; i++)
+        print_term(info, i);
+    if (info->model->term_count == 0)
+        puts("  none: the nodes fly on as they began");
+}
+
+/* ---- Costs
+ * ------------------------------------------------------------------------------------------------- */
+
+static void print_count(long long count)
+{
+    if (count)
+        printf(" %10lld", count);
+    else
+        printf(" %10s", "-");
+}
+
+static void print_time(double seconds)
+{
+    if (seconds > 0)
+        printf(" %12.2f", 1e6 * seconds);
+    else
+        printf(" %12s", "-");
+}
+
+static void print_cost(const cli_info *info, const char *name, const char *cloth, long long nonzeros,
+                       long long bytes, double residual, double jacobian)
+{
+    printf("  %-20s %-10.10s", name, cloth);
+    print_count(nonzeros);
+    print_count(bytes);
+    print_time(residual);
+    print_time(jacobian);
+    printf(" %6.1f %%\n", 100 * cli_share(info, residual + jacobian));
+}
+
+static void print_solver(const cli_info *info)
+{
+    const drape_profile *p = &info->profile;
+    const struct {
+        const char *name;
+        double seconds;
+    } parts[] = {{"factor", p->factor_seconds}, {"solve", p->solve_seconds}};
+    for (size_t i = 0; p->implicit && i < sizeof parts / sizeof *parts; i++)
+        printf("  %-20s %-10.10s %10s %10s %12s %12.2f %6.1f %%\n", parts[i].name, p->linear_solver, "-", "-",
+               "-", 1e6 * parts[i].seconds, 100 * cli_share(info, parts[i].seconds));
+    if (p->factor_status)
+        puts("  the Jacobian could not be factored there: what a step costs is not known");
+}
+
+static void print_costs(const cli_info *info)
+{
+    const drape_profile *p = &info->profile;
+    printf("\n%s, measured\n", p->implicit ? "cost of one Newton iteration" : "cost of one evaluation");
+    printf("  %-20s %-10s %10s %10s %12s %12s %8s\n", "part", "cloth", "nonzeros", "bytes", "residual us",
+           "Jacobian us", "share");
+    for (int32_t i = 0; i < info->model->term_count; i++) {
+        const drape_term *term = &info->model->terms[i];
+        const drape_profile_term *cost = &p->terms[i];
+        print_cost(info, term->ops->name, info->model->cloths[term->cloth].name, cost->nonzeros,
+                   (long long)cost->bytes, cost->residual_seconds, cost->jacobian_seconds);
+    }
+    print_cost(info, "masses, clearing", "", p->implicit ? info->model->pattern.n : 0,
+               (long long)info->model->node_count * (long long)sizeof(double),
+               cli_other_residual_seconds(info), cli_other_jacobian_seconds(info));
+    print_solver(info);
+    printf("  %-20s %10s %10lld %10s %25.2f %6.1f %%\n", "together", "",
+           (long long)info->model->pattern.nonzeros, "", 1e6 * drape_profile_seconds(p), 100.0);
+}
+
+static void print_bytes(const cli_info *info)
+{
+    const drape_profile *p = &info->profile;
+    const struct {
+        const char *name;
+        size_t bytes;
+    } parts[] = {{"model", p->model_bytes},
+                 {"meshes", p->mesh_bytes},
+                 {"sparsity", p->pattern_bytes},
+                 {"evaluation", p->system_bytes},
+                 {"integrator, factors included", p->integrator_bytes},
+                 {"state", p->state_bytes}};
+    size_t sum = drape_profile_bytes(p);
+    puts("\nmemory");
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
+        printf("  %-30s %12zu bytes\n", parts[i].name, parts[i].bytes);
+    printf("  %-30s %12zu bytes, %.0f a node\n", "together", sum, (double)sum / info->model->node_count);
+}
+
+void cli_info_text(const cli_info *info)
+{
+    cli_chosen_row rows[CLI_CHOSEN_ROWS];
+    print_scene(info);
+    for (int32_t c = 0; c < info->model->cloth_count; c++)
+        print_cloth(info, c);
+    cli_chosen_rows(info->sim, rows);
+    for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
+        print_chosen(&rows[i], &info->sim->chosen);
+    print_terms(info);
+    print_costs(info);
+    print_bytes(info);
+}

@@ -1,0 +1,121 @@
+/* main.c: the program `drape`: finds the verb, hands it the command line, and sees that its output arrived.
+ */
+#include "cli/cli.h"
+
+#include "base/param.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+
+/* A file that is opened later must not become the standard output: with a descriptor closed, it would. The
+ * stand-ins refuse what the real ones are for, so that it is still seen to fail. */
+static void fill_descriptors(void)
+{
+    static const int modes[] = {O_WRONLY, O_RDONLY, O_RDONLY};
+    for (int fd = 0; fd < 3; fd++)
+        if (fcntl(fd, F_GETFD) < 0 && open("/dev/null", modes[fd]) < 0)
+            return;
+}
+
+/* A closed pipe and a full quota are errors of a write, which is checked, and no reason to die. */
+static void ignore_write_signals(void)
+{
+    const struct sigaction ignore = {.sa_handler = SIG_IGN};
+    sigaction(SIGPIPE, &ignore, NULL);
+    sigaction(SIGXFSZ, &ignore, NULL);
+}
+
+static const drape_verb *find_verb(const char *name)
+{
+    for (int i = 0; drape_verbs[i]; i++)
+        if (strcmp(drape_verbs[i]->name, name) == 0)
+            return drape_verbs[i];
+    return NULL;
+}
+
+static size_t verb_count(void)
+{
+    size_t count = 0;
+    while (drape_verbs[count])
+        count++;
+    return count;
+}
+
+static int unknown_verb(const char *name)
+{
+    const char *meant = drape_did_you_mean(name, drape_verbs_words, verb_count());
+    fprintf(stderr, "drape: there is no verb \"%.60s\"%s%s%s; `drape --help` shows all\n", name,
+            meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+    return CLI_BAD_INPUT;
+}
+
+static void print_overview(void)
+{
+    puts("drape: a cloth simulator\n\nusage: drape VERB [arguments]\n");
+    for (int i = 0; drape_verbs[i]; i++)
+        printf("  %-8s %-16s %s\n", drape_verbs[i]->name, drape_verbs[i]->operand, drape_verbs[i]->summary);
+    puts("\n  drape VERB --help   what a verb takes\n"
+         "  drape --version     the version\n\n"
+         "Exit codes: 0 done, 1 the simulation, a check or the output failed, 2 bad input, 130 interrupted.");
+}
+
+/* `drape help`, `drape help VERB` */
+static int help(int argc, char **argv)
+{
+    const drape_verb *verb = argc > 2 ? find_verb(argv[2]) : NULL;
+    if (argc > 2 && !verb)
+        return unknown_verb(argv[2]);
+    if (verb)
+        cli_print_help(verb);
+    else
+        print_overview();
+    return CLI_DONE;
+}
+
+static int version(int argc, char **argv)
+{
+    (void)argc, (void)argv;
+    printf("drape %s\n", drape_version());
+    return CLI_DONE;
+}
+
+static int run(int argc, char **argv)
+{
+    static const struct {
+        const char *word;
+        int (*run)(int argc, char **argv);
+    } words[] = {
+        {"help", help}, {"--help", help}, {"-h", help}, {"--version", version}, {"version", version}};
+    if (argc < 2) {
+        fputs("drape: which verb? `drape --help` shows all\n", stderr);
+        return CLI_BAD_INPUT;
+    }
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (strcmp(argv[1], words[i].word) == 0)
+            return words[i].run(argc, argv);
+    const drape_verb *verb = find_verb(argv[1]);
+    return verb ? verb->run(argc - 1, argv + 1) : unknown_verb(argv[1]);
+}
+
+/* Results that did not arrive are a failure, whatever the verb thought. */
+static int finish_output(int code)
+{
+    bool lost = ferror(stdout);
+    errno = 0;
+    lost = fflush(stdout) != 0 || lost;
+    if (!lost)
+        return code;
+    fprintf(stderr, "drape: cannot write to the standard output%s%s\n", errno ? ": " : "",
+            errno ? strerror(errno) : "");
+    return code == CLI_DONE ? CLI_FAILED : code;
+}
+
+int main(int argc, char **argv)
+{
+    fill_descriptors();
+    ignore_write_signals();
+    return finish_output(run(argc, argv));
+}

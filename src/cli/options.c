@@ -1,0 +1,253 @@
+/* options.c: command lines and their help, along the tables of a verb. */
+#include "cli/cli.h"
+
+#include "base/param.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <jansson.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MAX_OPTIONS 40
+#define FIRST_VALUE 256 /* of getopt_long for option 0: beyond all letters */
+#define HELP_VALUE  'h'
+
+/* The options of every verb that takes a scene. Those with a pointer are --set in short. */
+static const cli_option scene_options[] = {
+    {"set", CLI_SET, "/POINTER=VALUE", "a value of the scene, by its JSON pointer; may be repeated", 0, 0,
+     NULL},
+    {"duration", CLI_VALUE, "SECONDS", "simulated time", 0, 0, "/duration"},
+    {"frame-rate", CLI_VALUE, "RATE", "frames a simulated second", 0, 0, "/frame_rate"},
+    {"format", CLI_LIST, "A,B", "formats of the frames, in place of the scene's", 0, 0, "/output/formats"},
+    {"integrator", CLI_VALUE, "ROW", "time integrator", 0, 0, "/integrator/method"},
+    {"dt", CLI_VALUE, "SECONDS", "nominal step", 0, 0, "/integrator/dt"},
+    {"tolerance", CLI_VALUE, "NEWTONS", "bound on the residual of a step", 0, 0, "/integrator/tolerance"},
+    {"linear-solver", CLI_VALUE, "ROW", "linear solver", 0, 0, "/integrator/linear_solver"},
+    {"controller", CLI_VALUE, "ROW", "step controller", 0, 0, "/controller/type"},
+    {"threads", CLI_NUMBER, "N", "threads that evaluate elements; the result does not depend on it",
+     offsetof(cli_command, threads), 256, NULL},
+};
+
+/* The options of a verb: its own, then the scene's. */
+typedef struct option_list {
+    const cli_option *options[MAX_OPTIONS];
+    size_t count;
+} option_list;
+
+static option_list list_options(const drape_verb *verb)
+{
+    option_list list = {.count = 0};
+    for (size_t i = 0; i < verb->option_count; i++)
+        list.options[list.count++] = &verb->options[i];
+    for (size_t i = 0; verb->takes_scene && i < sizeof scene_options / sizeof *scene_options; i++)
+        list.options[list.count++] = &scene_options[i];
+    return list;
+}
+
+/* ---- Help and faults
+ * --------------------------------------------------------------------------------------- */
+
+static void print_option(const char *name, const char *argument, const char *text)
+{
+    char left[64];
+    snprintf(left, sizeof left, "--%s%s%s", name, argument ? " " : "", argument ? argument : "");
+    printf("  %-24s %s\n", left, text);
+}
+
+void cli_print_help(const drape_verb *verb)
+{
+    const option_list list = list_options(verb);
+    printf("usage: drape %s %s [options]\n\n%s\n\n", verb->name, verb->operand, verb->details);
+    for (size_t i = 0; i < list.count; i++)
+        print_option(list.options[i]->name, list.options[i]->argument, list.options[i]->help);
+    print_option("help", NULL, "this text");
+}
+
+int cli_misuse(const char *verb, const char *format, ...)
+{
+    va_list args;
+    fprintf(stderr, "drape %s: ", verb);
+    va_start(args, format);
+    vfprintf(stderr, format, args);
+    va_end(args);
+    fputc('\n', stderr);
+    return CLI_BAD_INPUT;
+}
+
+static int unknown_option(const drape_verb *verb, const option_list *list, const char *given)
+{
+    const char *names[MAX_OPTIONS + 1];
+    char word[64];
+    for (size_t i = 0; i < list->count; i++)
+        names[i] = list->options[i]->name;
+    names[list->count] = "help";
+    snprintf(word, sizeof word, "%.*s", (int)strcspn(given + strspn(given, "-"), "="),
+             given + strspn(given, "-"));
+    const char *meant = drape_did_you_mean(word, names, list->count + 1);
+    return cli_misuse(verb->name, "there is no option \"%.60s\"%s%s%s; `drape %s --help` shows all", given,
+                      meant ? "; did you mean \"--" : "", meant ? meant : "", meant ? "\"?" : "", verb->name);
+}
+
+/* ---- Values
+ * ------------------------------------------------------------------------------------------------ */
+
+static int no_memory(const cli_command *command)
+{
+    return cli_misuse(command->verb, "out of memory for the command line");
+}
+
+static int add_setting(cli_command *command, const char *pointer, const char *value, char *memory)
+{
+    command->settings[command->setting_count++] =
+        (cli_setting){.pointer = pointer, .value = value, .memory = memory};
+    return CLI_GO_ON;
+}
+
+static int take_flag(cli_command *command, const cli_option *option, const char *argument)
+{
+    (void)argument;
+    *(bool *)(void *)((char *)command + option->offset) = true;
+    return CLI_GO_ON;
+}
+
+static int take_text(cli_command *command, const cli_option *option, const char *argument)
+{
+    if (!*argument)
+        return cli_misuse(command->verb, "--%s \"\": a name of at least one letter is needed", option->name);
+    memcpy((char *)command + option->offset, &argument, sizeof argument);
+    return CLI_GO_ON;
+}
+
+static int take_number(cli_command *command, const cli_option *option, const char *argument)
+{
+    char *end;
+    errno = 0;
+    long number = strtol(argument, &end, 10);
+    if (end == argument || *end || errno || number < 1 || number > option->max)
+        return cli_misuse(command->verb, "--%s \"%.60s\": it is an integer, 1 to %d", option->name, argument,
+                          option->max);
+    *(int *)(void *)((char *)command + option->offset) = (int)number;
+    return CLI_GO_ON;
+}
+
+static int take_value(cli_command *command, const cli_option *option, const char *argument)
+{
+    return add_setting(command, option->pointer, argument, NULL);
+}
+
+static int take_set(cli_command *command, const cli_option *option, const char *argument)
+{
+    const char *equals = strchr(argument, '=');
+    if (*argument != '/' || !equals)
+        return cli_misuse(command->verb, "--%s \"%.60s\": it is /pointer=value, as /integrator/dt=0.001",
+                          option->name, argument);
+    char *pointer = malloc((size_t)(equals - argument) + 1);
+    if (!pointer)
+        return no_memory(command);
+    memcpy(pointer, argument, (size_t)(equals - argument));
+    pointer[equals - argument] = 0;
+    return add_setting(command, pointer, equals + 1, pointer);
+}
+
+/* "a,b" -> ["a","b"]; "" -> [] */
+static int take_list(cli_command *command, const cli_option *option, const char *argument)
+{
+    json_t *array = json_array();
+    bool good = array != NULL, more = *argument != 0;
+    for (const char *word = argument; good && more;) {
+        size_t length = strcspn(word, ",");
+        good = json_array_append_new(array, json_stringn_nocheck(word, length)) == 0;
+        more = word[length] != 0;
+        word += length + 1;
+    }
+    char *text = good ? json_dumps(array, JSON_COMPACT) : NULL;
+    json_decref(array);
+    return text ? add_setting(command, option->pointer, text, text)
+                : cli_misuse(command->verb, "--%s \"%.60s\": it is words between commas, in UTF-8",
+                             option->name, argument);
+}
+
+static int take(cli_command *command, const cli_option *option, const char *argument)
+{
+    static int (*const takers[])(cli_command *, const cli_option *, const char *) = {
+        [CLI_FLAG] = take_flag,   [CLI_TEXT] = take_text, [CLI_NUMBER] = take_number,
+        [CLI_VALUE] = take_value, [CLI_LIST] = take_list, [CLI_SET] = take_set,
+    };
+    return takers[option->kind](command, option, argument);
+}
+
+/* ---- The line
+ * ---------------------------------------------------------------------------------------------- */
+
+static void make_table(const option_list *list, struct option *table)
+{
+    for (size_t i = 0; i < list->count; i++)
+        table[i] = (struct option){.name = list->options[i]->name,
+                                   .has_arg = list->options[i]->argument ? required_argument : no_argument,
+                                   .val = FIRST_VALUE + (int)i};
+    table[list->count] = (struct option){.name = "help", .has_arg = no_argument, .val = HELP_VALUE};
+}
+
+/* code: what getopt_long returned. */
+static int handle(const drape_verb *verb, const option_list *list, int code, char **argv,
+                  cli_command *request)
+{
+    if (code == HELP_VALUE) {
+        cli_print_help(verb);
+        return CLI_DONE;
+    }
+    if (code >= FIRST_VALUE)
+        return take(request, list->options[code - FIRST_VALUE], optarg);
+    if (code == ':')
+        return cli_misuse(verb->name, "%s needs an argument; `drape %s --help` shows all", argv[optind - 1],
+                          verb->name);
+    if (optopt >= FIRST_VALUE || optopt == HELP_VALUE)
+        return cli_misuse(verb->name, "\"%.60s\": this option takes no argument", argv[optind - 1]);
+    if (optopt) {
+        const char letter[] = {'-', (char)optopt, 0};
+        return unknown_option(verb, list, letter);
+    }
+    return unknown_option(verb, list, argv[optind - 1]);
+}
+
+static int take_operand(const drape_verb *verb, int argc, char **argv, cli_command *request)
+{
+    int count = argc - optind;
+    if (count > 1)
+        return cli_misuse(verb->name, "one %s is taken, %d are given: \"%.60s\", \"%.60s\"%s", verb->operand,
+                          count, argv[optind], argv[optind + 1], count > 2 ? " ..." : "");
+    if (count < 1 && !verb->operand_optional)
+        return cli_misuse(verb->name, "%s is missing; `drape %s --help` shows all", verb->operand,
+                          verb->name);
+    request->operand = count ? argv[optind] : NULL;
+    return CLI_GO_ON;
+}
+
+int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *request)
+{
+    struct option table[MAX_OPTIONS + 2] = {{0}};
+    const option_list list = list_options(verb);
+    int code, result = CLI_GO_ON;
+    request->verb = verb->name;
+    request->settings = calloc((size_t)argc, sizeof *request->settings);
+    if (!request->settings)
+        return no_memory(request);
+    make_table(&list, table);
+    opterr = 0;
+    optind = 1;
+    while (result == CLI_GO_ON && (code = getopt_long(argc, argv, ":h", table, NULL)) != -1)
+        result = handle(verb, &list, code, argv, request);
+    return result == CLI_GO_ON ? take_operand(verb, argc, argv, request) : result;
+}
+
+void cli_command_free(cli_command *command)
+{
+    for (size_t i = 0; i < command->setting_count; i++)
+        free(command->settings[i].memory);
+    free(command->settings);
+    command->settings = NULL;
+    command->setting_count = 0;
+}

@@ -1,0 +1,80 @@
+/* progress.c: see progress.h. Carriage returns and blanks only: no colours, no control sequences, so that
+ * NO_COLOR and dumb terminals need no exception. */
+#include "cli/progress.h"
+
+#include "base/clock.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#define PERIOD        0.1 /* [s] between two drawings */
+#define DEFAULT_WIDTH 80
+#define MAX_WIDTH     120
+#define BAR           24 /* cells */
+
+static int terminal_width(void)
+{
+    struct winsize size;
+    int columns =
+        ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : DEFAULT_WIDTH;
+    return columns > MAX_WIDTH ? MAX_WIDTH : columns - 1; /* in the last column a terminal may wrap */
+}
+
+/* 59 -> "0:59", 3725 -> "1:02:05" */
+static void time_text(double seconds, char *text, size_t size)
+{
+    if (!(seconds < 1e8)) {
+        snprintf(text, size, "-:--");
+        return;
+    }
+    long s = lround(seconds);
+    if (s >= 3600)
+        snprintf(text, size, "%ld:%02ld:%02ld", s / 3600, s / 60 % 60, s % 60);
+    else
+        snprintf(text, size, "%ld:%02ld", s / 60, s % 60);
+}
+
+static void draw(const cli_progress *p, const char *line)
+{
+    char padded[MAX_WIDTH + 3];
+    snprintf(padded, sizeof padded, "\r%-*.*s\r", p->width, p->width, line);
+    fputs(padded, stderr);
+}
+
+void cli_progress_begin(cli_progress *p, double end)
+{
+    *p = (cli_progress){.on = isatty(STDERR_FILENO), .end = end, .shown = -INFINITY};
+    if (!p->on)
+        return;
+    p->start = drape_clock_seconds();
+    p->width = terminal_width();
+    cli_progress_show(p, 0, 0);
+}
+
+void cli_progress_show(cli_progress *p, double time, int64_t rejected)
+{
+    double now = p->on ? drape_clock_seconds() : 0;
+    if (!p->on || now - p->shown < PERIOD)
+        return;
+    p->shown = now;
+    char bar[BAR + 1], eta[24], line[256];
+    double share = time / p->end, wall = now - p->start;
+    int full = (int)(share * BAR);
+    memset(bar, '.', BAR);
+    memset(bar, '#', (size_t)(full < 0 ? 0 : full > BAR ? BAR : full));
+    bar[BAR] = 0;
+    time_text(time > 0 ? wall * (p->end - time) / time : INFINITY, eta, sizeof eta);
+    snprintf(line, sizeof line, "[%s] %3.0f %%  %.4g of %.4g s  %.3gx real time  ETA %s  %lld rejected", bar,
+             100 * share, time, p->end, wall > 0 ? time / wall : 0.0, eta, (long long)rejected);
+    draw(p, line);
+}
+
+void cli_progress_clear(cli_progress *p)
+{
+    if (p->on)
+        draw(p, "");
+    p->on = false;
+}

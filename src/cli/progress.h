@@ -1,0 +1,20 @@
+/* progress.h: a line on the terminal that says how far a run is. Nothing where stderr is no terminal. */
+#ifndef DRAPE_CLI_PROGRESS_H
+#define DRAPE_CLI_PROGRESS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct cli_progress {
+    bool on;
+    double end;          /* [s] simulated */
+    double start, shown; /* [s] of the clock: begin of the run, last time that the line was drawn */
+    int width;           /* columns that the line may take */
+} cli_progress;
+
+void cli_progress_begin(cli_progress *progress, double end);
+void cli_progress_show(cli_progress *progress, double time,
+                       int64_t rejected); /* at most ten times a second */
+void cli_progress_clear(cli_progress *progress);
+
+#endif

@@ -1,0 +1,68 @@
+/* scene.c: from a command line to a sim. All that can be wrong with the input is found here, before any verb
+ * writes a file. */
+#include "cli/cli.h"
+
+#include "io/export.h"
+#include "model/scene.h"
+
+#include <stdio.h>
+
+static drape_status apply_settings(const cli_command *command, drape_scene *scene)
+{
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < command->setting_count; i++)
+        status = drape_scene_set(scene, command->settings[i].pointer, command->settings[i].value);
+    return status;
+}
+
+/* The library leaves the formats of a model to whoever writes frames. */
+static drape_status check_formats(const cli_scene *s)
+{
+    for (size_t i = 0; i < s->model->format_count; i++) {
+        const drape_exporter_ops *ops;
+        char pointer[64];
+        snprintf(pointer, sizeof pointer, "/output/formats/%zu", i);
+        drape_status status = drape_exporter_find(s->ctx, pointer, s->model->formats[i], &ops);
+        if (status) {
+            drape_scene_locate_fault(s->scene);
+            return status;
+        }
+    }
+    return DRAPE_OK;
+}
+
+static drape_status load(const cli_command *command, cli_scene *s)
+{
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.threads = command->threads ? command->threads : 1;
+    drape_status status = drape_scene_load(s->ctx, command->operand, &s->scene);
+    if (!status)
+        status = apply_settings(command, s->scene);
+    if (!status)
+        status = drape_scene_compile(s->scene, &s->model);
+    if (!status)
+        status = check_formats(s);
+    if (!status)
+        status = drape_sim_create(s->ctx, s->model, &def, &s->sim);
+    return status;
+}
+
+int cli_scene_load(const cli_command *command, cli_scene *out)
+{
+    *out = (cli_scene){.ctx = NULL};
+    if (drape_context_create(NULL, &out->ctx))
+        return cli_misuse(command->verb, "out of memory");
+    if (!load(command, out))
+        return CLI_GO_ON;
+    fprintf(stderr, "%s\n", drape_context_message(out->ctx));
+    return CLI_BAD_INPUT;
+}
+
+void cli_scene_free(cli_scene *scene)
+{
+    drape_sim_destroy(&scene->sim);
+    drape_model_destroy(&scene->model);
+    drape_scene_destroy(&scene->scene);
+    drape_context_destroy(&scene->ctx);
+}

@@ -1,0 +1,407 @@
+/*
+ * schema.c: see schema.h. As strict as the reader wherever a schema can say it. What it cannot say: that
+ * times of a track increase, that names of cloths differ, that a term is named once, and all that depends on
+ * the mesh.
+ *
+ * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere below ends
+ * as a NULL at the top.
+ */
+#include "cli/schema.h"
+
+#include "cli/tables.h"
+#include "compile/compile.h"
+#include "model/scene.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* ---- Small pieces
+ * ------------------------------------------------------------------------------------------ */
+
+/* Takes both references. The container, or NULL if it or the value is not there. */
+static json_t *with(json_t *object, const char *key, json_t *value)
+{
+    if (json_object_set_new(object, key, value) == 0)
+        return object;
+    json_decref(object);
+    return NULL;
+}
+
+static json_t *and_also(json_t *array, json_t *value)
+{
+    if (json_array_append_new(array, value) == 0)
+        return array;
+    json_decref(array);
+    return NULL;
+}
+
+static json_t *typed(const char *type)
+{
+    return with(json_object(), "type", json_string(type));
+}
+
+/* 3 rather than 3.0 where it is the same. */
+static json_t *number(double value)
+{
+    return value == floor(value) && fabs(value) < 1e15 ? json_integer((json_int_t)value) : json_real(value);
+}
+
+static json_t *array_of(json_t *items, size_t least, size_t most)
+{
+    json_t *array = with(typed("array"), "items", items);
+    if (least)
+        array = with(array, "minItems", json_integer((json_int_t)least));
+    return most ? with(array, "maxItems", json_integer((json_int_t)most)) : array;
+}
+
+static json_t *numbers(size_t least, size_t most)
+{
+    return array_of(typed("number"), least, most);
+}
+
+static json_t *any_of(json_t *a, json_t *b)
+{
+    return with(json_object(), "anyOf", and_also(and_also(json_array(), a), b));
+}
+
+static json_t *word(void)
+{
+    return with(typed("string"), "minLength", json_integer(1));
+}
+
+static json_t *one_of_words(const char *const *words)
+{
+    json_t *array = json_array();
+    for (int i = 0; words[i]; i++)
+        array = and_also(array, json_string(words[i]));
+    return with(json_object(), "enum", array);
+}
+
+/* { "required": [name] } for each name: exactly one of them. */
+static json_t *exactly_one(json_t *object, const char *const *names)
+{
+    json_t *cases = json_array();
+    for (int i = 0; names[i]; i++)
+        cases =
+            and_also(cases, with(json_object(), "required", and_also(json_array(), json_string(names[i]))));
+    return with(object, "oneOf", cases);
+}
+
+/* ---- Parameters of rows
+ * ------------------------------------------------------------------------------------ */
+
+static bool is_required(const drape_param *p)
+{
+    return isnan(p->default_value) && !p->derived;
+}
+
+static json_t *default_of(const drape_param *p)
+{
+    switch (p->kind) {
+    case DRAPE_PARAM_BOOLEAN:
+        return json_boolean(p->default_value != 0);
+    case DRAPE_PARAM_CHOICE:
+        return json_string(p->choices[(int)p->default_value]);
+    case DRAPE_PARAM_NUMBER:
+    case DRAPE_PARAM_INTEGER:
+        break;
+    }
+    return number(p->default_value);
+}
+
+static json_t *value_of(const drape_param *p)
+{
+    if (p->kind == DRAPE_PARAM_BOOLEAN) /* the reader takes numbers too */
+        return with(json_object(), "enum", json_pack("[bbii]", 1, 0, 1, 0));
+    if (p->kind == DRAPE_PARAM_CHOICE)
+        return one_of_words(p->choices);
+    json_t *value = typed(p->kind == DRAPE_PARAM_INTEGER ? "integer" : "number");
+    value = with(value, p->open_min ? "exclusiveMinimum" : "minimum", number(p->min));
+    return with(value, p->open_max ? "exclusiveMaximum" : "maximum", number(p->max));
+}
+
+static json_t *described(json_t *value, const char *help, const char *unit)
+{
+    char text[512];
+    bool has_unit = unit && strcmp(unit, "1") != 0;
+    snprintf(text, sizeof text, "%s%s%s%s", help, has_unit ? " [" : "", has_unit ? unit : "",
+             has_unit ? "]" : "");
+    return with(value, "description", json_string(text));
+}
+
+static json_t *param(const drape_param *p)
+{
+    json_t *value = described(value_of(p), p->help, p->unit);
+    return isnan(p->default_value) ? value : with(value, "default", default_of(p));
+}
+
+/* A parameter of several rows with different bounds must be right for each of them, as the reader has it. */
+static json_t *with_param(json_t *properties, const drape_param *p)
+{
+    json_t *schema = param(p), *before = json_object_get(properties, p->name);
+    if (!before)
+        return with(properties, p->name, schema);
+    if (json_equal(before, schema)) {
+        json_decref(schema);
+        return properties;
+    }
+    json_t *both = and_also(and_also(json_array(), json_incref(before)), schema);
+    return with(properties, p->name, with(json_object(), "allOf", both));
+}
+
+static json_t *with_params(json_t *properties, const cli_row *row)
+{
+    for (int i = 0; i < row->param_count; i++)
+        properties = with_param(properties, &row->params[i]);
+    return properties;
+}
+
+static bool needs_params(const cli_row *row)
+{
+    for (int i = 0; i < row->param_count; i++)
+        if (is_required(&row->params[i]))
+            return true;
+    return false;
+}
+
+static json_t *with_required(json_t *required, const cli_row *row)
+{
+    for (int i = 0; i < row->param_count; i++)
+        if (is_required(&row->params[i]))
+            required = and_also(required, json_string(row->params[i].name));
+    return required;
+}
+
+/* Rows that a scene may name: those that need no parameters where only a name is given. */
+static json_t *row_names(const cli_table *table, bool alone)
+{
+    json_t *names = json_array();
+    cli_row row;
+    for (int i = 0; table->row(i, &row); i++)
+        if (!row.implied && !(alone && needs_params(&row)))
+            names = and_also(names, json_string(row.name));
+    return with(json_object(), "enum", names);
+}
+
+/* ---- Which tables stand where in a scene
+ * ------------------------------------------------------------------- */
+
+typedef enum opening_kind {
+    ROW_PARAMS,  /* the parameters of the named row, and no others */
+    TABLE_PARAMS /* parameters of any row of the table, whichever is named */
+} opening_kind;
+
+/* The open objects of scene_keys.c. */
+static const struct opening {
+    const char *object, *key; /* the key that names the row; NULL: there is but one */
+    opening_kind kind;
+    const cli_table *table;
+    const char *const *one_of;
+} openings[] = {
+    {"term", "type", ROW_PARAMS, &cli_terms, NULL},
+    {"mesh", "grid", ROW_PARAMS, &cli_grids, NULL},
+    {"integrator", "method", TABLE_PARAMS, &cli_integrators, NULL},
+    {"controller", "type", TABLE_PARAMS, &cli_controllers, NULL},
+    {"material", NULL, ROW_PARAMS, &cli_materials,
+     (const char *const[]){"density", "areal_density", "total_mass", NULL}},
+};
+
+static const struct opening *opening_of(const drape_scene_object *object)
+{
+    for (size_t i = 0; i < sizeof openings / sizeof *openings; i++)
+        if (strcmp(openings[i].object, object->name) == 0)
+            return &openings[i];
+    return NULL;
+}
+
+/* Words that name rows. */
+static json_t *words_of(const drape_scene_object *object, const drape_scene_key *key)
+{
+    const struct opening *opening = object->open ? opening_of(object) : NULL;
+    if (opening && opening->key && strcmp(opening->key, key->name) == 0)
+        return row_names(opening->table, false);
+    if (strcmp(object->name, "output") == 0 && strcmp(key->name, "formats") == 0)
+        return row_names(&cli_exporters, false);
+    return key->words ? one_of_words(key->words) : word();
+}
+
+/* ---- Keys
+ * -------------------------------------------------------------------------------------------------- */
+
+static json_t *object_schema(const drape_scene_object *object);
+
+static json_t *ranged(const drape_scene_key *key, const char *type, const char *least)
+{
+    return with(with(typed(type), least, number(key->min)), "maximum", number(key->max));
+}
+
+static json_t *row_or_name(const drape_scene_key *key)
+{
+    return any_of(row_names(opening_of(key->child)->table, true), object_schema(key->child));
+}
+
+static json_t *key_value(const drape_scene_object *object, const drape_scene_key *key)
+{
+    switch (key->kind) {
+    case DRAPE_SCENE_VERSION:
+        return with(json_object(), "const", json_integer(DRAPE_SCENE_FORM));
+    case DRAPE_SCENE_TEXT:
+        return typed("string");
+    case DRAPE_SCENE_WORD:
+        return words_of(object, key);
+    case DRAPE_SCENE_WORDS:
+        return array_of(words_of(object, key), key->at_least, 0);
+    case DRAPE_SCENE_NUMBER:
+        return ranged(key, "number", "exclusiveMinimum");
+    case DRAPE_SCENE_INTEGER:
+        return ranged(key, "integer", "minimum");
+    case DRAPE_SCENE_INTEGERS:
+        return array_of(ranged(key, "integer", "minimum"), key->at_least, 0);
+    case DRAPE_SCENE_VECTOR:
+        return numbers(3, 3);
+    case DRAPE_SCENE_SCALE:
+        return any_of(typed("number"), numbers(3, 3));
+    case DRAPE_SCENE_ROTATION:
+        return numbers(3, 4);
+    case DRAPE_SCENE_BOX:
+        return array_of(numbers(3, 3), 2, 2);
+    case DRAPE_SCENE_TRACK: {
+        json_t *pair = and_also(and_also(json_array(), typed("number")), numbers(3, 3));
+        json_t *item = with(with(typed("array"), "prefixItems", pair), "minItems", json_integer(2));
+        return array_of(with(item, "maxItems", json_integer(2)), key->at_least, 0);
+    }
+    case DRAPE_SCENE_OBJECT:
+        return object_schema(key->child);
+    case DRAPE_SCENE_OBJECTS:
+        return array_of(object_schema(key->child), key->at_least, 0);
+    case DRAPE_SCENE_ROWS:
+        return array_of(row_or_name(key), key->at_least, 0);
+    }
+    return NULL;
+}
+
+/* An object that itself may be left out cannot be left out if something in it is required. */
+static bool key_is_required(const drape_scene_key *key)
+{
+    const struct opening *opening = key->kind == DRAPE_SCENE_OBJECT ? opening_of(key->child) : NULL;
+    cli_row row;
+    return key->required || (opening && !opening->key && opening->table->row(0, &row) && needs_params(&row));
+}
+
+/* ---- Objects
+ * ----------------------------------------------------------------------------------------------- */
+
+/* Whether a key is an alternative to another one, which was chosen. */
+static bool is_excluded(const drape_scene_object *object, const char *name, const char *chosen)
+{
+    for (int i = 0; chosen && object->one_of && object->one_of[i]; i++)
+        if (strcmp(object->one_of[i], name) == 0)
+            return strcmp(name, chosen) != 0;
+    return false;
+}
+
+static json_t *properties_of(const drape_scene_object *object, const char *chosen)
+{
+    json_t *properties = json_object();
+    for (size_t i = 0; i < object->key_count; i++) {
+        const drape_scene_key *key = &object->keys[i];
+        if (!is_excluded(object, key->name, chosen))
+            properties = with(properties, key->name, described(key_value(object, key), key->help, key->unit));
+    }
+    return properties;
+}
+
+static json_t *required_of(const drape_scene_object *object)
+{
+    json_t *required = json_array();
+    for (size_t i = 0; i < object->key_count; i++)
+        if (key_is_required(&object->keys[i]))
+            required = and_also(required, json_string(object->keys[i].name));
+    return required;
+}
+
+/* Takes both references. */
+static json_t *closed(json_t *properties, json_t *required)
+{
+    json_t *object = with(typed("object"), "properties", properties);
+    if (json_array_size(required) > 0)
+        object = with(object, "required", json_incref(required));
+    json_decref(required);
+    return with(object, "additionalProperties", json_false());
+}
+
+/* An object in which `key` names the row. */
+static json_t *row_schema(const drape_scene_object *object, const char *key, const cli_row *row)
+{
+    json_t *name =
+        with(with(json_object(), "const", json_string(row->name)), "description", json_string(row->summary));
+    json_t *properties = with(properties_of(object, key), key, name);
+    json_t *required = required_of(object);
+    bool named = false;
+    for (size_t i = 0; i < json_array_size(required); i++)
+        named = named || strcmp(json_string_value(json_array_get(required, i)), key) == 0;
+    if (!named)
+        required = and_also(required, json_string(key));
+    return closed(with_params(properties, row), with_required(required, row));
+}
+
+/* Without the key that opens the object: one of its alternatives. */
+static json_t *with_closed_forms(json_t *forms, const drape_scene_object *object)
+{
+    for (int i = 0; object->open_with && object->one_of && object->one_of[i]; i++) {
+        const char *name = object->one_of[i];
+        if (strcmp(name, object->open_with) != 0)
+            forms = and_also(
+                forms, closed(properties_of(object, name), and_also(required_of(object), json_string(name))));
+    }
+    return forms;
+}
+
+static json_t *rows_schema(const drape_scene_object *object, const struct opening *opening)
+{
+    json_t *forms = json_array();
+    cli_row row;
+    for (int i = 0; opening->table->row(i, &row); i++)
+        if (!row.implied)
+            forms = and_also(forms, row_schema(object, opening->key, &row));
+    return with(json_object(), "anyOf", with_closed_forms(forms, object));
+}
+
+/* Parameters of all rows of the table; for a table of one row that has no name, they are its own. */
+static json_t *table_schema(const drape_scene_object *object, const struct opening *opening)
+{
+    json_t *properties = properties_of(object, NULL), *required = required_of(object);
+    cli_row row;
+    for (int i = 0; opening->table->row(i, &row); i++) {
+        properties = with_params(properties, &row);
+        if (opening->kind == ROW_PARAMS)
+            required = with_required(required, &row);
+    }
+    return closed(properties, required);
+}
+
+static json_t *object_schema(const drape_scene_object *object)
+{
+    const struct opening *opening = object->open ? opening_of(object) : NULL;
+    if (opening && opening->kind == ROW_PARAMS && opening->key)
+        return rows_schema(object, opening);
+    json_t *schema =
+        opening ? table_schema(object, opening) : closed(properties_of(object, NULL), required_of(object));
+    const char *const *one_of = opening && opening->one_of ? opening->one_of : object->one_of;
+    return one_of ? exactly_one(schema, one_of) : schema;
+}
+
+json_t *cli_schema(void)
+{
+    json_t *schema = json_object();
+    schema = with(schema, "$schema", json_string("https://json-schema.org/draft/2020-12/schema"));
+    schema = with(schema, "title", json_string("A scene of Drape"));
+    json_t *form = object_schema(&drape_scene_form);
+    if (form && schema)
+        json_object_update(schema, form);
+    else
+        schema = (json_decref(schema), NULL);
+    json_decref(form);
+    return schema;
+}

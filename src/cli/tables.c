@@ -1,0 +1,107 @@
+/* tables.c: see tables.h. */
+#include "cli/tables.h"
+
+#include "compile/compile.h"
+#include "control/control.h"
+#include "io/export.h"
+#include "mesh/mesh.h"
+#include "solvers/linear.h"
+#include "terms/terms.h"
+
+static bool grid(int index, cli_row *row)
+{
+    const drape_grid_ops *ops = drape_grids[index];
+    if (ops)
+        *row = (cli_row){.name = ops->name,
+                         .summary = ops->summary,
+                         .params = ops->params,
+                         .param_count = ops->param_count};
+    return ops;
+}
+
+static bool import(int index, cli_row *row)
+{
+    const drape_import_ops *ops = drape_imports[index];
+    if (ops)
+        *row = (cli_row){.name = ops->name, .summary = ops->summary};
+    return ops;
+}
+
+/* One row: a material has parameters and no kinds. */
+static bool material(int index, cli_row *row)
+{
+    if (index == 0)
+        *row = (cli_row){.name = "material",
+                         .summary = "a sheet; exactly one of density, areal_density, total_mass is given",
+                         .params = drape_material_params,
+                         .param_count = DRAPE_MATERIAL_PARAM_COUNT};
+    return index == 0;
+}
+
+static bool term(int index, cli_row *row)
+{
+    const drape_term_ops *ops = drape_terms[index];
+    if (ops)
+        *row = (cli_row){.name = ops->name,
+                         .summary = ops->summary,
+                         .reference = ops->reference,
+                         .params = ops->params,
+                         .param_count = ops->param_count,
+                         .implied = ops->potential_of_gravity};
+    return ops;
+}
+
+static bool integrator(int index, cli_row *row)
+{
+    const drape_integrator_ops *ops = drape_integrators[index];
+    if (ops)
+        *row = (cli_row){.name = ops->name,
+                         .summary = ops->summary,
+                         .reference = ops->reference,
+                         .params = ops->params,
+                         .param_count = ops->param_count};
+    return ops;
+}
+
+static bool controller(int index, cli_row *row)
+{
+    const drape_controller_ops *ops = drape_controllers[index];
+    if (ops)
+        *row = (cli_row){.name = ops->name,
+                         .summary = ops->summary,
+                         .reference = ops->reference,
+                         .params = ops->params,
+                         .param_count = ops->param_count};
+    return ops;
+}
+
+static bool linear(int index, cli_row *row)
+{
+    const drape_linear_ops *ops = drape_linears[index];
+    if (ops)
+        *row = (cli_row){.name = ops->name, .summary = ops->summary, .reference = ops->reference};
+    return ops;
+}
+
+static bool exporter(int index, cli_row *row)
+{
+    const drape_exporter_ops *ops = drape_exporters[index];
+    if (ops)
+        *row = (cli_row){.name = ops->name, .summary = ops->summary, .reference = ops->reference};
+    return ops;
+}
+
+const cli_table cli_grids = {"grids", "Grids", "\"grid\" of a mesh, its parameters beside it", grid};
+const cli_table cli_imports = {"imports", "Mesh files", "\"file\" of a mesh, by its ending", import};
+const cli_table cli_materials = {"materials", "Material", "\"material\" of a cloth", material};
+const cli_table cli_terms = {"terms", "Terms", "\"terms\" of a cloth", term};
+const cli_table cli_integrators = {"integrators", "Integrators", "\"method\" of the integrator", integrator};
+const cli_table cli_controllers = {"controllers", "Step controllers", "\"type\" of the controller",
+                                   controller};
+const cli_table cli_linears = {"linear_solvers", "Linear solvers", "\"linear_solver\" of the integrator",
+                               linear};
+const cli_table cli_exporters = {"exporters", "Frame formats", "\"formats\" of the output", exporter};
+
+const cli_table *const cli_tables[] = {&cli_grids,   &cli_imports,     &cli_materials,
+                                       &cli_terms,   &cli_integrators, &cli_controllers,
+                                       &cli_linears, &cli_exporters,   NULL};

@@ -1,0 +1,174 @@
+/*
+ * bdf2: the backward differentiation formula of order 2 with variable steps. With r = h/h_before, a = r^2/(1
+ * + 2 r) and the weight w = (1 + 2 r)/(1 + r)/h: v1 = w (x1 - x0 - a (x0 - x_)),   M w (v1 - v0 - a (v0 -
+ * v_)) + g(x1, v1) = 0,   q' = w (q1 - q0 - a (q0 - q_)) where x_, v_, q_ are of the state before in. With d
+ * = x1 - x0 and c = a (x0 - x_): M w^2 (d - p) + g(x0 + d, w (d - c)) = 0,   p = c + (v0 + a (v0 - v_))/w. A-
+ * and L-stable at constant steps, zero-stable for r < 1 + sqrt(2), which halving and doubling keep. Hairer,
+ * Norsett & Wanner 1993, III.5. The first step and the one after a discontinuity are backward Euler: r = 0
+ * makes it of the same formulas.
+ */
+#include "integrators/implicit.h"
+
+#include <string.h>
+
+/* What the formula wants to know of the past of a state: differences to the state before it. */
+typedef struct past {
+    double t, h;          /* of the state, and of the step that led to it */
+    double *dx, *dv, *dq; /* x0 - x_, v0 - v_ (nodes), q0 - q_ (measures) */
+    bool known;
+} past;
+
+typedef struct bdf2_state {
+    drape_implicit common; /* first */
+    past past, made;       /* of the last accepted state; of the state that the last attempt made */
+    double *q0;            /* measures */
+} bdf2_state;
+
+static void destroy(void **state)
+{
+    bdf2_state *s = *state;
+    if (!s)
+        return;
+    drape_context *ctx = s->common.ctx;
+    past *both[] = {&s->past, &s->made};
+    for (int i = 0; i < 2; i++) {
+        drape_free(ctx, both[i]->dx);
+        drape_free(ctx, both[i]->dv);
+        drape_free(ctx, both[i]->dq);
+    }
+    drape_free(ctx, s->q0);
+    drape_implicit_free(&s->common);
+    drape_free(ctx, s);
+    *state = NULL;
+}
+
+static bool create_past(const drape_implicit *common, past *p)
+{
+    size_t nodes = 3 * (size_t)common->model->node_count;
+    p->dx = drape_alloc(common->ctx, nodes, sizeof(double));
+    p->dv = drape_alloc(common->ctx, nodes, sizeof(double));
+    if (common->history)
+        p->dq = drape_alloc(common->ctx, (size_t)common->model->measure_count, sizeof(double));
+    return p->dx && p->dv && (p->dq || !common->history);
+}
+
+static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+{
+    bdf2_state *s = drape_alloc(ctx, 1, sizeof *s);
+    *state = s;
+    if (!s)
+        return DRAPE_E_MEMORY;
+    drape_status status = drape_implicit_init(ctx, system, values, &s->common);
+    if (!status && s->common.history)
+        s->q0 = drape_alloc(ctx, (size_t)s->common.model->measure_count, sizeof(double));
+    if (!status && (!create_past(&s->common, &s->past) || !create_past(&s->common, &s->made) ||
+                    (s->common.history && !s->q0)))
+        status = DRAPE_E_MEMORY;
+    if (status)
+        destroy(state);
+    return status;
+}
+
+/* The attempt before was accepted if it made the state that this one starts from. */
+static void settle_past(bdf2_state *s, const drape_state *in)
+{
+    if (s->made.known && s->made.t == in->t) {
+        past swap = s->past;
+        s->past = s->made;
+        s->made = swap;
+    }
+    s->made.known = false;
+    s->past.known = s->past.known && s->past.t == in->t;
+}
+
+static void set_problem(bdf2_state *s, const drape_state *in, double a, double w)
+{
+    drape_implicit *c = &s->common;
+    for (size_t i = 0; i < 3 * (size_t)c->model->free_count; i++) {
+        size_t at = drape_implicit_at(c, i);
+        double dx = a > 0 ? a * s->past.dx[at] : 0, dv = a > 0 ? a * s->past.dv[at] : 0;
+        c->v_base[at] = -w * dx;
+        c->inertia[i] = dx + (in->v[at] + dv) / w;
+    }
+    drape_implicit_measure(c, in, s->q0);
+    for (int64_t i = 0; c->history && i < c->model->measure_count; i++)
+        c->history[i] = -w * (s->q0[i] + (a > 0 ? a * s->past.dq[i] : 0));
+}
+
+static void write_state(const drape_implicit *s, double w, drape_state *out)
+{
+    size_t nodes = 3 * (size_t)s->model->node_count;
+    memcpy(out->x, s->x_base, nodes * sizeof *out->x);
+    memcpy(out->v, s->v_base, nodes * sizeof *out->v);
+    for (size_t i = 0; i < 3 * (size_t)s->model->free_count; i++) {
+        out->x[drape_implicit_at(s, i)] += s->d[i];
+        out->v[drape_implicit_at(s, i)] += w * s->d[i];
+    }
+}
+
+/* What the next step will want to know, should this one be accepted. */
+static void remember(bdf2_state *s, const drape_state *in, const drape_state *out, double h)
+{
+    drape_implicit *c = &s->common;
+    s->made.t = out->t;
+    s->made.h = h;
+    s->made.known = true;
+    for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++) {
+        s->made.dx[i] = out->x[i] - in->x[i];
+        s->made.dv[i] = out->v[i] - in->v[i];
+    }
+    if (!c->history)
+        return;
+    drape_implicit_measure(c, &(drape_state){.x = out->x, .internal = in->internal}, s->made.dq);
+    for (int64_t i = 0; i < c->model->measure_count; i++)
+        s->made.dq[i] -= s->q0[i];
+}
+
+static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
+                         drape_step_info *info)
+{
+    bdf2_state *s = state;
+    settle_past(s, in);
+    double r = s->past.known ? h / s->past.h : 0;
+    double a = r * r / (1 + 2 * r), w = (1 + 2 * r) / (1 + r) / h;
+    drape_implicit_base(&s->common, in, out->t, h);
+    set_problem(s, in, a, w);
+    drape_status status = drape_implicit_solve(&s->common, in->internal, s->common.history, w, w * w, info);
+    if (status && !info->usable)
+        return status;
+    write_state(&s->common, w, out);
+    remember(s, in, out, h);
+    drape_implicit_audit(&s->common, in, out, h, info);
+    return status;
+}
+
+static void restart(void *state, const drape_state *from)
+{
+    bdf2_state *s = state;
+    s->past.known = s->made.known = false;
+    drape_implicit_restart(state, from);
+}
+
+static size_t bytes(const void *state)
+{
+    const bdf2_state *s = state;
+    size_t nodes = 3 * (size_t)s->common.model->node_count;
+    size_t measures = s->q0 ? (size_t)s->common.model->measure_count : 0;
+    return drape_implicit_bytes(state) + (4 * nodes + 3 * measures) * sizeof(double);
+}
+
+const drape_integrator_ops drape_integrator_bdf2 = {
+    .name = "bdf2",
+    .summary = "two-step backward differentiation by Newton: fixed step, second order, damps what h does not "
+               "resolve",
+    .reference = "Hairer, Norsett & Wanner 1993, Solving Ordinary Differential Equations I, III.5",
+    .order = 2,
+    .params = drape_newton_params,
+    .param_count = DRAPE_NEWTON_PARAM_COUNT,
+    .create = create,
+    .step = step,
+    .restart = restart,
+    .work = drape_implicit_work,
+    .bytes = bytes,
+    .destroy = destroy,
+};

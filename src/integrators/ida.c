@@ -1,0 +1,539 @@
+/*
+ * ida: variable order and step with local error control by IDA (Hindmarsh et al. 2005; Brenan, Campbell & Petzold 1996).
+ *     y = (x, v) of the free nodes,  F = [x' - v ; M v' + g(x, v, t)] = 0
+ *
+ * Each Newton correction of IDA solves [c_j I, -I; K, D + c_j M] (dx, dv) = (r1, r2), K = dg/dx, D = dg/dv. Eliminating dv = c_j dx - r1 leaves
+ *     (K + c_j D + c_j^2 M) dx = r2 + (D + c_j M) r1:
+ * the matrix of a backward Euler step of size 1/c_j, with the same pattern and the same linear solvers. IDA keeps Jacobian and factors
+ * while c_j stays near theirs; that is most of its advantage over one factorisation an iteration.
+ *
+ * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative part would make the error
+ * depend on where the scene lies. The maximum order is 2 at loose tolerances, because BDF 3 to 5 are not A-stable and feed
+ * energy into undamped waves; it is 5 when the tolerance resolves them.
+ *
+ * Pins that move have kinks at the keys of their tracks: IDA stops there and starts again.
+ */
+#include "base/clock.h"
+#include "integrators/integrator.h"
+#include "model/track.h"
+#include "solvers/sun_linear.h"
+
+#include <ida/ida.h>
+#include <math.h>
+#include <nvector/nvector_serial.h>
+#include <string.h>
+
+enum {
+    PARAM_RTOL,
+    PARAM_ATOL_X,
+    PARAM_ATOL_V,
+    PARAM_MAX_ORDER,
+    PARAM_MAX_STEP,
+    PARAM_LINEAR_SOLVER,
+    PARAM_COUNT
+};
+
+#define TIGHT        1e-4 /* rtol below which order 5 pays */
+#define LOOSE_ORDER  2
+#define TIGHT_ORDER  5
+#define NEWTON_SHARE 0.33 /* of the error tolerance that is left to the Newton iteration */
+#define CJ_CHANGE                                                                                            \
+    0.1 /* new factors past a change of c_j of (1 - d)/(1 + d): IDA's 0.25 takes a quarter more residuals for as many factors */
+#define MAX_ERROR_FAILS  10 /* error test failures in one step */
+#define MAX_SOLVER_FAILS 10 /* convergence failures in one step */
+
+static const drape_param params[PARAM_COUNT] = {
+    [PARAM_RTOL] = {.name = "rtol",
+                    .unit = "1",
+                    .default_value = 1e-3,
+                    .min = 1e-12,
+                    .max = 1,
+                    .help = "local error over the size of the scene; sets the defaults of atol_x and atol_v "
+                            "and nothing else"},
+    [PARAM_ATOL_X] = {.name = "atol_x",
+                      .unit = "m",
+                      .default_value = NAN,
+                      .derived = "rtol times the diagonal of the rest bounding box",
+                      .min = 0,
+                      .max = 1e9,
+                      .open_min = true,
+                      .help = "local error of positions"},
+    [PARAM_ATOL_V] = {.name = "atol_v",
+                      .unit = "m/s",
+                      .default_value = NAN,
+                      .derived = "rtol sqrt(g L), or rtol L/s without gravity, L the diagonal",
+                      .min = 0,
+                      .max = 1e9,
+                      .open_min = true,
+                      .help = "local error of velocities"},
+    [PARAM_MAX_ORDER] = {.name = "max_order",
+                         .kind = DRAPE_PARAM_INTEGER,
+                         .unit = "1",
+                         .default_value = NAN,
+                         .derived = "2 for rtol >= 1e-4, else 5",
+                         .min = 1,
+                         .max = 5,
+                         .help = "highest order of the BDF"},
+    [PARAM_MAX_STEP] = {.name = "max_step",
+                        .unit = "s",
+                        .default_value = NAN,
+                        .derived = "none",
+                        .min = 0,
+                        .max = 1e9,
+                        .open_min = true,
+                        .help = "largest step"},
+    [PARAM_LINEAR_SOLVER] = {.name = "linear_solver",
+                             .kind = DRAPE_PARAM_CHOICE,
+                             .unit = "1",
+                             .default_value = 0,
+                             .choices = drape_linears_words,
+                             .help = "a row of the linear solvers"},
+};
+
+typedef struct ida_state {
+    drape_context *ctx;
+    drape_system *system;
+    const drape_model *model;
+    double values[PARAM_COUNT];
+    int64_t n; /* free DOFs; the system has 2 n unknowns */
+    SUNContext sun;
+    void *ida;
+    N_Vector y, rate, weights, between; /* (x, v), (x', v'), absolute tolerances, dense output */
+    drape_sun_linear *linear;
+    double *x, *v, *g;      /* nodes: where the residual was evaluated last, and g there */
+    double *damping;        /* D (nonzeros); NULL where nothing dissipates */
+    double *reduced;        /* right-hand side of the reduced system (n) */
+    double *dissipated;     /* nodes; NULL where nothing dissipates */
+    double factored_cj;     /* c_j of the factors */
+    const double *internal; /* of the last accepted state */
+    double slope_time;      /* [s] between two keys of all tracks: where the slopes of tracks are taken */
+    double reached;         /* time of IDA's state; NaN: it must start anew */
+    double powers[2];       /* [W] taken by dissipation and put in by pins, at the time reached */
+    bool nonfinite;
+    long counted; /* Newton iterations of IDA that work has already */
+    drape_work work;
+} ida_state;
+
+/* ---- Between vectors and nodes ---------------------------------------------------------------------------------- */
+
+static size_t node_at(const ida_state *s, int64_t i)
+{
+    return 3 * (size_t)s->model->node_of_free[i / 3] + (size_t)(i % 3);
+}
+
+/* Within a step no track has a key, so the velocity of pins is the slope of their tracks at any time inside. */
+static void place_pins(ida_state *s, double t)
+{
+    const drape_model *m = s->model;
+    drape_model_place_pins(m, t, s->x);
+    for (int32_t i = 0; i < m->moved_count; i++) {
+        const drape_track *track = &m->tracks[m->moved_track[i]];
+        drape_track_velocity(track->keys, track->key_count, s->slope_time,
+                             s->v + 3 * (size_t)m->moved_node[i]);
+    }
+}
+
+static drape_point place(ida_state *s, double t, const double *y)
+{
+    place_pins(s, t);
+    for (int64_t i = 0; i < s->n; i++) {
+        s->x[node_at(s, i)] = y[i];
+        s->v[node_at(s, i)] = y[s->n + i];
+    }
+    return (drape_point){.x = s->x, .v = s->v, .internal = s->internal};
+}
+
+/* ---- The callbacks of IDA ----------------------------------------------------------------------------------------- */
+
+static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void *user)
+{
+    ida_state *s = user;
+    const double *v = N_VGetArrayPointer(y) + s->n, *xp = N_VGetArrayPointer(rate), *vp = xp + s->n;
+    double *f = N_VGetArrayPointer(out), probe = 0, start = drape_clock_seconds();
+    drape_point point = place(s, t, N_VGetArrayPointer(y));
+    drape_system_force(s->system, &point, s->g);
+    for (int64_t i = 0; i < s->n; i++) {
+        f[i] = xp[i] - v[i];
+        f[s->n + i] = s->model->mass[s->model->node_of_free[i / 3]] * vp[i] + s->g[node_at(s, i)];
+        probe += 0 * f[i] + 0 * f[s->n + i];
+    }
+    s->nonfinite = probe != 0;
+    s->work.residuals++;
+    s->work.residual_seconds += drape_clock_seconds() - start;
+    return s->nonfinite ? 1 : 0;
+}
+
+static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_Vector r, SUNMatrix matrix,
+                    void *user, N_Vector a, N_Vector b, N_Vector c)
+{
+    (void)rate, (void)r, (void)matrix, (void)a, (void)b, (void)c;
+    ida_state *s = user;
+    double start = drape_clock_seconds();
+    drape_point point = place(s, t, N_VGetArrayPointer(y));
+    point.weight = cj;
+    drape_system_jacobian(s->system, &point, cj * cj, false, s->linear->values);
+    if (s->damping)
+        drape_system_damping(s->system, &point, s->damping);
+    s->factored_cj = cj;
+    s->work.jacobians++;
+    s->work.jacobian_seconds += drape_clock_seconds() - start;
+    return 0;
+}
+
+/* reduced += D r */
+static void add_damping(const ida_state *s, const double *r)
+{
+    const drape_pattern *p = &s->model->pattern;
+    for (int64_t j = 0; s->damping && j < p->n; j++)
+        for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
+            s->reduced[p->row[k]] += s->damping[k] * r[j];
+}
+
+static int solve_reduced(SUNLinearSolver solver, SUNMatrix matrix, N_Vector out, N_Vector in,
+                         sunrealtype tolerance)
+{
+    (void)matrix, (void)tolerance;
+    drape_sun_linear *linear = solver->content;
+    ida_state *s = linear->owner;
+    const double *r1 = N_VGetArrayPointer(in), *r2 = r1 + s->n;
+    double *dx = N_VGetArrayPointer(out), *dv = dx + s->n;
+    for (int64_t i = 0; i < s->n; i++)
+        s->reduced[i] = r2[i] + s->factored_cj * s->model->mass[s->model->node_of_free[i / 3]] * r1[i];
+    add_damping(s, r1);
+    drape_status status = drape_sun_linear_solve(linear, s->reduced, dx);
+    for (int64_t i = 0; i < s->n; i++)
+        dv[i] = s->factored_cj * dx[i] - r1[i];
+    return status;
+}
+
+/* ---- Making and freeing ---------------------------------------------------------------------------------------------- */
+
+static void destroy(void **state)
+{
+    ida_state *s = *state;
+    if (!s)
+        return;
+    if (s->ida)
+        IDAFree(&s->ida);
+    drape_sun_linear_destroy(&s->linear);
+    N_Vector vectors[] = {s->y, s->rate, s->weights, s->between};
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
+        if (vectors[i])
+            N_VDestroy(vectors[i]);
+    if (s->sun)
+        SUNContext_Free(&s->sun);
+    double *arrays[] = {s->x, s->v, s->g, s->damping, s->reduced, s->dissipated};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
+        drape_free(s->ctx, arrays[i]);
+    drape_free(s->ctx, s);
+    *state = NULL;
+}
+
+static bool create_arrays(ida_state *s)
+{
+    size_t nodes = 3 * (size_t)s->model->node_count;
+    bool dissipates = s->model->has_dissipation;
+    s->x = drape_alloc(s->ctx, nodes, sizeof(double));
+    s->v = drape_alloc(s->ctx, nodes, sizeof(double));
+    s->g = drape_alloc(s->ctx, nodes, sizeof(double));
+    s->reduced = drape_alloc(s->ctx, (size_t)s->n, sizeof(double));
+    if (dissipates) {
+        s->damping = drape_alloc(s->ctx, (size_t)s->model->pattern.nonzeros, sizeof(double));
+        s->dissipated = drape_alloc(s->ctx, nodes, sizeof(double));
+    }
+    return s->x && s->v && s->g && s->reduced && (!dissipates || (s->damping && s->dissipated));
+}
+
+/* Derived defaults, and the weights that follow. */
+static void set_tolerances(ida_state *s)
+{
+    const drape_model *m = s->model;
+    double length = m->length, gravity = sqrt(m->gravity[0] * m->gravity[0] + m->gravity[1] * m->gravity[1] +
+                                              m->gravity[2] * m->gravity[2]);
+    double speed = gravity > 0 ? sqrt(gravity * length) : length, rtol = s->values[PARAM_RTOL];
+    if (isnan(s->values[PARAM_ATOL_X]))
+        s->values[PARAM_ATOL_X] = rtol * length;
+    if (isnan(s->values[PARAM_ATOL_V]))
+        s->values[PARAM_ATOL_V] = rtol * speed;
+    if (isnan(s->values[PARAM_MAX_ORDER]))
+        s->values[PARAM_MAX_ORDER] = rtol >= TIGHT ? LOOSE_ORDER : TIGHT_ORDER;
+    double *w = N_VGetArrayPointer(s->weights);
+    for (int64_t i = 0; i < s->n; i++) {
+        w[i] = s->values[PARAM_ATOL_X];
+        w[s->n + i] = s->values[PARAM_ATOL_V];
+    }
+}
+
+static drape_status create_vectors(ida_state *s)
+{
+    s->y = N_VNew_Serial(2 * s->n, s->sun);
+    s->rate = N_VNew_Serial(2 * s->n, s->sun);
+    s->weights = N_VNew_Serial(2 * s->n, s->sun);
+    s->between = N_VNew_Serial(2 * s->n, s->sun);
+    if (!s->y || !s->rate || !s->weights || !s->between)
+        return drape_fail_memory(s->ctx, 2 * (size_t)s->n * sizeof(double));
+    N_VConst(0, s->y);
+    N_VConst(0, s->rate);
+    set_tolerances(s);
+    return DRAPE_OK;
+}
+
+static bool configure(ida_state *s)
+{
+    DRAPE_IDA_QUIET(s->ida);
+    bool good = !IDAInit(s->ida, residual, 0, s->y, s->rate) && !IDASetUserData(s->ida, s) &&
+                !IDASVtolerances(s->ida, 0, s->weights) &&
+                !IDASetLinearSolver(s->ida, s->linear->solver, s->linear->matrix) &&
+                !IDASetJacFn(s->ida, jacobian) && !IDASetMaxOrd(s->ida, (int)s->values[PARAM_MAX_ORDER]) &&
+                !IDASetMaxErrTestFails(s->ida, MAX_ERROR_FAILS) &&
+                !IDASetMaxConvFails(s->ida, MAX_SOLVER_FAILS) &&
+                !IDASetNonlinConvCoef(s->ida, NEWTON_SHARE) && !IDASetDeltaCjLSetup(s->ida, CJ_CHANGE);
+    if (good && !isnan(s->values[PARAM_MAX_STEP]))
+        good = !IDASetMaxStep(s->ida, s->values[PARAM_MAX_STEP]);
+    return good;
+}
+
+static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+{
+    ida_state *s = drape_alloc(ctx, 1, sizeof *s);
+    *state = s;
+    if (!s)
+        return DRAPE_E_MEMORY;
+    *s = (ida_state){.ctx = ctx, .system = system, .model = drape_system_model(system), .reached = NAN};
+    s->n = 3 * (int64_t)s->model->free_count;
+    memcpy(s->values, values, sizeof s->values);
+    drape_status status = create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
+    if (!status && (drape_sundials_context(&s->sun) || !(s->ida = IDACreate(s->sun))))
+        status = drape_fail_memory(ctx, sizeof(void *));
+    if (!status && s->n > 0)
+        status = create_vectors(s);
+    if (!status && s->n > 0)
+        status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
+                                         &s->model->pattern, &s->linear);
+    if (!status && s->n > 0) {
+        s->linear->owner = s;
+        s->linear->solver->ops->solve = solve_reduced;
+        if (!configure(s))
+            status = drape_fail(ctx, DRAPE_E_MEMORY, "IDA cannot be set up for %lld unknowns",
+                                (long long)(2 * s->n));
+    }
+    if (status)
+        destroy(state);
+    return status;
+}
+
+/* ---- A step ------------------------------------------------------------------------------------------------------------ */
+
+/* Every return code of IDASolve, as what it means for the step. */
+static drape_status status_of(int code, bool nonfinite, const char **reason)
+{
+    *reason = nonfinite ? "nonfinite" : "converged";
+    switch (code) {
+    case IDA_SUCCESS:
+    case IDA_TSTOP_RETURN:
+        *reason = "converged";
+        return DRAPE_OK;
+    case IDA_ERR_FAIL:
+        *reason = "error_test";
+        return DRAPE_RETRY_REJECTED;
+    case IDA_TOO_MUCH_ACC:
+        *reason = "round_off";
+        return DRAPE_RETRY_REJECTED;
+    case IDA_CONV_FAIL:
+    case IDA_NLS_FAIL:
+        *reason = nonfinite ? "nonfinite" : "newton";
+        return nonfinite ? DRAPE_RETRY_NONFINITE : DRAPE_RETRY_NONLINEAR;
+    case IDA_LSETUP_FAIL:
+    case IDA_LSOLVE_FAIL:
+        *reason = "singular";
+        return DRAPE_RETRY_LINEAR;
+    case IDA_RES_FAIL:
+    case IDA_REP_RES_ERR:
+    case IDA_FIRST_RES_FAIL:
+        *reason = "nonfinite";
+        return DRAPE_RETRY_NONFINITE;
+    default: /* IDA_MEM_NULL, IDA_ILL_INPUT, IDA_NO_MALLOC, IDA_LINIT_FAIL, IDA_VECTOROP_ERR ...: no smaller step helps */
+        *reason = "solver";
+        return DRAPE_E_SOLVER;
+    }
+}
+
+/* Consistent initial values need no solve: x' = v, v' = -M^-1 g. */
+static bool start(ida_state *s, const drape_state *in)
+{
+    double *y = N_VGetArrayPointer(s->y), *rate = N_VGetArrayPointer(s->rate);
+    for (int64_t i = 0; i < s->n; i++) {
+        y[i] = in->x[node_at(s, i)];
+        y[s->n + i] = rate[i] = in->v[node_at(s, i)];
+    }
+    drape_point point = place(s, in->t, y);
+    drape_system_force(s->system, &point, s->g);
+    s->work.residuals++;
+    for (int64_t i = 0; i < s->n; i++)
+        rate[s->n + i] = -s->g[node_at(s, i)] / s->model->mass[s->model->node_of_free[i / 3]];
+    s->counted = 0;
+    return !IDAReInit(s->ida, in->t, s->y, s->rate);
+}
+
+/* The next time at which some pin's velocity jumps, at most end. */
+static double next_kink(const drape_model *m, double t, double end)
+{
+    for (int32_t k = 0; k < m->track_count; k++)
+        for (size_t i = 0; i < m->tracks[k].key_count; i++)
+            if (m->tracks[k].keys[i].time > t && m->tracks[k].keys[i].time < end)
+                end = m->tracks[k].keys[i].time;
+    return end;
+}
+
+/* Pinned nodes that do not move keep their rest positions and no velocity in s->x and s->v for good. */
+static void begin(ida_state *s, const drape_state *in)
+{
+    size_t nodes = 3 * (size_t)s->model->node_count;
+    memcpy(s->x, in->x, nodes * sizeof *s->x);
+    memcpy(s->v, in->v, nodes * sizeof *s->v);
+    s->internal = in->internal;
+}
+
+/* Power at the state in s->x, s->v: of dissipative forces, and of the forces that moved pins need. */
+static void measure_powers(ida_state *s, double powers[2])
+{
+    const drape_model *m = s->model;
+    const drape_point point = {.x = s->x, .v = s->v, .internal = s->internal};
+    powers[0] = powers[1] = 0;
+    if (s->dissipated) {
+        drape_system_dissipation(s->system, &point, s->dissipated);
+        for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
+            powers[0] += s->dissipated[i] * s->v[i];
+    }
+    if (m->moved_count > 0)
+        drape_system_force(s->system, &point, s->g);
+    for (int32_t i = 0; i < m->moved_count; i++)
+        for (size_t k = 0; k < 3; k++)
+            powers[1] += s->g[3 * (size_t)m->moved_node[i] + k] * s->v[3 * (size_t)m->moved_node[i] + k];
+}
+
+/* Work by the trapezoidal rule; what it costs to set pins into motion where a track has a kink. */
+static void audit(ida_state *s, const drape_state *in, const drape_state *out, drape_step_info *info)
+{
+    double after[2];
+    measure_powers(s, after);
+    info->dissipated = 0.5 * (out->t - in->t) * (s->powers[0] + after[0]);
+    info->pin_work = 0.5 * (out->t - in->t) * (s->powers[1] + after[1]);
+    for (int32_t i = 0; i < s->model->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            size_t at = 3 * (size_t)s->model->moved_node[i] + k;
+            info->pin_work +=
+                0.5 * s->model->mass[at / 3] * (out->v[at] * out->v[at] - in->v[at] * in->v[at]);
+        }
+    memcpy(s->powers, after, sizeof after);
+}
+
+static void count_iterations(ida_state *s, drape_step_info *info)
+{
+    long iterations = 0;
+    IDAGetNumNonlinSolvIters(s->ida, &iterations);
+    info->iterations = (int)(iterations - s->counted);
+    s->work.newton_iterations += iterations - s->counted;
+    s->counted = iterations;
+}
+
+/* Goes on from in if IDA is there, else starts anew, with a first step of at most h where an attempt before was rejected. */
+static drape_status prepare(ida_state *s, const drape_state *in, double end, double h)
+{
+    double stop = next_kink(s->model, in->t, end);
+    begin(s, in);
+    s->slope_time = in->t + (stop - in->t) / 2;
+    if (s->n > 0 && s->reached != in->t) {
+        if (!start(s, in) || IDASetInitStep(s->ida, h < end - in->t ? h : 0))
+            return DRAPE_E_SOLVER;
+        measure_powers(s, s->powers);
+    }
+    return s->n > 0 && IDASetStopTime(s->ida, stop) ? DRAPE_E_SOLVER : DRAPE_OK;
+}
+
+static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
+                         drape_step_info *info)
+{
+    ida_state *s = state;
+    double end = out->t, t = end;
+    info->tolerance = info->residual = NAN; /* IDA bounds errors, not residuals */
+    info->reason = "solver";
+    drape_status status = prepare(s, in, end, h);
+    if (!status && s->n > 0) {
+        int code = IDASolve(s->ida, end, &t, s->y, s->rate, IDA_ONE_STEP);
+        status = status_of(code, s->nonfinite, &info->reason);
+        count_iterations(s, info);
+    }
+    s->reached = NAN;
+    if (status) {
+        IDAGetCurrentStep(s->ida, &info->h);
+        return status;
+    }
+    place(s, t, s->n > 0 ? N_VGetArrayPointer(s->y) : NULL);
+    memcpy(out->x, s->x, 3 * (size_t)s->model->node_count * sizeof *out->x);
+    memcpy(out->v, s->v, 3 * (size_t)s->model->node_count * sizeof *out->v);
+    out->t = t;
+    info->h = t - in->t;
+    info->reason = "converged";
+    audit(s, in, out, info);
+    s->reached = next_kink(s->model, in->t, end) == t && t < end ? NAN : t;
+    return DRAPE_OK;
+}
+
+static void interpolate(void *state, double t, double *x)
+{
+    ida_state *s = state;
+    drape_model_place_pins(s->model, t, x);
+    if (s->n == 0 || IDAGetDky(s->ida, t, 0, s->between))
+        return;
+    const double *y = N_VGetArrayPointer(s->between);
+    for (int64_t i = 0; i < s->n; i++)
+        x[node_at(s, i)] = y[i];
+}
+
+static void restart(void *state, const drape_state *from)
+{
+    (void)from;
+    ((ida_state *)state)->reached = NAN;
+}
+
+static drape_work work(const void *state)
+{
+    const ida_state *s = state;
+    drape_work work = s->work;
+    if (s->linear) {
+        work.factorizations = s->linear->factorizations;
+        work.linear_iterations = s->linear->solves;
+        work.factor_seconds = s->linear->factor_seconds;
+        work.solve_seconds = s->linear->solve_seconds;
+    }
+    return work;
+}
+
+static size_t bytes(const void *state)
+{
+    const ida_state *s = state;
+    size_t nodes = 3 * (size_t)s->model->node_count, n = (size_t)s->n,
+           values = (size_t)s->model->pattern.nonzeros;
+    size_t order = isnan(s->values[PARAM_MAX_ORDER]) ? TIGHT_ORDER : (size_t)s->values[PARAM_MAX_ORDER];
+    size_t vectors = 4 + order + 1 + 6; /* ours, the history of IDA, its scratch */
+    size_t doubles = (s->dissipated ? 4 : 3) * nodes + n + 2 * n * vectors + (s->damping ? 2 : 1) * values;
+    return doubles * sizeof(double) + (s->linear ? s->linear->ops->bytes(s->linear->state) : 0);
+}
+
+const drape_integrator_ops drape_integrator_ida = {
+    .name = "ida",
+    .summary = "variable order and step with local error control by IDA",
+    .reference = "Hindmarsh et al. 2005, SUNDIALS; Brenan, Campbell & Petzold 1996",
+    .order = 5,
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .create = create,
+    .own_steps = true,
+    .step = step,
+    .interpolate = interpolate,
+    .restart = restart,
+    .work = work,
+    .bytes = bytes,
+    .destroy = destroy,
+};

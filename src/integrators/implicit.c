@@ -1,0 +1,134 @@
+/* implicit.c: see implicit.h. */
+#include "integrators/implicit.h"
+
+#include <string.h>
+
+static bool create_arrays(drape_implicit *s)
+{
+    size_t nodes = 3 * (size_t)s->model->node_count, dofs = 3 * (size_t)s->model->free_count;
+    s->x_base = drape_alloc(s->ctx, nodes, sizeof(double));
+    s->v_base = drape_alloc(s->ctx, nodes, sizeof(double));
+    s->inertia = drape_alloc(s->ctx, dofs, sizeof(double));
+    s->d = drape_alloc(s->ctx, dofs, sizeof(double));
+    if (s->model->has_laws)
+        s->history = drape_alloc(s->ctx, (size_t)s->model->measure_count, sizeof(double));
+    if (s->model->has_dissipation)
+        s->dissipated = drape_alloc(s->ctx, nodes, sizeof(double));
+    return s->x_base && s->v_base && s->inertia && s->d && (s->history || !s->model->has_laws) &&
+           (s->dissipated || !s->model->has_dissipation);
+}
+
+drape_status drape_implicit_init(drape_context *ctx, drape_system *system, const double *values,
+                                 drape_implicit *s)
+{
+    *s = (drape_implicit){.ctx = ctx, .system = system, .model = drape_system_model(system)};
+    s->inertial_guess = values[DRAPE_NEWTON_PREDICTOR] == 0;
+    return create_arrays(s) ? drape_newton_create(ctx, system, values, &s->newton) : DRAPE_E_MEMORY;
+}
+
+void drape_implicit_free(drape_implicit *s)
+{
+    drape_newton_destroy(&s->newton);
+    drape_free(s->ctx, s->x_base);
+    drape_free(s->ctx, s->v_base);
+    drape_free(s->ctx, s->inertia);
+    drape_free(s->ctx, s->d);
+    drape_free(s->ctx, s->history);
+    drape_free(s->ctx, s->dissipated);
+}
+
+void drape_implicit_base(drape_implicit *s, const drape_state *in, double t, double span)
+{
+    const drape_model *m = s->model;
+    size_t nodes = 3 * (size_t)m->node_count;
+    memcpy(s->x_base, in->x, nodes * sizeof *s->x_base);
+    memset(s->v_base, 0, nodes * sizeof *s->v_base);
+    drape_model_place_pins(m, t, s->x_base);
+    for (int32_t i = 0; i < m->moved_count; i++)
+        for (int k = 0; k < 3; k++) {
+            size_t at = 3 * (size_t)m->moved_node[i] + (size_t)k;
+            s->v_base[at] = (s->x_base[at] - in->x[at]) / span;
+        }
+}
+
+void drape_implicit_measure(drape_implicit *s, const drape_state *state, double *q)
+{
+    if (s->history)
+        drape_system_measures(s->system, &(drape_point){.x = state->x, .internal = state->internal}, q);
+}
+
+drape_status drape_implicit_solve(drape_implicit *s, const double *internal, const double *history,
+                                  double weight, double mass_weight, drape_step_info *info)
+{
+    const drape_newton_problem problem = {.x_base = s->x_base,
+                                          .v_base = s->v_base,
+                                          .weight = weight,
+                                          .mass_weight = mass_weight,
+                                          .inertia = s->inertia,
+                                          .internal = internal,
+                                          .history = history};
+    for (size_t i = 0; i < 3 * (size_t)s->model->free_count; i++)
+        s->d[i] = s->inertial_guess ? s->inertia[i] : 0;
+    return drape_newton_solve(s->newton, &problem, s->d, info);
+}
+
+void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_state *out, double h,
+                          drape_step_info *info)
+{
+    const drape_model *m = s->model;
+    const double *g = drape_newton_force(s->newton);
+    for (int32_t i = 0; i < m->moved_count; i++)
+        for (int k = 0; k < 3; k++) {
+            size_t at = 3 * (size_t)m->moved_node[i] + (size_t)k;
+            double reaction = m->mass[m->moved_node[i]] * (out->v[at] - in->v[at]) / h + g[at];
+            info->pin_work += reaction * (out->x[at] - in->x[at]);
+        }
+    if (!s->dissipated)
+        return;
+    drape_system_dissipation(s->system, drape_newton_point(s->newton), s->dissipated);
+    for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
+        info->dissipated += s->dissipated[i] * (out->x[i] - in->x[i]);
+}
+
+void drape_implicit_destroy(void **state)
+{
+    drape_implicit *s = *state;
+    if (!s)
+        return;
+    drape_implicit_free(s);
+    drape_free(s->ctx, s);
+    *state = NULL;
+}
+
+drape_status drape_implicit_create(drape_context *ctx, drape_system *system, const double *values,
+                                   void **state)
+{
+    *state = drape_alloc(ctx, 1, sizeof(drape_implicit));
+    if (!*state)
+        return DRAPE_E_MEMORY;
+    drape_status status = drape_implicit_init(ctx, system, values, *state);
+    if (status)
+        drape_implicit_destroy(state);
+    return status;
+}
+
+/* One-step rows keep nothing of the past but factors. */
+void drape_implicit_restart(void *state, const drape_state *from)
+{
+    (void)from;
+    drape_newton_forget_factors(((drape_implicit *)state)->newton);
+}
+
+drape_work drape_implicit_work(const void *state)
+{
+    return drape_newton_work(((const drape_implicit *)state)->newton);
+}
+
+size_t drape_implicit_bytes(const void *state)
+{
+    const drape_implicit *s = state;
+    size_t nodes = 3 * (size_t)s->model->node_count, dofs = 3 * (size_t)s->model->free_count;
+    size_t doubles = 2 * nodes + 2 * dofs + (s->history ? (size_t)s->model->measure_count : 0) +
+                     (s->dissipated ? nodes : 0);
+    return doubles * sizeof(double) + drape_newton_bytes(s->newton);
+}

@@ -1,0 +1,57 @@
+/*
+ * implicit.h: what the implicit fixed-step rows share. Each is a choice of the numbers of one Newton problem
+ * (newton.h): weights, inertia, history; the arrays, the pins and the audit are the same.
+ */
+#ifndef DRAPE_INTEGRATORS_IMPLICIT_H
+#define DRAPE_INTEGRATORS_IMPLICIT_H
+
+#include "integrators/newton.h"
+
+typedef struct drape_implicit {
+    drape_context *ctx;
+    drape_system *system;
+    const drape_model *model;
+    drape_newton *newton;
+    double *x_base, *v_base; /* nodes: see drape_newton_problem */
+    double *inertia, *d;     /* free DOFs */
+    double *history;         /* measures; NULL where no law wants rates */
+    double *dissipated;      /* nodes; NULL where nothing dissipates */
+    bool inertial_guess;
+} drape_implicit;
+
+/* For rows that embed it: on failure what was taken is freed by drape_implicit_free. */
+drape_status drape_implicit_init(drape_context *ctx, drape_system *system, const double *values,
+                                 drape_implicit *implicit);
+void drape_implicit_free(drape_implicit *implicit);
+
+/* For rows that need no state of their own, and work and bytes for those that have it first in theirs. */
+drape_status drape_implicit_create(drape_context *ctx, drape_system *system, const double *values,
+                                   void **state);
+void drape_implicit_destroy(void **state);
+void drape_implicit_restart(void *state, const drape_state *from);
+drape_work drape_implicit_work(const void *state);
+size_t drape_implicit_bytes(const void *state);
+
+/* Free nodes stand where they were, at rest; pinned ones where their tracks have them at time t, span after
+ * in. */
+void drape_implicit_base(drape_implicit *implicit, const drape_state *in, double t, double span);
+
+/* The index of free DOF i among the nodes' coordinates. */
+static inline size_t drape_implicit_at(const drape_implicit *implicit, size_t i)
+{
+    return 3 * (size_t)implicit->model->node_of_free[i / 3] + i % 3;
+}
+
+/* q at the positions of a state, into q (measures); nothing where no law wants rates. */
+void drape_implicit_measure(drape_implicit *implicit, const drape_state *state, double *q);
+
+/* Solves for d with base and inertia as they stand. history: of the measures' rates, NULL: q' = grad q . v. */
+drape_status drape_implicit_solve(drape_implicit *implicit, const double *internal, const double *history,
+                                  double weight, double mass_weight, drape_step_info *info);
+
+/* Work over a step: of dissipative forces on all nodes, and of the moved pins, whose force is what M a + g
+ * lacks. */
+void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out, double h,
+                          drape_step_info *info);
+
+#endif
