@@ -25,8 +25,7 @@
 
 DRAPE_C_BEGIN
 
-/* ---- Status
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- Status ---- */
 
 /* The sign says who acts: 0 done; > 0 a smaller step may succeed; < 0 it will not, stop and explain. */
 typedef enum drape_status {
@@ -53,8 +52,7 @@ DRAPE_API const char *drape_status_name(drape_status status);
 /* "0.1.0": the version of the library that is linked, to compare with the DRAPE_VERSION_* of the header. */
 DRAPE_API const char *drape_version(void);
 
-/* ---- Context
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- Context ---- */
 
 typedef struct drape_context drape_context;
 
@@ -87,11 +85,10 @@ DRAPE_API void drape_context_destroy(drape_context **ctx);
  * call with this context or with an object made from it. NULL ctx: a fixed text. */
 DRAPE_API const char *drape_context_message(const drape_context *ctx);
 
-/* ---- Scene in memory: what a host fills instead of a scene file
- * ---------------------------------------------------- */
+/* ---- Scene in memory: what a host fills instead of a scene file ---- */
 
-/* One parameter by name. Numbers, integers and booleans (0, 1) go into number with text NULL; choices go into
- * text. */
+/* One parameter by name. Numbers and integers go into number with text NULL; choices into text; booleans as text "true" or "false",
+ * or as number 0 or 1. */
 typedef struct drape_setting {
     const char *name;
     double number;
@@ -177,8 +174,7 @@ DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
 DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
 DRAPE_API void drape_pin_def_init(drape_pin_def *def, size_t struct_size);
 
-/* ---- Scene from text
- * ----------------------------------------------------------------------------------------------- */
+/* ---- Scene from text ---- */
 
 /* A parsed scene file, open to changes before it is compiled. */
 typedef struct drape_scene drape_scene;
@@ -308,6 +304,9 @@ typedef struct drape_statistics {
     int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
     double wall_setup, wall_steps, wall_residual, wall_jacobian, wall_factor, wall_solve, wall_contact;
     double strain_min, strain_max; /* |e|/L - 1 over all edges and accepted steps */
+    bool
+        stability_known; /* the integrator "static" found an equilibrium and the signs of its Hessian's eigenvalues */
+    int64_t unstable_modes; /* how many are negative: 0 for a stable equilibrium */
 } drape_statistics;
 DRAPE_API drape_statistics drape_sim_statistics(const drape_sim *sim);
 
@@ -315,8 +314,7 @@ DRAPE_API drape_statistics drape_sim_statistics(const drape_sim *sim);
  * "edge_collapse" ... index runs from 0; *count is 0 and the result NULL past the last. */
 DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t *count);
 
-/* ---- Observers
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- Observers ---- */
 
 /* The element or node that an attempt has most to say about. */
 typedef struct drape_worst {

@@ -20,8 +20,7 @@
 
 DRAPE_C_BEGIN
 
-/* ---- Parameters of a row
- * ------------------------------------------------------------------------------------------- */
+/* ---- Parameters of a row ---- */
 
 typedef enum drape_param_kind {
     DRAPE_PARAM_NUMBER,
@@ -46,8 +45,7 @@ typedef struct drape_param {
 
 #define DRAPE_MAX_PARAMS 24
 
-/* ---- What a term is built from
- * --------------------------------------------------------------------------------------- */
+/* ---- What a term is built from ---- */
 
 /* Stiffness and mass of a sheet, resolved. SI units. */
 typedef struct drape_material {
@@ -115,8 +113,7 @@ typedef struct drape_fault {
     double value, limit;
 } drape_fault;
 
-/* ---- The ops table of a term
- * ----------------------------------------------------------------------------------------- */
+/* ---- The ops table of a term ---- */
 
 /*
  * A row. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first + count

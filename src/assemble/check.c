@@ -68,8 +68,7 @@ static double ratio(double difference, double scale)
     return difference == 0 ? 0 : difference / scale;
 }
 
-/* ---- The state
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- The state ---- */
 
 /* Rotation by 0.7 rad about (1, 2, 3)/sqrt(14), Rodrigues' formula. */
 static void rotate(const double a[3], double out[3])
@@ -105,8 +104,7 @@ static double mean_edge(const drape_model *m)
     return m->edge_count > 0 ? sum / m->edge_count : m->length;
 }
 
-/* ---- One term, element by element
- * ------------------------------------------------------------------------------------- */
+/* ---- One term, element by element ---- */
 
 /* What an author's function returns for one element: a scalar, its gradient, the Hessian. */
 typedef struct local {
@@ -233,8 +231,7 @@ static void check_law(checker *c, const drape_term *law)
         report(c, law->ops->name, "force of energy", ratio(fabs(energy - f), scale), GRADIENT_LIMIT);
 }
 
-/* ---- The assembled Jacobian
- * ---------------------------------------------------------------------------------------------- */
+/* ---- The assembled Jacobian ---- */
 
 /* x2, v2 = the state moved by s along direction on the free nodes; v moves by w times that. */
 static void move(checker *c, double s, double weight)

@@ -71,8 +71,7 @@ size_t drape_system_bytes(const drape_system *system)
     return sizeof *system + (size_t)system->threads * sizeof *system->buffers;
 }
 
-/* ---- Evaluating a block
- * ---------------------------------------------------------------------------------------- */
+/* ---- Evaluating a block ---- */
 
 /* Generalised force on one measure and its derivatives, summed over elasticity and laws. */
 typedef struct stress {
@@ -201,8 +200,7 @@ static void evaluate(const drape_term *term, const request *want, block_buffer *
         drape_project(d, b->hessian + (size_t)i * (size_t)(d * d));
 }
 
-/* ---- Adding a block
- * -------------------------------------------------------------------------------------------- */
+/* ---- Adding a block ---- */
 
 /* Where sums go; NULL: not wanted. */
 typedef struct sums {
@@ -258,8 +256,7 @@ static void add(const drape_model *model, const drape_term *term, const block_bu
         add_hessians(model, term, b, to->values);
 }
 
-/* ---- Sums over terms
- * --------------------------------------------------------------------------------------------- */
+/* ---- Sums over terms ---- */
 
 static bool contributes(const drape_term *term, const request *want, const sums *to)
 {
@@ -270,27 +267,42 @@ static bool contributes(const drape_term *term, const request *want, const sums 
     return term->ops->dissipation ? want->dissipative : want->conservative;
 }
 
+static void evaluate_block(const drape_term *term, const request *want, int32_t k, block_buffer *b)
+{
+    int32_t left = term->elements.count - k * BLOCK;
+    b->first = k * BLOCK;
+    b->count = left < BLOCK ? left : BLOCK;
+    evaluate(term, want, b);
+}
+
+#ifdef _OPENMP
+/* Blocks are evaluated by whoever is free next and added in order. */
+static void sum_in_parallel(drape_system *system, const drape_term *term, const request *want, const sums *to,
+                            int32_t blocks)
+{
+#pragma omp parallel for ordered schedule(static, 1) num_threads(system->threads)
+    for (int32_t k = 0; k < blocks; k++) {
+        block_buffer *b = &system->buffers[omp_get_thread_num()];
+        evaluate_block(term, want, k, b);
+#pragma omp ordered
+        add(system->model, term, b, to);
+    }
+}
+#endif
+
+/* One thread takes a plain loop: a parallel region of one thread costs libgomp a heap call. */
 static void sum_term(drape_system *system, const drape_term *term, const request *want, const sums *to)
 {
-    int32_t count = term->elements.count;
-    int32_t blocks = (count + BLOCK - 1) / BLOCK;
+    int32_t blocks = (term->elements.count + BLOCK - 1) / BLOCK;
 #ifdef _OPENMP
-#pragma omp parallel for ordered schedule(static, 1)                                                         \
-    num_threads(system->threads) if (system->threads > 1 && blocks > 1)
+    if (system->threads > 1 && blocks > 1) {
+        sum_in_parallel(system, term, want, to, blocks);
+        return;
+    }
 #endif
     for (int32_t k = 0; k < blocks; k++) {
-        int thread = 0;
-#ifdef _OPENMP
-        thread = omp_get_thread_num();
-#endif
-        block_buffer *b = &system->buffers[thread];
-        b->first = k * BLOCK;
-        b->count = count - b->first < BLOCK ? count - b->first : BLOCK;
-        evaluate(term, want, b);
-#ifdef _OPENMP
-#pragma omp ordered
-#endif
-        add(system->model, term, b, to);
+        evaluate_block(term, want, k, &system->buffers[0]);
+        add(system->model, term, &system->buffers[0], to);
     }
 }
 
@@ -377,8 +389,7 @@ void drape_system_measures(drape_system *system, const drape_point *point, doubl
     }
 }
 
-/* ---- Finding what is wrong
- * ---------------------------------------------------------------------------------------- */
+/* ---- Finding what is wrong ---- */
 
 static drape_worst worst_element(const drape_term *term, const drape_fault *fault)
 {

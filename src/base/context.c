@@ -151,7 +151,7 @@ void drape_context_set_message(drape_context *ctx, const char *format, ...)
 void drape_log(drape_context *ctx, drape_log_level level, const char *format, ...)
 {
     char text[DRAPE_MESSAGE_SIZE];
-    if (!ctx->def.log)
+    if (!ctx->def.log || !format)
         return;
     locale_t old = drape_locale_enter();
     va_list args;

@@ -140,6 +140,11 @@ drape_status drape_param_value(drape_context *ctx, const char *pointer, const dr
     if (param->kind == DRAPE_PARAM_CHOICE)
         return setting->text ? choice_value(ctx, pointer, param, setting->text, value)
                              : refuse_number(ctx, pointer, param, setting->number);
+    if (setting->text && param->kind == DRAPE_PARAM_BOOLEAN &&
+        (strcmp(setting->text, "true") == 0 || strcmp(setting->text, "false") == 0)) {
+        *value = strcmp(setting->text, "true") == 0;
+        return DRAPE_OK;
+    }
     if (setting->text) {
         char given[80];
         snprintf(given, sizeof given, "\"%.60s\"", setting->text);

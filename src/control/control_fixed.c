@@ -1,14 +1,13 @@
 /* fixed: every step has the nominal size; the first that fails ends the run. */
 #include "control/control.h"
 
-static drape_verdict judge(const double *values, double t, double h, const drape_step_info *info,
-                           drape_status *status)
+static drape_verdict judge(const double *values, drape_trial *trial)
 {
-    (void)values, (void)t, (void)h;
-    if (*status == DRAPE_OK || info->usable)
+    (void)values;
+    if (trial->status == DRAPE_OK || trial->info->usable)
         return DRAPE_ACCEPT;
-    if (*status > 0)
-        *status = DRAPE_E_SOLVER;
+    if (trial->status > 0)
+        trial->status = DRAPE_E_SOLVER;
     return DRAPE_STOP;
 }
 

@@ -114,7 +114,7 @@ typedef struct ida_state {
     drape_work work;
 } ida_state;
 
-/* ---- Between vectors and nodes ---------------------------------------------------------------------------------- */
+/* ---- Between vectors and nodes ---- */
 
 static size_t node_at(const ida_state *s, int64_t i)
 {
@@ -143,7 +143,7 @@ static drape_point place(ida_state *s, double t, const double *y)
     return (drape_point){.x = s->x, .v = s->v, .internal = s->internal};
 }
 
-/* ---- The callbacks of IDA ----------------------------------------------------------------------------------------- */
+/* ---- The callbacks of IDA ---- */
 
 static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void *user)
 {
@@ -206,7 +206,7 @@ static int solve_reduced(SUNLinearSolver solver, SUNMatrix matrix, N_Vector out,
     return status;
 }
 
-/* ---- Making and freeing ---------------------------------------------------------------------------------------------- */
+/* ---- Making and freeing ---- */
 
 static void destroy(void **state)
 {
@@ -322,7 +322,7 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
     return status;
 }
 
-/* ---- A step ------------------------------------------------------------------------------------------------------------ */
+/* ---- A step ---- */
 
 /* Every return code of IDASolve, as what it means for the step. */
 static drape_status status_of(int code, bool nonfinite, const char **reason)

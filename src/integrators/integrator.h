@@ -17,11 +17,15 @@ typedef struct drape_step_info {
     bool usable; /* with a status > 0: the caller asked to go on with what there is (on_failure accept) */
     double dissipated; /* [J] work that dissipative terms took in this step */
     double pin_work;   /* [J] work that moving pins put in */
+    bool
+        committed; /* out->internal is set and its elements were checked along the way: the step is longer than one branch */
     drape_worst worst;
 } drape_step_info;
 
 /* Work done so far. */
 typedef struct drape_work {
+    bool stability_known;   /* of an equilibrium */
+    int64_t unstable_modes; /* negative eigenvalues of the Hessian there */
     int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
     double residual_seconds, jacobian_seconds, factor_seconds, solve_seconds;
 } drape_work;
@@ -36,6 +40,8 @@ typedef struct drape_integrator_ops {
     /* The row chooses its own steps: h is the way to the end of the advance or, after a rejection, an upper bound,
      * out->t the end of the advance, which a step may reach and not pass; the row sets out->t to where it came. */
     bool own_steps;
+    /* Between the states of a step there is no motion, so no frames. */
+    bool timeless;
     /* From in to out, whose t is set: h = the nominal size of the step, exact where out->t - in->t has
      * rounding. Fills out->x and out->v. */
     drape_status (*step)(void *state, const drape_state *in, drape_state *out, double h,

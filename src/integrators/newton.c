@@ -123,8 +123,7 @@ struct drape_newton {
     drape_work work;
 };
 
-/* ---- The callbacks of KINSOL
- * ------------------------------------------------------------------------------------- */
+/* ---- The callbacks of KINSOL ---- */
 
 static void place(drape_newton *s, const double *d)
 {
@@ -179,8 +178,7 @@ static int jacobian(N_Vector d, N_Vector f, SUNMatrix matrix, void *user, N_Vect
     return 0;
 }
 
-/* ---- Making and freeing
- * -------------------------------------------------------------------------------------------- */
+/* ---- Making and freeing ---- */
 
 static drape_status create_vectors(drape_newton *s)
 {
@@ -273,8 +271,7 @@ void drape_newton_destroy(drape_newton **newton)
     *newton = NULL;
 }
 
-/* ---- One solve
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- One solve ---- */
 
 static double norm_of(const drape_newton *s)
 {
@@ -399,6 +396,11 @@ const drape_point *drape_newton_point(const drape_newton *newton)
 const double *drape_newton_force(const drape_newton *newton)
 {
     return newton->g;
+}
+
+const double *drape_newton_values(const drape_newton *newton)
+{
+    return newton->values;
 }
 
 void drape_newton_forget_factors(drape_newton *newton)

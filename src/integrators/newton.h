@@ -51,6 +51,9 @@ drape_status drape_newton_solve(drape_newton *newton, const drape_newton_problem
 const drape_point *drape_newton_point(const drape_newton *newton);
 const double *drape_newton_force(const drape_newton *newton);
 
+/* The parameter values it was made with, in the order of drape_newton_params. */
+const double *drape_newton_values(const drape_newton *newton);
+
 /* The factors belong to another system now: modified Newton must not reuse them. */
 void drape_newton_forget_factors(drape_newton *newton);
 

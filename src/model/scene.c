@@ -37,7 +37,7 @@ struct drape_scene {
     drape_arena defs; /* arrays of the last drape_scene_to_def */
 };
 
-/* ---- Making and freeing ------------------------------------------------------------------------------ */
+/* ---- Making and freeing ---- */
 
 void drape_scene_destroy(drape_scene **scene)
 {
@@ -99,7 +99,7 @@ static drape_status new_scene(drape_context *ctx, const char *name, drape_scene 
     return scene ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-/* ---- Reading a file ---------------------------------------------------------------------------------- */
+/* ---- Reading a file ---- */
 
 static drape_status cannot_read(drape_scene *scene, const char *why)
 {
@@ -164,7 +164,7 @@ static drape_status read_file(drape_scene *scene, const char *path, size_t *size
     return status;
 }
 
-/* ---- Parsing ----------------------------------------------------------------------------------------- */
+/* ---- Parsing ---- */
 
 static drape_status parse_fault(drape_scene *scene, size_t offset, const char *what)
 {
@@ -284,7 +284,7 @@ drape_status drape_scene_parse(drape_context *ctx, const char *text, const char 
     return finish(scene, status, out);
 }
 
-/* ---- Setting values ---------------------------------------------------------------------------------- */
+/* ---- Setting values ---- */
 
 /* Where a pointer leads to in the tree. */
 typedef struct landing {
@@ -511,7 +511,7 @@ drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char
     return status;
 }
 
-/* ---- Defs and faults --------------------------------------------------------------------------------- */
+/* ---- Defs and faults ---- */
 
 drape_status drape_scene_to_def(drape_scene *scene, drape_scene_def *def)
 {

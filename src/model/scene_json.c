@@ -23,7 +23,7 @@ typedef struct reader {
 typedef drape_status read_function(reader *r, const drape_scene_key *key, json_t *value, char *def);
 static read_function read_value;
 
-/* ---- Words for messages ------------------------------------------------------------------------------ */
+/* ---- Words for messages ---- */
 
 /* The shortest text that reads back as the number. */
 static void describe_number(double number, char *text, size_t size)
@@ -128,7 +128,7 @@ static void expectation(const drape_scene_key *key, char *text, size_t size)
              key->at_least ? ", at least one" : "");
 }
 
-/* ---- Faults ------------------------------------------------------------------------------------------ */
+/* ---- Faults ---- */
 
 static drape_status refuse_as(reader *r, json_t *value, const char *what, const char *expected)
 {
@@ -190,7 +190,7 @@ static drape_status unknown_key(reader *r, const drape_scene_object *object, con
     return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "unknown key %s; known: %s", given, list);
 }
 
-/* ---- Numbers ----------------------------------------------------------------------------------------- */
+/* ---- Numbers ---- */
 
 static drape_status read_version(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
@@ -308,7 +308,7 @@ static drape_status read_box(reader *r, const drape_scene_key *key, json_t *valu
     return DRAPE_OK;
 }
 
-/* ---- Arrays ------------------------------------------------------------------------------------------ */
+/* ---- Arrays ---- */
 
 /* Takes the memory of an array with as many elements as value and puts it into the def; refuses what is no
  * array, or too short. */
@@ -396,7 +396,7 @@ static drape_status read_track(reader *r, const drape_scene_key *key, json_t *va
     return status;
 }
 
-/* ---- Strings ----------------------------------------------------------------------------------------- */
+/* ---- Strings ---- */
 
 static drape_status read_text(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
@@ -413,7 +413,7 @@ static drape_status read_word(reader *r, const drape_scene_key *key, json_t *val
     return DRAPE_OK;
 }
 
-/* ---- Objects ----------------------------------------------------------------------------------------- */
+/* ---- Objects ---- */
 
 static bool has_key(const drape_scene_object *object, const char *name)
 {
@@ -427,7 +427,7 @@ static drape_status read_setting(reader *r, const char *name, json_t *value, dra
 {
     *out = (drape_setting){.name = name};
     if (json_is_boolean(value)) {
-        out->number = json_is_true(value);
+        out->text = json_is_true(value) ? "true" : "false"; /* so that no number takes it */
     } else if (json_is_number(value)) {
         out->number = json_number_value(value);
     } else if (json_is_string(value)) {
@@ -562,7 +562,7 @@ static drape_status read_value(reader *r, const drape_scene_key *key, json_t *va
     return readers[key->kind](r, key, value, def);
 }
 
-/* ---- The scene --------------------------------------------------------------------------------------- */
+/* ---- The scene ---- */
 
 /* The version before all else: in another version other keys would be right. */
 static drape_status check_version(reader *r, json_t *root)

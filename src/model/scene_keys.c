@@ -12,7 +12,7 @@
 const char *const drape_pin_corners[] = {"top-left", "top-right", "bottom-left", "bottom-right", NULL};
 const char *const drape_pin_edges[] = {"top", "bottom", "left", "right", NULL};
 
-/* ---- Pins -------------------------------------------------------------------------------------------- */
+/* ---- Pins ---- */
 
 static const drape_scene_key pin_keys[] = {
     {"nodes", DRAPE_SCENE_INTEGERS, ARRAY(drape_pin_def, nodes, node_count), .max = INT32_MAX, .at_least = 1,
@@ -40,7 +40,7 @@ static const drape_scene_object pin = {.name = "pin",
                                        .def_size = sizeof(drape_pin_def),
                                        .init = init_pin};
 
-/* ---- Rows with settings ------------------------------------------------------------------------------ */
+/* ---- Rows with settings ---- */
 
 static const drape_scene_key term_keys[] = {
     {"type", DRAPE_SCENE_WORD, .required = true, IN(drape_row_def, type), .help = "a row of the terms"},
@@ -67,7 +67,7 @@ static const drape_scene_object controller = {
 static const drape_scene_object material = {.name = "material",
                                             SETTINGS(drape_cloth_def, material, material_count)};
 
-/* ---- Mesh -------------------------------------------------------------------------------------------- */
+/* ---- Mesh ---- */
 
 static const drape_scene_key transform_keys[] = {
     {"translate", DRAPE_SCENE_VECTOR, IN(drape_mesh_def, translate), .unit = "m",
@@ -92,7 +92,7 @@ static const drape_scene_object mesh = {.name = "mesh",
                                         SETTINGS(drape_mesh_def, grid.settings, grid.setting_count),
                                         .open_with = "grid"};
 
-/* ---- Cloth ------------------------------------------------------------------------------------------- */
+/* ---- Cloth ---- */
 
 static const drape_scene_key cloth_keys[] = {
     {"name", DRAPE_SCENE_WORD, IN(drape_cloth_def, name),
@@ -116,7 +116,7 @@ static void init_cloth(void *def)
 static const drape_scene_object cloth = {
     .name = "cloth", KEYS(cloth_keys), .def_size = sizeof(drape_cloth_def), .init = init_cloth};
 
-/* ---- Scene ------------------------------------------------------------------------------------------- */
+/* ---- Scene ---- */
 
 static const drape_scene_key output_keys[] = {
     {"formats", DRAPE_SCENE_WORDS, ARRAY(drape_scene_def, formats, format_count),

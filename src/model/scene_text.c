@@ -8,7 +8,7 @@
 
 #define BYTE_ORDER_MARK "\xEF\xBB\xBF"
 
-/* ---- JSON pointers ----------------------------------------------------------------------------------- */
+/* ---- JSON pointers ---- */
 
 static void push_text(drape_pointer *pointer, const char *text)
 {
@@ -72,7 +72,7 @@ bool drape_pointer_index(const char *key, size_t *index)
     return true;
 }
 
-/* ---- Tokens ------------------------------------------------------------------------------------------ */
+/* ---- Tokens ---- */
 
 static bool starts_comment(const char *p)
 {
@@ -168,7 +168,7 @@ size_t drape_text_token(const char *text, size_t consumed, bool its_end)
     return (size_t)((its_end ? end : token) - text);
 }
 
-/* ---- Places ------------------------------------------------------------------------------------------ */
+/* ---- Places ---- */
 
 static bool continues_character(char c)
 {

@@ -90,7 +90,9 @@ static drape_status apply_all(drape_context *ctx, const table *t, int row, const
 {
     drape_status status = DRAPE_OK;
     for (size_t i = 0; !status && i < count; i++)
-        status = apply(ctx, t, row, &settings[i], values);
+        status = settings && settings[i].name
+                     ? apply(ctx, t, row, &settings[i], values)
+                     : drape_fail_at(ctx, DRAPE_E_ARGUMENT, t->pointer, "the name of a setting is NULL");
     return status;
 }
 
@@ -134,6 +136,10 @@ drape_status drape_choose(drape_context *ctx, const drape_model *model, const dr
         status = apply_number(ctx, &controllers, c, "dt_min", d->dt_min, chosen->controller_values);
     chosen->integrator = drape_integrators[i];
     chosen->controller = drape_controllers[c];
+    if (!status && chosen->integrator->own_steps && chosen->controller->own_steps)
+        status = drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/controller/type",
+                               "\"%s\" chooses steps, and so does the integrator \"%s\"; take \"halving\"",
+                               chosen->controller->name, chosen->integrator->name);
     return status;
 }
 

@@ -41,11 +41,18 @@ static drape_status emit(drape_sim *sim, double time, const double *x)
     return drape_sim_tell(sim, &event);
 }
 
-drape_status drape_sim_emit_frames(drape_sim *sim, const drape_state *before)
+drape_status drape_sim_emit_frames(drape_sim *sim)
 {
+    const drape_state *before = sim->before >= 0 ? &sim->states[sim->before] : NULL;
     const drape_state *now = drape_sim_state(sim);
     double near = before ? SAME_TIME * (now->t - before->t) : 0;
     drape_status status = DRAPE_OK;
+    if (before && sim->chosen.integrator->timeless)
+        return DRAPE_OK;
+    if (sim->observer_count == 0) { /* nobody looks: count them, but make none */
+        sim->next_frame = (int64_t)floor((now->t + near) * sim->frame_rate) + 1;
+        return DRAPE_OK;
+    }
     while (!status) {
         double time = (double)sim->next_frame / sim->frame_rate;
         if (time > now->t + near)

@@ -28,8 +28,7 @@ typedef struct bench {
     drape_status status; /* of the last factor or solve */
 } bench;
 
-/* ---- The state
- * --------------------------------------------------------------------------------------------- */
+/* ---- The state ---- */
 
 /* Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX): the same everywhere. */
 static double next_random(uint64_t *seed)
@@ -97,8 +96,7 @@ static drape_status create(bench *s, bool implicit)
     return DRAPE_OK;
 }
 
-/* ---- Measuring
- * --------------------------------------------------------------------------------------------- */
+/* ---- Measuring ---- */
 
 static void term_residual(bench *s)
 {
@@ -143,8 +141,7 @@ static double shortest(bench *s, void (*call)(bench *s))
     return best;
 }
 
-/* ---- Terms
- * ------------------------------------------------------------------------------------------------- */
+/* ---- Terms ---- */
 
 /* seen: a mark for each block of the pattern. */
 static int64_t count_nonzeros(const drape_term *term, unsigned char *seen, size_t blocks)
@@ -204,8 +201,7 @@ static drape_status measure_terms(bench *s, bool implicit, drape_profile_term *t
     return DRAPE_OK;
 }
 
-/* ---- The whole
- * --------------------------------------------------------------------------------------------- */
+/* ---- The whole ---- */
 
 static size_t mesh_bytes(const drape_model *model)
 {
@@ -214,9 +210,7 @@ static size_t mesh_bytes(const drape_model *model)
         const drape_mesh *m = &model->cloths[c].mesh;
         sum += (size_t)m->node_count * (3 * sizeof *m->x + sizeof *m->node_area);
         sum += (size_t)m->triangle_count * (3 * sizeof *m->triangle + sizeof *m->triangle_area);
-        sum += (size_t)m->edge_count *
-               (2 * sizeof *m->edge + 2 * sizeof *m->edge_triangle + sizeof *m->edge_length);
-        sum += (size_t)m->hinge_count * (4 * sizeof *m->hinge + sizeof *m->hinge_edge);
+        sum += (size_t)m->edge_count * (2 * sizeof *m->edge + sizeof *m->edge_length);
     }
     return sum;
 }

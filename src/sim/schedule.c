@@ -4,17 +4,19 @@
 #include <float.h>
 #include <math.h>
 
-#define JOIN 1e-9 /* of dt: a shorter remainder joins the interval before */
+#define MOST_LEVELS 60   /* parts are counted in 64 bits */
+#define JOIN        1e-9 /* of dt: a shorter remainder joins the interval before */
 
-void drape_schedule_init(drape_schedule *s, double dt, double start)
+void drape_schedule_init(drape_schedule *s, drape_stepping stepping, double dt, double start)
 {
-    *s = (drape_schedule){.dt = dt, .start = start, .now = start, .limit = INFINITY};
+    *s = (drape_schedule){.stepping = stepping, .dt = dt, .start = start, .now = start};
+    s->limit = stepping == DRAPE_STEPS_PROPOSED ? dt : INFINITY;
 }
 
-void drape_schedule_aim(drape_schedule *s, double now, double end)
+void drape_schedule_aim(drape_schedule *s, double end)
 {
     if (s->part > 0) {
-        s->start = now;
+        s->start = s->now;
         s->count = 0;
         s->part = 0;
     }
@@ -40,13 +42,24 @@ static void open_interval(drape_schedule *s)
     s->interval_size = s->cut ? s->end - t0 : at_end && !same ? s->dt + beyond : s->dt;
 }
 
-bool drape_schedule_next(drape_schedule *s, double *t1, double *h)
+static bool next_free(const drape_schedule *s, double *t1, double *h)
 {
-    if (s->dt == 0) {
-        *t1 = s->end;
-        *h = fmin(s->end - s->now, s->limit);
-        return s->end > s->now;
-    }
+    *t1 = s->end;
+    *h = fmin(s->end - s->now, s->limit);
+    return s->end > s->now;
+}
+
+/* What is left of the advance is taken whole if one step does it, in halves if two do, so that no tiny step is left over. */
+static bool next_proposed(const drape_schedule *s, double *t1, double *h)
+{
+    double left = s->end - s->now;
+    *h = s->limit >= (1 - JOIN) * left ? left : 2 * s->limit > left ? left / 2 : s->limit;
+    *t1 = *h == left ? s->end : s->now + *h;
+    return left > 0;
+}
+
+static bool next_counted(drape_schedule *s, double *t1, double *h)
+{
     if (s->part == 0) {
         if (!(s->end - interval_time(s, s->count) > JOIN * s->dt))
             return false;
@@ -60,6 +73,19 @@ bool drape_schedule_next(drape_schedule *s, double *t1, double *h)
     return true;
 }
 
+bool drape_schedule_next(drape_schedule *s, double *t1, double *h)
+{
+    switch (s->stepping) {
+    case DRAPE_STEPS_FREE:
+        return next_free(s, t1, h);
+    case DRAPE_STEPS_PROPOSED:
+        return next_proposed(s, t1, h);
+    case DRAPE_STEPS_COUNTED:
+        break;
+    }
+    return next_counted(s, t1, h);
+}
+
 static void close_interval(drape_schedule *s)
 {
     s->part = 0;
@@ -71,12 +97,8 @@ static void close_interval(drape_schedule *s)
 }
 
 /* A level is left as soon as the parts done make whole parts of the level below. */
-void drape_schedule_accept(drape_schedule *s, double t1)
+static void accept_part(drape_schedule *s)
 {
-    s->now = t1;
-    s->limit = INFINITY;
-    if (s->dt == 0)
-        return;
     s->part++;
     bool whole = s->part == (int64_t)1 << s->level;
     if (s->level > 0 && s->part % 2 == 0) {
@@ -87,9 +109,22 @@ void drape_schedule_accept(drape_schedule *s, double t1)
         close_interval(s);
 }
 
-void drape_schedule_halve(drape_schedule *s, double h)
+void drape_schedule_accept(drape_schedule *s, double t1, double h_next)
 {
-    s->limit = h / 2;
+    s->now = t1;
+    s->limit = s->stepping == DRAPE_STEPS_PROPOSED ? h_next : INFINITY;
+    if (s->stepping == DRAPE_STEPS_COUNTED)
+        accept_part(s);
+}
+
+bool drape_schedule_retry(drape_schedule *s, double h_next)
+{
+    s->limit = h_next;
+    if (s->stepping != DRAPE_STEPS_COUNTED)
+        return true;
+    if (s->level == MOST_LEVELS)
+        return false;
     s->level++;
     s->part *= 2;
+    return true;
 }

@@ -1,8 +1,13 @@
 /*
- * schedule.h: which steps a fixed-step method takes. Steps end at start + k dt, counted and never summed. An
- * interval between two such times may be split in 2^level equal parts after a rejection; the parts end at
- * exact fractions of it. Only the end of an advance cuts an interval, and a remainder below 1e-9 dt joins the
- * interval before.
+ * schedule.h: which steps a sim takes.
+ *
+ * Counted: steps end at start + k dt, counted and never summed. An interval between two such times may be split in 2^level
+ * equal parts after a rejection; the parts end at exact fractions of it. Only the end of an advance cuts an interval, and a
+ * remainder below 1e-9 dt joins the interval before.
+ *
+ * Proposed: the controller says how large the next step is; only the end of an advance cuts it.
+ *
+ * Free: the integrator chooses. It is told where the end is, and after a rejection a bound on its next step.
  */
 #ifndef DRAPE_SIM_SCHEDULE_H
 #define DRAPE_SIM_SCHEDULE_H
@@ -10,31 +15,35 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+typedef enum drape_stepping { DRAPE_STEPS_COUNTED, DRAPE_STEPS_PROPOSED, DRAPE_STEPS_FREE } drape_stepping;
+
 typedef struct drape_schedule {
-    double dt;         /* [s] 0: the integrator chooses its own steps */
-    double now, limit; /* where it came with them; an upper bound after a rejection */
-    double start;      /* [s] intervals are counted from here */
-    int64_t count;     /* intervals done since start */
-    int level;         /* the interval has 2^level parts */
-    int64_t part;      /* parts of it done */
-    double end;        /* [s] of this advance */
+    drape_stepping stepping;
+    double end;    /* [s] of this advance */
+    double now;    /* [s] where it came */
+    double dt;     /* [s] counted: the interval; proposed: the first step */
+    double limit;  /* [s] proposed: the next step; free: an upper bound */
+    double start;  /* [s] counted: intervals are counted from here */
+    int64_t count; /* intervals done since start */
+    int level;     /* the interval has 2^level parts */
+    int64_t part;  /* parts of it done */
     double interval_start, interval_end, interval_size;
     bool cut; /* the interval is shorter than dt: the next count starts at its end */
 } drape_schedule;
 
-void drape_schedule_init(drape_schedule *schedule, double dt, double start);
+void drape_schedule_init(drape_schedule *schedule, drape_stepping stepping, double dt, double start);
 
-/* Sets the end of an advance. now: the time of the state. An interval that was left half done is given up:
- * counting starts at now. */
-void drape_schedule_aim(drape_schedule *schedule, double now, double end);
+/* Sets the end of an advance. An interval that was left half done is given up: counting starts where it came. */
+void drape_schedule_aim(drape_schedule *schedule, double end);
 
 /* The next step: its end and its size. False when the end is reached. */
 bool drape_schedule_next(drape_schedule *schedule, double *t1, double *h);
 
-/* A step to t1 was accepted. */
-void drape_schedule_accept(drape_schedule *schedule, double t1);
+/* A step to t1 was accepted; h_next counts where steps are proposed. */
+void drape_schedule_accept(drape_schedule *schedule, double t1, double h_next);
 
-/* A step of size h was rejected. */
-void drape_schedule_halve(drape_schedule *schedule, double h);
+/* A step was rejected: h_next next, which is half of it where steps are counted. False where an interval cannot be split further (2^60
+ * parts): no step is left to try. */
+bool drape_schedule_retry(drape_schedule *schedule, double h_next);
 
 #endif

@@ -39,9 +39,9 @@ static drape_status read_def(drape_context *ctx, const drape_sim_def *given, dra
 
 static drape_status create_states(drape_sim *sim)
 {
-    drape_status status = drape_state_create(sim->ctx, &sim->arena, sim->model, &sim->states[0]);
-    if (!status)
-        status = drape_state_create(sim->ctx, &sim->arena, sim->model, &sim->states[1]);
+    drape_status status = DRAPE_OK;
+    for (int i = 0; !status && i < 2 + sim->chosen.controller->pasts; i++)
+        status = drape_state_create(sim->ctx, &sim->arena, sim->model, &sim->states[i]);
     sim->frame =
         drape_arena_take(&sim->arena, sim->ctx, 3 * (size_t)sim->model->node_count, sizeof *sim->frame);
     return status ? status : sim->frame ? DRAPE_OK : DRAPE_E_MEMORY;
@@ -60,6 +60,13 @@ static drape_status create_parts(drape_sim *sim, const drape_sim_def *def)
     return status;
 }
 
+static drape_stepping stepping_of(const drape_chosen *chosen)
+{
+    if (chosen->integrator->own_steps)
+        return DRAPE_STEPS_FREE;
+    return chosen->controller->own_steps ? DRAPE_STEPS_PROPOSED : DRAPE_STEPS_COUNTED;
+}
+
 drape_status drape_sim_create(drape_context *ctx, const drape_model *model, const drape_sim_def *given,
                               drape_sim **out)
 {
@@ -76,15 +83,19 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
     drape_sim *sim = drape_alloc(ctx, 1, sizeof *sim);
     if (!sim)
         return DRAPE_E_MEMORY;
-    *sim = (drape_sim){
-        .ctx = ctx, .model = model, .frame_rate = def.frame_rate > 0 ? def.frame_rate : model->frame_rate};
+    *sim = (drape_sim){.next = 1,
+                       .before = -1,
+                       .past = {-1, -1},
+                       .ctx = ctx,
+                       .model = model,
+                       .frame_rate = def.frame_rate > 0 ? def.frame_rate : model->frame_rate};
     status = create_parts(sim, &def);
     if (status) {
         drape_sim_destroy(&sim);
         return status;
     }
-    bool own = sim->chosen.integrator->own_steps;
-    drape_schedule_init(&sim->schedule, own ? 0 : drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
+    drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
+                        drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
     drape_energy e = drape_sim_energy(sim);
     sim->start_energy = e.kinetic + e.elastic + e.gravity;
     sim->energy_known = false;
@@ -131,31 +142,6 @@ uint64_t drape_sim_hash(const drape_sim *sim)
     return sim ? drape_state_hash(sim->model, drape_sim_state(sim)) : 0;
 }
 
-static double kinetic(const drape_model *model, const double *v)
-{
-    double sum = 0;
-    for (size_t i = 0; i < (size_t)model->node_count; i++)
-        sum += model->mass[i] *
-               (v[3 * i] * v[3 * i] + v[3 * i + 1] * v[3 * i + 1] + v[3 * i + 2] * v[3 * i + 2]);
-    return 0.5 * sum;
-}
-
-drape_energy drape_sim_energy(drape_sim *sim)
-{
-    if (!sim)
-        return (drape_energy){0};
-    const drape_state *state = drape_sim_state(sim);
-    if (sim->energy_known)
-        return sim->energy;
-    drape_energy e = {.kinetic = kinetic(sim->model, state->v), .dissipated = sim->dissipated};
-    const drape_point point = {.x = state->x, .v = state->v, .internal = state->internal};
-    drape_system_energy(sim->system, &point, &e.elastic, &e.gravity);
-    e.numerical = sim->start_energy + sim->pin_work - e.dissipated - (e.kinetic + e.elastic + e.gravity);
-    sim->energy = e;
-    sim->energy_known = true;
-    return e;
-}
-
 drape_statistics drape_sim_statistics(const drape_sim *sim)
 {
     if (!sim)
@@ -167,6 +153,8 @@ drape_statistics drape_sim_statistics(const drape_sim *sim)
     s.factorizations = work.factorizations;
     s.linear_iterations = work.linear_iterations;
     s.residuals = work.residuals;
+    s.stability_known = work.stability_known;
+    s.unstable_modes = work.unstable_modes;
     s.wall_residual = work.residual_seconds;
     s.wall_jacobian = work.jacobian_seconds;
     s.wall_factor = work.factor_seconds;

@@ -20,9 +20,12 @@ struct drape_sim {
     const drape_model *model;
     drape_chosen chosen;
     drape_system *system;
-    void *integrator; /* state of chosen.integrator */
-    drape_state states[2];
-    int now; /* states[now] is the last accepted one, the other is being made */
+    void *integrator;      /* state of chosen.integrator */
+    drape_state states[4]; /* as many as are needed: 2, and those before that the controller asks for */
+    int now, next;         /* states[now] is the last accepted one, states[next] is being made */
+    int before;  /* the one that the last step began with, until the next attempt; -1 before the first */
+    int past[2]; /* the ones before; -1: there is none */
+    double scratch[2]; /* the controller's memory */
     drape_schedule schedule;
     double frame_rate;
     int64_t next_frame;
@@ -44,11 +47,14 @@ static inline const drape_state *drape_sim_state(const drape_sim *sim)
     return &sim->states[sim->now];
 }
 
+/* Whether out has kinetic energy that neither in nor the work on it can account for: the step exploded. Cheap unless that is likely. */
+bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, const drape_step_info *info,
+                        drape_worst *worst);
+
 /* Tells the observers. 0 to go on, else the negative status to stop with. */
 drape_status drape_sim_tell(drape_sim *sim, const drape_event *event);
 
-/* The frames that are due up to the present state, reached by a step from before. before NULL: the first, at
- * the present time. */
-drape_status drape_sim_emit_frames(drape_sim *sim, const drape_state *before);
+/* The frames that are due up to the present state and were not told yet. A stop leaves the rest for the next call. */
+drape_status drape_sim_emit_frames(drape_sim *sim);
 
 #endif

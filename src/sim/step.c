@@ -12,11 +12,10 @@
 
 static drape_state *next_state(drape_sim *sim)
 {
-    return &sim->states[1 - sim->now];
+    return &sim->states[sim->next];
 }
 
-/* ---- Check
- * ------------------------------------------------------------------------------------------------------- */
+/* ---- Check ---- */
 
 static bool finite(const double *a, size_t n)
 {
@@ -34,12 +33,17 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
         info->reason = "nonfinite";
         return DRAPE_RETRY_NONFINITE;
     }
+    if (info->committed)
+        return DRAPE_OK;
+    if (drape_sim_ran_away(sim, next, info, &info->worst)) {
+        info->reason = "energy";
+        return DRAPE_RETRY_REJECTED;
+    }
     return drape_system_check(sim->system, next->x, drape_sim_state(sim)->internal, &info->reason,
                               &info->worst);
 }
 
-/* ---- Attempt
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- Attempt ---- */
 
 static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info *info)
 {
@@ -55,8 +59,7 @@ static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info
     return degenerate ? degenerate : status;
 }
 
-/* ---- Accept and reject
- * --------------------------------------------------------------------------------------------- */
+/* ---- Accept and reject ---- */
 
 static void measure_strain(drape_sim *sim, const double *x)
 {
@@ -76,11 +79,28 @@ static void measure_strain(drape_sim *sim, const double *x)
     s->strain_max = high;
 }
 
-static void accept(drape_sim *sim, const drape_step_info *info)
+/* The new state counts. What was now becomes past, as far back as the controller looks; the oldest is written over next. */
+static void turn_states(drape_sim *sim)
+{
+    int pasts = sim->chosen.controller->pasts, spare = sim->now;
+    for (int k = 0; k < pasts; k++) {
+        int older = sim->past[k];
+        sim->past[k] = spare;
+        spare = older;
+    }
+    if (spare < 0) /* not all places were filled yet: the first free one */
+        spare = (int)sim->statistics.steps_accepted + 2;
+    sim->before = sim->now;
+    sim->now = sim->next;
+    sim->next = spare;
+}
+
+static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
 {
     drape_statistics *s = &sim->statistics;
-    drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
-    sim->now = 1 - sim->now;
+    if (!info->committed)
+        drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
+    turn_states(sim);
     sim->energy_known = false;
     sim->dissipated += info->dissipated;
     sim->pin_work += info->pin_work;
@@ -88,7 +108,7 @@ static void accept(drape_sim *sim, const drape_step_info *info)
     s->h_min = s->steps_accepted == 0 ? info->h : fmin(info->h, s->h_min);
     s->h_max = fmax(info->h, s->h_max);
     s->steps_accepted++;
-    drape_schedule_accept(&sim->schedule, drape_sim_state(sim)->t);
+    drape_schedule_accept(&sim->schedule, drape_sim_state(sim)->t, h_next);
 }
 
 static void count_reason(drape_sim *sim, const char *reason)
@@ -109,8 +129,28 @@ static void reject(drape_sim *sim, const drape_step_info *info)
     count_reason(sim, info->reason);
 }
 
-/* ---- Telling
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- Judge ---- */
+
+static const drape_state *past_state(const drape_sim *sim, int k)
+{
+    return sim->past[k] >= 0 ? &sim->states[sim->past[k]] : NULL;
+}
+
+static drape_verdict judge(drape_sim *sim, drape_step_info *info, drape_status status, drape_trial *trial)
+{
+    *trial = (drape_trial){.model = sim->model,
+                           .past = {past_state(sim, 0), past_state(sim, 1)},
+                           .in = drape_sim_state(sim),
+                           .out = next_state(sim),
+                           .order = sim->chosen.integrator->order,
+                           .scratch = sim->scratch,
+                           .h = info->h,
+                           .info = info,
+                           .status = status};
+    return sim->chosen.controller->judge(sim->chosen.controller_values, trial);
+}
+
+/* ---- Telling ---- */
 
 /* "bend.hinge 37 (nodes 4 5 9 10 of sheet): altitude / rest altitude = 3e-09, limit 1e-06" */
 static void describe_worst(const drape_model *model, const drape_worst *worst, char *text, size_t size)
@@ -148,52 +188,55 @@ static drape_status tell_attempt(drape_sim *sim, const drape_attempt *attempt)
     return drape_sim_tell(sim, &event);
 }
 
-/* ---- One step, and all of them
- * --------------------------------------------------------------------------------------- */
+/* ---- One step, and all of them ---- */
 
-/* One attempt from proposal to verdict. *stop: the negative status that ends the advance, 0 to go on. */
-static drape_verdict try_step(drape_sim *sim, double t1, double h, drape_attempt *record, drape_status *stop)
+/* What an attempt was, for the observers. */
+static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *info, drape_status status,
+                               bool accepted)
 {
-    drape_step_info info = {.reason = "converged", .h = h};
-    double t = drape_sim_state(sim)->t;
-    drape_status status = attempt(sim, t1, h, &info);
-    *record = (drape_attempt){.index = sim->attempts++,
-                              .t = t,
-                              .h = info.h,
-                              .status = status,
-                              .reason = info.reason,
-                              .iterations = info.iterations,
-                              .residual = info.residual,
-                              .tolerance = info.tolerance,
-                              .worst = info.worst};
-    *stop = status;
-    drape_verdict verdict =
-        sim->chosen.controller->judge(sim->chosen.controller_values, t, info.h, &info, stop);
-    record->accepted = verdict == DRAPE_ACCEPT;
-    if (verdict == DRAPE_ACCEPT)
-        accept(sim, &info);
-    else
-        reject(sim, &info);
-    if (verdict == DRAPE_HALVE)
-        drape_schedule_halve(&sim->schedule, info.h);
-    if (verdict != DRAPE_STOP)
-        *stop = DRAPE_OK;
-    return verdict;
+    return (drape_attempt){.index = sim->attempts++,
+                           .t = t,
+                           .h = info->h,
+                           .status = status,
+                           .reason = info->reason,
+                           .accepted = accepted,
+                           .iterations = info->iterations,
+                           .residual = info->residual,
+                           .tolerance = info->tolerance,
+                           .worst = info->worst};
 }
 
+/* One attempt from proposal to verdict. *stop: the negative status that ends the advance, 0 to go on. */
+static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status *stop)
+{
+    drape_step_info info = {.reason = "converged", .h = h};
+    drape_trial trial;
+    double t = drape_sim_state(sim)->t;
+    drape_status status = attempt(sim, t1, h, &info);
+    drape_verdict verdict = judge(sim, &info, status, &trial);
+    bool refused = status == DRAPE_OK && verdict != DRAPE_ACCEPT; /* by the controller alone */
+    *stop = verdict == DRAPE_STOP ? trial.status : DRAPE_OK;
+    if (verdict == DRAPE_ACCEPT)
+        accept(sim, &info, trial.h_next);
+    else
+        reject(sim, &info);
+    if (verdict == DRAPE_RETRY && !drape_schedule_retry(&sim->schedule, trial.h_next))
+        *stop = DRAPE_E_STEP_TOO_SMALL;
+    return record_of(sim, t, &info, refused ? DRAPE_RETRY_REJECTED : status, verdict == DRAPE_ACCEPT);
+}
+
+/* The frames inside an accepted step belong to it even if an observer stops the run there. */
 static drape_status step(drape_sim *sim, double t1, double h)
 {
-    drape_attempt record;
     drape_status stop = DRAPE_OK;
     double start = drape_clock_seconds();
-    drape_verdict verdict = try_step(sim, t1, h, &record, &stop);
+    drape_attempt record = try_step(sim, t1, h, &stop);
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     drape_status told = tell_attempt(sim, &record);
-    if (told)
-        return told;
-    if (verdict == DRAPE_STOP)
+    drape_status framed = record.accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
+    if (stop)
         return explain(sim, stop, &record);
-    return verdict == DRAPE_ACCEPT ? drape_sim_emit_frames(sim, next_state(sim)) : DRAPE_OK;
+    return told ? told : framed;
 }
 
 drape_status drape_sim_advance(drape_sim *sim, double t_end)
@@ -203,8 +246,9 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
         return DRAPE_E_ARGUMENT;
     if (!isfinite(t_end))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_advance: t_end is not finite");
-    drape_status status = sim->next_frame == 0 ? drape_sim_emit_frames(sim, NULL) : DRAPE_OK;
-    drape_schedule_aim(&sim->schedule, drape_sim_state(sim)->t, t_end);
+    drape_status status =
+        drape_sim_emit_frames(sim); /* the first, and those that an observer's stop left over */
+    drape_schedule_aim(&sim->schedule, t_end);
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h))
         status = step(sim, t1, h);
     return status;

@@ -65,7 +65,7 @@ static void check_one_line(const char *text)
         ck_assert_msg((unsigned char)*text >= ' ' && *text != 127, "control character %d", *text);
 }
 
-/* ---- Defs -------------------------------------------------------------------------------------------- */
+/* ---- Defs ---- */
 
 static const char example[] =
     "{ 'drape': 1,\n"
@@ -117,7 +117,7 @@ START_TEST(test_example_scene)
     check_setting(&def.integrator.settings[0], "dt", 0.01, NULL);
     check_setting(&def.integrator.settings[2], "max_iterations", 50, NULL);
     check_setting(&def.integrator.settings[3], "linear_solver", 0, "klu");
-    check_setting(&def.integrator.settings[4], "accept", 1, NULL);
+    check_setting(&def.integrator.settings[4], "accept", 0, "true");
     ck_assert_str_eq(def.controller.type, "fixed");
     check_setting(&def.controller.settings[0], "dt_min", 1e-7, NULL);
     close_context();
@@ -262,7 +262,7 @@ START_TEST(test_def_sizes)
 }
 END_TEST
 
-/* ---- Comments ---------------------------------------------------------------------------------------- */
+/* ---- Comments ---- */
 
 START_TEST(test_comments)
 {
@@ -277,7 +277,7 @@ START_TEST(test_comments)
 }
 END_TEST
 
-/* ---- Places ------------------------------------------------------------------------------------------ */
+/* ---- Places ---- */
 
 static const char places[] =
     "// \xC3\xA9\n"
@@ -360,7 +360,7 @@ START_TEST(test_mend_end)
 }
 END_TEST
 
-/* ---- Wrong scenes ------------------------------------------------------------------------------------ */
+/* ---- Wrong scenes ---- */
 
 /* What is wrong stands in line 2. */
 #define ROOT(members)  "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g'}}],\n" members "}"
@@ -706,7 +706,7 @@ START_TEST(test_mutations)
 }
 END_TEST
 
-/* ---- Values that are set ----------------------------------------------------------------------------- */
+/* ---- Values that are set ---- */
 
 /* Each on the example: message NULL for those that are fine. */
 static const struct {
@@ -846,7 +846,7 @@ START_TEST(test_set_order)
 }
 END_TEST
 
-/* ---- Faults of others -------------------------------------------------------------------------------- */
+/* ---- Faults of others ---- */
 
 START_TEST(test_locate_fault)
 {
@@ -865,7 +865,7 @@ START_TEST(test_locate_fault)
 }
 END_TEST
 
-/* ---- Files ------------------------------------------------------------------------------------------- */
+/* ---- Files ---- */
 
 static void write_file(const char *path, const void *data, size_t size)
 {
@@ -961,7 +961,7 @@ START_TEST(test_arguments)
 }
 END_TEST
 
-/* ---- Size, locale, memory ---------------------------------------------------------------------------- */
+/* ---- Size, locale, memory ---- */
 
 START_TEST(test_many_nodes)
 {

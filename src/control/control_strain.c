@@ -1,0 +1,104 @@
+/*
+ * strain: halving that also refuses a step in which the cloth moves too far: an edge that changes its length, or a node that moves,
+ * by more than a share of the rest length. What happens in such a step is not resolved, even if the solver converged.
+ */
+#include "base/vec3.h"
+#include "control/halve.h"
+
+#include <math.h>
+
+enum { PARAM_DT_MIN, PARAM_MAX_STRETCH, PARAM_MAX_MOVE, PARAM_COUNT };
+
+static const drape_param params[PARAM_COUNT] = {
+    [PARAM_DT_MIN] = {.name = "dt_min",
+                      .unit = "s",
+                      .default_value = 1e-7,
+                      .min = 0,
+                      .max = 1e6,
+                      .open_min = true,
+                      .help = "no step is cut to less than this"},
+    [PARAM_MAX_STRETCH] = {.name = "max_stretch",
+                           .unit = "1",
+                           .default_value = 0.1,
+                           .min = 0,
+                           .max = 1e6,
+                           .open_min = true,
+                           .help = "largest change of an edge's length in one step, over its rest length"},
+    [PARAM_MAX_MOVE] =
+        {.name = "max_move",
+         .unit = "1",
+         .default_value = 10,
+         .min = 0,
+         .max = 1e9,
+         .open_min = true,
+         .help = "largest way of a node in one step, over the length of the shortest of its edges"},
+};
+
+static double length_between(const double *x, const int32_t *node)
+{
+    double d[3];
+    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], d);
+    return vec3_norm(d);
+}
+
+static double way(const drape_trial *trial, int32_t node)
+{
+    double d[3];
+    vec3_sub(trial->out->x + 3 * (size_t)node, trial->in->x + 3 * (size_t)node, d);
+    return vec3_norm(d);
+}
+
+/* Keeps the worst of one kind; limit and what are set by the caller. */
+static void keep(drape_worst *worst, const int32_t *node, int count, double value)
+{
+    if (value <= worst->value)
+        return;
+    worst->value = value;
+    for (int a = 0; a < count; a++)
+        worst->node[a] = node[a];
+}
+
+static bool too_far(const double *values, drape_trial *trial)
+{
+    const drape_model *m = trial->model;
+    drape_worst stretch = {
+        .what = "change of edge length / rest length", .term = "", .element = -1, .node = {-1, -1, -1, -1}};
+    drape_worst move = {
+        .what = "way of a node / edge length", .term = "", .element = -1, .node = {-1, -1, -1, -1}};
+    stretch.limit = values[PARAM_MAX_STRETCH];
+    move.limit = values[PARAM_MAX_MOVE];
+    for (int32_t e = 0; e < m->edge_count; e++) {
+        const int32_t *node = m->edge + 2 * (size_t)e;
+        double rest = m->edge_length[e];
+        keep(&stretch, node, 2,
+             fabs(length_between(trial->out->x, node) - length_between(trial->in->x, node)) / rest);
+        keep(&move, &node[0], 1, way(trial, node[0]) / rest);
+        keep(&move, &node[1], 1, way(trial, node[1]) / rest);
+    }
+    bool stretched = stretch.value > stretch.limit, moved = move.value > move.limit;
+    if (!stretched && !moved)
+        return false;
+    trial->info->reason = stretched ? "stretch" : "move";
+    trial->info->worst = stretched ? stretch : move;
+    trial->info->worst.cloth = drape_model_cloth_of(m, trial->info->worst.node[0]);
+    return true;
+}
+
+static drape_verdict judge(const double *values, drape_trial *trial)
+{
+    if (trial->status && !trial->info->usable)
+        return drape_halve(values[PARAM_DT_MIN], trial);
+    if (!too_far(values, trial))
+        return DRAPE_ACCEPT;
+    trial->status = DRAPE_RETRY_REJECTED;
+    return drape_halve(values[PARAM_DT_MIN], trial);
+}
+
+const drape_controller_ops drape_controller_strain = {
+    .name = "strain",
+    .summary = "halving that also rejects steps in which an edge or a node moves too far",
+    .reference = "-",
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .judge = judge,
+};

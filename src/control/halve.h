@@ -1,0 +1,13 @@
+/* halve.h: what controllers share: dt_min, and the rule that a step is halved until it is too small. */
+#ifndef DRAPE_CONTROL_HALVE_H
+#define DRAPE_CONTROL_HALVE_H
+
+#include "control/control.h"
+
+extern const drape_param drape_dt_min_param;
+
+/* The attempt failed, or was refused with a status > 0: half of it next, or DRAPE_E_STEP_TOO_SMALL where that is below dt_min or no longer
+ * moves the time. A negative status stops as it is. */
+drape_verdict drape_halve(double dt_min, drape_trial *trial);
+
+#endif
