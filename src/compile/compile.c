@@ -217,7 +217,9 @@ drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape
     if (!model)
         return DRAPE_E_MEMORY;
     model->ctx = ctx;
-    drape_status status = copy_scene(model, def);
+    drape_status status = drape_compile_check_def(ctx, def);
+    if (!status)
+        status = copy_scene(model, def);
     if (!status)
         status = compile_cloths(model, def);
     if (!status)
@@ -226,6 +228,8 @@ drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape
         status = drape_compile_terms(model, def);
     if (!status)
         status = drape_compile_pattern(model);
+    for (int32_t c = 0; c < model->cloth_count; c++) /* a scene without bending keeps no hinges */
+        drape_mesh_drop_topology(ctx, &model->cloths[c].mesh);
     if (!status)
         stop_pinned(model);
     if (status)

@@ -6,6 +6,9 @@
 #include "base/param.h"
 #include "compile/compile.h"
 
+/* Nothing that a count promises is NULL. */
+drape_status drape_compile_check_def(drape_context *ctx, const drape_scene_def *def);
+
 /* Resolves the material of a cloth whose mesh stands, and lumps its mass. pointer: "/cloth/0". */
 drape_status drape_compile_material(drape_model *model, const char *pointer, const drape_cloth_def *def,
                                     drape_cloth *cloth);

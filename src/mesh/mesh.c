@@ -129,6 +129,14 @@ drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drap
     return status;
 }
 
+void drape_mesh_drop_topology(drape_context *ctx, drape_mesh *mesh)
+{
+    drape_free(ctx, mesh->edge_triangle);
+    drape_free(ctx, mesh->hinge);
+    drape_free(ctx, mesh->hinge_edge);
+    mesh->edge_triangle = mesh->hinge = mesh->hinge_edge = NULL;
+}
+
 void drape_mesh_free(drape_context *ctx, drape_mesh *mesh)
 {
     drape_free(ctx, mesh->x);

@@ -106,6 +106,9 @@ drape_status drape_mesh_measure(drape_context *ctx, drape_mesh *mesh);
  * failure. */
 drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
                              const char *folder, drape_mesh *mesh);
+/* Frees what only the building of terms needs: edge_triangle and the hinges. Their pointers become NULL. */
+void drape_mesh_drop_topology(drape_context *ctx, drape_mesh *mesh);
+
 void drape_mesh_free(drape_context *ctx, drape_mesh *mesh); /* leaves it empty; an empty one is fine */
 
 #endif
