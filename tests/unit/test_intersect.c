@@ -1,0 +1,111 @@
+/* test_intersect.c: edges that pass through triangles are counted exactly, whatever cells the grid puts them in. */
+#include "contact/intersect.h"
+#include "support/suite.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Two squares of 5 x 5 nodes, the second turned upright through the middle of the first, shifted by a hair so that no edge touches a node. */
+static drape_model *crossed_squares(drape_context *ctx, double shift)
+{
+    static const drape_setting grid[] = {
+        {"columns", 5, NULL}, {"rows", 5, NULL}, {"width", 1, NULL}, {"height", 1, NULL}};
+    static const drape_setting material[] = {
+        {"young_modulus", 1e5, NULL}, {"thickness", 1e-3, NULL}, {"density", 200, NULL}};
+    drape_cloth_def cloths[2];
+    drape_scene_def scene;
+    drape_model *model = NULL;
+    drape_scene_def_init(&scene, sizeof scene);
+    for (int c = 0; c < 2; c++) {
+        drape_cloth_def_init(&cloths[c], sizeof cloths[c]);
+        cloths[c].mesh.grid = (drape_row_def){"square", grid, 4};
+        cloths[c].material = material;
+        cloths[c].material_count = 3;
+    }
+    const double upright[4] = {1, 0, 0, 90};
+    memcpy(cloths[1].mesh.rotate, upright, sizeof upright);
+    cloths[1].mesh.translate[0] = 0.013;
+    cloths[1].mesh.translate[1] = shift;
+    cloths[1].mesh.translate[2] = -0.387;
+    scene.cloths = cloths;
+    scene.cloth_count = 2;
+    ck_assert_int_eq(drape_model_create(ctx, &scene, &model), DRAPE_OK);
+    return model;
+}
+
+/* Every edge against every triangle, by solving for the point where they meet. */
+static int64_t count_all_pairs(const drape_model *m, const double *x)
+{
+    int64_t count = 0;
+    for (int32_t e = 0; e < m->edge_count; e++)
+        for (int32_t t = 0; t < m->triangle_count; t++) {
+            const int32_t *edge = m->edge + 2 * (size_t)e, *tri = m->triangle + 3 * (size_t)t;
+            const double *p = x + 3 * (size_t)edge[0], *q = x + 3 * (size_t)edge[1],
+                         *a = x + 3 * (size_t)tri[0];
+            double d[3], u[3], v[3], w[3];
+            bool shared = false;
+            for (int k = 0; k < 3; k++) {
+                d[k] = q[k] - p[k];
+                u[k] = x[3 * (size_t)tri[1] + (size_t)k] - a[k];
+                v[k] = x[3 * (size_t)tri[2] + (size_t)k] - a[k];
+                w[k] = p[k] - a[k];
+                shared = shared || tri[k] == edge[0] || tri[k] == edge[1];
+            }
+            /* Cramer's rule for s u + r v - l d = w */
+            double det = -(u[0] * (v[1] * d[2] - v[2] * d[1]) - u[1] * (v[0] * d[2] - v[2] * d[0]) +
+                           u[2] * (v[0] * d[1] - v[1] * d[0]));
+            double s = -(w[0] * (v[1] * d[2] - v[2] * d[1]) - w[1] * (v[0] * d[2] - v[2] * d[0]) +
+                         w[2] * (v[0] * d[1] - v[1] * d[0])) /
+                       det;
+            double r = -(u[0] * (w[1] * d[2] - w[2] * d[1]) - u[1] * (w[0] * d[2] - w[2] * d[0]) +
+                         u[2] * (w[0] * d[1] - w[1] * d[0])) /
+                       det;
+            double l = (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) +
+                        u[2] * (v[0] * w[1] - v[1] * w[0])) /
+                       det;
+            count += !shared && det != 0 && s > 0 && r > 0 && s + r < 1 && l > 0 && l < 1;
+        }
+    return count;
+}
+
+START_TEST(crossing_sheets_are_counted_as_by_all_pairs)
+{
+    drape_context *ctx = NULL;
+    drape_intersections found;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    drape_model *model = crossed_squares(ctx, -0.4629);
+    double *x = model->rest;
+    int64_t expected = count_all_pairs(model, x);
+    ck_assert_int_gt(expected, 5); /* 4 cells wide: at least one edge a cell */
+    ck_assert_int_eq(drape_find_intersections(ctx, model, x, &found), DRAPE_OK);
+    ck_assert_int_eq(found.count, expected);
+    ck_assert_int_ge(found.edge[0], 0);
+    uint64_t random = 1; /* crumpled states: many pairs in many cells */
+    for (int round = 0; round < 20; round++) {
+        for (int32_t i = 0; i < 3 * model->node_count; i++) {
+            random = random * UINT64_C(6364136223846793005) + 1;
+            x[i] += 0.2 * ((double)(random >> 11) / 9007199254740992.0 - 0.5);
+        }
+        ck_assert_int_eq(drape_find_intersections(ctx, model, x, &found), DRAPE_OK);
+        ck_assert_int_eq(found.count, count_all_pairs(model, x));
+    }
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(sheets_apart_have_none)
+{
+    drape_context *ctx = NULL;
+    drape_intersections found;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    drape_model *model = crossed_squares(ctx, 3);
+    ck_assert_int_eq(drape_find_intersections(ctx, model, model->rest, &found), DRAPE_OK);
+    ck_assert_int_eq(found.count, 0);
+    ck_assert_int_eq(found.edge[0], -1);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+SUITE("intersect", crossing_sheets_are_counted_as_by_all_pairs, sheets_apart_have_none)
