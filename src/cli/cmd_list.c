@@ -41,8 +41,7 @@ static param_text text_of(const drape_param *param)
     return text;
 }
 
-/* ---- As text
- * ----------------------------------------------------------------------------------------------- */
+/* ---- As text ---- */
 
 static void nothing(void) {}
 
@@ -73,8 +72,7 @@ static void text_param(const cli_row *row, const drape_param *param)
            isnan(param->default_value) ? "" : "default ", text.value);
 }
 
-/* ---- As Markdown
- * ------------------------------------------------------------------------------------------- */
+/* ---- As Markdown ---- */
 
 /* A cell: what would end it is written as it must be. */
 static void cell(const char *text)
@@ -139,8 +137,7 @@ static const list_style text_style = {text_table, nothing, text_row, no_params, 
 static const list_style markdown_style = {markdown_table,        markdown_rows_begin, markdown_row,
                                           markdown_params_begin, markdown_param,      true};
 
-/* ---- What is printed
- * --------------------------------------------------------------------------------------- */
+/* ---- What is printed ---- */
 
 static bool has_params(const cli_table *table, const char *only)
 {

@@ -39,8 +39,7 @@ static void note(run *r, drape_status status)
     snprintf(r->message, sizeof r->message, "%s", drape_context_message(r->in.ctx));
 }
 
-/* ---- Output
- * ------------------------------------------------------------------------------------------------ */
+/* ---- Output ---- */
 
 /* A run that is killed must not leave the summary of the one before. What is no regular file stays: a
  * summary is written through it. */
@@ -83,8 +82,7 @@ static void write_summary(run *r, const char *path)
     note(r, drape_summary_write(r->in.ctx, r->in.sim, &def, path));
 }
 
-/* ---- Results on stdout
- * ------------------------------------------------------------------------------------- */
+/* ---- Results on stdout ---- */
 
 static void print_steps(const run *r, const drape_statistics *s)
 {
@@ -158,8 +156,7 @@ static void print_results(const run *r)
                (long long)drape_recorder_frames(r->recorder), r->request->out);
 }
 
-/* ---- The run
- * ----------------------------------------------------------------------------------------------- */
+/* ---- The run ---- */
 
 /* Comes after the recorder, so that the step in which the signal came is logged. */
 static drape_status watch(void *user, const drape_event *event)

@@ -46,8 +46,7 @@ static json_t *vector(const double v[3])
     return and_also(and_also(and_also(json_array(), number(v[0])), number(v[1])), number(v[2]));
 }
 
-/* ---- Parameters
- * -------------------------------------------------------------------------------------------- */
+/* ---- Parameters ---- */
 
 static json_t *value_of(const drape_param *param, double value)
 {
@@ -85,8 +84,7 @@ static json_t *chosen(const cli_chosen_row *row, const drape_chosen *all)
     return with(object, "ignored", ignored);
 }
 
-/* ---- Cloths and terms
- * -------------------------------------------------------------------------------------- */
+/* ---- Cloths and terms ---- */
 
 static json_t *material(const drape_material *m)
 {
@@ -134,8 +132,7 @@ static json_t *term(const cli_info *info, int32_t i)
                 params_of(from->ops->params, from->ops->param_count, from->params, NULL));
 }
 
-/* ---- Costs
- * ------------------------------------------------------------------------------------------------- */
+/* ---- Costs ---- */
 
 static json_t *iteration(const cli_info *info)
 {

@@ -2,13 +2,13 @@
  * instance, pairs of neighbouring triangles, but they are named by the term that uses them alone. */
 #include "cli/info.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #define MOST_NODES 12 /* that are listed by number */
 
-/* ---- Scene and cloths
- * -------------------------------------------------------------------------------------- */
+/* ---- Scene and cloths ---- */
 
 static void print_scene(const cli_info *info)
 {
@@ -68,8 +68,7 @@ static void print_cloth(const cli_info *info, int32_t c)
     print_material(&cloth->material);
 }
 
-/* ---- Integrator and controller
- * ----------------------------------------------------------------------------- */
+/* ---- Integrator and controller ---- */
 
 static void print_ignored(const cli_chosen_row *row, const drape_chosen *chosen)
 {
@@ -82,22 +81,27 @@ static void print_ignored(const cli_chosen_row *row, const drape_chosen *chosen)
     fputs(any ? "\n" : "", stdout);
 }
 
+/* With its unit, unless it is words or has none. */
+static void print_value(const drape_param *param, double value)
+{
+    char text[128];
+    drape_param_value_text(param, value, text, sizeof text);
+    bool has_unit = !isnan(value) && strcmp(param->unit, "1") != 0;
+    printf("%s%s%s", text, has_unit ? " " : "", has_unit ? param->unit : "");
+}
+
 static void print_chosen(const cli_chosen_row *row, const drape_chosen *chosen)
 {
     printf("\n%s %s: %s\n", row->title, row->name, row->summary);
     for (int p = 0; p < row->param_count; p++) {
-        const drape_param *param = &row->params[p];
-        char value[128];
-        drape_param_value_text(param, row->values[p], value, sizeof value);
-        printf("  %-16s %s%s%s%s\n", param->name, value, strcmp(param->unit, "1") ? " " : "",
-               strcmp(param->unit, "1") ? param->unit : "",
-               cli_is_given(row->choice, param->name) ? "" : " (default)");
+        printf("  %-16s ", row->params[p].name);
+        print_value(&row->params[p], row->values[p]);
+        puts(cli_is_given(row->choice, row->params[p].name) ? "" : " (default)");
     }
     print_ignored(row, chosen);
 }
 
-/* ---- Terms
- * ------------------------------------------------------------------------------------------------- */
+/* ---- Terms ---- */
 
 static void print_term(const cli_info *info, int32_t i)
 {
@@ -110,11 +114,8 @@ static void print_term(const cli_info *info, int32_t i)
         printf("%d %s elements of %d node%s", (int)term->elements.count, term->ops->element_name,
                term->elements.nodes, term->elements.nodes == 1 ? "" : "s");
     for (int p = 0; p < term->ops->param_count; p++) {
-        const drape_param *param = &term->ops->params[p];
-        char value[128];
-        drape_param_value_text(param, term->params[p], value, sizeof value);
-        printf("; %s %s%s%s", param->name, value, strcmp(param->unit, "1") ? " " : "",
-               strcmp(param->unit, "1") ? param->unit : "");
+        printf("; %s ", term->ops->params[p].name);
+        print_value(&term->ops->params[p], term->params[p]);
     }
     fputc('\n', stdout);
 }
@@ -128,8 +129,7 @@ static void print_terms(const cli_info *info)
         puts("  none: the nodes fly on as they began");
 }
 
-/* ---- Costs
- * ------------------------------------------------------------------------------------------------- */
+/* ---- Costs ---- */
 
 static void print_count(long long count)
 {

@@ -47,8 +47,7 @@ static option_list list_options(const drape_verb *verb)
     return list;
 }
 
-/* ---- Help and faults
- * --------------------------------------------------------------------------------------- */
+/* ---- Help and faults ---- */
 
 static void print_option(const char *name, const char *argument, const char *text)
 {
@@ -91,8 +90,7 @@ static int unknown_option(const drape_verb *verb, const option_list *list, const
                       meant ? "; did you mean \"--" : "", meant ? meant : "", meant ? "\"?" : "", verb->name);
 }
 
-/* ---- Values
- * ------------------------------------------------------------------------------------------------ */
+/* ---- Values ---- */
 
 static int no_memory(const cli_command *command)
 {
@@ -179,8 +177,7 @@ static int take(cli_command *command, const cli_option *option, const char *argu
     return takers[option->kind](command, option, argument);
 }
 
-/* ---- The line
- * ---------------------------------------------------------------------------------------------- */
+/* ---- The line ---- */
 
 static void make_table(const option_list *list, struct option *table)
 {

@@ -16,8 +16,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* ---- Small pieces
- * ------------------------------------------------------------------------------------------ */
+/* ---- Small pieces ---- */
 
 /* Takes both references. The container, or NULL if it or the value is not there. */
 static json_t *with(json_t *object, const char *key, json_t *value)
@@ -88,8 +87,7 @@ static json_t *exactly_one(json_t *object, const char *const *names)
     return with(object, "oneOf", cases);
 }
 
-/* ---- Parameters of rows
- * ------------------------------------------------------------------------------------ */
+/* ---- Parameters of rows ---- */
 
 static bool is_required(const drape_param *p)
 {
@@ -184,8 +182,7 @@ static json_t *row_names(const cli_table *table, bool alone)
     return with(json_object(), "enum", names);
 }
 
-/* ---- Which tables stand where in a scene
- * ------------------------------------------------------------------- */
+/* ---- Which tables stand where in a scene ---- */
 
 typedef enum opening_kind {
     ROW_PARAMS,  /* the parameters of the named row, and no others */
@@ -226,8 +223,7 @@ static json_t *words_of(const drape_scene_object *object, const drape_scene_key 
     return key->words ? one_of_words(key->words) : word();
 }
 
-/* ---- Keys
- * -------------------------------------------------------------------------------------------------- */
+/* ---- Keys ---- */
 
 static json_t *object_schema(const drape_scene_object *object);
 
@@ -289,8 +285,7 @@ static bool key_is_required(const drape_scene_key *key)
     return key->required || (opening && !opening->key && opening->table->row(0, &row) && needs_params(&row));
 }
 
-/* ---- Objects
- * ----------------------------------------------------------------------------------------------- */
+/* ---- Objects ---- */
 
 /* Whether a key is an alternative to another one, which was chosen. */
 static bool is_excluded(const drape_scene_object *object, const char *name, const char *chosen)

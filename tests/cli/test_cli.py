@@ -1,0 +1,584 @@
+#!/usr/bin/env python3
+"""The program `drape` as its users meet it: exit codes, messages, files. TAP on stdout.
+
+DRAPE_BUILD is the folder of the build, DRAPE_SOURCE that of the sources; or: test_cli.py PROGRAM [SOURCES]. A test is a
+function test_*; its docstring is its name. Everything is written below a temporary folder.
+"""
+import csv
+import glob
+import json
+import os
+import pty
+import re
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+
+SOURCES = sys.argv[2] if len(sys.argv) > 2 else os.environ.get("DRAPE_SOURCE", os.path.dirname(__file__) + "/../..")
+PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRAPE_BUILD"] + "/drape")
+SOURCES = os.path.abspath(SOURCES)
+VERBS = ["run", "info", "check", "list"]
+LIMIT = 300  # [s] for one call: sanitizers are slow
+
+
+class Skip(Exception):
+    pass
+
+
+def scene(**changes):
+    """16 nodes, one corner free to swing for 0.1 s: a run takes milliseconds."""
+    cloth = {
+        "name": "sheet",
+        "mesh": {"grid": "equilateral", "edges": 3, "edge_length": 0.1},
+        "material": {"young_modulus": 1e5, "thickness": 1e-3, "density": 200},
+        "terms": ["stretch.edge", "bend.hinge", {"type": "damp.kelvin_voigt", "beta": 1e-3}],
+        "pins": [{"corner": "top-left"}, {"corner": "top-right"}],
+    }
+    whole = {"drape": 1, "cloth": [cloth], "integrator": {"dt": 0.01}, "duration": 0.1, "frame_rate": 30}
+    for key, value in changes.items():
+        (cloth if key in cloth else whole)[key] = value
+    return whole
+
+
+def write_scene(**changes):
+    with open("scene.json", "w", encoding="utf-8") as file:
+        json.dump(scene(**changes), file, indent=1)
+    return "scene.json"
+
+
+def drape(*args, **options):
+    return subprocess.run([PROGRAM, *args], capture_output=True, text=True, timeout=LIMIT, **options)
+
+
+def equal(found, expected, what=""):
+    assert found == expected, f"{what}: found {found!r}, expected {expected!r}"
+
+
+def good(*args, **options):
+    result = drape(*args, **options)
+    equal((result.returncode, result.stderr), (0, ""), " ".join(args))
+    return result.stdout
+
+
+def refused(*args, says="", **options):
+    """Exit 2, one line, no result, and no file that was not there before."""
+    before = sorted(os.listdir("."))
+    result = drape(*args, **options)
+    equal(result.returncode, 2, " ".join(args) + ": " + result.stderr)
+    equal(result.stdout, "", " ".join(args))
+    assert re.fullmatch(r"[^\n]+\n", result.stderr), f"{args}: not one line: {result.stderr!r}"
+    assert says in result.stderr, f"{args}: {says!r} is not in {result.stderr!r}"
+    equal(sorted(os.listdir(".")), before, "files after " + " ".join(args))
+    return result.stderr
+
+
+def read_json(path):
+    with open(path, encoding="utf-8") as file:
+        return json.load(file)
+
+
+def read_steps(folder):
+    with open(folder + "/steps.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def read_npy(path):
+    """(frames, nodes, 3) and the numbers, by the format's definition."""
+    with open(path, "rb") as file:
+        data = file.read()
+    equal(data[:8], b"\x93NUMPY\x01\x00", "magic and version")
+    size = struct.unpack("<H", data[8:10])[0]
+    equal((10 + size) % 64, 0, "alignment of the data")
+    header = data[10:10 + size].decode("ascii")
+    equal(re.search(r"'descr': '(.*?)'", header).group(1), "<f8", "type")
+    equal(re.search(r"'fortran_order': (\w+)", header).group(1), "False", "order")
+    shape = tuple(int(n) for n in re.search(r"'shape': \((.*?)\)", header).group(1).split(","))
+    count = shape[0] * shape[1] * shape[2]
+    equal(len(data) - 10 - size, 8 * count, "bytes of data")
+    return shape, struct.unpack(f"<{count}d", data[10 + size:])
+
+
+# ---- Help and usage
+
+
+def test_help():
+    """help of the program and of every verb is on stdout with exit 0"""
+    overview = good("--help")
+    equal(good("help"), overview)
+    for verb in VERBS:
+        assert re.search(rf"^  {verb} ", overview, re.M), verb
+        text = good(verb, "--help")
+        assert text.startswith(f"usage: drape {verb} "), text
+        equal(good("help", verb), text)
+    assert re.fullmatch(r"drape \d+\.\d+\.\d+\n", good("--version"))
+
+
+def test_help_needs_no_scene():
+    """help comes before what else is wrong with a command line"""
+    good("run", "--help", "a", "b", "c")
+
+
+def test_wrong_usage():
+    """wrong command lines are one line, exit 2, and write nothing"""
+    write_scene()
+    refused(says="which verb")
+    refused("rnu", says='did you mean "run"?')
+    refused("help", "chekc", says='did you mean "check"?')
+    refused("run", says="SCENE is missing")
+    refused("run", "scene.json", "scene.json", says="one SCENE is taken, 2 are given")
+    refused("run", "scene.json", "--dration", "1", says='did you mean "--duration"?')
+    refused("run", "scene.json", "--out", says="--out needs an argument")
+    refused("run", "scene.json", "--out", "", says="--out")
+    refused("run", "scene.json", "-x", says='no option "-x"')
+    refused("info", "scene.json", "--json=1", says="takes no argument")
+    refused("info", "scene.json", "--out", "x", says='no option "--out"')
+    refused("run", "scene.json", "--threads", "none", says="1 to 256")
+    refused("run", "scene.json", "--threads", "257", says="1 to 256")
+    refused("run", "scene.json", "--set", "integrator.dt=1", says="/pointer=value")
+    refused("run", "scene.json", "--set", "/integrator/dt", says="/pointer=value")
+    refused("list", "klo", says='did you mean "klu"?')
+    refused("list", "terms", "--schema", says="--schema")
+
+
+def test_wrong_scenes():
+    """bad input is one line with place and pointer, exit 2, for every verb that takes a scene"""
+    write_scene(duration=-1)
+    for verb in "run", "info", "check":
+        line = refused(verb, "scene.json", says="/duration: ")
+        assert re.match(r"scene\.json:\d+:\d+: ", line), line
+    refused("run", "missing.json", "--out", "out", says="missing.json")
+    write_scene()
+    refused("run", "scene.json", "--out", "out", "--set", "/cloth/0/terms/0=stretch.egde", says='did you mean "stretch.edge"?')
+    refused("run", "scene.json", "--out", "out", "--dt", "-1", says="--set /integrator/dt=-1: /integrator/dt: ")
+    refused("run", "scene.json", "--out", "out", "--dt", "fast", says="/integrator/dt")
+    refused("run", "scene.json", "--out", "out", "--integrator", "eb", says="/integrator/method")
+    refused("run", "scene.json", "--out", "out", "--controller", "halve", says="/controller/type")
+    refused("run", "scene.json", "--out", "out", "--linear-solver", "kul", says='did you mean "klu"?')
+    refused("run", "scene.json", "--out", "out", "--summary", "s.json", "--duration", "0", says="/duration")
+
+
+def test_wrong_formats():
+    """a wrong format is found before anything is made, by every verb"""
+    write_scene(output={"formats": ["npy", "nyp"]})
+    for verb in "run", "info", "check":
+        line = refused(verb, "scene.json", says='/output/formats/1: unknown format "nyp"')
+        assert re.match(r"scene\.json:\d+:\d+: ", line), line
+    refused("run", "scene.json", "--out", "out", "--format", "npy,objj", says='did you mean "obj"?')
+    good("run", "scene.json", "--out", "out", "--format", "npy")
+
+
+# ---- Runs
+
+
+def test_run_without_out():
+    """without --out a run writes nothing but its results on stdout"""
+    write_scene()
+    text = good("run", "scene.json")
+    assert re.search(r"^status +ok$", text, re.M), text
+    assert re.search(r"^steps +10 accepted, 0 rejected", text, re.M), text
+    equal(os.listdir("."), ["scene.json"])
+
+
+def test_run_files():
+    """frames, steps.csv and summary.json say what was asked for"""
+    write_scene()
+    good("run", "scene.json", "--out", "deep/er/out/", "--summary", "s.json", "--format", "npy,obj,ply,npy")
+    shape, numbers = read_npy("deep/er/out/positions.npy")
+    frames = 4  # t = 0, 1/30, 2/30, 3/30 = the end
+    equal(shape, (frames, 16, 3))
+    for ending in "obj", "ply":
+        found = sorted(os.path.basename(path) for path in glob.glob("deep/er/out/frame_*"))
+        equal([name for name in found if name.endswith(ending)], [f"frame_{i:06d}.{ending}" for i in range(frames)])
+    equal(glob.glob("deep/er/out/**/*.npy", recursive=True), ["deep/er/out/positions.npy"])
+    with open("deep/er/out/frame_000003.obj", encoding="ascii") as file:
+        nodes = [[float(word) for word in line.split()[1:]] for line in file if line.startswith("v ")]
+    equal([x for node in nodes for x in node], list(numbers[-48:]), "the last frame in both formats")
+    summary = read_json("s.json")
+    equal(read_json("deep/er/out/summary.json")["hash"], summary["hash"])
+    equal((summary["status"], summary["message"], summary["frames"]), ("ok", "", frames))
+    equal((summary["nodes"], summary["dofs"]), (16, 42))
+    assert abs(summary["time"] - 0.1) < 1e-15
+    rows = read_steps("deep/er/out")
+    equal(len(rows), summary["steps"]["accepted"] + summary["steps"]["rejected"])
+    equal([row["attempt"] for row in rows], [str(i) for i in range(len(rows))])
+    equal(sum(int(row["iterations"]) for row in rows), summary["newton"]["iterations"])
+    for row in rows:
+        assert float(row["residual"]) <= float(row["tolerance"]) and row["accepted"] == "1", row
+
+
+def test_last_frame():
+    """the last frame is the end, also where no frame is due there"""
+    write_scene(duration=0.05)
+    good("run", "scene.json", "--out", "out", "--format", "npy")
+    equal(read_npy("out/positions.npy")[0][0], 3)  # 0, 1/30, 0.05
+    equal(read_json("out/summary.json")["frames"], 3)
+    write_scene(duration=0.3, frame_rate=7)  # 0, 1/7, 2/7, 0.3
+    good("run", "scene.json", "--out", "out", "--format", "npy")
+    equal(read_npy("out/positions.npy")[0][0], 4)
+
+
+def test_settings():
+    """--set and the short options change the scene, the last one wins, and the result is the same"""
+    write_scene()
+    def hash_of(*args):
+        good("run", "scene.json", "--summary", "s.json", *args)
+        return read_json("s.json")["hash"]
+    plain = hash_of()
+    equal(hash_of("--set", "/integrator/dt=0.005", "--dt", "0.01"), plain)
+    fine = hash_of("--dt", "0.005")
+    assert fine != plain
+    equal(read_json("s.json")["steps"]["accepted"], 20)
+    equal(hash_of("--set=/integrator/dt=0.005"), fine)
+    equal(hash_of("--threads", "3"), plain)
+    assert hash_of("--set", "/gravity=[0, 0, 0]") != plain
+    hash_of("--set", "/integrator/linear_solver=dense")
+    hash_of("--linear-solver", "dense", "--tolerance", "1e-9", "--controller", "fixed", "--integrator", "be")
+    hash_of("--duration", "0.02", "--set", '/output={"formats": []}', "--format", "")
+    equal(read_json("s.json")["steps"]["accepted"], 2)
+
+
+def test_failure():
+    """a run that fails ends with exit 1, one line, the summary of what was, and its frames"""
+    write_scene(duration=1, integrator={"dt": 0.01, "max_iterations": 1, "tolerance": 1e-12})
+    result = drape("run", "scene.json", "--out", "out", "--format", "npy", "--controller", "fixed")
+    equal(result.returncode, 1, result.stderr)
+    assert re.fullmatch(r"t=[^\n]+max_iterations[^\n]+\n", result.stderr), result.stderr
+    summary = read_json("out/summary.json")
+    equal((summary["status"], summary["message"] + "\n"), ("e_solver", result.stderr))
+    equal(summary["steps"]["reasons"], {"max_iterations": 1})
+    equal(read_npy("out/positions.npy")[0][0], summary["frames"])
+    assert re.search(r"^status +e_solver$", result.stdout, re.M), result.stdout
+    write_scene(duration=1, integrator={"dt": 0.01, "max_iterations": 1, "tolerance": 1e-12}, controller={"dt_min": 1e-3})
+    result = drape("run", "scene.json", "--out", "out")
+    equal((result.returncode, read_json("out/summary.json")["status"]), (1, "e_step_too_small"))
+    assert all(row["accepted"] == "0" for row in read_steps("out")), "the last attempt failed, and all before it"
+
+
+def interrupt(signals, *args):
+    """Signals a run when its step log has begun to fill; the exit code and stderr."""
+    with subprocess.Popen([PROGRAM, "run", "scene.json", "--out", "out", *args],
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        end = time.monotonic() + LIMIT
+        while time.monotonic() < end and process.poll() is None:
+            if os.path.exists("out/steps.csv") and len(read_steps("out")) >= 3:
+                break
+            time.sleep(0.01)
+        for one in signals:
+            process.send_signal(one)
+        out, err = process.communicate(timeout=LIMIT)
+    return process.returncode, out, err
+
+
+def test_interrupt():
+    """Ctrl-C ends after the step with exit 130, frames and summary kept"""
+    for one in signal.SIGINT, signal.SIGTERM:
+        shutil.rmtree("out", ignore_errors=True)
+        write_scene(duration=1e5)
+        code, out, err = interrupt([one], "--format", "npy", "--frame-rate", "100", "--summary", "s.json")
+        equal(code, 130, err)
+        assert re.fullmatch(r"t=\S+: interrupted\n", err), err
+        assert re.search(r"^status +e_stopped$", out, re.M), out
+        summary = read_json("out/summary.json")
+        equal((summary["status"], read_json("s.json")["status"]), ("e_stopped", "e_stopped"))
+        shape, _ = read_npy("out/positions.npy")
+        equal(shape[0], summary["frames"])
+        assert shape[0] >= 3, shape
+        equal(len(read_steps("out")), summary["steps"]["accepted"] + summary["steps"]["rejected"])
+
+
+def test_interrupt_in_background():
+    """a job in the background of a shell script can be interrupted, too"""
+    write_scene(duration=1e5)
+    script = """"$0" run scene.json --out out --format npy >/dev/null & drape=$!
+        until [ -s out/steps.csv ]; do sleep 0.02; done; kill -INT $drape; wait $drape"""
+    result = subprocess.run(["/bin/sh", "-c", script, PROGRAM], stderr=subprocess.PIPE, text=True, timeout=LIMIT)
+    equal(result.returncode, 130, result.stderr)
+    equal(read_json("out/summary.json")["status"], "e_stopped")
+
+
+def test_lost_output():
+    """results that cannot be written are exit 1"""
+    if not os.path.exists("/dev/full"):
+        raise Skip("there is no /dev/full")
+    write_scene()
+    for args in (["run", "scene.json"], ["info", "scene.json"], ["info", "scene.json", "--json"],
+                 ["check", "scene.json"], ["list"], ["list", "--schema"], ["--help"]):
+        with open("/dev/full", "w", encoding="ascii") as full:
+            result = subprocess.run([PROGRAM, *args], stdout=full, stderr=subprocess.PIPE, text=True, timeout=LIMIT)
+        equal(result.returncode, 1, " ".join(args))
+        assert re.fullmatch(r"drape: cannot write to the standard output[^\n]*\n", result.stderr), result.stderr
+
+
+def test_closed_output():
+    """a closed stdout is an error, is not a death by a signal, and gets into no file"""
+    write_scene()
+    read, write = os.pipe()
+    os.close(read)
+    result = subprocess.run([PROGRAM, "list"], stdout=write, stderr=subprocess.PIPE, text=True, timeout=LIMIT)
+    os.close(write)
+    equal(result.returncode, 1, result.stderr)
+    script = 'exec "$0" run scene.json --out out --format npy >&-'
+    result = subprocess.run(["/bin/sh", "-c", script, PROGRAM], stderr=subprocess.PIPE, text=True, timeout=LIMIT)
+    equal(result.returncode, 1, result.stderr)
+    equal(read_npy("out/positions.npy")[0], (4, 16, 3))
+    for name in os.listdir("out"):
+        with open("out/" + name, "rb") as file:
+            assert b"newton  " not in file.read(), name
+
+
+def test_unwritable():
+    """output that cannot be written is exit 1 and one line"""
+    write_scene()
+    with open("taken", "w", encoding="ascii"):
+        pass
+    for args in (["--out", "taken"], ["--summary", "nowhere/s.json"], ["--out", "o", "--summary", "nowhere/s.json"]):
+        result = drape("run", "scene.json", *args)
+        equal(result.returncode, 1, " ".join(args))
+        assert re.fullmatch(r"[^\n]+\n", result.stderr), result.stderr
+    equal(read_json("o/summary.json")["status"], "ok", "the run itself was good")
+    result = drape("run", "scene.json", "--out", "taken", "--summary", "s.json")
+    equal((result.returncode, read_json("s.json")["status"]), (1, "e_file"))
+
+
+def limited(*args):
+    """With files of at most 20 blocks of 512 bytes."""
+    return subprocess.run(["/bin/sh", "-c", 'ulimit -f 20; exec "$0" "$@"', PROGRAM, *args],
+                          capture_output=True, text=True, timeout=LIMIT, check=False)
+
+
+def test_full():
+    """output that stops in the middle is exit 1; the frames before are whole"""
+    write_scene(duration=5)
+    result = limited("run", "scene.json", "--out", "out", "--format", "npy")
+    equal(result.returncode, 1, result.stderr)
+    assert re.fullmatch(r"[^\n]+\n", result.stderr), result.stderr
+    summary = read_json("out/summary.json")
+    equal(summary["status"], "e_file")
+    shape, _ = read_npy("out/positions.npy")
+    assert shape[0] >= summary["frames"] > 1, (shape, summary["frames"])
+
+
+def test_old_summary():
+    """a summary of an earlier run does not outlive the start of a new one"""
+    write_scene(duration=1e5)
+    os.mkdir("out")
+    with open("out/summary.json", "w", encoding="ascii") as file:
+        file.write("old")
+    code, _, _ = interrupt([signal.SIGKILL])
+    equal(code, -signal.SIGKILL)
+    assert not os.path.exists("out/summary.json")
+
+
+def terminal(*args):
+    """What a run shows where stderr is a terminal."""
+    master, slave = pty.openpty()
+    with subprocess.Popen([PROGRAM, *args], stdout=subprocess.DEVNULL, stderr=slave, env={"NO_COLOR": "1"}) as process:
+        os.close(slave)
+        shown = b""
+        try:
+            while chunk := os.read(master, 4096):
+                shown += chunk
+        except OSError:  # the other end is closed
+            pass
+        code = process.wait(timeout=LIMIT)
+    os.close(master)
+    return code, shown.decode()
+
+
+def test_progress():
+    """progress is drawn on a terminal, at most ten times a second, without colours, and cleared"""
+    write_scene(duration=1)
+    start = time.monotonic()
+    code, shown = terminal("run", "scene.json")
+    seconds = time.monotonic() - start
+    equal(code, 0, shown)
+    drawn = re.findall(r"\[[#.]+\]", shown)
+    assert 1 <= len(drawn) <= 2 + 10 * seconds, (len(drawn), seconds)
+    for word in "real time", "ETA", "rejected":
+        assert word in shown, shown
+    assert "\x1b" not in shown and re.search(r"\r +\r$", shown), repr(shown)
+
+
+# ---- info, check, list
+
+
+def test_info():
+    """info shows what is modelled: values, defaults, ignored keys, costs"""
+    write_scene(integrator={"dt": 0.01, "linear_solver": "dense"})
+    text = good("info", "scene.json")
+    for word in ("young_modulus", "100000 Pa", "E h", "flexural", "dt_min", "(default)", "corner", "dense"):
+        assert (word in text) == (word != "corner"), word
+    assert re.search(r"^  dt +0\.01 s$", text, re.M), text
+    found = json.loads(good("info", "scene.json", "--json"))
+    equal((found["nodes"], found["dofs"], found["frames"]), (16, 42, 4))
+    material = found["cloths"][0]["material"]
+    assert abs(material["membrane_stiffness"] - 100) < 1e-9
+    assert abs(material["flexural_rigidity"] / (1e5 * 1e-9 / 12 / (1 - 1 / 9)) - 1) < 1e-12
+    terms = {term["name"]: term for term in found["terms"]}
+    equal(list(terms), ["stretch.edge", "bend.hinge", "damp.kelvin_voigt", "gravity"])
+    equal((terms["stretch.edge"]["elements"], terms["bend.hinge"]["elements"]), (33, 21))
+    equal(terms["damp.kelvin_voigt"]["acts_on"], 54)
+    equal(terms["gravity"]["nonzeros"], 0)
+    equal(terms["bend.hinge"]["nonzeros"], found["nnz"])
+    assert found["integrator"]["parameters"]["tolerance"] == {"value": 1e-6, "unit": "N", "default": True}
+    assert found["integrator"]["parameters"]["dt"]["default"] is False
+    assert found["iteration"]["factored"] and found["iteration"]["factor_s"] > 0
+    equal(found["bytes"]["total"], sum(v for k, v in found["bytes"].items() if k not in ("total", "a_node")))
+
+
+def test_info_names_nothing_absent():
+    """info of a scene without bending does not say hinge"""
+    write_scene(terms=["stretch.edge"])
+    for args in ([], ["--json"]):
+        assert "hinge" not in good("info", "scene.json", *args).lower()
+    write_scene()
+    assert "hinge" in good("info", "scene.json")
+
+
+def test_info_of_odd_scenes():
+    """info and check take scenes without terms, without gravity, with nothing free, of several cloths"""
+    for changes in ({"terms": []}, {"terms": [], "gravity": [0, 0, 0]}, {"pins": [{"box": [[-9, -9, -9], [9, 9, 9]]}]},
+                    {"cloth": [scene(name=name)["cloth"][0] for name in ("a", "b")]},
+                    {"pins": [{"row": 0, "track": [[0, [0, 0, 0]], [1, [0, 1, 0]]]}]}):
+        write_scene(**changes)
+        for verb in "info", "check", "run":
+            good(verb, "scene.json")
+        json.loads(good("info", "scene.json", "--json"))
+
+
+def test_check():
+    """check compares every term and the assembled Jacobian"""
+    write_scene(terms=["stretch.edge", "bend.hinge", {"type": "damp.kelvin_voigt", "beta": 1e-3},
+                       {"type": "drag.viscous", "coefficient": 1}])
+    text = good("check", "scene.json")
+    for word in "stretch.edge", "bend.hinge", "damp.kelvin_voigt", "drag.viscous", "gravity", "assembled":
+        assert re.search(rf"^{word} .* ok$", text, re.M), text
+    assert re.search(r"^\d+ passed, 0 failed$", text, re.M), text
+    assert good("check", "scene.json", "--seed", "2") != text
+
+
+def test_list():
+    """list shows every row; a table or a row narrows; Markdown has as many cells in every line of a table"""
+    text = good("list")
+    for word in ("equilateral", "stretch.edge", "be", "halving", "klu", "dense", "npy", "young_modulus", "required"):
+        assert word in text, word
+    assert "klu" not in good("list", "terms") and "bend.hinge" in good("list", "terms")
+    assert "stretch.edge" not in good("list", "bend.hinge")
+    rows = [line for line in good("list", "--markdown").splitlines() if line.startswith("|")]
+    assert len(rows) > 40, rows
+    for line in rows:
+        assert line.replace("\\|", "").count("|") in (4, 7), line
+
+
+# ---- The schema
+
+
+def validator():
+    try:
+        from jsonschema import Draft202012Validator  # pylint: disable=import-outside-toplevel
+    except ImportError as error:
+        raise Skip("python3-jsonschema is not here") from error
+    schema = json.loads(good("list", "--schema"))
+    Draft202012Validator.check_schema(schema)
+    return Draft202012Validator(schema)
+
+
+def variants():
+    """Scenes, each with whether it is right in form."""
+    yield True, scene()
+    yield True, scene(description="a remark", gravity=[0, 0, 0], controller={"type": "fixed"}, output={"formats": ["ply"]})
+    yield True, scene(mesh={"grid": "square", "columns": 3, "rows": 4, "width": 1, "height": 1, "orientation": "vertical",
+                            "transform": {"scale": 2, "rotate": [0, 1, 0, 90], "translate": [0, 0, 1]}})
+    yield True, scene(pins=[{"nodes": [0, 3]}, {"row": 1}, {"edge": "top"}, {"box": [[0, 0, 0], [1, 1, 1]]},
+                            {"nodes": [15], "track": [[0, [0, 0, 0]], [1, [0, 1, 0]]]}])
+    yield True, scene(integrator={"method": "be", "project": True, "norm": "l2", "max_iterations": 6})
+    yield False, scene(drape=2)
+    yield False, scene(duration=0)
+    yield False, scene(duration="5")
+    yield False, scene(gravty=[0, 0, 0])
+    yield False, scene(gravity=[0, 0])
+    yield False, scene(cloth=[])
+    yield False, scene(terms=["stretch.egde"])
+    yield False, scene(terms=["damp.kelvin_voigt", "stretch.edge"])
+    yield False, scene(terms=["gravity"])
+    yield False, scene(terms=[{"type": "stretch.edge", "stiffness": "soft"}])
+    yield False, scene(terms=[{"type": "stretch.edge", "max_turn": 1}])
+    yield False, scene(mesh={"grid": "equilateral", "edges": 3})
+    yield False, scene(mesh={"grid": "equilateral", "edges": 3.5, "edge_length": 0.1})
+    yield False, scene(mesh={"grid": "equilateral", "edges": 3, "edge_length": 0.1, "rows": 2})
+    yield False, scene(mesh={"file": "x.obj", "edges": 3})
+    yield False, scene(mesh={"transform": {}})
+    yield False, scene(material={"thickness": 1e-3, "density": 200})
+    yield False, scene(material={"young_modulus": 1e5, "thickness": 1e-3})
+    yield False, scene(material={"young_modulus": 1e5, "thickness": 1e-3, "density": 1, "total_mass": 1})
+    yield False, scene(material={"young_modulus": 1e5, "poisson_ratio": -1, "thickness": 1e-3, "density": 200})
+    yield False, scene(pins=[{"nodes": [0], "row": 1}])
+    yield False, scene(pins=[{"track": [[0, [0, 0, 0]]]}])
+    yield False, scene(pins=[{"nodes": []}])
+    yield False, scene(pins=[{"corner": "top"}])
+    yield False, scene(pins=[{"box": [[0, 0, 0]]}])
+    yield False, scene(integrator={"dt": 0})
+    yield False, scene(integrator={"method": "eb"})
+    yield False, scene(integrator={"max_iterations": 1.5})
+    yield False, scene(controller={"type": "halving", "dt": 1})
+    yield False, scene(output={"formats": ["npz"]})
+    yield False, scene(output={"format": ["npy"]})
+
+
+def test_schema_and_reader():
+    """the schema and the reader agree on right and wrong scenes"""
+    schema = validator()
+    for right, one in variants():
+        equal(schema.is_valid(one), right, "schema: " + json.dumps(one))
+        with open("scene.json", "w", encoding="utf-8") as file:
+            json.dump(one, file)
+        result = drape("info", "scene.json")
+        equal(result.returncode, 0 if right else 2, json.dumps(one) + result.stderr)
+
+
+def test_schema_and_examples():
+    """the schema takes every example, and describes every value"""
+    schema = validator()
+    paths = sorted(glob.glob(SOURCES + "/examples/scenes/*.json"))
+    for path in paths:
+        with open(path, encoding="utf-8") as file:
+            text = re.sub(r'("(?:\\.|[^"\\])*")|//[^\n]*|/\*.*?\*/', lambda m: m.group(1) or " ", file.read(), flags=re.S)
+        errors = [error.message for error in schema.iter_errors(json.loads(text))]
+        equal(errors, [], path)
+        good("info", path)
+    def walk(node):
+        for name, value in node.get("properties", {}).items():
+            assert "description" in value or "allOf" in value, name
+            walk(value)
+        for value in node.get("anyOf", []) + ([node["items"]] if isinstance(node.get("items"), dict) else []):
+            walk(value)
+    walk(schema.schema)
+
+
+def main():
+    tests = [(name, test) for name, test in globals().items() if name.startswith("test_")]
+    print(f"1..{len(tests)}", flush=True)
+    failed = 0
+    for number, (_, test) in enumerate(tests, 1):
+        words = f"{number} - {test.__doc__}"
+        with tempfile.TemporaryDirectory() as folder:
+            os.chdir(folder)
+            try:
+                test()
+                print("ok", words, flush=True)
+            except Skip as reason:
+                print("ok", words, "# SKIP", reason, flush=True)
+            except Exception:  # pylint: disable=broad-except
+                failed += 1
+                print("not ok", words, flush=True)
+                print("# " + traceback.format_exc().rstrip().replace("\n", "\n# "), flush=True)
+            os.chdir("/")
+    return failed > 0
+
+
+sys.exit(main())
