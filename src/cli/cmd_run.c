@@ -149,6 +149,9 @@ static void print_results(const run *r)
     print_steps(r, &s);
     print_newton(&s);
     printf("strain    %.5g to %.5g\n", s.strain_min, s.strain_max);
+    if (s.stability_known)
+        printf("equilibrium %s, %lld unstable modes\n", s.unstable_modes == 0 ? "stable" : "unstable",
+               (long long)s.unstable_modes);
     print_energy(r);
     print_wall(r, &s);
     if (r->recorder)

@@ -116,6 +116,13 @@ static json_t *energy(drape_sim *sim)
     return with_reals(json_object(), parts, LENGTH(parts));
 }
 
+/* Of an equilibrium: whether it is stable, and how many eigenvalues of its Hessian are negative. */
+static json_t *stability(const drape_statistics *s)
+{
+    json_t *object = with(json_object(), "stable", json_boolean(s->unstable_modes == 0));
+    return with(object, "unstable_modes", json_integer(s->unstable_modes));
+}
+
 static json_t *strain(const drape_statistics *s)
 {
     const real_item bounds[] = {{"min", s->strain_min}, {"max", s->strain_max}};
@@ -147,6 +154,8 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     object = with(object, "wall_s", wall(def, &s));
     object = with(object, "energy", energy(sim));
     object = with(object, "strain", strain(&s));
+    if (s.stability_known)
+        object = with(object, "equilibrium", stability(&s));
     return with(object, "hash", hash(sim));
 }
 

@@ -1,0 +1,1070 @@
+/* test_api.c: the library as a host sees it: the public headers alone. */
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "drape/extend.h"
+#include "support/failing_allocator.h"
+#include "support/suite.h"
+
+/* ---- Helpers
+ * ------------------------------------------------------------------------------------------------------ */
+
+static drape_context *make_context(void)
+{
+    drape_context *ctx = NULL;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    return ctx;
+}
+
+static void check_message(const drape_context *ctx, const char *part)
+{
+    const char *message = drape_context_message(ctx);
+    ck_assert_msg(strstr(message, part) != NULL, "\"%s\" is not in: %s", part, message);
+    for (const char *p = message; *p; p++)
+        ck_assert_msg((unsigned char)*p >= ' ' && *p != 127, "not one line: %s", message);
+}
+
+/* Texts of tests are written with ' for ". */
+static drape_status compile_text(drape_context *ctx, const char *text, drape_model **model)
+{
+    char quoted[4096];
+    drape_scene *scene = NULL;
+    snprintf(quoted, sizeof quoted, "%s", text);
+    for (char *c = quoted; *c; c++)
+        *c = *c == '\'' ? '"' : *c;
+    *model = NULL;
+    drape_status status = drape_scene_parse(ctx, quoted, "s.json", &scene);
+    if (!status)
+        status = drape_scene_compile(scene, model);
+    drape_scene_destroy(&scene);
+    return status;
+}
+
+#define SHEET                                                                                                \
+    "{'drape': 1, 'cloth': [{'name': 'sheet', 'mesh': {'grid': 'equilateral', 'edges': 5, 'edge_length': "   \
+    "0.1, 'transform': {'rotate': [1, 2, 3, 20]}},"                                                          \
+    " 'material': {'young_modulus': 1e5, 'poisson_ratio': 0.3, 'thickness': 1e-3, 'density': 200},"          \
+    " 'terms': ['stretch.edge', {'type': 'bend.hinge', 'stiffness': 'report'},"                              \
+    "           {'type': 'damp.kelvin_voigt', 'beta': 1e-3}],"                                               \
+    " 'pins': [{'nodes': [0]}, {'corner': 'top-right', 'track': [[0, [0,0,0]], [1, [0,0.5,0]]]}],"           \
+    " 'velocity': [0, 0, 0.25]}],"                                                                           \
+    " 'gravity': [0, -9.5, 0.5], 'integrator': {'method': 'be', 'dt': 0.01, 'tolerance': 1e-7},"             \
+    " 'controller': {'type': 'halving', 'dt_min': 1e-6}, 'duration': 1, 'frame_rate': 30}"
+
+static drape_model *make_sheet(drape_context *ctx)
+{
+    drape_model *model;
+    drape_status status = compile_text(ctx, SHEET, &model);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+    return model;
+}
+
+static drape_sim *make_sim(drape_context *ctx, const drape_model *model)
+{
+    drape_sim *sim = NULL;
+    ck_assert_msg(drape_sim_create(ctx, model, NULL, &sim) == DRAPE_OK, "%s", drape_context_message(ctx));
+    return sim;
+}
+
+/* The scene above as a host says it. */
+typedef struct host_scene {
+    drape_setting grid[2], material[4], stiffness, beta, integrator[2], controller;
+    drape_row_def terms[3];
+    drape_pin_def pins[2];
+    drape_track_key track[2];
+    drape_cloth_def cloth;
+    drape_scene_def scene;
+} host_scene;
+
+static const int32_t first_node[] = {0};
+
+static void fill_scene(host_scene *s)
+{
+    *s = (host_scene){
+        .grid = {{"edges", 5, NULL}, {"edge_length", 0.1, NULL}},
+        .material = {{"young_modulus", 1e5, NULL},
+                     {"poisson_ratio", 0.3, NULL},
+                     {"thickness", 1e-3, NULL},
+                     {"density", 200, NULL}},
+        .stiffness = {"stiffness", 0, "report"},
+        .beta = {"beta", 1e-3, NULL},
+        .integrator = {{"dt", 0.01, NULL}, {"tolerance", 1e-7, NULL}},
+        .controller = {"dt_min", 1e-6, NULL},
+        .track = {{0, {0, 0, 0}}, {1, {0, 0.5, 0}}},
+    };
+    s->terms[0] = (drape_row_def){.type = "stretch.edge"};
+    s->terms[1] = (drape_row_def){"bend.hinge", &s->stiffness, 1};
+    s->terms[2] = (drape_row_def){"damp.kelvin_voigt", &s->beta, 1};
+    drape_scene_def_init(&s->scene, sizeof s->scene);
+    drape_cloth_def_init(&s->cloth, sizeof s->cloth);
+    drape_pin_def_init(&s->pins[0], sizeof s->pins[0]);
+    drape_pin_def_init(&s->pins[1], sizeof s->pins[1]);
+    s->pins[0].nodes = first_node;
+    s->pins[0].node_count = 1;
+    s->pins[1].corner = "top-right";
+    s->pins[1].track = s->track;
+    s->pins[1].key_count = 2;
+    s->cloth.name = "sheet";
+    s->cloth.mesh.grid = (drape_row_def){"equilateral", s->grid, 2};
+    memcpy(s->cloth.mesh.rotate, (const double[]){1, 2, 3, 20}, sizeof s->cloth.mesh.rotate);
+    s->cloth.material = s->material;
+    s->cloth.material_count = 4;
+    s->cloth.terms = s->terms;
+    s->cloth.term_count = 3;
+    s->cloth.pins = s->pins;
+    s->cloth.pin_count = 2;
+    s->cloth.velocity[2] = 0.25;
+    s->scene.cloths = &s->cloth;
+    s->scene.cloth_count = 1;
+    memcpy(s->scene.gravity, (const double[]){0, -9.5, 0.5}, sizeof s->scene.gravity);
+    s->scene.integrator = (drape_row_def){"be", s->integrator, 2};
+    s->scene.controller = (drape_row_def){"halving", &s->controller, 1};
+    s->scene.frame_rate = 30;
+}
+
+static uint64_t hash_after(drape_context *ctx, const drape_model *model, double t)
+{
+    drape_sim *sim = make_sim(ctx, model);
+    ck_assert_msg(drape_sim_advance(sim, t) == DRAPE_OK, "%s", drape_context_message(ctx));
+    uint64_t hash = drape_sim_hash(sim);
+    drape_sim_destroy(&sim);
+    return hash;
+}
+
+/* ---- Arguments
+ * ---------------------------------------------------------------------------------------------------- */
+
+START_TEST(destroying_nothing_is_fine)
+{
+    drape_context *ctx = NULL;
+    drape_scene *scene = NULL;
+    drape_model *model = NULL;
+    drape_sim *sim = NULL;
+    drape_context_destroy(NULL), drape_context_destroy(&ctx);
+    drape_scene_destroy(NULL), drape_scene_destroy(&scene);
+    drape_model_destroy(NULL), drape_model_destroy(&model);
+    drape_sim_destroy(NULL), drape_sim_destroy(&sim);
+}
+END_TEST
+
+START_TEST(destroy_writes_null)
+{
+    drape_context *ctx = make_context();
+    drape_scene *scene = NULL;
+    drape_model *model = make_sheet(ctx);
+    drape_sim *sim = make_sim(ctx, model);
+    ck_assert_int_eq(drape_scene_parse(ctx, "{}", "s.json", &scene), DRAPE_OK);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_scene_destroy(&scene);
+    drape_context_destroy(&ctx);
+    ck_assert(!sim && !model && !scene && !ctx);
+}
+END_TEST
+
+START_TEST(null_arguments_are_told)
+{
+    drape_context *ctx = make_context(), *none = NULL;
+    drape_scene *scene = NULL;
+    drape_model *model = NULL;
+    drape_sim *sim = NULL;
+    drape_scene_def def;
+    drape_scene_def_init(&def, sizeof def);
+    ck_assert_int_eq(drape_context_create(NULL, NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_load(NULL, "x.json", &scene), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_load(ctx, NULL, &scene), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_load(ctx, "x.json", NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_parse(NULL, "{}", "x", &scene), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_parse(ctx, NULL, "x", &scene), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_parse(ctx, "{}", "x", NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_set(NULL, "/a", "1"), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_compile(NULL, &model), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_parse(ctx, "{}", NULL, &scene), DRAPE_OK); /* a name for messages only */
+    ck_assert_int_eq(drape_scene_set(scene, NULL, "1"), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_set(scene, "/a", NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_scene_compile(scene, NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_model_create(NULL, &def, &model), DRAPE_E_ARGUMENT);
+    ck_assert_int_lt(drape_model_create(ctx, NULL, &model), 0);
+    ck_assert_int_eq(drape_model_create(ctx, &def, NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_model_load(NULL, "x.json", &model), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_model_load(ctx, NULL, &model), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_model_load(ctx, "x.json", NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_sim_create(ctx, NULL, NULL, &sim), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_sim_create(NULL, NULL, NULL, &sim), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_sim_create(ctx, NULL, NULL, NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_sim_advance(NULL, 1), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_sim_observe(NULL, NULL, NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_context_add_term(ctx, NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_context_add_term(NULL, NULL), DRAPE_E_ARGUMENT);
+    ck_assert(!model && !sim && !none);
+    ck_assert(*drape_context_message(NULL));
+    drape_scene_destroy(&scene);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(no_model_has_nothing)
+{
+    int64_t count = 7;
+    ck_assert_int_eq(drape_model_node_count(NULL), 0);
+    ck_assert_int_eq(drape_model_triangle_count(NULL), 0);
+    ck_assert_int_eq(drape_model_dof_count(NULL), 0);
+    ck_assert_int_eq(drape_model_nonzero_count(NULL), 0);
+    ck_assert_int_eq(drape_model_cloth_count(NULL), 0);
+    ck_assert_str_eq(drape_model_cloth(NULL, 0).name, "");
+    ck_assert(!drape_model_triangles(NULL) && !drape_model_rest_positions(NULL) && !drape_model_masses(NULL));
+    ck_assert(!drape_model_pinned(NULL) && !drape_sim_model(NULL));
+    ck_assert(!drape_sim_positions(NULL) && !drape_sim_velocities(NULL));
+    ck_assert(drape_model_duration(NULL) == 0 && drape_model_frame_rate(NULL) == 0 &&
+              drape_sim_time(NULL) == 0);
+    ck_assert_uint_eq(drape_sim_hash(NULL), 0);
+    ck_assert_double_eq(drape_sim_energy(NULL).kinetic, 0);
+    ck_assert_int_eq(drape_sim_statistics(NULL).steps_accepted, 0);
+    ck_assert_ptr_null(drape_sim_reason(NULL, 0, &count));
+    ck_assert_int_eq(count, 0);
+    ck_assert_ptr_null(drape_sim_reason(NULL, 0, NULL));
+}
+END_TEST
+
+/* ---- Defs
+ * --------------------------------------------------------------------------------------------------------- */
+
+START_TEST(defs_that_were_not_initialised_are_refused)
+{
+    drape_context *ctx = make_context(), *other = NULL;
+    drape_context_def context_def = {0};
+    drape_scene_def scene_def = {0};
+    drape_sim_def sim_def = {0};
+    drape_model *model = make_sheet(ctx), *no_model = NULL;
+    drape_sim *sim = NULL;
+    for (int longer = 0; longer < 2; longer++) {
+        context_def.struct_size = longer ? sizeof context_def + 1 : 0;
+        scene_def.struct_size = longer ? sizeof scene_def + 1 : 0;
+        sim_def.struct_size = longer ? sizeof sim_def + 1 : 0;
+        ck_assert_int_lt(drape_context_create(&context_def, &other), 0);
+        ck_assert_int_eq(drape_model_create(ctx, &scene_def, &no_model), DRAPE_E_VERSION);
+        check_message(ctx, "drape_scene_def_init");
+        ck_assert_int_eq(drape_sim_create(ctx, model, &sim_def, &sim), DRAPE_E_VERSION);
+        check_message(ctx, "drape_sim_def_init");
+    }
+    ck_assert(!other && !no_model && !sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* A caller built against a header whose structs ended earlier. */
+START_TEST(shorter_defs_of_older_callers_are_read)
+{
+    drape_context *ctx = make_context(), *other = NULL;
+    drape_context_def context_def;
+    drape_sim_def sim_def;
+    host_scene s;
+    drape_model *model = make_sheet(ctx), *same = NULL;
+    drape_sim *sim = NULL;
+    uint64_t expected = hash_after(ctx, model, 0.05);
+
+    memset(&sim_def, 0xee, sizeof sim_def);
+    drape_sim_def_init(&sim_def, offsetof(drape_sim_def, dt_min));
+    ck_assert_uint_eq(sim_def.struct_size, offsetof(drape_sim_def, dt_min));
+    ck_assert_int_eq(drape_sim_create(ctx, model, &sim_def, &sim), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.05), DRAPE_OK);
+    ck_assert_uint_eq(drape_sim_hash(sim), expected);
+
+    fill_scene(&s);
+    s.scene.struct_size = offsetof(drape_scene_def, formats);
+    memset((char *)&s.scene + s.scene.struct_size, 0xee, sizeof s.scene - s.scene.struct_size);
+    ck_assert_msg(drape_model_create(ctx, &s.scene, &same) == DRAPE_OK, "%s", drape_context_message(ctx));
+    ck_assert_uint_eq(hash_after(ctx, same, 0.05), expected);
+
+    memset(&context_def, 0xee, sizeof context_def);
+    drape_context_def_init(&context_def, offsetof(drape_context_def, log));
+    ck_assert_int_eq(drape_context_create(&context_def, &other), DRAPE_OK);
+
+    drape_context_destroy(&other);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&same);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+static void *some_memory(void *user, size_t size)
+{
+    (void)user;
+    return malloc(size);
+}
+
+START_TEST(half_an_allocator_is_refused)
+{
+    drape_context *ctx = NULL;
+    drape_context_def def;
+    drape_context_def_init(&def, sizeof def);
+    def.allocate = some_memory;
+    ck_assert_int_eq(drape_context_create(&def, &ctx), DRAPE_E_ARGUMENT);
+    ck_assert_ptr_null(ctx);
+}
+END_TEST
+
+/* Values of a sim's def: what each message says. */
+START_TEST(sim_defs_are_checked)
+{
+    static const struct {
+        const char *integrator, *controller, *key;
+        double number;
+        const char *text;
+        double dt, dt_min, frame_rate;
+        int threads;
+        const char *says;
+    } cases[] = {
+        {.integrator = "bee", .threads = 1, .says = "did you mean \"be\"?"},
+        {.controller = "halvin", .threads = 1, .says = "did you mean \"halving\"?"},
+        {.key = "tolerance", .number = -1, .threads = 1, .says = "/integrator/tolerance: -1 is not allowed"},
+        {.key = "tolerance", .number = NAN, .threads = 1, .says = "/integrator/tolerance"},
+        {.key = "tolerance", .text = "small", .threads = 1, .says = "\"small\" is not allowed"},
+        {.key = "linear_solver", .text = "kluu", .threads = 1, .says = "did you mean \"klu\"?"},
+        {.key = "linear_solver", .number = 1, .threads = 1, .says = "/integrator/linear_solver"},
+        {.key = "max_iterations", .number = 2.5, .threads = 1, .says = "2.5 is not allowed"},
+        {.key = "toleranc", .number = 1, .threads = 1, .says = "did you mean \"tolerance\"?"},
+        {.dt = -1, .threads = 1, .says = "/integrator/dt: -1 is not allowed"},
+        {.dt = INFINITY, .threads = 1, .says = "/integrator/dt"},
+        {.dt_min = NAN, .threads = 1, .says = "/controller/dt_min"},
+        {.frame_rate = -1, .threads = 1, .says = "frame_rate = -1"},
+        {.threads = 0, .says = "threads = 0; it is 1 to 256"},
+        {.threads = 257, .says = "threads = 257"},
+    };
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        drape_sim *sim = (drape_sim *)(uintptr_t)1;
+        const drape_setting setting = {cases[i].key, cases[i].number, cases[i].text};
+        drape_sim_def def;
+        drape_sim_def_init(&def, sizeof def);
+        def.integrator = cases[i].integrator;
+        def.controller = cases[i].controller;
+        def.integrator_settings = &setting;
+        def.integrator_setting_count = cases[i].key ? 1 : 0;
+        def.dt = cases[i].dt;
+        def.dt_min = cases[i].dt_min;
+        def.frame_rate = cases[i].frame_rate;
+        def.threads = cases[i].threads;
+        ck_assert_msg(drape_sim_create(ctx, model, &def, &sim) == DRAPE_E_ARGUMENT, "case %zu", i);
+        ck_assert_ptr_null(sim);
+        check_message(ctx, cases[i].says);
+    }
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(an_end_that_is_no_time_is_refused)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    drape_sim *sim = make_sim(ctx, model);
+    uint64_t hash = drape_sim_hash(sim);
+    ck_assert_int_eq(drape_sim_advance(sim, NAN), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_sim_advance(sim, INFINITY), DRAPE_E_ARGUMENT);
+    check_message(ctx, "t_end is not finite");
+    ck_assert_int_eq(drape_sim_advance(sim, -1), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(sim, 0), DRAPE_OK);
+    ck_assert_uint_eq(drape_sim_hash(sim), hash);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* Whether a scene whose defs hold a NULL or a zeroed row is refused; in a process of its own, because the mistake
+ * of a host must not be a crash of the host. */
+static int zeroed(int which)
+{
+    host_scene s;
+    drape_context *ctx = make_context();
+    drape_model *model = NULL;
+    fill_scene(&s);
+    if (which == 0)
+        s.terms[1] = (drape_row_def){0};
+    else if (which == 1)
+        s.cloth.terms = NULL;
+    else if (which == 2)
+        s.scene.cloths = NULL;
+    else if (which == 3)
+        s.material[1].name = NULL;
+    else if (which == 4)
+        s.cloth.material = NULL;
+    else if (which == 5)
+        s.integrator[0].name = NULL;
+    else if (which == 6)
+        s.grid[1].name = NULL;
+    else if (which == 7)
+        s.pins[1].track = NULL;
+    else if (which == 8)
+        s.cloth.pins = NULL;
+    else if (which == 9)
+        memset(&s.cloth.mesh, 0, sizeof s.cloth.mesh);
+    else if (which == 10)
+        s.scene.format_count = 1;
+    else if (which == 11)
+        memset(&s.pins[0], 0, sizeof s.pins[0]);
+    drape_status status = drape_model_create(ctx, &s.scene, &model);
+    return status < 0 && !model && *drape_context_message(ctx) ? 0 : 1;
+}
+
+START_TEST(zeroed_parts_of_a_scene_are_refused)
+{
+    static const char *const names[] = {"a term without type",
+                                        "terms",
+                                        "cloths",
+                                        "a setting's name",
+                                        "material",
+                                        "an integrator setting's name",
+                                        "a grid setting's name",
+                                        "track",
+                                        "pins",
+                                        "mesh",
+                                        "formats",
+                                        "a pin without _init"};
+    char failed[512] = "";
+    for (int which = 0; which < 12; which++) {
+        int status = 0;
+        pid_t child = fork();
+        ck_assert_int_ge(child, 0);
+        if (child == 0)
+            _exit(zeroed(which));
+        ck_assert_int_eq(waitpid(child, &status, 0), child);
+        if (!WIFEXITED(status) || WEXITSTATUS(status) != 0)
+            snprintf(failed + strlen(failed), sizeof failed - strlen(failed), "%s%s (%s)",
+                     *failed ? ", " : "", names[which], WIFEXITED(status) ? "taken" : "crash");
+    }
+    ck_assert_msg(!*failed, "NULL where there should be something: %s", failed);
+}
+END_TEST
+
+/* ---- Scenes
+ * -------------------------------------------------------------------------------------------------------- */
+
+START_TEST(a_scene_in_memory_is_the_same_as_in_a_file)
+{
+    drape_context *ctx = make_context();
+    host_scene s;
+    drape_model *text = make_sheet(ctx), *memory = NULL;
+    fill_scene(&s);
+    ck_assert_msg(drape_model_create(ctx, &s.scene, &memory) == DRAPE_OK, "%s", drape_context_message(ctx));
+    memset(&s, 0xee, sizeof s); /* nothing of it is needed any more */
+    ck_assert_int_eq(drape_model_node_count(memory), 36);
+    ck_assert_int_eq(drape_model_dof_count(memory), 3 * 34);
+    ck_assert_int_eq(drape_model_nonzero_count(memory), drape_model_nonzero_count(text));
+    ck_assert_double_eq(drape_model_frame_rate(memory), 30);
+    ck_assert_double_eq(drape_model_duration(memory), 1);
+    ck_assert_uint_eq(hash_after(ctx, memory, 0.2), hash_after(ctx, text, 0.2));
+    ck_assert_uint_ne(hash_after(ctx, memory, 0.1), hash_after(ctx, text, 0.2));
+    drape_model_destroy(&memory);
+    drape_model_destroy(&text);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* The hash is of time, positions and velocities: each alone changes it. */
+START_TEST(the_hash_sees_all_of_the_state)
+{
+    drape_context *ctx = make_context();
+    host_scene s;
+    drape_model *models[3];
+    uint64_t hashes[3];
+    for (int i = 0; i < 3; i++) {
+        fill_scene(&s);
+        if (i == 1)
+            s.cloth.velocity[2] = 0.26;
+        if (i == 2)
+            s.cloth.mesh.translate[0] = 1e-9;
+        ck_assert_int_eq(drape_model_create(ctx, &s.scene, &models[i]), DRAPE_OK);
+        hashes[i] = hash_after(ctx, models[i], 0);
+        for (int k = 0; k < i; k++)
+            ck_assert_uint_ne(hashes[i], hashes[k]);
+        ck_assert_uint_eq(hashes[i], hash_after(ctx, models[i], 0));
+    }
+    for (int i = 0; i < 3; i++)
+        drape_model_destroy(&models[i]);
+    fill_scene(&s); /* nothing moves but the time */
+    memset(s.scene.gravity, 0, sizeof s.scene.gravity);
+    memset(s.cloth.velocity, 0, sizeof s.cloth.velocity);
+    s.cloth.pin_count = 0;
+    s.cloth.term_count = 0;
+    ck_assert_int_eq(drape_model_create(ctx, &s.scene, &models[0]), DRAPE_OK);
+    ck_assert_uint_ne(hash_after(ctx, models[0], 0.01), hash_after(ctx, models[0], 0.02));
+    drape_model_destroy(&models[0]);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(a_model_can_be_read)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    int32_t nodes = drape_model_node_count(model), triangles = drape_model_triangle_count(model);
+    double mass = 0;
+    ck_assert_int_eq(nodes, 36);
+    ck_assert_int_eq(triangles, 50);
+    ck_assert_int_eq(drape_model_cloth_count(model), 1);
+    drape_cloth_range cloth = drape_model_cloth(model, 0);
+    ck_assert_str_eq(cloth.name, "sheet");
+    ck_assert(cloth.first_node == 0 && cloth.node_count == nodes);
+    ck_assert(cloth.first_triangle == 0 && cloth.triangle_count == triangles);
+    ck_assert_str_eq(drape_model_cloth(model, 1).name, "");
+    ck_assert_str_eq(drape_model_cloth(model, -1).name, "");
+    for (int32_t i = 0; i < 3 * triangles; i++)
+        ck_assert(drape_model_triangles(model)[i] >= 0 && drape_model_triangles(model)[i] < nodes);
+    for (int32_t i = 0; i < nodes; i++) {
+        mass += drape_model_masses(model)[i];
+        ck_assert_int_eq(drape_model_pinned(model)[i], i == 0 || i == 5);
+    }
+    ck_assert_double_eq_tol(mass, 50 * sqrt(3) / 4 * 0.01 * 0.2, 1e-15); /* triangles of 0.1 m, 0.2 kg/m2 */
+    drape_sim *sim = make_sim(ctx, model);
+    ck_assert_ptr_eq(drape_sim_model(sim), model);
+    ck_assert_mem_eq(drape_sim_positions(sim), drape_model_rest_positions(model), 3 * 36 * sizeof(double));
+    for (int32_t i = 0; i < 3 * nodes; i++)
+        ck_assert_double_eq(drape_sim_velocities(sim)[i],
+                            i % 3 == 2 && !drape_model_pinned(model)[i / 3] ? 0.25 : 0);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(an_override_is_a_value_of_the_scene)
+{
+    drape_context *ctx = make_context();
+    char text[] = SHEET;
+    drape_scene *scene = NULL;
+    drape_model *model = make_sheet(ctx), *other = NULL;
+    drape_sim *sim = NULL;
+    drape_sim_def def;
+    for (char *c = text; *c; c++)
+        *c = *c == '\'' ? '"' : *c;
+    ck_assert_int_eq(drape_scene_parse(ctx, text, "s.json", &scene), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/integrator/dt", "0.02"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_set(scene, "/integrator/linear_solver", "dense"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_compile(scene, &other), DRAPE_OK);
+    drape_scene_destroy(&scene);
+    const drape_setting dense = {"linear_solver", 0, "dense"};
+    drape_sim_def_init(&def, sizeof def);
+    def.dt = 0.02;
+    def.integrator_settings = &dense;
+    def.integrator_setting_count = 1;
+    ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.2), DRAPE_OK);
+    ck_assert_uint_eq(drape_sim_hash(sim), hash_after(ctx, other, 0.2));
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_model_destroy(&other);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* ---- Terms of the host
+ * -------------------------------------------------------------------------------------------- */
+
+/* E = 1/2 k |x - c|^2 of every node. */
+static const drape_param attract_params[] = {
+    {.name = "stiffness", .unit = "N/m", .default_value = NAN, .min = 0, .max = 1e6, .help = "k"},
+    {.name = "height", .unit = "m", .default_value = 1, .min = -100, .max = 100, .help = "y of the point"},
+    {.name = "refuse",
+     .kind = DRAPE_PARAM_BOOLEAN,
+     .unit = "1",
+     .default_value = 0,
+     .help = "for tests: build says no"},
+};
+
+static drape_status attract_build(const drape_cloth_view *cloth, const double *params,
+                                  drape_term_builder *builder)
+{
+    if (params[2] != 0)
+        return drape_term_refuse(builder, "height %g m is not\nto its taste", params[1]);
+    drape_status status = drape_term_reserve(builder, cloth->node_count, 0);
+    for (int32_t i = 0; !status && i < cloth->node_count; i++)
+        drape_term_set(builder, i, &i, NULL);
+    return status;
+}
+
+static void attract_one(const drape_elements *el, int32_t element, const double *x, double *e, double *g,
+                        double *hess)
+{
+    const double k = el->params[0], d[3] = {x[0], x[1] - el->params[1], x[2]};
+    (void)element;
+    if (e)
+        *e = 0.5 * k * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    for (int i = 0; g && i < 3; i++)
+        g[i] = k * d[i];
+    for (int i = 0; hess && i < 9; i++)
+        hess[i] = i % 4 == 0 ? k : 0;
+}
+
+static void attract_energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                           const double *internal, double *e, double *g, double *hess)
+{
+    (void)internal;
+    drape_energy_range(el, first, count, x, e, g, hess, attract_one);
+}
+
+static const drape_term_ops attract = {.struct_size = sizeof(drape_term_ops),
+                                       .name = "host.attract",
+                                       .summary = "draws every node to a point",
+                                       .reference = "Hooke 1678",
+                                       .params = attract_params,
+                                       .param_count = 3,
+                                       .element_name = "node",
+                                       .nodes = 1,
+                                       .build = attract_build,
+                                       .energy = attract_energy};
+
+#define ATTRACTED(term)                                                                                      \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 1, 'edge_length': 0.1},"               \
+    " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'total_mass': 0.4, 'mass': 'uniform'},"          \
+    " 'terms': [" term "]}], 'gravity': [0,0,0], 'integrator': {'dt': 0.001, 'tolerance': 1e-10}, "          \
+    "'duration': 1}"
+
+/* Four nodes of 0.1 kg on springs of 10 N/m without any between them: w = 10 rad/s, y = 1 - cos(10 t), but for
+ * the decay of backward Euler, exp(-w^2 h t/2), and its phase of the same order. */
+START_TEST(a_term_of_the_host_works)
+{
+    drape_context *ctx = make_context();
+    drape_model *model;
+    ck_assert_int_eq(drape_context_add_term(ctx, &attract), DRAPE_OK);
+    drape_status status = compile_text(ctx, ATTRACTED("{'type': 'host.attract', 'stiffness': 10}"), &model);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+    drape_sim *sim = make_sim(ctx, model);
+    ck_assert_double_gt(drape_sim_energy(sim).elastic, 4 * 0.5 * 10 * 1);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.2), DRAPE_OK);
+    for (int i = 0; i < 4; i++)
+        ck_assert_double_eq_tol(drape_sim_positions(sim)[3 * i + 1], 1 - cos(2.0), 100 * 0.001 * 0.2);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(faults_of_a_term_of_the_host_are_told_at_its_place)
+{
+    static const struct {
+        const char *scene, *says;
+    } cases[] = {
+        {ATTRACTED("'host.attract'"), "\"stiffness\" is missing"},
+        {ATTRACTED("{'type': 'host.attract', 'stiffness': -1}"),
+         "/cloth/0/terms/0/stiffness: -1 is not allowed"},
+        {ATTRACTED("{'type': 'host.attract', 'stifness': 1}"), "did you mean \"stiffness\"?"},
+        {ATTRACTED("{'type': 'host.atract', 'stiffness': 1}"), "did you mean \"host.attract\"?"},
+        {ATTRACTED("{'type': 'host.attract', 'stiffness': 1, 'refuse': true}"),
+         "/cloth/0/terms/0: height 1 m is not?to its taste"},
+        {ATTRACTED("{'type': 'host.attract', 'stiffness': 1}, {'type': 'host.attract', 'stiffness': 2}"),
+         "/cloth/0/terms/1: the term \"host.attract\" is named twice"},
+    };
+    drape_context *ctx = make_context(), *other = make_context();
+    drape_model *model;
+    ck_assert_int_eq(drape_context_add_term(ctx, &attract), DRAPE_OK);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        ck_assert_int_eq(compile_text(ctx, cases[i].scene, &model), DRAPE_E_ARGUMENT);
+        ck_assert_ptr_null(model);
+        check_message(ctx, cases[i].says);
+        check_message(ctx, "s.json:1:");
+    }
+    /* a context that it was not given to does not know it */
+    ck_assert_int_eq(compile_text(other, ATTRACTED("{'type': 'host.attract', 'stiffness': 1}"), &model),
+                     DRAPE_E_ARGUMENT);
+    check_message(other, "there is no term \"host.attract\"");
+    drape_context_destroy(&other);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+static void some_law(const double *params, double k, double strain, double rate, double *force,
+                     double *dforce_dstrain, double *dforce_drate, double *energy)
+{
+    (void)params, (void)k, (void)strain, (void)rate;
+    *force = *dforce_dstrain = *dforce_drate = *energy = 0;
+}
+
+START_TEST(malformed_ops_are_refused)
+{
+    drape_context *ctx = make_context();
+    for (int i = 0; i < 13; i++) {
+        drape_term_ops ops = attract;
+        const char *says = "not well formed";
+        drape_status expected = DRAPE_E_ARGUMENT;
+        switch (i) {
+        case 0:
+            ops.struct_size = 0;
+            expected = DRAPE_E_VERSION;
+            says = "the ops of a term have 0 bytes";
+            break;
+        case 1:
+            ops.struct_size--;
+            expected = DRAPE_E_VERSION;
+            says = "bytes";
+            break;
+        case 2:
+            ops.name = NULL;
+            break;
+        case 3:
+            ops.summary = NULL;
+            break;
+        case 4:
+            ops.element_name = NULL;
+            break;
+        case 5:
+            ops.energy = NULL;
+            break;
+        case 6:
+            ops.law = some_law;
+            break;
+        case 7:
+            ops.nodes = 0;
+            break;
+        case 8:
+            ops.nodes = DRAPE_MAX_ELEMENT_NODES + 1;
+            break;
+        case 9:
+            ops.build = NULL;
+            break;
+        case 10:
+            ops.has_internal = true;
+            break;
+        case 11:
+            ops.param_count = DRAPE_MAX_PARAMS + 1;
+            break;
+        case 12:
+            ops.name = "stretch.edge";
+            says = "there is a term \"stretch.edge\" already";
+            break;
+        }
+        ck_assert_msg(drape_context_add_term(ctx, &ops) == expected, "case %d", i);
+        check_message(ctx, says);
+    }
+    ck_assert_int_eq(drape_context_add_term(ctx, &attract), DRAPE_OK);
+    ck_assert_int_eq(drape_context_add_term(ctx, &attract), DRAPE_E_ARGUMENT);
+    check_message(ctx, "there is a term \"host.attract\" already");
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(a_context_holds_32_terms)
+{
+    static drape_term_ops ops[33];
+    static char names[33][16];
+    drape_context *ctx = make_context();
+    for (int i = 0; i < 33; i++) {
+        snprintf(names[i], sizeof names[i], "host.n%d", i);
+        ops[i] = attract;
+        ops[i].name = names[i];
+        ck_assert_int_eq(drape_context_add_term(ctx, &ops[i]), i < 32 ? DRAPE_OK : DRAPE_E_ARGUMENT);
+    }
+    check_message(ctx, "at most 32");
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* ---- Observers, statistics
+ * ---------------------------------------------------------------------------------------- */
+
+typedef struct record {
+    int64_t frames, attempts, accepted, iterations;
+    double sum, h_min, h_max;
+    double time[128], height[128]; /* of frames: of node 35 */
+    double t[128], y[128], v[128]; /* of states, from the start */
+} record;
+
+static drape_status observe(void *user, const drape_event *event)
+{
+    record *r = user;
+    const drape_attempt *a = event->attempt;
+    if (event->kind == DRAPE_EVENT_FRAME) {
+        ck_assert_ptr_null(a);
+        ck_assert_int_eq(event->frame, r->frames);
+        r->time[r->frames] = event->time;
+        r->height[r->frames++] = event->positions[3 * 35 + 1];
+        return DRAPE_OK;
+    }
+    ck_assert_int_eq(a->index, r->attempts++);
+    r->iterations += a->iterations;
+    if (!a->accepted) {
+        ck_assert_int_gt(a->status, 0);
+        return DRAPE_OK;
+    }
+    r->sum += a->h;
+    r->h_min = r->accepted == 0 ? a->h : fmin(r->h_min, a->h);
+    r->h_max = fmax(r->h_max, a->h);
+    r->accepted++;
+    r->t[r->accepted] = drape_sim_time(event->sim);
+    r->y[r->accepted] = drape_sim_positions(event->sim)[3 * 35 + 1];
+    r->v[r->accepted] = drape_sim_velocities(event->sim)[3 * 35 + 1];
+    return DRAPE_OK;
+}
+
+/* The cubic through both ends of a step with their velocities. */
+static double hermite(const record *r, int64_t k, double t)
+{
+    double h = r->t[k + 1] - r->t[k], s = (t - r->t[k]) / h;
+    return (1 + 2 * s) * (1 - s) * (1 - s) * r->y[k] + s * (1 - s) * (1 - s) * h * r->v[k] +
+           s * s * (3 - 2 * s) * r->y[k + 1] + s * s * (s - 1) * h * r->v[k + 1];
+}
+
+static record run_frames(double rate, double t_end)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    drape_sim *sim = NULL;
+    drape_sim_def def;
+    record r = {0};
+    drape_sim_def_init(&def, sizeof def);
+    def.frame_rate = rate;
+    ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_observe(sim, observe, &r), DRAPE_OK);
+    r.y[0] = drape_sim_positions(sim)[3 * 35 + 1];
+    r.v[0] = drape_sim_velocities(sim)[3 * 35 + 1];
+    ck_assert_int_eq(drape_sim_advance(sim, t_end), DRAPE_OK);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+    return r;
+}
+
+START_TEST(frames_come_in_time)
+{
+    static const double rates[] = {30, 60, 100, 250, 7};
+    for (int i = 0; i < 5; i++) {
+        const double end = 0.4;
+        record r = run_frames(rates[i], end);
+        ck_assert_int_eq(r.frames, (int64_t)floor(end * rates[i] + 1e-9) + 1);
+        for (int64_t f = 0; f < r.frames; f++) {
+            int64_t k = 0;
+            ck_assert_double_eq_tol(r.time[f], (double)f / rates[i], 1e-11);
+            while (k + 2 <= r.accepted && r.t[k + 1] < r.time[f])
+                k++;
+            ck_assert_double_eq_tol(r.height[f], hermite(&r, k, r.time[f]), 1e-12);
+        }
+    }
+}
+END_TEST
+
+/* Frames and final state do not depend on how an advance is cut up at steps' ends. */
+START_TEST(advances_may_be_cut_up)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    drape_sim *sim = make_sim(ctx, model);
+    record r = {0}, whole = run_frames(0, 0.4);
+    ck_assert_int_eq(drape_sim_observe(sim, observe, &r), DRAPE_OK);
+    for (int k = 1; k <= 40; k++)
+        ck_assert_int_eq(drape_sim_advance(sim, 0.01 * k), DRAPE_OK);
+    ck_assert_int_eq(r.frames, whole.frames);
+    ck_assert_mem_eq(r.height, whole.height, (size_t)r.frames * sizeof *r.height);
+    ck_assert_uint_eq(drape_sim_hash(sim), hash_after(ctx, model, 0.4));
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(statistics_agree_with_what_was_told)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    drape_sim *sim = NULL;
+    drape_sim_def def;
+    record r = {0};
+    const drape_setting few = {"max_iterations", 3, NULL}; /* so that some are rejected */
+    int64_t rejected = 0, count;
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator_settings = &few;
+    def.integrator_setting_count = 1;
+    ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_observe(sim, observe, &r), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_statistics(sim).steps_accepted, 0);
+    ck_assert_double_eq(drape_sim_statistics(sim).h_max, 0);
+    ck_assert_msg(drape_sim_advance(sim, 0.2) == DRAPE_OK, "%s", drape_context_message(ctx));
+    drape_statistics s = drape_sim_statistics(sim);
+    for (int i = 0; drape_sim_reason(sim, i, &count); i++) {
+        ck_assert_int_gt(count, 0);
+        rejected += count;
+    }
+    ck_assert_int_gt(rejected, 0);
+    ck_assert_int_eq(s.steps_rejected, rejected);
+    ck_assert_int_eq(s.steps_accepted, r.accepted);
+    ck_assert_int_eq(s.steps_accepted + s.steps_rejected, r.attempts);
+    ck_assert_double_eq(s.h_min, r.h_min);
+    ck_assert_double_eq(s.h_max, r.h_max);
+    ck_assert_double_eq_tol(r.sum, 0.2, 1e-14);
+    ck_assert_double_eq(drape_sim_time(sim), 0.2);
+    ck_assert_int_eq(s.newton_iterations, r.iterations);
+    ck_assert(s.residuals > s.newton_iterations && s.jacobians <= s.newton_iterations);
+    ck_assert(s.factorizations == s.jacobians && s.linear_iterations >= s.factorizations);
+    ck_assert(s.strain_min <= 0 && s.strain_max >= 0 && s.strain_max < 1);
+    ck_assert(s.wall_steps >= s.wall_residual + s.wall_jacobian + s.wall_factor + s.wall_solve);
+    ck_assert(s.wall_setup > 0 && s.wall_contact == 0);
+    drape_energy e = drape_sim_energy(sim);
+    ck_assert(e.kinetic > 0 && e.elastic > 0 && e.contact == 0 && e.dissipated > 0);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(a_sim_has_at_most_8_observers)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    drape_sim *sim = make_sim(ctx, model);
+    record r[9] = {{0}};
+    for (int i = 0; i < 9; i++)
+        ck_assert_int_eq(drape_sim_observe(sim, observe, &r[i]), i < 8 ? DRAPE_OK : DRAPE_E_ARGUMENT);
+    check_message(ctx, "at most 8");
+    ck_assert_int_eq(drape_sim_observe(sim, NULL, NULL), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.05), DRAPE_OK);
+    for (int i = 0; i < 9; i++)
+        ck_assert_int_eq(r[i].attempts, i < 8 ? 5 : 0);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* ---- Threads, names
+ * ----------------------------------------------------------------------------------------------- */
+
+typedef struct job {
+    const drape_model *model;
+    uint64_t hash;
+} job;
+
+static void *run_job(void *user)
+{
+    job *j = user;
+    drape_context *ctx = NULL;
+    drape_sim *sim = NULL;
+    if (drape_context_create(NULL, &ctx) || drape_sim_create(ctx, j->model, NULL, &sim) ||
+        drape_sim_advance(sim, 0.3))
+        return NULL;
+    j->hash = drape_sim_hash(sim);
+    drape_sim_destroy(&sim);
+    drape_context_destroy(&ctx);
+    return NULL;
+}
+
+START_TEST(threads_share_a_model)
+{
+    enum { THREADS = 4 };
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    uint64_t expected = hash_after(ctx, model, 0.3);
+    pthread_t thread[THREADS];
+    job jobs[THREADS];
+    for (int i = 0; i < THREADS; i++) {
+        jobs[i] = (job){.model = model};
+        ck_assert_int_eq(pthread_create(&thread[i], NULL, run_job, &jobs[i]), 0);
+    }
+    for (int i = 0; i < THREADS; i++) {
+        ck_assert_int_eq(pthread_join(thread[i], NULL), 0);
+        ck_assert_uint_eq(jobs[i].hash, expected);
+    }
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(element_threads_change_no_bit)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    uint64_t expected = hash_after(ctx, model, 0.2);
+    for (int threads = 2; threads <= 4; threads++) {
+        drape_sim *sim = NULL;
+        drape_sim_def def;
+        drape_sim_def_init(&def, sizeof def);
+        def.threads = threads;
+        ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_advance(sim, 0.2), DRAPE_OK);
+        ck_assert_uint_eq(drape_sim_hash(sim), expected);
+        drape_sim_destroy(&sim);
+    }
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(statuses_have_names)
+{
+    static const struct {
+        drape_status status;
+        const char *name;
+    } names[] = {{DRAPE_OK, "ok"},
+                 {DRAPE_RETRY_NONLINEAR, "retry_nonlinear"},
+                 {DRAPE_RETRY_LINEAR, "retry_linear"},
+                 {DRAPE_RETRY_NONFINITE, "retry_nonfinite"},
+                 {DRAPE_RETRY_DEGENERATE, "retry_degenerate"},
+                 {DRAPE_RETRY_REJECTED, "retry_rejected"},
+                 {DRAPE_E_ARGUMENT, "e_argument"},
+                 {DRAPE_E_MEMORY, "e_memory"},
+                 {DRAPE_E_FILE, "e_file"},
+                 {DRAPE_E_PARSE, "e_parse"},
+                 {DRAPE_E_STEP_TOO_SMALL, "e_step_too_small"},
+                 {DRAPE_E_SOLVER, "e_solver"},
+                 {DRAPE_E_VERSION, "e_version"},
+                 {DRAPE_E_STOPPED, "e_stopped"},
+                 {(drape_status)99, "unknown"},
+                 {(drape_status)-99, "unknown"}};
+    char version[32];
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        ck_assert_str_eq(drape_status_name(names[i].status), names[i].name);
+    snprintf(version, sizeof version, "%d.%d.%d", DRAPE_VERSION_MAJOR, DRAPE_VERSION_MINOR,
+             DRAPE_VERSION_PATCH);
+    ck_assert_str_eq(drape_version(), version);
+}
+END_TEST
+
+START_TEST(messages_are_one_line)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = NULL;
+    ck_assert_str_eq(drape_context_message(ctx), "");
+    drape_context_set_message(ctx, "a\nb\tc\x7f %d", 5);
+    ck_assert_str_eq(drape_context_message(ctx), "a?b?c? 5");
+    ck_assert_int_eq(drape_model_load(ctx, "no\nsuch\rfile.json", &model), DRAPE_E_FILE);
+    check_message(ctx, "no?such?file.json: cannot read the scene");
+    ck_assert_int_lt(compile_text(ctx, "{'drape': 1, 'clo\\nth': 1}", &model), 0);
+    check_message(ctx, "unknown key");
+    ck_assert_int_lt(compile_text(ctx, "{'drape': 1,\n 'cloth': [{]}", &model), 0);
+    check_message(ctx, "s.json:2:");
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* All memory is the context's own, and all of it comes back. */
+START_TEST(nothing_leaks)
+{
+    failing_allocator memory = {.fail_at = 0};
+    drape_context *ctx = failing_context(&memory);
+    drape_model *model = make_sheet(ctx);
+    uint64_t expected = hash_after(ctx, model, 0.05);
+    drape_context *plain = make_context();
+    ck_assert_uint_eq(hash_after(plain, model, 0.05), expected);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+    drape_context_destroy(&plain);
+    ck_assert_int_gt(memory.calls, 30);
+    ck_assert_int_eq(memory.live, 0);
+}
+END_TEST
+
+SUITE("api", destroying_nothing_is_fine, destroy_writes_null, null_arguments_are_told, no_model_has_nothing,
+      defs_that_were_not_initialised_are_refused, shorter_defs_of_older_callers_are_read,
+      half_an_allocator_is_refused, sim_defs_are_checked, an_end_that_is_no_time_is_refused,
+      zeroed_parts_of_a_scene_are_refused, a_scene_in_memory_is_the_same_as_in_a_file,
+      the_hash_sees_all_of_the_state, a_model_can_be_read, an_override_is_a_value_of_the_scene,
+      a_term_of_the_host_works, faults_of_a_term_of_the_host_are_told_at_its_place, malformed_ops_are_refused,
+      a_context_holds_32_terms, frames_come_in_time, advances_may_be_cut_up,
+      statistics_agree_with_what_was_told, a_sim_has_at_most_8_observers, threads_share_a_model,
+      element_threads_change_no_bit, statuses_have_names, messages_are_one_line, nothing_leaks)

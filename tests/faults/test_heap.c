@@ -1,0 +1,199 @@
+/*
+ * test_heap.c: from the second step on no heap call is made in a step, by Drape or by KINSOL or KLU. The heap calls
+ * of the whole process are counted: malloc and its family are defined here, in front of glibc's.
+ */
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "io/recorder.h"
+#include "support/scene.h"
+
+#if defined(__SANITIZE_ADDRESS__) || !defined(__GLIBC__)
+#define COUNTS_HEAP 0 /* the sanitizer has a heap of its own */
+#else
+#define COUNTS_HEAP 1
+
+void *__libc_malloc(size_t size);
+void *__libc_calloc(size_t count, size_t size);
+void *__libc_realloc(void *memory, size_t size);
+void __libc_free(void *memory);
+#endif
+
+static volatile bool counting;
+static volatile long calls;
+
+#if COUNTS_HEAP
+static void count_call(void)
+{
+    if (counting)
+        __atomic_add_fetch(&calls, 1, __ATOMIC_RELAXED);
+}
+
+void *malloc(size_t size)
+{
+    count_call();
+    return __libc_malloc(size);
+}
+
+void *calloc(size_t count, size_t size)
+{
+    count_call();
+    return __libc_calloc(count, size);
+}
+
+void *realloc(void *memory, size_t size)
+{
+    count_call();
+    return __libc_realloc(memory, size);
+}
+
+void free(void *memory)
+{
+    if (memory)
+        count_call();
+    __libc_free(memory);
+}
+#endif
+
+static scene open_scene(const char *integrator, bool damped)
+{
+    return scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 5, 'edge_length': 0.05},"
+        " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
+        " 'terms': ['stretch.edge', 'bend.hinge'%s],"
+        " 'pins': [{'corner': 'top-left'}, {'nodes': [5], 'track': [[0, [0,0,0]], [1, [0,0.1,0]]]}]}],"
+        " 'integrator': {'dt': 0.01, %s}, 'duration': 1}",
+        damped ? ", {'type': 'damp.kelvin_voigt', 'beta': 1e-3}, {'type': 'drag.viscous', "
+                 "'coefficient': 0.1}"
+               : "",
+        integrator);
+}
+
+/* Heap calls within steps 2 to 50. */
+static long count_steps(scene *s)
+{
+    drape_status status = drape_sim_advance(s->sim, 0.01);
+    ck_assert_int_eq(status, DRAPE_OK);
+    calls = 0;
+    for (int k = 2; k <= 50 && !status; k++) {
+        counting = true;
+        status = drape_sim_advance(s->sim, 0.01 * k);
+        drape_sim_energy(s->sim);
+        counting = false;
+    }
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    ck_assert_int_ge(drape_sim_statistics(s->sim).steps_accepted, 50);
+    return calls;
+}
+
+START_TEST(the_counter_counts)
+{
+    calls = 0;
+    counting = true;
+    void *volatile memory = malloc(100);
+    memory = realloc(memory, 100000);
+    free(memory);
+    memory = calloc(10, 10);
+    free(memory);
+    counting = false;
+    ck_assert_int_eq(calls, COUNTS_HEAP ? 5 : 0);
+}
+END_TEST
+
+START_TEST(no_heap_call_from_the_second_step_on)
+{
+    static const char *const solvers[] = {"klu", "dense"}, *const newtons[] = {"exact", "modified"},
+                             *const globals[] = {"none", "line_search"};
+    for (int i = 0; i < 32; i++) {
+        char integrator[160];
+        bool damped = i & 8, project = i & 16;
+        snprintf(integrator, sizeof integrator,
+                 "'linear_solver': '%s', 'newton': '%s', 'globalization': '%s', 'project': %s",
+                 solvers[i & 1], newtons[(i >> 1) & 1], globals[(i >> 2) & 1], project ? "true" : "false");
+        scene s = open_scene(integrator, damped);
+        long n = count_steps(&s);
+        ck_assert_msg(n == 0, "%s%s: %ld heap calls in 49 steps", integrator, damped ? ", damped" : "", n);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* Rejected steps too: one iteration is not enough at 0.01 s. */
+START_TEST(no_heap_call_in_rejected_steps)
+{
+    scene s = open_scene("'max_iterations': 2", true);
+    long n = count_steps(&s);
+    ck_assert_int_gt(drape_sim_statistics(s.sim).steps_rejected, 50);
+    ck_assert_int_eq(n, 0);
+    scene_close(&s);
+}
+END_TEST
+
+/* Frames and step log are written through buffers that were taken before. */
+START_TEST(no_heap_call_for_output)
+{
+    static const char *const formats[] = {"npy", "obj", "ply"};
+    char folder[] = "/tmp/drape-heap-XXXXXX", command[64];
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    scene s = open_scene("'linear_solver': 'klu'", true);
+    drape_recorder *recorder = NULL;
+    const drape_recorder_def def = {.folder = folder, .formats = formats, .format_count = 3};
+    ck_assert_int_eq(drape_recorder_create(s.ctx, s.sim, &def, &recorder), DRAPE_OK);
+    ck_assert_int_eq(count_steps(&s), 0);
+    ck_assert_int_gt(drape_recorder_frames(recorder), 25);
+    drape_recorder_destroy(&recorder);
+    scene_close(&s);
+    snprintf(command, sizeof command, "rm -rf %s", folder);
+    ck_assert_int_eq(system(command), 0);
+}
+END_TEST
+
+/* With several threads the calls of OpenMP's own library are not ours to promise: they are printed. What
+ * Drape takes by its allocator stays nothing. */
+static long own_calls;
+
+static void *own_allocate(void *user, size_t size)
+{
+    (void)user;
+    own_calls++;
+    return malloc(size);
+}
+
+static void own_release(void *user, void *memory)
+{
+    (void)user;
+    own_calls++;
+    free(memory);
+}
+
+START_TEST(threads_take_nothing_of_ours)
+{
+    scene s = open_scene("'linear_solver': 'klu'", true);
+    drape_context_def def;
+    drape_sim_def sim_def;
+    drape_context *ctx = NULL;
+    drape_sim *sim = NULL;
+    drape_context_def_init(&def, sizeof def);
+    def.allocate = own_allocate;
+    def.release = own_release;
+    ck_assert_int_eq(drape_context_create(&def, &ctx), DRAPE_OK);
+    drape_sim_def_init(&sim_def, sizeof sim_def);
+    sim_def.threads = 2;
+    ck_assert_int_eq(drape_sim_create(ctx, s.model, &sim_def, &sim), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.01), DRAPE_OK);
+    own_calls = calls = 0;
+    counting = true;
+    drape_status status = drape_sim_advance(sim, 0.5);
+    counting = false;
+    ck_assert_int_eq(status, DRAPE_OK);
+    printf("# 2 threads: %ld heap calls in 49 steps, all of them OpenMP's\n", calls);
+    ck_assert_int_eq(own_calls, 0);
+    drape_sim_destroy(&sim);
+    drape_context_destroy(&ctx);
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("heap", the_counter_counts, no_heap_call_from_the_second_step_on, no_heap_call_in_rejected_steps,
+      no_heap_call_for_output, threads_take_nothing_of_ours)

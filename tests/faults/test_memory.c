@@ -1,0 +1,175 @@
+/* test_memory.c: every allocation of a whole life fails once: parse, compile, sim, frames, summary. Each failure is
+ * reported as one, leaves NULL, and leaks nothing. */
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "io/recorder.h"
+#include "io/summary.h"
+#include "support/failing_allocator.h"
+#include "support/suite.h"
+
+static char folder[] = "/tmp/drape-memory-XXXXXX";
+static char scene_path[64], mesh_path[64], out_path[64], summary_path[64];
+
+static const char mesh_text[] = "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0.2 1\nf 1 2 3\nf 3 2 4\n";
+static const char scene_text[] =
+    "{ \"drape\": 1, // a grid and a file, every kind of term, of pin\n"
+    "  \"cloth\": [\n"
+    "    {\"name\": \"sheet\", \"mesh\": {\"grid\": \"equilateral\", \"edges\": 3, \"edge_length\": 0.1},\n"
+    "     \"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200},\n"
+    "     \"terms\": [\"stretch.edge\", {\"type\": \"bend.hinge\", \"rest\": \"flat\"},\n"
+    "               {\"type\": \"damp.kelvin_voigt\", \"beta\": 1e-3}, {\"type\": \"drag.viscous\", "
+    "\"coefficient\": 0.1}],\n"
+    "     \"pins\": [{\"corner\": \"top-left\"}, {\"nodes\": [3], \"track\": [[0, [0,0,0]], [1, "
+    "[0,0.1,0]]]}]},\n"
+    "    {\"mesh\": {\"file\": \"mesh.obj\", \"transform\": {\"scale\": 0.2, \"rotate\": [0, 1, 0, 30]}},\n"
+    "     \"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"total_mass\": 0.1},\n"
+    "     \"terms\": [\"stretch.edge\"], \"pins\": [{\"box\": [[-1,-1,-1],[0.1,1,0.1]]}]}],\n"
+    "  \"integrator\": {\"dt\": 0.01, \"linear_solver\": \"klu\"}, \"controller\": {\"type\": \"halving\"},\n"
+    "  \"duration\": 1, \"frame_rate\": 150, \"output\": {\"formats\": [\"npy\", \"obj\", \"ply\"]} }\n";
+
+static void write_text(const char *path, const char *text)
+{
+    FILE *file = fopen(path, "w");
+    ck_assert_ptr_nonnull(file);
+    ck_assert_int_ge(fputs(text, file), 0);
+    ck_assert_int_eq(fclose(file), 0);
+}
+
+static void make_files(void)
+{
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    snprintf(scene_path, sizeof scene_path, "%s/scene.json", folder);
+    snprintf(mesh_path, sizeof mesh_path, "%s/mesh.obj", folder);
+    snprintf(out_path, sizeof out_path, "%s/out", folder);
+    snprintf(summary_path, sizeof summary_path, "%s/summary.json", folder);
+    write_text(scene_path, scene_text);
+    write_text(mesh_path, mesh_text);
+}
+
+static void remove_files(void)
+{
+    char command[128];
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    ck_assert_int_eq(system(command), 0);
+}
+
+static drape_status run(drape_context *ctx, const drape_model *model, const char *linear_solver)
+{
+    static const char *const formats[] = {"npy", "obj", "ply"};
+    const drape_setting setting = {"linear_solver", 0, linear_solver};
+    drape_sim *sim = (drape_sim *)(uintptr_t)1;
+    drape_recorder *recorder = (drape_recorder *)(uintptr_t)1;
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator_settings = &setting;
+    def.integrator_setting_count = 1;
+    drape_status status = drape_sim_create(ctx, model, &def, &sim);
+    ck_assert_int_eq(status != DRAPE_OK, sim == NULL);
+    if (status)
+        return status;
+    status = drape_recorder_create(
+        ctx, sim, &(drape_recorder_def){.folder = out_path, .formats = formats, .format_count = 3},
+        &recorder);
+    ck_assert_int_eq(status != DRAPE_OK, recorder == NULL);
+    if (!status)
+        status = drape_sim_advance(sim, 0.03);
+    if (!status)
+        status = drape_recorder_finish(recorder);
+    if (!status) {
+        ck_assert_int_ge(drape_recorder_frames(recorder), 5);
+        ck_assert_int_eq(drape_sim_statistics(sim).steps_accepted, 3);
+        status = drape_summary_write(ctx, sim, &(drape_summary_def){.frames = 5}, summary_path);
+    }
+    drape_recorder_destroy(&recorder);
+    drape_sim_destroy(&sim);
+    ck_assert(!recorder && !sim);
+    return status;
+}
+
+/* All of a program's life; by text, set and defs. */
+static drape_status live(drape_context *ctx, const char *linear_solver)
+{
+    drape_scene *scene = (drape_scene *)(uintptr_t)1;
+    drape_model *model = (drape_model *)(uintptr_t)1;
+    drape_status status = drape_scene_load(ctx, scene_path, &scene);
+    ck_assert_int_eq(status != DRAPE_OK, scene == NULL);
+    if (!status)
+        status = drape_scene_set(scene, "/controller/dt_min", "1e-6");
+    if (!status) {
+        status = drape_scene_compile(scene, &model);
+        ck_assert_int_eq(status != DRAPE_OK, model == NULL);
+    } else
+        model = NULL;
+    drape_scene_destroy(&scene);
+    if (!status)
+        status = run(ctx, model, linear_solver);
+    drape_model_destroy(&model);
+    ck_assert(!scene && !model);
+    return status;
+}
+
+/* The number of allocations of a life in which none fails. */
+static long sweep(const char *linear_solver, bool stay_broken)
+{
+    long n = 0;
+    for (drape_status status = DRAPE_E_MEMORY; status;) {
+        failing_allocator memory = {.fail_at = ++n, .stay_broken = stay_broken};
+        drape_context *ctx = failing_context(&memory);
+        status = live(ctx, linear_solver);
+        ck_assert_msg(status == DRAPE_OK || status == DRAPE_E_MEMORY, "allocation %ld: %s: %s", n,
+                      drape_status_name(status), drape_context_message(ctx));
+        ck_assert_msg(status == DRAPE_OK || strstr(drape_context_message(ctx), "out of memory"),
+                      "allocation %ld: %s", n, drape_context_message(ctx));
+        ck_assert_msg(status == DRAPE_E_MEMORY || memory.calls < n, "failure %ld of %ld was not told", n,
+                      memory.calls);
+        drape_context_destroy(&ctx);
+        ck_assert_msg(memory.live == 0, "allocation %ld: %ld leaks", n, memory.live);
+        ck_assert_int_lt(n, 10000);
+    }
+    return n - 1;
+}
+
+START_TEST(every_allocation_fails_once)
+{
+    make_files();
+    long klu = sweep("klu", false), dense = sweep("dense", false);
+    ck_assert_int_gt(klu, 100);
+    ck_assert_int_gt(dense, 100);
+    remove_files();
+}
+END_TEST
+
+START_TEST(memory_ends_and_stays_away)
+{
+    make_files();
+    ck_assert_int_gt(sweep("klu", true), 100);
+    remove_files();
+}
+END_TEST
+
+static void *no_memory(void *user, size_t size)
+{
+    (void)user, (void)size;
+    return NULL;
+}
+
+static void release(void *user, void *memory)
+{
+    (void)user, (void)memory;
+}
+
+START_TEST(a_context_without_memory)
+{
+    drape_context *ctx = (drape_context *)(uintptr_t)1;
+    drape_context_def def;
+    drape_context_def_init(&def, sizeof def);
+    def.allocate = no_memory;
+    def.release = release;
+    ck_assert_int_eq(drape_context_create(&def, &ctx), DRAPE_E_MEMORY);
+    ck_assert_ptr_null(ctx);
+}
+END_TEST
+
+SUITE("memory", every_allocation_fails_once, memory_ends_and_stays_away, a_context_without_memory)

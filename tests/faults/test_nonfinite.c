@@ -1,0 +1,159 @@
+/* test_nonfinite.c: the nth evaluation of a force or of a Hessian is not finite, for every n. No such number comes
+ * into a state; a fixed step fails and says so, a halved one recovers. */
+#include "host.h"
+
+enum { EVALUATIONS = 60 };
+
+/* Modified Newton needs few Jacobians: not all of them come within this time. */
+enum { MOST_STEPS = 14 };
+
+/* Steps one by one until one fails or the fault is behind; the state of a failed step is the one before. */
+static bool fails_cleanly(host_sim *s, const char *reason)
+{
+    for (int k = 1; k <= MOST_STEPS && !host_has_broken(); k++) {
+        host_copy before = host_copy_state(s);
+        drape_status status = drape_sim_advance(s->sim, HOST_DT * k);
+        ck_assert_int_eq(s->nonfinite, 0);
+        ck_assert_int_eq(s->unconverged, 0);
+        if (!status)
+            continue;
+        ck_assert_int_lt(status, 0);
+        host_check_state(s, &before);
+        ck_assert_int_eq(drape_sim_statistics(s->sim).steps_rejected, 1);
+        if (!host_has_broken()) /* modified Newton without a controller may fail by itself */
+            return false;
+        host_check_message(s, reason);
+        return true;
+    }
+    return false;
+}
+
+/* Controller fixed. KINSOL recovers from some by itself (it takes a shorter step of Newton): then the step is
+ * converged; others end the run with e_solver. */
+static void check_fixed(host_fault kind, const char *reason)
+{
+    for (int setting = 0; setting < HOST_SETTINGS; setting++) {
+        int failures = 0;
+        for (long n = 1; n <= EVALUATIONS; n++) {
+            host_sim s = host_open(host_settings[setting], "'type': 'fixed'", true);
+            host_watch(&s);
+            host_break(kind, n, false);
+            failures += fails_cleanly(&s, reason);
+            host_close(&s);
+        }
+        ck_assert_msg(failures >= 3, "{%s}: %d of %d fail", host_settings[setting], failures, EVALUATIONS);
+    }
+}
+
+START_TEST(a_nan_force_stops_fixed_steps)
+{
+    check_fixed(HOST_NAN_FORCE, "nonfinite");
+}
+END_TEST
+
+START_TEST(an_infinite_force_stops_fixed_steps)
+{
+    check_fixed(HOST_INFINITE_FORCE, "nonfinite");
+}
+END_TEST
+
+START_TEST(a_nan_hessian_stops_fixed_steps)
+{
+    check_fixed(HOST_NAN_HESSIAN, "singular");
+}
+END_TEST
+
+START_TEST(an_infinite_hessian_stops_fixed_steps)
+{
+    check_fixed(HOST_INFINITE_HESSIAN, "singular");
+}
+END_TEST
+
+START_TEST(halving_recovers)
+{
+    static const host_fault kinds[] = {HOST_NAN_FORCE, HOST_INFINITE_FORCE, HOST_NAN_HESSIAN,
+                                       HOST_INFINITE_HESSIAN};
+    for (int k = 0; k < 4; k++)
+        for (int setting = 0; setting < HOST_SETTINGS; setting++)
+            for (long n = 1; n <= EVALUATIONS; n++) {
+                host_sim s = host_open(host_settings[setting], "'type': 'halving'", true);
+                host_watch(&s);
+                host_break(kinds[k], n, false);
+                drape_status status = drape_sim_advance(s.sim, 0.2);
+                ck_assert_msg(status == DRAPE_OK, "fault %d at %ld, {%s}: %s", kinds[k], n,
+                              host_settings[setting], drape_context_message(s.ctx));
+                ck_assert_double_eq(drape_sim_time(s.sim), 0.2);
+                ck_assert_int_eq(s.unconverged, 0);
+                ck_assert_int_eq(s.nonfinite, 0);
+                host_close(&s);
+            }
+}
+END_TEST
+
+/* A fault that stays ends the run, after as many attempts as there are halves down to dt_min, in the state
+ * before. */
+START_TEST(a_fault_that_stays_ends_the_run)
+{
+    static const host_fault kinds[] = {HOST_NAN_FORCE, HOST_INFINITE_FORCE, HOST_NAN_HESSIAN,
+                                       HOST_INFINITE_HESSIAN};
+    for (int k = 0; k < 4; k++)
+        for (int setting = 0; setting < HOST_SETTINGS; setting++)
+            for (int late = 0; late < 2; late++) {
+                host_sim s = host_open(host_settings[setting], "'type': 'halving', 'dt_min': 1e-6", true);
+                host_watch(&s);
+                if (late)
+                    ck_assert_int_eq(drape_sim_advance(s.sim, 0.05), DRAPE_OK);
+                host_copy before = host_copy_state(&s);
+                long attempts = s.attempts;
+                host_break(kinds[k], 1, true);
+                ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_STEP_TOO_SMALL);
+                if (drape_sim_time(s.sim) ==
+                    before.t) /* modified Newton may live on old factors for a while */
+                    host_check_state(&s, &before);
+                else
+                    ck_assert(strstr(host_settings[setting], "modified") && kinds[k] >= HOST_NAN_HESSIAN);
+                host_check_message(&s, kinds[k] >= HOST_NAN_HESSIAN ? "singular" : "nonfinite");
+                if (drape_sim_time(s.sim) == before.t)
+                    ck_assert_int_eq(s.attempts - attempts, 14); /* 2^-19 s > 1e-6 s > 2^-20 s */
+                ck_assert_double_eq(s.last_h, HOST_DT / 8192);
+                ck_assert_int_eq(s.nonfinite, 0);
+                ck_assert_int_eq(s.unconverged, 0);
+                host_close(&s);
+            }
+}
+END_TEST
+
+/* on_failure "accept" takes what is not converged, never what is no number. */
+START_TEST(accept_takes_no_nan)
+{
+    for (long n = 1; n <= EVALUATIONS; n++) {
+        host_sim s = host_open(", 'on_failure': 'accept', 'max_iterations': 2", "'type': 'fixed'", true);
+        host_watch(&s);
+        host_break(HOST_NAN_FORCE, n, false);
+        drape_status status = drape_sim_advance(s.sim, 0.3);
+        ck_assert(status == DRAPE_OK || status == DRAPE_E_SOLVER);
+        ck_assert_int_eq(s.nonfinite, 0);
+        ck_assert_int_gt(s.unconverged + s.rejected, 0);
+        host_close(&s);
+    }
+}
+END_TEST
+
+/* The smallest allowed dt_min: any number above 0. The run still ends, at t = 0 too, where every step moves the
+ * time. */
+START_TEST(a_tiny_dt_min_ends_too)
+{
+    host_sim s = host_open("", "'type': 'halving', 'dt_min': 1e-30", true);
+    host_watch(&s);
+    host_copy before = host_copy_state(&s);
+    host_break(HOST_NAN_FORCE, 1, true);
+    ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_STEP_TOO_SMALL);
+    host_check_state(&s, &before);
+    ck_assert_int_lt(s.attempts, 110);
+    host_close(&s);
+}
+END_TEST
+
+SUITE("nonfinite", a_nan_force_stops_fixed_steps, an_infinite_force_stops_fixed_steps,
+      a_nan_hessian_stops_fixed_steps, an_infinite_hessian_stops_fixed_steps, halving_recovers,
+      a_fault_that_stays_ends_the_run, accept_takes_no_nan, a_tiny_dt_min_ends_too)

@@ -1,0 +1,167 @@
+/* test_stop.c: an observer stops an advance, at a step or at a frame; the state is that of the last accepted step, the
+ * sim goes on where it was, and no frame is lost, told twice or out of place. */
+#include "support/scene.h"
+
+#define STEPS 40
+
+static const char falling[] =
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 3, 'edge_length': 0.1},"
+    " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge'],"
+    " 'pins': [{'corner': 'top-left'}]}],"
+    " 'integrator': {'dt': %g%s}, 'controller': {'type': '%s'}, 'frame_rate': %g, 'duration': 1}";
+
+/* What an observer has seen, and when it is to say stop. */
+typedef struct watcher {
+    drape_event_kind kind;
+    long at, events; /* stops at the event of that kind and number, from 1 */
+    drape_status answer;
+    const char *message;
+    drape_context *ctx;
+    long attempts, frames;
+    double frame_time[256], frame_x[256]; /* of the last node's height */
+    uint64_t hash;                        /* of the state at the last attempt */
+} watcher;
+
+static drape_status watch(void *user, const drape_event *event)
+{
+    watcher *w = user;
+    if (event->kind == DRAPE_EVENT_FRAME) {
+        ck_assert_int_eq(event->frame, w->frames);
+        ck_assert_int_lt(w->frames, 256);
+        w->frame_time[w->frames] = event->time;
+        w->frame_x[w->frames++] = event->positions[3 * 15 + 1];
+    } else {
+        w->attempts++;
+        w->hash = drape_sim_hash(event->sim);
+    }
+    if (event->kind != w->kind || ++w->events != w->at)
+        return DRAPE_OK;
+    if (w->message)
+        drape_context_set_message(w->ctx, "%s", w->message);
+    return w->answer;
+}
+
+static scene open_watched(double dt, double rate, watcher *w)
+{
+    scene s = scene_open(falling, dt, "", "halving", rate);
+    w->ctx = s.ctx;
+    ck_assert_int_eq(drape_sim_observe(s.sim, watch, w), DRAPE_OK);
+    return s;
+}
+
+/* The run without any stop. */
+static watcher reference(double dt, double rate, uint64_t *hash)
+{
+    watcher w = {.at = -1};
+    scene s = open_watched(dt, rate, &w);
+    scene_advance(&s, STEPS * dt);
+    *hash = drape_sim_hash(s.sim);
+    scene_close(&s);
+    return w;
+}
+
+/* Stops at every event of a kind in turn and goes on. */
+static void check_stops(drape_event_kind kind, double dt, double rate)
+{
+    uint64_t hash;
+    watcher whole = reference(dt, rate, &hash);
+    long events = kind == DRAPE_EVENT_ATTEMPT ? whole.attempts : whole.frames;
+    ck_assert_int_gt(events, 3);
+    for (long at = 1; at <= events; at++) {
+        watcher w = {.kind = kind, .at = at, .answer = DRAPE_RETRY_REJECTED};
+        scene s = open_watched(dt, rate, &w);
+        ck_assert_int_eq(drape_sim_advance(s.sim, STEPS * dt), DRAPE_E_STOPPED);
+        ck_assert_msg(strstr(drape_context_message(s.ctx), "an observer asked to stop"), "%s",
+                      drape_context_message(s.ctx));
+        ck_assert_int_ge(w.events, at); /* the frames of the step that it stopped in may still come */
+        if (w.attempts > 0)
+            ck_assert_uint_eq(drape_sim_hash(s.sim), w.hash);
+        ck_assert_int_eq(drape_sim_statistics(s.sim).steps_accepted, w.attempts);
+        scene_advance(&s, STEPS * dt);
+        ck_assert_uint_eq(drape_sim_hash(s.sim), hash);
+        ck_assert_int_eq(w.attempts, whole.attempts);
+        ck_assert_int_eq(w.frames, whole.frames);
+        for (long f = 0; f < w.frames; f++) {
+            ck_assert_double_eq(w.frame_time[f], whole.frame_time[f]);
+            ck_assert_msg(w.frame_x[f] == whole.frame_x[f],
+                          "stopped at %s %ld: frame %ld (t=%g) is at %.17g, without a stop at %.17g",
+                          kind == DRAPE_EVENT_ATTEMPT ? "attempt" : "frame", at, f, w.frame_time[f],
+                          w.frame_x[f], whole.frame_x[f]);
+        }
+        scene_close(&s);
+    }
+}
+
+START_TEST(stops_at_a_step_and_goes_on)
+{
+    check_stops(DRAPE_EVENT_ATTEMPT, 0.01, 60);
+    check_stops(DRAPE_EVENT_ATTEMPT, 0.01, 100);
+}
+END_TEST
+
+START_TEST(stops_at_a_step_between_frames_and_goes_on)
+{
+    check_stops(DRAPE_EVENT_ATTEMPT, 0.01, 370); /* several frames a step */
+}
+END_TEST
+
+START_TEST(stops_at_a_frame_and_goes_on)
+{
+    check_stops(DRAPE_EVENT_FRAME, 0.01, 60);
+    check_stops(DRAPE_EVENT_FRAME, 0.01, 100);
+    check_stops(DRAPE_EVENT_FRAME, 0.01, 370);
+}
+END_TEST
+
+START_TEST(a_negative_answer_is_returned_with_its_message)
+{
+    for (int kind = 0; kind < 2; kind++) {
+        watcher w = {
+            .kind = (drape_event_kind)kind, .at = 3, .answer = DRAPE_E_FILE, .message = "the disk\nis full"};
+        scene s = open_watched(0.01, 60, &w);
+        ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_FILE);
+        ck_assert_str_eq(drape_context_message(s.ctx), "the disk?is full");
+        ck_assert_double_eq_tol(drape_sim_time(s.sim), kind == DRAPE_EVENT_ATTEMPT ? 0.03 : 0.04, 1e-15);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* A stop at a rejected attempt: the state is the one before it. */
+START_TEST(stops_at_a_rejected_step)
+{
+    watcher w = {.kind = DRAPE_EVENT_ATTEMPT, .at = 1, .answer = DRAPE_RETRY_REJECTED};
+    scene s = scene_open(falling, 0.05, ", 'max_iterations': 1", "halving", 60.0);
+    w.ctx = s.ctx;
+    ck_assert_int_eq(drape_sim_observe(s.sim, watch, &w), DRAPE_OK);
+    uint64_t start = drape_sim_hash(s.sim);
+    ck_assert_int_eq(drape_sim_advance(s.sim, 0.2), DRAPE_E_STOPPED);
+    ck_assert_int_eq(drape_sim_statistics(s.sim).steps_accepted, 0);
+    ck_assert_int_eq(drape_sim_statistics(s.sim).steps_rejected, 1);
+    ck_assert_uint_eq(drape_sim_hash(s.sim), start);
+    ck_assert_double_eq(drape_sim_time(s.sim), 0);
+    scene_close(&s);
+}
+END_TEST
+
+/* The observers before the one that stops are told, those after it are not. */
+START_TEST(observers_are_told_in_order)
+{
+    watcher before = {.at = -1},
+            stops = {.kind = DRAPE_EVENT_ATTEMPT, .at = 4, .answer = DRAPE_RETRY_REJECTED},
+            after = {.at = -1};
+    scene s = scene_open(falling, 0.01, "", "halving", 60.0);
+    ck_assert_int_eq(drape_sim_observe(s.sim, watch, &before), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_observe(s.sim, watch, &stops), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_observe(s.sim, watch, &after), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_STOPPED);
+    ck_assert_int_eq(before.attempts, 4);
+    ck_assert_int_eq(stops.attempts, 4);
+    ck_assert_int_eq(after.attempts, 3);
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("stop", stops_at_a_step_and_goes_on, stops_at_a_step_between_frames_and_goes_on,
+      stops_at_a_frame_and_goes_on, a_negative_answer_is_returned_with_its_message, stops_at_a_rejected_step,
+      observers_are_told_in_order)

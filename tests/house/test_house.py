@@ -1,0 +1,190 @@
+#!/usr/bin/env python3
+"""test_house.py ROOT: what no compiler checks about the tree of sources. Speaks TAP.
+
+A check is a function of {path: text} that returns complaints. Each is first tried on a tiny tree that breaks it: a check that
+finds nothing there would find nothing anywhere.
+"""
+import os
+import re
+import sys
+
+ARROWS = re.compile(r"^([a-z]+) -> ([a-z ]+)$", re.M)
+
+
+def files_of(root):
+    """{path: text} of what is ours: these folders and the pages and build files at the top; no binary files."""
+    kept = {}
+    names = [os.path.join(root, name) for name in os.listdir(root) if re.search(r"\.md$|^meson|^LICENSE$|^\.clang-format$|^\.gitignore$", name)]
+    for top in (".ci", "bench", "docs", "examples", "include", "src", "tests", "tools"):
+        for folder, folders, inside in os.walk(os.path.join(root, top)):
+            folders[:] = [name for name in folders if name != "__pycache__"]
+            names += [os.path.join(folder, name) for name in inside]
+    for name in names:
+        with open(name, "rb") as file:
+            data = file.read()
+        if b"\0" not in data:
+            kept[os.path.relpath(name, root)] = data.decode("utf-8", "replace")
+    return kept
+
+
+def sources(files, *tops):
+    return {path: text for path, text in files.items() if path.split("/")[0] in tops and path.endswith((".c", ".h", ".c.in"))}
+
+
+def folder_of(path):
+    """src/mesh/rest.c -> mesh; include/drape/drape.h -> drape; src/rows.c.in -> src"""
+    return path.split("/")[-2]
+
+
+def code_of(text):
+    """text without comments and strings, its lines kept."""
+    def blank(match):
+        return re.sub(r"[^\n]", " ", match.group())
+    return re.sub(r'/\*.*?\*/|//[^\n]*|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'', blank, text, flags=re.S)
+
+
+def line_of(text, position):
+    return text.count("\n", 0, position) + 1
+
+
+def below(files):
+    """{folder: the folders that it may include}, from the arrows in src/README.md."""
+    direct = {upper: set(lower.split()) for upper, lower in ARROWS.findall(files.get("src/README.md", ""))}
+    reach = {folder: set(lower) for folder, lower in direct.items()}
+    for folder in set().union(*direct.values(), direct):
+        reach.setdefault(folder, set())
+    changed = True
+    while changed:
+        changed = False
+        for lower in reach.values():
+            more = set().union(*(reach[folder] for folder in lower)) - lower
+            lower |= more
+            changed = changed or bool(more)
+    return reach
+
+
+def includes_point_down(files):
+    reach, complaints = below(files), []
+    for folder, lower in reach.items():
+        if folder in lower:
+            complaints.append(f"src/README.md: the arrows lead from {folder} back to {folder}")
+    for path, text in sources(files, "src", "include").items():
+        folder = folder_of(path)
+        if folder == "src":
+            continue
+        for match in re.finditer(r'^[ \t]*#[ \t]*include[ \t]+"([^"]+)"', text, re.M):
+            name, place = match.group(1), f"{path}:{line_of(text, match.start())}"
+            target = name.split("/")[0] if "/" in name else folder
+            if folder == "drape":
+                if target != "drape":
+                    complaints.append(f"{place}: a public header includes {name}")
+            elif "/" not in name or name.startswith("."):
+                complaints.append(f'{place}: "{name}" does not say its folder, as in "{folder}/{os.path.basename(name)}"')
+            elif target not in reach.get(folder, set()) | {folder, "drape"}:
+                complaints.append(f"{place}: {folder} may not include {name}: no arrow in src/README.md leads there")
+            elif (f"include/{name}" if target == "drape" else f"src/{name}") not in files:
+                complaints.append(f"{place}: there is no {name}")
+    return complaints
+
+
+def map_is_whole(files):
+    reach = below(files)
+    folders = {path.split("/")[1] for path in files if re.match(r"src/\w+/.*\.[ch]$", path)}
+    return [f"src/README.md: no arrow names the folder {folder}" for folder in sorted(folders - set(reach))] + [
+        f"src/README.md: there is no folder {folder}" for folder in sorted(set(reach) - folders)]
+
+
+def all_is_built(files):
+    """Each .c of src/ and each test is named in the meson.build beside it, or above it for tests."""
+    complaints = []
+    for path in files:
+        folder, name = os.path.split(path)
+        if not name.endswith(".c") or not re.match(r"src/\w+/|tests/(unit|rows|physics|faults|api)/test_", path):
+            continue
+        list_file = "tests/meson.build" if path.startswith("tests/") else f"{folder}/meson.build"
+        if folder == "src/cli" and list_file not in files:
+            list_file = "meson.build"
+        words = re.findall(r"'([^']+)'", files.get(list_file, ""))
+        stem = name[:-2]
+        if not any(word in (stem, name) or word.endswith("/" + name) or stem.endswith("_" + word) for word in words):
+            complaints.append(f"{path}: is not named in {list_file}")
+    return complaints
+
+
+def library_is_silent(files):
+    """The library never prints and never ends the process; the program may."""
+    complaints = []
+    for path, text in sources(files, "src").items():
+        if path.startswith("src/cli/"):
+            continue
+        code = code_of(text)
+        for match in re.finditer(r"\b(v?printf|puts|putchar|perror|exit|_exit|_Exit|abort)[ \t]*\(|\b(stdout|stderr)\b", code):
+            complaints.append(f"{path}:{line_of(code, match.start())}: {match.group().rstrip('( ')}: the library does not print or exit")
+    return complaints
+
+
+def one_place_for_cpp(files):
+    complaints = []
+    for path, text in sources(files, "src", "include").items():
+        for match in re.finditer(r"__cplusplus|\bvisibility\b", text):
+            if path != "include/drape/export.h":
+                complaints.append(f"{path}:{line_of(text, match.start())}: {match.group()} belongs into include/drape/export.h")
+    return complaints
+
+
+def no_stray_blanks(files):
+    complaints = []
+    for path, text in files.items():
+        if path.startswith(("docs/", "tests/bad/")) or path.endswith((".obj", ".ply", ".csv", ".svg")):
+            continue
+        for number, line in enumerate(text.split("\n"), 1):
+            if "\t" in line:
+                complaints.append(f"{path}:{number}: a tab")
+            if line != line.rstrip():
+                complaints.append(f"{path}:{number}: a blank at the end of the line")
+        if text and not text.endswith("\n"):
+            complaints.append(f"{path}: no newline at the end")
+    return complaints
+
+
+MAP = {"src/README.md": "sim -> mesh\nmesh -> base\n", "src/sim/a.h": "", "src/mesh/a.h": "", "src/base/a.h": ""}
+BROKEN = {
+    includes_point_down: [
+        {**MAP, "src/mesh/b.c": '#include "sim/a.h"\n'},
+        {**MAP, "src/mesh/b.c": '#include "a.h"\n'},
+        {**MAP, "src/mesh/b.c": '#include "../base/a.h"\n'},
+        {**MAP, "src/mesh/b.c": '#include "base/missing.h"\n'},
+        {**MAP, "include/drape/drape.h": '#include "base/a.h"\n'},
+        {**MAP, "src/README.md": "sim -> mesh\nmesh -> base\nbase -> sim\n"}],
+    map_is_whole: [{**MAP, "src/other/a.c": ""}, {**MAP, "src/README.md": "sim -> mesh\nmesh -> base gone\n"}],
+    all_is_built: [
+        {"src/mesh/a.c": "", "src/mesh/meson.build": "sources = ['b.c']\n"},
+        {"tests/unit/test_a.c": "", "tests/meson.build": "'b'\n"}],
+    library_is_silent: [{"src/io/a.c": 'printf("x");\n'}, {"src/io/a.c": "fputs(x, stderr);\n"}, {"src/io/a.c": "abort ();\n"}],
+    one_place_for_cpp: [{"src/io/a.h": "#ifdef __cplusplus\n"}, {"include/drape/drape.h": "visibility\n"}],
+    no_stray_blanks: [{"a.c": "\tx\n"}, {"a.md": "x \n"}, {"tools/a": "x"}],
+}
+SOUND = {
+    **MAP, "src/sim/b.c": '#include "base/a.h"\n#include "sim/a.h"\n#include "drape/drape.h"\n/* printf(x) */ snprintf(x, "exit(1)");\n',
+    "src/sim/meson.build": "sources = ['b.c']\nrows += {'r': ['halving']}\n", "src/sim/control_halving.c": "", "src/cli/main.c": "exit(1);\n",
+    "src/cli/meson.build": "'main.c'\n", "src/README.md": "cli -> sim\nsim -> mesh\nmesh -> base\n", "include/drape/drape.h": '#include "export.h"\n',
+    "include/drape/export.h": "__cplusplus visibility\n", "tests/unit/test_a.c": "", "tests/meson.build": "'a'\n"}
+
+
+def main(root):
+    files = files_of(root)
+    print(f"1..{len(BROKEN)}")
+    failed = 0
+    for number, (check, broken) in enumerate(BROKEN.items(), 1):
+        complaints = check(files)
+        complaints += [f"the check overlooks {tree}" for tree in broken if not check(tree)]
+        complaints += [f"the check refuses what is sound: {complaint}" for complaint in check(SOUND)]
+        for complaint in complaints:
+            print(f"# {complaint}")
+        print(f"{'not ok' if complaints else 'ok'} {number} - {check.__name__}")
+        failed += bool(complaints)
+    return failed > 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -1,0 +1,294 @@
+/*
+ * test_fall.c: what holds exactly for backward Euler whatever the forces inside the sheet: they have no
+ * resultant, no moment, and do no work on rigid motion.
+ *
+ * Bounds come from two sources: residuals r that the attempts report, and round-off of the forces
+ * (force_noise).
+ */
+#include "support/scene.h"
+
+#define EDGES     4
+#define LENGTH    0.1
+#define MODULUS   1e4
+#define THICKNESS 1e-3
+#define GRAVITY   9.81
+#define STEP      0.01
+#define BETA      0.013
+
+static const double spring = 0.8660254037844386 * MODULUS * THICKNESS; /* of an inner edge [N/m] */
+
+/* A free sheet with everything that acts inside. terms: more of them, each ending in a comma. */
+static scene sheet(const char *terms, double gravity, const char *velocity)
+{
+    return scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': %d, 'edge_length': %g},"
+        "'material': {'young_modulus': %g, 'thickness': %g, 'areal_density': 0.5},"
+        "'terms': [%s 'stretch.edge', 'bend.hinge'], 'velocity': %s}],"
+        "'gravity': [0, %.17g, 0], 'integrator': {'dt': %g, 'tolerance': 1e-12}, 'duration': 1}",
+        EDGES, LENGTH, MODULUS, THICKNESS, terms, velocity, -gravity, STEP);
+}
+
+static const char damping[] = "{'type': 'damp.kelvin_voigt', 'beta': 0.013},";
+
+/* Numbers of [-1, 1], always the same. */
+static double wobble(size_t i)
+{
+    return sin(1.7 * (double)i + 0.3) * cos(0.9 * (double)(i * i % 101));
+}
+
+/* Nodes moved by up to a and thrown with up to b m/s, in all directions. */
+static void shake(scene *s, double a, double b)
+{
+    drape_state *state = scene_state(s);
+    for (size_t i = 0; i < 3 * (size_t)s->model->node_count; i++) {
+        state->x[i] += a * wobble(i);
+        state->v[i] += b * wobble(i + 1000);
+    }
+}
+
+static void momentum(scene *s, double p[3])
+{
+    const drape_state *state = scene_state(s);
+    memset(p, 0, 3 * sizeof *p);
+    for (size_t i = 0; i < 3 * (size_t)s->model->node_count; i++)
+        p[i % 3] += s->model->mass[i / 3] * state->v[i];
+}
+
+/* sum m a x v */
+static void moment(const scene *s, const double *a, const double *v, double l[3])
+{
+    memset(l, 0, 3 * sizeof *l);
+    for (size_t i = 0; i < (size_t)s->model->node_count; i++, a += 3, v += 3)
+        for (int k = 0; k < 3; k++)
+            l[k] += s->model->mass[i] * (a[(k + 1) % 3] * v[(k + 2) % 3] - a[(k + 2) % 3] * v[(k + 1) % 3]);
+}
+
+static double total_mass(const scene *s)
+{
+    double m = 0;
+    for (int32_t i = 0; i < s->model->node_count; i++)
+        m += s->model->mass[i];
+    return m;
+}
+
+static double fall_error(scene *s, int steps)
+{
+    const double v0[3] = {0.3, -0.2, 0.1}, t = steps * STEP;
+    double worst = 0;
+    for (size_t i = 0; i < 3 * (size_t)s->model->node_count; i++) {
+        double exact = s->model->rest[i] + v0[i % 3] * t;
+        exact -= i % 3 == 1 ? GRAVITY * STEP * STEP * steps * (steps + 1) / 2 : 0;
+        worst = fmax(worst, fabs(scene_state(s)->x[i] - exact));
+    }
+    return worst;
+}
+
+/* x_n = x0 + v0 n h - g h^2 n (n + 1)/2 at every step, with springs, hinges and dashpots inside. */
+START_TEST(free_fall_is_exact)
+{
+    const int steps = 50;
+    scene s = sheet(damping, GRAVITY, "[0.3, -0.2, 0.1]");
+    double worst = 0;
+    scene_watch(&s);
+    for (int n = 1; n <= steps; n++) {
+        scene_advance(&s, n * STEP);
+        worst = fmax(worst, fall_error(&s, n));
+    }
+    ck_assert_int_eq(s.accepted, steps);
+    /* The dashpots multiply noise in the springs' lengths by another BETA/STEP. */
+    const double r = s.residual + (1 + BETA / STEP) * force_noise(spring, 1.5);
+    assert_below(worst, drift_bound(&s, steps, STEP, r));
+    scene_close(&s);
+}
+END_TEST
+
+/* The same fall with and without dashpots differs by no more than each from the exact one; and damping takes
+ * no work: strain rates are round-off, 4 DBL_EPSILON size/(L h), so forces are BETA K times that of a length,
+ * and the work is that force over the fall, 1.5 m, on every node. */
+START_TEST(falling_cloth_does_not_feel_its_damping)
+{
+    const int steps = 50;
+    scene with = sheet(damping, GRAVITY, "[0.3, -0.2, 0.1]"),
+          without = sheet("", GRAVITY, "[0.3, -0.2, 0.1]");
+    double worst = 0;
+    scene_watch(&with);
+    scene_watch(&without);
+    scene_advance(&with, steps * STEP);
+    scene_advance(&without, steps * STEP);
+    for (size_t i = 0; i < 3 * (size_t)with.model->node_count; i++)
+        worst = fmax(worst, fabs(scene_state(&with)->x[i] - scene_state(&without)->x[i]));
+    const double noise = (1 + BETA / STEP) * force_noise(spring, 1.5);
+    assert_below(worst, drift_bound(&with, steps, STEP, with.residual + without.residual + 2 * noise));
+    assert_below(fabs(drape_sim_energy(with.sim).dissipated),
+                 with.model->node_count * 1.5 * BETA / STEP * force_noise(spring, 1.5));
+    scene_close(&with);
+    scene_close(&without);
+}
+END_TEST
+
+/* What backward Euler itself takes in free fall is M g^2 h^2/2 a step: v1 = v0 - g h, x1 = x0 + h v1. The
+ * log of energies says so: numerical. Errors: of positions (as above) times M g, of velocities times M v,
+ * twice. */
+START_TEST(energy_lost_in_free_fall_is_reported)
+{
+    const int steps = 50;
+    scene s = sheet("", GRAVITY, "[0.3, -0.2, 0.1]");
+    scene_watch(&s);
+    scene_advance(&s, steps * STEP);
+    const double m = total_mass(&s), expected = steps * m * GRAVITY * GRAVITY * STEP * STEP / 2;
+    const double drift = drift_bound(&s, steps, STEP, s.residual + force_noise(spring, 1.5));
+    assert_below(fabs(drape_sim_energy(s.sim).numerical - expected), 2 * m * drift * (GRAVITY + 10 / STEP));
+    scene_close(&s);
+}
+END_TEST
+
+/* Turns by `angle` about an axis that is no symmetry of anything, then moves; out may be in. */
+static void turn(size_t nodes, const double *in, double angle, double *out)
+{
+    const double u[3] = {2.0 / 7, 3.0 / 7, 6.0 / 7}, c = cos(angle), s = sin(angle);
+    for (size_t i = 0; i < nodes; i++, in += 3, out += 3) {
+        const double a[3] = {in[0], in[1], in[2]}, along = u[0] * a[0] + u[1] * a[1] + u[2] * a[2];
+        for (int k = 0; k < 3; k++) {
+            const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+            out[k] = c * a[k] + s * (u[k1] * a[k2] - u[k2] * a[k1]) + (1 - c) * along * u[k];
+        }
+    }
+}
+
+static double largest(const double *a, size_t n)
+{
+    double max = 0;
+    for (size_t i = 0; i < n; i++)
+        max = fmax(max, fabs(a[i]));
+    return max;
+}
+
+/*
+ * Damping forces at a state turned rigidly, of a sheet that is bent and stretched. Both forms of the rate
+ * are zero but for round-off: v = omega x x in continuous time, and q(x1) = q(x0) between two turned
+ * states in a step. Bound: an edge's rate is wrong by the round-off of a velocity over L, a hinge's by the
+ * same times |grad theta| <= 4/H, and the forces are beta k times |grad q| times that: springs 6 beta K,
+ * hinges 12 a node, beta D-like k_b (4/H)^2, H >= L/2 here. The same speeds along the strain give forces
+ * of beta K v: the last line says that the test would see them.
+ */
+START_TEST(turning_cloth_does_not_feel_its_damping)
+{
+    enum { NODES = (EDGES + 1) * (EDGES + 1) };
+    scene s = sheet(damping, 0, "[0, 0, 0]");
+    double bent[3 * NODES], x0[3 * NODES], x1[3 * NODES], v[3 * NODES], g[3 * NODES], history[256];
+    const double omega = 5, speed = omega * 1.0; /* nodes are within 1 m of the axis */
+    const double bending = 2 / sqrt(3.0) * MODULUS * pow(THICKNESS, 3) / 12 * 9 / 8;
+    const double stiff = 6 * spring + 12 * bending * pow(4 / (LENGTH / 2), 2);
+    const drape_state *state = scene_state(&s);
+    ck_assert(s.model->measure_count <= 256 && s.model->node_count == NODES);
+    shake(&s, 0.15 * LENGTH, 0);
+    memcpy(bent, state->x, sizeof bent);
+    turn(NODES, bent, 0.7, x0);
+    /* v = d/dt of the turn: the turn by a quarter more, of what is normal to the axis */
+    const double u[3] = {2.0 / 7, 3.0 / 7, 6.0 / 7};
+    for (int i = 0; i < NODES; i++)
+        for (int k = 0; k < 3; k++) {
+            const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+            v[3 * i + k] = omega * (u[k1] * x0[3 * i + k2] - u[k2] * x0[3 * i + k1]) + wobble((size_t)k);
+        }
+    drape_system_dissipation(s.sim->system, &(drape_point){.x = x0, .v = v, .internal = state->internal}, g);
+    assert_below(largest(g, 3 * NODES), BETA * stiff * 16 * DBL_EPSILON * (speed + 1));
+
+    turn(NODES, bent, 0.7 + omega * STEP, x1);
+    drape_system_measures(s.sim->system, &(drape_point){.x = x0, .internal = state->internal}, history);
+    for (int64_t i = 0; i < s.model->measure_count; i++)
+        history[i] /= -STEP;
+    const drape_point step = {
+        .x = x1, .v = v, .internal = state->internal, .weight = 1 / STEP, .history = history};
+    drape_system_dissipation(s.sim->system, &step, g);
+    assert_below(largest(g, 3 * NODES), BETA * stiff * 16 * DBL_EPSILON * 1.0 / STEP);
+
+    for (int i = 0; i < 3 * NODES; i++)
+        v[i] = i % 3 == 0 ? omega * x0[i] : 0; /* a stretching */
+    drape_system_dissipation(s.sim->system, &(drape_point){.x = x0, .v = v, .internal = state->internal}, g);
+    ck_assert(largest(g, 3 * NODES) > 0.1 * BETA * spring * omega * LENGTH);
+    scene_close(&s);
+}
+END_TEST
+
+/* P' = sum of residuals: n steps change the momentum by n h nodes r at most in each direction, beside M g
+ * t. */
+START_TEST(linear_momentum_is_conserved)
+{
+    const int steps = 40;
+    scene s = sheet(damping, GRAVITY, "[0.3, -0.2, 0.1]");
+    double before[3], after[3];
+    shake(&s, 0.1 * LENGTH, 1);
+    scene_watch(&s);
+    momentum(&s, before);
+    scene_advance(&s, steps * STEP);
+    momentum(&s, after);
+    before[1] -= total_mass(&s) * GRAVITY * steps * STEP;
+    const double r = s.residual + (1 + BETA / STEP) * force_noise(spring, 1.5);
+    for (int k = 0; k < 3; k++)
+        assert_below(fabs(after[k] - before[k]), s.accepted * STEP * s.model->node_count * r);
+    scene_close(&s);
+}
+END_TEST
+
+/* L1 = L0 + h sum m v1 x v0, since x1 x v1 = x1 x v0 + x1 x (v1 - v0), x1 = x0 + h v1, and internal forces
+ * have no moment about anything. Residuals add h sum x1 x r: 2 h size nodes r. */
+START_TEST(angular_momentum_of_backward_euler)
+{
+    const int steps = 40;
+    scene s = sheet(damping, 0, "[0.3, -0.2, 0.1]");
+    enum { NODES = (EDGES + 1) * (EDGES + 1) };
+    double v0[3 * NODES], l0[3], l1[3], cross[3], worst = 0, change = 0;
+    shake(&s, 0.1 * LENGTH, 1);
+    scene_watch(&s);
+    for (int n = 1; n <= steps; n++) {
+        memcpy(v0, scene_state(&s)->v, sizeof v0);
+        moment(&s, scene_state(&s)->x, v0, l0);
+        scene_advance(&s, n * STEP);
+        moment(&s, scene_state(&s)->x, scene_state(&s)->v, l1);
+        moment(&s, scene_state(&s)->v, v0, cross);
+        for (int k = 0; k < 3; k++) {
+            worst = fmax(worst, fabs(l1[k] - l0[k] - STEP * cross[k]));
+            change = fmax(change, fabs(l1[k] - l0[k]));
+        }
+    }
+    ck_assert_int_eq(s.accepted, steps); /* h is STEP throughout */
+    const double r = s.residual + (1 + BETA / STEP) * force_noise(spring, 1.5);
+    assert_below(worst, 2 * STEP * 1.5 * NODES * r);
+    ck_assert(change > 1e3 * worst); /* it is not conserved: the term matters */
+    scene_close(&s);
+}
+END_TEST
+
+/* A level sheet in a medium: every node has the same mass per area, so v1 = (v0 + g h)/(1 + c h/rho)
+ * exactly, with rho g/c in the end. Its energy goes into drag: c A v1 . h v1 a step. Velocities are off by
+ * at most n h r sqrt(3 nodes)/m_min (see drift_bound). */
+START_TEST(drag_slows_a_falling_sheet)
+{
+    const double c = 7, rho = 0.5;
+    const int steps = 60;
+    scene s = sheet("{'type': 'drag.viscous', 'coefficient': 7},", GRAVITY, "[0, 2, 0]");
+    double v = 2, worst = 0, work = 0;
+    scene_watch(&s);
+    const double area = total_mass(&s) / rho;
+    for (int n = 1; n <= steps; n++) {
+        scene_advance(&s, n * STEP);
+        v = (v - GRAVITY * STEP) / (1 + c * STEP / rho);
+        work += c * area * v * v * STEP;
+        for (size_t i = 0; i < 3 * (size_t)s.model->node_count; i++)
+            worst = fmax(worst, fabs(scene_state(&s)->v[i] - (i % 3 == 1 ? v : 0)));
+    }
+    const double r = s.residual + force_noise(spring, 1.5);
+    const double slip = steps * STEP * r * sqrt(3.0 * s.model->node_count) / scene_least_mass(&s);
+    assert_below(worst, slip);
+    /* dW = 2 c A v dv t, v below 2 */
+    assert_below(fabs(drape_sim_energy(s.sim).dissipated - work), 2 * c * area * 2 * slip * steps * STEP);
+    const double end = -rho * GRAVITY / c; /* of the speed's difference from it this factor is left: */
+    ck_assert_double_eq_tol(v, end + (2 - end) * pow(1 + c * STEP / rho, -steps), 1e-13);
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("fall", free_fall_is_exact, falling_cloth_does_not_feel_its_damping,
+      energy_lost_in_free_fall_is_reported, turning_cloth_does_not_feel_its_damping,
+      linear_momentum_is_conserved, angular_momentum_of_backward_euler, drag_slows_a_falling_sheet)

@@ -1,0 +1,249 @@
+/* test_schedule.c: which steps a fixed-step method takes: counted times, halves that fill their interval,
+ * growth, the cut at the end. */
+#include "sim/schedule.h"
+
+#include <float.h>
+
+#include "models.h"
+#include "support/suite.h"
+
+/* The interface of counted steps, here once. */
+static void begin(drape_schedule *s, double dt, double start)
+{
+    drape_schedule_init(s, DRAPE_STEPS_COUNTED, dt, start);
+}
+
+static void accept(drape_schedule *s, double t1)
+{
+    drape_schedule_accept(s, t1, NAN);
+}
+
+static void halve(drape_schedule *s, double h)
+{
+    drape_schedule_retry(s, h / 2);
+}
+
+START_TEST(times_are_counted)
+{
+    drape_schedule s;
+    double t1, h;
+    const double dt = 0.1; /* a sum of 0.1 has another last digit from the third on */
+    begin(&s, dt, 0);
+    drape_schedule_aim(&s, 100);
+    for (int k = 1; k <= 1000; k++) {
+        ck_assert(drape_schedule_next(&s, &t1, &h));
+        ck_assert_double_eq(t1, k * dt);
+        ck_assert_double_eq(h, dt);
+        accept(&s, t1);
+    }
+    ck_assert(!drape_schedule_next(&s, &t1, &h));
+}
+END_TEST
+
+START_TEST(asking_changes_nothing)
+{
+    drape_schedule s;
+    double t1, h, t2, h2;
+    begin(&s, 0.25, 1);
+    drape_schedule_aim(&s, 1.6);
+    for (int k = 0; k < 3; k++) {
+        ck_assert(drape_schedule_next(&s, &t1, &h));
+        ck_assert(drape_schedule_next(&s, &t2, &h2));
+        ck_assert(t1 == t2 && h == h2);
+        accept(&s, t1);
+    }
+    ck_assert_double_eq(t1, 1.6);
+    ck_assert_double_eq_tol(h, 0.1, 1e-15);
+}
+END_TEST
+
+/* Rejected once, then twice: halves and quarters of the same interval, and the size grows back. */
+START_TEST(halves_fill_the_interval)
+{
+    static const struct {
+        int halvings;
+        double t1, h;
+    } steps[] = {{1, 0.5, 0.5}, {2, 0.625, 0.125}, {0, 0.75, 0.125}, {0, 1, 0.25},
+                 {0, 1.5, 0.5}, {0, 2, 0.5},       {0, 3, 1}};
+    drape_schedule s;
+    double t1, h;
+    begin(&s, 1, 0);
+    drape_schedule_aim(&s, 10);
+    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
+        for (int k = 0; k <= steps[i].halvings; k++) {
+            if (k > 0)
+                halve(&s, h);
+            ck_assert(drape_schedule_next(&s, &t1, &h));
+        }
+        ck_assert_double_eq(t1, steps[i].t1);
+        ck_assert_double_eq(h, steps[i].h);
+        accept(&s, t1);
+    }
+}
+END_TEST
+
+START_TEST(the_end_cuts_and_tiny_remainders_join)
+{
+    static const struct {
+        double end, last;
+        int steps;
+    } cases[] = {{1, 0.25, 4},
+                 {1.1, 0.1, 5},
+                 {1 + 1e-11, 0.25 + 1e-11, 4}, /* below 1e-9 dt: the last step takes it along */
+                 {1 - 1e-11, 0.25 - 1e-11, 4}, /* or gives it */
+                 {1 + 1e-9, 1e-9, 5},          /* not below */
+                 {0.25e-12, 0, 0},             /* nothing to do */
+                 {0.1, 0.1, 1},
+                 {0, 0, 0},
+                 {-1, 0, 0}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        drape_schedule s;
+        double t1 = 0, h = 0;
+        int steps = 0;
+        begin(&s, 0.25, 0);
+        drape_schedule_aim(&s, cases[i].end);
+        for (; drape_schedule_next(&s, &t1, &h); steps++)
+            accept(&s, t1);
+        ck_assert_int_eq(steps, cases[i].steps);
+        if (steps > 0) {
+            ck_assert_double_eq(t1, cases[i].end);
+            ck_assert_double_eq_tol(h, cases[i].last, 1e-15);
+        }
+    }
+}
+END_TEST
+
+/* 60 advances of 1/60 s in steps of 1/120 s end in the same steps as one of 1 s. */
+START_TEST(advances_do_not_shift_the_count)
+{
+    drape_schedule s;
+    double t1 = 0, h;
+    int steps = 0;
+    begin(&s, 1.0 / 120, 0);
+    for (int frame = 1; frame <= 60; frame++) {
+        drape_schedule_aim(&s, frame / 60.0);
+        while (drape_schedule_next(&s, &t1, &h)) {
+            steps++;
+            ck_assert_double_eq_tol(t1, steps * (1.0 / 120), 2 * DBL_EPSILON);
+            ck_assert_double_eq(h, 1.0 / 120);
+            accept(&s, t1);
+        }
+    }
+    ck_assert_int_eq(steps, 120);
+}
+END_TEST
+
+START_TEST(an_interval_left_half_done_is_given_up)
+{
+    drape_schedule s;
+    double t1, h;
+    begin(&s, 1, 0);
+    drape_schedule_aim(&s, 10);
+    ck_assert(drape_schedule_next(&s, &t1, &h));
+    halve(&s, h);
+    ck_assert(drape_schedule_next(&s, &t1, &h));
+    accept(&s, t1); /* at 0.5; the advance ends here */
+    drape_schedule_aim(&s, 0.75);
+    double sum = 0;
+    while (drape_schedule_next(&s, &t1, &h)) {
+        sum += h;
+        accept(&s, t1);
+    }
+    ck_assert_double_eq(t1, 0.75);
+    ck_assert_double_eq(sum, 0.25);
+}
+END_TEST
+
+/* Any sequence of rejections and ends: times increase strictly, h is the difference of times but for their
+ * rounding, an advance ends at its end exactly, the sizes add up, no step is larger than dt (1 + 1e-9). */
+START_TEST(any_sequence_fills_the_time)
+{
+    for (uint64_t trial = 1; trial <= 1000; trial++) {
+        uint64_t seed = trial * 1000003;
+        double dt = exp(6 * random_number(&seed) - 4), start = 100 * fmax(0, random_number(&seed));
+        double odds = 0.6 * random_number(&seed); /* of a rejection */
+        drape_schedule s;
+        double now = start, sum = 0;
+        begin(&s, dt, start);
+        for (int advance = 0; advance < 4; advance++) {
+            double span = dt * 8 * fmax(0, random_number(&seed));
+            if (advance % 2) /* a whole number of steps, and a remainder that may be tiny */
+                span = dt * (floor(span / dt) + 1e-10 * random_number(&seed));
+            double end = now + span, t1, h;
+            bool stops = advance == 2 && random_number(&seed) > 0;
+            int accepted = 0, rejected = 0;
+            drape_schedule_aim(&s, end);
+            while (drape_schedule_next(&s, &t1, &h)) {
+                ck_assert_int_lt(rejected, 100000);
+                ck_assert_double_gt(h, 0);
+                ck_assert_double_le(h, dt * (1 + 1e-9));
+                ck_assert_double_le(t1, fmax(end, now + 2e-9 * dt));
+                if (s.level < 5 && random_number(&seed) < odds) {
+                    halve(&s, h);
+                    rejected++;
+                    continue;
+                }
+                ck_assert_double_gt(t1, now);
+                ck_assert_double_eq_tol(t1 - now, h, 2e-9 * dt + 8 * DBL_EPSILON * t1);
+                sum += h;
+                now = t1;
+                accept(&s, t1);
+                if (stops && ++accepted == 3) /* an observer stops the advance in the middle */
+                    break;
+            }
+            ck_assert_msg(stops || now == end || end - now <= 1.1e-9 * dt, "at %.17g, not %.17g", now, end);
+            ck_assert_double_eq_tol(sum, now - start, 1e-8 * dt + 1e-13 * now);
+        }
+    }
+}
+END_TEST
+
+/* A controller may halve from t = 0 as far as doubles go (dt_min is any number above 0): steps stay small. */
+START_TEST(many_halvings_stay_small)
+{
+    drape_schedule s;
+    double t1, h;
+    begin(&s, 1, 0);
+    drape_schedule_aim(&s, 1);
+    ck_assert(drape_schedule_next(&s, &t1, &h));
+    for (int level = 1; level <= 100; level++) {
+        halve(&s, h);
+        ck_assert(drape_schedule_next(&s, &t1, &h));
+        ck_assert_msg(t1 == h && h <= 1.0 / 1024 / 1024 * ldexp(1, 20 - (level < 60 ? level : 60)),
+                      "after %d halvings a step of %g ends at %g", level, h, t1);
+    }
+}
+END_TEST
+
+/* Where steps are proposed: no step above what was proposed (but for the last 1e-9), no tiny one left over. */
+START_TEST(proposed_steps_reach_the_end)
+{
+    for (uint64_t trial = 1; trial <= 500; trial++) {
+        uint64_t seed = trial * 7919;
+        double t1, h, now = 0, sum = 0, limit = 0.1, end = 3 + random_number(&seed);
+        drape_schedule s;
+        drape_schedule_init(&s, DRAPE_STEPS_PROPOSED, limit, 0);
+        drape_schedule_aim(&s, end);
+        while (drape_schedule_next(&s, &t1, &h)) {
+            ck_assert(h > 0 && h <= limit * (1 + 2e-9) && t1 > now && t1 <= end);
+            ck_assert(h >= 0.4 * fmin(limit, end - now));
+            bool refused = random_number(&seed) > 0.5;
+            limit = refused ? h / 2 : 0.1 * exp(random_number(&seed));
+            if (refused) {
+                drape_schedule_retry(&s, limit);
+                continue;
+            }
+            sum += h;
+            now = t1;
+            drape_schedule_accept(&s, t1, limit);
+        }
+        ck_assert_double_eq(now, end);
+        ck_assert_double_eq_tol(sum, end, 1e-12);
+    }
+}
+END_TEST
+
+SUITE("schedule", times_are_counted, asking_changes_nothing, halves_fill_the_interval,
+      the_end_cuts_and_tiny_remainders_join, advances_do_not_shift_the_count,
+      an_interval_left_half_done_is_given_up, any_sequence_fills_the_time, many_halvings_stay_small,
+      proposed_steps_reach_the_end)

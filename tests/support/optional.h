@@ -1,0 +1,21 @@
+/* optional.h: a test program that runs only where an environment variable is set; else it says in TAP
+ * that, and why, it was skipped. */
+#ifndef DRAPE_TESTS_OPTIONAL_H
+#define DRAPE_TESTS_OPTIONAL_H
+
+#include <stdio.h>
+
+#include "support/suite.h"
+
+#define SUITE_IF_SET(variable, why, name, ...)                                                               \
+    int main(void)                                                                                           \
+    {                                                                                                        \
+        const TTest *const tests[] = {__VA_ARGS__};                                                          \
+        if (!getenv(variable)) {                                                                             \
+            puts("1..0 # SKIP " name ": set " variable ", " why);                                            \
+            return 0;                                                                                        \
+        }                                                                                                    \
+        return run_suite(name, tests, sizeof tests / sizeof *tests);                                         \
+    }
+
+#endif
