@@ -10,6 +10,7 @@
  * Hairer & Wanner 1996, IV.2): h_next = h safety e^(-0.7/(p+1)) e_before^(0.4/(p+1)).
  */
 #include "control/halve.h"
+#include "integrators/tolerance.h"
 
 #include <math.h>
 
@@ -23,35 +24,10 @@ enum { SCRATCH_LAST_ERROR };
 #define LEAST_ERROR  1e-4 /* smaller ones are round-off and say nothing of the next step */
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_DT_MIN] = {.name = "dt_min",
-                      .unit = "s",
-                      .default_value = 1e-7,
-                      .min = 0,
-                      .max = 1e6,
-                      .open_min = true,
-                      .help = "no step is cut to less than this"},
-    [PARAM_RTOL] = {.name = "rtol",
-                    .unit = "1",
-                    .default_value = 1e-3,
-                    .min = 1e-12,
-                    .max = 1,
-                    .help = "local error over the size of the scene; sets the defaults of atol_x and atol_v"},
-    [PARAM_ATOL_X] = {.name = "atol_x",
-                      .unit = "m",
-                      .default_value = NAN,
-                      .derived = "rtol times the diagonal of the rest bounding box",
-                      .min = 0,
-                      .max = 1e9,
-                      .open_min = true,
-                      .help = "local error of positions"},
-    [PARAM_ATOL_V] = {.name = "atol_v",
-                      .unit = "m/s",
-                      .default_value = NAN,
-                      .derived = "rtol sqrt(g L), or rtol L/s without gravity, L the diagonal",
-                      .min = 0,
-                      .max = 1e9,
-                      .open_min = true,
-                      .help = "local error of velocities"},
+    [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
+    [PARAM_RTOL] = DRAPE_RTOL_PARAM,
+    [PARAM_ATOL_X] = DRAPE_ATOL_X_PARAM,
+    [PARAM_ATOL_V] = DRAPE_ATOL_V_PARAM,
     [PARAM_DT_MAX] = {.name = "dt_max",
                       .unit = "s",
                       .default_value = NAN,
@@ -97,15 +73,6 @@ static double difference(const prediction *p, double solution, double y0, double
     return p->factor * (solution - (p->weight[0] * y0 + p->weight[1] * y1 + p->weight[2] * y2));
 }
 
-static double scale(const drape_model *m, double given, double rtol, bool velocity)
-{
-    double g =
-        sqrt(m->gravity[0] * m->gravity[0] + m->gravity[1] * m->gravity[1] + m->gravity[2] * m->gravity[2]);
-    if (!isnan(given))
-        return given;
-    return rtol * (velocity && g > 0 ? sqrt(g * m->length) : m->length);
-}
-
 /* Root mean square over the free DOFs of the weighted errors of positions and velocities. */
 static double local_error(const double *values, const drape_trial *trial)
 {
@@ -113,15 +80,15 @@ static double local_error(const double *values, const drape_trial *trial)
     const drape_state *a = trial->in, *b = trial->past[0] ? trial->past[0] : a,
                       *c = trial->past[1] ? trial->past[1] : a;
     const prediction p = predict(trial);
-    double wx = 1 / scale(m, values[PARAM_ATOL_X], values[PARAM_RTOL], false);
-    double wv = 1 / scale(m, values[PARAM_ATOL_V], values[PARAM_RTOL], true), sum = 0;
+    double atol_x = values[PARAM_ATOL_X], atol_v = values[PARAM_ATOL_V], sum = 0;
+    drape_derive_tolerances(m, values[PARAM_RTOL], &atol_x, &atol_v);
     for (int32_t f = 0; f < m->free_count; f++)
         for (size_t k = 0; k < 3; k++) {
             size_t i = 3 * (size_t)m->node_of_free[f] + k;
             double flight =
                 p.points == 1 ? trial->h * a->v[i] : 0; /* the first step knows its velocity at least */
-            double ex = wx * (difference(&p, trial->out->x[i], a->x[i], b->x[i], c->x[i]) - flight);
-            double ev = wv * difference(&p, trial->out->v[i], a->v[i], b->v[i], c->v[i]);
+            double ex = (difference(&p, trial->out->x[i], a->x[i], b->x[i], c->x[i]) - flight) / atol_x;
+            double ev = difference(&p, trial->out->v[i], a->v[i], b->v[i], c->v[i]) / atol_v;
             sum += ex * ex + ev * ev;
         }
     return m->free_count > 0 ? sqrt(sum / (6.0 * m->free_count)) : 0;

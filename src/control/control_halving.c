@@ -7,6 +7,8 @@
 
 enum { PARAM_DT_MIN, PARAM_COUNT };
 
+static const drape_param params[PARAM_COUNT] = {[PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM};
+
 static drape_verdict judge(const double *values, drape_trial *trial)
 {
     if (trial->status == DRAPE_OK || trial->info->usable)
@@ -18,7 +20,7 @@ const drape_controller_ops drape_controller_halving = {
     .name = "halving",
     .summary = "a failed step is rolled back and halved; the size grows back after successes",
     .reference = "as DisMech halves unconverged steps, with rollback and filled intervals",
-    .params = &drape_dt_min_param,
+    .params = params,
     .param_count = PARAM_COUNT,
     .judge = judge,
 };

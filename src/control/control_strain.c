@@ -10,13 +10,7 @@
 enum { PARAM_DT_MIN, PARAM_MAX_STRETCH, PARAM_MAX_MOVE, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_DT_MIN] = {.name = "dt_min",
-                      .unit = "s",
-                      .default_value = 1e-7,
-                      .min = 0,
-                      .max = 1e6,
-                      .open_min = true,
-                      .help = "no step is cut to less than this"},
+    [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
     [PARAM_MAX_STRETCH] = {.name = "max_stretch",
                            .unit = "1",
                            .default_value = 0.1,

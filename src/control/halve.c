@@ -1,14 +1,6 @@
 /* halve.c: see halve.h. */
 #include "control/halve.h"
 
-const drape_param drape_dt_min_param = {.name = "dt_min",
-                                        .unit = "s",
-                                        .default_value = 1e-7,
-                                        .min = 0,
-                                        .max = 1e6,
-                                        .open_min = true,
-                                        .help = "no step is cut to less than this"};
-
 drape_verdict drape_halve(double dt_min, drape_trial *trial)
 {
     if (trial->status < 0)

@@ -4,7 +4,11 @@
 
 #include "control/control.h"
 
-extern const drape_param drape_dt_min_param;
+#define DRAPE_DT_MIN_PARAM                                                                                   \
+    {                                                                                                        \
+        .name = "dt_min", .unit = "s", .default_value = 1e-7, .min = 0, .max = 1e6, .open_min = true,        \
+        .help = "no step is cut to less than this"                                                           \
+    }
 
 /* The attempt failed, or was refused with a status > 0: half of it next, or DRAPE_E_STEP_TOO_SMALL where that is below dt_min or no longer
  * moves the time. A negative status stops as it is. */

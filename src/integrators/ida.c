@@ -15,6 +15,7 @@
  */
 #include "base/clock.h"
 #include "integrators/integrator.h"
+#include "integrators/tolerance.h"
 #include "model/track.h"
 #include "solvers/sun_linear.h"
 
@@ -43,29 +44,9 @@ enum {
 #define MAX_SOLVER_FAILS 10 /* convergence failures in one step */
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_RTOL] = {.name = "rtol",
-                    .unit = "1",
-                    .default_value = 1e-3,
-                    .min = 1e-12,
-                    .max = 1,
-                    .help = "local error over the size of the scene; sets the defaults of atol_x and atol_v "
-                            "and nothing else"},
-    [PARAM_ATOL_X] = {.name = "atol_x",
-                      .unit = "m",
-                      .default_value = NAN,
-                      .derived = "rtol times the diagonal of the rest bounding box",
-                      .min = 0,
-                      .max = 1e9,
-                      .open_min = true,
-                      .help = "local error of positions"},
-    [PARAM_ATOL_V] = {.name = "atol_v",
-                      .unit = "m/s",
-                      .default_value = NAN,
-                      .derived = "rtol sqrt(g L), or rtol L/s without gravity, L the diagonal",
-                      .min = 0,
-                      .max = 1e9,
-                      .open_min = true,
-                      .help = "local error of velocities"},
+    [PARAM_RTOL] = DRAPE_RTOL_PARAM,
+    [PARAM_ATOL_X] = DRAPE_ATOL_X_PARAM,
+    [PARAM_ATOL_V] = DRAPE_ATOL_V_PARAM,
     [PARAM_MAX_ORDER] = {.name = "max_order",
                          .kind = DRAPE_PARAM_INTEGER,
                          .unit = "1",
@@ -247,14 +228,8 @@ static bool create_arrays(ida_state *s)
 /* Derived defaults, and the weights that follow. */
 static void set_tolerances(ida_state *s)
 {
-    const drape_model *m = s->model;
-    double length = m->length, gravity = sqrt(m->gravity[0] * m->gravity[0] + m->gravity[1] * m->gravity[1] +
-                                              m->gravity[2] * m->gravity[2]);
-    double speed = gravity > 0 ? sqrt(gravity * length) : length, rtol = s->values[PARAM_RTOL];
-    if (isnan(s->values[PARAM_ATOL_X]))
-        s->values[PARAM_ATOL_X] = rtol * length;
-    if (isnan(s->values[PARAM_ATOL_V]))
-        s->values[PARAM_ATOL_V] = rtol * speed;
+    double rtol = s->values[PARAM_RTOL];
+    drape_derive_tolerances(s->model, rtol, &s->values[PARAM_ATOL_X], &s->values[PARAM_ATOL_V]);
     if (isnan(s->values[PARAM_MAX_ORDER]))
         s->values[PARAM_MAX_ORDER] = rtol >= TIGHT ? LOOSE_ORDER : TIGHT_ORDER;
     double *w = N_VGetArrayPointer(s->weights);

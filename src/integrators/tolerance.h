@@ -1,0 +1,33 @@
+/*
+ * tolerance.h: local errors are measured by a length and a velocity, the same for every node: a part relative to the positions would
+ * make the error depend on where the scene lies. Both follow from one number, rtol, and the size of the scene.
+ */
+#ifndef DRAPE_INTEGRATORS_TOLERANCE_H
+#define DRAPE_INTEGRATORS_TOLERANCE_H
+
+#include "model/model.h"
+
+/* Parameters of the rows that bound a local error. */
+#define DRAPE_RTOL_PARAM                                                                                     \
+    {                                                                                                        \
+        .name = "rtol", .unit = "1", .default_value = 1e-3, .min = 1e-12, .max = 1,                          \
+        .help =                                                                                              \
+            "local error over the size of the scene; sets the defaults of atol_x and atol_v, nothing else"   \
+    }
+#define DRAPE_ATOL_X_PARAM                                                                                   \
+    {                                                                                                        \
+        .name = "atol_x", .unit = "m", .default_value = NAN,                                                 \
+        .derived = "rtol times the diagonal of the rest bounding box", .min = 0, .max = 1e9,                 \
+        .open_min = true, .help = "local error of positions"                                                 \
+    }
+#define DRAPE_ATOL_V_PARAM                                                                                   \
+    {                                                                                                        \
+        .name = "atol_v", .unit = "m/s", .default_value = NAN,                                               \
+        .derived = "rtol sqrt(g L), or rtol L/s without gravity, L the diagonal", .min = 0, .max = 1e9,      \
+        .open_min = true, .help = "local error of velocities"                                                \
+    }
+
+/* Replaces what is NaN by what the parameters say is derived. */
+void drape_derive_tolerances(const drape_model *model, double rtol, double *atol_x, double *atol_v);
+
+#endif
