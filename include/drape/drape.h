@@ -87,8 +87,8 @@ DRAPE_API const char *drape_context_message(const drape_context *ctx);
 
 /* ---- Scene in memory: what a host fills instead of a scene file ---- */
 
-/* One parameter by name. Numbers and integers go into number with text NULL; choices into text; booleans as text "true" or "false",
- * or as number 0 or 1. */
+/* One parameter by name. Numbers and integers go into number with text NULL; choices into text; booleans
+ * as text "true" or "false", or as number 0 or 1. */
 typedef struct drape_setting {
     const char *name;
     double number;
@@ -304,8 +304,7 @@ typedef struct drape_statistics {
     int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
     double wall_setup, wall_steps, wall_residual, wall_jacobian, wall_factor, wall_solve, wall_contact;
     double strain_min, strain_max; /* |e|/L - 1 over all edges and accepted steps */
-    bool
-        stability_known; /* the integrator "static" found an equilibrium and the signs of its Hessian's eigenvalues */
+    bool stability_known;   /* "static" found an equilibrium and the signs of its Hessian's eigenvalues */
     int64_t unstable_modes; /* how many are negative: 0 for a stable equilibrium */
 } drape_statistics;
 DRAPE_API drape_statistics drape_sim_statistics(const drape_sim *sim);

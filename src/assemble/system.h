@@ -1,8 +1,9 @@
 /*
  * system.h: the forces of all terms and their derivatives, assembled. With
  *     g(x, v) = grad E + g_damp       [N], positive against the motion: M v' + g = 0
- *     J = dg/dx + w dg/dv             [N/m], w the weight of x in v: v = w x + const in a step method, c_j in
- * IDA every time integrator is a choice of x, v, w and of a mass term.
+ *     J = dg/dx + w dg/dv             [N/m], w the weight of x in v
+ * (v = w x + const in a step method, w = c_j in IDA) every time integrator is a choice of x, v, w and of a
+ * mass term.
  *
  * Elements are evaluated in blocks, by several threads if there are any, and added in the order of elements:
  * the result has the same bits for any number of threads.

@@ -35,7 +35,8 @@ static int print_rows(const drape_check_row *rows, int count)
     return failed ? CLI_FAILED : CLI_DONE;
 }
 
-/* Where the cloths pass through themselves or each other at the start. No failure: a scene without self-contact may. */
+/* Where the cloths pass through themselves or each other at the start. No failure: a scene without
+ * self-contact may. */
 static drape_status print_intersections(const cli_scene *in)
 {
     drape_intersections found;

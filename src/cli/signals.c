@@ -12,8 +12,8 @@ static void remember(int signal)
     interrupted = 1;
 }
 
-/* Also where they were ignored: a shell starts the background jobs of a script so, and a signal that is sent to
- * such a job is meant. */
+/* Also where they were ignored: a shell starts the background jobs of a script so, and a signal that is
+ * sent to such a job is meant. */
 void cli_catch_signals(void)
 {
     const struct sigaction action = {.sa_handler = remember, .sa_flags = (int)SA_RESETHAND | SA_RESTART};

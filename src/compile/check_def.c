@@ -1,4 +1,5 @@
-/* check_def.c: a scene def that a host filled may have NULL where something should be: found here, so that nobody else has to look. */
+/* check_def.c: a scene def that a host filled may have NULL where something should be: found here, so that
+ * nobody else has to look. */
 #include "compile/stages.h"
 
 #include <stdio.h>

@@ -1,8 +1,10 @@
 /*
- * intersect.c: see intersect.h. Triangles are listed in the cells of a uniform grid that their boxes touch; an edge is tried against the
- * triangles of the cells that its box touches. A pair meets in several cells and is tried in the one that holds the low corner of the
- * overlap of both boxes. An edge p q crosses triangle a b c where p and q lie on different sides of its plane and the line
- * through them leaves a b, b c and c a on the same side: five signs of tetrahedron volumes (Moeller & Trumbore 1997 compute the same).
+ * intersect.c: see intersect.h. Triangles are listed in the cells of a uniform grid that their boxes
+ * touch; an edge is tried against the triangles of the cells that its box touches. A pair meets in several
+ * cells and is tried in the one that holds the low corner of the overlap of both boxes. An edge p q
+ * crosses triangle a b c where p and q lie on different sides of its plane and the line through them
+ * leaves a b, b c and c a on the same side: five signs of tetrahedron volumes (Moeller & Trumbore 1997
+ * compute the same).
  */
 #include "contact/intersect.h"
 

@@ -1,6 +1,6 @@
 /*
- * control.h: what to do with an attempted step, as rows of one table. A row is the constant drape_controller_<word> of
- * control_<word>.c.
+ * control.h: what to do with an attempted step, as rows of one table. A row is the constant
+ * drape_controller_<word> of control_<word>.c.
  */
 #ifndef DRAPE_CONTROL_CONTROL_H
 #define DRAPE_CONTROL_CONTROL_H

@@ -1,13 +1,16 @@
 /*
- * error: any fixed-step row becomes adaptive. The local error is estimated, as BDF codes do it, by what separates the solution of the
- * step from its prediction: the polynomial through the states before, of the degree p of the method's order, continued to the end
- * of the step; positions and velocities each from their own past, because a method's velocities are not the exact
- * derivatives of its positions. With x^(p+1) the derivative, prediction and solution differ by the product of (t1 - t_j) over
- * (p+1)! of it, and the method's local error is about h^(p+1)/(p+1)!: so the estimate is the difference times h^(p+1) over that
- * product. That is exact for backward Euler, 3/4 of the error of bdf2 at constant steps and more than that of midpoint.
+ * error: any fixed-step row becomes adaptive. The local error is estimated, as BDF codes do it, by what
+ * separates the solution of the step from its prediction: the polynomial through the states before, of the
+ * degree p of the method's order, continued to the end of the step; positions and velocities each from
+ * their own past, because a method's velocities are not the exact derivatives of its positions. With
+ * x^(p+1) the derivative, prediction and solution differ by the product of (t1 - t_j) over (p+1)! of it,
+ * and the method's local error is about h^(p+1)/(p+1)!: so the estimate is the difference times h^(p+1)
+ * over that product. That is exact for backward Euler, 3/4 of the error of bdf2 at constant steps and more
+ * than that of midpoint.
  *
- * Weights are a length and a velocity, as IDA's. The next step follows from this error and the last by a PI rule (Gustafsson 1991;
- * Hairer & Wanner 1996, IV.2): h_next = h safety e^(-0.7/(p+1)) e_before^(0.4/(p+1)).
+ * Weights are a length and a velocity, as IDA's. The next step follows from this error and the last by a PI
+ * rule (Gustafsson 1991; Hairer & Wanner 1996, IV.2):
+ *     h_next = h safety e^(-0.7/(p+1)) e_before^(0.4/(p+1)).
  */
 #include "control/halve.h"
 #include "integrators/tolerance.h"
@@ -44,7 +47,8 @@ static const drape_param params[PARAM_COUNT] = {
                       .help = "share of the step that the estimate allows"},
 };
 
-/* A prediction: weights of the states in, past[0], past[1], and the factor from its difference to the local error. */
+/* A prediction: weights of the states in, past[0], past[1], and the factor from its difference to the
+ * local error. */
 typedef struct prediction {
     double weight[3], factor;
     int points;

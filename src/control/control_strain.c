@@ -1,6 +1,7 @@
 /*
- * strain: halving that also refuses a step in which the cloth moves too far: an edge that changes its length, or a node that moves,
- * by more than a share of the rest length. What happens in such a step is not resolved, even if the solver converged.
+ * strain: halving that also refuses a step in which the cloth moves too far: an edge that changes its
+ * length, or a node that moves, by more than a share of the rest length. What happens in such a step is
+ * not resolved, even if the solver converged.
  */
 #include "base/vec3.h"
 #include "control/halve.h"

@@ -10,8 +10,8 @@
         .help = "no step is cut to less than this"                                                           \
     }
 
-/* The attempt failed, or was refused with a status > 0: half of it next, or DRAPE_E_STEP_TOO_SMALL where that is below dt_min or no longer
- * moves the time. A negative status stops as it is. */
+/* The attempt failed, or was refused with a status > 0: half of it next, or DRAPE_E_STEP_TOO_SMALL where
+ * that is below dt_min or no longer moves the time. A negative status stops as it is. */
 drape_verdict drape_halve(double dt_min, drape_trial *trial);
 
 #endif

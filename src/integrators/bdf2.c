@@ -1,9 +1,11 @@
 /*
- * bdf2: the backward differentiation formula of order 2 with variable steps. With r = h/h_before, a = r^2/(1
- * + 2 r) and the weight w = (1 + 2 r)/(1 + r)/h: v1 = w (x1 - x0 - a (x0 - x_)),   M w (v1 - v0 - a (v0 -
- * v_)) + g(x1, v1) = 0,   q' = w (q1 - q0 - a (q0 - q_)) where x_, v_, q_ are of the state before in. With d
- * = x1 - x0 and c = a (x0 - x_): M w^2 (d - p) + g(x0 + d, w (d - c)) = 0,   p = c + (v0 + a (v0 - v_))/w. A-
- * and L-stable at constant steps, zero-stable for r < 1 + sqrt(2), which halving and doubling keep. Hairer,
+ * bdf2: the backward differentiation formula of order 2 with variable steps. With r = h/h_before,
+ * a = r^2/(1 + 2 r) and the weight w = (1 + 2 r)/(1 + r)/h:
+ *     v1 = w (x1 - x0 - a (x0 - x_))
+ *     M w (v1 - v0 - a (v0 - v_)) + g(x1, v1) = 0,  q' = w (q1 - q0 - a (q0 - q_))
+ * where x_, v_, q_ are of the state before in. With d = x1 - x0 and c = a (x0 - x_):
+ *     M w^2 (d - p) + g(x0 + d, w (d - c)) = 0,  p = c + (v0 + a (v0 - v_))/w
+ * A- and L-stable at constant steps, zero-stable for r < 1 + sqrt(2), which halving and doubling keep. Hairer,
  * Norsett & Wanner 1993, III.5. The first step and the one after a discontinuity are backward Euler: r = 0
  * makes it of the same formulas.
  */

@@ -1,8 +1,8 @@
 /*
- * be: backward Euler, v1 = (x1 - x0)/h, M (v1 - v0)/h + g(x1, v1) = 0. First order, L-stable: it damps what
- * it cannot resolve, an oscillator's energy by the factor 1/(1 + (w h)^2) a step. Baraff & Witkin 1998,
- * solved to a tolerance and not by one linear solve. With d = x1 - x0: M (d - h v0)/h^2 + g(x0 + d, d/h) = 0,
- * and q' = (q(x1) - q(x0))/h.
+ * be: backward Euler, first order and L-stable. It damps what it cannot resolve, an oscillator's energy by
+ * the factor 1/(1 + (w h)^2) a step. Baraff & Witkin 1998, solved to a tolerance and not by one linear solve.
+ *     v1 = (x1 - x0)/h,  M (v1 - v0)/h + g(x1, v1) = 0,  q' = (q(x1) - q(x0))/h
+ * With d = x1 - x0:  M (d - h v0)/h^2 + g(x0 + d, d/h) = 0.
  */
 #include "integrators/implicit.h"
 

@@ -1,15 +1,19 @@
 /*
- * ida: variable order and step with local error control by IDA (Hindmarsh et al. 2005; Brenan, Campbell & Petzold 1996).
+ * ida: variable order and step with local error control by IDA (Hindmarsh et al. 2005; Brenan, Campbell &
+ * Petzold 1996).
  *     y = (x, v) of the free nodes,  F = [x' - v ; M v' + g(x, v, t)] = 0
  *
- * Each Newton correction of IDA solves [c_j I, -I; K, D + c_j M] (dx, dv) = (r1, r2), K = dg/dx, D = dg/dv. Eliminating dv = c_j dx - r1 leaves
+ * Each Newton correction of IDA solves [c_j I, -I; K, D + c_j M] (dx, dv) = (r1, r2), K = dg/dx, D =
+ * dg/dv. Eliminating dv = c_j dx - r1 leaves
  *     (K + c_j D + c_j^2 M) dx = r2 + (D + c_j M) r1:
- * the matrix of a backward Euler step of size 1/c_j, with the same pattern and the same linear solvers. IDA keeps Jacobian and factors
- * while c_j stays near theirs; that is most of its advantage over one factorisation an iteration.
+ * the matrix of a backward Euler step of size 1/c_j, with the same pattern and the same linear solvers.
+ * IDA keeps Jacobian and factors while c_j stays near theirs; that is most of its advantage over one
+ * factorisation an iteration.
  *
- * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative part would make the error
- * depend on where the scene lies. The maximum order is 2 at loose tolerances, because BDF 3 to 5 are not A-stable and feed
- * energy into undamped waves; it is 5 when the tolerance resolves them.
+ * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative
+ * part would make the error depend on where the scene lies. The maximum order is 2 at loose tolerances,
+ * because BDF 3 to 5 are not A-stable and feed energy into undamped waves; it is 5 when the tolerance
+ * resolves them.
  *
  * Pins that move have kinks at the keys of their tracks: IDA stops there and starts again.
  */
@@ -38,8 +42,9 @@ enum {
 #define LOOSE_ORDER  2
 #define TIGHT_ORDER  5
 #define NEWTON_SHARE 0.33 /* of the error tolerance that is left to the Newton iteration */
-#define CJ_CHANGE                                                                                            \
-    0.1 /* new factors past a change of c_j of (1 - d)/(1 + d): IDA's 0.25 takes a quarter more residuals for as many factors */
+/* New factors past a change of c_j by (1 - d)/(1 + d). IDA's own 0.25 takes a quarter more residuals for
+ * as many factors. */
+#define CJ_CHANGE        0.1
 #define MAX_ERROR_FAILS  10 /* error test failures in one step */
 #define MAX_SOLVER_FAILS 10 /* convergence failures in one step */
 
@@ -102,7 +107,8 @@ static size_t node_at(const ida_state *s, int64_t i)
     return 3 * (size_t)s->model->node_of_free[i / 3] + (size_t)(i % 3);
 }
 
-/* Within a step no track has a key, so the velocity of pins is the slope of their tracks at any time inside. */
+/* Within a step no track has a key, so the velocity of pins is the slope of their tracks at any time
+ * inside. */
 static void place_pins(ida_state *s, double t)
 {
     const drape_model *m = s->model;
@@ -327,7 +333,7 @@ static drape_status status_of(int code, bool nonfinite, const char **reason)
     case IDA_FIRST_RES_FAIL:
         *reason = "nonfinite";
         return DRAPE_RETRY_NONFINITE;
-    default: /* IDA_MEM_NULL, IDA_ILL_INPUT, IDA_NO_MALLOC, IDA_LINIT_FAIL, IDA_VECTOROP_ERR ...: no smaller step helps */
+    default: /* IDA_MEM_NULL, IDA_ILL_INPUT, IDA_LINIT_FAIL, IDA_VECTOROP_ERR ...: no smaller step helps */
         *reason = "solver";
         return DRAPE_E_SOLVER;
     }
@@ -412,7 +418,8 @@ static void count_iterations(ida_state *s, drape_step_info *info)
     s->counted = iterations;
 }
 
-/* Goes on from in if IDA is there, else starts anew, with a first step of at most h where an attempt before was rejected. */
+/* Goes on from in if IDA is there, else starts anew, with a first step of at most h where an attempt
+ * before was rejected. */
 static drape_status prepare(ida_state *s, const drape_state *in, double end, double h)
 {
     double stop = next_kink(s->model, in->t, end);

@@ -45,7 +45,8 @@ static inline size_t drape_implicit_at(const drape_implicit *implicit, size_t i)
 /* q at the positions of a state, into q (measures); nothing where no law wants rates. */
 void drape_implicit_measure(drape_implicit *implicit, const drape_state *state, double *q);
 
-/* Solves for d with base and inertia as they stand. history: of the measures' rates, NULL: q' = grad q . v. */
+/* Solves for d with base and inertia as they stand. history: of the measures' rates, NULL: q' = grad q .
+ * v. */
 drape_status drape_implicit_solve(drape_implicit *implicit, const double *internal, const double *history,
                                   double weight, double mass_weight, drape_step_info *info);
 

@@ -17,8 +17,7 @@ typedef struct drape_step_info {
     bool usable; /* with a status > 0: the caller asked to go on with what there is (on_failure accept) */
     double dissipated; /* [J] work that dissipative terms took in this step */
     double pin_work;   /* [J] work that moving pins put in */
-    bool
-        committed; /* out->internal is set and its elements were checked along the way: the step is longer than one branch */
+    bool committed;    /* out->internal is set, its elements were checked along the way */
     drape_worst worst;
 } drape_step_info;
 
@@ -37,8 +36,9 @@ typedef struct drape_integrator_ops {
     int param_count;
     /* values in the order of params. Takes all memory that stepping needs. */
     drape_status (*create)(drape_context *ctx, drape_system *system, const double *values, void **state);
-    /* The row chooses its own steps: h is the way to the end of the advance or, after a rejection, an upper bound,
-     * out->t the end of the advance, which a step may reach and not pass; the row sets out->t to where it came. */
+    /* The row chooses its own steps: h is the way to the end of the advance or, after a rejection, an
+     * upper bound, out->t the end of the advance, which a step may reach and not pass; the row sets out->t
+     * to where it came. */
     bool own_steps;
     /* Between the states of a step there is no motion, so no frames. */
     bool timeless;
@@ -48,7 +48,8 @@ typedef struct drape_integrator_ops {
                          drape_step_info *info);
     /* The next step starts anew from a state that this integrator did not make, or after a rejection. */
     void (*restart)(void *state, const drape_state *from);
-    /* Positions (node_count x 3) at a time within the last step. NULL: cubic Hermite between the states serves. */
+    /* Positions (node_count x 3) at a time within the last step. NULL: cubic Hermite between the states
+     * serves. */
     void (*interpolate)(void *state, double t, double *x);
     drape_work (*work)(const void *state);
     size_t (*bytes)(const void *state);

@@ -1,8 +1,11 @@
 /*
  * newton.h: the nonlinear system of one implicit step, solved by KINSOL. With the displacement d of the free
- * nodes from a base state, x = x_base + d,   v = v_base + w d, F(d) = m_w M (d - p) + g(x, v) = 0 [N] J(d) =
- * m_w M + dg/dx + w dg/dv              [N/m] Backward Euler: m_w = 1/h^2, w = 1/h, p = h v0. Displacements
- * and not positions are unknown, so that M (d - p) keeps its digits at small h, wherever the scene lies.
+ * nodes from a base state,
+ *     x = x_base + d,  v = v_base + w d
+ *     F(d) = m_w M (d - p) + g(x, v) = 0       [N]
+ *     J(d) = m_w M + dg/dx + w dg/dv           [N/m]
+ * Backward Euler: m_w = 1/h^2, w = 1/h, p = h v0. Displacements and not positions are unknown, so that
+ * M (d - p) keeps its digits at small h, wherever the scene lies.
  */
 #ifndef DRAPE_INTEGRATORS_NEWTON_H
 #define DRAPE_INTEGRATORS_NEWTON_H

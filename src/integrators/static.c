@@ -1,9 +1,11 @@
 /*
- * static: equilibrium, grad E(x) = 0 with the pins where they are at the end. Newton on that stalls far away, so it is led there by
- * pseudo-transient continuation (Kelley & Keyes 1998): implicit Euler steps of the gradient flow M x' = -grad E in a pseudo time,
+ * static: equilibrium, grad E(x) = 0 with the pins where they are at the end. Newton on that stalls far
+ * away, so it is led there by pseudo-transient continuation (Kelley & Keyes 1998): implicit Euler steps of
+ * the gradient flow M x' = -grad E in a pseudo time,
  *     m M d + grad E(x + d) = 0,   x <- x + d,
- * each a Newton solve, with a weight m that falls with the residual and by half at least, so that the last ones are Newton's own. A solve that
- * fails, or that ends in a degenerate element, is forgotten and tried with a larger m. Damping and velocities have no part.
+ * each a Newton solve, with a weight m that falls with the residual and by half at least, so that the last
+ * ones are Newton's own. A solve that fails, or that ends in a degenerate element, is forgotten and tried
+ * with a larger m. Damping and velocities have no part.
  *
  * Whether the equilibrium is stable is told by the signs of D in K = L D L': it is where none is negative.
  */
@@ -13,7 +15,7 @@
 #include <math.h>
 #include <string.h>
 
-#define MOST_STEPS 500  /* of pseudo time */
+#define MOST_STEPS 1000 /* of pseudo time */
 #define MOST_FAILS 40   /* in a row */
 #define LEAST_FALL 0.02 /* m falls by no more than this in one step */
 #define FALL       0.5 /* and by at least this: where the residual does not fall yet, the flow has far to go */
@@ -59,7 +61,8 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
     return status;
 }
 
-/* The residual of statics: grad E on the free nodes, in the largest component, at the last point of Newton. */
+/* The residual of statics: grad E on the free nodes, in the largest component, at the last point of
+ * Newton. */
 static double static_residual(const static_state *s)
 {
     const double *g = drape_newton_force(s->common.newton);

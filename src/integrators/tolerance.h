@@ -1,6 +1,7 @@
 /*
- * tolerance.h: local errors are measured by a length and a velocity, the same for every node: a part relative to the positions would
- * make the error depend on where the scene lies. Both follow from one number, rtol, and the size of the scene.
+ * tolerance.h: local errors are measured by a length and a velocity, the same for every node: a part
+ * relative to the positions would make the error depend on where the scene lies. Both follow from one
+ * number, rtol, and the size of the scene.
  */
 #ifndef DRAPE_INTEGRATORS_TOLERANCE_H
 #define DRAPE_INTEGRATORS_TOLERANCE_H

@@ -1,6 +1,7 @@
 /*
- * audit.c: where the energy goes. Kinetic, elastic and gravitational energy are of the state; what damping terms took and moving
- * pins put in is summed over accepted steps by the integrators; the remainder is the integrator's own.
+ * audit.c: where the energy goes. Kinetic, elastic and gravitational energy are of the state; what damping
+ * terms took and moving pins put in is summed over accepted steps by the integrators; the remainder is the
+ * integrator's own.
  */
 #include "sim/sim.h"
 

@@ -49,7 +49,8 @@ static bool next_free(const drape_schedule *s, double *t1, double *h)
     return s->end > s->now;
 }
 
-/* What is left of the advance is taken whole if one step does it, in halves if two do, so that no tiny step is left over. */
+/* What is left of the advance is taken whole if one step does it, in halves if two do, so that no tiny
+ * step is left over. */
 static bool next_proposed(const drape_schedule *s, double *t1, double *h)
 {
     double left = s->end - s->now;

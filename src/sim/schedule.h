@@ -1,9 +1,9 @@
 /*
  * schedule.h: which steps a sim takes.
  *
- * Counted: steps end at start + k dt, counted and never summed. An interval between two such times may be split in 2^level
- * equal parts after a rejection; the parts end at exact fractions of it. Only the end of an advance cuts an interval, and a
- * remainder below 1e-9 dt joins the interval before.
+ * Counted: steps end at start + k dt, counted and never summed. An interval between two such times may be
+ * split in 2^level equal parts after a rejection; the parts end at exact fractions of it. Only the end of
+ * an advance cuts an interval, and a remainder below 1e-9 dt joins the interval before.
  *
  * Proposed: the controller says how large the next step is; only the end of an advance cuts it.
  *
@@ -33,7 +33,8 @@ typedef struct drape_schedule {
 
 void drape_schedule_init(drape_schedule *schedule, drape_stepping stepping, double dt, double start);
 
-/* Sets the end of an advance. An interval that was left half done is given up: counting starts where it came. */
+/* Sets the end of an advance. An interval that was left half done is given up: counting starts where it
+ * came. */
 void drape_schedule_aim(drape_schedule *schedule, double end);
 
 /* The next step: its end and its size. False when the end is reached. */
@@ -42,8 +43,8 @@ bool drape_schedule_next(drape_schedule *schedule, double *t1, double *h);
 /* A step to t1 was accepted; h_next counts where steps are proposed. */
 void drape_schedule_accept(drape_schedule *schedule, double t1, double h_next);
 
-/* A step was rejected: h_next next, which is half of it where steps are counted. False where an interval cannot be split further (2^60
- * parts): no step is left to try. */
+/* A step was rejected: h_next next, which is half of it where steps are counted. False where an interval
+ * cannot be split further (2^60 parts): no step is left to try. */
 bool drape_schedule_retry(drape_schedule *schedule, double h_next);
 
 #endif

@@ -47,14 +47,16 @@ static inline const drape_state *drape_sim_state(const drape_sim *sim)
     return &sim->states[sim->now];
 }
 
-/* Whether out has kinetic energy that neither in nor the work on it can account for: the step exploded. Cheap unless that is likely. */
+/* Whether out has kinetic energy that neither in nor the work on it can account for: the step exploded.
+ * Cheap unless that is likely. */
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, const drape_step_info *info,
                         drape_worst *worst);
 
 /* Tells the observers. 0 to go on, else the negative status to stop with. */
 drape_status drape_sim_tell(drape_sim *sim, const drape_event *event);
 
-/* The frames that are due up to the present state and were not told yet. A stop leaves the rest for the next call. */
+/* The frames that are due up to the present state and were not told yet. A stop leaves the rest for the
+ * next call. */
 drape_status drape_sim_emit_frames(drape_sim *sim);
 
 #endif

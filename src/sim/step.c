@@ -79,7 +79,8 @@ static void measure_strain(drape_sim *sim, const double *x)
     s->strain_max = high;
 }
 
-/* The new state counts. What was now becomes past, as far back as the controller looks; the oldest is written over next. */
+/* The new state counts. What was now becomes past, as far back as the controller looks; the oldest is
+ * written over next. */
 static void turn_states(drape_sim *sim)
 {
     int pasts = sim->chosen.controller->pasts, spare = sim->now;

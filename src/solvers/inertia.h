@@ -4,8 +4,9 @@
 
 #include "sparse/pattern.h"
 
-/* By Sylvester's law of inertia: A = L D L' has as many negative eigenvalues as D has negative entries. *known: false where a pivot is
- * zero and the factorisation stops. Takes and frees its own memory. Errors: DRAPE_E_MEMORY. */
+/* By Sylvester's law of inertia: A = L D L' has as many negative eigenvalues as D has negative entries.
+ * *known: false where a pivot is zero and the factorisation stops. Takes and frees its own memory. Errors:
+ * DRAPE_E_MEMORY. */
 drape_status drape_inertia(drape_context *ctx, const drape_pattern *pattern, const double *values,
                            int64_t *negative, bool *known);
 

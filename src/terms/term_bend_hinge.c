@@ -1,20 +1,24 @@
 /*
  * bend.hinge: a torsion spring along each inner edge, on the angle theta between its two triangles.
  *
- * Edge x0 x1, apices x2 x3, e = x1 - x0. For triangle t with apex a: unit normals n from n1 = e x (x2 - x0)
- * and n2 = (x3 - x0) x e, altitude H over e, foot s = (a - x0).e/|e|^2 and m the in-plane unit vector from
- * the edge to the apex. theta = atan2(ehat . (n2 x n1), n1 . n2): never acos, which loses all digits when
- * flat gradient: g_a = n/H,  g_0 = -sum (1 - s_t) g_t,  g_1 = -sum s_t g_t The Hessian follows by
- * differentiating these, with the gradients of the barycentric coordinates of the triangle p_a = m/H,  p_0 =
- * -(1 - s) m/H - ehat/|e|,  p_1 = -s m/H + ehat/|e|, d g_a/d a  = -(p_a n' + n p_a')/H d g_a/d x0 = -(p_0 n'
- * + n p_0')/H - n ehat'/(|e| H),   d g_a/d x1 = -(p_1 n' + n p_1')/H + n ehat'/(|e| H) ds/da = ehat/|e|,
- * ds/dx0 = -((1 - s) e + H m)/|e|^2,  ds/dx1 = (-s e + H m)/|e|^2. Tamstorf & Grinspun 2013, Discrete bending
- * forces and their Jacobians, has the same in closed form.
+ * Edge x0 x1, apices x2 x3, e = x1 - x0. For triangle t with apex a: unit normal n, along n1 = e x (x2 - x0)
+ * for one and n2 = (x3 - x0) x e for the other; altitude H over e; foot s = (a - x0).e/|e|^2; and m the
+ * in-plane unit vector from the edge to the apex.
+ *     theta = atan2(ehat . (n2 x n1), n1 . n2), never acos, which loses all digits when flat
+ *     gradient: g_a = n/H,  g_0 = -sum (1 - s_t) g_t,  g_1 = -sum s_t g_t
+ * The Hessian follows by differentiating these, with the gradients of the barycentric coordinates:
+ *     p_a = m/H,  p_0 = -(1 - s) m/H - ehat/|e|,  p_1 = -s m/H + ehat/|e|
+ *     d g_a/d a  = -(p_a n' + n p_a')/H
+ *     d g_a/d x0 = -(p_0 n' + n p_0')/H - n ehat'/(|e| H)
+ *     d g_a/d x1 = -(p_1 n' + n p_1')/H + n ehat'/(|e| H)
+ *     ds/da = ehat/|e|,  ds/dx0 = -((1 - s) e + H m)/|e|^2,  ds/dx1 = (-s e + H m)/|e|^2
+ * Tamstorf & Grinspun 2013, Discrete bending forces and their Jacobians, has the same in closed form.
  *
  * E = 1/2 k (theta - theta0)^2.
- * consistent: k = D |e|^2/(A1 + A2), D = E h^3/(12 (1 - nu^2)).  Its bending Poisson ratio is -1/3 on the
- * equilateral lattice. report: k = 2/sqrt(3) E h^3/12 on every hinge, as the DEP report and DisMech have it:
- * no (1 - nu^2), right on equilateral meshes only.
+ * consistent: k = D |e|^2/(A1 + A2), D = E h^3/(12 (1 - nu^2)). Its bending Poisson ratio is -1/3 on the
+ *     equilateral lattice.
+ * report: k = 2/sqrt(3) E h^3/12 on every hinge, as the DEP report and DisMech have it: no (1 - nu^2), right
+ *     on equilateral meshes only.
  *
  * theta jumps by 2 pi where the hinge is folded onto itself. The internal variable is the angle of the last
  * accepted state; the angle is taken on the branch nearest to it, so energy and force go on smoothly through

@@ -1,14 +1,14 @@
 /*
  * stretch.edge: a spring along each edge. With u = (x1 - x0)/|x1 - x0| and rest length L:
- *     q = |x1 - x0|/L - 1,   dq/dx1 = -dq/dx0 = u/L,   d2q/dx1 dx1 = (I - u u')/(L |x1 - x0|),   E = 1/2 k
- * q^2.
+ *     q = |x1 - x0|/L - 1,  dq/dx1 = -dq/dx0 = u/L,  d2q/dx1 dx1 = (I - u u')/(L |x1 - x0|)
+ *     E = 1/2 k q^2
  *
  * consistent: k = E h (A1 + A2), that is the spring constant K = k/L^2 = E h (A1 + A2)/L^2 of Van Gelder
- * (1998); each triangle owns half a spring, so a boundary edge has K/2. On an equilateral mesh K = sqrt(3)/2
- * E h, and the lattice is the constant-strain triangle of a sheet with nu = 1/3 exactly. report: the DEP
- * report's code, whose number k_s = sqrt(3)/2 E h L^2 [J] is used as a force [N]: E = 1/2 k_s L q^2, too soft
- * by one edge length, and boundary edges as stiff as the others. Kept so that its trajectories can be
- * reproduced.
+ *     (1998); each triangle owns half a spring, so a boundary edge has K/2. On an equilateral mesh
+ *     K = sqrt(3)/2 E h, and the lattice is the constant-strain triangle of a sheet with nu = 1/3 exactly.
+ * report: the DEP report's code, whose number k_s = sqrt(3)/2 E h L^2 [J] is used as a force [N]:
+ *     E = 1/2 k_s L q^2, too soft by one edge length, and boundary edges as stiff as the others. Kept so that
+ *     its trajectories can be reproduced.
  */
 #include "base/vec3.h"
 #include "terms/terms.h"

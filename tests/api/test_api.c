@@ -379,8 +379,8 @@ START_TEST(an_end_that_is_no_time_is_refused)
 }
 END_TEST
 
-/* Whether a scene whose defs hold a NULL or a zeroed row is refused; in a process of its own, because the mistake
- * of a host must not be a crash of the host. */
+/* Whether a scene whose defs hold a NULL or a zeroed row is refused; in a process of its own, because the
+ * mistake of a host must not be a crash of the host. */
 static int zeroed(int which)
 {
     host_scene s;
@@ -628,8 +628,8 @@ static const drape_term_ops attract = {.struct_size = sizeof(drape_term_ops),
     " 'terms': [" term "]}], 'gravity': [0,0,0], 'integrator': {'dt': 0.001, 'tolerance': 1e-10}, "          \
     "'duration': 1}"
 
-/* Four nodes of 0.1 kg on springs of 10 N/m without any between them: w = 10 rad/s, y = 1 - cos(10 t), but for
- * the decay of backward Euler, exp(-w^2 h t/2), and its phase of the same order. */
+/* Four nodes of 0.1 kg on springs of 10 N/m without any between them: w = 10 rad/s, y = 1 - cos(10 t), but
+ * for the decay of backward Euler, exp(-w^2 h t/2), and its phase of the same order. */
 START_TEST(a_term_of_the_host_works)
 {
     drape_context *ctx = make_context();

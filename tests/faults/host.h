@@ -28,7 +28,7 @@ static long host_at, host_forces, host_hessians;
 static bool host_always;
 static double host_step; /* [s] */
 
-static void host_break(host_fault kind, long at, bool always)
+static inline void host_break(host_fault kind, long at, bool always)
 {
     host_fault_kind = kind;
     host_at = at;
@@ -43,13 +43,13 @@ static inline bool host_has_broken(void)
     return (force ? host_forces : host_hessians) >= host_at;
 }
 
-static bool host_is_due(long evaluation)
+static inline bool host_is_due(long evaluation)
 {
     return host_at > 0 && (evaluation == host_at || (host_always && evaluation > host_at));
 }
 
-static drape_status host_build(const drape_cloth_view *cloth, const double *params,
-                               drape_term_builder *builder)
+static inline drape_status host_build(const drape_cloth_view *cloth, const double *params,
+                                      drape_term_builder *builder)
 {
     (void)params;
     drape_status status = drape_term_reserve(builder, cloth->node_count, 1);
@@ -62,8 +62,8 @@ static drape_status host_build(const drape_cloth_view *cloth, const double *para
 #define HOST_NODE 7 /* the node that is struck */
 
 /* E = 0 otherwise. */
-static void host_energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
-                        const double *internal, double *e, double *g, double *hess)
+static inline void host_energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                               const double *internal, double *e, double *g, double *hess)
 {
     (void)x, (void)internal;
     bool force = host_fault_kind == HOST_NAN_FORCE || host_fault_kind == HOST_INFINITE_FORCE;
@@ -117,7 +117,7 @@ typedef struct host_sim {
     double last_h;
 } host_sim;
 
-static bool host_all_finite(const double *a, size_t n)
+static inline bool host_all_finite(const double *a, size_t n)
 {
     for (size_t i = 0; i < n; i++)
         if (!isfinite(a[i]))
@@ -125,7 +125,7 @@ static bool host_all_finite(const double *a, size_t n)
     return true;
 }
 
-static drape_status host_observe(void *user, const drape_event *event)
+static inline drape_status host_observe(void *user, const drape_event *event)
 {
     host_sim *s = user;
     const drape_attempt *a = event->attempt;
@@ -144,9 +144,9 @@ static drape_status host_observe(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* settings: members of "integrator" beside dt = 1/64 (whose powers are exact), after a comma, and what else the scene has. stretch: whether the
- * cloth has springs; without, its free nodes fall alone. */
-static host_sim host_open(const char *integrator, const char *controller, bool stretch)
+/* settings: members of "integrator" beside dt = 1/64 (whose powers are exact), after a comma, and what
+ * else the scene has. stretch: whether the cloth has springs; without, its free nodes fall alone. */
+static inline host_sim host_open(const char *integrator, const char *controller, bool stretch)
 {
     char text[1024];
     host_sim s = {.attempts = 0};
@@ -174,12 +174,12 @@ static host_sim host_open(const char *integrator, const char *controller, bool s
 }
 
 /* s must stay where it is. */
-static void host_watch(host_sim *s)
+static inline void host_watch(host_sim *s)
 {
     ck_assert_int_eq(drape_sim_observe(s->sim, host_observe, s), DRAPE_OK);
 }
 
-static void host_close(host_sim *s)
+static inline void host_close(host_sim *s)
 {
     drape_sim_destroy(&s->sim);
     drape_model_destroy(&s->model);
@@ -192,7 +192,7 @@ typedef struct host_copy {
     uint64_t hash;
 } host_copy;
 
-static host_copy host_copy_state(const host_sim *s)
+static inline host_copy host_copy_state(const host_sim *s)
 {
     host_copy copy = {.t = drape_sim_time(s->sim), .hash = drape_sim_hash(s->sim)};
     size_t bytes = 3 * (size_t)drape_model_node_count(s->model) * sizeof(double);
@@ -202,7 +202,7 @@ static host_copy host_copy_state(const host_sim *s)
     return copy;
 }
 
-static void host_check_state(const host_sim *s, const host_copy *expected)
+static inline void host_check_state(const host_sim *s, const host_copy *expected)
 {
     host_copy now = host_copy_state(s);
     ck_assert_double_eq(now.t, expected->t);
@@ -212,7 +212,7 @@ static void host_check_state(const host_sim *s, const host_copy *expected)
 }
 
 /* One line that begins with the time and has the reason. */
-static void host_check_message(const host_sim *s, const char *reason)
+static inline void host_check_message(const host_sim *s, const char *reason)
 {
     char time[40];
     const char *message = drape_context_message(s->ctx);

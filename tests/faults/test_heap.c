@@ -1,6 +1,7 @@
 /*
- * test_heap.c: from the second step on no heap call is made in a step, by Drape or by KINSOL or KLU. The heap calls
- * of the whole process are counted: malloc and its family are defined here, in front of glibc's.
+ * test_heap.c: from the second step on no heap call is made in a step, by Drape or by KINSOL or KLU. The
+ * heap calls of the whole process are counted: malloc and its family are defined here, in front of
+ * glibc's.
  */
 #include <stdint.h>
 #include <stdio.h>

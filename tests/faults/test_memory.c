@@ -1,5 +1,5 @@
-/* test_memory.c: every allocation of a whole life fails once: parse, compile, sim, frames, summary. Each failure is
- * reported as one, leaves NULL, and leaks nothing. */
+/* test_memory.c: every allocation of a whole life fails once: parse, compile, sim, frames, summary. Each
+ * failure is reported as one, leaves NULL, and leaks nothing. */
 #include <stdio.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -9,7 +9,7 @@
 #include "support/failing_allocator.h"
 #include "support/suite.h"
 
-static char folder[] = "/tmp/drape-memory-XXXXXX";
+static char folder[32];
 static char scene_path[64], mesh_path[64], out_path[64], summary_path[64];
 
 static const char mesh_text[] = "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0.2 1\nf 1 2 3\nf 3 2 4\n";
@@ -39,6 +39,7 @@ static void write_text(const char *path, const char *text)
 
 static void make_files(void)
 {
+    snprintf(folder, sizeof folder, "/tmp/drape-memory-XXXXXX");
     ck_assert_ptr_nonnull(mkdtemp(folder));
     snprintf(scene_path, sizeof scene_path, "%s/scene.json", folder);
     snprintf(mesh_path, sizeof mesh_path, "%s/mesh.obj", folder);

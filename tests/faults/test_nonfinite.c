@@ -1,5 +1,5 @@
-/* test_nonfinite.c: the nth evaluation of a force or of a Hessian is not finite, for every n. No such number comes
- * into a state; a fixed step fails and says so, a halved one recovers. */
+/* test_nonfinite.c: the nth evaluation of a force or of a Hessian is not finite, for every n. No such
+ * number comes into a state; a fixed step fails and says so, a halved one recovers. */
 #include "host.h"
 
 enum { EVALUATIONS = 60 };
@@ -139,8 +139,8 @@ START_TEST(accept_takes_no_nan)
 }
 END_TEST
 
-/* The smallest allowed dt_min: any number above 0. The run still ends, at t = 0 too, where every step moves the
- * time. */
+/* The smallest allowed dt_min: any number above 0. The run still ends, at t = 0 too, where every step
+ * moves the time. */
 START_TEST(a_tiny_dt_min_ends_too)
 {
     host_sim s = host_open("", "'type': 'halving', 'dt_min': 1e-30", true);

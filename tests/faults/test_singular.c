@@ -1,5 +1,5 @@
-/* test_singular.c: a Jacobian that has no inverse: the step fails with "singular" and is rolled back; a smaller step,
- * whose inertia is another, succeeds. */
+/* test_singular.c: a Jacobian that has no inverse: the step fails with "singular" and is rolled back; a
+ * smaller step, whose inertia is another, succeeds. */
 #include "host.h"
 
 /* Without springs the Jacobian is M/h^2 alone, and the host's Hessian takes just that away. */

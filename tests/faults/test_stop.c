@@ -1,5 +1,5 @@
-/* test_stop.c: an observer stops an advance, at a step or at a frame; the state is that of the last accepted step, the
- * sim goes on where it was, and no frame is lost, told twice or out of place. */
+/* test_stop.c: an observer stops an advance, at a step or at a frame; the state is that of the last
+ * accepted step, the sim goes on where it was, and no frame is lost, told twice or out of place. */
 #include "support/scene.h"
 
 #define STEPS 40

@@ -11,8 +11,8 @@ static void defaults(const drape_controller_ops *ops, double *values)
         values[i] = generic_value(&ops->params[i]);
 }
 
-/* The interface of a judge, here once: an attempt of size h from time t that ended with *status, of a sheet that stands
- * still. */
+/* The interface of a judge, here once: an attempt of size h from time t that ended with *status, of a
+ * sheet that stands still. */
 static drape_verdict judge(const drape_controller_ops *ops, const double *values, double t, double h,
                            drape_step_info *info, drape_status *status)
 {

@@ -151,9 +151,9 @@ static void for_all_choices(void (*use)(const drape_integrator_ops *ops, const d
     }
 }
 
-/* Good steps and steps that fail leave `in` as it is; after a restart the same `in` gives the same bits. But for
- * modified Newton: KINSOL keeps a little of the solve before, and with inexact steps that shows; there two
- * results are both within the tolerance. */
+/* Good steps and steps that fail leave `in` as it is; after a restart the same `in` gives the same bits.
+ * But for modified Newton: KINSOL keeps a little of the solve before, and with inexact steps that shows;
+ * there two results are both within the tolerance. */
 static void check_steps(const drape_integrator_ops *ops, const double *values, const char *what)
 {
     stepper s = open_stepper(ops, values);
@@ -305,8 +305,9 @@ END_TEST
  * ----------------------------------------------------------------------------------------------------------
  */
 
-/* How far free fall may be off after a time t: order 1 is g h t/2 behind or ahead; higher ones are exact but for a
- * start of order 1, of some g h^2; one that chooses its steps keeps to rtol 1e-3 of 0.5 m in each of a few. */
+/* How far free fall may be off after a time t: order 1 is g h t/2 behind or ahead; higher ones are exact
+ * but for a start of order 1, of some g h^2; one that chooses its steps keeps to rtol 1e-3 of 0.5 m in
+ * each of a few. */
 static double fall_tolerance(const drape_integrator_ops *ops, double h, double t)
 {
     if (ops->own_steps)

@@ -215,7 +215,8 @@ START_TEST(many_halvings_stay_small)
 }
 END_TEST
 
-/* Where steps are proposed: no step above what was proposed (but for the last 1e-9), no tiny one left over. */
+/* Where steps are proposed: no step above what was proposed (but for the last 1e-9), no tiny one left
+ * over. */
 START_TEST(proposed_steps_reach_the_end)
 {
     for (uint64_t trial = 1; trial <= 500; trial++) {

@@ -1,11 +1,13 @@
-/* test_intersect.c: edges that pass through triangles are counted exactly, whatever cells the grid puts them in. */
+/* test_intersect.c: edges that pass through triangles are counted exactly, whatever cells the grid puts
+ * them in. */
 #include "contact/intersect.h"
 #include "support/suite.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Two squares of 5 x 5 nodes, the second turned upright through the middle of the first, shifted by a hair so that no edge touches a node. */
+/* Two squares of 5 x 5 nodes, the second turned upright through the middle of the first, shifted by a hair
+ * so that no edge touches a node. */
 static drape_model *crossed_squares(drape_context *ctx, double shift)
 {
     static const drape_setting grid[] = {
