@@ -98,10 +98,13 @@ void drape_param_value_text(const drape_param *param, double value, char *text, 
 static drape_status refuse(drape_context *ctx, const char *pointer, const drape_param *param,
                            const char *given)
 {
+    const char *kind = param->kind == DRAPE_PARAM_INTEGER  ? "an integer in "
+                       : param->kind == DRAPE_PARAM_NUMBER ? "in "
+                                                           : "";
     char range[256];
     drape_param_range_text(param, range, sizeof range);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%.100s is not allowed; %s is %s", given,
-                         param->name, range);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%.100s is not allowed; %s is %s%s", given,
+                         param->name, kind, range);
 }
 
 static drape_status refuse_number(drape_context *ctx, const char *pointer, const drape_param *param,
@@ -147,7 +150,8 @@ drape_status drape_param_value(drape_context *ctx, const char *pointer, const dr
     }
     if (setting->text) {
         char given[80];
-        snprintf(given, sizeof given, "\"%.60s\"", setting->text);
+        bool word = strcmp(setting->text, "true") == 0 || strcmp(setting->text, "false") == 0; /* a boolean */
+        snprintf(given, sizeof given, word ? "%.60s" : "\"%.60s\"", setting->text);
         return refuse(ctx, pointer, param, given);
     }
     double number = setting->number;

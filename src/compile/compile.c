@@ -50,19 +50,20 @@ static drape_status check_number(drape_context *ctx, const char *pointer, double
                          max);
 }
 
-static drape_status check_vector(drape_context *ctx, const char *pointer, const double v[3], double max)
+static drape_status check_vector(drape_context *ctx, const char *pointer, const double v[3], double max,
+                                 const char *unit)
 {
     for (int k = 0; k < 3; k++)
         if (!(fabs(v[k]) <= max))
-            return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "component %d is %.10g; it is in [%g, %g]",
-                                 k, v[k], -max, max);
+            return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
+                                 "component %d is %.10g; it is in [%g, %g] %s", k, v[k], -max, max, unit);
     return DRAPE_OK;
 }
 
 static drape_status copy_scene(drape_model *model, const drape_scene_def *def)
 {
     drape_context *ctx = model->ctx;
-    drape_status status = check_vector(ctx, "/gravity", def->gravity, 1e9);
+    drape_status status = check_vector(ctx, "/gravity", def->gravity, 1e9, "m/s2");
     if (!status)
         status = check_number(ctx, "/duration", def->duration, 1e9);
     if (!status)
@@ -105,7 +106,7 @@ static drape_status compile_cloth(drape_model *model, int32_t c, const drape_sce
         status = drape_compile_material(model, pointer, def, cloth);
     snprintf(at, sizeof at, "%s/velocity", pointer);
     if (!status)
-        status = check_vector(model->ctx, at, def->velocity, 1e9);
+        status = check_vector(model->ctx, at, def->velocity, 1e9, "m/s");
     memcpy(cloth->velocity, def->velocity, sizeof cloth->velocity);
     return status;
 }

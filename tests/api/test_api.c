@@ -412,7 +412,10 @@ static int zeroed(int which)
     else if (which == 11)
         memset(&s.pins[0], 0, sizeof s.pins[0]);
     drape_status status = drape_model_create(ctx, &s.scene, &model);
-    return status < 0 && !model && *drape_context_message(ctx) ? 0 : 1;
+    int code = status < 0 && !model && *drape_context_message(ctx) ? 0 : 1;
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+    return code;
 }
 
 START_TEST(zeroed_parts_of_a_scene_are_refused)

@@ -268,13 +268,13 @@ START_TEST(grid_faults)
 {
     drape_setting s[6];
     drape_mesh_def def = equilateral(s, 0, 1);
-    assert_refused(&def, "/m/edges: 0 is not allowed; edges is [1, 16383]");
+    assert_refused(&def, "/m/edges: 0 is not allowed; edges is an integer in [1, 16383]");
     def = equilateral(s, 16384, 1);
-    assert_refused(&def, "/m/edges: 16384 is not allowed; edges is [1, 16383]");
+    assert_refused(&def, "/m/edges: 16384 is not allowed; edges is an integer in [1, 16383]");
     def = equilateral(s, 1, 0);
-    assert_refused(&def, "/m/edge_length: 0 is not allowed; edge_length is (0, 1000000000] m");
+    assert_refused(&def, "/m/edge_length: 0 is not allowed; edge_length is in (0, 1000000000] m");
     def = equilateral(s, 1, NAN);
-    assert_refused(&def, "/m/edge_length: nan is not allowed; edge_length is (0, 1000000000] m");
+    assert_refused(&def, "/m/edge_length: nan is not allowed; edge_length is in (0, 1000000000] m");
     def = equilateral(s, 1, 1);
     def.grid.setting_count = 1;
     assert_refused(&def, "/m: \"edge_length\" is missing: length of every edge, (0, 1000000000] m");
@@ -287,7 +287,7 @@ START_TEST(grid_faults)
     def.grid.type = "hexagons";
     assert_refused(&def, "/m/grid: unknown grid \"hexagons\"; known are equilateral, square");
     def = square(s, 1, 2, "parallel", "vertical");
-    assert_refused(&def, "/m/columns: 1 is not allowed; columns is [2, 134217728]");
+    assert_refused(&def, "/m/columns: 1 is not allowed; columns is an integer in [2, 134217728]");
     def = square(s, 20000, 20000, "parallel", "vertical");
     assert_refused(&def, "/m/columns: 20000 columns x 20000 rows are 400000000 nodes; at most 268435456 are "
                          "allowed");
