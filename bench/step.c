@@ -70,20 +70,28 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Steps until the number or the budget is used up; at least one is measured. */
+/* Steps until the number or the budget is used up. The first step, which chooses pivots, is left out, unless it took
+ * the whole budget: then it is what there is. */
 static drape_status run_steps(drape_sim *sim, const settings *set, measurement *m)
 {
-    double wall[MAX_STEPS], begin = drape_clock_seconds();
+    double wall[MAX_STEPS], begin = drape_clock_seconds(), cpu = drape_clock_cpu_seconds();
     drape_status status = drape_sim_advance(sim, 0.01);
-    drape_statistics before = drape_sim_statistics(sim), after = before;
-    double cpu = drape_clock_cpu_seconds();
-    while (!status && m->steps < set->steps &&
-           (m->steps == 0 || drape_clock_seconds() - begin < set->budget)) {
+    drape_statistics before = {0}, after;
+    wall[0] = 1e3 * (drape_clock_seconds() - begin);
+    if (drape_clock_seconds() - begin > set->budget)
+        m->steps = 1;
+    else {
+        before = drape_sim_statistics(sim);
+        cpu = drape_clock_cpu_seconds();
+    }
+    while (!status && m->steps < set->steps && drape_clock_seconds() - begin < set->budget) {
         double start = drape_clock_seconds();
         status = drape_sim_advance(sim, 0.01 * (m->steps + 2));
         wall[m->steps++] = 1e3 * (drape_clock_seconds() - start);
     }
     after = drape_sim_statistics(sim);
+    if (m->steps == 0)
+        return status;
     qsort(wall, (size_t)m->steps, sizeof *wall, compare);
     m->median_ms = wall[m->steps / 2];
     m->cpu_ms = 1e3 * (drape_clock_cpu_seconds() - cpu) / m->steps;
