@@ -340,9 +340,9 @@ static drape_status status_of(int code, bool nonfinite, const char **reason)
 }
 
 /* Consistent initial values need no solve: x' = v, v' = -M^-1 g. */
-static bool start(ida_state *s, const drape_state *in)
+static drape_status start(ida_state *s, const drape_state *in, drape_step_info *info)
 {
-    double *y = N_VGetArrayPointer(s->y), *rate = N_VGetArrayPointer(s->rate);
+    double *y = N_VGetArrayPointer(s->y), *rate = N_VGetArrayPointer(s->rate), probe = 0;
     for (int64_t i = 0; i < s->n; i++) {
         y[i] = in->x[node_at(s, i)];
         y[s->n + i] = rate[i] = in->v[node_at(s, i)];
@@ -350,10 +350,16 @@ static bool start(ida_state *s, const drape_state *in)
     drape_point point = place(s, in->t, y);
     drape_system_force(s->system, &point, s->g);
     s->work.residuals++;
-    for (int64_t i = 0; i < s->n; i++)
+    for (int64_t i = 0; i < s->n; i++) {
         rate[s->n + i] = -s->g[node_at(s, i)] / s->model->mass[s->model->node_of_free[i / 3]];
+        probe += 0 * rate[s->n + i];
+    }
     s->counted = 0;
-    return !IDAReInit(s->ida, in->t, s->y, s->rate);
+    info->reason = "nonfinite";
+    if (probe != 0) /* IDA would cut its step ten times over it */
+        return DRAPE_RETRY_NONFINITE;
+    info->reason = "solver";
+    return IDAReInit(s->ida, in->t, s->y, s->rate) ? DRAPE_E_SOLVER : DRAPE_OK;
 }
 
 /* The next time at which some pin's velocity jumps, at most end. */
@@ -364,6 +370,15 @@ static double next_kink(const drape_model *m, double t, double end)
             if (m->tracks[k].keys[i].time > t && m->tracks[k].keys[i].time < end)
                 end = m->tracks[k].keys[i].time;
     return end;
+}
+
+static bool at_kink(const drape_model *m, double t)
+{
+    for (int32_t k = 0; k < m->track_count; k++)
+        for (size_t i = 0; i < m->tracks[k].key_count; i++)
+            if (m->tracks[k].keys[i].time == t)
+                return true;
+    return false;
 }
 
 /* Pinned nodes that do not move keep their rest positions and no velocity in s->x and s->v for good. */
@@ -420,13 +435,16 @@ static void count_iterations(ida_state *s, drape_step_info *info)
 
 /* Goes on from in if IDA is there, else starts anew, with a first step of at most h where an attempt
  * before was rejected. */
-static drape_status prepare(ida_state *s, const drape_state *in, double end, double h)
+static drape_status prepare(ida_state *s, const drape_state *in, double end, double h, drape_step_info *info)
 {
     double stop = next_kink(s->model, in->t, end);
     begin(s, in);
     s->slope_time = in->t + (stop - in->t) / 2;
     if (s->n > 0 && s->reached != in->t) {
-        if (!start(s, in) || IDASetInitStep(s->ida, h < end - in->t ? h : 0))
+        drape_status status = start(s, in, info);
+        if (status)
+            return status;
+        if (IDASetInitStep(s->ida, h < end - in->t ? h : 0))
             return DRAPE_E_SOLVER;
         measure_powers(s, s->powers);
     }
@@ -440,17 +458,17 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     double end = out->t, t = end;
     info->tolerance = info->residual = NAN; /* IDA bounds errors, not residuals */
     info->reason = "solver";
-    drape_status status = prepare(s, in, end, h);
+    drape_status status = prepare(s, in, end, h, info);
     if (!status && s->n > 0) {
         int code = IDASolve(s->ida, end, &t, s->y, s->rate, IDA_ONE_STEP);
         status = status_of(code, s->nonfinite, &info->reason);
         count_iterations(s, info);
+        if (status)
+            IDAGetCurrentStep(s->ida, &info->h);
     }
     s->reached = NAN;
-    if (status) {
-        IDAGetCurrentStep(s->ida, &info->h);
+    if (status)
         return status;
-    }
     place(s, t, s->n > 0 ? N_VGetArrayPointer(s->y) : NULL);
     memcpy(out->x, s->x, 3 * (size_t)s->model->node_count * sizeof *out->x);
     memcpy(out->v, s->v, 3 * (size_t)s->model->node_count * sizeof *out->v);
@@ -458,7 +476,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     info->h = t - in->t;
     info->reason = "converged";
     audit(s, in, out, info);
-    s->reached = next_kink(s->model, in->t, end) == t && t < end ? NAN : t;
+    s->reached = at_kink(s->model, t) ? NAN : t;
     return DRAPE_OK;
 }
 

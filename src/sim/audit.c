@@ -7,9 +7,9 @@
 
 #include <math.h>
 
-#define JUMP      4.0   /* a kinetic energy that grew by less is no explosion */
-#define SHARE     0.5   /* nor one of which less than this came from nowhere */
-#define ROUND_OFF 1e-10 /* of the energies that are compared */
+#define JUMP      4.0  /* a kinetic energy that grew by less is no explosion */
+#define SHARE     0.5  /* nor one of which less than this came from nowhere */
+#define UNNOTICED 1e-6 /* of the energies that are compared: less is below what adaptive rows resolve */
 
 static double kinetic(const drape_model *model, const double *v)
 {
@@ -49,7 +49,7 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, const drape_step
     double gain =
         after + elastic + gravity + info->dissipated - info->pin_work - (e.kinetic + e.elastic + e.gravity);
     double size = after + fabs(elastic) + fabs(gravity) + fabs(e.elastic) + fabs(e.gravity);
-    if (!(gain > SHARE * after && gain > ROUND_OFF * size))
+    if (!(gain > SHARE * after && gain > UNNOTICED * size))
         return false;
     *worst = (drape_worst){.what = "energy from nowhere / kinetic energy",
                            .term = "",

@@ -1,0 +1,411 @@
+/*
+ * test_ida.c: the row "ida": tolerances that mean what they say, steps that depend on nothing else, restarts, dense
+ * output.
+ *
+ * The sheet: 0.5 m x 0.4 m, hung by two corners and pushed, soft enough (E h = 20 N/m) that its stretch waves have
+ * periods above sqrt(m/(8 K)) 2 pi = 0.03 s, which steps resolve, and smooth but for rounding.
+ */
+#include "faults/host.h"
+#include "support/scene.h"
+
+#define LENGTH 0.6403124237432849 /* [m] diagonal, the length of the default tolerances */
+#define END    0.3                /* [s] */
+
+/* The text of a sheet, for printf: shift along x [m], more terms, pins, rtol, more settings after a comma. */
+#define SHEET                                                                                                \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 5, 'width': 0.5, 'height': "   \
+    "0.4, "                                                                                                  \
+    "'transform': {'translate': [%.17g, 0, 0]}},"                                                            \
+    "'material': {'young_modulus': 2e4, 'thickness': 1e-3, 'areal_density': 0.2},"                           \
+    "'terms': ['stretch.edge', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 1e-3}],"                  \
+    "'velocity': [0.1, 0, 0.2], 'pins': [%s]}],"                                                             \
+    "'integrator': {'method': 'ida', 'rtol': %g%s}, 'duration': 1}"
+
+#define HUNG "{'corner': 'top-left'}, {'corner': 'top-right'}"
+#define MOVED                                                                                                \
+    "{'corner': 'top-left'}, {'corner': 'top-right', 'track': [[0.05, [0, 0, 0]], [0.1, [0, 0.03, 0]], "     \
+    "[0.17, [-0.02, 0.03, 0.02]], [1, [-0.02, 0, 0]]]}"
+
+static scene sheet(const char *pins, double rtol, const char *more)
+{
+    return scene_open(SHEET, 0.0, pins, rtol, more);
+}
+
+/* Root mean square over the nodes of the distance. */
+static double distance(const scene *s, const double *a, const double *b)
+{
+    double sum = 0;
+    for (size_t i = 0; i < 3 * (size_t)s->model->node_count; i++)
+        sum += (a[i] - b[i]) * (a[i] - b[i]);
+    return sqrt(sum / s->model->node_count);
+}
+
+static double *positions_at(const char *pins, double rtol, const char *more, double t)
+{
+    scene s = sheet(pins, rtol, more);
+    const size_t size = 3 * (size_t)s.model->node_count * sizeof(double);
+    double *x = malloc(size);
+    ck_assert_ptr_nonnull(x);
+    scene_advance(&s, t);
+    memcpy(x, drape_sim_positions(s.sim), size);
+    scene_close(&s);
+    return x;
+}
+
+/* ---- Tolerances ---- */
+
+/* Over 1e-2 ... 1e-8 the error falls with rtol, never by more than a factor 2 above the one before. BDF of order p takes steps of
+ * rtol^(1/(p+1)), and its error at a time is that many local errors: rtol^(p/(p+1)), at least rtol^(2/3) in order 2. Six
+ * decades of rtol are four of the error at least, of which one is granted to the loose end, where IDA is not yet in
+ * its asymptotic range. */
+static void falls(const char *pins, int max_order)
+{
+    char order[40];
+    double first = 0, before = INFINITY, *reference = positions_at(pins, 1e-10, ", 'max_order': 5", END);
+    snprintf(order, sizeof order, ", 'max_order': %d", max_order);
+    for (int k = 2; k <= 8; k++) {
+        scene s = sheet(pins, pow(10, -k), order);
+        scene_advance(&s, END);
+        const double error = distance(&s, reference, drape_sim_positions(s.sim));
+        printf("# max_order %d, rtol 1e-%d: error %.3g m, %lld steps\n", max_order, k, error,
+               (long long)drape_sim_statistics(s.sim).steps_accepted);
+        ck_assert_msg(error <= 2 * before, "rtol 1e-%d: error %g m, before %g m", k, error, before);
+        first = k == 2 ? error : first;
+        before = error;
+        scene_close(&s);
+    }
+    assert_below(before, 1e-3 * first);
+    free(reference);
+}
+
+START_TEST(error_falls_with_rtol_in_order_2)
+{
+    falls(HUNG, 2);
+}
+END_TEST
+
+START_TEST(error_falls_with_rtol_in_order_5)
+{
+    falls(HUNG, 5);
+}
+END_TEST
+
+/* Kinks do not spoil it, because IDA starts anew there. */
+START_TEST(error_falls_with_rtol_over_kinks_of_tracks)
+{
+    falls(MOVED, 5);
+}
+END_TEST
+
+static scene after(const char *more, double rtol)
+{
+    scene s = sheet(HUNG, rtol, more);
+    scene_advance(&s, END);
+    return s;
+}
+
+static uint64_t hash_after(const char *more, double rtol)
+{
+    scene s = after(more, rtol);
+    const uint64_t hash = drape_sim_hash(s.sim);
+    scene_close(&s);
+    return hash;
+}
+
+static long long steps_after(const char *more, double rtol)
+{
+    scene s = after(more, rtol);
+    const long long steps = drape_sim_statistics(s.sim).steps_accepted;
+    scene_close(&s);
+    return steps;
+}
+
+/* rtol is a name for two weights and an order, and nothing else: given all three, it does not count; and each counts for
+ * itself. */
+START_TEST(atol_x_and_atol_v_are_the_weights)
+{
+    char all[160];
+    snprintf(all, sizeof all, ", 'max_order': 2, 'atol_x': %.17g, 'atol_v': %.17g", 1e-4 * LENGTH,
+             1e-4 * sqrt(9.81 * LENGTH));
+    ck_assert(hash_after(all, 1e-4) == hash_after("", 1e-4));
+    ck_assert(hash_after(all, 1e-6) == hash_after(all, 1e-2));
+    const long long neither = steps_after(", 'max_order': 2, 'atol_x': 1e2, 'atol_v': 1e2", 1e-3),
+                    tight_x = steps_after(", 'max_order': 2, 'atol_x': 1e-5, 'atol_v': 1e2", 1e-3),
+                    tight_v = steps_after(", 'max_order': 2, 'atol_x': 1e2, 'atol_v': 1e-3", 1e-3);
+    printf("# steps without bounds %lld, with one on positions %lld, with one on velocities %lld\n", neither,
+           tight_x, tight_v);
+    ck_assert_int_gt(tight_x, 2 * neither);
+    ck_assert_int_gt(tight_v, 2 * neither);
+}
+END_TEST
+
+/* Tolerances do not depend on where the scene lies. At 1000 m positions are rounded to 2^-44 = 5.7e-14 m, at the
+ * origin to 1e-16 m; that noise grows by what parts neighbouring runs (test_ida_full.c), here less than 1e4-fold.
+ * Decisions to accept a step compare numbers that differ by as much: they are the same but for an accident. */
+START_TEST(a_scene_far_away_takes_the_same_steps)
+{
+    const double far = 1000;
+    static const int orders[] = {2, 5};
+    for (int k = 0; k < 2; k++) {
+        char order[40];
+        double worst = 0;
+        snprintf(order, sizeof order, ", 'max_order': %d", orders[k]);
+        scene here = scene_open(SHEET, 0.0, HUNG, 1e-4, order),
+              there = scene_open(SHEET, far, HUNG, 1e-4, order);
+        scene_watch(&here);
+        scene_watch(&there);
+        scene_advance(&here, END);
+        scene_advance(&there, END);
+        ck_assert_int_eq(here.accepted, there.accepted);
+        ck_assert_int_eq(here.rejected, there.rejected);
+        ck_assert_int_eq(drape_sim_statistics(here.sim).residuals, drape_sim_statistics(there.sim).residuals);
+        ck_assert_int_eq(drape_sim_statistics(here.sim).jacobians, drape_sim_statistics(there.sim).jacobians);
+        for (size_t i = 0; i < 3 * (size_t)here.model->node_count; i++)
+            worst = fmax(worst, fabs(drape_sim_positions(there.sim)[i] - (i % 3 == 0 ? far : 0) -
+                                     drape_sim_positions(here.sim)[i]));
+        assert_below(worst, 1e4 * 5.7e-14);
+        scene_close(&here);
+        scene_close(&there);
+    }
+}
+END_TEST
+
+/* ---- Steps ---- */
+
+/* Steps as an observer saw them. */
+typedef struct step_log {
+    double t[4096], h[4096];
+    int count;
+} step_log;
+
+static drape_status note_step(void *user, const drape_event *event)
+{
+    step_log *log = user;
+    if (event->kind != DRAPE_EVENT_ATTEMPT || !event->attempt->accepted)
+        return DRAPE_OK;
+    ck_assert_int_lt(log->count, 4096);
+    log->t[log->count] = event->attempt->t;
+    log->h[log->count++] = event->attempt->h;
+    return DRAPE_OK;
+}
+
+static step_log steps_of(scene *s, double end)
+{
+    step_log log = {.count = 0};
+    ck_assert_int_eq(drape_sim_observe(s->sim, note_step, &log), DRAPE_OK);
+    scene_advance(s, end);
+    return log;
+}
+
+START_TEST(max_step_is_kept)
+{
+    const double limit = 7e-4;
+    scene free_run = sheet(HUNG, 1e-2, ""), s = sheet(HUNG, 1e-2, ", 'max_step': 7e-4");
+    const step_log log = steps_of(&s, 0.1), free_log = steps_of(&free_run, 0.1);
+    ck_assert_double_gt(free_log.h[free_log.count / 2], 2 * limit); /* it would take longer ones */
+    for (int i = 0; i < log.count; i++) /* a step is the difference of two times of at most 0.1 s */
+        ck_assert_double_le(log.h[i], limit + 0.1 * DBL_EPSILON);
+    ck_assert_double_eq(drape_sim_time(s.sim), 0.1);
+    scene_close(&free_run);
+    scene_close(&s);
+}
+END_TEST
+
+/* A step ends at every key that lies within, to the last bit, and the next starts small: IDA knows nothing of the time
+ * before. Its first step is a thousandth of the way left at most, or 1/2 over the norm of the rates; here less
+ * than a fifth of the step before. */
+START_TEST(steps_end_at_kinks_and_start_anew)
+{
+    static const double kinks[] = {0.05, 0.1, 0.17};
+    scene s = sheet(MOVED, 1e-4, "");
+    step_log log = steps_of(&s, END);
+    for (int k = 0; k < 3; k++) {
+        int at = 0;
+        while (at < log.count && log.t[at] != kinks[k])
+            at++;
+        ck_assert_msg(at < log.count, "no step begins at %g s", kinks[k]);
+        printf("# kink at %g s: steps %g, %g before and %g after it\n", kinks[k], log.h[at - 2],
+               log.h[at - 1], log.h[at]);
+        ck_assert_double_lt(log.h[at], 0.2 * fmax(log.h[at - 2], log.h[at - 1]));
+    }
+    scene_close(&s);
+}
+END_TEST
+
+/* An advance that ends where a key lies is no different: the next begins anew, as if it had gone on. Its steps are not the same, because
+ * IDA's first depends on the way to the end, but as small. */
+START_TEST(an_advance_that_ends_at_a_kink_starts_anew_too)
+{
+    scene s = sheet(MOVED, 1e-4, "");
+    scene_advance(&s, 0.1);
+    const double before = s.sim->statistics.h_max;
+    step_log log = steps_of(&s, END);
+    printf("# steps %g before and %g after the kink\n", before, log.h[0]);
+    ck_assert_double_eq(log.t[0], 0.1);
+    ck_assert_double_lt(log.h[0], 0.2 * before);
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Ends and frames ---- */
+
+typedef struct frame_log {
+    double *x; /* (count x node_count x 3) */
+    size_t size;
+    int count;
+} frame_log;
+
+static drape_status note_frame(void *user, const drape_event *event)
+{
+    frame_log *log = user;
+    if (event->kind != DRAPE_EVENT_FRAME)
+        return DRAPE_OK;
+    ck_assert_int_lt(log->count, 64);
+    memcpy(log->x + (size_t)log->count++ * log->size, event->positions, log->size * sizeof(double));
+    return DRAPE_OK;
+}
+
+/* Frames at 60/s, from dense output or from a run that stops at every frame. */
+static frame_log frames(double rtol, const char *more, bool stop)
+{
+    scene s = sheet(MOVED, rtol, more);
+    frame_log log = {.size = 3 * (size_t)s.model->node_count};
+    log.x = malloc(64 * log.size * sizeof *log.x);
+    ck_assert_ptr_nonnull(log.x);
+    ck_assert_int_eq(drape_sim_observe(s.sim, note_frame, &log), DRAPE_OK);
+    for (int k = 1; stop && k <= 60 * END; k++) {
+        scene_advance(&s, k / 60.0);
+        ck_assert(drape_sim_time(s.sim) == k / 60.0);
+    }
+    scene_advance(&s, END);
+    ck_assert_int_eq(log.count, (int)(60 * END + 0.5) + 1);
+    scene_close(&s);
+    return log;
+}
+
+static double worst_frame(const frame_log *a, const frame_log *b)
+{
+    double worst = 0;
+    for (int k = 0; k < a->count; k++) {
+        double sum = 0;
+        for (size_t i = 0; i < a->size; i++)
+            sum += pow(a->x[(size_t)k * a->size + i] - b->x[(size_t)k * a->size + i], 2);
+        worst = fmax(worst, sqrt(3 * sum / (double)a->size));
+    }
+    return worst;
+}
+
+/* Frames between steps are as good as steps that end there: both within their errors of the converged run. Dense output is
+ * the polynomial of the step, whose error is of the size of the local error, atol_x, which comes on top. So an advance in pieces gives the
+ * same answer to the tolerance, frame by frame, and ends where it was told. */
+START_TEST(frames_are_what_a_run_that_stops_there_has)
+{
+    static const double rtols[] = {1e-3, 1e-4, 1e-6};
+    frame_log converged = frames(1e-9, ", 'max_order': 5", true);
+    for (int k = 0; k < 3; k++) {
+        frame_log dense = frames(rtols[k], "", false), stopped = frames(rtols[k], "", true);
+        const double error = worst_frame(&stopped, &converged);
+        printf("# rtol %g: error of a run that stops at frames %.3g m, of one that does not %.3g m, "
+               "difference %.3g m\n",
+               rtols[k], error, worst_frame(&dense, &converged), worst_frame(&dense, &stopped));
+        assert_below(worst_frame(&dense, &converged), 2 * error + rtols[k] * LENGTH);
+        free(dense.x);
+        free(stopped.x);
+    }
+    free(converged.x);
+}
+END_TEST
+
+/* Nobody watches frames: the steps are the same as with observers of any rate. */
+START_TEST(frames_do_not_change_the_steps)
+{
+    drape_sim_def def;
+    const uint64_t unseen = hash_after("", 1e-4);
+    drape_sim_def_init(&def, sizeof def);
+    def.frame_rate = 1013;
+    scene s = sheet(HUNG, 1e-4, "");
+    drape_sim_destroy(&s.sim);
+    scene_start(&s, &def);
+    scene_watch(&s);
+    scene_advance(&s, END);
+    ck_assert(drape_sim_hash(s.sim) == unseen);
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Faults ---- */
+
+static host_sim host_with_ida(double rtol)
+{
+    const drape_setting setting = {"rtol", rtol, NULL};
+    drape_sim_def def;
+    host_sim s = host_open("", "'type': 'halving', 'dt_min': 1e-6", true);
+    drape_sim_destroy(&s.sim);
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator = "ida";
+    def.integrator_settings = &setting;
+    def.integrator_setting_count = 1;
+    ck_assert_int_eq(drape_sim_create(s.ctx, s.model, &def, &s.sim), DRAPE_OK);
+    return s;
+}
+
+static double host_distance(const host_sim *s, const host_copy *from)
+{
+    double sum = 0;
+    const int32_t nodes = drape_model_node_count(s->model);
+    for (int32_t i = 0; i < 3 * nodes; i++)
+        sum += pow(drape_sim_positions(s->sim)[i] - from->x[i], 2);
+    return sqrt(sum / nodes);
+}
+
+/* One force or Hessian that is no number, at the nth evaluation for every n but the first force, which is of the initial state and
+ * no smaller step's: IDA takes a quarter of the step and goes on, or the controller makes it start anew. The run comes to
+ * its end with finite states, and it is no worse than twice a run of the same tolerance without fault. */
+START_TEST(one_fault_is_recovered_from)
+{
+    host_sim tight = host_with_ida(1e-9), good = host_with_ida(1e-4);
+    ck_assert_int_eq(drape_sim_advance(tight.sim, 0.2), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(good.sim, 0.2), DRAPE_OK);
+    const host_copy truth = host_copy_state(&tight);
+    for (int kind = HOST_NAN_FORCE; kind <= HOST_INFINITE_HESSIAN; kind++) {
+        double worst = 0;
+        for (long n = 2; n <= 60; n++) {
+            host_sim s = host_with_ida(1e-4);
+            host_watch(&s);
+            host_break((host_fault)kind, n, false);
+            drape_status status = drape_sim_advance(s.sim, 0.2);
+            ck_assert_msg(status == DRAPE_OK, "fault %d at %ld: %s", kind, n, drape_context_message(s.ctx));
+            ck_assert(drape_sim_time(s.sim) == 0.2);
+            ck_assert_int_eq(s.nonfinite, 0);
+            worst = fmax(worst, host_distance(&s, &truth));
+            host_close(&s);
+        }
+        assert_below(worst, 2 * host_distance(&good, &truth));
+    }
+    host_close(&good);
+    host_close(&tight);
+}
+END_TEST
+
+/* A fault that stays ends the run in the state before it, with the reason. */
+START_TEST(a_fault_that_stays_ends_the_run)
+{
+    for (int kind = HOST_NAN_FORCE; kind <= HOST_INFINITE_FORCE; kind++) {
+        host_sim s = host_with_ida(1e-3);
+        host_watch(&s);
+        ck_assert_int_eq(drape_sim_advance(s.sim, 0.05), DRAPE_OK);
+        host_copy before = host_copy_state(&s);
+        host_break((host_fault)kind, 1, true);
+        ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_STEP_TOO_SMALL);
+        host_check_state(&s, &before);
+        host_check_message(&s, "nonfinite");
+        host_close(&s);
+    }
+}
+END_TEST
+
+SUITE("ida", error_falls_with_rtol_in_order_2, error_falls_with_rtol_in_order_5,
+      error_falls_with_rtol_over_kinks_of_tracks, atol_x_and_atol_v_are_the_weights,
+      a_scene_far_away_takes_the_same_steps, max_step_is_kept, steps_end_at_kinks_and_start_anew,
+      an_advance_that_ends_at_a_kink_starts_anew_too, frames_are_what_a_run_that_stops_there_has,
+      frames_do_not_change_the_steps, one_fault_is_recovered_from, a_fault_that_stays_ends_the_run)

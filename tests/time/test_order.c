@@ -1,0 +1,360 @@
+/*
+ * test_order.c: the order of convergence that each row of the integrators declares, measured on a sheet that swings, with
+ * dashpots and drag; and the error controller.
+ *
+ * The sheet is soft: E h = 20 N/m and a node of 0.2 kg/m2 x 0.01 m2 = 2 g. Springs, of sqrt(3)/2 E h = 17 N/m at
+ * most, give its stretch waves angular frequencies below sqrt(8 x 17/0.002) = 260/s: steps of 2 ms and less resolve them.
+ *
+ * An error C h^p (1 + c h + ...) has a slope log2(e(h)/e(h/2)) = p + c h/(2 log 2) + ...: it is off p by an amount that
+ * halves with h. c is of the size of the fastest rate, 260/s, times a number below 1, and p is approached from h = 1 ms
+ * to 0.25 ms: 260 x 0.00025/1.4 = 0.05 at the last pair if that number is 1. The bound is 0.15.
+ */
+#include "support/scene.h"
+
+#define END   0.2 /* [s] */
+#define BOUND 0.15
+
+#define SHEET                                                                                                \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 4, 'width': 0.4, 'height': "   \
+    "0.3},"                                                                                                  \
+    "'material': {'young_modulus': 2e4, 'thickness': 1e-3, 'areal_density': 0.2},"                           \
+    "'terms': ['stretch.edge', 'bend.hinge', {'type': 'drag.viscous', 'coefficient': 0.3} %s],"              \
+    "'velocity': [0.1, 0, 0.2], 'pins': [%s]}], 'integrator': {'tolerance': 1e-12}, 'duration': 1}"
+
+#define DASHPOTS ", {'type': 'damp.kelvin_voigt', 'beta': 2e-3}"
+#define HUNG     "{'corner': 'top-left'}, {'corner': 'top-right'}"
+/* Kinks at multiples of 10 ms. */
+#define MOVED                                                                                                \
+    "{'corner': 'top-left'}, {'corner': 'top-right', 'track': [[0.03, [0, 0, 0]], [0.1, [0, 0.03, 0]], "     \
+    "[0.15, [-0.02, 0.03, 0.02]], [1, [-0.02, 0, 0]]]}"
+
+static scene sheet(const char *terms, const char *pins, const drape_sim_def *def)
+{
+    scene s = scene_model(SHEET, terms, pins);
+    scene_start(&s, def);
+    return s;
+}
+
+static double distance(const scene *s, const double *reference)
+{
+    double sum = 0;
+    for (size_t i = 0; i < 3 * (size_t)s->model->node_count; i++)
+        sum += pow(drape_sim_positions(s->sim)[i] - reference[i], 2);
+    return sqrt(sum / s->model->node_count);
+}
+
+/* By ida at rtol 1e-10, whose error is 1e-9 m at most (test_ida.c): 1e-3 of the smallest that is measured here, which moves
+ * a slope by 0.002. It starts anew at kinks. */
+static double *converged(const char *terms, const char *pins)
+{
+    const drape_setting settings[] = {{"rtol", 1e-10, NULL}, {"max_order", 5, NULL}};
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator = "ida";
+    def.integrator_settings = settings;
+    def.integrator_setting_count = 2;
+    scene s = sheet(terms, pins, &def);
+    const size_t size = 3 * (size_t)s.model->node_count * sizeof(double);
+    double *x = malloc(size);
+    ck_assert_ptr_nonnull(x);
+    scene_advance(&s, END);
+    memcpy(x, drape_sim_positions(s.sim), size);
+    scene_close(&s);
+    return x;
+}
+
+/* The end of step k of n. */
+typedef double step_end(int k, int n);
+
+static double equal_steps(int k, int n)
+{
+    return END * k / n;
+}
+
+/* Sizes 1 2 1 2 ...: ratios 2 and 1/2, as halving and doubling make them, all the time. */
+static double uneven_steps(int k, int n)
+{
+    return END * (k / 2 * 3 + k % 2) / (n / 2 * 3);
+}
+
+/* Error at the end of n steps. dt is larger than any: every advance is one step. */
+static double error_of(const char *row, const char *terms, const char *pins, const double *reference, int n,
+                       step_end *end)
+{
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator = row;
+    def.controller = "fixed";
+    def.dt = 1;
+    scene s = sheet(terms, pins, &def);
+    scene_watch(&s);
+    for (int k = 1; k <= n; k++)
+        scene_advance(&s, end(k, n));
+    ck_assert_int_eq(s.accepted, n);
+    const double error = distance(&s, reference);
+    scene_close(&s);
+    return error;
+}
+
+/* The slopes over n = 200, 400, 800, of which the last is returned. */
+static double slope_of(const char *row, const char *terms, const char *pins, step_end *end)
+{
+    double *reference = converged(terms, pins), before = NAN, slope = NAN;
+    for (int n = 200; n <= 800; n *= 2) {
+        const double error = error_of(row, terms, pins, reference, n, end);
+        slope = log2(before / error);
+        printf("# %s, %d steps: error %.3g m, slope %.3f\n", row, n, error, slope);
+        before = error;
+    }
+    free(reference);
+    return slope;
+}
+
+static void check_slope(const char *row, const char *terms, const char *pins, step_end *end, int order)
+{
+    const double slope = slope_of(row, terms, pins, end);
+    ck_assert_msg(fabs(slope - order) <= BOUND, "%s: slope %g, order %d", row, slope, order);
+}
+
+static bool has_fixed_steps(const drape_integrator_ops *row)
+{
+    return !row->own_steps && !row->timeless;
+}
+
+START_TEST(every_row_converges_with_the_order_it_declares)
+{
+    for (int i = 0; drape_integrators[i]; i++)
+        if (has_fixed_steps(drape_integrators[i]))
+            check_slope(drape_integrators[i]->name, DASHPOTS, HUNG, equal_steps, drape_integrators[i]->order);
+}
+END_TEST
+
+/* bdf2 knows the size of the step before; one-step rows have nothing to know. */
+START_TEST(so_it_does_with_steps_of_changing_size)
+{
+    for (int i = 0; drape_integrators[i]; i++)
+        if (has_fixed_steps(drape_integrators[i]))
+            check_slope(drape_integrators[i]->name, DASHPOTS, HUNG, uneven_steps,
+                        drape_integrators[i]->order);
+}
+END_TEST
+
+/* At a kink of a track the pin's velocity jumps. Springs then have a force with a kink in time, dashpots one that jumps. One-step rows do
+ * not look back, and with kinks at the ends of steps every step is smooth: the order stays.
+ *
+ * bdf2 looks back over the kink. Where the acceleration jumps from f to f + j it takes v1 = v0 + h f/3 + 2 h f1/3 with f1 the force
+ * of the step. With the exact rate of the dashpot that would be f + j and v1 off by h j/3: order 1. But the rate is the same formula
+ * of q: 3/2 of the new slope less 1/2 of the old, so f1 = f + 3/2 j and v1 = v0 + h (f + j): the impulse is right and the order stays. */
+START_TEST(kinks_at_ends_of_steps_leave_the_order)
+{
+    for (int i = 0; drape_integrators[i]; i++)
+        if (has_fixed_steps(drape_integrators[i]))
+            check_slope(drape_integrators[i]->name, DASHPOTS, MOVED, equal_steps,
+                        drape_integrators[i]->order);
+}
+END_TEST
+
+/* Without dashpots the acceleration does not jump, but its slope: a single error of h^2 in v, for bdf2 as for all. */
+START_TEST(and_without_dashpots_as_well)
+{
+    for (int i = 0; drape_integrators[i]; i++)
+        if (has_fixed_steps(drape_integrators[i]))
+            check_slope(drape_integrators[i]->name, "", MOVED, equal_steps, drape_integrators[i]->order);
+}
+END_TEST
+
+static double steps_across_kinks(int k, int n)
+{
+    return k == 0 ? 0 : k == n ? END : END * (k - 0.5) / (n - 1);
+}
+
+/* A kink inside a step. The pin takes its mean velocity over the step, so for be and bdf2, whose dashpots' rates are
+ * differences of q, the impulse of a dashpot over the step is right and the order stays. midpoint takes the rate at mid-way, grad q . v: its
+ * impulse is off by h times a jump: order 1, which it comes down to only where that is larger than its error of second order. */
+START_TEST(kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_first)
+{
+    check_slope("be", DASHPOTS, MOVED, steps_across_kinks, 1);
+    check_slope("bdf2", DASHPOTS, MOVED, steps_across_kinks, 2);
+    const double slope = slope_of("midpoint", DASHPOTS, MOVED, steps_across_kinks);
+    ck_assert_msg(slope > 1 - BOUND && slope < 2 - BOUND, "midpoint: slope %g", slope);
+}
+END_TEST
+
+/* ---- The error controller ---- */
+
+typedef struct step_log {
+    double t[40000], h[40000];
+    int count, rejected;
+} step_log;
+
+static drape_status note_step(void *user, const drape_event *event)
+{
+    step_log *log = user;
+    if (event->kind != DRAPE_EVENT_ATTEMPT)
+        return DRAPE_OK;
+    log->rejected += !event->attempt->accepted;
+    if (!event->attempt->accepted)
+        return DRAPE_OK;
+    ck_assert_int_lt(log->count, 40000);
+    log->t[log->count] = event->attempt->t;
+    log->h[log->count++] = event->attempt->h;
+    return DRAPE_OK;
+}
+
+static drape_sim_def controlled(const char *row, const drape_setting *settings, size_t count)
+{
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator = row;
+    def.controller = "error";
+    def.controller_settings = settings;
+    def.controller_setting_count = count;
+    def.dt = 1e-4;
+    return def;
+}
+
+/* Local errors are held to rtol: steps go with rtol^(1/(p+1)), the error at a time with rtol^(p/(p+1)): a decade of rtol gains
+ * 10^(1/2) in order 1 and 10^(2/3) in order 2. Over the three decades one quarter of the exponent is left for the
+ * start, where the first steps are of another size than they will be. */
+START_TEST(error_falls_with_the_controllers_rtol)
+{
+    double *reference = converged(DASHPOTS, HUNG);
+    for (int i = 0; drape_integrators[i]; i++) {
+        const drape_integrator_ops *row = drape_integrators[i];
+        double first = 0, before = INFINITY;
+        for (int k = 2; has_fixed_steps(row) && k <= 5; k++) {
+            const drape_setting rtol = {"rtol", pow(10, -k), NULL};
+            const drape_sim_def def = controlled(row->name, &rtol, 1);
+            scene s = sheet(DASHPOTS, HUNG, &def);
+            scene_advance(&s, END);
+            const double error = distance(&s, reference);
+            printf("# %s, rtol 1e-%d: error %.3g m, %lld steps, %lld rejected\n", row->name, k, error,
+                   (long long)drape_sim_statistics(s.sim).steps_accepted,
+                   (long long)drape_sim_statistics(s.sim).steps_rejected);
+            ck_assert_msg(error <= 2 * before, "%s, rtol 1e-%d: error %g m, before %g m", row->name, k, error,
+                          before);
+            first = k == 2 ? error : first;
+            before = error;
+            scene_close(&s);
+        }
+        if (has_fixed_steps(row))
+            assert_below(before, first * pow(10, -0.75 * 3 * row->order / (row->order + 1)));
+    }
+    free(reference);
+}
+END_TEST
+
+/* The PI rule changes sizes smoothly: never more than doubled (bdf2 is stable below 1 + sqrt(2)), few rejections: less than a tenth of
+ * the steps where the motion is smooth. The last steps of the advance are cut to end with it. */
+START_TEST(steps_of_the_error_controller_change_gently)
+{
+    static step_log log;
+    for (int i = 0; drape_integrators[i]; i++) {
+        const drape_setting rtol = {"rtol", 1e-4, NULL};
+        double most = 0, least = INFINITY;
+        if (!has_fixed_steps(drape_integrators[i]))
+            continue;
+        const drape_sim_def def = controlled(drape_integrators[i]->name, &rtol, 1);
+        scene s = sheet(DASHPOTS, HUNG, &def);
+        log = (step_log){.count = 0};
+        ck_assert_int_eq(drape_sim_observe(s.sim, note_step, &log), DRAPE_OK);
+        scene_advance(&s, END);
+        for (int k = 1; k < log.count - 2; k++) {
+            most = fmax(most, log.h[k] / log.h[k - 1]);
+            least = fmin(least, log.h[k] / log.h[k - 1]);
+        }
+        printf("# %s: %d steps, %d rejected, ratios %.3f to %.3f\n", drape_integrators[i]->name, log.count,
+               log.rejected, least, most);
+        ck_assert_double_le(most, 2 * (1 + 1e-9)); /* times are rounded */
+        ck_assert_int_le(10 * log.rejected, log.count);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* One free node for the judge. */
+static scene node(void)
+{
+    return scene_model(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 2, 'edge_length': 0.1},"
+        "'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2}, 'terms': "
+        "['stretch.edge'],"
+        "'pins': [{'nodes': [0, 1, 2, 3, 5, 6, 7, 8]}]}], 'duration': 1}");
+}
+
+/* What the controller takes for the local error in x or in v, through what it says of a rejected step: root mean square over
+ * the six of x and v of the node. Only the first component of the node differs from 0. */
+static double estimate(const scene *s, bool velocity, double h, const double past[2], const double in[2],
+                       const double out[2], double *values)
+{
+    double x[3][27] = {{0}}, v[3][27] = {{0}}, scratch[2] = {0};
+    const double *given[3] = {past, in, out};
+    const size_t at = 3 * (size_t)s->model->node_of_free[0];
+    drape_step_info info = {.reason = "converged", .h = h};
+    drape_state state[3];
+    for (int k = 0; k < 3; k++) {
+        x[k][at] = given[k][0];
+        v[k][at] = given[k][1];
+        state[k] = (drape_state){.t = (k - 1) * h, .x = x[k], .v = v[k]};
+    }
+    const drape_controller_ops *error = drape_controllers[0];
+    for (int i = 0; strcmp(error->name, "error") != 0; i++)
+        error = drape_controllers[i];
+    for (int p = 0; p < error->param_count; p++)
+        values[p] = error->params[p].default_value;
+    values[drape_param_find(error->params, error->param_count, "dt_min")] = 1e-300;
+    values[drape_param_find(error->params, error->param_count, "atol_x")] = velocity ? 1e9 : 1e-15;
+    values[drape_param_find(error->params, error->param_count, "atol_v")] = velocity ? 1e-15 : 1e9;
+    drape_trial trial = {.model = s->model,
+                         .past = {&state[0], NULL},
+                         .in = &state[1],
+                         .out = &state[2],
+                         .order = 1,
+                         .scratch = scratch,
+                         .h = h,
+                         .info = &info,
+                         .status = DRAPE_OK};
+    ck_assert_int_eq(error->judge(values, &trial), DRAPE_RETRY);
+    ck_assert_str_eq(info.reason, "error_test");
+    return info.worst.value * 1e-15 * sqrt(6);
+}
+
+/* Two steps of backward Euler on x'' = -w^2 x: x1 = (x0 + h v0)/(1 + (w h)^2), v1 = (x1 - x0)/h. The second differences of its x and
+ * v are h^2 times their second derivatives in the sense of the equation, which is twice its local error y1 - y(h) = h^2/2 y'' +
+ * O(h^3), y(h) the exact solution from the state in the middle: the estimate is that but for some w h. The terms of third order are
+ * of 1/2 h^3 y''' from the second difference and 1/3 h^3 y''' from the local error, and y''' < 1.5 w y'' at this phase for
+ * both: less than 2.5 w h in all. */
+START_TEST(the_estimate_for_backward_euler_is_its_local_error)
+{
+    static const double phases[] = {0.1, 0.03, 0.01, 0.001}; /* w h */
+    const double w = 50;                                     /* [1/s] */
+    double values[DRAPE_MAX_PARAMS], y[3][2];
+    scene s = node();
+    ck_assert_int_eq(s.model->free_count, 1);
+    for (int k = 0; k < 4; k++) {
+        const double z = phases[k], h = z / w;
+        y[0][0] = cos(0.8);
+        y[0][1] = -w * sin(0.8);
+        for (int n = 1; n < 3; n++) {
+            y[n][0] = (y[n - 1][0] + h * y[n - 1][1]) / (1 + z * z);
+            y[n][1] = (y[n][0] - y[n - 1][0]) / h;
+        }
+        const double exact[2] = {y[1][0] * cos(z) + y[1][1] / w * sin(z),
+                                 y[1][1] * cos(z) - w * y[1][0] * sin(z)};
+        for (int c = 0; c < 2; c++) {
+            const double guess = estimate(&s, c == 1, h, y[0], y[1], y[2], values),
+                         truth = fabs(y[2][c] - exact[c]);
+            printf("# w h = %g, %s: estimate / local error = %.5f\n", z, c ? "v" : "x", guess / truth);
+            fflush(stdout);
+            ck_assert_double_le(fabs(guess / truth - 1), 2.5 * z);
+        }
+    }
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("order", every_row_converges_with_the_order_it_declares, so_it_does_with_steps_of_changing_size,
+      kinks_at_ends_of_steps_leave_the_order, and_without_dashpots_as_well,
+      kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_first,
+      error_falls_with_the_controllers_rtol, steps_of_the_error_controller_change_gently,
+      the_estimate_for_backward_euler_is_its_local_error)
