@@ -300,7 +300,8 @@ DRAPE_API drape_energy drape_sim_energy(drape_sim *sim);
 /* Work done since the sim was made. Times in seconds of wall clock; newton times are parts of steps. */
 typedef struct drape_statistics {
     int64_t steps_accepted, steps_rejected;
-    double h_min, h_max; /* [s] of accepted steps; 0 before the first */
+    int64_t steps_unconverged; /* of the accepted: taken although unconverged, by on_failure "accept" */
+    double h_min, h_max;       /* [s] of accepted steps; 0 before the first */
     int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
     double wall_setup, wall_steps, wall_residual, wall_jacobian, wall_factor, wall_solve, wall_contact;
     double strain_min, strain_max; /* |e|/L - 1 over all edges and accepted steps */

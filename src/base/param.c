@@ -20,7 +20,7 @@ static size_t edit_distance(const char *a, const char *b)
 {
     size_t na = strlen(a), nb = strlen(b), row[LONGEST_WORD + 1];
     if (na > LONGEST_WORD || nb > LONGEST_WORD)
-        return LONGEST_WORD;
+        return SIZE_MAX;
     for (size_t j = 0; j <= nb; j++)
         row[j] = j;
     for (size_t i = 1; i <= na; i++) {

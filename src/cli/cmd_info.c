@@ -131,6 +131,22 @@ static const cli_option options[] = {
     {"json", CLI_FLAG, NULL, "the same as JSON", offsetof(info_request, json), 0, NULL},
 };
 
+/* The settings were good when the model was compiled, so they are now. */
+const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values)
+{
+    for (int g = 0; drape_grids[g]; g++) {
+        const drape_grid_ops *grid = drape_grids[g];
+        drape_context *ctx = NULL;
+        if (strcmp(grid->name, cloth->grid.type) != 0 || drape_context_create(NULL, &ctx))
+            continue;
+        drape_status status = drape_params_resolve(ctx, "", grid->params, grid->param_count,
+                                                   cloth->grid.settings, cloth->grid.setting_count, values);
+        drape_context_destroy(&ctx);
+        return status ? NULL : grid;
+    }
+    return NULL;
+}
+
 static int main_info(int argc, char **argv);
 
 const drape_verb drape_verb_info = {

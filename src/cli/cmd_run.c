@@ -93,6 +93,8 @@ static void print_steps(const run *r, const drape_statistics *s)
     for (int i = 0; (reason = drape_sim_reason(r->in.sim, i, &count)); i++)
         printf("%s%s %lld", i ? ", " : " (", reason, (long long)count);
     fputs(s->steps_rejected > 0 ? ")" : "", stdout);
+    if (s->steps_unconverged > 0)
+        printf("; %lld accepted although unconverged", (long long)s->steps_unconverged);
     if (s->steps_accepted > 0)
         printf("; %.4g to %.4g s", s->h_min, s->h_max);
     fputc('\n', stdout);

@@ -2,7 +2,10 @@
 #ifndef DRAPE_CLI_INFO_H
 #define DRAPE_CLI_INFO_H
 
+#include "base/param.h"
 #include "cli/cli.h"
+#include "compile/compile.h"
+#include "mesh/mesh.h"
 #include "sim/profile.h"
 
 #include <jansson.h>
@@ -46,5 +49,8 @@ double cli_other_jacobian_seconds(const cli_info *info);
 
 void cli_info_text(const cli_info *info);    /* on stdout */
 json_t *cli_info_json(const cli_info *info); /* a new reference; NULL: out of memory */
+
+/* The grid that a cloth's mesh is, with its values; NULL where it is none. */
+const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values);
 
 #endif

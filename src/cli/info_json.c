@@ -86,11 +86,52 @@ static json_t *chosen(const cli_chosen_row *row, const drape_chosen *all)
 
 /* ---- Cloths and terms ---- */
 
-static json_t *material(const drape_material *m)
+/* The values of a parameter list, choices and booleans in words. */
+static json_t *values_of(const drape_param *params, int param_count, const double *values)
 {
-    json_t *object = with(json_object(), "young_modulus", number(m->young_modulus));
-    object = with(object, "poisson_ratio", number(m->poisson_ratio));
-    object = with(object, "thickness", number(m->thickness));
+    char words[128];
+    json_t *object = json_object();
+    for (int p = 0; p < param_count; p++) {
+        bool spoken = params[p].kind == DRAPE_PARAM_CHOICE || params[p].kind == DRAPE_PARAM_BOOLEAN;
+        if (spoken)
+            drape_param_value_text(&params[p], values[p], words, sizeof words);
+        if (!isnan(values[p]))
+            object = with(object, params[p].name, spoken ? text(words) : number(values[p]));
+    }
+    return object;
+}
+
+static json_t *numbers(const double *values, int n)
+{
+    json_t *array = json_array();
+    for (int i = 0; i < n; i++)
+        json_array_append_new(array, number(values[i]));
+    return array;
+}
+
+static json_t *transform(const drape_cloth *cloth)
+{
+    json_t *object = with(json_object(), "scale", numbers(cloth->scale, 3));
+    object = with(object, "rotate", numbers(cloth->rotate, 4));
+    return with(object, "translate", numbers(cloth->translate, 3));
+}
+
+static json_t *mesh(const drape_cloth *cloth)
+{
+    double values[DRAPE_MAX_PARAMS];
+    const drape_grid_ops *grid = cli_grid_of(cloth, values);
+    json_t *object = grid ? values_of(grid->params, grid->param_count, values) : json_object();
+    if (grid)
+        object = with(object, "grid", text(grid->name));
+    if (cloth->file)
+        object = with(object, "file", text(cloth->file));
+    return with(object, "transform", transform(cloth));
+}
+
+static json_t *material(const drape_cloth *cloth)
+{
+    const drape_material *m = &cloth->material;
+    json_t *object = values_of(drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, cloth->material_values);
     object = with(object, "areal_density", number(m->areal_density));
     object = with(object, "membrane_stiffness", number(m->membrane_stiffness));
     return with(object, "flexural_rigidity", number(m->flexural_rigidity));
@@ -109,7 +150,7 @@ static json_t *cloth(const cli_info *info, int32_t c)
     object = with(object, "pinned", count(more->pinned));
     object = with(object, "moved", count(more->moved));
     object = with(object, "velocity", vector(from->velocity));
-    return with(object, "material", material(&from->material));
+    return with(with(object, "mesh", mesh(from)), "material", material(from));
 }
 
 static json_t *term(const cli_info *info, int32_t i)

@@ -37,18 +37,56 @@ static void print_pins(const drape_model *model, const drape_cloth *cloth, const
     printf("%s\n", info->pinned > listed ? " ..." : "");
 }
 
-static void print_material(const drape_material *m)
+/* With its unit, unless it is words or has none. */
+static void print_value(const drape_param *param, double value)
 {
+    char text[128];
+    drape_param_value_text(param, value, text, sizeof text);
+    bool has_unit = !isnan(value) && strcmp(param->unit, "1") != 0;
+    printf("%s%s%s", text, has_unit ? " " : "", has_unit ? param->unit : "");
+}
+
+static bool is_default(const drape_param *param, double value)
+{
+    return value == param->default_value || (isnan(value) && isnan(param->default_value));
+}
+
+static void print_params(const char *indent, const drape_param *params, int count, const double *values)
+{
+    for (int p = 0; p < count; p++) {
+        printf("%s%-16s ", indent, params[p].name);
+        print_value(&params[p], values[p]);
+        puts(!isnan(values[p]) && is_default(&params[p], values[p]) ? " (default)" : "");
+    }
+}
+
+static void print_source(const drape_cloth *cloth)
+{
+    double values[DRAPE_MAX_PARAMS];
+    const drape_grid_ops *grid = cli_grid_of(cloth, values);
+    if (cloth->file)
+        printf("  file      %s\n", cloth->file);
+    if (grid) {
+        printf("  grid      %s\n", grid->name);
+        print_params("    ", grid->params, grid->param_count, values);
+    }
+    printf("  transform scale %.9g %.9g %.9g, turn about %.9g %.9g %.9g by %.9g degrees, shift %.9g %.9g "
+           "%.9g m\n",
+           cloth->scale[0], cloth->scale[1], cloth->scale[2], cloth->rotate[0], cloth->rotate[1],
+           cloth->rotate[2], cloth->rotate[3], cloth->translate[0], cloth->translate[1], cloth->translate[2]);
+}
+
+static void print_material(const drape_cloth *cloth)
+{
+    const drape_material *m = &cloth->material;
     const struct {
         const char *name, *unit;
         double value;
-    } lines[] = {{"young_modulus", "Pa", m->young_modulus},
-                 {"poisson_ratio", "1", m->poisson_ratio},
-                 {"thickness", "m", m->thickness},
-                 {"areal_density", "kg/m2", m->areal_density},
+    } lines[] = {{"areal density", "kg/m2", m->areal_density},
                  {"E h", "N/m, membrane stiffness", m->membrane_stiffness},
                  {"D", "N m, flexural rigidity E h^3/(12 (1 - nu^2))", m->flexural_rigidity}};
     puts("  material");
+    print_params("    ", drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, cloth->material_values);
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
         printf("    %-16s %.9g %s\n", lines[i].name, lines[i].value, lines[i].unit);
 }
@@ -62,10 +100,12 @@ static void print_cloth(const cli_info *info, int32_t c)
            (int)mesh->edge_count);
     if (mesh->rows)
         printf("; a grid of %d rows and %d columns of nodes", (int)mesh->rows, (int)mesh->columns);
-    printf("\n  mass      %.9g kg on %.9g m2\n", info->cloths[c].mass, info->cloths[c].area);
+    putchar('\n');
+    print_source(cloth);
+    printf("  mass      %.9g kg on %.9g m2\n", info->cloths[c].mass, info->cloths[c].area);
     printf("  velocity  %.9g %.9g %.9g m/s\n", cloth->velocity[0], cloth->velocity[1], cloth->velocity[2]);
     print_pins(info->model, cloth, &info->cloths[c]);
-    print_material(&cloth->material);
+    print_material(cloth);
 }
 
 /* ---- Integrator and controller ---- */
@@ -79,15 +119,6 @@ static void print_ignored(const cli_chosen_row *row, const drape_chosen *chosen)
             any = true;
         }
     fputs(any ? "\n" : "", stdout);
-}
-
-/* With its unit, unless it is words or has none. */
-static void print_value(const drape_param *param, double value)
-{
-    char text[128];
-    drape_param_value_text(param, value, text, sizeof text);
-    bool has_unit = !isnan(value) && strcmp(param->unit, "1") != 0;
-    printf("%s%s%s", text, has_unit ? " " : "", has_unit ? param->unit : "");
 }
 
 static void print_chosen(const cli_chosen_row *row, const drape_chosen *chosen)
@@ -116,6 +147,7 @@ static void print_term(const cli_info *info, int32_t i)
     for (int p = 0; p < term->ops->param_count; p++) {
         printf("; %s ", term->ops->params[p].name);
         print_value(&term->ops->params[p], term->params[p]);
+        fputs(is_default(&term->ops->params[p], term->params[p]) ? " (default)" : "", stdout);
     }
     fputc('\n', stdout);
 }

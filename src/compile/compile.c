@@ -92,6 +92,17 @@ static drape_status name_cloth(drape_model *model, int32_t c, const drape_cloth_
     return model->cloths[c].name ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
+/* Where the mesh came from, for whoever asks what was modelled. */
+static drape_status copy_source(drape_model *model, const drape_mesh_def *def, drape_cloth *cloth)
+{
+    memcpy(cloth->scale, def->scale, sizeof cloth->scale);
+    memcpy(cloth->rotate, def->rotate, sizeof cloth->rotate);
+    memcpy(cloth->translate, def->translate, sizeof cloth->translate);
+    if (def->file && !(cloth->file = drape_arena_text(&model->arena, model->ctx, def->file)))
+        return DRAPE_E_MEMORY;
+    return copy_choice(model, &def->grid, "", &cloth->grid);
+}
+
 static drape_status compile_cloth(drape_model *model, int32_t c, const drape_scene_def *scene)
 {
     const drape_cloth_def *def = &scene->cloths[c];
@@ -102,6 +113,8 @@ static drape_status compile_cloth(drape_model *model, int32_t c, const drape_sce
     snprintf(at, sizeof at, "%s/mesh", pointer);
     if (!status)
         status = drape_mesh_make(model->ctx, at, &def->mesh, scene->folder, &cloth->mesh);
+    if (!status)
+        status = copy_source(model, &def->mesh, cloth);
     if (!status)
         status = drape_compile_material(model, pointer, def, cloth);
     snprintf(at, sizeof at, "%s/velocity", pointer);

@@ -6,6 +6,10 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
+
+_Static_assert(sizeof(((drape_cloth *)0)->material_values) >= DRAPE_MATERIAL_PARAM_COUNT * sizeof(double),
+               "room for all values of a material");
 
 enum { MASS_AREA, MASS_UNIFORM };
 static const char *const mass_choices[] = {"area", "uniform", NULL};
@@ -119,6 +123,7 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
     cloth->node_mass = drape_arena_take(&model->arena, model->ctx, (size_t)count, sizeof *cloth->node_mass);
     if (!cloth->node_mass)
         return DRAPE_E_MEMORY;
+    memcpy(cloth->material_values, values, sizeof values);
     cloth->material = resolve(values, mass, area);
     for (int32_t i = 0; i < count; i++)
         cloth->node_mass[i] = values[DRAPE_MATERIAL_MASS] == MASS_UNIFORM

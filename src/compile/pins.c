@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#define ROUND_OFF 1e-14 /* relative: a coordinate that is meant to lie on the side of a box lies in it */
+
 /* One pin under construction: where it stands in the scene, and which cloth it pins. */
 typedef struct pin_place {
     drape_model *model;
@@ -141,8 +143,10 @@ static drape_status take_box(pin_place *pin)
     for (int32_t i = 0; !status && i < pin->cloth->mesh.node_count; i++) {
         const double *x = pin->cloth->mesh.x + 3 * (size_t)i;
         bool inside = true;
-        for (int k = 0; k < 3; k++)
-            inside = inside && low[k] <= x[k] && x[k] <= high[k];
+        for (int k = 0; k < 3; k++) {
+            double slack = ROUND_OFF * fmax(fabs(x[k]), fmax(fabs(low[k]), fabs(high[k])));
+            inside = inside && low[k] - slack <= x[k] && x[k] <= high[k] + slack;
+        }
         if (inside)
             status = take_node(pin, "/box", i);
     }

@@ -347,6 +347,14 @@ static void count_iterations(drape_newton *s, drape_step_info *info)
     s->work.newton_iterations += iterations;
 }
 
+/* A number that is not finite has a cause: an element that collapsed on the way is named before a node. */
+static drape_status blame_element(drape_newton *s, drape_status status, drape_step_info *info)
+{
+    drape_status degenerate =
+        drape_system_check(s->system, s->x, s->problem->internal, &info->reason, &info->worst);
+    return degenerate ? degenerate : status;
+}
+
 static drape_status judge(drape_newton *s, drape_status status, const double *d, drape_step_info *info)
 {
     double tolerance = s->values[DRAPE_NEWTON_TOLERANCE];
@@ -363,8 +371,8 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
         info->reason = "residual";
         status = DRAPE_RETRY_NONLINEAR;
     }
-    info->usable = s->values[DRAPE_NEWTON_ON_FAILURE] == FAILURE_ACCEPT && !s->nonfinite && status > 0;
-    return status;
+    info->usable = info->lenient && !s->nonfinite && status > 0;
+    return s->nonfinite ? blame_element(s, status, info) : status;
 }
 
 drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *problem, double *d,
@@ -372,6 +380,7 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *pro
 {
     begin(s, problem);
     info->reason = "converged";
+    info->lenient = s->values[DRAPE_NEWTON_ON_FAILURE] == FAILURE_ACCEPT;
     if (s->n == 0) {
         evaluate(s, d);
         return DRAPE_OK;

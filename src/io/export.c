@@ -57,7 +57,7 @@ static bool is_frame_file(const char *name, const char *ending)
     return !*rest || strcmp(rest, DRAPE_FILE_PART) == 0;
 }
 
-static drape_status remove_old_frames(drape_context *ctx, const char *folder, const char *ending)
+drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, const char *ending)
 {
     DIR *dir = opendir(folder);
     if (!dir)
@@ -80,8 +80,7 @@ drape_status drape_frame_files_open(drape_context *ctx, const drape_model *model
     frames->model = model;
     frames->folder = folder;
     frames->ending = ending;
-    drape_status status = drape_file_create(ctx, strlen(folder) + NAME_ROOM, &frames->file);
-    return status ? status : remove_old_frames(ctx, folder, ending);
+    return drape_file_create(ctx, strlen(folder) + NAME_ROOM, &frames->file);
 }
 
 drape_status drape_frame_files_begin(drape_frame_files *frames, int64_t frame)

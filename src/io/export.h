@@ -15,9 +15,12 @@ typedef struct drape_exporter_ops {
     const char *reference; /* the format's definition */
     size_t state_size;
 
-    /* model and folder, without a slash at its end, live until close. Removes frames of an earlier run.
+    /* model and folder, without a slash at its end, live until close.
      * Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
     drape_status (*open)(drape_context *ctx, const drape_model *model, const char *folder, void *state);
+    /* Removes what an earlier run left in folder in this format, and nothing else. Called for every row, whatever is
+     * written now: frames of two runs must not lie side by side. */
+    drape_status (*clean)(drape_context *ctx, const char *folder);
 
     /* frame counts from 0 without gaps; time [s]; positions (node_count x 3) [m]. Errors: DRAPE_E_FILE. */
     drape_status (*write)(drape_context *ctx, void *state, int64_t frame, double time,
@@ -41,8 +44,9 @@ typedef struct drape_frame_files {
     drape_file file;
 } drape_frame_files;
 
-/* Takes the memory, and removes the files of that pattern, and only those, from the folder: frames of a
- * longer run before must not follow the new ones. Errors: DRAPE_E_MEMORY, DRAPE_E_FILE. */
+/* Removes the files of that pattern, and only those, from the folder. Errors: DRAPE_E_FILE. */
+drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, const char *ending);
+/* Takes the memory. Errors: DRAPE_E_MEMORY. */
 drape_status drape_frame_files_open(drape_context *ctx, const drape_model *model, const char *folder,
                                     const char *ending, drape_frame_files *frames);
 /* Begins the file of one frame, to be filled and ended by drape_frame_files_end. Errors: DRAPE_E_FILE. */

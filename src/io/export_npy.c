@@ -6,11 +6,14 @@
  * number of frames, and the count in it is raised after the frame's data are written: at any moment the file
  * holds what its header says.
  */
+
+#include "io/export.h"
+
+#include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-
-#include "io/export.h"
+#include <sys/stat.h>
 
 #define FILE_NAME   "positions.npy"
 #define HEADER_SIZE 128 /* the dict takes at most 92 bytes with counts of 19 and 10 digits */
@@ -34,6 +37,22 @@ static void make_header(int64_t frames, int32_t node_count, char header[HEADER_S
                         frames, node_count);
     header[MAGIC_SIZE + used] = ' ';
     header[HEADER_SIZE - 1] = '\n';
+}
+
+/* What is no regular file stays: frames are written through it. */
+static drape_status npy_clean(drape_context *ctx, const char *folder)
+{
+    struct stat info;
+    size_t size = strlen(folder) + sizeof "/" FILE_NAME;
+    char *path = drape_alloc(ctx, size, 1);
+    drape_status status = DRAPE_OK;
+    if (!path)
+        return DRAPE_E_MEMORY;
+    snprintf(path, size, "%s/" FILE_NAME, folder);
+    if (lstat(path, &info) == 0 && S_ISREG(info.st_mode) && remove(path) != 0)
+        status = drape_file_fail(ctx, "remove the old frames", path, errno);
+    drape_free(ctx, path);
+    return status;
 }
 
 static drape_status npy_open(drape_context *ctx, const drape_model *model, const char *folder, void *state)
@@ -95,6 +114,7 @@ const drape_exporter_ops drape_exporter_npy = {
     .reference = "NPY format version 1.0, numpy.lib.format",
     .state_size = sizeof(npy_state),
     .open = npy_open,
+    .clean = npy_clean,
     .write = npy_write,
     .close = npy_close,
 };

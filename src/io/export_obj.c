@@ -7,6 +7,11 @@
 
 #include "io/export.h"
 
+static drape_status obj_clean(drape_context *ctx, const char *folder)
+{
+    return drape_frame_files_clean(ctx, folder, "obj");
+}
+
 static drape_status obj_open(drape_context *ctx, const drape_model *model, const char *folder, void *state)
 {
     return drape_frame_files_open(ctx, model, folder, "obj", state);
@@ -63,6 +68,7 @@ const drape_exporter_ops drape_exporter_obj = {
     .reference = "Wavefront Advanced Visualizer manual, appendix B1",
     .state_size = sizeof(drape_frame_files),
     .open = obj_open,
+    .clean = obj_clean,
     .write = obj_write,
     .close = obj_close,
 };

@@ -9,6 +9,11 @@
 
 #define FACE_SIZE 13 /* the count 3 in a byte, three nodes in four */
 
+static drape_status ply_clean(drape_context *ctx, const char *folder)
+{
+    return drape_frame_files_clean(ctx, folder, "ply");
+}
+
 static drape_status ply_open(drape_context *ctx, const drape_model *model, const char *folder, void *state)
 {
     return drape_frame_files_open(ctx, model, folder, "ply", state);
@@ -65,6 +70,7 @@ const drape_exporter_ops drape_exporter_ply = {
     .reference = "G. Turk, The PLY Polygon File Format, 1994",
     .state_size = sizeof(drape_frame_files),
     .open = ply_open,
+    .clean = ply_clean,
     .write = ply_write,
     .close = ply_close,
 };

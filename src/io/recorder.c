@@ -156,9 +156,18 @@ static drape_status make_folder(drape_recorder *r, const char *folder)
     return drape_folder_make(r->ctx, r->folder);
 }
 
-static drape_status open_files(drape_recorder *r)
+/* Of all formats, not of those alone that are written now. */
+static drape_status clean_folder(drape_recorder *r)
 {
     drape_status status = DRAPE_OK;
+    for (int i = 0; drape_exporters[i] && !status; i++)
+        status = drape_exporters[i]->clean(r->ctx, r->folder);
+    return status;
+}
+
+static drape_status open_files(drape_recorder *r)
+{
+    drape_status status = clean_folder(r);
     for (size_t i = 0; i < r->output_count && !status; i++) {
         output *o = &r->outputs[i];
         o->open = true; /* close is due after an open that failed, too */

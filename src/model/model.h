@@ -21,10 +21,21 @@ typedef struct drape_term {
     int law_count;
 } drape_term;
 
+/* A row that was chosen by name, with the settings that the scene gave. */
+typedef struct drape_choice {
+    char *type;
+    drape_setting *settings; /* (setting_count) */
+    size_t setting_count;
+} drape_choice;
+
 /* One cloth: its mesh at rest, and what the scene said of it. */
 typedef struct drape_cloth {
     char *name;
     drape_mesh mesh;
+    drape_choice grid; /* type "" where the mesh is no grid */
+    char *file;        /* NULL where it is from no file */
+    double scale[3], rotate[4], translate[3];
+    double material_values[8]; /* in the order of drape_material_params */
     drape_material material;
     double *node_mass;  /* (mesh.node_count) [kg] */
     double velocity[3]; /* [m/s] at t = 0 */
@@ -32,14 +43,6 @@ typedef struct drape_cloth {
     const struct drape_term **laws; /* (law_count) */
     int law_count;
 } drape_cloth;
-
-/* A row that was chosen by name, with all its parameter values. */
-typedef struct drape_choice {
-    char *type;
-    drape_setting *settings; /* as the scene gave them: checked against the union of the rows, resolved when a
-                                sim is made */
-    size_t setting_count;
-} drape_choice;
 
 typedef struct drape_track {
     drape_track_key *keys;

@@ -606,7 +606,10 @@ static drape_status check_names(reader *r, const drape_scene_def *def)
 drape_status drape_scene_read(drape_context *ctx, drape_arena *arena, json_t *root, drape_scene_def *def)
 {
     reader r = {.ctx = ctx, .arena = arena};
+    static const char *const default_formats[] = {"npy"};
     drape_scene_def_init(def, sizeof *def);
+    def->formats = default_formats;
+    def->format_count = 1;
     drape_status status = check_version(&r, root);
     if (!status)
         status = read_object(&r, &drape_scene_form, root, (char *)def);

@@ -120,7 +120,7 @@ static const drape_scene_object cloth = {
 
 static const drape_scene_key output_keys[] = {
     {"formats", DRAPE_SCENE_WORDS, ARRAY(drape_scene_def, formats, format_count),
-     .help = "rows of the exporters; default none"},
+     .help = "rows of the exporters; default npy"},
 };
 static const drape_scene_object output = {.name = "output", KEYS(output_keys)};
 

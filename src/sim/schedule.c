@@ -62,7 +62,10 @@ static bool next_proposed(const drape_schedule *s, double *t1, double *h)
 static bool next_counted(drape_schedule *s, double *t1, double *h)
 {
     if (s->part == 0) {
-        if (!(s->end - interval_time(s, s->count) > JOIN * s->dt))
+        double left = s->end - interval_time(s, s->count);
+        double least = s->stepped ? JOIN * s->dt
+                                  : 1e3 * DBL_EPSILON * fabs(s->end); /* the first step has none to join */
+        if (!(left > least))
             return false;
         open_interval(s);
     }
@@ -113,6 +116,7 @@ static void accept_part(drape_schedule *s)
 void drape_schedule_accept(drape_schedule *s, double t1, double h_next)
 {
     s->now = t1;
+    s->stepped = true;
     s->limit = s->stepping == DRAPE_STEPS_PROPOSED ? h_next : INFINITY;
     if (s->stepping == DRAPE_STEPS_COUNTED)
         accept_part(s);

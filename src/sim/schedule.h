@@ -28,7 +28,8 @@ typedef struct drape_schedule {
     int level;     /* the interval has 2^level parts */
     int64_t part;  /* parts of it done */
     double interval_start, interval_end, interval_size;
-    bool cut; /* the interval is shorter than dt: the next count starts at its end */
+    bool stepped; /* a step was accepted: a remainder has a step to join */
+    bool cut;     /* the interval is shorter than dt: the next count starts at its end */
 } drape_schedule;
 
 void drape_schedule_init(drape_schedule *schedule, drape_stepping stepping, double dt, double start);

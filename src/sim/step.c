@@ -33,7 +33,7 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
         info->reason = "nonfinite";
         return DRAPE_RETRY_NONFINITE;
     }
-    if (info->committed)
+    if (info->committed || info->lenient)
         return DRAPE_OK;
     if (drape_sim_ran_away(sim, next, info, &info->worst)) {
         info->reason = "energy";
@@ -109,6 +109,7 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     s->h_min = s->steps_accepted == 0 ? info->h : fmin(info->h, s->h_min);
     s->h_max = fmax(info->h, s->h_max);
     s->steps_accepted++;
+    s->steps_unconverged += info->usable;
     drape_schedule_accept(&sim->schedule, drape_sim_state(sim)->t, h_next);
 }
 
@@ -158,8 +159,11 @@ static void describe_worst(const drape_model *model, const drape_worst *worst, c
 {
     size_t used = 0;
     text[0] = 0;
-    if (worst->node[0] < 0)
+    if (worst->node[0] < 0) {
+        if (*worst->what)
+            snprintf(text, size, "; %s = %.4g, limit %.4g", worst->what, worst->value, worst->limit);
         return;
+    }
     if (worst->element >= 0)
         used = (size_t)snprintf(text, size, "; %s %d (nodes", worst->term, (int)worst->element);
     else

@@ -92,7 +92,7 @@ START_TEST(the_end_cuts_and_tiny_remainders_join)
                  {1 + 1e-11, 0.25 + 1e-11, 4}, /* below 1e-9 dt: the last step takes it along */
                  {1 - 1e-11, 0.25 - 1e-11, 4}, /* or gives it */
                  {1 + 1e-9, 1e-9, 5},          /* not below */
-                 {0.25e-12, 0, 0},             /* nothing to do */
+                 {0.25e-12, 0.25e-12, 1},      /* no step before it to join */
                  {0.1, 0.1, 1},
                  {0, 0, 0},
                  {-1, 0, 0}};
@@ -178,7 +178,7 @@ START_TEST(any_sequence_fills_the_time)
                 ck_assert_double_gt(h, 0);
                 ck_assert_double_le(h, dt * (1 + 1e-9));
                 ck_assert_double_le(t1, fmax(end, now + 2e-9 * dt));
-                if (s.level < 5 && random_number(&seed) < odds) {
+                if (s.level < 5 && now + h / 2 > now && random_number(&seed) < odds) {
                     halve(&s, h);
                     rejected++;
                     continue;

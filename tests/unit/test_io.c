@@ -438,10 +438,10 @@ END_TEST
 
 START_TEST(old_frames_are_removed_and_nothing_else)
 {
-    static const char *const old[] = {"frame_000001.obj", "frame_000123.obj", "frame_1234567.obj",
-                                      "frame_000124.obj.part"};
+    static const char *const old[] = {"frame_000001.obj", "frame_000123.ply", "frame_000123.obj",
+                                      "frame_1234567.obj", "frame_000124.obj.part"};
     static const char *const other[] = {"frame_12345.obj",     "frame_000123.objx", "my_frame_000123.obj",
-                                        "frame_000123.ply",    "frame_00012x.obj",  "frame_000123.obj.bak",
+                                        "frame_000123.vtp",    "frame_00012x.obj",  "frame_000123.obj.bak",
                                         "frame_000123.OBJ.png"};
     world w;
     set_up(&w);
@@ -948,7 +948,7 @@ START_TEST(summary_is_complete)
     json_t *json = load_summary(path);
     check_keys(json,
                "status message version nodes dofs nnz frames time steps newton wall_s energy strain hash ");
-    check_keys(json_object_get(json, "steps"), "accepted rejected h_min h_max reasons ");
+    check_keys(json_object_get(json, "steps"), "accepted rejected unconverged h_min h_max reasons ");
     check_keys(json_object_get(json, "newton"),
                "iterations jacobians factorizations linear_iterations residuals ");
     check_keys(json_object_get(json, "wall_s"),
