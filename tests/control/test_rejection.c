@@ -1,0 +1,590 @@
+/*
+ * test_rejection.c: a rejected step never was. The state after it is that before it to the bit, the steps
+ * that are kept fill their intervals exactly and are those of a run that never tried the others, every
+ * attempt is told once with its reason, and what cannot succeed ends.
+ */
+#include <jansson.h>
+#include <unistd.h>
+
+#include "base/context.h"
+#include "control/control.h"
+#include "drape/extend.h"
+#include "io/recorder.h"
+#include "io/summary.h"
+#include "support/scene.h"
+
+#define MOST_STEPS 4000
+
+static const char *const fixed_rows[] = {"be", "bdf2", "midpoint"};
+
+/* ---- The record of a run ---- */
+
+typedef struct record {
+    drape_sim *sim;
+    drape_attempt attempt[MOST_STEPS];
+    double end[MOST_STEPS]; /* [s] where the state stood after the attempt */
+    uint64_t hash[MOST_STEPS];
+    uint64_t before; /* hash of the state that the next attempt starts from */
+    int count, accepted, rejected;
+} record;
+
+static drape_status keep_record(void *user, const drape_event *event)
+{
+    record *r = user;
+    if (event->kind != DRAPE_EVENT_ATTEMPT)
+        return DRAPE_OK;
+    ck_assert(r->count < MOST_STEPS);
+    const drape_attempt *a = event->attempt;
+    const uint64_t hash = drape_sim_hash(r->sim);
+    ck_assert_int_eq(a->index, r->count);
+    ck_assert_msg(a->accepted || hash == r->before, "attempt %d, rejected for %s, changed the state",
+                  r->count, a->reason);
+    ck_assert_msg(!a->accepted || hash != r->before, "attempt %d was accepted and changed nothing", r->count);
+    r->attempt[r->count] = *a;
+    r->end[r->count] = drape_sim_time(r->sim);
+    r->hash[r->count] = r->before = hash;
+    r->accepted += a->accepted;
+    r->rejected += !a->accepted;
+    r->count++;
+    return DRAPE_OK;
+}
+
+static record *watch(scene *s)
+{
+    static record r;
+    memset(&r, 0, sizeof r);
+    r.sim = s->sim;
+    r.before = drape_sim_hash(s->sim);
+    ck_assert_int_eq(drape_sim_observe(s->sim, keep_record, &r), DRAPE_OK);
+    return &r;
+}
+
+/* ---- Scenes ---- */
+
+/*
+ * A sheet of 7 edges a side that swings by two corners, at a step far too long for it. All powers of two, so
+ * that parts of a step are exact.
+ */
+#define STEP 0.125 /* [s] */
+
+static scene swinging(const char *integrator, const char *controller)
+{
+    return scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 7, 'edge_length': 0.1},"
+        "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
+        "'terms': ['stretch.edge', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 0.01}],"
+        "'pins': [{'nodes': [0, 7]}]}],"
+        "'integrator': {'method': '%s', 'dt': %g}, 'controller': {%s}, 'duration': 2}",
+        integrator, STEP, controller);
+}
+
+/* ---- Halving ---- */
+
+/* Runs on whatever halving accepted, with the controller that never halves: the same states, to the bit. */
+static void repeat_without_rejections(const char *integrator, const record *r)
+{
+    scene s = swinging(integrator, "'type': 'fixed'");
+    for (int i = 0; i < r->count; i++)
+        if (r->attempt[i].accepted) {
+            scene_advance(&s, r->end[i]);
+            ck_assert_msg(drape_sim_hash(s.sim) == r->hash[i], "%s: the state at %.9g s", integrator,
+                          r->end[i]);
+        }
+    ck_assert_int_eq(drape_sim_statistics(s.sim).steps_rejected, 0);
+    scene_close(&s);
+}
+
+START_TEST(a_run_with_rejections_is_the_run_of_its_accepted_steps)
+{
+    for (size_t k = 0; k < sizeof fixed_rows / sizeof *fixed_rows; k++) {
+        scene s = swinging(fixed_rows[k], "'type': 'halving'");
+        record *r = watch(&s);
+        scene_advance(&s, 2);
+        printf("# %s: %d accepted, %d rejected\n", fixed_rows[k], r->accepted, r->rejected);
+        ck_assert_int_gt(r->rejected, 0);
+        repeat_without_rejections(fixed_rows[k], r);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/*
+ * Step ends are places on the binary subdivision of the interval; every k dt is one of them, and the size is
+ * that of the part.
+ */
+START_TEST(parts_fill_their_interval_exactly)
+{
+    for (size_t k = 0; k < sizeof fixed_rows / sizeof *fixed_rows; k++) {
+        int whole = 0;
+        double t = 0;
+        scene s = swinging(fixed_rows[k], "'type': 'halving'");
+        record *r = watch(&s);
+        scene_advance(&s, 2);
+        for (int i = 0; i < r->count; i++) {
+            ck_assert(r->attempt[i].t == t);
+            if (!r->attempt[i].accepted)
+                continue;
+            ck_assert(r->end[i] == t + r->attempt[i].h); /* exact in powers of two */
+            const double level = log2(STEP / r->attempt[i].h), place = r->end[i] / r->attempt[i].h;
+            ck_assert(level == floor(level) && level >= 0 && place == floor(place));
+            t = r->end[i];
+            whole += t / STEP == floor(t / STEP);
+        }
+        ck_assert(t == 2);
+        ck_assert_int_eq(whole, 16);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* Times that are no sums of halves: all k dt are met to the bit all the same. */
+START_TEST(nominal_times_are_met_to_the_bit)
+{
+    const double dt = 0.15;
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.dt = dt;
+    scene s = swinging("be", "'type': 'halving'");
+    drape_sim_destroy(&s.sim);
+    scene_start(&s, &def);
+    record *r = watch(&s);
+    scene_advance(&s, 20 * dt);
+    ck_assert_int_gt(r->rejected, 0);
+    int met = 0;
+    for (int i = 0; i < r->count; i++)
+        met += r->attempt[i].accepted && r->end[i] == (met + 1) * dt;
+    ck_assert_int_eq(met, 20);
+    scene_close(&s);
+}
+END_TEST
+
+/*
+ * A rejection halves; a success never makes the next step longer than twice itself, and makes it that as
+ * soon as the step ends where one of twice the size would.
+ */
+START_TEST(sizes_are_halved_and_grow_back)
+{
+    int grown = 0;
+    scene s = swinging("be", "'type': 'halving'");
+    record *r = watch(&s);
+    scene_advance(&s, 2);
+    for (int i = 0; i + 1 < r->count; i++) {
+        const double h = r->attempt[i].h, next = r->attempt[i + 1].h, parts = r->end[i] / h;
+        if (!r->attempt[i].accepted) {
+            ck_assert(next == h / 2);
+            continue;
+        }
+        const bool even = fmod(parts, 2) == 0;
+        ck_assert(next == (even && h < STEP ? 2 * h : h));
+        grown += next > h;
+    }
+    ck_assert_int_gt(grown, 0);
+    scene_close(&s);
+}
+END_TEST
+
+/*
+ * One node is led onto its neighbour: every step that reaches it is too long, and what is left to say is
+ * when, why and which edge.
+ */
+START_TEST(a_step_that_gets_too_small_names_time_reason_and_element)
+{
+    char expected[200];
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 4, 'edge_length': 0.1},"
+        "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge'],"
+        "'pins': [{'nodes': [0]}, {'nodes': [1], 'track': [[0, [0, 0, 0]], [0.25, [-0.1, 0, 0]]]}]}],"
+        "'integrator': {'method': 'midpoint', 'dt': 0.0625}, 'controller': {'dt_min': 1e-4}, 'duration': 1}");
+    record *r = watch(&s);
+    ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_STEP_TOO_SMALL);
+    const drape_attempt *last = &r->attempt[r->count - 1];
+    /* The interval's halves are 2^-4 2^-k; 2^-13 is the last that is not below dt_min. */
+    ck_assert(last->h == ldexp(1, -13) && drape_sim_time(s.sim) == 0.25 - last->h);
+    snprintf(expected, sizeof expected, "t=%.9g h=%.4g: edge_collapse (retry_degenerate) after ",
+             drape_sim_time(s.sim), last->h);
+    const char *message = drape_context_message(s.ctx);
+    ck_assert_msg(strncmp(message, expected, strlen(expected)) == 0, "%s", message);
+    ck_assert_msg(strstr(message, "; stretch.edge 0 (nodes 0 1 of cloth0): edge length / rest length = "),
+                  "%s", message);
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Strain ---- */
+
+/*
+ * The largest change of an edge's length over its rest length, or way of a node over its shortest edge (here
+ * all are alike).
+ */
+static void largest(const scene *s, const double *from, double *stretch, double *move)
+{
+    const drape_model *m = s->model;
+    const double *to = drape_sim_positions(s->sim);
+    *stretch = *move = 0;
+    for (int32_t e = 0; e < m->edge_count; e++) {
+        const size_t a = 3 * (size_t)m->edge[2 * e], b = 3 * (size_t)m->edge[2 * e + 1];
+        double length[2] = {0, 0};
+        for (size_t k = 0; k < 3; k++) {
+            length[0] += pow(from[b + k] - from[a + k], 2);
+            length[1] += pow(to[b + k] - to[a + k], 2);
+        }
+        *stretch = fmax(*stretch, fabs(sqrt(length[1]) - sqrt(length[0])) / m->edge_length[e]);
+    }
+    for (int32_t i = 0; i < m->node_count; i++)
+        *move = fmax(*move, sqrt(pow(to[3 * i] - from[3 * i], 2) + pow(to[3 * i + 1] - from[3 * i + 1], 2) +
+                                 pow(to[3 * i + 2] - from[3 * i + 2], 2)) /
+                                m->edge_length[0]);
+}
+
+static void run_strain(const char *settings, double max_stretch, double max_move, const char *reason,
+                       int nodes)
+{
+    char controller[100];
+    double from[3 * 64], stretch, move;
+    int refused = 0;
+    snprintf(controller, sizeof controller, "'type': 'strain', %s", settings);
+    scene s = swinging("be", controller);
+    record *r = watch(&s);
+    for (int k = 1; k <= 8; k++) { /* one nominal step at a time */
+        const int before = r->count;
+        memcpy(from, drape_sim_positions(s.sim), sizeof from);
+        scene_advance(&s, k * STEP);
+        if (r->count != before + 1)
+            continue;
+        largest(&s, from, &stretch, &move);
+        ck_assert(stretch <= max_stretch && move <= max_move);
+    }
+    for (int i = 0; i < r->count; i++) {
+        const drape_attempt *a = &r->attempt[i];
+        if (a->accepted || a->status != DRAPE_RETRY_REJECTED)
+            continue;
+        refused++;
+        ck_assert_str_eq(a->reason, reason);
+        ck_assert(a->worst.value > a->worst.limit && a->worst.cloth == 0 && a->worst.element == -1);
+        for (int n = 0; n < 4; n++)
+            ck_assert((a->worst.node[n] >= 0) == (n < nodes));
+    }
+    ck_assert_int_gt(refused, 0);
+    scene_close(&s);
+}
+
+START_TEST(strain_names_the_edge_or_the_node_that_went_too_far)
+{
+    run_strain("'max_stretch': 0.002, 'max_move': 1e6", 0.002, 1e6, "stretch", 2);
+    run_strain("'max_stretch': 1e6, 'max_move': 0.5", 1e6, 0.5, "move", 1);
+}
+END_TEST
+
+/* ---- Error ---- */
+
+/* Sizes fall after every rejection, and no state that was refused comes back. */
+START_TEST(the_error_controller_never_tries_a_refused_size_again)
+{
+    for (size_t k = 0; k < sizeof fixed_rows / sizeof *fixed_rows; k++) {
+        scene s = swinging(fixed_rows[k], "'type': 'error', 'rtol': 1e-3");
+        record *r = watch(&s);
+        scene_advance(&s, 0.5);
+        printf("# %s: %d accepted, %d rejected\n", fixed_rows[k], r->accepted, r->rejected);
+        ck_assert_int_gt(r->rejected, 0);
+        for (int i = 0; i + 1 < r->count; i++)
+            if (!r->attempt[i].accepted)
+                ck_assert(r->attempt[i + 1].h <= 0.9 * r->attempt[i].h &&
+                          r->attempt[i + 1].t == r->attempt[i].t);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+static const drape_controller_ops *row(const char *name)
+{
+    int i = 0;
+    while (strcmp(drape_controllers[i]->name, name) != 0)
+        i++;
+    return drape_controllers[i];
+}
+
+/*
+ * A solution that is not a number has an estimate that is none: refused, as often as it comes, until the
+ * step is too small.
+ */
+START_TEST(an_estimate_that_is_not_a_number_is_refused_until_it_ends)
+{
+    static const double wrongs[] = {NAN, INFINITY, -INFINITY};
+    const drape_controller_ops *ops = row("error");
+    scene s = swinging("be", "");
+    double values[DRAPE_MAX_PARAMS];
+    for (int i = 0; i < ops->param_count; i++)
+        values[i] = ops->params[i].default_value;
+    for (size_t k = 0; k < 3; k++) {
+        drape_state *out = &s.sim->states[s.sim->next];
+        double scratch[2] = {0, 0}, h = 1;
+        int attempts = 0;
+        memcpy(out->x, drape_sim_positions(s.sim), 3 * (size_t)s.model->node_count * sizeof *out->x);
+        memset(out->v, 0, 3 * (size_t)s.model->node_count * sizeof *out->v);
+        out->v[3 * 20 + 1] = wrongs[k];
+        for (;;) {
+            drape_step_info info = {.reason = "converged", .h = h};
+            drape_trial trial = {.model = s.model,
+                                 .in = scene_state(&s),
+                                 .out = out,
+                                 .order = 1,
+                                 .scratch = scratch,
+                                 .h = h,
+                                 .info = &info};
+            out->t = h;
+            attempts++;
+            const drape_verdict verdict = ops->judge(values, &trial);
+            ck_assert_str_eq(info.reason, "error_test");
+            ck_assert(verdict != DRAPE_ACCEPT);
+            if (verdict == DRAPE_STOP) {
+                ck_assert_int_eq(trial.status, DRAPE_E_STEP_TOO_SMALL);
+                break;
+            }
+            ck_assert_int_eq(trial.status, DRAPE_RETRY_REJECTED);
+            ck_assert(trial.h_next <= h / 2);
+            h = trial.h_next;
+        }
+        /* from 1 s to dt_min = 1e-7 s in halves at least */
+        ck_assert_int_le(attempts, 24);
+        ck_assert(scratch[0] == 0); /* a refused estimate leaves nothing behind */
+    }
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Runaway ---- */
+
+/* A force on every node with no energy to it: per mass, a [m/s2] along y, or -c v. */
+static double push, negative_drag;
+
+static drape_status build(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder)
+{
+    (void)params;
+    drape_status status = drape_term_reserve(builder, cloth->node_count, 1);
+    for (int32_t i = 0; !status && i < cloth->node_count; i++)
+        drape_term_set(builder, i, &i, &cloth->node_mass[i]);
+    return status;
+}
+
+static void lie(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                const double *internal, double *e, double *g, double *hess)
+{
+    (void)x, (void)internal, (void)hess;
+    for (int32_t i = 0; i < count; i++) {
+        if (e)
+            e[i] = 0;
+        if (g) {
+            memset(g + 3 * i, 0, 3 * sizeof *g);
+            g[3 * i + 1] = -el->rest[first + i] * push;
+        }
+    }
+}
+
+static void spur(const drape_elements *el, int32_t first, int32_t count, const double *x, const double *v,
+                 double *g, double *dg_dx, double *dg_dv)
+{
+    (void)x;
+    for (int32_t i = 0; i < count; i++) {
+        const double c = -negative_drag * el->rest[first + i];
+        for (int k = 0; g && k < 3; k++)
+            g[3 * i + k] = c * v[3 * (size_t)el->node[first + i] + (size_t)k];
+        if (dg_dx)
+            memset(dg_dx + 9 * i, 0, 9 * sizeof *dg_dx);
+        for (int k = 0; dg_dv && k < 9; k++)
+            dg_dv[9 * i + k] = k % 4 == 0 ? c : 0;
+    }
+}
+
+static const drape_term_ops liar = {.struct_size = sizeof(drape_term_ops),
+                                    .name = "host.lie",
+                                    .summary = "a force that is not the slope of its energy",
+                                    .reference = "-",
+                                    .element_name = "node",
+                                    .nodes = 1,
+                                    .linear = true,
+                                    .build = build,
+                                    .energy = lie};
+static const drape_term_ops spurs = {.struct_size = sizeof(drape_term_ops),
+                                     .name = "host.spur",
+                                     .summary = "drag of the wrong sign",
+                                     .reference = "-",
+                                     .element_name = "node",
+                                     .nodes = 1,
+                                     .build = build,
+                                     .dissipation = spur,
+                                     .dissipative = true};
+
+static scene flying(const drape_term_ops *term, const char *integrator, double speed)
+{
+    char text[600];
+    scene s = scene_empty();
+    drape_scene *parsed = NULL;
+    ck_assert_int_eq(drape_context_add_term(s.ctx, term), DRAPE_OK);
+    snprintf(text, sizeof text,
+             "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"equilateral\", \"edges\": 2, "
+             "\"edge_length\": 0.1},"
+             "\"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200},"
+             "\"terms\": [\"%s\"], \"velocity\": [%g, 0, 0]}], \"gravity\": [0, 0, 0],"
+             "\"integrator\": {\"method\": \"%s\", \"dt\": 0.0625}, \"duration\": 1}",
+             term->name, speed, integrator);
+    drape_status status = drape_scene_parse(s.ctx, text, "test", &parsed);
+    if (!status)
+        status = drape_scene_compile(parsed, &s.model);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s.ctx));
+    drape_scene_destroy(&parsed);
+    scene_start(&s, NULL);
+    return s;
+}
+
+/*
+ * From rest, all the kinetic energy that a force without an energy gives is from nowhere, at any size of the
+ * step: the check must refuse it and the run must end.
+ */
+START_TEST(kinetic_energy_from_nowhere_is_refused)
+{
+    for (size_t k = 0; k < sizeof fixed_rows / sizeof *fixed_rows; k++) {
+        push = 5;
+        scene s = flying(&liar, fixed_rows[k], 0);
+        record *r = watch(&s);
+        ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_STEP_TOO_SMALL);
+        ck_assert_int_eq(r->accepted, 0);
+        /* 2^-4 s 2^-k >= 1e-7 s: k to 19, and the first attempt */
+        ck_assert_int_eq(r->rejected, 20);
+        for (int i = 0; i < r->count; i++) {
+            ck_assert_str_eq(r->attempt[i].reason, "energy");
+            ck_assert_int_eq(r->attempt[i].status, DRAPE_RETRY_REJECTED);
+            ck_assert_double_eq_tol(r->attempt[i].worst.value, 1, 1e-12); /* all of it */
+        }
+        ck_assert_msg(strstr(drape_context_message(s.ctx), ": energy (retry_rejected) after "), "%s",
+                      drape_context_message(s.ctx));
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/*
+ * The same force on a sheet in flight at 10 m/s adds 5 m/s2 x 1/16 s to it: no explosion, and the audit has
+ * it as gain.
+ */
+START_TEST(a_slow_gain_is_no_runaway)
+{
+    push = 5;
+    scene s = flying(&liar, "be", 10);
+    record *r = watch(&s);
+    const double before = drape_sim_energy(s.sim).kinetic;
+    scene_advance(&s, 1);
+    const drape_energy e = drape_sim_energy(s.sim);
+    ck_assert_int_eq(r->rejected, 0);
+    ck_assert_double_eq_tol(-e.numerical, e.kinetic - before, 1e-12 * e.kinetic);
+    scene_close(&s);
+}
+END_TEST
+
+/*
+ * Drag of the wrong sign: v1 = v0/(1 - c h), with c h = 5/8 a kinetic energy that grows 7 times in every
+ * step of backward Euler. Its work is known, as dissipation below zero: nothing comes from nowhere.
+ */
+START_TEST(energy_that_a_term_answers_for_is_no_runaway)
+{
+    negative_drag = 10;
+    scene s = flying(&spurs, "be", 1);
+    record *r = watch(&s);
+    scene_advance(&s, 0.25);
+    const drape_energy e = drape_sim_energy(s.sim);
+    ck_assert_int_eq(r->accepted, 4);
+    ck_assert_int_eq(r->rejected, 0);
+    ck_assert_double_eq_tol(drape_sim_velocities(s.sim)[0], pow(1 - 0.625, -4), 1e-9 * pow(1 - 0.625, -4));
+    ck_assert(e.dissipated < 0 && e.numerical > 0);
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- What is written ---- */
+
+static const char *file_in(const char *folder, const char *name)
+{
+    static char path[400];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return path;
+}
+
+static int count_rows(const char *path, int *rejected)
+{
+    char line[2000];
+    int rows = -1; /* the head */
+    FILE *file = fopen(path, "r");
+    ck_assert_ptr_nonnull(file);
+    *rejected = 0;
+    for (; fgets(line, sizeof line, file); rows++) {
+        int accepted = 1;
+        if (rows >= 0) {
+            ck_assert_int_eq(sscanf(line, "%*d,%*[^,],%*[^,],%d,", &accepted), 1);
+            *rejected += !accepted;
+        }
+    }
+    fclose(file);
+    return rows;
+}
+
+static void check_summary(const char *path, const record *r)
+{
+    const char *reason;
+    json_t *count;
+    long long counted = 0;
+    json_t *summary = json_load_file(path, 0, NULL), *steps = json_object_get(summary, "steps");
+    ck_assert_int_eq(json_integer_value(json_object_get(steps, "accepted")), r->accepted);
+    ck_assert_int_eq(json_integer_value(json_object_get(steps, "rejected")), r->rejected);
+    json_object_foreach(json_object_get(steps, "reasons"), reason, count)
+    {
+        long long seen = 0;
+        for (int i = 0; i < r->count; i++)
+            seen += !r->attempt[i].accepted && strcmp(r->attempt[i].reason, reason) == 0;
+        ck_assert_int_eq(json_integer_value(count), seen);
+        counted += seen;
+    }
+    ck_assert_int_eq(counted, r->rejected);
+    json_decref(summary);
+}
+
+START_TEST(every_attempt_is_one_row_one_call_and_one_reason)
+{
+    static const char *const controllers[] = {"'type': 'halving'", "'type': 'strain', 'max_stretch': 0.01",
+                                              "'type': 'error'"};
+    const char *files[] = {"steps.csv", "summary.json"};
+    for (size_t k = 0; k < 3; k++) {
+        char folder[300];
+        int rejected;
+        const char *build = getenv("DRAPE_BUILD");
+        drape_recorder *recorder = NULL;
+        snprintf(folder, sizeof folder, "%s/rejection.XXXXXX", build ? build : "/tmp");
+        ck_assert_ptr_nonnull(mkdtemp(folder));
+        scene s = swinging("be", controllers[k]);
+        record *r = watch(&s);
+        const drape_recorder_def def = {.folder = folder};
+        ck_assert_int_eq(drape_recorder_create(s.ctx, s.sim, &def, &recorder), DRAPE_OK);
+        scene_advance(&s, 1);
+        ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
+        ck_assert_int_eq(drape_summary_write(s.ctx, s.sim, &(drape_summary_def){.status = DRAPE_OK},
+                                             file_in(folder, "summary.json")),
+                         DRAPE_OK);
+        ck_assert_int_gt(r->rejected, 0);
+        ck_assert_int_eq(count_rows(file_in(folder, "steps.csv"), &rejected), r->count);
+        ck_assert_int_eq(rejected, r->rejected);
+        check_summary(file_in(folder, "summary.json"), r);
+        drape_recorder_destroy(&recorder);
+        scene_close(&s);
+        for (size_t i = 0; i < 2; i++)
+            remove(file_in(folder, files[i]));
+        rmdir(folder);
+    }
+}
+END_TEST
+
+SUITE("rejection", a_run_with_rejections_is_the_run_of_its_accepted_steps, parts_fill_their_interval_exactly,
+      nominal_times_are_met_to_the_bit, sizes_are_halved_and_grow_back,
+      a_step_that_gets_too_small_names_time_reason_and_element,
+      strain_names_the_edge_or_the_node_that_went_too_far,
+      the_error_controller_never_tries_a_refused_size_again,
+      an_estimate_that_is_not_a_number_is_refused_until_it_ends, kinetic_energy_from_nowhere_is_refused,
+      a_slow_gain_is_no_runaway, energy_that_a_term_answers_for_is_no_runaway,
+      every_attempt_is_one_row_one_call_and_one_reason)
