@@ -136,7 +136,7 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
     term->cloth = c;
     term->first_internal = term->first_measure = -1;
     model->term_count++;
-    model->has_dissipation = model->has_dissipation || term->ops->dissipative;
+    model->has_dissipation = model->has_dissipation || term->ops->dissipative || term->ops->dissipation;
     if (term->ops->law) {
         cloth->laws[cloth->law_count++] = term;
         return DRAPE_OK;

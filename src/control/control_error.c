@@ -77,8 +77,9 @@ static double difference(const prediction *p, double solution, double y0, double
     return p->factor * (solution - (p->weight[0] * y0 + p->weight[1] * y1 + p->weight[2] * y2));
 }
 
-/* Root mean square over the free DOFs of the weighted errors of positions and velocities. */
-static double local_error(const double *values, const drape_trial *trial)
+/* *worst_node: that of the largest part, -1 for none. Root mean square over the free DOFs of the weighted
+ * errors of positions and velocities. */
+static double local_error(const double *values, const drape_trial *trial, int32_t *worst_node)
 {
     const drape_model *m = trial->model;
     const drape_state *a = trial->in, *b = trial->past[0] ? trial->past[0] : a,
@@ -86,6 +87,8 @@ static double local_error(const double *values, const drape_trial *trial)
     const prediction p = predict(trial);
     double atol_x = values[PARAM_ATOL_X], atol_v = values[PARAM_ATOL_V], sum = 0;
     drape_derive_tolerances(m, values[PARAM_RTOL], &atol_x, &atol_v);
+    double largest = -1;
+    *worst_node = -1;
     for (int32_t f = 0; f < m->free_count; f++)
         for (size_t k = 0; k < 3; k++) {
             size_t i = 3 * (size_t)m->node_of_free[f] + k;
@@ -94,6 +97,10 @@ static double local_error(const double *values, const drape_trial *trial)
             double ex = (difference(&p, trial->out->x[i], a->x[i], b->x[i], c->x[i]) - flight) / atol_x;
             double ev = difference(&p, trial->out->v[i], a->v[i], b->v[i], c->v[i]) / atol_v;
             sum += ex * ex + ev * ev;
+            if (!(ex * ex + ev * ev <= largest) && !isnan(largest)) { /* the first that is no number stays */
+                largest = ex * ex + ev * ev;
+                *worst_node = m->node_of_free[f];
+            }
         }
     return m->free_count > 0 ? sqrt(sum / (6.0 * m->free_count)) : 0;
 }
@@ -103,7 +110,7 @@ static double bounded(double factor)
     return fmin(MAX_GROWTH, fmax(MAX_CUT, factor));
 }
 
-static drape_verdict reject(const double *values, drape_trial *trial, double error)
+static drape_verdict reject(const double *values, drape_trial *trial, double error, int32_t node)
 {
     double factor =
         isnan(error) ? 0.5 : fmin(0.9, bounded(values[PARAM_SAFETY] * pow(error, -1.0 / (trial->order + 1))));
@@ -112,8 +119,8 @@ static drape_verdict reject(const double *values, drape_trial *trial, double err
     trial->info->worst = (drape_worst){.what = "local error / tolerance",
                                        .term = "",
                                        .element = -1,
-                                       .node = {-1, -1, -1, -1},
-                                       .cloth = -1,
+                                       .node = {node, -1, -1, -1},
+                                       .cloth = node >= 0 ? drape_model_cloth_of(trial->model, node) : -1,
                                        .value = error,
                                        .limit = 1};
     drape_verdict verdict = drape_halve(values[PARAM_DT_MIN], trial);
@@ -126,13 +133,15 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 {
     if (trial->status && !trial->info->usable)
         return drape_halve(values[PARAM_DT_MIN], trial);
-    double error = local_error(values, trial), last = trial->scratch[SCRATCH_LAST_ERROR];
+    int32_t node;
+    double error = local_error(values, trial, &node), last = trial->scratch[SCRATCH_LAST_ERROR];
     if (!(error <= 1)) /* a NaN is rejected */
-        return reject(values, trial, error);
+        return reject(values, trial, error, node);
     double e = fmax(error, LEAST_ERROR), before = last > 0 ? last : e, p = trial->order + 1;
     trial->scratch[SCRATCH_LAST_ERROR] = e;
     trial->h_next =
         trial->h * bounded(values[PARAM_SAFETY] * pow(e, -INTEGRAL / p) * pow(before, PROPORTIONAL / p));
+    trial->h_next = fmax(values[PARAM_DT_MIN], trial->h_next);
     if (trial->h_next > values[PARAM_DT_MAX])
         trial->h_next = values[PARAM_DT_MAX];
     return DRAPE_ACCEPT;

@@ -5,9 +5,9 @@
  *     M w (v1 - v0 - a (v0 - v_)) + g(x1, v1) = 0,  q' = w (q1 - q0 - a (q0 - q_))
  * where x_, v_, q_ are of the state before in. With d = x1 - x0 and c = a (x0 - x_):
  *     M w^2 (d - p) + g(x0 + d, w (d - c)) = 0,  p = c + (v0 + a (v0 - v_))/w
- * A- and L-stable at constant steps, zero-stable for r < 1 + sqrt(2), which halving and doubling keep. Hairer,
- * Norsett & Wanner 1993, III.5. The first step and the one after a discontinuity are backward Euler: r = 0
- * makes it of the same formulas.
+ * A- and L-stable at constant steps, zero-stable for r < 1 + sqrt(2), which halving and doubling keep.
+ * Hairer, Norsett & Wanner 1993, III.5. The first step and the one after a discontinuity are backward
+ * Euler: r = 0 makes it of the same formulas.
  */
 #include "integrators/implicit.h"
 

@@ -451,6 +451,27 @@ static drape_status prepare(ida_state *s, const drape_state *in, double end, dou
     return s->n > 0 && IDASetStopTime(s->ida, stop) ? DRAPE_E_SOLVER : DRAPE_OK;
 }
 
+/* After a failure: the degenerate element or the node whose force is no number, else the node of the
+ * largest weighted error. */
+static void name_worst(ida_state *s, drape_step_info *info)
+{
+    if (s->n == 0)
+        return;
+    if (s->nonfinite) {
+        for (int64_t i = 0; i < s->n; i++)
+            s->reduced[i] = s->g[node_at(s, i)];
+        info->worst = drape_system_worst_dof(s->system, s->reduced, "force [N]", INFINITY);
+        drape_system_check(s->system, s->x, s->internal, &info->reason, &info->worst);
+        return;
+    }
+    if (IDAGetEstLocalErrors(s->ida, s->between))
+        return;
+    const double *e = N_VGetArrayPointer(s->between), *w = N_VGetArrayPointer(s->weights);
+    for (int64_t i = 0; i < s->n; i++)
+        s->reduced[i] = fmax(fabs(e[i]) / w[i], fabs(e[s->n + i]) / w[s->n + i]);
+    info->worst = drape_system_worst_dof(s->system, s->reduced, "local error / tolerance", 1);
+}
+
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {
@@ -467,8 +488,10 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
             IDAGetCurrentStep(s->ida, &info->h);
     }
     s->reached = NAN;
-    if (status)
+    if (status) {
+        name_worst(s, info);
         return status;
+    }
     place(s, t, s->n > 0 ? N_VGetArrayPointer(s->y) : NULL);
     memcpy(out->x, s->x, 3 * (size_t)s->model->node_count * sizeof *out->x);
     memcpy(out->v, s->v, 3 * (size_t)s->model->node_count * sizeof *out->v);

@@ -95,6 +95,19 @@ static drape_status pseudo_step(static_state *s, double weight, drape_state *out
     return DRAPE_OK;
 }
 
+/* After a failure: the residual of statics where the flow has come, not that of the pseudo step that
+ * failed. x_base serves as scratch. */
+static void say_residual(static_state *s, const drape_state *out, double tolerance, drape_step_info *info)
+{
+    drape_implicit *c = &s->common;
+    const drape_point point = {.x = out->x, .v = c->v_base, .internal = s->internal};
+    drape_system_force(c->system, &point, c->x_base);
+    for (size_t i = 0; i < 3 * (size_t)c->model->free_count; i++)
+        c->d[i] = c->x_base[drape_implicit_at(c, i)];
+    info->worst = drape_system_worst_dof(c->system, c->d, "residual [N]", tolerance);
+    info->residual = info->worst.value;
+}
+
 /* Follows the flow until the residual of statics is within the tolerance. */
 static drape_status follow(static_state *s, double weight, double tolerance, drape_state *out,
                            drape_step_info *info)
@@ -118,13 +131,9 @@ static drape_status follow(static_state *s, double weight, double tolerance, dra
             weight *= fmin(FALL, fmax(LEAST_FALL, info->residual / last));
         last = info->residual;
     }
-    if (fails == 0) {
+    if (fails == 0)
         info->reason = "stalled";
-        for (size_t i = 0; i < 3 * (size_t)s->common.model->free_count;
-             i++) /* the residual of statics, not of a pseudo step */
-            s->common.d[i] = drape_newton_force(s->common.newton)[drape_implicit_at(&s->common, i)];
-        info->worst = drape_system_worst_dof(s->common.system, s->common.d, "residual [N]", tolerance);
-    }
+    say_residual(s, out, tolerance, info);
     return DRAPE_E_SOLVER;
 }
 

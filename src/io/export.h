@@ -18,8 +18,8 @@ typedef struct drape_exporter_ops {
     /* model and folder, without a slash at its end, live until close.
      * Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
     drape_status (*open)(drape_context *ctx, const drape_model *model, const char *folder, void *state);
-    /* Removes what an earlier run left in folder in this format, and nothing else. Called for every row, whatever is
-     * written now: frames of two runs must not lie side by side. */
+    /* Removes what an earlier run left in folder in this format, and nothing else. Called for every row,
+     * whatever is written now: frames of two runs must not lie side by side. */
     drape_status (*clean)(drape_context *ctx, const char *folder);
 
     /* frame counts from 0 without gaps; time [s]; positions (node_count x 3) [m]. Errors: DRAPE_E_FILE. */

@@ -3,13 +3,15 @@
  * terms took and moving pins put in is summed over accepted steps by the integrators; the remainder is the
  * integrator's own.
  */
+#include "integrators/tolerance.h"
 #include "sim/sim.h"
 
 #include <math.h>
 
-#define JUMP      4.0  /* a kinetic energy that grew by less is no explosion */
-#define SHARE     0.5  /* nor one of which less than this came from nowhere */
-#define UNNOTICED 1e-6 /* of the energies that are compared: less is below what adaptive rows resolve */
+#define JUMP      4.0   /* a kinetic energy that grew by less is no explosion */
+#define SHARE     0.5   /* nor one of which less than this came from nowhere */
+#define UNNOTICED 1e-6  /* of the energies that are compared: less is below what adaptive rows resolve */
+#define QUIET     1e-16 /* of the scene's own energy: motion at 1e-8 of its speed is rounding */
 
 static double kinetic(const drape_model *model, const double *v)
 {
@@ -36,6 +38,33 @@ drape_energy drape_sim_energy(drape_sim *sim)
     return e;
 }
 
+/* The energy of the scene's mass at the scene's speed: the unit in which rounding may move a sheet at
+ * rest. */
+static double scene_energy(const drape_model *m)
+{
+    double mass = 0, atol_x = NAN, atol_v = NAN;
+    drape_derive_tolerances(m, 1, &atol_x, &atol_v);
+    for (int32_t i = 0; i < m->node_count; i++)
+        mass += m->mass[i];
+    return 0.5 * mass * atol_v * atol_v;
+}
+
+/* The node that moves with the most energy. */
+static int32_t hottest(const drape_model *m, const double *v)
+{
+    int32_t node = 0;
+    double most = -1;
+    for (int32_t i = 0; i < m->node_count; i++) {
+        const double *u = v + 3 * (size_t)i;
+        double energy = m->mass[i] * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+        if (energy > most) {
+            most = energy;
+            node = i;
+        }
+    }
+    return node;
+}
+
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, const drape_step_info *info,
                         drape_worst *worst)
 {
@@ -49,13 +78,14 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, const drape_step
     double gain =
         after + elastic + gravity + info->dissipated - info->pin_work - (e.kinetic + e.elastic + e.gravity);
     double size = after + fabs(elastic) + fabs(gravity) + fabs(e.elastic) + fabs(e.gravity);
-    if (!(gain > SHARE * after && gain > UNNOTICED * size))
+    if (!(gain > SHARE * after && gain > UNNOTICED * size + QUIET * scene_energy(sim->model)))
         return false;
+    int32_t node = hottest(sim->model, out->v);
     *worst = (drape_worst){.what = "energy from nowhere / kinetic energy",
                            .term = "",
                            .element = -1,
-                           .node = {-1, -1, -1, -1},
-                           .cloth = -1,
+                           .node = {node, -1, -1, -1},
+                           .cloth = drape_model_cloth_of(sim->model, node),
                            .value = gain / after,
                            .limit = SHARE};
     return true;

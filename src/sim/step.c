@@ -178,13 +178,14 @@ static void describe_worst(const drape_model *model, const drape_worst *worst, c
 
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
-    char worst[400];
+    char worst[400], residual[100] = "";
     describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
-    return drape_fail(
-        sim->ctx, stop,
-        "t=%.9g h=%.4g: %s (%s) after %d iterations, residual %.4g N for a tolerance of %.4g N%s", attempt->t,
-        attempt->h, attempt->reason, drape_status_name(attempt->status), attempt->iterations,
-        attempt->residual, attempt->tolerance, worst);
+    if (!isnan(attempt->tolerance)) /* rows that bound errors have none */
+        snprintf(residual, sizeof residual, ", residual %.4g N for a tolerance of %.4g N", attempt->residual,
+                 attempt->tolerance);
+    return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s", attempt->t,
+                      attempt->h, attempt->reason, drape_status_name(attempt->status), attempt->iterations,
+                      residual, worst);
 }
 
 static drape_status tell_attempt(drape_sim *sim, const drape_attempt *attempt)

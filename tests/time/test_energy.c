@@ -1,7 +1,8 @@
 /*
- * test_energy.c: the audit of energy. That kinetic + elastic + gravity + dissipated + numerical - work of pins stays what it was holds by
- * construction, since numerical is the remainder. What does not: that the remainder goes away with h, or with rtol, as the order of
- * the method says; that what damping took is what the closed form takes; that pins do the work that the closed form does.
+ * test_energy.c: the audit of energy. That kinetic + elastic + gravity + dissipated + numerical - work of
+ * pins stays what it was holds by construction, since numerical is the remainder. What does not: that the
+ * remainder goes away with h, or with rtol, as the order of the method says; that what damping took is
+ * what the closed form takes; that pins do the work that the closed form does.
  */
 #include "support/scene.h"
 
@@ -41,8 +42,8 @@ static double numerical(const char *row, const char *terms, double dt, const dra
     return energy;
 }
 
-/* Slopes as in test_order.c, of the remainder. midpoint conserves quadratic invariants only: what it leaves of other
- * energies, and of the work of damping taken at mid-way, is of its order. */
+/* Slopes as in test_order.c, of the remainder. midpoint conserves quadratic invariants only: what it
+ * leaves of other energies, and of the work of damping taken at mid-way, is of its order. */
 START_TEST(the_remainder_of_be_and_midpoint_has_their_order)
 {
     static const char *const rows[] = {"be", "midpoint"}, *const terms[] = {"", DAMPED};
@@ -57,8 +58,8 @@ START_TEST(the_remainder_of_be_and_midpoint_has_their_order)
 }
 END_TEST
 
-/* Backward Euler takes energy in every step: with a convex energy at least 1/2 m |v1 - v0|^2. Of hinges and springs under pressure
- * the energy is not convex, but at this h they are slow. */
+/* Backward Euler takes energy in every step: with a convex energy at least 1/2 m |v1 - v0|^2. Of hinges
+ * and springs under pressure the energy is not convex, but at this h they are slow. */
 START_TEST(be_only_takes_energy)
 {
     const drape_sim_def def = def_of("be", END / 100, NULL);
@@ -75,9 +76,9 @@ START_TEST(be_only_takes_energy)
 }
 END_TEST
 
-/* In order 5 the error at a time falls as rtol^(5/6) and so does the remainder without damping. With it, the work of damping is summed by the
- * trapezoidal rule, of order 2 in the steps, which go with rtol^(1/6): only as rtol^(1/3), a decade for three. A factor 2 is
- * left for the loose end. */
+/* In order 5 the error at a time falls as rtol^(5/6) and so does the remainder without damping. With it,
+ * the work of damping is summed by the trapezoidal rule, of order 2 in the steps, which go with
+ * rtol^(1/6): only as rtol^(1/3), a decade for three. A factor 2 is left for the loose end. */
 START_TEST(the_remainder_of_ida_falls_with_rtol)
 {
     static const char *const terms[] = {"", DAMPED};
@@ -95,10 +96,11 @@ START_TEST(the_remainder_of_ida_falls_with_rtol)
 }
 END_TEST
 
-/* The oscillator of test_oscillator.c with dashpots and drag: x'' + 2 d x' + w^2 x = 0 with 2 d = w^2 beta + coefficient/areal
- * density; from x = 0 and v0, x = v0/wd exp(-d t) sin(wd t), and what is dissipated is what is missing of E. The springs are linear but for
- * (a/L)^2 = 1e-8. midpoint turns phases of w h by (w h)^2/12 of them and takes work at mid-way: an error of (w h)^2 of E0 at most;
- * ida's trapezoidal rule of (w h)^2/12 with steps h below 0.3/w at rtol 1e-8. */
+/* The oscillator of test_oscillator.c with dashpots and drag: x'' + 2 d x' + w^2 x = 0 with 2 d = w^2 beta
+ * + coefficient/areal density; from x = 0 and v0, x = v0/wd exp(-d t) sin(wd t), and what is dissipated is
+ * what is missing of E. The springs are linear but for (a/L)^2 = 1e-8. midpoint turns phases of w h by (w
+ * h)^2/12 of them and takes work at mid-way: an error of (w h)^2 of E0 at most; ida's trapezoidal rule of
+ * (w h)^2/12 with steps h below 0.3/w at rtol 1e-8. */
 START_TEST(dissipated_is_the_work_of_damping_in_closed_form)
 {
     const double length = 0.1, density = 0.2, stiffness = 3 * sqrt(3.0) / 2 * 1e3,
@@ -142,10 +144,11 @@ START_TEST(dissipated_is_the_work_of_damping_in_closed_form)
 }
 END_TEST
 
-/* A curtain hung by its upper edge, at rest in its own weight, is lifted by H at a speed u that is slow against its stretch waves. A pin at
- * constant speed does u times the impulse it gives: u (m g T + p) = m g H + u p, p the momentum at the end, m u when the
- * curtain moves along; waves that are not yet damped and how a row counts the jumps of the pins' own kinetic energy are of
- * the same size. So the work is m g H within 2 m u^2: 0.5 % of it. */
+/* A curtain hung by its upper edge, at rest in its own weight, is lifted by H at a speed u that is slow
+ * against its stretch waves. A pin at constant speed does u times the impulse it gives: u (m g T + p) = m
+ * g H + u p, p the momentum at the end, m u when the curtain moves along; waves that are not yet damped
+ * and how a row counts the jumps of the pins' own kinetic energy are of the same size. So the work is m g
+ * H within 2 m u^2: 0.5 % of it. */
 START_TEST(pins_that_lift_a_sheet_do_m_g_h)
 {
     const double height = 0.1, speed = 0.05;

@@ -1,9 +1,9 @@
 /*
- * test_ida.c: the row "ida": tolerances that mean what they say, steps that depend on nothing else, restarts, dense
- * output.
+ * test_ida.c: the row "ida": tolerances that mean what they say, steps that depend on nothing else,
+ * restarts, dense output.
  *
- * The sheet: 0.5 m x 0.4 m, hung by two corners and pushed, soft enough (E h = 20 N/m) that its stretch waves have
- * periods above sqrt(m/(8 K)) 2 pi = 0.03 s, which steps resolve, and smooth but for rounding.
+ * The sheet: 0.5 m x 0.4 m, hung by two corners and pushed, soft enough (E h = 20 N/m) that its stretch
+ * waves have periods above sqrt(m/(8 K)) 2 pi = 0.03 s, which steps resolve, and smooth but for rounding.
  */
 #include "faults/host.h"
 #include "support/scene.h"
@@ -54,10 +54,10 @@ static double *positions_at(const char *pins, double rtol, const char *more, dou
 
 /* ---- Tolerances ---- */
 
-/* Over 1e-2 ... 1e-8 the error falls with rtol, never by more than a factor 2 above the one before. BDF of order p takes steps of
- * rtol^(1/(p+1)), and its error at a time is that many local errors: rtol^(p/(p+1)), at least rtol^(2/3) in order 2. Six
- * decades of rtol are four of the error at least, of which one is granted to the loose end, where IDA is not yet in
- * its asymptotic range. */
+/* Over 1e-2 ... 1e-8 the error falls with rtol, never by more than a factor 2 above the one before. BDF of
+ * order p takes steps of rtol^(1/(p+1)), and its error at a time is that many local errors:
+ * rtol^(p/(p+1)), at least rtol^(2/3) in order 2. Six decades of rtol are four of the error at least, of
+ * which one is granted to the loose end, where IDA is not yet in its asymptotic range. */
 static void falls(const char *pins, int max_order)
 {
     char order[40];
@@ -120,8 +120,8 @@ static long long steps_after(const char *more, double rtol)
     return steps;
 }
 
-/* rtol is a name for two weights and an order, and nothing else: given all three, it does not count; and each counts for
- * itself. */
+/* rtol is a name for two weights and an order, and nothing else: given all three, it does not count; and
+ * each counts for itself. */
 START_TEST(atol_x_and_atol_v_are_the_weights)
 {
     char all[160];
@@ -139,9 +139,10 @@ START_TEST(atol_x_and_atol_v_are_the_weights)
 }
 END_TEST
 
-/* Tolerances do not depend on where the scene lies. At 1000 m positions are rounded to 2^-44 = 5.7e-14 m, at the
- * origin to 1e-16 m; that noise grows by what parts neighbouring runs (test_ida_full.c), here less than 1e4-fold.
- * Decisions to accept a step compare numbers that differ by as much: they are the same but for an accident. */
+/* Tolerances do not depend on where the scene lies. At 1000 m positions are rounded to 2^-44 = 5.7e-14 m,
+ * at the origin to 1e-16 m; that noise grows by what parts neighbouring runs (test_ida_full.c), here less
+ * than 1e4-fold. Decisions to accept a step compare numbers that differ by as much: they are the same but
+ * for an accident. */
 START_TEST(a_scene_far_away_takes_the_same_steps)
 {
     const double far = 1000;
@@ -211,9 +212,9 @@ START_TEST(max_step_is_kept)
 }
 END_TEST
 
-/* A step ends at every key that lies within, to the last bit, and the next starts small: IDA knows nothing of the time
- * before. Its first step is a thousandth of the way left at most, or 1/2 over the norm of the rates; here less
- * than a fifth of the step before. */
+/* A step ends at every key that lies within, to the last bit, and the next starts small: IDA knows nothing
+ * of the time before. Its first step is a thousandth of the way left at most, or 1/2 over the norm of the
+ * rates; here less than a fifth of the step before. */
 START_TEST(steps_end_at_kinks_and_start_anew)
 {
     static const double kinks[] = {0.05, 0.1, 0.17};
@@ -232,8 +233,8 @@ START_TEST(steps_end_at_kinks_and_start_anew)
 }
 END_TEST
 
-/* An advance that ends where a key lies is no different: the next begins anew, as if it had gone on. Its steps are not the same, because
- * IDA's first depends on the way to the end, but as small. */
+/* An advance that ends where a key lies is no different: the next begins anew, as if it had gone on. Its
+ * steps are not the same, because IDA's first depends on the way to the end, but as small. */
 START_TEST(an_advance_that_ends_at_a_kink_starts_anew_too)
 {
     scene s = sheet(MOVED, 1e-4, "");
@@ -295,9 +296,10 @@ static double worst_frame(const frame_log *a, const frame_log *b)
     return worst;
 }
 
-/* Frames between steps are as good as steps that end there: both within their errors of the converged run. Dense output is
- * the polynomial of the step, whose error is of the size of the local error, atol_x, which comes on top. So an advance in pieces gives the
- * same answer to the tolerance, frame by frame, and ends where it was told. */
+/* Frames between steps are as good as steps that end there: both within their errors of the converged run.
+ * Dense output is the polynomial of the step, whose error is of the size of the local error, atol_x, which
+ * comes on top. So an advance in pieces gives the same answer to the tolerance, frame by frame, and ends
+ * where it was told. */
 START_TEST(frames_are_what_a_run_that_stops_there_has)
 {
     static const double rtols[] = {1e-3, 1e-4, 1e-6};
@@ -358,9 +360,10 @@ static double host_distance(const host_sim *s, const host_copy *from)
     return sqrt(sum / nodes);
 }
 
-/* One force or Hessian that is no number, at the nth evaluation for every n but the first force, which is of the initial state and
- * no smaller step's: IDA takes a quarter of the step and goes on, or the controller makes it start anew. The run comes to
- * its end with finite states, and it is no worse than twice a run of the same tolerance without fault. */
+/* One force or Hessian that is no number, at the nth evaluation for every n but the first force, which is
+ * of the initial state and no smaller step's: IDA takes a quarter of the step and goes on, or the
+ * controller makes it start anew. The run comes to its end with finite states, and it is no worse than
+ * twice a run of the same tolerance without fault. */
 START_TEST(one_fault_is_recovered_from)
 {
     host_sim tight = host_with_ida(1e-9), good = host_with_ida(1e-4);

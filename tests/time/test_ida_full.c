@@ -1,14 +1,15 @@
 /*
- * test_ida_full.c: eliminating velocities changes nothing: IDA with the Schur complement K + c_j D + c_j^2 M goes the
- * way of IDA with the unreduced system, factored by SUNDIALS' own KLU (support/ida_full.h).
+ * test_ida_full.c: eliminating velocities changes nothing: IDA with the Schur complement K + c_j D + c_j^2
+ * M goes the way of IDA with the unreduced system, factored by SUNDIALS' own KLU (support/ida_full.h).
  *
- * In exact arithmetic both are the same, step by step. What is left is round-off: a Newton correction d of the order of the
- * tolerance is solved to DBL_EPSILON times a condition number of 1 + (w h)^2 < 1e5: below 1e-13 m for d < 1e-2 m. Between
- * the steps it grows: IDA makes one correction a step with old factors where that is within its tolerance, and what the
- * old factors do not reach grows by some factor a step until new ones come. With dashpots, whose matrix turns with the
- * sheet, that factor reaches 5, and round-off can grow as far as the tolerance of the run. Hence short runs, weak dashpots and
- * a tolerance that keeps the factors young. 1e-10 m leaves room for a thousandfold growth; velocities are faster by the
- * 1e2/s of the stiffest wave that the steps resolve.
+ * In exact arithmetic both are the same, step by step. What is left is round-off: a Newton correction d of
+ * the order of the tolerance is solved to DBL_EPSILON times a condition number of 1 + (w h)^2 < 1e5: below
+ * 1e-13 m for d < 1e-2 m. Between the steps it grows: IDA makes one correction a step with old factors
+ * where that is within its tolerance, and what the old factors do not reach grows by some factor a step
+ * until new ones come. With dashpots, whose matrix turns with the sheet, that factor reaches 5, and
+ * round-off can grow as far as the tolerance of the run. Hence short runs, weak dashpots and a tolerance
+ * that keeps the factors young. 1e-10 m leaves room for a thousandfold growth; velocities are faster by
+ * the 1e2/s of the stiffest wave that the steps resolve.
  */
 #include "support/ida_full.h"
 #include "support/scene.h"

@@ -1,13 +1,15 @@
 /*
- * test_order.c: the order of convergence that each row of the integrators declares, measured on a sheet that swings, with
- * dashpots and drag; and the error controller.
+ * test_order.c: the order of convergence that each row of the integrators declares, measured on a sheet
+ * that swings, with dashpots and drag; and the error controller.
  *
- * The sheet is soft: E h = 20 N/m and a node of 0.2 kg/m2 x 0.01 m2 = 2 g. Springs, of sqrt(3)/2 E h = 17 N/m at
- * most, give its stretch waves angular frequencies below sqrt(8 x 17/0.002) = 260/s: steps of 2 ms and less resolve them.
+ * The sheet is soft: E h = 20 N/m and a node of 0.2 kg/m2 x 0.01 m2 = 2 g. Springs, of sqrt(3)/2 E h = 17
+ * N/m at most, give its stretch waves angular frequencies below sqrt(8 x 17/0.002) = 260/s: steps of 2 ms
+ * and less resolve them.
  *
- * An error C h^p (1 + c h + ...) has a slope log2(e(h)/e(h/2)) = p + c h/(2 log 2) + ...: it is off p by an amount that
- * halves with h. c is of the size of the fastest rate, 260/s, times a number below 1, and p is approached from h = 1 ms
- * to 0.25 ms: 260 x 0.00025/1.4 = 0.05 at the last pair if that number is 1. The bound is 0.15.
+ * An error C h^p (1 + c h + ...) has a slope log2(e(h)/e(h/2)) = p + c h/(2 log 2) + ...: it is off p by
+ * an amount that halves with h. c is of the size of the fastest rate, 260/s, times a number below 1, and p
+ * is approached from h = 1 ms to 0.25 ms: 260 x 0.00025/1.4 = 0.05 at the last pair if that number is 1.
+ * The bound is 0.15.
  */
 #include "support/scene.h"
 
@@ -43,8 +45,8 @@ static double distance(const scene *s, const double *reference)
     return sqrt(sum / s->model->node_count);
 }
 
-/* By ida at rtol 1e-10, whose error is 1e-9 m at most (test_ida.c): 1e-3 of the smallest that is measured here, which moves
- * a slope by 0.002. It starts anew at kinks. */
+/* By ida at rtol 1e-10, whose error is 1e-9 m at most (test_ida.c): 1e-3 of the smallest that is measured
+ * here, which moves a slope by 0.002. It starts anew at kinks. */
 static double *converged(const char *terms, const char *pins)
 {
     const drape_setting settings[] = {{"rtol", 1e-10, NULL}, {"max_order", 5, NULL}};
@@ -139,12 +141,14 @@ START_TEST(so_it_does_with_steps_of_changing_size)
 }
 END_TEST
 
-/* At a kink of a track the pin's velocity jumps. Springs then have a force with a kink in time, dashpots one that jumps. One-step rows do
- * not look back, and with kinks at the ends of steps every step is smooth: the order stays.
+/* At a kink of a track the pin's velocity jumps. Springs then have a force with a kink in time, dashpots
+ * one that jumps. One-step rows do not look back, and with kinks at the ends of steps every step is
+ * smooth: the order stays.
  *
- * bdf2 looks back over the kink. Where the acceleration jumps from f to f + j it takes v1 = v0 + h f/3 + 2 h f1/3 with f1 the force
- * of the step. With the exact rate of the dashpot that would be f + j and v1 off by h j/3: order 1. But the rate is the same formula
- * of q: 3/2 of the new slope less 1/2 of the old, so f1 = f + 3/2 j and v1 = v0 + h (f + j): the impulse is right and the order stays. */
+ * bdf2 looks back over the kink. Where the acceleration jumps from f to f + j it takes v1 = v0 + h f/3 + 2
+ * h f1/3 with f1 the force of the step. With the exact rate of the dashpot that would be f + j and v1 off
+ * by h j/3: order 1. But the rate is the same formula of q: 3/2 of the new slope less 1/2 of the old, so
+ * f1 = f + 3/2 j and v1 = v0 + h (f + j): the impulse is right and the order stays. */
 START_TEST(kinks_at_ends_of_steps_leave_the_order)
 {
     for (int i = 0; drape_integrators[i]; i++)
@@ -154,7 +158,8 @@ START_TEST(kinks_at_ends_of_steps_leave_the_order)
 }
 END_TEST
 
-/* Without dashpots the acceleration does not jump, but its slope: a single error of h^2 in v, for bdf2 as for all. */
+/* Without dashpots the acceleration does not jump, but its slope: a single error of h^2 in v, for bdf2 as
+ * for all. */
 START_TEST(and_without_dashpots_as_well)
 {
     for (int i = 0; drape_integrators[i]; i++)
@@ -168,9 +173,10 @@ static double steps_across_kinks(int k, int n)
     return k == 0 ? 0 : k == n ? END : END * (k - 0.5) / (n - 1);
 }
 
-/* A kink inside a step. The pin takes its mean velocity over the step, so for be and bdf2, whose dashpots' rates are
- * differences of q, the impulse of a dashpot over the step is right and the order stays. midpoint takes the rate at mid-way, grad q . v: its
- * impulse is off by h times a jump: order 1, which it comes down to only where that is larger than its error of second order. */
+/* A kink inside a step. The pin takes its mean velocity over the step, so for be and bdf2, whose dashpots'
+ * rates are differences of q, the impulse of a dashpot over the step is right and the order stays.
+ * midpoint takes the rate at mid-way, grad q . v: its impulse is off by h times a jump: order 1, which it
+ * comes down to only where that is larger than its error of second order. */
 START_TEST(kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_first)
 {
     check_slope("be", DASHPOTS, MOVED, steps_across_kinks, 1);
@@ -213,9 +219,9 @@ static drape_sim_def controlled(const char *row, const drape_setting *settings, 
     return def;
 }
 
-/* Local errors are held to rtol: steps go with rtol^(1/(p+1)), the error at a time with rtol^(p/(p+1)): a decade of rtol gains
- * 10^(1/2) in order 1 and 10^(2/3) in order 2. Over the three decades one quarter of the exponent is left for the
- * start, where the first steps are of another size than they will be. */
+/* Local errors are held to rtol: steps go with rtol^(1/(p+1)), the error at a time with rtol^(p/(p+1)): a
+ * decade of rtol gains 10^(1/2) in order 1 and 10^(2/3) in order 2. Over the three decades one quarter of
+ * the exponent is left for the start, where the first steps are of another size than they will be. */
 START_TEST(error_falls_with_the_controllers_rtol)
 {
     double *reference = converged(DASHPOTS, HUNG);
@@ -244,8 +250,9 @@ START_TEST(error_falls_with_the_controllers_rtol)
 }
 END_TEST
 
-/* The PI rule changes sizes smoothly: never more than doubled (bdf2 is stable below 1 + sqrt(2)), few rejections: less than a tenth of
- * the steps where the motion is smooth. The last steps of the advance are cut to end with it. */
+/* The PI rule changes sizes smoothly: never more than doubled (bdf2 is stable below 1 + sqrt(2)), few
+ * rejections: less than a tenth of the steps where the motion is smooth. The last steps of the advance are
+ * cut to end with it. */
 START_TEST(steps_of_the_error_controller_change_gently)
 {
     static step_log log;
@@ -282,8 +289,9 @@ static scene node(void)
         "'pins': [{'nodes': [0, 1, 2, 3, 5, 6, 7, 8]}]}], 'duration': 1}");
 }
 
-/* What the controller takes for the local error in x or in v, through what it says of a rejected step: root mean square over
- * the six of x and v of the node. Only the first component of the node differs from 0. */
+/* What the controller takes for the local error in x or in v, through what it says of a rejected step:
+ * root mean square over the six of x and v of the node. Only the first component of the node differs from
+ * 0. */
 static double estimate(const scene *s, bool velocity, double h, const double past[2], const double in[2],
                        const double out[2], double *values)
 {
@@ -319,11 +327,12 @@ static double estimate(const scene *s, bool velocity, double h, const double pas
     return info.worst.value * 1e-15 * sqrt(6);
 }
 
-/* Two steps of backward Euler on x'' = -w^2 x: x1 = (x0 + h v0)/(1 + (w h)^2), v1 = (x1 - x0)/h. The second differences of its x and
- * v are h^2 times their second derivatives in the sense of the equation, which is twice its local error y1 - y(h) = h^2/2 y'' +
- * O(h^3), y(h) the exact solution from the state in the middle: the estimate is that but for some w h. The terms of third order are
- * of 1/2 h^3 y''' from the second difference and 1/3 h^3 y''' from the local error, and y''' < 1.5 w y'' at this phase for
- * both: less than 2.5 w h in all. */
+/* Two steps of backward Euler on x'' = -w^2 x: x1 = (x0 + h v0)/(1 + (w h)^2), v1 = (x1 - x0)/h. The
+ * second differences of its x and v are h^2 times their second derivatives in the sense of the equation,
+ * which is twice its local error y1 - y(h) = h^2/2 y'' + O(h^3), y(h) the exact solution from the state in
+ * the middle: the estimate is that but for some w h. The terms of third order are of 1/2 h^3 y''' from the
+ * second difference and 1/3 h^3 y''' from the local error, and y''' < 1.5 w y'' at this phase for both:
+ * less than 2.5 w h in all. */
 START_TEST(the_estimate_for_backward_euler_is_its_local_error)
 {
     static const double phases[] = {0.1, 0.03, 0.01, 0.001}; /* w h */
