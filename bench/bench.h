@@ -1,6 +1,6 @@
 /*
- * bench.h: what benchmarks share: a sim from scene text in which apostrophes stand for quotation marks, an error that
- * ends the program, repeats, and the head of a CSV file.
+ * bench.h: what benchmarks share: a sim from scene text in which apostrophes stand for quotation marks, an
+ * error that ends the program, repeats, and the head of a CSV file.
  */
 #ifndef DRAPE_BENCH_BENCH_H
 #define DRAPE_BENCH_BENCH_H

@@ -1,18 +1,20 @@
 /*
- * oscillator: what time integrators do to the energy of an undamped oscillator in 100 periods: E/E0 - 1, for ida over its
- * orders and tolerances, for the fixed-step rows over w h. A free node on a spring of the host's, E = 1/2 m w^2 |x - x0|^2,
- * made through drape_context_add_term, moves through the rest position with equal speeds along x, y and z, so that IDA's
- * root mean square over unknowns is that of a single oscillator. Tolerances are relative to the amplitudes: atol_x = rtol A,
- * atol_v = rtol A w.
+ * oscillator: what time integrators do to the energy of an undamped oscillator in 100 periods: E/E0 - 1,
+ * for ida over its orders and tolerances, for the fixed-step rows over w h. A free node on a spring of the
+ * host's, E = 1/2 m w^2 |x - x0|^2, made through drape_context_add_term, moves through the rest position
+ * with equal speeds along x, y and z, so that IDA's root mean square over unknowns is that of a single
+ * oscillator. Tolerances are relative to the amplitudes: atol_x = rtol A, atol_v = rtol A w.
  *
- * The table of the design notes was made with other weights: rtol |y| + atol with rtol = atol, w = 1/s, x = 1, v = 0 at the start.
- * IDA alone, set so, is at the end: order 1, 2, 4, 5 at 1e-3: -100 %, -20 %, +424 %, -70 %, at 1e-6: -60 %, -5e-4, -1.4e-3, -4.4e-3. Drape's
- * weights do not follow |y|, which would make errors depend on where a scene lies, so its numbers are others, of the same kind.
- * From order 3 on, a factor 2 in the tolerance can change the sign: IDA mostly doubles its step or keeps it, and whether BDF feeds
- * energy in or takes it out depends on w h.
+ * The table of the design notes was made with other weights: rtol |y| + atol with rtol = atol, w = 1/s, x
+ * = 1, v = 0 at the start. IDA alone, set so, is at the end: order 1, 2, 4, 5 at 1e-3: -100 %, -20 %, +424
+ * %, -70 %, at 1e-6: -60 %, -5e-4, -1.4e-3, -4.4e-3. Drape's weights do not follow |y|, which would make
+ * errors depend on where a scene lies, so its numbers are others, of the same kind. From order 3 on, a
+ * factor 2 in the tolerance can change the sign: IDA mostly doubles its step or keeps it, and whether BDF
+ * feeds energy in or takes it out depends on w h.
  *
- * What to expect: be multiplies E by 1/(1 + (w h)^2) a step, bdf2 by 1 - (w h)^4/2 and less, midpoint by 1 exactly. BDF 3 to 5 are not
- * A-stable: they feed energy in at the steps that loose tolerances choose, and take it out at others.
+ * What to expect: be multiplies E by 1/(1 + (w h)^2) a step, bdf2 by 1 - (w h)^4/2 and less, midpoint by 1
+ * exactly. BDF 3 to 5 are not A-stable: they feed energy in at the steps that loose tolerances choose, and
+ * take it out at others.
  */
 #include "bench.h"
 #include "drape/extend.h"

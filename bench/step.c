@@ -70,8 +70,8 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Steps until the number or the budget is used up. The first step, which chooses pivots, is left out, unless it took
- * the whole budget: then it is what there is. */
+/* Steps until the number or the budget is used up. The first step, which chooses pivots, is left out,
+ * unless it took the whole budget: then it is what there is. */
 static drape_status run_steps(drape_sim *sim, const settings *set, measurement *m)
 {
     double wall[MAX_STEPS], begin = drape_clock_seconds(), cpu = drape_clock_cpu_seconds();

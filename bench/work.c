@@ -1,10 +1,11 @@
 /*
- * work: accuracy against cost. A square sheet of 12 x 12 nodes, 1 m, E 1e6 Pa, h 1 mm, 0.2 kg/m2, undamped, is let go
- * level and swings down from two corners. The error is the root mean square over the free nodes of the distance to
- * a converged reference at 0.5 s: ida at rtol 1e-8 and order 5, whose own error is its distance to rtol 1e-9. Every row of the
- * integrators, over its dt or rtol, the fixed-step ones under the controllers halving and error; CPU is the least of the
- * repeats. The last lines hold ida at rtol 1e-3 against be at 1/60 s, and both at equal error, between the
- * points of the table by straight lines in logarithms.
+ * work: accuracy against cost. A square sheet of 12 x 12 nodes, 1 m, E 1e6 Pa, h 1 mm, 0.2 kg/m2,
+ * undamped, is let go level and swings down from two corners. The error is the root mean square over the
+ * free nodes of the distance to a converged reference at 0.5 s: ida at rtol 1e-8 and order 5, whose own
+ * error is its distance to rtol 1e-9. Every row of the integrators, over its dt or rtol, the fixed-step
+ * ones under the controllers halving and error; CPU is the least of the repeats. The last lines hold ida
+ * at rtol 1e-3 against be at 1/60 s, and both at equal error, between the points of the table by straight
+ * lines in logarithms.
  */
 #include "bench.h"
 
