@@ -18,6 +18,7 @@
  * Pins that move have kinks at the keys of their tracks: IDA stops there and starts again.
  */
 #include "base/clock.h"
+#include "base/finite.h"
 #include "integrators/integrator.h"
 #include "integrators/tolerance.h"
 #include "model/track.h"
@@ -136,15 +137,14 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
 {
     ida_state *s = user;
     const double *v = N_VGetArrayPointer(y) + s->n, *xp = N_VGetArrayPointer(rate), *vp = xp + s->n;
-    double *f = N_VGetArrayPointer(out), probe = 0, start = drape_clock_seconds();
+    double *f = N_VGetArrayPointer(out), start = drape_clock_seconds();
     drape_point point = place(s, t, N_VGetArrayPointer(y));
     drape_system_force(s->system, &point, s->g);
     for (int64_t i = 0; i < s->n; i++) {
         f[i] = xp[i] - v[i];
         f[s->n + i] = s->model->mass[s->model->node_of_free[i / 3]] * vp[i] + s->g[node_at(s, i)];
-        probe += 0 * f[i] + 0 * f[s->n + i];
     }
-    s->nonfinite = probe != 0;
+    s->nonfinite = !drape_all_finite(f, 2 * (size_t)s->n);
     s->work.residuals++;
     s->work.residual_seconds += drape_clock_seconds() - start;
     return s->nonfinite ? 1 : 0;
@@ -342,7 +342,7 @@ static drape_status status_of(int code, bool nonfinite, const char **reason)
 /* Consistent initial values need no solve: x' = v, v' = -M^-1 g. */
 static drape_status start(ida_state *s, const drape_state *in, drape_step_info *info)
 {
-    double *y = N_VGetArrayPointer(s->y), *rate = N_VGetArrayPointer(s->rate), probe = 0;
+    double *y = N_VGetArrayPointer(s->y), *rate = N_VGetArrayPointer(s->rate);
     for (int64_t i = 0; i < s->n; i++) {
         y[i] = in->x[node_at(s, i)];
         y[s->n + i] = rate[i] = in->v[node_at(s, i)];
@@ -352,11 +352,10 @@ static drape_status start(ida_state *s, const drape_state *in, drape_step_info *
     s->work.residuals++;
     for (int64_t i = 0; i < s->n; i++) {
         rate[s->n + i] = -s->g[node_at(s, i)] / s->model->mass[s->model->node_of_free[i / 3]];
-        probe += 0 * rate[s->n + i];
     }
     s->counted = 0;
     info->reason = "nonfinite";
-    if (probe != 0) /* IDA would cut its step ten times over it */
+    if (!drape_all_finite(rate + s->n, (size_t)s->n)) /* IDA would cut its step ten times over it */
         return DRAPE_RETRY_NONFINITE;
     info->reason = "solver";
     return IDAReInit(s->ida, in->t, s->y, s->rate) ? DRAPE_E_SOLVER : DRAPE_OK;

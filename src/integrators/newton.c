@@ -3,6 +3,7 @@
 #include "integrators/newton.h"
 
 #include "base/clock.h"
+#include "base/finite.h"
 #include "solvers/sun_linear.h"
 
 #include <kinsol/kinsol.h>
@@ -140,7 +141,6 @@ static void place(drape_newton *s, const double *d)
 static bool evaluate(drape_newton *s, const double *d)
 {
     const drape_newton_problem *p = s->problem;
-    double probe = 0;
     double start = drape_clock_seconds();
     place(s, d);
     drape_system_force(s->system, &s->point, s->g);
@@ -148,11 +148,10 @@ static bool evaluate(drape_newton *s, const double *d)
         int32_t node = s->model->node_of_free[i / 3];
         double inertia = p->mass_weight * s->model->mass[node] * (d[i] - p->inertia[i]);
         s->f[i] = inertia + s->g[3 * (int64_t)node + i % 3];
-        probe += 0 * s->f[i];
     }
     s->work.residuals++;
     s->work.residual_seconds += drape_clock_seconds() - start;
-    return probe == 0;
+    return drape_all_finite(s->f, (size_t)s->n);
 }
 
 static int residual(N_Vector d, N_Vector f, void *user)

@@ -4,6 +4,7 @@
  * changing which one counts.
  */
 #include "base/clock.h"
+#include "base/finite.h"
 #include "sim/sim.h"
 
 #include <math.h>
@@ -17,19 +18,11 @@ static drape_state *next_state(drape_sim *sim)
 
 /* ---- Check ---- */
 
-static bool finite(const double *a, size_t n)
-{
-    double probe = 0;
-    for (size_t i = 0; i < n; i++)
-        probe += 0 * a[i];
-    return probe == 0;
-}
-
 static drape_status check(drape_sim *sim, drape_step_info *info)
 {
     const drape_state *next = next_state(sim);
     size_t n = 3 * (size_t)sim->model->node_count;
-    if (!finite(next->x, n) || !finite(next->v, n)) {
+    if (!drape_all_finite(next->x, n) || !drape_all_finite(next->v, n)) {
         info->reason = "nonfinite";
         return DRAPE_RETRY_NONFINITE;
     }
@@ -176,6 +169,17 @@ static void describe_worst(const drape_model *model, const drape_worst *worst, c
                  worst->value, worst->limit);
 }
 
+/* For the host's log: what was rejected, and why. */
+static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
+{
+    char worst[400];
+    if (attempt->accepted || !sim->ctx->def.log)
+        return;
+    describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
+    drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g h=%.4g: step rejected, %s (%s)%s", attempt->t, attempt->h,
+              attempt->reason, drape_status_name(attempt->status), worst);
+}
+
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
     char worst[400], residual[100] = "";
@@ -238,6 +242,7 @@ static drape_status step(drape_sim *sim, double t1, double h)
     double start = drape_clock_seconds();
     drape_attempt record = try_step(sim, t1, h, &stop);
     sim->statistics.wall_steps += drape_clock_seconds() - start;
+    log_rejection(sim, &record);
     drape_status told = tell_attempt(sim, &record);
     drape_status framed = record.accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
     if (stop)

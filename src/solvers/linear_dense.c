@@ -2,7 +2,8 @@
  * baseline that sparse solvers are measured against. */
 #include "solvers/linear.h"
 
-#include <math.h>
+#include "base/finite.h"
+
 #include <string.h>
 #include <sundials/sundials_dense.h>
 
@@ -54,28 +55,23 @@ static drape_status factor(void *state, const double *values)
 {
     dense_state *s = state;
     const drape_pattern *p = s->pattern;
-    double sum = 0;
     memset(s->values, 0, (size_t)p->n * (size_t)p->n * sizeof *s->values);
     for (int64_t j = 0; j < p->n; j++)
-        for (int64_t k = p->column[j]; k < p->column[j + 1]; k++) {
+        for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
             s->column[j][p->row[k]] = values[k];
-            sum += values[k];
-        }
-    s->factored = isfinite(sum) && SUNDlsMat_denseGETRF(s->column, p->n, p->n, s->pivot) == 0;
+    s->factored = drape_all_finite(values, (size_t)p->nonzeros) &&
+                  SUNDlsMat_denseGETRF(s->column, p->n, p->n, s->pivot) == 0;
     return s->factored ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
 static drape_status solve(void *state, const double *b, double *x)
 {
     dense_state *s = state;
-    double sum = 0;
     if (!s->factored)
         return DRAPE_RETRY_LINEAR;
     memcpy(x, b, (size_t)s->pattern->n * sizeof *x);
     SUNDlsMat_denseGETRS(s->column, s->pattern->n, s->pivot, x);
-    for (int64_t i = 0; i < s->pattern->n; i++)
-        sum += x[i];
-    return isfinite(sum) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
+    return drape_all_finite(x, (size_t)s->pattern->n) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
 static size_t bytes(const void *state)

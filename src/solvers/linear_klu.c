@@ -6,8 +6,9 @@
  */
 #include "solvers/linear.h"
 
+#include "base/finite.h"
+
 #include <klu.h>
-#include <math.h>
 
 #define ORDER_AMD 0
 #define MIN_RCOND 1e-15 /* below: singular to working precision; a fresh choice of pivots is tried first */
@@ -96,22 +97,19 @@ static drape_status factor(void *state, const double *values)
 static drape_status solve(void *state, const double *b, double *x)
 {
     klu_state *s = state;
-    double sum = 0;
     if (!s->numeric)
         return DRAPE_RETRY_LINEAR;
     for (int64_t i = 0; i < s->pattern->n; i++)
         x[i] = b[i];
     if (!klu_l_solve(s->symbolic, s->numeric, s->pattern->n, 1, x, &s->common))
         return DRAPE_RETRY_LINEAR;
-    for (int64_t i = 0; i < s->pattern->n; i++)
-        sum += x[i];
-    return isfinite(sum) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
+    return drape_all_finite(x, (size_t)s->pattern->n) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
 static size_t bytes(const void *state)
 {
     const klu_state *s = state;
-    return s->common.mempeak > 0 ? (size_t)s->common.memusage : 0;
+    return s->common.memusage;
 }
 
 const drape_linear_ops drape_linear_klu = {

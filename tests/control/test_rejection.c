@@ -598,6 +598,27 @@ START_TEST(every_attempt_is_one_row_one_call_and_one_reason)
 }
 END_TEST
 
+static void count_line(void *user, drape_log_level level, const char *text)
+{
+    (void)level;
+    ck_assert_ptr_nonnull(strstr(text, "step rejected, "));
+    ck_assert_ptr_null(strchr(text, '\n'));
+    ++*(int *)user;
+}
+
+START_TEST(a_rejection_is_one_line_of_the_hosts_log)
+{
+    int lines = 0;
+    scene s = swinging("be", "'type': 'halving'");
+    s.ctx->def.log = count_line;
+    s.ctx->def.log_user = &lines;
+    scene_advance(&s, 2);
+    ck_assert_int_gt(lines, 0);
+    ck_assert_int_eq(lines, drape_sim_statistics(s.sim).steps_rejected);
+    scene_close(&s);
+}
+END_TEST
+
 SUITE("rejection", a_run_with_rejections_is_the_run_of_its_accepted_steps, parts_fill_their_interval_exactly,
       nominal_times_are_met_to_the_bit, sizes_are_halved_and_grow_back,
       a_step_that_gets_too_small_names_time_reason_and_element,
@@ -605,4 +626,4 @@ SUITE("rejection", a_run_with_rejections_is_the_run_of_its_accepted_steps, parts
       the_error_controller_never_tries_a_refused_size_again,
       an_estimate_that_is_not_a_number_is_refused_until_it_ends, kinetic_energy_from_nowhere_is_refused,
       a_slow_gain_is_no_runaway, energy_that_a_term_answers_for_is_no_runaway, a_sheet_at_rest_stays_at_rest,
-      every_attempt_is_one_row_one_call_and_one_reason)
+      every_attempt_is_one_row_one_call_and_one_reason, a_rejection_is_one_line_of_the_hosts_log)
