@@ -124,8 +124,9 @@ static drape_verdict reject(const double *values, drape_trial *trial, double err
                                        .value = error,
                                        .limit = 1};
     drape_verdict verdict = drape_halve(values[PARAM_DT_MIN], trial);
-    if (verdict == DRAPE_RETRY)
-        trial->h_next = fmax(values[PARAM_DT_MIN], factor * trial->h);
+    double proposed = fmax(values[PARAM_DT_MIN], factor * trial->h);
+    if (verdict == DRAPE_RETRY && trial->in->t + proposed > trial->in->t) /* else the half, which does */
+        trial->h_next = proposed;
     return verdict;
 }
 

@@ -35,6 +35,7 @@ enum {
     PARAM_ATOL_V,
     PARAM_MAX_ORDER,
     PARAM_MAX_STEP,
+    PARAM_MAX_STEPS,
     PARAM_LINEAR_SOLVER,
     PARAM_COUNT
 };
@@ -69,6 +70,14 @@ static const drape_param params[PARAM_COUNT] = {
                         .max = 1e9,
                         .open_min = true,
                         .help = "largest step"},
+    [PARAM_MAX_STEPS] = {.name = "max_steps",
+                         .kind = DRAPE_PARAM_INTEGER,
+                         .unit = "1/s",
+                         .default_value = 100000,
+                         .min = 1,
+                         .max = 1e9,
+                         .help = "steps within one second of simulated time, those that end an advance "
+                                 "apart; one more ends the run"},
     [PARAM_LINEAR_SOLVER] = {.name = "linear_solver",
                              .kind = DRAPE_PARAM_CHOICE,
                              .unit = "1",
@@ -97,7 +106,9 @@ typedef struct ida_state {
     double reached;         /* time of IDA's state; NaN: it must start anew */
     double powers[2];       /* [W] taken by dissipation and put in by pins, at the time reached */
     bool nonfinite;
-    long counted; /* Newton iterations of IDA that work has already */
+    double second; /* [s] the second of simulated time that steps are counted in */
+    int64_t steps; /* attempted in it, but for those that end an advance */
+    long counted;  /* Newton iterations of IDA that work has already */
     drape_work work;
 } ida_state;
 
@@ -471,12 +482,31 @@ static void name_worst(ida_state *s, drape_step_info *info)
     info->worst = drape_system_worst_dof(s->system, s->reduced, "local error / tolerance", 1);
 }
 
+/* Work is bounded: an undamped sheet that has degenerated may be followed for ever with steps that all
+ * succeed. The bound is a rate, so that it is the same however a host cuts its advances; steps that end one
+ * are the host's wish and not counted. Whoever goes on after the failure is given as many steps again. */
+static bool exhausted(ida_state *s, const drape_state *in, drape_step_info *info)
+{
+    if (floor(in->t) != s->second)
+        s->steps = 0;
+    s->second = floor(in->t);
+    if (s->steps++ < (int64_t)s->values[PARAM_MAX_STEPS])
+        return false;
+    s->steps = 0;
+    info->reason = "max_steps";
+    IDAGetLastStep(s->ida, &info->h);
+    name_worst(s, info);
+    return true;
+}
+
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {
     ida_state *s = state;
     double end = out->t, t = end;
     info->tolerance = info->residual = NAN; /* IDA bounds errors, not residuals */
+    if (exhausted(s, in, info))
+        return DRAPE_E_STEP_TOO_SMALL;
     info->reason = "solver";
     drape_status status = prepare(s, in, end, h, info);
     if (!status && s->n > 0) {
@@ -485,6 +515,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         count_iterations(s, info);
         if (status)
             IDAGetCurrentStep(s->ida, &info->h);
+        info->h = fmin(info->h, h); /* IDA's may be of an attempt before: half of it is no smaller step */
     }
     s->reached = NAN;
     if (status) {
@@ -499,6 +530,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     info->reason = "converged";
     audit(s, in, out, info);
     s->reached = at_kink(s->model, t) ? NAN : t;
+    s->steps -= t == end;
     return DRAPE_OK;
 }
 

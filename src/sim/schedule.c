@@ -4,8 +4,9 @@
 #include <float.h>
 #include <math.h>
 
-#define MOST_LEVELS 60   /* parts are counted in 64 bits */
-#define JOIN        1e-9 /* of dt: a shorter remainder joins the interval before */
+#define MOST_LEVELS 60                  /* parts are counted in 64 bits */
+#define JOIN        1e-9                /* of dt: a shorter remainder joins the interval before */
+#define ROUNDING    (1e3 * DBL_EPSILON) /* of the time: a shorter way is rounding of the host's own sum */
 
 void drape_schedule_init(drape_schedule *s, drape_stepping stepping, double dt, double start)
 {
@@ -46,7 +47,7 @@ static bool next_free(const drape_schedule *s, double *t1, double *h)
 {
     *t1 = s->end;
     *h = fmin(s->end - s->now, s->limit);
-    return s->end > s->now;
+    return s->end - s->now > ROUNDING * fabs(s->end);
 }
 
 /* What is left of the advance is taken whole if one step does it, in halves if two do, so that no tiny
@@ -56,15 +57,15 @@ static bool next_proposed(const drape_schedule *s, double *t1, double *h)
     double left = s->end - s->now;
     *h = s->limit >= (1 - JOIN) * left ? left : 2 * s->limit > left ? left / 2 : s->limit;
     *t1 = *h == left ? s->end : s->now + *h;
-    return left > 0;
+    return left > ROUNDING * fabs(s->end);
 }
 
 static bool next_counted(drape_schedule *s, double *t1, double *h)
 {
     if (s->part == 0) {
         double left = s->end - interval_time(s, s->count);
-        double least = s->stepped ? JOIN * s->dt
-                                  : 1e3 * DBL_EPSILON * fabs(s->end); /* the first step has none to join */
+        double least =
+            s->stepped ? JOIN * s->dt : ROUNDING * fabs(s->end); /* the first step has none to join */
         if (!(left > least))
             return false;
         open_interval(s);
@@ -77,7 +78,7 @@ static bool next_counted(drape_schedule *s, double *t1, double *h)
     return true;
 }
 
-bool drape_schedule_next(drape_schedule *s, double *t1, double *h)
+static bool propose(drape_schedule *s, double *t1, double *h)
 {
     switch (s->stepping) {
     case DRAPE_STEPS_FREE:
@@ -88,6 +89,13 @@ bool drape_schedule_next(drape_schedule *s, double *t1, double *h)
         break;
     }
     return next_counted(s, t1, h);
+}
+
+bool drape_schedule_next(drape_schedule *s, double *t1, double *h)
+{
+    bool more = propose(s, t1, h);
+    s->tried = *h;
+    return more;
 }
 
 static void close_interval(drape_schedule *s)
@@ -126,7 +134,7 @@ bool drape_schedule_retry(drape_schedule *s, double h_next)
 {
     s->limit = h_next;
     if (s->stepping != DRAPE_STEPS_COUNTED)
-        return true;
+        return h_next > 0 && h_next < s->tried;
     if (s->level == MOST_LEVELS)
         return false;
     s->level++;

@@ -23,6 +23,7 @@ typedef struct drape_schedule {
     double now;    /* [s] where it came */
     double dt;     /* [s] counted: the interval; proposed: the first step */
     double limit;  /* [s] proposed: the next step; free: an upper bound */
+    double tried;  /* [s] the step that was handed out last */
     double start;  /* [s] counted: intervals are counted from here */
     int64_t count; /* intervals done since start */
     int level;     /* the interval has 2^level parts */
@@ -44,8 +45,9 @@ bool drape_schedule_next(drape_schedule *schedule, double *t1, double *h);
 /* A step to t1 was accepted; h_next counts where steps are proposed. */
 void drape_schedule_accept(drape_schedule *schedule, double t1, double h_next);
 
-/* A step was rejected: h_next next, which is half of it where steps are counted. False where an interval
- * cannot be split further (2^60 parts): no step is left to try. */
+/* A step was rejected: h_next next, which is half of it where steps are counted. False where no step is left
+ * to try: an interval cannot be split further (2^60 parts), or h_next is no smaller than what was rejected.
+ * So whatever a controller says, a step is never tried again at its size. */
 bool drape_schedule_retry(drape_schedule *schedule, double h_next);
 
 #endif

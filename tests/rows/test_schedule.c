@@ -244,7 +244,28 @@ START_TEST(proposed_steps_reach_the_end)
 }
 END_TEST
 
+/* Whatever a controller proposes after a rejection, it is a smaller step or there is none. */
+START_TEST(no_step_is_tried_again_at_its_size)
+{
+    static const drape_stepping kinds[] = {DRAPE_STEPS_PROPOSED, DRAPE_STEPS_FREE};
+    for (int k = 0; k < 2; k++) {
+        drape_schedule s;
+        double t1, h, tried;
+        drape_schedule_init(&s, kinds[k], 0.25, 0);
+        drape_schedule_aim(&s, 1);
+        ck_assert(drape_schedule_next(&s, &t1, &tried));
+        ck_assert(!drape_schedule_retry(&s, tried));
+        ck_assert(!drape_schedule_retry(&s, 2 * tried));
+        ck_assert(!drape_schedule_retry(&s, 0));
+        ck_assert(!drape_schedule_retry(&s, NAN));
+        ck_assert(drape_schedule_retry(&s, nextafter(tried, 0)));
+        ck_assert(drape_schedule_next(&s, &t1, &h));
+        ck_assert_double_lt(h, tried);
+    }
+}
+END_TEST
+
 SUITE("schedule", times_are_counted, asking_changes_nothing, halves_fill_the_interval,
       the_end_cuts_and_tiny_remainders_join, advances_do_not_shift_the_count,
       an_interval_left_half_done_is_given_up, any_sequence_fills_the_time, many_halvings_stay_small,
-      proposed_steps_reach_the_end)
+      proposed_steps_reach_the_end, no_step_is_tried_again_at_its_size)

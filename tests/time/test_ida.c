@@ -407,8 +407,101 @@ START_TEST(a_fault_that_stays_ends_the_run)
 }
 END_TEST
 
+/* ---- Work is bounded ---- */
+
+/* The state after the last attempt that was accepted. */
+typedef struct last_state {
+    double t, h;
+    uint64_t hash;
+    long accepted;
+} last_state;
+
+static drape_status note_last(void *user, const drape_event *event)
+{
+    last_state *last = user;
+    if (event->kind == DRAPE_EVENT_ATTEMPT && event->attempt->accepted)
+        *last = (last_state){.t = drape_sim_time(event->sim),
+                             .h = event->attempt->h,
+                             .hash = drape_sim_hash(event->sim),
+                             .accepted = last->accepted + 1};
+    return DRAPE_OK;
+}
+
+#define MOST 40 /* far fewer steps than the sheet needs for END at rtol 1e-6 */
+
+/* One step too many ends the run with its reason, time, size of step and worst node, in the last accepted
+ * state. Each further advance has as many steps again, and they are those of a run without the bound. */
+START_TEST(too_many_steps_end_the_run)
+{
+    char message[100];
+    int ends = 0;
+    int64_t count = 0;
+    last_state last = {0};
+    scene s = sheet(HUNG, 1e-6, ", 'max_steps': 40");
+    ck_assert_int_eq(drape_sim_observe(s.sim, note_last, &last), DRAPE_OK);
+    while (drape_sim_advance(s.sim, END)) {
+        ends++;
+        ck_assert_int_lt(ends, 100);
+        snprintf(message, sizeof message,
+                 "t=%.9g h=%.4g: max_steps (e_step_too_small) after 0 iterations; worst "
+                 "at (node ",
+                 last.t, last.h);
+        ck_assert_msg(!strncmp(drape_context_message(s.ctx), message, strlen(message)), "%s",
+                      drape_context_message(s.ctx));
+        ck_assert_ptr_nonnull(
+            strstr(drape_context_message(s.ctx), " of cloth0): local error / tolerance = "));
+        ck_assert_double_eq(drape_sim_time(s.sim), last.t);
+        ck_assert_uint_eq(drape_sim_hash(s.sim), last.hash);
+        ck_assert_int_eq(last.accepted, MOST * ends);
+        ck_assert_int_eq(drape_sim_statistics(s.sim).steps_rejected, ends);
+    }
+    printf("# %ld steps, ended %d times\n", last.accepted, ends);
+    ck_assert_int_ge(ends, 2);
+    ck_assert_str_eq(drape_sim_reason(s.sim, 0, &count), "max_steps");
+    ck_assert_int_eq(count, ends);
+    ck_assert_double_eq(drape_sim_time(s.sim), END);
+    ck_assert_uint_eq(drape_sim_hash(s.sim), hash_after("", 1e-6));
+    scene_close(&s);
+}
+END_TEST
+
+/* The bound is on what IDA chooses: a host may end more advances than that in a second, and a new second has
+ * a new count. */
+START_TEST(steps_that_a_host_asks_for_are_not_counted)
+{
+    scene s = sheet(HUNG, 1e-2, ", 'max_steps': 100");
+    for (int k = 1; k <= 300; k++)
+        scene_advance(&s, 1e-4 * k);
+    ck_assert_int_ge(drape_sim_statistics(s.sim).steps_accepted, 300);
+    scene_close(&s);
+    scene slow = sheet(HUNG, 1e-1, ", 'max_steps': 250, 'max_step': 0.01");
+    scene_advance(&slow, 3);
+    ck_assert_int_gt(drape_sim_statistics(slow.sim).steps_accepted, 250);
+    scene_close(&slow);
+}
+END_TEST
+
+/* A host that adds up its times may ask for an advance by a rounding error, also where IDA starts anew. IDA
+ * would call that too close; it is no step. */
+START_TEST(an_advance_by_one_ulp_is_no_failure)
+{
+    scene s = sheet(MOVED, 1e-3, "");
+    static const double times[] = {0.02, 0.05, 0.06};
+    for (int k = 0; k < 3; k++) {
+        scene_advance(&s, times[k]);
+        scene_advance(&s, nextafter(times[k], 1));
+        scene_advance(&s, times[k] + 1e-15);
+    }
+    scene_advance(&s, 0.1);
+    ck_assert_double_eq(drape_sim_time(s.sim), 0.1);
+    scene_close(&s);
+}
+END_TEST
+
 SUITE("ida", error_falls_with_rtol_in_order_2, error_falls_with_rtol_in_order_5,
       error_falls_with_rtol_over_kinks_of_tracks, atol_x_and_atol_v_are_the_weights,
       a_scene_far_away_takes_the_same_steps, max_step_is_kept, steps_end_at_kinks_and_start_anew,
       an_advance_that_ends_at_a_kink_starts_anew_too, frames_are_what_a_run_that_stops_there_has,
-      frames_do_not_change_the_steps, one_fault_is_recovered_from, a_fault_that_stays_ends_the_run)
+      frames_do_not_change_the_steps, one_fault_is_recovered_from, a_fault_that_stays_ends_the_run,
+      too_many_steps_end_the_run, steps_that_a_host_asks_for_are_not_counted,
+      an_advance_by_one_ulp_is_no_failure)
