@@ -157,7 +157,7 @@ static void print_results(const run *r)
     print_energy(r);
     print_wall(r, &s);
     if (r->recorder)
-        printf("output    %lld frames, steps.csv and summary.json in %s\n",
+        printf("output    %lld frames, steps.csv, energy.csv and summary.json in %s\n",
                (long long)drape_recorder_frames(r->recorder), r->request->out);
 }
 
@@ -222,7 +222,8 @@ static int load_and_run(const run_request *request)
 }
 
 static const cli_option options[] = {
-    {"out", CLI_TEXT, "DIR", "folder for frames, steps.csv and summary.json; made if it is not there",
+    {"out", CLI_TEXT, "DIR",
+     "folder for frames, steps.csv, energy.csv and summary.json; made if it is not there",
      offsetof(run_request, out), 0, NULL},
     {"summary", CLI_TEXT, "FILE", "write the summary there, too", offsetof(run_request, summary), 0, NULL},
 };

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "io/energy.h"
 #include "io/export.h"
 #include "io/steps.h"
 
@@ -24,7 +25,7 @@ struct drape_recorder {
     char *folder; /* without a slash at its end */
     output *outputs;
     size_t output_count;
-    drape_file steps;
+    drape_file steps, energies;
     int64_t frames;
     double last_time; /* [s] of the last frame */
     bool moved;       /* a step was accepted after the last frame */
@@ -71,6 +72,10 @@ static void write_frame(drape_recorder *r, double time, const double *positions)
 {
     for (size_t i = 0; i < r->output_count && !r->failure; i++)
         note(r, r->outputs[i].ops->write(r->ctx, r->outputs[i].state, r->frames, time, positions));
+    const drape_energy_row row = {
+        .frame = r->frames, .t = time, .t_state = drape_sim_time(r->sim), .energy = drape_sim_energy(r->sim)};
+    if (!r->failure)
+        note(r, drape_energy_write(&r->energies, &row));
     if (r->failure)
         return;
     r->frames++;
@@ -173,7 +178,9 @@ static drape_status open_files(drape_recorder *r)
         o->open = true; /* close is due after an open that failed, too */
         status = o->ops->open(r->ctx, drape_sim_model(r->sim), r->folder, o->state);
     }
-    return status ? status : drape_steps_open(r->ctx, r->folder, &r->steps);
+    if (!status)
+        status = drape_steps_open(r->ctx, r->folder, &r->steps);
+    return status ? status : drape_energy_open(r->ctx, r->folder, &r->energies);
 }
 
 static drape_status set_up(drape_recorder *r, const drape_recorder_def *def)
@@ -197,6 +204,7 @@ static void close_files(drape_recorder *r)
         o->open = false;
     }
     note(r, drape_file_close(&r->steps));
+    note(r, drape_file_close(&r->energies));
 }
 
 drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
@@ -256,6 +264,7 @@ void drape_recorder_destroy(drape_recorder **recorder)
         drape_free(r->ctx, r->outputs[i].state);
     drape_free(r->ctx, r->outputs);
     drape_file_destroy(&r->steps);
+    drape_file_destroy(&r->energies);
     drape_free(r->ctx, r->folder);
     drape_free(r->ctx, r);
     *recorder = NULL;

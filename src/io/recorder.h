@@ -1,4 +1,4 @@
-/* recorder.h: an observer that writes the frames and the step log of a sim into a folder. */
+/* recorder.h: an observer that writes the frames, the step log and the energies of a sim into a folder. */
 #ifndef DRAPE_IO_RECORDER_H
 #define DRAPE_IO_RECORDER_H
 
@@ -8,7 +8,7 @@
 typedef struct drape_recorder_def {
     const char *folder;         /* made, with those above it, if it is not there */
     const char *const *formats; /* format_count names of exporters; a name given twice counts once */
-    size_t format_count;        /* 0: the step log alone */
+    size_t format_count;        /* 0: the step log and the energies alone */
 } drape_recorder_def;
 
 typedef struct drape_recorder drape_recorder;

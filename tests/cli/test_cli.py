@@ -209,6 +209,11 @@ def test_run_files():
     equal(sum(int(row["iterations"]) for row in rows), summary["newton"]["iterations"])
     for row in rows:
         assert float(row["residual"]) <= float(row["tolerance"]) and row["accepted"] == "1", row
+    with open("deep/er/out/energy.csv", encoding="ascii", newline="") as file:
+        energies = list(csv.DictReader(file))
+    equal([row["frame"] for row in energies], [str(i) for i in range(frames)])
+    for key, value in summary["energy"].items():
+        equal(float(energies[-1][key]), value, "the last row and the summary: " + key)
 
 
 def test_last_frame():

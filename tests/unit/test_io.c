@@ -599,6 +599,48 @@ START_TEST(steps_quotes_and_keeps_digits)
 }
 END_TEST
 
+/* ---- Energies */
+
+#define ENERGY_FIELDS 10
+static const char energy_columns[] =
+    "frame,t,t_state,kinetic,elastic,gravity,contact,dissipated,numerical,total\n";
+
+/* The energies of frame k are those of the state at or after it, which the attempts saw. Frames of 1/40 s lie
+ * on and between steps of 1/100 s; the first is before any step. */
+START_TEST(energies_are_of_the_state_at_or_after_the_frame)
+{
+    world w;
+    size_t size;
+    set_up(&w);
+    const drape_energy start = drape_sim_energy(w.sim);
+    run(&w, NULL, 0.11);
+    char *data = slurp(in_folder(w.out, "energy.csv"), &size), *row = data + strlen(energy_columns);
+    ck_assert_int_eq(strncmp(data, energy_columns, strlen(energy_columns)), 0);
+    for (int k = 0; k < 6; k++) { /* and 0.11, where the run ends */
+        char *field[ENERGY_FIELDS + 1];
+        const double t = k < 5 ? k / RATE : 0.11;
+        const int step = (int)ceil(t / DT - 1e-9); /* the state after so many steps */
+        const drape_energy e = step > 0 ? w.seen.energy[step - 1] : start;
+        const double expected[] = {e.kinetic,
+                                   e.elastic,
+                                   e.gravity,
+                                   e.contact,
+                                   e.dissipated,
+                                   e.numerical,
+                                   e.kinetic + e.elastic + e.gravity + e.contact};
+        ck_assert_int_eq(split(row, field, ENERGY_FIELDS + 1, &row), ENERGY_FIELDS);
+        check_number(field[0], k);
+        ck_assert_double_eq_tol(strtod(field[1], NULL), t, 1e-15);
+        ck_assert_double_eq_tol(strtod(field[2], NULL), step * DT, 1e-15);
+        for (int i = 0; i < 7; i++)
+            check_number(field[3 + i], expected[i]);
+    }
+    ck_assert_ptr_eq(row, data + size);
+    free(data);
+    tear_down(&w);
+}
+END_TEST
+
 /* ---- Failures */
 
 /* No file may grow past size from here on: a full disk. Nothing is asserted until free_disk(). */
@@ -671,6 +713,27 @@ START_TEST(full_disk_leaves_whole_rows)
 }
 END_TEST
 
+/* Frames so often that their rows fill the disk before those of the steps do. */
+START_TEST(full_disk_leaves_whole_rows_of_energies)
+{
+    world w;
+    size_t size;
+    drape_sim_def def;
+    set_up(&w);
+    drape_sim_destroy(&w.sim);
+    drape_sim_def_init(&def, sizeof def);
+    def.frame_rate = 10 / DT;
+    ck_assert_int_eq(drape_sim_create(w.ctx, w.model, &def, &w.sim), DRAPE_OK);
+    run_on_small_disk(&w, NULL, 2000, "energy.csv");
+    char *data = slurp(in_folder(w.out, "energy.csv"), &size);
+    ck_assert_uint_gt(size, strlen(energy_columns));
+    ck_assert_uint_le(size, 2000);
+    ck_assert_int_eq(data[size - 1], '\n');
+    free(data);
+    tear_down(&w);
+}
+END_TEST
+
 START_TEST(full_disk_leaves_no_half_frame)
 {
     world w;
@@ -705,6 +768,10 @@ START_TEST(a_disk_full_from_the_start_is_told_at_once)
     unlink(in_folder(w.out, "steps.csv"));
     ck_assert_int_eq(symlink("/dev/full", in_folder(w.out, "steps.csv")), 0);
     refuse(&w, NULL, DRAPE_E_FILE, "/steps.csv\": No space left on device");
+    unlink(in_folder(w.out, "steps.csv"));
+    unlink(in_folder(w.out, "energy.csv"));
+    ck_assert_int_eq(symlink("/dev/full", in_folder(w.out, "energy.csv")), 0);
+    refuse(&w, NULL, DRAPE_E_FILE, "/energy.csv\": No space left on device");
     tear_down(&w);
 }
 END_TEST
@@ -790,6 +857,10 @@ START_TEST(a_killed_run_leaves_whole_files)
     ck_assert_int_eq(count_files(w.out, ".obj"), 6);
     data = slurp(in_folder(w.out, "steps.csv"), &size);
     ck_assert_uint_gt(size, strlen(columns));
+    ck_assert_int_eq(data[size - 1], '\n');
+    free(data);
+    data = slurp(in_folder(w.out, "energy.csv"), &size);
+    ck_assert_uint_gt(size, strlen(energy_columns));
     ck_assert_int_eq(data[size - 1], '\n');
     free(data);
     tear_down(&w);
@@ -1048,6 +1119,7 @@ END_TEST
 
 SUITE("io", npy_is_exact, npy_is_valid_after_each_frame, the_last_frame_comes_once, obj_parses_back,
       ply_parses_back, every_row_writes_the_same_frames, old_frames_are_removed_and_nothing_else,
+      energies_are_of_the_state_at_or_after_the_frame, full_disk_leaves_whole_rows_of_energies,
       steps_has_a_row_for_each_attempt, steps_quotes_and_keeps_digits, full_disk_leaves_a_valid_npy,
       full_disk_leaves_whole_rows, full_disk_leaves_no_half_frame, a_disk_full_from_the_start_is_told_at_once,
       bad_folders_are_refused, unknown_formats_are_refused_before_anything_is_made,

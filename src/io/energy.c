@@ -1,0 +1,43 @@
+/*
+ * energy.c: see energy.h. A row is one write to the system, so that a killed run leaves whole rows.
+ *
+ * The energies of interpolated positions would be wrong: stretching is so stiff that the error of an
+ * interpolation, harmless to the eye, may be an energy of the size of the motion's, and no velocities belong
+ * to it. So a row has those of an accepted state, and says when that was.
+ */
+#include "io/energy.h"
+
+#include <inttypes.h>
+#include <string.h>
+
+#include "io/csv.h"
+
+#define FILE_NAME "energy.csv"
+
+static const char columns[] = "frame,t,t_state,kinetic,elastic,gravity,contact,dissipated,numerical,total\n";
+
+drape_status drape_energy_open(drape_context *ctx, const char *folder, drape_file *file)
+{
+    drape_status status = drape_file_create(ctx, strlen(folder) + sizeof FILE_NAME, file);
+    if (status)
+        return status;
+    drape_file_name(file, "%s/" FILE_NAME, folder);
+    status = drape_file_begin(file);
+    if (status)
+        return status;
+    drape_file_put_text(file, columns);
+    return drape_file_publish(file);
+}
+
+drape_status drape_energy_write(drape_file *file, const drape_energy_row *row)
+{
+    const drape_energy *e = &row->energy;
+    const double numbers[] = {row->t,        row->t_state, e->kinetic,
+                              e->elastic,    e->gravity,   e->contact,
+                              e->dissipated, e->numerical, e->kinetic + e->elastic + e->gravity + e->contact};
+    drape_file_print(file, "%" PRId64, row->frame);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        drape_csv_put_number(file, numbers[i]);
+    drape_file_put_text(file, "\n");
+    return drape_file_keep(file);
+}
