@@ -166,10 +166,11 @@ typedef struct drape_term_ops {
      * element, like internal. */
     void (*initial)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *after);
 
-    /* Looks for a degenerate element: DRAPE_OK, or DRAPE_RETRY_DEGENERATE with *fault filled for the worst.
-     * NULL: none can be. */
-    drape_status (*check)(const drape_elements *el, const double *x, const double *internal,
-                          drape_fault *fault);
+    /* Looks for an element that a step from before to x made degenerate: DRAPE_OK, or DRAPE_RETRY_DEGENERATE
+     * with *fault filled for the worst. One that was so before and did not become worse is not the step's
+     * fault: else no step could lead out of it. before NULL: none is excused. check NULL: none can be. */
+    drape_status (*check)(const drape_elements *el, const double *x, const double *before,
+                          const double *internal, drape_fault *fault);
 } drape_term_ops;
 
 /* Registers a term of the host's own: scenes compiled with this context may name it from then on. ops must

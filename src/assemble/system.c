@@ -406,8 +406,8 @@ static drape_worst worst_element(const drape_term *term, const drape_fault *faul
     return worst;
 }
 
-drape_status drape_system_check(const drape_system *system, const double *x, const double *internal,
-                                const char **reason, drape_worst *worst)
+drape_status drape_system_check(const drape_system *system, const double *x, const double *before,
+                                const double *internal, const char **reason, drape_worst *worst)
 {
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
@@ -415,7 +415,7 @@ drape_status drape_system_check(const drape_system *system, const double *x, con
         if (!term->ops->check)
             continue;
         const double *own = term->first_internal >= 0 ? internal + term->first_internal : NULL;
-        drape_status status = term->ops->check(&term->elements, x, own, &fault);
+        drape_status status = term->ops->check(&term->elements, x, before, own, &fault);
         if (status) {
             *reason = fault.reason;
             *worst = worst_element(term, &fault);

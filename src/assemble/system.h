@@ -54,10 +54,11 @@ void drape_system_measures(drape_system *system, const drape_point *point, doubl
 void drape_system_term(drape_system *system, int32_t term, const drape_point *point, double *energy,
                        double *g, double *values);
 
-/* Looks for a degenerate element in all terms: DRAPE_OK or DRAPE_RETRY_DEGENERATE, with the worst filled in.
- * x is the new state, internal of the one before. */
-drape_status drape_system_check(const drape_system *system, const double *x, const double *internal,
-                                const char **reason, drape_worst *worst);
+/* Looks in all terms for an element that a step made degenerate: DRAPE_OK or DRAPE_RETRY_DEGENERATE, with the
+ * worst filled in. x is the new state; before and internal are of the one before. before NULL: also those that
+ * were degenerate already. */
+drape_status drape_system_check(const drape_system *system, const double *x, const double *before,
+                                const double *internal, const char **reason, drape_worst *worst);
 
 /* Which node, and what it belongs to, for a message about a vector over free DOFs: the entry of largest
  * magnitude, or the first that is not finite. */

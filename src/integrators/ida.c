@@ -471,7 +471,7 @@ static void name_worst(ida_state *s, drape_step_info *info)
         for (int64_t i = 0; i < s->n; i++)
             s->reduced[i] = s->g[node_at(s, i)];
         info->worst = drape_system_worst_dof(s->system, s->reduced, "force [N]", INFINITY);
-        drape_system_check(s->system, s->x, s->internal, &info->reason, &info->worst);
+        drape_system_check(s->system, s->x, NULL, s->internal, &info->reason, &info->worst);
         return;
     }
     if (IDAGetEstLocalErrors(s->ida, s->between))

@@ -350,7 +350,7 @@ static void count_iterations(drape_newton *s, drape_step_info *info)
 static drape_status blame_element(drape_newton *s, drape_status status, drape_step_info *info)
 {
     drape_status degenerate =
-        drape_system_check(s->system, s->x, s->problem->internal, &info->reason, &info->worst);
+        drape_system_check(s->system, s->x, NULL, s->problem->internal, &info->reason, &info->worst);
     return degenerate ? degenerate : status;
 }
 

@@ -85,7 +85,7 @@ static drape_status pseudo_step(static_state *s, double weight, drape_state *out
         return status;
     for (size_t i = 0; i < 3 * (size_t)c->model->free_count; i++)
         c->x_base[drape_implicit_at(c, i)] += c->d[i];
-    status = drape_system_check(c->system, c->x_base, s->internal, &info->reason, &info->worst);
+    status = drape_system_check(c->system, c->x_base, out->x, s->internal, &info->reason, &info->worst);
     if (status)
         return status;
     memcpy(out->x, c->x_base, 3 * (size_t)c->model->node_count * sizeof *out->x);

@@ -32,8 +32,8 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
         info->reason = "energy";
         return DRAPE_RETRY_REJECTED;
     }
-    return drape_system_check(sim->system, next->x, drape_sim_state(sim)->internal, &info->reason,
-                              &info->worst);
+    const drape_state *before = drape_sim_state(sim);
+    return drape_system_check(sim->system, next->x, before->x, before->internal, &info->reason, &info->worst);
 }
 
 /* ---- Attempt ---- */

@@ -62,8 +62,7 @@ static const drape_param params[PARAM_COUNT] = {
          .min = 0,
          .max = 1,
          .open_max = true,
-         .help =
-             "a step that leaves an altitude over a hinge below this share of its rest value is rejected"},
+         .help = "a step that takes an altitude over a hinge below this share of its rest value is rejected"},
     [PARAM_MAX_TURN] =
         {.name = "max_turn",
          .kind = DRAPE_PARAM_NUMBER,
@@ -251,9 +250,25 @@ static void keep_worst(drape_fault *worst, const char *reason, const char *what,
         (drape_fault){.reason = reason, .what = what, .element = element, .value = value, .limit = limit};
 }
 
+/* Altitude over that at rest. */
+static double ratio_of(const drape_elements *el, int32_t element, const hinge *h, int s)
+{
+    return h->side[s].altitude / el->rest[(size_t)(REST_ALTITUDE1 + s) * (size_t)el->count + (size_t)element];
+}
+
+static bool altitude_fell(const drape_elements *el, int32_t element, const hinge *h, int s,
+                          const double *before)
+{
+    hinge was;
+    if (!before)
+        return true;
+    measure_hinge(el, element, before, &was);
+    return drape_fell(ratio_of(el, element, h, s), ratio_of(el, element, &was, s));
+}
+
 /* The lowest altitude counts first: where a triangle has collapsed its angle means nothing. */
-static drape_status check(const drape_elements *el, const double *x, const double *internal,
-                          drape_fault *fault)
+static drape_status check(const drape_elements *el, const double *x, const double *before,
+                          const double *internal, drape_fault *fault)
 {
     drape_fault altitude = {.element = -1, .value = INFINITY}, turn = {.element = -1, .value = -INFINITY};
     double min_altitude = el->params[PARAM_MIN_ALTITUDE], max_turn = el->params[PARAM_MAX_TURN];
@@ -261,9 +276,8 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
         hinge h;
         measure_hinge(el, i, x, &h);
         for (int s = 0; s < 2; s++) {
-            double ratio =
-                h.side[s].altitude / el->rest[(size_t)(REST_ALTITUDE1 + s) * (size_t)el->count + (size_t)i];
-            if (ratio < altitude.value)
+            double ratio = ratio_of(el, i, &h, s);
+            if (ratio < altitude.value && (ratio >= min_altitude || altitude_fell(el, i, &h, s, before)))
                 keep_worst(&altitude, "altitude_collapse", "altitude / rest altitude", i, ratio,
                            min_altitude);
         }

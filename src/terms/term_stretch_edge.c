@@ -39,7 +39,7 @@ static const drape_param params[PARAM_COUNT] = {
          .min = 0,
          .max = 1,
          .open_max = true,
-         .help = "a step that leaves an edge shorter than this share of its rest length is rejected"},
+         .help = "a step that makes an edge shorter than this share of its rest length is rejected"},
 };
 
 static double element_stiffness(const drape_cloth_view *cloth, int32_t edge, double choice)
@@ -107,24 +107,32 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
     }
 }
 
-static drape_status check(const drape_elements *el, const double *x, const double *internal,
-                          drape_fault *fault)
+/* Length over rest length. */
+static double ratio_of(const drape_elements *el, int32_t e, const double *x)
+{
+    const int32_t *node = el->node + 2 * (size_t)e;
+    double d[3];
+    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], d);
+    return vec3_norm(d) * el->rest[(size_t)REST_INVERSE_LENGTH * (size_t)el->count + (size_t)e];
+}
+
+static drape_status check(const drape_elements *el, const double *x, const double *before,
+                          const double *internal, drape_fault *fault)
 {
     (void)internal;
-    const double *inverse = el->rest + (size_t)REST_INVERSE_LENGTH * (size_t)el->count;
     *fault = (drape_fault){.reason = "edge_collapse",
                            .what = "edge length / rest length",
                            .element = -1,
                            .value = INFINITY,
                            .limit = el->params[PARAM_COLLAPSE]};
     for (int32_t e = 0; e < el->count; e++) {
-        double d[3];
-        vec3_sub(x + 3 * (size_t)el->node[2 * (size_t)e + 1], x + 3 * (size_t)el->node[2 * (size_t)e], d);
-        double ratio = vec3_norm(d) * inverse[e];
-        if (ratio < fault->value) {
-            fault->value = ratio;
-            fault->element = e;
-        }
+        double ratio = ratio_of(el, e, x);
+        if (!(ratio < fault->value))
+            continue;
+        if (ratio < fault->limit && before && !drape_fell(ratio, ratio_of(el, e, before)))
+            continue;
+        fault->value = ratio;
+        fault->element = e;
     }
     return fault->value < fault->limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
 }

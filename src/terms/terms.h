@@ -7,4 +7,11 @@
 
 extern const drape_term_ops *const drape_terms[]; /* NULL-ended */
 
+/* Whether a step is to blame for a ratio (of a length to that at rest) below its limit: it fell. The slack is
+ * rounding: of coordinates up to a thousand lengths away. */
+static inline bool drape_fell(double ratio, double before)
+{
+    return ratio < before - 1e-12;
+}
+
 #endif

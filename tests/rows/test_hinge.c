@@ -193,8 +193,8 @@ static void free_sheet(sheet *s)
     drape_context_destroy(&s->ctx);
 }
 
-/* Moves node a to the line from p to q, leaving 1e-8 of the way to it. */
-static void flatten(double *x, const int32_t *node)
+/* Moves node a to the line from p to q, leaving a share of the way to it. */
+static void flatten(double *x, const int32_t *node, double share)
 {
     const double *p = x + 3 * node[0], *q = x + 3 * node[1];
     double *a = x + 3 * node[2], along = 0, length = 0;
@@ -204,7 +204,7 @@ static void flatten(double *x, const int32_t *node)
     }
     for (int k = 0; k < 3; k++) {
         double foot = p[k] + along / length * (q[k] - p[k]);
-        a[k] = foot + 1e-8 * (a[k] - foot);
+        a[k] = foot + share * (a[k] - foot);
     }
 }
 
@@ -219,10 +219,10 @@ START_TEST(a_collapsed_altitude_is_told)
         drape_worst worst = {.what = ""};
         double kept[3 * IRREGULAR_NODES];
         memcpy(kept, s.state.x, sizeof kept);
-        ck_assert_int_eq(drape_system_check(s.system, s.state.x, s.state.internal, &reason, &worst),
+        ck_assert_int_eq(drape_system_check(s.system, s.state.x, NULL, s.state.internal, &reason, &worst),
                          DRAPE_OK);
-        flatten(s.state.x, el->node + 4 * e);
-        ck_assert_int_eq(drape_system_check(s.system, s.state.x, s.state.internal, &reason, &worst),
+        flatten(s.state.x, el->node + 4 * e, 1e-8);
+        ck_assert_int_eq(drape_system_check(s.system, s.state.x, NULL, s.state.internal, &reason, &worst),
                          DRAPE_RETRY_DEGENERATE);
         ck_assert_str_eq(reason, "altitude_collapse");
         ck_assert_str_eq(worst.term, "bend.hinge");
@@ -253,7 +253,7 @@ START_TEST(a_collapsed_edge_is_told)
         for (int k = 0; k < 3; k++)
             s.state.x[3 * node[0] + k] +=
                 (1 - 1e-7) * (s.state.x[3 * node[1] + k] - s.state.x[3 * node[0] + k]);
-        ck_assert_int_eq(drape_system_check(s.system, s.state.x, s.state.internal, &reason, &worst),
+        ck_assert_int_eq(drape_system_check(s.system, s.state.x, NULL, s.state.internal, &reason, &worst),
                          DRAPE_RETRY_DEGENERATE);
         ck_assert_str_eq(reason, "edge_collapse");
         ck_assert_str_eq(worst.term, "stretch.edge");
@@ -268,6 +268,53 @@ START_TEST(a_collapsed_edge_is_told)
 }
 END_TEST
 
+/* Steps of the first element from 1e-7 of its rest shape to a share of it. */
+static void check_below_limit(const char *term, void (*squeeze)(double *x, const int32_t *node, double share))
+{
+    sheet s = make_sheet(term);
+    const int32_t *node = s.model->terms[0].elements.node;
+    const char *reason = "";
+    drape_worst worst = {.what = ""};
+    double rest[3 * IRREGULAR_NODES], before[3 * IRREGULAR_NODES];
+    memcpy(rest, s.state.x, sizeof rest);
+    memcpy(before, rest, sizeof before);
+    squeeze(before, node, 1e-7);
+    static const struct {
+        double share; /* of rest, after the step from 1e-7 */
+        drape_status status;
+    } steps[] = {{1e-7, DRAPE_OK}, /* it stays */
+                 {2e-7, DRAPE_OK}, /* it leaves, not far enough to be above */
+                 {1, DRAPE_OK},
+                 {0.9e-7, DRAPE_RETRY_DEGENERATE}};
+    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
+        memcpy(s.state.x, rest, sizeof rest);
+        squeeze(s.state.x, node, steps[i].share);
+        drape_status status =
+            drape_system_check(s.system, s.state.x, before, s.state.internal, &reason, &worst);
+        ck_assert_msg(status == steps[i].status, "%s, to %g of rest: %s", term, steps[i].share,
+                      drape_status_name(status));
+        if (steps[i].share < 1)
+            ck_assert_int_eq(drape_system_check(s.system, s.state.x, NULL, s.state.internal, &reason, &worst),
+                             DRAPE_RETRY_DEGENERATE);
+    }
+    free_sheet(&s);
+}
+
+static void shorten(double *x, const int32_t *node, double share)
+{
+    for (int k = 0; k < 3; k++)
+        x[3 * node[0] + k] = x[3 * node[1] + k] + share * (x[3 * node[0] + k] - x[3 * node[1] + k]);
+}
+
+/* Below its limit before the step: it may stay or grow, so that a crumpled start can be left; it must not
+ * fall. */
+START_TEST(what_was_degenerate_must_not_become_worse)
+{
+    check_below_limit("stretch.edge", shorten);
+    check_below_limit("bend.hinge", flatten);
+}
+END_TEST
+
 /* A fold of more than 2.8 in a step is not told from one the other way. */
 START_TEST(a_turn_that_is_too_large_is_told)
 {
@@ -275,17 +322,20 @@ START_TEST(a_turn_that_is_too_large_is_told)
     const char *reason = "";
     drape_worst worst = {.what = ""};
     place_apex(h.after.x, 2.7);
-    ck_assert_int_eq(drape_system_check(h.system, h.after.x, h.before.internal, &reason, &worst), DRAPE_OK);
+    ck_assert_int_eq(drape_system_check(h.system, h.after.x, h.before.x, h.before.internal, &reason, &worst),
+                     DRAPE_OK);
     place_apex(h.after.x, 2.9);
-    ck_assert_int_eq(drape_system_check(h.system, h.after.x, h.before.internal, &reason, &worst),
+    ck_assert_int_eq(drape_system_check(h.system, h.after.x, h.before.x, h.before.internal, &reason, &worst),
                      DRAPE_RETRY_DEGENERATE);
     ck_assert_str_eq(reason, "hinge_branch");
     ck_assert_double_eq_tol(worst.value, 2.9, 1e-12);
     ck_assert_double_eq(worst.limit, 2.8);
     accept_angle(&h, 1); /* from 1 it is a turn of 1.9 */
-    ck_assert_int_eq(drape_system_check(h.system, h.after.x, h.before.internal, &reason, &worst), DRAPE_OK);
+    ck_assert_int_eq(drape_system_check(h.system, h.after.x, h.before.x, h.before.internal, &reason, &worst),
+                     DRAPE_OK);
     place_apex(h.after.x, 2.9);
-    ck_assert_int_eq(drape_system_check(h.system, h.after.x, h.before.internal, &reason, &worst), DRAPE_OK);
+    ck_assert_int_eq(drape_system_check(h.system, h.after.x, h.before.x, h.before.internal, &reason, &worst),
+                     DRAPE_OK);
     free_hinge(&h);
 }
 END_TEST
@@ -343,4 +393,5 @@ END_TEST
 
 SUITE("hinge", folds_through_pi_smoothly, the_bare_angle_would_jump, only_accepted_states_count,
       rest_angles_of_the_mesh_or_flat, a_collapsed_altitude_is_told, a_collapsed_edge_is_told,
-      a_turn_that_is_too_large_is_told, the_message_names_the_element)
+      what_was_degenerate_must_not_become_worse, a_turn_that_is_too_large_is_told,
+      the_message_names_the_element)
