@@ -278,6 +278,23 @@ DRAPE_API void drape_sim_destroy(drape_sim **sim);
  * asked), DRAPE_E_ARGUMENT (t_end not finite); the message names time, step, reason and worst element. */
 DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);
 
+/* Puts the sim into a state of the host's own, from which the next advance starts: time [s], 0 to 1e9, before
+ * or after the present one; positions [m] and velocities [m/s], node_count x 3, copied. Pinned nodes must lie
+ * where their pins have them at t, to 1e-9 of the scene's size, and are put there exactly; the velocities of
+ * fixed ones become 0, those of moved ones are taken until a step gives them the mean of their track. Internal
+ * variables follow from the positions: a hinge's angle is taken on the branch nearest to its present one.
+ *
+ * The integrator and the controller start anew, as after a kink; steps are counted from t, and the energies
+ * dissipated and numerical from 0. Frames go on with the first at or after t; where t is the present time, with
+ * the next that was not told. Statistics go on. Positions and velocities that a sim of the same model had, at
+ * the same time, are taken to the bit, so a one-step integrator goes on from them as that sim did where k dt
+ * has no rounding.
+ *
+ * Nothing is allocated, and no element checked: a state with one that is degenerate is a start that steps may
+ * lead out of. Not for observers. Errors: DRAPE_E_ARGUMENT (NULL, not finite, a pinned node elsewhere), and
+ * then nothing has changed. Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, const double *v);
+
 /* The last accepted state: time [s], positions [m] and velocities [m/s], node_count x 3; valid until the next
  * call that changes the sim. */
 DRAPE_API double drape_sim_time(const drape_sim *sim);
@@ -290,7 +307,7 @@ DRAPE_API const drape_model *drape_sim_model(const drape_sim *sim);
 DRAPE_API uint64_t drape_sim_hash(const drape_sim *sim);
 
 /* Energies of the last accepted state [J]. gravity: the potential, zero at the origin. dissipated: the work
- * that damping and drag terms took since t = 0. numerical: what is missing otherwise, the integrator's own
+ * that damping and drag terms took since t = 0 or drape_sim_set_state. numerical: what is missing otherwise, the integrator's own
  * dissipation (negative: gain), after the work of moving pins. */
 typedef struct drape_energy {
     double kinetic, elastic, gravity, contact, dissipated, numerical;
@@ -311,7 +328,7 @@ typedef struct drape_statistics {
 DRAPE_API drape_statistics drape_sim_statistics(const drape_sim *sim);
 
 /* Reasons for which attempts were rejected, with their counts: "max_iterations", "line_search",
- * "edge_collapse" ... index runs from 0; *count is 0 and the result NULL past the last. */
+ * "edge_collapse" ..., "other" for all past the 31st. index runs from 0; *count is 0 and the result NULL past the last. */
 DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t *count);
 
 /* ---- Observers ---- */
@@ -357,7 +374,7 @@ typedef struct drape_event {
 
 /* Called within drape_sim_advance. Returns 0 to go on, anything else to stop: the advance then returns
  * DRAPE_E_STOPPED if the value was > 0, else that status, with the message that the observer may have set by
- * drape_context_set_message. An observer must not advance or destroy the sim. */
+ * drape_context_set_message. An observer must not advance or destroy the sim, nor set its state. */
 typedef drape_status drape_observer(void *user, const drape_event *event);
 
 /* Adds an observer; they are called in the order in which they were added, at most 8. Errors:

@@ -38,6 +38,15 @@ drape_energy drape_sim_energy(drape_sim *sim)
     return e;
 }
 
+void drape_sim_reset_energy(drape_sim *sim)
+{
+    sim->dissipated = sim->pin_work = 0;
+    sim->energy_known = false;
+    drape_energy e = drape_sim_energy(sim);
+    sim->start_energy = e.kinetic + e.elastic + e.gravity;
+    sim->energy_known = false;
+}
+
 /* The energy of the scene's mass at the scene's speed: the unit in which rounding may move a sheet at
  * rest. */
 static double scene_energy(const drape_model *m)

@@ -96,9 +96,7 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
     }
     drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
                         drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
-    drape_energy e = drape_sim_energy(sim);
-    sim->start_energy = e.kinetic + e.elastic + e.gravity;
-    sim->energy_known = false;
+    drape_sim_reset_energy(sim);
     sim->statistics.wall_setup = drape_clock_seconds() - start;
     *out = sim;
     return DRAPE_OK;

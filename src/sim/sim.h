@@ -7,7 +7,7 @@
 #include "sim/schedule.h"
 
 #define DRAPE_MAX_OBSERVERS 8
-#define DRAPE_MAX_REASONS   32
+#define DRAPE_MAX_REASONS   32 /* of which the last is "other" where there are more */
 
 typedef struct drape_reason {
     const char *reason; /* static text */
@@ -51,6 +51,12 @@ static inline const drape_state *drape_sim_state(const drape_sim *sim)
  * Cheap unless that is likely. */
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, const drape_step_info *info,
                         drape_worst *worst);
+
+/* The energy of the present state is the one that the audit starts from. */
+void drape_sim_reset_energy(drape_sim *sim);
+
+/* Of a badly distorted present state: the clause of a message that names its worst edge or triangle; else "". */
+void drape_sim_describe_distortion(const drape_sim *sim, char *text, size_t size);
 
 /* Tells the observers. 0 to go on, else the negative status to stop with. */
 drape_status drape_sim_tell(drape_sim *sim, const drape_event *event);

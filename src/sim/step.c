@@ -82,8 +82,8 @@ static void turn_states(drape_sim *sim)
         sim->past[k] = spare;
         spare = older;
     }
-    if (spare < 0) /* not all places were filled yet: the first free one */
-        spare = (int)sim->statistics.steps_accepted + 2;
+    while (spare < 0 || spare == sim->next || spare == sim->past[0] || spare == sim->past[1])
+        spare++; /* not all places are filled yet: the first free one */
     sim->before = sim->now;
     sim->now = sim->next;
     sim->next = spare;
@@ -111,8 +111,10 @@ static void count_reason(drape_sim *sim, const char *reason)
     int i = 0;
     while (i < sim->reason_count && strcmp(sim->reasons[i].reason, reason) != 0)
         i++;
-    if (i == DRAPE_MAX_REASONS)
-        return;
+    if (i == sim->reason_count && i >= DRAPE_MAX_REASONS - 1) {
+        i = DRAPE_MAX_REASONS - 1;
+        reason = "other";
+    }
     if (i == sim->reason_count)
         sim->reasons[sim->reason_count++] = (drape_reason){.reason = reason};
     sim->reasons[i].count++;
@@ -182,14 +184,16 @@ static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
 
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
-    char worst[400], residual[100] = "";
+    char worst[400], residual[100] = "", distortion[200] = "";
     describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
+    if (attempt->worst.element < 0) /* a node says where, an element may say why */
+        drape_sim_describe_distortion(sim, distortion, sizeof distortion);
     if (!isnan(attempt->tolerance)) /* rows that bound errors have none */
         snprintf(residual, sizeof residual, ", residual %.4g N for a tolerance of %.4g N", attempt->residual,
                  attempt->tolerance);
-    return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s", attempt->t,
+    return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s", attempt->t,
                       attempt->h, attempt->reason, drape_status_name(attempt->status), attempt->iterations,
-                      residual, worst);
+                      residual, worst, distortion);
 }
 
 static drape_status tell_attempt(drape_sim *sim, const drape_attempt *attempt)

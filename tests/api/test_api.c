@@ -916,6 +916,362 @@ START_TEST(statistics_agree_with_what_was_told)
 }
 END_TEST
 
+/* ---- States of the host's own
+ * ------------------------------------------------------------------------------------- */
+
+#define MAX_NODES 36
+
+typedef struct state {
+    double t, x[3 * MAX_NODES], v[3 * MAX_NODES];
+} state;
+
+static state state_of(const drape_sim *sim)
+{
+    state s = {.t = drape_sim_time(sim)};
+    const size_t size = 3 * (size_t)drape_model_node_count(drape_sim_model(sim)) * sizeof(double);
+    memcpy(s.x, drape_sim_positions(sim), size);
+    memcpy(s.v, drape_sim_velocities(sim), size);
+    return s;
+}
+
+static drape_status set_state(drape_sim *sim, const state *s)
+{
+    return drape_sim_set_state(sim, s->t, s->x, s->v);
+}
+
+static drape_sim *make_sim_of(drape_context *ctx, const drape_model *model, const char *integrator,
+                              const char *controller)
+{
+    drape_sim *sim = NULL;
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator = integrator;
+    def.controller = controller;
+    def.dt = 1.0 / 64;
+    ck_assert_msg(drape_sim_create(ctx, model, &def, &sim) == DRAPE_OK, "%s", drape_context_message(ctx));
+    return sim;
+}
+
+/* Backward Euler without forces but gravity: n steps of h from v0 move by n h v0 + g h^2 n (n + 1)/2, and h and
+ * the sums are exact in binary but for rounding of g. */
+START_TEST(a_state_of_the_host_is_where_a_run_starts)
+{
+    drape_context *ctx = make_context();
+    host_scene h;
+    drape_model *model;
+    fill_scene(&h);
+    h.cloth.pin_count = 0;
+    h.cloth.term_count = 0;
+    ck_assert_int_eq(drape_model_create(ctx, &h.scene, &model), DRAPE_OK);
+    drape_sim *sim = make_sim_of(ctx, model, "be", "fixed");
+    ck_assert_int_eq(drape_sim_advance(sim, 0.25), DRAPE_OK);
+    state s = state_of(sim);
+    s.t = 2;
+    for (int i = 0; i < 3 * MAX_NODES; i++) {
+        s.x[i] = 0.1 * i;
+        s.v[i] = 1 - 0.01 * i;
+    }
+    ck_assert_int_eq(set_state(sim, &s), DRAPE_OK);
+    ck_assert_double_eq(drape_sim_time(sim), 2);
+    ck_assert_mem_eq(drape_sim_positions(sim), s.x, sizeof s.x);
+    ck_assert_mem_eq(drape_sim_velocities(sim), s.v, sizeof s.v);
+    ck_assert_int_eq(drape_sim_advance(sim, 3), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_statistics(sim).steps_accepted, 16 + 64);
+    for (int i = 0; i < 3 * MAX_NODES; i++) {
+        const double g = h.scene.gravity[i % 3];
+        ck_assert_double_eq_tol(drape_sim_velocities(sim)[i], s.v[i] + g, 1e-10);
+        ck_assert_double_eq_tol(drape_sim_positions(sim)[i], s.x[i] + s.v[i] + g * 65 / 128, 1e-10);
+    }
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* One sim's state given to another, with hinges, dashpots and a moving pin: both go on alike, to the bit, and
+ * the other's energies are counted from there. */
+START_TEST(a_state_of_another_sim_is_taken_to_the_bit)
+{
+    static const char *const rows[] = {"be", "midpoint"};
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    for (int i = 0; i < 2; i++) {
+        drape_sim *one = make_sim_of(ctx, model, rows[i], "fixed"),
+                  *other = make_sim_of(ctx, model, rows[i], "fixed");
+        ck_assert_int_eq(drape_sim_advance(one, 0.25), DRAPE_OK);
+        const state middle = state_of(one);
+        const drape_energy before = drape_sim_energy(one);
+        ck_assert_int_eq(set_state(other, &middle), DRAPE_OK);
+        ck_assert_uint_eq(drape_sim_hash(other), drape_sim_hash(one));
+        const drape_energy start = drape_sim_energy(other);
+        ck_assert_double_eq(start.kinetic, before.kinetic);
+        ck_assert_double_eq(start.elastic, before.elastic);
+        ck_assert_double_eq(start.dissipated, 0);
+        ck_assert_double_eq(start.numerical, 0);
+        ck_assert_int_eq(drape_sim_advance(one, 0.5), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_advance(other, 0.5), DRAPE_OK);
+        ck_assert_uint_eq(drape_sim_hash(other), drape_sim_hash(one));
+        const drape_energy a = drape_sim_energy(one), b = drape_sim_energy(other);
+        ck_assert_double_gt(b.dissipated, 0);
+        ck_assert_double_eq_tol(b.dissipated, a.dissipated - before.dissipated, 1e-12); /* of sums of 1 J */
+        ck_assert_double_eq_tol(b.numerical, a.numerical - before.numerical, 1e-12);
+        drape_sim_destroy(&one);
+        drape_sim_destroy(&other);
+    }
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* What a sim did before leaves no trace: it goes on from a state as a new sim does, to the bit, forwards and
+ * back in time, under every integrator and controller. */
+START_TEST(the_past_does_not_count_after_a_state_was_set)
+{
+    static const char *const rows[][2] = {{"be", "halving"},     {"bdf2", "halving"}, {"midpoint", "strain"},
+                                          {"ida", "halving"},    {"be", "error"},     {"bdf2", "error"},
+                                          {"midpoint", "error"}, {"ida", "fixed"}};
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    drape_sim *source = make_sim_of(ctx, model, "be", "halving");
+    ck_assert_int_eq(drape_sim_advance(source, 0.125), DRAPE_OK);
+    const state s = state_of(source);
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        drape_sim *used = make_sim_of(ctx, model, rows[i][0], rows[i][1]),
+                  *fresh = make_sim_of(ctx, model, rows[i][0], rows[i][1]);
+        ck_assert_msg(drape_sim_advance(used, 0.3) == DRAPE_OK, "%s", drape_context_message(ctx));
+        ck_assert_int_eq(set_state(used, &s), DRAPE_OK);
+        ck_assert_int_eq(set_state(fresh, &s), DRAPE_OK);
+        for (int k = 1; k <= 4; k++) {
+            ck_assert_msg(drape_sim_advance(used, 0.125 + 0.05 * k) == DRAPE_OK, "%s",
+                          drape_context_message(ctx));
+            ck_assert_msg(drape_sim_advance(fresh, 0.125 + 0.05 * k) == DRAPE_OK, "%s",
+                          drape_context_message(ctx));
+            ck_assert_msg(drape_sim_hash(used) == drape_sim_hash(fresh), "%s, %s, %g s later", rows[i][0],
+                          rows[i][1], 0.05 * k);
+        }
+        drape_sim_destroy(&used);
+        drape_sim_destroy(&fresh);
+    }
+    drape_sim_destroy(&source);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+static void refuse_state(drape_context *ctx, drape_sim *sim, const state *s, const char *part)
+{
+    const uint64_t hash = drape_sim_hash(sim);
+    ck_assert_int_eq(set_state(sim, s), DRAPE_E_ARGUMENT);
+    check_message(ctx, part);
+    ck_assert_uint_eq(drape_sim_hash(sim), hash);
+}
+
+START_TEST(states_of_the_host_are_checked)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    drape_sim *sim = make_sim(ctx, model);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
+    const state good = state_of(sim);
+    const uint64_t hash = drape_sim_hash(sim);
+    static const double times[] = {-1e-9, NAN, INFINITY, 1.1e9};
+    ck_assert_int_eq(drape_sim_set_state(NULL, 0, good.x, good.v), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_sim_set_state(sim, 0.1, NULL, good.v), DRAPE_E_ARGUMENT);
+    check_message(ctx, "there are no positions");
+    ck_assert_int_eq(drape_sim_set_state(sim, 0.1, good.x, NULL), DRAPE_E_ARGUMENT);
+    check_message(ctx, "there are no velocities");
+    for (int i = 0; i < 4; i++) {
+        state bad = good;
+        bad.t = times[i];
+        refuse_state(ctx, sim, &bad, "it is 0 to 1e+09 s");
+    }
+    state bad = good;
+    bad.x[3 * 7 + 1] = NAN;
+    refuse_state(ctx, sim, &bad, "the position of node 7 of sheet is nan");
+    bad = good;
+    bad.v[3 * 35 + 2] = -INFINITY;
+    refuse_state(ctx, sim, &bad, "the velocity of node 35 of sheet is -inf");
+    bad = good;
+    bad.x[0] += 1e-6; /* node 0 is fixed */
+    refuse_state(ctx, sim, &bad, "node 0 of sheet is at (");
+    bad = good;
+    bad.t = 0.2; /* the other pin has gone on by 5 cm */
+    refuse_state(ctx, sim, &bad, "its pin has it at (");
+    bad = good; /* rounding is not refused, nor kept; nor is a velocity of a fixed node */
+    bad.x[0] += 1e-12;
+    bad.v[0] = 3;
+    ck_assert_int_eq(set_state(sim, &bad), DRAPE_OK);
+    ck_assert_uint_eq(drape_sim_hash(sim), hash);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+typedef struct frame_times {
+    int64_t frames, number; /* of the first */
+    double first;
+} frame_times;
+
+static drape_status note_frame_time(void *user, const drape_event *event)
+{
+    frame_times *r = user;
+    if (event->kind == DRAPE_EVENT_FRAME && r->frames++ == 0) {
+        r->first = event->time;
+        r->number = event->frame;
+    }
+    return DRAPE_OK;
+}
+
+/* Frames of 1/30 s: the first at or after the new time; none twice where the time stays. */
+START_TEST(frames_follow_the_time_of_a_state)
+{
+    static const struct {
+        double t, end;
+        int64_t frames;
+        double first;
+    } jumps[] = {{0.3, 0.35, 2, 0.3}, /* frames 9, 10 */
+                 {0.41, 0.45, 1, 13 / 30.0},
+                 {0.1, 0.15, 2, 0.1},       /* back, to frame 3 and 4 */
+                 {0.15, 0.19, 1, 5 / 30.0}, /* the present time */
+                 {0, 0.01, 1, 0}};
+    drape_context *ctx = make_context();
+    host_scene h;
+    drape_model *model;
+    frame_times r = {0};
+    fill_scene(&h);
+    h.cloth.pin_count = 0;
+    ck_assert_int_eq(drape_model_create(ctx, &h.scene, &model), DRAPE_OK);
+    drape_sim *sim = make_sim(ctx, model);
+    ck_assert_int_eq(drape_sim_observe(sim, note_frame_time, &r), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
+    for (size_t i = 0; i < sizeof jumps / sizeof *jumps; i++) {
+        state s = state_of(sim);
+        s.t = jumps[i].t;
+        memset(&r, 0, sizeof r);
+        ck_assert_int_eq(set_state(sim, &s), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_advance(sim, jumps[i].end), DRAPE_OK);
+        ck_assert_int_eq(r.frames, jumps[i].frames);
+        ck_assert_double_eq_tol(r.first, jumps[i].first, 1e-15);
+        ck_assert_int_eq(r.number, llround(30 * r.first));
+    }
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* A push between two advances at a frame's time: that frame is not told again. */
+START_TEST(a_push_repeats_no_frame)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    drape_sim *sim = make_sim(ctx, model);
+    record r = {0};
+    ck_assert_int_eq(drape_sim_observe(sim, observe, &r), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
+    ck_assert_int_eq(r.frames, 4);
+    state s = state_of(sim);
+    for (int i = 0; i < MAX_NODES; i++)
+        s.v[3 * i] += 0.5;
+    ck_assert_int_eq(set_state(sim, &s), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.11), DRAPE_OK);
+    ck_assert_int_eq(r.frames, 4);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* ---- Reasons and explanations
+ * ------------------------------------------------------------------------------------- */
+
+/* A term that finds another fault in every step. */
+static int faults_found;
+
+static drape_status fussy_check(const drape_elements *el, const double *x, const double *before,
+                                const double *internal, drape_fault *fault)
+{
+    static char names[50][20];
+    (void)el, (void)x, (void)before, (void)internal;
+    char *name = names[faults_found < 50 ? faults_found++ : 49];
+    snprintf(name, sizeof *names, "fault%d", faults_found);
+    *fault = (drape_fault){.reason = name, .what = "fault", .element = 0};
+    return DRAPE_RETRY_DEGENERATE;
+}
+
+START_TEST(more_reasons_than_there_is_room_for_are_other)
+{
+    drape_context *ctx = make_context();
+    drape_model *model;
+    drape_sim *sim = NULL;
+    drape_sim_def def;
+    drape_term_ops fussy = attract;
+    int64_t count = 0, sum = 0;
+    fussy.check = fussy_check;
+    faults_found = 0;
+    ck_assert_int_eq(drape_context_add_term(ctx, &fussy), DRAPE_OK);
+    drape_status status = compile_text(ctx, ATTRACTED("{'type': 'host.attract', 'stiffness': 10}"), &model);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+    drape_sim_def_init(&def, sizeof def);
+    def.dt = 0.001;
+    def.dt_min = ldexp(0.001, -40) * 0.99; /* 41 attempts */
+    ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(sim, 1), DRAPE_E_STEP_TOO_SMALL);
+    for (int i = 0; i < 32; i++) {
+        char expected[16];
+        snprintf(expected, sizeof expected, i < 31 ? "fault%d" : "other", i + 1);
+        ck_assert_str_eq(drape_sim_reason(sim, i, &count), expected);
+        ck_assert_int_eq(count, i < 31 ? 1 : 10);
+        sum += count;
+    }
+    ck_assert_ptr_null(drape_sim_reason(sim, 32, &count));
+    ck_assert_int_eq(sum, drape_sim_statistics(sim).steps_rejected);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* One Newton iteration is not enough: the residual's worst node is named, and if the sheet has lost its shape
+ * somewhere, what is there: edges of 3 m that were of 0.1 m, a triangle at 2 % of its altitude. */
+START_TEST(a_failure_names_what_is_distorted)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    drape_sim *sim = NULL;
+    drape_sim_def def;
+    const drape_setting one = {"max_iterations", 1, NULL};
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator_settings = &one;
+    def.integrator_setting_count = 1;
+    def.controller = "fixed";
+    ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
+    const state rest = state_of(sim);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_E_SOLVER);
+    check_message(ctx, "worst at (node ");
+    ck_assert_ptr_null(strstr(drape_context_message(ctx), "distorted"));
+    state s = rest;
+    s.x[3 * 14 + 1] += 3;
+    ck_assert_int_eq(set_state(sim, &s), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_E_SOLVER);
+    check_message(ctx, "; most distorted: edge (nodes 13 14 of sheet): length / rest length = 30.");
+    const int32_t *corner = drape_model_triangles(model) + 3 * 20;
+    s = rest; /* an apex to the middle of the side across but for 2 % */
+    for (int k = 0; k < 3; k++) {
+        const double middle = 0.5 * (rest.x[3 * corner[1] + k] + rest.x[3 * corner[2] + k]);
+        s.x[3 * corner[0] + k] = middle + 0.02 * (rest.x[3 * corner[0] + k] - middle);
+    }
+    ck_assert_int_eq(set_state(sim, &s), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_E_SOLVER);
+    check_message(ctx, "; most distorted: triangle (nodes ");
+    check_message(ctx, " of sheet): altitude / rest altitude = 0.02");
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 START_TEST(a_sim_has_at_most_8_observers)
 {
     drape_context *ctx = make_context();
@@ -1069,5 +1425,9 @@ SUITE("api", destroying_nothing_is_fine, destroy_writes_null, null_arguments_are
       the_hash_sees_all_of_the_state, a_model_can_be_read, an_override_is_a_value_of_the_scene,
       a_term_of_the_host_works, faults_of_a_term_of_the_host_are_told_at_its_place, malformed_ops_are_refused,
       a_context_holds_32_terms, frames_come_in_time, advances_may_be_cut_up,
-      statistics_agree_with_what_was_told, a_sim_has_at_most_8_observers, threads_share_a_model,
-      element_threads_change_no_bit, statuses_have_names, messages_are_one_line, nothing_leaks)
+      statistics_agree_with_what_was_told, a_state_of_the_host_is_where_a_run_starts,
+      a_state_of_another_sim_is_taken_to_the_bit, the_past_does_not_count_after_a_state_was_set,
+      states_of_the_host_are_checked, frames_follow_the_time_of_a_state, a_push_repeats_no_frame,
+      more_reasons_than_there_is_room_for_are_other, a_failure_names_what_is_distorted,
+      a_sim_has_at_most_8_observers, threads_share_a_model, element_threads_change_no_bit,
+      statuses_have_names, messages_are_one_line, nothing_leaks)

@@ -1,0 +1,118 @@
+/*
+ * place.c: a state of the host's own. It is made in the other of two states, so that one that is refused
+ * changes nothing; what was kept of the way to the present state is forgotten.
+ */
+#include "base/finite.h"
+#include "sim/sim.h"
+
+#include <math.h>
+#include <string.h>
+
+#define LONGEST  1e9  /* [s] as the duration of a scene */
+#define PIN_SLIP 1e-9 /* of the scene's size: the host's rounding of where a pin has its node */
+
+static drape_status check_given(const drape_sim *sim, double t, const double *x, const double *v)
+{
+    size_t n = 3 * (size_t)sim->model->node_count;
+    if (!x || !v)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_state: there are no %s",
+                          x ? "velocities" : "positions");
+    if (!(t >= 0 && t <= LONGEST))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_state: t = %g s; it is 0 to %g s", t,
+                          LONGEST);
+    for (size_t i = 0; i < 2 * n; i++) {
+        double value = i < n ? x[i] : v[i - n];
+        int32_t node = (int32_t)(i % n / 3), c = drape_model_cloth_of(sim->model, node);
+        if (!isfinite(value))
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                              "drape_sim_set_state: %s of node %d of %s is %g; it must be finite",
+                              i < n ? "the position" : "the velocity",
+                              (int)(node - sim->model->cloths[c].first_node), sim->model->cloths[c].name,
+                              value);
+    }
+    return DRAPE_OK;
+}
+
+/* Pinned nodes where their pins have them at the time of the state. */
+static void place_pinned(const drape_model *m, drape_state *state)
+{
+    for (int32_t i = 0; i < m->node_count; i++)
+        if (m->pinned[i])
+            memcpy(state->x + 3 * (size_t)i, m->rest + 3 * (size_t)i, 3 * sizeof *state->x);
+    drape_model_place_pins(m, state->t, state->x);
+}
+
+/* Fixed nodes have no velocity; moved ones keep what was given, until a step gives them the mean of their
+ * way. */
+static void stop_fixed(const drape_model *m, const double *given, drape_state *state)
+{
+    for (int32_t i = 0; i < m->node_count; i++)
+        if (m->pinned[i])
+            memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
+    for (int32_t i = 0; i < m->moved_count; i++) {
+        size_t at = 3 * (size_t)m->moved_node[i];
+        memcpy(state->v + at, given + at, 3 * sizeof *state->v);
+    }
+}
+
+static drape_status check_pinned(const drape_sim *sim, const double *given, const drape_state *state)
+{
+    const drape_model *m = sim->model;
+    for (int32_t i = 0; i < m->node_count; i++) {
+        const double *x = given + 3 * (size_t)i, *pin = state->x + 3 * (size_t)i;
+        const drape_cloth *cloth = &m->cloths[drape_model_cloth_of(m, i)];
+        if (m->pinned[i] &&
+            !(hypot(hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <= PIN_SLIP * m->length))
+            return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                              "drape_sim_set_state: node %d of %s is at (%g %g %g); its pin has it at (%g %g "
+                              "%g) m at t = %g s",
+                              (int)(i - cloth->first_node), cloth->name, x[0], x[1], x[2], pin[0], pin[1],
+                              pin[2], state->t);
+    }
+    return DRAPE_OK;
+}
+
+/* The first frame at or after the present time. */
+static int64_t first_frame(const drape_sim *sim)
+{
+    double t = drape_sim_state(sim)->t;
+    int64_t k = (int64_t)floor(t * sim->frame_rate);
+    return (double)k / sim->frame_rate < t ? k + 1 : k;
+}
+
+/* The state is a start: nothing of what led to the one before counts. */
+static void start_anew(drape_sim *sim, double t_before)
+{
+    double t = drape_sim_state(sim)->t;
+    sim->before = sim->past[0] = sim->past[1] = -1;
+    memset(sim->scratch, 0, sizeof sim->scratch);
+    sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+    drape_schedule_init(&sim->schedule, sim->schedule.stepping, sim->schedule.dt, t);
+    if (t != t_before) /* else the frame at t may have been told */
+        sim->next_frame = first_frame(sim);
+    drape_sim_reset_energy(sim);
+}
+
+drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, const double *v)
+{
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    drape_status status = check_given(sim, t, x, v);
+    if (status)
+        return status;
+    const drape_model *m = sim->model;
+    drape_state *now = &sim->states[sim->now], *next = &sim->states[sim->next];
+    next->t = t;
+    memcpy(next->x, x, 3 * (size_t)m->node_count * sizeof *x);
+    memcpy(next->v, v, 3 * (size_t)m->node_count * sizeof *v);
+    place_pinned(m, next);
+    stop_fixed(m, v, next);
+    status = check_pinned(sim, x, next);
+    if (status)
+        return status;
+    drape_state_commit(m, now, next);
+    sim->next = sim->now;
+    sim->now = (int)(next - sim->states);
+    start_anew(sim, now->t);
+    return DRAPE_OK;
+}
