@@ -35,8 +35,8 @@ typedef struct drape_schedule {
 
 void drape_schedule_init(drape_schedule *schedule, drape_stepping stepping, double dt, double start);
 
-/* Sets the end of an advance. An interval that was left half done is given up: counting starts where it
- * came. */
+/* Sets the end of an advance. An interval that was left half done goes on where the end is the same, else it is
+ * given up: counting starts where it came. */
 void drape_schedule_aim(drape_schedule *schedule, double end);
 
 /* The next step: its end and its size. False when the end is reached. */

@@ -619,6 +619,43 @@ START_TEST(a_rejection_is_one_line_of_the_hosts_log)
 }
 END_TEST
 
+/*
+ * A start below min_length is left. An edge at 1e-7 of its length pushes its nodes apart with the force
+ * k/L^2 (1 - 1e-7) L: in steps of 1e-7 s it grows by some 1e-8 of its length in the first, so it is below the
+ * limit of 1e-6 for several. Under "fixed", the first of them that is rejected would end the run.
+ */
+START_TEST(a_start_below_the_limit_is_left)
+{
+    for (size_t k = 0; k < sizeof fixed_rows / sizeof *fixed_rows; k++) {
+        int below = 0;
+        double ratio = 0;
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 3, 'edge_length': 0.1},"
+            "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
+            "'terms': ['stretch.edge'], 'pins': [{'nodes': [0]}]}],"
+            "'integrator': {'method': '%s', 'dt': 1e-7}, 'controller': {'type': 'fixed'}, 'duration': 1}",
+            fixed_rows[k]);
+        double x[48];
+        memcpy(x, drape_sim_positions(s.sim), sizeof x);
+        for (int i = 0; i < 3; i++)
+            x[3 * 5 + i] = x[3 * 6 + i] + 1e-7 * (x[3 * 5 + i] - x[3 * 6 + i]);
+        ck_assert_int_eq(drape_sim_set_state(s.sim, 0, x, drape_sim_velocities(s.sim)), DRAPE_OK);
+        for (int n = 1; ratio < 1e-3; n++) {
+            double d = 0;
+            ck_assert_int_lt(n, 10000);
+            scene_advance(&s, 1e-7 * n);
+            for (int i = 0; i < 3; i++)
+                d += pow(drape_sim_positions(s.sim)[3 * 5 + i] - drape_sim_positions(s.sim)[3 * 6 + i], 2);
+            ratio = sqrt(d) / 0.1;
+            below += ratio < 1e-6;
+        }
+        printf("# %s: %d steps below the limit\n", fixed_rows[k], below);
+        ck_assert_int_ge(below, 2);
+        scene_close(&s);
+    }
+}
+END_TEST
+
 SUITE("rejection", a_run_with_rejections_is_the_run_of_its_accepted_steps, parts_fill_their_interval_exactly,
       nominal_times_are_met_to_the_bit, sizes_are_halved_and_grow_back,
       a_step_that_gets_too_small_names_time_reason_and_element,
@@ -626,4 +663,5 @@ SUITE("rejection", a_run_with_rejections_is_the_run_of_its_accepted_steps, parts
       the_error_controller_never_tries_a_refused_size_again,
       an_estimate_that_is_not_a_number_is_refused_until_it_ends, kinetic_energy_from_nowhere_is_refused,
       a_slow_gain_is_no_runaway, energy_that_a_term_answers_for_is_no_runaway, a_sheet_at_rest_stays_at_rest,
-      every_attempt_is_one_row_one_call_and_one_reason, a_rejection_is_one_line_of_the_hosts_log)
+      every_attempt_is_one_row_one_call_and_one_reason, a_rejection_is_one_line_of_the_hosts_log,
+      a_start_below_the_limit_is_left)

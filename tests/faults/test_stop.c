@@ -162,6 +162,117 @@ START_TEST(observers_are_told_in_order)
 }
 END_TEST
 
+/* ---- Stops at a time, in every row ---- */
+
+#define END 0.4 /* [s] */
+
+typedef struct timer {
+    double stop;   /* [s] stops after the first accepted step that ends at it or later; NaN: never */
+    double before; /* [s] end of the step before that */
+    uint64_t hash; /* of the state there */
+    bool stopped;
+} timer;
+
+static drape_status stop_at_time(void *user, const drape_event *event)
+{
+    timer *w = user;
+    if (event->kind != DRAPE_EVENT_ATTEMPT || !event->attempt->accepted || w->stopped)
+        return DRAPE_OK;
+    w->hash = drape_sim_hash(event->sim);
+    if (!(drape_sim_time(event->sim) >= w->stop)) {
+        w->before = drape_sim_time(event->sim);
+        return DRAPE_OK;
+    }
+    w->stopped = true;
+    return DRAPE_RETRY_REJECTED;
+}
+
+static scene open_row(const char *row, const char *controller, const char *more, timer *w)
+{
+    scene s = scene_model(falling, 0.025, more, controller, 60.0);
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator = row;
+    scene_start(&s, &def);
+    ck_assert_int_eq(drape_sim_observe(s.sim, stop_at_time, w), DRAPE_OK);
+    return s;
+}
+
+/* Stopped at a time the state is that of the last accepted step and stays it; going on to the same end gives
+ * the bits of the run without a stop, also where it was stopped between two halves of an interval. */
+static void check_time_stops(const char *row, const char *controller, const char *more)
+{
+    timer never = {.stop = NAN};
+    scene whole = open_row(row, controller, more, &never);
+    scene_advance(&whole, END);
+    const uint64_t end = drape_sim_hash(whole.sim);
+    const int64_t rejected = drape_sim_statistics(whole.sim).steps_rejected;
+    for (double t = 0.01; t < END; t += 0.013) {
+        timer w = {.stop = t};
+        scene s = open_row(row, controller, more, &w);
+        ck_assert_int_eq(drape_sim_advance(s.sim, END), DRAPE_E_STOPPED);
+        ck_assert(w.before < t && drape_sim_time(s.sim) >= t);
+        ck_assert_uint_eq(drape_sim_hash(s.sim), w.hash);
+        scene_advance(&s, drape_sim_time(s.sim)); /* no way to go */
+        ck_assert_uint_eq(drape_sim_hash(s.sim), w.hash);
+        scene_close(&s);
+        w = (timer){.stop = t};
+        s = open_row(row, controller, more, &w);
+        ck_assert_int_eq(drape_sim_advance(s.sim, END), DRAPE_E_STOPPED);
+        scene_advance(&s, END);
+        ck_assert_msg(drape_sim_hash(s.sim) == end, "%s, %s, stopped at %g s", row, controller, t);
+        ck_assert_int_eq(drape_sim_statistics(s.sim).steps_rejected, rejected);
+        scene_close(&s);
+    }
+    ck_assert(!*more || rejected > 0);
+    scene_close(&whole);
+}
+
+START_TEST(every_row_stops_at_a_time_and_goes_on)
+{
+    for (int i = 0; drape_integrators[i]; i++) {
+        const drape_integrator_ops *row = drape_integrators[i];
+        if (row->timeless)
+            continue;
+        check_time_stops(row->name, "halving", "");
+        if (row->own_steps)
+            continue;
+        check_time_stops(row->name, "halving", ", 'max_iterations': 3");
+        check_time_stops(row->name, "error", "");
+    }
+}
+END_TEST
+
+/* A host stops at a time by ending its advance there: every row is there, exactly. */
+START_TEST(an_advance_ends_at_its_time_exactly)
+{
+    for (int i = 0; drape_integrators[i]; i++) {
+        timer never = {.stop = NAN};
+        scene s = open_row(drape_integrators[i]->name, "halving", "", &never);
+        for (double t = 0.0123; t < 0.2; t *= 1.7) {
+            scene_advance(&s, t);
+            ck_assert_double_eq(drape_sim_time(s.sim), t);
+        }
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* The equilibrium is one step: stopped there, there is nothing left to do. */
+START_TEST(a_row_without_time_stops_at_its_equilibrium)
+{
+    timer w = {.stop = 0.1};
+    scene s = open_row("static", "halving", "", &w);
+    ck_assert_int_eq(drape_sim_advance(s.sim, END), DRAPE_E_STOPPED);
+    ck_assert_double_eq(drape_sim_time(s.sim), END);
+    ck_assert_uint_eq(drape_sim_hash(s.sim), w.hash);
+    scene_advance(&s, END);
+    ck_assert_uint_eq(drape_sim_hash(s.sim), w.hash);
+    scene_close(&s);
+}
+END_TEST
+
 SUITE("stop", stops_at_a_step_and_goes_on, stops_at_a_step_between_frames_and_goes_on,
       stops_at_a_frame_and_goes_on, a_negative_answer_is_returned_with_its_message, stops_at_a_rejected_step,
-      observers_are_told_in_order)
+      observers_are_told_in_order, every_row_stops_at_a_time_and_goes_on, an_advance_ends_at_its_time_exactly,
+      a_row_without_time_stops_at_its_equilibrium)
