@@ -992,10 +992,10 @@ END_TEST
  * the other's energies are counted from there. */
 START_TEST(a_state_of_another_sim_is_taken_to_the_bit)
 {
-    static const char *const rows[] = {"be", "midpoint"};
+    static const char *const rows[] = {"be", "midpoint", "trbdf2"};
     drape_context *ctx = make_context();
     drape_model *model = make_sheet(ctx);
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 3; i++) {
         drape_sim *one = make_sim_of(ctx, model, rows[i], "fixed"),
                   *other = make_sim_of(ctx, model, rows[i], "fixed");
         ck_assert_int_eq(drape_sim_advance(one, 0.25), DRAPE_OK);
@@ -1029,7 +1029,8 @@ START_TEST(the_past_does_not_count_after_a_state_was_set)
 {
     static const char *const rows[][2] = {{"be", "halving"},     {"bdf2", "halving"}, {"midpoint", "strain"},
                                           {"ida", "halving"},    {"be", "error"},     {"bdf2", "error"},
-                                          {"midpoint", "error"}, {"ida", "fixed"}};
+                                          {"midpoint", "error"}, {"ida", "fixed"},    {"trbdf2", "halving"},
+                                          {"trbdf2", "error"}};
     drape_context *ctx = make_context();
     drape_model *model = make_sheet(ctx);
     drape_sim *source = make_sim_of(ctx, model, "be", "halving");

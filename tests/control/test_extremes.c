@@ -256,7 +256,7 @@ static void nearly_collapse(scene *s)
 
 /* ---- The table ---- */
 
-enum { BE = 1, BDF2 = 2, MIDPOINT = 4, IDA = 8, EVERY = 15 };
+enum { BE = 1, BDF2 = 2, MIDPOINT = 4, IDA = 8, TRBDF2 = 16, EVERY = 31 };
 
 typedef struct extreme {
     const char *name;
@@ -497,6 +497,12 @@ START_TEST(midpoint_ends_whatever_the_scene_is)
 }
 END_TEST
 
+START_TEST(trbdf2_ends_whatever_the_scene_is)
+{
+    run_all("trbdf2", TRBDF2);
+}
+END_TEST
+
 START_TEST(ida_ends_whatever_the_scene_is)
 {
     run_all("ida", IDA);
@@ -523,5 +529,5 @@ START_TEST(validation_refuses_an_altitude_below_1e_12)
 END_TEST
 
 SUITE("extremes", be_ends_whatever_the_scene_is, bdf2_ends_whatever_the_scene_is,
-      midpoint_ends_whatever_the_scene_is, ida_ends_whatever_the_scene_is,
+      midpoint_ends_whatever_the_scene_is, trbdf2_ends_whatever_the_scene_is, ida_ends_whatever_the_scene_is,
       validation_refuses_an_altitude_below_1e_12)

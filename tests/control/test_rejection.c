@@ -15,7 +15,7 @@
 
 #define MOST_STEPS 4000
 
-static const char *const fixed_rows[] = {"be", "bdf2", "midpoint"};
+static const char *const fixed_rows[] = {"be", "bdf2", "midpoint", "trbdf2"};
 
 /* ---- The record of a run ---- */
 

@@ -291,7 +291,7 @@ START_TEST(a_step_that_is_not_converged_says_so)
             ck_assert_int_eq(take_step(&s, 0.05, &info), DRAPE_RETRY_NONLINEAR);
             ck_assert_str_eq(info.reason, "max_iterations");
             ck_assert_int_eq(info.usable, accept);
-            ck_assert_int_eq(info.iterations, 1);
+            ck_assert(info.iterations == 1 || (accept && info.iterations == 2)); /* two stages */
             ck_assert_double_gt(info.residual, info.tolerance);
             ck_assert_double_eq(info.worst.value, info.residual);
             ck_assert_double_eq(info.worst.limit, info.tolerance);
