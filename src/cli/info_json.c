@@ -184,7 +184,10 @@ static json_t *iteration(const cli_info *info)
     object = with(object, "solve_s", number(p->solve_seconds));
     object = with(object, "total_s", number(drape_profile_seconds(p)));
     object = with(object, "factored", json_boolean(p->implicit && !p->factor_status));
-    return with(object, "linear_solver", json_string(p->linear_solver));
+    object = with(object, "linear_solver", json_string(p->linear_solver));
+    object = with(object, "linear_picked", json_string(p->linear_picked));
+    object = with(object, "linear_why", json_string(p->linear_why));
+    return with(object, "linear_fell_back", json_boolean(p->linear_fell_back));
 }
 
 static json_t *bytes(const cli_info *info)

@@ -198,8 +198,12 @@ static void print_solver(const cli_info *info)
         double seconds;
     } parts[] = {{"factor", p->factor_seconds}, {"solve", p->solve_seconds}};
     for (size_t i = 0; p->implicit && i < sizeof parts / sizeof *parts; i++)
-        printf("  %-20s %-10.10s %10s %10s %12s %12.2f %6.1f %%\n", parts[i].name, p->linear_solver, "-", "-",
+        printf("  %-20s %-10.10s %10s %10s %12s %12.2f %6.1f %%\n", parts[i].name, p->linear_picked, "-", "-",
                "-", 1e6 * parts[i].seconds, 100 * cli_share(info, parts[i].seconds));
+    if (p->linear_why[0])
+        printf("  linear_solver %s picks %s: %s\n", p->linear_solver, p->linear_picked, p->linear_why);
+    if (p->linear_fell_back)
+        printf("  the Jacobian there is not one for %s: klu factors it\n", p->linear_picked);
     if (p->factor_status)
         puts("  the Jacobian could not be factored there: what a step costs is not known");
 }

@@ -9,7 +9,9 @@
 
 #define BUDGET       0.02 /* [s] for the repeats of one measurement */
 #define MOST_REPEATS 200
-#define DEFORMATION  1e-3 /* displacement of the nodes, as a share of the scene's mean edge */
+/* Displacement of the nodes, as a share of the scene's mean edge. Edges that are 1e-3 shorter than at rest make
+ * the matrix of a common scene indefinite, which a step seldom meets and for which solvers take other ways. */
+#define DEFORMATION 1e-5
 
 /* Where everything is evaluated, and room for the results. */
 typedef struct bench {
@@ -233,6 +235,16 @@ static void count_bytes(const drape_sim *sim, drape_profile *out)
     out->state_bytes = sizeof *sim + sim->arena.bytes;
 }
 
+static void tell_solver(const bench *s, drape_profile *out)
+{
+    drape_linear_report report = {.row = s->linear};
+    if (s->linear->report)
+        s->linear->report(s->solver, &report);
+    out->linear_picked = report.row->name;
+    out->linear_fell_back = report.fallbacks > 0;
+    memcpy(out->linear_why, report.why, sizeof out->linear_why);
+}
+
 /* The integrator's solver has no factors before the first step: ours, of the same pattern, says what they
  * will take. */
 static drape_status measure_solver(bench *s, drape_profile *out)
@@ -247,6 +259,7 @@ static drape_status measure_solver(bench *s, drape_profile *out)
         out->integrator_bytes += s->linear->bytes(s->solver) - before;
         out->solve_seconds = shortest(s, solve);
     }
+    tell_solver(s, out);
     s->linear->destroy(&s->solver);
     return DRAPE_OK;
 }
@@ -280,6 +293,7 @@ drape_status drape_profile_measure(drape_context *ctx, const drape_sim *sim, dra
     *out = (drape_profile){.terms = terms,
                            .implicit = s.linear != NULL,
                            .linear_solver = s.linear ? s.linear->name : "",
+                           .linear_picked = s.linear ? s.linear->name : "",
                            .dt = drape_chosen_integrator_value(&sim->chosen, "dt", 1.0 / 60)};
     count_bytes(sim, out);
     drape_status status = measure(&s, out);

@@ -19,7 +19,10 @@ typedef struct drape_profile_term {
 typedef struct drape_profile {
     drape_profile_term *terms; /* one for each term of the model; the caller's */
     bool implicit;             /* the integrator has a linear solver; else only the residual is measured */
-    const char *linear_solver; /* its row; "" for none */
+    const char *linear_solver; /* the row that was asked for; "" for none */
+    const char *linear_picked; /* the row that solves: it, or what it picked for this size */
+    char linear_why[96];       /* it was picked; "" where nothing was */
+    bool linear_fell_back;     /* the matrix was not for its method: klu's times are what was measured */
     double dt;                 /* [s] that weights the Jacobian */
     double residual_seconds, jacobian_seconds, factor_seconds, solve_seconds;
     drape_status factor_status; /* DRAPE_RETRY_LINEAR: there were no factors to measure */

@@ -1,15 +1,31 @@
 /*
  * linear.h: direct and iterative solvers of A x = b for a matrix of a fixed pattern, as rows of one table. A
  * row is the constant drape_linear_<word> of linear_<word>.c. Analysis happens once, in create; factor may be
- * called with new values any number of times.
+ * called with new values any number of times. Where the sparsity changes, the solver is destroyed and made
+ * again. The pattern is symmetric; whether the values are is for the row to see: no caller says it.
  */
 #ifndef DRAPE_SOLVERS_LINEAR_H
 #define DRAPE_SOLVERS_LINEAR_H
 
 #include "sparse/pattern.h"
 
-typedef struct drape_linear_ops {
+typedef struct drape_linear_ops drape_linear_ops;
+
+/* What a solver has to say of itself. */
+typedef struct drape_linear_report {
+    const drape_linear_ops *row; /* that solves: the one asked for, or one that it picked */
+    char why[96];                /* it was picked; "" where nothing was */
+    int64_t fallbacks;           /* matrices that were not for its method, and that klu was given */
+} drape_linear_report;
+
+struct drape_linear_ops {
     const char *name, *summary, *reference;
+    /* Unknowns from which on it is measured to be the fastest for a positive definite matrix: what `auto` goes
+     * by. 0: at no size. */
+    int64_t best_from;
+    /* The library behind it takes heap for the time of a factorisation and gives it back. Else nothing is taken
+     * from the second factorisation on. */
+    bool borrows_heap;
     /* Makes the solver's state. pattern outlives it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
     drape_status (*create)(drape_context *ctx, const drape_pattern *pattern, void **state);
     /* Takes the values (pattern->nonzeros). DRAPE_OK, or DRAPE_RETRY_LINEAR: singular to working precision,
@@ -18,9 +34,11 @@ typedef struct drape_linear_ops {
     /* x = A^-1 b, b untouched. */
     drape_status (*solve)(void *state, const double *b, double *x);
     void (*destroy)(void **state);
-    /* Bytes that the factors take. */
+    /* Bytes that it takes, factors included. */
     size_t (*bytes)(const void *state);
-} drape_linear_ops;
+    /* NULL: it is what its name says. */
+    void (*report)(const void *state, drape_linear_report *report);
+};
 
 extern const drape_linear_ops *const drape_linears[]; /* NULL-ended */
 extern const char *const drape_linears_words[];       /* their names, NULL-ended */

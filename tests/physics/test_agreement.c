@@ -7,6 +7,7 @@
  * springs a node is at most 12 K e, hinges less; so with d = h^2 12 K e/m the error grows beside that by
  * the solution of e_{n+1} - 2 e_n + e_{n-1} = d e_{n+1}, which is below cosh(n sqrt(d/(1 - d))).
  */
+#include "solvers/linear.h"
 #include "support/scene.h"
 
 #define STEP  0.002
@@ -48,9 +49,13 @@ static void agree(const char *one, const char *other)
     scene_close(&b);
 }
 
-START_TEST(klu_and_dense_agree)
+START_TEST(linear_solvers_agree)
 {
-    agree(", 'linear_solver': 'klu'", ", 'linear_solver': 'dense'");
+    for (int i = 0; drape_linears_words[i]; i++) {
+        char other[64];
+        snprintf(other, sizeof other, ", 'linear_solver': '%s'", drape_linears_words[i]);
+        agree(", 'linear_solver': 'klu'", other);
+    }
 }
 END_TEST
 
@@ -164,7 +169,7 @@ START_TEST(runs_repeat_bit_for_bit)
 }
 END_TEST
 
-SUITE("agreement", klu_and_dense_agree, exact_and_modified_newton_agree, line_search_and_full_steps_agree,
+SUITE("agreement", linear_solvers_agree, exact_and_modified_newton_agree, line_search_and_full_steps_agree,
       projected_and_full_hessians_agree, predictors_agree, threads_do_not_change_a_bit,
       frames_do_not_change_a_bit, one_advance_or_sixty, advances_that_cut_steps_end_in_time,
       runs_repeat_bit_for_bit)

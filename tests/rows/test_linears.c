@@ -2,6 +2,8 @@
  * long double. */
 #include "solvers/linear.h"
 
+#include <float.h>
+
 #include "model/model.h"
 #include "models.h"
 #include "support/suite.h"
@@ -138,6 +140,15 @@ static void *open_solver(problem *q, const drape_linear_ops *ops)
     ck_assert_msg(ops->create(q->ctx, q->p, &solver) == DRAPE_OK, "%s", drape_context_message(q->ctx));
     ck_assert_ptr_nonnull(solver);
     return solver;
+}
+
+/* What a row says of itself, filled in for those that say nothing. */
+static drape_linear_report report_of(const drape_linear_ops *ops, const void *solver)
+{
+    drape_linear_report report = {.row = ops};
+    if (ops->report)
+        ops->report(solver, &report);
+    return report;
 }
 
 /* ---- Tests ---- */
@@ -309,6 +320,218 @@ START_TEST(kept_pivots_that_become_zero_are_chosen_again)
 }
 END_TEST
 
+/* A node's own 3 x 3 block is symmetric in the pattern whatever the mesh: a difference there is the least that
+ * can be overlooked. A solver that took one triangle for both would be off by about the difference. */
+START_TEST(a_small_part_that_is_not_symmetric_is_not_lost)
+{
+    problem q = open_problem();
+    for (int i = 0; drape_linears[i]; i++) {
+        void *solver = open_solver(&q, drape_linears[i]);
+        for (int upper = 0; upper < 2; upper++)
+            for (double size = 1; size > 1e-8; size /= 10) {
+                fill(&q, SPD, 5);
+                int64_t c = 3 * (q.p->n / 6) + upper; /* entry (1 - upper, upper) of that block */
+                for (int64_t k = q.p->column[c]; k < q.p->column[c + 1]; k++)
+                    if (q.p->row[k] == c + 1 - 2 * upper)
+                        q.values[k] *= 1 + size;
+                check_solution(&q, drape_linears[i], solver, "a little unsymmetric");
+            }
+        drape_linears[i]->destroy(&solver);
+    }
+    close_problem(&q);
+}
+END_TEST
+
+/* Which matrices a row gives to another one: where there is one, all but the positive definite ones. */
+START_TEST(fallbacks_are_counted)
+{
+    problem q = open_problem();
+    for (int i = 0; drape_linears[i]; i++) {
+        const drape_linear_ops *ops = drape_linears[i];
+        void *solver = open_solver(&q, ops);
+        int64_t before = report_of(ops, solver).fallbacks, counts[KIND_COUNT];
+        ck_assert_int_eq(before, 0);
+        for (int kind = 0; kind < KIND_COUNT; kind++) {
+            fill(&q, (matrix_kind)kind, 6);
+            check_solution(&q, ops, solver, "counted");
+            counts[kind] = report_of(ops, solver).fallbacks - before;
+            before += counts[kind];
+        }
+        bool falls = strcmp(ops->name, "cholmod") == 0;
+        ck_assert_int_eq(counts[SPD] + counts[TINY] + counts[HUGE_ENTRIES], 0);
+        ck_assert_int_eq(counts[INDEFINITE], falls);
+        ck_assert_int_eq(counts[UNSYMMETRIC], falls);
+        ops->destroy(&solver);
+    }
+    close_problem(&q);
+}
+END_TEST
+
+/* ---- A sheet of many supernodes ---- */
+
+typedef struct sheet {
+    drape_context *ctx;
+    drape_pattern p;
+    double *values, *b, *x, *again;
+} sheet;
+
+/* side x side nodes, each coupled to those within two: the pattern of a cloth with hinges. */
+static sheet open_sheet(int32_t side)
+{
+    sheet q = {.ctx = make_context()};
+    int32_t count = side * side, patches = (side - 2) * (side - 2),
+            *block = take((size_t)count, sizeof *block), *node = take(9 * (size_t)patches, sizeof *node),
+            *next = node;
+    for (int32_t i = 0; i < count; i++)
+        block[i] = i;
+    for (int32_t r = 0; r + 2 < side; r++)
+        for (int32_t c = 0; c + 2 < side; c++)
+            for (int32_t k = 0; k < 9; k++)
+                *next++ = (r + k / 3) * side + c + k % 3;
+    const drape_coupling coupling = {.count = patches, .nodes = 9, .node = node};
+    ck_assert_int_eq(drape_pattern_build(q.ctx, count, block, &coupling, 1, &q.p), DRAPE_OK);
+    free(block);
+    free(node);
+    q.values = take((size_t)q.p.nonzeros, sizeof *q.values);
+    q.b = take((size_t)q.p.n, sizeof *q.b);
+    q.x = take((size_t)q.p.n, sizeof *q.x);
+    q.again = take((size_t)q.p.n, sizeof *q.again);
+    return q;
+}
+
+static void close_sheet(sheet *q)
+{
+    free(q->values);
+    free(q->b);
+    free(q->x);
+    free(q->again);
+    drape_pattern_free(q->ctx, &q->p);
+    drape_context_destroy(&q->ctx);
+}
+
+/* Symmetric, random; shift 1: the diagonal dominates, weakly; below: the less the more indefinite. */
+static void fill_sheet(sheet *q, double shift, uint64_t seed)
+{
+    uint64_t side = seed;
+    for (int64_t c = 0; c < q->p.n; c++) {
+        double *diagonal = NULL, sum = 0;
+        for (int64_t k = q->p.column[c]; k < q->p.column[c + 1]; k++) {
+            int64_t r = q->p.row[k], low = r < c ? r : c, high = r < c ? c : r;
+            uint64_t own = seed * 1000003 + (uint64_t)(low * q->p.n + high);
+            random_number(&own);
+            q->values[k] = random_number(&own);
+            sum += fabs(q->values[k]);
+            diagonal = r == c ? &q->values[k] : diagonal;
+        }
+        *diagonal = shift * sum;
+        q->b[c] = random_number(&side);
+    }
+}
+
+/* Backward stability: |A x - b| <= c eps (|A| |x| + |b|) row by row, c = 1e4 for Cholesky factors of some 1e3
+ * unknowns. KLU takes a diagonal pivot that is a thousandth of the largest: a thousand times that where the
+ * matrix is indefinite. */
+static void check_residual(const sheet *q, bool definite, const char *name)
+{
+    double *r = take((size_t)q->p.n, sizeof *r), *size = take((size_t)q->p.n, sizeof *size), most = 0;
+    for (int64_t i = 0; i < q->p.n; i++) {
+        r[i] = -q->b[i];
+        size[i] = fabs(q->b[i]);
+    }
+    for (int64_t c = 0; c < q->p.n; c++)
+        for (int64_t k = q->p.column[c]; k < q->p.column[c + 1]; k++) {
+            r[q->p.row[k]] += q->values[k] * q->x[c];
+            size[q->p.row[k]] += fabs(q->values[k] * q->x[c]);
+        }
+    for (int64_t i = 0; i < q->p.n; i++)
+        most = fmax(most, fabs(r[i]) / size[i]);
+    ck_assert_msg(most <= (definite ? 1e4 : 1e7) * DBL_EPSILON, "%s: a row of A x - b is %g of its terms",
+                  name, most);
+    free(r);
+    free(size);
+}
+
+/* Definite and indefinite in turn; a second solver that is given the same gives the same bits. */
+START_TEST(a_sheet_of_many_supernodes)
+{
+    static const double shifts[] = {1.01, 0.15, 1.5, 0.2, 1.01};
+    sheet q = open_sheet(24);
+    for (int i = 0; drape_linears[i]; i++) {
+        const drape_linear_ops *ops = drape_linears[i];
+        void *solver = NULL, *other = NULL;
+        ck_assert_int_eq(ops->create(q.ctx, &q.p, &solver), DRAPE_OK);
+        ck_assert_int_eq(ops->create(q.ctx, &q.p, &other), DRAPE_OK);
+        for (size_t k = 0; k < sizeof shifts / sizeof *shifts; k++) {
+            fill_sheet(&q, shifts[k], 7);
+            ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
+            ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
+            check_residual(&q, shifts[k] > 1, ops->name);
+            ck_assert_int_eq(ops->factor(other, q.values), DRAPE_OK);
+            ck_assert_int_eq(ops->solve(other, q.b, q.again), DRAPE_OK);
+            ck_assert_mem_eq(q.again, q.x, (size_t)q.p.n * sizeof *q.x);
+        }
+        if (report_of(ops, solver).row->borrows_heap)
+            ck_assert_int_eq(report_of(ops, solver).fallbacks, 2);
+        ops->destroy(&solver);
+        ops->destroy(&other);
+    }
+    close_sheet(&q);
+}
+END_TEST
+
+/* As where contact changes the sparsity: destroyed and made again on patterns that grow and shrink. */
+START_TEST(made_again_on_other_patterns)
+{
+    static const int32_t sides[] = {3, 15, 4, 20, 3, 15};
+    for (int i = 0; drape_linears[i]; i++) {
+        const drape_linear_ops *ops = drape_linears[i];
+        for (size_t k = 0; k < sizeof sides / sizeof *sides; k++) {
+            sheet q = open_sheet(sides[k]);
+            void *solver = NULL;
+            ck_assert_int_eq(ops->create(q.ctx, &q.p, &solver), DRAPE_OK);
+            if (k % 3 != 2) { /* and once without a factorisation */
+                fill_sheet(&q, k % 2 ? 0.2 : 1.01, 9);
+                ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
+                ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
+                check_residual(&q, k % 2 == 0, ops->name);
+            }
+            ops->destroy(&solver);
+            close_sheet(&q);
+        }
+    }
+}
+END_TEST
+
+/* The largest best_from that is not above the size; klu below all others. */
+START_TEST(auto_picks_by_size_and_says_so)
+{
+    static const int32_t sides[] = {3, 30};
+    const drape_linear_ops *chooser = drape_linears[0];
+    ck_assert_str_eq(chooser->name, "auto");
+    ck_assert_int_eq(chooser->best_from, 0);
+    for (size_t k = 0; k < sizeof sides / sizeof *sides; k++) {
+        sheet q = open_sheet(sides[k]);
+        void *solver = NULL;
+        const drape_linear_ops *expected = NULL;
+        for (int i = 0; drape_linears[i]; i++)
+            if (drape_linears[i]->best_from > 0 && drape_linears[i]->best_from <= q.p.n &&
+                (!expected || drape_linears[i]->best_from > expected->best_from))
+                expected = drape_linears[i];
+        ck_assert_int_eq(chooser->create(q.ctx, &q.p, &solver), DRAPE_OK);
+        drape_linear_report report = report_of(chooser, solver);
+        ck_assert_ptr_eq(report.row, expected);
+        ck_assert_ptr_nonnull(report.row);
+        ck_assert_str_ne(report.why, "");
+        if (k == 0)
+            ck_assert_str_eq(report.row->name, "klu");
+        chooser->destroy(&solver);
+        close_sheet(&q);
+    }
+}
+END_TEST
+
 SUITE("linears", rows_are_well_formed, random_systems_are_solved,
       several_right_hand_sides_of_one_factorisation, broken_matrices_are_told_and_good_ones_work_again,
-      a_right_hand_side_that_is_not_finite_is_told, kept_pivots_that_become_zero_are_chosen_again)
+      a_right_hand_side_that_is_not_finite_is_told, kept_pivots_that_become_zero_are_chosen_again,
+      a_small_part_that_is_not_symmetric_is_not_lost, fallbacks_are_counted, a_sheet_of_many_supernodes,
+      made_again_on_other_patterns, auto_picks_by_size_and_says_so)

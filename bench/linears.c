@@ -1,0 +1,164 @@
+/*
+ * linears: what each linear solver takes for the matrix of a backward Euler step, by size: create (ordering and
+ * analysis, done once a sparsity), the first factorisation, a later one, a solve. Square sheets of 1 m hung
+ * by two corners, dt 1/60 s, a little deformed; the matrix is positive definite at each size. The least of the
+ * repeats. From these figures the sizes of the row `auto` are taken.
+ */
+#include "bench.h"
+#include "solvers/linear.h"
+
+#define DT          (1.0 / 60)
+#define DEFORMATION 1e-3 /* of an edge */
+#define BUDGET      1.0  /* [s] a figure */
+
+typedef struct problem {
+    drape_context *ctx;
+    drape_model *model;
+    double *values, *b, *x;
+} problem;
+
+typedef struct times {
+    double create, first, factor, solve; /* [s] CPU */
+    size_t bytes;
+} times;
+
+static double *take(size_t count)
+{
+    double *memory = calloc(count, sizeof *memory);
+    if (!memory)
+        exit(1);
+    return memory;
+}
+
+static void fill(problem *q)
+{
+    const drape_model *m = q->model;
+    drape_system *system = NULL;
+    drape_arena arena = {0};
+    drape_state state = {0};
+    if (drape_system_create(q->ctx, m, 1, &system) || drape_state_create(q->ctx, &arena, m, &state))
+        bench_fail(q->ctx, "the state");
+    const double edge = m->edge_length[0];
+    for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
+        state.x[i] += m->pinned[i / 3] ? 0 : DEFORMATION * edge * sin(12.9898 * (double)(i + 1));
+    drape_system_jacobian(
+        system, &(drape_point){.x = state.x, .v = state.v, .internal = state.internal, .weight = 1 / DT},
+        1 / (DT * DT), true, q->values);
+    for (int64_t i = 0; i < m->pattern.n; i++)
+        q->b[i] = cos((double)i);
+    drape_arena_free(&arena, q->ctx);
+    drape_system_destroy(&system);
+}
+
+static problem open_problem(int side)
+{
+    problem q = {.ctx = bench_context()};
+    q.model = bench_model(q.ctx,
+                          "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': %d, 'rows': %d, "
+                          "'width': 1, 'height': 1},"
+                          "'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'areal_density': 0.2},"
+                          "'terms': ['stretch.edge', 'bend.hinge'],"
+                          "'pins': [{'corner': 'top-left'}, {'corner': 'top-right'}]}], 'duration': 1}",
+                          side, side);
+    const drape_pattern *p = &q.model->pattern;
+    q.values = take((size_t)p->nonzeros);
+    q.b = take((size_t)p->n);
+    q.x = take((size_t)p->n);
+    fill(&q);
+    return q;
+}
+
+static void close_problem(problem *q)
+{
+    free(q->values);
+    free(q->b);
+    free(q->x);
+    drape_model_destroy(&q->model);
+    drape_context_destroy(&q->ctx);
+}
+
+static void keep_least(double *least, double start)
+{
+    double seconds = drape_clock_cpu_seconds() - start;
+    *least = seconds < *least ? seconds : *least;
+}
+
+static times measure(problem *q, const drape_linear_ops *ops)
+{
+    times t = {INFINITY, INFINITY, INFINITY, INFINITY, 0};
+    void *solver = NULL;
+    double begin = drape_clock_cpu_seconds();
+    do {
+        if (solver)
+            ops->destroy(&solver);
+        double start = drape_clock_cpu_seconds();
+        if (ops->create(q->ctx, &q->model->pattern, &solver))
+            bench_fail(q->ctx, "%s", ops->name);
+        keep_least(&t.create, start);
+        start = drape_clock_cpu_seconds();
+        if (ops->factor(solver, q->values))
+            bench_fail(q->ctx, "%s cannot factor", ops->name);
+        keep_least(&t.first, start);
+    } while (drape_clock_cpu_seconds() - begin < BUDGET);
+    begin = drape_clock_cpu_seconds();
+    do {
+        double start = drape_clock_cpu_seconds();
+        if (ops->factor(solver, q->values))
+            bench_fail(q->ctx, "%s cannot factor", ops->name);
+        keep_least(&t.factor, start);
+        start = drape_clock_cpu_seconds();
+        if (ops->solve(solver, q->b, q->x))
+            bench_fail(q->ctx, "%s cannot solve", ops->name);
+        keep_least(&t.solve, start);
+    } while (drape_clock_cpu_seconds() - begin < BUDGET);
+    t.bytes = ops->bytes(solver);
+    ops->destroy(&solver);
+    return t;
+}
+
+static void report(FILE *csv, int nodes, const problem *q, const char *name, const times *t)
+{
+    const drape_pattern *p = &q->model->pattern;
+    printf("%6d %-8s %8lld %9lld %10.3f %10.3f %10.3f %9.3f %9.2f\n", nodes, name, (long long)p->n,
+           (long long)p->nonzeros, 1e3 * t->create, 1e3 * t->first, 1e3 * t->factor, 1e3 * t->solve,
+           1e-6 * (double)t->bytes);
+    fflush(stdout);
+    if (!csv)
+        return;
+    bench_csv_row(csv);
+    fprintf(csv, "%d,%s,%lld,%lld,%.4f,%.4f,%.4f,%.4f,%zu\n", nodes, name, (long long)p->n,
+            (long long)p->nonzeros, 1e3 * t->create, 1e3 * t->first, 1e3 * t->factor, 1e3 * t->solve,
+            t->bytes);
+}
+
+/* n^3: beyond, minutes. */
+static bool affordable(const drape_linear_ops *ops, int side)
+{
+    return side <= 16 || strcmp(ops->name, "dense") != 0;
+}
+
+int main(int argc, char **argv)
+{
+    static const int sides[] = {4, 6, 8, 10, 12, 16, 23, 32, 50, 71, 100};
+    if (argc > 3 || (argc >= 2 && argv[1][0] == '-')) {
+        fputs("linears [CSV [NODES]]: milliseconds of each linear solver by size, up to NODES (10000)\n",
+              stderr);
+        return 2;
+    }
+    int most = argc == 3 ? atoi(argv[2]) : 10000;
+    FILE *csv =
+        bench_csv(argc >= 2 ? argv[1] : NULL,
+                  "nodes,linear,unknowns,nonzeros,create_ms,first_factor_ms,factor_ms,solve_ms,bytes");
+    printf("%6s %-8s %8s %9s %10s %10s %10s %9s %9s\n", "nodes", "linear", "unknowns", "nonzeros",
+           "create ms", "first ms", "factor ms", "solve ms", "MB");
+    for (size_t i = 0; i < sizeof sides / sizeof *sides && sides[i] * sides[i] <= most; i++) {
+        problem q = open_problem(sides[i]);
+        for (int k = 0; drape_linears[k]; k++)
+            if (affordable(drape_linears[k], sides[i])) {
+                times t = measure(&q, drape_linears[k]);
+                report(csv, sides[i] * sides[i], &q, drape_linears[k]->name, &t);
+            }
+        close_problem(&q);
+    }
+    return csv && fclose(csv) != 0;
+}

@@ -1,0 +1,104 @@
+/*
+ * auto: the row that was measured to be the fastest at this number of unknowns (bench/linears) among those
+ * in this build: each row says from how many unknowns on it is.
+ */
+#include "solvers/linear.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+typedef struct auto_state {
+    drape_context *ctx;
+    const drape_linear_ops *row;
+    int64_t n;
+    void *solver;
+} auto_state;
+
+static const drape_linear_ops *pick(int64_t n)
+{
+    const drape_linear_ops *best = NULL;
+    for (int i = 0; drape_linears[i]; i++) {
+        int64_t from = drape_linears[i]->best_from;
+        if (from > 0 && (!best || (from <= n && from > best->best_from) || best->best_from > n))
+            best = drape_linears[i];
+    }
+    return best;
+}
+
+/* The row that takes over at some larger size; NULL: none. */
+static const drape_linear_ops *next_row(int64_t from)
+{
+    const drape_linear_ops *next = NULL;
+    for (int i = 0; drape_linears[i]; i++)
+        if (drape_linears[i]->best_from > from && (!next || drape_linears[i]->best_from < next->best_from))
+            next = drape_linears[i];
+    return next;
+}
+
+static void destroy(void **state)
+{
+    auto_state *s = *state;
+    if (!s)
+        return;
+    s->row->destroy(&s->solver);
+    drape_free(s->ctx, s);
+    *state = NULL;
+}
+
+static drape_status create(drape_context *ctx, const drape_pattern *pattern, void **state)
+{
+    auto_state *s = drape_alloc(ctx, 1, sizeof *s);
+    *state = s;
+    if (!s)
+        return DRAPE_E_MEMORY;
+    *s = (auto_state){.ctx = ctx, .row = pick(pattern->n), .n = pattern->n};
+    drape_status status = s->row->create(ctx, pattern, &s->solver);
+    if (status)
+        destroy(state);
+    return status;
+}
+
+static drape_status factor(void *state, const double *values)
+{
+    auto_state *s = state;
+    return s->row->factor(s->solver, values);
+}
+
+static drape_status solve(void *state, const double *b, double *x)
+{
+    auto_state *s = state;
+    return s->row->solve(s->solver, b, x);
+}
+
+static size_t bytes(const void *state)
+{
+    const auto_state *s = state;
+    return sizeof *s + s->row->bytes(s->solver);
+}
+
+static void report(const void *state, drape_linear_report *out)
+{
+    const auto_state *s = state;
+    const drape_linear_ops *next = next_row(s->row->best_from);
+    *out = (drape_linear_report){.row = s->row};
+    if (s->row->report)
+        s->row->report(s->solver, out);
+    const char *name = next ? next->name : s->row->name;
+    int64_t from = next ? next->best_from : s->row->best_from;
+    if (from > 1)
+        snprintf(out->why, sizeof out->why, "%" PRId64 " unknowns; %s from %" PRId64 " on", s->n, name, from);
+    else
+        snprintf(out->why, sizeof out->why, "the only one for all sizes in this build");
+}
+
+const drape_linear_ops drape_linear_auto = {
+    .name = "auto",
+    .summary = "the fastest direct solver of this build for the number of unknowns; drape info says which",
+    .reference = "bench/linears",
+    .create = create,
+    .factor = factor,
+    .solve = solve,
+    .destroy = destroy,
+    .bytes = bytes,
+    .report = report,
+};
