@@ -26,10 +26,12 @@ typedef enum drape_param_kind {
     DRAPE_PARAM_NUMBER,
     DRAPE_PARAM_INTEGER,
     DRAPE_PARAM_BOOLEAN, /* 0 or 1 */
-    DRAPE_PARAM_CHOICE   /* the index of one of choices */
+    DRAPE_PARAM_CHOICE,  /* the index of one of choices */
+    DRAPE_PARAM_VECTOR   /* three numbers, one after another in the values; the range holds for each */
 } drape_param_kind;
 
-/* One parameter. All values travel as doubles: integers exact, booleans 0 or 1, choices by index. */
+/* One parameter. All values travel as doubles: integers exact, booleans 0 or 1, choices by index; a vector
+ * takes three of them. */
 typedef struct drape_param {
     const char *name;
     drape_param_kind kind;
@@ -185,6 +187,49 @@ typedef void drape_element_energy(const drape_elements *el, int32_t element, con
                                   double *g, double *hess);
 DRAPE_API void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                   double *e, double *g, double *hess, drape_element_energy *one);
+
+/* ---- Colliders ---- */
+
+/* What of a collider cloth can touch besides its smooth surface, in the collider's own coordinates, with the
+ * surface `radius` outside of it: points against the faces of a cloth, segments against its edges, and
+ * triangles (rows without a smooth distance) against its nodes. Arrays are taken by drape_shape_reserve. */
+typedef struct drape_collider_shape {
+    int32_t point_count, segment_count, triangle_count;
+    double *point;     /* (point_count x 3) [m] */
+    int32_t *segment;  /* (segment_count x 2) numbers of points */
+    int32_t *triangle; /* (triangle_count x 3) numbers of points, counterclockwise from outside */
+    double radius;     /* [m] */
+    void *owner;       /* where the arrays live; for drape_shape_reserve */
+} drape_collider_shape;
+
+/* Takes the arrays of a shape; they live as long as the model. Errors: DRAPE_E_MEMORY. */
+DRAPE_API drape_status drape_shape_reserve(drape_collider_shape *shape, int32_t points, int32_t segments,
+                                           int32_t triangles);
+
+/*
+ * A row of the colliders: a rigid, closed obstacle. values: in the order of params; a vector takes three.
+ * Coordinates are the collider's own: a track moves it as a whole. Thread-safety: as for terms.
+ */
+typedef struct drape_collider_ops {
+    size_t struct_size;
+    const char *name, *summary, *reference;
+    const drape_param *params;
+    int param_count;
+
+    /* Fills the shape, from a mesh file too. tolerance [m]: how far a polygon may stay inside a curved
+     * surface. */
+    drape_status (*shape)(const double *values, double tolerance, drape_collider_shape *shape);
+
+    /* The signed distance of x from the surface [m], negative inside; normal (3), its gradient, of length 1;
+     * curvature (3 x 3 [1/m]), its Hessian. Outputs that are NULL are not wanted. Everywhere defined: where
+     * the gradient is not unique, one of those there. */
+    double (*distance)(const double *values, const drape_collider_shape *shape, const double *x,
+                       double *normal, double *curvature);
+
+    /* The derivatives of distance serve contact in a residual: they are continuous outside, and nodes of the
+     * cloth meet the surface by it. Else they meet the shape's triangles. */
+    bool smooth;
+} drape_collider_ops;
 
 DRAPE_C_END
 

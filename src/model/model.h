@@ -49,6 +49,27 @@ typedef struct drape_track {
     size_t key_count;
 } drape_track;
 
+/* One obstacle. */
+typedef struct drape_collider {
+    const drape_collider_ops *ops;
+    char *name;
+    double values[DRAPE_MAX_PARAMS];
+    drape_collider_shape shape;
+    double friction;   /* Coulomb's mu [1] */
+    drape_track track; /* displacement from where its values put it; no keys: it rests */
+} drape_collider;
+
+/* What contact is made of, resolved. */
+typedef struct drape_contact_def {
+    double distance;          /* activation distance of cloth and collider [m] */
+    double stiffness;         /* scale of the contact pressure [Pa] */
+    double friction_velocity; /* below it friction falls to zero [m/s] */
+    bool lagged;              /* friction takes normal force and direction from the start of the step */
+    bool self;                /* cloth against cloth */
+    double self_thickness;    /* layers are kept twice this apart [m] */
+    double self_friction;     /* mu [1] */
+} drape_contact_def;
+
 struct drape_model {
     drape_arena arena; /* holds all that is below but the meshes and the pattern */
     drape_context *ctx;
@@ -69,6 +90,9 @@ struct drape_model {
     int32_t *moved_track; /* (moved_count) */
     int32_t moved_count, track_count;
     drape_track *tracks;
+    drape_collider *colliders; /* (collider_count) */
+    int32_t collider_count;
+    drape_contact_def contact;
     int64_t internal_count, measure_count;
     bool has_laws;        /* some term needs the rates of measures */
     bool has_dissipation; /* some term takes energy out */
