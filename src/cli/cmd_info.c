@@ -98,7 +98,13 @@ static drape_status gather(const cli_scene *in, cli_info *info)
     info->frames = count_frames(model);
     for (int32_t c = 0; c < model->cloth_count; c++)
         info->cloths[c] = cloth_info(model, &model->cloths[c]);
-    return drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
+    drape_status status = drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
+    const drape_integrator_ops *integrator = in->sim->chosen.integrator;
+    info->has_limit = integrator->stability;
+    if (!status && info->has_limit)
+        integrator->stability(in->sim->integrator, drape_sim_state(in->sim), info->profile.dt,
+                              &info->stability);
+    return status;
 }
 
 static int print_json(const cli_info *info)

@@ -209,6 +209,16 @@ static json_t *formats(const drape_model *model)
     return array;
 }
 
+/* A limit that is infinite is null. */
+static json_t *stability(const drape_stability *s)
+{
+    json_t *object = with(json_object(), "omega", number(s->omega));
+    object = with(object, "damping", number(s->damping));
+    object = with(object, "limit", number(s->limit));
+    object = with(object, "substep", number(s->substep));
+    return with(object, "share", number(s->substep / s->limit));
+}
+
 json_t *cli_info_json(const cli_info *info)
 {
     const drape_model *model = info->model;
@@ -231,6 +241,8 @@ json_t *cli_info_json(const cli_info *info)
     cli_chosen_rows(info->sim, rows);
     for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
         object = with(object, rows[i].title, chosen(&rows[i], &info->sim->chosen));
+    if (info->has_limit)
+        object = with(object, "stability", stability(&info->stability));
     object = with(object, "terms", terms);
     object = with(object, "iteration", iteration(info));
     return with(object, "bytes", bytes(info));

@@ -243,6 +243,20 @@ static void print_bytes(const cli_info *info)
     printf("  %-30s %12zu bytes, %.0f a node\n", "together", sum, (double)sum / info->model->node_count);
 }
 
+static void print_stability(const cli_info *info)
+{
+    const drape_stability *s = &info->stability;
+    if (!info->has_limit)
+        return;
+    puts("\nstability, at the start");
+    printf("  fastest wave     %.6g rad/s", s->omega);
+    if (s->damping > 0)
+        printf(", damping rates up to %.6g 1/s", s->damping);
+    printf("\n  stable below     %.6g s a substep\n", s->limit);
+    printf("  this scene's     %.6g s a substep, %.3g of the limit%s\n", s->substep, s->substep / s->limit,
+           s->substep > s->limit ? ": IT WILL BLOW UP" : "");
+}
+
 void cli_info_text(const cli_info *info)
 {
     cli_chosen_row rows[CLI_CHOSEN_ROWS];
@@ -252,6 +266,7 @@ void cli_info_text(const cli_info *info)
     cli_chosen_rows(info->sim, rows);
     for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
         print_chosen(&rows[i], &info->sim->chosen);
+    print_stability(info);
     print_terms(info);
     print_costs(info);
     print_bytes(info);
