@@ -71,7 +71,8 @@ typedef struct drape_cloth_view {
     const int32_t *hinge_edge; /* (hinge_count) */
     const double *node_area;   /* (node_count) lumped, a third of each triangle [m2] */
     const double *node_mass;   /* (node_count) lumped [kg] */
-    int32_t rows, columns;     /* of a grid, in nodes; 0 on other meshes */
+    int32_t rows, columns;     /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
+    bool rectangular;          /* a grid whose cells are rectangles before its transform */
     drape_material material;
     double gravity[3]; /* [m/s2] */
 } drape_cloth_view;
@@ -84,8 +85,8 @@ typedef struct drape_term_builder drape_term_builder;
  * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count);
 
-/* Sets element `element`: its nodes (local to the cloth) and its rest data. Measures keep k [J] in rest[0]
- * and q0 in rest[1]. */
+/* Sets element `element`: its nodes (local to the cloth) and its rest data. Measures keep k [J/q2] in rest[0]
+ * and q0 in rest[1]; rows that are damped keep c >= 0 [J s/q2] in rest[2]. */
 DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes,
                               const double *rest);
 
@@ -136,6 +137,7 @@ typedef struct drape_term_ops {
     bool linear;               /* energy: its Hessian is zero and takes no sparsity */
     bool potential_of_gravity; /* energy: counts as gravity, not as elastic */
     bool has_internal;         /* one internal variable an element */
+    bool damped;               /* measure: a dashpot of its own in each element, force c q' on q */
 
     /* Adds the elements of one cloth. Called once a cloth. Errors: what the builder returned. */
     drape_status (*build)(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder);

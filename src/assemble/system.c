@@ -73,16 +73,21 @@ size_t drape_system_bytes(const drape_system *system)
 
 /* ---- Evaluating a block ---- */
 
-/* Generalised force on one measure and its derivatives, summed over elasticity and laws. */
+/* Generalised force on one measure and its derivatives, summed over elasticity, its own dashpot and laws. */
 typedef struct stress {
     double force, by_strain, by_rate, energy;
 } stress;
 
-static stress stress_of(const drape_term *term, const request *want, double k, double strain, double rate)
+static stress stress_of(const drape_term *term, const request *want, int32_t e, double strain, double rate)
 {
+    double k = term->elements.rest[e];
     stress s = {0};
     if (want->conservative)
         s = (stress){.force = k * strain, .by_strain = k, .energy = 0.5 * k * strain * strain};
+    if (want->dissipative && term->damping) {
+        s.force += term->damping[e] * rate;
+        s.by_rate = term->damping[e];
+    }
     for (int i = 0; i < term->law_count; i++) {
         const drape_term *law = term->laws[i];
         stress one;
@@ -144,12 +149,12 @@ static void evaluate_measure(const drape_term *term, const request *want, block_
     const drape_point *point = want->point;
     int d = 3 * el->nodes;
     const double *internal = term->first_internal >= 0 ? point->internal + term->first_internal : NULL;
-    bool rates = term->law_count > 0;
+    bool rates = term->law_count > 0 || term->damping;
     term->ops->measure(el, b->first, b->count, point->x, internal, b->q, b->dq,
                        want->hessian && !want->velocity ? b->hessian : NULL);
     for (int32_t i = 0; i < b->count; i++) {
         int32_t e = b->first + i;
-        double k = el->rest[e], strain = b->q[i] - el->rest[(size_t)el->count + (size_t)e], rate = 0, v[D];
+        double strain = b->q[i] - el->rest[(size_t)el->count + (size_t)e], rate = 0, v[D];
         double *dq = b->dq + (size_t)i * (size_t)d;
         if (rates && point->history)
             rate = point->weight * b->q[i] + point->history[term->first_measure + e];
@@ -157,7 +162,7 @@ static void evaluate_measure(const drape_term *term, const request *want, block_
             gather(el, e, point->v, v);
             rate = dot(d, dq, v);
         }
-        stress s = stress_of(term, want, k, strain, rate);
+        stress s = stress_of(term, want, e, strain, rate);
         b->energy[i] = s.energy;
         for (int j = 0; j < d; j++)
             b->gradient[i * d + j] = s.force * dq[j];
@@ -263,7 +268,7 @@ static bool contributes(const drape_term *term, const request *want, const sums 
     if (term->ops->law || (to->values && !to->g && !to->energy && term->ops->linear))
         return false;
     if (term->ops->measure)
-        return want->conservative || term->law_count > 0;
+        return want->conservative || term->law_count > 0 || term->damping;
     return term->ops->dissipation ? want->dissipative : want->conservative;
 }
 

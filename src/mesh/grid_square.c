@@ -119,6 +119,7 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
         status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
     if (status)
         return status;
+    mesh->rectangular = true;
     place_nodes(mesh, values[WIDTH], values[HEIGHT], vertical);
     add_noise(mesh, values[NOISE], vertical);
     /* Rows of a vertical sheet go down where those of grid.h go up. */

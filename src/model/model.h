@@ -19,6 +19,7 @@ typedef struct drape_term {
     int64_t first_measure;                /* its measures in the list of all measures; -1 for none */
     const struct drape_term *const *laws; /* laws of the cloth, on this measure */
     int law_count;
+    const double *damping; /* (elements.count) its measures' own dashpots [J s/q2]; NULL: it has none */
 } drape_term;
 
 /* A row that was chosen by name, with the settings that the scene gave. */

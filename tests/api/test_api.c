@@ -694,7 +694,7 @@ static void some_law(const double *params, double k, double strain, double rate,
 START_TEST(malformed_ops_are_refused)
 {
     drape_context *ctx = make_context();
-    for (int i = 0; i < 13; i++) {
+    for (int i = 0; i < 14; i++) {
         drape_term_ops ops = attract;
         const char *says = "not well formed";
         drape_status expected = DRAPE_E_ARGUMENT;
@@ -742,6 +742,9 @@ START_TEST(malformed_ops_are_refused)
         case 12:
             ops.name = "stretch.edge";
             says = "there is a term \"stretch.edge\" already";
+            break;
+        case 13:
+            ops.damped = true; /* its dashpots would be on a measure, which it has not */
             break;
         }
         ck_assert_msg(drape_context_add_term(ctx, &ops) == expected, "case %d", i);

@@ -462,6 +462,25 @@ def test_check():
     assert good("check", "scene.json", "--seed", "2") != text
 
 
+def test_scene_of_springs():
+    """the scene in docs/springs.md is checked, described and run, below its strain limit"""
+    with open(os.path.join(SOURCES, "docs", "springs.md"), encoding="utf-8") as file:
+        block = re.search(r"\n\n((?:    .*\n)+)", file.read()).group(1)
+    with open("scene.json", "w", encoding="utf-8") as file:
+        file.write(block)
+    text = good("info", "scene.json")
+    for count, word in (480, "structural"), (450, "shear"), (448, "bend"):
+        assert re.search(rf"spring\.{word} .*: {count} spring elements of 2 nodes; stiffness 20 N/m", text), text
+    assert re.search(r"limit\.strain .*: 1378 edge elements .*onset half of limit \(default\)", text), text
+    text = good("check", "scene.json")
+    for word in r"spring\.structural", r"spring\.shear", r"spring\.bend", r"limit\.strain", "assembled":
+        assert re.search(rf"^{word} .* ok$", text, re.M), text
+    good("run", "scene.json", "--out", "springs", "--duration", "0.5")
+    with open("springs/summary.json", encoding="utf-8") as file:
+        summary = json.load(file)
+    assert 0.05 < summary["strain"]["max"] < 0.1 and summary["energy"]["dissipated"] > 0, summary
+
+
 def test_list():
     """list shows every row; a table or a row narrows; Markdown has as many cells in every line of a table"""
     text = good("list")
