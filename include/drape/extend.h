@@ -1,6 +1,6 @@
 /*
- * extend.h: all that an author of a term needs: parameter lists, the view of a cloth, the ops table of a
- * term.
+ * extend.h: all that an author of a term or a collider needs: parameter lists, the view of a cloth, the ops
+ * table of a term, the shape and the ops table of a collider.
  *
  * A term is a sum over elements of one cloth. Its author writes, for a range of elements in local
  * coordinates, one of measure      a scalar strain measure q(x) with gradient and Hessian; the library makes
@@ -27,11 +27,14 @@ typedef enum drape_param_kind {
     DRAPE_PARAM_INTEGER,
     DRAPE_PARAM_BOOLEAN, /* 0 or 1 */
     DRAPE_PARAM_CHOICE,  /* the index of one of choices */
-    DRAPE_PARAM_VECTOR   /* three numbers, one after another in the values; the range holds for each */
+    DRAPE_PARAM_VECTOR,  /* three numbers, one after another in the values; the range holds for each */
+    DRAPE_PARAM_TURN, /* given as a vector along the axis, as long as the angle [degrees], or as axis and angle;
+                         travels as the former, three numbers; the range holds for the angle */
+    DRAPE_PARAM_TEXT /* a text, such as the name of a file; it does not travel: its value is 0 */
 } drape_param_kind;
 
 /* One parameter. All values travel as doubles: integers exact, booleans 0 or 1, choices by index; a vector
- * takes three of them. */
+ * or a turn takes three of them, so that the values of the parameters after it stand two further on. */
 typedef struct drape_param {
     const char *name;
     drape_param_kind kind;
@@ -43,9 +46,10 @@ typedef struct drape_param {
     bool open_min, open_max;    /* the bound itself is excluded */
     const char *const *choices; /* NULL-ended list of words */
     const char *help;           /* what it is and what it does, one line */
+    bool uniform;               /* VECTOR: one number may stand for three equal ones */
 } drape_param;
 
-#define DRAPE_MAX_PARAMS 24
+#define DRAPE_MAX_PARAMS 24 /* values of the parameters of a row */
 
 /* ---- What a term is built from ---- */
 
@@ -194,23 +198,42 @@ DRAPE_API void drape_energy_range(const drape_elements *el, int32_t first, int32
 
 /* What of a collider cloth can touch besides its smooth surface, in the collider's own coordinates, with the
  * surface `radius` outside of it: points against the faces of a cloth, segments against its edges, and
- * triangles (rows without a smooth distance) against its nodes. Arrays are taken by drape_shape_reserve. */
+ * triangles (rows without a smooth distance) against its nodes. No segment has the length 0. A shape begins as
+ * all zeros; arrays are taken by drape_shape_reserve. */
 typedef struct drape_collider_shape {
     int32_t point_count, segment_count, triangle_count;
     double *point;     /* (point_count x 3) [m] */
     int32_t *segment;  /* (segment_count x 2) numbers of points */
     int32_t *triangle; /* (triangle_count x 3) numbers of points, counterclockwise from outside */
     double radius;     /* [m] */
-    void *owner;       /* where the arrays live; for drape_shape_reserve */
+    const void *kept;  /* what the row keeps for its distance, of drape_shape_take; NULL for nothing */
+    struct drape_shape_builder
+        *builder; /* of the functions below; NULL outside of the row's function shape */
 } drape_collider_shape;
 
-/* Takes the arrays of a shape; they live as long as the model. Errors: DRAPE_E_MEMORY. */
+/* Takes the arrays of a shape; they live as long as the model. Called once. Errors: DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_shape_reserve(drape_collider_shape *shape, int32_t points, int32_t segments,
                                            int32_t triangles);
 
+/* Memory that lives as long as the model, zeroed, for what the row keeps; NULL: return DRAPE_E_MEMORY. */
+DRAPE_API void *drape_shape_take(drape_collider_shape *shape, size_t count, size_t size);
+
+/* Refuses a value: the reason is reported at the parameter in the scene. Returns DRAPE_E_ARGUMENT. */
+DRAPE_API drape_status drape_shape_refuse(drape_collider_shape *shape, const char *parameter,
+                                          const char *format, ...) DRAPE_PRINTF(3, 4);
+
+/* Fills points, segments and triangles from the OBJ or PLY file that the TEXT parameter of this name gives,
+ * relative to the scene: scaled, then turned about the origin (a value of the kind TURN), then moved. The mesh
+ * must be closed and its triangles counterclockwise from outside. Errors: DRAPE_E_FILE, DRAPE_E_PARSE,
+ * DRAPE_E_ARGUMENT, DRAPE_E_MEMORY; return them. */
+DRAPE_API drape_status drape_shape_read_mesh(drape_collider_shape *shape, const char *parameter,
+                                             const double scale[3], const double turn[3],
+                                             const double translate[3]);
+
 /*
  * A row of the colliders: a rigid, closed obstacle. values: in the order of params; a vector takes three.
- * Coordinates are the collider's own: a track moves it as a whole. Thread-safety: as for terms.
+ * Coordinates are the collider's own: a track moves it as a whole. Thread-safety: as for terms; shape, called
+ * once a collider while a model is compiled, may allocate.
  */
 typedef struct drape_collider_ops {
     size_t struct_size;
@@ -218,8 +241,8 @@ typedef struct drape_collider_ops {
     const drape_param *params;
     int param_count;
 
-    /* Fills the shape, from a mesh file too. tolerance [m]: how far a polygon may stay inside a curved
-     * surface. */
+    /* Refuses values that do not go together, and fills the shape. tolerance [m]: how far a polygon may stay
+     * inside a curved surface. */
     drape_status (*shape)(const double *values, double tolerance, drape_collider_shape *shape);
 
     /* The signed distance of x from the surface [m], negative inside; normal (3), its gradient, of length 1;
@@ -232,6 +255,10 @@ typedef struct drape_collider_ops {
      * cloth meet the surface by it. Else they meet the shape's triangles. */
     bool smooth;
 } drape_collider_ops;
+
+/* Registers a collider of the host's own, as drape_context_add_term does a term. Errors: DRAPE_E_ARGUMENT (not
+ * well formed, name taken, more than 32), DRAPE_E_VERSION (struct_size). */
+DRAPE_API drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *ops);
 
 DRAPE_C_END
 

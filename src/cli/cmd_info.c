@@ -40,6 +40,14 @@ bool cli_is_given(const drape_choice *choice, const char *name)
     return false;
 }
 
+const char *cli_text_of(const drape_choice *choice, const char *name)
+{
+    for (size_t i = 0; i < choice->setting_count; i++)
+        if (strcmp(choice->settings[i].name, name) == 0 && choice->settings[i].text)
+            return choice->settings[i].text;
+    return "";
+}
+
 double cli_share(const cli_info *info, double seconds)
 {
     double whole = drape_profile_seconds(&info->profile);

@@ -42,6 +42,9 @@ void cli_chosen_rows(const drape_sim *sim, cli_chosen_row rows[CLI_CHOSEN_ROWS])
 /* Whether the scene gave the parameter. */
 bool cli_is_given(const drape_choice *choice, const char *name);
 
+/* The text that the scene gave for a parameter; "" for none. */
+const char *cli_text_of(const drape_choice *choice, const char *name);
+
 /* A share of the residual, Jacobian, factor and solve of one Newton iteration [1]. */
 double cli_share(const cli_info *info, double seconds);
 

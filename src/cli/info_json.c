@@ -48,15 +48,26 @@ static json_t *vector(const double v[3])
 
 /* ---- Parameters ---- */
 
-static json_t *value_of(const drape_param *param, double value)
+/* choice: where a text is; NULL where there are none. */
+static json_t *value_of(const drape_param *param, const double *value, const drape_choice *choice)
 {
-    if (param->kind == DRAPE_PARAM_BOOLEAN)
-        return json_boolean(value != 0);
-    if (param->kind == DRAPE_PARAM_CHOICE)
-        return json_string(param->choices[(int)value]);
-    if (isnan(value) && param->derived)
+    if (isnan(*value) && param->derived)
         return json_string(param->derived);
-    return param->kind == DRAPE_PARAM_INTEGER ? count((int64_t)value) : number(value);
+    switch (param->kind) {
+    case DRAPE_PARAM_BOOLEAN:
+        return json_boolean(*value != 0);
+    case DRAPE_PARAM_CHOICE:
+        return json_string(param->choices[(int)*value]);
+    case DRAPE_PARAM_VECTOR:
+    case DRAPE_PARAM_TURN:
+        return vector(value);
+    case DRAPE_PARAM_TEXT:
+        return text(choice ? cli_text_of(choice, param->name) : "");
+    case DRAPE_PARAM_NUMBER:
+    case DRAPE_PARAM_INTEGER:
+        break;
+    }
+    return param->kind == DRAPE_PARAM_INTEGER ? count((int64_t)*value) : number(*value);
 }
 
 static json_t *params_of(const drape_param *params, int param_count, const double *values,
@@ -64,7 +75,8 @@ static json_t *params_of(const drape_param *params, int param_count, const doubl
 {
     json_t *object = json_object();
     for (int p = 0; p < param_count; p++) {
-        json_t *one = with(json_object(), "value", value_of(&params[p], values[p]));
+        json_t *one =
+            with(json_object(), "value", value_of(&params[p], values + drape_param_place(params, p), choice));
         one = with(one, "unit", json_string(params[p].unit));
         if (choice)
             one = with(one, "default", json_boolean(!cli_is_given(choice, params[p].name)));
@@ -93,10 +105,11 @@ static json_t *values_of(const drape_param *params, int param_count, const doubl
     json_t *object = json_object();
     for (int p = 0; p < param_count; p++) {
         bool spoken = params[p].kind == DRAPE_PARAM_CHOICE || params[p].kind == DRAPE_PARAM_BOOLEAN;
+        const double *value = values + drape_param_place(params, p);
         if (spoken)
-            drape_param_value_text(&params[p], values[p], words, sizeof words);
-        if (!isnan(values[p]))
-            object = with(object, params[p].name, spoken ? text(words) : number(values[p]));
+            drape_param_value_text(&params[p], value, words, sizeof words);
+        if (!isnan(*value))
+            object = with(object, params[p].name, spoken ? text(words) : value_of(&params[p], value, NULL));
     }
     return object;
 }

@@ -38,25 +38,29 @@ static void print_pins(const drape_model *model, const drape_cloth *cloth, const
 }
 
 /* With its unit, unless it is words or has none. */
-static void print_value(const drape_param *param, double value)
+static void print_value(const drape_param *param, const double *value)
 {
     char text[128];
     drape_param_value_text(param, value, text, sizeof text);
-    bool has_unit = !isnan(value) && strcmp(param->unit, "1") != 0;
+    bool has_unit = !isnan(*value) && strcmp(param->unit, "1") != 0;
     printf("%s%s%s", text, has_unit ? " " : "", has_unit ? param->unit : "");
 }
 
-static bool is_default(const drape_param *param, double value)
+static bool is_default(const drape_param *param, const double *value)
 {
-    return value == param->default_value || (isnan(value) && isnan(param->default_value));
+    bool same = true;
+    for (int k = 0; k < drape_param_width(param); k++)
+        same = same && (value[k] == param->default_value || (isnan(value[k]) && isnan(param->default_value)));
+    return same;
 }
 
 static void print_params(const char *indent, const drape_param *params, int count, const double *values)
 {
     for (int p = 0; p < count; p++) {
         printf("%s%-16s ", indent, params[p].name);
-        print_value(&params[p], values[p]);
-        puts(!isnan(values[p]) && is_default(&params[p], values[p]) ? " (default)" : "");
+        const double *value = values + drape_param_place(params, p);
+        print_value(&params[p], value);
+        puts(!isnan(*value) && is_default(&params[p], value) ? " (default)" : "");
     }
 }
 
@@ -126,7 +130,7 @@ static void print_chosen(const cli_chosen_row *row, const drape_chosen *chosen)
     printf("\n%s %s: %s\n", row->title, row->name, row->summary);
     for (int p = 0; p < row->param_count; p++) {
         printf("  %-16s ", row->params[p].name);
-        print_value(&row->params[p], row->values[p]);
+        print_value(&row->params[p], row->values + drape_param_place(row->params, p));
         puts(cli_is_given(row->choice, row->params[p].name) ? "" : " (default)");
     }
     print_ignored(row, chosen);
@@ -146,8 +150,9 @@ static void print_term(const cli_info *info, int32_t i)
                term->elements.nodes, term->elements.nodes == 1 ? "" : "s");
     for (int p = 0; p < term->ops->param_count; p++) {
         printf("; %s ", term->ops->params[p].name);
-        print_value(&term->ops->params[p], term->params[p]);
-        fputs(is_default(&term->ops->params[p], term->params[p]) ? " (default)" : "", stdout);
+        const double *value = term->params + drape_param_place(term->ops->params, p);
+        print_value(&term->ops->params[p], value);
+        fputs(is_default(&term->ops->params[p], value) ? " (default)" : "", stdout);
     }
     fputc('\n', stdout);
 }

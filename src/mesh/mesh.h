@@ -78,6 +78,9 @@ drape_status drape_mesh_allocate(drape_context *ctx, const drape_mesh_source *so
 /* Scale, then rotate, then translate; faults of the three at pointer/transform/scale and so on. */
 drape_status drape_mesh_check_transform(drape_context *ctx, const char *pointer, const double scale[3],
                                         const double rotate[4], const double translate[3]);
+/* The matrix of a turn about the axis rotate[0..2], of any length, by the angle rotate[3] [degrees]; exact at
+ * right angles. */
+void drape_rotation_matrix(const double rotate[4], double matrix[3][3]);
 void drape_mesh_transform(drape_mesh *mesh, const double scale[3], const double rotate[4],
                           const double translate[3]);
 

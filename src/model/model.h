@@ -54,6 +54,7 @@ typedef struct drape_track {
 typedef struct drape_collider {
     const drape_collider_ops *ops;
     char *name;
+    drape_choice choice; /* what the scene said */
     double values[DRAPE_MAX_PARAMS];
     drape_collider_shape shape;
     double friction;   /* Coulomb's mu [1] */
@@ -94,6 +95,7 @@ struct drape_model {
     drape_collider *colliders; /* (collider_count) */
     int32_t collider_count;
     drape_contact_def contact;
+    drape_choice contact_choice, self_choice; /* what the scene said of them */
     int64_t internal_count, measure_count;
     bool has_laws;        /* some term needs the rates of measures */
     bool has_dissipation; /* some term takes energy out */
