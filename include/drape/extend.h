@@ -141,6 +141,7 @@ typedef struct drape_term_ops {
     bool linear;               /* energy: its Hessian is zero and takes no sparsity */
     bool potential_of_gravity; /* energy: counts as gravity, not as elastic */
     bool has_internal;         /* one internal variable an element */
+    bool constraint; /* an energy that keeps a limit: integrators that move nodes to keep limits do without */
     bool damped;               /* measure: a dashpot of its own in each element, force c q' on q */
 
     /* Adds the elements of one cloth. Called once a cloth. Errors: what the builder returned. */

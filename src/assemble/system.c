@@ -34,6 +34,7 @@ struct drape_system {
     drape_context *ctx;
     const drape_model *model;
     int threads;
+    bool unconstrained;    /* terms that are a constraint are left out */
     block_buffer *buffers; /* (threads) */
 };
 
@@ -59,6 +60,16 @@ void drape_system_destroy(drape_system **system)
     drape_free(ctx, (*system)->buffers);
     drape_free(ctx, *system);
     *system = NULL;
+}
+
+void drape_system_leave_constraints(drape_system *system)
+{
+    system->unconstrained = true;
+}
+
+static bool is_left_out(const drape_system *system, const drape_term *term)
+{
+    return system->unconstrained && term->ops->constraint;
 }
 
 const drape_model *drape_system_model(const drape_system *system)
@@ -314,7 +325,8 @@ static void sum_term(drape_system *system, const drape_term *term, const request
 static void sum_terms(drape_system *system, const request *want, const sums *to)
 {
     for (int32_t i = 0; i < system->model->term_count; i++)
-        if (contributes(&system->model->terms[i], want, to))
+        if (!is_left_out(system, &system->model->terms[i]) &&
+            contributes(&system->model->terms[i], want, to))
             sum_term(system, &system->model->terms[i], want, to);
 }
 
@@ -364,7 +376,7 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
         const sums to = {.energy = term->ops->potential_of_gravity ? gravity : elastic};
-        if (contributes(term, &want, &to))
+        if (!is_left_out(system, term) && contributes(term, &want, &to))
             sum_term(system, term, &want, &to);
     }
 }
@@ -378,7 +390,7 @@ void drape_system_term(drape_system *system, int32_t term, const drape_point *po
     const sums to = {.energy = energy, .g = g, .values = t->block ? values : NULL};
     if (energy)
         *energy = 0;
-    if (!t->ops->law)
+    if (!t->ops->law && !is_left_out(system, t))
         sum_term(system, t, &want, &to);
 }
 
@@ -417,7 +429,7 @@ drape_status drape_system_check(const drape_system *system, const double *x, con
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
         drape_fault fault;
-        if (!term->ops->check)
+        if (!term->ops->check || is_left_out(system, term))
             continue;
         const double *own = term->first_internal >= 0 ? internal + term->first_internal : NULL;
         drape_status status = term->ops->check(&term->elements, x, own, &fault);

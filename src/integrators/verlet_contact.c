@@ -16,36 +16,22 @@
  * sqrt(r^2 + (d/2)^2) - r with the spacing d: 5 mm of its 100 m.
  */
 #include "base/vec3.h"
+#include "colliders/colliders.h"
 #include "integrators/verlet.h"
-#include "model/track.h"
 
 #include <string.h>
 
 /* A collider over one substep. */
 typedef struct pose {
     const drape_collider *collider;
-    double at[3], way[3]; /* displacement at the end, and since the start */
+    drape_collider_pose at; /* at the end */
+    double way[3];          /* [m] since the start */
 } pose;
-
-static void displacement_at(const drape_collider *c, double t, double out[3])
-{
-    memset(out, 0, 3 * sizeof *out);
-    if (c->track.key_count > 0)
-        drape_track_displacement(c->track.keys, c->track.key_count, t, out);
-}
-
-static double distance(const drape_collider *c, const double displacement[3], const double *x, double *normal,
-                       double *curvature)
-{
-    double own[3];
-    vec3_sub(x, displacement, own);
-    return c->ops->distance(c->values, &c->shape, own, normal, curvature);
-}
 
 static bool is_flat(const pose *p, const double *x)
 {
     double curvature[9], sum = 0;
-    distance(p->collider, p->at, x, NULL, curvature);
+    drape_collider_distance(p->collider, &p->at, x, NULL, curvature);
     for (int i = 0; i < 9; i++)
         sum += fabs(curvature[i]);
     return sum == 0;
@@ -57,7 +43,7 @@ static void surface_point(const pose *p, double offset, const double *y0, const 
                           const double *n, double *t)
 {
     bool flat = is_flat(p, x);
-    double before = flat ? distance(p->collider, p->at, y0, NULL, NULL) : 0;
+    double before = flat ? drape_collider_distance(p->collider, &p->at, y0, NULL, NULL) : 0;
     for (int k = 0; k < 3; k++)
         t[k] = before > 0 ? y0[k] + before / (before - phi) * (x[k] - y0[k]) : x[k] - phi * n[k];
     if (flat)
@@ -103,14 +89,12 @@ static void rub_on(const drape_verlet_contact *contact, const drape_collider *c,
                    const double *v, double *g)
 {
     const drape_model *m = contact->model;
-    double at[3], velocity[3] = {0}, n[3];
-    displacement_at(c, t, at);
-    if (c->track.key_count > 0)
-        drape_track_velocity(c->track.keys, c->track.key_count, t, velocity);
+    const drape_collider_pose pose_now = drape_collider_pose_at(c, t);
+    double n[3];
     for (int32_t f = 0; f < m->free_count; f++) {
         size_t i = 3 * (size_t)m->node_of_free[f];
-        if (distance(c, at, x + i, n, NULL) < contact->friction_range)
-            rub(contact, c, velocity, n, v + i, g + i);
+        if (drape_collider_distance(c, &pose_now, x + i, n, NULL) < contact->friction_range)
+            rub(contact, c, pose_now.velocity, n, v + i, g + i);
     }
 }
 
@@ -135,7 +119,7 @@ static void project_on(const drape_verlet_contact *contact, const pose *p, const
     const drape_model *m = contact->model;
     for (int32_t f = 0; f < m->free_count; f++) {
         size_t i = 3 * (size_t)m->node_of_free[f];
-        double n[3], y0[3], phi = distance(p->collider, p->at, x + i, n, NULL);
+        double n[3], y0[3], phi = drape_collider_distance(p->collider, &p->at, x + i, n, NULL);
         if (!(phi <= 0))
             continue;
         for (size_t k = 0; k < 3; k++)
@@ -149,10 +133,9 @@ void drape_verlet_project(const drape_verlet_contact *contact, double t0, double
 {
     for (int32_t c = 0; c < contact->model->collider_count; c++) {
         pose p = {.collider = &contact->model->colliders[c]};
-        double before[3];
-        displacement_at(p.collider, t0, before);
-        displacement_at(p.collider, t, p.at);
-        vec3_sub(p.at, before, p.way);
+        const drape_collider_pose before = drape_collider_pose_at(p.collider, t0);
+        p.at = drape_collider_pose_at(p.collider, t);
+        vec3_sub(p.at.displacement, before.displacement, p.way);
         project_on(contact, &p, x0, x);
     }
 }

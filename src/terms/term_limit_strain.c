@@ -220,6 +220,7 @@ const drape_term_ops drape_term_limit_strain = {
     .param_count = PARAM_COUNT,
     .element_name = "edge",
     .nodes = 2,
+    .constraint = true,
     .build = build,
     .energy = energy,
     .check = check,
