@@ -122,6 +122,8 @@ typedef struct drape_fault {
 
 /* ---- The ops table of a term ---- */
 
+#define DRAPE_PAIR_BLOCK 32
+
 /*
  * A row. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first + count
  * - 1; outputs are element-major: item i belongs to element first + i. d = 3 * nodes. Gradients have the sign
@@ -150,6 +152,12 @@ typedef struct drape_term_ops {
     /* q [q] (count), dq (count x d), ddq (count x d x d, symmetric). */
     void (*measure)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                     const double *internal, double *q, double *dq, double *ddq);
+
+    /* Optional, beside measure, where nodes is 2 and q depends on the distance of the nodes alone: the same for
+     * forces without derivatives, which take half of the numbers. q (count), d (3 x count: all x, all y, all z)
+     * = x1 - x0 [m], c (count) with dq = (-c d, c d). count is at most DRAPE_PAIR_BLOCK. */
+    void (*pair)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q, double *d,
+                 double *c);
 
     /* e [J] (count), g [N] (count x d), hess [N/m] (count x d x d, symmetric). */
     void (*energy)(const drape_elements *el, int32_t first, int32_t count, const double *x,
@@ -194,6 +202,10 @@ typedef void drape_element_energy(const drape_elements *el, int32_t element, con
                                   double *g, double *hess);
 DRAPE_API void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                   double *e, double *g, double *hess, drape_element_energy *one);
+
+/* For rows with pair: d (3 x count) and the distance l (count) of the two nodes of each element. */
+DRAPE_API void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                                   double *l, double *d);
 
 /* ---- Colliders ---- */
 

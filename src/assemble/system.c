@@ -28,7 +28,10 @@ typedef struct block_buffer {
     int32_t first, count;
     double energy[BLOCK], gradient[BLOCK * D], hessian[BLOCK * D * D];
     double q[BLOCK], dq[BLOCK * D], velocity[BLOCK * D * D];
+    bool pairs;                  /* the result is pull instead: the force on the second node, the first has its */
+    double c[BLOCK], pull[3 * BLOCK]; /* opposite; all x, all y, all z */
 } block_buffer;
+_Static_assert(BLOCK <= DRAPE_PAIR_BLOCK, "rows with pair take a block");
 
 struct drape_system {
     drape_context *ctx;
@@ -184,6 +187,42 @@ static void evaluate_measure(const drape_term *term, const request *want, block_
     }
 }
 
+/* Forces on the measures of pairs, in b->q, which has their values on entry. */
+static void pair_stresses(const drape_term *term, const request *want, block_buffer *b)
+{
+    const drape_elements *el = &term->elements;
+    const drape_point *point = want->point;
+    const double *k = el->rest + b->first, *q0 = el->rest + (size_t)el->count + b->first;
+    if (term->law_count == 0 && !term->damping) {
+        for (int32_t i = 0; i < b->count; i++)
+            b->q[i] = k[i] * (b->q[i] - q0[i]);
+        return;
+    }
+    for (int32_t i = 0; i < b->count; i++) {
+        const int32_t *node = el->node + 2 * (size_t)(b->first + i);
+        double rate = 0;
+        if (point->history)
+            rate = point->weight * b->q[i] + point->history[term->first_measure + b->first + i];
+        else
+            for (int r = 0; r < 3; r++)
+                rate += b->c[i] * b->pull[r * b->count + i] *
+                        (point->v[3 * (size_t)node[1] + (size_t)r] - point->v[3 * (size_t)node[0] + (size_t)r]);
+        b->q[i] = stress_of(term, want, b->first + i, b->q[i] - q0[i], rate).force;
+    }
+}
+
+/* Forces of a measure of pairs: half of the numbers of a gradient, and loops without calls. */
+static void evaluate_pairs(const drape_term *term, const request *want, block_buffer *b)
+{
+    term->ops->pair(&term->elements, b->first, b->count, want->point->x, b->q, b->pull, b->c);
+    pair_stresses(term, want, b);
+    for (int32_t i = 0; i < b->count; i++)
+        b->c[i] *= b->q[i];
+    for (int r = 0; r < 3; r++)
+        for (int32_t i = 0; i < b->count; i++)
+            b->pull[r * b->count + i] *= b->c[i];
+}
+
 static void evaluate_energy(const drape_term *term, const request *want, block_buffer *b)
 {
     const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
@@ -205,7 +244,10 @@ static void evaluate_dissipation(const drape_term *term, const request *want, bl
 
 static void evaluate(const drape_term *term, const request *want, block_buffer *b)
 {
-    if (term->ops->measure)
+    b->pairs = term->ops->pair && !want->hessian && !want->energy;
+    if (b->pairs)
+        evaluate_pairs(term, want, b);
+    else if (term->ops->measure)
         evaluate_measure(term, want, b);
     else if (term->ops->energy)
         evaluate_energy(term, want, b);
@@ -222,6 +264,21 @@ static void evaluate(const drape_term *term, const request *want, block_buffer *
 typedef struct sums {
     double *energy, *g, *values;
 } sums;
+
+static void add_pulls(const drape_elements *el, const block_buffer *b, double *g)
+{
+    const int32_t *node = el->node + 2 * (size_t)b->first;
+    const double *px = b->pull, *py = px + b->count, *pz = py + b->count;
+    for (int32_t i = 0; i < b->count; i++) {
+        double *a = g + 3 * (size_t)node[2 * i], *c = g + 3 * (size_t)node[2 * i + 1];
+        a[0] -= px[i];
+        a[1] -= py[i];
+        a[2] -= pz[i];
+        c[0] += px[i];
+        c[1] += py[i];
+        c[2] += pz[i];
+    }
+}
 
 static void add_gradients(const drape_elements *el, const block_buffer *b, double *g)
 {
@@ -266,7 +323,9 @@ static void add(const drape_model *model, const drape_term *term, const block_bu
 {
     for (int32_t i = 0; to->energy && i < b->count; i++)
         *to->energy += b->energy[i];
-    if (to->g)
+    if (to->g && b->pairs)
+        add_pulls(&term->elements, b, to->g);
+    else if (to->g)
         add_gradients(&term->elements, b, to->g);
     if (to->values)
         add_hessians(model, term, b, to->values);

@@ -196,6 +196,15 @@ void drape_spring_measure(const drape_elements *el, int32_t first, int32_t count
     }
 }
 
+/* dq = (-d, d)/l */
+void drape_spring_pairs(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,
+                        double *d, double *c)
+{
+    drape_pair_distance(el, first, count, x, q, d);
+    for (int32_t i = 0; i < count; i++)
+        c[i] = 1 / q[i];
+}
+
 drape_status drape_spring_check(const drape_elements *el, const double *x, const double *internal,
                                 drape_fault *fault)
 {

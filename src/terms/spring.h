@@ -54,6 +54,8 @@ drape_status drape_spring_build_kind(const drape_cloth_view *cloth, int kind, co
 /* Of the row: see drape_term_ops. */
 void drape_spring_measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
                           const double *internal, double *q, double *dq, double *ddq);
+void drape_spring_pairs(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,
+                        double *d, double *c);
 drape_status drape_spring_check(const drape_elements *el, const double *x, const double *internal,
                                 drape_fault *fault);
 

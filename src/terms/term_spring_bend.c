@@ -22,5 +22,6 @@ const drape_term_ops drape_term_spring_bend = {
     .damped = true,
     .build = build,
     .measure = drape_spring_measure,
+    .pair = drape_spring_pairs,
     .check = drape_spring_check,
 };

@@ -25,5 +25,6 @@ const drape_term_ops drape_term_spring_structural = {
     .damped = true,
     .build = build,
     .measure = drape_spring_measure,
+    .pair = drape_spring_pairs,
     .check = drape_spring_check,
 };
