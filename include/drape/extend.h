@@ -144,7 +144,7 @@ typedef struct drape_term_ops {
     bool potential_of_gravity; /* energy: counts as gravity, not as elastic */
     bool has_internal;         /* one internal variable an element */
     bool constraint; /* an energy that keeps a limit: integrators that move nodes to keep limits do without */
-    bool damped;               /* measure: a dashpot of its own in each element, force c q' on q */
+    bool damped;     /* measure: a dashpot of its own in each element, force c q' on q */
 
     /* Adds the elements of one cloth. Called once a cloth. Errors: what the builder returned. */
     drape_status (*build)(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder);
@@ -156,8 +156,8 @@ typedef struct drape_term_ops {
     /* Optional, beside measure, where nodes is 2 and q depends on the distance of the nodes alone: the same for
      * forces without derivatives, which take half of the numbers. q (count), d (3 x count: all x, all y, all z)
      * = x1 - x0 [m], c (count) with dq = (-c d, c d). count is at most DRAPE_PAIR_BLOCK. */
-    void (*pair)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q, double *d,
-                 double *c);
+    void (*pair)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,
+                 double *d, double *c);
 
     /* e [J] (count), g [N] (count x d), hess [N/m] (count x d x d, symmetric). */
     void (*energy)(const drape_elements *el, int32_t first, int32_t count, const double *x,

@@ -28,7 +28,7 @@ typedef struct block_buffer {
     int32_t first, count;
     double energy[BLOCK], gradient[BLOCK * D], hessian[BLOCK * D * D];
     double q[BLOCK], dq[BLOCK * D], velocity[BLOCK * D * D];
-    bool pairs;                  /* the result is pull instead: the force on the second node, the first has its */
+    bool pairs; /* the result is pull instead: the force on the second node, the first has its */
     double c[BLOCK], pull[3 * BLOCK]; /* opposite; all x, all y, all z */
 } block_buffer;
 _Static_assert(BLOCK <= DRAPE_PAIR_BLOCK, "rows with pair take a block");
@@ -205,8 +205,9 @@ static void pair_stresses(const drape_term *term, const request *want, block_buf
             rate = point->weight * b->q[i] + point->history[term->first_measure + b->first + i];
         else
             for (int r = 0; r < 3; r++)
-                rate += b->c[i] * b->pull[r * b->count + i] *
-                        (point->v[3 * (size_t)node[1] + (size_t)r] - point->v[3 * (size_t)node[0] + (size_t)r]);
+                rate +=
+                    b->c[i] * b->pull[r * b->count + i] *
+                    (point->v[3 * (size_t)node[1] + (size_t)r] - point->v[3 * (size_t)node[0] + (size_t)r]);
         b->q[i] = stress_of(term, want, b->first + i, b->q[i] - q0[i], rate).force;
     }
 }
@@ -384,8 +385,7 @@ static void sum_term(drape_system *system, const drape_term *term, const request
 static void sum_terms(drape_system *system, const request *want, const sums *to)
 {
     for (int32_t i = 0; i < system->model->term_count; i++)
-        if (!is_left_out(system, &system->model->terms[i]) &&
-            contributes(&system->model->terms[i], want, to))
+        if (!is_left_out(system, &system->model->terms[i]) && contributes(&system->model->terms[i], want, to))
             sum_term(system, &system->model->terms[i], want, to);
 }
 

@@ -27,7 +27,7 @@
 #define MOST_NEAR 64  /* points in the list of one */
 #define A_NODE    24  /* of them on the average */
 #define SKIN      0.5 /* of r */
-#define FARTHEST 1e9 /* boxes are counted in 32 bits: what is beyond has blown up and shares one */
+#define FARTHEST  1e9 /* boxes are counted in 32 bits: what is beyond has blown up and shares one */
 
 struct drape_verlet_self {
     drape_context *ctx;
@@ -330,18 +330,20 @@ static bool lists_are_good(const drape_verlet_self *s, double share, const doubl
 
 /* ---- Pushing ---- */
 
-static void push_node(drape_verlet_self *s, int32_t i, const int32_t *near, int count, double share, double *x)
+/* near NULL: all points, which are count. */
+static void push_node(drape_verlet_self *s, int32_t i, const int32_t *near, int count, double share,
+                      double *x)
 {
     double *own = x + 3 * (size_t)i, sum[3] = {0}, square_of_reach = s->reach * s->reach;
     int pushing = 0;
     for (int k = 0; k < count; k++) {
         double d[3];
-        vec3_sub(own, x + 3 * (size_t)near[k], d);
+        vec3_sub(own, x + 3 * (size_t)(near ? near[k] : k), d);
         double square = vec3_dot(d, d);
-        if (!(square < square_of_reach) || square == 0) /* no direction to push in */
+        if (!(square < square_of_reach) || square == 0) /* itself, or no direction to push in */
             continue;
         double distance = sqrt(square);
-        vec3_add_scaled((s->reach - distance) / distance, d, sum);
+        vec3_add_scaled(s->reach / distance - 1, d, sum);
         pushing++;
     }
     if (pushing > 0)
@@ -355,6 +357,8 @@ static void push_listed(drape_verlet_self *s, double share, double *x)
             push_node(s, i, s->near + s->first[i], s->first[i + 1] - s->first[i], share, x);
 }
 
+/* A point in a heap of more than MOST_NEAR others, of cloth much thicker than its mesh is fine, asks all; in its
+ * own box it keeps to the first of them. */
 static void push_searched(drape_verlet_self *s, double share, double *x)
 {
     for (int32_t i = 0; i < s->model->node_count; i++) {
@@ -362,7 +366,12 @@ static void push_searched(drape_verlet_self *s, double share, double *x)
         if (s->model->pinned[i])
             continue;
         search_near(s, &q, s->reach, s->same_box ? 0 : s->reach * (1 + share));
-        push_node(s, i, q.found, q.count < MOST_NEAR ? q.count : MOST_NEAR, share, x);
+        if (q.count <= MOST_NEAR)
+            push_node(s, i, q.found, q.count, share, x);
+        else if (s->same_box)
+            push_node(s, i, q.found, MOST_NEAR, share, x);
+        else
+            push_node(s, i, NULL, s->model->node_count, share, x);
         memcpy(s->x + 3 * (size_t)s->place[i], q.x, 3 * sizeof *q.x);
     }
 }

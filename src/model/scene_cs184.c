@@ -210,7 +210,7 @@ static drape_status check_pins(drape_context *ctx, json_t *cloth)
         if (is_point(json_array_get(pins, i), columns, rows))
             continue;
         char expected[100];
-        snprintf(expected, sizeof expected, "[x, y] with x from 0 to %.0f and y from 0 to %.0f", columns - 1,
+        snprintf(expected, sizeof expected, "[x, y], x from 0 to %.0f and y from 0 to %.0f", columns - 1,
                  rows - 1);
         drape_pointer_push_index(&at, i);
         return refuse(ctx, &at, json_array_get(pins, i), "a pin", expected);

@@ -108,8 +108,8 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
 }
 
 /* dq = (-d, d)/(L l) */
-static void pair(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q, double *d,
-                 double *c)
+static void pair(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,
+                 double *d, double *c)
 {
     const double *inverse = el->rest + (size_t)REST_INVERSE_LENGTH * (size_t)el->count + first;
     drape_pair_distance(el, first, count, x, q, d);
