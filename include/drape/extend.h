@@ -28,8 +28,8 @@ typedef enum drape_param_kind {
     DRAPE_PARAM_BOOLEAN, /* 0 or 1 */
     DRAPE_PARAM_CHOICE,  /* the index of one of choices */
     DRAPE_PARAM_VECTOR,  /* three numbers, one after another in the values; the range holds for each */
-    DRAPE_PARAM_TURN,    /* axis and angle [degrees], four numbers, or three: a vector along the axis, as long as
-                            the angle; travels as the latter; the range holds for the angle */
+    DRAPE_PARAM_TURN,    /* three numbers: a vector along the axis, as long as the angle [degrees], which the
+                            range holds for; may be given as axis and angle, four numbers */
     DRAPE_PARAM_TEXT     /* a text, such as the name of a file; it does not travel: its value is 0 */
 } drape_param_kind;
 
