@@ -96,6 +96,28 @@ static void write_globe(const char *path, int rings, double dent)
     fclose(file);
 }
 
+/* A wedge with its tip at 0, whose upper face is a fan of 30 triangles about the tip and whose lower face is one:
+ * a mean of normals that is not weighted by their angles has the points below the tip inside. */
+static void write_wedge(const char *path)
+{
+    enum { TOP = 1, SLICES = 30, LOW = TOP + SLICES + 1, HIGH = LOW + 1 };
+    FILE *file = fopen(path, "w");
+    ck_assert_ptr_nonnull(file);
+    fprintf(file, "v 1 0 0\n");
+    for (int i = 0; i <= SLICES; i++)
+        fprintf(file, "v -1 0.1 %.17g\n", 2.0 * i / SLICES - 1);
+    fprintf(file, "v -1 -0.1 -1\nv -1 -0.1 1\n");
+    for (int i = TOP; i < TOP + SLICES; i++) {
+        print_face(file, (int[]){0, i, i + 1}, false);
+        print_face(file, (int[]){LOW, i + 1, i}, false);
+    }
+    print_face(file, (int[]){LOW, HIGH, TOP + SLICES}, false);
+    print_face(file, (int[]){0, HIGH, LOW}, false);
+    print_face(file, (int[]){0, LOW, TOP}, false);
+    print_face(file, (int[]){0, TOP + SLICES, HIGH}, false);
+    fclose(file);
+}
+
 /* A folder of its own for the files of a test, with those that the variants below name. */
 static void enter_folder(void)
 {
@@ -104,12 +126,13 @@ static void enter_folder(void)
     ck_assert_int_eq(chdir(folder), 0);
     write_cube("cube.obj", whole_cube);
     write_globe("globe.obj", 7, 0.2);
+    write_wedge("wedge.obj");
 }
 
 static void leave_folder(void)
 {
     char folder[256];
-    static const char *const files[] = {"cube.obj", "globe.obj", "wrong.obj", "large.obj"};
+    static const char *const files[] = {"cube.obj", "globe.obj", "wedge.obj", "wrong.obj", "large.obj"};
     for (size_t i = 0; i < sizeof files / sizeof *files; i++)
         unlink(files[i]);
     ck_assert_ptr_nonnull(getcwd(folder, sizeof folder));
@@ -226,6 +249,7 @@ static const struct variant {
      in_round_cylinder},
     {"mesh", "{'type': 'mesh', 'file': 'cube.obj'}", in_cube},
     {"mesh", "{'type': 'mesh', 'file': 'globe.obj', 'scale': [0.7, 0.5, 0.6], 'rotate': [20, 0, 30]}", NULL},
+    {"mesh", "{'type': 'mesh', 'file': 'wedge.obj', 'scale': 0.7}", NULL},
 };
 #define VARIANTS (sizeof variants / sizeof *variants)
 
