@@ -117,8 +117,8 @@ typedef struct drape_mesh_def {
     double translate[3]; /* [m]; default 0; applied last */
 } drape_mesh_def;
 
-/* Displacement of pinned nodes from their rest positions as a piecewise linear function of time, constant
- * before the first and after the last key. */
+/* Displacement of pinned nodes from their rest positions, or of a collider from where its parameters put it,
+ * as a piecewise linear function of time, constant before the first and after the last key. */
 typedef struct drape_track_key {
     double time;            /* [s], strictly increasing from key to key */
     double displacement[3]; /* [m] */

@@ -28,9 +28,9 @@ typedef enum drape_param_kind {
     DRAPE_PARAM_BOOLEAN, /* 0 or 1 */
     DRAPE_PARAM_CHOICE,  /* the index of one of choices */
     DRAPE_PARAM_VECTOR,  /* three numbers, one after another in the values; the range holds for each */
-    DRAPE_PARAM_TURN, /* given as a vector along the axis, as long as the angle [degrees], or as axis and angle;
-                         travels as the former, three numbers; the range holds for the angle */
-    DRAPE_PARAM_TEXT /* a text, such as the name of a file; it does not travel: its value is 0 */
+    DRAPE_PARAM_TURN,    /* three numbers: a vector along the axis, as long as the angle [degrees], which the
+                            range holds for; may be given as axis and angle, four numbers */
+    DRAPE_PARAM_TEXT     /* a text, such as the name of a file; it does not travel: its value is 0 */
 } drape_param_kind;
 
 /* One parameter. All values travel as doubles: integers exact, booleans 0 or 1, choices by index; a vector
@@ -211,8 +211,8 @@ DRAPE_API void drape_pair_distance(const drape_elements *el, int32_t first, int3
 
 /* What of a collider cloth can touch besides its smooth surface, in the collider's own coordinates, with the
  * surface `radius` outside of it: points against the faces of a cloth, segments against its edges, and
- * triangles (rows without a smooth distance) against its nodes. No segment has the length 0. A shape begins as
- * all zeros; arrays are taken by drape_shape_reserve. */
+ * triangles (rows without a smooth distance) against its nodes. No segment has the length 0. A shape begins
+ * as all zeros; arrays are taken by drape_shape_reserve. */
 typedef struct drape_collider_shape {
     int32_t point_count, segment_count, triangle_count;
     double *point;     /* (point_count x 3) [m] */
@@ -236,8 +236,8 @@ DRAPE_API drape_status drape_shape_refuse(drape_collider_shape *shape, const cha
                                           const char *format, ...) DRAPE_PRINTF(3, 4);
 
 /* Fills points, segments and triangles from the OBJ or PLY file that the TEXT parameter of this name gives,
- * relative to the scene: scaled, then turned about the origin (a value of the kind TURN), then moved. The mesh
- * must be closed and its triangles counterclockwise from outside. Errors: DRAPE_E_FILE, DRAPE_E_PARSE,
+ * relative to the scene: scaled, then turned about the origin (a value of the kind TURN), then moved. The
+ * mesh must be closed and its triangles counterclockwise from outside. Errors: DRAPE_E_FILE, DRAPE_E_PARSE,
  * DRAPE_E_ARGUMENT, DRAPE_E_MEMORY; return them. */
 DRAPE_API drape_status drape_shape_read_mesh(drape_collider_shape *shape, const char *parameter,
                                              const double scale[3], const double turn[3],
@@ -269,8 +269,8 @@ typedef struct drape_collider_ops {
     bool smooth;
 } drape_collider_ops;
 
-/* Registers a collider of the host's own, as drape_context_add_term does a term. Errors: DRAPE_E_ARGUMENT (not
- * well formed, name taken, more than 32), DRAPE_E_VERSION (struct_size). */
+/* Registers a collider of the host's own, as drape_context_add_term does a term. Errors: DRAPE_E_ARGUMENT
+ * (not well formed, name taken, more than 32), DRAPE_E_VERSION (struct_size). */
 DRAPE_API drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *ops);
 
 DRAPE_C_END

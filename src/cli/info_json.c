@@ -85,6 +85,47 @@ static json_t *params_of(const drape_param *params, int param_count, const doubl
     return object;
 }
 
+static json_t *track(const drape_track *track)
+{
+    json_t *keys = json_array();
+    for (size_t k = 0; k < track->key_count; k++)
+        keys = and_also(keys, and_also(and_also(json_array(), number(track->keys[k].time)),
+                                       vector(track->keys[k].displacement)));
+    return keys;
+}
+
+static json_t *collider(const drape_collider *from, const cli_collider_info *info)
+{
+    json_t *object = with(json_object(), "name", text(from->name));
+    object = with(object, "type", json_string(from->ops->name));
+    object = with(object, "parameters",
+                  params_of(from->ops->params, from->ops->param_count, from->values, &from->choice));
+    object = with(object, "friction", number(from->friction));
+    if (from->track.key_count > 0)
+        object = with(object, "track", track(&from->track));
+    object = with(object, "points", count(from->shape.point_count));
+    object = with(object, "segments", count(from->shape.segment_count));
+    object = with(object, "triangles", count(from->shape.triangle_count));
+    return with(object, "nodes_inside", count(info->inside));
+}
+
+static json_t *with_contact(json_t *object, const cli_info *info)
+{
+    cli_contact_rows contact;
+    json_t *colliders = json_array();
+    for (int32_t c = 0; c < info->model->collider_count; c++)
+        colliders = and_also(colliders, collider(&info->model->colliders[c], &info->colliders[c]));
+    if (info->model->collider_count > 0)
+        object = with(object, "colliders", json_incref(colliders));
+    json_decref(colliders);
+    cli_contact(info->model, &contact);
+    for (int i = 0; i < contact.count; i++) {
+        const cli_chosen_row *row = &contact.rows[i];
+        object = with(object, row->title, params_of(row->params, row->param_count, row->values, row->choice));
+    }
+    return object;
+}
+
 static json_t *chosen(const cli_chosen_row *row, const drape_chosen *all)
 {
     json_t *ignored = json_array();
@@ -251,6 +292,7 @@ json_t *cli_info_json(const cli_info *info)
     object = with(object, "dofs", count(model->pattern.n));
     object = with(object, "nnz", count(model->pattern.nonzeros));
     object = with(object, "cloths", cloths);
+    object = with_contact(object, info);
     cli_chosen_rows(info->sim, rows);
     for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
         object = with(object, rows[i].title, chosen(&rows[i], &info->sim->chosen));

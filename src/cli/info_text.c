@@ -125,15 +125,54 @@ static void print_ignored(const cli_chosen_row *row, const drape_chosen *chosen)
     fputs(any ? "\n" : "", stdout);
 }
 
+/* As the scene gave them, or by default. */
+static void print_given(const drape_param *params, int count, const double *values,
+                        const drape_choice *choice)
+{
+    for (int p = 0; p < count; p++) {
+        printf("  %-16s ", params[p].name);
+        if (params[p].kind == DRAPE_PARAM_TEXT)
+            fputs(cli_text_of(choice, params[p].name), stdout);
+        else
+            print_value(&params[p], values + drape_param_place(params, p));
+        puts(cli_is_given(choice, params[p].name) ? "" : " (default)");
+    }
+}
+
 static void print_chosen(const cli_chosen_row *row, const drape_chosen *chosen)
 {
     printf("\n%s %s: %s\n", row->title, row->name, row->summary);
-    for (int p = 0; p < row->param_count; p++) {
-        printf("  %-16s ", row->params[p].name);
-        print_value(&row->params[p], row->values + drape_param_place(row->params, p));
-        puts(cli_is_given(row->choice, row->params[p].name) ? "" : " (default)");
-    }
+    print_given(row->params, row->param_count, row->values, row->choice);
     print_ignored(row, chosen);
+}
+
+/* ---- Colliders and contact ---- */
+
+static void print_collider(const drape_collider *collider, const cli_collider_info *info)
+{
+    const drape_collider_shape *shape = &collider->shape;
+    printf("\ncollider %s: %s, %s\n", collider->name, collider->ops->name, collider->ops->summary);
+    print_given(collider->ops->params, collider->ops->param_count, collider->values, &collider->choice);
+    printf("  %-16s %.9g\n", "friction", collider->friction);
+    if (collider->track.key_count > 0)
+        printf("  %-16s %zu keys, %.9g s to %.9g s\n", "track", collider->track.key_count,
+               collider->track.keys[0].time, collider->track.keys[collider->track.key_count - 1].time);
+    printf("  %-16s %d points, %d segments, %d triangles\n", "features", (int)shape->point_count,
+           (int)shape->segment_count, (int)shape->triangle_count);
+    if (info->inside)
+        printf("  %d node%s of the cloth start%s inside of it\n", (int)info->inside,
+               info->inside == 1 ? "" : "s", info->inside == 1 ? "s" : "");
+}
+
+static void print_contact(const drape_model *model)
+{
+    cli_contact_rows contact;
+    cli_contact(model, &contact);
+    for (int i = 0; i < contact.count; i++) {
+        const cli_chosen_row *row = &contact.rows[i];
+        printf("\n%s\n", row->title);
+        print_given(row->params, row->param_count, row->values, row->choice);
+    }
 }
 
 /* ---- Terms ---- */
@@ -268,6 +307,9 @@ void cli_info_text(const cli_info *info)
     print_scene(info);
     for (int32_t c = 0; c < info->model->cloth_count; c++)
         print_cloth(info, c);
+    for (int32_t c = 0; c < info->model->collider_count; c++)
+        print_collider(&info->model->colliders[c], &info->colliders[c]);
+    print_contact(info->model);
     cli_chosen_rows(info->sim, rows);
     for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
         print_chosen(&rows[i], &info->sim->chosen);

@@ -1,7 +1,7 @@
 /*
  * schema.c: see schema.h. As strict as the reader wherever a schema can say it. What it cannot say: that
- * times of a track increase, that names of cloths differ, that a term is named once, and all that depends on
- * the mesh.
+ * times of a track increase, that names of cloths or colliders differ, that a term is named once, what one
+ * parameter of a collider demands of another, and all that depends on a mesh.
  *
  * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere below ends
  * as a NULL at the top.

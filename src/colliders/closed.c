@@ -1,5 +1,5 @@
-/* closed.c: a mesh file as the surface of a solid: every edge has two triangles, which run along it in opposite
- * directions, and the volume inside is positive. */
+/* closed.c: a mesh file as the surface of a solid: every edge has two triangles, which run along it in
+ * opposite directions, and the volume inside is positive. */
 #include "colliders/colliders.h"
 
 #include "base/vec3.h"
@@ -14,8 +14,8 @@ static bool runs_along(const drape_mesh *mesh, int32_t t, int32_t a, int32_t b)
     return (n[0] == a && n[1] == b) || (n[1] == a && n[2] == b) || (n[2] == a && n[0] == b);
 }
 
-/* Six times the volume: the sum of the tetrahedra from the first node, which is near where the origin need not
- * be. */
+/* Six times the volume: the sum of the tetrahedra from the first node, which is near where the origin need
+ * not be. */
 static double six_volumes(const drape_mesh *mesh)
 {
     double sum = 0, side[3][3], cross[3];

@@ -1,5 +1,5 @@
-/* collider_plane.c: the half space below a plane: d = n . (x - p), n the normal brought to length 1. Faces and
- * edges of a cloth are above it where their nodes are, so that it has no features. */
+/* collider_plane.c: the half space below a plane: d = n . (x - p), n the normal brought to length 1. Faces
+ * and edges of a cloth are above it where their nodes are, so that it has no features. */
 #include "colliders/colliders.h"
 
 #include "base/vec3.h"

@@ -18,8 +18,8 @@ typedef struct drape_collider_pose {
 
 drape_collider_pose drape_collider_pose_at(const drape_collider *collider, double t);
 
-/* Signed distance [m] of a point of space; normal (3) and curvature (3 x 3 [1/m]) as in drape_collider_ops, NULL
- * where they are not wanted. */
+/* Signed distance [m] of a point of space; normal (3) and curvature (3 x 3 [1/m]) as in drape_collider_ops,
+ * NULL where they are not wanted. */
 double drape_collider_distance(const drape_collider *collider, const drape_collider_pose *pose,
                                const double *x, double *normal, double *curvature);
 

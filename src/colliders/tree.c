@@ -15,7 +15,7 @@
 
 #include <string.h>
 
-#define LEAF_SIZE 4
+#define LEAF_SIZE 2
 #define DEPTH     64 /* halving 2^31 triangles ends after 31 levels */
 
 typedef struct box {
@@ -247,8 +247,8 @@ static void offer_edge(const drape_collider_shape *s, int32_t t, int k, const do
     }
 }
 
-/* Inside of all three edges the nearest point is the foot of the perpendicular; else it is on an edge that x is
- * outside of. */
+/* Inside of all three edges the nearest point is the foot of the perpendicular; else it is on an edge that x
+ * is outside of. */
 static void offer_triangle(const drape_collider_shape *s, const drape_tree *tree, int32_t t, const double *x,
                            nearest *best)
 {
@@ -281,25 +281,35 @@ static double squared_distance(const box *b, const double *x)
     return sum;
 }
 
+/* A node that is still to be visited. */
+typedef struct pending {
+    int32_t index;
+    double squared; /* of the distance of its box */
+} pending;
+
+static pending pending_at(const drape_tree *tree, int32_t index, const double *x)
+{
+    return (pending){index, squared_distance(&tree->node[index].bounds, x)};
+}
+
 static nearest find_nearest(const drape_tree *tree, const drape_collider_shape *s, const double *x)
 {
     nearest best = {.squared = INFINITY};
-    int32_t stack[DEPTH];
-    int height = 0;
-    stack[height++] = 0;
+    pending stack[DEPTH] = {{0, 0}};
+    int height = 1;
     while (height > 0) {
-        int32_t index = stack[--height];
-        const tree_node *node = &tree->node[index];
-        if (squared_distance(&node->bounds, x) >= best.squared)
+        const pending next = stack[--height];
+        const tree_node *node = &tree->node[next.index];
+        if (next.squared >= best.squared)
             continue;
         for (int32_t i = 0; i < node->count; i++)
             offer_triangle(s, tree, tree->order[node->first + i], x, &best);
         if (node->count > 0)
             continue;
-        bool first_is_near = squared_distance(&tree->node[index + 1].bounds, x) <=
-                             squared_distance(&tree->node[node->second].bounds, x);
-        stack[height++] = first_is_near ? node->second : index + 1;
-        stack[height++] = first_is_near ? index + 1 : node->second;
+        const pending one = pending_at(tree, next.index + 1, x), other = pending_at(tree, node->second, x);
+        bool one_is_near = one.squared <= other.squared;
+        stack[height++] = one_is_near ? other : one;
+        stack[height++] = one_is_near ? one : other;
     }
     return best;
 }

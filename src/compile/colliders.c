@@ -5,9 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_NAMES      128
-#define MOST_COLLIDERS 4096
-#define MOST_FRICTION  1e3
+#define MAX_NAMES     128
+#define MOST_FRICTION 1e3
 
 /* How far a polygon may stay inside a curved surface, of the activation distance: an edge of the cloth that
  * rests on a polygon then is pushed off nearly as if it were the surface. */
@@ -94,10 +93,6 @@ static drape_status compile_collider(drape_model *model, size_t i, const drape_s
 drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *def)
 {
     drape_status status = DRAPE_OK;
-    if (def->collider_count > MOST_COLLIDERS)
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/colliders",
-                             "the scene has %zu colliders; it has at most %d", def->collider_count,
-                             MOST_COLLIDERS);
     if (def->collider_count == 0)
         return DRAPE_OK;
     model->colliders =

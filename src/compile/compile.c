@@ -1,5 +1,5 @@
-/* compile.c: the stages of a compilation, in order: cloths, whole-model arrays, pins, contact, colliders, terms,
- * pattern. */
+/* compile.c: the stages of a compilation, in order: cloths, whole-model arrays, pins, contact, colliders,
+ * terms, pattern. */
 #include "compile/compile.h"
 
 #include "compile/stages.h"

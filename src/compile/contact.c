@@ -79,9 +79,9 @@ static double largest_thickness(const drape_model *model)
     return largest;
 }
 
-/* 100 sigma |g|, sigma the largest areal density: a sheet at rest on a collider then is pushed in by a hundredth
- * of what such a pressure is. Without gravity L / s^2 stands for |g|: the acceleration that takes the sheet, of
- * the size L, its own length away in about a second. */
+/* 100 sigma |g|, sigma the largest areal density: a sheet at rest on a collider then is pushed in by a
+ * hundredth of what such a pressure is. Without gravity L / s^2 stands for |g|: the acceleration that takes
+ * the sheet, of the size L, its own length away in about a second. */
 static double stiffness_of_weight(const drape_model *model)
 {
     double sigma = 0, g = hypot(hypot(model->gravity[0], model->gravity[1]), model->gravity[2]);

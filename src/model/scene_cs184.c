@@ -173,11 +173,10 @@ static drape_status check_keys(drape_context *ctx, json_t *root)
             continue;
         const char *meant = drape_did_you_mean(name, theirs, 3);
         drape_pointer_push(&at, name);
-        return drape_fail_at(
-            ctx, DRAPE_E_ARGUMENT, at.text,
-            "unknown key of a CS184 scene%s%s%s; it has cloth, sphere, plane (and a scene of ours "
-            "\"drape\": 1)",
-            meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at.text,
+                             "unknown key \"%.60s\" of a CS184 scene%s%s%s; one of ours has \"drape\": 1",
+                             name, meant ? "; did you mean \"" : ", which has cloth, sphere, plane",
+                             meant ? meant : "", meant ? "\"?" : "");
     }
     return DRAPE_OK;
 }
@@ -187,33 +186,38 @@ static double number_of(json_t *object_value, const char *name)
     return json_number_value(json_object_get(object_value, name));
 }
 
-static bool is_point(json_t *pin, double columns, double rows)
+/* One pin, at its pointer. */
+static drape_status check_pin(drape_context *ctx, drape_pointer *at, json_t *pin, const double points[2])
 {
-    const double most[] = {columns, rows};
-    bool good = json_array_size(pin) == 2;
-    for (size_t i = 0; good && i < 2; i++) {
-        double number = json_number_value(json_array_get(pin, i));
-        good = json_is_number(json_array_get(pin, i)) && number >= 0 && number < most[i] &&
-               number == floor(number);
+    if (json_array_size(pin) != 2)
+        return refuse(ctx, at, pin, "a pin", "[x, y]");
+    for (size_t i = 0; i < 2; i++) {
+        json_t *value = json_array_get(pin, i);
+        double number = json_number_value(value);
+        if (json_is_number(value) && number >= 0 && number < points[i] && number == floor(number))
+            continue;
+        char expected[60];
+        snprintf(expected, sizeof expected, "an integer from 0 to %.0f", points[i] - 1);
+        drape_pointer_push_index(at, i);
+        return refuse(ctx, at, value, i ? "y of a pin" : "x of a pin", expected);
     }
-    return good;
+    return DRAPE_OK;
 }
 
 static drape_status check_pins(drape_context *ctx, json_t *cloth)
 {
     json_t *pins = json_object_get(cloth, "pinned");
-    double columns = number_of(cloth, "num_width_points"), rows = number_of(cloth, "num_height_points");
+    const double points[] = {number_of(cloth, "num_width_points"), number_of(cloth, "num_height_points")};
     drape_pointer at = {.length = 0};
     drape_pointer_push(&at, "cloth");
     drape_pointer_push(&at, "pinned");
+    size_t mark = at.length;
     for (size_t i = 0; i < json_array_size(pins); i++) {
-        if (is_point(json_array_get(pins, i), columns, rows))
-            continue;
-        char expected[100];
-        snprintf(expected, sizeof expected, "[x, y], x from 0 to %.0f and y from 0 to %.0f", columns - 1,
-                 rows - 1);
         drape_pointer_push_index(&at, i);
-        return refuse(ctx, &at, json_array_get(pins, i), "a pin", expected);
+        drape_status status = check_pin(ctx, &at, json_array_get(pins, i), points);
+        if (status)
+            return status;
+        drape_pointer_cut(&at, mark);
     }
     return DRAPE_OK;
 }

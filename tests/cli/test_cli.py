@@ -494,6 +494,37 @@ def test_list():
         assert line.replace("\\|", "").count("|") in (4, 7), line
 
 
+def test_info_of_contact():
+    """info shows colliders and contact where they are modelled, and how many nodes start inside"""
+    write_scene()
+    for words in good("info", "scene.json"), good("info", "scene.json", "--json"):
+        assert "collider" not in words and "contact" not in words, words
+    write_scene(colliders=[{"type": "plane", "name": "floor", "point": [0, 0, 0], "normal": [0, 3, 0], "friction": 0.5},
+                           {"type": "box", "center": [0, 0, 0], "size": 0.05, "track": [[0, [0, 0, 0]], [2, [0, 1, 0]]]},
+                           {"type": "mesh", "file": "tetrahedron.obj", "translate": [0, 5, 0]}],
+                self_contact={"thickness": 0.002}, contact={"friction_velocity": 0.01})
+    with open("tetrahedron.obj", "w", encoding="utf-8") as file:
+        file.write("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 4 3\nf 1 2 4\nf 2 3 4\n")
+    words = good("info", "scene.json")
+    for part in (r"collider floor: plane", r"  normal +\[0, 3, 0\]\n", r"  friction +0\.5\n", r"collider collider1: box",
+                 r"  size +\[0\.05, 0\.05, 0\.05\] m\n", r"  track +2 keys, 0 s to 2 s\n", r"  file +tetrahedron\.obj\n",
+                 r"1 node of the cloth starts inside", r"\ncontact\n +distance +0\.001 m \(default\)", r"thickness +0\.002 m\n"):
+        assert re.search(part, words), (part, words)
+    found = json.loads(good("info", "scene.json", "--json"))
+    floor, box, mesh = found["colliders"]
+    equal((floor["name"], floor["type"], floor["friction"], floor["nodes_inside"]), ("floor", "plane", 0.5, 0))
+    equal(floor["parameters"]["normal"], {"value": [0, 3, 0], "unit": "1", "default": False})
+    equal((box["name"], box["points"], box["segments"], box["nodes_inside"]), ("collider1", 8, 12, 1))
+    equal(box["track"], [[0, [0, 0, 0]], [2, [0, 1, 0]]])
+    equal((mesh["parameters"]["file"]["value"], mesh["triangles"]), ("tetrahedron.obj", 4))
+    equal(mesh["parameters"]["scale"], {"value": [1, 1, 1], "unit": "1", "default": True})
+    # 100 times 0.2 kg/m2 times 9.81 m/s2
+    assert abs(found["contact"]["stiffness"]["value"] - 196.2) < 1e-9, found["contact"]
+    equal((found["contact"]["distance"]["default"], found["contact"]["friction"]["value"]), (True, "implicit"))
+    equal(found["self_contact"], {"thickness": {"value": 0.002, "unit": "m", "default": False},
+                                  "friction": {"value": 0, "unit": "1", "default": True}})
+
+
 # ---- The schema
 
 
@@ -516,6 +547,30 @@ def variants():
     yield True, scene(pins=[{"nodes": [0, 3]}, {"row": 1}, {"edge": "top"}, {"box": [[0, 0, 0], [1, 1, 1]]},
                             {"nodes": [15], "track": [[0, [0, 0, 0]], [1, [0, 1, 0]]]}])
     yield True, scene(integrator={"method": "be", "project": True, "norm": "l2", "max_iterations": 6})
+    ball = {"type": "sphere", "center": [0, -5, 0], "radius": 1}
+    for more in ({}, {"friction": 0}, {"friction": 1000, "name": "b", "track": [[0, [0, 0, 0]], [1, [0, 1, 0]]]}):
+        yield True, scene(colliders=[{**ball, **more}])
+    for more in ({"radius": 0}, {"radius": "1"}, {"center": [0, 0]}, {"center": 0}, {"center": [0, "0", 0]}, {"center": [0, 0, 1e10]},
+                 {"friction": -1}, {"friction": 1001}, {"name": ""}, {"type": "shpere"}, {"size": 1}, {"track": [[0, [0, 0]]]}):
+        yield False, scene(colliders=[{**ball, **more}])
+    box = {"type": "box", "center": [0, -5, 0], "size": [1, 2, 3]}
+    for more in ({}, {"size": 2}, {"rotate": [0, 90, 0]}, {"rotate": [0, 1, 0, 90], "rounding": 0.1}):
+        yield True, scene(colliders=[{**box, **more}])
+    for more in ({"size": 0}, {"size": [1, 2]}, {"size": [1, 0, 1]}, {"rotate": 90}, {"rotate": [0, 90]}, {"rounding": -1}):
+        yield False, scene(colliders=[{**box, **more}])
+    yield True, scene(colliders=[{"type": "plane", "point": [0, -1, 0], "normal": [0, 2, 0]},
+                                 {"type": "capsule", "a": [0, -5, 0], "b": [0, -6, 0], "radius": 0.1},
+                                 {"type": "cylinder", "a": [0, -5, 0], "b": [0, -6, 0], "radius": 0.1}])
+    yield False, scene(colliders=["plane"])
+    yield False, scene(colliders=[{"type": "plane", "point": [0, -1, 0]}])
+    yield False, scene(colliders=[{"type": "mesh"}])
+    yield False, scene(colliders=[{"type": "mesh", "file": ""}])
+    yield True, scene(self_contact={"thickness": 0.001, "friction": 0.2}, contact={"stiffness": 10, "friction": "lagged"})
+    yield True, scene(contact={})
+    yield False, scene(self_contact={})
+    yield False, scene(self_contact={"thickness": 0})
+    yield False, scene(contact={"distance": 0})
+    yield False, scene(contact={"friction": 0.5})
     yield False, scene(drape=2)
     yield False, scene(duration=0)
     yield False, scene(duration="5")
