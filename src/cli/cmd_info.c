@@ -140,7 +140,8 @@ static drape_status gather(const cli_scene *in, cli_info *info)
     info->frames = count_frames(model);
     for (int32_t c = 0; c < model->cloth_count; c++)
         info->cloths[c] = cloth_info(model, &model->cloths[c]);
-<<<<<<< HEAD
+    for (int32_t c = 0; c < model->collider_count; c++)
+        info->colliders[c] = collider_info(in->sim, &model->colliders[c]);
     drape_status status = drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
     const drape_integrator_ops *integrator = in->sim->chosen.integrator;
     info->has_limit = integrator->stability;
@@ -148,11 +149,6 @@ static drape_status gather(const cli_scene *in, cli_info *info)
         integrator->stability(in->sim->integrator, drape_sim_state(in->sim), info->profile.dt,
                               &info->stability);
     return status;
-=======
-    for (int32_t c = 0; c < model->collider_count; c++)
-        info->colliders[c] = collider_info(in->sim, &model->colliders[c]);
-    return drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
->>>>>>> colliders
 }
 
 static int print_json(const cli_info *info)

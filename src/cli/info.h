@@ -24,16 +24,11 @@ typedef struct cli_info {
     const drape_model *model;
     const drape_sim *sim;
     drape_profile profile;
-<<<<<<< HEAD
-    bool has_limit;            /* the integrator has a stability limit: */
-    drape_stability stability; /* at the start, of a step of profile.dt */
-    int64_t frames;            /* of a whole run */
-    cli_cloth_info *cloths;    /* one for each of the model */
-=======
+    bool has_limit;               /* the integrator has a stability limit: */
+    drape_stability stability;    /* at the start, of a step of profile.dt */
     int64_t frames;               /* of a whole run */
     cli_cloth_info *cloths;       /* one for each of the model */
     cli_collider_info *colliders; /* likewise */
->>>>>>> colliders
 } cli_info;
 
 /* A row that was chosen by name. */
