@@ -204,11 +204,14 @@ static bool is_searched(const search *q, const int32_t *cell, int32_t y, int32_t
 static void search_range(const drape_verlet_self *s, search *q, int32_t y, int32_t z, int32_t first,
                          int32_t last)
 {
+    const int32_t below = q->lower ? q->node : INT32_MAX;
     for (int32_t at = first; at < last; at++) {
         double d[3];
+        if (s->node[at] >= below)
+            continue;
         vec3_sub(q->x, s->x + 3 * (size_t)at, d);
         if (!(vec3_dot(d, d) < q->reach_squared) || s->node[at] == q->node ||
-            (q->lower && s->node[at] > q->node) || !is_searched(q, s->cell + 3 * (size_t)at, y, z))
+            !is_searched(q, s->cell + 3 * (size_t)at, y, z))
             continue;
         if (q->count < MOST_NEAR)
             q->found[q->count] = s->node[at];
