@@ -81,7 +81,7 @@ static inline drape_sim *bench_sim(drape_context *ctx, const drape_model *model,
     def.controller_settings = controller_settings;
     def.controller_setting_count = bench_count(controller_settings);
     if (drape_sim_create(ctx, model, &def, &sim))
-        bench_fail(ctx, "%s", integrator);
+        bench_fail(ctx, "%s", integrator ? integrator : "the scene's integrator");
     return sim;
 }
 

@@ -87,12 +87,14 @@ DRAPE_API const char *drape_context_message(const drape_context *ctx);
 
 /* ---- Scene in memory: what a host fills instead of a scene file ---- */
 
-/* One parameter by name. Numbers and integers go into number with text NULL; choices into text; booleans
- * as text "true" or "false", or as number 0 or 1. */
+/* One parameter by name. Numbers and integers go into number with text and vector NULL; choices and file
+ * names into text; booleans as text "true" or "false", or as number 0 or 1; vectors into vector. */
 typedef struct drape_setting {
     const char *name;
     double number;
     const char *text;
+    const double *vector; /* vector_count numbers: 3, or 4 for axis and angle [degrees] */
+    size_t vector_count;
 } drape_setting;
 
 /* A row of one of Drape's tables by name, with the parameters that differ from their defaults. `drape list`
@@ -115,8 +117,8 @@ typedef struct drape_mesh_def {
     double translate[3]; /* [m]; default 0; applied last */
 } drape_mesh_def;
 
-/* Displacement of pinned nodes from their rest positions as a piecewise linear function of time, constant
- * before the first and after the last key. */
+/* Displacement of pinned nodes from their rest positions, or of a collider from where its parameters put it,
+ * as a piecewise linear function of time, constant before the first and after the last key. */
 typedef struct drape_track_key {
     double time;            /* [s], strictly increasing from key to key */
     double displacement[3]; /* [m] */
@@ -151,6 +153,15 @@ typedef struct drape_cloth_def {
     double velocity[3]; /* [m/s] of every node at t = 0 */
 } drape_cloth_def;
 
+/* A rigid obstacle: a row of the colliders with its parameters. Initialise with drape_collider_def_init. */
+typedef struct drape_collider_def {
+    drape_row_def row;            /* "plane", "sphere" ... */
+    const char *name;             /* NULL: "collider0", "collider1" ... */
+    double friction;              /* Coulomb's mu between it and cloth [1], [0, 1000]; default 0 */
+    const drape_track_key *track; /* displacement from where the parameters put it; NULL: it rests */
+    size_t key_count;
+} drape_collider_def;
+
 /* A whole scene. Initialise with drape_scene_def_init; everything pointed to need only live until
  * drape_model_create returns. */
 typedef struct drape_scene_def {
@@ -166,6 +177,12 @@ typedef struct drape_scene_def {
     const char *const *formats; /* frame formats of `drape run`, rows of the exporters; default none */
     size_t format_count;
     const char *folder; /* folder that relative mesh files are in; NULL: the working directory */
+    const drape_collider_def *colliders; /* at most 4096 */
+    size_t collider_count;
+    const drape_setting *self_contact; /* thickness, friction; NULL: cloth goes through cloth */
+    size_t self_contact_count;
+    const drape_setting *contact; /* distance, stiffness ...: `drape list contact` shows all */
+    size_t contact_count;
 } drape_scene_def;
 
 /* Fill a def with the defaults above. */
@@ -173,6 +190,7 @@ DRAPE_API void drape_scene_def_init(drape_scene_def *def, size_t struct_size);
 DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
 DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
 DRAPE_API void drape_pin_def_init(drape_pin_def *def, size_t struct_size);
+DRAPE_API void drape_collider_def_init(drape_collider_def *def, size_t struct_size);
 
 /* ---- Scene from text ---- */
 
@@ -234,6 +252,16 @@ typedef struct drape_cloth_range {
 } drape_cloth_range;
 DRAPE_API int32_t drape_model_cloth_count(const drape_model *model);
 DRAPE_API drape_cloth_range drape_model_cloth(const drape_model *model, int32_t index);
+
+/* The obstacles, in scene order, and where they are at time t [s]. */
+typedef struct drape_collider_motion {
+    const char *name;
+    const char *type;       /* the row */
+    double displacement[3]; /* [m] from where its parameters put it */
+    double velocity[3];     /* [m/s]; at a key of the track, that of the piece after it */
+} drape_collider_motion;
+DRAPE_API int32_t drape_model_collider_count(const drape_model *model);
+DRAPE_API drape_collider_motion drape_model_collider(const drape_model *model, int32_t index, double t);
 
 /* The scene's own duration [s] and frame rate [1/s]. */
 DRAPE_API double drape_model_duration(const drape_model *model);

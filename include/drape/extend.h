@@ -1,6 +1,6 @@
 /*
- * extend.h: all that an author of a term needs: parameter lists, the view of a cloth, the ops table of a
- * term.
+ * extend.h: all that an author of a term or a collider needs: parameter lists, the view of a cloth, the ops
+ * table of a term, the shape and the ops table of a collider.
  *
  * A term is a sum over elements of one cloth. Its author writes, for a range of elements in local
  * coordinates, one of measure      a scalar strain measure q(x) with gradient and Hessian; the library makes
@@ -26,10 +26,15 @@ typedef enum drape_param_kind {
     DRAPE_PARAM_NUMBER,
     DRAPE_PARAM_INTEGER,
     DRAPE_PARAM_BOOLEAN, /* 0 or 1 */
-    DRAPE_PARAM_CHOICE   /* the index of one of choices */
+    DRAPE_PARAM_CHOICE,  /* the index of one of choices */
+    DRAPE_PARAM_VECTOR,  /* three numbers, one after another in the values; the range holds for each */
+    DRAPE_PARAM_TURN,    /* three numbers: a vector along the axis, as long as the angle [degrees], which the
+                            range holds for; may be given as axis and angle, four numbers */
+    DRAPE_PARAM_TEXT     /* a text, such as the name of a file; it does not travel: its value is 0 */
 } drape_param_kind;
 
-/* One parameter. All values travel as doubles: integers exact, booleans 0 or 1, choices by index. */
+/* One parameter. All values travel as doubles: integers exact, booleans 0 or 1, choices by index; a vector
+ * or a turn takes three of them, so that the values of the parameters after it stand two further on. */
 typedef struct drape_param {
     const char *name;
     drape_param_kind kind;
@@ -41,9 +46,10 @@ typedef struct drape_param {
     bool open_min, open_max;    /* the bound itself is excluded */
     const char *const *choices; /* NULL-ended list of words */
     const char *help;           /* what it is and what it does, one line */
+    bool uniform;               /* VECTOR: one number may stand for three equal ones */
 } drape_param;
 
-#define DRAPE_MAX_PARAMS 24
+#define DRAPE_MAX_PARAMS 24 /* values of the parameters of a row */
 
 /* ---- What a term is built from ---- */
 
@@ -69,7 +75,8 @@ typedef struct drape_cloth_view {
     const int32_t *hinge_edge; /* (hinge_count) */
     const double *node_area;   /* (node_count) lumped, a third of each triangle [m2] */
     const double *node_mass;   /* (node_count) lumped [kg] */
-    int32_t rows, columns;     /* of a grid, in nodes; 0 on other meshes */
+    int32_t rows, columns;     /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
+    bool rectangular;          /* a grid whose cells are rectangles before its transform */
     drape_material material;
     double gravity[3]; /* [m/s2] */
 } drape_cloth_view;
@@ -82,8 +89,8 @@ typedef struct drape_term_builder drape_term_builder;
  * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count);
 
-/* Sets element `element`: its nodes (local to the cloth) and its rest data. Measures keep k [J] in rest[0]
- * and q0 in rest[1]. */
+/* Sets element `element`: its nodes (local to the cloth) and its rest data. Measures keep k [J/q2] in rest[0]
+ * and q0 in rest[1]; rows that are damped keep c >= 0 [J s/q2] in rest[2]. */
 DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes,
                               const double *rest);
 
@@ -115,6 +122,8 @@ typedef struct drape_fault {
 
 /* ---- The ops table of a term ---- */
 
+#define DRAPE_PAIR_BLOCK 32
+
 /*
  * A row. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first + count
  * - 1; outputs are element-major: item i belongs to element first + i. d = 3 * nodes. Gradients have the sign
@@ -134,6 +143,8 @@ typedef struct drape_term_ops {
     bool linear;               /* energy: its Hessian is zero and takes no sparsity */
     bool potential_of_gravity; /* energy: counts as gravity, not as elastic */
     bool has_internal;         /* one internal variable an element */
+    bool constraint; /* an energy that keeps a limit: integrators that move nodes to keep limits do without */
+    bool damped;     /* measure: a dashpot of its own in each element, force c q' on q */
 
     /* Adds the elements of one cloth. Called once a cloth. Errors: what the builder returned. */
     drape_status (*build)(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder);
@@ -141,6 +152,12 @@ typedef struct drape_term_ops {
     /* q [q] (count), dq (count x d), ddq (count x d x d, symmetric). */
     void (*measure)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                     const double *internal, double *q, double *dq, double *ddq);
+
+    /* Optional, beside measure, where nodes is 2 and q depends on the distance of the nodes alone: the same for
+     * forces without derivatives, which take half of the numbers. q (count), d (3 x count: all x, all y, all z)
+     * = x1 - x0 [m], c (count) with dq = (-c d, c d). count is at most DRAPE_PAIR_BLOCK. */
+    void (*pair)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,
+                 double *d, double *c);
 
     /* e [J] (count), g [N] (count x d), hess [N/m] (count x d x d, symmetric). */
     void (*energy)(const drape_elements *el, int32_t first, int32_t count, const double *x,
@@ -186,6 +203,76 @@ typedef void drape_element_energy(const drape_elements *el, int32_t element, con
                                   double *g, double *hess);
 DRAPE_API void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                   double *e, double *g, double *hess, drape_element_energy *one);
+
+/* For rows with pair: d (3 x count) and the distance l (count) of the two nodes of each element. */
+DRAPE_API void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                                   double *l, double *d);
+
+/* ---- Colliders ---- */
+
+/* What of a collider cloth can touch besides its smooth surface, in the collider's own coordinates, with the
+ * surface `radius` outside of it: points against the faces of a cloth, segments against its edges, and
+ * triangles (rows without a smooth distance) against its nodes. No segment has the length 0. A shape begins
+ * as all zeros; arrays are taken by drape_shape_reserve. */
+typedef struct drape_collider_shape {
+    int32_t point_count, segment_count, triangle_count;
+    double *point;     /* (point_count x 3) [m] */
+    int32_t *segment;  /* (segment_count x 2) numbers of points */
+    int32_t *triangle; /* (triangle_count x 3) numbers of points, counterclockwise from outside */
+    double radius;     /* [m] */
+    const void *kept;  /* what the row keeps for its distance, of drape_shape_take; NULL for nothing */
+    struct drape_shape_builder
+        *builder; /* of the functions below; NULL outside of the row's function shape */
+} drape_collider_shape;
+
+/* Takes the arrays of a shape; they live as long as the model. Called once. Errors: DRAPE_E_MEMORY. */
+DRAPE_API drape_status drape_shape_reserve(drape_collider_shape *shape, int32_t points, int32_t segments,
+                                           int32_t triangles);
+
+/* Memory that lives as long as the model, zeroed, for what the row keeps; NULL: return DRAPE_E_MEMORY. */
+DRAPE_API void *drape_shape_take(drape_collider_shape *shape, size_t count, size_t size);
+
+/* Refuses a value: the reason is reported at the parameter in the scene. Returns DRAPE_E_ARGUMENT. */
+DRAPE_API drape_status drape_shape_refuse(drape_collider_shape *shape, const char *parameter,
+                                          const char *format, ...) DRAPE_PRINTF(3, 4);
+
+/* Fills points, segments and triangles from the OBJ or PLY file that the TEXT parameter of this name gives,
+ * relative to the scene: scaled, then turned about the origin (a value of the kind TURN), then moved. The
+ * mesh must be closed and its triangles counterclockwise from outside. Errors: DRAPE_E_FILE, DRAPE_E_PARSE,
+ * DRAPE_E_ARGUMENT, DRAPE_E_MEMORY; return them. */
+DRAPE_API drape_status drape_shape_read_mesh(drape_collider_shape *shape, const char *parameter,
+                                             const double scale[3], const double turn[3],
+                                             const double translate[3]);
+
+/*
+ * A row of the colliders: a rigid, closed obstacle. values: in the order of params; a vector takes three.
+ * Coordinates are the collider's own: a track moves it as a whole. Thread-safety: as for terms; shape, called
+ * once a collider while a model is compiled, may allocate.
+ */
+typedef struct drape_collider_ops {
+    size_t struct_size;
+    const char *name, *summary, *reference;
+    const drape_param *params;
+    int param_count;
+
+    /* Refuses values that do not go together, and fills the shape. tolerance [m]: how far a polygon may stay
+     * inside a curved surface. */
+    drape_status (*shape)(const double *values, double tolerance, drape_collider_shape *shape);
+
+    /* The signed distance of x from the surface [m], negative inside; normal (3), its gradient, of length 1;
+     * curvature (3 x 3 [1/m]), its Hessian. Outputs that are NULL are not wanted. Everywhere defined: where
+     * the gradient is not unique, one of those there. */
+    double (*distance)(const double *values, const drape_collider_shape *shape, const double *x,
+                       double *normal, double *curvature);
+
+    /* The derivatives of distance serve contact in a residual: they are continuous outside, and nodes of the
+     * cloth meet the surface by it. Else they meet the shape's triangles. */
+    bool smooth;
+} drape_collider_ops;
+
+/* Registers a collider of the host's own, as drape_context_add_term does a term. Errors: DRAPE_E_ARGUMENT
+ * (not well formed, name taken, more than 32), DRAPE_E_VERSION (struct_size). */
+DRAPE_API drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *ops);
 
 DRAPE_C_END
 

@@ -28,12 +28,16 @@ typedef struct block_buffer {
     int32_t first, count;
     double energy[BLOCK], gradient[BLOCK * D], hessian[BLOCK * D * D];
     double q[BLOCK], dq[BLOCK * D], velocity[BLOCK * D * D];
+    bool pairs; /* the result is pull instead: the force on the second node, the first has its */
+    double c[BLOCK], pull[3 * BLOCK]; /* opposite; all x, all y, all z */
 } block_buffer;
+_Static_assert(BLOCK <= DRAPE_PAIR_BLOCK, "rows with pair take a block");
 
 struct drape_system {
     drape_context *ctx;
     const drape_model *model;
     int threads;
+    bool unconstrained;    /* terms that are a constraint are left out */
     block_buffer *buffers; /* (threads) */
 };
 
@@ -61,6 +65,16 @@ void drape_system_destroy(drape_system **system)
     *system = NULL;
 }
 
+void drape_system_leave_constraints(drape_system *system)
+{
+    system->unconstrained = true;
+}
+
+static bool is_left_out(const drape_system *system, const drape_term *term)
+{
+    return system->unconstrained && term->ops->constraint;
+}
+
 const drape_model *drape_system_model(const drape_system *system)
 {
     return system->model;
@@ -73,16 +87,21 @@ size_t drape_system_bytes(const drape_system *system)
 
 /* ---- Evaluating a block ---- */
 
-/* Generalised force on one measure and its derivatives, summed over elasticity and laws. */
+/* Generalised force on one measure and its derivatives, summed over elasticity, its own dashpot and laws. */
 typedef struct stress {
     double force, by_strain, by_rate, energy;
 } stress;
 
-static stress stress_of(const drape_term *term, const request *want, double k, double strain, double rate)
+static stress stress_of(const drape_term *term, const request *want, int32_t e, double strain, double rate)
 {
+    double k = term->elements.rest[e];
     stress s = {0};
     if (want->conservative)
         s = (stress){.force = k * strain, .by_strain = k, .energy = 0.5 * k * strain * strain};
+    if (want->dissipative && term->damping) {
+        s.force += term->damping[e] * rate;
+        s.by_rate = term->damping[e];
+    }
     for (int i = 0; i < term->law_count; i++) {
         const drape_term *law = term->laws[i];
         stress one;
@@ -144,12 +163,12 @@ static void evaluate_measure(const drape_term *term, const request *want, block_
     const drape_point *point = want->point;
     int d = 3 * el->nodes;
     const double *internal = term->first_internal >= 0 ? point->internal + term->first_internal : NULL;
-    bool rates = term->law_count > 0;
+    bool rates = term->law_count > 0 || term->damping;
     term->ops->measure(el, b->first, b->count, point->x, internal, b->q, b->dq,
                        want->hessian && !want->velocity ? b->hessian : NULL);
     for (int32_t i = 0; i < b->count; i++) {
         int32_t e = b->first + i;
-        double k = el->rest[e], strain = b->q[i] - el->rest[(size_t)el->count + (size_t)e], rate = 0, v[D];
+        double strain = b->q[i] - el->rest[(size_t)el->count + (size_t)e], rate = 0, v[D];
         double *dq = b->dq + (size_t)i * (size_t)d;
         if (rates && point->history)
             rate = point->weight * b->q[i] + point->history[term->first_measure + e];
@@ -157,7 +176,7 @@ static void evaluate_measure(const drape_term *term, const request *want, block_
             gather(el, e, point->v, v);
             rate = dot(d, dq, v);
         }
-        stress s = stress_of(term, want, k, strain, rate);
+        stress s = stress_of(term, want, e, strain, rate);
         b->energy[i] = s.energy;
         for (int j = 0; j < d; j++)
             b->gradient[i * d + j] = s.force * dq[j];
@@ -166,6 +185,43 @@ static void evaluate_measure(const drape_term *term, const request *want, block_
         else if (want->hessian)
             measure_hessian(d, point, &s, dq, v, b->hessian + (size_t)i * (size_t)(d * d));
     }
+}
+
+/* Forces on the measures of pairs, in b->q, which has their values on entry. */
+static void pair_stresses(const drape_term *term, const request *want, block_buffer *b)
+{
+    const drape_elements *el = &term->elements;
+    const drape_point *point = want->point;
+    const double *k = el->rest + b->first, *q0 = el->rest + (size_t)el->count + b->first;
+    if (term->law_count == 0 && !term->damping) {
+        for (int32_t i = 0; i < b->count; i++)
+            b->q[i] = k[i] * (b->q[i] - q0[i]);
+        return;
+    }
+    for (int32_t i = 0; i < b->count; i++) {
+        const int32_t *node = el->node + 2 * (size_t)(b->first + i);
+        double rate = 0;
+        if (point->history)
+            rate = point->weight * b->q[i] + point->history[term->first_measure + b->first + i];
+        else
+            for (int r = 0; r < 3; r++)
+                rate +=
+                    b->c[i] * b->pull[r * b->count + i] *
+                    (point->v[3 * (size_t)node[1] + (size_t)r] - point->v[3 * (size_t)node[0] + (size_t)r]);
+        b->q[i] = stress_of(term, want, b->first + i, b->q[i] - q0[i], rate).force;
+    }
+}
+
+/* Forces of a measure of pairs: half of the numbers of a gradient, and loops without calls. */
+static void evaluate_pairs(const drape_term *term, const request *want, block_buffer *b)
+{
+    term->ops->pair(&term->elements, b->first, b->count, want->point->x, b->q, b->pull, b->c);
+    pair_stresses(term, want, b);
+    for (int32_t i = 0; i < b->count; i++)
+        b->c[i] *= b->q[i];
+    for (int r = 0; r < 3; r++)
+        for (int32_t i = 0; i < b->count; i++)
+            b->pull[r * b->count + i] *= b->c[i];
 }
 
 static void evaluate_energy(const drape_term *term, const request *want, block_buffer *b)
@@ -189,7 +245,10 @@ static void evaluate_dissipation(const drape_term *term, const request *want, bl
 
 static void evaluate(const drape_term *term, const request *want, block_buffer *b)
 {
-    if (term->ops->measure)
+    b->pairs = term->ops->pair && !want->hessian && !want->energy;
+    if (b->pairs)
+        evaluate_pairs(term, want, b);
+    else if (term->ops->measure)
         evaluate_measure(term, want, b);
     else if (term->ops->energy)
         evaluate_energy(term, want, b);
@@ -206,6 +265,21 @@ static void evaluate(const drape_term *term, const request *want, block_buffer *
 typedef struct sums {
     double *energy, *g, *values;
 } sums;
+
+static void add_pulls(const drape_elements *el, const block_buffer *b, double *g)
+{
+    const int32_t *node = el->node + 2 * (size_t)b->first;
+    const double *px = b->pull, *py = px + b->count, *pz = py + b->count;
+    for (int32_t i = 0; i < b->count; i++) {
+        double *a = g + 3 * (size_t)node[2 * i], *c = g + 3 * (size_t)node[2 * i + 1];
+        a[0] -= px[i];
+        a[1] -= py[i];
+        a[2] -= pz[i];
+        c[0] += px[i];
+        c[1] += py[i];
+        c[2] += pz[i];
+    }
+}
 
 static void add_gradients(const drape_elements *el, const block_buffer *b, double *g)
 {
@@ -250,7 +324,9 @@ static void add(const drape_model *model, const drape_term *term, const block_bu
 {
     for (int32_t i = 0; to->energy && i < b->count; i++)
         *to->energy += b->energy[i];
-    if (to->g)
+    if (to->g && b->pairs)
+        add_pulls(&term->elements, b, to->g);
+    else if (to->g)
         add_gradients(&term->elements, b, to->g);
     if (to->values)
         add_hessians(model, term, b, to->values);
@@ -263,7 +339,7 @@ static bool contributes(const drape_term *term, const request *want, const sums 
     if (term->ops->law || (to->values && !to->g && !to->energy && term->ops->linear))
         return false;
     if (term->ops->measure)
-        return want->conservative || term->law_count > 0;
+        return want->conservative || term->law_count > 0 || term->damping;
     return term->ops->dissipation ? want->dissipative : want->conservative;
 }
 
@@ -309,7 +385,7 @@ static void sum_term(drape_system *system, const drape_term *term, const request
 static void sum_terms(drape_system *system, const request *want, const sums *to)
 {
     for (int32_t i = 0; i < system->model->term_count; i++)
-        if (contributes(&system->model->terms[i], want, to))
+        if (!is_left_out(system, &system->model->terms[i]) && contributes(&system->model->terms[i], want, to))
             sum_term(system, &system->model->terms[i], want, to);
 }
 
@@ -359,7 +435,7 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
         const sums to = {.energy = term->ops->potential_of_gravity ? gravity : elastic};
-        if (contributes(term, &want, &to))
+        if (!is_left_out(system, term) && contributes(term, &want, &to))
             sum_term(system, term, &want, &to);
     }
 }
@@ -373,7 +449,7 @@ void drape_system_term(drape_system *system, int32_t term, const drape_point *po
     const sums to = {.energy = energy, .g = g, .values = t->block ? values : NULL};
     if (energy)
         *energy = 0;
-    if (!t->ops->law)
+    if (!t->ops->law && !is_left_out(system, t))
         sum_term(system, t, &want, &to);
 }
 
@@ -412,7 +488,7 @@ drape_status drape_system_check(const drape_system *system, const double *x, con
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
         drape_fault fault;
-        if (!term->ops->check)
+        if (!term->ops->check || is_left_out(system, term))
             continue;
         const double *own = term->first_internal >= 0 ? internal + term->first_internal : NULL;
         drape_status status = term->ops->check(&term->elements, x, before, own, &fault);

@@ -27,6 +27,11 @@ typedef struct drape_point {
 drape_status drape_system_create(drape_context *ctx, const drape_model *model, int threads,
                                  drape_system **out);
 void drape_system_destroy(drape_system **system);
+
+/* From here on what stands for a constraint has no part in forces, energies and checks: for integrators that keep
+ * constraints by moving nodes. */
+void drape_system_leave_constraints(drape_system *system);
+
 const drape_model *drape_system_model(const drape_system *system);
 
 /* g (node_count x 3) of all nodes, pinned ones too. */

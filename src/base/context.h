@@ -1,4 +1,4 @@
-/* context.h: allocator, last message, log, terms of the host. Every function that can fail reports through
+/* context.h: allocator, last message, log, rows of the host. Every function that can fail reports through
  * its context. */
 #ifndef DRAPE_BASE_CONTEXT_H
 #define DRAPE_BASE_CONTEXT_H
@@ -7,8 +7,9 @@
 
 #include "drape/extend.h"
 
-#define DRAPE_MESSAGE_SIZE   1024
-#define DRAPE_MAX_HOST_TERMS 32
+#define DRAPE_MESSAGE_SIZE       1024
+#define DRAPE_MAX_HOST_TERMS     32
+#define DRAPE_MAX_HOST_COLLIDERS 32
 
 struct drape_context {
     drape_context_def def;
@@ -18,6 +19,8 @@ struct drape_context {
     char text[DRAPE_MESSAGE_SIZE]; /* the message without its place */
     const drape_term_ops *host_terms[DRAPE_MAX_HOST_TERMS];
     int host_term_count;
+    const drape_collider_ops *host_colliders[DRAPE_MAX_HOST_COLLIDERS];
+    int host_collider_count;
 };
 
 /* count x size bytes, zeroed, aligned for any type; NULL with a message on failure or overflow. 0 bytes give

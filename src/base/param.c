@@ -15,6 +15,25 @@ int drape_param_find(const drape_param *params, int param_count, const char *nam
     return -1;
 }
 
+int drape_param_width(const drape_param *param)
+{
+    return param->kind == DRAPE_PARAM_VECTOR || param->kind == DRAPE_PARAM_TURN ? 3 : 1;
+}
+
+int drape_param_place(const drape_param *params, int index)
+{
+    int place = 0;
+    for (int i = 0; i < index; i++)
+        place += drape_param_width(&params[i]);
+    return place;
+}
+
+void drape_param_default(const drape_param *param, double *values)
+{
+    for (int k = 0; k < drape_param_width(param); k++)
+        values[k] = param->default_value;
+}
+
 /* Levenshtein distance by one row of the table; words longer than LONGEST_WORD are never meant. */
 static size_t edit_distance(const char *a, const char *b)
 {
@@ -60,6 +79,16 @@ static void choices_text(const drape_param *param, char *text, size_t size)
         used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", param->choices[i]);
 }
 
+/* What stands before the range of each number of several. */
+static const char *several_text(const drape_param *param)
+{
+    if (param->kind == DRAPE_PARAM_TURN)
+        return "[x, y, z, angle], or [x, y, z] as long as the angle, which is in ";
+    if (param->kind == DRAPE_PARAM_VECTOR)
+        return param->uniform ? "a number or [x, y, z], each in " : "[x, y, z], each in ";
+    return "";
+}
+
 void drape_param_range_text(const drape_param *param, char *text, size_t size)
 {
     const char *unit = strcmp(param->unit, "1") == 0 ? "" : param->unit;
@@ -70,28 +99,41 @@ void drape_param_range_text(const drape_param *param, char *text, size_t size)
     case DRAPE_PARAM_CHOICE:
         choices_text(param, text, size);
         return;
+    case DRAPE_PARAM_TEXT:
+        snprintf(text, size, "a string, not empty");
+        return;
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
-        snprintf(text, size, "%c%.10g, %.10g%c%s%s", param->open_min ? '(' : '[', param->min, param->max,
-                 param->open_max ? ')' : ']', *unit ? " " : "", unit);
+    case DRAPE_PARAM_VECTOR:
+    case DRAPE_PARAM_TURN:
+        snprintf(text, size, "%s%c%.10g, %.10g%c%s%s", several_text(param), param->open_min ? '(' : '[',
+                 param->min, param->max, param->open_max ? ')' : ']', *unit ? " " : "", unit);
     }
 }
 
-void drape_param_value_text(const drape_param *param, double value, char *text, size_t size)
+void drape_param_value_text(const drape_param *param, const double *value, char *text, size_t size)
 {
+    if (isnan(*value)) {
+        snprintf(text, size, "%s", param->derived ? param->derived : "required");
+        return;
+    }
     switch (param->kind) {
     case DRAPE_PARAM_BOOLEAN:
-        snprintf(text, size, "%s", value != 0 ? "true" : "false");
+        snprintf(text, size, "%s", *value != 0 ? "true" : "false");
         return;
     case DRAPE_PARAM_CHOICE:
-        snprintf(text, size, "%s", param->choices[(int)value]);
+        snprintf(text, size, "%s", param->choices[(int)*value]);
         return;
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
-        if (isnan(value))
-            snprintf(text, size, "%s", param->derived ? param->derived : "required");
-        else
-            snprintf(text, size, "%.10g", value);
+        snprintf(text, size, "%.10g", *value);
+        return;
+    case DRAPE_PARAM_VECTOR:
+    case DRAPE_PARAM_TURN:
+        snprintf(text, size, "[%.10g, %.10g, %.10g]", value[0], value[1], value[2]);
+        return;
+    case DRAPE_PARAM_TEXT:
+        snprintf(text, size, "a text");
     }
 }
 
@@ -137,35 +179,96 @@ static drape_status choice_value(drape_context *ctx, const char *pointer, const 
                          meant ? "\"?" : "");
 }
 
+static bool in_range(const drape_param *param, double number)
+{
+    return isfinite(number) && (param->open_min ? number > param->min : number >= param->min) &&
+           (param->open_max ? number < param->max : number <= param->max);
+}
+
+static drape_status number_value(drape_context *ctx, const char *pointer, const drape_param *param,
+                                 double number, double *value)
+{
+    bool good = in_range(param, number) && (param->kind != DRAPE_PARAM_INTEGER || number == floor(number));
+    if (param->kind == DRAPE_PARAM_BOOLEAN)
+        good = number == 0 || number == 1;
+    if (!good || param->kind == DRAPE_PARAM_TEXT)
+        return refuse_number(ctx, pointer, param, number);
+    for (int k = 0; k < drape_param_width(param); k++) /* a vector: one number for all three */
+        value[k] = number;
+    return DRAPE_OK;
+}
+
+/* Axis and angle become a vector along the axis, as long as the angle. */
+static drape_status turn_value(drape_context *ctx, const char *pointer, const drape_param *param,
+                               const drape_setting *setting, double *value)
+{
+    const double *v = setting->vector;
+    double axis = hypot(hypot(v[0], v[1]), v[2]), angle = setting->vector_count == 4 ? v[3] : axis;
+    if (!in_range(param, angle) || !isfinite(axis))
+        return refuse_number(ctx, pointer, param, isfinite(axis) ? angle : axis);
+    if (axis == 0 && angle != 0)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
+                             "the axis of a turn by %.10g degrees is 0 0 0; it must not be zero", angle);
+    for (int k = 0; k < 3; k++)
+        value[k] = axis > 0 ? v[k] / axis * angle : 0;
+    return DRAPE_OK;
+}
+
+static drape_status vector_value(drape_context *ctx, const char *pointer, const drape_param *param,
+                                 const drape_setting *setting, double *value)
+{
+    char given[64];
+    bool turn = param->kind == DRAPE_PARAM_TURN;
+    if (drape_param_width(param) == 3 &&
+        (setting->vector_count == 3 || (turn && setting->vector_count == 4))) {
+        if (turn)
+            return turn_value(ctx, pointer, param, setting, value);
+        for (int k = 0; k < 3; k++) {
+            if (!in_range(param, setting->vector[k]))
+                return refuse_number(ctx, pointer, param, setting->vector[k]);
+            value[k] = setting->vector[k];
+        }
+        return DRAPE_OK;
+    }
+    snprintf(given, sizeof given, "an array of %zu", setting->vector_count);
+    return refuse(ctx, pointer, param, given);
+}
+
+static drape_status refuse_text(drape_context *ctx, const char *pointer, const drape_param *param,
+                                const char *text)
+{
+    char given[80];
+    bool word = strcmp(text, "true") == 0 || strcmp(text, "false") == 0; /* a boolean */
+    snprintf(given, sizeof given, word ? "%.60s" : "\"%.60s\"", text);
+    return refuse(ctx, pointer, param, given);
+}
+
+static drape_status text_value(drape_context *ctx, const char *pointer, const drape_param *param,
+                               const char *text, double *value)
+{
+    bool yes = strcmp(text, "true") == 0, no = strcmp(text, "false") == 0;
+    if (param->kind == DRAPE_PARAM_CHOICE)
+        return choice_value(ctx, pointer, param, text, value);
+    if (param->kind == DRAPE_PARAM_BOOLEAN && (yes || no))
+        *value = yes;
+    else if (param->kind == DRAPE_PARAM_TEXT && *text)
+        *value = 0;
+    else
+        return refuse_text(ctx, pointer, param, text);
+    return DRAPE_OK;
+}
+
 drape_status drape_param_value(drape_context *ctx, const char *pointer, const drape_param *param,
                                const drape_setting *setting, double *value)
 {
-    if (param->kind == DRAPE_PARAM_CHOICE)
-        return setting->text ? choice_value(ctx, pointer, param, setting->text, value)
-                             : refuse_number(ctx, pointer, param, setting->number);
-    if (setting->text && param->kind == DRAPE_PARAM_BOOLEAN &&
-        (strcmp(setting->text, "true") == 0 || strcmp(setting->text, "false") == 0)) {
-        *value = strcmp(setting->text, "true") == 0;
-        return DRAPE_OK;
-    }
-    if (setting->text) {
-        char given[80];
-        bool word = strcmp(setting->text, "true") == 0 || strcmp(setting->text, "false") == 0; /* a boolean */
-        snprintf(given, sizeof given, word ? "%.60s" : "\"%.60s\"", setting->text);
-        return refuse(ctx, pointer, param, given);
-    }
-    double number = setting->number;
-    bool good = isfinite(number);
-    if (param->kind == DRAPE_PARAM_BOOLEAN)
-        good = number == 0 || number == 1;
-    else if (good)
-        good = (param->open_min ? number > param->min : number >= param->min) &&
-               (param->open_max ? number < param->max : number <= param->max) &&
-               (param->kind != DRAPE_PARAM_INTEGER || number == floor(number));
-    if (!good)
-        return refuse_number(ctx, pointer, param, number);
-    *value = number;
-    return DRAPE_OK;
+    if (setting->text)
+        return text_value(ctx, pointer, param, setting->text, value);
+    if (setting->vector)
+        return vector_value(ctx, pointer, param, setting, value);
+    if (param->kind == DRAPE_PARAM_CHOICE || param->kind == DRAPE_PARAM_TURN ||
+        (param->kind == DRAPE_PARAM_VECTOR && !param->uniform))
+        return refuse_number(ctx, pointer, param, setting->number);
+    return number_value(ctx, pointer, param, setting->number, value);
 }
 
 static drape_status unknown_name(drape_context *ctx, const char *pointer, const drape_param *params,
@@ -185,20 +288,21 @@ drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const
 {
     bool given[DRAPE_MAX_PARAMS] = {false};
     for (int i = 0; i < param_count; i++)
-        values[i] = params[i].default_value;
+        drape_param_default(&params[i], values + drape_param_place(params, i));
     for (size_t s = 0; s < setting_count; s++) {
         char at[256];
         snprintf(at, sizeof at, "%s/%.80s", pointer, settings[s].name);
         int i = drape_param_find(params, param_count, settings[s].name);
         if (i < 0)
             return unknown_name(ctx, at, params, param_count, settings[s].name);
-        drape_status status = drape_param_value(ctx, at, &params[i], &settings[s], &values[i]);
+        drape_status status =
+            drape_param_value(ctx, at, &params[i], &settings[s], values + drape_param_place(params, i));
         if (status)
             return status;
         given[i] = true;
     }
     for (int i = 0; i < param_count; i++)
-        if (!given[i] && isnan(values[i]) && !params[i].derived) {
+        if (!given[i] && isnan(params[i].default_value) && !params[i].derived) {
             char range[256];
             drape_param_range_text(&params[i], range, sizeof range);
             return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%s\" is missing: %s, %s", params[i].name,

@@ -4,6 +4,13 @@
 
 #include "base/context.h"
 
+/* How many values a parameter takes, and a list of them up to the given one: the place of its first value. */
+int drape_param_width(const drape_param *param);
+int drape_param_place(const drape_param *params, int index);
+
+/* The default, once for each value. */
+void drape_param_default(const drape_param *param, double *values);
+
 /* Values of params in their order: the default where no setting names it (NaN where the default is derived).
  * Faults are reported at "pointer/name". A setting of a name that the list does not have is a fault, with a
  * "did you mean". */
@@ -11,18 +18,20 @@ drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const
                                   int param_count, const drape_setting *settings, size_t setting_count,
                                   double *values);
 
-/* Checks one setting against its parameter and converts it. */
+/* Checks one setting against its parameter and converts it; writes as many values as the parameter takes, at
+ * most DRAPE_PARAM_WIDEST. */
+#define DRAPE_PARAM_WIDEST 3
 drape_status drape_param_value(drape_context *ctx, const char *pointer, const drape_param *param,
                                const drape_setting *setting, double *value);
 
 /* The index of a name; -1 if it is not in the list. */
 int drape_param_find(const drape_param *params, int param_count, const char *name);
 
-/* "(0, 1e9] N/m" or "one of: a, b": the range of a parameter in words. */
+/* "(0, 1e9] N/m", "[x, y, z], each in [0, 1]" or "one of: a, b": the range of a parameter in words. */
 void drape_param_range_text(const drape_param *param, char *text, size_t size);
 
-/* A value of a parameter in words: "0.001", "true", "report". */
-void drape_param_value_text(const drape_param *param, double value, char *text, size_t size);
+/* A value of a parameter in words: "0.001", "true", "report", "[0, 1, 0]". */
+void drape_param_value_text(const drape_param *param, const double *value, char *text, size_t size);
 
 /* The candidate nearest to word by edit distance, NULL if none is near enough to be meant. */
 const char *drape_did_you_mean(const char *word, const char *const *candidates, size_t count);

@@ -1,6 +1,8 @@
 /* cmd_info.c: `drape info`: what a scene models and what it costs. */
 #include "cli/info.h"
 
+#include "colliders/colliders.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -32,12 +34,41 @@ void cli_chosen_rows(const drape_sim *sim, cli_chosen_row rows[CLI_CHOSEN_ROWS])
                                drape_chosen_ignores_controller};
 }
 
+void cli_contact(const drape_model *model, cli_contact_rows *out)
+{
+    out->count = 0;
+    if (model->collider_count > 0 || model->contact.self) {
+        drape_contact_values(&model->contact, out->values[0]);
+        out->rows[out->count++] = (cli_chosen_row){.title = "contact",
+                                                   .params = drape_contact_params,
+                                                   .param_count = DRAPE_CONTACT_PARAM_COUNT,
+                                                   .values = out->values[0],
+                                                   .choice = &model->contact_choice};
+    }
+    if (model->contact.self) {
+        drape_self_contact_values(&model->contact, out->values[1]);
+        out->rows[out->count++] = (cli_chosen_row){.title = "self_contact",
+                                                   .params = drape_self_contact_params,
+                                                   .param_count = DRAPE_SELF_PARAM_COUNT,
+                                                   .values = out->values[1],
+                                                   .choice = &model->self_choice};
+    }
+}
+
 bool cli_is_given(const drape_choice *choice, const char *name)
 {
     for (size_t i = 0; i < choice->setting_count; i++)
         if (strcmp(choice->settings[i].name, name) == 0)
             return true;
     return false;
+}
+
+const char *cli_text_of(const drape_choice *choice, const char *name)
+{
+    for (size_t i = 0; i < choice->setting_count; i++)
+        if (strcmp(choice->settings[i].name, name) == 0 && choice->settings[i].text)
+            return choice->settings[i].text;
+    return "";
 }
 
 double cli_share(const cli_info *info, double seconds)
@@ -78,6 +109,16 @@ static cli_cloth_info cloth_info(const drape_model *model, const drape_cloth *cl
     return info;
 }
 
+static cli_collider_info collider_info(const drape_sim *sim, const drape_collider *collider)
+{
+    cli_collider_info info = {0};
+    const double *x = drape_sim_positions(sim);
+    const drape_collider_pose pose = drape_collider_pose_at(collider, drape_sim_time(sim));
+    for (int32_t i = 0; i < sim->model->node_count; i++)
+        info.inside += drape_collider_distance(collider, &pose, x + 3 * (size_t)i, NULL, NULL) < 0;
+    return info;
+}
+
 /* The frames at k / rate up to the end, and one at the end where none of them is there. */
 static int64_t count_frames(const drape_model *model)
 {
@@ -91,14 +132,23 @@ static drape_status gather(const cli_scene *in, cli_info *info)
     drape_profile_term *terms = drape_alloc(in->ctx, (size_t)model->term_count, sizeof *terms);
     info->profile.terms = terms;
     info->cloths = drape_alloc(in->ctx, (size_t)model->cloth_count, sizeof *info->cloths);
-    if (!terms || !info->cloths)
+    info->colliders = drape_alloc(in->ctx, (size_t)model->collider_count, sizeof *info->colliders);
+    if (!terms || !info->cloths || !info->colliders)
         return DRAPE_E_MEMORY;
     info->model = model;
     info->sim = in->sim;
     info->frames = count_frames(model);
     for (int32_t c = 0; c < model->cloth_count; c++)
         info->cloths[c] = cloth_info(model, &model->cloths[c]);
-    return drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
+    for (int32_t c = 0; c < model->collider_count; c++)
+        info->colliders[c] = collider_info(in->sim, &model->colliders[c]);
+    drape_status status = drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
+    const drape_integrator_ops *integrator = in->sim->chosen.integrator;
+    info->has_limit = integrator->stability;
+    if (!status && info->has_limit)
+        integrator->stability(in->sim->integrator, drape_sim_state(in->sim), info->profile.dt,
+                              &info->stability);
+    return status;
 }
 
 static int print_json(const cli_info *info)
@@ -124,6 +174,7 @@ static int print_info(const info_request *request, const cli_scene *in)
     }
     drape_free(in->ctx, info.profile.terms);
     drape_free(in->ctx, info.cloths);
+    drape_free(in->ctx, info.colliders);
     return code;
 }
 

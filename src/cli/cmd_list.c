@@ -36,7 +36,9 @@ static param_text text_of(const drape_param *param)
     drape_param plain = *param;
     plain.unit = "1"; /* the range without its unit, which has a place of its own */
     drape_param_range_text(&plain, text.range, sizeof text.range);
-    drape_param_value_text(param, param->default_value, text.value, sizeof text.value);
+    double value[DRAPE_PARAM_WIDEST];
+    drape_param_default(param, value);
+    drape_param_value_text(param, value, text.value, sizeof text.value);
     snprintf(text.unit, sizeof text.unit, "%s", strcmp(param->unit, "1") == 0 ? "" : param->unit);
     return text;
 }

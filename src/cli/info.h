@@ -15,13 +15,20 @@ typedef struct cli_cloth_info {
     int32_t pinned, moved; /* nodes; moved ones are pinned, too */
 } cli_cloth_info;
 
+typedef struct cli_collider_info {
+    int32_t inside; /* nodes at t = 0 */
+} cli_collider_info;
+
 typedef struct cli_info {
     const char *path;
     const drape_model *model;
     const drape_sim *sim;
     drape_profile profile;
-    int64_t frames;         /* of a whole run */
-    cli_cloth_info *cloths; /* one for each of the model */
+    bool has_limit;               /* the integrator has a stability limit: */
+    drape_stability stability;    /* at the start, of a step of profile.dt */
+    int64_t frames;               /* of a whole run */
+    cli_cloth_info *cloths;       /* one for each of the model */
+    cli_collider_info *colliders; /* likewise */
 } cli_info;
 
 /* A row that was chosen by name. */
@@ -37,8 +44,19 @@ typedef struct cli_chosen_row {
 #define CLI_CHOSEN_ROWS 2
 void cli_chosen_rows(const drape_sim *sim, cli_chosen_row rows[CLI_CHOSEN_ROWS]);
 
+/* Contact and self-contact as far as they are modelled, seen as rows that were chosen; how many. */
+typedef struct cli_contact_rows {
+    int count;
+    cli_chosen_row rows[2];
+    double values[2][DRAPE_MAX_PARAMS];
+} cli_contact_rows;
+void cli_contact(const drape_model *model, cli_contact_rows *out);
+
 /* Whether the scene gave the parameter. */
 bool cli_is_given(const drape_choice *choice, const char *name);
+
+/* The text that the scene gave for a parameter; "" for none. */
+const char *cli_text_of(const drape_choice *choice, const char *name);
 
 /* A share of the residual, Jacobian, factor and solve of one Newton iteration [1]. */
 double cli_share(const cli_info *info, double seconds);

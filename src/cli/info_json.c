@@ -48,15 +48,26 @@ static json_t *vector(const double v[3])
 
 /* ---- Parameters ---- */
 
-static json_t *value_of(const drape_param *param, double value)
+/* choice: where a text is; NULL where there are none. */
+static json_t *value_of(const drape_param *param, const double *value, const drape_choice *choice)
 {
-    if (param->kind == DRAPE_PARAM_BOOLEAN)
-        return json_boolean(value != 0);
-    if (param->kind == DRAPE_PARAM_CHOICE)
-        return json_string(param->choices[(int)value]);
-    if (isnan(value) && param->derived)
+    if (isnan(*value) && param->derived)
         return json_string(param->derived);
-    return param->kind == DRAPE_PARAM_INTEGER ? count((int64_t)value) : number(value);
+    switch (param->kind) {
+    case DRAPE_PARAM_BOOLEAN:
+        return json_boolean(*value != 0);
+    case DRAPE_PARAM_CHOICE:
+        return json_string(param->choices[(int)*value]);
+    case DRAPE_PARAM_VECTOR:
+    case DRAPE_PARAM_TURN:
+        return vector(value);
+    case DRAPE_PARAM_TEXT:
+        return text(choice ? cli_text_of(choice, param->name) : "");
+    case DRAPE_PARAM_NUMBER:
+    case DRAPE_PARAM_INTEGER:
+        break;
+    }
+    return param->kind == DRAPE_PARAM_INTEGER ? count((int64_t)*value) : number(*value);
 }
 
 static json_t *params_of(const drape_param *params, int param_count, const double *values,
@@ -64,11 +75,53 @@ static json_t *params_of(const drape_param *params, int param_count, const doubl
 {
     json_t *object = json_object();
     for (int p = 0; p < param_count; p++) {
-        json_t *one = with(json_object(), "value", value_of(&params[p], values[p]));
+        json_t *one =
+            with(json_object(), "value", value_of(&params[p], values + drape_param_place(params, p), choice));
         one = with(one, "unit", json_string(params[p].unit));
         if (choice)
             one = with(one, "default", json_boolean(!cli_is_given(choice, params[p].name)));
         object = with(object, params[p].name, one);
+    }
+    return object;
+}
+
+static json_t *track(const drape_track *track)
+{
+    json_t *keys = json_array();
+    for (size_t k = 0; k < track->key_count; k++)
+        keys = and_also(keys, and_also(and_also(json_array(), number(track->keys[k].time)),
+                                       vector(track->keys[k].displacement)));
+    return keys;
+}
+
+static json_t *collider(const drape_collider *from, const cli_collider_info *info)
+{
+    json_t *object = with(json_object(), "name", text(from->name));
+    object = with(object, "type", json_string(from->ops->name));
+    object = with(object, "parameters",
+                  params_of(from->ops->params, from->ops->param_count, from->values, &from->choice));
+    object = with(object, "friction", number(from->friction));
+    if (from->track.key_count > 0)
+        object = with(object, "track", track(&from->track));
+    object = with(object, "points", count(from->shape.point_count));
+    object = with(object, "segments", count(from->shape.segment_count));
+    object = with(object, "triangles", count(from->shape.triangle_count));
+    return with(object, "nodes_inside", count(info->inside));
+}
+
+static json_t *with_contact(json_t *object, const cli_info *info)
+{
+    cli_contact_rows contact;
+    json_t *colliders = json_array();
+    for (int32_t c = 0; c < info->model->collider_count; c++)
+        colliders = and_also(colliders, collider(&info->model->colliders[c], &info->colliders[c]));
+    if (info->model->collider_count > 0)
+        object = with(object, "colliders", json_incref(colliders));
+    json_decref(colliders);
+    cli_contact(info->model, &contact);
+    for (int i = 0; i < contact.count; i++) {
+        const cli_chosen_row *row = &contact.rows[i];
+        object = with(object, row->title, params_of(row->params, row->param_count, row->values, row->choice));
     }
     return object;
 }
@@ -93,10 +146,11 @@ static json_t *values_of(const drape_param *params, int param_count, const doubl
     json_t *object = json_object();
     for (int p = 0; p < param_count; p++) {
         bool spoken = params[p].kind == DRAPE_PARAM_CHOICE || params[p].kind == DRAPE_PARAM_BOOLEAN;
+        const double *value = values + drape_param_place(params, p);
         if (spoken)
-            drape_param_value_text(&params[p], values[p], words, sizeof words);
-        if (!isnan(values[p]))
-            object = with(object, params[p].name, spoken ? text(words) : number(values[p]));
+            drape_param_value_text(&params[p], value, words, sizeof words);
+        if (!isnan(*value))
+            object = with(object, params[p].name, spoken ? text(words) : value_of(&params[p], value, NULL));
     }
     return object;
 }
@@ -212,6 +266,16 @@ static json_t *formats(const drape_model *model)
     return array;
 }
 
+/* A limit that is infinite is null. */
+static json_t *stability(const drape_stability *s)
+{
+    json_t *object = with(json_object(), "omega", number(s->omega));
+    object = with(object, "damping", number(s->damping));
+    object = with(object, "limit", number(s->limit));
+    object = with(object, "substep", number(s->substep));
+    return with(object, "share", number(s->substep / s->limit));
+}
+
 json_t *cli_info_json(const cli_info *info)
 {
     const drape_model *model = info->model;
@@ -231,9 +295,12 @@ json_t *cli_info_json(const cli_info *info)
     object = with(object, "dofs", count(model->pattern.n));
     object = with(object, "nnz", count(model->pattern.nonzeros));
     object = with(object, "cloths", cloths);
+    object = with_contact(object, info);
     cli_chosen_rows(info->sim, rows);
     for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
         object = with(object, rows[i].title, chosen(&rows[i], &info->sim->chosen));
+    if (info->has_limit)
+        object = with(object, "stability", stability(&info->stability));
     object = with(object, "terms", terms);
     object = with(object, "iteration", iteration(info));
     return with(object, "bytes", bytes(info));

@@ -38,25 +38,29 @@ static void print_pins(const drape_model *model, const drape_cloth *cloth, const
 }
 
 /* With its unit, unless it is words or has none. */
-static void print_value(const drape_param *param, double value)
+static void print_value(const drape_param *param, const double *value)
 {
     char text[128];
     drape_param_value_text(param, value, text, sizeof text);
-    bool has_unit = !isnan(value) && strcmp(param->unit, "1") != 0;
+    bool has_unit = !isnan(*value) && strcmp(param->unit, "1") != 0;
     printf("%s%s%s", text, has_unit ? " " : "", has_unit ? param->unit : "");
 }
 
-static bool is_default(const drape_param *param, double value)
+static bool is_default(const drape_param *param, const double *value)
 {
-    return value == param->default_value || (isnan(value) && isnan(param->default_value));
+    bool same = true;
+    for (int k = 0; k < drape_param_width(param); k++)
+        same = same && (value[k] == param->default_value || (isnan(value[k]) && isnan(param->default_value)));
+    return same;
 }
 
 static void print_params(const char *indent, const drape_param *params, int count, const double *values)
 {
     for (int p = 0; p < count; p++) {
         printf("%s%-16s ", indent, params[p].name);
-        print_value(&params[p], values[p]);
-        puts(!isnan(values[p]) && is_default(&params[p], values[p]) ? " (default)" : "");
+        const double *value = values + drape_param_place(params, p);
+        print_value(&params[p], value);
+        puts(!isnan(*value) && is_default(&params[p], value) ? " (default)" : "");
     }
 }
 
@@ -121,15 +125,54 @@ static void print_ignored(const cli_chosen_row *row, const drape_chosen *chosen)
     fputs(any ? "\n" : "", stdout);
 }
 
+/* As the scene gave them, or by default. */
+static void print_given(const drape_param *params, int count, const double *values,
+                        const drape_choice *choice)
+{
+    for (int p = 0; p < count; p++) {
+        printf("  %-16s ", params[p].name);
+        if (params[p].kind == DRAPE_PARAM_TEXT)
+            fputs(cli_text_of(choice, params[p].name), stdout);
+        else
+            print_value(&params[p], values + drape_param_place(params, p));
+        puts(cli_is_given(choice, params[p].name) ? "" : " (default)");
+    }
+}
+
 static void print_chosen(const cli_chosen_row *row, const drape_chosen *chosen)
 {
     printf("\n%s %s: %s\n", row->title, row->name, row->summary);
-    for (int p = 0; p < row->param_count; p++) {
-        printf("  %-16s ", row->params[p].name);
-        print_value(&row->params[p], row->values[p]);
-        puts(cli_is_given(row->choice, row->params[p].name) ? "" : " (default)");
-    }
+    print_given(row->params, row->param_count, row->values, row->choice);
     print_ignored(row, chosen);
+}
+
+/* ---- Colliders and contact ---- */
+
+static void print_collider(const drape_collider *collider, const cli_collider_info *info)
+{
+    const drape_collider_shape *shape = &collider->shape;
+    printf("\ncollider %s: %s, %s\n", collider->name, collider->ops->name, collider->ops->summary);
+    print_given(collider->ops->params, collider->ops->param_count, collider->values, &collider->choice);
+    printf("  %-16s %.9g\n", "friction", collider->friction);
+    if (collider->track.key_count > 0)
+        printf("  %-16s %zu keys, %.9g s to %.9g s\n", "track", collider->track.key_count,
+               collider->track.keys[0].time, collider->track.keys[collider->track.key_count - 1].time);
+    printf("  %-16s %d points, %d segments, %d triangles\n", "features", (int)shape->point_count,
+           (int)shape->segment_count, (int)shape->triangle_count);
+    if (info->inside)
+        printf("  %d node%s of the cloth start%s inside of it\n", (int)info->inside,
+               info->inside == 1 ? "" : "s", info->inside == 1 ? "s" : "");
+}
+
+static void print_contact(const drape_model *model)
+{
+    cli_contact_rows contact;
+    cli_contact(model, &contact);
+    for (int i = 0; i < contact.count; i++) {
+        const cli_chosen_row *row = &contact.rows[i];
+        printf("\n%s\n", row->title);
+        print_given(row->params, row->param_count, row->values, row->choice);
+    }
 }
 
 /* ---- Terms ---- */
@@ -146,8 +189,9 @@ static void print_term(const cli_info *info, int32_t i)
                term->elements.nodes, term->elements.nodes == 1 ? "" : "s");
     for (int p = 0; p < term->ops->param_count; p++) {
         printf("; %s ", term->ops->params[p].name);
-        print_value(&term->ops->params[p], term->params[p]);
-        fputs(is_default(&term->ops->params[p], term->params[p]) ? " (default)" : "", stdout);
+        const double *value = term->params + drape_param_place(term->ops->params, p);
+        print_value(&term->ops->params[p], value);
+        fputs(is_default(&term->ops->params[p], value) ? " (default)" : "", stdout);
     }
     fputc('\n', stdout);
 }
@@ -247,15 +291,33 @@ static void print_bytes(const cli_info *info)
     printf("  %-30s %12zu bytes, %.0f a node\n", "together", sum, (double)sum / info->model->node_count);
 }
 
+static void print_stability(const cli_info *info)
+{
+    const drape_stability *s = &info->stability;
+    if (!info->has_limit)
+        return;
+    puts("\nstability, at the start");
+    printf("  fastest wave     %.6g rad/s", s->omega);
+    if (s->damping > 0)
+        printf(", damping rates up to %.6g 1/s", s->damping);
+    printf("\n  stable below     %.6g s a substep\n", s->limit);
+    printf("  this scene's     %.6g s a substep, %.3g of the limit%s\n", s->substep, s->substep / s->limit,
+           s->substep > s->limit ? ": IT WILL BLOW UP" : "");
+}
+
 void cli_info_text(const cli_info *info)
 {
     cli_chosen_row rows[CLI_CHOSEN_ROWS];
     print_scene(info);
     for (int32_t c = 0; c < info->model->cloth_count; c++)
         print_cloth(info, c);
+    for (int32_t c = 0; c < info->model->collider_count; c++)
+        print_collider(&info->model->colliders[c], &info->colliders[c]);
+    print_contact(info->model);
     cli_chosen_rows(info->sim, rows);
     for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
         print_chosen(&rows[i], &info->sim->chosen);
+    print_stability(info);
     print_terms(info);
     print_costs(info);
     print_bytes(info);

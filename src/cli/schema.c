@@ -1,7 +1,7 @@
 /*
  * schema.c: see schema.h. As strict as the reader wherever a schema can say it. What it cannot say: that
- * times of a track increase, that names of cloths differ, that a term is named once, and all that depends on
- * the mesh.
+ * times of a track increase, that names of cloths or colliders differ, that a term is named once, what one
+ * parameter of a collider demands of another, and all that depends on a mesh.
  *
  * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere below ends
  * as a NULL at the top.
@@ -94,6 +94,11 @@ static bool is_required(const drape_param *p)
     return isnan(p->default_value) && !p->derived;
 }
 
+static json_t *three(double value)
+{
+    return and_also(and_also(and_also(json_array(), number(value)), number(value)), number(value));
+}
+
 static json_t *default_of(const drape_param *p)
 {
     switch (p->kind) {
@@ -101,22 +106,47 @@ static json_t *default_of(const drape_param *p)
         return json_boolean(p->default_value != 0);
     case DRAPE_PARAM_CHOICE:
         return json_string(p->choices[(int)p->default_value]);
+    case DRAPE_PARAM_VECTOR:
+    case DRAPE_PARAM_TURN:
+        return three(p->default_value);
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
+    case DRAPE_PARAM_TEXT: /* always required */
         break;
     }
     return number(p->default_value);
 }
 
+static json_t *bounded(const char *type, const drape_param *p)
+{
+    json_t *value = with(typed(type), p->open_min ? "exclusiveMinimum" : "minimum", number(p->min));
+    return with(value, p->open_max ? "exclusiveMaximum" : "maximum", number(p->max));
+}
+
+static json_t *vector_of(const drape_param *p)
+{
+    json_t *three_numbers = array_of(bounded("number", p), 3, 3);
+    return p->uniform ? any_of(bounded("number", p), three_numbers) : three_numbers;
+}
+
 static json_t *value_of(const drape_param *p)
 {
-    if (p->kind == DRAPE_PARAM_BOOLEAN) /* the reader takes numbers too */
+    switch (p->kind) {
+    case DRAPE_PARAM_BOOLEAN: /* the reader takes numbers too */
         return with(json_object(), "enum", json_pack("[bbii]", 1, 0, 1, 0));
-    if (p->kind == DRAPE_PARAM_CHOICE)
+    case DRAPE_PARAM_CHOICE:
         return one_of_words(p->choices);
-    json_t *value = typed(p->kind == DRAPE_PARAM_INTEGER ? "integer" : "number");
-    value = with(value, p->open_min ? "exclusiveMinimum" : "minimum", number(p->min));
-    return with(value, p->open_max ? "exclusiveMaximum" : "maximum", number(p->max));
+    case DRAPE_PARAM_TEXT:
+        return word();
+    case DRAPE_PARAM_VECTOR:
+        return vector_of(p);
+    case DRAPE_PARAM_TURN:
+        return numbers(3, 4);
+    case DRAPE_PARAM_NUMBER:
+    case DRAPE_PARAM_INTEGER:
+        break;
+    }
+    return bounded(p->kind == DRAPE_PARAM_INTEGER ? "integer" : "number", p);
 }
 
 static json_t *described(json_t *value, const char *help, const char *unit)
@@ -198,6 +228,9 @@ static const struct opening {
 } openings[] = {
     {"term", "type", ROW_PARAMS, &cli_terms, NULL},
     {"mesh", "grid", ROW_PARAMS, &cli_grids, NULL},
+    {"collider", "type", ROW_PARAMS, &cli_colliders, NULL},
+    {"self_contact", NULL, ROW_PARAMS, &cli_self_contacts, NULL},
+    {"contact", NULL, ROW_PARAMS, &cli_contacts, NULL},
     {"integrator", "method", TABLE_PARAMS, &cli_integrators, NULL},
     {"controller", "type", TABLE_PARAMS, &cli_controllers, NULL},
     {"material", NULL, ROW_PARAMS, &cli_materials,
@@ -249,7 +282,7 @@ static json_t *key_value(const drape_scene_object *object, const drape_scene_key
     case DRAPE_SCENE_WORDS:
         return array_of(words_of(object, key), key->at_least, 0);
     case DRAPE_SCENE_NUMBER:
-        return ranged(key, "number", "exclusiveMinimum");
+        return ranged(key, "number", key->closed ? "minimum" : "exclusiveMinimum");
     case DRAPE_SCENE_INTEGER:
         return ranged(key, "integer", "minimum");
     case DRAPE_SCENE_INTEGERS:
@@ -282,6 +315,8 @@ static bool key_is_required(const drape_scene_key *key)
 {
     const struct opening *opening = key->kind == DRAPE_SCENE_OBJECT ? opening_of(key->child) : NULL;
     cli_row row;
+    if (key->optional)
+        return false;
     return key->required || (opening && !opening->key && opening->table->row(0, &row) && needs_params(&row));
 }
 

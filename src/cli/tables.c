@@ -1,6 +1,7 @@
 /* tables.c: see tables.h. */
 #include "cli/tables.h"
 
+#include "colliders/colliders.h"
 #include "compile/compile.h"
 #include "control/control.h"
 #include "io/export.h"
@@ -51,6 +52,38 @@ static bool term(int index, cli_row *row)
     return ops;
 }
 
+static bool collider(int index, cli_row *row)
+{
+    const drape_collider_ops *ops = drape_colliders[index];
+    if (ops)
+        *row = (cli_row){.name = ops->name,
+                         .summary = ops->summary,
+                         .reference = ops->reference,
+                         .params = ops->params,
+                         .param_count = ops->param_count};
+    return ops;
+}
+
+static bool self_contact(int index, cli_row *row)
+{
+    if (index == 0)
+        *row = (cli_row){.name = "self_contact",
+                         .summary = "cloth against cloth; a scene without it lets cloth through itself",
+                         .params = drape_self_contact_params,
+                         .param_count = DRAPE_SELF_PARAM_COUNT};
+    return index == 0;
+}
+
+static bool contact(int index, cli_row *row)
+{
+    if (index == 0)
+        *row = (cli_row){.name = "contact",
+                         .summary = "how contact with colliders and between layers of cloth acts",
+                         .params = drape_contact_params,
+                         .param_count = DRAPE_CONTACT_PARAM_COUNT};
+    return index == 0;
+}
+
 static bool integrator(int index, cli_row *row)
 {
     const drape_integrator_ops *ops = drape_integrators[index];
@@ -95,6 +128,12 @@ const cli_table cli_grids = {"grids", "Grids", "\"grid\" of a mesh, its paramete
 const cli_table cli_imports = {"imports", "Mesh files", "\"file\" of a mesh, by its ending", import};
 const cli_table cli_materials = {"materials", "Material", "\"material\" of a cloth", material};
 const cli_table cli_terms = {"terms", "Terms", "\"terms\" of a cloth", term};
+const cli_table cli_colliders = {"colliders", "Colliders",
+                                 "\"type\" of the colliders, parameters, friction, name and track beside it",
+                                 collider};
+const cli_table cli_self_contacts = {"self_contacts", "Self-contact", "\"self_contact\" of the scene",
+                                     self_contact};
+const cli_table cli_contacts = {"contacts", "Contact", "\"contact\" of the scene", contact};
 const cli_table cli_integrators = {"integrators", "Integrators", "\"method\" of the integrator", integrator};
 const cli_table cli_controllers = {"controllers", "Step controllers", "\"type\" of the controller",
                                    controller};
@@ -102,6 +141,6 @@ const cli_table cli_linears = {"linear_solvers", "Linear solvers", "\"linear_sol
                                linear};
 const cli_table cli_exporters = {"exporters", "Frame formats", "\"formats\" of the output", exporter};
 
-const cli_table *const cli_tables[] = {&cli_grids,   &cli_imports,     &cli_materials,
-                                       &cli_terms,   &cli_integrators, &cli_controllers,
-                                       &cli_linears, &cli_exporters,   NULL};
+const cli_table *const cli_tables[] = {&cli_grids,       &cli_imports,       &cli_materials, &cli_terms,
+                                       &cli_colliders,   &cli_self_contacts, &cli_contacts,  &cli_integrators,
+                                       &cli_controllers, &cli_linears,       &cli_exporters, NULL};

@@ -18,8 +18,8 @@ typedef struct cli_table {
     bool (*row)(int index, cli_row *row); /* false: past the last */
 } cli_table;
 
-extern const cli_table cli_grids, cli_imports, cli_materials, cli_terms, cli_integrators, cli_controllers,
-    cli_linears, cli_exporters;
+extern const cli_table cli_grids, cli_imports, cli_materials, cli_terms, cli_colliders, cli_self_contacts,
+    cli_contacts, cli_integrators, cli_controllers, cli_linears, cli_exporters;
 extern const cli_table *const cli_tables[]; /* all of them, NULL-ended */
 
 #endif

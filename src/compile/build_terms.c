@@ -103,6 +103,7 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
                               .node_mass = cloth->node_mass,
                               .rows = m->rows,
                               .columns = m->columns,
+                              .rectangular = m->rectangular,
                               .material = cloth->material,
                               .gravity = {model->gravity[0], model->gravity[1], model->gravity[2]}};
 }
@@ -110,6 +111,11 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
 static drape_status check_elements(drape_term_builder *builder)
 {
     const drape_elements *el = &builder->term->elements;
+    const drape_term_ops *ops = builder->term->ops;
+    const int needed = ops->measure ? 2 + ops->damped : 0;
+    if (el->rest_count < needed)
+        return drape_term_refuse(builder, "%s has %d numbers of rest data an element; its kind needs %d",
+                                 ops->name, el->rest_count, needed);
     int32_t first = builder->first_node, last = first + builder->node_count - 1;
     for (size_t i = 0; i < (size_t)el->count * (size_t)el->nodes; i++)
         if (el->node[i] < first || el->node[i] > last)
@@ -175,6 +181,17 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
     return status;
 }
 
+/* A row that can damp need not: where all its dashpots are 0 nothing asks for their rates. */
+static const double *own_damping(const drape_term *term)
+{
+    const drape_elements *el = &term->elements;
+    const double *c = term->ops->damped ? el->rest + 2 * (size_t)el->count : NULL;
+    for (int32_t e = 0; c && e < el->count; e++)
+        if (c[e] != 0)
+            return c;
+    return NULL;
+}
+
 /* Places in the lists of measures and internal variables; laws onto the measures of their cloth. */
 static drape_status tie(drape_model *model, int32_t c)
 {
@@ -194,6 +211,9 @@ static drape_status tie(drape_model *model, int32_t c)
             model->measure_count += term->elements.count;
             term->laws = cloth->laws;
             term->law_count = cloth->law_count;
+            term->damping = own_damping(term);
+            model->has_laws = model->has_laws || term->damping;
+            model->has_dissipation = model->has_dissipation || term->damping;
         }
     }
     model->has_laws = model->has_laws || cloth->law_count > 0;
@@ -231,7 +251,8 @@ static bool well_formed(const drape_term_ops *ops)
         ops->law ? ops->nodes == 0 : ops->nodes >= 1 && ops->nodes <= DRAPE_MAX_ELEMENT_NODES && ops->build;
     bool internal = !ops->has_internal || (ops->commit && ops->initial);
     return ops->name && ops->summary && ops->reference && ops->element_name && kinds == 1 && sized &&
-           internal && ops->param_count >= 0 && ops->param_count <= DRAPE_MAX_PARAMS;
+           internal && (!ops->damped || ops->measure) && ops->param_count >= 0 &&
+           ops->param_count <= DRAPE_MAX_PARAMS;
 }
 
 drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *ops)
@@ -246,7 +267,7 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *op
                           "the ops of term \"%s\" are not well formed: name, summary, reference, "
                           "element_name, exactly one of measure, "
                           "energy, dissipation, law; nodes 1 to %d and build but for a law; commit and "
-                          "initial with has_internal",
+                          "initial with has_internal; damped with a measure alone",
                           ops->name ? ops->name : "?", DRAPE_MAX_ELEMENT_NODES);
     const drape_term_ops *other = NULL;
     for (int i = 0; (other = row(ctx, i)) != NULL; i++)

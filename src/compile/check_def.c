@@ -4,6 +4,8 @@
 
 #include <stdio.h>
 
+#define MOST_COLLIDERS 4096
+
 /* count of what, but no array, or an array with a hole. */
 static drape_status refuse(drape_context *ctx, const char *pointer, const char *what)
 {
@@ -56,6 +58,33 @@ static drape_status check_pins(drape_context *ctx, const char *pointer, const dr
     return DRAPE_OK;
 }
 
+static drape_status check_collider(drape_context *ctx, size_t i, const drape_collider_def *collider)
+{
+    char pointer[64];
+    snprintf(pointer, sizeof pointer, "/colliders/%zu", i);
+    if (!collider->row.type)
+        return refuse(ctx, pointer, "the type of a collider");
+    if (collider->key_count > 0 && !collider->track)
+        return refuse(ctx, pointer, "the track");
+    return check_row(ctx, pointer, &collider->row);
+}
+
+static drape_status check_contact(drape_context *ctx, const drape_scene_def *def)
+{
+    if (def->collider_count > 0 && !def->colliders)
+        return refuse(ctx, "/colliders", "the array of colliders");
+    if (def->collider_count > MOST_COLLIDERS)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/colliders",
+                             "the scene has %zu colliders; it has at most %d", def->collider_count,
+                             MOST_COLLIDERS);
+    drape_status status = check_settings(ctx, "/contact", def->contact, def->contact_count);
+    if (!status)
+        status = check_settings(ctx, "/self_contact", def->self_contact, def->self_contact_count);
+    for (size_t i = 0; !status && i < def->collider_count; i++)
+        status = check_collider(ctx, i, &def->colliders[i]);
+    return status;
+}
+
 static drape_status check_cloth(drape_context *ctx, size_t c, const drape_cloth_def *cloth)
 {
     char pointer[64], at[96];
@@ -84,6 +113,8 @@ drape_status drape_compile_check_def(drape_context *ctx, const drape_scene_def *
     drape_status status = check_row(ctx, "/integrator", &def->integrator);
     if (!status)
         status = check_row(ctx, "/controller", &def->controller);
+    if (!status)
+        status = check_contact(ctx, def);
     for (size_t c = 0; !status && c < def->cloth_count; c++)
         status = check_cloth(ctx, c, &def->cloths[c]);
     return status;

@@ -1,4 +1,5 @@
-/* compile.c: the stages of a compilation, in order: cloths, whole-model arrays, pins, terms, pattern. */
+/* compile.c: the stages of a compilation, in order: cloths, whole-model arrays, pins, contact, colliders,
+ * terms, pattern. */
 #include "compile/compile.h"
 
 #include "compile/stages.h"
@@ -7,8 +8,26 @@
 #include <stdio.h>
 #include <string.h>
 
-static drape_status copy_choice(drape_model *model, const drape_row_def *def, const char *fallback,
-                                drape_choice *choice)
+static drape_status copy_setting(drape_model *model, const drape_setting *from, drape_setting *to)
+{
+    to->number = from->number;
+    to->name = drape_arena_text(&model->arena, model->ctx, from->name);
+    to->text = from->text ? drape_arena_text(&model->arena, model->ctx, from->text) : NULL;
+    if (!to->name || (from->text && !to->text))
+        return DRAPE_E_MEMORY;
+    if (!from->vector)
+        return DRAPE_OK;
+    double *vector = drape_arena_take(&model->arena, model->ctx, from->vector_count, sizeof *vector);
+    if (!vector)
+        return DRAPE_E_MEMORY;
+    memcpy(vector, from->vector, from->vector_count * sizeof *vector);
+    to->vector = vector;
+    to->vector_count = from->vector_count;
+    return DRAPE_OK;
+}
+
+drape_status drape_compile_choice(drape_model *model, const drape_row_def *def, const char *fallback,
+                                  drape_choice *choice)
 {
     choice->type = drape_arena_text(&model->arena, model->ctx, def->type ? def->type : fallback);
     choice->settings =
@@ -16,13 +35,9 @@ static drape_status copy_choice(drape_model *model, const drape_row_def *def, co
     if (!choice->type || !choice->settings)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < def->setting_count; i++) {
-        const drape_setting *from = &def->settings[i];
-        drape_setting *to = &choice->settings[i];
-        to->number = from->number;
-        to->name = drape_arena_text(&model->arena, model->ctx, from->name);
-        to->text = from->text ? drape_arena_text(&model->arena, model->ctx, from->text) : NULL;
-        if (!to->name || (from->text && !to->text))
-            return DRAPE_E_MEMORY;
+        drape_status status = copy_setting(model, &def->settings[i], &choice->settings[i]);
+        if (status)
+            return status;
     }
     choice->setting_count = def->setting_count;
     return DRAPE_OK;
@@ -72,9 +87,9 @@ static drape_status copy_scene(drape_model *model, const drape_scene_def *def)
     model->duration = def->duration;
     model->frame_rate = def->frame_rate;
     if (!status)
-        status = copy_choice(model, &def->integrator, "be", &model->integrator);
+        status = drape_compile_choice(model, &def->integrator, "be", &model->integrator);
     if (!status)
-        status = copy_choice(model, &def->controller, "halving", &model->controller);
+        status = drape_compile_choice(model, &def->controller, "halving", &model->controller);
     return status ? status : copy_formats(model, def);
 }
 
@@ -100,7 +115,7 @@ static drape_status copy_source(drape_model *model, const drape_mesh_def *def, d
     memcpy(cloth->translate, def->translate, sizeof cloth->translate);
     if (def->file && !(cloth->file = drape_arena_text(&model->arena, model->ctx, def->file)))
         return DRAPE_E_MEMORY;
-    return copy_choice(model, &def->grid, "", &cloth->grid);
+    return drape_compile_choice(model, &def->grid, "", &cloth->grid);
 }
 
 static drape_status compile_cloth(drape_model *model, int32_t c, const drape_scene_def *scene)
@@ -238,6 +253,10 @@ drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape
         status = compile_cloths(model, def);
     if (!status)
         status = drape_compile_pins(model, def);
+    if (!status)
+        status = drape_compile_contact(model, def);
+    if (!status)
+        status = drape_compile_colliders(model, def);
     if (!status)
         status = drape_compile_terms(model, def);
     if (!status)

@@ -17,6 +17,20 @@ enum {
 };
 extern const drape_param drape_material_params[DRAPE_MATERIAL_PARAM_COUNT];
 
+/* The parameters of contact and of self-contact, in this order, and their values in a model. */
+enum {
+    DRAPE_CONTACT_DISTANCE,
+    DRAPE_CONTACT_STIFFNESS,
+    DRAPE_CONTACT_FRICTION_VELOCITY,
+    DRAPE_CONTACT_FRICTION,
+    DRAPE_CONTACT_PARAM_COUNT
+};
+enum { DRAPE_SELF_THICKNESS, DRAPE_SELF_FRICTION, DRAPE_SELF_PARAM_COUNT };
+extern const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT];
+extern const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT];
+void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_CONTACT_PARAM_COUNT]);
+void drape_self_contact_values(const drape_contact_def *contact, double values[DRAPE_SELF_PARAM_COUNT]);
+
 /* Makes a model. Faults are reported at JSON pointers of the scene. Integrator and controller are copied, not
  * yet checked. */
 drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape_model **out);

@@ -175,38 +175,15 @@ static drape_status take_selection(pin_place *pin)
     return def->has_box ? take_box(pin) : take_row(pin);
 }
 
-static drape_status check_keys(const pin_place *pin)
-{
-    const drape_track_key *keys = pin->def->track;
-    for (size_t k = 0; k < pin->def->key_count; k++) {
-        char key[48];
-        snprintf(key, sizeof key, "/track/%zu", k);
-        bool finite = isfinite(keys[k].time);
-        for (int i = 0; i < 3; i++)
-            finite = finite && fabs(keys[k].displacement[i]) <= 1e9;
-        if (!finite)
-            return refuse(pin, key, "time and displacement must be finite, the displacement within 1e9 m");
-        if (k > 0 && !(keys[k].time > keys[k - 1].time))
-            return refuse(pin, key, "times must increase from key to key");
-    }
-    return DRAPE_OK;
-}
-
 static drape_status keep_track(pin_place *pin)
 {
-    pin->track = -1;
-    drape_status status = check_keys(pin);
-    if (status || pin->def->key_count == 0)
-        return status;
     drape_model *model = pin->model;
-    drape_track *track = &model->tracks[model->track_count];
-    track->key_count = pin->def->key_count;
-    track->keys = drape_arena_take(&model->arena, model->ctx, track->key_count, sizeof *track->keys);
-    if (!track->keys)
-        return DRAPE_E_MEMORY;
-    memcpy(track->keys, pin->def->track, track->key_count * sizeof *track->keys);
+    pin->track = -1;
+    if (pin->def->key_count == 0)
+        return DRAPE_OK;
     pin->track = model->track_count++;
-    return DRAPE_OK;
+    return drape_compile_track(model, pin->pointer, pin->def->track, pin->def->key_count,
+                               &model->tracks[pin->track]);
 }
 
 static drape_status pin_cloths(drape_model *model, const drape_scene_def *def, int32_t *track_of_node)

@@ -16,6 +16,20 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
 /* Marks the pinned nodes of all cloths, numbers the free ones, keeps the tracks. */
 drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def);
 
+/* Checks a track, of one key or more, and copies it. pointer: of what has it. */
+drape_status drape_compile_track(drape_model *model, const char *pointer, const drape_track_key *keys,
+                                 size_t key_count, drape_track *track);
+
+/* What the scene chose, copied; a type that is NULL is the fallback. */
+drape_status drape_compile_choice(drape_model *model, const drape_row_def *def, const char *fallback,
+                                  drape_choice *choice);
+
+/* Resolves contact and self-contact; the materials stand. */
+drape_status drape_compile_contact(drape_model *model, const drape_scene_def *def);
+
+/* Builds the colliders; contact is resolved. */
+drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *def);
+
 /* Builds the terms of all cloths and gives measures and internal variables their places. */
 drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def);
 

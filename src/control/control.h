@@ -18,13 +18,16 @@ typedef struct drape_trial {
     const drape_model *model;
     const drape_state
         *past[2]; /* the states before in, latest first; NULL where there is none, or the row did not ask */
-    const drape_state *in, *out; /* out is of worth only with status 0, or with info->usable */
-    int order;                   /* of the integrator */
-    double *scratch;             /* [2] a controller's memory between steps; 0 at first */
-    double h;                    /* [s] the size that was tried */
-    drape_step_info *info;       /* a controller that rejects sets reason and worst */
-    drape_status status;         /* of the attempt; on DRAPE_STOP the negative one to return */
-    double h_next;               /* [s] set on DRAPE_RETRY, and by rows with own_steps on DRAPE_ACCEPT */
+    const drape_state *in, *out;            /* out is of worth only with status 0, or with info->usable */
+    int order;                              /* of the integrator */
+    double *scratch;                        /* [2] a controller's memory between steps; 0 at first */
+    double h;                               /* [s] the size that was tried */
+    double dt;                              /* [s] the nominal size */
+    const drape_integrator_ops *integrator; /* for its stability limit, which costs evaluations of forces */
+    void *integrator_state;
+    drape_step_info *info; /* a controller that rejects sets reason and worst */
+    drape_status status;   /* of the attempt; on DRAPE_STOP the negative one to return */
+    double h_next;         /* [s] set on DRAPE_RETRY, and by rows with own_steps on DRAPE_ACCEPT */
 } drape_trial;
 
 typedef struct drape_controller_ops {

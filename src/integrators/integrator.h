@@ -22,12 +22,22 @@ typedef struct drape_step_info {
     drape_worst worst;
 } drape_step_info;
 
+/* How large an explicit row may step at a state: what the fastest wave of the forces there allows. */
+typedef struct drape_stability {
+    double omega;   /* [rad/s] largest eigenfrequency, of M^-1 K */
+    double damping; /* [1/s] largest rate of M^-1 D */
+    double limit;   /* [s] a longer substep grows what is smallest; INFINITY where nothing pulls */
+    double substep; /* [s] of a step of the size asked for */
+    double step;    /* [s] largest stable step: as many substeps of `limit`; INFINITY where their number
+                       follows the limit */
+} drape_stability;
+
 /* Work done so far. */
 typedef struct drape_work {
     bool stability_known;   /* of an equilibrium */
     int64_t unstable_modes; /* negative eigenvalues of the Hessian there */
     int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
-    double residual_seconds, jacobian_seconds, factor_seconds, solve_seconds;
+    double residual_seconds, jacobian_seconds, factor_seconds, solve_seconds, contact_seconds;
 } drape_work;
 
 typedef struct drape_integrator_ops {
@@ -43,12 +53,18 @@ typedef struct drape_integrator_ops {
     bool own_steps;
     /* Between the states of a step there is no motion, so no frames. */
     bool timeless;
+    /* The row keeps contact and limits by moving nodes: forces that stand for them (contact of the model,
+     * terms that are a constraint) must not act beside it. The sim makes its system without them. */
+    bool projects_contact;
     /* From in to out, whose t is set: h = the nominal size of the step, exact where out->t - in->t has
      * rounding. Fills out->x and out->v. */
     drape_status (*step)(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info);
     /* The next step starts anew from a state that this integrator did not make, or after a rejection. */
     void (*restart)(void *state, const drape_state *from);
+    /* The stability limit at a state, for steps of size h: a function of the state alone. NULL: stable for any
+     * h. */
+    void (*stability)(void *state, const drape_state *at, double h, drape_stability *out);
     /* Positions (node_count x 3) at a time within the last step. NULL: cubic Hermite between the states
      * serves. */
     void (*interpolate)(void *state, double t, double *x);

@@ -4,6 +4,8 @@
  *
  *     horizontal: (u, 0, -w), normal +y        vertical: (u, -w, 0), normal +z.
  *
+ * With noise a node is up to that far off the plane: it lets a sheet fall that would stand on its edge for ever.
+ *
  * The diagonals of its cells are parallel, from (r, c) to (r+1, c+1), or alternate with r + c, beginning with
  * that one: alternating ones do not make the sheet stiffer along one diagonal than along the other.
  */
@@ -12,7 +14,7 @@
 
 #include "mesh/grid.h"
 
-enum { COLUMNS, ROWS, WIDTH, HEIGHT, DIAGONALS, ORIENTATION, PARAM_COUNT };
+enum { COLUMNS, ROWS, WIDTH, HEIGHT, DIAGONALS, ORIENTATION, NOISE, PARAM_COUNT };
 enum { ALTERNATING, PARALLEL };
 enum { HORIZONTAL, VERTICAL };
 
@@ -62,6 +64,14 @@ static const drape_param params[PARAM_COUNT] = {
                      .default_value = HORIZONTAL,
                      .choices = orientations,
                      .help = "the plane of the sheet: y = 0 or z = 0"},
+    [NOISE] = {.name = "noise",
+               .kind = DRAPE_PARAM_NUMBER,
+               .unit = "m",
+               .default_value = 0,
+               .min = 0,
+               .max = 1e9,
+               .help =
+                   "nodes are off the plane by up to this, at random and always the same: breaks symmetry"},
 };
 
 static drape_status check_node_count(drape_context *ctx, const char *pointer, int64_t columns, int64_t rows)
@@ -87,6 +97,16 @@ static void place_nodes(drape_mesh *mesh, double width, double height, bool vert
         }
 }
 
+/* Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX): the same everywhere. */
+static void add_noise(drape_mesh *mesh, double size, bool vertical)
+{
+    uint64_t seed = 1;
+    for (size_t i = 0; size > 0 && i < (size_t)mesh->node_count; i++) {
+        seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+        mesh->x[3 * i + (vertical ? 2 : 1)] += size * ((double)(seed >> 11) / 4503599627370496.0 - 1);
+    }
+}
+
 static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
 {
     static const bool falling[][2][2] = {
@@ -99,7 +119,9 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
         status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
     if (status)
         return status;
+    mesh->rectangular = true;
     place_nodes(mesh, values[WIDTH], values[HEIGHT], vertical);
+    add_noise(mesh, values[NOISE], vertical);
     /* Rows of a vertical sheet go down where those of grid.h go up. */
     drape_grid_triangulate(mesh, falling[(int)values[DIAGONALS]], vertical);
     return DRAPE_OK;

@@ -9,6 +9,7 @@
 typedef struct drape_mesh {
     int32_t node_count, triangle_count, edge_count, hinge_count;
     int32_t rows, columns;  /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
+    bool rectangular;       /* a grid whose cells are rectangles before the transform */
     double *x;              /* (node_count x 3) [m] */
     int32_t *triangle;      /* (triangle_count x 3) */
     int32_t *edge;          /* (edge_count x 2) lower node first, ordered by (lower, higher) */
@@ -44,7 +45,7 @@ typedef struct drape_grid_ops {
     const char *name, *summary;
     const drape_param *params;
     int param_count;
-    /* Fills x, triangle, their counts, rows and columns. Faults are reported at pointer or below it. */
+    /* Fills x, triangle, their counts, rows, columns and rectangular. Faults are reported at pointer or below it. */
     drape_status (*generate)(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh);
 } drape_grid_ops;
 extern const drape_grid_ops *const drape_grids[]; /* NULL-ended */
@@ -77,6 +78,9 @@ drape_status drape_mesh_allocate(drape_context *ctx, const drape_mesh_source *so
 /* Scale, then rotate, then translate; faults of the three at pointer/transform/scale and so on. */
 drape_status drape_mesh_check_transform(drape_context *ctx, const char *pointer, const double scale[3],
                                         const double rotate[4], const double translate[3]);
+/* The matrix of a turn about the axis rotate[0..2], of any length, by the angle rotate[3] [degrees]; exact at
+ * right angles. */
+void drape_rotation_matrix(const double rotate[4], double matrix[3][3]);
 void drape_mesh_transform(drape_mesh *mesh, const double scale[3], const double rotate[4],
                           const double translate[3]);
 

@@ -64,7 +64,7 @@ static void sine_and_cosine(double degrees, double *sine, double *cosine)
 }
 
 /* Rodrigues: R = cos a I + sin a [k]x + (1 - cos a) k k^T for a unit axis k. */
-static void rotation_matrix(const double rotate[4], double matrix[3][3])
+void drape_rotation_matrix(const double rotate[4], double matrix[3][3])
 {
     double sine = 0, cosine = 1, k[3] = {0, 0, 0};
     const double largest = fmax(fabs(rotate[0]), fmax(fabs(rotate[1]), fabs(rotate[2])));
@@ -86,7 +86,7 @@ void drape_mesh_transform(drape_mesh *mesh, const double scale[3], const double 
                           const double translate[3])
 {
     double matrix[3][3];
-    rotation_matrix(rotate, matrix);
+    drape_rotation_matrix(rotate, matrix);
     for (int32_t node = 0; node < mesh->node_count; node++) {
         double *x = mesh->x + 3 * (size_t)node;
         const double scaled[3] = {scale[0] * x[0], scale[1] * x[1], scale[2] * x[2]};

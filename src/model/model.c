@@ -74,6 +74,24 @@ drape_cloth_range drape_model_cloth(const drape_model *model, int32_t index)
                                .triangle_count = cloth->mesh.triangle_count};
 }
 
+int32_t drape_model_collider_count(const drape_model *model)
+{
+    return model ? model->collider_count : 0;
+}
+
+drape_collider_motion drape_model_collider(const drape_model *model, int32_t index, double t)
+{
+    if (!model || index < 0 || index >= model->collider_count)
+        return (drape_collider_motion){.name = "", .type = ""};
+    const drape_collider *collider = &model->colliders[index];
+    drape_collider_motion motion = {.name = collider->name, .type = collider->ops->name};
+    if (collider->track.key_count > 0) {
+        drape_track_displacement(collider->track.keys, collider->track.key_count, t, motion.displacement);
+        drape_track_velocity(collider->track.keys, collider->track.key_count, t, motion.velocity);
+    }
+    return motion;
+}
+
 double drape_model_duration(const drape_model *model)
 {
     return model ? model->duration : 0;

@@ -19,6 +19,7 @@ typedef struct drape_term {
     int64_t first_measure;                /* its measures in the list of all measures; -1 for none */
     const struct drape_term *const *laws; /* laws of the cloth, on this measure */
     int law_count;
+    const double *damping; /* (elements.count) its measures' own dashpots [J s/q2]; NULL: it has none */
 } drape_term;
 
 /* A row that was chosen by name, with the settings that the scene gave. */
@@ -49,6 +50,28 @@ typedef struct drape_track {
     size_t key_count;
 } drape_track;
 
+/* One obstacle. */
+typedef struct drape_collider {
+    const drape_collider_ops *ops;
+    char *name;
+    drape_choice choice; /* what the scene said */
+    double values[DRAPE_MAX_PARAMS];
+    drape_collider_shape shape;
+    double friction;   /* Coulomb's mu [1] */
+    drape_track track; /* displacement from where its values put it; no keys: it rests */
+} drape_collider;
+
+/* What contact is made of, resolved. */
+typedef struct drape_contact_def {
+    double distance;          /* activation distance of cloth and collider [m] */
+    double stiffness;         /* scale of the contact pressure [Pa] */
+    double friction_velocity; /* below it friction falls to zero [m/s] */
+    bool lagged;              /* friction takes normal force and direction from the start of the step */
+    bool self;                /* cloth against cloth */
+    double self_thickness;    /* layers are kept twice this apart [m] */
+    double self_friction;     /* mu [1] */
+} drape_contact_def;
+
 struct drape_model {
     drape_arena arena; /* holds all that is below but the meshes and the pattern */
     drape_context *ctx;
@@ -69,6 +92,10 @@ struct drape_model {
     int32_t *moved_track; /* (moved_count) */
     int32_t moved_count, track_count;
     drape_track *tracks;
+    drape_collider *colliders; /* (collider_count) */
+    int32_t collider_count;
+    drape_contact_def contact;
+    drape_choice contact_choice, self_choice; /* what the scene said of them */
     int64_t internal_count, measure_count;
     bool has_laws;        /* some term needs the rates of measures */
     bool has_dissipation; /* some term takes energy out */

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "model/scene_cs184.h"
 #include "model/scene_json.h"
 #include "model/scene_text.h"
 
@@ -32,6 +33,7 @@ struct drape_scene {
     char *name;       /* of the text in messages, one line */
     char *folder;     /* of mesh files; NULL: the working directory */
     json_t *root;     /* an object */
+    json_t *ours;     /* root in our form, if it is of another: what the last defs are made of */
     override *last;   /* the latest of the overrides */
     drape_arena kept; /* name, folder, overrides */
     drape_arena defs; /* arrays of the last drape_scene_to_def */
@@ -45,6 +47,7 @@ void drape_scene_destroy(drape_scene **scene)
         return;
     drape_scene *s = *scene;
     json_decref(s->root);
+    json_decref(s->ours);
     drape_arena_free(&s->defs, s->ctx);
     drape_arena_free(&s->kept, s->ctx);
     drape_free(s->ctx, s->text);
@@ -513,11 +516,22 @@ drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char
 
 /* ---- Defs and faults ---- */
 
+static drape_status read_tree(drape_scene *scene, drape_scene_def *def)
+{
+    drape_status status = DRAPE_OK;
+    json_decref(scene->ours);
+    scene->ours = NULL;
+    if (drape_scene_is_cs184(scene->root))
+        status = drape_scene_from_cs184(scene->ctx, scene->root, &scene->ours);
+    return status ? status
+                  : drape_scene_read(scene->ctx, &scene->defs, scene->ours ? scene->ours : scene->root, def);
+}
+
 drape_status drape_scene_to_def(drape_scene *scene, drape_scene_def *def)
 {
     locale_t old = drape_locale_enter();
     drape_arena_free(&scene->defs, scene->ctx);
-    drape_status status = drape_scene_read(scene->ctx, &scene->defs, scene->root, def);
+    drape_status status = read_tree(scene, def);
     def->folder = scene->folder;
     drape_locale_leave(old);
     if (status)

@@ -29,7 +29,7 @@ typedef enum drape_scene_kind {
     DRAPE_SCENE_TEXT,     /* a string for people */
     DRAPE_SCENE_WORD,     /* a string that is not empty */
     DRAPE_SCENE_WORDS,    /* an array of them */
-    DRAPE_SCENE_NUMBER,   /* from min to max, min excluded */
+    DRAPE_SCENE_NUMBER,   /* from min to max, min excluded unless closed */
     DRAPE_SCENE_INTEGER,  /* from min to max */
     DRAPE_SCENE_INTEGERS, /* an array of them */
     DRAPE_SCENE_VECTOR,   /* [x, y, z] */
@@ -51,6 +51,8 @@ typedef struct drape_scene_key {
     size_t offset;       /* in the def of its object */
     size_t count_offset; /* arrays: of their size_t count */
     double min, max;     /* NUMBER, INTEGER, INTEGERS */
+    bool closed;         /* NUMBER: min is allowed */
+    bool optional;       /* OBJECT: may be left out although something in it is required */
     size_t at_least;     /* elements of an array */
     const char *unit;    /* NULL for none */
     const char *const

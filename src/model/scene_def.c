@@ -40,6 +40,12 @@ void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size)
     give(def, struct_size, &defaults, sizeof defaults);
 }
 
+void drape_collider_def_init(drape_collider_def *def, size_t struct_size)
+{
+    const drape_collider_def defaults = {.friction = 0};
+    give(def, struct_size, &defaults, sizeof defaults);
+}
+
 void drape_pin_def_init(drape_pin_def *def, size_t struct_size)
 {
     const drape_pin_def defaults = {.row = -1};

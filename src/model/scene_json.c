@@ -120,7 +120,7 @@ static void expectation(const drape_scene_key *key, char *text, size_t size)
                                    .unit = unit,
                                    .min = key->min,
                                    .max = key->max,
-                                   .open_min = key->kind == DRAPE_SCENE_NUMBER};
+                                   .open_min = key->kind == DRAPE_SCENE_NUMBER && !key->closed};
         drape_param_range_text(&param, range, sizeof range);
     }
     snprintf(text, size, "%s%s%s%s%s%s", kind_text(key->kind), ranged ? " in " : "", range,
@@ -207,8 +207,9 @@ static drape_status read_version(reader *r, const drape_scene_key *key, json_t *
 
 static drape_status read_number(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
-    double number = json_number_value(value); /* 0, which is out of range, if it is none */
-    if (!(number > key->min && number <= key->max))
+    double number = json_number_value(value);
+    bool high_enough = key->closed ? number >= key->min : number > key->min;
+    if (!json_is_number(value) || !high_enough || !(number <= key->max))
         return refuse(r, key, value);
     memcpy(def + key->offset, &number, sizeof number);
     return DRAPE_OK;
@@ -423,8 +424,19 @@ static bool has_key(const drape_scene_object *object, const char *name)
     return false;
 }
 
+static drape_status read_vector_setting(reader *r, json_t *value, drape_setting *out)
+{
+    double *numbers = drape_arena_take(r->arena, r->ctx, json_array_size(value), sizeof *numbers);
+    if (!numbers)
+        return DRAPE_E_MEMORY;
+    out->vector = numbers;
+    out->vector_count = json_array_size(value);
+    return read_numbers(r, value, numbers);
+}
+
 static drape_status read_setting(reader *r, const char *name, json_t *value, drape_setting *out)
 {
+    size_t mark = r->at.length;
     *out = (drape_setting){.name = name};
     if (json_is_boolean(value)) {
         out->text = json_is_true(value) ? "true" : "false"; /* so that no number takes it */
@@ -434,7 +446,13 @@ static drape_status read_setting(reader *r, const char *name, json_t *value, dra
         out->text = json_string_value(value);
     } else {
         drape_pointer_push(&r->at, name);
-        return refuse_as(r, value, "a setting", "a number, true, false or a string");
+        drape_status status =
+            json_is_array(value)
+                ? read_vector_setting(r, value, out)
+                : refuse_as(r, value, "a setting", "a number, true, false, a string or an array of numbers");
+        if (status)
+            return status;
+        drape_pointer_cut(&r->at, mark);
     }
     return DRAPE_OK;
 }
@@ -460,7 +478,7 @@ static drape_status read_others(reader *r, const drape_scene_object *object, jso
             return status;
         count++;
     }
-    if (count) {
+    if (open) { /* none is not the same as no object */
         memcpy(def + object->settings_offset, &settings, sizeof settings);
         memcpy(def + object->settings_count_offset, &count, sizeof count);
     }

@@ -116,6 +116,40 @@ static void init_cloth(void *def)
 static const drape_scene_object cloth = {
     .name = "cloth", KEYS(cloth_keys), .def_size = sizeof(drape_cloth_def), .init = init_cloth};
 
+/* ---- Colliders and contact ---- */
+
+static const drape_scene_key collider_keys[] = {
+    {"type", DRAPE_SCENE_WORD, .required = true, IN(drape_collider_def, row.type),
+     .help = "a row of the colliders; its parameters stand beside it"},
+    {"name", DRAPE_SCENE_WORD, IN(drape_collider_def, name),
+     .help = "its own; default \"collider0\", \"collider1\" ..."},
+    {"friction", DRAPE_SCENE_NUMBER, IN(drape_collider_def, friction), .max = 1e3, .closed = true,
+     .help = "Coulomb's mu between it and cloth; default 0"},
+    {"track", DRAPE_SCENE_TRACK, ARRAY(drape_collider_def, track, key_count), .at_least = 1,
+     .unit = "s and m",
+     .help =
+         "displacement from where its parameters put it, linear between the times; default none: it rests"},
+};
+
+static void init_collider(void *def)
+{
+    drape_collider_def_init(def, sizeof(drape_collider_def));
+}
+
+static const drape_scene_object collider = {
+    .name = "collider",
+    KEYS(collider_keys),
+    SETTINGS(drape_collider_def, row.settings, row.setting_count),
+    .def_size = sizeof(drape_collider_def),
+    .init = init_collider,
+};
+
+/* Their members are settings all of them, as those of a material. */
+static const drape_scene_object self_contact = {.name = "self_contact",
+                                                SETTINGS(drape_scene_def, self_contact, self_contact_count)};
+static const drape_scene_object contact = {.name = "contact",
+                                           SETTINGS(drape_scene_def, contact, contact_count)};
+
 /* ---- Scene ---- */
 
 static const drape_scene_key output_keys[] = {
@@ -131,6 +165,12 @@ static const drape_scene_key scene_keys[] = {
      .at_least = 1, .child = &cloth, .help = "the pieces of cloth"},
     {"gravity", DRAPE_SCENE_VECTOR, IN(drape_scene_def, gravity), .unit = "m/s2",
      .help = "default [0, -9.81, 0]"},
+    {"colliders", DRAPE_SCENE_OBJECTS, ARRAY(drape_scene_def, colliders, collider_count), .child = &collider,
+     .help = "rigid obstacles; default none"},
+    {"self_contact", DRAPE_SCENE_OBJECT, .optional = true, .child = &self_contact,
+     .help = "cloth against cloth; default none: it goes through itself"},
+    {"contact", DRAPE_SCENE_OBJECT, .child = &contact,
+     .help = "how contact with colliders and between layers acts"},
     {"integrator", DRAPE_SCENE_OBJECT, IN(drape_scene_def, integrator), .child = &integrator,
      .help = "method and its settings"},
     {"controller", DRAPE_SCENE_OBJECT, IN(drape_scene_def, controller), .child = &controller,

@@ -71,16 +71,17 @@ static drape_status apply(drape_context *ctx, const table *t, int row, const dra
     bool known = false;
     snprintf(at, sizeof at, "%s/%.80s", t->pointer, setting->name);
     for (int r = 0; r < t->count; r++) {
-        double value;
+        double value[DRAPE_PARAM_WIDEST];
         int p = drape_param_find(t->params[r], t->param_counts[r], setting->name);
         if (p < 0)
             continue;
         known = true;
-        drape_status status = drape_param_value(ctx, at, &t->params[r][p], setting, &value);
+        drape_status status = drape_param_value(ctx, at, &t->params[r][p], setting, value);
         if (status)
             return status;
         if (r == row)
-            values[p] = value;
+            memcpy(values + drape_param_place(t->params[r], p), value,
+                   (size_t)drape_param_width(&t->params[r][p]) * sizeof *value);
     }
     return known ? DRAPE_OK : unknown_key(ctx, t, at, setting->name);
 }
@@ -103,7 +104,7 @@ static drape_status choose(drape_context *ctx, const table *t, const char *name,
     if (status)
         return status;
     for (int p = 0; p < t->param_counts[*row]; p++)
-        values[p] = t->params[*row][p].default_value;
+        drape_param_default(&t->params[*row][p], values + drape_param_place(t->params[*row], p));
     status = apply_all(ctx, t, *row, scene->settings, scene->setting_count, values);
     return status ? status : apply_all(ctx, t, *row, settings, setting_count, values);
 }

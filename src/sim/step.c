@@ -142,6 +142,9 @@ static drape_verdict judge(drape_sim *sim, drape_step_info *info, drape_status s
                            .order = sim->chosen.integrator->order,
                            .scratch = sim->scratch,
                            .h = info->h,
+                           .dt = sim->schedule.dt,
+                           .integrator = sim->chosen.integrator,
+                           .integrator_state = sim->integrator,
                            .info = info,
                            .status = status};
     return sim->chosen.controller->judge(sim->chosen.controller_values, trial);

@@ -1,6 +1,8 @@
 /* range.c: makes a range of elements out of a function for one (extend.h). */
 #include "terms/terms.h"
 
+#include <math.h>
+
 void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, const double *x, double *e,
                         double *g, double *hess, drape_element_energy *one)
 {
@@ -13,4 +15,20 @@ void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, 
         one(el, first + i, local, e ? e + i : NULL, g ? g + (size_t)i * (size_t)d : NULL,
             hess ? hess + (size_t)i * (size_t)(d * d) : NULL);
     }
+}
+
+/* In two loops: the second has no gather, and compilers make vectors of it. */
+void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count, const double *x, double *l,
+                         double *d)
+{
+    double *restrict dx = d, *restrict dy = d + count, *restrict dz = d + 2 * (size_t)count;
+    const int32_t *node = el->node + 2 * (size_t)first;
+    for (int32_t i = 0; i < count; i++) {
+        const double *a = x + 3 * (size_t)node[2 * i], *b = x + 3 * (size_t)node[2 * i + 1];
+        dx[i] = b[0] - a[0];
+        dy[i] = b[1] - a[1];
+        dz[i] = b[2] - a[2];
+    }
+    for (int32_t i = 0; i < count; i++)
+        l[i] = sqrt(dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i]);
 }

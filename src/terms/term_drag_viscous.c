@@ -7,7 +7,10 @@
 #include <math.h>
 #include <string.h>
 
-enum { PARAM_COEFFICIENT, PARAM_COUNT };
+enum { PARAM_COEFFICIENT, PARAM_AREA, PARAM_COUNT };
+enum { AREA_LUMPED, AREA_UNIFORM };
+
+static const char *const area_choices[] = {[AREA_LUMPED] = "lumped", [AREA_UNIFORM] = "uniform", NULL};
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_COEFFICIENT] =
@@ -18,13 +21,25 @@ static const drape_param params[PARAM_COUNT] = {
          .min = 0,
          .max = 1e9,
          .help = "drag per area and speed: a node loses speed at the rate coefficient / areal density"},
+    [PARAM_AREA] = {.name = "area",
+                    .kind = DRAPE_PARAM_CHOICE,
+                    .unit = "1",
+                    .default_value = AREA_LUMPED,
+                    .choices = area_choices,
+                    .help =
+                        "a node's share; lumped: a third of each triangle; uniform: the same for every node, "
+                        "as Boson's drag"},
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     drape_status status = drape_term_reserve(builder, cloth->node_count, 1);
+    double mean = 0;
+    for (int32_t i = 0; i < cloth->node_count; i++)
+        mean += cloth->node_area[i] / cloth->node_count;
     for (int32_t i = 0; !status && i < cloth->node_count; i++) {
-        double rest = values[PARAM_COEFFICIENT] * cloth->node_area[i];
+        double area = values[PARAM_AREA] == AREA_UNIFORM ? mean : cloth->node_area[i];
+        double rest = values[PARAM_COEFFICIENT] * area;
         drape_term_set(builder, i, &i, &rest);
     }
     return status;

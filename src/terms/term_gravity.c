@@ -16,26 +16,21 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     return status;
 }
 
-static void one(const drape_elements *el, int32_t element, const double *x, double *e, double *g,
-                double *hess)
-{
-    (void)hess;
-    double energy = 0;
-    for (int k = 0; k < 3; k++) {
-        double force = el->rest[(size_t)k * (size_t)el->count + (size_t)element];
-        energy -= force * x[k];
-        if (g)
-            g[k] = -force;
-    }
-    if (e)
-        *e = energy;
-}
-
 static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
                    const double *internal, double *e, double *g, double *hess)
 {
     (void)internal;
-    drape_energy_range(el, first, count, x, e, g, hess, one);
+    (void)hess;
+    size_t n = (size_t)el->count;
+    const double *force = el->rest + first;
+    for (size_t i = 0; i < (size_t)count; i++) {
+        const double f[3] = {force[i], force[n + i], force[2 * n + i]};
+        const double *at = x + 3 * (size_t)el->node[(size_t)first + i];
+        if (e)
+            e[i] = -(f[0] * at[0] + f[1] * at[1] + f[2] * at[2]);
+        for (size_t k = 0; g && k < 3; k++)
+            g[3 * i + k] = -f[k];
+    }
 }
 
 const drape_term_ops drape_term_gravity = {

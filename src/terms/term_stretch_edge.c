@@ -107,6 +107,18 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
     }
 }
 
+/* dq = (-d, d)/(L l) */
+static void pair(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,
+                 double *d, double *c)
+{
+    const double *inverse = el->rest + (size_t)REST_INVERSE_LENGTH * (size_t)el->count + first;
+    drape_pair_distance(el, first, count, x, q, d);
+    for (int32_t i = 0; i < count; i++) {
+        c[i] = inverse[i] / q[i];
+        q[i] = q[i] * inverse[i] - 1;
+    }
+}
+
 /* Length over rest length. */
 static double ratio_of(const drape_elements *el, int32_t e, const double *x)
 {
@@ -148,5 +160,6 @@ const drape_term_ops drape_term_stretch_edge = {
     .nodes = 2,
     .build = build,
     .measure = measure,
+    .pair = pair,
     .check = check,
 };

@@ -411,6 +411,20 @@ static int zeroed(int which)
         s.scene.format_count = 1;
     else if (which == 11)
         memset(&s.pins[0], 0, sizeof s.pins[0]);
+    else if (which == 12)
+        s.scene.collider_count = 1;
+    else if (which == 13)
+        s.scene.colliders = &(drape_collider_def){0}, s.scene.collider_count = 1;
+    else if (which == 14)
+        s.scene.colliders = &(drape_collider_def){.row = {.type = "sphere", .setting_count = 1}},
+        s.scene.collider_count = 1;
+    else if (which == 15)
+        s.scene.colliders = &(drape_collider_def){.row = {.type = "sphere"}, .key_count = 1},
+        s.scene.collider_count = 1;
+    else if (which == 16)
+        s.scene.contact_count = 1;
+    else if (which == 17)
+        s.scene.self_contact_count = 1;
     drape_status status = drape_model_create(ctx, &s.scene, &model);
     int code = status < 0 && !model && *drape_context_message(ctx) ? 0 : 1;
     drape_model_destroy(&model);
@@ -431,9 +445,15 @@ START_TEST(zeroed_parts_of_a_scene_are_refused)
                                         "pins",
                                         "mesh",
                                         "formats",
-                                        "a pin without _init"};
+                                        "a pin without _init",
+                                        "colliders",
+                                        "a collider without type",
+                                        "settings of a collider",
+                                        "track of a collider",
+                                        "contact",
+                                        "self-contact"};
     char failed[512] = "";
-    for (int which = 0; which < 12; which++) {
+    for (int which = 0; which < 18; which++) {
         int status = 0;
         pid_t child = fork();
         ck_assert_int_ge(child, 0);
@@ -684,6 +704,204 @@ START_TEST(faults_of_a_term_of_the_host_are_told_at_its_place)
 }
 END_TEST
 
+/* ---- Colliders: of scenes, of hosts ---- */
+
+#define WITH_COLLIDERS(text)                                                                                 \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 1, 'edge_length': 0.1},"               \
+    " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}}], 'colliders': [" text "],"     \
+    " 'duration': 1}"
+
+/* A ball about the host's own center: of two vectors and a number, the values are 7. */
+static const drape_param blob_params[] = {
+    {.name = "tilt",
+     .kind = DRAPE_PARAM_TURN,
+     .unit = "degrees",
+     .default_value = 0,
+     .min = -360,
+     .max = 360,
+     .help = "what it is turned by"},
+    {.name = "middle",
+     .kind = DRAPE_PARAM_VECTOR,
+     .unit = "m",
+     .default_value = 0.25,
+     .min = -1,
+     .max = 1,
+     .help = "its center"},
+    {.name = "size", .unit = "m", .default_value = NAN, .min = 0, .max = 2, .help = "its radius"},
+};
+
+static drape_status blob_shape(const double *values, double tolerance, drape_collider_shape *shape)
+{
+    (void)tolerance;
+    if (values[6] == 2)
+        return drape_shape_refuse(shape, "size", "%g m is not\nto its taste", values[6]);
+    double *kept = drape_shape_take(shape, 1, sizeof *kept);
+    if (!kept)
+        return DRAPE_E_MEMORY;
+    *kept = values[0] == 0 && values[1] == 30 && values[2] == 0 ? values[3] + values[4] + values[5] : NAN;
+    shape->kept = kept;
+    drape_status status = drape_shape_reserve(shape, 1, 0, 0);
+    return status ? status : values[6] == 1 ? drape_shape_reserve(shape, 1, 0, 0) : DRAPE_OK;
+}
+
+static double blob_distance(const double *values, const drape_collider_shape *shape, const double *x,
+                            double *normal, double *curvature)
+{
+    (void)values, (void)shape, (void)x, (void)normal, (void)curvature;
+    return 1;
+}
+
+static const drape_collider_ops blob = {.struct_size = sizeof(drape_collider_ops),
+                                        .name = "host.blob",
+                                        .summary = "a ball of the host",
+                                        .reference = "none",
+                                        .params = blob_params,
+                                        .param_count = 3,
+                                        .shape = blob_shape,
+                                        .distance = blob_distance};
+
+START_TEST(colliders_of_a_scene_can_be_asked)
+{
+    drape_context *ctx = make_context();
+    drape_model *model;
+    drape_status status =
+        compile_text(ctx,
+                     WITH_COLLIDERS("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0]},"
+                                    "{'type': 'sphere', 'center': [0, 0, 0], 'radius': 1, 'name': 'ball',"
+                                    " 'track': [[1, [0, 0, 0]], [2, [0, 0, 4]]]}"),
+                     &model);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+    ck_assert_int_eq(drape_model_collider_count(model), 2);
+    drape_collider_motion plane = drape_model_collider(model, 0, 1.5),
+                          ball = drape_model_collider(model, 1, 1.5);
+    ck_assert_str_eq(plane.name, "collider0");
+    ck_assert_str_eq(plane.type, "plane");
+    ck_assert_double_eq(plane.displacement[2], 0);
+    ck_assert_double_eq(plane.velocity[2], 0);
+    ck_assert_str_eq(ball.name, "ball");
+    ck_assert_double_eq(ball.displacement[2], 2);
+    ck_assert_double_eq(ball.velocity[2], 4);
+    ck_assert_str_eq(drape_model_collider(model, 2, 0).name, "");
+    ck_assert_str_eq(drape_model_collider(model, -1, 0).type, "");
+    ck_assert_str_eq(drape_model_collider(NULL, 0, 0).name, "");
+    ck_assert_int_eq(drape_model_collider_count(NULL), 0);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(a_collider_in_memory_is_the_same_as_in_a_file)
+{
+    host_scene s;
+    drape_context *ctx = make_context();
+    drape_model *model = NULL;
+    const double center[3] = {0.1, 0.2, 0.3}, turn[4] = {0, 1, 0, 45};
+    const drape_setting box[] = {{.name = "center", .vector = center, .vector_count = 3},
+                                 {.name = "size", .number = 0.5},
+                                 {.name = "rotate", .vector = turn, .vector_count = 4}};
+    const drape_track_key keys[] = {{0, {0, 0, 0}}, {1, {1, 0, 0}}};
+    const drape_setting thickness = {"thickness", 0.01, NULL}, lagged = {"friction", 0, "lagged"};
+    drape_collider_def def;
+    fill_scene(&s);
+    drape_collider_def_init(&def, sizeof def);
+    def.row = (drape_row_def){"box", box, 3};
+    def.track = keys;
+    def.key_count = 2;
+    s.scene.colliders = &def;
+    s.scene.collider_count = 1;
+    s.scene.self_contact = &thickness;
+    s.scene.self_contact_count = 1;
+    s.scene.contact = &lagged;
+    s.scene.contact_count = 1;
+    ck_assert_msg(drape_model_create(ctx, &s.scene, &model) == DRAPE_OK, "%s", drape_context_message(ctx));
+    ck_assert_double_eq(drape_model_collider(model, 0, 0.5).displacement[0], 0.5);
+    drape_model_destroy(&model);
+
+    def.friction = -1;
+    ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
+    check_message(ctx, "/colliders/0/friction: -1 is not allowed; it is in [0, 1000]");
+    def.friction = NAN;
+    ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
+    def.friction = 0;
+    s.scene.collider_count = 4097;
+    ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
+    check_message(ctx, "/colliders: the scene has 4097 colliders; it has at most 4096");
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(a_collider_of_the_host_works)
+{
+    static const struct {
+        const char *scene, *says;
+    } cases[] = {
+        {WITH_COLLIDERS("{'type': 'host.blob'}"), "/colliders/0: \"size\" is missing: its radius, [0, 2] m"},
+        {WITH_COLLIDERS("{'type': 'host.blob', 'size': 2}"), "/colliders/0/size: 2 m is not?to its taste"},
+        {WITH_COLLIDERS("{'type': 'host.blob', 'size': 1}"),
+         "/colliders/0: the shape announced 1 points, 0 segments, 0 triangles, or twice"},
+        {WITH_COLLIDERS("{'type': 'host.blob', 'size': 0.5, 'middle': [0, 0, 2]}"),
+         "/colliders/0/middle: 2 is not allowed; middle is [x, y, z], each in [-1, 1] m"},
+        {WITH_COLLIDERS("{'type': 'host.blb', 'size': 2}"), "did you mean \"host.blob\"?"},
+    };
+    drape_context *ctx = make_context();
+    drape_model *model;
+    ck_assert_int_eq(drape_context_add_collider(ctx, &blob), DRAPE_OK);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        ck_assert_int_eq(compile_text(ctx, cases[i].scene, &model), DRAPE_E_ARGUMENT);
+        check_message(ctx, cases[i].says);
+    }
+    drape_status status = compile_text(
+        ctx, WITH_COLLIDERS("{'type': 'host.blob', 'size': 0.5, 'tilt': [0, 3, 0, 30]}"), &model);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+    ck_assert_str_eq(drape_model_collider(model, 0, 0).type, "host.blob");
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+START_TEST(malformed_colliders_are_refused)
+{
+    drape_context *ctx = make_context();
+    static drape_param wide[9];
+    for (int i = 0; i < 9; i++)
+        wide[i] = blob_params[1];
+    for (int i = 0; i < 8; i++) {
+        drape_collider_ops ops = blob;
+        const char *says = i == 0 ? "the ops of a collider have 0 bytes" : "not well formed";
+        if (i == 0)
+            ops.struct_size = 0;
+        else if (i == 1)
+            ops.name = NULL;
+        else if (i == 2)
+            ops.summary = NULL;
+        else if (i == 3)
+            ops.reference = NULL;
+        else if (i == 4)
+            ops.shape = NULL;
+        else if (i == 5)
+            ops.distance = NULL;
+        else if (i == 6)
+            ops.params = wide, ops.param_count = 9; /* 27 values */
+        else
+            ops.name = "sphere", says = "there is a collider \"sphere\" already";
+        ck_assert_int_eq(drape_context_add_collider(ctx, &ops), i == 0 ? DRAPE_E_VERSION : DRAPE_E_ARGUMENT);
+        check_message(ctx, says);
+    }
+    static drape_collider_ops many[33];
+    static char names[33][16];
+    for (int i = 0; i < 33; i++) {
+        snprintf(names[i], sizeof names[i], "host.n%d", i);
+        many[i] = blob;
+        many[i].name = names[i];
+        ck_assert_int_eq(drape_context_add_collider(ctx, &many[i]), i < 32 ? DRAPE_OK : DRAPE_E_ARGUMENT);
+    }
+    check_message(ctx, "at most 32");
+    ck_assert_int_eq(drape_context_add_collider(NULL, &blob), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_context_add_collider(ctx, NULL), DRAPE_E_ARGUMENT);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 static void some_law(const double *params, double k, double strain, double rate, double *force,
                      double *dforce_dstrain, double *dforce_drate, double *energy)
 {
@@ -694,7 +912,7 @@ static void some_law(const double *params, double k, double strain, double rate,
 START_TEST(malformed_ops_are_refused)
 {
     drape_context *ctx = make_context();
-    for (int i = 0; i < 13; i++) {
+    for (int i = 0; i < 14; i++) {
         drape_term_ops ops = attract;
         const char *says = "not well formed";
         drape_status expected = DRAPE_E_ARGUMENT;
@@ -742,6 +960,9 @@ START_TEST(malformed_ops_are_refused)
         case 12:
             ops.name = "stretch.edge";
             says = "there is a term \"stretch.edge\" already";
+            break;
+        case 13:
+            ops.damped = true; /* its dashpots would be on a measure, which it has not */
             break;
         }
         ck_assert_msg(drape_context_add_term(ctx, &ops) == expected, "case %d", i);
@@ -1425,7 +1646,9 @@ SUITE("api", destroying_nothing_is_fine, destroy_writes_null, null_arguments_are
       zeroed_parts_of_a_scene_are_refused, a_scene_in_memory_is_the_same_as_in_a_file,
       the_hash_sees_all_of_the_state, a_model_can_be_read, an_override_is_a_value_of_the_scene,
       a_term_of_the_host_works, faults_of_a_term_of_the_host_are_told_at_its_place, malformed_ops_are_refused,
-      a_context_holds_32_terms, frames_come_in_time, advances_may_be_cut_up,
+      a_context_holds_32_terms, colliders_of_a_scene_can_be_asked,
+      a_collider_in_memory_is_the_same_as_in_a_file, a_collider_of_the_host_works,
+      malformed_colliders_are_refused, frames_come_in_time, advances_may_be_cut_up,
       statistics_agree_with_what_was_told, a_state_of_the_host_is_where_a_run_starts,
       a_state_of_another_sim_is_taken_to_the_bit, the_past_does_not_count_after_a_state_was_set,
       states_of_the_host_are_checked, frames_follow_the_time_of_a_state, a_push_repeats_no_frame,

@@ -11,9 +11,10 @@
 #include "support/suite.h"
 
 static char folder[32];
-static char scene_path[64], mesh_path[64], out_path[64], summary_path[64];
+static char scene_path[64], mesh_path[64], solid_path[64], out_path[64], summary_path[64];
 
 static const char mesh_text[] = "v 0 0 0\nv 1 0 0\nv 0 0 1\nv 1 0.2 1\nf 1 2 3\nf 3 2 4\n";
+static const char solid_text[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 4 3\nf 1 2 4\nf 2 3 4\n";
 static const char scene_text[] =
     "{ \"drape\": 1, // a grid and a file, every kind of term, of pin\n"
     "  \"cloth\": [\n"
@@ -27,6 +28,12 @@ static const char scene_text[] =
     "    {\"mesh\": {\"file\": \"mesh.obj\", \"transform\": {\"scale\": 0.2, \"rotate\": [0, 1, 0, 30]}},\n"
     "     \"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"total_mass\": 0.1},\n"
     "     \"terms\": [\"stretch.edge\"], \"pins\": [{\"box\": [[-1,-1,-1],[0.1,1,0.1]]}]}],\n"
+    "  \"colliders\": [{\"type\": \"plane\", \"point\": [0, -9, 0], \"normal\": [0, 1, 0]},\n"
+    "    {\"type\": \"cylinder\", \"a\": [0, -9, 0], \"b\": [0, -8, 0], \"radius\": 0.1, \"name\": "
+    "\"post\",\n"
+    "     \"track\": [[0, [0,0,0]], [1, [0,0.1,0]]]},\n"
+    "    {\"type\": \"mesh\", \"file\": \"solid.obj\", \"translate\": [0, -9, 0], \"scale\": 0.5}],\n"
+    "  \"contact\": {\"friction\": \"lagged\"},\n"
     "  \"integrator\": {\"dt\": 0.01, \"linear_solver\": \"klu\"}, \"controller\": {\"type\": \"halving\"},\n"
     "  \"duration\": 1, \"frame_rate\": 150, \"output\": {\"formats\": [\"npy\", \"obj\", \"ply\"]} }\n";
 
@@ -44,10 +51,12 @@ static void make_files(void)
     ck_assert_ptr_nonnull(mkdtemp(folder));
     snprintf(scene_path, sizeof scene_path, "%s/scene.json", folder);
     snprintf(mesh_path, sizeof mesh_path, "%s/mesh.obj", folder);
+    snprintf(solid_path, sizeof solid_path, "%s/solid.obj", folder);
     snprintf(out_path, sizeof out_path, "%s/out", folder);
     snprintf(summary_path, sizeof summary_path, "%s/summary.json", folder);
     write_text(scene_path, scene_text);
     write_text(mesh_path, mesh_text);
+    write_text(solid_path, solid_text);
 }
 
 static void remove_files(void)

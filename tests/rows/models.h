@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "assemble/system.h"
+#include "base/param.h"
 #include "drape/extend.h"
 
 /* ---- Random numbers
@@ -204,7 +205,7 @@ static inline void check_range(const drape_param *p)
 
 static inline void check_params(const drape_param *params, int count)
 {
-    ck_assert(count >= 0 && count <= DRAPE_MAX_PARAMS && (params || count == 0));
+    ck_assert(count >= 0 && (params || count == 0) && drape_param_place(params, count) <= DRAPE_MAX_PARAMS);
     for (int i = 0; i < count; i++) {
         const drape_param *p = &params[i];
         check_word(p->name, false);
@@ -216,6 +217,8 @@ static inline void check_params(const drape_param *params, int count)
             check_choices(p);
         else if (p->kind == DRAPE_PARAM_BOOLEAN)
             ck_assert(p->default_value == 0 || p->default_value == 1);
+        else if (p->kind == DRAPE_PARAM_TEXT)
+            ck_assert(isnan(p->default_value));
         else
             check_range(p);
     }

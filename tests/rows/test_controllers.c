@@ -32,6 +32,7 @@ static drape_verdict judge(const drape_controller_ops *ops, const double *values
                          .order = 1,
                          .scratch = scratch,
                          .h = h,
+                         .dt = h,
                          .info = info,
                          .status = *status};
     drape_verdict verdict = ops->judge(values, &trial);

@@ -12,7 +12,8 @@
 
 /* ---- A model of one row ---- */
 
-/* One row with one choice of one of its parameters, or with its defaults; a law comes with all measures. */
+/* One row with one choice of one of its parameters, with its defaults, or with a dashpot in each element; a
+ * law comes with all measures. */
 typedef struct variant {
     const drape_term_ops *ops;
     enum model_mesh mesh;
@@ -20,12 +21,24 @@ typedef struct variant {
     bool pinned;
 } variant;
 
+static bool is_word(const drape_param *p)
+{
+    return p->kind == DRAPE_PARAM_CHOICE;
+}
+
+/* Rows that are damped have it as a parameter. */
+static bool is_dashpot(const drape_term_ops *ops, const drape_param *p)
+{
+    return ops->damped && strcmp(p->name, "damping") == 0;
+}
+
 static size_t settings_of(const variant *v, const drape_term_ops *ops, drape_setting *settings)
 {
     size_t count = required_settings(ops->params, ops->param_count, settings);
     if (ops == v->ops && v->param >= 0) {
         const drape_param *p = &ops->params[v->param];
-        settings[count++] = (drape_setting){p->name, 0, p->choices[v->choice]};
+        settings[count++] = is_word(p) ? (drape_setting){p->name, 0, p->choices[v->choice]}
+                                       : (drape_setting){p->name, 2.385, NULL};
     }
     return count;
 }
@@ -35,14 +48,39 @@ static bool is_gravity(const drape_term_ops *ops)
     return ops->potential_of_gravity;
 }
 
+/* The row alone; NULL where it refuses the mesh, which its message says. All rows take rectangles. */
+static drape_model *try_alone(drape_context *ctx, const variant *v)
+{
+    drape_setting settings[DRAPE_MAX_PARAMS + 1];
+    const drape_row_def term = {v->ops->name, settings, settings_of(v, v->ops, settings)};
+    drape_model *model = NULL;
+    const model_def def = {.mesh = v->mesh, .terms = &term, .term_count = 1, .pinned = v->pinned};
+    if (try_model(ctx, &def, &model)) {
+        ck_assert_msg(v->mesh != MESH_SQUARE, "%s: %s", v->ops->name, drape_context_message(ctx));
+        ck_assert_ptr_nonnull(strstr(drape_context_message(ctx), "mesh"));
+    }
+    return model;
+}
+
+static bool takes(drape_context *ctx, const drape_term_ops *ops, enum model_mesh mesh)
+{
+    drape_model *model = try_alone(ctx, &(variant){.ops = ops, .mesh = mesh, .param = -1});
+    bool built = model != NULL;
+    drape_model_destroy(&model);
+    return built;
+}
+
+/* NULL where the row refuses the mesh. */
 static drape_model *model_of(drape_context *ctx, const variant *v)
 {
     static drape_setting settings[MAX_TERMS][DRAPE_MAX_PARAMS + 1];
     drape_row_def terms[MAX_TERMS];
     size_t count = 0;
+    if (!v->ops->law && !is_gravity(v->ops))
+        return try_alone(ctx, v);
     for (int i = 0; drape_terms[i]; i++) {
         const drape_term_ops *ops = drape_terms[i];
-        if (is_gravity(ops) || !(ops == v->ops || (v->ops->law && ops->measure)))
+        if (is_gravity(ops) || !(ops == v->ops || (v->ops->law && ops->measure && takes(ctx, ops, v->mesh))))
             continue;
         ck_assert_uint_lt(count, MAX_TERMS);
         terms[count] = (drape_row_def){ops->name, settings[count], settings_of(v, ops, settings[count])};
@@ -55,22 +93,30 @@ static drape_model *model_of(drape_context *ctx, const variant *v)
                                         .pinned = v->pinned});
 }
 
-/* Calls use for every row, mesh and choice. */
+static void use_variant(drape_context *ctx, const variant *v,
+                        void (*use)(drape_context *ctx, const variant *v, const drape_model *model))
+{
+    drape_model *model = model_of(ctx, v);
+    if (model)
+        use(ctx, v, model);
+    drape_model_destroy(&model);
+}
+
+/* Calls use for every row, mesh and choice, and with dashpots. */
 static void for_all_variants(void (*use)(drape_context *ctx, const variant *v, const drape_model *model))
 {
     drape_context *ctx = make_context();
     for (int i = 0; drape_terms[i]; i++)
         for (int mesh = 0; mesh < MESH_COUNT; mesh++)
             for (int p = -1; p < drape_terms[i]->param_count; p++) {
-                bool words = p >= 0 && drape_terms[i]->params[p].kind == DRAPE_PARAM_CHOICE;
-                if (p >= 0 && !words)
+                const drape_param *param = &drape_terms[i]->params[p < 0 ? 0 : p];
+                bool words = p >= 0 && is_word(param);
+                if (p >= 0 && !words && !is_dashpot(drape_terms[i], param))
                     continue;
-                for (int c = 0; c == 0 || (words && drape_terms[i]->params[p].choices[c]); c++) {
-                    variant v = {drape_terms[i], (enum model_mesh)mesh, p, c, (mesh + c) % 2 == 0};
-                    drape_model *model = model_of(ctx, &v);
-                    use(ctx, &v, model);
-                    drape_model_destroy(&model);
-                }
+                for (int c = 0; c == 0 || (words && param->choices[c]); c++)
+                    use_variant(ctx,
+                                &(variant){drape_terms[i], (enum model_mesh)mesh, p, c, (mesh + c) % 2 == 0},
+                                use);
             }
     drape_context_destroy(&ctx);
 }
@@ -79,7 +125,9 @@ static const char *name_of(const variant *v)
 {
     static char text[128];
     snprintf(text, sizeof text, "%s on %s%s%s", v->ops->name, mesh_names[v->mesh], v->param >= 0 ? ", " : "",
-             v->param >= 0 ? v->ops->params[v->param].choices[v->choice] : "");
+             v->param < 0                         ? ""
+             : is_word(&v->ops->params[v->param]) ? v->ops->params[v->param].choices[v->choice]
+                                                  : v->ops->params[v->param].name);
     return text;
 }
 
@@ -138,6 +186,7 @@ START_TEST(rows_are_well_formed)
         ck_assert(!ops->has_internal || (ops->commit && ops->initial));
         ck_assert(!ops->dissipation || ops->dissipative);
         ck_assert(!ops->linear || ops->energy);
+        ck_assert(!ops->damped || ops->measure);
         for (int i = 0; i < count; i++)
             ck_assert_str_ne(ops->name, drape_terms[i]->name);
     }
@@ -255,6 +304,24 @@ START_TEST(mistakes_are_found)
 }
 END_TEST
 
+/* A row that is damped has no dashpots without a number for them. */
+START_TEST(dashpots_need_their_number)
+{
+    drape_context *ctx = make_context();
+    drape_term_ops ops = wrong_term;
+    drape_model *model = NULL;
+    ops.damped = true;
+    ck_assert_int_eq(drape_context_add_term(ctx, &ops), DRAPE_OK);
+    const drape_row_def term = {.type = "host.wrong"};
+    const model_def def = {.mesh = MESH_SQUARE, .terms = &term, .term_count = 1};
+    ck_assert_int_eq(try_model(ctx, &def, &model), DRAPE_E_ARGUMENT);
+    ck_assert_msg(
+        strstr(drape_context_message(ctx), "has 2 numbers of rest data an element; its kind needs 3"), "%s",
+        drape_context_message(ctx));
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 /* ---- Physics of one row ---- */
 
 /* E(R x + t) = E(x). Rounding of positions of 3 m against strains of 0.1 of 0.1 m: 1e-15 * 30 / 0.1, and a
@@ -313,7 +380,8 @@ static double rounding_force(const drape_model *model, const drape_point *point)
  * no energy. A law at rest has no rate. */
 static void check_rest(drape_context *ctx, const variant *v, const drape_model *model)
 {
-    bool flat = v->param >= 0 && strcmp(v->ops->params[v->param].choices[v->choice], "flat") == 0;
+    bool flat = v->param >= 0 && is_word(&v->ops->params[v->param]) &&
+                strcmp(v->ops->params[v->param].choices[v->choice], "flat") == 0;
     if (is_gravity(v->ops) || (flat && v->mesh == MESH_CURVED))
         return;
     drape_system *system = make_system(ctx, model, 1);
@@ -340,9 +408,10 @@ END_TEST
  * a rigid motion. */
 static void check_power(drape_context *ctx, const variant *v, const drape_model *model)
 {
-    if (!v->ops->dissipative)
+    if (!model->has_dissipation)
         return;
     drape_system *system = make_system(ctx, model, 1);
+    ck_assert(v->ops->dissipative || v->ops->damped);
     for (uint64_t seed = 1; seed <= SEEDS; seed++) {
         double power = 0, scale, spin[3] = {0.3, -1.1, 0.7};
         state s = make_state(ctx, model, seed, 0.01);
@@ -356,7 +425,7 @@ static void check_power(drape_context *ctx, const variant *v, const drape_model 
             s.v[i] = spin[(i + 1) % 3] * s.x[i - i % 3 + (i + 2) % 3] -
                      spin[(i + 2) % 3] * s.x[i - i % 3 + (i + 1) % 3] + 0.5;
         drape_system_dissipation(system, &s.point, s.g);
-        if (v->ops->law)
+        if (!v->ops->dissipation)
             ck_assert_msg(largest(s.g, s.n) <= 1e-13 * scale, "%s: %g N of %g", name_of(v), largest(s.g, s.n),
                           scale);
         drape_arena_free(&s.arena, ctx);
@@ -484,5 +553,6 @@ START_TEST(projected_jacobians_are_positive)
 END_TEST
 
 SUITE("terms", rows_are_well_formed, derivatives_agree_with_differences, mistakes_are_found,
-      energy_does_not_change_with_rigid_motion, no_force_at_rest, dissipation_takes_power,
-      elements_do_not_depend_on_the_range, threads_give_the_same_bits, projected_jacobians_are_positive)
+      dashpots_need_their_number, energy_does_not_change_with_rigid_motion, no_force_at_rest,
+      dissipation_takes_power, elements_do_not_depend_on_the_range, threads_give_the_same_bits,
+      projected_jacobians_are_positive)

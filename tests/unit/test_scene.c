@@ -427,19 +427,38 @@ static const struct {
      "s.json:1:24: /cloth/0/mesh: \"mesh\" is missing: a grid or a file; an object"},
     {"{'drape': 1, 'durration': 1}",
      "s.json:1:14: /durration: unknown key \"durration\"; did you mean \"duration\"?"},
-    {ROOT("'colliders': []"), "s.json:2:1: /colliders: unknown key \"colliders\"; known: drape, description, "
-                              "cloth, gravity, integrator, controller, duration, frame_rate, output"},
-    {ROOT("'self_contact': {}"),
-     "s.json:2:1: /self_contact: unknown key \"self_contact\"; known: drape, description, cloth, gravity, "
-     "integrator, controller, duration, frame_rate, output"},
+    {ROOT("'colliders': 3"), "s.json:2:1: /colliders: 3 is not allowed; colliders is an array of objects"},
+    {ROOT("'colliders': ['plane']"),
+     "s.json:2:15: /colliders/0: \"plane\" is not allowed; an element is an object"},
+    {ROOT("'colliders': [{}]"), "s.json:2:15: /colliders/0/type: \"type\" is missing: a row of the "
+                                "colliders; its parameters stand beside "
+                                "it; a string, not empty"},
+    {ROOT("'colliders': [{'type': 's', 'friction': -0.1}]"),
+     "s.json:2:29: /colliders/0/friction: -0.1 is not allowed; friction is a number in [0, 1000]"},
+    {ROOT("'colliders': [{'type': 's', 'friction': 1000.5}]"),
+     "s.json:2:29: /colliders/0/friction: 1000.5 is not allowed; friction is a number in [0, 1000]"},
+    {ROOT("'colliders': [{'type': 's', 'friction': true}]"),
+     "s.json:2:29: /colliders/0/friction: true is not allowed; friction is a number in [0, 1000]"},
+    {ROOT("'colliders': [{'type': 's', 'center': [0, '1', 2]}]"),
+     "s.json:2:43: /colliders/0/center/1: \"1\" is not allowed; an element is a number"},
+    {ROOT("'colliders': [{'type': 's', 'track': [[0, [0, 0, 0]], [0, [1, 0, 0]]]}]"),
+     "s.json:2:56: /colliders/0/track/1/0: 0 is not allowed; the time of a key is greater than that of the "
+     "key "
+     "before, 0"},
+    {ROOT("'self_contact': 0.01"),
+     "s.json:2:1: /self_contact: 0.01 is not allowed; self_contact is an object"},
+    {ROOT("'contact': []"), "s.json:2:1: /contact: an empty array is not allowed; contact is an object"},
     {ROOT("'Gravity': [0, 0, 0]"),
      "s.json:2:1: /Gravity: unknown key \"Gravity\"; did you mean \"gravity\"?"},
-    {ROOT("'a/b~c': 1"), "s.json:2:1: /a~1b~0c: unknown key \"a/b~c\"; known: drape, description, cloth, "
-                         "gravity, integrator, controller, duration, frame_rate, output"},
-    {ROOT("'': 1"), "s.json:2:1: /: unknown key \"\"; known: drape, description, cloth, gravity, integrator, "
+    {ROOT("'a/b~c': 1"),
+     "s.json:2:1: /a~1b~0c: unknown key \"a/b~c\"; known: drape, description, cloth, "
+     "gravity, colliders, self_contact, contact, integrator, controller, duration, frame_rate, output"},
+    {ROOT("'': 1"), "s.json:2:1: /: unknown key \"\"; known: drape, description, cloth, gravity, colliders, "
+                    "self_contact, contact, integrator, "
                     "controller, duration, frame_rate, output"},
-    {ROOT("'\xc3\xa9\\n': 1"), "s.json:1:1: /é?: unknown key \"é?\"; known: drape, description, cloth, "
-                               "gravity, integrator, controller, duration, frame_rate, output"},
+    {ROOT("'\xc3\xa9\\n': 1"),
+     "s.json:1:1: /é?: unknown key \"é?\"; known: drape, description, cloth, "
+     "gravity, colliders, self_contact, contact, integrator, controller, duration, frame_rate, output"},
     {ROOT("'description': 1"), "s.json:2:1: /description: 1 is not allowed; description is a string"},
     {ROOT("'gravity': 9.81"),
      "s.json:2:1: /gravity: 9.81 is not allowed; gravity is three numbers, [x, y, z], in m/s2"},
@@ -452,10 +471,11 @@ static const struct {
      "s.json:2:16: /integrator/method: 1 is not allowed; method is a string, not empty"},
     {ROOT("'integrator': {'method': ''}"),
      "s.json:2:16: /integrator/method: \"\" is not allowed; method is a string, not empty"},
-    {ROOT("'integrator': {'dt': [1]}"), "s.json:2:16: /integrator/dt: an array of 1 is not allowed; a "
-                                        "setting is a number, true, false or a string"},
+    {ROOT("'integrator': {'dt': [null]}"),
+     "s.json:2:23: /integrator/dt/0: null is not allowed; an element is a number"},
     {ROOT("'controller': {'dt_min': null}"),
-     "s.json:2:16: /controller/dt_min: null is not allowed; a setting is a number, true, false or a string"},
+     "s.json:2:16: /controller/dt_min: null is not allowed; a setting is a number, true, false, a string or "
+     "an array of numbers"},
     {ROOT("'controller': []"),
      "s.json:2:1: /controller: an empty array is not allowed; controller is an object"},
     {"{'drape': 1, 'duration': 0, 'cloth': [{'mesh': {'grid': 'g'}}]}",
@@ -487,10 +507,11 @@ static const struct {
     {CLOTH("'nam': 'x'"), "s.json:2:1: /cloth/0/nam: unknown key \"nam\"; did you mean \"name\"?"},
     {CLOTH("'material': []"),
      "s.json:2:1: /cloth/0/material: an empty array is not allowed; material is an object"},
-    {CLOTH("'material': {'density': {}}"), "s.json:2:14: /cloth/0/material/density: an object is not "
-                                           "allowed; a setting is a number, true, false or a string"},
-    {CLOTH("'material': {'a/b': [1]}"), "s.json:2:14: /cloth/0/material/a~1b: an array of 1 is not allowed; "
-                                        "a setting is a number, true, false or a string"},
+    {CLOTH("'material': {'density': {}}"),
+     "s.json:2:14: /cloth/0/material/density: an object is not "
+     "allowed; a setting is a number, true, false, a string or an array of numbers"},
+    {CLOTH("'material': {'a/b': [true]}"),
+     "s.json:2:22: /cloth/0/material/a~1b/0: true is not allowed; an element is a number"},
     {CLOTH("'terms': 'stretch.edge'"), "s.json:2:1: /cloth/0/terms: \"stretch.edge\" is not allowed; terms "
                                        "is an array of names, or objects with a \"type\""},
     {CLOTH("'terms': ['']"), "s.json:2:11: /cloth/0/terms/0: \"\" is not allowed; an element is a name, or "
@@ -500,8 +521,8 @@ static const struct {
     {CLOTH("'terms': ['stretch.edge', {'stiffness': 1}]"),
      "s.json:2:27: /cloth/0/terms/1/type: \"type\" is missing: a row of the terms; a string, not empty"},
     {CLOTH("'terms': [{'type': 'bend.hinge', 'stiffness': null}]"),
-     "s.json:2:34: /cloth/0/terms/0/stiffness: null is not allowed; a setting is a number, true, false or a "
-     "string"},
+     "s.json:2:34: /cloth/0/terms/0/stiffness: null is not allowed; a setting is a number, true, false, a "
+     "string or an array of numbers"},
     {CLOTH("'velocity': [1, 2, 3, 4]"), "s.json:2:1: /cloth/0/velocity: an array of 4 is not allowed; "
                                         "velocity is three numbers, [x, y, z], in m/s"},
     {CLOTH("'velocity': [null, 2, 3]"),
@@ -524,8 +545,8 @@ static const struct {
     {MESH("{'grid': 5}"), "s.json:2:2: /cloth/0/mesh/grid: 5 is not allowed; grid is a string, not empty"},
     {MESH("{'file': ''}"),
      "s.json:2:2: /cloth/0/mesh/file: \"\" is not allowed; file is a string, not empty"},
-    {MESH("{'grid': 'g', 'rows': [3]}"), "s.json:2:15: /cloth/0/mesh/rows: an array of 1 is not allowed; a "
-                                         "setting is a number, true, false or a string"},
+    {MESH("{'grid': 'g', 'rows': ['3']}"),
+     "s.json:2:24: /cloth/0/mesh/rows/0: \"3\" is not allowed; an element is a number"},
     {MESH("{'grid': 'g', 'transform': []}"),
      "s.json:2:15: /cloth/0/mesh/transform: an empty array is not allowed; transform is an object"},
     {MESH("{'grid': 'g', 'transform': {'translation': [0, 0, 0]}}"),
@@ -616,6 +637,57 @@ static const struct {
     {CLOTH("'pins': [{'row': 0, 'tracks': []}]"),
      "s.json:2:21: /cloth/0/pins/0/tracks: unknown key \"tracks\"; did you mean \"track\"?"},
 };
+
+static const char obstacles[] =
+    "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g'}}], 'colliders': ["
+    "{'type': 'sphere', 'center': [0.5, 0.2, -1], 'radius': 0.2, 'friction': 0.3},"
+    "{'type': 'box', 'name': 'step', 'size': 2, 'rotate': [0, 1, 0, 30],"
+    " 'track': [[0, [0, 0, 0]], [2, [0, 1, 0]]]}, {'type': 'mesh', 'file': 'a.obj'}],"
+    "'self_contact': {'thickness': 0.0095}, 'contact': {'friction': 'lagged', 'distance': 0.002}}";
+
+static void check_numbers(const drape_setting *setting, const char *name, size_t count, const double *numbers)
+{
+    ck_assert_str_eq(setting->name, name);
+    ck_assert_ptr_null(setting->text);
+    ck_assert_uint_eq(setting->vector_count, count);
+    for (size_t i = 0; i < count; i++)
+        ck_assert_double_eq(setting->vector[i], numbers[i]);
+}
+
+START_TEST(test_colliders_and_contact)
+{
+    open_context();
+    ck_assert_msg(read_quoted(obstacles) == DRAPE_OK, "%s", message());
+    ck_assert_uint_eq(def.collider_count, 3);
+    const drape_collider_def *sphere = &def.colliders[0], *box = &def.colliders[1], *mesh = &def.colliders[2];
+    ck_assert_str_eq(sphere->row.type, "sphere");
+    ck_assert_ptr_null(sphere->name);
+    ck_assert_double_eq(sphere->friction, 0.3);
+    ck_assert_uint_eq(sphere->key_count, 0);
+    ck_assert_uint_eq(sphere->row.setting_count, 2);
+    check_numbers(&sphere->row.settings[0], "center", 3, (const double[]){0.5, 0.2, -1});
+    check_setting(&sphere->row.settings[1], "radius", 0.2, NULL);
+    ck_assert_ptr_null(sphere->row.settings[1].vector);
+    ck_assert_str_eq(box->name, "step");
+    ck_assert_double_eq(box->friction, 0);
+    check_setting(&box->row.settings[0], "size", 2, NULL);
+    check_numbers(&box->row.settings[1], "rotate", 4, (const double[]){0, 1, 0, 30});
+    ck_assert_uint_eq(box->key_count, 2);
+    ck_assert_double_eq(box->track[1].time, 2);
+    check_vector(box->track[1].displacement, 0, 1, 0);
+    check_setting(&mesh->row.settings[0], "file", 0, "a.obj");
+    ck_assert_uint_eq(def.self_contact_count, 1);
+    check_setting(&def.self_contact[0], "thickness", 0.0095, NULL);
+    ck_assert_uint_eq(def.contact_count, 2);
+    check_setting(&def.contact[0], "friction", 0, "lagged");
+    /* what is not there is not the same as what is empty: an empty one lacks its thickness */
+    ck_assert_int_eq(read_quoted(ROOT("'self_contact': {}")), DRAPE_OK);
+    ck_assert(def.self_contact && def.self_contact_count == 0);
+    ck_assert_int_eq(read_quoted(ROOT("'colliders': []")), DRAPE_OK);
+    ck_assert(!def.self_contact && !def.contact && def.collider_count == 0);
+    close_context();
+}
+END_TEST
 
 START_TEST(test_wrong_scenes)
 {
@@ -718,7 +790,7 @@ static const struct {
     {"/integrator/method", "'verlet'", NULL},
     {"/self", "1",
      "--set /self=1: /self: unknown key \"self\"; known: drape, description, cloth, gravity, "
-     "integrator, controller, duration, frame_rate, output"},
+     "colliders, self_contact, contact, integrator, controller, duration, frame_rate, output"},
     {"/cloth/0/pins/-", "{'edge': 'top'}", NULL},
     {"/cloth/0/pins/-/edge", "top", NULL},
     {"/cloth/0/pins", "[]", NULL},
@@ -1103,7 +1175,7 @@ START_TEST(test_form)
 END_TEST
 
 SUITE("scene", test_example_scene, test_example_cloth, test_example_pins, test_transforms, test_defaults,
-      test_numbers, test_def_sizes, test_comments, test_places, test_mend_end, test_wrong_scenes,
-      test_long_texts, test_deep_nesting, test_truncations, test_mutations, test_sets, test_set_values,
-      test_set_order, test_locate_fault, test_files, test_pipe, test_arguments, test_many_nodes, test_locale,
-      test_no_memory, test_no_memory_for_json, test_form)
+      test_numbers, test_def_sizes, test_comments, test_places, test_mend_end, test_colliders_and_contact,
+      test_wrong_scenes, test_long_texts, test_deep_nesting, test_truncations, test_mutations, test_sets,
+      test_set_values, test_set_order, test_locate_fault, test_files, test_pipe, test_arguments,
+      test_many_nodes, test_locale, test_no_memory, test_no_memory_for_json, test_form)

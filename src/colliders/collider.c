@@ -1,0 +1,42 @@
+/* collider.c: see colliders.h. */
+#include "colliders/colliders.h"
+
+#include "base/param.h"
+#include "base/vec3.h"
+#include "model/track.h"
+
+drape_collider_pose drape_collider_pose_at(const drape_collider *collider, double t)
+{
+    drape_collider_pose pose = {{0}, {0}};
+    const drape_track *track = &collider->track;
+    if (track->key_count > 0) {
+        drape_track_displacement(track->keys, track->key_count, t, pose.displacement);
+        drape_track_velocity(track->keys, track->key_count, t, pose.velocity);
+    }
+    return pose;
+}
+
+double drape_collider_distance(const drape_collider *collider, const drape_collider_pose *pose,
+                               const double *x, double *normal, double *curvature)
+{
+    double own[3];
+    vec3_sub(x, pose->displacement, own);
+    return collider->ops->distance(collider->values, &collider->shape, own, normal, curvature);
+}
+
+drape_status drape_collider_build(drape_context *ctx, drape_arena *arena, const char *pointer,
+                                  const char *folder, double tolerance, drape_collider *collider)
+{
+    const drape_collider_ops *ops = collider->ops;
+    struct drape_shape_builder builder = {
+        .ctx = ctx, .arena = arena, .pointer = pointer, .folder = folder, .choice = &collider->choice};
+    drape_status status =
+        drape_params_resolve(ctx, pointer, ops->params, ops->param_count, collider->choice.settings,
+                             collider->choice.setting_count, collider->values);
+    if (status)
+        return status;
+    collider->shape = (drape_collider_shape){.builder = &builder};
+    status = ops->shape(collider->values, tolerance, &collider->shape);
+    collider->shape.builder = NULL;
+    return status;
+}

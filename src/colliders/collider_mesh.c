@@ -1,0 +1,68 @@
+/* collider_mesh.c: the solid inside of a closed triangle mesh. Its distance bends in jumps, so that nodes of
+ * the cloth meet its triangles. */
+#include "colliders/tree.h"
+
+#include <math.h>
+
+/* places of the values */
+enum { FILE_NAME = 0, TRANSLATE = 1, ROTATE = 4, SCALE = 7, PARAM_COUNT = 4 };
+
+static const drape_param params[PARAM_COUNT] = {
+    {.name = "file",
+     .kind = DRAPE_PARAM_TEXT,
+     .unit = "1",
+     .default_value = NAN,
+     .help = "an OBJ or PLY file relative to the scene, closed and counterclockwise from outside"},
+    {.name = "translate",
+     .kind = DRAPE_PARAM_VECTOR,
+     .unit = "m",
+     .default_value = 0,
+     .min = -1e9,
+     .max = 1e9,
+     .help = "applied last"},
+    {.name = "rotate",
+     .kind = DRAPE_PARAM_TURN,
+     .unit = "degrees",
+     .default_value = 0,
+     .min = -1e6,
+     .max = 1e6,
+     .help = "axis and angle, or a vector along the axis as long as the angle; about the origin"},
+    {.name = "scale",
+     .kind = DRAPE_PARAM_VECTOR,
+     .unit = "1",
+     .default_value = 1,
+     .min = 0,
+     .max = 1e9,
+     .open_min = true,
+     .help = "applied first; one number: in all directions",
+     .uniform = true},
+};
+
+static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)
+{
+    (void)tolerance;
+    drape_status status =
+        drape_shape_read_mesh(shape, "file", values + SCALE, values + ROTATE, values + TRANSLATE);
+    if (status)
+        return status;
+    shape->kept = drape_tree_make(shape);
+    return shape->kept ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+static double distance(const double *values, const drape_collider_shape *shape, const double *x,
+                       double *normal, double *curvature)
+{
+    (void)values;
+    return drape_tree_distance(shape->kept, shape, x, normal, curvature);
+}
+
+const drape_collider_ops drape_collider_mesh = {
+    .struct_size = sizeof(drape_collider_ops),
+    .name = "mesh",
+    .summary = "the solid inside of a closed triangle mesh",
+    .reference = "Baerentzen and Aanaes 2005: signed distance by angle-weighted pseudo-normals",
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .shape = make_shape,
+    .distance = distance,
+};

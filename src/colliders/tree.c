@@ -1,0 +1,360 @@
+/*
+ * tree.c: see tree.h.
+ *
+ * A node of the tree holds the box around its triangles; they are halved at the median of their centers along
+ * the longest side of the box of these, so that the depth is the logarithm of their number. The nearest point
+ * is sought depth first, the nearer child before the other (Ericson 2005, sections 5.1.5 and 6.3).
+ *
+ * The side: n . (x - c) > 0 for the angle-weighted pseudo-normal n of the face, edge or point that the nearest
+ * point c is in (Baerentzen and Aanaes 2005, "Signed distance computation using the angle weighted
+ * pseudonormal", theorem 1); right for every closed mesh without self-intersections.
+ */
+#include "colliders/tree.h"
+
+#include "colliders/round.h"
+
+#include <string.h>
+
+#define LEAF_SIZE 2
+#define DEPTH     64 /* halving 2^31 triangles ends after 31 levels */
+
+typedef struct box {
+    double low[3], high[3];
+} box;
+
+/* Children of an inner node follow it: the first at its index + 1, the second at `second`. */
+typedef struct tree_node {
+    box bounds;
+    int32_t second;       /* inner nodes */
+    int32_t first, count; /* leaves: triangles order[first] ... ; count 0: an inner node */
+} tree_node;
+
+struct drape_tree {
+    int32_t node_count;
+    tree_node *node;
+    int32_t *order;       /* (triangle_count) */
+    int32_t *edge_of;     /* (triangle_count x 3) segment between corners k and k + 1 */
+    double *face_normal;  /* (triangle_count x 3) of length 1 */
+    double *edge_normal;  /* (segment_count x 3), their length does not matter */
+    double *point_normal; /* (point_count x 3), likewise */
+};
+
+/* ---- Normals ---- */
+
+static const double *corner(const drape_collider_shape *s, int32_t t, int k)
+{
+    return s->point + 3 * (size_t)s->triangle[3 * (size_t)t + (size_t)(k % 3)];
+}
+
+static double angle_between(const double *a, const double *b)
+{
+    double cross[3];
+    vec3_cross(a, b, cross);
+    return atan2(vec3_norm(cross), vec3_dot(a, b));
+}
+
+static void add_normals(const drape_collider_shape *s, int32_t t, drape_tree *tree)
+{
+    double *n = tree->face_normal + 3 * (size_t)t, to_next[3], to_last[3];
+    vec3_sub(corner(s, t, 1), corner(s, t, 0), to_next);
+    vec3_sub(corner(s, t, 2), corner(s, t, 0), to_last);
+    vec3_cross(to_next, to_last, n);
+    double length = vec3_norm(n);
+    for (int k = 0; k < 3; k++)
+        n[k] /= length;
+    for (int k = 0; k < 3; k++) {
+        size_t at = 3 * (size_t)t + (size_t)k;
+        vec3_sub(corner(s, t, k + 1), corner(s, t, k), to_next);
+        vec3_sub(corner(s, t, k + 2), corner(s, t, k), to_last);
+        vec3_add_scaled(angle_between(to_next, to_last), n, tree->point_normal + 3 * (size_t)s->triangle[at]);
+        vec3_add_scaled(1, n, tree->edge_normal + 3 * (size_t)tree->edge_of[at]);
+    }
+}
+
+/* The segment a b; they are ordered by (lower, higher), the lower first. */
+static int32_t find_segment(const drape_collider_shape *s, int32_t a, int32_t b)
+{
+    int32_t low = 0, high = s->segment_count - 1, least = a < b ? a : b, most = a < b ? b : a;
+    while (low < high) {
+        int32_t middle = low + (high - low) / 2;
+        const int32_t *ends = s->segment + 2 * (size_t)middle;
+        if (ends[0] < least || (ends[0] == least && ends[1] < most))
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+static void fill_normals(const drape_collider_shape *s, drape_tree *tree)
+{
+    for (int32_t t = 0; t < s->triangle_count; t++) {
+        const int32_t *n = s->triangle + 3 * (size_t)t;
+        for (int k = 0; k < 3; k++)
+            tree->edge_of[3 * (size_t)t + (size_t)k] = find_segment(s, n[k], n[(k + 1) % 3]);
+        add_normals(s, t, tree);
+    }
+}
+
+/* ---- Boxes ---- */
+
+static box empty_box(void)
+{
+    return (box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+}
+
+static void include(box *b, const double *x)
+{
+    for (int k = 0; k < 3; k++) {
+        b->low[k] = fmin(b->low[k], x[k]);
+        b->high[k] = fmax(b->high[k], x[k]);
+    }
+}
+
+static double center(const drape_collider_shape *s, int32_t t, int axis)
+{
+    return (corner(s, t, 0)[axis] + corner(s, t, 1)[axis] + corner(s, t, 2)[axis]) / 3;
+}
+
+/* The axis along which the centers are spread most. */
+static int longest_axis(const drape_collider_shape *s, const int32_t *order, int32_t count)
+{
+    box centers = empty_box();
+    for (int32_t i = 0; i < count; i++)
+        include(&centers,
+                (double[3]){center(s, order[i], 0), center(s, order[i], 1), center(s, order[i], 2)});
+    int axis = 0;
+    for (int k = 1; k < 3; k++)
+        if (centers.high[k] - centers.low[k] > centers.high[axis] - centers.low[axis])
+            axis = k;
+    return axis;
+}
+
+static void swap(int32_t *a, int32_t *b)
+{
+    int32_t kept = *a;
+    *a = *b;
+    *b = kept;
+}
+
+/* Quickselect (Hoare 1961): the `wanted` lowest centers come first. */
+static void select_lowest(const drape_collider_shape *s, int axis, int32_t *order, int32_t count,
+                          int32_t wanted)
+{
+    int32_t first = 0, last = count - 1;
+    while (first < last) {
+        double pivot = center(s, order[first + (last - first) / 2], axis);
+        int32_t i = first, j = last;
+        while (i <= j) {
+            while (center(s, order[i], axis) < pivot)
+                i++;
+            while (center(s, order[j], axis) > pivot)
+                j--;
+            if (i <= j)
+                swap(&order[i++], &order[j--]);
+        }
+        if (wanted <= j)
+            last = j;
+        else if (wanted >= i)
+            first = i;
+        else
+            return;
+    }
+}
+
+/* Makes the node of order[first] ... and those below it; its index. */
+static int32_t make_node(drape_tree *tree, const drape_collider_shape *s, int32_t first, int32_t count)
+{
+    int32_t index = tree->node_count++;
+    tree_node *node = &tree->node[index];
+    int32_t *order = tree->order + first;
+    node->bounds = empty_box();
+    for (int32_t i = 0; i < count; i++)
+        for (int k = 0; k < 3; k++)
+            include(&node->bounds, corner(s, order[i], k));
+    if (count <= LEAF_SIZE) {
+        node->first = first;
+        node->count = count;
+        return index;
+    }
+    select_lowest(s, longest_axis(s, order, count), order, count, count / 2);
+    make_node(tree, s, first, count / 2);
+    node->second = make_node(tree, s, first + count / 2, count - count / 2);
+    return index;
+}
+
+const drape_tree *drape_tree_make(drape_collider_shape *shape)
+{
+    size_t triangles = (size_t)shape->triangle_count;
+    drape_tree *tree = drape_shape_take(shape, 1, sizeof *tree);
+    if (!tree)
+        return NULL;
+    tree->node = drape_shape_take(shape, 2 * triangles, sizeof *tree->node);
+    tree->order = drape_shape_take(shape, triangles, sizeof *tree->order);
+    tree->edge_of = drape_shape_take(shape, triangles, 3 * sizeof *tree->edge_of);
+    tree->face_normal = drape_shape_take(shape, triangles, 3 * sizeof *tree->face_normal);
+    tree->edge_normal = drape_shape_take(shape, (size_t)shape->segment_count, 3 * sizeof *tree->edge_normal);
+    tree->point_normal = drape_shape_take(shape, (size_t)shape->point_count, 3 * sizeof *tree->point_normal);
+    if (!tree->node || !tree->order || !tree->edge_of || !tree->face_normal || !tree->edge_normal ||
+        !tree->point_normal)
+        return NULL;
+    fill_normals(shape, tree);
+    for (int32_t t = 0; t < shape->triangle_count; t++)
+        tree->order[t] = t;
+    make_node(tree, shape, 0, shape->triangle_count);
+    return tree;
+}
+
+/* ---- The nearest point ---- */
+
+typedef enum feature_kind { FACE, EDGE, POINT } feature_kind;
+
+typedef struct nearest {
+    double squared; /* of the distance [m2] */
+    double at[3];
+    int32_t triangle;
+    feature_kind kind;
+    int which; /* EDGE: from corner `which` to the next; POINT: that corner */
+} nearest;
+
+static void offer(nearest *best, const double *x, const double *at, int32_t t, feature_kind kind, int which)
+{
+    double from[3];
+    vec3_sub(x, at, from);
+    double squared = vec3_dot(from, from);
+    if (squared < best->squared) {
+        *best = (nearest){.squared = squared, .triangle = t, .kind = kind, .which = which};
+        memcpy(best->at, at, sizeof best->at);
+    }
+}
+
+/* On the edge from corner k, which point x is beside of or beyond. */
+static void offer_edge(const drape_collider_shape *s, int32_t t, int k, const double *x, nearest *best)
+{
+    double along[3], from[3], at[3];
+    const double *a = corner(s, t, k), *b = corner(s, t, k + 1);
+    vec3_sub(b, a, along);
+    vec3_sub(x, a, from);
+    double share = vec3_dot(from, along) / vec3_dot(along, along);
+    if (share <= 0) {
+        offer(best, x, a, t, POINT, k);
+    } else if (share >= 1) {
+        offer(best, x, b, t, POINT, (k + 1) % 3);
+    } else {
+        memcpy(at, a, sizeof at);
+        vec3_add_scaled(share, along, at);
+        offer(best, x, at, t, EDGE, k);
+    }
+}
+
+/* Inside of all three edges the nearest point is the foot of the perpendicular; else it is on an edge that x
+ * is outside of. */
+static void offer_triangle(const drape_collider_shape *s, const drape_tree *tree, int32_t t, const double *x,
+                           nearest *best)
+{
+    const double *n = tree->face_normal + 3 * (size_t)t;
+    double along[3], from[3], outward[3], at[3];
+    bool inside = true;
+    for (int k = 0; k < 3; k++) {
+        vec3_sub(corner(s, t, k + 1), corner(s, t, k), along);
+        vec3_sub(x, corner(s, t, k), from);
+        vec3_cross(along, n, outward);
+        if (vec3_dot(outward, from) >= 0) {
+            inside = false;
+            offer_edge(s, t, k, x, best);
+        }
+    }
+    if (inside) {
+        memcpy(at, x, sizeof at);
+        vec3_add_scaled(-vec3_dot(n, from), n, at);
+        offer(best, x, at, t, FACE, 0);
+    }
+}
+
+static double squared_distance(const box *b, const double *x)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++) {
+        double beyond = fmax(fmax(b->low[k] - x[k], x[k] - b->high[k]), 0);
+        sum += beyond * beyond;
+    }
+    return sum;
+}
+
+/* A node that is still to be visited. */
+typedef struct pending {
+    int32_t index;
+    double squared; /* of the distance of its box */
+} pending;
+
+static pending pending_at(const drape_tree *tree, int32_t index, const double *x)
+{
+    return (pending){index, squared_distance(&tree->node[index].bounds, x)};
+}
+
+static nearest find_nearest(const drape_tree *tree, const drape_collider_shape *s, const double *x)
+{
+    nearest best = {.squared = INFINITY};
+    pending stack[DEPTH] = {{0, 0}};
+    int height = 1;
+    while (height > 0) {
+        const pending next = stack[--height];
+        const tree_node *node = &tree->node[next.index];
+        if (next.squared >= best.squared)
+            continue;
+        for (int32_t i = 0; i < node->count; i++)
+            offer_triangle(s, tree, tree->order[node->first + i], x, &best);
+        if (node->count > 0)
+            continue;
+        const pending one = pending_at(tree, next.index + 1, x), other = pending_at(tree, node->second, x);
+        bool one_is_near = one.squared <= other.squared;
+        stack[height++] = one_is_near ? other : one;
+        stack[height++] = one_is_near ? one : other;
+    }
+    return best;
+}
+
+/* ---- The distance ---- */
+
+static double face_distance(const double *n, const double *from, double *normal, double *curvature)
+{
+    if (normal)
+        memcpy(normal, n, 3 * sizeof *normal);
+    if (curvature)
+        memset(curvature, 0, 9 * sizeof *curvature);
+    return vec3_dot(from, n);
+}
+
+/* About an edge with the direction u, or a point. On it, the pseudo-normal is the normal. */
+static double round_signed(const double *pseudo, const double *u, const double *from, double *normal,
+                           double *curvature)
+{
+    double sign = vec3_dot(pseudo, from) < 0 ? -1 : 1, length = round_distance(from, u, normal, curvature);
+    double pseudo_length = vec3_norm(pseudo);
+    for (int k = 0; normal && k < 3; k++)
+        normal[k] = length > 0 ? sign * normal[k] : pseudo[k] / pseudo_length;
+    for (int i = 0; curvature && i < 9; i++)
+        curvature[i] *= sign;
+    return sign * length;
+}
+
+double drape_tree_distance(const drape_tree *tree, const drape_collider_shape *shape, const double *x,
+                           double *normal, double *curvature)
+{
+    const nearest found = find_nearest(tree, shape, x);
+    size_t place = 3 * (size_t)found.triangle + (size_t)found.which;
+    double from[3], u[3];
+    if (found.kind == FACE) {
+        vec3_sub(x, corner(shape, found.triangle, 0), from);
+        return face_distance(tree->face_normal + 3 * (size_t)found.triangle, from, normal, curvature);
+    }
+    vec3_sub(x, found.at, from);
+    if (found.kind == POINT)
+        return round_signed(tree->point_normal + 3 * (size_t)shape->triangle[place], NULL, from, normal,
+                            curvature);
+    vec3_sub(corner(shape, found.triangle, found.which + 1), corner(shape, found.triangle, found.which), u);
+    double length = vec3_norm(u);
+    for (int k = 0; k < 3; k++)
+        u[k] /= length;
+    return round_signed(tree->edge_normal + 3 * (size_t)tree->edge_of[place], u, from, normal, curvature);
+}

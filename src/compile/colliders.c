@@ -1,0 +1,139 @@
+/* colliders.c: rows by name, their parameters, shapes and tracks. */
+#include "colliders/colliders.h"
+#include "compile/stages.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define MAX_NAMES     128
+#define MOST_FRICTION 1e3
+
+/* How far a polygon may stay inside a curved surface, of the activation distance: an edge of the cloth that
+ * rests on a polygon then is pushed off nearly as if it were the surface. */
+#define SHARE_OF_DISTANCE 0.1
+
+/* Row i of the built-in rows followed by the host's; NULL past the last. */
+static const drape_collider_ops *row(const drape_context *ctx, int i)
+{
+    int built_in = 0;
+    while (drape_colliders[built_in])
+        built_in++;
+    if (i < built_in)
+        return drape_colliders[i];
+    return i - built_in < ctx->host_collider_count ? ctx->host_colliders[i - built_in] : NULL;
+}
+
+static drape_status find_row(drape_context *ctx, const char *pointer, const char *name,
+                             const drape_collider_ops **out)
+{
+    const char *names[MAX_NAMES];
+    char at[96];
+    size_t count = 0;
+    for (int i = 0; (*out = row(ctx, i)) != NULL; i++) {
+        if (strcmp((*out)->name, name) == 0)
+            return DRAPE_OK;
+        if (count < MAX_NAMES)
+            names[count++] = (*out)->name;
+    }
+    const char *meant = drape_did_you_mean(name, names, count);
+    snprintf(at, sizeof at, "%s/type", pointer);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at,
+                         "there is no collider \"%.60s\"%s%s%s; `drape list` shows all", name,
+                         meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+}
+
+static drape_status name_collider(drape_model *model, const char *pointer, const char *given,
+                                  drape_collider *to)
+{
+    char name[32], at[96];
+    int32_t index = (int32_t)(to - model->colliders);
+    snprintf(name, sizeof name, "collider%d", (int)index);
+    const char *wanted = given ? given : name;
+    snprintf(at, sizeof at, "%s/name", pointer);
+    for (int32_t i = 0; i < index; i++)
+        if (strcmp(model->colliders[i].name, wanted) == 0)
+            return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "two colliders have the name \"%.60s\"",
+                                 wanted);
+    to->name = drape_arena_text(&model->arena, model->ctx, wanted);
+    return to->name ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+static drape_status take_friction(drape_model *model, const char *pointer, double friction,
+                                  drape_collider *to)
+{
+    char at[96];
+    snprintf(at, sizeof at, "%s/friction", pointer);
+    to->friction = friction;
+    if (friction >= 0 && friction <= MOST_FRICTION)
+        return DRAPE_OK;
+    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%.10g is not allowed; it is in [0, %g]", friction,
+                         MOST_FRICTION);
+}
+
+static drape_status compile_collider(drape_model *model, size_t i, const drape_scene_def *scene)
+{
+    const drape_collider_def *def = &scene->colliders[i];
+    drape_collider *to = &model->colliders[i];
+    char pointer[64];
+    snprintf(pointer, sizeof pointer, "/colliders/%zu", i);
+    drape_status status = name_collider(model, pointer, def->name, to);
+    if (!status)
+        status = find_row(model->ctx, pointer, def->row.type, &to->ops);
+    if (!status)
+        status = take_friction(model, pointer, def->friction, to);
+    if (!status)
+        status = drape_compile_choice(model, &def->row, "", &to->choice);
+    if (!status && def->key_count > 0)
+        status = drape_compile_track(model, pointer, def->track, def->key_count, &to->track);
+    return status ? status
+                  : drape_collider_build(model->ctx, &model->arena, pointer, scene->folder,
+                                         SHARE_OF_DISTANCE * model->contact.distance, to);
+}
+
+drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *def)
+{
+    drape_status status = DRAPE_OK;
+    if (def->collider_count == 0)
+        return DRAPE_OK;
+    model->colliders =
+        drape_arena_take(&model->arena, model->ctx, def->collider_count, sizeof *model->colliders);
+    if (!model->colliders)
+        return DRAPE_E_MEMORY;
+    for (size_t i = 0; !status && i < def->collider_count; i++)
+        status = compile_collider(model, i, def);
+    model->collider_count = status ? 0 : (int32_t)def->collider_count;
+    return status;
+}
+
+static bool well_formed(const drape_collider_ops *ops)
+{
+    bool named = ops->name && ops->summary && ops->reference && ops->shape && ops->distance;
+    bool sized =
+        ops->param_count >= 0 && ops->param_count <= DRAPE_MAX_PARAMS && (ops->params || !ops->param_count);
+    return named && sized && drape_param_place(ops->params, ops->param_count) <= DRAPE_MAX_PARAMS;
+}
+
+drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *ops)
+{
+    const drape_collider_ops *other = NULL;
+    if (!ctx || !ops)
+        return DRAPE_E_ARGUMENT;
+    if (ops->struct_size != sizeof *ops)
+        return drape_fail(ctx, DRAPE_E_VERSION,
+                          "the ops of a collider have %zu bytes; this library's have %zu", ops->struct_size,
+                          sizeof *ops);
+    if (!well_formed(ops))
+        return drape_fail(ctx, DRAPE_E_ARGUMENT,
+                          "the ops of collider \"%s\" are not well formed: name, summary, reference, shape, "
+                          "distance; at most %d values of parameters",
+                          ops->name ? ops->name : "?", DRAPE_MAX_PARAMS);
+    for (int i = 0; (other = row(ctx, i)) != NULL; i++)
+        if (strcmp(other->name, ops->name) == 0)
+            return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a collider \"%s\" already", ops->name);
+    if (ctx->host_collider_count == DRAPE_MAX_HOST_COLLIDERS)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT,
+                          "collider \"%s\": a context holds at most %d colliders of the host", ops->name,
+                          DRAPE_MAX_HOST_COLLIDERS);
+    ctx->host_colliders[ctx->host_collider_count++] = ops;
+    return DRAPE_OK;
+}

@@ -1,0 +1,136 @@
+/* contact.c: what contact is made of: the scene's "contact" and "self_contact", and the scales of the scene
+ * where it does not say. */
+#include "compile/stages.h"
+
+#include <math.h>
+
+enum { IMPLICIT, LAGGED };
+static const char *const frictions[] = {"implicit", "lagged", NULL};
+
+const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
+    [DRAPE_CONTACT_DISTANCE] =
+        {.name = "distance",
+         .unit = "m",
+         .default_value = NAN,
+         .derived = "the largest thickness of the cloths",
+         .min = 0,
+         .max = 1e3,
+         .open_min = true,
+         .help = "activation distance: nearer to a collider than this, cloth is pushed off"},
+    [DRAPE_CONTACT_STIFFNESS] = {.name = "stiffness",
+                                 .unit = "Pa",
+                                 .default_value = NAN,
+                                 .derived = "100 times the largest weight an area of the cloths",
+                                 .min = 0,
+                                 .max = 1e15,
+                                 .open_min = true,
+                                 .help = "scale of the contact pressure"},
+    [DRAPE_CONTACT_FRICTION_VELOCITY] = {.name = "friction_velocity",
+                                         .unit = "m/s",
+                                         .default_value = 1e-3,
+                                         .min = 0,
+                                         .max = 1e3,
+                                         .open_min = true,
+                                         .help = "sliding slower than this, friction falls to zero smoothly"},
+    [DRAPE_CONTACT_FRICTION] =
+        {.name = "friction",
+         .kind = DRAPE_PARAM_CHOICE,
+         .unit = "1",
+         .default_value = IMPLICIT,
+         .choices = frictions,
+         .help = "implicit: of the normal force at the end of the step; lagged: at its start"},
+};
+
+const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT] = {
+    [DRAPE_SELF_THICKNESS] = {.name = "thickness",
+                              .unit = "m",
+                              .default_value = NAN,
+                              .min = 0,
+                              .max = 1e3,
+                              .open_min = true,
+                              .help = "half the distance that layers of cloth are kept apart"},
+    [DRAPE_SELF_FRICTION] = {.name = "friction",
+                             .unit = "1",
+                             .default_value = 0,
+                             .min = 0,
+                             .max = 1e3,
+                             .help = "Coulomb's mu between layers of cloth"},
+};
+
+void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_CONTACT_PARAM_COUNT])
+{
+    values[DRAPE_CONTACT_DISTANCE] = contact->distance;
+    values[DRAPE_CONTACT_STIFFNESS] = contact->stiffness;
+    values[DRAPE_CONTACT_FRICTION_VELOCITY] = contact->friction_velocity;
+    values[DRAPE_CONTACT_FRICTION] = contact->lagged ? LAGGED : IMPLICIT;
+}
+
+void drape_self_contact_values(const drape_contact_def *contact, double values[DRAPE_SELF_PARAM_COUNT])
+{
+    values[DRAPE_SELF_THICKNESS] = contact->self_thickness;
+    values[DRAPE_SELF_FRICTION] = contact->self_friction;
+}
+
+static double largest_thickness(const drape_model *model)
+{
+    double largest = 0;
+    for (int32_t c = 0; c < model->cloth_count; c++)
+        largest = fmax(largest, model->cloths[c].material.thickness);
+    return largest;
+}
+
+/* 100 sigma |g|, sigma the largest areal density: a sheet at rest on a collider then is pushed in by a
+ * hundredth of what such a pressure is. Without gravity L / s^2 stands for |g|: the acceleration that takes
+ * the sheet, of the size L, its own length away in about a second. */
+static double stiffness_of_weight(const drape_model *model)
+{
+    double sigma = 0, g = hypot(hypot(model->gravity[0], model->gravity[1]), model->gravity[2]);
+    for (int32_t c = 0; c < model->cloth_count; c++)
+        sigma = fmax(sigma, model->cloths[c].material.areal_density);
+    return 100 * sigma * (g > 0 ? g : model->length);
+}
+
+static drape_status resolve_contact(drape_model *model, const drape_scene_def *def)
+{
+    double values[DRAPE_CONTACT_PARAM_COUNT];
+    drape_contact_def *contact = &model->contact;
+    drape_status status =
+        drape_params_resolve(model->ctx, "/contact", drape_contact_params, DRAPE_CONTACT_PARAM_COUNT,
+                             def->contact, def->contact_count, values);
+    if (status)
+        return status;
+    double distance = values[DRAPE_CONTACT_DISTANCE], stiffness = values[DRAPE_CONTACT_STIFFNESS];
+    contact->distance = isnan(distance) ? largest_thickness(model) : distance;
+    contact->stiffness = isnan(stiffness) ? stiffness_of_weight(model) : stiffness;
+    contact->friction_velocity = values[DRAPE_CONTACT_FRICTION_VELOCITY];
+    contact->lagged = values[DRAPE_CONTACT_FRICTION] == LAGGED;
+    return DRAPE_OK;
+}
+
+static drape_status resolve_self_contact(drape_model *model, const drape_scene_def *def)
+{
+    double values[DRAPE_SELF_PARAM_COUNT];
+    if (!def->self_contact)
+        return DRAPE_OK;
+    drape_status status =
+        drape_params_resolve(model->ctx, "/self_contact", drape_self_contact_params, DRAPE_SELF_PARAM_COUNT,
+                             def->self_contact, def->self_contact_count, values);
+    if (status)
+        return status;
+    model->contact.self = true;
+    model->contact.self_thickness = values[DRAPE_SELF_THICKNESS];
+    model->contact.self_friction = values[DRAPE_SELF_FRICTION];
+    return DRAPE_OK;
+}
+
+drape_status drape_compile_contact(drape_model *model, const drape_scene_def *def)
+{
+    const drape_row_def contact = {.settings = def->contact, .setting_count = def->contact_count};
+    const drape_row_def self = {.settings = def->self_contact, .setting_count = def->self_contact_count};
+    drape_status status = resolve_contact(model, def);
+    if (!status)
+        status = resolve_self_contact(model, def);
+    if (!status)
+        status = drape_compile_choice(model, &contact, "contact", &model->contact_choice);
+    return status ? status : drape_compile_choice(model, &self, "self_contact", &model->self_choice);
+}

@@ -1,0 +1,97 @@
+/*
+ * stable: steps of the nominal size where they are stable, else as large as the stability limit of an explicit
+ * row allows, times a safety. The limit is found again every few steps, as the stiffness of a stretched or folded
+ * sheet is another, and where a step failed: one that was above it is forgotten. Rows without a limit take nominal
+ * steps. A step that fails below the limit is halved.
+ *
+ * A step of verlet is as many substeps as the scene says, so that it is the substeps that keep below 2/omega.
+ */
+#include "control/halve.h"
+
+#include <math.h>
+
+enum { PARAM_DT_MIN, PARAM_SAFETY, PARAM_EVERY, PARAM_COUNT };
+enum { SCRATCH_LIMIT, SCRATCH_LEFT };
+
+#define SLACK 1e-6 /* a limit of which a step was made is found again to this */
+
+static const drape_param params[PARAM_COUNT] = {
+    [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
+    [PARAM_SAFETY] = {.name = "safety",
+                      .unit = "1",
+                      .default_value = 0.9,
+                      .min = 0.1,
+                      .max = 1,
+                      .help = "share of the step that the estimate allows"},
+    [PARAM_EVERY] = {.name = "every",
+                     .kind = DRAPE_PARAM_INTEGER,
+                     .unit = "1",
+                     .default_value = 10,
+                     .min = 1,
+                     .max = 1e6,
+                     .help = "steps between two estimates of the stability limit"},
+};
+
+static double stable_step(const drape_trial *trial, const drape_state *at)
+{
+    drape_stability found;
+    if (!trial->integrator || !trial->integrator->stability)
+        return INFINITY;
+    trial->integrator->stability(trial->integrator_state, at, trial->h, &found);
+    return found.step;
+}
+
+/* The largest stable step: where the attempt came if that is known, else where it began. */
+static double limit_of(const double *values, drape_trial *trial)
+{
+    double *limit = &trial->scratch[SCRATCH_LIMIT], *left = &trial->scratch[SCRATCH_LEFT];
+    bool failed = trial->status && !trial->info->usable;
+    if (!failed && *left > 0) {
+        --*left;
+        return *limit;
+    }
+    *limit = stable_step(trial, failed ? trial->in : trial->out);
+    *left = failed ? 0 : values[PARAM_EVERY] - 1;
+    return *limit;
+}
+
+static drape_verdict reject(const double *values, drape_trial *trial, double limit)
+{
+    trial->status = DRAPE_RETRY_REJECTED;
+    trial->info->reason = "unstable";
+    trial->info->worst = (drape_worst){.what = "step / stable step",
+                                       .term = "",
+                                       .element = -1,
+                                       .node = {-1, -1, -1, -1},
+                                       .cloth = -1,
+                                       .value = trial->h / limit,
+                                       .limit = 1};
+    drape_verdict verdict = drape_halve(values[PARAM_DT_MIN], trial);
+    if (verdict == DRAPE_RETRY)
+        trial->h_next = fmin(0.9 * trial->h, fmax(values[PARAM_DT_MIN], values[PARAM_SAFETY] * limit));
+    trial->scratch[SCRATCH_LEFT] = 0;
+    return verdict;
+}
+
+static drape_verdict judge(const double *values, drape_trial *trial)
+{
+    if (trial->status < 0)
+        return DRAPE_STOP;
+    double limit = limit_of(values, trial);
+    if (trial->h > limit * (1 + SLACK))
+        return reject(values, trial, limit);
+    if (trial->status && !trial->info->usable)
+        return drape_halve(values[PARAM_DT_MIN], trial);
+    trial->h_next = fmax(values[PARAM_DT_MIN], fmin(values[PARAM_SAFETY] * limit, trial->dt));
+    return DRAPE_ACCEPT;
+}
+
+const drape_controller_ops drape_controller_stable = {
+    .name = "stable",
+    .summary = "nominal steps, smaller where an explicit integrator's stability limit asks for it",
+    .reference = "2/omega: Courant, Friedrichs & Lewy 1928; Hairer, Lubich & Wanner 2003",
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .own_steps = true,
+    .judge = judge,
+};

@@ -1,0 +1,567 @@
+/*
+ * verlet: explicit steps, each split in substeps of h. With a = -M^-1 g(x, v) and c = 1 - damping/100:
+ *
+ * velocity   v <- c v, x' = x + h v + h^2/2 a(x, v), v' = v + h/2 (a(x, v) + a(x', v + h a(x, v)))
+ *            velocity Verlet: second order, also with forces that depend on v.
+ * position   v' = c v + h a(x, v), x' = x + h v'
+ *            x' = x + c (x - x_before) + h^2 a of CS184 and Boson, with v = (x - x_before)/h: the same numbers
+ *            up to rounding, but (x, v) is all of the state. v is that of half a substep ago: first order.
+ *
+ * Then nodes are moved: apart where cloth is too near to cloth, out of colliders, and to where springs are not
+ * too long; the order is that of CS184. What moved a node by d changed its velocity by d/h: Verlet's velocity
+ * is a difference of positions.
+ *
+ * Stable for
+ *     h < (sqrt(mu^2 + 2 (1 + c) omega^2) - mu)/omega^2
+ * with omega^2 the largest eigenvalue of M^-1 K and mu of M^-1 D: from z^2 - (1 + c - h^2 omega^2 - h mu) z
+ * + c - h mu, whose roots are the growth of one wave in a substep of the position form, where omega and mu are
+ * of the same wave. For mu = 0, c = 1 it is 2/omega. Damping lowers it, as its forces lag. The velocity form
+ * bears a little more. What moves nodes is not in it.
+ *
+ * Energy: `dissipated` has the work of the dissipative terms and what c takes. What moving nodes gives or takes
+ * has no force and no law behind it; it is left in `numerical`, with the error of the substeps.
+ */
+#include "integrators/verlet.h"
+
+#include "base/clock.h"
+#include "base/finite.h"
+#include "base/vec3.h"
+#include "integrators/stability.h"
+
+#include <string.h>
+
+enum {
+    PARAM_DT,
+    PARAM_SUBSTEPS,
+    PARAM_FORM,
+    PARAM_DAMPING,
+    PARAM_CONTACT,
+    PARAM_SURFACE_OFFSET,
+    PARAM_FRICTION_RANGE,
+    PARAM_FRICTION_DRAG,
+    PARAM_SELF_BOXES,
+    PARAM_STRAIN_LIMIT,
+    PARAM_STRAIN_LIMIT_ITERATIONS,
+    PARAM_STRAIN_LIMIT_TOLERANCE,
+    PARAM_SAFETY,
+    PARAM_MAX_SUBSTEPS,
+    PARAM_MAX_SPEED,
+    PARAM_GUARD,
+    PARAM_COUNT
+};
+enum { FORM_VELOCITY, FORM_POSITION };
+enum { BOXES_ALL, BOXES_OWN };
+
+static const char *const form_choices[] = {"velocity", "position", NULL};
+static const char *const contact_choices[] = {
+    [DRAPE_VERLET_CS184] = "cs184", [DRAPE_VERLET_BOSON] = "boson", NULL};
+static const char *const boxes_choices[] = {[BOXES_ALL] = "all", [BOXES_OWN] = "own", NULL};
+static const drape_param params[PARAM_COUNT] = {
+    [PARAM_DT] = {.name = "dt",
+                  .unit = "s",
+                  .default_value = 1.0 / 60,
+                  .min = 0,
+                  .max = 1e6,
+                  .open_min = true,
+                  .help = "nominal step"},
+    [PARAM_SUBSTEPS] = {.name = "substeps",
+                        .kind = DRAPE_PARAM_INTEGER,
+                        .unit = "1",
+                        .default_value = 0,
+                        .min = 0,
+                        .max = 1e6,
+                        .help = "of a step; 0: as many as the stability limit at its start asks for"},
+    [PARAM_FORM] =
+        {.name = "form",
+         .kind = DRAPE_PARAM_CHOICE,
+         .unit = "1",
+         .default_value = FORM_VELOCITY,
+         .choices = form_choices,
+         .help = "velocity: second order; position: x' = x + (x - x_before) + a h^2 as CS184 and Boson"},
+    [PARAM_DAMPING] = {.name = "damping",
+                       .unit = "%",
+                       .default_value = 0,
+                       .min = 0,
+                       .max = 100,
+                       .help = "velocity that every substep takes: more substeps damp more, as in CS184"},
+    [PARAM_CONTACT] =
+        {.name = "contact",
+         .kind = DRAPE_PARAM_CHOICE,
+         .unit = "1",
+         .default_value = DRAPE_VERLET_CS184,
+         .choices = contact_choices,
+         .help = "how nodes leave colliders; cs184: friction is the share of a correction that is not made; "
+                 "boson: nodes stop on flat surfaces, friction changes forces"},
+    [PARAM_SURFACE_OFFSET] = {.name = "surface_offset",
+                              .unit = "m",
+                              .default_value = 1e-4,
+                              .min = 0,
+                              .max = 1e9,
+                              .help = "cs184: how far outside of a flat surface a node is put"},
+    [PARAM_FRICTION_RANGE] = {.name = "friction_range",
+                              .unit = "m",
+                              .default_value = 0.5,
+                              .min = 0,
+                              .max = 1e9,
+                              .help = "boson: nodes this near to a surface rub on it"},
+    [PARAM_FRICTION_DRAG] = {.name = "friction_drag",
+                             .unit = "N s/m",
+                             .default_value = 0.5,
+                             .min = 0,
+                             .max = 1e9,
+                             .help = "boson: drag of a node that rubs"},
+    [PARAM_SELF_BOXES] =
+        {.name = "self_boxes",
+         .kind = DRAPE_PARAM_CHOICE,
+         .unit = "1",
+         .default_value = BOXES_ALL,
+         .choices = boxes_choices,
+         .help = "where cloth is looked for near a point of cloth; own: in its own box alone, as CS184"},
+    [PARAM_STRAIN_LIMIT] = {.name = "strain_limit",
+                            .unit = "1",
+                            .default_value = NAN,
+                            .derived = "none",
+                            .min = 0,
+                            .max = 1e6,
+                            .help = "no spring is longer than 1 + this times its rest length; 0.1 in CS184"},
+    [PARAM_STRAIN_LIMIT_ITERATIONS] =
+        {.name = "strain_limit_iterations",
+         .kind = DRAPE_PARAM_INTEGER,
+         .unit = "1",
+         .default_value = 1,
+         .min = 1,
+         .max = 1e6,
+         .help = "most passes over all springs; one does not reach the limit, as in CS184"},
+    [PARAM_STRAIN_LIMIT_TOLERANCE] = {.name = "strain_limit_tolerance",
+                                      .unit = "1",
+                                      .default_value = 1e-3,
+                                      .min = 0,
+                                      .max = 1,
+                                      .help = "passes end where no spring is longer than 1 + this allows"},
+    [PARAM_SAFETY] = {.name = "safety",
+                      .unit = "1",
+                      .default_value = 0.8,
+                      .min = 0.01,
+                      .max = 1,
+                      .help = "substeps 0: share of the stability limit that a substep takes"},
+    [PARAM_MAX_SUBSTEPS] = {.name = "max_substeps",
+                            .kind = DRAPE_PARAM_INTEGER,
+                            .unit = "1",
+                            .default_value = 10000,
+                            .min = 1,
+                            .max = 1e6,
+                            .help = "substeps 0: a step that needs more is rejected"},
+    [PARAM_MAX_SPEED] = {.name = "max_speed",
+                         .unit = "m/s",
+                         .default_value = 1e6,
+                         .min = 0,
+                         .max = 1e100,
+                         .open_min = true,
+                         .help = "a step in which a node is faster has blown up and is rejected"},
+    [PARAM_GUARD] = {.name = "guard",
+                     .kind = DRAPE_PARAM_BOOLEAN,
+                     .unit = "1",
+                     .default_value = 1,
+                     .help =
+                         "energy from nowhere and collapsed elements reject a step; false, as in CS184 and "
+                         "Boson: only max_speed does"},
+};
+
+#define STABILITY_ITERATIONS 30 /* finds omega of a sheet to 1 % */
+
+typedef struct verlet_state {
+    drape_context *ctx;
+    drape_system *system;
+    const drape_model *model;
+    double values[PARAM_COUNT];
+    double keep;        /* c */
+    double *g, *g1;     /* nodes: forces with their sign turned */
+    double *x0, *moved; /* nodes: at the start of the substep; before nodes are moved */
+    double *v_ahead;    /* nodes: velocity form with forces that depend on v */
+    double *dissipated; /* nodes; NULL where nothing dissipates */
+    drape_verlet_contact contact;
+    drape_verlet_limit limit;
+    drape_verlet_self *self; /* NULL: cloth does not meet cloth */
+    drape_spectrum *spectrum;
+    drape_work work;
+} verlet_state;
+
+/* One substep. */
+typedef struct substep {
+    double t0, t, h;
+    double share; /* of self-contact: one over the substeps */
+    double *x, *v;
+    const double *internal;
+    drape_step_info *info;
+} substep;
+
+/* ---- Making ---- */
+
+static void destroy(void **state)
+{
+    verlet_state *s = *state;
+    if (!s)
+        return;
+    double *const all[] = {s->g, s->g1, s->x0, s->moved, s->v_ahead, s->dissipated};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+        drape_free(s->ctx, all[i]);
+    drape_verlet_limit_free(s->ctx, &s->limit);
+    drape_verlet_self_destroy(&s->self);
+    drape_spectrum_destroy(&s->spectrum);
+    drape_free(s->ctx, s);
+    *state = NULL;
+}
+
+static bool create_arrays(verlet_state *s)
+{
+    size_t nodes = 3 * (size_t)s->model->node_count;
+    double **const always[] = {&s->g, &s->g1, &s->x0, &s->moved};
+    for (size_t i = 0; i < sizeof always / sizeof *always; i++)
+        if (!(*always[i] = drape_alloc(s->ctx, nodes, sizeof(double))))
+            return false;
+    if (!s->model->has_dissipation)
+        return true;
+    s->v_ahead = drape_alloc(s->ctx, nodes, sizeof(double));
+    s->dissipated = drape_alloc(s->ctx, nodes, sizeof(double));
+    return s->v_ahead && s->dissipated;
+}
+
+static drape_status create_parts(verlet_state *s)
+{
+    const double *values = s->values;
+    drape_status status = create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
+    if (!status && !isnan(values[PARAM_STRAIN_LIMIT]))
+        status = drape_verlet_limit_create(s->ctx, s->model, values[PARAM_STRAIN_LIMIT],
+                                           (int)values[PARAM_STRAIN_LIMIT_ITERATIONS],
+                                           values[PARAM_STRAIN_LIMIT_TOLERANCE], &s->limit);
+    if (!status && s->model->contact.self)
+        status = drape_verlet_self_create(s->ctx, s->model, values[PARAM_SELF_BOXES] == BOXES_OWN, &s->self);
+    if (!status)
+        status = drape_spectrum_create(s->ctx, s->system, STABILITY_ITERATIONS, &s->spectrum);
+    return status;
+}
+
+static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+{
+    verlet_state *s = drape_alloc(ctx, 1, sizeof *s);
+    *state = s;
+    if (!s)
+        return DRAPE_E_MEMORY;
+    *s = (verlet_state){.ctx = ctx, .system = system, .model = drape_system_model(system)};
+    memcpy(s->values, values, sizeof s->values);
+    s->keep = 1 - values[PARAM_DAMPING] / 100;
+    s->contact = (drape_verlet_contact){.model = s->model,
+                                        .rule = (int)values[PARAM_CONTACT],
+                                        .offset = values[PARAM_SURFACE_OFFSET],
+                                        .friction_range = values[PARAM_FRICTION_RANGE],
+                                        .friction_drag = values[PARAM_FRICTION_DRAG]};
+    drape_status status = create_parts(s);
+    if (status)
+        destroy(state);
+    return status;
+}
+
+/* ---- Forces ---- */
+
+static void evaluate(verlet_state *s, const substep *sub, double t, const double *v, double *g)
+{
+    double start = drape_clock_seconds();
+    drape_system_force(s->system, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal}, g);
+    s->work.residual_seconds += drape_clock_seconds() - start;
+    s->work.residuals++;
+    drape_verlet_rub(&s->contact, t, sub->x, v, g);
+}
+
+/* Adds half of the power of the dissipative forces at x and v over the substep. */
+static void audit_dissipation(verlet_state *s, const substep *sub, double share, const double *v)
+{
+    double power = 0;
+    if (!s->dissipated)
+        return;
+    drape_system_dissipation(s->system, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal},
+                             s->dissipated);
+    for (size_t i = 0; i < 3 * (size_t)s->model->node_count; i++)
+        power += s->dissipated[i] * v[i];
+    sub->info->dissipated += share * sub->h * power;
+}
+
+/* ---- The stages of a substep ---- */
+
+/* Velocities of pins that move: their mean over the substep. What they jump by is work on the pins themselves. */
+static void start_pins(verlet_state *s, const substep *sub)
+{
+    const drape_model *m = s->model;
+    if (m->moved_count == 0)
+        return;
+    drape_model_place_pins(m, sub->t, s->moved);
+    for (int32_t i = 0; i < m->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            size_t at = 3 * (size_t)m->moved_node[i] + k;
+            double before = sub->v[at], v = (s->moved[at] - sub->x[at]) / sub->h;
+            sub->info->pin_work += 0.5 * m->mass[m->moved_node[i]] * (v * v - before * before);
+            sub->v[at] = v;
+        }
+}
+
+/* Work of the pins that move, against g. */
+static void audit_pins(verlet_state *s, const substep *sub, const double *g, double share)
+{
+    const drape_model *m = s->model;
+    for (int32_t i = 0; i < m->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            size_t at = 3 * (size_t)m->moved_node[i] + k;
+            sub->info->pin_work += share * g[at] * sub->v[at] * sub->h;
+        }
+}
+
+static void damp(verlet_state *s, const substep *sub)
+{
+    const drape_model *m = s->model;
+    double taken = 0;
+    if (s->keep == 1)
+        return;
+    for (int32_t f = 0; f < m->free_count; f++) {
+        double *v = sub->v + 3 * (size_t)m->node_of_free[f];
+        taken += m->mass[m->node_of_free[f]] * vec3_dot(v, v);
+        for (int k = 0; k < 3; k++)
+            v[k] *= s->keep;
+    }
+    sub->info->dissipated += 0.5 * (1 - s->keep * s->keep) * taken;
+}
+
+/* v += w a, x += h v of the free nodes; pins to where they are at the end. */
+static void move(const verlet_state *s, const substep *sub, double w)
+{
+    const drape_model *m = s->model;
+    for (int32_t f = 0; f < m->free_count; f++) {
+        size_t at = 3 * (size_t)m->node_of_free[f];
+        double by = w / m->mass[m->node_of_free[f]];
+        for (size_t k = at; k < at + 3; k++) {
+            sub->v[k] -= by * s->g[k];
+            sub->x[k] += sub->h * sub->v[k];
+        }
+    }
+    drape_model_place_pins(m, sub->t, sub->x);
+}
+
+/* Whatever moves nodes beside the forces, and what it does to their velocities. */
+static void project(verlet_state *s, const substep *sub)
+{
+    const drape_model *m = s->model;
+    if (!s->self && m->collider_count == 0 && s->limit.count == 0)
+        return;
+    double start = drape_clock_seconds();
+    size_t nodes = 3 * (size_t)m->node_count;
+    memcpy(s->moved, sub->x, nodes * sizeof *s->moved);
+    if (s->self)
+        drape_verlet_self_push(s->self, sub->share, sub->x);
+    drape_verlet_project(&s->contact, sub->t0, sub->t, s->x0, sub->x);
+    if (s->limit.count > 0)
+        drape_verlet_limit_lengths(&s->limit, sub->x);
+    for (size_t i = 0; i < nodes; i++)
+        sub->v[i] += (sub->x[i] - s->moved[i]) / sub->h;
+    s->work.contact_seconds += drape_clock_seconds() - start;
+}
+
+static void substep_position(verlet_state *s, const substep *sub)
+{
+    memcpy(s->x0, sub->x, 3 * (size_t)s->model->node_count * sizeof *s->x0);
+    start_pins(s, sub);
+    evaluate(s, sub, sub->t0, sub->v, s->g);
+    audit_dissipation(s, sub, 1, sub->v);
+    audit_pins(s, sub, s->g, 1);
+    damp(s, sub);
+    move(s, sub, sub->h);
+    project(s, sub);
+}
+
+/* v_ahead = v + h/2 a more than the half that move() has added: the velocity at the end, to first order. */
+static const double *velocity_ahead(const verlet_state *s, const substep *sub)
+{
+    const drape_model *m = s->model;
+    if (!s->v_ahead)
+        return sub->v;
+    memcpy(s->v_ahead, sub->v, 3 * (size_t)m->node_count * sizeof *s->v_ahead);
+    for (int32_t f = 0; f < m->free_count; f++)
+        vec3_add_scaled(-0.5 * sub->h / m->mass[m->node_of_free[f]], s->g + 3 * (size_t)m->node_of_free[f],
+                        s->v_ahead + 3 * (size_t)m->node_of_free[f]);
+    return s->v_ahead;
+}
+
+/* Forces that depend on positions alone are known from the end of the substep before. */
+static void substep_velocity(verlet_state *s, const substep *sub, bool first)
+{
+    const drape_model *m = s->model;
+    memcpy(s->x0, sub->x, 3 * (size_t)m->node_count * sizeof *s->x0);
+    start_pins(s, sub);
+    damp(s, sub);
+    if (first || s->v_ahead || s->contact.rule == DRAPE_VERLET_BOSON) {
+        evaluate(s, sub, sub->t0, sub->v, s->g);
+    } else {
+        double *swap = s->g;
+        s->g = s->g1;
+        s->g1 = swap;
+    }
+    audit_dissipation(s, sub, 0.5, sub->v);
+    audit_pins(s, sub, s->g, 0.5);
+    move(s, sub, 0.5 * sub->h);
+    project(s, sub);
+    const double *ahead = velocity_ahead(s, sub);
+    evaluate(s, sub, sub->t, ahead, s->g1);
+    audit_dissipation(s, sub, 0.5, ahead);
+    audit_pins(s, sub, s->g1, 0.5);
+    for (int32_t f = 0; f < m->free_count; f++)
+        vec3_add_scaled(-0.5 * sub->h / m->mass[m->node_of_free[f]], s->g1 + 3 * (size_t)m->node_of_free[f],
+                        sub->v + 3 * (size_t)m->node_of_free[f]);
+}
+
+/* ---- Stability ---- */
+
+static int64_t substeps_for(const verlet_state *s, double h, double limit)
+{
+    int64_t given = (int64_t)s->values[PARAM_SUBSTEPS];
+    double most = s->values[PARAM_MAX_SUBSTEPS];
+    if (given > 0)
+        return given;
+    double needed = ceil(h / (s->values[PARAM_SAFETY] * limit));
+    return needed <= most ? (int64_t)fmax(needed, 1) : (int64_t)most + 1;
+}
+
+static void stability(void *state, const drape_state *at, double h, drape_stability *out)
+{
+    verlet_state *s = state;
+    drape_spectrum_largest(s->spectrum, at, &out->omega, &out->damping);
+    double w = out->omega, mu = out->damping, c = s->keep;
+    /* The formula multiplied by its conjugate, which does not cancel. */
+    double sum = mu + sqrt(mu * mu + 2 * (1 + c) * w * w);
+    out->limit = sum > 0 ? 2 * (1 + c) / sum : INFINITY;
+    out->substep = h / (double)substeps_for(s, h, out->limit);
+    out->step = s->values[PARAM_SUBSTEPS] > 0 ? s->values[PARAM_SUBSTEPS] * out->limit : INFINITY;
+}
+
+/* How many substeps this step takes; more than are allowed: none is. */
+static int64_t count_substeps(verlet_state *s, const drape_state *in, double h)
+{
+    drape_stability known = {.limit = INFINITY};
+    if (s->values[PARAM_SUBSTEPS] == 0)
+        stability(s, in, h, &known);
+    return substeps_for(s, h, known.limit);
+}
+
+/* ---- The step ---- */
+
+/* The first node whose numbers are none, else the fastest. */
+static int32_t worst_node(const drape_model *m, const drape_state *out)
+{
+    int32_t worst = -1;
+    double most = -1;
+    for (int32_t i = 0; i < m->node_count; i++) {
+        const double *v = out->v + 3 * (size_t)i;
+        double square = vec3_dot(v, v);
+        if (!isfinite(square) || !drape_all_finite(out->x + 3 * (size_t)i, 3))
+            return i;
+        if (square > most) {
+            most = square;
+            worst = i;
+        }
+    }
+    return worst;
+}
+
+static bool blew_up(const verlet_state *s, const drape_state *out, drape_step_info *info)
+{
+    const drape_model *m = s->model;
+    int32_t node = worst_node(m, out);
+    double speed = vec3_norm(out->v + 3 * (size_t)node);
+    if (speed <= s->values[PARAM_MAX_SPEED] && drape_all_finite(out->x + 3 * (size_t)node, 3))
+        return false;
+    info->reason = "blow_up";
+    info->worst = (drape_worst){.what = "speed [m/s]",
+                                .term = "",
+                                .element = -1,
+                                .node = {node, -1, -1, -1},
+                                .cloth = drape_model_cloth_of(m, node),
+                                .value = speed,
+                                .limit = s->values[PARAM_MAX_SPEED]};
+    return true;
+}
+
+static drape_status refuse(drape_step_info *info, int64_t most)
+{
+    info->reason = "max_substeps";
+    info->worst.what = "substeps";
+    info->worst.value = (double)most + 1;
+    info->worst.limit = (double)most;
+    return DRAPE_RETRY_REJECTED;
+}
+
+static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
+                         drape_step_info *info)
+{
+    verlet_state *s = state;
+    size_t nodes = 3 * (size_t)s->model->node_count;
+    int64_t n = count_substeps(s, in, h);
+    info->residual = info->tolerance = NAN;
+    info->lenient = s->values[PARAM_GUARD] == 0;
+    if (s->values[PARAM_SUBSTEPS] == 0 && n > (int64_t)s->values[PARAM_MAX_SUBSTEPS])
+        return refuse(info, (int64_t)s->values[PARAM_MAX_SUBSTEPS]);
+    memcpy(out->x, in->x, nodes * sizeof *out->x);
+    memcpy(out->v, in->v, nodes * sizeof *out->v);
+    info->reason = "converged";
+    for (int64_t k = 0; k < n; k++) {
+        const substep sub = {.t0 = in->t + (double)k / (double)n * (out->t - in->t),
+                             .t =
+                                 k + 1 == n ? out->t : in->t + (double)(k + 1) / (double)n * (out->t - in->t),
+                             .h = h / (double)n,
+                             .share = 1 / (double)n,
+                             .x = out->x,
+                             .v = out->v,
+                             .internal = in->internal,
+                             .info = info};
+        if (s->values[PARAM_FORM] == FORM_POSITION)
+            substep_position(s, &sub);
+        else
+            substep_velocity(s, &sub, k == 0);
+    }
+    info->iterations = (int)n;
+    return blew_up(s, out, info) ? DRAPE_RETRY_NONFINITE : DRAPE_OK;
+}
+
+/* The state is all there is. */
+static void restart(void *state, const drape_state *from)
+{
+    (void)state;
+    (void)from;
+}
+
+static drape_work work(const void *state)
+{
+    return ((const verlet_state *)state)->work;
+}
+
+static size_t bytes(const void *state)
+{
+    const verlet_state *s = state;
+    size_t nodes = 3 * (size_t)s->model->node_count;
+    size_t limit = (size_t)s->limit.count * (2 * sizeof *s->limit.node + sizeof *s->limit.longest);
+    return sizeof *s + (s->dissipated ? 6 : 4) * nodes * sizeof(double) + limit +
+           (s->self ? drape_verlet_self_bytes(s->self) : 0) + drape_spectrum_bytes(s->spectrum);
+}
+
+const drape_integrator_ops drape_integrator_verlet = {
+    .name = "verlet",
+    .summary = "explicit Verlet steps in substeps, with the contact rules and the strain limit of CS184 and "
+               "Boson; stable below 2/omega",
+    .reference = "Verlet 1967; Provot 1995; CS184 clothsim; Hairer, Lubich & Wanner 2003",
+    .order = 2,
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .create = create,
+    .projects_contact = true,
+    .step = step,
+    .restart = restart,
+    .stability = stability,
+    .work = work,
+    .bytes = bytes,
+    .destroy = destroy,
+};

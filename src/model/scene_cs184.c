@@ -1,0 +1,394 @@
+/*
+ * scene_cs184.c: see scene_cs184.h. A scene of theirs is an object of at most "cloth", "sphere" and "plane",
+ * whose members are checked here, those that they do not know ignored, as there. What their program has in its
+ * windows and constants is what it begins with: gravity -9.8, 90 frames a second of 30 substeps, bend springs of
+ * 0.2 ks, strains limited to 10 % in one pass, cloth that never passes through cloth.
+ *
+ * Beside their keys a scene may have our own of the whole scene, so that a command line can set the integrator,
+ * the duration, the output: they stand as they are. An integrator without a method is verlet.
+ *
+ * Their sheets lie at y = 1, rows along +z, or stand, rows along +y, with a random z of at most 1 mm that breaks
+ * the symmetry. Ours begin at row 0 and go along -z or -y: half a turn about x makes one of the other. Mass is
+ * the same on all points.
+ *
+ * For methods that do not move nodes there are limit.strain and contact; Verlet leaves them out. friction is
+ * taken as mu there.
+ */
+#include "model/scene_cs184.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/param.h"
+#include "model/scene.h"
+#include "model/scene_json.h"
+#include "model/scene_text.h"
+
+#define DURATION   3.0 /* [s]; their program runs until it is closed */
+#define FRAME_RATE 90
+#define SUBSTEPS   30
+#define NOISE      1e-3 /* [m] */
+
+typedef enum kind { NUMBER, INTEGER, BOOLEAN, VECTOR, PINS } kind;
+
+typedef struct key {
+    const char *name;
+    kind kind;
+    bool required;
+    double min, max; /* NUMBER, INTEGER */
+    bool open_min;
+    const char *expected;
+} key;
+
+#define ANY -1e9, 1e9
+
+static const key cloth_keys[] = {
+    {"width", NUMBER, true, 0, 1e9, true, "a number in (0, 1e9] m"},
+    {"height", NUMBER, true, 0, 1e9, true, "a number in (0, 1e9] m"},
+    {"num_width_points", INTEGER, true, 2, 1 << 27, false, "an integer from 2"},
+    {"num_height_points", INTEGER, true, 2, 1 << 27, false, "an integer from 2"},
+    {"thickness", NUMBER, true, 0, 10, false, "a number in [0, 10] m"},
+    {"orientation", INTEGER, true, 0, 1, false, "0 (horizontal) or 1 (vertical)"},
+    {"pinned", PINS, false, 0, 0, false, "an array of [x, y], numbers of points of the grid from 0"},
+    {"damping", NUMBER, true, 0, 100, false, "a number in [0, 100] %"},
+    {"density", NUMBER, true, 0, 1e9, true, "a number in (0, 1e9] kg/m2"},
+    {"ks", NUMBER, true, 0, 1e15, false, "a number in [0, 1e15] N/m"},
+    {"enable_structural", BOOLEAN, true, 0, 0, false, "true or false"},
+    {"enable_shearing", BOOLEAN, true, 0, 0, false, "true or false"},
+    {"enable_bending", BOOLEAN, true, 0, 0, false, "true or false"},
+};
+static const key sphere_keys[] = {
+    {"origin", VECTOR, true, ANY, false, "three numbers, [x, y, z], in m"},
+    {"radius", NUMBER, true, 0, 1e9, true, "a number in (0, 1e9] m"},
+    {"friction", NUMBER, true, 0, 1, false, "a number in [0, 1]"},
+};
+static const key plane_keys[] = {
+    {"point", VECTOR, true, ANY, false, "three numbers, [x, y, z], in m"},
+    {"normal", VECTOR, true, ANY, false, "three numbers, [x, y, z]"},
+    {"friction", NUMBER, true, 0, 1, false, "a number in [0, 1]"},
+};
+
+typedef struct object {
+    const char *name;
+    bool required;
+    const key *keys;
+    size_t key_count;
+} object;
+
+#define KEYS(array) array, sizeof array / sizeof *array
+static const object objects[] = {{"cloth", true, KEYS(cloth_keys)},
+                                 {"sphere", false, KEYS(sphere_keys)},
+                                 {"plane", false, KEYS(plane_keys)}};
+#define OBJECTS (sizeof objects / sizeof *objects)
+
+/* Of our form, and taken as they are. */
+static const char *const ours[] = {"description", "gravity", "integrator", "controller", "duration",
+                                   "frame_rate",  "output",  "contact",    NULL};
+
+bool drape_scene_is_cs184(json_t *root)
+{
+    return !json_object_get(root, "drape") && json_is_object(json_object_get(root, "cloth"));
+}
+
+/* ---- Checking ---- */
+
+static drape_status refuse(drape_context *ctx, const drape_pointer *at, json_t *value, const char *what,
+                           const char *expected)
+{
+    char given[80];
+    drape_json_describe(value, given, sizeof given);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at->text, "%s is not allowed; %s is %s", given, what,
+                         expected);
+}
+
+static bool is_vector(json_t *value)
+{
+    bool good = json_array_size(value) == 3; /* 0 if it is no array */
+    for (size_t i = 0; good && i < 3; i++)
+        good = json_is_number(json_array_get(value, i)) &&
+               fabs(json_number_value(json_array_get(value, i))) <= 1e9;
+    return good;
+}
+
+static bool fits(const key *k, json_t *value)
+{
+    double number = json_number_value(value);
+    bool inside =
+        json_is_number(value) && number >= k->min && number <= k->max && (!k->open_min || number > k->min);
+    switch (k->kind) {
+    case NUMBER:
+        return inside;
+    case INTEGER:
+        return inside && number == floor(number);
+    case BOOLEAN:
+        return json_is_boolean(value);
+    case VECTOR:
+        return is_vector(value);
+    case PINS:
+        return json_is_array(value);
+    }
+    return false;
+}
+
+static drape_status check_object(drape_context *ctx, const object *o, json_t *value)
+{
+    drape_pointer at = {.length = 0};
+    drape_pointer_push(&at, o->name);
+    if (!json_is_object(value))
+        return refuse(ctx, &at, value, o->name, "an object");
+    size_t mark = at.length;
+    for (size_t i = 0; i < o->key_count; i++) {
+        const key *k = &o->keys[i];
+        json_t *member = json_object_get(value, k->name);
+        drape_pointer_push(&at, k->name);
+        if (!member && k->required)
+            return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at.text, "\"%s\" is missing from a CS184 scene: %s",
+                                 k->name, k->expected);
+        if (member && !fits(k, member))
+            return refuse(ctx, &at, member, k->name, k->expected);
+        drape_pointer_cut(&at, mark);
+    }
+    return DRAPE_OK;
+}
+
+static bool is_known(const char *name)
+{
+    for (size_t i = 0; i < OBJECTS; i++)
+        if (strcmp(objects[i].name, name) == 0)
+            return true;
+    for (int i = 0; ours[i]; i++)
+        if (strcmp(ours[i], name) == 0)
+            return true;
+    return false;
+}
+
+static drape_status check_keys(drape_context *ctx, json_t *root)
+{
+    static const char *const theirs[] = {"cloth", "sphere", "plane"};
+    for (void *it = json_object_iter(root); it; it = json_object_iter_next(root, it)) {
+        const char *name = json_object_iter_key(it);
+        drape_pointer at = {.length = 0};
+        if (is_known(name))
+            continue;
+        const char *meant = drape_did_you_mean(name, theirs, 3);
+        drape_pointer_push(&at, name);
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at.text,
+                             "unknown key \"%.60s\" of a CS184 scene%s%s%s; one of ours has \"drape\": 1",
+                             name, meant ? "; did you mean \"" : ", which has cloth, sphere, plane",
+                             meant ? meant : "", meant ? "\"?" : "");
+    }
+    return DRAPE_OK;
+}
+
+static double number_of(json_t *object_value, const char *name)
+{
+    return json_number_value(json_object_get(object_value, name));
+}
+
+/* One pin, at its pointer. */
+static drape_status check_pin(drape_context *ctx, drape_pointer *at, json_t *pin, const double points[2])
+{
+    if (json_array_size(pin) != 2)
+        return refuse(ctx, at, pin, "a pin", "[x, y]");
+    for (size_t i = 0; i < 2; i++) {
+        json_t *value = json_array_get(pin, i);
+        double number = json_number_value(value);
+        if (json_is_number(value) && number >= 0 && number < points[i] && number == floor(number))
+            continue;
+        char expected[60];
+        snprintf(expected, sizeof expected, "an integer from 0 to %.0f", points[i] - 1);
+        drape_pointer_push_index(at, i);
+        return refuse(ctx, at, value, i ? "y of a pin" : "x of a pin", expected);
+    }
+    return DRAPE_OK;
+}
+
+static drape_status check_pins(drape_context *ctx, json_t *cloth)
+{
+    json_t *pins = json_object_get(cloth, "pinned");
+    const double points[] = {number_of(cloth, "num_width_points"), number_of(cloth, "num_height_points")};
+    drape_pointer at = {.length = 0};
+    drape_pointer_push(&at, "cloth");
+    drape_pointer_push(&at, "pinned");
+    size_t mark = at.length;
+    for (size_t i = 0; i < json_array_size(pins); i++) {
+        drape_pointer_push_index(&at, i);
+        drape_status status = check_pin(ctx, &at, json_array_get(pins, i), points);
+        if (status)
+            return status;
+        drape_pointer_cut(&at, mark);
+    }
+    return DRAPE_OK;
+}
+
+static drape_status check_normal(drape_context *ctx, json_t *plane)
+{
+    json_t *normal = json_object_get(plane, "normal");
+    for (size_t i = 0; i < json_array_size(normal); i++)
+        if (json_number_value(json_array_get(normal, i)) != 0)
+            return DRAPE_OK;
+    return normal ? drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/plane/normal", "it has no direction: it is 0 0 0")
+                  : DRAPE_OK;
+}
+
+static drape_status check(drape_context *ctx, json_t *root)
+{
+    drape_status status = check_keys(ctx, root);
+    for (size_t i = 0; !status && i < OBJECTS; i++) {
+        json_t *value = json_object_get(root, objects[i].name);
+        if (value || objects[i].required)
+            status = check_object(ctx, &objects[i], value);
+    }
+    if (!status)
+        status = check_pins(ctx, json_object_get(root, "cloth"));
+    return status ? status : check_normal(ctx, json_object_get(root, "plane"));
+}
+
+/* ---- Our form. NULL, which jansson passes on, is out of memory. ---- */
+
+static json_t *pins_of(json_t *cloth)
+{
+    json_t *from = json_object_get(cloth, "pinned"), *nodes = json_array();
+    double columns = number_of(cloth, "num_width_points");
+    if (json_array_size(from) == 0) {
+        json_decref(nodes);
+        return json_array();
+    }
+    for (size_t i = 0; i < json_array_size(from); i++) {
+        json_t *pin = json_array_get(from, i);
+        double node =
+            json_number_value(json_array_get(pin, 1)) * columns + json_number_value(json_array_get(pin, 0));
+        if (json_array_append_new(nodes, json_real(node))) {
+            json_decref(nodes);
+            return NULL;
+        }
+    }
+    return json_pack("[{s:o}]", "nodes", nodes);
+}
+
+static double stiffness_of(json_t *cloth, const char *enabled)
+{
+    return json_is_true(json_object_get(cloth, enabled)) ? number_of(cloth, "ks") : 0;
+}
+
+/* Springs that are switched off have no stiffness: theirs still obey the limit. */
+static json_t *terms_of(json_t *cloth)
+{
+    return json_pack("[{s:s,s:f},{s:s,s:f},{s:s,s:f,s:f},{s:s,s:f,s:s}]", "type", "spring.structural",
+                     "stiffness", stiffness_of(cloth, "enable_structural"), "type", "spring.shear",
+                     "stiffness", stiffness_of(cloth, "enable_shearing"), "type", "spring.bend", "stiffness",
+                     stiffness_of(cloth, "enable_bending"), "factor", 0.2, "type", "limit.strain", "limit",
+                     0.1, "over", "springs");
+}
+
+static json_t *mesh_of(json_t *cloth)
+{
+    bool vertical = number_of(cloth, "orientation") == 1;
+    return json_pack("{s:s,s:f,s:f,s:f,s:f,s:s,s:f,s:{s:[fff],s:[ffff]}}", "grid", "square", "columns",
+                     number_of(cloth, "num_width_points"), "rows", number_of(cloth, "num_height_points"),
+                     "width", number_of(cloth, "width"), "height", number_of(cloth, "height"), "orientation",
+                     vertical ? "vertical" : "horizontal", "noise", vertical ? NOISE : 0.0, "transform",
+                     "translate", 0.0, vertical ? 0.0 : 1.0, 0.0, "rotate", 1.0, 0.0, 0.0, 180.0);
+}
+
+/* E h = ks, what a row of these springs has; no term here asks for it. */
+static json_t *material_of(json_t *cloth)
+{
+    double thickness = fmax(number_of(cloth, "thickness"), 1e-4);
+    double mass = number_of(cloth, "width") * number_of(cloth, "height") * number_of(cloth, "density");
+    return json_pack("{s:f,s:f,s:f,s:s}", "young_modulus", fmax(number_of(cloth, "ks"), 1) / thickness,
+                     "thickness", thickness, "total_mass", mass, "mass", "uniform");
+}
+
+static json_t *cloth_of(json_t *cloth)
+{
+    return json_pack("[{s:o,s:o,s:o,s:o}]", "mesh", mesh_of(cloth), "material", material_of(cloth), "terms",
+                     terms_of(cloth), "pins", pins_of(cloth));
+}
+
+static json_t *colliders_of(json_t *root)
+{
+    json_t *sphere = json_object_get(root, "sphere"), *plane = json_object_get(root, "plane");
+    json_t *array = json_array();
+    if (sphere && json_array_append_new(array, json_pack("{s:s,s:O,s:O,s:O}", "type", "sphere", "center",
+                                                         json_object_get(sphere, "origin"), "radius",
+                                                         json_object_get(sphere, "radius"), "friction",
+                                                         json_object_get(sphere, "friction")))) {
+        json_decref(array);
+        array = NULL;
+    }
+    if (plane && json_array_append_new(array, json_pack("{s:s,s:O,s:O,s:O}", "type", "plane", "point",
+                                                        json_object_get(plane, "point"), "normal",
+                                                        json_object_get(plane, "normal"), "friction",
+                                                        json_object_get(plane, "friction")))) {
+        json_decref(array);
+        array = NULL;
+    }
+    return array;
+}
+
+/* Their program's, changed by what the scene says of ours. */
+static json_t *integrator_of(json_t *root)
+{
+    json_t *cloth = json_object_get(root, "cloth");
+    json_t *made =
+        json_pack("{s:s,s:f,s:i,s:s,s:O,s:s,s:f,s:b}", "method", "verlet", "dt", 1.0 / FRAME_RATE, "substeps",
+                  SUBSTEPS, "form", "position", "damping", json_object_get(cloth, "damping"), "contact",
+                  "cs184", "strain_limit", 0.1, "guard", 0);
+    json_t *given = json_object_get(root, "integrator");
+    if (made && given && json_object_update(made, given)) {
+        json_decref(made);
+        return NULL;
+    }
+    return made;
+}
+
+/* Their program goes on whatever happens, and a step that blew up ends it: no smaller one is tried. Other
+ * methods have the controller that they have by default. */
+static const char *controller_of(json_t *root)
+{
+    const char *method = json_string_value(json_object_get(json_object_get(root, "integrator"), "method"));
+    return method && strcmp(method, "verlet") != 0 ? "halving" : "fixed";
+}
+
+static int set_ours(json_t *scene, json_t *root)
+{
+    for (int i = 0; ours[i]; i++) {
+        json_t *value = json_object_get(root, ours[i]);
+        if (value && strcmp(ours[i], "integrator") != 0 && json_object_set(scene, ours[i], value))
+            return -1;
+    }
+    return 0;
+}
+
+drape_status drape_scene_from_cs184(drape_context *ctx, json_t *root, json_t **out)
+{
+    *out = NULL;
+    json_t *given = json_object_get(root, "integrator");
+    if (given && !json_is_object(given)) {
+        drape_pointer at = {.length = 0};
+        drape_pointer_push(&at, "integrator");
+        return refuse(ctx, &at, given, "integrator", "an object");
+    }
+    drape_status status = check(ctx, root);
+    if (status)
+        return status;
+    json_t *cloth = json_object_get(root, "cloth");
+    json_t *scene = json_pack("{s:i,s:o,s:o,s:o,s:{s:s},s:[fff],s:f,s:i}", "drape", DRAPE_SCENE_FORM, "cloth",
+                              cloth_of(cloth), "colliders", colliders_of(root), "integrator",
+                              integrator_of(root), "controller", "type", controller_of(root), "gravity", 0.0,
+                              -9.8, 0.0, "duration", DURATION, "frame_rate", FRAME_RATE);
+    if (scene && number_of(cloth, "thickness") > 0 &&
+        json_object_set_new(scene, "self_contact",
+                            json_pack("{s:O}", "thickness", json_object_get(cloth, "thickness")))) {
+        json_decref(scene);
+        scene = NULL;
+    }
+    if (!scene || set_ours(scene, root)) {
+        json_decref(scene);
+        return drape_fail_memory(ctx, 1);
+    }
+    *out = scene;
+    return DRAPE_OK;
+}

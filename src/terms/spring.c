@@ -1,0 +1,234 @@
+/* spring.c: see spring.h. With n n' and P = (I - n n')/l: dq = (-n, n), ddq = [P -P; -P P]. */
+#include "terms/spring.h"
+
+#include "base/vec3.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#define KIND_OFFSETS 2
+
+enum { REST_K, REST_LENGTH, REST_DAMPING, REST_COUNT };
+
+const drape_spring_offset drape_spring_offsets[DRAPE_SPRING_OFFSETS] = {
+    [DRAPE_SPRING_STRUCTURAL] = {0, 1}, {1, 0}, [DRAPE_SPRING_SHEAR] = {1, 1}, {1, -1},
+    [DRAPE_SPRING_BEND] = {0, 2},       {2, 0}};
+
+const drape_param drape_spring_params[DRAPE_SPRING_PARAM_COUNT] = {
+    [DRAPE_SPRING_STIFFNESS] = {.name = "stiffness",
+                                .kind = DRAPE_PARAM_NUMBER,
+                                .unit = "N/m",
+                                .default_value = NAN,
+                                .min = 0,
+                                .max = 1e15,
+                                .help = "spring constant of each spring, whatever its length and the mesh"},
+    [DRAPE_SPRING_FACTOR] =
+        {.name = "factor",
+         .kind = DRAPE_PARAM_NUMBER,
+         .unit = "1",
+         .default_value = 1,
+         .min = 0,
+         .max = 1e6,
+         .help = "multiplies stiffness, so that all kinds may share one: 0.2 for the bend springs of CS184"},
+    [DRAPE_SPRING_DAMPING] =
+        {.name = "damping",
+         .kind = DRAPE_PARAM_NUMBER,
+         .unit = "N s/m",
+         .default_value = 0,
+         .min = 0,
+         .max = 1e12,
+         .help = "dashpot beside each spring: force on the rate of its length, none on rigid motion"},
+    [DRAPE_SPRING_GRADIENT] =
+        {.name = "gradient",
+         .kind = DRAPE_PARAM_NUMBER,
+         .unit = "1",
+         .default_value = 0,
+         .min = -1,
+         .max = 1e6,
+         .help = "stiffness times 1 + gradient (1 - row/rows), the mean of both ends: stiffer at row 0"},
+    [DRAPE_SPRING_REST_SCALE] =
+        {.name = "rest_scale",
+         .kind = DRAPE_PARAM_NUMBER,
+         .unit = "1",
+         .default_value = 1,
+         .min = 0,
+         .max = 1e3,
+         .open_min = true,
+         .help = "rest length over the distance in the mesh: below 1 the springs begin stretched"},
+    [DRAPE_SPRING_MIN_LENGTH] =
+        {.name = "min_length",
+         .kind = DRAPE_PARAM_NUMBER,
+         .unit = "1",
+         .default_value = 1e-6,
+         .min = 0,
+         .max = 1,
+         .open_max = true,
+         .help = "a step that leaves a spring shorter than this share of its rest length is rejected"},
+};
+
+/* ---- Which nodes ---- */
+
+/* Springs of one offset: one for each node whose partner is on the grid. */
+static int32_t columns_of(const drape_cloth_view *cloth, const drape_spring_offset *offset)
+{
+    int32_t columns = cloth->columns - abs(offset->columns);
+    return columns > 0 ? columns : 0;
+}
+
+static int32_t offset_count(const drape_cloth_view *cloth, const drape_spring_offset *offset)
+{
+    int32_t rows = cloth->rows - offset->rows;
+    return rows > 0 ? rows * columns_of(cloth, offset) : 0;
+}
+
+int32_t drape_spring_count(const drape_spring_set *set)
+{
+    int32_t count = 0;
+    for (int k = 0; k < set->offset_count; k++)
+        count += offset_count(set->cloth, &set->offset[k]);
+    return set->offset_count > 0 ? count : set->cloth->edge_count;
+}
+
+void drape_spring_pair(const drape_spring_set *set, int32_t spring, int32_t pair[2])
+{
+    const drape_spring_offset *offset = set->offset;
+    if (set->offset_count == 0) {
+        pair[0] = set->cloth->edge[2 * (size_t)spring];
+        pair[1] = set->cloth->edge[2 * (size_t)spring + 1];
+        return;
+    }
+    for (; spring >= offset_count(set->cloth, offset); offset++)
+        spring -= offset_count(set->cloth, offset);
+    int32_t columns = columns_of(set->cloth, offset), skip = offset->columns < 0 ? -offset->columns : 0;
+    pair[0] = spring / columns * set->cloth->columns + spring % columns + skip;
+    pair[1] = pair[0] + offset->rows * set->cloth->columns + offset->columns;
+}
+
+double drape_spring_rest_length(const drape_cloth_view *cloth, const int32_t pair[2])
+{
+    double d[3];
+    vec3_sub(cloth->rest + 3 * (size_t)pair[1], cloth->rest + 3 * (size_t)pair[0], d);
+    return vec3_norm(d);
+}
+
+/* ---- Building ---- */
+
+/* The mean over both ends, so that a spring is the same seen from either: with the row of the neighbour, as
+ * Boson has it, the two forces differ and the net force of a sheet is not zero. */
+static double gradient_factor(const drape_cloth_view *cloth, const int32_t pair[2], double gradient)
+{
+    if (gradient == 0)
+        return 1;
+    double row = 0.5 * (pair[0] / cloth->columns + pair[1] / cloth->columns);
+    return 1 + gradient * (1 - row / cloth->rows);
+}
+
+drape_status drape_spring_build(const drape_spring_set *set, const double *values,
+                                drape_term_builder *builder)
+{
+    if (values[DRAPE_SPRING_GRADIENT] != 0 && set->cloth->rows == 0)
+        return drape_term_refuse(builder,
+                                 "\"gradient\" = %g goes from row to row of a grid; this mesh has no rows",
+                                 values[DRAPE_SPRING_GRADIENT]);
+    int32_t count = drape_spring_count(set);
+    drape_status status = drape_term_reserve(builder, count, REST_COUNT);
+    for (int32_t i = 0; !status && i < count; i++) {
+        int32_t pair[2];
+        drape_spring_pair(set, i, pair);
+        double k = values[DRAPE_SPRING_STIFFNESS] * values[DRAPE_SPRING_FACTOR];
+        double rest[REST_COUNT] = {
+            [REST_K] = k * gradient_factor(set->cloth, pair, values[DRAPE_SPRING_GRADIENT]),
+            [REST_LENGTH] = values[DRAPE_SPRING_REST_SCALE] * drape_spring_rest_length(set->cloth, pair),
+            [REST_DAMPING] = values[DRAPE_SPRING_DAMPING]};
+        drape_term_set(builder, i, pair, rest);
+    }
+    return status;
+}
+
+drape_status drape_spring_build_kind(const drape_cloth_view *cloth, int kind, const double *values,
+                                     drape_term_builder *builder)
+{
+    const drape_spring_set set = {
+        .cloth = cloth, .offset = drape_spring_offsets + kind, .offset_count = KIND_OFFSETS};
+    if (!cloth->rectangular)
+        return drape_term_refuse(builder, "these springs join rows and columns of the grid \"square\"; on "
+                                          "other meshes there is spring.structural, along the edges");
+    return drape_spring_build(&set, values, builder);
+}
+
+/* ---- The spring ---- */
+
+/* dq = (-n, n) */
+static void gradient(const double n[3], double *dq)
+{
+    for (int i = 0; i < 3; i++) {
+        dq[3 + i] = n[i];
+        dq[i] = -n[i];
+    }
+}
+
+/* ddq = [P -P; -P P] with P = (I - n n')/l */
+static void hessian(const double n[3], double length, double *ddq)
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            double p = ((i == j) - n[i] * n[j]) / length;
+            ddq[6 * i + j] = ddq[6 * (3 + i) + 3 + j] = p;
+            ddq[6 * i + 3 + j] = ddq[6 * (3 + i) + j] = -p;
+        }
+}
+
+void drape_spring_measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                          const double *internal, double *q, double *dq, double *ddq)
+{
+    (void)internal;
+    for (int32_t i = 0; i < count; i++) {
+        const int32_t *node = el->node + 2 * (size_t)(first + i);
+        double n[3];
+        vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], n);
+        q[i] = vec3_norm(n);
+        for (int k = 0; k < 3; k++)
+            n[k] /= q[i];
+        if (dq)
+            gradient(n, dq + 6 * (size_t)i);
+        if (ddq)
+            hessian(n, q[i], ddq + 36 * (size_t)i);
+    }
+}
+
+/* dq = (-d, d)/l */
+void drape_spring_pairs(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,
+                        double *d, double *c)
+{
+    drape_pair_distance(el, first, count, x, q, d);
+    for (int32_t i = 0; i < count; i++)
+        c[i] = 1 / q[i];
+}
+
+static double ratio_of(const drape_elements *el, int32_t e, const double *x)
+{
+    double d[3];
+    vec3_sub(x + 3 * (size_t)el->node[2 * (size_t)e + 1], x + 3 * (size_t)el->node[2 * (size_t)e], d);
+    return vec3_norm(d) / el->rest[(size_t)REST_LENGTH * (size_t)el->count + (size_t)e];
+}
+
+drape_status drape_spring_check(const drape_elements *el, const double *x, const double *before,
+                                const double *internal, drape_fault *fault)
+{
+    (void)internal;
+    *fault = (drape_fault){.reason = "spring_collapse",
+                           .what = "spring length / rest length",
+                           .element = -1,
+                           .value = INFINITY,
+                           .limit = el->params[DRAPE_SPRING_MIN_LENGTH]};
+    for (int32_t e = 0; e < el->count; e++) {
+        double ratio = ratio_of(el, e, x);
+        if (!(ratio < fault->value))
+            continue;
+        if (ratio < fault->limit && before && !drape_fell(ratio, ratio_of(el, e, before)))
+            continue;
+        fault->value = ratio;
+        fault->element = e;
+    }
+    return fault->value < fault->limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
+}

@@ -1,0 +1,235 @@
+/*
+ * limit.strain: keeps edges, or springs, from stretching beyond a limit. With s = l/L - 1 and the window
+ * y = (s - onset)/w, w = limit - onset, each has the energy
+ *     E = K (L w)^2 b(y),  b = 0 for y <= 0,  -y^2 ln(1 - y) for 0 < y <= 1 - cap
+ *     dE/dl = K L w b',    b' = -2 y ln(1 - y) + y^2/(1 - y)
+ *     d2E/dl2 = K b'',     b'' = -2 ln(1 - y) + 4 y/(1 - y) + y^2/(1 - y)^2
+ * which is the barrier of Li et al. 2020 (Incremental Potential Contact, eq. 6), its gap limit - s: zero
+ * below the onset, C2 there since b ~ y^3, and it has no end below the limit. b'' >= 0 and b' >= 0, so the
+ * Hessian b'' grad l grad l' + b' hess l is positive semidefinite.
+ *
+ * A barrier that is infinite beyond the limit would leave Newton nowhere to come from: fast nodes' first
+ * guess lies beyond it, and so does any sheet whose pins were moved. So b goes on above y = 1 - cap as the
+ * parabola that is C2 there. Iterates may be beyond the limit; states may not: the check rejects them.
+ * The forces at the limit are some 2/cap K L w; a load beyond it needs a larger stiffness, or smaller cap.
+ *
+ * Pressed together springs are not limited, nor does CS184's pass limit them.
+ */
+#include "base/vec3.h"
+#include "terms/spring.h"
+
+#include <math.h>
+
+enum { PARAM_LIMIT, PARAM_ONSET, PARAM_STIFFNESS, PARAM_OVER, PARAM_CAP, PARAM_COUNT };
+enum { OVER_EDGES, OVER_SPRINGS };
+enum { REST_K, REST_LENGTH, REST_COUNT };
+
+static const char *const over_choices[] = {[OVER_EDGES] = "edges", [OVER_SPRINGS] = "springs", NULL};
+
+static const drape_param params[PARAM_COUNT] = {
+    [PARAM_LIMIT] = {.name = "limit",
+                     .kind = DRAPE_PARAM_NUMBER,
+                     .unit = "1",
+                     .default_value = 0.1,
+                     .min = 0,
+                     .max = 100,
+                     .open_min = true,
+                     .help = "strain |e|/L - 1 that no accepted state exceeds"},
+    [PARAM_ONSET] = {.name = "onset",
+                     .kind = DRAPE_PARAM_NUMBER,
+                     .unit = "1",
+                     .default_value = NAN,
+                     .derived = "half of limit",
+                     .min = 0,
+                     .max = 100,
+                     .help = "strain below limit from which it is resisted; none is below"},
+    [PARAM_STIFFNESS] =
+        {.name = "stiffness",
+         .kind = DRAPE_PARAM_NUMBER,
+         .unit = "N/m",
+         .default_value = NAN,
+         .derived = "the larger of E h and the cloth's weight over its mean rest length times limit - onset",
+         .min = 0,
+         .max = 1e15,
+         .open_min = true,
+         .help = "scale of the resistance: a spring of this constant, 6.4 times it halfway from onset to "
+                 "limit"},
+    [PARAM_OVER] = {.name = "over",
+                    .kind = DRAPE_PARAM_CHOICE,
+                    .unit = "1",
+                    .default_value = OVER_EDGES,
+                    .choices = over_choices,
+                    .help =
+                        "edges: of the mesh; springs: all structural, shear and bend pairs of a square grid"},
+    [PARAM_CAP] = {.name = "cap",
+                   .kind = DRAPE_PARAM_NUMBER,
+                   .unit = "1",
+                   .default_value = 0.01,
+                   .min = 1e-9,
+                   .max = 0.5,
+                   .help =
+                       "share of limit - onset, next to the limit, where the barrier goes on as a parabola: "
+                       "forces at the limit are some 2/cap stiffness L (limit - onset)"},
+};
+
+static double onset_of(const double *values)
+{
+    return isnan(values[PARAM_ONSET]) ? values[PARAM_LIMIT] / 2 : values[PARAM_ONSET];
+}
+
+/* ---- Building ---- */
+
+static double mean_length(const drape_spring_set *set, int32_t count)
+{
+    double sum = 0;
+    for (int32_t i = 0; i < count; i++) {
+        int32_t pair[2];
+        drape_spring_pair(set, i, pair);
+        sum += drape_spring_rest_length(set->cloth, pair);
+    }
+    return sum / count;
+}
+
+/* One edge alone can carry the sheet's weight, with b' = 1, at y = 0.46. */
+static double stiffness_of(const drape_spring_set *set, int32_t count, const double *values)
+{
+    const drape_cloth_view *cloth = set->cloth;
+    double mass = 0, width = values[PARAM_LIMIT] - onset_of(values);
+    if (!isnan(values[PARAM_STIFFNESS]))
+        return values[PARAM_STIFFNESS];
+    for (int32_t i = 0; i < cloth->node_count; i++)
+        mass += cloth->node_mass[i];
+    return fmax(cloth->material.membrane_stiffness,
+                mass * vec3_norm(cloth->gravity) / (width * mean_length(set, count)));
+}
+
+static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+{
+    const bool springs = values[PARAM_OVER] == OVER_SPRINGS;
+    const drape_spring_set set = {
+        .cloth = cloth, .offset = drape_spring_offsets, .offset_count = springs ? DRAPE_SPRING_OFFSETS : 0};
+    if (springs && !cloth->rectangular)
+        return drape_term_refuse(builder, "\"over\" = \"springs\" needs the grid \"square\"; this mesh has "
+                                          "edges alone");
+    if (!(onset_of(values) < values[PARAM_LIMIT]))
+        return drape_term_refuse(builder, "\"onset\" = %g is not below \"limit\" = %g", values[PARAM_ONSET],
+                                 values[PARAM_LIMIT]);
+    int32_t count = drape_spring_count(&set);
+    double stiffness = stiffness_of(&set, count, values);
+    drape_status status = drape_term_reserve(builder, count, REST_COUNT);
+    for (int32_t i = 0; !status && i < count; i++) {
+        int32_t pair[2];
+        drape_spring_pair(&set, i, pair);
+        double rest[REST_COUNT] = {
+            [REST_K] = stiffness, [REST_LENGTH] = drape_spring_rest_length(cloth, pair)};
+        drape_term_set(builder, i, pair, rest);
+    }
+    return status;
+}
+
+/* ---- The barrier ---- */
+
+typedef struct barrier {
+    double value, slope, curve; /* b, b', b'' */
+} barrier;
+
+static barrier barrier_below_cap(double y)
+{
+    double log_gap = log1p(-y), ratio = y / (1 - y);
+    return (barrier){.value = -y * y * log_gap,
+                     .slope = y * (ratio - 2 * log_gap),
+                     .curve = ratio * (4 + ratio) - 2 * log_gap};
+}
+
+static barrier barrier_at(double y, double cap)
+{
+    if (y <= 0)
+        return (barrier){0};
+    if (y <= 1 - cap)
+        return barrier_below_cap(y);
+    barrier b = barrier_below_cap(1 - cap);
+    double beyond = y - (1 - cap); /* NaN, too, comes here and stays one */
+    b.value += beyond * (b.slope + 0.5 * b.curve * beyond);
+    b.slope += b.curve * beyond;
+    return b;
+}
+
+/* With n = (x1 - x0)/l:  g = E' (-n, n),  H = [B -B; -B B],  B = E'' n n' + E'/l (I - n n'). */
+static void one(const drape_elements *el, int32_t element, const double *x, double *e, double *g,
+                double *hess)
+{
+    const double *rest = el->rest + element;
+    double k = rest[REST_K], rest_length = rest[(size_t)REST_LENGTH * (size_t)el->count];
+    double onset = onset_of(el->params), width = el->params[PARAM_LIMIT] - onset, n[3];
+    vec3_sub(x + 3, x, n);
+    double length = vec3_norm(n), scale = rest_length * width;
+    barrier b = barrier_at((length / rest_length - 1 - onset) / width, el->params[PARAM_CAP]);
+    double force = k * scale * b.slope, across = b.slope > 0 ? force / length : 0;
+    for (int i = 0; i < 3; i++)
+        n[i] = b.slope > 0 ? n[i] / length : 0; /* a collapsed edge is not stretched */
+    if (e)
+        *e = k * scale * scale * b.value;
+    for (int i = 0; g && i < 3; i++) {
+        g[3 + i] = force * n[i];
+        g[i] = -g[3 + i];
+    }
+    for (int i = 0; hess && i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            double block = (k * b.curve - across) * n[i] * n[j] + across * (i == j);
+            hess[6 * i + j] = hess[6 * (3 + i) + 3 + j] = block;
+            hess[6 * i + 3 + j] = hess[6 * (3 + i) + j] = -block;
+        }
+}
+
+static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                   const double *internal, double *e, double *g, double *hess)
+{
+    (void)internal;
+    drape_energy_range(el, first, count, x, e, g, hess, one);
+}
+
+static double strain_of(const drape_elements *el, int32_t e, const double *x)
+{
+    double d[3];
+    vec3_sub(x + 3 * (size_t)el->node[2 * (size_t)e + 1], x + 3 * (size_t)el->node[2 * (size_t)e], d);
+    return vec3_norm(d) / el->rest[(size_t)REST_LENGTH * (size_t)el->count + (size_t)e] - 1;
+}
+
+/* Beyond the limit a step may only lead back. */
+static drape_status check(const drape_elements *el, const double *x, const double *before,
+                          const double *internal, drape_fault *fault)
+{
+    (void)internal;
+    *fault = (drape_fault){.reason = "strain_limit",
+                           .what = "strain of a limited edge",
+                           .element = -1,
+                           .value = -INFINITY,
+                           .limit = el->params[PARAM_LIMIT]};
+    for (int32_t e = 0; e < el->count; e++) {
+        double strain = strain_of(el, e, x);
+        if (!(strain > fault->value))
+            continue;
+        if (strain > fault->limit && before && strain <= strain_of(el, e, before))
+            continue;
+        fault->value = strain;
+        fault->element = e;
+    }
+    return fault->value > fault->limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
+}
+
+const drape_term_ops drape_term_limit_strain = {
+    .struct_size = sizeof(drape_term_ops),
+    .name = "limit.strain",
+    .summary = "keeps edges or springs from stretching beyond a limit, by a barrier that is zero below an "
+               "onset",
+    .reference =
+        "barrier of Li et al. 2020, Incremental Potential Contact, eq. 6; CS184 clothsim's limit of 10 %",
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .element_name = "edge",
+    .nodes = 2,
+    .constraint = true,
+    .build = build,
+    .energy = energy,
+    .check = check,
+};

@@ -1,0 +1,25 @@
+/* spring.shear: springs along both diagonals of each cell of a square grid, which resist its shear. They are
+ * the sheet's only resistance to shear beside springs along rows and columns. */
+#include "terms/spring.h"
+
+static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+{
+    return drape_spring_build_kind(cloth, DRAPE_SPRING_SHEAR, values, builder);
+}
+
+const drape_term_ops drape_term_spring_shear = {
+    .struct_size = sizeof(drape_term_ops),
+    .name = "spring.shear",
+    .summary = "springs along both diagonals of each cell of a square grid: E = 1/2 k (l - L)^2",
+    .reference =
+        "Provot 1995, Deformation constraints in a mass-spring model to describe rigid cloth behavior",
+    .params = drape_spring_params,
+    .param_count = DRAPE_SPRING_PARAM_COUNT,
+    .element_name = "spring",
+    .nodes = 2,
+    .damped = true,
+    .build = build,
+    .measure = drape_spring_measure,
+    .pair = drape_spring_pairs,
+    .check = drape_spring_check,
+};

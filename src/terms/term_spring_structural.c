@@ -1,0 +1,30 @@
+/*
+ * spring.structural: springs that resist stretching: from each node to the next along its row and its column
+ * on a grid of rectangles; on any other mesh all edges, which on the equilateral lattice are the same thing.
+ */
+#include "terms/spring.h"
+
+static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+{
+    if (cloth->rectangular)
+        return drape_spring_build_kind(cloth, DRAPE_SPRING_STRUCTURAL, values, builder);
+    return drape_spring_build(&(drape_spring_set){.cloth = cloth}, values, builder);
+}
+
+const drape_term_ops drape_term_spring_structural = {
+    .struct_size = sizeof(drape_term_ops),
+    .name = "spring.structural",
+    .summary = "springs to the next node along rows and columns, on other meshes along edges: E = 1/2 k "
+               "(l - L)^2",
+    .reference =
+        "Provot 1995, Deformation constraints in a mass-spring model to describe rigid cloth behavior",
+    .params = drape_spring_params,
+    .param_count = DRAPE_SPRING_PARAM_COUNT,
+    .element_name = "spring",
+    .nodes = 2,
+    .damped = true,
+    .build = build,
+    .measure = drape_spring_measure,
+    .pair = drape_spring_pairs,
+    .check = drape_spring_check,
+};

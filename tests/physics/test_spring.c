@@ -1,0 +1,377 @@
+/*
+ * test_spring.c: the terms spring.* and limit.strain against closed forms.
+ *
+ * Chains are vertical grids of 2 columns: each column is a chain of structural springs, and what joins the
+ * two is neither stretched nor turned, since both do the same. They are 10 m apart, so that the edges across,
+ * too, which are limited with the others, are not stretched by more than one per cent.
+ */
+#include "drape/extend.h"
+#include "support/scene.h"
+
+#define CHAIN(mesh_rows, height)                                                                             \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'orientation': 'vertical', 'columns': 2,"            \
+    "'width': 10, 'rows': " #mesh_rows ", 'height': " #height "},"                                           \
+    "'pins': [{'row': 0}], 'material': {'young_modulus': 1, 'thickness': 1e-3, 'mass': 'uniform', "
+
+/* ---- One spring ---- */
+
+#define STIFFNESS 37.0 /* [N/m] */
+#define NODE_MASS 0.25
+#define SPEED     1.3
+#define LENGTH    0.8
+
+/* One node below each of two held ones, thrown downwards: along its spring q = l is linear, so m x'' + c x' +
+ * k x = 0 exactly, at any amplitude below the length. */
+static scene oscillator(double damping, const char *integrator)
+{
+    return scene_open(
+        CHAIN(2, 0.8) "'total_mass': %g}, 'velocity': [0, %g, 0],"
+                      "'terms': [{'type': 'spring.structural', 'stiffness': %g, 'damping': %.17g}]}],"
+                      "'gravity': [0, 0, 0], 'integrator': {%s}, 'duration': 10}",
+        4 * NODE_MASS, -SPEED, STIFFNESS, damping, integrator);
+}
+
+static double stretch(scene *s)
+{
+    return -scene_state(s)->x[3 * 2 + 1] - LENGTH;
+}
+
+/* x = v0/wd exp(-a t) sin(wd t), a = c/(2 m), wd = sqrt(k/m - a^2): frequency and decay at once. Steps do
+ * not expand the energy norm, so their errors add up: those of IDA are at most sqrt(N) tolerances in one
+ * component, N = 12 the unknowns, of x or, over w, of v. */
+START_TEST(one_spring_follows_the_damped_oscillator)
+{
+    static const double ratios[] = {0, 0.05, 0.6}; /* of critical damping */
+    const double w = sqrt(STIFFNESS / NODE_MASS), atol = 1e-9;
+    for (size_t k = 0; k < sizeof ratios / sizeof *ratios; k++) {
+        const double a = ratios[k] * w, wd = sqrt(w * w - a * a);
+        char integrator[128];
+        snprintf(integrator, sizeof integrator, "'method': 'ida', 'rtol': 1e-8, 'atol_x': %g, 'atol_v': %g",
+                 atol, atol * w);
+        scene s = oscillator(2 * a * NODE_MASS, integrator);
+        scene_watch(&s);
+        double worst = 0;
+        for (int n = 1; n <= 40; n++) {
+            const double t = 0.05 * n;
+            scene_advance(&s, t);
+            worst = fmax(worst, fabs(stretch(&s) - SPEED / wd * exp(-a * t) * sin(wd * t)));
+        }
+        assert_below(worst, (double)s.accepted * sqrt(12) * 2 * atol);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* Backward Euler, whose rate is a difference of lengths: v1 = (v0 - h w^2 x0)/(1 + h^2 w^2 + h c/m), x1 = x0
+ * + h v1 exactly; and the dashpot takes c ((x1 - x0)/h)^2 h a step. A residual r moves x1 by r h^2/m at
+ * most, and no step expands. */
+START_TEST(backward_euler_takes_the_dashpot_in_step_form)
+{
+    const double c = 1.1, h = 0.03, tolerance = 1e-11, w2 = STIFFNESS / NODE_MASS;
+    scene s = oscillator(c, "'dt': 0.03, 'tolerance': 1e-11");
+    double x = 0, v = SPEED, worst = 0, taken = 0;
+    for (int n = 1; n <= 50; n++) {
+        scene_advance(&s, n * h);
+        v = (v - h * w2 * x) / (1 + h * h * w2 + h * c / NODE_MASS);
+        x += h * v;
+        taken += 2 * c * v * v * h; /* of both columns */
+        worst = fmax(worst, fabs(stretch(&s) - x));
+    }
+    assert_below(worst, 50 * h * h / NODE_MASS * (tolerance + force_noise(STIFFNESS + c / h, LENGTH)));
+    /* relative to the first step's, whose v is known to the same errors over h */
+    assert_below(fabs(drape_sim_energy(s.sim).dissipated / taken - 1), 1e-9);
+    scene_close(&s);
+}
+END_TEST
+
+/* Implicit midpoint, whose rate is grad q . v: for a quadratic energy and a linear dashpot energy and what was
+ * dissipated add up to what there was, but for what residuals of r do over the way of the nodes. */
+START_TEST(midpoint_accounts_for_every_joule)
+{
+    const double tolerance = 1e-11;
+    scene s = oscillator(1.1, "'method': 'midpoint', 'dt': 0.03, 'tolerance': 1e-11");
+    const double start = 2 * 0.5 * NODE_MASS * SPEED * SPEED;
+    double way = 0, before = 0;
+    for (int n = 1; n <= 50; n++) {
+        scene_advance(&s, n * 0.03);
+        way += 2 * fabs(stretch(&s) - before);
+        before = stretch(&s);
+    }
+    const drape_energy e = drape_sim_energy(s.sim);
+    ck_assert_double_gt(e.dissipated, 0.9 * start);
+    assert_below(fabs(e.kinetic + e.elastic + e.dissipated - start),
+                 way * (tolerance + force_noise(STIFFNESS, LENGTH)) + 50 * 8 * DBL_EPSILON * start);
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- A chain that hangs ---- */
+
+#define ROWS 9 /* nodes of a chain, the first held */
+
+/* Spring j, from row j to j + 1, carries what hangs below: (ROWS - 1 - j) m g. Its constant is k times the
+ * mean of both ends' 1 + G (1 - row/ROWS). Residuals of at most r in every node shift a node by the sum over
+ * the springs above it of (ROWS - 1) r/k. */
+START_TEST(chain_hangs_with_its_gradient)
+{
+    static const double gradients[] = {0, 0.4, -0.9};
+    const double k = 200, g = 9.81, m = 0.05, tolerance = 1e-10;
+    for (size_t i = 0; i < sizeof gradients / sizeof *gradients; i++) {
+        scene s = scene_open(
+            CHAIN(9, 1.6) "'total_mass': %.17g},"
+                          "'terms': [{'type': 'spring.structural', 'stiffness': 2000, 'factor': 0.1,"
+                          "'gradient': %g}]}], 'gravity': [0, %g, 0],"
+                          "'integrator': {'method': 'static', 'tolerance': %g}, 'duration': 1}",
+            2 * ROWS * m, gradients[i], -g, tolerance);
+        scene_advance(&s, 1);
+        double y = 0, worst = 0, least = INFINITY;
+        for (int j = 0; j + 1 < ROWS; j++) {
+            const double kj = k * (1 + gradients[i] * (1 - (j + 0.5) / ROWS));
+            y -= 0.2 + (ROWS - 1 - j) * m * g / kj;
+            least = fmin(least, kj);
+            for (int column = 0; column < 2; column++)
+                worst = fmax(worst, fabs(scene_state(&s)->x[3 * (2 * (j + 1) + column) + 1] - y));
+        }
+        assert_below(worst, ROWS * (ROWS * tolerance + force_noise(k, 2)) / least);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* ---- Newton's third law ---- */
+
+/* Forces and moments of all springs and dashpots of a sheet sum to zero, with the gradient, at a deformed,
+ * moving state: a spring with the stiffness of the neighbour's row, as Boson has it, leaves 0.4 % of the
+ * force of every spring that goes down. A sum of n terms of size F is known to n DBL_EPSILON F. */
+START_TEST(forces_and_moments_sum_to_zero)
+{
+    scene s =
+        scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 8, 'width': 1,"
+                   "'height': 1.3}, 'material': {'young_modulus': 1, 'thickness': 1e-3, 'total_mass': 1},"
+                   "'terms': [{'type': 'spring.structural', 'stiffness': 80, 'gradient': 0.4, 'damping': 2},"
+                   "{'type': 'spring.shear', 'stiffness': 56, 'gradient': 0.4, 'damping': 1},"
+                   "{'type': 'spring.bend', 'stiffness': 40, 'gradient': 0.4, 'damping': 0.5},"
+                   "{'type': 'limit.strain', 'over': 'springs', 'stiffness': 50}]}],"
+                   "'gravity': [0, 0, 0], 'duration': 1}");
+    const int32_t nodes = s.model->node_count;
+    double g[3 * 56], net[6] = {0}, force = 0, reach = 0;
+    drape_state *state = scene_state(&s);
+    ck_assert_int_eq(nodes, 56);
+    for (int i = 0; i < 3 * nodes; i++) {
+        state->x[i] = 1.02 * state->x[i] + 0.03 * sin(1.7 * i * i);
+        state->v[i] = cos(2.3 * i);
+    }
+    drape_system_force(s.sim->system, &(drape_point){.x = state->x, .v = state->v}, g);
+    for (int i = 0; i < nodes; i++)
+        for (int k = 0; k < 3; k++) {
+            const int a = 3 * i + (k + 1) % 3, b = 3 * i + (k + 2) % 3;
+            net[k] += g[3 * i + k];
+            net[3 + k] += state->x[a] * g[b] - state->x[b] * g[a];
+            force = fmax(force, fabs(g[3 * i + k]));
+            reach = fmax(reach, fabs(state->x[3 * i + k]));
+        }
+    ck_assert_double_gt(force, 1);
+    for (int k = 0; k < 3; k++) {
+        assert_below(fabs(net[k]), 8 * 3 * nodes * DBL_EPSILON * force);
+        assert_below(fabs(net[3 + k]), 8 * 6 * nodes * DBL_EPSILON * force * reach);
+    }
+    scene_close(&s);
+}
+END_TEST
+
+/* Rows r and columns c: r (c - 1) + (r - 1) c structural, 2 (r - 1)(c - 1) shear, r (c - 2) + (r - 2) c bend;
+ * each of its own length. The 14 502 springs of CS184's 50 x 50 points are these. */
+START_TEST(springs_join_the_right_nodes)
+{
+    static const char *const kinds[] = {"spring.structural", "spring.shear", "spring.bend"};
+    scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 50, 'rows': 50,"
+                          "'width': 98, 'height': 49},"
+                          "'material': {'young_modulus': 1, 'thickness': 1e-3, 'total_mass': 1},"
+                          "'terms': [{'type': 'spring.structural', 'stiffness': 1},"
+                          "{'type': 'spring.shear', 'stiffness': 1}, {'type': 'spring.bend', 'stiffness': 1, "
+                          "'rest_scale': 0.5}]}],"
+                          "'gravity': [0, 0, 0], 'duration': 1}");
+    const double lengths[3][2] = {{2, 1}, {sqrt(5), sqrt(5)}, {0.5 * 4, 0.5 * 2}};
+    int32_t total = 0;
+    for (int t = 0; t < 3; t++) {
+        const drape_elements *el = &s.model->terms[t].elements;
+        ck_assert_str_eq(s.model->terms[t].ops->name, kinds[t]);
+        for (int32_t e = 0; e < el->count; e++) {
+            const double length = el->rest[el->count + e];
+            ck_assert(fabs(length - lengths[t][0]) < 1e-12 || fabs(length - lengths[t][1]) < 1e-12);
+        }
+        total += el->count;
+    }
+    ck_assert_int_eq(total, 14502);
+    ck_assert(!s.model->has_dissipation && !s.model->has_laws); /* dashpots of 0 cost nothing */
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- The strain limit ---- */
+
+static double barrier_slope(double y)
+{
+    return -2 * y * log(1 - y) + y * y / (1 - y);
+}
+
+/* A node on a spring and a limit hangs where m g = k L s + K L w b'(y), s = onset + w y: at chosen y, for
+ * the weight that belongs to it. A residual r moves it by r over a stiffness above k. */
+START_TEST(limit_balances_its_load)
+{
+    static const double windows[] = {-0.5, 1e-3, 0.3, 0.7, 0.97, 0.989};
+    const double k = 3, big_k = 90, limit = 0.2, onset = 0.12, w = limit - onset, tolerance = 1e-8;
+    for (size_t i = 0; i < sizeof windows / sizeof *windows; i++) {
+        const double y = windows[i], strain = onset + w * y;
+        const double load = k * LENGTH * strain + (y > 0 ? big_k * LENGTH * w * barrier_slope(y) : 0);
+        scene s =
+            scene_open(CHAIN(2, 0.8) "'total_mass': %g}, 'terms': [{'type': 'spring.structural',"
+                                     "'stiffness': %g}, {'type': 'limit.strain', 'limit': %g, 'onset': %g,"
+                                     "'stiffness': %g}]}], 'gravity': [0, %.17g, 0],"
+                                     "'integrator': {'method': 'static', 'tolerance': %g}, 'duration': 1}",
+                       4 * NODE_MASS, k, limit, onset, big_k, -load / NODE_MASS, tolerance);
+        scene_advance(&s, 1);
+        assert_below(fabs(stretch(&s) - LENGTH * strain), (tolerance + force_noise(k, 1)) / k);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* b and its first two derivatives on both sides of the onset and of the cap, by the energy of one element:
+ * they differ by no more than the next derivative, b''' <= 6 at the onset and some 2/cap^3 at the cap, makes
+ * of the distance. */
+START_TEST(limit_is_smooth_twice)
+{
+    scene s = scene_model(CHAIN(2, 1) "'total_mass': 1}, 'terms': [{'type': 'limit.strain', 'stiffness': 1,"
+                                      "'limit': 2, 'onset': 1, 'cap': 0.1}]}],"
+                                      "'gravity': [0, 0, 0], 'duration': 1}");
+    const drape_term *term = &s.model->terms[0];
+    static const double at[] = {0, 0.9};
+    static const double third[] = {7, 3e3}; /* 2/cap^3 and lesser powers of 1/cap */
+    const double d = 1e-6;
+    int32_t vertical = 0; /* an edge of length 1, from node 0 to 2 */
+    while (term->elements.node[2 * vertical] != 0 || term->elements.node[2 * vertical + 1] != 2)
+        vertical++;
+    for (size_t i = 0; i < 2; i++) {
+        double e[2], g[2][6], h[2][36];
+        for (int side = 0; side < 2; side++) {
+            double x[12] = {0};
+            x[3 * 2 + 1] = -(2 + at[i] + (side ? d : -d)); /* y = l - 2 */
+            term->ops->energy(&term->elements, vertical, 1, x, NULL, &e[side], g[side], h[side]);
+        }
+        const double curve = fabs(h[0][7]) + 2 * d * third[i];
+        assert_below(fabs(e[1] - e[0] - 2 * d * g[0][1]), 2 * d * d * curve + 1e-15);
+        assert_below(fabs(g[1][1] - g[0][1]), 2 * d * curve);
+        assert_below(fabs(h[1][7] - h[0][7]), 2 * d * third[i]);
+        ck_assert(i == 0 || h[0][7] > 100); /* there is something to be smooth */
+    }
+    scene_close(&s);
+}
+END_TEST
+
+/* CS184's pinned2 at 9 x 9 points: ks 5000, bend 0.2 ks, hung by two corners, by backward Euler at 1/30 s. */
+static scene hung_sheet(double gravity, const char *limit)
+{
+    return scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 1,"
+        "'height': 1}, 'pins': [{'corner': 'top-left'}, {'corner': 'top-right'}],"
+        "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'total_mass': 150},"
+        "'terms': [{'type': 'spring.structural', 'stiffness': 5000},"
+        "{'type': 'spring.shear', 'stiffness': 5000},"
+        "{'type': 'spring.bend', 'stiffness': 5000, 'factor': 0.2}%s]}],"
+        "'gravity': [0, %g, 0], 'integrator': {'dt': 0.03333333333333333, 'tolerance': 1e-4},"
+        "'duration': 2}",
+        limit, gravity);
+}
+
+static double largest_strain(const scene *s, const drape_elements *pairs)
+{
+    const double *x = drape_sim_positions(s->sim);
+    double most = -1;
+    for (int32_t e = 0; e < pairs->count; e++) {
+        const double *a = x + 3 * pairs->node[2 * e], *b = x + 3 * pairs->node[2 * e + 1];
+        const double length = sqrt(pow(b[0] - a[0], 2) + pow(b[1] - a[1], 2) + pow(b[2] - a[2], 2));
+        most = fmax(most, length / pairs->rest[pairs->count + e] - 1);
+    }
+    return most;
+}
+
+/* With what the defaults make of the weight at 9.8 m/s2, a hundredfold load stays below 10 %, of every
+ * spring; without the limit the sheet is beyond it at once. */
+START_TEST(limit_holds_a_hundredfold_load)
+{
+    static const double loads[] = {-9.8, -980};
+    char limit[128];
+    for (size_t i = 0; i < sizeof loads / sizeof *loads; i++) {
+        /* 150 kg 9.8 m/s2 over 0.05 and the mean length of the springs, some 0.16 m */
+        snprintf(limit, sizeof limit, ", {'type': 'limit.strain', 'over': 'springs'%s}",
+                 i ? ", 'stiffness': 183000" : "");
+        scene s = hung_sheet(loads[i], limit), without = hung_sheet(loads[i], "");
+        const drape_elements *pairs = &s.model->terms[3].elements;
+        double most = 0, most_without = 0;
+        for (int frame = 1; frame <= 60; frame++) {
+            scene_advance(&s, frame / 30.0);
+            most = fmax(most, largest_strain(&s, pairs));
+        }
+        for (int frame = 1; frame <= 20; frame++) {
+            scene_advance(&without, frame / 30.0);
+            most_without = fmax(most_without, largest_strain(&without, pairs));
+        }
+        printf("# strain %g without, %g with\n", most_without, most);
+        assert_below(most, 0.1);
+        ck_assert_double_gt(most_without, 0.1);
+        scene_close(&s);
+        scene_close(&without);
+    }
+}
+END_TEST
+
+/* Where the load is beyond what the barrier has below its limit, some 2/cap K L w, no state is accepted that
+ * breaks it: the steps become small, and the message says why. */
+START_TEST(overload_stops_and_says_so)
+{
+    scene s = scene_open(CHAIN(2, 0.8) "'total_mass': 1}, 'terms': [{'type': 'limit.strain', 'stiffness': 1,"
+                                       "'cap': 0.5}]}], 'gravity': [0, -9.8, 0], 'integrator': {'dt': 0.01},"
+                                       "'controller': {'type': 'halving', 'dt_min': 1e-3}, 'duration': 2}");
+    const drape_status status = drape_sim_advance(s.sim, 2);
+    ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
+    ck_assert_msg(strstr(drape_context_message(s.ctx), "strain of a limited edge"), "%s",
+                  drape_context_message(s.ctx));
+    ck_assert_double_le(largest_strain(&s, &s.model->terms[0].elements), 0.1);
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Degeneration ---- */
+
+/* A spring of no length has no direction: the state is rejected and the spring named; just above the bound
+ * all is finite. */
+START_TEST(collapsed_spring_is_named)
+{
+    scene s = oscillator(0.5, "'dt': 0.01");
+    drape_state *state = scene_state(&s);
+    const char *reason = NULL;
+    drape_worst worst;
+    double g[12];
+    memcpy(state->x + 6, state->x, 6 * sizeof *state->x);
+    ck_assert_int_eq(drape_system_check(s.sim->system, state->x, NULL, NULL, &reason, &worst),
+                     DRAPE_RETRY_DEGENERATE);
+    ck_assert_str_eq(reason, "spring_collapse");
+    ck_assert_str_eq(worst.term, "spring.structural");
+    ck_assert(worst.node[0] == 0 && worst.node[1] == 2);
+    state->x[7] -= 1e-5;
+    state->x[10] -= 1e-5;
+    ck_assert_int_eq(drape_system_check(s.sim->system, state->x, NULL, NULL, &reason, &worst), DRAPE_OK);
+    drape_system_force(s.sim->system, &(drape_point){.x = state->x, .v = state->v}, g);
+    for (int i = 0; i < 12; i++)
+        ck_assert(isfinite(g[i]));
+    /* Pushed down by the spring, held up by the dashpot; 1e-5 m are what is left of numbers below 1. */
+    assert_below(fabs(g[7] - STIFFNESS * (LENGTH - 1e-5) + 0.5 * SPEED) / g[7], 4 * DBL_EPSILON / 1e-5);
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("spring", one_spring_follows_the_damped_oscillator, backward_euler_takes_the_dashpot_in_step_form,
+      midpoint_accounts_for_every_joule, chain_hangs_with_its_gradient, forces_and_moments_sum_to_zero,
+      springs_join_the_right_nodes, limit_balances_its_load, limit_is_smooth_twice,
+      limit_holds_a_hundredfold_load, overload_stops_and_says_so, collapsed_spring_is_named)
