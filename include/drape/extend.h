@@ -142,6 +142,7 @@ typedef struct drape_term_ops {
     int nodes;                 /* nodes an element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
     bool linear;               /* energy: its Hessian is zero and takes no sparsity */
     bool potential_of_gravity; /* energy: counts as gravity, not as elastic */
+    bool convex;               /* measure: its Hessian ddq is positive semidefinite, as of a length */
     bool has_internal;         /* one internal variable an element */
     bool constraint; /* an energy that keeps a limit: integrators that move nodes to keep limits do without */
     bool damped;     /* measure: a dashpot of its own in each element, force c q' on q */

@@ -2,7 +2,7 @@
  * result (add_*). */
 #include "assemble/system.h"
 
-#include "assemble/project.h"
+#include "sparse/project.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -37,9 +37,24 @@ struct drape_system {
     drape_context *ctx;
     const drape_model *model;
     int threads;
-    bool unconstrained;    /* terms that are a constraint are left out */
-    block_buffer *buffers; /* (threads) */
+    bool unconstrained;           /* terms that are a constraint are left out */
+    block_buffer *buffers;        /* (threads) */
+    drape_contact *contact;       /* NULL: none */
+    const drape_pattern *pattern; /* the model's, or wider */
+    drape_pattern wider;          /* with what contact couples */
+    int32_t **blocks;    /* (term_count) as in the terms, for the wider one; NULL while there is none */
+    drape_status status; /* of placing contact */
 };
+
+static void forget_wider(drape_system *system)
+{
+    for (int32_t i = 0; system->blocks && i < system->model->term_count; i++)
+        drape_free(system->ctx, system->blocks[i]);
+    drape_free(system->ctx, system->blocks);
+    system->blocks = NULL;
+    drape_pattern_free(system->ctx, &system->wider);
+    system->pattern = &system->model->pattern;
+}
 
 drape_status drape_system_create(drape_context *ctx, const drape_model *model, int threads,
                                  drape_system **out)
@@ -48,7 +63,7 @@ drape_status drape_system_create(drape_context *ctx, const drape_model *model, i
     *out = system;
     if (!system)
         return DRAPE_E_MEMORY;
-    *system = (drape_system){.ctx = ctx, .model = model, .threads = threads};
+    *system = (drape_system){.ctx = ctx, .model = model, .threads = threads, .pattern = &model->pattern};
     system->buffers = drape_alloc(ctx, (size_t)threads, sizeof *system->buffers);
     if (!system->buffers)
         drape_system_destroy(out);
@@ -60,6 +75,8 @@ void drape_system_destroy(drape_system **system)
     if (!*system)
         return;
     drape_context *ctx = (*system)->ctx;
+    drape_contact_destroy(&(*system)->contact);
+    forget_wider(*system);
     drape_free(ctx, (*system)->buffers);
     drape_free(ctx, *system);
     *system = NULL;
@@ -82,7 +99,131 @@ const drape_model *drape_system_model(const drape_system *system)
 
 size_t drape_system_bytes(const drape_system *system)
 {
-    return sizeof *system + (size_t)system->threads * sizeof *system->buffers;
+    return sizeof *system + (size_t)system->threads * sizeof *system->buffers +
+           drape_contact_bytes(system->contact);
+}
+
+/* ---- Contact ---- */
+
+drape_status drape_system_add_contact(drape_system *system)
+{
+    return drape_contact_create(system->ctx, system->model, &system->contact);
+}
+
+const drape_contact *drape_system_contact(const drape_system *system)
+{
+    return system->contact;
+}
+
+drape_status drape_system_begin(drape_system *system, const drape_state *in)
+{
+    system->status = DRAPE_OK;
+    return system->contact ? drape_contact_begin(system->contact, in->x, in->v, in->t) : DRAPE_OK;
+}
+
+drape_status drape_system_status(const drape_system *system)
+{
+    return system->status;
+}
+
+const drape_pattern *drape_system_pattern(const drape_system *system)
+{
+    return system->pattern;
+}
+
+/* False where there is no contact, or no memory for it. */
+static bool place_contact(drape_system *system, const drape_point *point)
+{
+    if (!system->contact)
+        return false;
+    drape_status status = drape_contact_place(
+        system->contact,
+        &(drape_contact_at){
+            .x = point->x, .v = point->v, .t = point->t, .span = {point->span[0], point->span[1]}});
+    if (status && !system->status)
+        system->status = status;
+    return status == DRAPE_OK;
+}
+
+/* The places of the terms in the wider pattern. */
+static drape_status place_terms(drape_system *system)
+{
+    const drape_model *model = system->model;
+    system->blocks = drape_alloc(system->ctx, (size_t)model->term_count, sizeof *system->blocks);
+    if (!system->blocks)
+        return DRAPE_E_MEMORY;
+    for (int32_t i = 0; i < model->term_count; i++) {
+        if (!drape_term_couples(&model->terms[i]))
+            continue;
+        const drape_coupling coupling = drape_term_coupling(&model->terms[i]);
+        system->blocks[i] =
+            drape_alloc(system->ctx, (size_t)coupling.count * (size_t)(coupling.nodes * coupling.nodes),
+                        sizeof **system->blocks);
+        if (!system->blocks[i])
+            return DRAPE_E_MEMORY;
+        drape_pattern_place(&system->wider, model->free_of_node, &coupling, system->blocks[i]);
+    }
+    return DRAPE_OK;
+}
+
+static drape_status widen(drape_system *system)
+{
+    const drape_model *model = system->model;
+    const int32_t *nodes = NULL;
+    int32_t pairs = drape_contact_couplings(system->contact, &nodes);
+    drape_coupling *couplings = drape_alloc(system->ctx, (size_t)model->term_count + 1, sizeof *couplings);
+    int count = 0;
+    if (pairs < 0 || !couplings) {
+        drape_free(system->ctx, couplings);
+        return DRAPE_E_MEMORY;
+    }
+    for (int32_t i = 0; i < model->term_count; i++)
+        if (drape_term_couples(&model->terms[i]))
+            couplings[count++] = drape_term_coupling(&model->terms[i]);
+    couplings[count++] = (drape_coupling){.count = pairs, .nodes = 4, .node = nodes};
+    forget_wider(system);
+    drape_status status = drape_pattern_build(system->ctx, model->free_count, model->free_of_node, couplings,
+                                              count, &system->wider);
+    drape_free(system->ctx, couplings);
+    if (!status)
+        status = place_terms(system);
+    if (status)
+        forget_wider(system);
+    else
+        system->pattern = &system->wider;
+    return status;
+}
+
+drape_status drape_system_fit(drape_system *system, const drape_point *point, bool *changed)
+{
+    *changed = false;
+    if (!place_contact(system, point))
+        return system->status;
+    if (drape_contact_fits(system->contact, system->pattern))
+        return DRAPE_OK;
+    *changed = true;
+    return widen(system);
+}
+
+const double *drape_system_on_colliders(const drape_system *system)
+{
+    return system->contact ? drape_contact_on_colliders(system->contact) : NULL;
+}
+
+double drape_system_way(drape_system *system, const double *x, const double *y, double t)
+{
+    return system->contact ? drape_contact_way(system->contact, x, y, t) : 1;
+}
+
+bool drape_system_crosses(drape_system *system, const double *y, double t)
+{
+    return system->contact && drape_contact_crosses(system->contact, y, t);
+}
+
+drape_status drape_system_check_contact(drape_system *system, const double *x, double t, const char **reason,
+                                        drape_worst *worst)
+{
+    return system->contact ? drape_contact_check(system->contact, x, t, reason, worst) : DRAPE_OK;
 }
 
 /* ---- Evaluating a block ---- */
@@ -149,6 +290,18 @@ static void measure_hessian(int d, const drape_point *point, const stress *s, co
             h[d * i + j] = s->force * h[d * i + j] + dq[i] * (weight * dq[j] + along[j]);
 }
 
+/* The positive semidefinite part of that which is known without eigenvalues: f ddq where the measure is convex
+ * and pulls, and the Gauss-Newton part (Teran et al. 2005; Tamstorf & Grinspun 2013, 5). */
+static void positive_measure_hessian(int d, const drape_point *point, const stress *s, bool convex,
+                                     const double *dq, double *h)
+{
+    double weight = fmax(0, s->by_strain + point->weight * s->by_rate);
+    double force = convex ? fmax(0, s->force) : 0;
+    for (int i = 0; i < d; i++)
+        for (int j = 0; j < d; j++)
+            h[d * i + j] = force * h[d * i + j] + weight * dq[i] * dq[j];
+}
+
 static double dot(int d, const double *a, const double *b)
 {
     double sum = 0;
@@ -182,6 +335,9 @@ static void evaluate_measure(const drape_term *term, const request *want, block_
             b->gradient[i * d + j] = s.force * dq[j];
         if (want->velocity)
             measure_damping(d, &s, dq, b->hessian + (size_t)i * (size_t)(d * d));
+        else if (want->hessian && want->project)
+            positive_measure_hessian(d, point, &s, term->ops->convex, dq,
+                                     b->hessian + (size_t)i * (size_t)(d * d));
         else if (want->hessian)
             measure_hessian(d, point, &s, dq, v, b->hessian + (size_t)i * (size_t)(d * d));
     }
@@ -255,7 +411,8 @@ static void evaluate(const drape_term *term, const request *want, block_buffer *
     else
         evaluate_dissipation(term, want, b);
     int d = 3 * term->elements.nodes;
-    for (int32_t i = 0; want->hessian && want->project && i < b->count; i++)
+    bool given = term->ops->measure; /* as its positive part already */
+    for (int32_t i = 0; want->hessian && want->project && !given && i < b->count; i++)
         drape_project(d, b->hessian + (size_t)i * (size_t)(d * d));
 }
 
@@ -299,28 +456,30 @@ static void add_block(const double *from, int d, double *to, int64_t stride)
             to[c * stride + r] += from[d * r + c];
 }
 
-static void add_hessians(const drape_model *model, const drape_term *term, const block_buffer *b,
+static void add_hessians(const drape_system *system, const drape_term *term, const block_buffer *b,
                          double *values)
 {
+    const drape_model *model = system->model;
     const drape_elements *el = &term->elements;
+    const int32_t *blocks = system->blocks ? system->blocks[term - model->terms] : term->block;
     int n = el->nodes, d = 3 * n;
     for (int32_t i = 0; i < b->count; i++) {
         size_t e = (size_t)(b->first + i);
-        const int32_t *node = el->node + e * (size_t)n, *block = term->block + e * (size_t)(n * n);
+        const int32_t *node = el->node + e * (size_t)n, *block = blocks + e * (size_t)(n * n);
         const double *h = b->hessian + (size_t)i * (size_t)(d * d);
         for (int r = 0; r < n; r++)
             for (int c = 0; c < n; c++) {
                 int64_t stride;
                 if (block[n * r + c] < 0)
                     continue;
-                double *to = drape_pattern_at(&model->pattern, values, model->free_of_node[node[c]],
+                double *to = drape_pattern_at(system->pattern, values, model->free_of_node[node[c]],
                                               block[n * r + c], &stride);
                 add_block(h + 3 * (d * r + c), d, to, stride);
             }
     }
 }
 
-static void add(const drape_model *model, const drape_term *term, const block_buffer *b, const sums *to)
+static void add(const drape_system *system, const drape_term *term, const block_buffer *b, const sums *to)
 {
     for (int32_t i = 0; to->energy && i < b->count; i++)
         *to->energy += b->energy[i];
@@ -329,7 +488,7 @@ static void add(const drape_model *model, const drape_term *term, const block_bu
     else if (to->g)
         add_gradients(&term->elements, b, to->g);
     if (to->values)
-        add_hessians(model, term, b, to->values);
+        add_hessians(system, term, b, to->values);
 }
 
 /* ---- Sums over terms ---- */
@@ -361,7 +520,7 @@ static void sum_in_parallel(drape_system *system, const drape_term *term, const 
         block_buffer *b = &system->buffers[omp_get_thread_num()];
         evaluate_block(term, want, k, b);
 #pragma omp ordered
-        add(system->model, term, b, to);
+        add(system, term, b, to);
     }
 }
 #endif
@@ -378,7 +537,7 @@ static void sum_term(drape_system *system, const drape_term *term, const request
 #endif
     for (int32_t k = 0; k < blocks; k++) {
         evaluate_block(term, want, k, &system->buffers[0]);
-        add(system->model, term, &system->buffers[0], to);
+        add(system, term, &system->buffers[0], to);
     }
 }
 
@@ -393,19 +552,25 @@ void drape_system_force(drape_system *system, const drape_point *point, double *
 {
     memset(g, 0, 3 * (size_t)system->model->node_count * sizeof *g);
     sum_terms(system, &(request){.point = point, .conservative = true, .dissipative = true}, &(sums){.g = g});
+    if (place_contact(system, point))
+        drape_contact_add_forces(system->contact, true, true, g);
 }
 
 void drape_system_dissipation(drape_system *system, const drape_point *point, double *g)
 {
     memset(g, 0, 3 * (size_t)system->model->node_count * sizeof *g);
     sum_terms(system, &(request){.point = point, .dissipative = true}, &(sums){.g = g});
+    if (place_contact(system, point))
+        drape_contact_add_forces(system->contact, false, true, g);
 }
 
-static void add_masses(const drape_model *model, double mass_weight, double *values)
+static void add_masses(const drape_system *system, double mass_weight, double *values)
 {
+    const drape_model *model = system->model;
+    const drape_pattern *pattern = system->pattern;
     for (int32_t j = 0; j < model->free_count; j++) {
         int64_t stride;
-        double *to = drape_pattern_at(&model->pattern, values, j, model->pattern.diagonal[j], &stride);
+        double *to = drape_pattern_at(pattern, values, j, pattern->diagonal[j], &stride);
         for (int c = 0; c < 3; c++)
             to[c * stride + c] += mass_weight * model->mass[model->node_of_free[j]];
     }
@@ -416,16 +581,25 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
 {
     const request want = {
         .point = point, .hessian = true, .conservative = true, .dissipative = true, .project = project};
-    memset(values, 0, (size_t)system->model->pattern.nonzeros * sizeof *values);
+    memset(values, 0, (size_t)system->pattern->nonzeros * sizeof *values);
     sum_terms(system, &want, &(sums){.values = values});
-    add_masses(system->model, mass_weight, values);
+    if (place_contact(system, point))
+        drape_contact_add_jacobian(system->contact, point->weight, false, project, system->pattern, values);
+    add_masses(system, mass_weight, values);
 }
 
 void drape_system_damping(drape_system *system, const drape_point *point, double *values)
 {
     const request want = {.point = point, .hessian = true, .velocity = true, .dissipative = true};
-    memset(values, 0, (size_t)system->model->pattern.nonzeros * sizeof *values);
+    memset(values, 0, (size_t)system->pattern->nonzeros * sizeof *values);
     sum_terms(system, &want, &(sums){.values = values});
+    if (place_contact(system, point))
+        drape_contact_add_jacobian(system->contact, 0, true, false, system->pattern, values);
+}
+
+double drape_system_contact_energy(drape_system *system, const drape_point *point)
+{
+    return place_contact(system, point) ? drape_contact_potential(system->contact) : 0;
 }
 
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity)

@@ -12,6 +12,7 @@
 #define DRAPE_ASSEMBLE_SYSTEM_H
 
 #include "assemble/state.h"
+#include "contact/contact.h"
 
 typedef struct drape_system drape_system;
 
@@ -21,6 +22,8 @@ typedef struct drape_point {
     const double *internal; /* (internal_count) of the last accepted state */
     double weight;          /* w [1/s]: v = w x + const, and q' = w q + history */
     const double *history;  /* (measure_count) [q/s]; NULL: q' = grad q . v, as in continuous time */
+    double t;               /* [s] where colliders stand */
+    double span[2];         /* [s] over which their velocity is taken; equal: they rest */
 } drape_point;
 
 /* Workspace for a model; threads >= 1. */
@@ -33,6 +36,21 @@ void drape_system_destroy(drape_system **system);
 void drape_system_leave_constraints(drape_system *system);
 
 const drape_model *drape_system_model(const drape_system *system);
+
+/* From now on the forces of contact belong to the system, if the model has any. Errors: DRAPE_E_MEMORY. */
+drape_status drape_system_add_contact(drape_system *system);
+const drape_contact *drape_system_contact(const drape_system *system); /* NULL: there is none */
+
+/* A step begins at a state: contact is compared with it until the next. Errors: DRAPE_E_MEMORY. */
+drape_status drape_system_begin(drape_system *system, const drape_state *in);
+
+/* The sparsity of its matrices. Contact between cloths changes it: drape_system_fit makes it hold what acts
+ * at a point; *changed: it is another one since, in the same place. Errors: DRAPE_E_MEMORY. */
+const drape_pattern *drape_system_pattern(const drape_system *system);
+drape_status drape_system_fit(drape_system *system, const drape_point *point, bool *changed);
+
+/* The first failure since drape_system_begin of what has no status of its own: memory for contacts. */
+drape_status drape_system_status(const drape_system *system);
 
 /* g (node_count x 3) of all nodes, pinned ones too. */
 void drape_system_force(drape_system *system, const drape_point *point, double *g);
@@ -48,8 +66,17 @@ void drape_system_damping(drape_system *system, const drape_point *point, double
 /* The part of g that takes energy out: laws and terms that are dissipative. */
 void drape_system_dissipation(drape_system *system, const drape_point *point, double *g);
 
-/* Energies of the terms [J]. */
+/* Force on each collider at the last drape_system_force, or its dissipative part at the last
+ * drape_system_dissipation (collider_count x 3) [N], signed like g; NULL without contact. */
+const double *drape_system_on_colliders(const drape_system *system);
+
+/* Energies of the terms [J], and of contact. */
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity);
+double drape_system_contact_energy(drape_system *system, const drape_point *point);
+
+/* The largest fraction of the way from nodes x to y on which no two pieces pass through each other, colliders
+ * resting where they are at time t. */
+double drape_system_way(drape_system *system, const double *x, const double *y, double t);
 
 /* q of all measures (measure_count). */
 void drape_system_measures(drape_system *system, const drape_point *point, double *q);
@@ -64,6 +91,14 @@ void drape_system_term(drape_system *system, int32_t term, const drape_point *po
  * were degenerate already. */
 drape_status drape_system_check(const drape_system *system, const double *x, const double *before,
                                 const double *internal, const char **reason, drape_worst *worst);
+
+/* Whether on the straight way from the beginning of the step to y something passes through something. */
+bool drape_system_crosses(drape_system *system, const double *y, double t);
+
+/* Looks for a piece that a step brought into a collider or through something: x is the new state at time t, the
+ * one before that of drape_system_begin. DRAPE_OK, or DRAPE_RETRY_REJECTED with reason and worst. */
+drape_status drape_system_check_contact(drape_system *system, const double *x, double t, const char **reason,
+                                        drape_worst *worst);
 
 /* Which node, and what it belongs to, for a message about a vector over free DOFs: the entry of largest
  * magnitude, or the first that is not finite. */

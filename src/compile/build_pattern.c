@@ -2,26 +2,14 @@
  * in it. */
 #include "compile/stages.h"
 
-static bool has_sparsity(const drape_term *term)
-{
-    return !term->ops->law && !term->ops->linear && term->elements.count > 0;
-}
-
 static drape_status place_term(drape_model *model, drape_term *term)
 {
-    const drape_elements *el = &term->elements;
-    size_t pairs = (size_t)(el->nodes * el->nodes);
-    int32_t *block = drape_arena_take(&model->arena, model->ctx, (size_t)el->count * pairs, sizeof *block);
-    if (!block)
+    const drape_coupling coupling = drape_term_coupling(term);
+    size_t places = (size_t)coupling.count * (size_t)(coupling.nodes * coupling.nodes);
+    term->block = drape_arena_take(&model->arena, model->ctx, places, sizeof *term->block);
+    if (!term->block)
         return DRAPE_E_MEMORY;
-    term->block = block;
-    for (int32_t e = 0; e < el->count; e++) {
-        const int32_t *node = el->node + (size_t)e * (size_t)el->nodes;
-        for (int a = 0; a < el->nodes; a++)
-            for (int b = 0; b < el->nodes; b++)
-                *block++ = drape_pattern_find(&model->pattern, model->free_of_node[node[a]],
-                                              model->free_of_node[node[b]]);
-    }
+    drape_pattern_place(&model->pattern, model->free_of_node, &coupling, term->block);
     return DRAPE_OK;
 }
 
@@ -32,15 +20,13 @@ drape_status drape_compile_pattern(drape_model *model)
         return DRAPE_E_MEMORY;
     int count = 0;
     for (int32_t i = 0; i < model->term_count; i++)
-        if (has_sparsity(&model->terms[i])) {
-            const drape_elements *el = &model->terms[i].elements;
-            couplings[count++] = (drape_coupling){.count = el->count, .nodes = el->nodes, .node = el->node};
-        }
+        if (drape_term_couples(&model->terms[i]))
+            couplings[count++] = drape_term_coupling(&model->terms[i]);
     drape_status status = drape_pattern_build(model->ctx, model->free_count, model->free_of_node, couplings,
                                               count, &model->pattern);
     drape_free(model->ctx, couplings);
     for (int32_t i = 0; !status && i < model->term_count; i++)
-        if (has_sparsity(&model->terms[i]))
+        if (drape_term_couples(&model->terms[i]))
             status = place_term(model, &model->terms[i]);
     return status;
 }

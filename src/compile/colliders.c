@@ -102,6 +102,8 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
     for (size_t i = 0; !status && i < def->collider_count; i++)
         status = compile_collider(model, i, def);
     model->collider_count = status ? 0 : (int32_t)def->collider_count;
+    for (int32_t i = 0; i < model->collider_count; i++)
+        model->has_dissipation = model->has_dissipation || model->colliders[i].friction > 0;
     return status;
 }
 

@@ -17,14 +17,15 @@ const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
          .max = 1e3,
          .open_min = true,
          .help = "activation distance: nearer to a collider than this, cloth is pushed off"},
-    [DRAPE_CONTACT_STIFFNESS] = {.name = "stiffness",
-                                 .unit = "Pa",
-                                 .default_value = NAN,
-                                 .derived = "100 times the largest weight an area of the cloths",
-                                 .min = 0,
-                                 .max = 1e15,
-                                 .open_min = true,
-                                 .help = "scale of the contact pressure"},
+    [DRAPE_CONTACT_STIFFNESS] =
+        {.name = "stiffness",
+         .unit = "Pa",
+         .default_value = NAN,
+         .derived = "2 areal density gravity L / distance, L the diagonal of the rest bounding box",
+         .min = 0,
+         .max = 1e15,
+         .open_min = true,
+         .help = "scale of the contact pressure at that distance"},
     [DRAPE_CONTACT_FRICTION_VELOCITY] = {.name = "friction_velocity",
                                          .unit = "m/s",
                                          .default_value = 1e-3,
@@ -79,15 +80,15 @@ static double largest_thickness(const drape_model *model)
     return largest;
 }
 
-/* 100 sigma |g|, sigma the largest areal density: a sheet at rest on a collider then is pushed in by a
- * hundredth of what such a pressure is. Without gravity L / s^2 stands for |g|: the acceleration that takes
- * the sheet, of the size L, its own length away in about a second. */
-static double stiffness_of_weight(const drape_model *model)
+/* 2 sigma |g| L / d, sigma the largest areal density, L the scene's size: pushed together over d, cloth takes up
+ * about the energy of its fall over 2 L. Its own weight then is d / (2 L) of the stiffness, so that at rest it
+ * lies nearly d off. Without gravity L / s^2 stands for |g|. */
+static double stiffness_of_fall(const drape_model *model)
 {
     double sigma = 0, g = hypot(hypot(model->gravity[0], model->gravity[1]), model->gravity[2]);
     for (int32_t c = 0; c < model->cloth_count; c++)
         sigma = fmax(sigma, model->cloths[c].material.areal_density);
-    return 100 * sigma * (g > 0 ? g : model->length);
+    return 2 * sigma * (g > 0 ? g : model->length) * model->length / model->contact.distance;
 }
 
 static drape_status resolve_contact(drape_model *model, const drape_scene_def *def)
@@ -101,7 +102,7 @@ static drape_status resolve_contact(drape_model *model, const drape_scene_def *d
         return status;
     double distance = values[DRAPE_CONTACT_DISTANCE], stiffness = values[DRAPE_CONTACT_STIFFNESS];
     contact->distance = isnan(distance) ? largest_thickness(model) : distance;
-    contact->stiffness = isnan(stiffness) ? stiffness_of_weight(model) : stiffness;
+    contact->stiffness = isnan(stiffness) ? stiffness_of_fall(model) : stiffness;
     contact->friction_velocity = values[DRAPE_CONTACT_FRICTION_VELOCITY];
     contact->lagged = values[DRAPE_CONTACT_FRICTION] == LAGGED;
     return DRAPE_OK;

@@ -96,19 +96,19 @@ typedef struct ida_state {
     void *ida;
     N_Vector y, rate, weights, between; /* (x, v), (x', v'), absolute tolerances, dense output */
     drape_sun_linear *linear;
-    double *x, *v, *g;      /* nodes: where the residual was evaluated last, and g there */
-    double *damping;        /* D (nonzeros); NULL where nothing dissipates */
-    double *reduced;        /* right-hand side of the reduced system (n) */
-    double *dissipated;     /* nodes; NULL where nothing dissipates */
-    double factored_cj;     /* c_j of the factors */
-    const double *internal; /* of the last accepted state */
-    double slope_time;      /* [s] between two keys of all tracks: where the slopes of tracks are taken */
-    double reached;         /* time of IDA's state; NaN: it must start anew */
-    double powers[2];       /* [W] taken by dissipation and put in by pins, at the time reached */
-    bool nonfinite;
-    double second; /* [s] the second of simulated time that steps are counted in */
-    int64_t steps; /* attempted in it, but for those that end an advance */
-    long counted;  /* Newton iterations of IDA that work has already */
+    double *x, *v, *g;        /* nodes: where the residual was evaluated last, and g there */
+    double *damping;          /* D (nonzeros); NULL where nothing dissipates */
+    double *reduced;          /* right-hand side of the reduced system (n) */
+    double *dissipated;       /* nodes; NULL where nothing dissipates */
+    double factored_cj;       /* c_j of the factors */
+    const double *internal;   /* of the last accepted state */
+    double span[2];           /* [s] no track has a key inside: where the slopes of tracks are taken */
+    double reached;           /* time of IDA's state; NaN: it must start anew */
+    double powers[2];         /* [W] taken by dissipation and put in by pins, at the time reached */
+    bool nonfinite, crossing; /* why the last residual was refused */
+    double second;            /* [s] the second of simulated time that steps are counted in */
+    int64_t steps;            /* attempted in it, but for those that end an advance */
+    long counted;             /* Newton iterations of IDA that work has already */
     drape_work work;
 } ida_state;
 
@@ -127,7 +127,7 @@ static void place_pins(ida_state *s, double t)
     drape_model_place_pins(m, t, s->x);
     for (int32_t i = 0; i < m->moved_count; i++) {
         const drape_track *track = &m->tracks[m->moved_track[i]];
-        drape_track_velocity(track->keys, track->key_count, s->slope_time,
+        drape_track_velocity(track->keys, track->key_count, (s->span[0] + s->span[1]) / 2,
                              s->v + 3 * (size_t)m->moved_node[i]);
     }
 }
@@ -139,7 +139,8 @@ static drape_point place(ida_state *s, double t, const double *y)
         s->x[node_at(s, i)] = y[i];
         s->v[node_at(s, i)] = y[s->n + i];
     }
-    return (drape_point){.x = s->x, .v = s->v, .internal = s->internal};
+    return (drape_point){
+        .x = s->x, .v = s->v, .internal = s->internal, .t = t, .span = {s->span[0], s->span[1]}};
 }
 
 /* ---- The callbacks of IDA ---- */
@@ -156,9 +157,27 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
         f[s->n + i] = s->model->mass[s->model->node_of_free[i / 3]] * vp[i] + s->g[node_at(s, i)];
     }
     s->nonfinite = !drape_all_finite(f, 2 * (size_t)s->n);
+    s->crossing = !s->nonfinite && drape_system_crosses(s->system, s->x, t);
     s->work.residuals++;
     s->work.residual_seconds += drape_clock_seconds() - start;
-    return s->nonfinite ? 1 : 0;
+    return drape_system_status(s->system) ? -1 : s->nonfinite || s->crossing ? 1 : 0;
+}
+
+/* Contact may couple what it did not before: then the matrices are made anew. */
+static drape_status fit_pattern(ida_state *s, const drape_point *point)
+{
+    bool changed;
+    drape_status status = drape_system_fit(s->system, point, &changed);
+    if (status || !changed)
+        return status;
+    const drape_pattern *pattern = drape_system_pattern(s->system);
+    if (s->damping) {
+        drape_free(s->ctx, s->damping);
+        s->damping = drape_alloc(s->ctx, (size_t)pattern->nonzeros, sizeof *s->damping);
+        if (!s->damping)
+            return DRAPE_E_MEMORY;
+    }
+    return drape_sun_linear_adopt(s->linear, pattern);
 }
 
 static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_Vector r, SUNMatrix matrix,
@@ -169,6 +188,8 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
     double start = drape_clock_seconds();
     drape_point point = place(s, t, N_VGetArrayPointer(y));
     point.weight = cj;
+    if (fit_pattern(s, &point))
+        return -1;
     drape_system_jacobian(s->system, &point, cj * cj, false, s->linear->values);
     if (s->damping)
         drape_system_damping(s->system, &point, s->damping);
@@ -181,7 +202,7 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
 /* reduced += D r */
 static void add_damping(const ida_state *s, const double *r)
 {
-    const drape_pattern *p = &s->model->pattern;
+    const drape_pattern *p = drape_system_pattern(s->system);
     for (int64_t j = 0; s->damping && j < p->n; j++)
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
             s->reduced[p->row[k]] += s->damping[k] * r[j];
@@ -236,7 +257,7 @@ static bool create_arrays(ida_state *s)
     s->g = drape_alloc(s->ctx, nodes, sizeof(double));
     s->reduced = drape_alloc(s->ctx, (size_t)s->n, sizeof(double));
     if (dissipates) {
-        s->damping = drape_alloc(s->ctx, (size_t)s->model->pattern.nonzeros, sizeof(double));
+        s->damping = drape_alloc(s->ctx, (size_t)drape_system_pattern(s->system)->nonzeros, sizeof(double));
         s->dissipated = drape_alloc(s->ctx, nodes, sizeof(double));
     }
     return s->x && s->v && s->g && s->reduced && (!dissipates || (s->damping && s->dissipated));
@@ -301,7 +322,7 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
         status = create_vectors(s);
     if (!status && s->n > 0)
         status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
-                                         &s->model->pattern, &s->linear);
+                                         drape_system_pattern(s->system), &s->linear);
     if (!status && s->n > 0) {
         s->linear->owner = s;
         s->linear->solver->ops->solve = solve_reduced;
@@ -372,25 +393,6 @@ static drape_status start(ida_state *s, const drape_state *in, drape_step_info *
     return IDAReInit(s->ida, in->t, s->y, s->rate) ? DRAPE_E_SOLVER : DRAPE_OK;
 }
 
-/* The next time at which some pin's velocity jumps, at most end. */
-static double next_kink(const drape_model *m, double t, double end)
-{
-    for (int32_t k = 0; k < m->track_count; k++)
-        for (size_t i = 0; i < m->tracks[k].key_count; i++)
-            if (m->tracks[k].keys[i].time > t && m->tracks[k].keys[i].time < end)
-                end = m->tracks[k].keys[i].time;
-    return end;
-}
-
-static bool at_kink(const drape_model *m, double t)
-{
-    for (int32_t k = 0; k < m->track_count; k++)
-        for (size_t i = 0; i < m->tracks[k].key_count; i++)
-            if (m->tracks[k].keys[i].time == t)
-                return true;
-    return false;
-}
-
 /* Pinned nodes that do not move keep their rest positions and no velocity in s->x and s->v for good. */
 static void begin(ida_state *s, const drape_state *in)
 {
@@ -400,19 +402,37 @@ static void begin(ida_state *s, const drape_state *in)
     s->internal = in->internal;
 }
 
-/* Power at the state in s->x, s->v: of dissipative forces, and of the forces that moved pins need. */
-static void measure_powers(ida_state *s, double powers[2])
+/* Of forces on colliders (NULL: no contact) that move. */
+static double collider_power(const ida_state *s, const double *force)
+{
+    double power = 0;
+    for (int32_t c = 0; force && c < s->model->collider_count; c++) {
+        const drape_track *track = &s->model->colliders[c].track;
+        double v[3];
+        drape_track_velocity(track->keys, track->key_count, (s->span[0] + s->span[1]) / 2, v);
+        for (int k = 0; k < 3; k++)
+            power += force[3 * c + k] * v[k];
+    }
+    return power;
+}
+
+/* Power at the state in s->x, s->v at time t: of dissipative forces, and of the forces that moved pins and
+ * colliders need. */
+static void measure_powers(ida_state *s, double t, double powers[2])
 {
     const drape_model *m = s->model;
-    const drape_point point = {.x = s->x, .v = s->v, .internal = s->internal};
+    const drape_point point = {
+        .x = s->x, .v = s->v, .internal = s->internal, .t = t, .span = {s->span[0], s->span[1]}};
     powers[0] = powers[1] = 0;
     if (s->dissipated) {
         drape_system_dissipation(s->system, &point, s->dissipated);
         for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
             powers[0] += s->dissipated[i] * s->v[i];
+        powers[0] += collider_power(s, drape_system_on_colliders(s->system));
     }
-    if (m->moved_count > 0)
+    if (m->moved_count > 0 || m->collider_count > 0)
         drape_system_force(s->system, &point, s->g);
+    powers[1] += collider_power(s, drape_system_on_colliders(s->system));
     for (int32_t i = 0; i < m->moved_count; i++)
         for (size_t k = 0; k < 3; k++)
             powers[1] += s->g[3 * (size_t)m->moved_node[i] + k] * s->v[3 * (size_t)m->moved_node[i] + k];
@@ -422,7 +442,7 @@ static void measure_powers(ida_state *s, double powers[2])
 static void audit(ida_state *s, const drape_state *in, const drape_state *out, drape_step_info *info)
 {
     double after[2];
-    measure_powers(s, after);
+    measure_powers(s, out->t, after);
     info->dissipated = 0.5 * (out->t - in->t) * (s->powers[0] + after[0]);
     info->pin_work = 0.5 * (out->t - in->t) * (s->powers[1] + after[1]);
     for (int32_t i = 0; i < s->model->moved_count; i++)
@@ -447,16 +467,17 @@ static void count_iterations(ida_state *s, drape_step_info *info)
  * before was rejected. */
 static drape_status prepare(ida_state *s, const drape_state *in, double end, double h, drape_step_info *info)
 {
-    double stop = next_kink(s->model, in->t, end);
+    double stop = drape_model_next_kink(s->model, in->t, end);
     begin(s, in);
-    s->slope_time = in->t + (stop - in->t) / 2;
+    s->span[0] = in->t;
+    s->span[1] = stop;
     if (s->n > 0 && s->reached != in->t) {
         drape_status status = start(s, in, info);
         if (status)
             return status;
         if (IDASetInitStep(s->ida, h < end - in->t ? h : 0))
             return DRAPE_E_SOLVER;
-        measure_powers(s, s->powers);
+        measure_powers(s, in->t, s->powers);
     }
     return s->n > 0 && IDASetStopTime(s->ida, stop) ? DRAPE_E_SOLVER : DRAPE_OK;
 }
@@ -510,8 +531,13 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     info->reason = "solver";
     drape_status status = prepare(s, in, end, h, info);
     if (!status && s->n > 0) {
+        s->crossing = s->nonfinite = false;
         int code = IDASolve(s->ida, end, &t, s->y, s->rate, IDA_ONE_STEP);
         status = status_of(code, s->nonfinite, &info->reason);
+        if (status > 0 && s->crossing)
+            info->reason = "collision";
+        if (drape_system_status(s->system))
+            status = drape_system_status(s->system);
         count_iterations(s, info);
         if (status)
             IDAGetCurrentStep(s->ida, &info->h);
@@ -529,7 +555,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     info->h = t - in->t;
     info->reason = "converged";
     audit(s, in, out, info);
-    s->reached = at_kink(s->model, t) ? NAN : t;
+    s->reached = drape_model_at_kink(s->model, t) ? NAN : t;
     s->steps -= t == end;
     return DRAPE_OK;
 }

@@ -1,6 +1,8 @@
 /* implicit.c: see implicit.h. */
 #include "integrators/implicit.h"
 
+#include "model/track.h"
+
 #include <string.h>
 
 static bool create_arrays(drape_implicit *s)
@@ -41,6 +43,8 @@ void drape_implicit_base(drape_implicit *s, const drape_state *in, double t, dou
 {
     const drape_model *m = s->model;
     size_t nodes = 3 * (size_t)m->node_count;
+    s->t = s->span[1] = t;
+    s->span[0] = in->t;
     memcpy(s->x_base, in->x, nodes * sizeof *s->x_base);
     memset(s->v_base, 0, nodes * sizeof *s->v_base);
     drape_model_place_pins(m, t, s->x_base);
@@ -66,28 +70,58 @@ drape_status drape_implicit_solve(drape_implicit *s, const double *internal, con
                                           .mass_weight = mass_weight,
                                           .inertia = s->inertia,
                                           .internal = internal,
-                                          .history = history};
+                                          .history = history,
+                                          .t = s->t,
+                                          .span = {s->span[0], s->span[1]}};
     for (size_t i = 0; i < 3 * (size_t)s->model->free_count; i++)
         s->d[i] = s->inertial_guess ? s->inertia[i] : 0;
     return drape_newton_solve(s->newton, &problem, s->d, info);
 }
 
-void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_state *out, double h,
-                          drape_step_info *info)
+/* Of moving colliders: the force that cloth needs from them, along their way. force NULL: no contact. */
+static double collider_work(const drape_implicit *s, const double *force, double t0, double t1)
+{
+    const drape_model *m = s->model;
+    double work = 0;
+    for (int32_t c = 0; force && c < m->collider_count; c++) {
+        const drape_track *track = &m->colliders[c].track;
+        double before[3], after[3];
+        if (track->key_count == 0)
+            continue;
+        drape_track_displacement(track->keys, track->key_count, t0, before);
+        drape_track_displacement(track->keys, track->key_count, t1, after);
+        for (int k = 0; k < 3; k++)
+            work += force[3 * c + k] * (after[k] - before[k]);
+    }
+    return work;
+}
+
+static double pin_work(const drape_implicit *s, const drape_state *in, const drape_state *out, double h)
 {
     const drape_model *m = s->model;
     const double *g = drape_newton_force(s->newton);
+    double work = 0;
     for (int32_t i = 0; i < m->moved_count; i++)
         for (int k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)m->moved_node[i] + (size_t)k;
             double reaction = m->mass[m->moved_node[i]] * (out->v[at] - in->v[at]) / h + g[at];
-            info->pin_work += reaction * (out->x[at] - in->x[at]);
+            work += reaction * (out->x[at] - in->x[at]);
         }
+    return work;
+}
+
+/* The forces on colliders are those of the last residual, which was at the solution. */
+void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_state *out, double h,
+                          drape_step_info *info)
+{
+    info->pin_work +=
+        pin_work(s, in, out, h) + collider_work(s, drape_system_on_colliders(s->system), in->t, out->t);
     if (!s->dissipated)
         return;
     drape_system_dissipation(s->system, drape_newton_point(s->newton), s->dissipated);
-    for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
+    for (size_t i = 0; i < 3 * (size_t)s->model->node_count; i++)
         info->dissipated += s->dissipated[i] * (out->x[i] - in->x[i]);
+    info->dissipated += collider_work(s, drape_system_on_colliders(s->system), in->t, out->t);
 }
 
 void drape_implicit_destroy(void **state)

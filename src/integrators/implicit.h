@@ -17,6 +17,7 @@ typedef struct drape_implicit {
     double *history;         /* measures; NULL where no law wants rates */
     double *dissipated;      /* nodes; NULL where nothing dissipates */
     bool inertial_guess;
+    double t, span[2]; /* [s] of the base: where colliders stand, and the way to there */
 } drape_implicit;
 
 /* For rows that embed it: on failure what was taken is freed by drape_implicit_free. */

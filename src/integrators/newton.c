@@ -14,13 +14,13 @@
 enum { NORM_MAX, NORM_L1, NORM_L2 };
 enum { FAILURE_REJECT, FAILURE_ACCEPT };
 enum { METHOD_EXACT, METHOD_MODIFIED };
-enum { GLOBAL_LINE_SEARCH, GLOBAL_NONE };
+enum { GLOBAL_LINE_SEARCH, GLOBAL_NONE, GLOBAL_WORK, GLOBAL_AUTO };
 enum { PREDICTOR_INERTIAL, PREDICTOR_REST };
 
 static const char *const norm_choices[] = {"max", "l1", "l2", NULL};
 static const char *const failure_choices[] = {"reject", "accept", NULL};
 static const char *const method_choices[] = {"exact", "modified", NULL};
-static const char *const global_choices[] = {"line_search", "none", NULL};
+static const char *const global_choices[] = {"line_search", "none", "work", "auto", NULL};
 static const char *const predictor_choices[] = {"inertial", "rest", NULL};
 
 /* KINSOL's settings that no user should need, all set, none left to a default. */
@@ -30,6 +30,11 @@ static const char *const predictor_choices[] = {"inertial", "rest", NULL};
     1e-15 /* of the scene's size: below it a step moves nothing, and the solve stands still */
 #define MAX_NEWTON_STEP                                                                                      \
     1e3 /* of the scene's size, a node: KINSOL's own limit depends on the guess and is 1 for d = 0 */
+#define WORK_SHARE        0.5 /* of the work along a correction: so much may be left on the far side */
+#define MOST_CUTS         8   /* of a correction by the line search */
+#define LEAST_CUT         0.1
+#define MOST_CUT          0.7
+#define SHORT_STEP        0.5
 #define MAX_BETA_FAILURES 1000 /* the line search may fail its curvature condition as often as it likes */
 
 const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {
@@ -81,10 +86,11 @@ const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {
         {.name = "globalization",
          .kind = DRAPE_PARAM_CHOICE,
          .unit = "1",
-         .default_value = GLOBAL_NONE,
+         .default_value = GLOBAL_AUTO,
          .choices = global_choices,
          .help = "none: full Newton steps, failures go to the controller; line_search: steps shortened "
-                 "until the residual falls, which takes more iterations on most cloths"},
+                 "until the residual falls; work: until its work along them does, with positive matrices "
+                 "after short ones; auto: work in scenes with contact, else none"},
     [DRAPE_NEWTON_PREDICTOR] = {.name = "predictor",
                                 .kind = DRAPE_PARAM_CHOICE,
                                 .unit = "1",
@@ -117,9 +123,12 @@ struct drape_newton {
     drape_sun_linear *linear;
     const drape_newton_problem *problem;
     drape_point point;
+    double *trial;               /* free DOFs: of the line search; NULL without */
+    double *ahead;               /* nodes: where a correction would lead; NULL without contact */
     double *x, *v, *g;           /* nodes: where the residual was evaluated last, and g there */
     double *f;                   /* free DOFs: F there */
     bool nonfinite;              /* a residual was */
+    bool positive;               /* matrices are the positive parts: the last step was short */
     double factored_mass_weight; /* of the factors that modified Newton may keep; 0: none */
     drape_work work;
 };
@@ -154,27 +163,124 @@ static bool evaluate(drape_newton *s, const double *d)
     return drape_all_finite(s->f, (size_t)s->n);
 }
 
+/* < 0: no smaller step helps. */
 static int residual(N_Vector d, N_Vector f, void *user)
 {
     drape_newton *s = user;
     s->nonfinite = !evaluate(s, N_VGetArrayPointer(d));
     memcpy(N_VGetArrayPointer(f), s->f, (size_t)s->n * sizeof *s->f);
-    return s->nonfinite ? 1 : 0;
+    return drape_system_status(s->system) ? -1 : s->nonfinite ? 1 : 0;
+}
+
+/* Contact may couple what it did not before: then the solver is made anew. */
+static drape_status fit_pattern(drape_newton *s)
+{
+    bool changed;
+    drape_status status = drape_system_fit(s->system, &s->point, &changed);
+    return status || !changed ? status : drape_sun_linear_adopt(s->linear, drape_system_pattern(s->system));
+}
+
+/* J(d) into the values of the solver. */
+static drape_status assemble(drape_newton *s, const double *d)
+{
+    double start = drape_clock_seconds();
+    place(s, d); /* the residual may have been tried elsewhere since */
+    drape_status status = fit_pattern(s);
+    if (status)
+        return status;
+    drape_system_jacobian(s->system, &s->point, s->problem->mass_weight,
+                          s->positive || s->values[DRAPE_NEWTON_PROJECT] != 0, s->linear->values);
+    s->factored_mass_weight = s->problem->mass_weight;
+    s->work.jacobians++;
+    s->work.jacobian_seconds += drape_clock_seconds() - start;
+    return DRAPE_OK;
 }
 
 static int jacobian(N_Vector d, N_Vector f, SUNMatrix matrix, void *user, N_Vector scratch1,
                     N_Vector scratch2)
 {
     (void)f, (void)matrix, (void)scratch1, (void)scratch2;
-    drape_newton *s = user;
-    double start = drape_clock_seconds();
-    place(s, N_VGetArrayPointer(d)); /* the residual may have been tried elsewhere since */
-    drape_system_jacobian(s->system, &s->point, s->problem->mass_weight, s->values[DRAPE_NEWTON_PROJECT] != 0,
-                          s->linear->values);
-    s->factored_mass_weight = s->problem->mass_weight;
-    s->work.jacobians++;
-    s->work.jacobian_seconds += drape_clock_seconds() - start;
-    return 0;
+    return assemble(user, N_VGetArrayPointer(d)) ? -1 : 0;
+}
+
+/* The share of a displacement of the free nodes from x that passes through nothing. */
+static double free_share(drape_newton *s, const double *x, const double *step)
+{
+    memcpy(s->ahead, x, 3 * (size_t)s->model->node_count * sizeof *x);
+    for (int64_t i = 0; i < s->n; i++)
+        s->ahead[3 * (int64_t)s->model->node_of_free[i / 3] + i % 3] += step[i];
+    return drape_system_way(s->system, x, s->ahead, s->problem->t);
+}
+
+static double dot(const double *a, const double *b, int64_t n)
+{
+    double sum = 0;
+    for (int64_t i = 0; i < n; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
+
+/* The share a of a correction p that is taken: the work of the residual along it, F(d + a p) . p, is not to be
+ * above a share of what it was at a = 0, with the sign that says that the minimum of the energy was passed. The line
+ * search of Matthies & Strang 1979: it needs no energy, so it holds for friction and damping too. start:
+ * F(d) . p < 0. */
+static double search_along(drape_newton *s, const double *p, double start)
+{
+    const double *d = N_VGetArrayPointer(s->unknown);
+    double a = 1;
+    for (int k = 0; k < MOST_CUTS; k++) {
+        for (int64_t i = 0; i < s->n; i++)
+            s->trial[i] = d[i] + a * p[i];
+        double work = evaluate(s, s->trial) ? dot(s->f, p, s->n) : INFINITY;
+        if (work <= -WORK_SHARE * start)
+            return a;
+        a *= fmax(LEAST_CUT, fmin(MOST_CUT, -start / (work - start)));
+    }
+    return a;
+}
+
+/* A correction that climbs is none: the matrix was indefinite. Its positive part gives one that descends. */
+static drape_status descend(drape_newton *s, N_Vector x, N_Vector b)
+{
+    double *p = N_VGetArrayPointer(x), *minus_f = N_VGetArrayPointer(b);
+    if (dot(minus_f, p, s->n) > 0 || s->positive)
+        return DRAPE_OK;
+    s->positive = true;
+    drape_status status = assemble(s, N_VGetArrayPointer(s->unknown));
+    if (!status)
+        status = s->linear->solver->ops->setup(s->linear->solver, s->linear->matrix);
+    return status ? status : drape_sun_linear_solve(s->linear, minus_f, p);
+}
+
+/* After a short step the next matrix is the positive part, after a whole one the exact one again. */
+static drape_status globalize(drape_newton *s, N_Vector x, N_Vector b)
+{
+    double *p = N_VGetArrayPointer(x);
+    drape_status status = s->trial ? descend(s, x, b) : DRAPE_OK;
+    if (status || !drape_all_finite(p, (size_t)s->n))
+        return status;
+    double share = s->ahead ? free_share(s, s->x, p) : 1;
+    for (int64_t i = 0; share < 1 && i < s->n; i++)
+        p[i] *= share;
+    double start = s->trial ? -dot(N_VGetArrayPointer(b), p, s->n) : 0;
+    if (start < 0) {
+        double a = search_along(s, p, start);
+        for (int64_t i = 0; a < 1 && i < s->n; i++)
+            p[i] *= a;
+        s->positive = a < SHORT_STEP;
+    }
+    return DRAPE_OK;
+}
+
+/* The correction of Newton, cut short where on the way cloth would pass through something, and where it goes too
+ * far. */
+static int solve_and_globalize(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b,
+                               sunrealtype tolerance)
+{
+    (void)matrix, (void)tolerance;
+    drape_sun_linear *linear = solver->content;
+    drape_status status = drape_sun_linear_solve(linear, N_VGetArrayPointer(b), N_VGetArrayPointer(x));
+    return status ? status : globalize(linear->owner, x, b);
 }
 
 /* ---- Making and freeing ---- */
@@ -186,7 +292,13 @@ static drape_status create_vectors(drape_newton *s)
     s->v = drape_alloc(s->ctx, nodes, sizeof *s->v);
     s->g = drape_alloc(s->ctx, nodes, sizeof *s->g);
     s->f = drape_alloc(s->ctx, (size_t)s->n, sizeof *s->f);
-    if (!s->x || !s->v || !s->g || !s->f)
+    bool searches = s->values[DRAPE_NEWTON_GLOBALIZATION] == GLOBAL_WORK;
+    if (searches)
+        s->trial = drape_alloc(s->ctx, (size_t)s->n, sizeof *s->trial);
+    if (drape_system_contact(s->system))
+        s->ahead = drape_alloc(s->ctx, nodes, sizeof *s->ahead);
+    if (!s->x || !s->v || !s->g || !s->f || (drape_system_contact(s->system) && !s->ahead) ||
+        (searches && !s->trial))
         return DRAPE_E_MEMORY;
     s->unknown = N_VMake_Serial(s->n, s->f, s->sun);
     s->ones = N_VNew_Serial(s->n, s->sun);
@@ -232,6 +344,8 @@ drape_status drape_newton_create(drape_context *ctx, drape_system *system, const
     s->model = drape_system_model(system);
     s->n = 3 * (int64_t)s->model->free_count;
     memcpy(s->values, values, sizeof s->values);
+    if (s->values[DRAPE_NEWTON_GLOBALIZATION] == GLOBAL_AUTO)
+        s->values[DRAPE_NEWTON_GLOBALIZATION] = drape_system_contact(system) ? GLOBAL_WORK : GLOBAL_NONE;
     drape_status status = DRAPE_OK;
     if (drape_sundials_context(&s->sun) || !(s->kin = KINCreate(s->sun)))
         status = drape_fail_memory(ctx, sizeof(void *));
@@ -239,7 +353,11 @@ drape_status drape_newton_create(drape_context *ctx, drape_system *system, const
         status = create_vectors(s);
     if (!status && s->n > 0)
         status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
-                                         &s->model->pattern, &s->linear);
+                                         drape_system_pattern(system), &s->linear);
+    if (!status && s->n > 0 && (s->ahead || s->trial)) {
+        s->linear->owner = s;
+        s->linear->solver->ops->solve = solve_and_globalize;
+    }
     if (!status && s->n > 0 && !configure(s))
         status =
             drape_fail(ctx, DRAPE_E_MEMORY, "KINSOL cannot be set up for %lld unknowns", (long long)s->n);
@@ -266,6 +384,8 @@ void drape_newton_destroy(drape_newton **newton)
     drape_free(s->ctx, s->v);
     drape_free(s->ctx, s->g);
     drape_free(s->ctx, s->f);
+    drape_free(s->ctx, s->ahead);
+    drape_free(s->ctx, s->trial);
     drape_free(s->ctx, s);
     *newton = NULL;
 }
@@ -331,10 +451,12 @@ static void begin(drape_newton *s, const drape_newton_problem *problem)
                              .v = s->v,
                              .internal = problem->internal,
                              .weight = problem->weight,
-                             .history = problem->history};
+                             .history = problem->history,
+                             .t = problem->t,
+                             .span = {problem->span[0], problem->span[1]}};
     memcpy(s->x, problem->x_base, bytes);
     memcpy(s->v, problem->v_base, bytes);
-    s->nonfinite = false;
+    s->nonfinite = s->positive = false;
 }
 
 /* KINSOL's counters start anew with each KINSol. */
@@ -387,10 +509,15 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *pro
     bool keep =
         s->values[DRAPE_NEWTON_METHOD] == METHOD_MODIFIED && s->factored_mass_weight == problem->mass_weight;
     KINSetNoInitSetup(s->kin, keep);
+    double share = s->ahead ? free_share(s, s->x, d) : 1; /* of the guess, from d = 0 */
+    for (int64_t i = 0; share < 1 && i < s->n; i++)
+        d[i] *= share;
     N_VSetArrayPointer(d, s->unknown);
     int strategy = s->values[DRAPE_NEWTON_GLOBALIZATION] == GLOBAL_LINE_SEARCH ? KIN_LINESEARCH : KIN_NONE;
     drape_status status = status_of(KINSol(s->kin, s->unknown, strategy, s->ones, s->ones), &info->reason);
     count_iterations(s, info);
+    if (drape_system_status(s->system))
+        return drape_system_status(s->system);
     if (status)
         drape_newton_forget_factors(s);
     return judge(s, status, d, info);

@@ -38,6 +38,7 @@ typedef struct drape_newton_problem {
     const double *inertia;         /* p, free DOFs [m] */
     const double *internal;
     const double *history; /* of the measures' rates, see drape_point */
+    double t, span[2];     /* [s] where colliders stand, and the step, see drape_point */
 } drape_newton_problem;
 
 drape_status drape_newton_create(drape_context *ctx, drape_system *system, const double *values,

@@ -85,14 +85,16 @@ static drape_status pseudo_step(static_state *s, double weight, drape_state *out
         return status;
     for (size_t i = 0; i < 3 * (size_t)c->model->free_count; i++)
         c->x_base[drape_implicit_at(c, i)] += c->d[i];
-    status = drape_system_check(c->system, c->x_base, out->x, s->internal, &info->reason, &info->worst);
+    status = drape_system_check_contact(c->system, c->x_base, c->t, &info->reason, &info->worst);
+    if (!status)
+        status = drape_system_check(c->system, c->x_base, out->x, s->internal, &info->reason, &info->worst);
     if (status)
         return status;
     memcpy(out->x, c->x_base, 3 * (size_t)c->model->node_count * sizeof *out->x);
     const drape_state from = {.x = out->x, .internal = s->internal};
     drape_state to = {.x = out->x, .internal = s->internal};
     drape_state_commit(c->model, &from, &to);
-    return DRAPE_OK;
+    return drape_system_begin(c->system, &(drape_state){.t = c->t, .x = out->x, .v = c->v_base});
 }
 
 /* After a failure: the residual of statics where the flow has come, not that of the pseudo step that
@@ -100,7 +102,7 @@ static drape_status pseudo_step(static_state *s, double weight, drape_state *out
 static void say_residual(static_state *s, const drape_state *out, double tolerance, drape_step_info *info)
 {
     drape_implicit *c = &s->common;
-    const drape_point point = {.x = out->x, .v = c->v_base, .internal = s->internal};
+    const drape_point point = {.x = out->x, .v = c->v_base, .internal = s->internal, .t = c->t};
     drape_system_force(c->system, &point, c->x_base);
     for (size_t i = 0; i < 3 * (size_t)c->model->free_count; i++)
         c->d[i] = c->x_base[drape_implicit_at(c, i)];
@@ -139,7 +141,7 @@ static drape_status follow(static_state *s, double weight, double tolerance, dra
 
 static drape_status judge_stability(static_state *s, const drape_state *out)
 {
-    const drape_point point = {.x = out->x, .v = s->common.v_base, .internal = s->internal};
+    const drape_point point = {.x = out->x, .v = s->common.v_base, .internal = s->internal, .t = s->common.t};
     if (s->common.model->free_count == 0)
         return DRAPE_OK;
     drape_system_jacobian(s->common.system, &point, 0, false, s->values);
@@ -156,6 +158,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     double dt = values[DRAPE_NEWTON_DT], tolerance = values[DRAPE_NEWTON_TOLERANCE];
     info->h = h;
     drape_implicit_base(&s->common, in, out->t, 1);
+    s->common.span[0] = s->common.t; /* colliders rest */
     memset(s->common.v_base, 0, nodes * sizeof *s->common.v_base);
     memcpy(out->x, s->common.x_base, nodes * sizeof *out->x);
     memset(out->v, 0, nodes * sizeof *out->v);

@@ -26,7 +26,7 @@
 
 #define MOST_NEAR 64  /* points in the list of one */
 #define A_NODE    24  /* of them on the average */
-#define SKIN      0.6 /* of r */
+#define SKIN      0.5 /* of r */
 #define FARTHEST  1e9 /* boxes are counted in 32 bits: what is beyond has blown up and shares one */
 
 struct drape_verlet_self {
@@ -47,7 +47,6 @@ struct drape_verlet_self {
     int32_t *near;           /* (node_count x A_NODE) */
     int32_t *pair;           /* (node_count x A_NODE / 2) of each pair the lower node, by the higher one */
     double *x_built;         /* (node_count x 3) */
-    double way[3];           /* of all since then, about [m] */
 };
 
 /* ---- Making ---- */
@@ -204,14 +203,11 @@ static bool is_searched(const search *q, const int32_t *cell, int32_t y, int32_t
 static void search_range(const drape_verlet_self *s, search *q, int32_t y, int32_t z, int32_t first,
                          int32_t last)
 {
-    const int32_t below = q->lower ? q->node : INT32_MAX;
     for (int32_t at = first; at < last; at++) {
         double d[3];
-        if (s->node[at] >= below)
-            continue;
         vec3_sub(q->x, s->x + 3 * (size_t)at, d);
         if (!(vec3_dot(d, d) < q->reach_squared) || s->node[at] == q->node ||
-            !is_searched(q, s->cell + 3 * (size_t)at, y, z))
+            (q->lower && s->node[at] > q->node) || !is_searched(q, s->cell + 3 * (size_t)at, y, z))
             continue;
         if (q->count < MOST_NEAR)
             q->found[q->count] = s->node[at];
@@ -308,76 +304,50 @@ static void build_lists(drape_verlet_self *s, double share, const double *x)
     sort_nodes(s, x);
     s->built = !s->same_box && collect_pairs(s, x, s->reach * (1 + 2 * share + SKIN)) && spread_pairs(s);
     s->built_share = share;
-    memset(s->way, 0, sizeof s->way);
     if (s->built)
         memcpy(s->x_built, x, 3 * (size_t)s->model->node_count * sizeof *x);
 }
 
-/* No node has moved by half of the skin against what all move alike: the mean of the last time, since any way
- * will do that is the same for all. */
-static bool lists_are_good(drape_verlet_self *s, double share, const double *x)
+/* No node has moved by half of the skin against the mean of all. */
+static bool lists_are_good(const drape_verlet_self *s, double share, const double *x)
 {
     size_t n = (size_t)s->model->node_count;
-    double sum[3] = {0}, most = 0, bound = 0.5 * SKIN * s->reach;
+    double mean[3] = {0}, most = 0, bound = 0.5 * SKIN * s->reach;
     if (!s->built || share > s->built_share)
         return false;
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < 3; k++)
+            mean[k] += x[3 * i + k] - s->x_built[3 * i + k];
+    for (size_t k = 0; k < 3; k++)
+        mean[k] /= (double)n;
     for (size_t i = 0; i < n; i++) {
-        const double *now = x + 3 * i, *then = s->x_built + 3 * i;
-        double a = now[0] - then[0], b = now[1] - then[1], c = now[2] - then[2];
-        sum[0] += a;
-        sum[1] += b;
-        sum[2] += c;
-        a -= s->way[0];
-        b -= s->way[1];
-        c -= s->way[2];
-        double square = a * a + b * b + c * c;
-        most = square <= most ? most : square; /* what is no number stays */
-        if (!(most <= bound * bound))
-            return false;
+        double a = x[3 * i] - s->x_built[3 * i] - mean[0], b = x[3 * i + 1] - s->x_built[3 * i + 1] - mean[1],
+               c = x[3 * i + 2] - s->x_built[3 * i + 2] - mean[2], square = a * a + b * b + c * c;
+        most = square > most || square != square ? square : most;
     }
-    for (int k = 0; k < 3; k++)
-        s->way[k] = sum[k] / (double)n;
-    return true;
+    return most <= bound * bound;
 }
 
 /* ---- Pushing ---- */
 
-/* What pushes a node. */
-typedef struct push {
-    double sum[3];
-    int count;
-} push;
-
-static inline void add_push(push *p, double reach, const double *own, const double *other)
-{
-    double d[3];
-    vec3_sub(own, other, d);
-    double square = vec3_dot(d, d);
-    if (!(square < reach * reach) || square == 0) /* itself, or no direction to push in */
-        return;
-    vec3_add_scaled(reach / sqrt(square) - 1, d, p->sum);
-    p->count++;
-}
-
-static void push_node(const drape_verlet_self *s, int32_t i, const int32_t *near, int count, double share,
+/* near NULL: all points, which are count. */
+static void push_node(drape_verlet_self *s, int32_t i, const int32_t *near, int count, double share,
                       double *x)
 {
-    double *own = x + 3 * (size_t)i, reach = s->reach;
-    push p = {.count = 0};
-    for (int k = 0; k < count; k++)
-        add_push(&p, reach, own, x + 3 * (size_t)near[k]);
-    if (p.count > 0)
-        vec3_add_scaled(share / p.count, p.sum, own);
-}
-
-static void push_by_all(const drape_verlet_self *s, int32_t i, double share, double *x)
-{
-    double *own = x + 3 * (size_t)i;
-    push p = {.count = 0};
-    for (int32_t j = 0; j < s->model->node_count; j++)
-        add_push(&p, s->reach, own, x + 3 * (size_t)j);
-    if (p.count > 0)
-        vec3_add_scaled(share / p.count, p.sum, own);
+    double *own = x + 3 * (size_t)i, sum[3] = {0}, square_of_reach = s->reach * s->reach;
+    int pushing = 0;
+    for (int k = 0; k < count; k++) {
+        double d[3];
+        vec3_sub(own, x + 3 * (size_t)(near ? near[k] : k), d);
+        double square = vec3_dot(d, d);
+        if (!(square < square_of_reach) || square == 0) /* itself, or no direction to push in */
+            continue;
+        double distance = sqrt(square);
+        vec3_add_scaled(s->reach / distance - 1, d, sum);
+        pushing++;
+    }
+    if (pushing > 0)
+        vec3_add_scaled(share / pushing, sum, own);
 }
 
 static void push_listed(drape_verlet_self *s, double share, double *x)
@@ -401,7 +371,7 @@ static void push_searched(drape_verlet_self *s, double share, double *x)
         else if (s->same_box)
             push_node(s, i, q.found, MOST_NEAR, share, x);
         else
-            push_by_all(s, i, share, x);
+            push_node(s, i, NULL, s->model->node_count, share, x);
         memcpy(s->x + 3 * (size_t)s->place[i], q.x, 3 * sizeof *q.x);
     }
 }

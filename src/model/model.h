@@ -22,6 +22,18 @@ typedef struct drape_term {
     const double *damping; /* (elements.count) its measures' own dashpots [J s/q2]; NULL: it has none */
 } drape_term;
 
+/* Whether a term has a Hessian, and what it couples then. */
+static inline bool drape_term_couples(const drape_term *term)
+{
+    return !term->ops->law && !term->ops->linear && term->elements.count > 0;
+}
+
+static inline drape_coupling drape_term_coupling(const drape_term *term)
+{
+    return (drape_coupling){
+        .count = term->elements.count, .nodes = term->elements.nodes, .node = term->elements.node};
+}
+
 /* A row that was chosen by name, with the settings that the scene gave. */
 typedef struct drape_choice {
     char *type;
@@ -110,6 +122,10 @@ struct drape_model {
 
 /* Writes the positions that tracks give pinned nodes at time t; other entries of x (node_count x 3) stay. */
 void drape_model_place_pins(const drape_model *model, double t, double *x);
+
+/* The next time after t, before end, at which some pin's or collider's velocity jumps; else end. */
+double drape_model_next_kink(const drape_model *model, double t, double end);
+bool drape_model_at_kink(const drape_model *model, double t);
 
 /* The cloth that a node belongs to. */
 int32_t drape_model_cloth_of(const drape_model *model, int32_t node);

@@ -30,9 +30,11 @@ drape_energy drape_sim_energy(drape_sim *sim)
     if (sim->energy_known)
         return sim->energy;
     drape_energy e = {.kinetic = kinetic(sim->model, state->v), .dissipated = sim->dissipated};
-    const drape_point point = {.x = state->x, .v = state->v, .internal = state->internal};
+    const drape_point point = {.x = state->x, .v = state->v, .internal = state->internal, .t = state->t};
     drape_system_energy(sim->system, &point, &e.elastic, &e.gravity);
-    e.numerical = sim->start_energy + sim->pin_work - e.dissipated - (e.kinetic + e.elastic + e.gravity);
+    e.contact = drape_system_contact_energy(sim->system, &point);
+    e.numerical =
+        sim->start_energy + sim->pin_work - e.dissipated - (e.kinetic + e.elastic + e.gravity + e.contact);
     sim->energy = e;
     sim->energy_known = true;
     return e;
@@ -43,7 +45,7 @@ void drape_sim_reset_energy(drape_sim *sim)
     sim->dissipated = sim->pin_work = 0;
     sim->energy_known = false;
     drape_energy e = drape_sim_energy(sim);
-    sim->start_energy = e.kinetic + e.elastic + e.gravity;
+    sim->start_energy = e.kinetic + e.elastic + e.gravity + e.contact;
     sim->energy_known = false;
 }
 
@@ -82,10 +84,10 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, const drape_step
     if (!(after > JUMP * before))
         return false;
     drape_energy e = drape_sim_energy(sim);
-    const drape_point point = {.x = out->x, .v = out->v, .internal = in->internal};
+    const drape_point point = {.x = out->x, .v = out->v, .internal = in->internal, .t = out->t};
     drape_system_energy(sim->system, &point, &elastic, &gravity);
-    double gain =
-        after + elastic + gravity + info->dissipated - info->pin_work - (e.kinetic + e.elastic + e.gravity);
+    double gain = after + elastic + gravity + drape_system_contact_energy(sim->system, &point) +
+                  info->dissipated - info->pin_work - (e.kinetic + e.elastic + e.gravity + e.contact);
     double size = after + fabs(elastic) + fabs(gravity) + fabs(e.elastic) + fabs(e.gravity);
     if (!(gain > SHARE * after && gain > UNNOTICED * size + QUIET * scene_energy(sim->model)))
         return false;

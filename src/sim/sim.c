@@ -54,8 +54,11 @@ static drape_status create_parts(drape_sim *sim, const drape_sim_def *def)
         status = create_states(sim);
     if (!status)
         status = drape_system_create(sim->ctx, sim->model, def->threads, &sim->system);
-    if (!status && sim->chosen.integrator->projects_contact)
+    bool projects = sim->chosen.integrator->projects_contact;
+    if (!status && projects)
         drape_system_leave_constraints(sim->system);
+    if (!status && !projects)
+        status = drape_system_add_contact(sim->system);
     if (!status)
         status = sim->chosen.integrator->create(sim->ctx, sim->system, sim->chosen.integrator_values,
                                                 &sim->integrator);
@@ -159,7 +162,7 @@ drape_statistics drape_sim_statistics(const drape_sim *sim)
     s.wall_jacobian = work.jacobian_seconds;
     s.wall_factor = work.factor_seconds;
     s.wall_solve = work.solve_seconds;
-    s.wall_contact = work.contact_seconds;
+    s.wall_contact = work.contact_seconds + drape_contact_seconds(drape_system_contact(sim->system));
     return s;
 }
 

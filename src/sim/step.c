@@ -33,6 +33,10 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
         return DRAPE_RETRY_REJECTED;
     }
     const drape_state *before = drape_sim_state(sim);
+    drape_status status =
+        drape_system_check_contact(sim->system, next->x, next->t, &info->reason, &info->worst);
+    if (status)
+        return status;
     return drape_system_check(sim->system, next->x, before->x, before->internal, &info->reason, &info->worst);
 }
 
@@ -43,7 +47,9 @@ static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info
     drape_state *next = next_state(sim);
     next->t = t1;
     info->worst = (drape_worst){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
-    drape_status status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
+    drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
+    if (!status)
+        status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
     if (status && !info->usable)
         return status;
     drape_status degenerate = check(sim, info);

@@ -94,6 +94,20 @@ drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const d
     return DRAPE_OK;
 }
 
+drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_pattern *pattern)
+{
+    double start = drape_clock_seconds();
+    if (linear->state)
+        linear->ops->destroy(&linear->state);
+    drape_free(linear->ctx, linear->values);
+    linear->values = drape_alloc(linear->ctx, (size_t)pattern->nonzeros, sizeof *linear->values);
+    if (!linear->values)
+        return DRAPE_E_MEMORY;
+    drape_status status = linear->ops->create(linear->ctx, pattern, &linear->state);
+    linear->factor_seconds += drape_clock_seconds() - start;
+    return status;
+}
+
 void drape_sun_linear_destroy(drape_sun_linear **out)
 {
     drape_sun_linear *linear = *out;

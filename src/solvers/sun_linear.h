@@ -28,6 +28,10 @@ typedef struct drape_sun_linear {
 
 drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const drape_linear_ops *ops,
                                      const drape_pattern *pattern, drape_sun_linear **out);
+
+/* Another pattern from now on: the values are cleared, the solver is analysed anew. Errors: as of create; then
+ * it can only be destroyed, or adopt again. */
+drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_pattern *pattern);
 void drape_sun_linear_destroy(drape_sun_linear **linear);
 
 /* x = A^-1 b with the factors there are, time and work counted: what the SUNLinearSolver does. */

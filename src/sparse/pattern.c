@@ -174,3 +174,19 @@ int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t co
     }
     return low;
 }
+
+bool drape_pattern_has(const drape_pattern *pattern, int32_t row, int32_t column)
+{
+    return pattern->block_row[drape_pattern_find(pattern, row, column)] == row;
+}
+
+void drape_pattern_place(const drape_pattern *pattern, const int32_t *block_of_node,
+                         const drape_coupling *coupling, int32_t *block)
+{
+    for (int32_t e = 0; e < coupling->count; e++) {
+        const int32_t *node = coupling->node + (size_t)e * (size_t)coupling->nodes;
+        for (int a = 0; a < coupling->nodes; a++)
+            for (int b = 0; b < coupling->nodes; b++)
+                *block++ = drape_pattern_find(pattern, block_of_node[node[a]], block_of_node[node[b]]);
+    }
+}

@@ -37,6 +37,11 @@ void drape_pattern_free(drape_context *ctx, drape_pattern *pattern);
 
 /* The block at (row, column); -1 if either is -1. It must be in the pattern. */
 int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t column);
+bool drape_pattern_has(const drape_pattern *pattern, int32_t row, int32_t column); /* both >= 0 */
+
+/* The block of each pair of nodes of each element, row by row: block (count x nodes x nodes). */
+void drape_pattern_place(const drape_pattern *pattern, const int32_t *block_of_node,
+                         const drape_coupling *coupling, int32_t *block);
 
 /* The first value of a block and the distance to its next column. */
 static inline double *drape_pattern_at(const drape_pattern *pattern, double *values, int32_t column,

@@ -24,6 +24,7 @@ const drape_term_ops drape_term_spring_structural = {
     .nodes = 2,
     .damped = true,
     .build = build,
+    .convex = true,
     .measure = drape_spring_measure,
     .pair = drape_spring_pairs,
     .check = drape_spring_check,

@@ -159,6 +159,7 @@ const drape_term_ops drape_term_stretch_edge = {
     .element_name = "edge",
     .nodes = 2,
     .build = build,
+    .convex = true,
     .measure = measure,
     .pair = pair,
     .check = check,

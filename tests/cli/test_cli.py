@@ -523,8 +523,8 @@ def test_info_of_contact():
     equal(box["track"], [[0, [0, 0, 0]], [2, [0, 1, 0]]])
     equal((mesh["parameters"]["file"]["value"], mesh["triangles"]), ("tetrahedron.obj", 4))
     equal(mesh["parameters"]["scale"], {"value": [1, 1, 1], "unit": "1", "default": True})
-    # 100 times 0.2 kg/m2 times 9.81 m/s2
-    assert abs(found["contact"]["stiffness"]["value"] - 196.2) < 1e-9, found["contact"]
+    # 2 times 0.2 kg/m2 times 9.81 m/s2 times the diagonal of 0.35 m by 3 rows of sqrt(3)/2 0.1 m, over 1e-3 m
+    assert abs(found["contact"]["stiffness"]["value"] - 2 * 0.2 * 9.81 * 0.19 ** 0.5 / 1e-3) < 1e-6, found["contact"]
     equal((found["contact"]["distance"]["default"], found["contact"]["friction"]["value"]), (True, "implicit"))
     equal(found["self_contact"], {"thickness": {"value": 0.002, "unit": "m", "default": False},
                                   "friction": {"value": 0, "unit": "1", "default": True}})

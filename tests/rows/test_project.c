@@ -1,5 +1,5 @@
 /* test_project.c: the nearest positive semidefinite matrix, by its properties and by closed forms. */
-#include "assemble/project.h"
+#include "sparse/project.h"
 
 #include "models.h"
 #include "support/suite.h"

@@ -3,7 +3,7 @@
  * ones set to zero. Jacobi, and not LAPACK: for 6 x 6 and 12 x 12 it is as fast, needs no heap and no
  * library, and gives the same bits everywhere.
  */
-#include "assemble/project.h"
+#include "sparse/project.h"
 
 #include "drape/extend.h"
 

@@ -1,7 +1,7 @@
 /* project.h: the nearest positive semidefinite matrix to a symmetric one (in the Frobenius norm), for element
  * Hessians. */
-#ifndef DRAPE_ASSEMBLE_PROJECT_H
-#define DRAPE_ASSEMBLE_PROJECT_H
+#ifndef DRAPE_SPARSE_PROJECT_H
+#define DRAPE_SPARSE_PROJECT_H
 
 /* a (n x n, symmetric, n <= DRAPE_MAX_ELEMENT_DOFS) becomes V max(Lambda, 0) V'. */
 void drape_project(int n, double *a);

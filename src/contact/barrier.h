@@ -1,0 +1,39 @@
+/*
+ * barrier.h: the energy of a gap, b(s) with s = gap / activation distance: the logarithmic barrier of Li et
+ * al. 2020 (Incremental Potential Contact, eq. 6) scaled to length one,
+ *     b = -(s - 1)^2 ln s   for s < 1,  0 beyond,
+ * C2 at s = 1. Below s = DRAPE_BARRIER_LOW it goes on as its own parabola: finite everywhere, so that an
+ * iterate of Newton, or a start that touches, is pushed out again. A step is not accepted there.
+ */
+#ifndef DRAPE_CONTACT_BARRIER_H
+#define DRAPE_CONTACT_BARRIER_H
+
+#include <math.h>
+
+#define DRAPE_BARRIER_LOW 0.01
+
+typedef struct drape_barrier {
+    double b, db, ddb; /* b, b', b'' */
+} drape_barrier;
+
+static inline drape_barrier drape_barrier_log(double s)
+{
+    double log_s = log(s), u = s - 1;
+    return (drape_barrier){.b = -u * u * log_s,
+                           .db = -2 * u * log_s - u * u / s,
+                           .ddb = -2 * log_s - 4 * u / s + u * u / (s * s)};
+}
+
+static inline drape_barrier drape_barrier_at(double s)
+{
+    if (s >= 1)
+        return (drape_barrier){0};
+    if (s >= DRAPE_BARRIER_LOW)
+        return drape_barrier_log(s);
+    drape_barrier at = drape_barrier_log(DRAPE_BARRIER_LOW);
+    double u = s - DRAPE_BARRIER_LOW;
+    return (drape_barrier){
+        .b = at.b + u * (at.db + 0.5 * u * at.ddb), .db = at.db + u * at.ddb, .ddb = at.ddb};
+}
+
+#endif

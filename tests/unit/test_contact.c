@@ -1,0 +1,313 @@
+/*
+ * test_contact.c: contact of two pieces. Every derivative is compared with differences, in every region of
+ * both kinds of pairs: energy and force, force and Hessian, friction by velocity and by position, the
+ * mollifier where edges are nearly parallel. Ways that are called free are.
+ */
+#include "contact/barrier.h"
+#include "contact/bvh.h"
+#include "contact/pair.h"
+#include "support/suite.h"
+
+#include <math.h>
+#include <string.h>
+
+#define D 12
+
+/* Numbers in (-1, 1), the same on every machine. */
+static double next_number(uint64_t *seed)
+{
+    *seed = *seed * 6364136223846793005u + 1442695040888963407u;
+    return (double)(int64_t)(*seed >> 11) / (double)(1ll << 52) - 1;
+}
+
+static void fill(uint64_t *seed, double scale, double *to, int count)
+{
+    for (int i = 0; i < count; i++)
+        to[i] = scale * next_number(seed);
+}
+
+/* A pair of four points that are all of the cloth. */
+typedef struct setting {
+    drape_pair pair;
+    double x[D], v[D], rest[D];
+    drape_contact_law law;
+} setting;
+
+static void gap_of(const setting *s, bool derivatives, drape_gap *gap)
+{
+    const drape_placed at = {.x = s->x};
+    drape_pair_gap(&s->pair, &at, s->rest, derivatives, gap);
+}
+
+static double energy_of(const setting *s)
+{
+    drape_gap gap;
+    gap_of(s, false, &gap);
+    return drape_contact_energy(&gap, &s->law);
+}
+
+static void forces_of(const setting *s, double *normal, double *friction)
+{
+    drape_gap gap;
+    double v[4][3];
+    gap_of(s, true, &gap);
+    memcpy(v, s->v, sizeof v);
+    drape_contact_normal(&gap, &s->law, normal, NULL);
+    drape_contact_friction(&gap, &s->law, drape_contact_normal_force(&gap, &s->law), v, friction, NULL);
+}
+
+static double largest(const double *a, int count)
+{
+    double most = 0;
+    for (int i = 0; i < count; i++)
+        most = fmax(most, fabs(a[i]));
+    return most;
+}
+
+/* Central differences with step e: truncation e^2 f'''/6 and rounding 1e-16 f/e. With lengths L of about .1 m
+ * and e = 1e-6 that is (e/L)^2 = 1e-10 and 1e-9, times the powers of 10 of short gaps: 2e-6 of the largest
+ * entry. Closest points of edges at an angle of 1e-2 turn over L = 1e-3 .. 1e-4, so e = 2e-9, and rounding is
+ * 1e-16 L / e / angle^2 = 1e-5. */
+static void compare(const char *what, const double *exact, const double *difference, int count, double limit)
+{
+    double scale = fmax(largest(exact, count), 1e-9);
+    for (int i = 0; i < count; i++)
+        ck_assert_msg(fabs(exact[i] - difference[i]) <= limit * scale, "%s[%d]: %.12g, by differences %.12g",
+                      what, i, exact[i], difference[i]);
+}
+
+static void check_derivatives(setting *s, double e, double limit)
+{
+    drape_gap gap;
+    double g[D], h[D * D], f[D], dgdv[D * D] = {0}, dgdx[D * D] = {0}, v[4][3];
+    double by_x[D], h_by_x[D * D], f_by_x[D * D], f_by_v[D * D];
+    gap_of(s, true, &gap);
+    memcpy(v, s->v, sizeof v);
+    drape_contact_normal(&gap, &s->law, g, h);
+    drape_contact_friction(&gap, &s->law, drape_contact_normal_force(&gap, &s->law), v, f, dgdv);
+    drape_contact_friction_slope(&gap, &s->law, v, dgdx);
+    for (int j = 0; j < D; j++) {
+        double g_[2][D], f_[2][D], energy[2], w_[2][D], unused[D], x = s->x[j], u = s->v[j];
+        for (int side = 0; side < 2; side++) {
+            s->x[j] = x + (side ? e : -e);
+            energy[side] = energy_of(s);
+            forces_of(s, g_[side], f_[side]);
+            s->x[j] = x;
+            s->v[j] = u + (side ? e : -e);
+            forces_of(s, unused, w_[side]);
+            s->v[j] = u;
+        }
+        by_x[j] = (energy[1] - energy[0]) / (2 * e);
+        for (int i = 0; i < D; i++) {
+            h_by_x[D * i + j] = (g_[1][i] - g_[0][i]) / (2 * e);
+            f_by_x[D * i + j] = (f_[1][i] - f_[0][i]) / (2 * e);
+            f_by_v[D * i + j] = (w_[1][i] - w_[0][i]) / (2 * e);
+        }
+    }
+    compare("g", g, by_x, D, limit);
+    compare("h", h, h_by_x, D * D, limit);
+    compare("dfriction/dv", dgdv, f_by_v, D * D, limit);
+    compare("dfriction/dx", dgdx, f_by_x, D * D, limit);
+    for (int i = 0; i < D; i++)
+        for (int j = 0; j < i; j++)
+            ck_assert_double_le(fabs(h[D * i + j] - h[D * j + i]), 1e-10 * largest(h, D * D));
+}
+
+/* The signs of the weights say in which region the closest points lie. */
+static int region_of(const setting *s)
+{
+    drape_gap gap;
+    int region = 0;
+    gap_of(s, false, &gap);
+    for (int a = 0; a < 4; a++)
+        region = 2 * region + (gap.c[a] != 0);
+    return region;
+}
+
+/* Random pairs that act, until every region was met often enough. Derivatives jump where regions meet, so the
+ * neighbourhood of the differences has to be of one. */
+static void check_kind(drape_pair_kind kind, double speed)
+{
+    uint64_t seed = 7 + (uint64_t)kind;
+    int met[16] = {0}, tried = 0;
+    for (int k = 0; k < 3000; k++) {
+        setting s = {.pair = {.kind = kind, .node = {0, 1, 2, 3}, .collider = -1, .radius = 0.01},
+                     .law = {.distance = 0.2, .stiffness = 3, .friction = 0.4, .velocity = 0.05}};
+        drape_gap gap;
+        fill(&seed, 0.1, s.x, D);
+        fill(&seed, speed, s.v, D);
+        fill(&seed, 0.1, s.rest, D);
+        gap_of(&s, false, &gap);
+        double edge = 1;
+        for (int a = 0; a < 4; a++)
+            if (gap.c[a] != 0)
+                edge = fmin(edge, fmin(fabs(gap.c[a]), fabs(gap.c[a]) == 1 ? 1 : 1 - fabs(gap.c[a])));
+        if (!(gap.value > 0.01) || edge < 0.05 || gap.value > 0.19)
+            continue;
+        if (++met[region_of(&s)] > 40)
+            continue;
+        check_derivatives(&s, 1e-6, 2e-6);
+        tried++;
+    }
+    int regions = 0;
+    for (int r = 0; r < 16; r++)
+        regions += met[r] > 0;
+    ck_assert_int_ge(regions, kind == DRAPE_PAIR_TRIANGLE ? 7 : 8);
+    ck_assert_int_ge(tried, 100);
+}
+
+START_TEST(test_triangle)
+{
+    check_kind(DRAPE_PAIR_TRIANGLE, 1);    /* sliding */
+    check_kind(DRAPE_PAIR_TRIANGLE, 0.01); /* sticking */
+}
+END_TEST
+
+START_TEST(test_segments)
+{
+    check_kind(DRAPE_PAIR_SEGMENTS, 1);
+    check_kind(DRAPE_PAIR_SEGMENTS, 0.01);
+}
+END_TEST
+
+/* Nearly parallel edges above each other: the mollifier is at work. */
+START_TEST(test_parallel)
+{
+    uint64_t seed = 3;
+    for (int k = 0; k < 200; k++) {
+        setting s = {.pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1},
+                     .law = {.distance = 0.2, .stiffness = 3, .friction = 0.4, .velocity = 0.05},
+                     .x = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, -0.001, 0.1, 0.05, 0.001},
+                     .rest = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, 0, 0.1, 0.05, 0}};
+        double noise[D];
+        drape_gap gap;
+        fill(&seed, 2e-4, noise, D);
+        fill(&seed, 1, s.v, D);
+        for (int i = 0; i < D; i++)
+            s.x[i] += noise[i];
+        gap_of(&s, false, &gap);
+        ck_assert(gap.mollified);
+        if (fabs(gap.c[0]) < 0.1 || fabs(gap.c[1]) < 0.1 || fabs(gap.c[2]) < 0.1 || fabs(gap.c[3]) < 0.1)
+            continue; /* near an end, where the derivatives jump */
+        check_derivatives(&s, 2e-9, 1e-4);
+    }
+}
+END_TEST
+
+/* Where both are parallel, the energy is gone, whatever the closest points are. */
+START_TEST(test_mollified_away)
+{
+    setting s = {.pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1},
+                 .law = {.distance = 0.2, .stiffness = 3},
+                 .x = {-0.1, 0, 0, 0.1, 0, 0, -0.08, 0.05, 0, 0.12, 0.05, 0},
+                 .rest = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, 0, 0.1, 0.05, 0}};
+    ck_assert_double_eq(energy_of(&s), 0);
+}
+END_TEST
+
+/* C2 where it begins and where its parabola takes over, and it only ever pushes apart. */
+START_TEST(test_barrier)
+{
+    const double joints[] = {1, DRAPE_BARRIER_LOW}, e = 1e-9;
+    for (int k = 0; k < 2; k++) {
+        drape_barrier a = drape_barrier_at(joints[k] - e), b = drape_barrier_at(joints[k] + e);
+        double third =
+            k ? 2 / pow(DRAPE_BARRIER_LOW, 3) + 4 / pow(DRAPE_BARRIER_LOW, 2) : 8; /* bounds b''' */
+        ck_assert_double_le(fabs(a.ddb - b.ddb), 2 * e * 4 * third);
+        ck_assert_double_le(fabs(a.db - b.db), 2 * e * (fabs(a.ddb) + 1));
+        ck_assert_double_le(fabs(a.b - b.b), 2 * e * (fabs(a.db) + 1));
+    }
+    double last = -INFINITY;
+    for (double s = -2; s < 1; s += 1e-3) {
+        ck_assert_double_lt(drape_barrier_at(s).db, 0);
+        ck_assert_double_gt(drape_barrier_at(s).db, last); /* convex */
+        last = drape_barrier_at(s).db;
+    }
+}
+END_TEST
+
+/* On a way that is called free the gap never falls below what is to be kept; a way that is not is cut before
+ * the gap is gone and after most of it is. */
+START_TEST(test_way)
+{
+    uint64_t seed = 11;
+    int cut = 0, whole = 0;
+    for (int k = 0; k < 2000; k++) {
+        drape_pair pair = {.kind = k % 2 ? DRAPE_PAIR_SEGMENTS : DRAPE_PAIR_TRIANGLE,
+                           .node = {0, 1, 2, 3},
+                           .collider = -1,
+                           .radius = k % 3 ? 0 : 0.01};
+        double x[D], y[D], at[D], least = INFINITY;
+        const drape_placed placed = {.x = at};
+        fill(&seed, 0.1, x, D);
+        fill(&seed, 0.1, y, D);
+        memcpy(at, x, sizeof at);
+        double start = drape_pair_gap_value(&pair, &placed);
+        if (!(start > 1e-3))
+            continue;
+        double way = drape_pair_way(&pair, x, y, 0.1, false);
+        for (int i = 0; i <= 200; i++) {
+            for (int j = 0; j < D; j++)
+                at[j] = x[j] + way * i / 200 * (y[j] - x[j]);
+            least = fmin(least, drape_pair_gap_value(&pair, &placed));
+        }
+        ck_assert_double_ge(least, (0.1 - 1e-9) * start);
+        cut += way < 1;
+        whole += way == 1;
+        if (way < 1)
+            ck_assert_double_le(drape_pair_gap_value(&pair, &placed), 0.2 * start);
+    }
+    ck_assert_int_ge(cut, 50);
+    ck_assert_int_ge(whole, 50);
+}
+END_TEST
+
+typedef struct found {
+    int32_t elements[1000];
+    int count;
+} found;
+
+static void note(void *user, int32_t element)
+{
+    found *f = user;
+    f->elements[f->count++] = element;
+}
+
+/* Every element whose box meets the question's is found once, whatever became of the positions. */
+START_TEST(test_tree)
+{
+    uint64_t seed = 5;
+    double x[300], y[300];
+    int32_t edge[400];
+    drape_bvh tree;
+    drape_context *ctx = NULL;
+    fill(&seed, 1, x, 300);
+    fill(&seed, 1, y, 300);
+    for (int i = 0; i < 400; i++)
+        edge[i] = (int32_t)(fabs(next_number(&seed)) * 99.9);
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    ck_assert_int_eq(drape_bvh_build(ctx, 200, 2, edge, x, &tree), DRAPE_OK);
+    for (int k = 0; k < 100; k++) {
+        int32_t node = k;
+        found f = {.count = 0};
+        drape_box box = drape_box_of(&node, 1, y, NULL, 0.3);
+        drape_bvh_fit(&tree, y, k % 2 ? x : NULL);
+        drape_bvh_query(&tree, &box, note, &f);
+        for (int32_t e = 0; e < 200; e++) {
+            drape_box own = drape_box_of(edge + 2 * e, 2, y, k % 2 ? x : NULL, 0);
+            bool meets = true;
+            int times = 0;
+            for (int i = 0; i < 3; i++)
+                meets = meets && own.low[i] <= box.high[i] && box.low[i] <= own.high[i];
+            for (int i = 0; i < f.count; i++)
+                times += f.elements[i] == e;
+            ck_assert_int_eq(times, meets);
+        }
+    }
+    drape_bvh_free(ctx, &tree);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+SUITE("contact", test_triangle, test_segments, test_parallel, test_mollified_away, test_barrier, test_way,
+      test_tree)
