@@ -49,7 +49,7 @@ struct drape_contact {
     double start_least; /* the smallest feature gap that a collider had, at most 0 [m] */
     double *on_collider; /* (collider_count x 3) */
     drape_status status; /* of the search */
-    double seconds;
+    double seconds, search_seconds;
 };
 
 /* ---- Making and freeing ---- */
@@ -126,6 +126,11 @@ size_t drape_contact_bytes(const drape_contact *c)
 double drape_contact_seconds(const drape_contact *c)
 {
     return c ? c->seconds : 0;
+}
+
+double drape_contact_search_seconds(const drape_contact *c)
+{
+    return c ? c->search_seconds : 0;
 }
 
 /* A list with room for one more; it doubles. The contents are kept. */
@@ -257,6 +262,7 @@ static void search_surfaces(drape_contact *c)
 
 static drape_status search(drape_contact *c)
 {
+    double start = drape_clock_seconds();
     c->count = 0;
     c->status = DRAPE_OK;
     search_surfaces(c);
@@ -264,6 +270,7 @@ static drape_status search(drape_contact *c)
     memcpy(c->searched, c->x, 3 * (size_t)c->search.points * sizeof *c->x);
     memcpy(c->searched_pose, c->pose, (size_t)c->model->collider_count * sizeof *c->pose);
     c->moved = 0;
+    c->search_seconds += drape_clock_seconds() - start;
     c->known = c->status == DRAPE_OK;
     return c->status;
 }
@@ -624,7 +631,9 @@ static void follow(void *user, const drape_pair *pair)
 static void travel(drape_contact *c, journey *j)
 {
     if (moved_since_search(c, j->x) > c->margin || moved_since_search(c, j->y) > c->margin) {
+        double start = drape_clock_seconds();
         drape_search_pairs(&c->search, j->x, j->y, -c->search.most_distance, follow, j);
+        c->search_seconds += drape_clock_seconds() - start;
         return;
     }
     for (int32_t i = 0; i < c->count; i++)

@@ -25,7 +25,8 @@ typedef struct drape_contact_at {
 drape_status drape_contact_create(drape_context *ctx, const drape_model *model, drape_contact **out);
 void drape_contact_destroy(drape_contact **contact);
 size_t drape_contact_bytes(const drape_contact *contact);
-double drape_contact_seconds(const drape_contact *contact); /* spent in all functions here */
+double drape_contact_seconds(const drape_contact *contact);        /* spent in all functions here */
+double drape_contact_search_seconds(const drape_contact *contact); /* of that, in the broad phase */
 
 /* A step begins at the state x, v at time t: lagged friction takes its normal forces here, and what follows
  * is compared with it. The arrays are copied. Errors: DRAPE_E_MEMORY. */
