@@ -241,16 +241,34 @@ static double search_along(drape_newton *s, const double *p, double start)
     return low > 0 ? low : a;
 }
 
+/* The positive part of the matrix at the present iterate, factored. */
+static drape_status factor_positive(drape_newton *s)
+{
+    s->positive = true;
+    drape_status status = assemble(s, N_VGetArrayPointer(s->unknown));
+    return status ? status : drape_sun_linear_factor(s->linear);
+}
+
+/* A matrix that is not definite leads nowhere good; its positive part does, and takes no LU factors. */
+static int factor_or_repair(SUNLinearSolver solver, SUNMatrix matrix)
+{
+    (void)matrix;
+    drape_sun_linear *linear = solver->content;
+    drape_newton *s = linear->owner;
+    linear->definite = !s->positive;
+    drape_status status = drape_sun_linear_factor(linear);
+    bool refused = status == DRAPE_RETRY_LINEAR && linear->definite;
+    linear->definite = false;
+    return refused ? factor_positive(s) : status;
+}
+
 /* A correction that climbs is none: the matrix was indefinite. Its positive part gives one that descends. */
 static drape_status descend(drape_newton *s, N_Vector x, N_Vector b)
 {
     double *p = N_VGetArrayPointer(x), *minus_f = N_VGetArrayPointer(b);
     if (dot(minus_f, p, s->n) > 0 || s->positive)
         return DRAPE_OK;
-    s->positive = true;
-    drape_status status = assemble(s, N_VGetArrayPointer(s->unknown));
-    if (!status)
-        status = s->linear->solver->ops->setup(s->linear->solver, s->linear->matrix);
+    drape_status status = factor_positive(s);
     return status ? status : drape_sun_linear_solve(s->linear, minus_f, p);
 }
 
@@ -359,6 +377,8 @@ drape_status drape_newton_create(drape_context *ctx, drape_system *system, const
     if (!status && s->n > 0 && (s->ahead || s->trial)) {
         s->linear->owner = s;
         s->linear->solver->ops->solve = solve_and_globalize;
+        if (s->trial)
+            s->linear->solver->ops->setup = factor_or_repair;
     }
     if (!status && s->n > 0 && !configure(s))
         status =

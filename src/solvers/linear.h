@@ -31,6 +31,9 @@ struct drape_linear_ops {
     /* Takes the values (pattern->nonzeros). DRAPE_OK, or DRAPE_RETRY_LINEAR: singular to working precision,
      * or not finite. */
     drape_status (*factor)(void *state, const double *values);
+    /* The same, but a symmetric matrix that is not positive definite is refused with DRAPE_RETRY_LINEAR, for
+     * callers that have another one then. NULL: it cannot tell, or it costs no more. */
+    drape_status (*factor_definite)(void *state, const double *values);
     /* x = A^-1 b, b untouched. */
     drape_status (*solve)(void *state, const double *b, double *x);
     void (*destroy)(void **state);

@@ -64,6 +64,12 @@ static drape_status factor(void *state, const double *values)
     return s->row->factor(s->solver, values);
 }
 
+static drape_status factor_definite(void *state, const double *values)
+{
+    auto_state *s = state;
+    return (s->row->factor_definite ? s->row->factor_definite : s->row->factor)(s->solver, values);
+}
+
 static drape_status solve(void *state, const double *b, double *x)
 {
     auto_state *s = state;
@@ -97,6 +103,7 @@ const drape_linear_ops drape_linear_auto = {
     .reference = "bench/linears",
     .create = create,
     .factor = factor,
+    .factor_definite = factor_definite,
     .solve = solve,
     .destroy = destroy,
     .bytes = bytes,

@@ -404,19 +404,35 @@ static bool factor_lower(cholmod_state *s)
            cholmod_l_rcond(s->factor, &s->common) > MIN_RCOND;
 }
 
-static drape_status factor(void *state, const double *values)
+/* By klu, what is not for a Cholesky factor. */
+static drape_status factor_general(cholmod_state *s, const double *values)
 {
-    cholmod_state *s = state;
-    s->factored = s->by_general = false;
-    if (!drape_all_finite(values, (size_t)s->pattern->nonzeros))
-        return DRAPE_RETRY_LINEAR;
-    s->factored = read_diagonal(s, values) && copy_values(s, values) && factor_lower(s);
-    if (s->factored)
-        return DRAPE_OK;
     s->fallbacks++;
     drape_status status = drape_linear_klu.factor(s->general, values);
     s->factored = s->by_general = !status;
     return status;
+}
+
+static drape_status factor_any(cholmod_state *s, const double *values, bool definite)
+{
+    s->factored = s->by_general = false;
+    if (!drape_all_finite(values, (size_t)s->pattern->nonzeros))
+        return DRAPE_RETRY_LINEAR;
+    bool positive = read_diagonal(s, values), symmetric = positive && copy_values(s, values);
+    s->factored = symmetric && factor_lower(s);
+    if (s->factored)
+        return DRAPE_OK;
+    return definite && (symmetric || !positive) ? DRAPE_RETRY_LINEAR : factor_general(s, values);
+}
+
+static drape_status factor(void *state, const double *values)
+{
+    return factor_any(state, values, false);
+}
+
+static drape_status factor_definite(void *state, const double *values)
+{
+    return factor_any(state, values, true);
 }
 
 /* ---- Solutions ---- */
@@ -479,6 +495,7 @@ const drape_linear_ops drape_linear_cholmod = {
     .borrows_heap = true, /* the update of the largest supernode, and what OpenMP needs for a loop */
     .create = create,
     .factor = factor,
+    .factor_definite = factor_definite,
     .solve = solve,
     .destroy = destroy,
     .bytes = bytes,

@@ -35,16 +35,22 @@ static int keep_solver(SUNLinearSolver solver)
     return 0;
 }
 
+drape_status drape_sun_linear_factor(drape_sun_linear *linear)
+{
+    double start = drape_clock_seconds();
+    bool refuses = linear->definite && linear->ops->factor_definite;
+    linear->status =
+        (refuses ? linear->ops->factor_definite : linear->ops->factor)(linear->state, linear->values);
+    linear->factor_seconds += drape_clock_seconds() - start;
+    linear->factorizations++;
+    return linear->status;
+}
+
 /* SUNDIALS wants 0, > 0 recoverable, < 0 fatal: the signs of drape_status. */
 static int setup(SUNLinearSolver solver, SUNMatrix matrix)
 {
     (void)matrix;
-    drape_sun_linear *linear = solver->content;
-    double start = drape_clock_seconds();
-    linear->status = linear->ops->factor(linear->state, linear->values);
-    linear->factor_seconds += drape_clock_seconds() - start;
-    linear->factorizations++;
-    return linear->status;
+    return drape_sun_linear_factor(solver->content);
 }
 
 drape_status drape_sun_linear_solve(drape_sun_linear *linear, const double *b, double *x)

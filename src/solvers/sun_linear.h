@@ -21,6 +21,7 @@ typedef struct drape_sun_linear {
     double *values; /* (nonzeros) where the Jacobian is assembled */
     SUNLinearSolver solver;
     SUNMatrix matrix;
+    bool definite; /* the next factorisations refuse what is not positive definite, where the row can tell */
     int64_t factorizations, solves;
     double factor_seconds, solve_seconds;
     drape_status status; /* of the last factor or solve */
@@ -33,6 +34,9 @@ drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const d
  * it can only be destroyed, or adopt again. */
 drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_pattern *pattern);
 void drape_sun_linear_destroy(drape_sun_linear **linear);
+
+/* Factors the values, time and work counted: what the SUNLinearSolver does. */
+drape_status drape_sun_linear_factor(drape_sun_linear *linear);
 
 /* x = A^-1 b with the factors there are, time and work counted: what the SUNLinearSolver does. */
 drape_status drape_sun_linear_solve(drape_sun_linear *linear, const double *b, double *x);
