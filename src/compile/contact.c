@@ -121,6 +121,7 @@ static drape_status resolve_self_contact(drape_model *model, const drape_scene_d
     model->contact.self = true;
     model->contact.self_thickness = values[DRAPE_SELF_THICKNESS];
     model->contact.self_friction = values[DRAPE_SELF_FRICTION];
+    model->has_dissipation = model->has_dissipation || model->contact.self_friction > 0;
     return DRAPE_OK;
 }
 
