@@ -200,4 +200,63 @@ START_TEST(cloth_on_cloth)
 }
 END_TEST
 
-SUITE("contact_system", colliders_of_every_row, cloth_on_cloth)
+/* A point that is no number leaves nothing behind: the next one is what it was. */
+START_TEST(nan_is_forgotten)
+{
+    scene s = scene_model(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, 'height': "
+        "0.3},"
+        " 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}],"
+        " 'self_contact': {'thickness': 2e-3}, 'contact': {'distance': 4e-3}, 'colliders': ["
+        " {'type': 'box', 'center': [0.1,-0.1,-0.1], 'size': [0.2,0.2,0.2], 'friction': 0.4},"
+        " {'type': 'sphere', 'center': [0.1,-0.1,-0.1], 'radius': 0.1, 'friction': 0.4}], 'duration': 1}");
+    probe t = open_probe(s, 2e-3, 3);
+    const size_t n = 3 * (size_t)s.model->node_count;
+    drape_point point = {.x = t.at.x, .v = t.at.v, .internal = t.at.internal, .t = 0.01, .span = {0, 0.01}};
+    double gap;
+    drape_system_force(t.system, &point, t.g[0]);
+    ck_assert_int_gt(drape_contact_active((drape_contact *)(uintptr_t)drape_system_contact(t.system), &gap),
+                     0);
+    for (size_t broken = 0; broken < n; broken += 7) {
+        const char *reason = "";
+        drape_worst worst;
+        memcpy(t.x, t.at.x, n * sizeof *t.x);
+        t.x[broken] = broken % 2 ? NAN : INFINITY;
+        point.x = t.x;
+        drape_system_force(t.system, &point, t.g[1]);
+        drape_system_way(t.system, t.at.x, t.x, 0.01);
+        drape_system_crosses(t.system, t.x, 0.01);
+        drape_system_check_contact(t.system, t.x, 0.01, &reason, &worst);
+        point.x = t.at.x;
+        drape_system_force(t.system, &point, t.g[1]);
+        ck_assert_int_eq(memcmp(t.g[0], t.g[1], n * sizeof *t.g[0]), 0);
+    }
+    ck_assert_int_eq(drape_system_status(t.system), DRAPE_OK);
+    close_probe(&t);
+}
+END_TEST
+
+/* No collider and no self-contact: no time, no memory, nothing. */
+START_TEST(who_has_none_pays_nothing)
+{
+    static const char *const rows[] = {"be", "bdf2", "midpoint", "trbdf2", "ida", "static", "verlet"};
+    for (size_t k = 0; k < 2 * sizeof rows / sizeof *rows; k++) {
+        const bool there = k % 2;
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, "
+            "'height':"
+            " 0.3}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200},"
+            " 'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'row': 0}]}]%s,"
+            " 'integrator': {'method': '%s', 'dt': 0.01, 'substeps': 100}, 'duration': 1}",
+            there ? ", 'colliders': [{'type': 'plane', 'point': [0,-1,0], 'normal': [0,1,0]}]" : "",
+            rows[k / 2]);
+        scene_advance(&s, 0.02);
+        const double seconds = drape_sim_statistics(s.sim).wall_contact;
+        ck_assert_msg(there ? seconds > 0 : seconds == 0, "%s: %g s", rows[k / 2], seconds);
+        ck_assert(there || !drape_system_contact(s.sim->system));
+        scene_close(&s);
+    }
+}
+END_TEST
+
+SUITE("contact_system", colliders_of_every_row, cloth_on_cloth, nan_is_forgotten, who_has_none_pays_nothing)
