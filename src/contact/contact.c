@@ -672,28 +672,30 @@ static double march_all(const drape_contact *c, const double *x, const double *y
     return way;
 }
 
-static double way(drape_contact *c, const double *x, const double *y, double t, double keep, bool core)
+double drape_contact_way(drape_contact *c, const double *x, const double *y, double t)
 {
     double start = drape_clock_seconds();
     const double span[2] = {t, t};
     pose_colliders(c, t, span);
     fill_points(c, x, c->x);
     fill_points(c, y, c->y);
-    journey j = {.contact = c, .x = c->x, .y = c->y, .keep = keep, .way = 1, .core = core};
+    journey j = {.contact = c, .x = c->x, .y = c->y, .keep = KEEP_ITERATE, .way = 1};
     travel(c, &j);
+    double share = fmin(j.way, march_all(c, x, y, KEEP_ITERATE));
     c->seconds += drape_clock_seconds() - start;
-    return j.way;
-}
-
-double drape_contact_way(drape_contact *c, const double *x, const double *y, double t)
-{
-    double share = way(c, x, y, t, KEEP_ITERATE, false);
-    return fmin(share, march_all(c, x, y, KEEP_ITERATE));
+    return share;
 }
 
 bool drape_contact_crosses(drape_contact *c, const double *y, double t)
 {
-    return way(c, c->start, y, t, KEEP_STEP, true) < 1;
+    double start = drape_clock_seconds();
+    const double span[2] = {t, t};
+    pose_colliders(c, t, span);
+    fill_points(c, y, c->y);
+    journey j = {.contact = c, .x = c->start, .y = c->y, .keep = KEEP_STEP, .way = 1, .core = true};
+    travel(c, &j);
+    c->seconds += drape_clock_seconds() - start;
+    return j.way < 1;
 }
 
 /* ---- The end of a step ---- */

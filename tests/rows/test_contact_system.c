@@ -2,6 +2,7 @@
  * test_contact_system.c: the Jacobian of the whole system with active contacts against differences of its force,
  * for every row of the colliders, resting and moving, with implicit and lagged friction, and for cloth on cloth.
  */
+#include "assemble/check.h"
 #include "rows/models.h"
 #include "support/scene.h"
 
@@ -236,6 +237,33 @@ START_TEST(nan_is_forgotten)
 }
 END_TEST
 
+/* `drape check` looks at contact where a scene has it, and only there. */
+START_TEST(contact_has_rows_of_its_own)
+{
+    static const char *const more[] = {
+        "", ", 'colliders': [{'type': 'box', 'center': [0,-1,0], 'size': [0.2,0.2,0.2], 'friction': 0.4}]",
+        ", 'self_contact': {'thickness': 2e-3, 'friction': 0.2}, 'contact': {'friction': 'lagged'}"};
+    static drape_check_row found[DRAPE_MAX_CHECK_ROWS];
+    for (int k = 0; k < 3; k++) {
+        scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 7, "
+                             "'width': 0.3, 'height':"
+                             " 0.3}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200},"
+                             " 'terms': ['stretch.edge']}]%s, 'duration': 1}",
+                             more[k]);
+        int count = 0, contact = 0, self = 0;
+        ck_assert_int_eq(drape_check_derivatives(s.ctx, s.sim->system, 1, found, &count), DRAPE_OK);
+        for (int i = 0; i < count; i++) {
+            ck_assert_msg(found[i].pass, "%s %s: %g", found[i].term, found[i].what, found[i].error);
+            contact += strcmp(found[i].term, "contact") == 0 && found[i].error > 0;
+            self += strcmp(found[i].term, "self_contact") == 0 && found[i].error > 0;
+        }
+        ck_assert_int_eq(contact, k == 1 ? 2 : 0);
+        ck_assert_int_eq(self, k == 2 ? 2 : 0);
+        scene_close(&s);
+    }
+}
+END_TEST
+
 /* No collider and no self-contact: no time, no memory, nothing. */
 START_TEST(who_has_none_pays_nothing)
 {
@@ -259,4 +287,5 @@ START_TEST(who_has_none_pays_nothing)
 }
 END_TEST
 
-SUITE("contact_system", colliders_of_every_row, cloth_on_cloth, nan_is_forgotten, who_has_none_pays_nothing)
+SUITE("contact_system", colliders_of_every_row, cloth_on_cloth, nan_is_forgotten, contact_has_rows_of_its_own,
+      who_has_none_pays_nothing)
