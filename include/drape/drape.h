@@ -397,7 +397,8 @@ typedef struct drape_event {
     const drape_attempt *attempt; /* ATTEMPT only */
     int64_t frame;                /* FRAME: its number from 0 */
     double time;                  /* FRAME [s] */
-    const double *positions;      /* FRAME: node_count x 3 [m]; cubic Hermite between the steps around it */
+    const double *positions; /* FRAME: node_count x 3 [m]; cubic Hermite between the steps around it, or the
+                                     straight way, or the nearer of them, where that leads through something */
 } drape_event;
 
 /* Called within drape_sim_advance. Returns 0 to go on, anything else to stop: the advance then returns

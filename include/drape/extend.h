@@ -221,6 +221,7 @@ typedef struct drape_collider_shape {
     int32_t *segment;  /* (segment_count x 2) numbers of points */
     int32_t *triangle; /* (triangle_count x 3) numbers of points, counterclockwise from outside */
     double radius;     /* [m] */
+    bool inscribed;    /* of a convex body: its points and segments stay inside of a curved surface */
     const void *kept;  /* what the row keeps for its distance, of drape_shape_take; NULL for nothing */
     struct drape_shape_builder
         *builder; /* of the functions below; NULL outside of the row's function shape */

@@ -8,6 +8,9 @@
  * 1e-16/1e-5. Barriers change over lengths far below that size, so shorter steps are tried, too, and the best
  * counts: a wrong derivative is wrong at all of them. Where a barrier begins its gradient is as small as one
  * likes, so an element's error is relative to no less than a millionth of the term's largest entry.
+ *
+ * Contact is looked at where there is some: the sheet is moved until its deepest node lies half of the activation
+ * distance off a collider, or folded onto itself; steps are relative to that distance.
  */
 #include "assemble/check.h"
 
@@ -25,6 +28,9 @@
 #define GRADIENT_LIMIT   1e-7
 #define HESSIAN_LIMIT    1e-6
 #define INVARIANCE_LIMIT 1e-9
+#define CONTACT_STEP     1e-4 /* of the distance over which contact acts; */
+#define APPROACHES       20   /* moves of the sheet towards a collider */
+#define FOLD_SHIFT       0.07 /* of a layer's way: no edge lies exactly on another */
 
 typedef struct checker {
     drape_system *system;
@@ -33,7 +39,10 @@ typedef struct checker {
     double size, step; /* [m] */
     double *x, *v, *internal, *history;
     double *x2, *v2, *g1, *g2, *direction; /* scratch, nodes */
-    double *values;                        /* a Jacobian */
+    double *values;                        /* a Jacobian in the system's pattern */
+    size_t room;                           /* of values */
+    drape_context *ctx;
+    drape_arena *arena;
     drape_check_row *rows;
     int row_count;
 } checker;
@@ -294,31 +303,53 @@ static void move(checker *c, double s, double weight)
     }
 }
 
+/* Room for a Jacobian at a point, whatever contact couples there. */
+static drape_status fit(checker *c, const drape_point *point)
+{
+    bool changed;
+    drape_status status = drape_system_fit(c->system, point, &changed);
+    size_t nonzeros = (size_t)drape_system_pattern(c->system)->nonzeros;
+    if (status || (c->values && nonzeros <= c->room))
+        return status;
+    c->values = drape_arena_take(c->arena, c->ctx, nonzeros, sizeof(double));
+    c->room = nonzeros;
+    return c->values ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
 /* y = J p over the free DOFs, into y (nodes). */
 static void multiply(const checker *c, double *y)
 {
     const drape_model *m = c->model;
+    const drape_pattern *pattern = drape_system_pattern(c->system);
     memset(y, 0, 3 * (size_t)m->node_count * sizeof *y);
-    for (int64_t j = 0; j < m->pattern.n; j++) {
+    for (int64_t j = 0; j < pattern->n; j++) {
         double p = c->direction[3 * (int64_t)m->node_of_free[j / 3] + j % 3];
-        for (int64_t k = m->pattern.column[j]; k < m->pattern.column[j + 1]; k++) {
-            int64_t i = m->pattern.row[k];
+        for (int64_t k = pattern->column[j]; k < pattern->column[j + 1]; k++) {
+            int64_t i = pattern->row[k];
             y[3 * (int64_t)m->node_of_free[i / 3] + i % 3] += c->values[k] * p;
         }
     }
 }
 
+/* Which force a Jacobian is of. */
+typedef void force(drape_system *system, const drape_point *point, double *g);
+
+static void contact_force(drape_system *system, const drape_point *point, double *g)
+{
+    drape_system_contact_part(system, point, true, g, NULL);
+}
+
 /* Error of the Jacobian in c->values along c->direction, with the step as it stands. point is c's. */
-static double direction_error(checker *c, drape_point point)
+static double direction_error(checker *c, drape_point point, force *of)
 {
     const drape_model *m = c->model;
     size_t n = 3 * (size_t)m->node_count;
     point.x = c->x2;
     point.v = c->v2;
     move(c, c->step, point.weight);
-    drape_system_force(c->system, &point, c->g1);
+    of(c->system, &point, c->g1);
     move(c, -c->step, point.weight);
-    drape_system_force(c->system, &point, c->g2);
+    of(c->system, &point, c->g2);
     for (size_t i = 0; i < n; i++)
         c->g1[i] = m->pinned[i / 3] ? 0 : (c->g1[i] - c->g2[i]) / (2 * c->step);
     multiply(c, c->g2);
@@ -326,22 +357,145 @@ static double direction_error(checker *c, drape_point point)
     return ratio(largest_difference(c->g1, c->g2, n), scale);
 }
 
-static double jacobian_error(checker *c, double weight, const double *history)
+static void choose_direction(checker *c)
 {
-    const drape_point point = {
-        .x = c->x, .v = c->v, .internal = c->internal, .weight = weight, .history = history};
+    for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++)
+        c->direction[i] = uniform(c);
+}
+
+/* Of the Jacobian in c->values, over all directions. */
+static double worst_direction(checker *c, const drape_point *point, force *of)
+{
     double worst = 0, step = c->step;
-    drape_system_jacobian(c->system, &point, 0, false, c->values);
     for (int r = 0; r < DIRECTIONS; r++) {
         double best = INFINITY;
-        for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++)
-            c->direction[i] = uniform(c);
+        choose_direction(c);
         for (int k = 0; k < STEPS; k++, c->step *= SHORTER_STEP)
-            best = fmin(best, direction_error(c, point));
+            best = fmin(best, direction_error(c, *point, of));
         c->step = step;
         worst = fmax(worst, best);
     }
     return worst;
+}
+
+static drape_status check_jacobian(checker *c, const char *what, double weight, const double *history)
+{
+    const drape_point point = {
+        .x = c->x, .v = c->v, .internal = c->internal, .weight = weight, .history = history};
+    drape_status status = fit(c, &point);
+    if (status)
+        return status;
+    drape_system_jacobian(c->system, &point, 0, false, c->values);
+    report(c, "assembled", what, worst_direction(c, &point, drape_system_force), HESSIAN_LIMIT);
+    return DRAPE_OK;
+}
+
+/* ---- Contact ---- */
+
+/* Moves all nodes until the deepest free one lies `gap` off a collider. */
+static void approach(checker *c, const drape_collider *collider, double gap)
+{
+    const drape_model *m = c->model;
+    const drape_collider_pose pose = drape_collider_pose_at(collider, 0);
+    for (int k = 0; k < APPROACHES; k++) {
+        double least = INFINITY, normal[3] = {0}, n[3];
+        for (int32_t i = 0; i < m->free_count; i++) {
+            double d =
+                drape_collider_distance(collider, &pose, c->x + 3 * (size_t)m->node_of_free[i], n, NULL);
+            if (d < least) {
+                least = d;
+                memcpy(normal, n, sizeof normal);
+            }
+        }
+        for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
+            c->x[i] += (gap - least) * normal[i % 3];
+    }
+}
+
+/* Folds the rest positions in the middle of their longest side, layers `gap` apart along the shortest. */
+static void fold(checker *c, double gap)
+{
+    const drape_model *m = c->model;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    int a = 0, b = 0;
+    for (size_t i = 0; i < 3 * (size_t)m->node_count; i++) {
+        low[i % 3] = fmin(low[i % 3], m->rest[i]);
+        high[i % 3] = fmax(high[i % 3], m->rest[i]);
+    }
+    for (int k = 1; k < 3; k++) {
+        a = high[k] - low[k] > high[a] - low[a] ? k : a;
+        b = high[k] - low[k] < high[b] - low[b] ? k : b;
+    }
+    for (size_t i = 0; i < (size_t)m->node_count; i++) {
+        double *x = c->x + 3 * i, side = m->rest[3 * i + (size_t)a] - (low[a] + high[a]) / 2;
+        for (int k = 0; k < 3; k++)
+            x[k] = m->rest[3 * i + (size_t)k] + 0.1 * gap * uniform(c);
+        if (side > 0) {
+            x[a] -= (2 - FOLD_SHIFT) * side;
+            x[b] += gap;
+        }
+    }
+}
+
+/* Energy, force and Jacobian of contact alone, where c->x is. */
+static drape_status compare_contact(checker *c, double distance, errors *worst)
+{
+    drape_state state = {.x = c->x, .v = c->v};
+    drape_point point = {.x = c->x, .v = c->v, .internal = c->internal, .weight = 60};
+    size_t n = 3 * (size_t)c->model->node_count;
+    drape_status status = drape_system_begin(c->system, &state);
+    if (!status)
+        status = fit(c, &point);
+    if (status)
+        return status;
+    double step = c->step, best = INFINITY;
+    c->step = CONTACT_STEP * distance;
+    drape_system_contact_part(c->system, &point, true, NULL, c->values);
+    worst->hessian = fmax(worst->hessian, worst_direction(c, &point, contact_force));
+    drape_system_contact_part(c->system, &point, false, c->g1, NULL);
+    double along = 0, scale = largest(c->g1, n);
+    for (size_t i = 0; i < n; i++)
+        along += c->model->pinned[i / 3] ? 0 : c->g1[i] * c->direction[i];
+    point.x = c->x2;
+    for (int k = 0; k < STEPS; k++, c->step *= SHORTER_STEP) {
+        move(c, c->step, 0);
+        double after = drape_system_contact_energy(c->system, &point);
+        move(c, -c->step, 0);
+        double before = drape_system_contact_energy(c->system, &point);
+        best = fmin(best, ratio(fabs((after - before) / (2 * c->step) - along), scale));
+    }
+    worst->gradient = fmax(worst->gradient, best);
+    c->step = step;
+    return DRAPE_OK;
+}
+
+static void report_contact(checker *c, const char *name, errors worst)
+{
+    report(c, name, "gradient", worst.gradient, HESSIAN_LIMIT); /* gaps have the rounding of positions */
+    report(c, name, "Jacobian with friction", worst.hessian, HESSIAN_LIMIT);
+}
+
+static drape_status check_contact(checker *c, const drape_state *rest)
+{
+    const drape_contact_def *def = &c->model->contact;
+    drape_status status = DRAPE_OK;
+    errors worst = {0};
+    if (!drape_system_contact(c->system))
+        return status;
+    for (int32_t k = 0; !status && k < c->model->collider_count; k++) {
+        make_state(c, rest);
+        approach(c, &c->model->colliders[k], def->distance / 2);
+        status = compare_contact(c, def->distance, &worst);
+    }
+    if (!status && c->model->collider_count > 0)
+        report_contact(c, "contact", worst);
+    if (status || !def->self)
+        return status;
+    worst = (errors){0};
+    fold(c, def->self_thickness);
+    status = compare_contact(c, def->self_thickness, &worst);
+    report_contact(c, "self_contact", worst);
+    return status;
 }
 
 /* ---- All of it
@@ -357,8 +511,9 @@ static bool allocate(checker *c, drape_context *ctx, drape_arena *arena)
             return false;
     c->internal = drape_arena_take(arena, ctx, (size_t)c->model->internal_count, sizeof(double));
     c->history = drape_arena_take(arena, ctx, measures, sizeof(double));
-    c->values = drape_arena_take(arena, ctx, (size_t)c->model->pattern.nonzeros, sizeof(double));
-    return c->internal && c->history && c->values;
+    c->ctx = ctx;
+    c->arena = arena;
+    return c->internal && c->history;
 }
 
 static void check_terms(checker *c)
@@ -389,10 +544,13 @@ drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, u
     if (!status) {
         make_state(&c, &rest);
         check_terms(&c);
-        report(&c, "assembled", "Jacobian in a step", jacobian_error(&c, 60, c.history), HESSIAN_LIMIT);
-        report(&c, "assembled", "Jacobian in continuous time", jacobian_error(&c, 60, NULL), HESSIAN_LIMIT);
-        *row_count = c.row_count;
+        status = check_jacobian(&c, "Jacobian in a step", 60, c.history);
     }
+    if (!status)
+        status = check_jacobian(&c, "Jacobian in continuous time", 60, NULL);
+    if (!status)
+        status = check_contact(&c, &rest);
+    *row_count = c.row_count;
     drape_arena_free(&arena, ctx);
     return status;
 }

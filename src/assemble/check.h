@@ -5,7 +5,7 @@
 #include "assemble/system.h"
 
 typedef struct drape_check_row {
-    const char *term; /* name of the row, or "assembled" */
+    const char *term; /* name of the row, "contact", "self_contact" or "assembled" */
     const char *what; /* "gradient", "Hessian", "force by rate" ... */
     double error;     /* largest over the sample, relative */
     double limit;
@@ -14,8 +14,9 @@ typedef struct drape_check_row {
 
 #define DRAPE_MAX_CHECK_ROWS 1024
 
-/* Fills rows (DRAPE_MAX_CHECK_ROWS) for the terms of the system's model. seed: of the deformation. Errors:
- * DRAPE_E_MEMORY; a failed comparison is no error, its row says so. */
+/* Fills rows (DRAPE_MAX_CHECK_ROWS) for the terms of the system's model, and for its contact. seed: of the
+ * deformation. The system's pattern may be another one since: no sim goes on with it. Errors: DRAPE_E_MEMORY; a
+ * failed comparison is no error, its row says so. */
 drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, unsigned seed,
                                      drape_check_row *rows, int *row_count);
 

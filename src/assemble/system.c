@@ -187,7 +187,7 @@ static drape_status widen(drape_system *system)
     drape_free(system->ctx, couplings);
     if (!status)
         status = place_terms(system);
-    if (status)
+    if (status) /* the model's own again, which is another one than before, too */
         forget_wider(system);
     else
         system->pattern = &system->wider;
@@ -600,6 +600,21 @@ void drape_system_damping(drape_system *system, const drape_point *point, double
 double drape_system_contact_energy(drape_system *system, const drape_point *point)
 {
     return place_contact(system, point) ? drape_contact_potential(system->contact) : 0;
+}
+
+void drape_system_contact_part(drape_system *system, const drape_point *point, bool friction, double *g,
+                               double *values)
+{
+    if (g)
+        memset(g, 0, 3 * (size_t)system->model->node_count * sizeof *g);
+    if (values)
+        memset(values, 0, (size_t)system->pattern->nonzeros * sizeof *values);
+    if (!place_contact(system, point))
+        return;
+    if (g)
+        drape_contact_add_forces(system->contact, true, friction, g);
+    if (values)
+        drape_contact_add_jacobian(system->contact, point->weight, false, false, system->pattern, values);
 }
 
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity)

@@ -74,6 +74,11 @@ const double *drape_system_on_colliders(const drape_system *system);
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity);
 double drape_system_contact_energy(drape_system *system, const drape_point *point);
 
+/* Contact alone, for checks: g (node_count x 3), of the energy or with friction too, and its J in values
+ * (pattern.nonzeros, of drape_system_fit at this point), are overwritten; either may be NULL. */
+void drape_system_contact_part(drape_system *system, const drape_point *point, bool friction, double *g,
+                               double *values);
+
 /* The largest fraction of the way from nodes x to y on which no two pieces pass through each other, colliders
  * resting where they are at time t. */
 double drape_system_way(drape_system *system, const double *x, const double *y, double t);

@@ -107,6 +107,7 @@ static drape_status make_shape(const double *values, double tolerance, drape_col
     if (!status)
         fill_prism(shape->kept, core, sides, shape);
     shape->radius = values[ROUNDING];
+    shape->inscribed = true;
     return status;
 }
 

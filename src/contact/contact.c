@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "base/vec3.h"
+#include "contact/depth.h"
 #include "model/track.h"
 
 #include <math.h>
@@ -674,28 +675,30 @@ static double march_all(const drape_contact *c, const double *x, const double *y
     return way;
 }
 
-static double way(drape_contact *c, const double *x, const double *y, double t, double keep, bool core)
+double drape_contact_way(drape_contact *c, const double *x, const double *y, double t)
 {
     double start = drape_clock_seconds();
     const double span[2] = {t, t};
     pose_colliders(c, t, span);
     fill_points(c, x, c->x);
     fill_points(c, y, c->y);
-    journey j = {.contact = c, .x = c->x, .y = c->y, .keep = keep, .way = 1, .core = core};
+    journey j = {.contact = c, .x = c->x, .y = c->y, .keep = KEEP_ITERATE, .way = 1};
     travel(c, &j);
+    double share = fmin(j.way, march_all(c, x, y, KEEP_ITERATE));
     c->seconds += drape_clock_seconds() - start;
-    return j.way;
-}
-
-double drape_contact_way(drape_contact *c, const double *x, const double *y, double t)
-{
-    double share = way(c, x, y, t, KEEP_ITERATE, false);
-    return fmin(share, march_all(c, x, y, KEEP_ITERATE));
+    return share;
 }
 
 bool drape_contact_crosses(drape_contact *c, const double *y, double t)
 {
-    return way(c, c->start, y, t, KEEP_STEP, true) < 1;
+    double start = drape_clock_seconds();
+    const double span[2] = {t, t};
+    pose_colliders(c, t, span);
+    fill_points(c, y, c->y);
+    journey j = {.contact = c, .x = c->start, .y = c->y, .keep = KEEP_STEP, .way = 1, .core = true};
+    travel(c, &j);
+    c->seconds += drape_clock_seconds() - start;
+    return j.way < 1;
 }
 
 /* ---- The end of a step ---- */
@@ -741,6 +744,39 @@ static drape_status check_depth(drape_contact *c, const char **reason, drape_wor
     }
     *reason = most > 0 ? "penetration" : *reason;
     return most > 0 ? DRAPE_RETRY_REJECTED : DRAPE_OK;
+}
+
+/* Depth of an edge (two nodes) or a face (three) of cloth, now or where the step began. */
+static double depth_of(const drape_contact *c, int32_t collider, const int32_t *node, int nodes, bool start)
+{
+    const drape_collider *of = &c->model->colliders[collider];
+    const drape_collider_pose *pose = start ? &c->start_pose[collider] : &c->pose[collider];
+    const double *x = start ? c->start : c->x, *corner[3], enough = start ? INFINITY : -TOUCH;
+    for (int a = 0; a < nodes; a++)
+        corner[a] = x + 3 * (size_t)node[a];
+    return nodes == 2 ? drape_depth_edge(of, pose, corner[0], corner[1], enough)
+                      : drape_depth_face(of, pose, corner, enough);
+}
+
+/* Pieces of cloth against the curved surface of a shape that lies inside of it. As deep as it was before a piece
+ * may be. */
+static drape_status check_inscribed(drape_contact *c, const int32_t *node, int nodes, int32_t count,
+                                    const char **reason, drape_worst *worst)
+{
+    const drape_model *m = c->model;
+    for (int32_t k = 0; k < m->collider_count; k++)
+        for (int32_t i = 0; m->colliders[k].shape.inscribed && i < count; i++) {
+            const int32_t *n = node + (size_t)i * (size_t)nodes;
+            double depth = depth_of(c, k, n, nodes, false), least;
+            if (depth >= -TOUCH || depth >= (least = fmin(0, depth_of(c, k, n, nodes, true)) - TOUCH))
+                continue;
+            drape_pair pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {n[0], n[1], -1, -1}, .collider = k};
+            pair.node[2] = nodes > 2 ? n[2] : -1;
+            *reason = "penetration";
+            *worst = worst_of(c, &pair, "gap [m]", depth, least);
+            return DRAPE_RETRY_REJECTED;
+        }
+    return DRAPE_OK;
 }
 
 static drape_status check_way(drape_contact *c, const char **reason, drape_worst *worst)
@@ -804,6 +840,10 @@ drape_status drape_contact_check(drape_contact *c, const double *x, double t, co
         status = check_depth(c, reason, worst);
     if (!status)
         status = check_surfaces(c, reason, worst);
+    if (!status)
+        status = check_inscribed(c, c->model->edge, 2, c->model->edge_count, reason, worst);
+    if (!status)
+        status = check_inscribed(c, c->model->triangle, 3, c->model->triangle_count, reason, worst);
     if (!status)
         status = check_way(c, reason, worst);
     c->seconds += drape_clock_seconds() - start;

@@ -58,7 +58,7 @@ int32_t drape_contact_couplings(drape_contact *contact, const int32_t **nodes);
 double drape_contact_way(drape_contact *contact, const double *x, const double *y, double t);
 
 /* Whether something passes through something on the straight way from the beginning of the step to y, colliders
- * resting where they are at time t. */
+ * going straight to where they are at time t. */
 bool drape_contact_crosses(drape_contact *contact, const double *y, double t);
 
 /* Compares a step's end, x at time t, with its beginning: DRAPE_OK, or DRAPE_RETRY_REJECTED where something

@@ -8,6 +8,7 @@
 
 #define PARALLEL_WIDTH                                                                                       \
     1e-3                   /* of |e1|^2 |e2|^2 at rest: sin^2 below which edges count less (Li et al. 2020) */
+#define TOUCHING      1e-9 /* [m] nearer than that, positions do not say which side is which */
 #define WAY_SHARE     0.9  /* of the way that is certainly free, taken at once */
 #define MOST_ADVANCES 1000 /* then what was reached is safe, if not all there is */
 
@@ -72,6 +73,30 @@ static bool surface_gap(const drape_pair *pair, const drape_placed *at, bool der
     return true;
 }
 
+/* A sharp feature that touches has no direction of its own: it has that across both pieces, out of the collider.
+ * Normals do not turn there. */
+static void touching_normal(const drape_pair *pair, const drape_placed *at, double x[4][3], drape_gap *gap)
+{
+    const drape_collider *collider = &at->model->colliders[pair->collider];
+    const drape_collider_shape *shape = &collider->shape;
+    double u[3], w[3], out[3], n[3];
+    bool face = pair->kind == DRAPE_PAIR_TRIANGLE;
+    vec3_sub(x[face ? 2 : 1], x[face ? 1 : 0], u);
+    vec3_sub(x[3], x[face ? 1 : 2], w);
+    vec3_cross(u, w, n);
+    double length = vec3_norm(n);
+    for (int k = 0; k < 3; k++)
+        out[k] = x[0][k] - at->pose[pair->collider].displacement[k];
+    for (int32_t i = 0; i < shape->point_count; i++)
+        vec3_add_scaled(-1.0 / shape->point_count, shape->point + 3 * (size_t)i, out);
+    bool cloth_first = pair->node[0] < at->model->node_count;
+    double sign = (vec3_dot(n, out) < 0) == cloth_first ? -1 : 1;
+    for (int k = 0; k < 3 && length > 0; k++)
+        gap->normal[k] = sign * n[k] / length;
+    memset(gap->dc, 0, sizeof gap->dc);
+    memset(gap->dn, 0, sizeof gap->dn);
+}
+
 bool drape_pair_gap(const drape_pair *pair, const drape_placed *at, const double *rest, bool derivatives,
                     drape_gap *gap)
 {
@@ -89,7 +114,9 @@ bool drape_pair_gap(const drape_pair *pair, const drape_placed *at, const double
     gap->points = 4;
     memcpy(gap->c, closest.c, sizeof gap->c);
     memcpy(gap->normal, closest.normal, sizeof gap->normal);
-    if (derivatives) {
+    if (pair->collider >= 0 && closest.distance < TOUCHING) {
+        touching_normal(pair, at, x, gap);
+    } else if (derivatives) {
         drape_closest_derive(x, &closest, &slopes);
         memcpy(gap->dc, slopes.c, sizeof gap->dc);
         memcpy(gap->dn, slopes.normal, sizeof gap->dn);
@@ -139,7 +166,7 @@ double drape_pair_way(const drape_pair *pair, const double *from, const double *
     for (int a = 0; a < 4; a++)
         vec3_sub(y[a], x[a], p[a]);
     double speed = approach_speed(pair->kind, p), gap = gap_at(pair, x, p, 0, radius), least = keep * gap;
-    if (!(speed > 0) || !(gap > 0) || gap > speed)
+    if (!(speed > 0) || !(gap > (pair->collider >= 0 ? TOUCHING : 0)) || gap > speed)
         return 1;
     for (int i = 0; i < MOST_ADVANCES; i++) {
         t += WAY_SHARE * (gap - least) / speed;

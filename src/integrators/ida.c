@@ -106,6 +106,7 @@ typedef struct ida_state {
     double reached;           /* time of IDA's state; NaN: it must start anew */
     double powers[2];         /* [W] taken by dissipation and put in by pins, at the time reached */
     bool nonfinite, crossing; /* why the last residual was refused */
+    drape_status fitted;      /* of the last change of the pattern: < 0 ends the run */
     double second;            /* [s] the second of simulated time that steps are counted in */
     int64_t steps;            /* attempted in it, but for those that end an advance */
     long counted;             /* Newton iterations of IDA that work has already */
@@ -167,17 +168,18 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
 static drape_status fit_pattern(ida_state *s, const drape_point *point)
 {
     bool changed;
-    drape_status status = drape_system_fit(s->system, point, &changed);
-    if (status || !changed)
-        return status;
+    s->fitted = drape_system_fit(s->system, point, &changed);
+    s->linear->stale |= changed;
+    if (s->fitted || !s->linear->stale)
+        return s->fitted;
     const drape_pattern *pattern = drape_system_pattern(s->system);
-    if (s->damping) {
+    if (s->dissipated) {
         drape_free(s->ctx, s->damping);
         s->damping = drape_alloc(s->ctx, (size_t)pattern->nonzeros, sizeof *s->damping);
         if (!s->damping)
-            return DRAPE_E_MEMORY;
+            return s->fitted = DRAPE_E_MEMORY;
     }
-    return drape_sun_linear_adopt(s->linear, pattern);
+    return s->fitted = drape_sun_linear_adopt(s->linear, pattern);
 }
 
 static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_Vector r, SUNMatrix matrix,
@@ -532,12 +534,15 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     drape_status status = prepare(s, in, end, h, info);
     if (!status && s->n > 0) {
         s->crossing = s->nonfinite = false;
+        s->fitted = DRAPE_OK;
         int code = IDASolve(s->ida, end, &t, s->y, s->rate, IDA_ONE_STEP);
         status = status_of(code, s->nonfinite, &info->reason);
         if (status > 0 && s->crossing)
             info->reason = "collision";
         if (drape_system_status(s->system))
             status = drape_system_status(s->system);
+        if (s->fitted < 0)
+            status = s->fitted;
         count_iterations(s, info);
         if (status)
             IDAGetCurrentStep(s->ida, &info->h);

@@ -78,10 +78,10 @@ drape_status drape_implicit_solve(drape_implicit *s, const double *internal, con
     return drape_newton_solve(s->newton, &problem, s->d, info);
 }
 
-/* Of moving colliders: the force that cloth needs from them, along their way. force NULL: no contact. */
-static double collider_work(const drape_implicit *s, const double *force, double t0, double t1)
+double drape_implicit_collider_work(const drape_implicit *s, double t0, double t1)
 {
     const drape_model *m = s->model;
+    const double *force = drape_system_on_colliders(s->system);
     double work = 0;
     for (int32_t c = 0; force && c < m->collider_count; c++) {
         const drape_track *track = &m->colliders[c].track;
@@ -114,14 +114,13 @@ static double pin_work(const drape_implicit *s, const drape_state *in, const dra
 void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_state *out, double h,
                           drape_step_info *info)
 {
-    info->pin_work +=
-        pin_work(s, in, out, h) + collider_work(s, drape_system_on_colliders(s->system), in->t, out->t);
+    info->pin_work += pin_work(s, in, out, h) + drape_implicit_collider_work(s, in->t, out->t);
     if (!s->dissipated)
         return;
     drape_system_dissipation(s->system, drape_newton_point(s->newton), s->dissipated);
     for (size_t i = 0; i < 3 * (size_t)s->model->node_count; i++)
         info->dissipated += s->dissipated[i] * (out->x[i] - in->x[i]);
-    info->dissipated += collider_work(s, drape_system_on_colliders(s->system), in->t, out->t);
+    info->dissipated += drape_implicit_collider_work(s, in->t, out->t);
 }
 
 void drape_implicit_destroy(void **state)

@@ -126,6 +126,7 @@ struct drape_newton {
     double *x, *v, *g;           /* nodes: where the residual was evaluated last, and g there */
     double *f;                   /* free DOFs: F there */
     bool nonfinite;              /* a residual was */
+    drape_status fitted;         /* of the last change of the pattern: < 0 ends the solve */
     bool positive;               /* matrices are the positive parts: the last step was short */
     double factored_mass_weight; /* of the factors that modified Newton may keep; 0: none */
     drape_work work;
@@ -174,8 +175,11 @@ static int residual(N_Vector d, N_Vector f, void *user)
 static drape_status fit_pattern(drape_newton *s)
 {
     bool changed;
-    drape_status status = drape_system_fit(s->system, &s->point, &changed);
-    return status || !changed ? status : drape_sun_linear_adopt(s->linear, drape_system_pattern(s->system));
+    s->fitted = drape_system_fit(s->system, &s->point, &changed);
+    s->linear->stale |= changed;
+    if (!s->fitted && s->linear->stale)
+        s->fitted = drape_sun_linear_adopt(s->linear, drape_system_pattern(s->system));
+    return s->fitted;
 }
 
 /* J(d) into the values of the solver. */
@@ -479,6 +483,7 @@ static void begin(drape_newton *s, const drape_newton_problem *problem)
     memcpy(s->x, problem->x_base, bytes);
     memcpy(s->v, problem->v_base, bytes);
     s->nonfinite = s->positive = false;
+    s->fitted = DRAPE_OK;
 }
 
 /* KINSOL's counters start anew with each KINSol. */
@@ -540,6 +545,10 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *pro
     count_iterations(s, info);
     if (drape_system_status(s->system))
         return drape_system_status(s->system);
+    if (s->fitted < 0) {
+        info->reason = "memory";
+        return s->fitted;
+    }
     if (status)
         drape_newton_forget_factors(s);
     return judge(s, status, d, info);

@@ -62,7 +62,9 @@ static drape_status solve(trbdf2_state *s, const double *internal, double w, dra
                                           .weight = w,
                                           .mass_weight = w * w,
                                           .inertia = c->inertia,
-                                          .internal = internal};
+                                          .internal = internal,
+                                          .t = c->t,
+                                          .span = {c->span[0], c->span[1]}};
     int before = info->iterations;
     drape_status status = drape_newton_solve(c->newton, &problem, c->d, info);
     info->iterations += before;
@@ -82,19 +84,21 @@ static void write_stage(trbdf2_state *s, double w, double *x, double *v)
 }
 
 /* Adds the work over a stage, by the midpoint rule with the mean velocity: of dissipative forces, and of the
- * forces that hold moved pins on their way. Powers at the ends would count what a stiff dashpot has at the
+ * forces that hold moved pins and colliders on their way. Powers at the ends would count what a stiff dashpot has at the
  * jump of a pin's velocity for a good part of the step. Bases and g0 serve as scratch. */
-static void add_work(trbdf2_state *s, const double *from, const double *to, double span,
+static void add_work(trbdf2_state *s, const double *from, const double *to, double t, double span,
                      const double *internal, drape_step_info *info)
 {
     drape_implicit *c = &s->common;
-    const drape_point point = {.x = c->x_base, .v = c->v_base, .internal = internal};
+    const drape_point point = {
+        .x = c->x_base, .v = c->v_base, .internal = internal, .t = t + span / 2, .span = {t, t + span}};
     for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++) {
         c->x_base[i] = (from[i] + to[i]) / 2;
         c->v_base[i] = (to[i] - from[i]) / span;
     }
-    if (c->model->moved_count > 0)
+    if (c->model->moved_count > 0 || c->model->collider_count > 0)
         drape_system_force(c->system, &point, s->g0);
+    info->pin_work += drape_implicit_collider_work(c, t, t + span);
     for (int32_t i = 0; i < c->model->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)c->model->moved_node[i] + k;
@@ -105,6 +109,7 @@ static void add_work(trbdf2_state *s, const double *from, const double *to, doub
     drape_system_dissipation(c->system, &point, c->dissipated);
     for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++)
         info->dissipated += c->dissipated[i] * (to[i] - from[i]);
+    info->dissipated += drape_implicit_collider_work(c, t, t + span);
 }
 
 /* What it costs to bring moved pins to the velocity that they have at the end. */
@@ -118,14 +123,15 @@ static void add_pins(trbdf2_state *s, const drape_state *in, const drape_state *
         }
 }
 
-/* g0, with the pins' mean velocity in the stage, into which they go. */
+/* g0, with the mean velocity of pins and colliders in the stage, into which they go. */
 static void evaluate_start(trbdf2_state *s, const drape_state *in)
 {
     drape_implicit *c = &s->common;
     memcpy(s->vg, c->v_base, 3 * (size_t)c->model->node_count * sizeof *s->vg);
     for (size_t i = 0; i < 3 * (size_t)c->model->free_count; i++)
         s->vg[drape_implicit_at(c, i)] = in->v[drape_implicit_at(c, i)];
-    const drape_point point = {.x = in->x, .v = s->vg, .internal = in->internal};
+    const drape_point point = {
+        .x = in->x, .v = s->vg, .internal = in->internal, .t = in->t, .span = {c->span[0], c->span[1]}};
     drape_system_force(c->system, &point, s->g0);
 }
 
@@ -147,7 +153,7 @@ static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, 
     if (status && !info->usable)
         return status;
     write_stage(s, w, s->xg, s->vg);
-    add_work(s, in->x, s->xg, GAMMA * h, in->internal, info);
+    add_work(s, in->x, s->xg, in->t, GAMMA * h, in->internal, info);
     return status;
 }
 
@@ -173,7 +179,7 @@ static drape_status differentiate(trbdf2_state *s, const drape_state *in, double
     if (status && !info->usable)
         return status;
     write_stage(s, w, out->x, out->v);
-    add_work(s, s->xg, out->x, (1 - GAMMA) * h, in->internal, info);
+    add_work(s, s->xg, out->x, in->t + GAMMA * h, (1 - GAMMA) * h, in->internal, info);
     add_pins(s, in, out, info);
     return status;
 }

@@ -1,7 +1,8 @@
 /*
  * frames.c: frame times are k / frame_rate. No step is shortened for a frame: between the states of a step,
  * positions are the cubic Hermite interpolant of both positions and velocities, of fourth order in h for
- * smooth motion.
+ * smooth motion. Where that leads through a collider or through cloth, the straight way is taken, and where that
+ * does, too, the nearer of the two states.
  */
 #include "sim/sim.h"
 
@@ -19,6 +20,13 @@ static void hermite(const drape_state *a, const drape_state *b, double t, size_t
         x[i] = h00 * a->x[i] + h10 * h * a->v[i] + h01 * b->x[i] + h11 * h * b->v[i];
 }
 
+static void straight(const drape_state *a, const drape_state *b, double t, size_t n, double *x)
+{
+    double s = (t - a->t) / (b->t - a->t);
+    for (size_t i = 0; i < n; i++)
+        x[i] = (1 - s) * a->x[i] + s * b->x[i];
+}
+
 /* Into sim->frame: the integrator's own dense output where it has one. */
 static void interpolate(drape_sim *sim, const drape_state *before, double t)
 {
@@ -31,6 +39,31 @@ static void interpolate(drape_sim *sim, const drape_state *before, double t)
     }
     hermite(before, now, t, n, sim->frame);
     drape_model_place_pins(sim->model, t, sim->frame);
+}
+
+/* Contact still compares with the state before: the last step began there. */
+static drape_status check(drape_sim *sim, double t)
+{
+    const char *reason;
+    drape_worst worst;
+    return drape_system_check_contact(sim->system, sim->frame, t, &reason, &worst);
+}
+
+/* Into sim->frame, past all obstacles. */
+static drape_status make_frame(drape_sim *sim, const drape_state *before, double t)
+{
+    const drape_state *now = drape_sim_state(sim);
+    size_t n = 3 * (size_t)sim->model->node_count;
+    interpolate(sim, before, t);
+    drape_status status = check(sim, t);
+    if (status > 0) {
+        straight(before, now, t, n, sim->frame);
+        drape_model_place_pins(sim->model, t, sim->frame);
+        status = check(sim, t);
+    }
+    if (status > 0)
+        memcpy(sim->frame, t - before->t < now->t - t ? before->x : now->x, n * sizeof *sim->frame);
+    return status < 0 ? status : DRAPE_OK;
 }
 
 static drape_status emit(drape_sim *sim, double time, const double *x)
@@ -60,8 +93,9 @@ drape_status drape_sim_emit_frames(drape_sim *sim)
         if (!before || time > now->t - near)
             status = emit(sim, now->t, now->x);
         else {
-            interpolate(sim, before, time);
-            status = emit(sim, time, sim->frame);
+            status = make_frame(sim, before, time);
+            if (!status)
+                status = emit(sim, time, sim->frame);
         }
     }
     return status;

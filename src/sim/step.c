@@ -194,6 +194,8 @@ static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
     char worst[400], residual[100] = "", distortion[200] = "";
+    if (stop == DRAPE_E_MEMORY) /* the allocator said it */
+        return stop;
     describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
     if (attempt->worst.element < 0) /* a node says where, an element may say why */
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);

@@ -103,6 +103,7 @@ drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const d
 drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_pattern *pattern)
 {
     double start = drape_clock_seconds();
+    linear->stale = true;
     if (linear->state)
         linear->ops->destroy(&linear->state);
     drape_free(linear->ctx, linear->values);
@@ -110,6 +111,7 @@ drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_patter
     if (!linear->values)
         return DRAPE_E_MEMORY;
     drape_status status = linear->ops->create(linear->ctx, pattern, &linear->state);
+    linear->stale = status != DRAPE_OK;
     linear->factor_seconds += drape_clock_seconds() - start;
     return status;
 }

@@ -17,6 +17,7 @@ typedef struct drape_sun_linear {
     drape_context *ctx;
     const drape_linear_ops *ops;
     void *state;
+    bool stale;     /* the system's pattern has changed since: it must adopt it before it is used again */
     void *owner;    /* of an integrator that reduces its system to this one before it solves */
     double *values; /* (nonzeros) where the Jacobian is assembled */
     SUNLinearSolver solver;

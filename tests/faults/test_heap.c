@@ -197,6 +197,43 @@ START_TEST(no_heap_call_in_rejected_steps)
 }
 END_TEST
 
+/* With colliders: once the lists of contacts have grown, here in the same run before, nothing is taken any more. */
+START_TEST(no_heap_call_in_contact)
+{
+    static const char *const rows[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};
+    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, "
+            "'height': 0.3,"
+            " 'transform': {'translate': [-0.14, 0.11, 0.16]}}, 'terms': ['stretch.edge', 'bend.hinge'],"
+            " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}}],"
+            " 'colliders': [{'type': 'sphere', 'center': [0,0,0], 'radius': 0.1, 'friction': 0.3}, {'type': "
+            "'box',"
+            " 'center': [0.1,-0.1,0], 'size': [0.1,0.3,0.1]}, {'type': 'plane', 'point': [0,-0.1,0], "
+            "'normal':"
+            " [0,1,0]}], 'contact': {'distance': 4e-3, 'friction': '%s'},"
+            " 'integrator': {'method': '%s', 'dt': 0.01, 'linear_solver': 'klu'}, 'duration': 1}",
+            k % 2 ? "lagged" : "implicit", rows[k]);
+        const size_t n = 3 * (size_t)s.model->node_count;
+        double *x = malloc(n * sizeof *x), *v = calloc(n, sizeof *v), gap;
+        memcpy(x, drape_sim_positions(s.sim), n * sizeof *x);
+        scene_advance(&s, 0.15);
+        ck_assert_int_gt(
+            drape_contact_active((drape_contact *)(uintptr_t)drape_system_contact(s.sim->system), &gap), 0);
+        ck_assert_int_eq(drape_sim_set_state(s.sim, 0, x, v), DRAPE_OK);
+        calls = live = 0;
+        counting = true;
+        drape_status status = drape_sim_advance(s.sim, 0.15);
+        counting = false;
+        ck_assert_int_eq(status, DRAPE_OK);
+        ck_assert_msg(calls == 0, "%s: %ld heap calls", rows[k], calls);
+        free(x);
+        free(v);
+        scene_close(&s);
+    }
+}
+END_TEST
+
 /* Frames and step log are written through buffers that were taken before. */
 START_TEST(no_heap_call_for_output)
 {
@@ -263,4 +300,5 @@ START_TEST(threads_take_nothing_of_ours)
 END_TEST
 
 SUITE("heap", the_counter_counts, no_heap_call_from_the_second_step_on, no_heap_call_of_verlet,
-      no_heap_call_in_rejected_steps, no_heap_call_for_output, threads_take_nothing_of_ours)
+      no_heap_call_in_rejected_steps, no_heap_call_in_contact, no_heap_call_for_output,
+      threads_take_nothing_of_ours)

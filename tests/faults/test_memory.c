@@ -160,6 +160,87 @@ START_TEST(memory_ends_and_stays_away)
 }
 END_TEST
 
+/* ---- Lists of contacts that grow, and the pattern that widens ---- */
+
+static drape_model *folding_model(drape_context *ctx)
+{
+    static const char text[] =
+        "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"square\", \"columns\": 3, \"rows\": 9, "
+        "\"width\": 0.05,"
+        " \"height\": 0.2, \"orientation\": \"vertical\", \"transform\": {\"rotate\": [1, 0.2, 0, 20],"
+        " \"translate\": [0, 0.19, 0]}}, \"velocity\": [0, -1, 0], \"terms\": [\"stretch.edge\", "
+        "\"bend.hinge\"],"
+        " \"material\": {\"young_modulus\": 1e4, \"thickness\": 1e-3, \"density\": 200}}],"
+        " \"colliders\": [{\"type\": \"plane\", \"point\": [0,0,0], \"normal\": [0,1,0], \"friction\": 0.5}],"
+        " \"self_contact\": {\"thickness\": 3e-3, \"friction\": 0.3}, \"contact\": {\"friction\": "
+        "\"lagged\"},"
+        " \"integrator\": {\"dt\": 0.01}, \"duration\": 1}";
+    drape_scene *parsed = NULL;
+    drape_model *model = NULL;
+    ck_assert_int_eq(drape_scene_parse(ctx, text, "folding", &parsed), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_compile(parsed, &model), DRAPE_OK);
+    drape_scene_destroy(&parsed);
+    return model;
+}
+
+static drape_status note_accepted(void *user, const drape_event *event)
+{
+    if (event->kind == DRAPE_EVENT_ATTEMPT && event->attempt->accepted)
+        *(uint64_t *)user = drape_sim_hash(event->sim);
+    return DRAPE_OK;
+}
+
+/* Every allocation of a run fails once, from the n-th on after all was made. It is told; the state is the last that
+ * was accepted, and the run goes on from there. */
+static long grow_lists(const drape_model *model, const char *row)
+{
+    const double t = 0.08;
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator = row;
+    long n = 0;
+    for (drape_status status = DRAPE_E_MEMORY; status; n++) {
+        failing_allocator memory = {0};
+        drape_context *ctx = failing_context(&memory);
+        drape_sim *sim = NULL;
+        ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
+        uint64_t accepted = drape_sim_hash(sim);
+        ck_assert_int_eq(drape_sim_observe(sim, note_accepted, &accepted), DRAPE_OK);
+        memory.fail_at = memory.calls + n + 1;
+        status = drape_sim_advance(sim, t);
+        ck_assert_msg(status == DRAPE_E_MEMORY || (status == DRAPE_OK && memory.calls < memory.fail_at),
+                      "%s %ld of %ld: %s: %s", row, n, memory.calls, drape_status_name(status),
+                      drape_context_message(ctx));
+        ck_assert_uint_eq(drape_sim_hash(sim), accepted);
+        if (status) {
+            ck_assert_msg(strstr(drape_context_message(ctx), "out of memory") && drape_sim_time(sim) < t,
+                          "%ld: %s", n, drape_context_message(ctx));
+            ck_assert_msg(drape_sim_advance(sim, t) == DRAPE_OK, "%s %ld: %s", row, n,
+                          drape_context_message(ctx));
+        }
+        drape_sim_destroy(&sim);
+        drape_context_destroy(&ctx);
+        ck_assert_int_eq(memory.live, 0);
+    }
+    return n - 1;
+}
+
+START_TEST(contacts_without_memory)
+{
+    static const char *const rows[] = {"be", "ida"};
+    drape_context *ctx = NULL;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    drape_model *model = folding_model(ctx);
+    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+        const long failures = grow_lists(model, rows[k]);
+        printf("# %s: %ld allocations in the run\n", rows[k], failures);
+        ck_assert_int_gt(failures, 5);
+    }
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 static void *no_memory(void *user, size_t size)
 {
     (void)user, (void)size;
@@ -183,4 +264,5 @@ START_TEST(a_context_without_memory)
 }
 END_TEST
 
-SUITE("memory", every_allocation_fails_once, memory_ends_and_stays_away, a_context_without_memory)
+SUITE("memory", every_allocation_fails_once, memory_ends_and_stays_away, contacts_without_memory,
+      a_context_without_memory)

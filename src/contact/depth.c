@@ -1,0 +1,103 @@
+/* depth.c: see depth.h. */
+#include "contact/depth.h"
+
+#include "base/vec3.h"
+
+#include <math.h>
+#include <string.h>
+
+#define ENOUGH    1e-12 /* [m] between the least value and what it is known to be above */
+#define MOST_CUTS 60
+#define SECTIONS  40               /* of a face: 0.618^40 of its height are left */
+#define GOLDEN    0.61803398874989 /* (sqrt 5 - 1)/2 */
+
+/* The distance at a point of a way, and how it changes along. */
+typedef struct tangent {
+    double t, d, slope;
+} tangent;
+
+static tangent tangent_at(const drape_collider *collider, const drape_collider_pose *pose, const double *a,
+                          const double *u, double t)
+{
+    double x[3] = {a[0], a[1], a[2]}, n[3];
+    vec3_add_scaled(t, u, x);
+    tangent at = {.t = t, .d = drape_collider_distance(collider, pose, x, n, NULL)};
+    at.slope = vec3_dot(n, u);
+    return at;
+}
+
+double drape_depth_edge(const drape_collider *collider, const drape_collider_pose *pose, const double *a,
+                        const double *b, double enough)
+{
+    double u[3];
+    vec3_sub(b, a, u);
+    tangent low = tangent_at(collider, pose, a, u, 0), high = tangent_at(collider, pose, a, u, 1);
+    double least = fmin(low.d, high.d);
+    for (int i = 0; low.slope < 0 && high.slope > 0 && i < MOST_CUTS; i++) {
+        double t = (high.d - high.slope * high.t - low.d + low.slope * low.t) / (low.slope - high.slope);
+        double bound = low.d + low.slope * (t - low.t);
+        if (bound > enough)
+            return bound;
+        if (least - bound <= ENOUGH)
+            return least;
+        tangent at = tangent_at(collider, pose, a, u, t);
+        least = fmin(least, at.d);
+        *(at.slope < 0 ? &low : &high) = at;
+    }
+    return least;
+}
+
+/* On the triangle's line from side 0 1 to side 0 2 at s of their length. */
+static double depth_across(const drape_collider *collider, const drape_collider_pose *pose,
+                           const double *const corner[3], double s)
+{
+    double end[2][3], side[3];
+    for (int i = 0; i < 2; i++) {
+        memcpy(end[i], corner[0], sizeof end[i]);
+        vec3_sub(corner[i + 1], corner[0], side);
+        vec3_add_scaled(s, side, end[i]);
+    }
+    return drape_depth_edge(collider, pose, end[0], end[1], INFINITY);
+}
+
+/* No tangent plane at a corner is above `enough` on the whole triangle. */
+static bool may_be_deep(const drape_collider *collider, const drape_collider_pose *pose,
+                        const double *const corner[3], double enough)
+{
+    for (int i = 0; i < 3; i++) {
+        double n[3], to[3], d = drape_collider_distance(collider, pose, corner[i], n, NULL), least = d;
+        for (int j = 0; j < 3; j++) {
+            vec3_sub(corner[j], corner[i], to);
+            least = fmin(least, d + vec3_dot(n, to));
+        }
+        if (least > enough)
+            return false;
+    }
+    return true;
+}
+
+/* Least values of parallel lines are convex from line to line: golden section (Kiefer 1953). */
+double drape_depth_face(const drape_collider *collider, const drape_collider_pose *pose,
+                        const double *const corner[3], double enough)
+{
+    double low = 0, high = 1, d[2], sides[3], length = 0;
+    if (!may_be_deep(collider, pose, corner, enough))
+        return INFINITY;
+    for (int i = 1; i < 3; i++) {
+        vec3_sub(corner[i], corner[0], sides);
+        length = fmax(length, vec3_norm(sides)); /* how fast the distance can change with s */
+    }
+    for (int i = 0; i < 2; i++)
+        d[i] = depth_across(collider, pose, corner, i ? GOLDEN : 1 - GOLDEN);
+    double least = fmin(d[0], d[1]);
+    for (int k = 0; k < SECTIONS && least - length * (high - low) <= enough; k++) {
+        double width = GOLDEN * (high - low);
+        bool left = d[0] < d[1];
+        *(left ? &high : &low) = left ? low + width : high - width;
+        width = GOLDEN * (high - low);
+        d[left] = d[!left];
+        d[!left] = depth_across(collider, pose, corner, left ? high - width : low + width);
+        least = fmin(least, d[!left]);
+    }
+    return least;
+}

@@ -1,0 +1,375 @@
+/*
+ * test_drop.c: cloth that falls on things. Under every row and on every kind of collider no vertex, edge or
+ * face is ever inside, by a check of its own (support/solids.h), in states and in frames between them; cloth
+ * that falls on itself never passes through itself.
+ */
+#include "contact/intersect.h"
+#include "support/scene.h"
+#include "support/solids.h"
+
+#include <unistd.h>
+
+#define DEEPEST 1e-9 /* [m] */
+
+static const char *const rows[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};
+#define ROWS (sizeof rows / sizeof *rows)
+
+/* ---- Solids ---- */
+
+static double in_cylinder(const double *x) /* axis z, radius 0.08, length 0.2 */
+{
+    return fmin(0.08 - hypot(x[0], x[1]), 0.1 - fabs(x[2]));
+}
+
+static double in_round_box(
+    const double *x) /* size 0.16 0.12 0.2, rounding 0.03: from a core that much smaller */
+{
+    const double beyond[3] = {fmax(fabs(x[0]) - 0.05, 0), fmax(fabs(x[1]) - 0.03, 0),
+                              fmax(fabs(x[2]) - 0.07, 0)};
+    return 0.03 - sqrt(solid_dot(beyond, beyond));
+}
+
+/* |x| + |y| + |z| <= 0.15 */
+static const char octahedron[] = "v 0.15 0 0\nv -0.15 0 0\nv 0 0.15 0\nv 0 -0.15 0\nv 0 0 0.15\nv 0 0 -0.15\n"
+                                 "f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n";
+#define T 0.57735026918962576 /* 1/sqrt 3 */
+
+static const struct target {
+    const char *text;
+    double top; /* [m] of it */
+    solid body;
+    bool sharp; /* edges or corners that may pierce a sheet */
+} targets[] = {
+    {"{'type': 'plane', 'point': [0,0,0], 'normal': [0,1,0], 'friction': 0.3}",
+     0,
+     {.planes = 1, .plane = {{0, 1, 0, 0}}}},
+    {"{'type': 'sphere', 'center': [0,0,0], 'radius': 0.1, 'friction': 0.3}",
+     0.1,
+     {.round = true, .radius = 0.1}},
+    {"{'type': 'capsule', 'a': [-0.05,0,0], 'b': [0.05,0,0.03], 'radius': 0.06}",
+     0.06,
+     {.round = true, .a = {-0.05, 0, 0}, .b = {0.05, 0, 0.03}, .radius = 0.06}},
+    {"{'type': 'box', 'center': [0,0,0], 'size': [0.16,0.12,0.2], 'friction': 0.2}",
+     0.06,
+     {.planes = 6,
+      .plane = {{1, 0, 0, 0.08},
+                {-1, 0, 0, 0.08},
+                {0, 1, 0, 0.06},
+                {0, -1, 0, 0.06},
+                {0, 0, 1, 0.1},
+                {0, 0, -1, 0.1}}},
+     true},
+    {"{'type': 'box', 'center': [0,0,0], 'size': [0.16,0.12,0.2], 'rounding': 0.03}",
+     0.06,
+     {.depth = in_round_box,
+      .planes = 6,
+      .plane = {{1, 0, 0, 0.05},
+                {-1, 0, 0, 0.05},
+                {0, 1, 0, 0.03},
+                {0, -1, 0, 0.03},
+                {0, 0, 1, 0.07},
+                {0, 0, -1, 0.07}}}},
+    {"{'type': 'cylinder', 'a': [0,0,-0.1], 'b': [0,0,0.1], 'radius': 0.08, 'friction': 0.3}",
+     0.08,
+     {.depth = in_cylinder},
+     true},
+    {"{'type': 'mesh', 'file': 'octahedron.obj', 'friction': 0.3}",
+     0.15,
+     {.planes = 8,
+      .plane = {{T, T, T, 0.15 * T},
+                {-T, T, T, 0.15 * T},
+                {T, -T, T, 0.15 * T},
+                {T, T, -T, 0.15 * T},
+                {-T, -T, T, 0.15 * T},
+                {-T, T, -T, 0.15 * T},
+                {T, -T, -T, 0.15 * T},
+                {-T, -T, -T, 0.15 * T}}},
+     true},
+};
+#define TARGETS (sizeof targets / sizeof *targets)
+
+static void enter_folder(void)
+{
+    char folder[] = "/tmp/drape-drop-XXXXXX";
+    ck_assert_ptr_nonnull(mkdtemp(folder));
+    ck_assert_int_eq(chdir(folder), 0);
+    FILE *file = fopen("octahedron.obj", "w");
+    ck_assert_ptr_nonnull(file);
+    fputs(octahedron, file);
+    fclose(file);
+}
+
+static void leave_folder(void)
+{
+    char folder[256];
+    unlink("octahedron.obj");
+    ck_assert_ptr_nonnull(getcwd(folder, sizeof folder));
+    ck_assert_int_eq(chdir("/") + rmdir(folder), 0);
+}
+
+/* ---- Watching ---- */
+
+typedef struct watch {
+    scene *s;
+    const solid *body;
+    double state, frame; /* [m] the deepest in any of them */
+    int64_t crossings;   /* in frames */
+    int frames;
+} watch;
+
+static double deepest(const watch *w, const double *x, double t)
+{
+    const drape_model *m = w->s->model;
+    const drape_collider_motion at = drape_model_collider(m, 0, t);
+    double most = -INFINITY;
+    for (int32_t f = 0; f < m->triangle_count; f++) {
+        double corner[3][3];
+        for (int a = 0; a < 3; a++)
+            for (int k = 0; k < 3; k++)
+                corner[a][k] = x[3 * m->triangle[3 * f + a] + k] - at.displacement[k];
+        most = fmax(most, solid_depth(w->body, corner, DEEPEST));
+    }
+    return most;
+}
+
+static drape_status look(void *user, const drape_event *event)
+{
+    watch *w = user;
+    if (event->kind == DRAPE_EVENT_ATTEMPT) {
+        if (event->attempt->accepted && w->body)
+            w->state =
+                fmax(w->state, deepest(w, drape_sim_positions(event->sim), drape_sim_time(event->sim)));
+        return DRAPE_OK;
+    }
+    w->frames++;
+    if (w->body)
+        w->frame = fmax(w->frame, deepest(w, event->positions, event->time));
+    if (w->s->model->contact.self) {
+        drape_intersections found;
+        ck_assert_int_eq(drape_find_intersections(w->s->ctx, w->s->model, event->positions, &found),
+                         DRAPE_OK);
+        w->crossings += found.count;
+    }
+    return DRAPE_OK;
+}
+
+/* 0.3 m wide and centered but for some millimetres, so that nothing is symmetric; frames between steps. */
+static scene open_drop(const char *row, const struct target *on, double speed)
+{
+    return scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 7, 'width': 0.3, 'height': "
+        "0.3,"
+        " 'transform': {'translate': [-0.147, %g, 0.155]}}, 'velocity': [0, %g, 0],"
+        " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
+        " 'terms': ['stretch.edge', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 2e-3}]}],"
+        " 'colliders': [%s], 'contact': {'distance': 2e-3}, 'integrator': {'method': '%s', 'dt': 0.01},"
+        " 'duration': 1, 'frame_rate': 60}",
+        on->top + 0.03, -speed, on->text, row);
+}
+
+START_TEST(nothing_is_ever_inside)
+{
+    enter_folder();
+    double states = -INFINITY, frames = -INFINITY;
+    for (size_t i = 0; i < TARGETS; i++)
+        for (size_t k = 0; k < ROWS; k++) {
+            scene s = open_drop(rows[k], &targets[i], 0.8);
+            watch w = {.s = &s, .body = &targets[i].body, .state = -INFINITY, .frame = -INFINITY};
+            ck_assert_int_eq(drape_sim_observe(s.sim, look, &w), DRAPE_OK);
+            scene_advance(&s, 0.25);
+            const drape_statistics did = drape_sim_statistics(s.sim);
+            printf(
+                "# %s, %.20s: %lld steps, %lld rejected, %lld iterations, %.2f s; deepest in states %.3g, in "
+                "frames %.3g\n",
+                rows[k], targets[i].text, (long long)did.steps_accepted, (long long)did.steps_rejected,
+                (long long)did.newton_iterations, did.wall_steps, w.state, w.frame);
+            ck_assert_int_eq(w.frames, 16);
+            states = fmax(states, w.state);
+            frames = fmax(frames, w.frame);
+            scene_close(&s);
+        }
+    leave_folder();
+    assert_below(states, DEEPEST);
+    assert_below(frames, DEEPEST);
+}
+END_TEST
+
+/* A ball that rises into a sheet held at its corners, and out of it again. */
+START_TEST(nor_in_what_moves)
+{
+    const solid ball = {.round = true, .radius = 0.1};
+    for (size_t k = 0; k < ROWS; k++) {
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 7, 'width': 0.3,"
+            " 'height': 0.3, 'transform': {'translate': [-0.147, 0.12, 0.155]}},"
+            " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
+            " 'terms': ['stretch.edge', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 2e-3}],"
+            " 'pins': [{'corner': 'top-left'}, {'corner': 'top-right'}, {'corner': 'bottom-left'}]}],"
+            " 'colliders': [{'type': 'sphere', 'center': [0,0,0], 'radius': 0.1, 'friction': 0.5, 'track':"
+            " [[0, [0,0,0]], [0.1, [0.01,0.08,0]], [0.2, [0,0,0.01]]]}], 'contact': {'distance': 2e-3},"
+            " 'integrator': {'method': '%s', 'dt': 0.01}, 'duration': 1, 'frame_rate': 60}",
+            rows[k]);
+        watch w = {.s = &s, .body = &ball, .state = -INFINITY, .frame = -INFINITY};
+        ck_assert_int_eq(drape_sim_observe(s.sim, look, &w), DRAPE_OK);
+        scene_advance(&s, 0.25);
+        const drape_statistics did = drape_sim_statistics(s.sim);
+        printf("# %s: %lld steps, %lld rejected; deepest in states %.3g, in frames %.3g\n", rows[k],
+               (long long)did.steps_accepted, (long long)did.steps_rejected, w.state, w.frame);
+        ck_assert(w.state > -0.002); /* it was touched */
+        assert_below(w.state, DEEPEST);
+        assert_below(w.frame, DEEPEST);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* ---- Starts that are not free ---- */
+
+/* The sheet begins on the top or 0.5 mm inside of it. It comes out, and then it stays out. */
+START_TEST(what_begins_inside_comes_out)
+{
+    enter_folder();
+    for (size_t i = 0; i < TARGETS; i++)
+        for (size_t k = 0; k < 2 * ROWS; k++) {
+            if (targets[i].sharp && k < ROWS)
+                continue;
+            struct target on = targets[i];
+            on.top -= 0.03 + (k < ROWS ? 0.0005 : 0);
+            scene s = open_drop(rows[k % ROWS], &on, 0);
+            watch w = {.s = &s, .body = &targets[i].body, .state = -INFINITY, .frame = -INFINITY};
+            const double before = deepest(&w, drape_sim_positions(s.sim), 0);
+            scene_advance(&s, 0.05);
+            const double after = deepest(&w, drape_sim_positions(s.sim), 0.05);
+            ck_assert_int_eq(drape_sim_observe(s.sim, look, &w), DRAPE_OK);
+            scene_advance(&s, 0.15);
+            printf("# %s, %.20s: from %.3g m to %.3g m\n", rows[k % ROWS], on.text, before, after);
+            ck_assert(k >= ROWS || before > 1e-4);
+            assert_below(fmax(after, fmax(w.state, w.frame)), DEEPEST);
+            scene_close(&s);
+        }
+    leave_folder();
+}
+END_TEST
+
+/* A plate of 2 mm and a sheet at 20 m/s, which makes 0.2 m in a step. */
+START_TEST(nothing_tunnels)
+{
+    const solid plate = {.planes = 6,
+                         .plane = {{1, 0, 0, 0.3},
+                                   {-1, 0, 0, 0.3},
+                                   {0, 1, 0, 0.001},
+                                   {0, -1, 0, 0.001},
+                                   {0, 0, 1, 0.3},
+                                   {0, 0, -1, 0.3}}};
+    const struct target on = {"{'type': 'box', 'center': [0,0,0], 'size': [0.6,0.002,0.6]}", 0.001, plate};
+    int64_t collisions = 0;
+    for (size_t k = 0; k < ROWS; k++) {
+        scene s = open_drop(rows[k], &on, 20);
+        watch w = {.s = &s, .body = &plate, .state = -INFINITY, .frame = -INFINITY};
+        double lowest = INFINITY;
+        int64_t count;
+        ck_assert_int_eq(drape_sim_observe(s.sim, look, &w), DRAPE_OK);
+        scene_advance(&s, 0.05);
+        for (int32_t i = 0; i < s.model->node_count; i++)
+            lowest = fmin(lowest, drape_sim_positions(s.sim)[3 * i + 1]);
+        printf("# %s: %lld steps; lowest %.4g m;", rows[k],
+               (long long)drape_sim_statistics(s.sim).steps_accepted, lowest);
+        for (int i = 0; drape_sim_reason(s.sim, i, &count); i++) {
+            printf(" %lld %s", (long long)count, drape_sim_reason(s.sim, i, NULL));
+            collisions += strcmp(drape_sim_reason(s.sim, i, NULL), "collision") == 0 ? count : 0;
+        }
+        printf("\n");
+        ck_assert_double_gt(lowest, 0.001);
+        assert_below(fmax(w.state, w.frame), DEEPEST);
+        scene_close(&s);
+    }
+    ck_assert_int_gt(collisions, 0);
+}
+END_TEST
+
+/* ---- Cloth on itself ---- */
+
+static scene open_fold(const char *row, const char *self)
+{
+    return scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 13, 'width': 0.05,"
+        " 'height': 0.3, 'orientation': 'vertical', 'transform': {'rotate': [1, 0.2, 0, 4],"
+        " 'translate': [0, 0.302, 0]}}, 'velocity': [0, -1, 0],"
+        " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
+        " 'terms': ['stretch.edge', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 2e-3}]}],"
+        " 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': [0,1,0], 'friction': 0.4}],"
+        " 'contact': {'distance': 2e-3}%s, 'integrator': {'method': '%s', 'dt': 0.01}, 'duration': 1}",
+        self, row);
+}
+
+/* Dropped edge-on on a floor, a strip folds onto itself; what would pass through itself else does not. */
+START_TEST(a_fold_never_crosses_itself)
+{
+    const solid floor = {.planes = 1, .plane = {{0, 1, 0, 0}}};
+    for (size_t k = 0; k <= ROWS; k++) {
+        scene s = open_fold(rows[k % ROWS],
+                            k < ROWS ? ", 'self_contact': {'thickness': 2e-3, 'friction': 0.2}" : "");
+        watch w = {.s = &s, .body = &floor, .state = -INFINITY, .frame = -INFINITY};
+        drape_intersections found;
+        int64_t without = 0;
+        ck_assert_int_eq(drape_sim_observe(s.sim, look, &w), DRAPE_OK);
+        for (int i = 1; i <= 20; i++) {
+            scene_advance(&s, i / 60.0);
+            ck_assert_int_eq(drape_find_intersections(s.ctx, s.model, drape_sim_positions(s.sim), &found), 0);
+            without += found.count;
+        }
+        const drape_statistics did = drape_sim_statistics(s.sim);
+        printf("# %s%s: %lld steps, %lld rejected, %lld iterations, %.2f s; %lld crossings in %d frames\n",
+               rows[k % ROWS], k < ROWS ? "" : " without self_contact", (long long)did.steps_accepted,
+               (long long)did.steps_rejected, (long long)did.newton_iterations, did.wall_steps,
+               (long long)(k < ROWS ? w.crossings : without), w.frames);
+        if (k < ROWS)
+            ck_assert_int_eq(w.crossings + without, 0);
+        else
+            ck_assert_int_gt(without, 0);
+        assert_below(fmax(w.state, w.frame), DEEPEST);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* A sheet on one that is held, on a slope of tan a = 0.3: with mu = 0.6 it creeps at most at 0.3 eps once it has
+ * settled, within the millimetres of its fall onto the other's edges; with 0 it slides up to g sin a t^2/2 and be's
+ * h/t = 5 %, less what be takes of it where edges ride over edges: less than half. */
+START_TEST(friction_holds_layers)
+{
+    const double t = 0.2, slope = 0.3, fall = 9.81 / hypot(1, slope);
+    for (int i = 0; i < 4; i++) {
+        const double mu = i % 2 ? 0.6 : 0;
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'name': 'low', 'mesh': {'grid': 'square', 'columns': 7, 'rows': 7, "
+            "'width':"
+            " 0.3, 'height': 0.3}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
+            " 'terms': ['stretch.edge'], 'pins': [{'box': [[-1,-1,-1], [1,1,1]]}]},"
+            " {'name': 'high', 'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.15, 'height': "
+            "0.15,"
+            " 'transform': {'translate': [0.043, 0.0038, -0.067]}}, 'terms': ['stretch.edge', 'bend.hinge'],"
+            " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}}],"
+            " 'gravity': [%g, %g, 0], 'self_contact': {'thickness': 2e-3, 'friction': %g},"
+            " 'contact': {'friction': '%s'}, 'integrator': {'dt': 0.01}, 'duration': 1}",
+            slope * fall, -fall, mu, i / 2 ? "lagged" : "implicit");
+        const int32_t first = 49, count = 25;
+        double way = 0;
+        scene_advance(&s, t);
+        for (int32_t n = first; n < first + count; n++)
+            way += (drape_sim_positions(s.sim)[3 * n] - drape_model_rest_positions(s.model)[3 * n]) / count;
+        const double slide = slope * fall * t * t / 2;
+        printf("# mu %g: %.4g m, %.4g m without friction; %.3g J dissipated\n", mu, way, slide,
+               drape_sim_energy(s.sim).dissipated);
+        if (mu > 0)
+            assert_below(fabs(way), 2e-3);
+        else
+            ck_assert(way > 0.5 * slide && way < 1.1 * slide);
+        ck_assert((drape_sim_energy(s.sim).dissipated > 0) == (mu > 0));
+        scene_close(&s);
+    }
+}
+END_TEST
+
+SUITE("drop", nothing_is_ever_inside, nor_in_what_moves, what_begins_inside_comes_out, nothing_tunnels,
+      a_fold_never_crosses_itself, friction_holds_layers)
