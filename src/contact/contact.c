@@ -10,7 +10,7 @@
 
 #define D            12
 #define SEARCH_AHEAD 0.25 /* of a mean edge: how far points may move before a new search */
-#define KEEP_ITERATE 0.1  /* of a gap, where an iterate of Newton is cut short */
+#define KEEP_ITERATE 0.5  /* of a gap, where an iterate of Newton is cut short */
 #define KEEP_STEP    1e-3 /* of a gap: coming nearer than that on the way of a step is taken for a crossing */
 #define TOUCH        1e-9 /* [m] a piece may lie this deep in a collider */
 #define MARCH_SHARE  0.9
@@ -35,8 +35,9 @@ struct drape_contact {
     double *searched;          /* (points x 3) positions of the last search */
     drape_collider_pose *pose; /* (collider_count) */
     drape_collider_pose *searched_pose, *start_pose;
-    bool known; /* there was a search */
-    double margin;
+    bool known;        /* there was a search */
+    double margin;     /* how far points may move before a new one [m] */
+    double moved;      /* how far one has, where it was last placed [m] */
     drape_pair *pairs; /* (count of room) candidates, surfaces too */
     int32_t count, room;
     lagged *lagged; /* (lagged_count of lagged_room) */
@@ -196,18 +197,15 @@ static double moved2(const double *a, const double *b)
     return vec3_dot(d, d);
 }
 
-static bool search_is_stale(const drape_contact *c)
+/* The furthest that a point is from where the last search had it; INFINITY without any. */
+static double moved_since_search(const drape_contact *c, const double *x)
 {
-    double most = c->margin * c->margin;
-    if (!c->known)
-        return true;
-    for (size_t i = 0; i < (size_t)c->search.points; i++)
-        if (!(moved2(c->x + 3 * i, c->searched + 3 * i) <= most))
-            return true;
+    double most = 0;
+    for (size_t i = 0; c->known && i < (size_t)c->search.points; i++)
+        most = fmax(most, moved2(x + 3 * i, c->searched + 3 * i));
     for (int32_t i = 0; i < c->model->collider_count; i++)
-        if (!(moved2(c->pose[i].displacement, c->searched_pose[i].displacement) <= most))
-            return true;
-    return false;
+        most = fmax(most, moved2(c->pose[i].displacement, c->searched_pose[i].displacement));
+    return c->known ? sqrt(most) : INFINITY;
 }
 
 static drape_placed placed(const drape_contact *c, const double *x)
@@ -240,11 +238,11 @@ static void consider(void *user, const drape_pair *found)
     drape_contact *c = user;
     drape_pair pair = *found;
     const drape_placed now = placed(c, c->x);
-    double gap = drape_pair_gap_value(&pair, &now) - 2 * c->margin;
-    if (gap >= pair.distance || c->status)
+    pair.found = drape_pair_gap_value(&pair, &now);
+    if (pair.found - 2 * c->margin >= pair.distance || c->status)
         return;
     pair.distance = activation(c, &pair);
-    if (gap < pair.distance)
+    if (pair.found - 2 * c->margin < pair.distance)
         keep_pair(c, &pair);
 }
 
@@ -265,6 +263,7 @@ static drape_status search(drape_contact *c)
     drape_search_pairs(&c->search, c->x, NULL, 2 * c->margin, consider, c);
     memcpy(c->searched, c->x, 3 * (size_t)c->search.points * sizeof *c->x);
     memcpy(c->searched_pose, c->pose, (size_t)c->model->collider_count * sizeof *c->pose);
+    c->moved = 0;
     c->known = c->status == DRAPE_OK;
     return c->status;
 }
@@ -274,7 +273,8 @@ static drape_status place(drape_contact *c, const double *x, const double *v, do
     pose_colliders(c, t, span);
     fill_points(c, x, c->x);
     fill_velocities(c, v, c->v);
-    return search_is_stale(c) ? search(c) : DRAPE_OK;
+    c->moved = moved_since_search(c, c->x);
+    return c->moved > c->margin ? search(c) : DRAPE_OK;
 }
 
 drape_status drape_contact_place(drape_contact *c, const drape_contact_at *at)
@@ -317,14 +317,16 @@ static void scatter(drape_contact *c, const int32_t *node, int points, int32_t c
         }
 }
 
-/* Whether a candidate acts, and its gap. */
+/* Most candidates do not act, and that is known from how far points have moved since they were found. */
+static bool may_act(const drape_contact *c, const drape_pair *pair)
+{
+    return pair->found - 2 * c->moved < pair->distance;
+}
+
 static bool acts(const drape_contact *c, const drape_pair *pair, bool derivatives, drape_gap *gap)
 {
     const drape_placed now = placed(c, c->x);
-    if (!(drape_pair_gap_value(pair, &now) < pair->distance))
-        return false;
-    drape_pair_gap(pair, &now, c->search.rest, derivatives, gap);
-    return true;
+    return may_act(c, pair) && drape_pair_gap(pair, &now, c->search.rest, derivatives, gap);
 }
 
 static void add_pair(drape_contact *c, const drape_pair *pair, bool normal, bool friction, double *g)
@@ -496,7 +498,8 @@ bool drape_contact_fits(drape_contact *c, const drape_pattern *pattern)
 {
     const drape_placed now = placed(c, c->x);
     for (int32_t i = 0; i < c->count; i++)
-        if (c->pairs[i].collider < 0 && drape_pair_gap_value(&c->pairs[i], &now) < c->pairs[i].distance &&
+        if (c->pairs[i].collider < 0 && may_act(c, &c->pairs[i]) &&
+            drape_pair_gap_value(&c->pairs[i], &now) < c->pairs[i].distance &&
             !has_places(c, c->pairs[i].node, 4, pattern))
             return false;
     for (int32_t i = 0; i < c->lagged_count; i++)
@@ -617,19 +620,10 @@ static void follow(void *user, const drape_pair *pair)
     }
 }
 
-/* No point goes further from where the last search was than the list of candidates allows for. */
-static bool within_search(const drape_contact *c, const double *x)
-{
-    for (size_t i = 0; c->known && i < (size_t)c->search.points; i++)
-        if (!(moved2(x + 3 * i, c->searched + 3 * i) <= c->margin * c->margin))
-            return false;
-    return c->known;
-}
-
 /* Straight ways: where both ends are near the last search, what is between is. */
 static void travel(drape_contact *c, journey *j)
 {
-    if (!within_search(c, j->x) || !within_search(c, j->y)) {
+    if (moved_since_search(c, j->x) > c->margin || moved_since_search(c, j->y) > c->margin) {
         drape_search_pairs(&c->search, j->x, j->y, -c->search.most_distance, follow, j);
         return;
     }

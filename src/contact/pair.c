@@ -54,35 +54,39 @@ static double mollifier_width(const drape_pair *pair, const double *rest)
     return PARALLEL_WIDTH * vec3_dot(u, u) * vec3_dot(w, w);
 }
 
-static void surface_gap(const drape_pair *pair, const drape_placed *at, bool derivatives, drape_gap *gap)
+static bool surface_gap(const drape_pair *pair, const drape_placed *at, bool derivatives, drape_gap *gap)
 {
     double curvature[9];
     gap->points = 1;
     gap->c[0] = 1;
-    gap->value = surface(pair, at, gap->normal, derivatives ? curvature : NULL);
+    gap->value = surface(pair, at, gap->normal, NULL);
+    if (!(gap->value < pair->distance))
+        return false;
     if (!derivatives)
-        return;
+        return true;
+    surface(pair, at, NULL, curvature);
     memset(gap->dc, 0, sizeof gap->dc);
     for (int k = 0; k < 3; k++)
         for (int j = 0; j < 3; j++)
             gap->dn[k][j] = curvature[3 * k + j];
+    return true;
 }
 
-void drape_pair_gap(const drape_pair *pair, const drape_placed *at, const double *rest, bool derivatives,
+bool drape_pair_gap(const drape_pair *pair, const drape_placed *at, const double *rest, bool derivatives,
                     drape_gap *gap)
 {
     double x[4][3];
     drape_closest closest;
     drape_closest_slopes slopes;
     gap->mollified = false;
-    if (!finders[pair->kind]) {
-        surface_gap(pair, at, derivatives, gap);
-        return;
-    }
+    if (!finders[pair->kind])
+        return surface_gap(pair, at, derivatives, gap);
     drape_pair_gather(pair, at->x, x);
     finders[pair->kind](x, &closest);
-    gap->points = 4;
     gap->value = closest.distance - pair->radius;
+    if (!(gap->value < pair->distance))
+        return false;
+    gap->points = 4;
     memcpy(gap->c, closest.c, sizeof gap->c);
     memcpy(gap->normal, closest.normal, sizeof gap->normal);
     if (derivatives) {
@@ -92,6 +96,7 @@ void drape_pair_gap(const drape_pair *pair, const drape_placed *at, const double
     }
     if (pair->kind == DRAPE_PAIR_SEGMENTS)
         drape_mollify(x, mollifier_width(pair, rest), derivatives, gap);
+    return true;
 }
 
 /* ---- The way that is free ---- */

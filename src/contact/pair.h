@@ -21,6 +21,7 @@ typedef struct drape_pair {
     double radius;    /* the gap is the distance less this [m] */
     double area;      /* that its force acts on [m2] */
     double distance;  /* activation distance [m] */
+    double found;     /* the gap where it was found [m] */
 } drape_pair;
 
 /* All points at one instant. */
@@ -34,8 +35,9 @@ int drape_pair_points(const drape_pair *pair);
 void drape_pair_gather(const drape_pair *pair, const double *from, double local[4][3]);
 double drape_pair_gap_value(const drape_pair *pair, const drape_placed *at);
 
-/* derivatives: dc, dn and ddm too. rest: (points x 3), for the width of the mollifier. */
-void drape_pair_gap(const drape_pair *pair, const drape_placed *at, const double *rest, bool derivatives,
+/* False where the gap is not below the activation distance. derivatives: dc, dn and ddm too. rest: (points x 3),
+ * for the width of the mollifier. */
+bool drape_pair_gap(const drape_pair *pair, const drape_placed *at, const double *rest, bool derivatives,
                     drape_gap *gap);
 
 /* The largest fraction of the way from x to y, straight and for all points together, that a pair may go

@@ -31,9 +31,7 @@ static const char *const predictor_choices[] = {"inertial", "rest", NULL};
 #define MAX_NEWTON_STEP                                                                                      \
     1e3 /* of the scene's size, a node: KINSOL's own limit depends on the guess and is 1 for d = 0 */
 #define WORK_SHARE        0.5 /* of the work along a correction: so much may be left on the far side */
-#define MOST_CUTS         8   /* of a correction by the line search */
-#define LEAST_CUT         0.1
-#define MOST_CUT          0.7
+#define MOST_TRIALS       8   /* of the line search, by bisection */
 #define SHORT_STEP        0.5
 #define MAX_BETA_FAILURES 1000 /* the line search may fail its curvature condition as often as it likes */
 
@@ -227,16 +225,20 @@ static double dot(const double *a, const double *b, int64_t n)
 static double search_along(drape_newton *s, const double *p, double start)
 {
     const double *d = N_VGetArrayPointer(s->unknown);
-    double a = 1;
-    for (int k = 0; k < MOST_CUTS; k++) {
+    double low = 0, high = INFINITY, a = 1;
+    for (int k = 0; k < MOST_TRIALS; k++) {
         for (int64_t i = 0; i < s->n; i++)
             s->trial[i] = d[i] + a * p[i];
         double work = evaluate(s, s->trial) ? dot(s->f, p, s->n) : INFINITY;
-        if (work <= -WORK_SHARE * start)
+        if (fabs(work) <= -WORK_SHARE * start || (work < 0 && a == 1))
             return a;
-        a *= fmax(LEAST_CUT, fmin(MOST_CUT, -start / (work - start)));
+        if (work < 0)
+            low = a;
+        else
+            high = a;
+        a = (low + high) / 2;
     }
-    return a;
+    return low > 0 ? low : a;
 }
 
 /* A correction that climbs is none: the matrix was indefinite. Its positive part gives one that descends. */

@@ -162,6 +162,30 @@ START_TEST(no_heap_call_from_the_second_step_on)
 }
 END_TEST
 
+/* Explicit substeps with everything that moves nodes, and the lists of near points made anew. */
+START_TEST(no_heap_call_of_verlet)
+{
+    static const char *const forms[] = {"position", "velocity"};
+    for (int i = 0; i < 4; i++) {
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 8, 'width': 0.8, "
+            "'height': 0.7,"
+            " 'transform': {'translate': [0, 0.3, 0]}},"
+            " 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'areal_density': 0.2},"
+            " 'terms': ['stretch.edge', {'type': 'drag.viscous', 'coefficient': 0.1}],"
+            " 'pins': [{'corner': 'top-left', 'track': [[0, [0,0,0]], [1, [0,0.1,0]]]}]}],"
+            " 'colliders': [{'type': 'sphere', 'center': [0.4,0,-0.3], 'radius': 0.2, 'friction': 0.3}],"
+            " 'self_contact': {'thickness': 0.03},"
+            " 'integrator': {'method': 'verlet', 'dt': 0.01, 'form': '%s', 'substeps': %d, 'strain_limit': "
+            "0.1},"
+            " 'controller': {'type': '%s'}, 'duration': 1}",
+            forms[i & 1], i & 2 ? 0 : 20, i & 2 ? "halving" : "stable");
+        ck_assert_int_eq(count_steps(&s), 0);
+        scene_close(&s);
+    }
+}
+END_TEST
+
 /* Rejected steps too: one iteration is not enough at 0.01 s. */
 START_TEST(no_heap_call_in_rejected_steps)
 {
@@ -238,5 +262,5 @@ START_TEST(threads_take_nothing_of_ours)
 }
 END_TEST
 
-SUITE("heap", the_counter_counts, no_heap_call_from_the_second_step_on, no_heap_call_in_rejected_steps,
-      no_heap_call_for_output, threads_take_nothing_of_ours)
+SUITE("heap", the_counter_counts, no_heap_call_from_the_second_step_on, no_heap_call_of_verlet,
+      no_heap_call_in_rejected_steps, no_heap_call_for_output, threads_take_nothing_of_ours)

@@ -131,8 +131,9 @@ static void check_kind(drape_pair_kind kind, double speed)
     uint64_t seed = 7 + (uint64_t)kind;
     int met[16] = {0}, tried = 0;
     for (int k = 0; k < 3000; k++) {
-        setting s = {.pair = {.kind = kind, .node = {0, 1, 2, 3}, .collider = -1, .radius = 0.01},
-                     .law = {.distance = 0.2, .stiffness = 3, .friction = 0.4, .velocity = 0.05}};
+        setting s = {
+            .pair = {.kind = kind, .node = {0, 1, 2, 3}, .collider = -1, .radius = 0.01, .distance = 0.2},
+            .law = {.distance = 0.2, .stiffness = 3, .friction = 0.4, .velocity = 0.05}};
         drape_gap gap;
         fill(&seed, 0.1, s.x, D);
         fill(&seed, speed, s.v, D);
@@ -175,10 +176,11 @@ START_TEST(test_parallel)
 {
     uint64_t seed = 3;
     for (int k = 0; k < 200; k++) {
-        setting s = {.pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1},
-                     .law = {.distance = 0.2, .stiffness = 3, .friction = 0.4, .velocity = 0.05},
-                     .x = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, -0.001, 0.1, 0.05, 0.001},
-                     .rest = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, 0, 0.1, 0.05, 0}};
+        setting s = {
+            .pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1, .distance = 0.2},
+            .law = {.distance = 0.2, .stiffness = 3, .friction = 0.4, .velocity = 0.05},
+            .x = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, -0.001, 0.1, 0.05, 0.001},
+            .rest = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, 0, 0.1, 0.05, 0}};
         double noise[D];
         drape_gap gap;
         fill(&seed, 2e-4, noise, D);
@@ -197,7 +199,7 @@ END_TEST
 /* Where both are parallel, the energy is gone, whatever the closest points are. */
 START_TEST(test_mollified_away)
 {
-    setting s = {.pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1},
+    setting s = {.pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1, .distance = 0.2},
                  .law = {.distance = 0.2, .stiffness = 3},
                  .x = {-0.1, 0, 0, 0.1, 0, 0, -0.08, 0.05, 0, 0.12, 0.05, 0},
                  .rest = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, 0, 0.1, 0.05, 0}};
