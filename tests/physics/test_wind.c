@@ -1,0 +1,86 @@
+/* test_wind.c: drag.wind against closed forms: the force on a flat sheet, a sheet that falls level, one that the
+ * wind takes along. */
+#include "support/scene.h"
+
+#include "assemble/check.h"
+#include "base/vec3.h"
+
+#define DENSITY     1.225 /* of the air [kg/m3] */
+#define COEFFICIENT 1.17
+
+#define SHEET                                                                                                \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 5, 'width': 0.5, "             \
+    "'height': 0.4%s}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': "     \
+    "['stretch.edge', 'bend.hinge', {'type': 'drag.wind', 'wind': [%g, %g, %g]}]}], "                        \
+    "'gravity': [0, %g, 0], 'integrator': {'dt': 0.01, 'tolerance': 1e-12}, 'duration': 1}"
+
+/* The sum over the nodes is 1/2 rho C A |u.n| (u.n) n. Rounding: 60 triangles, some 20 operations each. */
+START_TEST(force_on_a_flat_sheet)
+{
+    const double wind[3] = {3, -2, 1.5}, n[3] = {0, cos(0.5), sin(0.5)}; /* y turned about x by 0.5 */
+    char turn[64];
+    snprintf(turn, sizeof turn, ", 'transform': {'rotate': [1, 0, 0, %.17g]}", 0.5 * 45 / atan(1));
+    scene s = scene_open(SHEET, turn, wind[0], wind[1], wind[2], 0.0);
+    const drape_state *state = scene_state(&s);
+    double g[90], along = vec3_dot(wind, n),
+                  force = 0.5 * DENSITY * COEFFICIENT * 0.5 * 0.4 * fabs(along) * along;
+    ck_assert_int_eq(s.model->node_count, 30);
+    drape_system_dissipation(s.sim->system,
+                             &(drape_point){.x = state->x, .v = state->v, .internal = state->internal}, g);
+    for (int k = 0; k < 3; k++) {
+        double sum = 0;
+        for (int i = 0; i < 30; i++)
+            sum -= g[3 * i + k];
+        ck_assert_double_eq_tol(sum, force * n[k], 1200 * DBL_EPSILON * fabs(force));
+    }
+    scene_close(&s);
+}
+END_TEST
+
+/* Its derivatives in a wind; the tests of the rows have it in air at rest. */
+START_TEST(derivatives_in_a_wind)
+{
+    static drape_check_row rows[DRAPE_MAX_CHECK_ROWS];
+    scene s = scene_open(SHEET, "", 3.0, -2.0, 1.5, -9.81);
+    int count = 0;
+    ck_assert_int_eq(drape_check_derivatives(s.ctx, s.sim->system, 3, rows, &count), DRAPE_OK);
+    ck_assert_int_gt(count, 0);
+    for (int i = 0; i < count; i++)
+        ck_assert_msg(rows[i].pass, "%s of %s is off by %g", rows[i].what, rows[i].term, rows[i].error);
+    scene_close(&s);
+}
+END_TEST
+
+/*
+ * A level sheet stays flat: the shares of weight and wind of a node are the same. Backward Euler's v1 = v0 + h (k u1 |u1| - g),
+ * u = w - v, k = rho C/(2 sigma), is for the wind it meets, u1 = u0 + h g - h k u1^2, the positive root
+ *     u1 = (sqrt(1 + 4 h k (u0 + h g)) - 1)/(2 h k).
+ * Tolerance: a residual of 1e-12 N on the least mass, 200 * 1e-3 * 0.01/6 kg (a corner in one triangle), moves v by
+ * h r/m = 3e-11 m/s a step, n = 100 of them, and u's own contraction is not counted.
+ */
+static void fall_level(double wind, double gravity)
+{
+    scene s = scene_open(SHEET, "", 0.0, wind, 0.0, -gravity);
+    double h = 0.01, k = DENSITY * COEFFICIENT / (2 * 0.2), u = wind;
+    scene_advance(&s, 1);
+    for (int n = 0; n < 100; n++)
+        u = (sqrt(1 + 4 * h * k * (u + h * gravity)) - 1) / (2 * h * k);
+    printf("# wind %g, gravity %g: v %.12g m/s, backward Euler %.12g m/s\n", wind, gravity,
+           drape_sim_velocities(s.sim)[1], wind - u);
+    for (int i = 0; i < s.model->node_count; i++) {
+        ck_assert_double_eq_tol(drape_sim_velocities(s.sim)[3 * i + 1], wind - u, 3e-9);
+        ck_assert_double_eq_tol(drape_sim_velocities(s.sim)[3 * i], 0, 3e-9);
+    }
+    drape_energy e = drape_sim_energy(s.sim);
+    ck_assert(wind > 0 ? e.dissipated < 0 : e.dissipated > 0); /* the wind gives, air at rest takes */
+    scene_close(&s);
+}
+
+START_TEST(a_level_sheet_falls_and_flies)
+{
+    fall_level(0, 9.81); /* to its terminal speed, sqrt(g/k) = 1.655 m/s */
+    fall_level(4, 0);    /* the wind takes it along */
+}
+END_TEST
+
+SUITE("wind", force_on_a_flat_sheet, derivatives_in_a_wind, a_level_sheet_falls_and_flies)

@@ -1,0 +1,101 @@
+/*
+ * audit.h: what a run of a scene with contact is judged by, at states that the run itself did not look at: how
+ * deep nodes, and points of faces and edges between them, lie in colliders, and how many edges pass through
+ * triangles, at the ends of accepted steps and at frames, which may lie between steps.
+ */
+#ifndef DRAPE_TESTS_AUDIT_H
+#define DRAPE_TESTS_AUDIT_H
+
+#include <math.h>
+
+#include "colliders/colliders.h"
+#include "contact/intersect.h"
+#include "sim/sim.h"
+
+#define AUDIT_CUTS 6 /* points of a triangle's side: a face is sampled at 28, among them its corners */
+
+/* At one kind of state: the worst of all that were looked at. */
+typedef struct audit_worst {
+    double node, face;     /* [m] deepest node, deepest of all samples; negative: the least gap */
+    int64_t intersections; /* most in one state */
+    double node_at, face_at, intersections_at; /* [s] when */
+    int64_t states;
+} audit_worst;
+
+typedef struct audit {
+    drape_context *ctx;
+    const drape_model *model;
+    bool self;  /* look for edges through triangles */
+    bool faces; /* look between the nodes too */
+    audit_worst steps, frames;
+} audit;
+
+static inline audit audit_of(drape_context *ctx, const drape_model *model, bool self, bool faces)
+{
+    const audit_worst none = {.node = -INFINITY, .face = -INFINITY};
+    return (audit){.ctx = ctx, .model = model, .self = self, .faces = faces, .steps = none, .frames = none};
+}
+
+static inline double audit_depth(const audit *a, const double *p, double t)
+{
+    double most = -INFINITY;
+    for (int32_t k = 0; k < a->model->collider_count; k++) {
+        const drape_collider *collider = &a->model->colliders[k];
+        const drape_collider_pose pose = drape_collider_pose_at(collider, t);
+        most = fmax(most, -drape_collider_distance(collider, &pose, p, NULL, NULL));
+    }
+    return most;
+}
+
+static inline void audit_faces(const audit *a, const double *x, double t, audit_worst *worst)
+{
+    for (int32_t f = 0; f < a->model->triangle_count; f++) {
+        const int32_t *node = a->model->triangle + 3 * (size_t)f;
+        for (int i = 0; i <= AUDIT_CUTS; i++)
+            for (int j = 0; i + j <= AUDIT_CUTS; j++) {
+                double p[3], u = (double)i / AUDIT_CUTS, v = (double)j / AUDIT_CUTS;
+                for (int k = 0; k < 3; k++)
+                    p[k] = (1 - u - v) * x[3 * node[0] + k] + u * x[3 * node[1] + k] + v * x[3 * node[2] + k];
+                double depth = audit_depth(a, p, t);
+                if (depth > worst->face) {
+                    worst->face = depth;
+                    worst->face_at = t;
+                }
+            }
+    }
+}
+
+/* x: positions at time t. */
+static inline drape_status audit_state(const audit *a, const double *x, double t, audit_worst *worst)
+{
+    worst->states++;
+    for (int32_t i = 0; i < a->model->node_count; i++) {
+        double depth = audit_depth(a, x + 3 * (size_t)i, t);
+        if (depth > worst->node) {
+            worst->node = depth;
+            worst->node_at = t;
+        }
+    }
+    if (a->faces && a->model->collider_count > 0)
+        audit_faces(a, x, t, worst);
+    drape_intersections found = {0};
+    drape_status status = a->self ? drape_find_intersections(a->ctx, a->model, x, &found) : DRAPE_OK;
+    if (found.count > worst->intersections) {
+        worst->intersections = found.count;
+        worst->intersections_at = t;
+    }
+    return status;
+}
+
+/* An observer of drape_sim_observe; user: an audit. */
+static inline drape_status audit_observe(void *user, const drape_event *event)
+{
+    audit *a = user;
+    if (event->kind == DRAPE_EVENT_FRAME)
+        return audit_state(a, event->positions, event->time, &a->frames);
+    if (!event->attempt->accepted)
+        return DRAPE_OK;
+    return audit_state(a, drape_sim_positions(event->sim), drape_sim_time(event->sim), &a->steps);
+}
+
+#endif
