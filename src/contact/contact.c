@@ -726,7 +726,7 @@ static drape_worst worst_of(const drape_contact *c, const drape_pair *pair, cons
 static double allowed(const drape_contact *c, const drape_pair *pair)
 {
     double before = drape_pair_points(pair) == 1 ? c->start_gaps[pair->node[0]] : c->start_least;
-    return fmin(before, 0) - TOUCH;
+    return fmin(before, -TOUCH);
 }
 
 static drape_status check_depth(drape_contact *c, const char **reason, drape_worst *worst)
@@ -768,7 +768,7 @@ static drape_status check_inscribed(drape_contact *c, const int32_t *node, int n
         for (int32_t i = 0; m->colliders[k].shape.inscribed && i < count; i++) {
             const int32_t *n = node + (size_t)i * (size_t)nodes;
             double depth = depth_of(c, k, n, nodes, false), least;
-            if (depth >= -TOUCH || depth >= (least = fmin(0, depth_of(c, k, n, nodes, true)) - TOUCH))
+            if (depth >= -TOUCH || depth >= (least = fmin(depth_of(c, k, n, nodes, true), -TOUCH)))
                 continue;
             drape_pair pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {n[0], n[1], -1, -1}, .collider = k};
             pair.node[2] = nodes > 2 ? n[2] : -1;
