@@ -438,19 +438,13 @@ static void measure_powers(ida_state *s, double t, double powers[2])
             powers[1] += s->g[3 * (size_t)m->moved_node[i] + k] * s->v[3 * (size_t)m->moved_node[i] + k];
 }
 
-/* Work by the trapezoidal rule; what it costs to set pins into motion where a track has a kink. */
+/* Work by the trapezoidal rule. */
 static void audit(ida_state *s, const drape_state *in, const drape_state *out, drape_step_info *info)
 {
     double after[2];
     measure_powers(s, out->t, after);
     info->dissipated = 0.5 * (out->t - in->t) * (s->powers[0] + after[0]);
     info->pin_work = 0.5 * (out->t - in->t) * (s->powers[1] + after[1]);
-    for (int32_t i = 0; i < s->model->moved_count; i++)
-        for (size_t k = 0; k < 3; k++) {
-            size_t at = 3 * (size_t)s->model->moved_node[i] + k;
-            info->pin_work +=
-                0.5 * s->model->mass[at / 3] * (out->v[at] * out->v[at] - in->v[at] * in->v[at]);
-        }
     memcpy(s->powers, after, sizeof after);
 }
 

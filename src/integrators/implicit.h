@@ -51,9 +51,9 @@ void drape_implicit_measure(drape_implicit *implicit, const drape_state *state, 
 drape_status drape_implicit_solve(drape_implicit *implicit, const double *internal, const double *history,
                                   double weight, double mass_weight, drape_step_info *info);
 
-/* Work over a step: of dissipative forces on all nodes, and of the moved pins, whose force is what M a + g
- * lacks. */
-void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out, double h,
+/* Work over a step: of dissipative forces on all nodes, and of the moved pins against g: it
+ * is not theirs to speed up their own mass. */
+void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out,
                           drape_step_info *info);
 
 #endif

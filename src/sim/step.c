@@ -28,7 +28,7 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
     }
     if (info->committed || info->lenient)
         return DRAPE_OK;
-    if (drape_sim_ran_away(sim, next, info, &info->worst)) {
+    if (drape_sim_ran_away(sim, next, info)) {
         info->reason = "energy";
         return DRAPE_RETRY_REJECTED;
     }
@@ -46,6 +46,7 @@ static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info
 {
     drape_state *next = next_state(sim);
     next->t = t1;
+    sim->made_known = false;
     info->worst = (drape_worst){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
     if (!status)
@@ -101,9 +102,7 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     if (!info->committed)
         drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
     turn_states(sim);
-    sim->energy_known = false;
-    sim->dissipated += info->dissipated;
-    sim->pin_work += info->pin_work;
+    drape_sim_book(sim, info);
     measure_strain(sim, drape_sim_state(sim)->x);
     s->h_min = s->steps_accepted == 0 ? info->h : fmin(info->h, s->h_min);
     s->h_max = fmax(info->h, s->h_max);
