@@ -458,8 +458,9 @@ static void count_iterations(ida_state *s, drape_step_info *info)
 }
 
 /* Goes on from in if IDA is there, else starts anew, with a first step of at most h where an attempt
- * before was rejected. */
-static drape_status prepare(ida_state *s, const drape_state *in, double end, double h, drape_step_info *info)
+ * before was rejected. *first: the kink or the end, whichever comes first. */
+static drape_status prepare(ida_state *s, const drape_state *in, double end, double h, double *first,
+                            drape_step_info *info)
 {
     double stop = drape_model_next_kink(s->model, in->t, end);
     begin(s, in);
@@ -472,7 +473,11 @@ static drape_status prepare(ida_state *s, const drape_state *in, double end, dou
         if (IDASetInitStep(s->ida, h < end - in->t ? h : 0))
             return DRAPE_E_SOLVER;
         measure_powers(s, in->t, s->powers);
+    } else if (s->n == 0) {
+        place_pins(s, in->t);
+        measure_powers(s, in->t, s->powers);
     }
+    *first = h < end - in->t ? fmin(stop, in->t + h) : stop;
     return s->n > 0 && IDASetStopTime(s->ida, stop) ? DRAPE_E_SOLVER : DRAPE_OK;
 }
 
@@ -523,7 +528,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     if (exhausted(s, in, info))
         return DRAPE_E_STEP_TOO_SMALL;
     info->reason = "solver";
-    drape_status status = prepare(s, in, end, h, info);
+    drape_status status = prepare(s, in, end, h, &t, info); /* t is where all goes that has no free nodes */
     if (!status && s->n > 0) {
         s->crossing = s->nonfinite = false;
         int code = IDASolve(s->ida, end, &t, s->y, s->rate, IDA_ONE_STEP);

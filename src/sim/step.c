@@ -196,7 +196,7 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
     describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
     if (attempt->worst.element < 0) /* a node says where, an element may say why */
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
-    if (!isnan(attempt->tolerance)) /* rows that bound errors have none */
+    if (!isnan(attempt->tolerance) && !isnan(attempt->residual)) /* rows that bound errors have none */
         snprintf(residual, sizeof residual, ", residual %.4g N for a tolerance of %.4g N", attempt->residual,
                  attempt->tolerance);
     return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s", attempt->t,
@@ -267,6 +267,7 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
     double t1, h;
     if (!sim)
         return DRAPE_E_ARGUMENT;
+    sim->ctx->message[0] = 0; /* what it says after a failure is of this advance */
     if (!isfinite(t_end))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_advance: t_end is not finite");
     drape_status status =

@@ -242,6 +242,56 @@ START_TEST(a_residual_of_rounding_is_converged)
 }
 END_TEST
 
+/* Two nodes in one place: no residual is a number, and the message does not call it one. */
+START_TEST(a_residual_that_is_no_number_is_not_told)
+{
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 4, 'edge_length': 0.1},"
+        "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge'],"
+        "'pins': [{'nodes': [0]}, {'nodes': [1], 'track': [[0, [0, 0, 0]], [0.25, [-0.1, 0, 0]]]}]}],"
+        "'integrator': {'method': 'be', 'dt': 0.0625}, 'controller': {'type': 'fixed'}, 'duration': 1}");
+    ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_SOLVER);
+    const char *message = drape_context_message(s.ctx);
+    ck_assert_msg(strstr(message, "edge_collapse") && !strstr(message, "nan"), "%s", message);
+    scene_close(&s);
+}
+END_TEST
+
+static drape_status stop_at_once(void *user, const drape_event *event)
+{
+    (void)user, (void)event;
+    return DRAPE_E_STOPPED;
+}
+
+/* An observer may stop without a message; that of an earlier failure is not its. */
+START_TEST(the_message_of_an_earlier_failure_is_not_told_again)
+{
+    scene s = swinging("be", "'type': 'halving'");
+    ck_assert_int_eq(drape_sim_advance(s.sim, NAN), DRAPE_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx), "not finite"));
+    ck_assert_int_eq(drape_sim_observe(s.sim, stop_at_once, NULL), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_STOPPED);
+    ck_assert_str_eq(drape_context_message(s.ctx), "t=0: an observer stopped the run with e_stopped");
+    scene_close(&s);
+}
+END_TEST
+
+/* ida without free nodes has nothing to solve and stops at the keys of the tracks all the same. */
+START_TEST(ida_without_free_nodes_stops_at_kinks)
+{
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 1, 'edge_length': 0.1},"
+        "'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge'],"
+        "'pins': [{'nodes': [0, 1, 2]}, {'nodes': [3], 'track': [[0, [0, 0, 0]], [0.5, [0, 0.05, 0]],"
+        "[1, [0, 0.01, 0]]]}]}], 'integrator': {'method': 'ida'}, 'duration': 2}");
+    record *r = watch(&s);
+    scene_advance(&s, 2);
+    ck_assert_int_eq(r->count, 3);
+    ck_assert(r->end[0] == 0.5 && r->end[1] == 1 && r->end[2] == 2);
+    scene_close(&s);
+}
+END_TEST
+
 /* ---- Strain ---- */
 
 /*
@@ -324,6 +374,27 @@ START_TEST(the_error_controller_never_tries_a_refused_size_again)
                           r->attempt[i + 1].t == r->attempt[i].t);
         scene_close(&s);
     }
+}
+END_TEST
+
+/* The first step knows nothing of the error of its velocities; at tight tolerances there is a first step all the
+ * same, and steps after it. be at rtol 1e-10 wants some 0.5 us a step. */
+START_TEST(the_error_controller_starts_at_tight_tolerances)
+{
+    for (size_t k = 0; k < sizeof fixed_rows / sizeof *fixed_rows; k++)
+        for (int digits = 7; digits <= 10; digits += 3) {
+            scene s = swinging(fixed_rows[k], "'type': 'error'");
+            drape_sim_destroy(&s.sim);
+            drape_sim_def def;
+            drape_sim_def_init(&def, sizeof def);
+            const drape_setting rtol = {"rtol", pow(10, -digits), NULL};
+            def.controller = "error";
+            def.controller_settings = &rtol;
+            def.controller_setting_count = 1;
+            scene_start(&s, &def);
+            scene_advance(&s, 2e-4);
+            scene_close(&s);
+        }
 }
 END_TEST
 
@@ -764,8 +835,10 @@ START_TEST(a_start_below_the_limit_is_left)
 }
 END_TEST
 
-SUITE("rejection", a_run_with_rejections_is_the_run_of_its_accepted_steps, parts_fill_their_interval_exactly,
-      nominal_times_are_met_to_the_bit, sizes_are_halved_and_grow_back,
+SUITE("rejection", a_residual_that_is_no_number_is_not_told,
+      the_message_of_an_earlier_failure_is_not_told_again, ida_without_free_nodes_stops_at_kinks,
+      the_error_controller_starts_at_tight_tolerances, a_run_with_rejections_is_the_run_of_its_accepted_steps,
+      parts_fill_their_interval_exactly, nominal_times_are_met_to_the_bit, sizes_are_halved_and_grow_back,
       a_step_that_gets_too_small_names_time_reason_and_element, a_residual_of_rounding_is_converged,
       strain_names_the_edge_or_the_node_that_went_too_far,
       the_error_controller_never_tries_a_refused_size_again,
