@@ -85,6 +85,14 @@ static inline drape_sim *bench_sim(drape_context *ctx, const drape_model *model,
     return sim;
 }
 
+/* --help is answered on stdout and is no failure; a wrong argument is told on stderr. The status to exit with. */
+static inline int bench_usage(const char *argument, const char *text)
+{
+    bool asked = strcmp(argument, "--help") == 0;
+    fputs(text, asked ? stdout : stderr);
+    return asked ? 0 : 2;
+}
+
 /* A CSV file whose rows begin with machine, commit, compiler and build; NULL without a name. */
 static inline FILE *bench_csv(const char *name, const char *columns)
 {

@@ -229,7 +229,7 @@ int main(int argc, char **argv)
         else if (argv[i][0] != '-')
             folder = argv[i];
         else
-            return fputs("explicit [--csv FILE] [SCENES]\n", stderr), 2;
+            return bench_usage(argv[i], "explicit [--csv FILE] [SCENES]\n");
     }
     drape_context *ctx = bench_context();
     FILE *csv =

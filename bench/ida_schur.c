@@ -121,8 +121,8 @@ int main(int argc, char **argv)
 {
     static const int sides[] = {12, 25, 50};
     if (argc > 2 || (argc == 2 && argv[1][0] == '-')) {
-        fputs("ida_schur [CSV]: CPU seconds of ida with the reduced system and with the full one\n", stderr);
-        return 2;
+        return bench_usage(
+            argv[1], "ida_schur [CSV]: CPU seconds of ida with the reduced system and with the full one\n");
     }
     FILE *csv =
         bench_csv(argc == 2 ? argv[1] : NULL,

@@ -141,9 +141,9 @@ int main(int argc, char **argv)
 {
     static const int sides[] = {4, 6, 8, 10, 12, 16, 23, 32, 50, 71, 100};
     if (argc > 3 || (argc >= 2 && argv[1][0] == '-')) {
-        fputs("linears [CSV [NODES]]: milliseconds of each linear solver by size, up to NODES (10000)\n",
-              stderr);
-        return 2;
+        return bench_usage(
+            argv[1],
+            "linears [CSV [NODES]]: milliseconds of each linear solver by size, up to NODES (10000)\n");
     }
     int most = argc == 3 ? atoi(argv[2]) : 10000;
     FILE *csv =

@@ -187,8 +187,7 @@ static void alone(FILE *csv)
 int main(int argc, char **argv)
 {
     if (argc > 2 || (argc == 2 && argv[1][0] == '-')) {
-        fputs("oscillator [CSV]: energy of an undamped oscillator after 100 periods\n", stderr);
-        return 2;
+        return bench_usage(argv[1], "oscillator [CSV]: energy of an undamped oscillator after 100 periods\n");
     }
     drape_context *ctx = bench_context();
     if (drape_context_add_term(ctx, &harmonic))

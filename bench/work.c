@@ -206,8 +206,8 @@ int main(int argc, char **argv)
 {
     bench b = {.ctx = bench_context()};
     if (argc > 2 || (argc == 2 && argv[1][0] == '-')) {
-        fputs("work [CSV]: error against work of every integrator on a falling sheet\n", stderr);
-        return 2;
+        return bench_usage(argv[1],
+                           "work [CSV]: error against work of every integrator on a falling sheet\n");
     }
     b.model = sheet(b.ctx);
     b.csv = bench_csv(

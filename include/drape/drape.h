@@ -334,7 +334,7 @@ DRAPE_API const drape_model *drape_sim_model(const drape_sim *sim);
  * else. */
 DRAPE_API uint64_t drape_sim_hash(const drape_sim *sim);
 
-/* Energies of the last accepted state [J]. gravity: the potential, zero at the origin. dissipated: the work
+/* Energies of the last accepted state [J]. kinetic: of the free nodes, as the motion of pinned ones is prescribed. gravity: the potential, zero at the origin. dissipated: the work
  * that damping and drag terms took since t = 0 or drape_sim_set_state. numerical: what is missing otherwise, the integrator's own
  * dissipation (negative: gain), after the work of moving pins. */
 typedef struct drape_energy {
@@ -381,7 +381,7 @@ typedef struct drape_attempt {
     bool accepted;
     int iterations;   /* Newton iterations */
     double residual;  /* of the free nodes at the end of the attempt, in the norm of the integrator [N] */
-    double tolerance; /* that it was to reach [N] */
+    double tolerance; /* that it was to reach [N]; with the reason "rounding" what rounding alone leaves */
     drape_worst worst;
 } drape_attempt;
 

@@ -24,6 +24,7 @@ enum { SCRATCH_LAST_ERROR };
 #define PROPORTIONAL 0.4
 #define MAX_GROWTH   2.0 /* bdf2 is zero-stable below 1 + sqrt(2) */
 #define MAX_CUT      0.2
+#define FIRST_SHARE  10.0 /* see first_error */
 #define LEAST_ERROR  1e-4 /* smaller ones are round-off and say nothing of the next step */
 
 static const drape_param params[PARAM_COUNT] = {
@@ -77,6 +78,15 @@ static double difference(const prediction *p, double solution, double y0, double
     return p->factor * (solution - (p->weight[0] * y0 + p->weight[1] * y1 + p->weight[2] * y2));
 }
 
+/* The first step has no past, so that its velocities have no estimate: what they change by, g h, is none, and at
+ * tight tolerances would allow no step at all. Positions have one, h^2 a/2 beyond flight. So the step may also be a
+ * share 1/FIRST_SHARE of that at which the whole of it is atol_x, as in Hairer, Norsett & Wanner 1993, II.4: its
+ * square is as small as the tolerance is, and with it the error h^2 v''/2 of velocities. */
+static double first_error(double by_both, double by_positions)
+{
+    return by_both <= 1 ? by_both : fmin(by_both, FIRST_SHARE * sqrt(by_positions));
+}
+
 /* *worst_node: that of the largest part, -1 for none. Root mean square over the free DOFs of the weighted
  * errors of positions and velocities. */
 static double local_error(const double *values, const drape_trial *trial, int32_t *worst_node)
@@ -85,7 +95,7 @@ static double local_error(const double *values, const drape_trial *trial, int32_
     const drape_state *a = trial->in, *b = trial->past[0] ? trial->past[0] : a,
                       *c = trial->past[1] ? trial->past[1] : a;
     const prediction p = predict(trial);
-    double atol_x = values[PARAM_ATOL_X], atol_v = values[PARAM_ATOL_V], sum = 0;
+    double atol_x = values[PARAM_ATOL_X], atol_v = values[PARAM_ATOL_V], sum = 0, positions = 0;
     drape_derive_tolerances(m, values[PARAM_RTOL], &atol_x, &atol_v);
     double largest = -1;
     *worst_node = -1;
@@ -97,12 +107,14 @@ static double local_error(const double *values, const drape_trial *trial, int32_
             double ex = (difference(&p, trial->out->x[i], a->x[i], b->x[i], c->x[i]) - flight) / atol_x;
             double ev = difference(&p, trial->out->v[i], a->v[i], b->v[i], c->v[i]) / atol_v;
             sum += ex * ex + ev * ev;
+            positions += ex * ex;
             if (!(ex * ex + ev * ev <= largest) && !isnan(largest)) { /* the first that is no number stays */
                 largest = ex * ex + ev * ev;
                 *worst_node = m->node_of_free[f];
             }
         }
-    return m->free_count > 0 ? sqrt(sum / (6.0 * m->free_count)) : 0;
+    double count = 6.0 * fmax(1, m->free_count), error = sqrt(sum / count);
+    return p.points == 1 && isfinite(error) ? first_error(error, sqrt(positions / count)) : error;
 }
 
 static double bounded(double factor)

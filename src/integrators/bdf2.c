@@ -140,7 +140,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         return status;
     write_state(&s->common, w, out);
     remember(s, in, out, h);
-    drape_implicit_audit(&s->common, in, out, h, info);
+    drape_implicit_audit(&s->common, in, out, info);
     return status;
 }
 

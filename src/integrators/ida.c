@@ -440,19 +440,13 @@ static void measure_powers(ida_state *s, double t, double powers[2])
             powers[1] += s->g[3 * (size_t)m->moved_node[i] + k] * s->v[3 * (size_t)m->moved_node[i] + k];
 }
 
-/* Work by the trapezoidal rule; what it costs to set pins into motion where a track has a kink. */
+/* Work by the trapezoidal rule. */
 static void audit(ida_state *s, const drape_state *in, const drape_state *out, drape_step_info *info)
 {
     double after[2];
     measure_powers(s, out->t, after);
     info->dissipated = 0.5 * (out->t - in->t) * (s->powers[0] + after[0]);
     info->pin_work = 0.5 * (out->t - in->t) * (s->powers[1] + after[1]);
-    for (int32_t i = 0; i < s->model->moved_count; i++)
-        for (size_t k = 0; k < 3; k++) {
-            size_t at = 3 * (size_t)s->model->moved_node[i] + k;
-            info->pin_work +=
-                0.5 * s->model->mass[at / 3] * (out->v[at] * out->v[at] - in->v[at] * in->v[at]);
-        }
     memcpy(s->powers, after, sizeof after);
 }
 
@@ -466,8 +460,9 @@ static void count_iterations(ida_state *s, drape_step_info *info)
 }
 
 /* Goes on from in if IDA is there, else starts anew, with a first step of at most h where an attempt
- * before was rejected. */
-static drape_status prepare(ida_state *s, const drape_state *in, double end, double h, drape_step_info *info)
+ * before was rejected. *first: the kink or the end, whichever comes first. */
+static drape_status prepare(ida_state *s, const drape_state *in, double end, double h, double *first,
+                            drape_step_info *info)
 {
     double stop = drape_model_next_kink(s->model, in->t, end);
     begin(s, in);
@@ -480,7 +475,11 @@ static drape_status prepare(ida_state *s, const drape_state *in, double end, dou
         if (IDASetInitStep(s->ida, h < end - in->t ? h : 0))
             return DRAPE_E_SOLVER;
         measure_powers(s, in->t, s->powers);
+    } else if (s->n == 0) {
+        place_pins(s, in->t);
+        measure_powers(s, in->t, s->powers);
     }
+    *first = h < end - in->t ? fmin(stop, in->t + h) : stop;
     return s->n > 0 && IDASetStopTime(s->ida, stop) ? DRAPE_E_SOLVER : DRAPE_OK;
 }
 
@@ -531,7 +530,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     if (exhausted(s, in, info))
         return DRAPE_E_STEP_TOO_SMALL;
     info->reason = "solver";
-    drape_status status = prepare(s, in, end, h, info);
+    drape_status status = prepare(s, in, end, h, &t, info); /* t is where all goes that has no free nodes */
     if (!status && s->n > 0) {
         s->crossing = s->nonfinite = false;
         s->fitted = DRAPE_OK;

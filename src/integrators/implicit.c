@@ -96,7 +96,7 @@ double drape_implicit_collider_work(const drape_implicit *s, double t0, double t
     return work;
 }
 
-static double pin_work(const drape_implicit *s, const drape_state *in, const drape_state *out, double h)
+static double pin_work(const drape_implicit *s, const drape_state *in, const drape_state *out)
 {
     const drape_model *m = s->model;
     const double *g = drape_newton_force(s->newton);
@@ -104,17 +104,16 @@ static double pin_work(const drape_implicit *s, const drape_state *in, const dra
     for (int32_t i = 0; i < m->moved_count; i++)
         for (int k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)m->moved_node[i] + (size_t)k;
-            double reaction = m->mass[m->moved_node[i]] * (out->v[at] - in->v[at]) / h + g[at];
-            work += reaction * (out->x[at] - in->x[at]);
+            work += g[at] * (out->x[at] - in->x[at]);
         }
     return work;
 }
 
 /* The forces on colliders are those of the last residual, which was at the solution. */
-void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_state *out, double h,
+void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_state *out,
                           drape_step_info *info)
 {
-    info->pin_work += pin_work(s, in, out, h) + drape_implicit_collider_work(s, in->t, out->t);
+    info->pin_work += pin_work(s, in, out) + drape_implicit_collider_work(s, in->t, out->t);
     if (!s->dissipated)
         return;
     drape_system_dissipation(s->system, drape_newton_point(s->newton), s->dissipated);

@@ -54,9 +54,9 @@ drape_status drape_implicit_solve(drape_implicit *implicit, const double *intern
 /* Work from t0 to t1 of what the system last put on moving colliders; 0 without contact. */
 double drape_implicit_collider_work(const drape_implicit *implicit, double t0, double t1);
 
-/* Work over a step: of dissipative forces on all nodes, and of the moved pins, whose force is what M a + g
- * lacks. */
-void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out, double h,
+/* Work over a step: of dissipative forces on all nodes, and of the moved pins against g: it
+ * is not theirs to speed up their own mass. */
+void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out,
                           drape_step_info *info);
 
 #endif

@@ -39,7 +39,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     if (status && !info->usable)
         return status;
     write_state(s, in, h, out);
-    drape_implicit_audit(s, in, out, h, info);
+    drape_implicit_audit(s, in, out, info);
     return status;
 }
 

@@ -6,6 +6,7 @@
 #include "base/finite.h"
 #include "solvers/sun_linear.h"
 
+#include <float.h>
 #include <kinsol/kinsol.h>
 #include <math.h>
 #include <nvector/nvector_serial.h>
@@ -431,6 +432,8 @@ static double norm_of(const drape_newton *s)
     return s->values[DRAPE_NEWTON_NORM] == NORM_L2 ? sqrt(squares) : max;
 }
 
+#define ROUNDINGS 4 /* of each of the terms of a residual: their own, their products', their sum's */
+
 /* Every return code of KINSol, as what it means for the step. */
 static drape_status status_of(int code, const char **reason)
 {
@@ -503,6 +506,19 @@ static drape_status blame_element(drape_newton *s, drape_status status, drape_st
     return degenerate ? degenerate : status;
 }
 
+/* Of F at d, in the norm: its terms are rounded to some DBL_EPSILON of themselves. At small h the inertia of a
+ * node in flight alone, M |v|/h, is more than 1e16 times a tight tolerance, and halving h doubles it. */
+static double rounding_of(drape_newton *s, const double *d)
+{
+    const drape_newton_problem *p = s->problem;
+    for (int64_t i = 0; i < s->n; i++) {
+        int32_t node = s->model->node_of_free[i / 3];
+        double inertia = p->mass_weight * s->model->mass[node] * (fabs(d[i]) + fabs(p->inertia[i]));
+        s->f[i] = ROUNDINGS * DBL_EPSILON * (inertia + fabs(s->g[3 * (int64_t)node + i % 3]));
+    }
+    return norm_of(s);
+}
+
 static drape_status judge(drape_newton *s, drape_status status, const double *d, drape_step_info *info)
 {
     double tolerance = s->values[DRAPE_NEWTON_TOLERANCE];
@@ -513,6 +529,12 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     info->worst = drape_system_worst_dof(s->system, s->f, "residual [N]", tolerance);
     if (info->residual <= tolerance) {
         info->reason = "converged";
+        return DRAPE_OK;
+    }
+    double rounding = s->nonfinite ? NAN : rounding_of(s, d);
+    if (info->residual <= rounding) {
+        info->reason = "rounding";
+        info->tolerance = rounding;
         return DRAPE_OK;
     }
     if (!status) { /* unreachable as long as KINSOL tests what it says */

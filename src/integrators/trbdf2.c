@@ -112,17 +112,6 @@ static void add_work(trbdf2_state *s, const double *from, const double *to, doub
     info->dissipated += drape_implicit_collider_work(c, t, t + span);
 }
 
-/* What it costs to bring moved pins to the velocity that they have at the end. */
-static void add_pins(trbdf2_state *s, const drape_state *in, const drape_state *out, drape_step_info *info)
-{
-    const drape_model *m = s->common.model;
-    for (int32_t i = 0; i < m->moved_count; i++)
-        for (size_t k = 0; k < 3; k++) {
-            size_t at = 3 * (size_t)m->moved_node[i] + k;
-            info->pin_work += 0.5 * m->mass[at / 3] * (out->v[at] * out->v[at] - in->v[at] * in->v[at]);
-        }
-}
-
 /* g0, with the mean velocity of pins and colliders in the stage, into which they go. */
 static void evaluate_start(trbdf2_state *s, const drape_state *in)
 {
@@ -180,7 +169,6 @@ static drape_status differentiate(trbdf2_state *s, const drape_state *in, double
         return status;
     write_stage(s, w, out->x, out->v);
     add_work(s, s->xg, out->x, in->t + GAMMA * h, (1 - GAMMA) * h, in->internal, info);
-    add_pins(s, in, out, info);
     return status;
 }
 

@@ -287,7 +287,7 @@ static void audit_dissipation(verlet_state *s, const substep *sub, double share,
 
 /* ---- The stages of a substep ---- */
 
-/* Velocities of pins that move: their mean over the substep. What they jump by is work on the pins themselves. */
+/* Velocities of pins that move: their mean over the substep. */
 static void start_pins(verlet_state *s, const substep *sub)
 {
     const drape_model *m = s->model;
@@ -297,9 +297,7 @@ static void start_pins(verlet_state *s, const substep *sub)
     for (int32_t i = 0; i < m->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)m->moved_node[i] + k;
-            double before = sub->v[at], v = (s->moved[at] - sub->x[at]) / sub->h;
-            sub->info->pin_work += 0.5 * m->mass[m->moved_node[i]] * (v * v - before * before);
-            sub->v[at] = v;
+            sub->v[at] = (s->moved[at] - sub->x[at]) / sub->h;
         }
 }
 

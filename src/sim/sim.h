@@ -14,6 +14,15 @@ typedef struct drape_reason {
     int64_t count;
 } drape_reason;
 
+/* What the audit of energy keeps of a run [J]. */
+typedef struct drape_audit {
+    double start, start_gravity; /* energy of the first state */
+    double dissipated, pin_work; /* so far */
+    double offered;              /* what the run started with and what work brought or took, without signs */
+    double lowest;               /* gravity so far */
+    double best;                 /* largest numerical dissipation so far */
+} drape_audit;
+
 struct drape_sim {
     drape_context *ctx;
     drape_arena arena;
@@ -37,9 +46,9 @@ struct drape_sim {
     drape_statistics statistics; /* what the driver counts; the integrator has the rest */
     drape_reason reasons[DRAPE_MAX_REASONS];
     int reason_count;
-    double start_energy, dissipated, pin_work;
-    drape_energy energy;
-    bool energy_known; /* of the present state */
+    drape_audit audit;
+    drape_energy energy, made;     /* of the present state; of the one that was attempted last */
+    bool energy_known, made_known; /* whether they are */
 };
 
 static inline const drape_state *drape_sim_state(const drape_sim *sim)
@@ -47,10 +56,12 @@ static inline const drape_state *drape_sim_state(const drape_sim *sim)
     return &sim->states[sim->now];
 }
 
-/* Whether out has kinetic energy that neither in nor the work on it can account for: the step exploded.
- * Cheap unless that is likely. */
-bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, const drape_step_info *info,
-                        drape_worst *worst);
+/* Whether out has energy that neither in nor the work on it can account for, or the run has by now: then
+ * info->worst says how much. */
+bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info *info);
+
+/* The step is accepted: its work counts. */
+void drape_sim_book(drape_sim *sim, const drape_step_info *info);
 
 /* The energy of the present state is the one that the audit starts from. */
 void drape_sim_reset_energy(drape_sim *sim);

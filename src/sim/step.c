@@ -28,7 +28,7 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
     }
     if (info->committed || info->lenient)
         return DRAPE_OK;
-    if (drape_sim_ran_away(sim, next, info, &info->worst)) {
+    if (drape_sim_ran_away(sim, next, info)) {
         info->reason = "energy";
         return DRAPE_RETRY_REJECTED;
     }
@@ -46,6 +46,7 @@ static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info
 {
     drape_state *next = next_state(sim);
     next->t = t1;
+    sim->made_known = false;
     info->worst = (drape_worst){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
     if (!status)
@@ -101,9 +102,7 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     if (!info->committed)
         drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
     turn_states(sim);
-    sim->energy_known = false;
-    sim->dissipated += info->dissipated;
-    sim->pin_work += info->pin_work;
+    drape_sim_book(sim, info);
     measure_strain(sim, drape_sim_state(sim)->x);
     s->h_min = s->steps_accepted == 0 ? info->h : fmin(info->h, s->h_min);
     s->h_max = fmax(info->h, s->h_max);
@@ -199,7 +198,7 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
     describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
     if (attempt->worst.element < 0) /* a node says where, an element may say why */
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
-    if (!isnan(attempt->tolerance)) /* rows that bound errors have none */
+    if (!isnan(attempt->tolerance) && !isnan(attempt->residual)) /* rows that bound errors have none */
         snprintf(residual, sizeof residual, ", residual %.4g N for a tolerance of %.4g N", attempt->residual,
                  attempt->tolerance);
     return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s", attempt->t,
@@ -270,6 +269,7 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
     double t1, h;
     if (!sim)
         return DRAPE_E_ARGUMENT;
+    sim->ctx->message[0] = 0; /* what it says after a failure is of this advance */
     if (!isfinite(t_end))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_advance: t_end is not finite");
     drape_status status =
