@@ -1,15 +1,21 @@
 /*
  * linears: what each linear solver takes for the matrix of a backward Euler step, by size: create (ordering and
  * analysis, done once a sparsity), the first factorisation, a later one, a solve. Square sheets of 1 m hung
- * by two corners, dt 1/60 s, a little deformed; the matrix is positive definite at each size. The least of the
- * repeats. From these figures the sizes of the row `auto` are taken.
+ * by two corners, dt 1/60 s, three matrices of each: of a sheet a little deformed, positive definite; the same
+ * with friction on a plane under each node, not symmetric; of a sheet pressed together, indefinite. The least
+ * of the repeats. From the first come the sizes of the row `auto`, from the others those of what falls back.
  */
 #include "bench.h"
 #include "solvers/linear.h"
 
 #define DT          (1.0 / 60)
 #define DEFORMATION 1e-3 /* of an edge */
+#define PRESSED     0.7  /* of the length, where indefinite */
+#define FRICTION    0.5  /* mu */
 #define BUDGET      1.0  /* [s] a figure */
+
+typedef enum matrix_kind { DEFINITE, FRICTIONAL, INDEFINITE, KIND_COUNT } matrix_kind;
+static const char *const kind_names[KIND_COUNT] = {"definite", "friction", "indefinite"};
 
 typedef struct problem {
     drape_context *ctx;
@@ -30,7 +36,19 @@ static double *take(size_t count)
     return memory;
 }
 
-static void fill(problem *q)
+/* Implicit friction: where the normal force k z holds a node that slides along x, its block of the Jacobian
+ * has k at (z, z) and mu k at (x, z). k is the node's own stiffness. */
+static void add_friction(const drape_pattern *p, double *values)
+{
+    for (int32_t j = 0; j < p->block_count; j++) {
+        int64_t stride;
+        double *at = drape_pattern_at(p, values, j, p->diagonal[j], &stride), k = at[2 * stride + 2];
+        at[2 * stride + 2] += k;
+        at[2 * stride] += FRICTION * k;
+    }
+}
+
+static void fill(problem *q, matrix_kind kind)
 {
     const drape_model *m = q->model;
     drape_system *system = NULL;
@@ -40,17 +58,20 @@ static void fill(problem *q)
         bench_fail(q->ctx, "the state");
     const double edge = m->edge_length[0];
     for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
-        state.x[i] += m->pinned[i / 3] ? 0 : DEFORMATION * edge * sin(12.9898 * (double)(i + 1));
+        state.x[i] = (kind == INDEFINITE ? PRESSED : 1) * state.x[i] +
+                     (m->pinned[i / 3] ? 0 : DEFORMATION * edge * sin(12.9898 * (double)(i + 1)));
     drape_system_jacobian(
         system, &(drape_point){.x = state.x, .v = state.v, .internal = state.internal, .weight = 1 / DT},
-        1 / (DT * DT), true, q->values);
+        1 / (DT * DT), kind != INDEFINITE, q->values);
+    if (kind == FRICTIONAL)
+        add_friction(&m->pattern, q->values);
     for (int64_t i = 0; i < m->pattern.n; i++)
         q->b[i] = cos((double)i);
     drape_arena_free(&arena, q->ctx);
     drape_system_destroy(&system);
 }
 
-static problem open_problem(int side)
+static problem open_problem(int side, matrix_kind kind)
 {
     problem q = {.ctx = bench_context()};
     q.model = bench_model(q.ctx,
@@ -64,7 +85,7 @@ static problem open_problem(int side)
     q.values = take((size_t)p->nonzeros);
     q.b = take((size_t)p->n);
     q.x = take((size_t)p->n);
-    fill(&q);
+    fill(&q, kind);
     return q;
 }
 
@@ -116,25 +137,36 @@ static times measure(problem *q, const drape_linear_ops *ops)
     return t;
 }
 
-static void report(FILE *csv, int nodes, const problem *q, const char *name, const times *t)
+static void report(FILE *csv, int nodes, const problem *q, matrix_kind kind, const char *name, const times *t)
 {
     const drape_pattern *p = &q->model->pattern;
-    printf("%6d %-8s %8lld %9lld %10.3f %10.3f %10.3f %9.3f %9.2f\n", nodes, name, (long long)p->n,
-           (long long)p->nonzeros, 1e3 * t->create, 1e3 * t->first, 1e3 * t->factor, 1e3 * t->solve,
-           1e-6 * (double)t->bytes);
+    printf("%6d %-10s %-8s %8lld %9lld %10.3f %10.3f %10.3f %9.3f %9.2f\n", nodes, kind_names[kind], name,
+           (long long)p->n, (long long)p->nonzeros, 1e3 * t->create, 1e3 * t->first, 1e3 * t->factor,
+           1e3 * t->solve, 1e-6 * (double)t->bytes);
     fflush(stdout);
     if (!csv)
         return;
     bench_csv_row(csv);
-    fprintf(csv, "%d,%s,%lld,%lld,%.4f,%.4f,%.4f,%.4f,%zu\n", nodes, name, (long long)p->n,
-            (long long)p->nonzeros, 1e3 * t->create, 1e3 * t->first, 1e3 * t->factor, 1e3 * t->solve,
-            t->bytes);
+    fprintf(csv, "%d,%s,%s,%lld,%lld,%.4f,%.4f,%.4f,%.4f,%zu\n", nodes, kind_names[kind], name,
+            (long long)p->n, (long long)p->nonzeros, 1e3 * t->create, 1e3 * t->first, 1e3 * t->factor,
+            1e3 * t->solve, t->bytes);
 }
 
 /* n^3: beyond, minutes. */
 static bool affordable(const drape_linear_ops *ops, int side)
 {
     return side <= 16 || strcmp(ops->name, "dense") != 0;
+}
+
+static void measure_all(FILE *csv, int side, matrix_kind kind)
+{
+    problem q = open_problem(side, kind);
+    for (int k = 0; drape_linears[k]; k++)
+        if (affordable(drape_linears[k], side)) {
+            times t = measure(&q, drape_linears[k]);
+            report(csv, side * side, &q, kind, drape_linears[k]->name, &t);
+        }
+    close_problem(&q);
 }
 
 int main(int argc, char **argv)
@@ -148,17 +180,11 @@ int main(int argc, char **argv)
     int most = argc == 3 ? atoi(argv[2]) : 10000;
     FILE *csv =
         bench_csv(argc >= 2 ? argv[1] : NULL,
-                  "nodes,linear,unknowns,nonzeros,create_ms,first_factor_ms,factor_ms,solve_ms,bytes");
-    printf("%6s %-8s %8s %9s %10s %10s %10s %9s %9s\n", "nodes", "linear", "unknowns", "nonzeros",
-           "create ms", "first ms", "factor ms", "solve ms", "MB");
-    for (size_t i = 0; i < sizeof sides / sizeof *sides && sides[i] * sides[i] <= most; i++) {
-        problem q = open_problem(sides[i]);
-        for (int k = 0; drape_linears[k]; k++)
-            if (affordable(drape_linears[k], sides[i])) {
-                times t = measure(&q, drape_linears[k]);
-                report(csv, sides[i] * sides[i], &q, drape_linears[k]->name, &t);
-            }
-        close_problem(&q);
-    }
+                  "nodes,matrix,linear,unknowns,nonzeros,create_ms,first_factor_ms,factor_ms,solve_ms,bytes");
+    printf("%6s %-10s %-8s %8s %9s %10s %10s %10s %9s %9s\n", "nodes", "matrix", "linear", "unknowns",
+           "nonzeros", "create ms", "first ms", "factor ms", "solve ms", "MB");
+    for (size_t i = 0; i < sizeof sides / sizeof *sides && sides[i] * sides[i] <= most; i++)
+        for (matrix_kind kind = DEFINITE; kind < KIND_COUNT; kind++)
+            measure_all(csv, sides[i], kind);
     return csv && fclose(csv) != 0;
 }

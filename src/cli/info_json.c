@@ -241,7 +241,7 @@ static json_t *iteration(const cli_info *info)
     object = with(object, "linear_solver", json_string(p->linear_solver));
     object = with(object, "linear_picked", json_string(p->linear_picked));
     object = with(object, "linear_why", json_string(p->linear_why));
-    return with(object, "linear_fell_back", json_boolean(p->linear_fell_back));
+    return with(object, "linear_fell_back", json_boolean(p->linear_fallback[0]));
 }
 
 static json_t *bytes(const cli_info *info)

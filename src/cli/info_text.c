@@ -246,8 +246,9 @@ static void print_solver(const cli_info *info)
                "-", 1e6 * parts[i].seconds, 100 * cli_share(info, parts[i].seconds));
     if (p->linear_why[0])
         printf("  linear_solver %s picks %s: %s\n", p->linear_solver, p->linear_picked, p->linear_why);
-    if (p->linear_fell_back)
-        printf("  the Jacobian there is not one for %s: klu factors it\n", p->linear_picked);
+    if (p->linear_fallback[0])
+        printf("  the Jacobian there is not one for %s: %s factors it\n", p->linear_picked,
+               p->linear_fallback);
     if (p->factor_status)
         puts("  the Jacobian could not be factored there: what a step costs is not known");
 }

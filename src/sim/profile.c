@@ -241,7 +241,7 @@ static void tell_solver(const bench *s, drape_profile *out)
     if (s->linear->report)
         s->linear->report(s->solver, &report);
     out->linear_picked = report.row->name;
-    out->linear_fell_back = report.fallbacks > 0;
+    out->linear_fallback = report.fallback ? report.fallback->name : "";
     memcpy(out->linear_why, report.why, sizeof out->linear_why);
 }
 
@@ -294,6 +294,7 @@ drape_status drape_profile_measure(drape_context *ctx, const drape_sim *sim, dra
                            .implicit = s.linear != NULL,
                            .linear_solver = s.linear ? s.linear->name : "",
                            .linear_picked = s.linear ? s.linear->name : "",
+                           .linear_fallback = "",
                            .dt = drape_chosen_integrator_value(&sim->chosen, "dt", 1.0 / 60)};
     count_bytes(sim, out);
     drape_status status = measure(&s, out);

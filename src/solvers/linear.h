@@ -13,9 +13,10 @@ typedef struct drape_linear_ops drape_linear_ops;
 
 /* What a solver has to say of itself. */
 typedef struct drape_linear_report {
-    const drape_linear_ops *row; /* that solves: the one asked for, or one that it picked */
-    char why[96];                /* it was picked; "" where nothing was */
-    int64_t fallbacks;           /* matrices that were not for its method, and that klu was given */
+    const drape_linear_ops *row;      /* that solves: the one asked for, or one that it picked */
+    char why[96];                     /* it was picked; "" where nothing was */
+    int64_t fallbacks;                /* matrices that were not for its method */
+    const drape_linear_ops *fallback; /* the row that was given them; NULL: none was */
 } drape_linear_report;
 
 struct drape_linear_ops {
@@ -23,13 +24,15 @@ struct drape_linear_ops {
     /* Unknowns from which on it is measured to be the fastest for a positive definite matrix: what `auto` goes
      * by. 0: at no size. */
     int64_t best_from;
-    /* The library behind it takes heap for the time of a factorisation and gives it back. Else nothing is taken
-     * from the second factorisation on. */
+    /* The same for a matrix that has no Cholesky factors: what rows that need them fall back to. */
+    int64_t general_from;
+    /* The library behind it takes heap for the time of a factorisation and gives it back, or it takes what it
+     * keeps at the first matrix that needs it. Else nothing is taken from the second factorisation on. */
     bool borrows_heap;
     /* Makes the solver's state. pattern outlives it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
     drape_status (*create)(drape_context *ctx, const drape_pattern *pattern, void **state);
     /* Takes the values (pattern->nonzeros). DRAPE_OK, or DRAPE_RETRY_LINEAR: singular to working precision,
-     * or not finite. */
+     * or not finite. Where it borrows heap also DRAPE_E_MEMORY, and it may be called again. */
     drape_status (*factor)(void *state, const double *values);
     /* The same, but a symmetric matrix that is not positive definite is refused with DRAPE_RETRY_LINEAR, for
      * callers that have another one then. NULL: it cannot tell, or it costs no more. */
@@ -45,5 +48,9 @@ struct drape_linear_ops {
 
 extern const drape_linear_ops *const drape_linears[]; /* NULL-ended */
 extern const char *const drape_linears_words[];       /* their names, NULL-ended */
+
+/* The row with the largest best_from, or general_from, that is not above n unknowns. */
+const drape_linear_ops *drape_linear_best(int64_t n);
+const drape_linear_ops *drape_linear_general(int64_t n);
 
 #endif

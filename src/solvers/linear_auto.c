@@ -14,17 +14,6 @@ typedef struct auto_state {
     void *solver;
 } auto_state;
 
-static const drape_linear_ops *pick(int64_t n)
-{
-    const drape_linear_ops *best = NULL;
-    for (int i = 0; drape_linears[i]; i++) {
-        int64_t from = drape_linears[i]->best_from;
-        if (from > 0 && (!best || (from <= n && from > best->best_from) || best->best_from > n))
-            best = drape_linears[i];
-    }
-    return best;
-}
-
 /* The row that takes over at some larger size; NULL: none. */
 static const drape_linear_ops *next_row(int64_t from)
 {
@@ -51,7 +40,7 @@ static drape_status create(drape_context *ctx, const drape_pattern *pattern, voi
     *state = s;
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (auto_state){.ctx = ctx, .row = pick(pattern->n), .n = pattern->n};
+    *s = (auto_state){.ctx = ctx, .row = drape_linear_best(pattern->n), .n = pattern->n};
     drape_status status = s->row->create(ctx, pattern, &s->solver);
     if (status)
         destroy(state);

@@ -6,8 +6,10 @@
  *
  * Whether a matrix is symmetric is not asked of the caller but seen: each entry of the lower triangle is
  * compared with its mirror while it is copied. A matrix that is not symmetric (internal damping in continuous
- * time has such a part), not positive definite, or singular to working precision goes to the row klu, which
- * solves it as it stands or tells that it cannot; nothing is made symmetric that is not.
+ * time and friction have such a part), not positive definite, or singular to working precision goes to the
+ * row that is the fastest for general matrices of this size, which solves it as it stands or tells that it
+ * cannot; nothing is made symmetric that is not. That row's solver is made for the first such matrix: most
+ * scenes have none, and its analysis would be up to half of create.
  */
 #include "solvers/linear.h"
 
@@ -24,10 +26,9 @@ typedef SuiteSparse_long index_t;
 /* Round-off in a_ij, whose elements' parts are at most about sqrt(a_ii a_jj) each. Below it, a difference
  * between mirrored entries moves the solution as rounding the entries does. */
 #define SYMMETRY  1e-13
-#define MIN_RCOND 1e-15 /* below: singular to working precision; klu decides */
+#define MIN_RCOND 1e-15 /* below: singular to working precision; the general row decides */
 
-extern const drape_linear_ops drape_linear_cholmod,
-    drape_linear_klu; /* klu: for what has no Cholesky factors */
+extern const drape_linear_ops drape_linear_cholmod;
 
 /* A triangle of the permuted matrix, as blocks or as scalars. */
 typedef struct triangle {
@@ -47,7 +48,8 @@ typedef struct cholmod_state {
     double *diagonal;           /* (n) in the pattern's order */
     double *solution, *scratch; /* (n), (largest supernode) for solve */
     cholmod_factor *factor;
-    void *general; /* state of klu */
+    const drape_linear_ops *general_row; /* for what has no Cholesky factors */
+    void *general;                       /* its state; NULL before the first such matrix */
     bool by_general, factored;
     int64_t fallbacks;
 } cholmod_state;
@@ -63,7 +65,8 @@ static void destroy(void **state)
         cholmod_l_free_factor(&s->factor, &s->common);
         cholmod_l_finish(&s->common);
     }
-    drape_linear_klu.destroy(&s->general);
+    if (s->general)
+        s->general_row->destroy(&s->general);
     void *all[] = {s->order,       s->blocks.column, s->blocks.row, s->source,   s->mirror, s->scalars.column,
                    s->scalars.row, s->values,        s->diagonal,   s->solution, s->scratch};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
@@ -326,16 +329,15 @@ static drape_status create(drape_context *ctx, const drape_pattern *pattern, voi
         return DRAPE_E_MEMORY;
     s->ctx = ctx;
     s->pattern = pattern;
+    s->general_row = drape_linear_general(pattern->n);
     analysis a = {0};
     drape_status status = analyse(s, &a);
     free_analysis(ctx, &a);
-    if (status)
+    if (status) {
         drape_fail(ctx, status, "out of memory: CHOLMOD cannot analyse the %lld x %lld Jacobian: status %d",
                    (long long)pattern->n, (long long)pattern->n, s->common.status);
-    else
-        status = drape_linear_klu.create(ctx, pattern, &s->general);
-    if (status)
         destroy(state);
+    }
     return status;
 }
 
@@ -404,11 +406,16 @@ static bool factor_lower(cholmod_state *s)
            cholmod_l_rcond(s->factor, &s->common) > MIN_RCOND;
 }
 
-/* By klu, what is not for a Cholesky factor. */
+/* Cholesky factors are tried for each symmetric matrix: leaving attempts out after failures saved 3 to 8 of the
+ * 52 that failed in the 512 matrices of a folding sheet, and gave definite matrices to the slower row. */
 static drape_status factor_general(cholmod_state *s, const double *values)
 {
+    drape_status status = DRAPE_OK;
     s->fallbacks++;
-    drape_status status = drape_linear_klu.factor(s->general, values);
+    if (!s->general)
+        status = s->general_row->create(s->ctx, s->pattern, &s->general);
+    if (!status)
+        status = s->general_row->factor(s->general, values);
     s->factored = s->by_general = !status;
     return status;
 }
@@ -455,7 +462,7 @@ static drape_status solve(void *state, const double *b, double *x)
     if (!s->factored)
         return DRAPE_RETRY_LINEAR;
     if (s->by_general)
-        return drape_linear_klu.solve(s->general, b, x);
+        return s->general_row->solve(s->general, b, x);
     for (size_t j = 0; j < n; j++)
         s->solution[j] = b[3 * s->order[j / 3] + (index_t)(j % 3)];
     cholmod_dense solution = as_vector(s->solution, n), scratch = as_vector(s->scratch, s->factor->maxesize);
@@ -476,19 +483,21 @@ static size_t bytes(const void *state)
     size_t doubles = lower_scalars(p) + 2 * n + s->factor->maxesize;
     return sizeof *s + indices * sizeof(index_t) + doubles * sizeof(double) +
            2 * lower_blocks(p) * sizeof(int32_t) + s->common.memory_inuse +
-           drape_linear_klu.bytes(s->general);
+           (s->general ? s->general_row->bytes(s->general) : 0);
 }
 
 static void report(const void *state, drape_linear_report *out)
 {
     const cholmod_state *s = state;
-    *out = (drape_linear_report){.row = &drape_linear_cholmod, .fallbacks = s->fallbacks};
+    *out = (drape_linear_report){.row = &drape_linear_cholmod,
+                                 .fallbacks = s->fallbacks,
+                                 .fallback = s->general ? s->general_row : NULL};
 }
 
 const drape_linear_ops drape_linear_cholmod = {
     .name = "cholmod",
     .summary = "supernodal Cholesky with a symbolic factor kept for good; what is not symmetric positive "
-               "definite goes to klu",
+               "definite goes to umfpack or klu, by size",
     .reference = "Chen, Davis, Hager & Rajamanickam 2008, Algorithm 887: CHOLMOD",
     .best_from =
         500, /* with OpenBLAS half of klu's time at 430, a third at 760; no slower with a plain BLAS */

@@ -6,6 +6,7 @@
 
 #include "model/model.h"
 #include "models.h"
+#include "support/failing_allocator.h"
 #include "support/suite.h"
 
 /* ---- Matrices on the pattern of a cloth ---- */
@@ -451,6 +452,20 @@ static void check_residual(const sheet *q, bool definite, const char *name)
     free(size);
 }
 
+/* Only cholmod falls back, to the row with the largest general_from that is not above the size. */
+static void check_fallback(const drape_linear_report *report, int64_t n, int64_t count)
+{
+    const drape_linear_ops *expected = NULL;
+    bool falls = strcmp(report->row->name, "cholmod") == 0;
+    for (int i = 0; falls && drape_linears[i]; i++) {
+        int64_t from = drape_linears[i]->general_from;
+        if (from > 0 && from <= n && (!expected || from > expected->general_from))
+            expected = drape_linears[i];
+    }
+    ck_assert_int_eq(report->fallbacks, falls ? count : 0);
+    ck_assert_ptr_eq(report->fallback, expected);
+}
+
 /* Definite and indefinite in turn; a second solver that is given the same gives the same bits. */
 START_TEST(a_sheet_of_many_supernodes)
 {
@@ -470,12 +485,54 @@ START_TEST(a_sheet_of_many_supernodes)
             ck_assert_int_eq(ops->solve(other, q.b, q.again), DRAPE_OK);
             ck_assert_mem_eq(q.again, q.x, (size_t)q.p.n * sizeof *q.x);
         }
-        if (report_of(ops, solver).row->borrows_heap)
-            ck_assert_int_eq(report_of(ops, solver).fallbacks, 2);
+        drape_linear_report report = report_of(ops, solver);
+        check_fallback(&report, q.p.n, 2);
         ops->destroy(&solver);
         ops->destroy(&other);
     }
     close_sheet(&q);
+}
+END_TEST
+
+/* What a row falls back to is made when it is needed: definite matrices do not pay for it, and where there is no
+ * memory then, the row says so, has no factors, and does the work when asked again. */
+START_TEST(no_memory_for_the_fallback)
+{
+    static const int32_t sides[] = {8, 24}; /* klu, and umfpack where it is built */
+    for (int i = 0; drape_linears[i]; i++)
+        for (size_t k = 0; k < sizeof sides / sizeof *sides; k++) {
+            const drape_linear_ops *ops = drape_linears[i];
+            failing_allocator memory = {0};
+            drape_context *ctx = failing_context(&memory);
+            sheet q = open_sheet(sides[k]);
+            void *solver = NULL;
+            ck_assert_int_eq(ops->create(ctx, &q.p, &solver), DRAPE_OK);
+            fill_sheet(&q, 1.5, 7);
+            ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
+            ck_assert_ptr_null(report_of(ops, solver).fallback);
+            size_t definite = ops->bytes(solver);
+            long before = memory.calls, failed = 0;
+            fill_sheet(&q, 0.2, 7);
+            drape_status status = DRAPE_E_MEMORY;
+            for (memory.fail_at = before + 1; status == DRAPE_E_MEMORY;
+                 memory.fail_at = memory.calls + 1 + failed) {
+                status = ops->factor(solver, q.values);
+                if (status)
+                    ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_RETRY_LINEAR);
+                failed += status == DRAPE_E_MEMORY;
+            }
+            ck_assert_int_eq(status, DRAPE_OK);
+            ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
+            check_residual(&q, false, ops->name);
+            bool falls = report_of(ops, solver).fallback;
+            ck_assert_int_eq(failed > 0, falls);
+            if (falls)
+                ck_assert_uint_gt(ops->bytes(solver), definite);
+            ops->destroy(&solver);
+            close_sheet(&q);
+            drape_context_destroy(&ctx);
+            ck_assert_int_eq(memory.live, 0);
+        }
 }
 END_TEST
 
@@ -534,4 +591,4 @@ SUITE("linears", rows_are_well_formed, random_systems_are_solved,
       several_right_hand_sides_of_one_factorisation, broken_matrices_are_told_and_good_ones_work_again,
       a_right_hand_side_that_is_not_finite_is_told, kept_pivots_that_become_zero_are_chosen_again,
       a_small_part_that_is_not_symmetric_is_not_lost, fallbacks_are_counted, a_sheet_of_many_supernodes,
-      made_again_on_other_patterns, auto_picks_by_size_and_says_so)
+      no_memory_for_the_fallback, made_again_on_other_patterns, auto_picks_by_size_and_says_so)

@@ -1,0 +1,34 @@
+/* pick.c: which row is the fastest of this build for a number of unknowns, by what each row says of itself. */
+#include "solvers/linear.h"
+
+static int64_t best_from(const drape_linear_ops *row)
+{
+    return row->best_from;
+}
+
+static int64_t general_from(const drape_linear_ops *row)
+{
+    return row->general_from;
+}
+
+/* Below the smallest size of all rows, the row with that. */
+static const drape_linear_ops *pick(int64_t n, int64_t (*from_of)(const drape_linear_ops *row))
+{
+    const drape_linear_ops *best = NULL;
+    for (int i = 0; drape_linears[i]; i++) {
+        int64_t from = from_of(drape_linears[i]), kept = best ? from_of(best) : 0;
+        if (from > 0 && (!best || (from <= n && from > kept) || kept > n))
+            best = drape_linears[i];
+    }
+    return best;
+}
+
+const drape_linear_ops *drape_linear_best(int64_t n)
+{
+    return pick(n, best_from);
+}
+
+const drape_linear_ops *drape_linear_general(int64_t n)
+{
+    return pick(n, general_from);
+}
