@@ -540,8 +540,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
             info->reason = "collision";
         if (drape_system_status(s->system))
             status = drape_system_status(s->system);
-        if (s->fitted < 0)
-            status = s->fitted;
+        if (s->fitted < 0 || s->linear->status < 0)
+            status = s->fitted < 0 ? s->fitted : s->linear->status;
         count_iterations(s, info);
         if (status)
             IDAGetCurrentStep(s->ida, &info->h);

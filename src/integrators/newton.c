@@ -567,9 +567,10 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *pro
     count_iterations(s, info);
     if (drape_system_status(s->system))
         return drape_system_status(s->system);
-    if (s->fitted < 0) {
+    drape_status fatal = s->fitted < 0 ? s->fitted : s->linear->status;
+    if (fatal < 0) {
         info->reason = "memory";
-        return s->fitted;
+        return fatal;
     }
     if (status)
         drape_newton_forget_factors(s);

@@ -406,7 +406,7 @@ static bool factor_lower(cholmod_state *s)
            cholmod_l_rcond(s->factor, &s->common) > MIN_RCOND;
 }
 
-/* Cholesky factors are tried for each symmetric matrix: leaving attempts out after failures saved 3 to 8 of the
+/* Cholesky factors are tried for each symmetric matrix: leaving attempts out after failures saved 2 or 3 of the
  * 52 that failed in the 512 matrices of a folding sheet, and gave definite matrices to the slower row. */
 static drape_status factor_general(cholmod_state *s, const double *values)
 {
