@@ -10,7 +10,7 @@
 
 #include <math.h>
 
-#define DRAPE_BARRIER_LOW 0.01
+#define DRAPE_BARRIER_LOW 0.1
 
 typedef struct drape_barrier {
     double b, db, ddb; /* b, b', b'' */
