@@ -21,7 +21,9 @@ static void list_collider(drape_search *s, int32_t collider, int32_t first, int3
                           int32_t *triangles)
 {
     const drape_collider *c = &s->model->colliders[collider];
-    memcpy(s->rest + 3 * (size_t)first, c->shape.point, 3 * (size_t)c->shape.point_count * sizeof *s->rest);
+    if (c->shape.point_count > 0)
+        memcpy(s->rest + 3 * (size_t)first, c->shape.point,
+               3 * (size_t)c->shape.point_count * sizeof *s->rest);
     for (int32_t p = 0; p < c->shape.point_count; p++)
         s->point_collider[first - s->model->node_count + p] = collider;
     for (int32_t k = 0; k < 2 * c->shape.segment_count; k++)

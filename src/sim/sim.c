@@ -54,7 +54,7 @@ static drape_status create_parts(drape_sim *sim, const drape_sim_def *def)
         status = create_states(sim);
     if (!status)
         status = drape_system_create(sim->ctx, sim->model, def->threads, &sim->system);
-    bool projects = sim->chosen.integrator->projects_contact;
+    bool projects = !status && sim->chosen.integrator->projects_contact;
     if (!status && projects)
         drape_system_leave_constraints(sim->system);
     if (!status && !projects)

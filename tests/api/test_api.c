@@ -386,7 +386,12 @@ static int zeroed(int which)
     host_scene s;
     drape_context *ctx = make_context();
     drape_model *model = NULL;
+    drape_collider_def collider = {0};
     fill_scene(&s);
+    if (which >= 13 && which <= 15) {
+        s.scene.colliders = &collider;
+        s.scene.collider_count = 1;
+    }
     if (which == 0)
         s.terms[1] = (drape_row_def){0};
     else if (which == 1)
@@ -413,14 +418,10 @@ static int zeroed(int which)
         memset(&s.pins[0], 0, sizeof s.pins[0]);
     else if (which == 12)
         s.scene.collider_count = 1;
-    else if (which == 13)
-        s.scene.colliders = &(drape_collider_def){0}, s.scene.collider_count = 1;
     else if (which == 14)
-        s.scene.colliders = &(drape_collider_def){.row = {.type = "sphere", .setting_count = 1}},
-        s.scene.collider_count = 1;
+        collider = (drape_collider_def){.row = {.type = "sphere", .setting_count = 1}};
     else if (which == 15)
-        s.scene.colliders = &(drape_collider_def){.row = {.type = "sphere"}, .key_count = 1},
-        s.scene.collider_count = 1;
+        collider = (drape_collider_def){.row = {.type = "sphere"}, .key_count = 1};
     else if (which == 16)
         s.scene.contact_count = 1;
     else if (which == 17)
