@@ -77,7 +77,10 @@ size_t drape_contact_bytes(const drape_contact *c)
 {
     if (!c)
         return 0;
-    return sizeof *c + drape_search_bytes(&c->search) + 15 * (size_t)c->search.points * sizeof(double) +
+    size_t points = (size_t)c->search.points, nodes = (size_t)c->model->node_count,
+           colliders = (size_t)c->model->collider_count;
+    return sizeof *c + drape_search_bytes(&c->search) +
+           (15 * points + nodes + 3 * colliders) * sizeof(double) + 3 * colliders * sizeof *c->pose +
            (size_t)c->room * sizeof *c->pairs + (size_t)c->lagged_room * sizeof *c->lagged +
            4 * (size_t)c->coupling_room * sizeof *c->coupling;
 }
