@@ -26,16 +26,18 @@ static bool take_arrays(drape_contact *c)
     size_t points = 3 * (size_t)c->search.points, colliders = (size_t)c->model->collider_count;
     c->x = drape_alloc(c->ctx, points, sizeof *c->x);
     c->v = drape_alloc(c->ctx, points, sizeof *c->v);
-    c->y = drape_alloc(c->ctx, points, sizeof *c->y);
+    c->from = drape_alloc(c->ctx, points, sizeof *c->from);
+    c->to = drape_alloc(c->ctx, points, sizeof *c->to);
     c->searched = drape_alloc(c->ctx, points, sizeof *c->searched);
     c->start = drape_alloc(c->ctx, points, sizeof *c->start);
     c->start_gaps = drape_alloc(c->ctx, (size_t)c->model->node_count, sizeof *c->start_gaps);
     c->pose = drape_alloc(c->ctx, colliders, sizeof *c->pose);
     c->searched_pose = drape_alloc(c->ctx, colliders, sizeof *c->searched_pose);
     c->start_pose = drape_alloc(c->ctx, colliders, sizeof *c->start_pose);
+    c->listed_pose = drape_alloc(c->ctx, colliders, sizeof *c->listed_pose);
     c->on_collider = drape_alloc(c->ctx, 3 * colliders, sizeof *c->on_collider);
-    return c->x && c->v && c->y && c->searched && c->start && c->start_gaps && c->pose && c->searched_pose &&
-           c->start_pose && c->on_collider;
+    return c->x && c->v && c->from && c->to && c->searched && c->start && c->start_gaps && c->pose &&
+           c->searched_pose && c->start_pose && c->listed_pose && c->on_collider;
 }
 
 drape_status drape_contact_create(drape_context *ctx, const drape_model *model, drape_contact **out)
@@ -63,9 +65,10 @@ void drape_contact_destroy(drape_contact **contact)
     drape_contact *c = *contact;
     if (!c)
         return;
-    void *arrays[] = {c->x,         c->v,     c->y,      c->searched, c->start,       c->start_gaps,
-                      c->pose,      c->pairs, c->lagged, c->coupling, c->on_collider, c->searched_pose,
-                      c->start_pose};
+    void *arrays[] = {c->x,        c->v,           c->from,          c->to,         c->searched,
+                      c->start,    c->start_gaps,  c->pose,          c->pairs,      c->lagged,
+                      c->coupling, c->on_collider, c->searched_pose, c->start_pose, c->touches,
+                      c->slots,    c->listed_pose};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         drape_free(c->ctx, arrays[i]);
     drape_search_destroy(&c->search);
@@ -80,9 +83,10 @@ size_t drape_contact_bytes(const drape_contact *c)
     size_t points = (size_t)c->search.points, nodes = (size_t)c->model->node_count,
            colliders = (size_t)c->model->collider_count;
     return sizeof *c + drape_search_bytes(&c->search) +
-           (15 * points + nodes + 3 * colliders) * sizeof(double) + 3 * colliders * sizeof *c->pose +
-           (size_t)c->room * sizeof *c->pairs + (size_t)c->lagged_room * sizeof *c->lagged +
-           4 * (size_t)c->coupling_room * sizeof *c->coupling;
+           (18 * points + nodes + 3 * colliders) * sizeof(double) + 4 * colliders * sizeof *c->pose +
+           (size_t)c->room * sizeof *c->pairs +
+           (size_t)c->touch_room * (sizeof *c->touches + DRAPE_SLOTS * sizeof *c->slots) +
+           (size_t)c->lagged_room * sizeof *c->lagged + 4 * (size_t)c->coupling_room * sizeof *c->coupling;
 }
 
 double drape_contact_seconds(const drape_contact *c)
@@ -232,13 +236,144 @@ static drape_status search(drape_contact *c)
     return c->status;
 }
 
+/* ---- What acts ---- */
+
+/* One piece that stands for several: the areas add up. Points and edges have no more than three nodes; what has
+ * four is itself alone, and so is what is more than its nodes. */
+static bool is_shared(const drape_touch *touch)
+{
+    return touch->closest.points > 1 && touch->closest.points < 4 && !touch->mollified && !touch->sharp;
+}
+
+static void sort_two(int32_t *a)
+{
+    int32_t least = a[0] < a[1] ? a[0] : a[1];
+    a[1] += a[0] - least;
+    a[0] = least;
+}
+
+/* Two points, or a point and then the ends of an edge, ascending. */
+static void key_of(const drape_touch *touch, int32_t key[3])
+{
+    const int32_t *n = touch->pair.node;
+    const double *c = touch->closest.c;
+    if (touch->closest.points == 2) {
+        const int32_t points[3] = {n[0], n[1], -1};
+        memcpy(key, points, sizeof points);
+        sort_two(key);
+        return;
+    }
+    int positive = (c[0] > 0) + (c[1] > 0) + (c[2] > 0), alone = 0;
+    while (alone < 2 && (c[alone] > 0) != (positive == 1))
+        alone++;
+    const int32_t nodes[3] = {n[alone], n[alone == 0], n[alone == 2 ? 1 : 2]};
+    memcpy(key, nodes, sizeof nodes);
+    sort_two(key + 1);
+}
+
+static bool is_same(const drape_touch *a, const drape_touch *b)
+{
+    int32_t key[3], other[3];
+    if (a->pair.collider != b->pair.collider || a->pair.distance != b->pair.distance ||
+        a->closest.points != b->closest.points)
+        return false;
+    key_of(a, key);
+    key_of(b, other);
+    return memcmp(key, other, sizeof key) == 0;
+}
+
+/* Where a touch is in the table, or its free place. */
+static int32_t *slot_of(const drape_contact *c, const drape_touch *touch)
+{
+    int32_t key[3];
+    key_of(touch, key);
+    uint64_t hash = 0;
+    for (int a = 0; a < 3; a++)
+        hash = (hash ^ (uint32_t)key[a]) * 0x9e3779b97f4a7c15u;
+    uint64_t size = DRAPE_SLOTS * (uint64_t)c->touch_room, at = (hash >> 20) % size;
+    while (c->slots[at] > 0 && !is_same(touch, &c->touches[c->slots[at] - 1]))
+        at = at + 1 < size ? at + 1 : 0;
+    return &c->slots[at];
+}
+
+/* Room for one more, in the table too. */
+static bool grow_touches(drape_contact *c)
+{
+    int32_t room = c->touch_room;
+    drape_touch *touches = drape_contact_grow(c->ctx, c->touches, c->touch_count, &room, sizeof *touches);
+    if (!touches)
+        return false;
+    c->touches = touches;
+    if (room == c->touch_room)
+        return true;
+    int32_t *slots = drape_alloc(c->ctx, DRAPE_SLOTS * (size_t)room, sizeof *slots);
+    if (!slots)
+        return false;
+    drape_free(c->ctx, c->slots);
+    c->slots = slots;
+    c->touch_room = room;
+    for (int32_t i = 0; i < c->touch_count; i++)
+        if (is_shared(&c->touches[i]))
+            *slot_of(c, &c->touches[i]) = i + 1;
+    return true;
+}
+
+static bool list_touch(drape_contact *c, const drape_touch *touch)
+{
+    if (!grow_touches(c))
+        return false;
+    int32_t *slot = is_shared(touch) ? slot_of(c, touch) : NULL;
+    if (slot && *slot > 0) {
+        c->touches[*slot - 1].pair.area += touch->pair.area;
+        return true;
+    }
+    if (slot)
+        *slot = c->touch_count + 1;
+    c->touches[c->touch_count++] = *touch;
+    return true;
+}
+
+static drape_status list_touches(drape_contact *c)
+{
+    const drape_placed now = drape_contact_placed(c, c->x);
+    c->touch_count = 0;
+    if (c->slots)
+        memset(c->slots, 0, DRAPE_SLOTS * (size_t)c->touch_room * sizeof *c->slots);
+    for (int32_t i = 0; i < c->count; i++) {
+        const drape_pair *pair = &c->pairs[i];
+        drape_touch touch;
+        if (!drape_contact_may(pair, c->moved, pair->distance) ||
+            !drape_pair_touch(pair, &now, c->search.rest, &touch))
+            continue;
+        drape_touch_reduce(&touch);
+        if (!list_touch(c, &touch))
+            return DRAPE_E_MEMORY;
+    }
+    memcpy(c->listed_pose, c->pose, (size_t)c->model->collider_count * sizeof *c->pose);
+    c->listed = true;
+    return DRAPE_OK;
+}
+
+/* Whether it stands there already: forces, energy and derivatives are often asked at one point. */
+static bool stands(const drape_contact *c, const double *x)
+{
+    for (int32_t i = 0; i < c->model->collider_count; i++)
+        if (moved2(c->pose[i].displacement, c->listed_pose[i].displacement) != 0)
+            return false;
+    return c->listed && memcmp(x, c->x, 3 * (size_t)c->model->node_count * sizeof *x) == 0;
+}
+
 drape_status drape_contact_go(drape_contact *c, const drape_contact_at *at)
 {
     drape_contact_pose(c, at->t, at->span);
-    drape_contact_fill(c, at->x, c->x);
     fill_velocities(c, at->v, c->v);
+    if (stands(c, at->x))
+        return DRAPE_OK;
+    c->listed = false;
+    drape_contact_fill(c, at->x, c->x);
     c->moved = drape_contact_moved(c, c->x);
-    return c->moved > c->margin ? search(c) : DRAPE_OK;
+    drape_status status = c->moved > c->margin ? search(c) : DRAPE_OK;
+    return status ? status : list_touches(c);
 }
 
 drape_status drape_contact_place(drape_contact *c, const drape_contact_at *at)
@@ -251,26 +386,26 @@ drape_status drape_contact_place(drape_contact *c, const drape_contact_at *at)
 
 /* ---- The beginning of a step ---- */
 
-static bool keep_lagged(drape_contact *c, const drape_pair *pair, const drape_gap *gap, double lambda)
+static bool keep_lagged(drape_contact *c, const drape_touch *touch, const drape_contact_law *law)
 {
     drape_lagged *list =
         drape_contact_grow(c->ctx, c->lagged, c->lagged_count, &c->lagged_room, sizeof *list);
     if (!list)
         return false;
     c->lagged = list;
-    c->lagged[c->lagged_count++] = (drape_lagged){.pair = *pair, .gap = *gap, .lambda = lambda};
+    drape_lagged *l = &c->lagged[c->lagged_count++];
+    l->pair = touch->pair;
+    drape_contact_gap(c, touch, false, &l->gap);
+    l->lambda = drape_contact_normal_force(&l->gap, law);
     return true;
 }
 
 static drape_status lag(drape_contact *c)
 {
     c->lagged_count = 0;
-    for (int32_t i = 0; c->model->contact.lagged && i < c->count; i++) {
-        drape_gap gap;
-        if (!drape_contact_acts(c, &c->pairs[i], false, &gap))
-            continue;
-        drape_contact_law law = drape_contact_law_of(c, &c->pairs[i]);
-        if (law.friction > 0 && !keep_lagged(c, &c->pairs[i], &gap, drape_contact_normal_force(&gap, &law)))
+    for (int32_t i = 0; c->model->contact.lagged && i < c->touch_count; i++) {
+        drape_contact_law law = drape_contact_law_of(c, &c->touches[i].pair);
+        if (law.friction > 0 && !keep_lagged(c, &c->touches[i], &law))
             return DRAPE_E_MEMORY;
     }
     return DRAPE_OK;
@@ -279,18 +414,14 @@ static drape_status lag(drape_contact *c)
 /* How deep things lie in colliders already. */
 static void measure_start(drape_contact *c)
 {
-    const drape_placed now = drape_contact_placed(c, c->x);
     memset(c->start_gaps, 0, (size_t)c->model->node_count * sizeof *c->start_gaps);
     c->start_least = 0;
-    for (int32_t i = 0; i < c->count; i++) {
-        const drape_pair *pair = &c->pairs[i];
-        if (pair->collider < 0)
+    for (int32_t i = 0; i < c->touch_count; i++) {
+        const drape_touch *touch = &c->touches[i];
+        if (touch->pair.collider < 0)
             continue;
-        double gap = drape_pair_gap_value(pair, &now);
-        if (drape_pair_points(pair) == 1)
-            c->start_gaps[pair->node[0]] = fmin(c->start_gaps[pair->node[0]], gap);
-        else
-            c->start_least = fmin(c->start_least, gap);
+        double *least = touch->closest.points == 1 ? &c->start_gaps[touch->pair.node[0]] : &c->start_least;
+        *least = fmin(*least, touch->gap);
     }
 }
 

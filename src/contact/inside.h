@@ -7,10 +7,12 @@
 
 #include "contact/contact.h"
 
+#define DRAPE_SLOTS 4 /* of the table of touches, for each that there is room for */
+
 /* Friction as it was where the step began. */
 typedef struct drape_lagged {
     drape_pair pair;
-    drape_gap gap; /* c and normal; the derivatives are zero */
+    drape_gap gap; /* points, c and normal */
     double lambda; /* [N] */
 } drape_lagged;
 
@@ -20,7 +22,7 @@ struct drape_contact {
     drape_search search;
     drape_contact_law law;     /* all but the distance and stiffness of a pair */
     double *x, *v;             /* (points x 3) where it was last placed */
-    double *y;                 /* (points x 3) the end of a way */
+    double *from, *to;         /* (points x 3) the ends of a way */
     double *searched;          /* (points x 3) positions of the last search */
     drape_collider_pose *pose; /* (collider_count) */
     drape_collider_pose *searched_pose, *start_pose;
@@ -29,6 +31,12 @@ struct drape_contact {
     double moved;      /* how far one has, where it was last placed [m] */
     drape_pair *pairs; /* (count of room) candidates, surfaces too */
     int32_t count, room;
+    bool listed; /* the touches are those of x, and of the colliders at listed_pose */
+    drape_touch
+        *touches; /* (touch_count of touch_room) what acts, the same pieces once with all their area */
+    int32_t touch_count, touch_room;
+    int32_t *slots; /* (DRAPE_SLOTS x touch_room) hashed by nodes: 1 + a touch, 0: free */
+    drape_collider_pose *listed_pose;
     drape_lagged *lagged; /* (lagged_count of lagged_room) */
     int32_t lagged_count, lagged_room;
     int32_t *coupling; /* (coupling_room x 4) */
@@ -62,8 +70,14 @@ static inline drape_placed drape_contact_placed(const drape_contact *c, const do
     return (drape_placed){.model = c->model, .x = x, .pose = c->pose};
 }
 
-/* Whether a candidate acts where it was last placed, and its gap there: see drape_pair_gap. */
-bool drape_contact_acts(const drape_contact *c, const drape_pair *pair, bool derivatives, drape_gap *gap);
+/* Whether a candidate can come nearer than `gap` where no point is further than moved from the last search. */
+static inline bool drape_contact_may(const drape_pair *pair, double moved, double gap)
+{
+    return pair->found - 2 * moved < gap;
+}
+
+/* The gap of what acts where it was last placed. */
+void drape_contact_gap(const drape_contact *c, const drape_touch *touch, bool derivatives, drape_gap *gap);
 
 drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_pair *pair);
 

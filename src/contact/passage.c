@@ -19,7 +19,6 @@
 
 /* The pairs that a way might bring together. */
 typedef struct journey {
-    drape_contact *contact;
     const double *x, *y; /* (points x 3) */
     double keep, way;
     bool core;
@@ -36,17 +35,31 @@ static void follow(void *user, const drape_pair *pair)
     }
 }
 
-/* Straight ways: where both ends are near the last search, what is between is. */
+static double longest_way(const drape_contact *c, const journey *j)
+{
+    double most = 0;
+    for (size_t i = 0; i < (size_t)c->search.points; i++) {
+        double way[3];
+        vec3_sub(j->y + 3 * i, j->x + 3 * i, way);
+        most = fmax(most, vec3_dot(way, way));
+    }
+    return sqrt(most);
+}
+
+/* Straight ways: where both ends are near the last search, what is between is. Two points come nearer to each other
+ * by no more than both of their ways. */
 static void travel(drape_contact *c, journey *j)
 {
-    if (drape_contact_moved(c, j->x) > c->margin || drape_contact_moved(c, j->y) > c->margin) {
+    double moved = drape_contact_moved(c, j->x);
+    if (moved > c->margin || drape_contact_moved(c, j->y) > c->margin) {
         double start = drape_clock_seconds();
         drape_search_pairs(&c->search, j->x, j->y, -c->search.most_distance, follow, j);
         c->search_seconds += drape_clock_seconds() - start;
         return;
     }
+    double reach = 2 * longest_way(c, j);
     for (int32_t i = 0; i < c->count; i++)
-        if (drape_pair_points(&c->pairs[i]) > 1)
+        if (drape_pair_points(&c->pairs[i]) > 1 && drape_contact_may(&c->pairs[i], moved, reach))
             follow(j, &c->pairs[i]);
 }
 
@@ -88,9 +101,9 @@ double drape_contact_way(drape_contact *c, const double *x, const double *y, dou
     double start = drape_clock_seconds();
     const double span[2] = {t, t};
     drape_contact_pose(c, t, span);
-    drape_contact_fill(c, x, c->x);
-    drape_contact_fill(c, y, c->y);
-    journey j = {.contact = c, .x = c->x, .y = c->y, .keep = KEEP_ITERATE, .way = 1};
+    drape_contact_fill(c, x, c->from);
+    drape_contact_fill(c, y, c->to);
+    journey j = {.x = c->from, .y = c->to, .keep = KEEP_ITERATE, .way = 1};
     travel(c, &j);
     double share = fmin(j.way, march_all(c, x, y, KEEP_ITERATE));
     c->seconds += drape_clock_seconds() - start;
@@ -102,8 +115,8 @@ bool drape_contact_crosses(drape_contact *c, const double *y, double t)
     double start = drape_clock_seconds();
     const double span[2] = {t, t};
     drape_contact_pose(c, t, span);
-    drape_contact_fill(c, y, c->y);
-    journey j = {.contact = c, .x = c->start, .y = c->y, .keep = KEEP_STEP, .way = 1, .core = true};
+    drape_contact_fill(c, y, c->to);
+    journey j = {.x = c->start, .y = c->to, .keep = KEEP_STEP, .way = 1, .core = true};
     travel(c, &j);
     c->seconds += drape_clock_seconds() - start;
     return j.way < 1;
@@ -123,32 +136,32 @@ static drape_worst worst_of(const drape_contact *c, const drape_pair *pair, cons
                          .value = value,
                          .limit = limit};
     int count = 0;
-    for (int a = 0; a < drape_pair_points(pair); a++)
-        if (pair->node[a] < c->model->node_count)
+    for (int a = 0; a < 4; a++)
+        if (pair->node[a] >= 0 && pair->node[a] < c->model->node_count)
             worst.node[count++] = pair->node[a];
     worst.cloth = drape_model_cloth_of(c->model, worst.node[0]);
     return worst;
 }
 
 /* A node may be where it was too deep before, but no deeper. */
-static double allowed(const drape_contact *c, const drape_pair *pair)
+static double allowed(const drape_contact *c, const drape_touch *touch)
 {
-    double before = drape_pair_points(pair) == 1 ? c->start_gaps[pair->node[0]] : c->start_least;
+    double before = touch->closest.points == 1 ? c->start_gaps[touch->pair.node[0]] : c->start_least;
     return fmin(before, -TOUCH);
 }
 
 static drape_status check_depth(drape_contact *c, const char **reason, drape_worst *worst)
 {
-    const drape_placed now = drape_contact_placed(c, c->x);
     double most = 0;
-    for (int32_t i = 0; i < c->count; i++) {
-        if (c->pairs[i].collider < 0)
+    for (int32_t i = 0; i < c->touch_count; i++) {
+        const drape_touch *touch = &c->touches[i];
+        if (touch->pair.collider < 0)
             continue;
-        double gap = drape_pair_gap_value(&c->pairs[i], &now), least = allowed(c, &c->pairs[i]);
-        if (gap >= least || least - gap < most)
+        double least = allowed(c, touch);
+        if (touch->gap >= least || least - touch->gap < most)
             continue;
-        most = least - gap;
-        *worst = worst_of(c, &c->pairs[i], "gap [m]", gap, least);
+        most = least - touch->gap;
+        *worst = worst_of(c, &touch->pair, "gap [m]", touch->gap, least);
     }
     *reason = most > 0 ? "penetration" : *reason;
     return most > 0 ? DRAPE_RETRY_REJECTED : DRAPE_OK;
@@ -189,7 +202,7 @@ static drape_status check_inscribed(drape_contact *c, const int32_t *node, int n
 
 static drape_status check_way(drape_contact *c, const char **reason, drape_worst *worst)
 {
-    journey j = {.contact = c, .x = c->start, .y = c->x, .keep = KEEP_STEP, .way = 1, .core = true};
+    journey j = {.x = c->start, .y = c->x, .keep = KEEP_STEP, .way = 1, .core = true};
     travel(c, &j);
     if (j.way >= 1)
         return DRAPE_OK;

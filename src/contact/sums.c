@@ -9,6 +9,8 @@
 #include <string.h>
 
 #define D 12
+#define PATTERN_AHEAD                                                                                        \
+    1 /* of the margin: what comes nearer than that has its place when the pattern is made */
 
 /* ---- Forces ---- */
 
@@ -23,60 +25,53 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_pair 
     return law;
 }
 
-/* Velocities relative to the collider whose surface it is: only those have a point fewer. */
-static void gather_velocities(const drape_contact *c, const drape_pair *pair, double v[4][3])
+static void gather_velocities(const drape_contact *c, const drape_pair *pair, int points, double v[4][3])
 {
-    drape_pair_gather(pair, c->v, v);
-    if (drape_pair_points(pair) == 1)
+    for (int a = 0; a < points; a++)
+        memcpy(v[a], c->v + 3 * (size_t)pair->node[a], sizeof v[a]);
+    if (points == 1)
         vec3_sub(v[0], c->pose[pair->collider].velocity, v[0]);
 }
 
-static void scatter(drape_contact *c, const int32_t *node, int points, int32_t collider, const double *from,
-                    double *g)
+static void scatter(drape_contact *c, const drape_pair *pair, int points, const double *from, double *g)
 {
+    const int32_t *node = pair->node;
     for (int a = 0; a < points; a++)
         for (int k = 0; k < 3 && node[a] < c->model->node_count; k++) {
             g[3 * (size_t)node[a] + (size_t)k] += from[3 * a + k];
-            if (collider >= 0)
-                c->on_collider[3 * (size_t)collider + (size_t)k] -= from[3 * a + k];
+            if (pair->collider >= 0)
+                c->on_collider[3 * (size_t)pair->collider + (size_t)k] -= from[3 * a + k];
         }
 }
 
-/* Most candidates do not act, and that is known from how far points have moved since they were found. */
-static bool may_act(const drape_contact *c, const drape_pair *pair)
-{
-    return pair->found - 2 * c->moved < pair->distance;
-}
-
-bool drape_contact_acts(const drape_contact *c, const drape_pair *pair, bool derivatives, drape_gap *gap)
+void drape_contact_gap(const drape_contact *c, const drape_touch *touch, bool derivatives, drape_gap *gap)
 {
     const drape_placed now = drape_contact_placed(c, c->x);
-    return may_act(c, pair) && drape_pair_gap(pair, &now, c->search.rest, derivatives, gap);
+    drape_touch_gap(touch, &now, c->search.rest, derivatives, gap);
 }
 
-static void add_pair(drape_contact *c, const drape_pair *pair, bool normal, bool friction, double *g)
+static void add_touch(drape_contact *c, const drape_touch *touch, bool normal, bool friction, double *g)
 {
     drape_gap gap;
     double local[D], v[4][3];
-    if (!drape_contact_acts(c, pair, normal, &gap))
-        return;
-    drape_contact_law law = drape_contact_law_of(c, pair);
+    drape_contact_law law = drape_contact_law_of(c, &touch->pair);
+    drape_contact_gap(c, touch, false, &gap);
     if (normal) {
         drape_contact_normal(&gap, &law, local, NULL);
-        scatter(c, pair->node, gap.points, pair->collider, local, g);
+        scatter(c, &touch->pair, gap.points, local, g);
     }
     if (!friction || c->model->contact.lagged || !(law.friction > 0))
         return;
-    gather_velocities(c, pair, v);
+    gather_velocities(c, &touch->pair, gap.points, v);
     drape_contact_friction(&gap, &law, drape_contact_normal_force(&gap, &law), v, local, NULL);
-    scatter(c, pair->node, gap.points, pair->collider, local, g);
+    scatter(c, &touch->pair, gap.points, local, g);
 }
 
 static void friction_of_lagged(drape_contact *c, const drape_lagged *l, double *g, double *dgdv)
 {
     double v[4][3];
     drape_contact_law law = drape_contact_law_of(c, &l->pair);
-    gather_velocities(c, &l->pair, v);
+    gather_velocities(c, &l->pair, l->gap.points, v);
     drape_contact_friction(&l->gap, &law, l->lambda, v, g, dgdv);
 }
 
@@ -84,12 +79,12 @@ void drape_contact_add_forces(drape_contact *c, bool normal, bool friction, doub
 {
     double start = drape_clock_seconds(), local[D];
     memset(c->on_collider, 0, 3 * (size_t)c->model->collider_count * sizeof *c->on_collider);
-    for (int32_t i = 0; i < c->count; i++)
-        add_pair(c, &c->pairs[i], normal, friction, g);
+    for (int32_t i = 0; i < c->touch_count; i++)
+        add_touch(c, &c->touches[i], normal, friction, g);
     for (int32_t i = 0; friction && i < c->lagged_count; i++) {
         const drape_lagged *l = &c->lagged[i];
         friction_of_lagged(c, l, local, NULL);
-        scatter(c, l->pair.node, l->gap.points, l->pair.collider, local, g);
+        scatter(c, &l->pair, l->gap.points, local, g);
     }
     c->seconds += drape_clock_seconds() - start;
 }
@@ -102,11 +97,10 @@ const double *drape_contact_on_colliders(const drape_contact *c)
 double drape_contact_potential(drape_contact *c)
 {
     double sum = 0;
-    for (int32_t i = 0; i < c->count; i++) {
+    for (int32_t i = 0; i < c->touch_count; i++) {
         drape_gap gap;
-        if (!drape_contact_acts(c, &c->pairs[i], false, &gap))
-            continue;
-        drape_contact_law law = drape_contact_law_of(c, &c->pairs[i]);
+        drape_contact_law law = drape_contact_law_of(c, &c->touches[i].pair);
+        drape_contact_gap(c, &c->touches[i], false, &gap);
         sum += drape_contact_energy(&gap, &law);
     }
     return sum;
@@ -114,16 +108,10 @@ double drape_contact_potential(drape_contact *c)
 
 int32_t drape_contact_active(drape_contact *c, double *least_gap)
 {
-    int32_t active = 0;
     *least_gap = INFINITY;
-    for (int32_t i = 0; i < c->count; i++) {
-        drape_gap gap;
-        if (!drape_contact_acts(c, &c->pairs[i], false, &gap))
-            continue;
-        active++;
-        *least_gap = fmin(*least_gap, gap.value);
-    }
-    return active;
+    for (int32_t i = 0; i < c->touch_count; i++)
+        *least_gap = fmin(*least_gap, c->touches[i].gap);
+    return c->touch_count;
 }
 
 /* ---- Jacobian ---- */
@@ -150,50 +138,58 @@ static void add_blocks(const drape_contact *c, const int32_t *node, int points, 
         }
 }
 
-static void add_weighted(double weight, const double *from, double *h)
+static void add_weighted(int d, double weight, const double *from, double *h)
 {
-    for (int i = 0; i < D * D; i++)
-        h[i] += weight * from[i];
+    for (int i = 0; i < d; i++)
+        for (int j = 0; j < d; j++)
+            h[D * i + j] += weight * from[D * i + j];
 }
 
-/* dg/dx + weight dg/dv of one pair, or dg/dv alone. */
-static void pair_jacobian(drape_contact *c, const drape_pair *pair, const drape_gap *gap, double weight,
-                          bool velocity_only, bool positive, double *h)
+/* dg/dx + weight dg/dv of what touches, or dg/dv alone. */
+static void touch_jacobian(drape_contact *c, const drape_pair *pair, const drape_gap *gap, double weight,
+                           bool velocity_only, bool positive, double *h)
 {
     drape_contact_law law = drape_contact_law_of(c, pair);
-    double v[4][3], g[D], dgdv[D * D] = {0};
-    memset(h, 0, D * D * sizeof *h);
-    if (!velocity_only && positive)
+    double v[4][3], g[D], dgdv[D * D];
+    int d = 3 * gap->points;
+    if (velocity_only)
+        memset(h, 0, D * (size_t)d * sizeof *h);
+    else if (positive)
         drape_contact_positive(gap, &law, h);
-    else if (!velocity_only)
+    else
         drape_contact_normal(gap, &law, g, h);
     if (c->model->contact.lagged || !(law.friction > 0))
         return;
-    gather_velocities(c, pair, v);
+    gather_velocities(c, pair, gap->points, v);
     drape_contact_friction(gap, &law, drape_contact_normal_force(gap, &law), v, g, dgdv);
-    add_weighted(velocity_only ? 1 : weight, dgdv, h);
+    add_weighted(d, velocity_only ? 1 : weight, dgdv, h);
     if (!velocity_only)
         drape_contact_friction_slope(gap, &law, v, h);
+}
+
+static void lagged_jacobian(drape_contact *c, const drape_lagged *l, double weight, double *h)
+{
+    double g[D], dgdv[D * D];
+    int d = 3 * l->gap.points;
+    friction_of_lagged(c, l, g, dgdv);
+    memset(h, 0, D * (size_t)d * sizeof *h);
+    add_weighted(d, weight, dgdv, h);
 }
 
 void drape_contact_add_jacobian(drape_contact *c, double weight, bool velocity_only, bool positive,
                                 const drape_pattern *pattern, double *values)
 {
-    double start = drape_clock_seconds(), h[D * D], g[D];
-    for (int32_t i = 0; i < c->count; i++) {
-        const drape_pair *pair = &c->pairs[i];
+    double start = drape_clock_seconds(), h[D * D];
+    for (int32_t i = 0; i < c->touch_count; i++) {
+        const drape_pair *pair = &c->touches[i].pair;
         drape_gap gap;
-        if (!drape_contact_acts(c, pair, true, &gap))
-            continue;
-        pair_jacobian(c, pair, &gap, weight, velocity_only, positive, h);
+        drape_contact_gap(c, &c->touches[i], true, &gap);
+        touch_jacobian(c, pair, &gap, weight, velocity_only, positive, h);
         add_blocks(c, pair->node, gap.points, h, pattern, values);
     }
     for (int32_t i = 0; i < c->lagged_count; i++) {
         const drape_lagged *l = &c->lagged[i];
-        double dgdv[D * D] = {0};
-        friction_of_lagged(c, l, g, dgdv);
-        memset(h, 0, sizeof h);
-        add_weighted(velocity_only ? 1 : weight, dgdv, h);
+        lagged_jacobian(c, l, velocity_only ? 1 : weight, h);
         add_blocks(c, l->pair.node, l->gap.points, h, pattern, values);
     }
     c->seconds += drape_clock_seconds() - start;
@@ -212,44 +208,48 @@ static bool has_places(const drape_contact *c, const int32_t *node, int points, 
 
 bool drape_contact_fits(drape_contact *c, const drape_pattern *pattern)
 {
-    const drape_placed now = drape_contact_placed(c, c->x);
-    for (int32_t i = 0; i < c->count; i++)
-        if (c->pairs[i].collider < 0 && may_act(c, &c->pairs[i]) &&
-            drape_pair_gap_value(&c->pairs[i], &now) < c->pairs[i].distance &&
-            !has_places(c, c->pairs[i].node, 4, pattern))
+    for (int32_t i = 0; i < c->touch_count; i++)
+        if (c->touches[i].pair.collider < 0 &&
+            !has_places(c, c->touches[i].pair.node, c->touches[i].closest.points, pattern))
             return false;
     for (int32_t i = 0; i < c->lagged_count; i++)
-        if (c->lagged[i].pair.collider < 0 && !has_places(c, c->lagged[i].pair.node, 4, pattern))
+        if (c->lagged[i].pair.collider < 0 &&
+            !has_places(c, c->lagged[i].pair.node, c->lagged[i].gap.points, pattern))
             return false;
     return true;
 }
 
-static bool list_coupling(drape_contact *c, int32_t count, const int32_t *node)
+/* Four nodes each: the first again for those that are not there. */
+static bool list_coupling(drape_contact *c, int32_t count, const drape_pair *pair, int points)
 {
     int32_t *coupling =
         drape_contact_grow(c->ctx, c->coupling, count, &c->coupling_room, 4 * sizeof *coupling);
     if (!coupling)
         return false;
     c->coupling = coupling;
-    memcpy(c->coupling + 4 * (size_t)count, node, 4 * sizeof *node);
+    for (int a = 0; a < 4; a++)
+        c->coupling[4 * (size_t)count + (size_t)a] = pair->node[a < points ? a : 0];
     return true;
+}
+
+static bool is_near(const drape_contact *c, const drape_pair *pair)
+{
+    const drape_placed now = drape_contact_placed(c, c->x);
+    double near = pair->distance + PATTERN_AHEAD * c->margin;
+    return drape_contact_may(pair, c->moved, near) && drape_pair_gap_value(pair, &now) < near;
 }
 
 int32_t drape_contact_couplings(drape_contact *c, const int32_t **nodes)
 {
     int32_t count = 0;
     for (int32_t i = 0; i < c->count; i++)
-        if (c->pairs[i].collider < 0) {
-            if (!list_coupling(c, count, c->pairs[i].node))
-                return -1;
-            count++;
-        }
+        if (c->pairs[i].collider < 0 && is_near(c, &c->pairs[i]) &&
+            !list_coupling(c, count++, &c->pairs[i], 4))
+            return -1;
     for (int32_t i = 0; i < c->lagged_count; i++)
-        if (c->lagged[i].pair.collider < 0) {
-            if (!list_coupling(c, count, c->lagged[i].pair.node))
-                return -1;
-            count++;
-        }
+        if (c->lagged[i].pair.collider < 0 &&
+            !list_coupling(c, count++, &c->lagged[i].pair, c->lagged[i].gap.points))
+            return -1;
     *nodes = c->coupling;
     return count;
 }
