@@ -10,7 +10,7 @@
 
 #define D 12
 #define PATTERN_AHEAD                                                                                        \
-    1 /* of the margin: what comes nearer than that has its place when the pattern is made */
+    0.25 /* of a mean edge: so near to acting, a pair has its place when a pattern is made */
 
 /* ---- Forces ---- */
 
@@ -235,7 +235,7 @@ static bool list_coupling(drape_contact *c, int32_t count, const drape_pair *pai
 static bool is_near(const drape_contact *c, const drape_pair *pair)
 {
     const drape_placed now = drape_contact_placed(c, c->x);
-    double near = pair->distance + PATTERN_AHEAD * c->margin;
+    double near = pair->distance + PATTERN_AHEAD * c->mean_edge;
     return drape_contact_may(pair, c->moved, near) && drape_pair_gap_value(pair, &now) < near;
 }
 
