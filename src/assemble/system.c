@@ -97,10 +97,26 @@ const drape_model *drape_system_model(const drape_system *system)
     return system->model;
 }
 
+/* Of the wider pattern and the terms' places in it. */
+static size_t wider_bytes(const drape_system *system)
+{
+    size_t terms = (size_t)system->model->term_count;
+    if (!system->blocks)
+        return 0;
+    size_t sum = drape_pattern_bytes(&system->wider) + terms * sizeof *system->blocks;
+    for (size_t i = 0; i < terms; i++)
+        if (system->blocks[i]) {
+            const drape_coupling coupling = drape_term_coupling(&system->model->terms[i]);
+            sum +=
+                (size_t)coupling.count * (size_t)(coupling.nodes * coupling.nodes) * sizeof **system->blocks;
+        }
+    return sum;
+}
+
 size_t drape_system_bytes(const drape_system *system)
 {
     return sizeof *system + (size_t)system->threads * sizeof *system->buffers +
-           drape_contact_bytes(system->contact);
+           drape_contact_bytes(system->contact) + wider_bytes(system);
 }
 
 /* ---- Contact ---- */
