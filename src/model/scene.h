@@ -86,4 +86,7 @@ extern const drape_scene_object drape_scene_form;
 /* The words of a pin's corner and edge, NULL-ended. */
 extern const char *const drape_pin_corners[], *const drape_pin_edges[];
 
+/* Those of the axis of frames that points up. */
+extern const char *const drape_up_axes[];
+
 #endif

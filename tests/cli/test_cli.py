@@ -643,6 +643,8 @@ def variants():
     yield False, scene(integrator={"max_iterations": 1.5})
     yield False, scene(controller={"type": "halving", "dt": 1})
     yield False, scene(output={"formats": ["npz"]})
+    yield True, scene(output={"formats": ["vtp", "pc2", "glb"], "up": "z"})
+    yield False, scene(output={"up": "x"})
     yield False, scene(output={"format": ["npy"]})
 
 
