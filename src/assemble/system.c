@@ -437,7 +437,18 @@ static void evaluate(const drape_term *term, const request *want, block_buffer *
 /* Where sums go; NULL: not wanted. */
 typedef struct sums {
     double *energy, *g, *values;
+    double *node_energy; /* (node_count) */
 } sums;
+
+/* In equal parts on its nodes. */
+static void share_energies(const drape_elements *el, const block_buffer *b, double *node_energy)
+{
+    for (int32_t i = 0; i < b->count; i++) {
+        const int32_t *node = el->node + (size_t)(b->first + i) * (size_t)el->nodes;
+        for (int a = 0; a < el->nodes; a++)
+            node_energy[node[a]] += b->energy[i] / el->nodes;
+    }
+}
 
 static void add_pulls(const drape_elements *el, const block_buffer *b, double *g)
 {
@@ -499,6 +510,8 @@ static void add(const drape_system *system, const drape_term *term, const block_
 {
     for (int32_t i = 0; to->energy && i < b->count; i++)
         *to->energy += b->energy[i];
+    if (to->node_energy)
+        share_energies(&term->elements, b, to->node_energy);
     if (to->g && b->pairs)
         add_pulls(&term->elements, b, to->g);
     else if (to->g)
@@ -641,6 +654,18 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
         const drape_term *term = &system->model->terms[i];
         const sums to = {.energy = term->ops->potential_of_gravity ? gravity : elastic};
         if (!is_left_out(system, term) && contributes(term, &want, &to))
+            sum_term(system, term, &want, &to);
+    }
+}
+
+void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy)
+{
+    const request want = {.point = point, .energy = true, .conservative = true};
+    const sums to = {.node_energy = energy};
+    memset(energy, 0, (size_t)system->model->node_count * sizeof *energy);
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        if (!term->ops->potential_of_gravity && !is_left_out(system, term) && contributes(term, &want, &to))
             sum_term(system, term, &want, &to);
     }
 }

@@ -130,6 +130,43 @@ def test_run_files():
         equal(float(energies[-1][key]), value, "the last row and the summary: " + key)
 
 
+def test_scene_copy():
+    """the folder of a run has the scene as it was run, with its meshes, and running that gives the same bits"""
+    os.makedirs("scenes/meshes")
+    shutil.copy(SOURCES + "/examples/scenes/tube.obj", "scenes/meshes/tube.obj")
+    with open("scenes/meshes/wedge.obj", "w", encoding="ascii") as file:
+        file.write("v 0 -3 0\nv 1 -3 0\nv 0 -2 0\nv 0 -3 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    whole = scene(mesh={"file": "meshes/tube.obj"}, pins=[{"nodes": [0, 1]}], description='say "\u00e9" \\ \t',
+                  colliders=[{"type": "mesh", "file": "meshes/wedge.obj"}])
+    with open("scenes/one.json", "w", encoding="utf-8") as file:
+        json.dump(whole, file)
+    good("run", "scenes/one.json", "--dt", "0.005", "--out", "a/b")
+    kept = read_json("a/b/scene.json")
+    equal(kept["integrator"], {"dt": 0.005})
+    equal((kept["description"], kept["duration"]), (whole["description"], 0.1))
+    equal((kept["cloth"][0]["mesh"]["file"], kept["colliders"][0]["file"]), ("scene_mesh_0.obj", "scene_mesh_1.obj"))
+    shutil.rmtree("scenes")
+    os.rename("a/b", "moved")
+    good("run", "moved/scene.json", "--out", "again")
+    equal(read_json("again/summary.json")["hash"], read_json("moved/summary.json")["hash"])
+    equal(open("again/scene.json", "rb").read(), open("moved/scene.json", "rb").read())
+    good("run", SOURCES + "/examples/scenes/cs184_pinned2.json", "--duration", "0.02", "--out", "cs184")
+    equal(read_json("cs184/scene.json")["drape"], 1)
+    good("run", "cs184/scene.json", "--out", "ours")
+    equal(read_json("ours/summary.json")["hash"], read_json("cs184/summary.json")["hash"])
+
+
+def test_scene_in_the_folder():
+    """a scene that is itself the scene.json of the folder is never written over"""
+    write_scene()
+    before = open("scene.json", "rb").read()
+    good("run", "scene.json", "--out", ".")
+    equal(open("scene.json", "rb").read(), before)
+    files = sorted(os.listdir("."))
+    refused("run", "scene.json", "--out", "./", "--dt", "0.005", says="choose another folder")
+    equal((open("scene.json", "rb").read(), sorted(os.listdir("."))), (before, files))
+
+
 def test_last_frame():
     """the last frame is the end, also where no frame is due there"""
     write_scene(duration=0.05)
@@ -520,6 +557,8 @@ def variants():
     yield False, scene(integrator={"max_iterations": 1.5})
     yield False, scene(controller={"type": "halving", "dt": 1})
     yield False, scene(output={"formats": ["npz"]})
+    yield True, scene(output={"formats": ["vtp", "pc2", "glb"], "up": "z"})
+    yield False, scene(output={"up": "x"})
     yield False, scene(output={"format": ["npy"]})
 
 
