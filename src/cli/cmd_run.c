@@ -4,8 +4,10 @@
 #include "cli/signals.h"
 
 #include "base/clock.h"
+#include "io/file.h"
 #include "io/recorder.h"
 #include "io/summary.h"
+#include "model/scene.h"
 
 #include <errno.h>
 #include <math.h>
@@ -50,6 +52,28 @@ static void remove_old_summary(const char *path)
         remove(path); /* if it stays, it is replaced at the end, or that failure is told */
 }
 
+/* The scene with all that the command line set, for whoever looks at the run later. */
+static drape_status write_scene(run *r)
+{
+    char *text = NULL;
+    drape_file file;
+    size_t length = strlen(r->request->out) + sizeof "/scene.json";
+    drape_status status = drape_scene_write_text(r->in.scene, &text);
+    if (!status)
+        status = drape_file_create(r->in.ctx, length, &file);
+    if (!status) {
+        drape_file_name(&file, "%s/scene.json", r->request->out);
+        status = drape_file_begin(&file);
+        drape_file_put_text(&file, text);
+        drape_file_put_text(&file, "\n");
+        if (!status)
+            status = drape_file_finish(&file);
+        drape_file_destroy(&file);
+    }
+    drape_free(r->in.ctx, text);
+    return status;
+}
+
 static drape_status begin_output(run *r)
 {
     const drape_model *model = r->in.model;
@@ -67,7 +91,7 @@ static drape_status begin_output(run *r)
     drape_status status = drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder);
     if (!status)
         remove_old_summary(r->summary_path);
-    return status;
+    return status ? status : write_scene(r);
 }
 
 static void write_summary(run *r, const char *path)
@@ -157,7 +181,7 @@ static void print_results(const run *r)
     print_energy(r);
     print_wall(r, &s);
     if (r->recorder)
-        printf("output    %lld frames, steps.csv, energy.csv and summary.json in %s\n",
+        printf("output    %lld frames, scene.json, steps.csv, energy.csv and summary.json in %s\n",
                (long long)drape_recorder_frames(r->recorder), r->request->out);
 }
 
@@ -223,7 +247,7 @@ static int load_and_run(const run_request *request)
 
 static const cli_option options[] = {
     {"out", CLI_TEXT, "DIR",
-     "folder for frames, steps.csv, energy.csv and summary.json; made if it is not there",
+     "folder for frames, scene.json, steps.csv, energy.csv and summary.json; made if it is not there",
      offsetof(run_request, out), 0, NULL},
     {"summary", CLI_TEXT, "FILE", "write the summary there, too", offsetof(run_request, summary), 0, NULL},
 };

@@ -22,6 +22,10 @@ void drape_scene_locate_fault(drape_scene *scene);
 
 drape_context *drape_scene_context(drape_scene *scene);
 
+/* The scene as it stands, with all that was set, as the text of a scene file that may lie anywhere: relative files
+ * in it are named from the root. *text is freed by drape_free. Errors: DRAPE_E_MEMORY. */
+drape_status drape_scene_write_text(drape_scene *scene, char **text);
+
 /* ---- The form of a scene ----------------------------------------------------------------------------- */
 
 typedef enum drape_scene_kind {
