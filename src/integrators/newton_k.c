@@ -9,8 +9,8 @@
  * s = 1/2 halves the error of one iteration on a swinging sheet; s = 1 feeds on its own noise and diverges.
  *
  * A step is never taken on faith. The residual of its end is evaluated and reported; where it has not fallen below
- * that of the guess there are more iterations, up to max_iterations, and then the step is refused: the controller
- * halves it. Corrections that go too far are shortened by the work along them, as in newton.c, and where cloth would
+ * that of the guess there are more iterations, up to rescue_iterations, and then the step is refused: the
+ * controller halves it. Corrections that go too far are shortened by the work along them, as in newton.c, and where cloth would
  * pass through something.
  */
 #include "integrators/implicit.h"
@@ -26,7 +26,7 @@ enum {
     PARAM_DT,
     PARAM_ITERATIONS,
     PARAM_TOLERANCE,
-    PARAM_MAX_ITERATIONS,
+    PARAM_RESCUE_ITERATIONS,
     PARAM_EXTRAPOLATION,
     PARAM_LINEAR_TOLERANCE,
     PARAM_LINEAR_ITERATIONS,
@@ -57,15 +57,14 @@ static const drape_param params[PARAM_COUNT] = {
                          .open_min = true,
                          .help = "residual of the free nodes, largest component, below which no iteration is "
                                  "made; not a bound on an accepted state"},
-    [PARAM_MAX_ITERATIONS] = {.name = "max_iterations",
-                              .kind = DRAPE_PARAM_INTEGER,
-                              .unit = "1",
-                              .default_value = 10,
-                              .min = 1,
-                              .max = 100000,
-                              .help =
-                                  "iterations of a step whose residual is not below that of its guess yet, "
-                                  "before it is rejected"},
+    [PARAM_RESCUE_ITERATIONS] = {.name = "rescue_iterations",
+                                 .kind = DRAPE_PARAM_INTEGER,
+                                 .unit = "1",
+                                 .default_value = 8,
+                                 .min = 0,
+                                 .max = 100000,
+                                 .help = "more iterations where the residual is not below that of the guess "
+                                         "after the others; then the step is rejected"},
     [PARAM_EXTRAPOLATION] = {.name = "extrapolation",
                              .unit = "1",
                              .default_value = 0.5,
@@ -104,7 +103,7 @@ static const drape_param params[PARAM_COUNT] = {
 /* What a step tries at each effort: iterations, and conjugate gradients an iteration. 0: as the parameters say. */
 static const struct {
     int iterations, linear_iterations;
-} efforts[] = {{0, 0}, {1, 0}, {1, 4}, {1, 2}};
+} efforts[] = {{0, 0}, {1, 0}, {1, 4}};
 
 typedef struct newton_k {
     drape_implicit base;
@@ -352,10 +351,11 @@ static drape_status iterate(newton_k *s, drape_step_info *info)
     for (;; info->iterations++) {
         info->residual = largest(s->f, s->dofs);
         bool fell = dot(s->f, s->f, s->dofs) < first;
+        info->reason = info->residual <= tolerance ? "converged" : "iterations";
         if (info->residual <= tolerance || (info->iterations >= wanted && fell))
             return DRAPE_OK;
-        if (info->iterations >= (int)fmax(wanted, s->values[PARAM_MAX_ITERATIONS]))
-            return fail(s, DRAPE_RETRY_NONLINEAR, "max_iterations", info);
+        if (info->iterations >= wanted + (int)s->values[PARAM_RESCUE_ITERATIONS])
+            return fail(s, DRAPE_RETRY_NONLINEAR, "residual", info);
         drape_status status = correct(s);
         if (status)
             return fail(s, status, status < 0 ? "memory" : "singular", info);
