@@ -20,7 +20,8 @@ typedef struct request {
     bool energy, hessian;
     bool conservative, dissipative; /* which parts of the forces */
     bool project;
-    bool velocity; /* the Hessian wanted is dg/dv alone */
+    bool velocity;  /* the Hessian wanted is dg/dv alone */
+    bool remainder; /* only what is of no measure */
 } request;
 
 /* Results of a block, element-major with the d of its term, and scratch. */
@@ -526,6 +527,8 @@ static bool contributes(const drape_term *term, const request *want, const sums 
 {
     if (term->ops->law || (to->values && !to->g && !to->energy && term->ops->linear))
         return false;
+    if (term->ops->measure && want->remainder)
+        return false;
     if (term->ops->measure)
         return want->conservative || term->law_count > 0 || term->damping;
     return term->ops->dissipation ? want->dissipative : want->conservative;
@@ -615,6 +618,64 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
     if (place_contact(system, point))
         drape_contact_add_jacobian(system->contact, point->weight, false, project, system->pattern, values);
     add_masses(system, mass_weight, values);
+}
+
+/* The block of one pair: d = x1 - x0, dq = (-c d, c d), so with dq = q'(l) d/l the Hessian is
+ *     H = k_eff c^2 d d' + f c (I - d d'/l^2),  k_eff = df/dq + w df/dq'
+ * up to f q'' d d'/l^2, which is zero for measures that are linear in the length l. */
+static void pair_block(const stress *s, double weight, double c, const double d[3], double h[6])
+{
+    double stiffness = fmax(0, s->by_strain + weight * s->by_rate), tension = fmax(0, s->force * c);
+    double along = stiffness * c * c - tension / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    h[0] = along * d[0] * d[0] + tension;
+    h[1] = along * d[0] * d[1];
+    h[2] = along * d[0] * d[2];
+    h[3] = along * d[1] * d[1] + tension;
+    h[4] = along * d[1] * d[2];
+    h[5] = along * d[2] * d[2] + tension;
+}
+
+void drape_system_pairs(const drape_system *system, int32_t number, const drape_point *point, double *h)
+{
+    const drape_term *term = &system->model->terms[number];
+    const drape_elements *el = &term->elements;
+    const request want = {.conservative = true, .dissipative = true};
+    double q[BLOCK], d[3 * BLOCK], c[BLOCK];
+    for (int32_t first = 0; first < el->count; first += BLOCK) {
+        int32_t count = el->count - first < BLOCK ? el->count - first : BLOCK;
+        term->ops->pair(el, first, count, point->x, q, d, c);
+        for (int32_t i = 0; i < count; i++) {
+            int32_t e = first + i;
+            double rate = point->history ? point->weight * q[i] + point->history[term->first_measure + e] : 0;
+            stress s = stress_of(term, &want, e, q[i] - el->rest[(size_t)el->count + (size_t)e], rate);
+            const double along[3] = {d[i], d[count + i], d[2 * count + i]};
+            pair_block(&s, point->weight, c[i], along, h + 6 * (size_t)e);
+        }
+    }
+}
+
+void drape_system_remainder(drape_system *system, const drape_point *point, double *values)
+{
+    const request want = {.point = point,
+                          .hessian = true,
+                          .conservative = true,
+                          .dissipative = true,
+                          .project = true,
+                          .remainder = true};
+    memset(values, 0, (size_t)system->pattern->nonzeros * sizeof *values);
+    sum_terms(system, &want, &(sums){.values = values});
+    if (place_contact(system, point))
+        drape_contact_add_jacobian(system->contact, point->weight, false, true, system->pattern, values);
+}
+
+bool drape_system_has_remainder(const drape_system *system)
+{
+    bool found = system->contact != NULL;
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        found = found || (drape_term_couples(term) && !term->ops->measure && !is_left_out(system, term));
+    }
+    return found;
 }
 
 void drape_system_damping(drape_system *system, const drape_point *point, double *values)
