@@ -151,46 +151,56 @@ LANES_INLINE lanes turn(const side *s, const lanes along[3], const lanes p[3], d
     return s->gradient[i] * (w * along[j] - p[j]) - p[i] * s->gradient[j];
 }
 
-/* Blocks of the nodes 0, 1 and the apex, on and below the diagonal. Both sides add to those of the edge alone;
- * there is none between the apices. */
-LANES_INLINE void add_side(const hinges *h, int number, lanes ddq[12][12])
+/* p and the gradients of s at the three nodes of a side: x0, x1, apex. That of s at the apex is in no block on or
+ * below the diagonal. */
+typedef struct change {
+    lanes p[3][3], foot[2][3];
+} change;
+
+LANES_INLINE void measure_change(const hinges *h, const side *s, const lanes along[3], change *c)
 {
-    const side *s = &h->side[number];
-    const int apex = 3 * (2 + number);
-    lanes p[3][3], ds[2][3], along[3]; /* of x0, x1, apex */
     for (int i = 0; i < 3; i++) {
         lanes in_plane = s->m[i] * s->per_altitude;
         lanes rise = s->altitude * s->m[i] * h->per_length * h->per_length;
-        along[i] = h->direction[i] * h->per_length;
-        p[0][i] = (s->foot - 1) * in_plane - along[i];
-        p[1][i] = along[i] - s->foot * in_plane;
-        p[2][i] = in_plane;
-        ds[0][i] = (s->foot - 1) * along[i] - rise;
-        ds[1][i] = rise - s->foot * along[i];
+        c->p[0][i] = (s->foot - 1) * in_plane - along[i];
+        c->p[1][i] = along[i] - s->foot * in_plane;
+        c->p[2][i] = in_plane;
+        c->foot[0][i] = (s->foot - 1) * along[i] - rise;
+        c->foot[1][i] = rise - s->foot * along[i];
     }
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            lanes by_0 = turn(s, along, p[0], -1, i, j), by_1 = turn(s, along, p[1], 1, i, j);
-            ddq[i][j] += s->gradient[i] * ds[0][j] + (s->foot - 1) * by_0;
-            ddq[3 + i][j] -= s->gradient[i] * ds[0][j] + s->foot * by_0;
-            ddq[3 + i][3 + j] -= s->gradient[i] * ds[1][j] + s->foot * by_1;
-            ddq[apex + i][j] = by_0;
-            ddq[apex + i][3 + j] = by_1;
-            ddq[apex + i][apex + j] = turn(s, along, p[2], 0, i, j);
-        }
 }
 
-LANES_INLINE void hessian(const hinges *h, double *to)
+/* The blocks on and below the diagonal. Both sides add to those of the edge; there is none between the apices. */
+LANES_INLINE void hessian(const hinges *h, double *ddq)
 {
-    lanes ddq[12][12];
-    for (int i = 0; i < 12; i++)
-        for (int j = 0; j <= i - i % 3 + 2; j++)
-            ddq[i][j] = (lanes){0};
-    add_side(h, 0, ddq);
-    add_side(h, 1, ddq);
-    for (int i = 0; i < 12; i++)
-        for (int j = 0; j <= i - i % 3 + 2; j++)
-            lanes_store(to + LANES * (12 * i + j), ddq[i][j]);
+    lanes along[3];
+    change side_change[2];
+    for (int i = 0; i < 3; i++)
+        along[i] = h->direction[i] * h->per_length;
+    measure_change(h, &h->side[0], along, &side_change[0]);
+    measure_change(h, &h->side[1], along, &side_change[1]);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            lanes of_00 = {0}, of_10 = {0}, of_11 = {0};
+            for (int k = 0; k < 2; k++) {
+                const side *s = &h->side[k];
+                const int apex = 3 * (2 + k);
+                lanes by_0 = turn(s, along, side_change[k].p[0], -1, i, j),
+                      by_1 = turn(s, along, side_change[k].p[1], 1, i, j);
+                lanes by_foot = s->gradient[i] * side_change[k].foot[0][j];
+                of_00 += by_foot + (s->foot - 1) * by_0;
+                of_10 -= by_foot + s->foot * by_0;
+                of_11 -= s->gradient[i] * side_change[k].foot[1][j] + s->foot * by_1;
+                lanes_store(ddq + LANES * (12 * (apex + i) + j), by_0);
+                lanes_store(ddq + LANES * (12 * (apex + i) + 3 + j), by_1);
+                lanes_store(ddq + LANES * (12 * (apex + i) + apex + j),
+                            turn(s, along, side_change[k].p[2], 0, i, j));
+            }
+            lanes_store(ddq + LANES * (12 * i + j), of_00);
+            lanes_store(ddq + LANES * (12 * (3 + i) + j), of_10);
+            lanes_store(ddq + LANES * (12 * (3 + i) + 3 + j), of_11);
+            lanes_store(ddq + LANES * (12 * (9 + i) + 6 + j), (lanes){0});
+        }
 }
 
 LANES_DISPATCH static void measure_lanes(const drape_elements *el, const int32_t *element, const double *x,
