@@ -52,6 +52,7 @@ typedef struct multifrontal {
     int32_t *source, *mirror;       /* (lower blocks) the pattern's block that each is, and the transposed one */
     int32_t *target;                /* (lower blocks) where it goes, from the begin of its front's panel */
     int32_t *target_start;          /* (e.n + 1) of each column, in the order of elimination */
+    int32_t *in_panel, *in_update;  /* (rows of all fronts) where a row lies in its front's parent; see place_rows */
     double *panels, *updates, *inverse, *work, *scratch;
     void *memory[2];                /* of panels and updates, before alignment */
     int64_t panel_size, update_size;
@@ -75,6 +76,7 @@ static void destroy(void **state)
         s->general_row->destroy(&s->general);
     drape_elimination_free(s->ctx, &s->e);
     void *all[] = {s->fronts, s->branch,  s->top,     s->source,    s->mirror,    s->target,   s->target_start,
+                   s->in_panel, s->in_update,
                    s->inverse, s->work, s->scratch, s->memory[0], s->memory[1], s->diagonal, s->failed};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         drape_free(s->ctx, all[i]);
@@ -225,6 +227,25 @@ static bool place_entries(multifrontal *s)
     return true;
 }
 
+/* Rows of strips, from the begin of a column: of panels, and of what fronts leave, the latter from where the tile
+ * of the first strip would be. -1: the row is factored in the parent. */
+static bool place_rows(multifrontal *s)
+{
+    for (int32_t i = 0; i < s->e.count; i++) {
+        const front *up = s->e.parent[i] >= 0 ? &s->fronts[s->e.parent[i]] : NULL;
+        for (int64_t k = s->e.row_start[i]; k < s->e.row_start[i + 1]; k++) {
+            const int32_t columns = up->columns / 3, at = s->e.in_parent[k], below = at - columns;
+            const int64_t strip = below < 0 ? at / A_STRIP : up->column_strips + below / A_STRIP;
+            const int64_t place = strip * up->columns * S + 3 * ((below < 0 ? at : below) % A_STRIP);
+            if (place > INT32_MAX)
+                return false;
+            s->in_panel[k] = (int32_t)place;
+            s->in_update[k] = below < 0 ? -1 : below / A_STRIP * DRAPE_TILE + 3 * (below % A_STRIP);
+        }
+    }
+    return true;
+}
+
 /* ---- Making ---- */
 
 static double *take_aligned(multifrontal *s, int which, int64_t count)
@@ -247,10 +268,12 @@ static bool allocate(multifrontal *s)
     s->work = drape_alloc(s->ctx, n, sizeof *s->work);
     s->failed = drape_alloc(s->ctx, (size_t)s->e.count, sizeof *s->failed);
     s->scratch = drape_alloc(s->ctx, (size_t)(5 * s->widest + s->tallest), sizeof *s->scratch);
+    s->in_panel = drape_alloc(s->ctx, (size_t)s->e.row_start[s->e.count], sizeof *s->in_panel);
+    s->in_update = drape_alloc(s->ctx, (size_t)s->e.row_start[s->e.count], sizeof *s->in_update);
     s->panels = take_aligned(s, 0, s->panel_size);
     s->updates = take_aligned(s, 1, s->update_size);
     return s->source && s->mirror && s->target && s->target_start && s->diagonal && s->inverse && s->work &&
-           s->failed && s->scratch && s->panels && s->updates;
+           s->failed && s->scratch && s->in_panel && s->in_update && s->panels && s->updates;
 }
 
 static drape_status analyse(multifrontal *s)
@@ -268,7 +291,8 @@ static drape_status analyse(multifrontal *s)
     place_updates(s);
     if (!allocate(s))
         return DRAPE_E_MEMORY;
-    return place_entries(s) ? DRAPE_OK
+    return place_entries(s) && place_rows(s)
+               ? DRAPE_OK
                             : drape_fail(s->ctx, DRAPE_E_SOLVER, "the factors have a front of more than 2^31 entries");
 }
 
@@ -302,13 +326,16 @@ static bool is_mirrored(const multifrontal *s, int32_t at, int32_t column)
     double *values = (double *)(uintptr_t)s->values;
     const double *block = drape_pattern_at(p, values, j, s->source[at], &stride),
                  *mirror = drape_pattern_at(p, values, i, s->mirror[at], &mirror_stride);
-    bool symmetric = true;
+    bool same = true, symmetric = true;
     for (int c = 0; c < 3; c++)
-        for (int r = 0; r < 3; r++) {
-            const double difference = block[c * stride + r] - mirror[r * mirror_stride + c];
-            symmetric &= difference * difference <=
-                         SYMMETRY * SYMMETRY * s->diagonal[3 * i + r] * s->diagonal[3 * j + c];
-        }
+        for (int r = 0; r < 3; r++)
+            same &= block[c * stride + r] == mirror[r * mirror_stride + c];
+    for (int k = 0; !same && k < 9; k++) {
+        const int c = k / 3, r = k % 3;
+        const double difference = block[c * stride + r] - mirror[r * mirror_stride + c];
+        symmetric &= difference * difference <=
+                     SYMMETRY * SYMMETRY * s->diagonal[3 * i + r] * s->diagonal[3 * j + c];
+    }
     return symmetric;
 }
 
@@ -331,44 +358,66 @@ static inline void add_block(const double *from, double *to)
             to[S * c + r] += from[S * c + r];
 }
 
-/* A column of blocks of what child c left, into its parent f, from row k of the child on. */
-static void add_child_column(const multifrontal *s, const front *f, double *panel, double *update,
-                             const front *c, const int32_t *in_parent, int32_t k)
-{
-    const int32_t blocks = c->rows / 3, columns = f->columns / 3, to = in_parent[k];
-    const double *from = s->updates + c->update + 3 * (k % A_STRIP) * S;
-    for (int32_t r = k; r < blocks; r++) {
-        const double *block = from + tile_at(c, r / A_STRIP, k / A_STRIP) + 3 * (r % A_STRIP);
-        const int32_t at = in_parent[r], below = at - columns;
-        if (to >= columns)
-            add_block(block, update + tile_at(f, below / A_STRIP, (to - columns) / A_STRIP) +
-                                 3 * ((to - columns) % A_STRIP) * S + 3 * (below % A_STRIP));
-        else {
-            const int32_t strip = below < 0 ? at / A_STRIP : f->column_strips + below / A_STRIP;
-            add_block(block, panel + ((int64_t)strip * f->columns + 3 * to) * S +
-                                 3 * ((below < 0 ? at : below) % A_STRIP));
-        }
-    }
-}
-
 /* What a front is made of, for rounds dealt out to threads. */
 typedef struct job {
     multifrontal *s;
     int32_t index;
     const front *f;
     double *panel, *update;
-    int32_t first, width; /* of the columns that are factored now */
+    int32_t first, width; /* of the columns that are factored now; the first that is added of a child */
+    int32_t child;
     int threads;
 } job;
 
-static void assemble(const job *w)
+/* A column of blocks of what a child left, into its front. */
+static void add_child_column(void *user, int64_t round)
+{
+    const job *w = user;
+    const multifrontal *s = w->s;
+    const front *f = w->f, *c = &s->fronts[w->child];
+    const int64_t start = s->e.row_start[w->child];
+    const int32_t k = w->first + (int32_t)round, blocks = c->rows / 3;
+    const int32_t column = s->e.in_parent[start + k], below = column - f->columns / 3;
+    const int32_t *place = (below < 0 ? s->in_panel : s->in_update) + start;
+    const double *from = s->updates + c->update + tile_at(c, 0, k / A_STRIP) + 3 * (k % A_STRIP) * S;
+    double *to = below < 0 ? w->panel + 3 * (int64_t)column * S
+                           : w->update + tile_at(f, 0, below / A_STRIP) + 3 * (below % A_STRIP) * S;
+    for (int32_t r = k; r < blocks; r++)
+        add_block(from + r / A_STRIP * DRAPE_TILE + 3 * (r % A_STRIP), to + place[r]);
+}
+
+/* The first of a child's rows that is not factored in its parent. */
+static int32_t first_row_left(const multifrontal *s, int32_t child)
+{
+    const int32_t *place = s->in_update + s->e.row_start[child];
+    int32_t low = 0, high = s->fronts[child].rows / 3;
+    while (low < high) {
+        const int32_t middle = low + (high - low) / 2;
+        if (place[middle] < 0)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* What children left on the columns that are factored here, or on the rows. */
+static void add_children(job *w, bool on_rows)
+{
+    for (w->child = w->f->first_child; w->child >= 0; w->child = w->s->fronts[w->child].sibling) {
+        const int32_t middle = first_row_left(w->s, w->child), all = w->s->fronts[w->child].rows / 3;
+        w->first = on_rows ? middle : 0;
+        drape_parallel(w->threads, on_rows ? all - middle : middle, add_child_column, w);
+    }
+}
+
+static void assemble(job *w)
 {
     const multifrontal *s = w->s;
     const front *f = w->f;
+    bool symmetric = true;
     memset(w->panel, 0,
            (size_t)(f->column_strips + f->row_strips) * S * (size_t)f->columns * sizeof *w->panel);
-    memset(w->update, 0, (size_t)update_tiles(f) * DRAPE_TILE * sizeof *w->update);
-    bool symmetric = true;
     for (int32_t column = s->e.first[w->index]; column < s->e.first[w->index + 1]; column++)
         for (int32_t at = s->target_start[column]; at < s->target_start[column + 1]; at++) {
             symmetric &= is_mirrored(s, at, column);
@@ -376,9 +425,7 @@ static void assemble(const job *w)
         }
     if (!symmetric)
         s->failed[w->index] = true;
-    for (int32_t c = f->first_child; c >= 0; c = s->fronts[c].sibling)
-        for (int32_t k = 0; k < s->fronts[c].rows / 3; k++)
-            add_child_column(s, f, w->panel, w->update, &s->fronts[c], s->e.in_parent + s->e.row_start[c], k);
+    add_children(w, false);
 }
 
 static double *strip_of(const job *w, int64_t strip)
@@ -394,7 +441,7 @@ static void finish_strip(void *user, int64_t round)
     const int32_t diagonal = w->first / S;
     const int64_t strip = diagonal + 1 + round;
     double *to = strip_of(w, strip) + S * w->first;
-    drape_tile_multiply(strip_of(w, strip), strip_of(w, diagonal), w->first, w->width, to);
+    drape_tile_multiply(strip_of(w, strip), strip_of(w, diagonal), w->first, w->width, false, to);
     drape_tile_divide(w->width, strip_of(w, diagonal) + S * w->first,
                       w->s->inverse + 3 * w->s->e.first[w->index] + w->first, to);
 }
@@ -406,7 +453,7 @@ static bool factor_columns(job *w)
         const int32_t diagonal = w->first / S;
         double *tile = strip_of(w, diagonal) + S * w->first;
         w->width = f->columns - w->first < S ? f->columns - w->first : S;
-        drape_tile_multiply(strip_of(w, diagonal), strip_of(w, diagonal), w->first, w->width, tile);
+        drape_tile_multiply(strip_of(w, diagonal), strip_of(w, diagonal), w->first, w->width, false, tile);
         if (!drape_tile_factor(w->width, tile, w->s->inverse + 3 * w->s->e.first[w->index] + w->first))
             return false;
         drape_parallel(w->threads, f->column_strips + f->row_strips - diagonal - 1, finish_strip, w);
@@ -424,7 +471,7 @@ static void leave_column(void *user, int64_t round)
         const int depth = f->columns - p < CHUNK ? f->columns - p : CHUNK;
         for (int32_t r = c; r < f->row_strips; r++)
             drape_tile_multiply(strip_of(w, f->column_strips + r) + S * p,
-                                strip_of(w, f->column_strips + c) + S * p, depth, S,
+                                strip_of(w, f->column_strips + c) + S * p, depth, S, p == 0,
                                 w->update + tile_at(f, r, c));
     }
 }
@@ -436,10 +483,12 @@ static void make_front(multifrontal *s, int32_t i, int threads)
              .threads = threads};
     s->failed[i] = false;
     assemble(&w);
-    if (!s->failed[i] && factor_columns(&w))
-        drape_parallel(threads, f->row_strips, leave_column, &w);
-    else
+    if (s->failed[i] || !factor_columns(&w)) {
         s->failed[i] = true;
+        return;
+    }
+    drape_parallel(threads, f->row_strips, leave_column, &w);
+    add_children(&w, true);
 }
 
 /* ---- Factors ---- */
@@ -629,14 +678,14 @@ static drape_status solve(void *state, const double *b, double *x)
         return DRAPE_RETRY_LINEAR;
     if (s->by_general)
         return s->general_row->solve(s->general, b, x);
-    for (size_t k = 0; k < n; k++)
-        s->work[k] = b[3 * (size_t)s->e.order[k / 3] + k % 3];
+    for (int32_t k = 0; k < s->e.n; k++)
+        memcpy(s->work + 3 * (size_t)k, b + 3 * (size_t)s->e.order[k], 3 * sizeof *b);
     for (int32_t i = 0; i < s->e.count; i++)
         solve_forward(s, i);
     for (int32_t i = s->e.count - 1; i >= 0; i--)
         solve_backward(s, i);
-    for (size_t k = 0; k < n; k++)
-        x[3 * (size_t)s->e.order[k / 3] + k % 3] = s->work[k];
+    for (int32_t k = 0; k < s->e.n; k++)
+        memcpy(x + 3 * (size_t)s->e.order[k], s->work + 3 * (size_t)k, 3 * sizeof *x);
     return drape_all_finite(x, n) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
@@ -648,7 +697,7 @@ static size_t bytes(const void *state)
     size_t doubles = (size_t)s->panel_size + (size_t)s->update_size + 3 * n +
                      (size_t)(5 * s->widest + s->tallest);
     return sizeof *s + doubles * sizeof(double) + (size_t)s->e.count * (sizeof(front) + 40) +
-           (3 * lower + 4 * blocks + 2 * rows) * sizeof(int32_t) +
+           (3 * lower + 4 * blocks + 4 * rows) * sizeof(int32_t) +
            (s->general ? s->general_row->bytes(s->general) : 0);
 }
 

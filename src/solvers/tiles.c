@@ -7,7 +7,7 @@
 #define PARTS (S / LANES)
 #define WIDE  3 /* columns at once */
 
-LANES_INLINE void multiply_columns(const double *a, const double *b, int depth, double *to)
+LANES_INLINE void multiply_columns(const double *a, const double *b, int depth, bool fresh, double *to)
 {
     lanes sum[WIDE][PARTS] = {{{0}}};
     for (int p = 0; p < depth; p++, a += S, b += S) {
@@ -23,14 +23,16 @@ LANES_INLINE void multiply_columns(const double *a, const double *b, int depth, 
     for (int j = 0; j < WIDE; j++)
 #pragma GCC unroll 3
         for (int i = 0; i < PARTS; i++)
-            lanes_store(to + S * j + LANES * i, lanes_load(to + S * j + LANES * i) - sum[j][i]);
+            lanes_store(to + S * j + LANES * i,
+                        (fresh ? (lanes){0} : lanes_load(to + S * j + LANES * i)) - sum[j][i]);
 }
 _Static_assert(PARTS == 3, "three vectors a column");
 
-LANES_DISPATCH void drape_tile_multiply(const double *a, const double *b, int depth, int columns, double *to)
+LANES_DISPATCH void drape_tile_multiply(const double *a, const double *b, int depth, int columns, bool fresh,
+                                        double *to)
 {
     for (int j = 0; j < columns; j += WIDE)
-        multiply_columns(a, b + j, depth, to + S * j);
+        multiply_columns(a, b + j, depth, fresh, to + S * j);
 }
 
 LANES_DISPATCH bool drape_tile_factor(int n, double *tile, double *inverse)

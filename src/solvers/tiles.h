@@ -12,8 +12,9 @@
 #define DRAPE_STRIP 12 /* 4 blocks; with three columns nine vectors of four, which fit into the registers */
 #define DRAPE_TILE  (DRAPE_STRIP * DRAPE_STRIP)
 
-/* to -= A B' over the first `depth` columns of the strips a and b, in `columns` columns of to: a multiple of 3. */
-void drape_tile_multiply(const double *a, const double *b, int depth, int columns, double *to);
+/* to -= A B' over the first `depth` columns of the strips a and b, in `columns` columns of to: a multiple of 3.
+ * fresh: to has been 0, whatever it holds. */
+void drape_tile_multiply(const double *a, const double *b, int depth, int columns, bool fresh, double *to);
 
 /* The lower triangle of the first n rows and columns of a tile becomes its Cholesky factor, inverse (n) what its
  * diagonal is divided by; false where it is not positive definite. */
