@@ -133,6 +133,7 @@ typedef struct drape_fault {
 /* ---- The ops table of a term ---- */
 
 #define DRAPE_PAIR_BLOCK 32
+#define DRAPE_LANES      4
 
 /*
  * A row. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first + count
@@ -165,11 +166,17 @@ typedef struct drape_term_ops {
     void (*measure)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                     const double *internal, double *q, double *dq, double *ddq);
 
-    /* Optional, beside measure, where nodes is 2 and q depends on the distance of the nodes alone: the same for
-     * forces without derivatives, which take half of the numbers. q (count), d (3 x count: all x, all y, all z)
-     * = x1 - x0 [m], c (count) with dq = (-c d, c d). count is at most DRAPE_PAIR_BLOCK. */
+    /* Optional, beside measure, where nodes is 2 and q is a linear function of the distance of the nodes: the
+     * same with a tenth of the numbers. q (count), d (3 x count: all x, all y, all z) = x1 - x0 [m], c (count) with
+     * dq = (-c d, c d), so that ddq = (P -P; -P P), P = c (I - d d'/d.d). count is at most DRAPE_PAIR_BLOCK. */
     void (*pair)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,
                  double *d, double *c);
+
+    /* Optional, beside measure: the same for the DRAPE_LANES elements of a list at once; the same one may stand
+     * in several places. Item i of the element in place l is at [DRAPE_LANES i + l]: q (1), dq (d), ddq (d x d), of
+     * which only the 3 x 3 blocks on and below the diagonal are written. */
+    void (*lanes)(const drape_elements *el, const int32_t *element, const double *x, const double *internal,
+                  double *q, double *dq, double *ddq);
 
     /* e [J] (count), g [N] (count x d), hess [N/m] (count x d x d, symmetric). */
     void (*energy)(const drape_elements *el, int32_t first, int32_t count, const double *x,
@@ -179,11 +186,12 @@ typedef struct drape_term_ops {
     void (*dissipation)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                         const double *v, double *g, double *dg_dx, double *dg_dv);
 
-    /* For one element with stiffness k [J], strain = q - q0 and rate = q' [q/s]: the generalised force [J/q]
-     * on q, its derivative by strain and by rate, and the energy [J] if it has one, else 0. dissipative: the
-     * force takes work, without an energy. */
-    void (*law)(const double *params, double k, double strain, double rate, double *force,
-                double *dforce_dstrain, double *dforce_drate, double *energy);
+    /* For count elements with stiffness k [J], strain = q - q0 and rate = q' [q/s]: adds the generalised force
+     * [J/q] on q, its derivatives by strain and by rate, and the energy [J] if it has one. All are (count).
+     * dissipative: the force takes work, without an energy. */
+    void (*law)(const double *params, int32_t count, const double *k, const double *strain,
+                const double *rate, double *force, double *dforce_dstrain, double *dforce_drate,
+                double *energy);
     bool dissipative;
 
     /* The internal variable of elements after a step was accepted: from those before and the new positions.
@@ -215,6 +223,13 @@ typedef void drape_element_energy(const drape_elements *el, int32_t element, con
                                   double *g, double *hess);
 DRAPE_API void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                   double *e, double *g, double *hess, drape_element_energy *one);
+
+/* Makes the function measure of a row out of its lanes, for a range of any count. */
+typedef void drape_measure_lanes(const drape_elements *el, const int32_t *element, const double *x,
+                                 const double *internal, double *q, double *dq, double *ddq);
+DRAPE_API void drape_measure_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                                   const double *internal, double *q, double *dq, double *ddq,
+                                   drape_measure_lanes *lanes);
 
 /* For rows with pair: d (3 x count) and the distance l (count) of the two nodes of each element. */
 DRAPE_API void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count, const double *x,

@@ -312,23 +312,21 @@ static void check_invariance(checker *c, int32_t t)
         report(c, term->ops->name, "net torque", ratio(largest(net + 3, 3), scale * size), INVARIANCE_LIMIT);
 }
 
+/* At one state and at two steps along each of its arguments. */
 static void check_law(checker *c, const drape_term *law)
 {
-    const double k = 2.385, strain = 0.117, rate = -0.731, h = 1e-6;
-    double f, fs, fr, e, plus, minus, by_strain, by_rate, energy, e2[2], x;
-    law->ops->law(law->params, k, strain, rate, &f, &fs, &fr, &e);
-    law->ops->law(law->params, k, strain + h, rate, &plus, &x, &x, &e2[0]);
-    law->ops->law(law->params, k, strain - h, rate, &minus, &x, &x, &e2[1]);
-    by_strain = (plus - minus) / (2 * h);
-    energy = (e2[0] - e2[1]) / (2 * h);
-    law->ops->law(law->params, k, strain, rate + h, &plus, &x, &x, &x);
-    law->ops->law(law->params, k, strain, rate - h, &minus, &x, &x, &x);
-    by_rate = (plus - minus) / (2 * h);
-    double scale = fmax(fmax(fabs(fs), fabs(fr)), fabs(f));
-    report(c, law->ops->name, "force by strain", ratio(fabs(by_strain - fs), scale), HESSIAN_LIMIT);
-    report(c, law->ops->name, "force by rate", ratio(fabs(by_rate - fr), scale), HESSIAN_LIMIT);
+    const double k = 2.385, at = 0.117, moves = -0.731, h = 1e-6;
+    const double stiffness[] = {k, k, k, k, k}, strain[] = {at, at + h, at - h, at, at},
+                 rate[] = {moves, moves, moves, moves + h, moves - h};
+    double f[5] = {0}, fs[5] = {0}, fr[5] = {0}, e[5] = {0};
+    law->ops->law(law->params, 5, stiffness, strain, rate, f, fs, fr, e);
+    double by_strain = (f[1] - f[2]) / (2 * h), by_rate = (f[3] - f[4]) / (2 * h);
+    double scale = fmax(fmax(fabs(fs[0]), fabs(fr[0])), fabs(f[0]));
+    report(c, law->ops->name, "force by strain", ratio(fabs(by_strain - fs[0]), scale), HESSIAN_LIMIT);
+    report(c, law->ops->name, "force by rate", ratio(fabs(by_rate - fr[0]), scale), HESSIAN_LIMIT);
     if (!law->ops->dissipative)
-        report(c, law->ops->name, "force of energy", ratio(fabs(energy - f), scale), GRADIENT_LIMIT);
+        report(c, law->ops->name, "force of energy", ratio(fabs((e[1] - e[2]) / (2 * h) - f[0]), scale),
+               GRADIENT_LIMIT);
 }
 
 /* ---- The assembled Jacobian ---- */
