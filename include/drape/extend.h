@@ -146,6 +146,7 @@ typedef struct drape_term_ops {
     bool has_internal;         /* one internal variable an element */
     bool constraint; /* an energy that keeps a limit: integrators that move nodes to keep limits do without */
     bool damped;     /* measure: a dashpot of its own in each element, force c q' on q */
+    bool distance;   /* measure: q is the distance of its two nodes, of all elements */
 
     /* Adds the elements of one cloth. Called once a cloth. Errors: what the builder returned. */
     drape_status (*build)(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder);

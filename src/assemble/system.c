@@ -20,7 +20,8 @@ typedef struct request {
     bool energy, hessian;
     bool conservative, dissipative; /* which parts of the forces */
     bool project;
-    bool velocity; /* the Hessian wanted is dg/dv alone */
+    bool velocity;       /* the Hessian wanted is dg/dv alone */
+    const bool *without; /* (term_count) terms that are left out; NULL: none */
 } request;
 
 /* Results of a block, element-major with the d of its term, and scratch. */
@@ -544,14 +545,22 @@ static void sum_term(drape_system *system, const drape_term *term, const request
 static void sum_terms(drape_system *system, const request *want, const sums *to)
 {
     for (int32_t i = 0; i < system->model->term_count; i++)
-        if (!is_left_out(system, &system->model->terms[i]) && contributes(&system->model->terms[i], want, to))
+        if (!(want->without && want->without[i]) && !is_left_out(system, &system->model->terms[i]) &&
+            contributes(&system->model->terms[i], want, to))
             sum_term(system, &system->model->terms[i], want, to);
 }
 
 void drape_system_force(drape_system *system, const drape_point *point, double *g)
 {
+    drape_system_force_without(system, point, NULL, g);
+}
+
+void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
+                                double *g)
+{
+    const request want = {.point = point, .conservative = true, .dissipative = true, .without = without};
     memset(g, 0, 3 * (size_t)system->model->node_count * sizeof *g);
-    sum_terms(system, &(request){.point = point, .conservative = true, .dissipative = true}, &(sums){.g = g});
+    sum_terms(system, &want, &(sums){.g = g});
     if (place_contact(system, point))
         drape_contact_add_forces(system->contact, true, true, g);
 }
