@@ -24,8 +24,8 @@
 #include "integrators/verlet.h"
 
 #include "base/clock.h"
-#include "base/clones.h"
 #include "base/finite.h"
+#include "base/lanes.h"
 #include "base/vec3.h"
 #include "integrators/stability.h"
 
@@ -338,9 +338,9 @@ static void damp(verlet_state *s, const substep *sub)
 }
 
 /* v -= w g/m, x0 = x, x += h v of all numbers; inverse is 0 where x stays. */
-DRAPE_CLONES static void move_all(size_t n, double w, double h, const double *restrict inverse,
-                                  const double *restrict g, double *restrict v, double *restrict x,
-                                  double *restrict x0)
+LANES_DISPATCH static void move_all(size_t n, double w, double h, const double *restrict inverse,
+                                    const double *restrict g, double *restrict v, double *restrict x,
+                                    double *restrict x0)
 {
     for (size_t i = 0; i < n; i++) {
         v[i] -= w * inverse[i] * g[i];
@@ -357,9 +357,9 @@ static void move(const verlet_state *s, const substep *sub, double w)
 }
 
 /* v = (x - x0)/h of what is not pinned. */
-DRAPE_CLONES static void take_velocities(size_t n, double h, const double *restrict inverse,
-                                         const double *restrict x, const double *restrict x0,
-                                         double *restrict v)
+LANES_DISPATCH static void take_velocities(size_t n, double h, const double *restrict inverse,
+                                           const double *restrict x, const double *restrict x0,
+                                           double *restrict v)
 {
     double per = 1 / h;
     for (size_t i = 0; i < n; i++)

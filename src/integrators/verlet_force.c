@@ -5,7 +5,7 @@
  * so that a run is a loop over arrays without indices, of which compilers make vectors. Linear terms have the
  * same forces at every x: they are taken once. The system sums what is left.
  */
-#include "base/clones.h"
+#include "base/lanes.h"
 #include "integrators/planes.h"
 #include "integrators/verlet.h"
 
@@ -183,7 +183,7 @@ static inline void add_opposite(const run *r, const double *restrict p, double *
         b[i] += p[i];
 }
 
-DRAPE_CLONES static void sum_runs(const run *runs, int32_t count, const double *x, size_t n, double *g)
+LANES_DISPATCH static void sum_runs(const run *runs, int32_t count, const double *x, size_t n, double *g)
 {
     double p[3][LONGEST];
     for (int32_t k = 0; k < count; k++) {

@@ -12,7 +12,7 @@
  * node of which no spring is too long is done, as long as none of its nodes is moved before its turn: one after the
  * other none would have moved. The springs of others, and those that are in no patch, are taken one after the other.
  */
-#include "base/clones.h"
+#include "base/lanes.h"
 #include "base/vec3.h"
 #include "integrators/planes.h"
 #include "integrators/verlet.h"
@@ -249,8 +249,8 @@ static double limit_each(const drape_verlet_limit *l, int32_t first, int32_t cou
 
 /* By how much the squares of the lengths of each node's springs are above what they may be, at most; 0 where none
  * is. True: it is some node. */
-DRAPE_CLONES static bool find_excess(const drape_verlet_limit *l, const drape_verlet_patch *p,
-                                     double excess[PATCH_NODES])
+LANES_DISPATCH static bool find_excess(const drape_verlet_limit *l, const drape_verlet_patch *p,
+                                       double excess[PATCH_NODES])
 {
     const double *x = l->x + p->from, *y = x + l->node_count, *z = y + l->node_count;
     double most = 0;

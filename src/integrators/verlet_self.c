@@ -19,7 +19,7 @@
  * points that push are the same, and are added in the order of their numbers, whichever way they were found: the
  * result depends on the positions alone, not on when a list was made.
  */
-#include "base/clones.h"
+#include "base/lanes.h"
 #include "base/vec3.h"
 #include "integrators/verlet.h"
 
@@ -393,7 +393,7 @@ static void build_lists(drape_verlet_self *s, double share, const double *x)
     sort_nodes(s, x);
 }
 
-#define LANES 4 /* nodes at once, each with sums and a maximum of its own */
+/* LANES nodes at once, each with sums and a maximum of its own. */
 
 /* sum of x - x0 over all nodes. */
 static inline void sum_moves(size_t n, const double *restrict x, const double *restrict x0, double sum[3])
@@ -416,7 +416,7 @@ static inline double square_of_move(const double *x, const double *x0, const dou
 }
 
 /* How far a node has moved from x0 to x at most, against the mean of all; infinite where a number is none. */
-DRAPE_CLONES static double farthest_moved(size_t n, const double *restrict x, const double *restrict x0)
+LANES_DISPATCH static double farthest_moved(size_t n, const double *restrict x, const double *restrict x0)
 {
     double mean[3], lane[LANES] = {0}, square;
     size_t whole = n - n % LANES;
