@@ -19,8 +19,9 @@ typedef struct drape_request {
     bool energy, hessian;
     bool conservative, dissipative; /* which parts of the forces */
     bool project;
-    bool velocity;  /* the Hessian wanted is dg/dv alone */
-    bool remainder; /* only what is of no measure */
+    bool velocity;       /* the Hessian wanted is dg/dv alone */
+    bool remainder;      /* only what is of no measure */
+    const bool *without; /* (term_count) terms that are left out; NULL: none */
 } drape_request;
 
 /*

@@ -298,7 +298,8 @@ static void add_share(drape_summer *s, const drape_request *want, const drape_su
     for (int32_t i = 0; i < s->model->term_count; i++) {
         const drape_term *term = &s->model->terms[i];
         const reach *reaches = s->reaches ? s->reaches[i] : NULL;
-        const int32_t blocks = contributes(s, term, want, to) ? block_count(term) : 0;
+        const bool wanted = !(want->without && want->without[i]) && contributes(s, term, want, to);
+        const int32_t blocks = wanted ? block_count(term) : 0;
         for (int32_t k = 0; k < blocks; k++) {
             if (reaches && (reaches[k].high < own.first || reaches[k].low >= own.last))
                 continue;

@@ -218,7 +218,14 @@ static drape_sums into_values(const drape_system *system, double *values)
 
 void drape_system_force(drape_system *system, const drape_point *point, double *g)
 {
-    const drape_request want = {.point = point, .conservative = true, .dissipative = true};
+    drape_system_force_without(system, point, NULL, g);
+}
+
+void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
+                                double *g)
+{
+    const drape_request want = {
+        .point = point, .conservative = true, .dissipative = true, .without = without};
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
     if (place_contact(system, point))
         drape_contact_add_forces(system->contact, true, true, g);

@@ -55,6 +55,10 @@ drape_status drape_system_status(const drape_system *system);
 /* g (node_count x 3) of all nodes, pinned ones too. */
 void drape_system_force(drape_system *system, const drape_point *point, double *g);
 
+/* The same without some terms (term_count): for callers that sum those themselves. */
+void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
+                                double *g);
+
 /* values (pattern.nonzeros) = mass_weight M + J over the free nodes. project: element Hessians become
  * positive semidefinite. */
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, bool project,
