@@ -98,10 +98,26 @@ const drape_model *drape_system_model(const drape_system *system)
     return system->model;
 }
 
+/* Of the wider pattern and the terms' places in it. */
+static size_t wider_bytes(const drape_system *system)
+{
+    size_t terms = (size_t)system->model->term_count;
+    if (!system->blocks)
+        return 0;
+    size_t sum = drape_pattern_bytes(&system->wider) + terms * sizeof *system->blocks;
+    for (size_t i = 0; i < terms; i++)
+        if (system->blocks[i]) {
+            const drape_coupling coupling = drape_term_coupling(&system->model->terms[i]);
+            sum +=
+                (size_t)coupling.count * (size_t)(coupling.nodes * coupling.nodes) * sizeof **system->blocks;
+        }
+    return sum;
+}
+
 size_t drape_system_bytes(const drape_system *system)
 {
     return sizeof *system + (size_t)system->threads * sizeof *system->buffers +
-           drape_contact_bytes(system->contact);
+           drape_contact_bytes(system->contact) + wider_bytes(system);
 }
 
 /* ---- Contact ---- */
@@ -422,7 +438,18 @@ static void evaluate(const drape_term *term, const request *want, block_buffer *
 /* Where sums go; NULL: not wanted. */
 typedef struct sums {
     double *energy, *g, *values;
+    double *node_energy; /* (node_count) */
 } sums;
+
+/* In equal parts on its nodes. */
+static void share_energies(const drape_elements *el, const block_buffer *b, double *node_energy)
+{
+    for (int32_t i = 0; i < b->count; i++) {
+        const int32_t *node = el->node + (size_t)(b->first + i) * (size_t)el->nodes;
+        for (int a = 0; a < el->nodes; a++)
+            node_energy[node[a]] += b->energy[i] / el->nodes;
+    }
+}
 
 static void add_pulls(const drape_elements *el, const block_buffer *b, double *g)
 {
@@ -484,6 +511,8 @@ static void add(const drape_system *system, const drape_term *term, const block_
 {
     for (int32_t i = 0; to->energy && i < b->count; i++)
         *to->energy += b->energy[i];
+    if (to->node_energy)
+        share_energies(&term->elements, b, to->node_energy);
     if (to->g && b->pairs)
         add_pulls(&term->elements, b, to->g);
     else if (to->g)
@@ -686,6 +715,18 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
         const drape_term *term = &system->model->terms[i];
         const sums to = {.energy = term->ops->potential_of_gravity ? gravity : elastic};
         if (!is_left_out(system, term) && contributes(term, &want, &to))
+            sum_term(system, term, &want, &to);
+    }
+}
+
+void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy)
+{
+    const request want = {.point = point, .energy = true, .conservative = true};
+    const sums to = {.node_energy = energy};
+    memset(energy, 0, (size_t)system->model->node_count * sizeof *energy);
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        if (!term->ops->potential_of_gravity && !is_left_out(system, term) && contributes(term, &want, &to))
             sum_term(system, term, &want, &to);
     }
 }

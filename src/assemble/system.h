@@ -84,6 +84,9 @@ const double *drape_system_on_colliders(const drape_system *system);
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity);
 double drape_system_contact_energy(drape_system *system, const drape_point *point);
 
+/* The elastic energy again, as (node_count) [J]: that of each element in equal parts on its nodes. */
+void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy);
+
 /* Contact alone, for checks: g (node_count x 3), of the energy or with friction too, and its J in values
  * (pattern.nonzeros, of drape_system_fit at this point), are overwritten; either may be NULL. */
 void drape_system_contact_part(drape_system *system, const drape_point *point, bool friction, double *g,
