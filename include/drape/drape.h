@@ -137,6 +137,7 @@ typedef struct drape_pin_def {
     double box_min[3], box_max[3]; /* [m], rest coordinates after the transform; boundary included */
     const drape_track_key *track;  /* key_count keys; NULL: fixed */
     size_t key_count;
+    bool clamp; /* edges between its nodes keep the direction of the sheet, for bending terms that see it */
 } drape_pin_def;
 
 /* One piece of cloth. */

@@ -5,8 +5,8 @@
  * (v = w x + const in a step method, w = c_j in IDA) every time integrator is a choice of x, v, w and of a
  * mass term.
  *
- * Elements are evaluated in blocks, by several threads if there are any, and added in the order of elements:
- * the result has the same bits for any number of threads.
+ * Elements are evaluated by several threads if there are any (sum.h): the result has the same bits for any
+ * number of them.
  */
 #ifndef DRAPE_ASSEMBLE_SYSTEM_H
 #define DRAPE_ASSEMBLE_SYSTEM_H

@@ -163,6 +163,11 @@ void drape_implicit_restart(void *state, const drape_state *from)
     drape_newton_forget_factors(((drape_implicit *)state)->newton);
 }
 
+const double *drape_implicit_residual(const void *state)
+{
+    return drape_newton_residual(((const drape_implicit *)state)->newton);
+}
+
 drape_work drape_implicit_work(const void *state)
 {
     return drape_newton_work(((const drape_implicit *)state)->newton);

@@ -32,6 +32,7 @@ drape_status drape_implicit_create(drape_context *ctx, drape_system *system, con
                                    void **state);
 void drape_implicit_destroy(void **state);
 void drape_implicit_restart(void *state, const drape_state *from);
+const double *drape_implicit_residual(const void *state);
 drape_work drape_implicit_work(const void *state);
 size_t drape_implicit_bytes(const void *state);
 size_t drape_implicit_array_bytes(const drape_implicit *implicit); /* without the Newton solver */

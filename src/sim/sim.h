@@ -75,6 +75,9 @@ static inline const drape_state *drape_sim_state(const drape_sim *sim)
  * info->worst says how much. */
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info *info);
 
+/* drape_sim_energy_density at other positions (node_count x 3), internal variables those of the present state. */
+void drape_sim_energy_density_at(drape_sim *sim, const double *x, double *density);
+
 /* The step is accepted: its work counts. */
 void drape_sim_book(drape_sim *sim, const drape_step_info *info);
 
