@@ -108,6 +108,15 @@ const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {
                                     .default_value = 0,
                                     .choices = drape_linears_words,
                                     .help = "a row of the linear solvers"},
+    [DRAPE_NEWTON_LINEAR_TOLERANCE] = {.name = "linear_tolerance",
+                                       .unit = "1",
+                                       .default_value = 1e-3,
+                                       .min = 1e-14,
+                                       .max = 1,
+                                       .open_max = true,
+                                       .help =
+                                           "share of the residual that iterative linear solvers leave in a "
+                                           "correction"},
 };
 
 struct drape_newton {
@@ -392,6 +401,8 @@ drape_status drape_newton_create(drape_context *ctx, drape_system *system, const
     if (!status && s->n > 0)
         status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
                                          drape_system_pattern(system), &s->linear);
+    if (!status && s->n > 0)
+        s->linear->tolerance = values[DRAPE_NEWTON_LINEAR_TOLERANCE];
     if (!status && s->n > 0 && (s->ahead || s->trial)) {
         s->linear->owner = s;
         s->linear->solver->ops->solve = solve_and_globalize;
@@ -619,7 +630,7 @@ drape_work drape_newton_work(const drape_newton *newton)
     drape_work work = newton->work;
     if (newton->linear) {
         work.factorizations = newton->linear->factorizations;
-        work.linear_iterations = newton->linear->solves;
+        work.linear_iterations = newton->linear->iterations;
         work.factor_seconds = newton->linear->factor_seconds;
         work.solve_seconds = newton->linear->solve_seconds;
     }
