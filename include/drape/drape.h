@@ -183,6 +183,7 @@ typedef struct drape_scene_def {
     size_t self_contact_count;
     const drape_setting *contact; /* distance, stiffness ...: `drape list contact` shows all */
     size_t contact_count;
+    const char *up; /* axis that points up in frames of `drape run`: "y" or "z"; NULL: "y" */
 } drape_scene_def;
 
 /* Fill a def with the defaults above. */
@@ -263,6 +264,11 @@ typedef struct drape_collider_motion {
 DRAPE_API int32_t drape_model_collider_count(const drape_model *model);
 DRAPE_API drape_collider_motion drape_model_collider(const drape_model *model, int32_t index, double t);
 
+/* How far each triangle is stretched at positions x (node_count x 3 [m]): strain (triangle_count x 2) gets its
+ * principal engineering strains [1], lambda - 1 of the principal stretches lambda of the triangle against its rest
+ * shape, the larger one first. Rest lengths that terms have of their own play no part. */
+DRAPE_API void drape_model_strain(const drape_model *model, const double *x, double *strain);
+
 /* The scene's own duration [s] and frame rate [1/s]. */
 DRAPE_API double drape_model_duration(const drape_model *model);
 DRAPE_API double drape_model_frame_rate(const drape_model *model);
@@ -342,6 +348,11 @@ typedef struct drape_energy {
 } drape_energy;
 DRAPE_API drape_energy drape_sim_energy(drape_sim *sim);
 
+/* Where the elastic energy of the last accepted state is: density (node_count) [J/m2], that of each element in
+ * equal parts on its nodes, over the area that is lumped to a node at rest. Its sum over nodes, each times its
+ * area, is the elastic energy. */
+DRAPE_API void drape_sim_energy_density(drape_sim *sim, double *density);
+
 /* Work done since the sim was made. Times in seconds of wall clock; newton times are parts of steps. */
 typedef struct drape_statistics {
     int64_t steps_accepted, steps_rejected;
@@ -397,8 +408,9 @@ typedef struct drape_event {
     const drape_attempt *attempt; /* ATTEMPT only */
     int64_t frame;                /* FRAME: its number from 0 */
     double time;                  /* FRAME [s] */
-    const double *positions; /* FRAME: node_count x 3 [m]; cubic Hermite between the steps around it, or the
+    const double *positions;  /* FRAME: node_count x 3 [m]; cubic Hermite between the steps around it, or the
                                      straight way, or the nearer of them, where that leads through something */
+    const double *velocities; /* FRAME: node_count x 3 [m/s]; linear between the steps around it */
 } drape_event;
 
 /* Called within drape_sim_advance. Returns 0 to go on, anything else to stop: the advance then returns

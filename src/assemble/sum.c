@@ -1,10 +1,9 @@
 /* sum.c: see sum.h. */
 #include "assemble/sum.h"
 
+#include "base/parallel.h"
+
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 /* The lowest and the highest node of a block of elements. */
 typedef struct reach {
@@ -48,6 +47,11 @@ static reach reach_of(const drape_term *term, int32_t block)
         r.high = node[i] > r.high ? node[i] : r.high;
     }
     return r;
+}
+
+int drape_summer_threads(const drape_summer *s)
+{
+    return s->threads;
 }
 
 static drape_status create_reaches(drape_summer *s)
@@ -150,6 +154,16 @@ static void add_gradients(const drape_term *term, const drape_block *b, const sh
             for (int k = 0; owns(own, node[a]) && k < 3; k++)
                 to[k] += from[b->stride * (3 * a + k)];
         }
+    }
+}
+
+static void share_energies(const drape_term *term, const drape_block *b, double *node_energy)
+{
+    const int n = term->elements.nodes;
+    for (int32_t i = 0; i < b->count; i++) {
+        const int32_t *node = term->elements.node + (size_t)(b->first + i) * (size_t)n;
+        for (int a = 0; a < n; a++)
+            node_energy[node[a]] += b->energy[i] / n;
     }
 }
 
@@ -274,7 +288,7 @@ static void clear(const drape_summer *s, const share *own, const drape_sums *to)
         }
 }
 
-/* What one thread does. */
+/* The nodes of one share. */
 static void add_share(drape_summer *s, const drape_request *want, const drape_sums *to, int thread)
 {
     const int64_t nodes = s->model->node_count;
@@ -294,19 +308,23 @@ static void add_share(drape_summer *s, const drape_request *want, const drape_su
     }
 }
 
-/* One thread takes a plain call: a parallel region of one costs libgomp a heap call. A region may get fewer
- * threads than it asked for: shares are dealt out, not assumed. */
+/* What all threads are to do. */
+typedef struct order {
+    drape_summer *summer;
+    const drape_request *want;
+    const drape_sums *to;
+} order;
+
+static void add_round(void *user, int64_t thread)
+{
+    const order *o = user;
+    add_share(o->summer, o->want, o->to, (int)thread);
+}
+
+/* There may be fewer threads than shares: they are dealt out, not assumed. */
 void drape_summer_add(drape_summer *s, const drape_request *want, const drape_sums *to)
 {
-#ifdef _OPENMP
-    if (s->threads > 1) {
-#pragma omp parallel for schedule(static, 1) num_threads(s->threads)
-        for (int thread = 0; thread < s->threads; thread++)
-            add_share(s, want, to, thread);
-        return;
-    }
-#endif
-    add_share(s, want, to, 0);
+    drape_parallel(s->threads, s->threads, add_round, &(order){s, want, to});
 }
 
 void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_request *want,
@@ -314,9 +332,11 @@ void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_
 {
     const share all = {0, s->model->node_count};
     double sum = 0;
-    for (int32_t k = 0; k < block_count(term) && (energy || contributes(s, term, want, to)); k++) {
+    for (int32_t k = 0; k < block_count(term); k++) {
         evaluate(term, want, k, &s->blocks[0]);
         add(s, term, &s->blocks[0], &all, to);
+        if (to->node_energy)
+            share_energies(term, &s->blocks[0], to->node_energy);
         for (int32_t i = 0; energy && i < s->blocks[0].count; i++)
             sum += s->blocks[0].energy[i];
     }

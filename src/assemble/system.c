@@ -64,9 +64,31 @@ const drape_model *drape_system_model(const drape_system *system)
     return system->model;
 }
 
+int drape_system_threads(const drape_system *system)
+{
+    return drape_summer_threads(system->summer);
+}
+
+/* Of the wider pattern and the terms' places in it. */
+static size_t wider_bytes(const drape_system *system)
+{
+    size_t terms = (size_t)system->model->term_count;
+    if (!system->blocks)
+        return 0;
+    size_t sum = drape_pattern_bytes(&system->wider) + terms * sizeof *system->blocks;
+    for (size_t i = 0; i < terms; i++)
+        if (system->blocks[i]) {
+            const drape_coupling coupling = drape_term_coupling(&system->model->terms[i]);
+            sum +=
+                (size_t)coupling.count * (size_t)(coupling.nodes * coupling.nodes) * sizeof **system->blocks;
+        }
+    return sum;
+}
+
 size_t drape_system_bytes(const drape_system *system)
 {
-    return sizeof *system + drape_summer_bytes(system->summer) + drape_contact_bytes(system->contact);
+    return sizeof *system + drape_summer_bytes(system->summer) + drape_contact_bytes(system->contact) +
+           wider_bytes(system);
 }
 
 /* ---- Contact ---- */
@@ -268,6 +290,11 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
         drape_contact_add_jacobian(system->contact, point->weight, false, false, system->pattern, values);
 }
 
+static bool has_energy(const drape_system *system, const drape_term *term)
+{
+    return !term->ops->law && !term->ops->dissipation && !drape_summer_leaves(system->summer, term);
+}
+
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity)
 {
     const drape_request want = {.point = point, .energy = true, .conservative = true};
@@ -275,10 +302,21 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
         double energy = 0;
-        if (term->ops->law || term->ops->dissipation || drape_summer_leaves(system->summer, term))
-            continue;
-        drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
+        if (has_energy(system, term))
+            drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
         *(term->ops->potential_of_gravity ? gravity : elastic) += energy;
+    }
+}
+
+void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy)
+{
+    const drape_request want = {.point = point, .energy = true, .conservative = true};
+    const drape_sums to = {.node_energy = energy};
+    memset(energy, 0, (size_t)system->model->node_count * sizeof *energy);
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        if (!term->ops->potential_of_gravity && has_energy(system, term))
+            drape_summer_add_term(system->summer, term, &want, &to, NULL);
     }
 }
 

@@ -36,6 +36,7 @@ void drape_system_destroy(drape_system **system);
 void drape_system_leave_constraints(drape_system *system);
 
 const drape_model *drape_system_model(const drape_system *system);
+int drape_system_threads(const drape_system *system);
 
 /* From now on the forces of contact belong to the system, if the model has any. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_add_contact(drape_system *system);
@@ -73,6 +74,9 @@ const double *drape_system_on_colliders(const drape_system *system);
 /* Energies of the terms [J], and of contact. */
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity);
 double drape_system_contact_energy(drape_system *system, const drape_point *point);
+
+/* The elastic energy again, as (node_count) [J]: that of each element in equal parts on its nodes. */
+void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy);
 
 /* Contact alone, for checks: g (node_count x 3), of the energy or with friction too, and its J in values
  * (pattern.nonzeros, of drape_system_fit at this point), are overwritten; either may be NULL. */

@@ -5,6 +5,7 @@
 
 #include "base/clock.h"
 #include "io/recorder.h"
+#include "io/scene_copy.h"
 #include "io/summary.h"
 
 #include <errno.h>
@@ -50,6 +51,15 @@ static void remove_old_summary(const char *path)
         remove(path); /* if it stays, it is replaced at the end, or that failure is told */
 }
 
+/* Where the scene lies in the folder already, under that name, it is not written over. */
+static drape_status keep_scene(const run *r)
+{
+    const char *path = r->request->command.operand, *folder = r->request->out;
+    return drape_scene_copy_is(path, folder)
+               ? DRAPE_OK
+               : drape_scene_copy(r->in.ctx, r->in.scene, r->in.model, path, folder);
+}
+
 static drape_status begin_output(run *r)
 {
     const drape_model *model = r->in.model;
@@ -65,9 +75,10 @@ static drape_status begin_output(run *r)
                                     .formats = (const char *const *)model->formats,
                                     .format_count = model->format_count};
     drape_status status = drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder);
-    if (!status)
-        remove_old_summary(r->summary_path);
-    return status;
+    if (status)
+        return status;
+    remove_old_summary(r->summary_path);
+    return keep_scene(r);
 }
 
 static void write_summary(run *r, const char *path)
@@ -157,7 +168,7 @@ static void print_results(const run *r)
     print_energy(r);
     print_wall(r, &s);
     if (r->recorder)
-        printf("output    %lld frames, steps.csv, energy.csv and summary.json in %s\n",
+        printf("output    %lld frames, steps.csv, energy.csv, summary.json and scene.json in %s\n",
                (long long)drape_recorder_frames(r->recorder), r->request->out);
 }
 
@@ -207,10 +218,26 @@ static int conclude(const run *r)
     return r->status == DRAPE_E_STOPPED ? CLI_INTERRUPTED : CLI_FAILED;
 }
 
+/* The folder of a run has the scene as it was run; one that was changed on the way would take the place of the
+ * user's own. */
+static int check_folder(const run_request *request)
+{
+    const cli_command *command = &request->command;
+    if (!request->out || command->setting_count == 0 || !drape_scene_copy_is(command->operand, request->out))
+        return CLI_GO_ON;
+    return cli_misuse(command->verb,
+                      "--out \"%.500s\": its " DRAPE_SCENE_COPY
+                      " is the scene itself, and the scene as it is "
+                      "changed here would be written over it; choose another folder",
+                      request->out);
+}
+
 static int load_and_run(const run_request *request)
 {
     run r = {.request = request, .start = drape_clock_seconds()};
     int code = cli_scene_load(&request->command, &r.in);
+    if (code == CLI_GO_ON)
+        code = check_folder(request);
     if (code == CLI_GO_ON) {
         simulate(&r);
         code = conclude(&r);
@@ -223,7 +250,7 @@ static int load_and_run(const run_request *request)
 
 static const cli_option options[] = {
     {"out", CLI_TEXT, "DIR",
-     "folder for frames, steps.csv, energy.csv and summary.json; made if it is not there",
+     "folder for frames, steps.csv, energy.csv, summary.json and scene.json; made if it is not there",
      offsetof(run_request, out), 0, NULL},
     {"summary", CLI_TEXT, "FILE", "write the summary there, too", offsetof(run_request, summary), 0, NULL},
 };

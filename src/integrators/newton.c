@@ -391,7 +391,7 @@ drape_status drape_newton_create(drape_context *ctx, drape_system *system, const
         status = create_vectors(s);
     if (!status && s->n > 0)
         status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
-                                         drape_system_pattern(system), &s->linear);
+                                         drape_system_pattern(system), drape_system_threads(s->system), &s->linear);
     if (!status && s->n > 0 && (s->ahead || s->trial)) {
         s->linear->owner = s;
         s->linear->solver->ops->solve = solve_and_globalize;

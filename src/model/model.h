@@ -118,6 +118,7 @@ struct drape_model {
     double duration, frame_rate;
     char **formats;
     size_t format_count;
+    bool z_up; /* frames are turned so that z points up */
 };
 
 /* Writes the positions that tracks give pinned nodes at time t; other entries of x (node_count x 3) stay. */

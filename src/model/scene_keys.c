@@ -12,6 +12,8 @@
 const char *const drape_pin_corners[] = {"top-left", "top-right", "bottom-left", "bottom-right", NULL};
 const char *const drape_pin_edges[] = {"top", "bottom", "left", "right", NULL};
 
+const char *const drape_up_axes[] = {"y", "z", NULL};
+
 /* ---- Pins ---- */
 
 static const drape_scene_key pin_keys[] = {
@@ -155,6 +157,10 @@ static const drape_scene_object contact = {.name = "contact",
 static const drape_scene_key output_keys[] = {
     {"formats", DRAPE_SCENE_WORDS, ARRAY(drape_scene_def, formats, format_count),
      .help = "rows of the exporters; default npy"},
+    {"up", DRAPE_SCENE_WORD, IN(drape_scene_def, up), .words = drape_up_axes,
+     .help = "the axis that points up in frames: \"z\" turns them, (x, y, z) to (x, -z, y); default \"y\"; "
+             "npy and "
+             "glb have y up always"},
 };
 static const drape_scene_object output = {.name = "output", KEYS(output_keys)};
 

@@ -42,9 +42,10 @@ static drape_status create_states(drape_sim *sim)
     drape_status status = DRAPE_OK;
     for (int i = 0; !status && i < 2 + sim->chosen.controller->pasts; i++)
         status = drape_state_create(sim->ctx, &sim->arena, sim->model, &sim->states[i]);
-    sim->frame =
-        drape_arena_take(&sim->arena, sim->ctx, 3 * (size_t)sim->model->node_count, sizeof *sim->frame);
-    return status ? status : sim->frame ? DRAPE_OK : DRAPE_E_MEMORY;
+    size_t n = 3 * (size_t)sim->model->node_count;
+    sim->frame = drape_arena_take(&sim->arena, sim->ctx, n, sizeof *sim->frame);
+    sim->frame_velocity = drape_arena_take(&sim->arena, sim->ctx, n, sizeof *sim->frame_velocity);
+    return status ? status : sim->frame && sim->frame_velocity ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
 static drape_status create_parts(drape_sim *sim, const drape_sim_def *def)

@@ -38,7 +38,7 @@ struct drape_sim {
     drape_schedule schedule;
     double frame_rate;
     int64_t next_frame;
-    double *frame; /* (node_count x 3) interpolated positions */
+    double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
     drape_observer *observers[DRAPE_MAX_OBSERVERS];
     void *observer_users[DRAPE_MAX_OBSERVERS];
     int observer_count;

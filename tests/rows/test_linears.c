@@ -341,6 +341,11 @@ START_TEST(a_small_part_that_is_not_symmetric_is_not_lost)
     }
     close_problem(&q);
 }
+
+static bool falls_back(const drape_linear_ops *row)
+{
+    return strcmp(row->name, "cholmod") == 0 || strcmp(row->name, "multifrontal") == 0;
+}
 END_TEST
 
 /* Which matrices a row gives to another one: where there is one, all but the positive definite ones. */
@@ -358,7 +363,7 @@ START_TEST(fallbacks_are_counted)
             counts[kind] = report_of(ops, solver).fallbacks - before;
             before += counts[kind];
         }
-        bool falls = strcmp(ops->name, "cholmod") == 0;
+        bool falls = falls_back(ops);
         ck_assert_int_eq(counts[SPD] + counts[TINY] + counts[HUGE_ENTRIES], 0);
         ck_assert_int_eq(counts[INDEFINITE], falls);
         ck_assert_int_eq(counts[UNSYMMETRIC], falls);
@@ -452,11 +457,11 @@ static void check_residual(const sheet *q, bool definite, const char *name)
     free(size);
 }
 
-/* Only cholmod falls back, to the row with the largest general_from that is not above the size. */
+/* Cholesky rows fall back, to the row with the largest general_from that is not above the size. */
 static void check_fallback(const drape_linear_report *report, int64_t n, int64_t count)
 {
     const drape_linear_ops *expected = NULL;
-    bool falls = strcmp(report->row->name, "cholmod") == 0;
+    bool falls = falls_back(report->row);
     for (int i = 0; falls && drape_linears[i]; i++) {
         int64_t from = drape_linears[i]->general_from;
         if (from > 0 && from <= n && (!expected || from > expected->general_from))
