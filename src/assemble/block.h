@@ -18,8 +18,8 @@ typedef struct drape_request {
     const drape_point *point;
     bool energy, hessian;
     bool conservative, dissipative; /* which parts of the forces */
-    bool project;
-    bool velocity; /* the Hessian wanted is dg/dv alone */
+    double project;                 /* share of the positive semidefinite part in Hessians, 0 to 1 */
+    bool velocity;                  /* the Hessian wanted is dg/dv alone */
 } drape_request;
 
 /*

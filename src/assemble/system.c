@@ -249,7 +249,7 @@ static void add_masses(const drape_system *system, double mass_weight, double *v
     }
 }
 
-void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, bool project,
+void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, double project,
                            double *values)
 {
     const drape_request want = {
@@ -257,7 +257,8 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
     const drape_sums to = into_values(system, values);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight, false, project, system->pattern, values);
+        drape_contact_add_jacobian(system->contact, point->weight, false, project > 0, system->pattern,
+                                   values);
     add_masses(system, mass_weight, values);
 }
 

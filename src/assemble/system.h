@@ -56,9 +56,9 @@ drape_status drape_system_status(const drape_system *system);
 /* g (node_count x 3) of all nodes, pinned ones too. */
 void drape_system_force(drape_system *system, const drape_point *point, double *g);
 
-/* values (pattern.nonzeros) = mass_weight M + J over the free nodes. project: element Hessians become
- * positive semidefinite. */
-void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, bool project,
+/* values (pattern.nonzeros) = mass_weight M + J over the free nodes. project: the share, 0 to 1, by which element
+ * Hessians become positive semidefinite: H + project (H+ - H); those of contact do altogether, if it is not 0. */
+void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, double project,
                            double *values);
 
 /* values (pattern.nonzeros) = D = dg/dv over the free nodes, in continuous time. */

@@ -41,8 +41,8 @@ static bool dissect(maker *m)
         start[j + 1] = at;
     }
     METIS_SetDefaultOptions(options);
-    bool done = start && other &&
-                METIS_NodeND(&n, start, other, NULL, options, m->e->order, m->e->place) == METIS_OK;
+    bool done =
+        start && other && METIS_NodeND(&n, start, other, NULL, options, m->e->order, m->e->place) == METIS_OK;
     drape_free(m->ctx, start);
     drape_free(m->ctx, other);
     return done;
@@ -228,7 +228,8 @@ static bool find_fronts(maker *m)
 }
 
 /* Whether front f takes less time with its last child, g, as one. */
-static bool is_better_merged(const maker *m, int32_t first, int32_t middle, int32_t last, int32_t g, int32_t f)
+static bool is_better_merged(const maker *m, int32_t first, int32_t middle, int32_t last, int32_t g,
+                             int32_t f)
 {
     const int32_t w = last - first;
     return cost_of(w, m->length[f]) <=

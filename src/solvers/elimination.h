@@ -9,21 +9,20 @@
 #include "sparse/pattern.h"
 
 typedef struct drape_elimination {
-    int32_t n;              /* block columns */
-    int32_t *order;         /* (n) the block column of the pattern that is eliminated k-th */
-    int32_t *place;         /* (n) its inverse */
-    int32_t count;          /* fronts, children before parents */
-    int32_t *first;         /* (count + 1) the first column of each, in the order of elimination */
-    int32_t *parent;        /* (count) -1: none */
-    int64_t *row_start;     /* (count + 1) */
-    int32_t *row;           /* rows below the columns of a front, ascending, in the order of elimination */
-    int32_t *in_parent;     /* of each row: its number among the columns and then the rows of the parent */
-    double *work;           /* (count) multiplications and additions, roughly */
+    int32_t n;          /* block columns */
+    int32_t *order;     /* (n) the block column of the pattern that is eliminated k-th */
+    int32_t *place;     /* (n) its inverse */
+    int32_t count;      /* fronts, children before parents */
+    int32_t *first;     /* (count + 1) the first column of each, in the order of elimination */
+    int32_t *parent;    /* (count) -1: none */
+    int64_t *row_start; /* (count + 1) */
+    int32_t *row;       /* rows below the columns of a front, ascending, in the order of elimination */
+    int32_t *in_parent; /* of each row: its number among the columns and then the rows of the parent */
+    double *work;       /* (count) multiplications and additions, roughly */
 } drape_elimination;
 
 /* Errors: DRAPE_E_MEMORY. */
-drape_status drape_elimination_create(drape_context *ctx, const drape_pattern *pattern,
-                                      drape_elimination *e);
+drape_status drape_elimination_create(drape_context *ctx, const drape_pattern *pattern, drape_elimination *e);
 void drape_elimination_free(drape_context *ctx, drape_elimination *e);
 
 static inline int32_t drape_front_columns(const drape_elimination *e, int32_t front)

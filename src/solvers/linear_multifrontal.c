@@ -34,35 +34,37 @@ extern const drape_linear_ops drape_linear_multifrontal;
 
 /* One front's place. */
 typedef struct front {
-    int32_t columns, rows;         /* scalars: factored, and below them */
+    int32_t columns, rows; /* scalars: factored, and below them */
     int32_t column_strips, row_strips;
-    int64_t panel, update;         /* where its columns, and what it leaves, begin */
-    int32_t first_child, sibling;  /* -1: none */
-    int32_t branch;                /* -1: at the top */
-    bool odd;                      /* its depth is */
+    int64_t panel, update;        /* where its columns, and what it leaves, begin */
+    int32_t first_child, sibling; /* -1: none */
+    int32_t branch;               /* -1: at the top */
+    bool odd;                     /* its depth is */
 } front;
 
 typedef struct multifrontal {
     drape_context *ctx;
     const drape_pattern *pattern;
     drape_elimination e;
-    front *fronts;                  /* (e.count) */
-    int32_t *branch, branch_count;  /* first and last front of each, for one thread; the most work first */
-    int32_t *top, top_count;        /* the other fronts, children first */
-    int32_t *source, *mirror;       /* (lower blocks) the pattern's block that each is, and the transposed one */
-    int32_t *target;                /* (lower blocks) where it goes, from the begin of its front's panel */
-    int32_t *target_start;          /* (e.n + 1) of each column, in the order of elimination */
-    int32_t *in_panel, *in_update;  /* (rows of all fronts) where a row lies in its front's parent; see place_rows */
+    front *fronts;                 /* (e.count) */
+    int32_t *branch, branch_count; /* first and last front of each, for one thread; the most work first */
+    int32_t *top, top_count;       /* the other fronts, children first */
+    int32_t *mirror;               /* (lower blocks, as the pattern has them) the transposed one of each */
+    int32_t *source, *target; /* (lower blocks, in the order of elimination) the pattern's block that each is,
+                                       and where it goes, from the begin of its front's panel */
+    int32_t *target_start;    /* (e.n + 1) of each column */
+    int32_t *in_panel,
+        *in_update; /* (rows of all fronts) where a row lies in its front's parent; see place_rows */
     double *panels, *updates, *inverse, *work, *scratch;
-    void *memory[2];                /* of panels and updates, before alignment */
+    void *memory[2]; /* of panels and updates, before alignment */
     int64_t panel_size, update_size;
-    int32_t widest, tallest;        /* scalars, of all fronts, in whole strips */
-    double *diagonal;               /* (n) in the pattern's order */
+    int32_t widest, tallest; /* scalars, of all fronts, in whole strips */
+    double *diagonal;        /* (n) in the pattern's order */
     int threads;
-    const double *values;           /* while it factors */
-    bool *failed;                   /* (e.count) */
+    const double *values; /* while it factors */
+    bool *failed;         /* (e.count) */
     const drape_linear_ops *general_row;
-    void *general;                  /* its state; NULL before the first matrix that it gets */
+    void *general; /* its state; NULL before the first matrix that it gets */
     bool by_general, factored;
     int64_t fallbacks;
 } multifrontal;
@@ -75,9 +77,9 @@ static void destroy(void **state)
     if (s->general)
         s->general_row->destroy(&s->general);
     drape_elimination_free(s->ctx, &s->e);
-    void *all[] = {s->fronts, s->branch,  s->top,     s->source,    s->mirror,    s->target,   s->target_start,
-                   s->in_panel, s->in_update,
-                   s->inverse, s->work, s->scratch, s->memory[0], s->memory[1], s->diagonal, s->failed};
+    void *all[] = {s->fronts,       s->branch,    s->top,       s->source,  s->mirror, s->target,
+                   s->target_start, s->in_panel,  s->in_update, s->inverse, s->work,   s->scratch,
+                   s->memory[0],    s->memory[1], s->diagonal,  s->failed};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         drape_free(s->ctx, all[i]);
     drape_free(s->ctx, s);
@@ -203,10 +205,20 @@ static int64_t place_in_panel(const multifrontal *s, int32_t i, int32_t row, int
     return ((int64_t)strip * f->columns + 3 * (int64_t)(column - s->e.first[i])) * S + 3 * within;
 }
 
+static void find_mirrors(multifrontal *s)
+{
+    const drape_pattern *p = s->pattern;
+    int32_t *mirror = s->mirror;
+    for (int32_t j = 0; j < p->block_count; j++)
+        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++)
+            *mirror++ = drape_pattern_find(p, j, p->block_row[k]);
+}
+
 static bool place_entries(multifrontal *s)
 {
     const drape_pattern *p = s->pattern;
     int32_t at = 0;
+    find_mirrors(s);
     for (int32_t i = 0; i < s->e.count; i++)
         for (int32_t column = s->e.first[i]; column < s->e.first[i + 1]; column++) {
             const int32_t j = s->e.order[column];
@@ -219,7 +231,6 @@ static bool place_entries(multifrontal *s)
                 if (target > INT32_MAX)
                     return false;
                 s->source[at] = k;
-                s->mirror[at] = drape_pattern_find(p, j, p->block_row[k]);
                 s->target[at++] = (int32_t)target;
             }
         }
@@ -293,7 +304,7 @@ static drape_status analyse(multifrontal *s)
         return DRAPE_E_MEMORY;
     return place_entries(s) && place_rows(s)
                ? DRAPE_OK
-                            : drape_fail(s->ctx, DRAPE_E_SOLVER, "the factors have a front of more than 2^31 entries");
+               : drape_fail(s->ctx, DRAPE_E_SOLVER, "the factors have a front of more than 2^31 entries");
 }
 
 static drape_status create(drape_context *ctx, const drape_pattern *pattern, void **state)
@@ -317,28 +328,6 @@ static void use_threads(void *state, int threads)
 
 /* ---- One front ---- */
 
-/* A block below or on the diagonal: whether it is what its mirror is. */
-static bool is_mirrored(const multifrontal *s, int32_t at, int32_t column)
-{
-    const drape_pattern *p = s->pattern;
-    const int32_t j = s->e.order[column], i = p->block_row[s->source[at]];
-    int64_t stride, mirror_stride;
-    double *values = (double *)(uintptr_t)s->values;
-    const double *block = drape_pattern_at(p, values, j, s->source[at], &stride),
-                 *mirror = drape_pattern_at(p, values, i, s->mirror[at], &mirror_stride);
-    bool same = true, symmetric = true;
-    for (int c = 0; c < 3; c++)
-        for (int r = 0; r < 3; r++)
-            same &= block[c * stride + r] == mirror[r * mirror_stride + c];
-    for (int k = 0; !same && k < 9; k++) {
-        const int c = k / 3, r = k % 3;
-        const double difference = block[c * stride + r] - mirror[r * mirror_stride + c];
-        symmetric &= difference * difference <=
-                     SYMMETRY * SYMMETRY * s->diagonal[3 * i + r] * s->diagonal[3 * j + c];
-    }
-    return symmetric;
-}
-
 static void copy_block(const multifrontal *s, int32_t at, int32_t column, double *panel)
 {
     int64_t stride;
@@ -350,12 +339,19 @@ static void copy_block(const multifrontal *s, int32_t at, int32_t column, double
             to[S * c + r] = from[c * stride + r];
 }
 
+typedef double couple __attribute__((vector_size(2 * sizeof(double))));
+
 /* Adds a block of what a child left; both lie in strips. */
 static inline void add_block(const double *from, double *to)
 {
-    for (int c = 0; c < 3; c++)
-        for (int r = 0; r < 3; r++)
-            to[S * c + r] += from[S * c + r];
+    for (int c = 0; c < 3; c++, from += S, to += S) {
+        couple a, b;
+        memcpy(&a, from, sizeof a);
+        memcpy(&b, to, sizeof b);
+        b += a;
+        memcpy(to, &b, sizeof b);
+        to[2] += from[2];
+    }
 }
 
 /* What a front is made of, for rounds dealt out to threads. */
@@ -415,16 +411,11 @@ static void assemble(job *w)
 {
     const multifrontal *s = w->s;
     const front *f = w->f;
-    bool symmetric = true;
     memset(w->panel, 0,
            (size_t)(f->column_strips + f->row_strips) * S * (size_t)f->columns * sizeof *w->panel);
     for (int32_t column = s->e.first[w->index]; column < s->e.first[w->index + 1]; column++)
-        for (int32_t at = s->target_start[column]; at < s->target_start[column + 1]; at++) {
-            symmetric &= is_mirrored(s, at, column);
+        for (int32_t at = s->target_start[column]; at < s->target_start[column + 1]; at++)
             copy_block(s, at, column, w->panel);
-        }
-    if (!symmetric)
-        s->failed[w->index] = true;
     add_children(w, false);
 }
 
@@ -479,14 +470,16 @@ static void leave_column(void *user, int64_t round)
 static void make_front(multifrontal *s, int32_t i, int threads)
 {
     const front *f = &s->fronts[i];
-    job w = {.s = s, .index = i, .f = f, .panel = s->panels + f->panel, .update = s->updates + f->update,
+    job w = {.s = s,
+             .index = i,
+             .f = f,
+             .panel = s->panels + f->panel,
+             .update = s->updates + f->update,
              .threads = threads};
-    s->failed[i] = false;
     assemble(&w);
-    if (s->failed[i] || !factor_columns(&w)) {
-        s->failed[i] = true;
+    s->failed[i] = !factor_columns(&w);
+    if (s->failed[i])
         return;
-    }
     drape_parallel(threads, f->row_strips, leave_column, &w);
     add_children(&w, true);
 }
@@ -503,8 +496,12 @@ static void make_branch(void *user, int64_t round)
     }
 }
 
-/* False where one is not positive: then the matrix is not positive definite. */
-static bool read_diagonal(multifrontal *s)
+/* What is seen of a matrix before it is factored. */
+typedef struct looks {
+    bool finite, positive, symmetric; /* positive: its diagonal is */
+} looks;
+
+static void look_at_diagonal(multifrontal *s, looks *seen)
 {
     const drape_pattern *p = s->pattern;
     for (int32_t j = 0; j < p->block_count; j++) {
@@ -512,11 +509,46 @@ static bool read_diagonal(multifrontal *s)
         const double *at = drape_pattern_at(p, (double *)(uintptr_t)s->values, j, p->diagonal[j], &stride);
         for (int c = 0; c < 3; c++) {
             s->diagonal[3 * j + c] = at[c * stride + c];
-            if (!(s->diagonal[3 * j + c] > 0))
-                return false;
+            seen->positive &= s->diagonal[3 * j + c] > 0;
         }
     }
-    return true;
+}
+
+/* Whether block k, at row i of column j, is what its mirror is. */
+static bool is_mirrored(const multifrontal *s, int32_t j, int32_t k, int32_t mirrored)
+{
+    const drape_pattern *p = s->pattern;
+    const int32_t i = p->block_row[k];
+    int64_t stride, mirror_stride;
+    double *values = (double *)(uintptr_t)s->values;
+    const double *block = drape_pattern_at(p, values, j, k, &stride),
+                 *mirror = drape_pattern_at(p, values, i, mirrored, &mirror_stride);
+    bool same = true, symmetric = true;
+    for (int c = 0; c < 3; c++)
+        for (int r = 0; r < 3; r++)
+            same &= block[c * stride + r] == mirror[r * mirror_stride + c];
+    for (int e = 0; !same && e < 9; e++) {
+        const int c = e / 3, r = e % 3;
+        const double difference = block[c * stride + r] - mirror[r * mirror_stride + c];
+        symmetric &=
+            difference * difference <= SYMMETRY * SYMMETRY * s->diagonal[3 * i + r] * s->diagonal[3 * j + c];
+    }
+    return symmetric;
+}
+
+/* Column by column, as the values lie: a mirror is never far from its block in a mesh that is numbered well. */
+static looks look_at(multifrontal *s)
+{
+    const drape_pattern *p = s->pattern;
+    looks seen = {
+        .finite = drape_all_finite(s->values, (size_t)p->nonzeros), .positive = true, .symmetric = true};
+    const int32_t *mirror = s->mirror;
+    if (seen.finite)
+        look_at_diagonal(s, &seen);
+    for (int32_t j = 0; seen.finite && seen.positive && j < p->block_count; j++)
+        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++)
+            seen.symmetric &= is_mirrored(s, j, k, *mirror++);
+    return seen;
 }
 
 /* The ratio of the extreme pivots bounds the condition from below. */
@@ -545,15 +577,6 @@ static bool factor_cholesky(multifrontal *s)
     return is_well_conditioned(s);
 }
 
-static bool is_symmetric(const multifrontal *s)
-{
-    bool symmetric = true;
-    for (int32_t column = 0; column < s->e.n; column++)
-        for (int32_t at = s->target_start[column]; at < s->target_start[column + 1]; at++)
-            symmetric &= is_mirrored(s, at, column);
-    return symmetric;
-}
-
 static drape_status factor_general(multifrontal *s, const double *values)
 {
     drape_status status = DRAPE_OK;
@@ -570,13 +593,13 @@ static drape_status factor_any(multifrontal *s, const double *values, bool defin
 {
     s->factored = s->by_general = false;
     s->values = values;
-    if (!drape_all_finite(values, (size_t)s->pattern->nonzeros))
+    const looks seen = look_at(s);
+    if (!seen.finite)
         return DRAPE_RETRY_LINEAR;
-    const bool positive = read_diagonal(s);
-    s->factored = positive && factor_cholesky(s);
+    s->factored = seen.positive && seen.symmetric && factor_cholesky(s);
     if (s->factored)
         return DRAPE_OK;
-    return definite && (!positive || is_symmetric(s)) ? DRAPE_RETRY_LINEAR : factor_general(s, values);
+    return definite && seen.symmetric ? DRAPE_RETRY_LINEAR : factor_general(s, values);
 }
 
 static drape_status factor(void *state, const double *values)
@@ -595,7 +618,7 @@ static drape_status factor_definite(void *state, const double *values)
 typedef struct part {
     const front *f;
     const double *panel, *inverse;
-    const int32_t *row; /* (f->rows / 3) */
+    const int32_t *row;   /* (f->rows / 3) */
     double *x, *y, *sums; /* of its columns, of its rows, four sums a column */
 } part;
 
@@ -653,13 +676,15 @@ static void solve_backward(multifrontal *s, int32_t i)
         w.y[k] = s->work[3 * w.row[k / 3] + k % 3];
     memset(w.sums, 0, (size_t)LANES * (size_t)f->columns * sizeof *w.sums);
     for (int32_t t = 0; t < f->row_strips; t++)
-        drape_strip_transposed_times(f->columns, strip_from(&w, f->column_strips + t, 0), w.y + S * t, w.sums);
+        drape_strip_transposed_times(f->columns, strip_from(&w, f->column_strips + t, 0), w.y + S * t,
+                                     w.sums);
     for (int32_t d = f->column_strips - 1; d >= 0; d--) {
         const int32_t first = S * d, width = f->columns - first < S ? f->columns - first : S;
         const double *tile = strip_from(&w, d, first), *sums = w.sums + LANES * first;
         double *x = w.x + first;
         for (int32_t t = d + 1; t < f->column_strips; t++)
-            drape_strip_transposed_times(width, strip_from(&w, t, first), w.x + S * t, w.sums + LANES * first);
+            drape_strip_transposed_times(width, strip_from(&w, t, first), w.x + S * t,
+                                         w.sums + LANES * first);
         for (int p = width - 1; p >= 0; p--) {
             x[p] -= (sums[LANES * p] + sums[LANES * p + 1]) + (sums[LANES * p + 2] + sums[LANES * p + 3]);
             for (int q = p + 1; q < width; q++)
@@ -692,10 +717,11 @@ static drape_status solve(void *state, const double *b, double *x)
 static size_t bytes(const void *state)
 {
     const multifrontal *s = state;
-    const size_t n = (size_t)s->pattern->n, blocks = n / 3, lower = ((size_t)s->pattern->nonzeros / 9 + blocks) / 2;
+    const size_t n = (size_t)s->pattern->n, blocks = n / 3,
+                 lower = ((size_t)s->pattern->nonzeros / 9 + blocks) / 2;
     const size_t rows = (size_t)s->e.row_start[s->e.count];
-    size_t doubles = (size_t)s->panel_size + (size_t)s->update_size + 3 * n +
-                     (size_t)(5 * s->widest + s->tallest);
+    size_t doubles =
+        (size_t)s->panel_size + (size_t)s->update_size + 3 * n + (size_t)(5 * s->widest + s->tallest);
     return sizeof *s + doubles * sizeof(double) + (size_t)s->e.count * (sizeof(front) + 40) +
            (3 * lower + 4 * blocks + 4 * rows) * sizeof(int32_t) +
            (s->general ? s->general_row->bytes(s->general) : 0);
@@ -711,8 +737,9 @@ static void report(const void *state, drape_linear_report *out)
 
 const drape_linear_ops drape_linear_multifrontal = {
     .name = "multifrontal",
-    .summary = "multifrontal Cholesky of our own, the same bits with any number of threads; what is not symmetric "
-               "positive definite goes to umfpack or klu, by size",
+    .summary =
+        "multifrontal Cholesky of our own, the same bits with any number of threads; what is not symmetric "
+        "positive definite goes to umfpack or klu, by size",
     .reference = "Duff & Reid 1983; Liu 1992, The multifrontal method for sparse matrix solution",
     .best_from = 100,
     .create = create,

@@ -91,5 +91,6 @@ LANES_DISPATCH void drape_strip_transposed_times(int n, const double *strip, con
     const lanes y0 = lanes_load(y), y1 = lanes_load(y + LANES), y2 = lanes_load(y + 2 * LANES);
     for (int p = 0; p < n; p++, strip += S)
         lanes_store(sums + LANES * p, lanes_load(sums + LANES * p) + lanes_load(strip) * y0 +
-                                          lanes_load(strip + LANES) * y1 + lanes_load(strip + 2 * LANES) * y2);
+                                          lanes_load(strip + LANES) * y1 +
+                                          lanes_load(strip + 2 * LANES) * y2);
 }
