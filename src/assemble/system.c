@@ -44,6 +44,7 @@ struct drape_system {
     drape_pattern wider;          /* with what contact couples */
     int32_t **blocks;    /* (term_count) as in the terms, for the wider one; NULL while there is none */
     drape_status status; /* of placing contact */
+    drape_pull pull;
 };
 
 static void forget_wider(drape_system *system)
@@ -95,6 +96,16 @@ static bool is_left_out(const drape_system *system, const drape_term *term)
 const drape_model *drape_system_model(const drape_system *system)
 {
     return system->model;
+}
+
+void drape_system_set_pull(drape_system *system, const drape_pull *pull)
+{
+    system->pull = *pull;
+}
+
+const drape_pull *drape_system_pull(const drape_system *system)
+{
+    return &system->pull;
 }
 
 size_t drape_system_bytes(const drape_system *system)
@@ -552,6 +563,7 @@ void drape_system_force(drape_system *system, const drape_point *point, double *
 {
     memset(g, 0, 3 * (size_t)system->model->node_count * sizeof *g);
     sum_terms(system, &(request){.point = point, .conservative = true, .dissipative = true}, &(sums){.g = g});
+    drape_pull_add_gradient(&system->pull, point->x, g);
     if (place_contact(system, point))
         drape_contact_add_forces(system->contact, true, true, g);
 }
@@ -585,6 +597,7 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
     sum_terms(system, &want, &(sums){.values = values});
     if (place_contact(system, point))
         drape_contact_add_jacobian(system->contact, point->weight, false, project, system->pattern, values);
+    drape_pull_add_hessian(&system->pull, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
 }
 
@@ -627,6 +640,7 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
         if (!is_left_out(system, term) && contributes(term, &want, &to))
             sum_term(system, term, &want, &to);
     }
+    *elastic += drape_pull_energy(&system->pull, point->x);
 }
 
 void drape_system_term(drape_system *system, int32_t term, const drape_point *point, double *energy,
