@@ -389,7 +389,7 @@ static void draw_cloth(const drape_stage *stage)
 
 static void draw_bodies(const drape_stage *stage, GLuint program, bool endless)
 {
-    for (int32_t c = 0; c < stage->model->collider_count; c++) {
+    for (int32_t c = 0; c < stage->body_count; c++) {
         const drape_stage_body *body = &stage->bodies[c];
         if (body->shape.endless != endless)
             continue;
@@ -568,6 +568,18 @@ static void put_legend(drape_painter *p, const drape_picture *picture)
                          field->shown * picture->high);
 }
 
+/* Behind lines of text, so that they are read over cloth, too. */
+static void put_veil(drape_overlay *o, const char *const *lines, float line)
+{
+    float widest = 0;
+    int count = 0;
+    for (; lines && lines[count]; count++)
+        widest = fmaxf(widest, drape_font_width(&o->font, lines[count]));
+    if (count > 0)
+        drape_overlay_box(o, 10 * o->unit, 9 * o->unit, widest + 20 * o->unit,
+                          (float)count * line + 10 * o->unit, (const float[]){1, 1, 1, 0.55f});
+}
+
 static void put_texts(drape_painter *p, const drape_picture *picture)
 {
     drape_overlay *o = &p->overlay;
@@ -583,6 +595,7 @@ static void put_texts(drape_painter *p, const drape_picture *picture)
             drape_overlay_box(o, (float)box[0] - 0.5f * o->unit, top, o->unit, (float)box[3],
                               (const float[]){1, 1, 1, 0.9f});
     }
+    put_veil(o, picture->lines, line);
     for (int i = 0; picture->lines && picture->lines[i]; i++)
         drape_overlay_text(o, left, 30 * o->unit + (float)i * line, DRAPE_LEFT, drape_ink, picture->lines[i]);
     if (picture->caption)
