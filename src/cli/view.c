@@ -199,7 +199,8 @@ static drape_status set_stiffness(cli_view *v, double factor, int *changed)
 bool view_scale_stiffness(cli_view *v, double factor)
 {
     int changed = 0;
-    bool good = commit(v, set_stiffness(v, factor, &changed), changed, "stiffness");
+    drape_status set = set_stiffness(v, factor, &changed);
+    bool good = commit(v, set, changed, "stiffness");
     if (!good)
         set_stiffness(v, 1, &changed);
     v->stiffness *= good ? factor : 1;
@@ -218,7 +219,8 @@ static drape_status set_damping(cli_view *v, double factor, int *changed)
 bool view_scale_damping(cli_view *v, double factor)
 {
     int changed = 0;
-    bool good = commit(v, set_damping(v, factor, &changed), changed, "damping");
+    drape_status set = set_damping(v, factor, &changed);
+    bool good = commit(v, set, changed, "damping");
     if (!good)
         set_damping(v, 1, &changed);
     v->damping *= good ? factor : 1;

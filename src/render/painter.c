@@ -62,7 +62,9 @@ static const char surface_main[] =
     "    s.at = at;\n"
     "    s.value = value;\n"
     "    s.piece = piece;\n"
-    "    s.sun = sunlight(shadow_at, dot(s.n, light));\n"
+    "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
+    "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
+    "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
     "    colour = vec4(encoded(shade(s)), 1.0);\n"
     "}\n";
 
@@ -109,7 +111,9 @@ static const char ground_main[] =
     "    s.at = at;\n"
     "    s.value = value;\n"
     "    s.piece = piece;\n"
-    "    s.sun = sunlight(shadow_at, dot(s.n, light));\n"
+    "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
+    "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
+    "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
     "    colour = vec4(ground(s), 1.0);\n"
     "}\n";
 
@@ -371,6 +375,8 @@ static void use_surface(drape_painter *p, GLuint program, const panel_view *v, c
     drape_gl_set_vec3(program, "front", front);
     drape_gl_set_vec3(program, "back", back);
     drape_gl_set_float(program, "soft", SOFT / SHADOW);
+    drape_gl_set_float(program, "texel_depth",
+                       2 * SHADOW_REACH / SHADOW / (4 * DEEP - 0.1f)); /* a texel's width as depth */
     drape_gl_set_float(program, "relief", 0);
     drape_gl_set_float(program, "spread", 1);
 }
@@ -414,7 +420,7 @@ static void draw_shadows(drape_painter *p, const drape_stage *stage, const drape
     glDepthMask(GL_TRUE);
     glClear(GL_DEPTH_BUFFER_BIT);
     glEnable(GL_POLYGON_OFFSET_FILL);
-    glPolygonOffset(2.2f, 6);
+    glPolygonOffset(2, 4);
     use_surface(p, p->depth, v, &v->lamp);
     draw_bodies(stage, p->depth, false);
     drape_gl_set_vec3(p->depth, "offset", (const float[3]){0});
@@ -577,7 +583,7 @@ static void put_veil(drape_overlay *o, const char *const *lines, float line)
         widest = fmaxf(widest, drape_font_width(&o->font, lines[count]));
     if (count > 0)
         drape_overlay_box(o, 10 * o->unit, 9 * o->unit, widest + 20 * o->unit,
-                          (float)count * line + 10 * o->unit, (const float[]){1, 1, 1, 0.55f});
+                          (float)count * line + 10 * o->unit, (const float[]){1, 1, 1, 0.42f});
 }
 
 static void put_texts(drape_painter *p, const drape_picture *picture)
