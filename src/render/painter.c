@@ -351,7 +351,7 @@ static void set_lamp(const drape_stage *stage, float azimuth, panel_view *v)
 /* For programs of surfaces, which take their textures at these units. */
 static void use_surface(drape_painter *p, GLuint program, const panel_view *v, const drape_matrix *view)
 {
-    static const float nowhere[3] = {0}, front[3] = {0.50f, 0.062f, 0.048f}, back[3] = {0.62f, 0.46f, 0.30f};
+    static const float nowhere[3] = {0}, front[3] = {0.50f, 0.062f, 0.048f}, back[3] = {0.40f, 0.29f, 0.18f};
     const struct {
         const char *name;
         GLuint texture;
