@@ -22,7 +22,7 @@ import traceback
 SOURCES = sys.argv[2] if len(sys.argv) > 2 else os.environ.get("DRAPE_SOURCE", os.path.dirname(__file__) + "/../..")
 PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRAPE_BUILD"] + "/drape")
 SOURCES = os.path.abspath(SOURCES)
-VERBS = ["run", "info", "check", "list"]
+VERBS = ["run", "report", "info", "check", "list"]
 LIMIT = 300  # [s] for one call: sanitizers are slow
 
 
