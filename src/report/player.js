@@ -179,7 +179,6 @@ class Player {
 
   makeCloth() {
     this.cloth = this.makeMesh([[3, this.positions], [3, this.normals], [1, this.values]], run.corners);
-    this.edges = this.elements(edgesOf(run.corners));
     this.pins = this.elements(new Uint32Array(run.pinned));
   }
 
@@ -326,6 +325,7 @@ class Player {
     if (shade !== 'plain') gl.uniform2fv(this.at.range, this.ranges[shade]);
     this.draw(this.cloth, shade === 'plain' ? { kind: 0, front: [0.72, 0.2, 0.17], back: [0.86, 0.62, 0.4] } : { kind: 1 });
     gl.disable(gl.POLYGON_OFFSET_FILL);
+    if (edges) this.edges ??= this.elements(edgesOf(run.corners)); // a large mesh has many
     if (edges) this.drawElements(this.edges, gl.LINES, 2, [0.05, 0.05, 0.08], 0.45);
     if (this.pins.count) this.drawElements(this.pins, gl.POINTS, 3, [0.1, 0.75, 0.85], 1);
   }

@@ -209,7 +209,8 @@ function stepPlot({ c, good, bad }) {
 }
 
 function iterationPlot({ c, good, bad }) {
-  if (!c.iterations.some((x) => x > 0)) return null;
+  const explicit = run.summary && run.summary.newton && run.summary.newton.factorizations === 0;
+  if (explicit || !c.iterations.some((x) => x > 0)) return null;
   const series = [{ name: 'iterations of an accepted step', color: 'var(--c4)', steps: true, t: good.map((i) => c.t[i]), y: good.map((i) => c.iterations[i]) }];
   const marks = bad.map((i) => ({ t: c.t[i], y: c.iterations[i] }));
   return new Plot({ title: 'Newton iterations', unit: '', series, marks, size: 'low', zero: true, note: bad.length ? 'crosses: rejected' : 'none rejected' });
