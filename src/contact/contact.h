@@ -67,7 +67,7 @@ bool drape_contact_crosses(drape_contact *contact, const double *y, double t);
 drape_status drape_contact_check(drape_contact *contact, const double *x, double t, const char **reason,
                                  drape_worst *worst);
 
-/* How many pairs act where it was last placed, and the smallest gap among them [m], INFINITY without any. */
+/* How many pairs of points, edges and faces act where it was last placed, and the smallest gap among them [m], INFINITY without any. */
 int32_t drape_contact_active(drape_contact *contact, double *least_gap);
 
 #endif

@@ -594,6 +594,11 @@ const drape_point *drape_newton_point(const drape_newton *newton)
     return &newton->point;
 }
 
+const double *drape_newton_residual(const drape_newton *newton)
+{
+    return newton->f;
+}
+
 const double *drape_newton_force(const drape_newton *newton)
 {
     return newton->g;

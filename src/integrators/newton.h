@@ -54,6 +54,8 @@ drape_status drape_newton_solve(drape_newton *newton, const drape_newton_problem
 /* The point of the last evaluation, which after a solve is its solution, and g there (nodes). */
 const drape_point *drape_newton_point(const drape_newton *newton);
 const double *drape_newton_force(const drape_newton *newton);
+/* F there (free DOFs). */
+const double *drape_newton_residual(const drape_newton *newton);
 
 /* The parameter values it was made with, in the order of drape_newton_params. */
 const double *drape_newton_values(const drape_newton *newton);

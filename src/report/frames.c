@@ -32,12 +32,12 @@ static void find_strain(const drape_report_data *d)
 /* Centred differences of positions; one-sided at the ends of the run. */
 static drape_status find_speed(const drape_report_data *d, int64_t frame)
 {
-    const drape_run *run = d->run;
+    const drape_record *run = d->run;
     int64_t before = frame > 0 ? frame - 1 : 0, after = frame + 1 < run->frames ? frame + 1 : frame;
     double h = run->times[after] - run->times[before];
-    drape_status status = drape_run_read(run, before, d->other);
+    drape_status status = drape_record_read(run, before, d->other);
     if (!status)
-        status = drape_run_read(run, after, d->v);
+        status = drape_record_read(run, after, d->v);
     for (int32_t i = 0; !status && i < run->model->node_count; i++) {
         double way[3];
         vec3_sub(d->v + 3 * (size_t)i, d->other + 3 * (size_t)i, way);
@@ -53,7 +53,7 @@ static const double *values_of(const drape_report_data *d, int field)
 
 static drape_status load(const drape_report_data *d, int64_t frame)
 {
-    drape_status status = drape_run_read(d->run, frame, d->x);
+    drape_status status = drape_record_read(d->run, frame, d->x);
     if (status)
         return status;
     find_strain(d);
@@ -63,7 +63,7 @@ static drape_status load(const drape_report_data *d, int64_t frame)
 /* ---- Which frames, and ranges ---- */
 
 /* 16 bits a number, and in base64 four thirds of that. */
-static double bytes_a_frame(const drape_run *run)
+static double bytes_a_frame(const drape_record *run)
 {
     return 5 * 2 * 4.0 / 3 * run->model->node_count;
 }
@@ -139,7 +139,7 @@ static drape_status take_room(drape_report_data *d)
     return DRAPE_OK;
 }
 
-drape_status drape_report_data_make(const drape_run *run, size_t most_bytes, drape_report_data *data)
+drape_status drape_report_data_make(const drape_record *run, size_t most_bytes, drape_report_data *data)
 {
     *data = (drape_report_data){.run = run};
     drape_status status = take_room(data);

@@ -84,16 +84,16 @@ static void take_row(void *user, int64_t row, char *const *cells)
 }
 
 /* {"rows": all of them, "every": n, "columns": {name: [...]}} */
-static drape_status read_columns(const drape_run *run, const char *name, columns *c, json_t **out)
+static drape_status read_columns(const drape_record *run, const char *name, columns *c, json_t **out)
 {
     int64_t rows = 0;
-    drape_status status = drape_run_rows(run, name, c->names, c->count, count_row, NULL, &rows);
+    drape_status status = drape_record_rows(run, name, c->names, c->count, count_row, NULL, &rows);
     if (status)
         return status;
     c->every = rows / MOST_ROWS + 1;
     for (size_t i = 0; i < c->count; i++)
         c->arrays[i] = json_array();
-    status = drape_run_rows(run, name, c->names, c->count, take_row, c, &rows);
+    status = drape_record_rows(run, name, c->names, c->count, take_row, c, &rows);
     json_t *object = json_object();
     for (size_t i = 0; i < c->count; i++)
         object = with(object, c->names[i], c->arrays[i]);
@@ -103,7 +103,7 @@ static drape_status read_columns(const drape_run *run, const char *name, columns
     return status;
 }
 
-static drape_status read_steps(const drape_run *run, json_t **out)
+static drape_status read_steps(const drape_record *run, json_t **out)
 {
     static const char *const names[] = {"t",        "h",         "accepted", "iterations",
                                         "residual", "tolerance", "reason"};
@@ -111,7 +111,7 @@ static drape_status read_steps(const drape_run *run, json_t **out)
     return read_columns(run, "steps.csv", &c, out);
 }
 
-static drape_status read_energies(const drape_run *run, json_t **out)
+static drape_status read_energies(const drape_record *run, json_t **out)
 {
     static const char *const names[] = {"t",       "kinetic",    "elastic",   "gravity",
                                         "contact", "dissipated", "numerical", "total"};
@@ -220,7 +220,7 @@ static int put_safe(const char *bytes, size_t size, void *file)
 
 drape_status drape_report_put_json(const drape_report_data *data, drape_file *file)
 {
-    const drape_run *run = data->run;
+    const drape_record *run = data->run;
     json_t *steps = NULL, *energies = NULL;
     drape_status status = read_steps(run, &steps);
     if (!status)

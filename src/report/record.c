@@ -1,5 +1,5 @@
-/* run.c: see run.h. */
-#include "report/run.h"
+/* record.c: see record.h. */
+#include "report/record.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -19,7 +19,7 @@
 #define SCENE_LIMIT ((off_t)64 << 20)
 
 /* folder/name; NULL: no memory. */
-static char *path_of(const drape_run *run, const char *name)
+static char *path_of(const drape_record *run, const char *name)
 {
     size_t size = strlen(run->folder) + strlen(name) + 2;
     char *path = drape_alloc(run->ctx, size, 1);
@@ -31,7 +31,7 @@ static char *path_of(const drape_run *run, const char *name)
 /* ---- Scene and summary ---- */
 
 /* A whole file with a 0 behind it. */
-static drape_status read_text(const drape_run *run, const char *path, char **out)
+static drape_status read_text(const drape_record *run, const char *path, char **out)
 {
     struct stat info;
     int fd = open(path, O_RDONLY | O_CLOEXEC);
@@ -53,7 +53,7 @@ static drape_status read_text(const drape_run *run, const char *path, char **out
     return status;
 }
 
-static drape_status read_scene(drape_run *run)
+static drape_status read_scene(drape_record *run)
 {
     char *path = path_of(run, DRAPE_SCENE_COPY);
     drape_status status = path ? read_text(run, path, &run->scene_text) : DRAPE_E_MEMORY;
@@ -68,7 +68,7 @@ static drape_status read_scene(drape_run *run)
     return status;
 }
 
-static drape_status read_summary(drape_run *run)
+static drape_status read_summary(drape_record *run)
 {
     char *path = path_of(run, "summary.json");
     if (!path)
@@ -80,13 +80,13 @@ static drape_status read_summary(drape_run *run)
 
 /* ---- Frames ---- */
 
-static drape_status not_positions(const drape_run *run, const char *path, const char *what)
+static drape_status not_positions(const drape_record *run, const char *path, const char *what)
 {
     return drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": %s", path, what);
 }
 
 /* frames x nodes x 3, float64: as export_npy.c writes it. */
-static drape_status read_header(drape_run *run, const char *path)
+static drape_status read_header(drape_record *run, const char *path)
 {
     char header[NPY_HEADER + 1] = "";
     int32_t nodes = 0;
@@ -108,7 +108,7 @@ static drape_status read_header(drape_run *run, const char *path)
     return DRAPE_OK;
 }
 
-static drape_status open_positions(drape_run *run)
+static drape_status open_positions(drape_record *run)
 {
     char *path = path_of(run, "positions.npy");
     if (!path)
@@ -123,7 +123,7 @@ static drape_status open_positions(drape_run *run)
     return status;
 }
 
-drape_status drape_run_read(const drape_run *run, int64_t frame, double *x)
+drape_status drape_record_read(const drape_record *run, int64_t frame, double *x)
 {
     size_t size = 24 * (size_t)run->model->node_count, used = 0;
     while (used < size) {
@@ -210,7 +210,7 @@ static int64_t read_rows(FILE *file, const table *t, char **line, size_t *room, 
     return rows;
 }
 
-static drape_status read_table(const drape_run *run, const char *path, table *t, drape_row_reader *reader,
+static drape_status read_table(const drape_record *run, const char *path, table *t, drape_row_reader *reader,
                                void *user, int64_t *rows)
 {
     char *line = NULL;
@@ -229,8 +229,8 @@ static drape_status read_table(const drape_run *run, const char *path, table *t,
     return error ? drape_file_fail(run->ctx, "read", path, error) : DRAPE_OK;
 }
 
-drape_status drape_run_rows(const drape_run *run, const char *name, const char *const *columns, size_t count,
-                            drape_row_reader *reader, void *user, int64_t *rows)
+drape_status drape_record_rows(const drape_record *run, const char *name, const char *const *columns,
+                               size_t count, drape_row_reader *reader, void *user, int64_t *rows)
 {
     table t = {.columns = columns, .count = count};
     char *path = path_of(run, name);
@@ -243,20 +243,20 @@ drape_status drape_run_rows(const drape_run *run, const char *name, const char *
 
 static void take_time(void *user, int64_t row, char *const *cells)
 {
-    const drape_run *run = user;
+    const drape_record *run = user;
     if (row < run->frames)
         run->times[row] = strtod(cells[0], NULL);
 }
 
 /* A killed run may have a frame more than rows, as frames come first. */
-static drape_status read_times(drape_run *run)
+static drape_status read_times(drape_record *run)
 {
     static const char *const columns[] = {"t"};
     int64_t rows = 0;
     run->times = drape_alloc(run->ctx, (size_t)run->frames, sizeof *run->times);
     if (!run->times)
         return DRAPE_E_MEMORY;
-    drape_status status = drape_run_rows(run, "energy.csv", columns, 1, take_time, run, &rows);
+    drape_status status = drape_record_rows(run, "energy.csv", columns, 1, take_time, run, &rows);
     if (!status && rows < 1)
         return drape_fail(run->ctx, DRAPE_E_PARSE,
                           "\"%.500s\": energy.csv has no row: the run wrote no frame", run->folder);
@@ -266,9 +266,9 @@ static drape_status read_times(drape_run *run)
 
 /* ---- All of it ---- */
 
-drape_status drape_run_open(drape_context *ctx, const char *folder, drape_run *run)
+drape_status drape_record_open(drape_context *ctx, const char *folder, drape_record *run)
 {
-    *run = (drape_run){.ctx = ctx, .positions = -1};
+    *run = (drape_record){.ctx = ctx, .positions = -1};
     run->folder = drape_copy_text(ctx, folder);
     if (!run->folder)
         return DRAPE_E_MEMORY;
@@ -282,7 +282,7 @@ drape_status drape_run_open(drape_context *ctx, const char *folder, drape_run *r
     return status ? status : read_summary(run);
 }
 
-void drape_run_close(drape_run *run)
+void drape_record_close(drape_record *run)
 {
     if (run->positions >= 0)
         close(run->positions);
@@ -291,5 +291,5 @@ void drape_run_close(drape_run *run)
     drape_free(run->ctx, run->scene_text);
     drape_free(run->ctx, run->times);
     drape_free(run->ctx, run->folder);
-    *run = (drape_run){.positions = -1};
+    *run = (drape_record){.positions = -1};
 }
