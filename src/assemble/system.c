@@ -412,7 +412,7 @@ static drape_worst worst_element(const drape_term *term, const drape_fault *faul
                          .cloth = term->cloth,
                          .value = fault->value,
                          .limit = fault->limit};
-    for (int a = 0; fault->element >= 0 && a < el->nodes; a++)
+    for (int a = 0; fault->element >= 0 && a < el->nodes && a < 4; a++)
         worst.node[a] = el->node[(size_t)fault->element * (size_t)el->nodes + (size_t)a];
     return worst;
 }
