@@ -14,7 +14,7 @@ import time
 
 from program import LIMIT, PROGRAM, SOURCES, Skip, drape, equal, good, read_json, read_npy, read_steps, refused, run_tests, scene, write_scene
 
-VERBS = ["run", "report", "info", "check", "list"]
+VERBS = ["run", "report", "info", "check", "list", "render", "view"]
 
 
 # ---- Help and usage
