@@ -24,18 +24,27 @@ enum {
 typedef enum cli_kind {
     CLI_FLAG,   /* a bool */
     CLI_TEXT,   /* a const char *, not empty */
+    CLI_TEXTS,  /* a cli_texts: the option may be repeated */
     CLI_NUMBER, /* an int from 1 to max */
+    CLI_REAL,   /* a double above 0 */
     CLI_VALUE,  /* of the scene, at pointer */
     CLI_LIST,   /* of the scene, at pointer: words between commas */
     CLI_SET     /* of the scene, "/pointer=value" */
 } cli_kind;
+
+#define CLI_MAX_TEXTS 16
+
+typedef struct cli_texts {
+    const char *items[CLI_MAX_TEXTS];
+    size_t count;
+} cli_texts;
 
 typedef struct cli_option {
     const char *name; /* without the dashes */
     cli_kind kind;
     const char *argument; /* "DIR" in the help; NULL: a flag */
     const char *help;
-    size_t offset;       /* FLAG, TEXT, NUMBER: in the verb's request */
+    size_t offset;       /* FLAG, TEXT, TEXTS, NUMBER, REAL: in the verb's request */
     int max;             /* NUMBER */
     const char *pointer; /* VALUE, LIST */
 } cli_option;

@@ -86,7 +86,7 @@ static void classify_triangle(double x[4][3], drape_closest *at)
 
 void drape_closest_point_triangle(double x[4][3], drape_closest *at)
 {
-    *at = (drape_closest){.c = {1}};
+    *at = (drape_closest){.points = 4, .c = {1}};
     classify_triangle(x, at);
     measure(x, at);
 }
@@ -130,9 +130,23 @@ static void classify_segments(double x[4][3], drape_closest *at)
 
 void drape_closest_segments(double x[4][3], drape_closest *at)
 {
-    *at = (drape_closest){0};
+    *at = (drape_closest){.points = 4};
     classify_segments(x, at);
     measure(x, at);
+}
+
+void drape_closest_reduce(drape_closest *at, int which[4])
+{
+    int kept = 0;
+    for (int i = 0; i < at->points; i++) {
+        if (at->c[i] == 0 && at->slope[0][i] == 0 && at->slope[1][i] == 0)
+            continue;
+        which[kept] = i;
+        at->c[kept] = at->c[i];
+        at->slope[0][kept] = at->slope[0][i];
+        at->slope[1][kept++] = at->slope[1][i];
+    }
+    at->points = kept;
 }
 
 /* ---- Derivatives ---- */
@@ -160,7 +174,7 @@ static void derive_params(double t[2][3], const drape_closest *at, double shift[
     invert(t, at->params, inverse);
     for (int k = 0; k < at->params; k++)
         for (int l = 0; l < at->params; l++)
-            for (int i = 0; i < 12; i++)
+            for (int i = 0; i < 3 * at->points; i++)
                 shift[k][i] -= inverse[k][l] * (at->slope[l][i / 3] * at->distance * at->normal[i % 3] +
                                                 at->c[i / 3] * t[l][i % 3]);
 }
@@ -170,18 +184,18 @@ void drape_closest_derive(double x[4][3], const drape_closest *at, drape_closest
     double t[2][3] = {{0}}, shift[2][12] = {{0}}, scale = at->distance > 0 ? 1 / at->distance : 0;
     memset(slopes, 0, sizeof *slopes);
     for (int k = 0; k < at->params; k++)
-        for (int i = 1; i < 4; i++) {
+        for (int i = 1; i < at->points; i++) {
             double e[3];
             vec3_sub(x[i], x[0], e);
             vec3_add_scaled(at->slope[k][i], e, t[k]);
         }
     derive_params(t, at, shift);
-    for (int i = 0; i < 12; i++) {
+    for (int i = 0; i < 3 * at->points; i++) {
         double dp[3] = {0}, along = 0;
         dp[i % 3] = at->c[i / 3];
         for (int k = 0; k < at->params; k++) {
             vec3_add_scaled(shift[k][i], t[k], dp);
-            for (int j = 0; j < 4; j++)
+            for (int j = 0; j < at->points; j++)
                 slopes->c[j][i] += at->slope[k][j] * shift[k][i];
         }
         along = vec3_dot(dp, at->normal);

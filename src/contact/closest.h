@@ -10,6 +10,7 @@
 #define DRAPE_CONTACT_CLOSEST_H
 
 typedef struct drape_closest {
+    int points;         /* 4, fewer after drape_closest_reduce */
     int params;         /* how many t there are: 2 in a face or between two edges, 0 between two points */
     double c[4];        /* of points 0 1 2 3 */
     double slope[2][4]; /* dc/dt */
@@ -28,6 +29,10 @@ void drape_closest_point_triangle(double x[4][3], drape_closest *at);
 
 /* Segments 0 1 and 2 3 (Ericson 2005, 5.1.9). */
 void drape_closest_segments(double x[4][3], drape_closest *at);
+
+/* Leaves out the points that have no part in it: the end of an edge that is closest at the other, and the like.
+ * which: the number that each of those that stay had. */
+void drape_closest_reduce(drape_closest *at, int which[4]);
 
 void drape_closest_derive(double x[4][3], const drape_closest *at, drape_closest_slopes *slopes);
 

@@ -44,7 +44,8 @@ const double *drape_contact_on_colliders(const drape_contact *contact);
 double drape_contact_potential(drape_contact *contact); /* [J] */
 
 /* Adds dg/dx + weight dg/dv, or dg/dv alone, of pairs of free nodes to values in the pattern, which has them.
- * positive: the positive semidefinite part of the Hessians of the energy. */
+ * positive: the positive semidefinite part of the Hessians of the energy, and a symmetric matrix above friction's
+ * dg/dv in place of its derivatives. */
 void drape_contact_add_jacobian(drape_contact *contact, double weight, bool velocity_only, bool positive,
                                 const drape_pattern *pattern, double *values);
 
@@ -67,7 +68,7 @@ bool drape_contact_crosses(drape_contact *contact, const double *y, double t);
 drape_status drape_contact_check(drape_contact *contact, const double *x, double t, const char **reason,
                                  drape_worst *worst);
 
-/* How many pairs act where it was last placed, and the smallest gap among them [m], INFINITY without any. */
+/* How many pairs of points, edges and faces act where it was last placed, and the smallest gap among them [m], INFINITY without any. */
 int32_t drape_contact_active(drape_contact *contact, double *least_gap);
 
 #endif

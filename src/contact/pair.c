@@ -4,6 +4,7 @@
 #include "base/vec3.h"
 #include "contact/closest.h"
 
+#include <math.h>
 #include <string.h>
 
 #define PARALLEL_WIDTH                                                                                       \
@@ -55,27 +56,9 @@ static double mollifier_width(const drape_pair *pair, const double *rest)
     return PARALLEL_WIDTH * vec3_dot(u, u) * vec3_dot(w, w);
 }
 
-static bool surface_gap(const drape_pair *pair, const drape_placed *at, bool derivatives, drape_gap *gap)
-{
-    double curvature[9];
-    gap->points = 1;
-    gap->c[0] = 1;
-    gap->value = surface(pair, at, gap->normal, NULL);
-    if (!(gap->value < pair->distance))
-        return false;
-    if (!derivatives)
-        return true;
-    surface(pair, at, NULL, curvature);
-    memset(gap->dc, 0, sizeof gap->dc);
-    for (int k = 0; k < 3; k++)
-        for (int j = 0; j < 3; j++)
-            gap->dn[k][j] = curvature[3 * k + j];
-    return true;
-}
-
 /* A sharp feature that touches has no direction of its own: it has that across both pieces, out of the collider.
  * Normals do not turn there. */
-static void touching_normal(const drape_pair *pair, const drape_placed *at, double x[4][3], drape_gap *gap)
+static void touching_normal(const drape_pair *pair, const drape_placed *at, double x[4][3], double normal[3])
 {
     const drape_collider *collider = &at->model->colliders[pair->collider];
     const drape_collider_shape *shape = &collider->shape;
@@ -92,37 +75,128 @@ static void touching_normal(const drape_pair *pair, const drape_placed *at, doub
     bool cloth_first = pair->node[0] < at->model->node_count;
     double sign = (vec3_dot(n, out) < 0) == cloth_first ? -1 : 1;
     for (int k = 0; k < 3 && length > 0; k++)
-        gap->normal[k] = sign * n[k] / length;
+        normal[k] = sign * n[k] / length;
+}
+
+/* Whether the boxes around both pieces are further apart than reach; false for numbers that are none. */
+static bool are_apart(drape_pair_kind kind, double x[4][3], double reach)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++) {
+        bool face = kind == DRAPE_PAIR_TRIANGLE;
+        double low = x[0][k], high = low, other = x[1][k], least = face ? other : x[2][k], most = least;
+        if (face) {
+            least = x[2][k] < least ? x[2][k] : least;
+            most = x[2][k] > most ? x[2][k] : most;
+        } else {
+            low = other < low ? other : low;
+            high = other > high ? other : high;
+        }
+        least = x[3][k] < least ? x[3][k] : least;
+        most = x[3][k] > most ? x[3][k] : most;
+        double between = least > high ? least - high : low > most ? low - most : 0;
+        sum += between * between;
+    }
+    return sum > reach * reach;
+}
+
+bool drape_pair_is_apart(const drape_pair *pair, const drape_placed *at, double gap)
+{
+    double x[4][3];
+    if (!finders[pair->kind])
+        return false;
+    drape_pair_gather(pair, at->x, x);
+    return are_apart(pair->kind, x, gap + pair->radius);
+}
+
+static bool touch_surface(const drape_pair *pair, const drape_placed *at, drape_touch *touch)
+{
+    touch->gap = surface(pair, at, touch->closest.normal, NULL);
+    touch->closest.points = 1;
+    touch->closest.c[0] = 1;
+    return touch->gap < pair->distance;
+}
+
+bool drape_pair_touch(const drape_pair *pair, const drape_placed *at, const double *rest, drape_touch *touch)
+{
+    double x[4][3];
+    drape_gap gap;
+    touch->pair = *pair;
+    touch->mollified = touch->sharp = false;
+    if (!finders[pair->kind])
+        return touch_surface(pair, at, touch);
+    drape_pair_gather(pair, at->x, x);
+    touch->gap = INFINITY;
+    if (are_apart(pair->kind, x, pair->distance + pair->radius))
+        return false;
+    finders[pair->kind](x, &touch->closest);
+    touch->gap = touch->closest.distance - pair->radius;
+    if (!(touch->gap < pair->distance))
+        return false;
+    touch->sharp = pair->collider >= 0 && touch->closest.distance < TOUCHING;
+    if (touch->sharp)
+        touching_normal(pair, at, x, touch->closest.normal);
+    if (pair->kind == DRAPE_PAIR_SEGMENTS) {
+        drape_mollify(x, mollifier_width(pair, rest), false, &gap);
+        touch->mollified = gap.mollified;
+    }
+    return true;
+}
+
+void drape_touch_reduce(drape_touch *touch)
+{
+    int which[4], points = touch->closest.points;
+    if (points < 4 || touch->mollified || touch->sharp)
+        return;
+    drape_closest_reduce(&touch->closest, which);
+    for (int a = 0; a < touch->closest.points; a++)
+        touch->pair.node[a] = touch->pair.node[which[a]];
+    for (int a = touch->closest.points; a < 4; a++)
+        touch->pair.node[a] = -1;
+}
+
+static void surface_slopes(const drape_touch *touch, const drape_placed *at, drape_gap *gap)
+{
+    double curvature[9];
+    surface(&touch->pair, at, NULL, curvature);
     memset(gap->dc, 0, sizeof gap->dc);
-    memset(gap->dn, 0, sizeof gap->dn);
+    for (int k = 0; k < 3; k++)
+        memcpy(gap->dn[k], curvature + 3 * k, 3 * sizeof *curvature);
+}
+
+void drape_touch_gap(const drape_touch *touch, const drape_placed *at, const double *rest, bool derivatives,
+                     drape_gap *gap)
+{
+    double x[4][3];
+    drape_closest_slopes slopes = {0};
+    gap->points = touch->closest.points;
+    gap->value = touch->gap;
+    gap->mollified = touch->mollified;
+    memcpy(gap->c, touch->closest.c, sizeof gap->c);
+    memcpy(gap->normal, touch->closest.normal, sizeof gap->normal);
+    if (gap->points == 1 && derivatives)
+        surface_slopes(touch, at, gap);
+    if (gap->points == 1 || (!derivatives && !gap->mollified))
+        return;
+    for (int a = 0; a < gap->points; a++)
+        memcpy(x[a], at->x + 3 * (size_t)touch->pair.node[a], sizeof x[a]);
+    if (derivatives && !touch->sharp)
+        drape_closest_derive(x, &touch->closest, &slopes);
+    memcpy(gap->dc, slopes.c, sizeof gap->dc);
+    memcpy(gap->dn, slopes.normal, sizeof gap->dn);
+    if (gap->mollified)
+        drape_mollify(x, mollifier_width(&touch->pair, rest), true, gap);
 }
 
 bool drape_pair_gap(const drape_pair *pair, const drape_placed *at, const double *rest, bool derivatives,
                     drape_gap *gap)
 {
-    double x[4][3];
-    drape_closest closest;
-    drape_closest_slopes slopes;
-    gap->mollified = false;
-    if (!finders[pair->kind])
-        return surface_gap(pair, at, derivatives, gap);
-    drape_pair_gather(pair, at->x, x);
-    finders[pair->kind](x, &closest);
-    gap->value = closest.distance - pair->radius;
-    if (!(gap->value < pair->distance))
+    drape_touch touch;
+    if (!drape_pair_touch(pair, at, rest, &touch)) {
+        *gap = (drape_gap){.points = touch.closest.points, .value = touch.gap};
         return false;
-    gap->points = 4;
-    memcpy(gap->c, closest.c, sizeof gap->c);
-    memcpy(gap->normal, closest.normal, sizeof gap->normal);
-    if (pair->collider >= 0 && closest.distance < TOUCHING) {
-        touching_normal(pair, at, x, gap);
-    } else if (derivatives) {
-        drape_closest_derive(x, &closest, &slopes);
-        memcpy(gap->dc, slopes.c, sizeof gap->dc);
-        memcpy(gap->dn, slopes.normal, sizeof gap->dn);
     }
-    if (pair->kind == DRAPE_PAIR_SEGMENTS)
-        drape_mollify(x, mollifier_width(pair, rest), derivatives, gap);
+    drape_touch_gap(&touch, at, rest, derivatives, gap);
     return true;
 }
 

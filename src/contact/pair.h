@@ -6,6 +6,7 @@
 #define DRAPE_CONTACT_PAIR_H
 
 #include "colliders/colliders.h"
+#include "contact/closest.h"
 #include "contact/force.h"
 
 typedef enum drape_pair_kind {
@@ -35,8 +36,30 @@ int drape_pair_points(const drape_pair *pair);
 void drape_pair_gather(const drape_pair *pair, const double *from, double local[4][3]);
 double drape_pair_gap_value(const drape_pair *pair, const drape_placed *at);
 
-/* False where the gap is not below the activation distance. derivatives: dc, dn and ddm too. rest: (points x 3),
- * for the width of the mollifier. */
+/* Whether the gap is seen at once to be above `gap`, from boxes around the pieces; most candidates are so. False says
+ * nothing. */
+bool drape_pair_is_apart(const drape_pair *pair, const drape_placed *at, double gap);
+
+/* A pair at an instant at which it acts. */
+typedef struct drape_touch {
+    drape_pair pair; /* its first closest.points nodes have a part in it */
+    double gap;      /* [m] */
+    drape_closest closest;
+    bool mollified;
+    bool sharp; /* a feature of a collider that touches: normals do not turn there */
+} drape_touch;
+
+/* False where the gap is not below the activation distance. rest: (points x 3), for the width of the mollifier. */
+bool drape_pair_touch(const drape_pair *pair, const drape_placed *at, const double *rest, drape_touch *touch);
+
+/* Leaves out the nodes that have no part in it: pairs of large pieces are often those of smaller ones. */
+void drape_touch_reduce(drape_touch *touch);
+
+/* derivatives: dc, dn and ddm too. at: as in drape_pair_touch. */
+void drape_touch_gap(const drape_touch *touch, const drape_placed *at, const double *rest, bool derivatives,
+                     drape_gap *gap);
+
+/* Both, of all four nodes; false as of drape_pair_touch, and then only the value is known. */
 bool drape_pair_gap(const drape_pair *pair, const drape_placed *at, const double *rest, bool derivatives,
                     drape_gap *gap);
 

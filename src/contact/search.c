@@ -139,6 +139,7 @@ size_t drape_search_bytes(const drape_search *s)
         (size_t)s->model->node_count + (size_t)s->model->edge_count + (size_t)s->model->triangle_count;
     return trees * (2 * sizeof(drape_bvh_branch) + sizeof(int32_t)) +
            (3 * (size_t)s->points + areas) * sizeof(double) +
+           (size_t)(s->points - s->model->node_count) * sizeof *s->point_collider +
            (3 * (size_t)s->segments + 4 * (size_t)s->obstacles.count) * sizeof(int32_t);
 }
 

@@ -108,6 +108,15 @@ const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {
                                     .default_value = 0,
                                     .choices = drape_linears_words,
                                     .help = "a row of the linear solvers"},
+    [DRAPE_NEWTON_LINEAR_TOLERANCE] = {.name = "linear_tolerance",
+                                       .unit = "1",
+                                       .default_value = 1e-3,
+                                       .min = 1e-14,
+                                       .max = 1,
+                                       .open_max = true,
+                                       .help =
+                                           "share of the residual that iterative linear solvers leave in a "
+                                           "correction"},
 };
 
 struct drape_newton {
@@ -126,6 +135,7 @@ struct drape_newton {
     double *ahead;               /* nodes: where a correction would lead; NULL without contact */
     double *x, *v, *g;           /* nodes: where the residual was evaluated last, and g there */
     double *f;                   /* free DOFs: F there */
+    bool searched;               /* there is trial: the line search ended on it */
     bool nonfinite;              /* a residual was */
     drape_status fitted;         /* of the last change of the pattern: < 0 ends the solve */
     bool positive;               /* matrices are the positive parts: the last step was short */
@@ -138,6 +148,7 @@ struct drape_newton {
 static void place(drape_newton *s, const double *d)
 {
     const drape_newton_problem *p = s->problem;
+    s->searched = false;
     for (int64_t i = 0; i < s->n; i++) {
         int64_t at = 3 * (int64_t)s->model->node_of_free[i / 3] + i % 3;
         s->x[at] = p->x_base[at] + d[i];
@@ -163,11 +174,17 @@ static bool evaluate(drape_newton *s, const double *d)
     return drape_all_finite(s->f, (size_t)s->n);
 }
 
+/* The line search has been at the point that KINSOL goes to: F there is known, and finite. */
+static bool is_searched(const drape_newton *s, const double *d)
+{
+    return s->searched && memcmp(d, s->trial, (size_t)s->n * sizeof *d) == 0;
+}
+
 /* < 0: no smaller step helps. */
 static int residual(N_Vector d, N_Vector f, void *user)
 {
     drape_newton *s = user;
-    s->nonfinite = !evaluate(s, N_VGetArrayPointer(d));
+    s->nonfinite = !is_searched(s, N_VGetArrayPointer(d)) && !evaluate(s, N_VGetArrayPointer(d));
     memcpy(N_VGetArrayPointer(f), s->f, (size_t)s->n * sizeof *s->f);
     return drape_system_status(s->system) ? -1 : s->nonfinite ? 1 : 0;
 }
@@ -215,6 +232,12 @@ static double free_share(drape_newton *s, const double *x, const double *step)
     return drape_system_way(s->system, x, s->ahead, s->problem->t);
 }
 
+static void shorten(double *p, double share, int64_t n)
+{
+    for (int64_t i = 0; share < 1 && i < n; i++)
+        p[i] *= share;
+}
+
 static double dot(const double *a, const double *b, int64_t n)
 {
     double sum = 0;
@@ -234,7 +257,8 @@ static double search_along(drape_newton *s, const double *p, double start)
     for (int k = 0; k < MOST_TRIALS; k++) {
         for (int64_t i = 0; i < s->n; i++)
             s->trial[i] = d[i] + a * p[i];
-        double work = evaluate(s, s->trial) ? dot(s->f, p, s->n) : INFINITY;
+        s->searched = evaluate(s, s->trial);
+        double work = s->searched ? dot(s->f, p, s->n) : INFINITY;
         if (fabs(work) <= -WORK_SHARE * start || (work < 0 && a == 1))
             return a;
         if (work < 0)
@@ -284,14 +308,12 @@ static drape_status globalize(drape_newton *s, N_Vector x, N_Vector b)
     drape_status status = s->trial ? descend(s, x, b) : DRAPE_OK;
     if (status || !drape_all_finite(p, (size_t)s->n))
         return status;
-    double share = s->ahead ? free_share(s, s->x, p) : 1;
-    for (int64_t i = 0; share < 1 && i < s->n; i++)
-        p[i] *= share;
+    if (s->ahead)
+        shorten(p, free_share(s, s->x, p), s->n);
     double start = s->trial ? -dot(N_VGetArrayPointer(b), p, s->n) : 0;
     if (start < 0) {
         double a = search_along(s, p, start);
-        for (int64_t i = 0; a < 1 && i < s->n; i++)
-            p[i] *= a;
+        shorten(p, a, s->n);
         s->positive = a < SHORT_STEP;
     }
     return DRAPE_OK;
@@ -379,6 +401,8 @@ drape_status drape_newton_create(drape_context *ctx, drape_system *system, const
     if (!status && s->n > 0)
         status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
                                          drape_system_pattern(system), &s->linear);
+    if (!status && s->n > 0)
+        s->linear->tolerance = values[DRAPE_NEWTON_LINEAR_TOLERANCE];
     if (!status && s->n > 0 && (s->ahead || s->trial)) {
         s->linear->owner = s;
         s->linear->solver->ops->solve = solve_and_globalize;
@@ -485,7 +509,7 @@ static void begin(drape_newton *s, const drape_newton_problem *problem)
                              .span = {problem->span[0], problem->span[1]}};
     memcpy(s->x, problem->x_base, bytes);
     memcpy(s->v, problem->v_base, bytes);
-    s->nonfinite = s->positive = false;
+    s->nonfinite = s->positive = s->searched = false;
     s->fitted = DRAPE_OK;
 }
 
@@ -558,9 +582,8 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *pro
     bool keep =
         s->values[DRAPE_NEWTON_METHOD] == METHOD_MODIFIED && s->factored_mass_weight == problem->mass_weight;
     KINSetNoInitSetup(s->kin, keep);
-    double share = s->ahead ? free_share(s, s->x, d) : 1; /* of the guess, from d = 0 */
-    for (int64_t i = 0; share < 1 && i < s->n; i++)
-        d[i] *= share;
+    if (s->ahead) /* the guess, from d = 0 */
+        shorten(d, free_share(s, s->x, d), s->n);
     N_VSetArrayPointer(d, s->unknown);
     int strategy = s->values[DRAPE_NEWTON_GLOBALIZATION] == GLOBAL_LINE_SEARCH ? KIN_LINESEARCH : KIN_NONE;
     drape_status status = status_of(KINSol(s->kin, s->unknown, strategy, s->ones, s->ones), &info->reason);
@@ -607,7 +630,7 @@ drape_work drape_newton_work(const drape_newton *newton)
     drape_work work = newton->work;
     if (newton->linear) {
         work.factorizations = newton->linear->factorizations;
-        work.linear_iterations = newton->linear->solves;
+        work.linear_iterations = newton->linear->iterations;
         work.factor_seconds = newton->linear->factor_seconds;
         work.solve_seconds = newton->linear->solve_seconds;
     }
@@ -616,8 +639,9 @@ drape_work drape_newton_work(const drape_newton *newton)
 
 size_t drape_newton_bytes(const drape_newton *newton)
 {
-    size_t nodes = 3 * (size_t)newton->model->node_count, values = (size_t)newton->model->pattern.nonzeros;
+    size_t nodes = 3 * (size_t)newton->model->node_count, n = (size_t)newton->n;
+    size_t values = (size_t)drape_system_pattern(newton->system)->nonzeros;
     size_t factors = newton->linear ? newton->linear->ops->bytes(newton->linear->state) : 0;
-    return (3 * nodes + 8 * (size_t)newton->n + values) * sizeof(double) +
-           factors; /* KINSOL keeps 6 vectors */
+    size_t searches = (newton->ahead ? nodes : 0) + (newton->trial ? n : 0);
+    return (3 * nodes + 8 * n + searches + values) * sizeof(double) + factors; /* KINSOL keeps 6 vectors */
 }

@@ -2,15 +2,13 @@
 #include "model/scene.h"
 
 #include <errno.h>
-#include <limits.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "model/scene_cs184.h"
 #include "model/scene_json.h"
+#include "model/scene_print.h"
 #include "model/scene_text.h"
 
 #define LARGEST_FILE                                                                                         \
@@ -103,6 +101,13 @@ static drape_status new_scene(drape_context *ctx, const char *name, drape_scene 
         drape_scene_destroy(&scene);
     *out = scene;
     return scene ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+void drape_scene_print(drape_scene *scene, drape_text_sink *sink, void *user)
+{
+    locale_t old = drape_locale_enter();
+    drape_json_print(scene->ours ? scene->ours : scene->root, sink, user);
+    drape_locale_leave(old);
 }
 
 /* ---- Reading a file ---- */
@@ -515,58 +520,6 @@ drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char
     drape_status status = set_value(scene, pointer, value);
     drape_locale_leave(old);
     return status;
-}
-
-/* ---- Writing ---- */
-
-/* A name that would be too long stays as it is: whoever reads it says so. */
-static json_t *rooted(const drape_scene *scene, const char *file)
-{
-    char here[PATH_MAX], path[3 * PATH_MAX];
-    const char *folder = scene->folder ? scene->folder : ".";
-    if (*file == '/' || strlen(folder) + strlen(file) >= PATH_MAX ||
-        (*folder != '/' && !getcwd(here, sizeof here)))
-        return json_string(file);
-    if (*folder == '/')
-        snprintf(path, sizeof path, "%s/%s", folder, file);
-    else
-        snprintf(path, sizeof path, "%s/%s/%s", here, folder, file);
-    return json_string(path);
-}
-
-/* Names of files stand at "file", wherever that is. */
-static bool root_files(const drape_scene *scene, json_t *value)
-{
-    const char *key;
-    json_t *item;
-    size_t index;
-    bool good = true;
-    json_array_foreach(value, index, item) good = good && root_files(scene, item);
-    json_object_foreach(value, key, item)
-    {
-        if (strcmp(key, "file") == 0 && json_is_string(item)) {
-            json_t *name = rooted(scene, json_string_value(item));
-            good = good && json_object_set_new(value, key, name) == 0;
-        } else {
-            good = good && root_files(scene, item);
-        }
-    }
-    return good;
-}
-
-drape_status drape_scene_write_text(drape_scene *scene, char **text)
-{
-    locale_t old = drape_locale_enter();
-    json_t *copy = json_deep_copy(scene->root);
-    bool good = copy && root_files(scene, copy);
-    char *dumped = good ? json_dumps(copy, JSON_INDENT(2) | JSON_REAL_PRECISION(17)) : NULL;
-    *text = dumped ? drape_copy_text(scene->ctx, dumped) : NULL;
-    if (!dumped)
-        drape_fail_memory(scene->ctx, 1);
-    free(dumped);
-    json_decref(copy);
-    drape_locale_leave(old);
-    return *text ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
 /* ---- Defs and faults ---- */

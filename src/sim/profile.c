@@ -217,19 +217,11 @@ static size_t mesh_bytes(const drape_model *model)
     return sum;
 }
 
-static size_t pattern_bytes(const drape_pattern *p)
-{
-    size_t blocks = (size_t)p->block_start[p->block_count], columns = (size_t)p->block_count;
-    return (columns + 1) * sizeof *p->block_start + blocks * sizeof *p->block_row +
-           columns * sizeof *p->diagonal + ((size_t)p->n + 1) * sizeof *p->column +
-           (size_t)p->nonzeros * sizeof *p->row;
-}
-
 static void count_bytes(const drape_sim *sim, drape_profile *out)
 {
     out->model_bytes = sim->model->arena.bytes;
     out->mesh_bytes = mesh_bytes(sim->model);
-    out->pattern_bytes = pattern_bytes(&sim->model->pattern);
+    out->pattern_bytes = drape_pattern_bytes(&sim->model->pattern);
     out->system_bytes = drape_system_bytes(sim->system);
     out->integrator_bytes = sim->chosen.integrator->bytes(sim->integrator);
     out->state_bytes = sizeof *sim + sim->arena.bytes;

@@ -160,6 +160,15 @@ void drape_pattern_free(drape_context *ctx, drape_pattern *pattern)
     memset(pattern, 0, sizeof *pattern);
 }
 
+size_t drape_pattern_bytes(const drape_pattern *p)
+{
+    size_t blocks = p->block_start ? (size_t)p->block_start[p->block_count] : 0,
+           columns = (size_t)p->block_count;
+    return (columns + 1) * sizeof *p->block_start + blocks * sizeof *p->block_row +
+           columns * sizeof *p->diagonal + ((size_t)p->n + 1) * sizeof *p->column +
+           (size_t)p->nonzeros * sizeof *p->row;
+}
+
 int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t column)
 {
     if (row < 0 || column < 0)

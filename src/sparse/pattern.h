@@ -34,6 +34,7 @@ typedef struct drape_coupling {
 drape_status drape_pattern_build(drape_context *ctx, int32_t block_count, const int32_t *block_of_node,
                                  const drape_coupling *couplings, int coupling_count, drape_pattern *pattern);
 void drape_pattern_free(drape_context *ctx, drape_pattern *pattern);
+size_t drape_pattern_bytes(const drape_pattern *pattern);
 
 /* The block at (row, column); -1 if either is -1. It must be in the pattern. */
 int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t column);

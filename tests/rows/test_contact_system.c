@@ -130,7 +130,7 @@ static void check(probe *t, const char *what, double time)
     const int32_t active = drape_contact_active((drape_contact *)(uintptr_t)contact, &gap);
     printf("# %.60s: %d active, least gap %.2g m; errors %.2g with w = 100, %.2g with w = 0\n", what,
            (int)active, gap, steps, still);
-    ck_assert_msg(active >= 3, "%s: %d active", what, (int)active);
+    ck_assert_msg(active >= 2, "%s: %d active", what, (int)active);
     assert_below(steps, 1e-5);
     assert_below(still, 1e-5);
 }
@@ -287,5 +287,70 @@ START_TEST(who_has_none_pays_nothing)
 }
 END_TEST
 
+#define LAYER                                                                                                \
+    "{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, 'height': 0.3, 'transform': "        \
+    "{'translate': [0, %g, 0]}}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, "    \
+    "'terms': ['stretch.edge', 'bend.hinge']}"
+
+/* Bytes that a context gave and has not back; each piece keeps its size in front. An empty array is one byte, which is
+ * nobody's. */
+static size_t held;
+
+static void *hold(void *user, size_t size)
+{
+    (void)user;
+    size_t *piece = malloc(size + 2 * sizeof *piece);
+    if (!piece)
+        return NULL;
+    *piece = size > 1 ? size : 0;
+    held += *piece;
+    return piece + 2;
+}
+
+static void let_go(void *user, void *memory)
+{
+    (void)user;
+    size_t *piece = (size_t *)memory - 2;
+    held -= *piece;
+    free(piece);
+}
+
+/* A system says how much memory it has, to the byte: contact, its lists as they grew, and the wider pattern. */
+START_TEST(bytes_are_all_of_them)
+{
+    scene s = scene_model(
+        "{'drape': 1, 'cloth': [" LAYER ", " LAYER "], 'self_contact': {'thickness': 2e-3, 'friction': 0.2},"
+        " 'contact': {'distance': 4e-3, 'friction': 'lagged'}, 'colliders': ["
+        " {'type': 'box', 'center': [0.1,-0.1,-0.1], 'size': [0.2,0.2,0.2], 'friction': 0.4},"
+        " {'type': 'plane', 'point': [0,-1,0], 'normal': [0,1,0]}], 'duration': 1}",
+        0.0, 0.1);
+    const drape_context_def def = s.ctx->def;
+    drape_system *system = NULL;
+    drape_arena arena = {0};
+    drape_state at;
+    bool changed;
+    ck_assert_int_eq(drape_state_create(s.ctx, &arena, s.model, &at), DRAPE_OK);
+    for (int32_t i = s.model->cloths[1].first_node; i < s.model->node_count; i++)
+        at.x[3 * (size_t)i + 1] = 2e-3;
+    s.ctx->def.allocate = hold;
+    s.ctx->def.release = let_go;
+    ck_assert_int_eq(drape_system_create(s.ctx, s.model, 1, &system), DRAPE_OK);
+    ck_assert_int_eq(drape_system_add_contact(system), DRAPE_OK);
+    ck_assert_uint_eq(drape_system_bytes(system), held);
+    const size_t before = held;
+    const drape_point point = {.x = at.x, .v = at.v, .internal = at.internal};
+    ck_assert_int_eq(drape_system_begin(system, &at), DRAPE_OK);
+    ck_assert_int_eq(drape_system_fit(system, &point, &changed), DRAPE_OK);
+    ck_assert(changed);
+    ck_assert_uint_gt(held, before);
+    ck_assert_uint_eq(drape_system_bytes(system), held);
+    drape_system_destroy(&system);
+    ck_assert_uint_eq(held, 0);
+    s.ctx->def = def;
+    drape_arena_free(&arena, s.ctx);
+    scene_close(&s);
+}
+END_TEST
+
 SUITE("contact_system", colliders_of_every_row, cloth_on_cloth, nan_is_forgotten, contact_has_rows_of_its_own,
-      who_has_none_pays_nothing)
+      who_has_none_pays_nothing, bytes_are_all_of_them)
