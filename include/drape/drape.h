@@ -424,7 +424,7 @@ typedef struct drape_worst {
         *what; /* "residual", "edge length / rest length", "altitude / rest altitude" ...; "" for none */
     const char *term;    /* the row that found it, "" for a node */
     int32_t element;     /* element number in that term of that cloth; -1 for a node */
-    int32_t node[4];     /* its nodes, numbers of the whole model; -1 past the last */
+    int32_t node[4];     /* its first nodes, numbers of the whole model; -1 past the last */
     int32_t cloth;       /* index of its cloth; -1 for none */
     double value, limit; /* in the unit of what */
 } drape_worst;

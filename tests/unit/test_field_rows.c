@@ -1,4 +1,4 @@
-/* test_node_fields.c: what is told of a moment at each node, against closed forms. */
+/* test_field_rows.c: what is told of a moment at each node, against closed forms. */
 #include "fields/fields.h"
 #include "support/scene.h"
 #include "support/suite.h"
@@ -138,5 +138,5 @@ START_TEST(contact_forces_carry_the_weight)
 }
 END_TEST
 
-SUITE("node_fields", strain_of_a_homogeneous_stretch_is_exact, energy_density_sums_to_the_energy,
+SUITE("field_rows", strain_of_a_homogeneous_stretch_is_exact, energy_density_sums_to_the_energy,
       velocity_is_the_speed, residual_is_that_of_the_last_step, contact_forces_carry_the_weight)
