@@ -1,8 +1,8 @@
 /* test_quasi.c: the coarse space, conjugate gradients, and the matrix that stands for a Jacobian. */
 #include "integrators/quasi.h"
+#include "rows/models.h"
 #include "solvers/pcg.h"
 #include "solvers/prolong.h"
-#include "rows/models.h"
 #include "support/scene.h"
 
 /* ---- The coarse space ---- */
