@@ -158,6 +158,7 @@ typedef struct drape_term_ops {
     int internal_count;        /* of an element, one after another; 0: one */
     bool constraint; /* an energy that keeps a limit: integrators that move nodes to keep limits do without */
     bool damped;     /* measure: a dashpot of its own in each element, force c q' on q */
+    bool distance;   /* measure: q is the distance of its two nodes, of all elements */
 
     /* Adds the elements of one cloth. Called once a cloth. Errors: what the builder returned. */
     drape_status (*build)(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder);

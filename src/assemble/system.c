@@ -64,6 +64,11 @@ const drape_model *drape_system_model(const drape_system *system)
     return system->model;
 }
 
+int drape_system_threads(const drape_system *system)
+{
+    return drape_summer_threads(system->summer);
+}
+
 /* Of the wider pattern and the terms' places in it. */
 static size_t wider_bytes(const drape_system *system)
 {
@@ -218,7 +223,14 @@ static drape_sums into_values(const drape_system *system, double *values)
 
 void drape_system_force(drape_system *system, const drape_point *point, double *g)
 {
-    const drape_request want = {.point = point, .conservative = true, .dissipative = true};
+    drape_system_force_without(system, point, NULL, g);
+}
+
+void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
+                                double *g)
+{
+    const drape_request want = {
+        .point = point, .conservative = true, .dissipative = true, .without = without};
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
     if (place_contact(system, point))
         drape_contact_add_forces(system->contact, true, true, g);
@@ -244,7 +256,7 @@ static void add_masses(const drape_system *system, double mass_weight, double *v
     }
 }
 
-void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, bool project,
+void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, double project,
                            double *values)
 {
     const drape_request want = {
@@ -252,7 +264,8 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
     const drape_sums to = into_values(system, values);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight, false, project, system->pattern, values);
+        drape_contact_add_jacobian(system->contact, point->weight, false, project > 0, system->pattern,
+                                   values);
     add_masses(system, mass_weight, values);
 }
 
@@ -317,6 +330,11 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
         drape_contact_add_jacobian(system->contact, point->weight, false, false, system->pattern, values);
 }
 
+static bool has_energy(const drape_system *system, const drape_term *term)
+{
+    return !term->ops->law && !term->ops->dissipation && !drape_summer_leaves(system->summer, term);
+}
+
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity)
 {
     const drape_request want = {.point = point, .energy = true, .conservative = true};
@@ -324,9 +342,8 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
         double energy = 0;
-        if (term->ops->law || term->ops->dissipation || drape_summer_leaves(system->summer, term))
-            continue;
-        drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
+        if (has_energy(system, term))
+            drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
         *(term->ops->potential_of_gravity ? gravity : elastic) += energy;
     }
 }
@@ -338,7 +355,7 @@ void drape_system_node_energy(drape_system *system, const drape_point *point, do
     memset(energy, 0, (size_t)system->model->node_count * sizeof *energy);
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
-        if (!term->ops->potential_of_gravity)
+        if (!term->ops->potential_of_gravity && has_energy(system, term))
             drape_summer_add_term(system->summer, term, &want, &to, NULL);
     }
 }

@@ -65,14 +65,15 @@ static const drape_param params[PARAM_COUNT] = {
                              .min = 0,
                              .max = 1,
                              .help = "share of the last change of velocity that the guess takes along"},
-    [PARAM_LINEAR_TOLERANCE] = {.name = "linear_tolerance",
-                                .unit = "1",
-                                .default_value = 0.1,
-                                .min = 1e-14,
-                                .max = 1,
-                                .open_max = true,
-                                .help =
-                                    "conjugate gradients reduce the residual of a correction to this share"},
+    [PARAM_LINEAR_TOLERANCE] =
+        {.name = "linear_tolerance",
+         .unit = "1",
+         .default_value = 0.1,
+         .min = 1e-14,
+         .max = 1,
+         .open_max = true,
+         .help = "conjugate gradients reduce the residual of a correction to this share at "
+                 "1/60 s, in proportion to the step at others"},
     [PARAM_LINEAR_ITERATIONS] = {.name = "max_linear_iterations",
                                  .kind = DRAPE_PARAM_INTEGER,
                                  .unit = "1",
