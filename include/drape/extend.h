@@ -152,7 +152,7 @@ typedef struct drape_term_ops {
     const char *element_name;  /* "edge", "hinge", "node": for messages */
     int nodes;                 /* nodes an element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
     bool linear;               /* energy: its Hessian is zero and takes no sparsity */
-    bool potential_of_gravity; /* energy: counts as gravity, not as elastic */
+    bool potential_of_gravity; /* energy: a force from outside, counts as gravity, not as elastic */
     bool convex;               /* measure: its Hessian ddq is positive semidefinite, as of a length */
     bool has_internal;         /* internal variables in each element */
     int internal_count;        /* of an element, one after another; 0: one */

@@ -60,9 +60,10 @@ static void weigh(const drape_term *term, const drape_request *want, drape_block
         b->of_ddq[i] = b->force[i];
         b->of_dq[i] = b->by_strain[i] + want->point->weight * b->by_rate[i];
     }
-    for (int32_t i = 0; want->project && i < b->count; i++) {
-        b->of_ddq[i] = convex ? fmax(0, b->of_ddq[i]) : 0;
-        b->of_dq[i] = fmax(0, b->of_dq[i]);
+    for (int32_t i = 0; want->project > 0 && i < b->count; i++) {
+        const double ddq = convex ? fmax(0, b->of_ddq[i]) : 0, dq = fmax(0, b->of_dq[i]);
+        b->of_ddq[i] += want->project * (ddq - b->of_ddq[i]);
+        b->of_dq[i] += want->project * (dq - b->of_dq[i]);
     }
     for (int32_t i = 0; want->velocity && i < b->count; i++) {
         b->of_ddq[i] = 0;
@@ -309,6 +310,14 @@ static void evaluate_dissipations(const drape_term *term, const drape_request *w
         b->hessian[i] = want->velocity ? b->scratch[i] : b->hessian[i] + want->point->weight * b->scratch[i];
 }
 
+static void project(int d, double share, double *h, double *positive)
+{
+    memcpy(positive, h, (size_t)(d * d) * sizeof *h);
+    drape_project(d, positive);
+    for (int i = 0; i < d * d; i++)
+        h[i] += share * (positive[i] - h[i]);
+}
+
 void drape_block_evaluate(const drape_term *term, const drape_request *want, drape_block *b)
 {
     b->pairs = term->ops->pair;
@@ -323,7 +332,7 @@ void drape_block_evaluate(const drape_term *term, const drape_request *want, dra
     else
         evaluate_dissipations(term, want, b);
     const int d = 3 * term->elements.nodes;
-    const bool given = term->ops->measure; /* as its positive part already */
-    for (int32_t i = 0; want->hessian && want->project && !given && i < b->count; i++)
-        drape_project(d, b->hessian + (size_t)i * (size_t)(d * d));
+    const bool given = term->ops->measure; /* with its positive part already */
+    for (int32_t i = 0; want->hessian && want->project > 0 && !given && i < b->count; i++)
+        project(d, want->project, b->hessian + (size_t)i * (size_t)(d * d), b->scratch);
 }

@@ -1,10 +1,9 @@
 /* sum.c: see sum.h. */
 #include "assemble/sum.h"
 
+#include "base/parallel.h"
+
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
 
 /* The lowest and the highest node of a block of elements. */
 typedef struct reach {
@@ -48,6 +47,11 @@ static reach reach_of(const drape_term *term, int32_t block)
         r.high = node[i] > r.high ? node[i] : r.high;
     }
     return r;
+}
+
+int drape_summer_threads(const drape_summer *s)
+{
+    return s->threads;
 }
 
 static drape_status create_reaches(drape_summer *s)
@@ -153,6 +157,16 @@ static void add_gradients(const drape_term *term, const drape_block *b, const sh
     }
 }
 
+static void share_energies(const drape_term *term, const drape_block *b, double *node_energy)
+{
+    const int n = term->elements.nodes;
+    for (int32_t i = 0; i < b->count; i++) {
+        const int32_t *node = term->elements.node + (size_t)(b->first + i) * (size_t)n;
+        for (int a = 0; a < n; a++)
+            node_energy[node[a]] += b->energy[i] / n;
+    }
+}
+
 /* to (r, c) += sign from (r, c), whose rows are `row` apart and whose columns `column`. */
 static inline void add_block(const double *from, int row, int column, double sign, double *to, int64_t stride)
 {
@@ -226,21 +240,9 @@ static void add_hessians(const drape_summer *s, const int32_t *block, const drap
     }
 }
 
-/* In equal parts on its nodes. */
-static void share_energies(const drape_term *term, const drape_block *b, double *node_energy)
-{
-    const int n = term->elements.nodes;
-    for (int32_t i = 0; i < b->count; i++)
-        for (int a = 0; a < n; a++)
-            node_energy[term->elements.node[(size_t)(b->first + i) * (size_t)n + (size_t)a]] +=
-                b->energy[i] / n;
-}
-
 static void add(const drape_summer *s, const drape_term *term, const drape_block *b, const share *own,
                 const drape_sums *to)
 {
-    if (to->node_energy)
-        share_energies(term, b, to->node_energy);
     if (to->g && b->pairs)
         add_pulls(term, b, own, to->g);
     else if (to->g)
@@ -288,7 +290,7 @@ static void clear(const drape_summer *s, const share *own, const drape_sums *to)
         }
 }
 
-/* What one thread does. */
+/* The nodes of one share. */
 static void add_share(drape_summer *s, const drape_request *want, const drape_sums *to, int thread)
 {
     const int64_t nodes = s->model->node_count;
@@ -309,19 +311,23 @@ static void add_share(drape_summer *s, const drape_request *want, const drape_su
     }
 }
 
-/* One thread takes a plain call: a parallel region of one costs libgomp a heap call. A region may get fewer
- * threads than it asked for: shares are dealt out, not assumed. */
+/* What all threads are to do. */
+typedef struct order {
+    drape_summer *summer;
+    const drape_request *want;
+    const drape_sums *to;
+} order;
+
+static void add_round(void *user, int64_t thread)
+{
+    const order *o = user;
+    add_share(o->summer, o->want, o->to, (int)thread);
+}
+
+/* There may be fewer threads than shares: they are dealt out, not assumed. */
 void drape_summer_add(drape_summer *s, const drape_request *want, const drape_sums *to)
 {
-#ifdef _OPENMP
-    if (s->threads > 1) {
-#pragma omp parallel for schedule(static, 1) num_threads(s->threads)
-        for (int thread = 0; thread < s->threads; thread++)
-            add_share(s, want, to, thread);
-        return;
-    }
-#endif
-    add_share(s, want, to, 0);
+    drape_parallel(s->threads, s->threads, add_round, &(order){s, want, to});
 }
 
 void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_request *want,
@@ -329,9 +335,11 @@ void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_
 {
     const share all = {0, s->model->node_count};
     double sum = 0;
-    for (int32_t k = 0; k < block_count(term) && (energy || contributes(s, term, want, to)); k++) {
+    for (int32_t k = 0; k < block_count(term); k++) {
         evaluate(term, want, k, &s->blocks[0]);
         add(s, term, &s->blocks[0], &all, to);
+        if (to->node_energy)
+            share_energies(term, &s->blocks[0], to->node_energy);
         for (int32_t i = 0; energy && i < s->blocks[0].count; i++)
             sum += s->blocks[0].energy[i];
     }

@@ -11,10 +11,10 @@
 
 typedef struct drape_summer drape_summer;
 
-/* Where sums go; NULL: not wanted. Forces and values are overwritten. */
+/* Where sums go; NULL: not wanted. */
 typedef struct drape_sums {
+    double *node_energy;          /* (node_count) an element's energy in equal parts on its nodes */
     double *g;                    /* (node_count x 3) */
-    double *node_energy;          /* (node_count): that of each element in equal parts; added to */
     double *values;               /* (pattern->nonzeros) */
     const drape_pattern *pattern; /* of values */
     int32_t *const
@@ -26,11 +26,13 @@ drape_status drape_summer_create(drape_context *ctx, const drape_model *model, i
                                  drape_summer **out);
 void drape_summer_destroy(drape_summer **summer);
 
+int drape_summer_threads(const drape_summer *summer);
+
 /* From here on terms that are a constraint are left out. */
 void drape_summer_leave_constraints(drape_summer *summer);
 bool drape_summer_leaves(const drape_summer *summer, const drape_term *term);
 
-/* Over all terms. */
+/* Over all terms; what is there is overwritten. */
 void drape_summer_add(drape_summer *summer, const drape_request *want, const drape_sums *to);
 
 /* Over one, in one thread, added to what is there; *energy, if not NULL, gets its energy. */

@@ -16,6 +16,7 @@ struct drape_system {
     drape_pattern wider;          /* with what contact couples */
     int32_t **blocks;    /* (term_count) as in the terms, for the wider one; NULL while there is none */
     drape_status status; /* of placing contact */
+    drape_pull pull;
 };
 
 static void forget_wider(drape_system *system)
@@ -62,6 +63,21 @@ void drape_system_leave_constraints(drape_system *system)
 const drape_model *drape_system_model(const drape_system *system)
 {
     return system->model;
+}
+
+int drape_system_threads(const drape_system *system)
+{
+    return drape_summer_threads(system->summer);
+}
+
+void drape_system_set_pull(drape_system *system, const drape_pull *pull)
+{
+    system->pull = *pull;
+}
+
+const drape_pull *drape_system_pull(const drape_system *system)
+{
+    return &system->pull;
 }
 
 /* Of the wider pattern and the terms' places in it. */
@@ -227,6 +243,7 @@ void drape_system_force_without(drape_system *system, const drape_point *point, 
     const drape_request want = {
         .point = point, .conservative = true, .dissipative = true, .without = without};
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
+    drape_pull_add_gradient(&system->pull, point->x, g);
     if (place_contact(system, point))
         drape_contact_add_forces(system->contact, true, true, g);
 }
@@ -251,7 +268,7 @@ static void add_masses(const drape_system *system, double mass_weight, double *v
     }
 }
 
-void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, bool project,
+void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, double project,
                            double *values)
 {
     const drape_request want = {
@@ -259,7 +276,9 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
     const drape_sums to = into_values(system, values);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight, false, project, system->pattern, values);
+        drape_contact_add_jacobian(system->contact, point->weight, false, project > 0, system->pattern,
+                                   values);
+    drape_pull_add_hessian(&system->pull, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
 }
 
@@ -324,6 +343,11 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
         drape_contact_add_jacobian(system->contact, point->weight, false, false, system->pattern, values);
 }
 
+static bool has_energy(const drape_system *system, const drape_term *term)
+{
+    return !term->ops->law && !term->ops->dissipation && !drape_summer_leaves(system->summer, term);
+}
+
 void drape_system_energy(drape_system *system, const drape_point *point, double *elastic, double *gravity)
 {
     const drape_request want = {.point = point, .energy = true, .conservative = true};
@@ -331,11 +355,11 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
         double energy = 0;
-        if (term->ops->law || term->ops->dissipation || drape_summer_leaves(system->summer, term))
-            continue;
-        drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
+        if (has_energy(system, term))
+            drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
         *(term->ops->potential_of_gravity ? gravity : elastic) += energy;
     }
+    *elastic += drape_pull_energy(&system->pull, point->x);
 }
 
 void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy)
@@ -345,7 +369,7 @@ void drape_system_node_energy(drape_system *system, const drape_point *point, do
     memset(energy, 0, (size_t)system->model->node_count * sizeof *energy);
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
-        if (!term->ops->potential_of_gravity)
+        if (!term->ops->potential_of_gravity && has_energy(system, term))
             drape_summer_add_term(system->summer, term, &want, &to, NULL);
     }
 }
@@ -388,7 +412,7 @@ static drape_worst worst_element(const drape_term *term, const drape_fault *faul
                          .cloth = term->cloth,
                          .value = fault->value,
                          .limit = fault->limit};
-    for (int a = 0; fault->element >= 0 && a < el->nodes; a++)
+    for (int a = 0; fault->element >= 0 && a < el->nodes && a < 4; a++)
         worst.node[a] = el->node[(size_t)fault->element * (size_t)el->nodes + (size_t)a];
     return worst;
 }

@@ -11,6 +11,7 @@
 #ifndef DRAPE_ASSEMBLE_SYSTEM_H
 #define DRAPE_ASSEMBLE_SYSTEM_H
 
+#include "assemble/pull.h"
 #include "assemble/state.h"
 #include "contact/contact.h"
 
@@ -36,6 +37,12 @@ void drape_system_destroy(drape_system **system);
 void drape_system_leave_constraints(drape_system *system);
 
 const drape_model *drape_system_model(const drape_system *system);
+int drape_system_threads(const drape_system *system);
+
+/* A spring that belongs to the system from now on, its energy to the elastic one; of stiffness 0: none. Its node is
+ * free. */
+void drape_system_set_pull(drape_system *system, const drape_pull *pull);
+const drape_pull *drape_system_pull(const drape_system *system);
 
 /* From now on the forces of contact belong to the system, if the model has any. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_add_contact(drape_system *system);
@@ -59,9 +66,9 @@ void drape_system_force(drape_system *system, const drape_point *point, double *
 void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
                                 double *g);
 
-/* values (pattern.nonzeros) = mass_weight M + J over the free nodes. project: element Hessians become
- * positive semidefinite. */
-void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, bool project,
+/* values (pattern.nonzeros) = mass_weight M + J over the free nodes. project: the share, 0 to 1, by which element
+ * Hessians become positive semidefinite: H + project (H+ - H); those of contact do altogether, if it is not 0. */
+void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, double project,
                            double *values);
 
 /* What a matrix that is cheaper than J is made of (integrators/quasi.h), term by term.

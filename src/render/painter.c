@@ -62,7 +62,9 @@ static const char surface_main[] =
     "    s.at = at;\n"
     "    s.value = value;\n"
     "    s.piece = piece;\n"
-    "    s.sun = sunlight(shadow_at, dot(s.n, light));\n"
+    "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
+    "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
+    "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
     "    colour = vec4(encoded(shade(s)), 1.0);\n"
     "}\n";
 
@@ -109,7 +111,9 @@ static const char ground_main[] =
     "    s.at = at;\n"
     "    s.value = value;\n"
     "    s.piece = piece;\n"
-    "    s.sun = sunlight(shadow_at, dot(s.n, light));\n"
+    "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
+    "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
+    "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
     "    colour = vec4(ground(s), 1.0);\n"
     "}\n";
 
@@ -347,7 +351,7 @@ static void set_lamp(const drape_stage *stage, float azimuth, panel_view *v)
 /* For programs of surfaces, which take their textures at these units. */
 static void use_surface(drape_painter *p, GLuint program, const panel_view *v, const drape_matrix *view)
 {
-    static const float nowhere[3] = {0}, front[3] = {0.50f, 0.062f, 0.048f}, back[3] = {0.62f, 0.46f, 0.30f};
+    static const float nowhere[3] = {0}, front[3] = {0.50f, 0.062f, 0.048f}, back[3] = {0.40f, 0.29f, 0.18f};
     const struct {
         const char *name;
         GLuint texture;
@@ -371,6 +375,8 @@ static void use_surface(drape_painter *p, GLuint program, const panel_view *v, c
     drape_gl_set_vec3(program, "front", front);
     drape_gl_set_vec3(program, "back", back);
     drape_gl_set_float(program, "soft", SOFT / SHADOW);
+    drape_gl_set_float(program, "texel_depth",
+                       2 * SHADOW_REACH / SHADOW / (4 * DEEP - 0.1f)); /* a texel's width as depth */
     drape_gl_set_float(program, "relief", 0);
     drape_gl_set_float(program, "spread", 1);
 }
@@ -389,7 +395,7 @@ static void draw_cloth(const drape_stage *stage)
 
 static void draw_bodies(const drape_stage *stage, GLuint program, bool endless)
 {
-    for (int32_t c = 0; c < stage->model->collider_count; c++) {
+    for (int32_t c = 0; c < stage->body_count; c++) {
         const drape_stage_body *body = &stage->bodies[c];
         if (body->shape.endless != endless)
             continue;
@@ -414,7 +420,7 @@ static void draw_shadows(drape_painter *p, const drape_stage *stage, const drape
     glDepthMask(GL_TRUE);
     glClear(GL_DEPTH_BUFFER_BIT);
     glEnable(GL_POLYGON_OFFSET_FILL);
-    glPolygonOffset(2.2f, 6);
+    glPolygonOffset(2, 4);
     use_surface(p, p->depth, v, &v->lamp);
     draw_bodies(stage, p->depth, false);
     drape_gl_set_vec3(p->depth, "offset", (const float[3]){0});
@@ -568,6 +574,18 @@ static void put_legend(drape_painter *p, const drape_picture *picture)
                          field->shown * picture->high);
 }
 
+/* Behind lines of text, so that they are read over cloth, too. */
+static void put_veil(drape_overlay *o, const char *const *lines, float line)
+{
+    float widest = 0;
+    int count = 0;
+    for (; lines && lines[count]; count++)
+        widest = fmaxf(widest, drape_font_width(&o->font, lines[count]));
+    if (count > 0)
+        drape_overlay_box(o, 10 * o->unit, 9 * o->unit, widest + 20 * o->unit,
+                          (float)count * line + 10 * o->unit, (const float[]){1, 1, 1, 0.42f});
+}
+
 static void put_texts(drape_painter *p, const drape_picture *picture)
 {
     drape_overlay *o = &p->overlay;
@@ -583,6 +601,7 @@ static void put_texts(drape_painter *p, const drape_picture *picture)
             drape_overlay_box(o, (float)box[0] - 0.5f * o->unit, top, o->unit, (float)box[3],
                               (const float[]){1, 1, 1, 0.9f});
     }
+    put_veil(o, picture->lines, line);
     for (int i = 0; picture->lines && picture->lines[i]; i++)
         drape_overlay_text(o, left, 30 * o->unit + (float)i * line, DRAPE_LEFT, drape_ink, picture->lines[i]);
     if (picture->caption)

@@ -49,9 +49,10 @@ typedef struct multifrontal {
     front *fronts;                 /* (e.count) */
     int32_t *branch, branch_count; /* first and last front of each, for one thread; the most work first */
     int32_t *top, top_count;       /* the other fronts, children first */
-    int32_t *source, *mirror; /* (lower blocks) the pattern's block that each is, and the transposed one */
-    int32_t *target;          /* (lower blocks) where it goes, from the begin of its front's panel */
-    int32_t *target_start;    /* (e.n + 1) of each column, in the order of elimination */
+    int32_t *mirror;               /* (lower blocks, as the pattern has them) the transposed one of each */
+    int32_t *source, *target; /* (lower blocks, in the order of elimination) the pattern's block that each is,
+                                       and where it goes, from the begin of its front's panel */
+    int32_t *target_start;    /* (e.n + 1) of each column */
     int32_t *in_panel,
         *in_update; /* (rows of all fronts) where a row lies in its front's parent; see place_rows */
     double *panels, *updates, *inverse, *work, *scratch;
@@ -204,10 +205,20 @@ static int64_t place_in_panel(const multifrontal *s, int32_t i, int32_t row, int
     return ((int64_t)strip * f->columns + 3 * (int64_t)(column - s->e.first[i])) * S + 3 * within;
 }
 
+static void find_mirrors(multifrontal *s)
+{
+    const drape_pattern *p = s->pattern;
+    int32_t *mirror = s->mirror;
+    for (int32_t j = 0; j < p->block_count; j++)
+        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++)
+            *mirror++ = drape_pattern_find(p, j, p->block_row[k]);
+}
+
 static bool place_entries(multifrontal *s)
 {
     const drape_pattern *p = s->pattern;
     int32_t at = 0;
+    find_mirrors(s);
     for (int32_t i = 0; i < s->e.count; i++)
         for (int32_t column = s->e.first[i]; column < s->e.first[i + 1]; column++) {
             const int32_t j = s->e.order[column];
@@ -220,7 +231,6 @@ static bool place_entries(multifrontal *s)
                 if (target > INT32_MAX)
                     return false;
                 s->source[at] = k;
-                s->mirror[at] = drape_pattern_find(p, j, p->block_row[k]);
                 s->target[at++] = (int32_t)target;
             }
         }
@@ -318,28 +328,6 @@ static void use_threads(void *state, int threads)
 
 /* ---- One front ---- */
 
-/* A block below or on the diagonal: whether it is what its mirror is. */
-static bool is_mirrored(const multifrontal *s, int32_t at, int32_t column)
-{
-    const drape_pattern *p = s->pattern;
-    const int32_t j = s->e.order[column], i = p->block_row[s->source[at]];
-    int64_t stride, mirror_stride;
-    double *values = (double *)(uintptr_t)s->values;
-    const double *block = drape_pattern_at(p, values, j, s->source[at], &stride),
-                 *mirror = drape_pattern_at(p, values, i, s->mirror[at], &mirror_stride);
-    bool same = true, symmetric = true;
-    for (int c = 0; c < 3; c++)
-        for (int r = 0; r < 3; r++)
-            same &= block[c * stride + r] == mirror[r * mirror_stride + c];
-    for (int k = 0; !same && k < 9; k++) {
-        const int c = k / 3, r = k % 3;
-        const double difference = block[c * stride + r] - mirror[r * mirror_stride + c];
-        symmetric &=
-            difference * difference <= SYMMETRY * SYMMETRY * s->diagonal[3 * i + r] * s->diagonal[3 * j + c];
-    }
-    return symmetric;
-}
-
 static void copy_block(const multifrontal *s, int32_t at, int32_t column, double *panel)
 {
     int64_t stride;
@@ -351,12 +339,19 @@ static void copy_block(const multifrontal *s, int32_t at, int32_t column, double
             to[S * c + r] = from[c * stride + r];
 }
 
+typedef double couple __attribute__((vector_size(2 * sizeof(double))));
+
 /* Adds a block of what a child left; both lie in strips. */
 static inline void add_block(const double *from, double *to)
 {
-    for (int c = 0; c < 3; c++)
-        for (int r = 0; r < 3; r++)
-            to[S * c + r] += from[S * c + r];
+    for (int c = 0; c < 3; c++, from += S, to += S) {
+        couple a, b;
+        memcpy(&a, from, sizeof a);
+        memcpy(&b, to, sizeof b);
+        b += a;
+        memcpy(to, &b, sizeof b);
+        to[2] += from[2];
+    }
 }
 
 /* What a front is made of, for rounds dealt out to threads. */
@@ -416,16 +411,11 @@ static void assemble(job *w)
 {
     const multifrontal *s = w->s;
     const front *f = w->f;
-    bool symmetric = true;
     memset(w->panel, 0,
            (size_t)(f->column_strips + f->row_strips) * S * (size_t)f->columns * sizeof *w->panel);
     for (int32_t column = s->e.first[w->index]; column < s->e.first[w->index + 1]; column++)
-        for (int32_t at = s->target_start[column]; at < s->target_start[column + 1]; at++) {
-            symmetric &= is_mirrored(s, at, column);
+        for (int32_t at = s->target_start[column]; at < s->target_start[column + 1]; at++)
             copy_block(s, at, column, w->panel);
-        }
-    if (!symmetric)
-        s->failed[w->index] = true;
     add_children(w, false);
 }
 
@@ -486,12 +476,10 @@ static void make_front(multifrontal *s, int32_t i, int threads)
              .panel = s->panels + f->panel,
              .update = s->updates + f->update,
              .threads = threads};
-    s->failed[i] = false;
     assemble(&w);
-    if (s->failed[i] || !factor_columns(&w)) {
-        s->failed[i] = true;
+    s->failed[i] = !factor_columns(&w);
+    if (s->failed[i])
         return;
-    }
     drape_parallel(threads, f->row_strips, leave_column, &w);
     add_children(&w, true);
 }
@@ -508,8 +496,12 @@ static void make_branch(void *user, int64_t round)
     }
 }
 
-/* False where one is not positive: then the matrix is not positive definite. */
-static bool read_diagonal(multifrontal *s)
+/* What is seen of a matrix before it is factored. */
+typedef struct looks {
+    bool finite, positive, symmetric; /* positive: its diagonal is */
+} looks;
+
+static void look_at_diagonal(multifrontal *s, looks *seen)
 {
     const drape_pattern *p = s->pattern;
     for (int32_t j = 0; j < p->block_count; j++) {
@@ -517,11 +509,46 @@ static bool read_diagonal(multifrontal *s)
         const double *at = drape_pattern_at(p, (double *)(uintptr_t)s->values, j, p->diagonal[j], &stride);
         for (int c = 0; c < 3; c++) {
             s->diagonal[3 * j + c] = at[c * stride + c];
-            if (!(s->diagonal[3 * j + c] > 0))
-                return false;
+            seen->positive &= s->diagonal[3 * j + c] > 0;
         }
     }
-    return true;
+}
+
+/* Whether block k, at row i of column j, is what its mirror is. */
+static bool is_mirrored(const multifrontal *s, int32_t j, int32_t k, int32_t mirrored)
+{
+    const drape_pattern *p = s->pattern;
+    const int32_t i = p->block_row[k];
+    int64_t stride, mirror_stride;
+    double *values = (double *)(uintptr_t)s->values;
+    const double *block = drape_pattern_at(p, values, j, k, &stride),
+                 *mirror = drape_pattern_at(p, values, i, mirrored, &mirror_stride);
+    bool same = true, symmetric = true;
+    for (int c = 0; c < 3; c++)
+        for (int r = 0; r < 3; r++)
+            same &= block[c * stride + r] == mirror[r * mirror_stride + c];
+    for (int e = 0; !same && e < 9; e++) {
+        const int c = e / 3, r = e % 3;
+        const double difference = block[c * stride + r] - mirror[r * mirror_stride + c];
+        symmetric &=
+            difference * difference <= SYMMETRY * SYMMETRY * s->diagonal[3 * i + r] * s->diagonal[3 * j + c];
+    }
+    return symmetric;
+}
+
+/* Column by column, as the values lie: a mirror is never far from its block in a mesh that is numbered well. */
+static looks look_at(multifrontal *s)
+{
+    const drape_pattern *p = s->pattern;
+    looks seen = {
+        .finite = drape_all_finite(s->values, (size_t)p->nonzeros), .positive = true, .symmetric = true};
+    const int32_t *mirror = s->mirror;
+    if (seen.finite)
+        look_at_diagonal(s, &seen);
+    for (int32_t j = 0; seen.finite && seen.positive && j < p->block_count; j++)
+        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++)
+            seen.symmetric &= is_mirrored(s, j, k, *mirror++);
+    return seen;
 }
 
 /* The ratio of the extreme pivots bounds the condition from below. */
@@ -550,15 +577,6 @@ static bool factor_cholesky(multifrontal *s)
     return is_well_conditioned(s);
 }
 
-static bool is_symmetric(const multifrontal *s)
-{
-    bool symmetric = true;
-    for (int32_t column = 0; column < s->e.n; column++)
-        for (int32_t at = s->target_start[column]; at < s->target_start[column + 1]; at++)
-            symmetric &= is_mirrored(s, at, column);
-    return symmetric;
-}
-
 static drape_status factor_general(multifrontal *s, const double *values)
 {
     drape_status status = DRAPE_OK;
@@ -575,13 +593,13 @@ static drape_status factor_any(multifrontal *s, const double *values, bool defin
 {
     s->factored = s->by_general = false;
     s->values = values;
-    if (!drape_all_finite(values, (size_t)s->pattern->nonzeros))
+    const looks seen = look_at(s);
+    if (!seen.finite)
         return DRAPE_RETRY_LINEAR;
-    const bool positive = read_diagonal(s);
-    s->factored = positive && factor_cholesky(s);
+    s->factored = seen.positive && seen.symmetric && factor_cholesky(s);
     if (s->factored)
         return DRAPE_OK;
-    return definite && (!positive || is_symmetric(s)) ? DRAPE_RETRY_LINEAR : factor_general(s, values);
+    return definite && seen.symmetric ? DRAPE_RETRY_LINEAR : factor_general(s, values);
 }
 
 static drape_status factor(void *state, const double *values)
