@@ -3,7 +3,7 @@
  * normals at the middles of its edges (midedge.h), C the law of orthotropic.h.
  *
  * C = sum k l l', so E = 1/2 sum k (q - q0)^2 with q = l . K = sum c theta over nine hinges at most: each square is an
- * element, three a triangle and one less for each free edge. Where no triangle needs hinges beyond its own (grids) elements
+ * element, three a triangle and one less for each free edge. Where no triangle needs hinges beyond its own (lattices) elements
  * have 6 nodes, else 12; a hinge whose c is 0 is not there, and its nodes are the first again.
  *
  * A clamped edge has no second triangle but a direction in space: x3 = (x0 + x1)/2 + r, r at rest.
