@@ -282,7 +282,7 @@ START_TEST(grid_faults)
     assert_refused(&def, "/m: node 3 is at (1.5e+09, 0, 0) m; coordinates must be finite and within 1e+09 m");
     def.grid.type = "equilaterale";
     assert_refused(&def,
-                   "/m/grid: unknown grid \"equilaterale\"; known are equilateral, square; did you mean "
+                   "/m/grid: unknown grid \"equilaterale\"; known are equilateral, square, irregular; did you mean "
                    "\"equilateral\"?");
     def.grid.type = "hexagons";
     assert_refused(&def, "/m/grid: unknown grid \"hexagons\"; known are equilateral, square");
