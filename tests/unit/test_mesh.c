@@ -285,7 +285,7 @@ START_TEST(grid_faults)
                    "/m/grid: unknown grid \"equilaterale\"; known are equilateral, square, irregular; did you mean "
                    "\"equilateral\"?");
     def.grid.type = "hexagons";
-    assert_refused(&def, "/m/grid: unknown grid \"hexagons\"; known are equilateral, square");
+    assert_refused(&def, "/m/grid: unknown grid \"hexagons\"; known are equilateral, square, irregular");
     def = square(s, 1, 2, "parallel", "vertical");
     assert_refused(&def, "/m/columns: 1 is not allowed; columns is an integer in [2, 134217728]");
     def = square(s, 20000, 20000, "parallel", "vertical");
