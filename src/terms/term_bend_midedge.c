@@ -48,7 +48,7 @@ static const char *const rest_choices[] = {"mesh", "flat", NULL};
 
 /* As a list the direction is one entry; among the values it takes three. */
 static const drape_param params[LIST_COUNT] = {
-    DRAPE_ORTHOTROPIC_PARAMS("N m", "E h^3/12 of the material", "twist",
+    DRAPE_ORTHOTROPIC_PARAMS("N m", "of the material: its fabric, or E h^3/12", "twist",
                              "torsional rigidity: a twist of curvature K12 takes 2 twist K12^2 per area"),
     [LIST_REST] = {.name = "rest",
                    .kind = DRAPE_PARAM_CHOICE,
@@ -232,13 +232,24 @@ static double rest_measure(const drape_cloth_view *cloth, const int32_t *node, c
     return q;
 }
 
-static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+/* What the scene leaves to the material: of a measured fabric, or of an isotropic sheet. */
+static void law_of(const drape_material *m, const double *given, double law[9])
 {
-    const drape_material *m = &cloth->material;
-    const double *bend = values + PARAM_CURVATURE;
-    double law[9];
+    double values[DRAPE_ORTHOTROPIC_COUNT];
+    const double measured[3] = {m->bending_warp, m->bending_weft, m->bending_twist};
+    memcpy(values, given, sizeof values);
+    for (int k = 0; k < 3; k++)
+        if (isnan(values[k]))
+            values[k] = measured[k];
     drape_orthotropic_law(values, m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio),
                           m->poisson_ratio, law);
+}
+
+static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+{
+    const double *bend = values + PARAM_CURVATURE;
+    double law[9];
+    law_of(&cloth->material, values, law);
     drape_status status = announce(cloth, values, law, builder);
     int32_t element = 0;
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {

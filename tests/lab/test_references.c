@@ -71,6 +71,7 @@ START_TEST(quick_references_pass)
     check("pendulum", 1, DRAPE_OUTCOME_PASS);
     check("free_fall", 0, DRAPE_OUTCOME_PASS);
     check("oscillator", 1, DRAPE_OUTCOME_PASS);
+    check("fabric", 2, DRAPE_OUTCOME_PASS);
 }
 END_TEST
 
