@@ -59,6 +59,7 @@ typedef struct drape_material {
     double areal_density;      /* [kg/m2]; total mass over area where the mass is uniform */
     double membrane_stiffness; /* E h [N/m] */
     double flexural_rigidity;  /* D = E h^3 / (12 (1 - nu^2)) [N m] */
+    double bending_warp, bending_weft, bending_twist; /* of a measured fabric [N m]; NaN: it is none */
 } drape_material;
 
 /* One cloth at rest. Node numbers are local to the cloth. All arrays are const and live as long as the model
@@ -72,11 +73,13 @@ typedef struct drape_cloth_view {
     const int32_t *edge_triangle; /* (edge_count x 2) triangles beside the edge; second -1 on the boundary */
     const double *edge_length;    /* (edge_count) [m] */
     const int32_t *hinge; /* (hinge_count x 4) x0 x1 the shared edge, x2 x3 the apices of its two triangles */
-    const int32_t *hinge_edge; /* (hinge_count) */
-    const double *node_area;   /* (node_count) lumped, a third of each triangle [m2] */
-    const double *node_mass;   /* (node_count) lumped [kg] */
-    int32_t rows, columns;     /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
-    bool rectangular;          /* a grid whose cells are rectangles before its transform */
+    const int32_t *hinge_edge;    /* (hinge_count) */
+    const int32_t *triangle_edge; /* (triangle_count x 3) the edge from corner k to corner k + 1 */
+    const uint8_t *edge_clamped;  /* (edge_count) 1: a pin keeps the direction of the sheet across it */
+    const double *node_area;      /* (node_count) lumped, a third of each triangle [m2] */
+    const double *node_mass;      /* (node_count) lumped [kg] */
+    int32_t rows, columns;        /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
+    bool rectangular;             /* a grid whose cells are rectangles before its transform */
     drape_material material;
     double gravity[3]; /* [m/s2] */
 } drape_cloth_view;
@@ -89,6 +92,14 @@ typedef struct drape_term_builder drape_term_builder;
  * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count);
 
+/* The same for elements of fewer nodes than the row's, on this cloth. A node may stand in several places of an element,
+ * as its first does in places that are left over: its derivatives are the sum of theirs. */
+DRAPE_API drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t element_count, int nodes,
+                                                int rest_count);
+
+/* Says that elements of this cloth hold on to directions in space: their forces have a torque. */
+DRAPE_API void drape_term_anchor(drape_term_builder *builder);
+
 /* Sets element `element`: its nodes (local to the cloth) and its rest data. Measures keep k [J/q2] in rest[0]
  * and q0 in rest[1]; rows that are damped keep c >= 0 [J s/q2] in rest[2]. */
 DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes,
@@ -99,7 +110,7 @@ DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, cons
 DRAPE_API drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
     DRAPE_PRINTF(2, 3);
 
-#define DRAPE_MAX_ELEMENT_NODES 4
+#define DRAPE_MAX_ELEMENT_NODES 12
 #define DRAPE_MAX_ELEMENT_DOFS  (3 * DRAPE_MAX_ELEMENT_NODES)
 
 /* The elements of one term on one cloth, const after compile. */
@@ -123,6 +134,7 @@ typedef struct drape_fault {
 /* ---- The ops table of a term ---- */
 
 #define DRAPE_PAIR_BLOCK 32
+#define DRAPE_LANES      4
 
 /*
  * A row. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first + count
@@ -141,11 +153,13 @@ typedef struct drape_term_ops {
     const char *element_name;  /* "edge", "hinge", "node": for messages */
     int nodes;                 /* nodes an element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
     bool linear;               /* energy: its Hessian is zero and takes no sparsity */
-    bool potential_of_gravity; /* energy: counts as gravity, not as elastic */
+    bool potential_of_gravity; /* energy: a force from outside, counts as gravity, not as elastic */
     bool convex;               /* measure: its Hessian ddq is positive semidefinite, as of a length */
-    bool has_internal;         /* one internal variable an element */
+    bool has_internal;         /* internal variables in each element */
+    int internal_count;        /* of an element, one after another; 0: one */
     bool constraint; /* an energy that keeps a limit: integrators that move nodes to keep limits do without */
     bool damped;     /* measure: a dashpot of its own in each element, force c q' on q */
+    bool distance;   /* measure: q is the distance of its two nodes, of all elements */
 
     /* Adds the elements of one cloth. Called once a cloth. Errors: what the builder returned. */
     drape_status (*build)(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder);
@@ -154,11 +168,17 @@ typedef struct drape_term_ops {
     void (*measure)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                     const double *internal, double *q, double *dq, double *ddq);
 
-    /* Optional, beside measure, where nodes is 2 and q depends on the distance of the nodes alone: the same for
-     * forces without derivatives, which take half of the numbers. q (count), d (3 x count: all x, all y, all z)
-     * = x1 - x0 [m], c (count) with dq = (-c d, c d). count is at most DRAPE_PAIR_BLOCK. */
+    /* Optional, beside measure, where nodes is 2 and q is a linear function of the distance of the nodes: the
+     * same with a tenth of the numbers. q (count), d (3 x count: all x, all y, all z) = x1 - x0 [m], c (count) with
+     * dq = (-c d, c d), so that ddq = (P -P; -P P), P = c (I - d d'/d.d). count is at most DRAPE_PAIR_BLOCK. */
     void (*pair)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,
                  double *d, double *c);
+
+    /* Optional, beside measure: the same for the DRAPE_LANES elements of a list at once; the same one may stand
+     * in several places. Item i of the element in place l is at [DRAPE_LANES i + l]: q (1), dq (d), ddq (d x d), of
+     * which only the 3 x 3 blocks on and below the diagonal are written. */
+    void (*lanes)(const drape_elements *el, const int32_t *element, const double *x, const double *internal,
+                  double *q, double *dq, double *ddq);
 
     /* e [J] (count), g [N] (count x d), hess [N/m] (count x d x d, symmetric). */
     void (*energy)(const drape_elements *el, int32_t first, int32_t count, const double *x,
@@ -168,11 +188,12 @@ typedef struct drape_term_ops {
     void (*dissipation)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                         const double *v, double *g, double *dg_dx, double *dg_dv);
 
-    /* For one element with stiffness k [J], strain = q - q0 and rate = q' [q/s]: the generalised force [J/q]
-     * on q, its derivative by strain and by rate, and the energy [J] if it has one, else 0. dissipative: the
-     * force takes work, without an energy. */
-    void (*law)(const double *params, double k, double strain, double rate, double *force,
-                double *dforce_dstrain, double *dforce_drate, double *energy);
+    /* For count elements with stiffness k [J], strain = q - q0 and rate = q' [q/s]: adds the generalised force
+     * [J/q] on q, its derivatives by strain and by rate, and the energy [J] if it has one. All are (count).
+     * dissipative: the force takes work, without an energy. */
+    void (*law)(const double *params, int32_t count, const double *k, const double *strain,
+                const double *rate, double *force, double *dforce_dstrain, double *dforce_drate,
+                double *energy);
     bool dissipative;
 
     /* The internal variable of elements after a step was accepted: from those before and the new positions.
@@ -204,6 +225,13 @@ typedef void drape_element_energy(const drape_elements *el, int32_t element, con
                                   double *g, double *hess);
 DRAPE_API void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                   double *e, double *g, double *hess, drape_element_energy *one);
+
+/* Makes the function measure of a row out of its lanes, for a range of any count. */
+typedef void drape_measure_lanes(const drape_elements *el, const int32_t *element, const double *x,
+                                 const double *internal, double *q, double *dq, double *ddq);
+DRAPE_API void drape_measure_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                                   const double *internal, double *q, double *dq, double *ddq,
+                                   drape_measure_lanes *lanes);
 
 /* For rows with pair: d (3 x count) and the distance l (count) of the two nodes of each element. */
 DRAPE_API void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count, const double *x,

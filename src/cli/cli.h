@@ -24,18 +24,27 @@ enum {
 typedef enum cli_kind {
     CLI_FLAG,   /* a bool */
     CLI_TEXT,   /* a const char *, not empty */
+    CLI_TEXTS,  /* a cli_texts: the option may be repeated */
     CLI_NUMBER, /* an int from 1 to max */
+    CLI_REAL,   /* a double above 0 */
     CLI_VALUE,  /* of the scene, at pointer */
     CLI_LIST,   /* of the scene, at pointer: words between commas */
     CLI_SET     /* of the scene, "/pointer=value" */
 } cli_kind;
+
+#define CLI_MAX_TEXTS 16
+
+typedef struct cli_texts {
+    const char *items[CLI_MAX_TEXTS];
+    size_t count;
+} cli_texts;
 
 typedef struct cli_option {
     const char *name; /* without the dashes */
     cli_kind kind;
     const char *argument; /* "DIR" in the help; NULL: a flag */
     const char *help;
-    size_t offset;       /* FLAG, TEXT, NUMBER: in the verb's request */
+    size_t offset;       /* FLAG, TEXT, TEXTS, NUMBER, REAL: in the verb's request */
     int max;             /* NUMBER */
     const char *pointer; /* VALUE, LIST */
 } cli_option;
@@ -50,6 +59,8 @@ typedef struct cli_setting {
 typedef struct cli_command {
     const char *verb;
     const char *operand; /* NULL: none, where it may be left out */
+    char **operands;     /* (operand_count) the first of them is operand */
+    int operand_count;
     cli_setting *settings;
     size_t setting_count;
     int threads; /* 0: not said */
@@ -59,6 +70,7 @@ typedef struct drape_verb {
     const char *name;
     const char *operand; /* "SCENE" in the help */
     bool operand_optional;
+    int operands_most;   /* 0: one */
     bool takes_scene;    /* the options that change a scene */
     const char *summary; /* a line in the list of verbs */
     const char *details; /* lines of its help */
@@ -95,5 +107,8 @@ typedef struct cli_scene {
  * file. CLI_GO_ON, or CLI_BAD_INPUT after the fault was printed. cli_scene_free in any case. */
 int cli_scene_load(const cli_command *command, cli_scene *out);
 void cli_scene_free(cli_scene *scene);
+
+/* The same of a file that is not the operand, or in a folder that drape run wrote. */
+int cli_scene_load_from(const cli_command *command, const char *path, cli_scene *out);
 
 #endif

@@ -1,10 +1,12 @@
 /* cmd_run.c: `drape run`: simulates a scene; frames, step log and summary into a folder. */
 #include "cli/cli.h"
 #include "cli/progress.h"
+#include "cli/realtime.h"
 #include "cli/signals.h"
 
 #include "base/clock.h"
 #include "io/recorder.h"
+#include "io/scene_copy.h"
 #include "io/summary.h"
 
 #include <errno.h>
@@ -17,6 +19,7 @@
 typedef struct run_request {
     cli_command command;
     const char *out, *summary;
+    bool realtime;
 } run_request;
 
 typedef struct run {
@@ -25,7 +28,8 @@ typedef struct run {
     drape_recorder *recorder; /* NULL without --out */
     char *summary_path;       /* in the folder of --out; NULL without it */
     cli_progress progress;
-    double start; /* [s] of the clock */
+    cli_realtime realtime; /* of --realtime */
+    double start;          /* [s] of the clock */
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
 } run;
@@ -50,6 +54,15 @@ static void remove_old_summary(const char *path)
         remove(path); /* if it stays, it is replaced at the end, or that failure is told */
 }
 
+/* Where the scene lies in the folder already, under that name, it is not written over. */
+static drape_status keep_scene(const run *r)
+{
+    const char *path = r->request->command.operand, *folder = r->request->out;
+    return drape_scene_copy_is(path, folder)
+               ? DRAPE_OK
+               : drape_scene_copy(r->in.ctx, r->in.scene, r->in.model, path, folder);
+}
+
 static drape_status begin_output(run *r)
 {
     const drape_model *model = r->in.model;
@@ -65,9 +78,10 @@ static drape_status begin_output(run *r)
                                     .formats = (const char *const *)model->formats,
                                     .format_count = model->format_count};
     drape_status status = drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder);
-    if (!status)
-        remove_old_summary(r->summary_path);
-    return status;
+    if (status)
+        return status;
+    remove_old_summary(r->summary_path);
+    return keep_scene(r);
 }
 
 static void write_summary(run *r, const char *path)
@@ -78,7 +92,8 @@ static void write_summary(run *r, const char *path)
                                    .message = r->message,
                                    .frames = drape_recorder_frames(r->recorder),
                                    .wall_total = drape_clock_seconds() - r->start,
-                                   .wall_output = drape_recorder_seconds(r->recorder)};
+                                   .wall_output = drape_recorder_seconds(r->recorder),
+                                   .realtime = r->request->realtime ? &r->realtime.result : NULL};
     note(r, drape_summary_write(r->in.ctx, r->in.sim, &def, path));
 }
 
@@ -156,8 +171,10 @@ static void print_results(const run *r)
                (long long)s.unstable_modes);
     print_energy(r);
     print_wall(r, &s);
+    if (r->request->realtime)
+        cli_realtime_print(&r->realtime);
     if (r->recorder)
-        printf("output    %lld frames, steps.csv, energy.csv and summary.json in %s\n",
+        printf("output    %lld frames, steps.csv, energy.csv, summary.json and scene.json in %s\n",
                (long long)drape_recorder_frames(r->recorder), r->request->out);
 }
 
@@ -187,7 +204,8 @@ static void simulate(run *r)
         note(r, drape_sim_observe(r->in.sim, watch, r));
     if (!r->status) {
         cli_progress_begin(&r->progress, end);
-        note(r, drape_sim_advance(r->in.sim, end));
+        note(r, r->request->realtime ? cli_realtime_run(&r->realtime, &r->in)
+                                     : drape_sim_advance(r->in.sim, end));
         cli_progress_clear(&r->progress);
     }
     if (r->recorder)
@@ -207,15 +225,32 @@ static int conclude(const run *r)
     return r->status == DRAPE_E_STOPPED ? CLI_INTERRUPTED : CLI_FAILED;
 }
 
+/* The folder of a run has the scene as it was run; one that was changed on the way would take the place of the
+ * user's own. */
+static int check_folder(const run_request *request)
+{
+    const cli_command *command = &request->command;
+    if (!request->out || command->setting_count == 0 || !drape_scene_copy_is(command->operand, request->out))
+        return CLI_GO_ON;
+    return cli_misuse(command->verb,
+                      "--out \"%.500s\": its " DRAPE_SCENE_COPY
+                      " is the scene itself, and the scene as it is "
+                      "changed here would be written over it; choose another folder",
+                      request->out);
+}
+
 static int load_and_run(const run_request *request)
 {
     run r = {.request = request, .start = drape_clock_seconds()};
     int code = cli_scene_load(&request->command, &r.in);
+    if (code == CLI_GO_ON)
+        code = check_folder(request);
     if (code == CLI_GO_ON) {
         simulate(&r);
         code = conclude(&r);
         drape_recorder_destroy(&r.recorder);
         drape_free(r.in.ctx, r.summary_path);
+        cli_realtime_free(&r.realtime);
     }
     cli_scene_free(&r.in);
     return code;
@@ -223,9 +258,11 @@ static int load_and_run(const run_request *request)
 
 static const cli_option options[] = {
     {"out", CLI_TEXT, "DIR",
-     "folder for frames, steps.csv, energy.csv and summary.json; made if it is not there",
+     "folder for frames, steps.csv, energy.csv, summary.json and scene.json; made if it is not there",
      offsetof(run_request, out), 0, NULL},
     {"summary", CLI_TEXT, "FILE", "write the summary there, too", offsetof(run_request, summary), 0, NULL},
+    {"realtime", CLI_FLAG, NULL, "frames of 1/frame_rate with that time as budget; tells how long they took",
+     offsetof(run_request, realtime), 0, NULL},
 };
 
 static int main_run(int argc, char **argv);

@@ -290,6 +290,7 @@ json_t *cli_info_json(const cli_info *info)
     object = with(object, "frame_rate", number(model->frame_rate));
     object = with(object, "frames", count(info->frames));
     object = with(object, "formats", formats(model));
+    object = with(object, "up", json_string(model->z_up ? "z" : "y"));
     object = with(object, "gravity", vector(model->gravity));
     object = with(object, "nodes", count(model->node_count));
     object = with(object, "dofs", count(model->pattern.n));

@@ -19,7 +19,7 @@ static void print_scene(const cli_info *info)
     printf("formats    ");
     for (size_t i = 0; i < m->format_count; i++)
         printf(" %s", m->formats[i]);
-    printf("%s\n", m->format_count ? "" : " none");
+    printf("%s\n", m->format_count ? m->z_up ? ", z up" : "" : " none");
     printf("gravity     %.9g %.9g %.9g m/s2\n", m->gravity[0], m->gravity[1], m->gravity[2]);
     printf("nodes       %d, %d of them free\n", (int)m->node_count, (int)m->free_count);
     printf("unknowns    %lld degrees of freedom, %lld nonzeros in their Jacobian\n", (long long)m->pattern.n,

@@ -119,6 +119,25 @@ static int take_text(cli_command *command, const cli_option *option, const char 
     return CLI_GO_ON;
 }
 
+static int take_texts(cli_command *command, const cli_option *option, const char *argument)
+{
+    cli_texts *texts = (cli_texts *)(void *)((char *)command + option->offset);
+    if (texts->count == CLI_MAX_TEXTS)
+        return cli_misuse(command->verb, "--%s is given more than %d times", option->name, CLI_MAX_TEXTS);
+    texts->items[texts->count++] = argument;
+    return CLI_GO_ON;
+}
+
+static int take_real(cli_command *command, const cli_option *option, const char *argument)
+{
+    char *end;
+    double number = strtod(argument, &end);
+    if (end == argument || *end || !(number > 0 && number < 1e300))
+        return cli_misuse(command->verb, "--%s \"%.60s\": it is a number above 0", option->name, argument);
+    memcpy((char *)command + option->offset, &number, sizeof number);
+    return CLI_GO_ON;
+}
+
 static int take_number(cli_command *command, const cli_option *option, const char *argument)
 {
     char *end;
@@ -171,8 +190,8 @@ static int take_list(cli_command *command, const cli_option *option, const char 
 static int take(cli_command *command, const cli_option *option, const char *argument)
 {
     static int (*const takers[])(cli_command *, const cli_option *, const char *) = {
-        [CLI_FLAG] = take_flag,   [CLI_TEXT] = take_text, [CLI_NUMBER] = take_number,
-        [CLI_VALUE] = take_value, [CLI_LIST] = take_list, [CLI_SET] = take_set,
+        [CLI_FLAG] = take_flag, [CLI_TEXT] = take_text, [CLI_NUMBER] = take_number, [CLI_VALUE] = take_value,
+        [CLI_LIST] = take_list, [CLI_SET] = take_set,   [CLI_TEXTS] = take_texts,   [CLI_REAL] = take_real,
     };
     return takers[option->kind](command, option, argument);
 }
@@ -212,14 +231,18 @@ static int handle(const drape_verb *verb, const option_list *list, int code, cha
 
 static int take_operand(const drape_verb *verb, int argc, char **argv, cli_command *request)
 {
-    int count = argc - optind;
-    if (count > 1)
+    int count = argc - optind, most = verb->operands_most ? verb->operands_most : 1;
+    if (count > most && most > 1)
+        return cli_misuse(verb->name, "at most %d operands are taken, %d are given", most, count);
+    if (count > most)
         return cli_misuse(verb->name, "one %s is taken, %d are given: \"%.60s\", \"%.60s\"%s", verb->operand,
                           count, argv[optind], argv[optind + 1], count > 2 ? " ..." : "");
     if (count < 1 && !verb->operand_optional)
         return cli_misuse(verb->name, "%s is missing; `drape %s --help` shows all", verb->operand,
                           verb->name);
     request->operand = count ? argv[optind] : NULL;
+    request->operands = argv + optind;
+    request->operand_count = count;
     return CLI_GO_ON;
 }
 

@@ -54,22 +54,53 @@ void cli_progress_begin(cli_progress *p, double end)
     cli_progress_show(p, 0, 0);
 }
 
-void cli_progress_show(cli_progress *p, double time, int64_t rejected)
+static void fill_bar(double share, char bar[BAR + 1])
 {
-    double now = p->on ? drape_clock_seconds() : 0;
-    if (!p->on || now - p->shown < PERIOD)
-        return;
-    p->shown = now;
-    char bar[BAR + 1], eta[24], line[256];
-    double share = time / p->end, wall = now - p->start;
     int full = (int)(share * BAR);
     memset(bar, '.', BAR);
     memset(bar, '#', (size_t)(full < 0 ? 0 : full > BAR ? BAR : full));
     bar[BAR] = 0;
+}
+
+/* At most ten times a second. */
+static bool is_due(cli_progress *p, double *now)
+{
+    *now = p->on ? drape_clock_seconds() : 0;
+    if (!p->on || *now - p->shown < PERIOD)
+        return false;
+    p->shown = *now;
+    return true;
+}
+
+void cli_progress_show(cli_progress *p, double time, int64_t rejected)
+{
+    char bar[BAR + 1], eta[24], line[256];
+    double now;
+    if (!is_due(p, &now))
+        return;
+    double share = time / p->end, wall = now - p->start;
+    fill_bar(share, bar);
     time_text(time > 0 ? wall * (p->end - time) / time : INFINITY, eta, sizeof eta);
     snprintf(line, sizeof line, "[%s] %3.0f %%  %.4g of %.4g s  %.3gx real time  ETA %s  %lld rejected", bar,
              100 * share, time, p->end, wall > 0 ? time / wall : 0.0, eta, (long long)rejected);
     draw(p, line);
+}
+
+void cli_progress_count(cli_progress *p, int64_t done, int64_t total, double seconds_left)
+{
+    char bar[BAR + 1], eta[24], line[256];
+    double now, share = total > 0 ? (double)done / (double)total : 0;
+    if (total > 0 && !is_due(p, &now))
+        return;
+    fill_bar(share, bar);
+    time_text(isnan(seconds_left) ? INFINITY : seconds_left, eta, sizeof eta);
+    if (total > 0)
+        snprintf(line, sizeof line, "[%s] %3.0f %%  %lld of %lld cases  ETA %s", bar, 100 * share,
+                 (long long)done, (long long)total, eta);
+    else
+        snprintf(line, sizeof line, "[%s] the reference", bar);
+    if (p->on)
+        draw(p, line);
 }
 
 void cli_progress_clear(cli_progress *p)

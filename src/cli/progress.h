@@ -15,6 +15,8 @@ typedef struct cli_progress {
 void cli_progress_begin(cli_progress *progress, double end);
 void cli_progress_show(cli_progress *progress, double time,
                        int64_t rejected); /* at most ten times a second */
+/* Cases of a sweep; total 0: what they are compared with is made. */
+void cli_progress_count(cli_progress *progress, int64_t done, int64_t total, double seconds_left);
 void cli_progress_clear(cli_progress *progress);
 
 #endif

@@ -57,6 +57,15 @@ static drape_status copy_formats(drape_model *model, const drape_scene_def *def)
     return DRAPE_OK;
 }
 
+static drape_status take_up(drape_model *model, const char *up)
+{
+    model->z_up = up && strcmp(up, "z") == 0;
+    if (!up || model->z_up || strcmp(up, "y") == 0)
+        return DRAPE_OK;
+    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/output/up", "\"%.60s\" is not allowed; one of: y, z",
+                         up);
+}
+
 static drape_status check_number(drape_context *ctx, const char *pointer, double value, double max)
 {
     if (value > 0 && value <= max)
@@ -90,6 +99,8 @@ static drape_status copy_scene(drape_model *model, const drape_scene_def *def)
         status = drape_compile_choice(model, &def->integrator, "be", &model->integrator);
     if (!status)
         status = drape_compile_choice(model, &def->controller, "halving", &model->controller);
+    if (!status)
+        status = take_up(model, def->up);
     return status ? status : copy_formats(model, def);
 }
 

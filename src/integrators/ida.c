@@ -324,7 +324,8 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
         status = create_vectors(s);
     if (!status && s->n > 0)
         status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
-                                         drape_system_pattern(s->system), &s->linear);
+                                         drape_system_pattern(s->system), drape_system_threads(s->system),
+                                         &s->linear);
     if (!status && s->n > 0) {
         s->linear->owner = s;
         s->linear->solver->ops->solve = solve_reduced;
@@ -587,7 +588,7 @@ static drape_work work(const void *state)
     drape_work work = s->work;
     if (s->linear) {
         work.factorizations = s->linear->factorizations;
-        work.linear_iterations = s->linear->solves;
+        work.linear_iterations = s->linear->iterations;
         work.factor_seconds = s->linear->factor_seconds;
         work.solve_seconds = s->linear->solve_seconds;
     }

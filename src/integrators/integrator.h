@@ -70,6 +70,12 @@ typedef struct drape_integrator_ops {
     /* Positions (node_count x 3) at a time within the last step. NULL: cubic Hermite between the states
      * serves. */
     void (*interpolate)(void *state, double t, double *x);
+    /* F of the free DOFs (3 free_count [N]) where the solver of the last step left it. NULL: it solves for none. */
+    const double *(*residual)(const void *state);
+    /* How hard a step tries, for a mode that must keep a deadline: 0, as the parameters say, to efforts - 1, the
+     * cheapest. NULL: there is one effort. */
+    int efforts;
+    void (*set_effort)(void *state, int effort);
     drape_work (*work)(const void *state);
     size_t (*bytes)(const void *state);
     void (*destroy)(void **state);

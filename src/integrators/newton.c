@@ -34,6 +34,8 @@ static const char *const predictor_choices[] = {"inertial", "rest", NULL};
 #define WORK_SHARE        0.5 /* of the work along a correction: so much may be left on the far side */
 #define MOST_TRIALS       8   /* of the line search, by bisection */
 #define SHORT_STEP        0.5
+#define LEAST_SHARE       1e-3 /* of the positive part, that an indefinite matrix is given */
+#define MORE_SHARE        4    /* times as much is tried next */
 #define MAX_BETA_FAILURES 1000 /* the line search may fail its curvature condition as often as it likes */
 
 const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {
@@ -89,7 +91,7 @@ const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {
          .choices = global_choices,
          .help = "none: full Newton steps, failures go to the controller; line_search: steps shortened "
                  "until the residual falls; work: until its work along them does, with positive matrices "
-                 "after short ones; auto: work in scenes with contact, else none"},
+                 "after short ones and where the exact one is not definite; auto: work"},
     [DRAPE_NEWTON_PREDICTOR] = {.name = "predictor",
                                 .kind = DRAPE_PARAM_CHOICE,
                                 .unit = "1",
@@ -108,6 +110,15 @@ const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {
                                     .default_value = 0,
                                     .choices = drape_linears_words,
                                     .help = "a row of the linear solvers"},
+    [DRAPE_NEWTON_LINEAR_TOLERANCE] = {.name = "linear_tolerance",
+                                       .unit = "1",
+                                       .default_value = 1e-3,
+                                       .min = 1e-14,
+                                       .max = 1,
+                                       .open_max = true,
+                                       .help =
+                                           "share of the residual that iterative linear solvers leave in a "
+                                           "correction"},
 };
 
 struct drape_newton {
@@ -129,7 +140,8 @@ struct drape_newton {
     bool searched;               /* there is trial: the line search ended on it */
     bool nonfinite;              /* a residual was */
     drape_status fitted;         /* of the last change of the pattern: < 0 ends the solve */
-    bool positive;               /* matrices are the positive parts: the last step was short */
+    double positive;             /* share of the positive parts in matrices: 1 after a short step, else 0 */
+    double enough;               /* the share that made the last indefinite matrix definite */
     double factored_mass_weight; /* of the factors that modified Newton may keep; 0: none */
     drape_work work;
 };
@@ -200,7 +212,7 @@ static drape_status assemble(drape_newton *s, const double *d)
     if (status)
         return status;
     drape_system_jacobian(s->system, &s->point, s->problem->mass_weight,
-                          s->positive || s->values[DRAPE_NEWTON_PROJECT] != 0, s->linear->values);
+                          s->values[DRAPE_NEWTON_PROJECT] != 0 ? 1 : s->positive, s->linear->values);
     s->factored_mass_weight = s->problem->mass_weight;
     s->work.jacobians++;
     s->work.jacobian_seconds += drape_clock_seconds() - start;
@@ -223,9 +235,9 @@ static double free_share(drape_newton *s, const double *x, const double *step)
     return drape_system_way(s->system, x, s->ahead, s->problem->t);
 }
 
-static void shorten(double *p, double share, int64_t n)
+static void scale(double *p, double share, int64_t n)
 {
-    for (int64_t i = 0; share < 1 && i < n; i++)
+    for (int64_t i = 0; share != 1 && i < n; i++)
         p[i] *= share;
 }
 
@@ -240,55 +252,69 @@ static double dot(const double *a, const double *b, int64_t n)
 /* The share a of a correction p that is taken: the work of the residual along it, F(d + a p) . p, is not to be
  * above a share of what it was at a = 0, with the sign that says that the minimum of the energy was passed. The line
  * search of Matthies & Strang 1979: it needs no energy, so it holds for friction and damping too. start:
- * F(d) . p < 0. */
+ * F(d) . p < 0. The positive part of an indefinite matrix is too stiff by far along what is unstable: its corrections
+ * are lengthened until they are enough, else a sheet that buckles takes a hundred of them. */
 static double search_along(drape_newton *s, const double *p, double start)
 {
     const double *d = N_VGetArrayPointer(s->unknown);
+    const bool lengthens = s->positive > 0 && !s->ahead;
     double low = 0, high = INFINITY, a = 1;
     for (int k = 0; k < MOST_TRIALS; k++) {
         for (int64_t i = 0; i < s->n; i++)
             s->trial[i] = d[i] + a * p[i];
         s->searched = evaluate(s, s->trial);
         double work = s->searched ? dot(s->f, p, s->n) : INFINITY;
-        if (fabs(work) <= -WORK_SHARE * start || (work < 0 && a == 1))
+        if (fabs(work) <= -WORK_SHARE * start || (work < 0 && a == 1 && !lengthens))
             return a;
         if (work < 0)
             low = a;
         else
             high = a;
-        a = (low + high) / 2;
+        a = isinf(high) ? 2 * a : (low + high) / 2;
     }
     return low > 0 ? low : a;
 }
 
-/* The positive part of the matrix at the present iterate, factored. */
-static drape_status factor_positive(drape_newton *s)
+/* The matrix at the present iterate with this share of its positive part, factored. A share below 1 may be refused. */
+static drape_status factor_shared(drape_newton *s, double share)
 {
-    s->positive = true;
+    s->positive = share;
     drape_status status = assemble(s, N_VGetArrayPointer(s->unknown));
-    return status ? status : drape_sun_linear_factor(s->linear);
+    if (status)
+        return status;
+    s->linear->definite = share < 1;
+    status = drape_sun_linear_factor(s->linear);
+    s->linear->definite = false;
+    return status;
 }
 
-/* A matrix that is not definite leads nowhere good; its positive part does, and takes no LU factors. */
+/* A matrix that is not definite leads nowhere good. Its positive part does, if slowly: what lies between is closer
+ * to Newton's the less it has of it. The share that was enough the last time is tried first, half as much. */
 static int factor_or_repair(SUNLinearSolver solver, SUNMatrix matrix)
 {
     (void)matrix;
     drape_sun_linear *linear = solver->content;
     drape_newton *s = linear->owner;
-    linear->definite = !s->positive;
+    linear->definite = s->positive == 0;
     drape_status status = drape_sun_linear_factor(linear);
     bool refused = status == DRAPE_RETRY_LINEAR && linear->definite;
     linear->definite = false;
-    return refused ? factor_positive(s) : status;
+    if (!refused)
+        return status;
+    double share = fmax(s->enough / 2, LEAST_SHARE);
+    while ((status = factor_shared(s, share)) == DRAPE_RETRY_LINEAR && share < 1)
+        share = fmin(1, MORE_SHARE * share);
+    s->enough = share;
+    return status;
 }
 
 /* A correction that climbs is none: the matrix was indefinite. Its positive part gives one that descends. */
 static drape_status descend(drape_newton *s, N_Vector x, N_Vector b)
 {
     double *p = N_VGetArrayPointer(x), *minus_f = N_VGetArrayPointer(b);
-    if (dot(minus_f, p, s->n) > 0 || s->positive)
+    if (dot(minus_f, p, s->n) > 0 || s->positive == 1)
         return DRAPE_OK;
-    drape_status status = factor_positive(s);
+    drape_status status = factor_shared(s, 1);
     return status ? status : drape_sun_linear_solve(s->linear, minus_f, p);
 }
 
@@ -300,11 +326,11 @@ static drape_status globalize(drape_newton *s, N_Vector x, N_Vector b)
     if (status || !drape_all_finite(p, (size_t)s->n))
         return status;
     if (s->ahead)
-        shorten(p, free_share(s, s->x, p), s->n);
+        scale(p, free_share(s, s->x, p), s->n);
     double start = s->trial ? -dot(N_VGetArrayPointer(b), p, s->n) : 0;
     if (start < 0) {
         double a = search_along(s, p, start);
-        shorten(p, a, s->n);
+        scale(p, a, s->n);
         s->positive = a < SHORT_STEP;
     }
     return DRAPE_OK;
@@ -381,9 +407,10 @@ drape_status drape_newton_create(drape_context *ctx, drape_system *system, const
     s->system = system;
     s->model = drape_system_model(system);
     s->n = 3 * (int64_t)s->model->free_count;
+    s->enough = 1;
     memcpy(s->values, values, sizeof s->values);
     if (s->values[DRAPE_NEWTON_GLOBALIZATION] == GLOBAL_AUTO)
-        s->values[DRAPE_NEWTON_GLOBALIZATION] = drape_system_contact(system) ? GLOBAL_WORK : GLOBAL_NONE;
+        s->values[DRAPE_NEWTON_GLOBALIZATION] = GLOBAL_WORK;
     drape_status status = DRAPE_OK;
     if (drape_sundials_context(&s->sun) || !(s->kin = KINCreate(s->sun)))
         status = drape_fail_memory(ctx, sizeof(void *));
@@ -391,7 +418,10 @@ drape_status drape_newton_create(drape_context *ctx, drape_system *system, const
         status = create_vectors(s);
     if (!status && s->n > 0)
         status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
-                                         drape_system_pattern(system), &s->linear);
+                                         drape_system_pattern(system), drape_system_threads(s->system),
+                                         &s->linear);
+    if (!status && s->n > 0)
+        s->linear->tolerance = values[DRAPE_NEWTON_LINEAR_TOLERANCE];
     if (!status && s->n > 0 && (s->ahead || s->trial)) {
         s->linear->owner = s;
         s->linear->solver->ops->solve = solve_and_globalize;
@@ -498,7 +528,8 @@ static void begin(drape_newton *s, const drape_newton_problem *problem)
                              .span = {problem->span[0], problem->span[1]}};
     memcpy(s->x, problem->x_base, bytes);
     memcpy(s->v, problem->v_base, bytes);
-    s->nonfinite = s->positive = s->searched = false;
+    s->nonfinite = s->searched = false;
+    s->positive = 0;
     s->fitted = DRAPE_OK;
 }
 
@@ -558,6 +589,19 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     return s->nonfinite ? blame_element(s, status, info) : status;
 }
 
+/* A guess that no step may end in is worse than none: springs beyond their limit, say, pull with forces far above
+ * any that act. */
+static void improve_guess(drape_newton *s, double *d)
+{
+    const char *reason;
+    drape_worst worst;
+    if (s->ahead) /* from d = 0 */
+        scale(d, free_share(s, s->x, d), s->n);
+    place(s, d);
+    if (drape_system_check(s->system, s->x, s->problem->x_base, s->problem->internal, &reason, &worst))
+        memset(d, 0, (size_t)s->n * sizeof *d);
+}
+
 drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *problem, double *d,
                                 drape_step_info *info)
 {
@@ -571,8 +615,7 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *pro
     bool keep =
         s->values[DRAPE_NEWTON_METHOD] == METHOD_MODIFIED && s->factored_mass_weight == problem->mass_weight;
     KINSetNoInitSetup(s->kin, keep);
-    if (s->ahead) /* the guess, from d = 0 */
-        shorten(d, free_share(s, s->x, d), s->n);
+    improve_guess(s, d);
     N_VSetArrayPointer(d, s->unknown);
     int strategy = s->values[DRAPE_NEWTON_GLOBALIZATION] == GLOBAL_LINE_SEARCH ? KIN_LINESEARCH : KIN_NONE;
     drape_status status = status_of(KINSol(s->kin, s->unknown, strategy, s->ones, s->ones), &info->reason);
@@ -592,6 +635,11 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *pro
 const drape_point *drape_newton_point(const drape_newton *newton)
 {
     return &newton->point;
+}
+
+const double *drape_newton_residual(const drape_newton *newton)
+{
+    return newton->f;
 }
 
 const double *drape_newton_force(const drape_newton *newton)
@@ -614,7 +662,7 @@ drape_work drape_newton_work(const drape_newton *newton)
     drape_work work = newton->work;
     if (newton->linear) {
         work.factorizations = newton->linear->factorizations;
-        work.linear_iterations = newton->linear->solves;
+        work.linear_iterations = newton->linear->iterations;
         work.factor_seconds = newton->linear->factor_seconds;
         work.solve_seconds = newton->linear->solve_seconds;
     }

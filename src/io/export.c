@@ -7,6 +7,7 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/param.h"
@@ -42,6 +43,34 @@ drape_status drape_exporter_find(drape_context *ctx, const char *pointer, const 
     return unknown_format(ctx, pointer, name);
 }
 
+/* ---- One file ---- */
+
+drape_status drape_export_clean(drape_context *ctx, const char *folder, const char *name)
+{
+    struct stat info;
+    size_t size = strlen(folder) + strlen(name) + 2;
+    char *path = drape_alloc(ctx, size, 1);
+    drape_status status = DRAPE_OK;
+    if (!path)
+        return DRAPE_E_MEMORY;
+    snprintf(path, size, "%s/%s", folder, name);
+    if (lstat(path, &info) == 0 && S_ISREG(info.st_mode) && remove(path) != 0)
+        status = drape_file_fail(ctx, "remove the old frames", path, errno);
+    drape_free(ctx, path);
+    return status;
+}
+
+drape_status drape_export_begin(drape_context *ctx, const char *folder, const char *name, drape_file *file)
+{
+    drape_status status = drape_file_create(ctx, strlen(folder) + strlen(name) + 2, file);
+    if (status)
+        return status;
+    drape_file_name(file, "%s/%s", folder, name);
+    return drape_file_begin(file);
+}
+
+/* ---- A file a frame ---- */
+
 /* frame_, six digits or more, a dot, the ending; or that with ".part", which a killed run left. */
 static bool is_frame_file(const char *name, const char *ending)
 {
@@ -74,19 +103,18 @@ drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, con
     return status;
 }
 
-drape_status drape_frame_files_open(drape_context *ctx, const drape_model *model, const char *folder,
-                                    const char *ending, drape_frame_files *frames)
+drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *def, const char *ending,
+                                    drape_frame_files *frames)
 {
-    frames->model = model;
-    frames->folder = folder;
+    frames->model = def->model;
+    frames->folder = def->folder;
     frames->ending = ending;
-    return drape_file_create(ctx, strlen(folder) + NAME_ROOM, &frames->file);
+    return drape_file_create(ctx, strlen(def->folder) + NAME_ROOM, &frames->file);
 }
 
 drape_status drape_frame_files_begin(drape_frame_files *frames, int64_t frame)
 {
-    drape_file_name(&frames->file, "%s/" FRAME_WORD "%06" PRId64 ".%s", frames->folder, frame,
-                    frames->ending);
+    drape_file_name(&frames->file, "%s/" DRAPE_FRAME_NAME, frames->folder, frame, frames->ending);
     return drape_file_begin(&frames->file);
 }
 
@@ -98,4 +126,19 @@ drape_status drape_frame_files_end(drape_frame_files *frames)
 void drape_frame_files_close(drape_frame_files *frames)
 {
     drape_file_destroy(&frames->file);
+}
+
+/* ---- OBJ ---- */
+
+void drape_obj_put_nodes(drape_file *file, const double *x, int32_t count)
+{
+    for (int32_t i = 0; i < count; i++, x += 3)
+        drape_file_print(file, "v %.17g %.17g %.17g\n", x[0], x[1], x[2]);
+}
+
+void drape_obj_put_triangles(drape_file *file, const int32_t *triangle, int32_t count)
+{
+    for (int32_t i = 0; i < count; i++, triangle += 3)
+        drape_file_print(file, "f %" PRId32 " %" PRId32 " %" PRId32 "\n", triangle[0] + 1, triangle[1] + 1,
+                         triangle[2] + 1);
 }

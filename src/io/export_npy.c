@@ -9,11 +9,9 @@
 
 #include "io/export.h"
 
-#include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #define FILE_NAME   "positions.npy"
 #define HEADER_SIZE 128 /* the dict takes at most 92 bytes with counts of 19 and 10 digits */
@@ -39,32 +37,17 @@ static void make_header(int64_t frames, int32_t node_count, char header[HEADER_S
     header[HEADER_SIZE - 1] = '\n';
 }
 
-/* What is no regular file stays: frames are written through it. */
 static drape_status npy_clean(drape_context *ctx, const char *folder)
 {
-    struct stat info;
-    size_t size = strlen(folder) + sizeof "/" FILE_NAME;
-    char *path = drape_alloc(ctx, size, 1);
-    drape_status status = DRAPE_OK;
-    if (!path)
-        return DRAPE_E_MEMORY;
-    snprintf(path, size, "%s/" FILE_NAME, folder);
-    if (lstat(path, &info) == 0 && S_ISREG(info.st_mode) && remove(path) != 0)
-        status = drape_file_fail(ctx, "remove the old frames", path, errno);
-    drape_free(ctx, path);
-    return status;
+    return drape_export_clean(ctx, folder, FILE_NAME);
 }
 
-static drape_status npy_open(drape_context *ctx, const drape_model *model, const char *folder, void *state)
+static drape_status npy_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
     npy_state *npy = state;
     char header[HEADER_SIZE];
-    npy->node_count = drape_model_node_count(model);
-    drape_status status = drape_file_create(ctx, strlen(folder) + sizeof FILE_NAME, &npy->file);
-    if (status)
-        return status;
-    drape_file_name(&npy->file, "%s/" FILE_NAME, folder);
-    status = drape_file_begin(&npy->file);
+    npy->node_count = drape_model_node_count(def->model);
+    drape_status status = drape_export_begin(ctx, def->folder, FILE_NAME, &npy->file);
     if (status)
         return status;
     make_header(0, npy->node_count, header);
@@ -79,15 +62,12 @@ static drape_status write_count(npy_state *npy, int64_t frames)
     return drape_file_overwrite(&npy->file, 0, header, sizeof header);
 }
 
-static drape_status npy_write(drape_context *ctx, void *state, int64_t frame, double time,
-                              const double *positions)
+static drape_status npy_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
     npy_state *npy = state;
     off_t before = npy->file.kept;
     (void)ctx;
-    (void)frame;
-    (void)time;
-    drape_file_put_doubles(&npy->file, positions, 3 * (size_t)npy->node_count);
+    drape_file_put_doubles(&npy->file, frame->positions, 3 * (size_t)npy->node_count);
     drape_status status = drape_file_keep(&npy->file);
     if (status)
         return status;
@@ -113,6 +93,7 @@ const drape_exporter_ops drape_exporter_npy = {
     .summary = "positions.npy: one array, frames x nodes x 3, float64; valid after every frame",
     .reference = "NPY format version 1.0, numpy.lib.format",
     .state_size = sizeof(npy_state),
+    .y_up = true,
     .open = npy_open,
     .clean = npy_clean,
     .write = npy_write,

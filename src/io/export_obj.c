@@ -12,9 +12,9 @@ static drape_status obj_clean(drape_context *ctx, const char *folder)
     return drape_frame_files_clean(ctx, folder, "obj");
 }
 
-static drape_status obj_open(drape_context *ctx, const drape_model *model, const char *folder, void *state)
+static drape_status obj_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
-    return drape_frame_files_open(ctx, model, folder, "obj", state);
+    return drape_frame_files_open(ctx, def, "obj", state);
 }
 
 /* A name may hold anything; a line may not hold its end. */
@@ -29,28 +29,23 @@ static void put_object(drape_file *file, const char *name)
 static void put_cloth(drape_file *file, const drape_model *model, const drape_cloth_range *cloth,
                       const double *positions)
 {
-    const double *x = positions + 3 * (size_t)cloth->first_node;
-    const int32_t *node = drape_model_triangles(model) + 3 * (size_t)cloth->first_triangle;
     put_object(file, cloth->name);
-    for (int32_t i = 0; i < cloth->node_count; i++, x += 3)
-        drape_file_print(file, "v %.17g %.17g %.17g\n", x[0], x[1], x[2]);
-    for (int32_t i = 0; i < cloth->triangle_count; i++, node += 3)
-        drape_file_print(file, "f %" PRId32 " %" PRId32 " %" PRId32 "\n", node[0] + 1, node[1] + 1,
-                         node[2] + 1);
+    drape_obj_put_nodes(file, positions + 3 * (size_t)cloth->first_node, cloth->node_count);
+    drape_obj_put_triangles(file, drape_model_triangles(model) + 3 * (size_t)cloth->first_triangle,
+                            cloth->triangle_count);
 }
 
-static drape_status obj_write(drape_context *ctx, void *state, int64_t frame, double time,
-                              const double *positions)
+static drape_status obj_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
     drape_frame_files *frames = state;
     (void)ctx;
-    drape_status status = drape_frame_files_begin(frames, frame);
+    drape_status status = drape_frame_files_begin(frames, frame->index);
     if (status)
         return status;
-    drape_file_print(&frames->file, "# Drape frame %" PRId64 ", t = %.17g s\n", frame, time);
+    drape_file_print(&frames->file, "# Drape frame %" PRId64 ", t = %.17g s\n", frame->index, frame->time);
     for (int32_t i = 0; i < drape_model_cloth_count(frames->model); i++) {
         drape_cloth_range cloth = drape_model_cloth(frames->model, i);
-        put_cloth(&frames->file, frames->model, &cloth, positions);
+        put_cloth(&frames->file, frames->model, &cloth, frame->positions);
     }
     return drape_frame_files_end(frames);
 }

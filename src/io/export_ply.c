@@ -14,16 +14,16 @@ static drape_status ply_clean(drape_context *ctx, const char *folder)
     return drape_frame_files_clean(ctx, folder, "ply");
 }
 
-static drape_status ply_open(drape_context *ctx, const drape_model *model, const char *folder, void *state)
+static drape_status ply_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
-    return drape_frame_files_open(ctx, model, folder, "ply", state);
+    return drape_frame_files_open(ctx, def, "ply", state);
 }
 
-static void put_header(drape_file *file, const drape_model *model, int64_t frame, double time)
+static void put_header(drape_file *file, const drape_model *model, const drape_frame *frame)
 {
     drape_file_print(file,
                      "ply\nformat binary_little_endian 1.0\ncomment Drape frame %" PRId64 ", t = %.17g s\n",
-                     frame, time);
+                     frame->index, frame->time);
     drape_file_print(file,
                      "element vertex %" PRId32 "\nproperty double x\nproperty double y\nproperty double z\n",
                      drape_model_node_count(model));
@@ -40,18 +40,17 @@ static void put_face(drape_file *file, const int32_t *node)
     drape_file_put(file, bytes, sizeof bytes);
 }
 
-static drape_status ply_write(drape_context *ctx, void *state, int64_t frame, double time,
-                              const double *positions)
+static drape_status ply_write(drape_context *ctx, void *state, const drape_frame *frame)
 {
     drape_frame_files *frames = state;
     const drape_model *model = frames->model;
     const int32_t *node = drape_model_triangles(model);
     (void)ctx;
-    drape_status status = drape_frame_files_begin(frames, frame);
+    drape_status status = drape_frame_files_begin(frames, frame->index);
     if (status)
         return status;
-    put_header(&frames->file, model, frame, time);
-    drape_file_put_doubles(&frames->file, positions, 3 * (size_t)drape_model_node_count(model));
+    put_header(&frames->file, model, frame);
+    drape_file_put_doubles(&frames->file, frame->positions, 3 * (size_t)drape_model_node_count(model));
     for (int32_t i = 0; i < drape_model_triangle_count(model); i++, node += 3)
         put_face(&frames->file, node);
     return drape_frame_files_end(frames);

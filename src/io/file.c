@@ -124,6 +124,21 @@ void drape_file_put(drape_file *file, const void *data, size_t size)
     }
 }
 
+void drape_file_put_word(drape_file *file, uint32_t word)
+{
+    unsigned char bytes[4];
+    for (int b = 0; b < 4; b++)
+        bytes[b] = (unsigned char)(word >> 8 * b);
+    drape_file_put(file, bytes, sizeof bytes);
+}
+
+void drape_file_put_float(drape_file *file, float value)
+{
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    drape_file_put_word(file, bits);
+}
+
 void drape_file_put_text(drape_file *file, const char *text)
 {
     drape_file_put(file, text, strlen(text));
@@ -206,6 +221,13 @@ drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *da
         size -= (size_t)n;
     }
     return DRAPE_OK;
+}
+
+/* The failure that led here is the one to report. */
+void drape_file_restore(drape_file *file, off_t offset, const void *data, size_t size)
+{
+    if (pwrite(file->fd, data, size, offset) == (ssize_t)size)
+        drape_file_cut(file, offset + (off_t)size);
 }
 
 drape_status drape_file_close(drape_file *file)

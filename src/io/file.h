@@ -44,7 +44,9 @@ drape_status drape_file_begin(drape_file *file);
 /* Add to the end. A failure is reported by the next call that returns a status. */
 void drape_file_put(drape_file *file, const void *data, size_t size);
 void drape_file_put_text(drape_file *file, const char *text);
-void drape_file_put_doubles(drape_file *file, const double *values, size_t count); /* little endian */
+void drape_file_put_word(drape_file *file, uint32_t word); /* little endian, as are the next two */
+void drape_file_put_float(drape_file *file, float value);
+void drape_file_put_doubles(drape_file *file, const double *values, size_t count);
 /* A piece of text below 1 KiB; in the locale of the thread. */
 void drape_file_print(drape_file *file, const char *format, ...) DRAPE_PRINTF(2, 3);
 
@@ -61,6 +63,10 @@ drape_status drape_file_keep(drape_file *file);
 
 /* Writes over bytes that are already kept. Errors: DRAPE_E_FILE. */
 drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size);
+
+/* Puts bytes back after a drape_file_overwrite that failed, where there was room for as many before, and ends the
+ * file with them, as far as it can. */
+void drape_file_restore(drape_file *file, off_t offset, const void *data, size_t size);
 
 /* Cuts a published file to its first size bytes, as far as it can. */
 void drape_file_cut(drape_file *file, off_t size);

@@ -9,9 +9,12 @@
 #include "io/energy.h"
 #include "io/export.h"
 #include "io/steps.h"
+#include "sim/sim.h"
 
 /* Times that differ by rounding only: k / frame_rate against a sum of steps. Steps are longer than this. */
 #define SAME_TIME 1e-12
+
+#define MOST_FRAMES INT64_C(1000000000000000)
 
 typedef struct output {
     const drape_exporter_ops *ops;
@@ -22,9 +25,12 @@ typedef struct output {
 struct drape_recorder {
     drape_context *ctx;
     drape_sim *sim;
-    char *folder; /* without a slash at its end */
+    char *folder;         /* without a slash at its end */
+    drape_export_def def; /* of the formats */
     output *outputs;
     size_t output_count;
+    double *fields; /* room for those of a frame; NULL where no format wants any */
+    double *turned; /* room for positions and velocities with z up; NULL where no format wants these */
     drape_file steps, energies;
     int64_t frames;
     double last_time; /* [s] of the last frame */
@@ -68,10 +74,55 @@ static drape_status report(drape_recorder *r)
 
 /* ---- Frames and rows */
 
-static void write_frame(drape_recorder *r, double time, const double *positions)
+/* (x, y, z) to (x, -z, y): a quarter turn about x. */
+static const double *turn(const double *from, size_t count, double *to)
 {
-    for (size_t i = 0; i < r->output_count && !r->failure; i++)
-        note(r, r->outputs[i].ops->write(r->ctx, r->outputs[i].state, r->frames, time, positions));
+    for (size_t i = 0; i < 3 * count; i += 3) {
+        to[i] = from[i];
+        to[i + 1] = -from[i + 2];
+        to[i + 2] = from[i + 1];
+    }
+    return to;
+}
+
+/* Fields of the frame, if a format wants any. */
+static void add_fields(drape_recorder *r, const double *velocities, drape_frame *frame)
+{
+    const drape_model *model = drape_sim_model(r->sim);
+    if (!r->fields)
+        return;
+    double *density = r->fields, *strain = density + drape_model_node_count(model);
+    drape_model_strain(model, frame->positions, strain);
+    drape_sim_energy_density(r->sim, density);
+    frame->velocities = velocities;
+    frame->strain = strain;
+    frame->energy_density = density;
+}
+
+static drape_frame turned_frame(const drape_recorder *r, const drape_frame *frame)
+{
+    size_t nodes = (size_t)drape_model_node_count(drape_sim_model(r->sim));
+    drape_frame turned = *frame;
+    turned.positions = turn(frame->positions, nodes, r->turned);
+    if (frame->velocities)
+        turned.velocities = turn(frame->velocities, nodes, r->turned + 3 * nodes);
+    return turned;
+}
+
+static void write_outputs(drape_recorder *r, const drape_frame *frame)
+{
+    const drape_frame turned = r->turned ? turned_frame(r, frame) : *frame;
+    for (size_t i = 0; i < r->output_count && !r->failure; i++) {
+        const output *o = &r->outputs[i];
+        note(r, o->ops->write(r->ctx, o->state, o->ops->y_up ? frame : &turned));
+    }
+}
+
+static void write_frame(drape_recorder *r, double time, const double *positions, const double *velocities)
+{
+    drape_frame frame = {.index = r->frames, .time = time, .positions = positions};
+    add_fields(r, velocities, &frame);
+    write_outputs(r, &frame);
     const drape_energy_row row = {
         .frame = r->frames, .t = time, .t_state = drape_sim_time(r->sim), .energy = drape_sim_energy(r->sim)};
     if (!r->failure)
@@ -103,7 +154,7 @@ static drape_status observe(void *user, const drape_event *event)
         write_attempt(r, event->attempt);
         break;
     case DRAPE_EVENT_FRAME:
-        write_frame(r, event->time, event->positions);
+        write_frame(r, event->time, event->positions, event->velocities);
         break;
     }
     scope_leave(r, s);
@@ -122,6 +173,30 @@ static drape_status check_def(drape_context *ctx, const drape_sim *sim, const dr
     return DRAPE_OK;
 }
 
+/* One at t = 0, one each 1 / frame_rate, one at the end. */
+static int64_t most_frames(const drape_sim *sim)
+{
+    const double counted = drape_model_duration(sim->model) * sim->frame_rate;
+    return counted < MOST_FRAMES ? (int64_t)counted + 3 : MOST_FRAMES;
+}
+
+static drape_export_def def_of(const drape_sim *sim, const char *folder)
+{
+    return (drape_export_def){.model = sim->model,
+                              .folder = folder,
+                              .frame_rate = sim->frame_rate,
+                              .most_frames = most_frames(sim)};
+}
+
+drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, const char *pointer,
+                                  const char *format)
+{
+    const drape_exporter_ops *ops;
+    const drape_export_def def = def_of(sim, NULL);
+    drape_status status = drape_exporter_find(ctx, pointer, format, &ops);
+    return status || !ops->check ? status : ops->check(ctx, pointer, &def);
+}
+
 static bool is_chosen(const drape_recorder *r, const drape_exporter_ops *ops)
 {
     for (size_t i = 0; i < r->output_count; i++)
@@ -137,7 +212,9 @@ static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < def->format_count; i++) {
         const drape_exporter_ops *ops;
-        drape_status status = drape_exporter_find(r->ctx, "", def->formats[i], &ops);
+        drape_status status = drape_recorder_check(r->ctx, r->sim, "", def->formats[i]);
+        if (!status)
+            status = drape_exporter_find(r->ctx, "", def->formats[i], &ops);
         if (status)
             return status;
         if (is_chosen(r, ops))
@@ -148,6 +225,22 @@ static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *
         if (!o->state)
             return DRAPE_E_MEMORY;
     }
+    return DRAPE_OK;
+}
+
+static drape_status take_rooms(drape_recorder *r)
+{
+    const drape_model *model = r->sim->model;
+    size_t nodes = (size_t)model->node_count, triangles = (size_t)model->triangle_count;
+    bool fields = false, turns = false;
+    for (size_t i = 0; i < r->output_count; i++) {
+        fields = fields || r->outputs[i].ops->wants_fields;
+        turns = turns || (model->z_up && !r->outputs[i].ops->y_up);
+    }
+    if (fields && !(r->fields = drape_alloc(r->ctx, nodes + 2 * triangles, sizeof *r->fields)))
+        return DRAPE_E_MEMORY;
+    if (turns && !(r->turned = drape_alloc(r->ctx, 6 * nodes, sizeof *r->turned)))
+        return DRAPE_E_MEMORY;
     return DRAPE_OK;
 }
 
@@ -172,11 +265,12 @@ static drape_status clean_folder(drape_recorder *r)
 
 static drape_status open_files(drape_recorder *r)
 {
+    r->def = def_of(r->sim, r->folder);
     drape_status status = clean_folder(r);
     for (size_t i = 0; i < r->output_count && !status; i++) {
         output *o = &r->outputs[i];
         o->open = true; /* close is due after an open that failed, too */
-        status = o->ops->open(r->ctx, drape_sim_model(r->sim), r->folder, o->state);
+        status = o->ops->open(r->ctx, &r->def, o->state);
     }
     if (!status)
         status = drape_steps_open(r->ctx, r->folder, &r->steps);
@@ -186,6 +280,8 @@ static drape_status open_files(drape_recorder *r)
 static drape_status set_up(drape_recorder *r, const drape_recorder_def *def)
 {
     drape_status status = choose_outputs(r, def);
+    if (!status)
+        status = take_rooms(r);
     if (!status)
         status = make_folder(r, def->folder);
     if (!status)
@@ -247,7 +343,7 @@ drape_status drape_recorder_finish(drape_recorder *r)
         return report(r);
     scope s = scope_enter();
     if (!r->failure && last_frame_is_due(r))
-        write_frame(r, drape_sim_time(r->sim), drape_sim_positions(r->sim));
+        write_frame(r, drape_sim_time(r->sim), drape_sim_positions(r->sim), drape_sim_velocities(r->sim));
     close_files(r);
     r->finished = true;
     scope_leave(r, s);
@@ -263,6 +359,8 @@ void drape_recorder_destroy(drape_recorder **recorder)
     for (size_t i = 0; i < r->output_count; i++)
         drape_free(r->ctx, r->outputs[i].state);
     drape_free(r->ctx, r->outputs);
+    drape_free(r->ctx, r->fields);
+    drape_free(r->ctx, r->turned);
     drape_file_destroy(&r->steps);
     drape_file_destroy(&r->energies);
     drape_free(r->ctx, r->folder);

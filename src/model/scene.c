@@ -8,6 +8,7 @@
 
 #include "model/scene_cs184.h"
 #include "model/scene_json.h"
+#include "model/scene_print.h"
 #include "model/scene_text.h"
 
 #define LARGEST_FILE                                                                                         \
@@ -100,6 +101,13 @@ static drape_status new_scene(drape_context *ctx, const char *name, drape_scene 
         drape_scene_destroy(&scene);
     *out = scene;
     return scene ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+void drape_scene_print(drape_scene *scene, drape_text_sink *sink, void *user)
+{
+    locale_t old = drape_locale_enter();
+    drape_json_print(scene->ours ? scene->ours : scene->root, sink, user);
+    drape_locale_leave(old);
 }
 
 /* ---- Reading a file ---- */

@@ -22,6 +22,13 @@ void drape_scene_locate_fault(drape_scene *scene);
 
 drape_context *drape_scene_context(drape_scene *scene);
 
+/* Receives a piece of a text. */
+typedef void drape_text_sink(void *user, const char *text, size_t size);
+
+/* The scene as it is by now, what was set in it included, as JSON without comments: the text of a scene of our
+ * form also where the scene is of another one, after a drape_scene_to_def or a compilation that was good. */
+void drape_scene_print(drape_scene *scene, drape_text_sink *sink, void *user);
+
 /* ---- The form of a scene ----------------------------------------------------------------------------- */
 
 typedef enum drape_scene_kind {
@@ -29,6 +36,7 @@ typedef enum drape_scene_kind {
     DRAPE_SCENE_TEXT,     /* a string for people */
     DRAPE_SCENE_WORD,     /* a string that is not empty */
     DRAPE_SCENE_WORDS,    /* an array of them */
+    DRAPE_SCENE_BOOLEAN,  /* true or false */
     DRAPE_SCENE_NUMBER,   /* from min to max, min excluded unless closed */
     DRAPE_SCENE_INTEGER,  /* from min to max */
     DRAPE_SCENE_INTEGERS, /* an array of them */
@@ -78,5 +86,8 @@ extern const drape_scene_object drape_scene_form;
 
 /* The words of a pin's corner and edge, NULL-ended. */
 extern const char *const drape_pin_corners[], *const drape_pin_edges[];
+
+/* Those of the axis of frames that points up. */
+extern const char *const drape_up_axes[];
 
 #endif

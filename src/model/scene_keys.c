@@ -12,6 +12,8 @@
 const char *const drape_pin_corners[] = {"top-left", "top-right", "bottom-left", "bottom-right", NULL};
 const char *const drape_pin_edges[] = {"top", "bottom", "left", "right", NULL};
 
+const char *const drape_up_axes[] = {"y", "z", NULL};
+
 /* ---- Pins ---- */
 
 static const drape_scene_key pin_keys[] = {
@@ -26,6 +28,9 @@ static const drape_scene_key pin_keys[] = {
      .help = "nodes inside, rest coordinates after the transform, boundary included"},
     {"track", DRAPE_SCENE_TRACK, ARRAY(drape_pin_def, track, key_count), .at_least = 1, .unit = "s and m",
      .help = "displacement from rest, linear between the times; default none: fixed"},
+    {"clamp", DRAPE_SCENE_BOOLEAN, IN(drape_pin_def, clamp),
+     .help = "edges between these nodes keep the direction of the sheet across them, in bend.midedge; "
+             "default false"},
 };
 static const char *const pin_selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
 
@@ -155,6 +160,10 @@ static const drape_scene_object contact = {.name = "contact",
 static const drape_scene_key output_keys[] = {
     {"formats", DRAPE_SCENE_WORDS, ARRAY(drape_scene_def, formats, format_count),
      .help = "rows of the exporters; default npy"},
+    {"up", DRAPE_SCENE_WORD, IN(drape_scene_def, up), .words = drape_up_axes,
+     .help = "the axis that points up in frames: \"z\" turns them, (x, y, z) to (x, -z, y); default \"y\"; "
+             "npy and "
+             "glb have y up always"},
 };
 static const drape_scene_object output = {.name = "output", KEYS(output_keys)};
 

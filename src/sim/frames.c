@@ -66,10 +66,23 @@ static drape_status make_frame(drape_sim *sim, const drape_state *before, double
     return status < 0 ? status : DRAPE_OK;
 }
 
-static drape_status emit(drape_sim *sim, double time, const double *x)
+/* Into sim->frame_velocity. Not the slope of the interpolant: that has what steps overshoot by. */
+static void mix_velocities(drape_sim *sim, const drape_state *before, double t)
 {
-    drape_event event = {
-        .kind = DRAPE_EVENT_FRAME, .sim = sim, .frame = sim->next_frame, .time = time, .positions = x};
+    const drape_state *now = drape_sim_state(sim);
+    double s = (t - before->t) / (now->t - before->t);
+    for (size_t i = 0; i < 3 * (size_t)sim->model->node_count; i++)
+        sim->frame_velocity[i] = (1 - s) * before->v[i] + s * now->v[i];
+}
+
+static drape_status emit(drape_sim *sim, double time, const double *x, const double *v)
+{
+    drape_event event = {.kind = DRAPE_EVENT_FRAME,
+                         .sim = sim,
+                         .frame = sim->next_frame,
+                         .time = time,
+                         .positions = x,
+                         .velocities = v};
     sim->next_frame++;
     return drape_sim_tell(sim, &event);
 }
@@ -91,11 +104,12 @@ drape_status drape_sim_emit_frames(drape_sim *sim)
         if (time > now->t + near)
             return DRAPE_OK;
         if (!before || time > now->t - near)
-            status = emit(sim, now->t, now->x);
+            status = emit(sim, now->t, now->x, now->v);
         else {
             status = make_frame(sim, before, time);
+            mix_velocities(sim, before, time);
             if (!status)
-                status = emit(sim, time, sim->frame);
+                status = emit(sim, time, sim->frame, sim->frame_velocity);
         }
     }
     return status;

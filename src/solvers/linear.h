@@ -31,6 +31,8 @@ struct drape_linear_ops {
     bool borrows_heap;
     /* Makes the solver's state. pattern outlives it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
     drape_status (*create)(drape_context *ctx, const drape_pattern *pattern, void **state);
+    /* How many threads it may use from now on; the result does not depend on it. NULL: it uses one. */
+    void (*use_threads)(void *state, int threads);
     /* Takes the values (pattern->nonzeros). DRAPE_OK, or DRAPE_RETRY_LINEAR: singular to working precision,
      * or not finite. Where it borrows heap also DRAPE_E_MEMORY, and it may be called again. */
     drape_status (*factor)(void *state, const double *values);
@@ -39,6 +41,10 @@ struct drape_linear_ops {
     drape_status (*factor_definite)(void *state, const double *values);
     /* x = A^-1 b, b untouched. */
     drape_status (*solve)(void *state, const double *b, double *x);
+    /* The same with the residual only reduced to a share `tolerance`, in a norm of the row's own; *iterations: how
+     * many it took. NULL: it is direct. */
+    drape_status (*solve_inexact)(void *state, const double *b, double *x, double tolerance,
+                                  int64_t *iterations);
     void (*destroy)(void **state);
     /* Bytes that it takes, factors included. */
     size_t (*bytes)(const void *state);

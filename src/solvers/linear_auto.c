@@ -47,6 +47,13 @@ static drape_status create(drape_context *ctx, const drape_pattern *pattern, voi
     return status;
 }
 
+static void use_threads(void *state, int threads)
+{
+    auto_state *s = state;
+    if (s->row->use_threads)
+        s->row->use_threads(s->solver, threads);
+}
+
 static drape_status factor(void *state, const double *values)
 {
     auto_state *s = state;
@@ -91,6 +98,7 @@ const drape_linear_ops drape_linear_auto = {
     .summary = "the fastest direct solver of this build for the number of unknowns; drape info says which",
     .reference = "bench/linears",
     .create = create,
+    .use_threads = use_threads,
     .factor = factor,
     .factor_definite = factor_definite,
     .solve = solve,

@@ -499,8 +499,6 @@ const drape_linear_ops drape_linear_cholmod = {
     .summary = "supernodal Cholesky with a symbolic factor kept for good; what is not symmetric positive "
                "definite goes to umfpack or klu, by size",
     .reference = "Chen, Davis, Hager & Rajamanickam 2008, Algorithm 887: CHOLMOD",
-    .best_from =
-        500, /* with OpenBLAS half of klu's time at 430, a third at 760; no slower with a plain BLAS */
     .borrows_heap = true, /* the update of the largest supernode, and what OpenMP needs for a loop */
     .create = create,
     .factor = factor,

@@ -56,9 +56,13 @@ static int setup(SUNLinearSolver solver, SUNMatrix matrix)
 drape_status drape_sun_linear_solve(drape_sun_linear *linear, const double *b, double *x)
 {
     double start = drape_clock_seconds();
-    linear->status = linear->ops->solve(linear->state, b, x);
+    int64_t iterations = 1;
+    if (linear->ops->solve_inexact && linear->tolerance > 0)
+        linear->status = linear->ops->solve_inexact(linear->state, b, x, linear->tolerance, &iterations);
+    else
+        linear->status = linear->ops->solve(linear->state, b, x);
     linear->solve_seconds += drape_clock_seconds() - start;
-    linear->solves++;
+    linear->iterations += iterations;
     return linear->status;
 }
 
@@ -68,8 +72,16 @@ static int solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector 
     return drape_sun_linear_solve(solver->content, N_VGetArrayPointer(b), N_VGetArrayPointer(x));
 }
 
+static drape_status create_state(drape_sun_linear *linear, const drape_pattern *pattern)
+{
+    drape_status status = linear->ops->create(linear->ctx, pattern, &linear->state);
+    if (!status && linear->ops->use_threads)
+        linear->ops->use_threads(linear->state, linear->threads);
+    return status;
+}
+
 drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const drape_linear_ops *ops,
-                                     const drape_pattern *pattern, drape_sun_linear **out)
+                                     const drape_pattern *pattern, int threads, drape_sun_linear **out)
 {
     drape_sun_linear *linear = drape_alloc(ctx, 1, sizeof *linear);
     *out = linear;
@@ -77,6 +89,7 @@ drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const d
         return DRAPE_E_MEMORY;
     linear->ctx = ctx;
     linear->ops = ops;
+    linear->threads = threads;
     linear->values = drape_alloc(ctx, (size_t)pattern->nonzeros, sizeof *linear->values);
     linear->solver = SUNLinSolNewEmpty(sun);
     linear->matrix = SUNMatNewEmpty(sun);
@@ -84,7 +97,7 @@ drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const d
     if (!status && (!linear->solver || !linear->matrix))
         status = drape_fail_memory(ctx, sizeof *linear->solver);
     if (!status)
-        status = ops->create(ctx, pattern, &linear->state);
+        status = create_state(linear, pattern);
     if (status) {
         drape_sun_linear_destroy(out);
         return status;
@@ -110,7 +123,7 @@ drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_patter
     linear->values = drape_alloc(linear->ctx, (size_t)pattern->nonzeros, sizeof *linear->values);
     if (!linear->values)
         return DRAPE_E_MEMORY;
-    drape_status status = linear->ops->create(linear->ctx, pattern, &linear->state);
+    drape_status status = create_state(linear, pattern);
     linear->stale = status != DRAPE_OK;
     linear->factor_seconds += drape_clock_seconds() - start;
     return status;

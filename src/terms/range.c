@@ -1,4 +1,4 @@
-/* range.c: makes a range of elements out of a function for one (extend.h). */
+/* range.c: makes a range of elements out of a function for one, or for some at once (extend.h). */
 #include "terms/terms.h"
 
 #include <math.h>
@@ -17,6 +17,37 @@ void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, 
     }
 }
 
+/* The blocks above the diagonal mirror those below. */
+static void take_hessian(int d, const double *from, double *to)
+{
+    for (int i = 0; i < d; i++)
+        for (int j = 0; j < d; j++)
+            to[d * i + j] =
+                i / 3 >= j / 3 ? from[DRAPE_LANES * (d * i + j)] : from[DRAPE_LANES * (d * j + i)];
+}
+
+void drape_measure_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                         const double *internal, double *q, double *dq, double *ddq,
+                         drape_measure_lanes *lanes)
+{
+    const int d = 3 * el->nodes;
+    double q4[DRAPE_LANES], dq4[DRAPE_LANES * DRAPE_MAX_ELEMENT_DOFS],
+        ddq4[DRAPE_LANES * DRAPE_MAX_ELEMENT_DOFS * DRAPE_MAX_ELEMENT_DOFS];
+    for (int32_t i = 0; i < count; i++) {
+        const int l = i % DRAPE_LANES;
+        if (l == 0) {
+            int32_t element[DRAPE_LANES];
+            drape_lanes_elements(first + i, first + count, element);
+            lanes(el, element, x, internal, q4, dq ? dq4 : NULL, ddq ? ddq4 : NULL);
+        }
+        q[i] = q4[l];
+        for (int k = 0; dq && k < d; k++)
+            dq[(size_t)i * (size_t)d + (size_t)k] = dq4[DRAPE_LANES * k + l];
+        if (ddq)
+            take_hessian(d, ddq4 + l, ddq + (size_t)i * (size_t)(d * d));
+    }
+}
+
 /* In two loops: the second has no gather, and compilers make vectors of it. */
 void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count, const double *x, double *l,
                          double *d)
@@ -31,4 +62,21 @@ void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count,
     }
     for (int32_t i = 0; i < count; i++)
         l[i] = sqrt(dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i]);
+}
+
+drape_status drape_check_ratios(const drape_elements *el, const double *x, const double *before,
+                                int32_t every, drape_ratio *ratio_of, drape_fault *fault)
+{
+    fault->element = -1;
+    fault->value = INFINITY;
+    for (int32_t e = 0; e < el->count; e += every) {
+        double ratio = ratio_of(el, e, x);
+        if (!(ratio < fault->value))
+            continue;
+        if (ratio < fault->limit && before && !drape_fell(ratio, ratio_of(el, e, before)))
+            continue;
+        fault->value = ratio;
+        fault->element = e;
+    }
+    return fault->value < fault->limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
 }

@@ -24,11 +24,10 @@
  * accepted state; the angle is taken on the branch nearest to it, so energy and force go on smoothly through
  * pi.
  */
-#include "base/vec3.h"
+#include "base/lanes.h"
 #include "terms/terms.h"
 
 #include <math.h>
-#include <string.h>
 
 enum { PARAM_STIFFNESS, PARAM_REST, PARAM_MIN_ALTITUDE, PARAM_MAX_TURN, PARAM_COUNT };
 enum { STIFFNESS_CONSISTENT, STIFFNESS_REPORT };
@@ -74,125 +73,153 @@ static const drape_param params[PARAM_COUNT] = {
          .help = "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"},
 };
 
-/* One triangle of a hinge: see the head of the file. */
+/* One triangle of a hinge: see the head of the file. Four hinges at once. */
 typedef struct side {
-    double n[3], m[3];
-    double altitude, foot;
+    lanes n[3], m[3];
+    lanes gradient[3]; /* n/H */
+    lanes altitude, per_altitude, foot;
 } side;
 
-typedef struct hinge {
-    double direction[3], length; /* ehat, |e| */
+typedef struct hinges {
+    lanes direction[3], per_length; /* ehat, 1/|e| */
     side side[2];
-    double theta; /* in (-pi, pi] */
-} hinge;
+    lanes theta; /* in (-pi, pi] */
+} hinges;
 
-static void measure_side(const double *origin, const double *apex, const double direction[3], double length,
-                         double sign, side *s)
+LANES_INLINE void measure_side(const lanes origin[3], const lanes apex[3], const hinges *h, double sign,
+                               side *s)
 {
-    double d[3], normal[3];
-    vec3_sub(apex, origin, d);
-    vec3_cross(direction, d, normal);
-    s->altitude = vec3_norm(normal); /* |ehat x d| */
-    s->foot = vec3_dot(d, direction) / length;
+    lanes d[3], normal[3];
+    for (int i = 0; i < 3; i++)
+        d[i] = apex[i] - origin[i];
+    lanes_cross(h->direction, d, normal);
+    lanes along = lanes_dot(d, h->direction);
+    s->altitude = lanes_sqrt(lanes_dot(normal, normal)); /* |ehat x d| */
+    s->per_altitude = 1 / s->altitude;
+    s->foot = along * h->per_length;
     for (int i = 0; i < 3; i++) {
-        s->n[i] = sign * normal[i] / s->altitude;
-        s->m[i] = (d[i] - s->foot * length * direction[i]) / s->altitude;
+        s->n[i] = sign * normal[i] * s->per_altitude;
+        s->m[i] = (d[i] - along * h->direction[i]) * s->per_altitude;
+        s->gradient[i] = s->n[i] * s->per_altitude;
     }
 }
 
-static void measure_hinge(const drape_elements *el, int32_t element, const double *x, hinge *h)
+LANES_INLINE void measure_hinges(const drape_elements *el, const int32_t element[LANES], const double *x,
+                                 hinges *h)
 {
-    const int32_t *node = el->node + 4 * (size_t)element;
-    const double *x0 = x + 3 * (size_t)node[0];
-    double cross[3];
-    vec3_sub(x + 3 * (size_t)node[1], x0, h->direction);
-    h->length = vec3_norm(h->direction);
+    lanes corner[4][3], cross[3];
+    for (int a = 0; a < 4; a++) {
+        int32_t node[LANES];
+        for (int l = 0; l < LANES; l++)
+            node[l] = el->node[4 * (size_t)element[l] + (size_t)a];
+        lanes_gather(x, node, corner[a]);
+    }
     for (int i = 0; i < 3; i++)
-        h->direction[i] /= h->length;
-    measure_side(x0, x + 3 * (size_t)node[2], h->direction, h->length, 1, &h->side[0]);
-    measure_side(x0, x + 3 * (size_t)node[3], h->direction, h->length, -1, &h->side[1]);
-    vec3_cross(h->side[1].n, h->side[0].n, cross);
-    h->theta = atan2(vec3_dot(h->direction, cross), vec3_dot(h->side[0].n, h->side[1].n));
+        h->direction[i] = corner[1][i] - corner[0][i];
+    h->per_length = 1 / lanes_sqrt(lanes_dot(h->direction, h->direction));
+    for (int i = 0; i < 3; i++)
+        h->direction[i] *= h->per_length;
+    measure_side(corner[0], corner[2], h, 1, &h->side[0]);
+    measure_side(corner[0], corner[3], h, -1, &h->side[1]);
+    lanes_cross(h->side[1].n, h->side[0].n, cross);
+    lanes sine = lanes_dot(h->direction, cross), cosine = lanes_dot(h->side[0].n, h->side[1].n);
+    for (int l = 0; l < LANES; l++)
+        h->theta[l] = atan2(sine[l], cosine[l]);
 }
 
 /* The branch of theta that is nearest to reference. */
-static double unwrap(double theta, double reference)
+static inline double unwrap(double theta, double reference)
 {
     return theta + 2 * pi * round((reference - theta) / (2 * pi));
 }
 
 /* dq: g_0 g_1 g_2 g_3 */
-static void gradient(const hinge *h, double *dq)
+LANES_INLINE void gradient(const hinges *h, double *dq)
 {
+    const side *s = h->side;
     for (int i = 0; i < 3; i++) {
-        double g2 = h->side[0].n[i] / h->side[0].altitude, g3 = h->side[1].n[i] / h->side[1].altitude;
-        dq[i] = -(1 - h->side[0].foot) * g2 - (1 - h->side[1].foot) * g3;
-        dq[3 + i] = -h->side[0].foot * g2 - h->side[1].foot * g3;
-        dq[6 + i] = g2;
-        dq[9 + i] = g3;
+        lanes_store(dq + LANES * i, (s[0].foot - 1) * s[0].gradient[i] + (s[1].foot - 1) * s[1].gradient[i]);
+        lanes_store(dq + LANES * (3 + i), -s[0].foot * s[0].gradient[i] - s[1].foot * s[1].gradient[i]);
+        lanes_store(dq + LANES * (6 + i), s[0].gradient[i]);
+        lanes_store(dq + LANES * (9 + i), s[1].gradient[i]);
     }
 }
 
-/* What one side adds to the rows of the Hessian for one column node: dg is d g_a / d column, ds is ds / d
- * column. */
-static void add_rows(const side *s, const double dg[9], const double ds[3], int apex, int column, double *ddq)
+/* d g_a/d column = -(p n' + n p')/H + w n ehat'/(|e| H), at (i, j) */
+LANES_INLINE lanes turn(const side *s, const lanes along[3], const lanes p[3], double w, int i, int j)
+{
+    return s->gradient[i] * (w * along[j] - p[j]) - p[i] * s->gradient[j];
+}
+
+/* p and the gradients of s at the three nodes of a side: x0, x1, apex. That of s at the apex is in no block on or
+ * below the diagonal. */
+typedef struct change {
+    lanes p[3][3], foot[2][3];
+} change;
+
+LANES_INLINE void measure_change(const hinges *h, const side *s, const lanes along[3], change *c)
 {
     for (int i = 0; i < 3; i++) {
-        double g = s->n[i] / s->altitude;
-        for (int j = 0; j < 3; j++) {
-            double a = dg[3 * i + j], b = g * ds[j];
-            ddq[12 * i + 3 * column + j] += b - (1 - s->foot) * a;
-            ddq[12 * (3 + i) + 3 * column + j] -= b + s->foot * a;
-            ddq[12 * (3 * apex + i) + 3 * column + j] += a;
-        }
+        lanes in_plane = s->m[i] * s->per_altitude;
+        lanes rise = s->altitude * s->m[i] * h->per_length * h->per_length;
+        c->p[0][i] = (s->foot - 1) * in_plane - along[i];
+        c->p[1][i] = along[i] - s->foot * in_plane;
+        c->p[2][i] = in_plane;
+        c->foot[0][i] = (s->foot - 1) * along[i] - rise;
+        c->foot[1][i] = rise - s->foot * along[i];
     }
 }
 
-/* -(p n' + n p')/H + w n ehat'/(|e| H) */
-static void normal_derivative(const side *s, const hinge *h, const double p[3], double w, double dg[9])
+/* The blocks on and below the diagonal. Both sides add to those of the edge; there is none between the apices. */
+LANES_INLINE void hessian(const hinges *h, double *ddq)
 {
+    lanes along[3];
+    change side_change[2];
     for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            dg[3 * i + j] =
-                (w * s->n[i] * h->direction[j] / h->length - p[i] * s->n[j] - s->n[i] * p[j]) / s->altitude;
+        along[i] = h->direction[i] * h->per_length;
+    measure_change(h, &h->side[0], along, &side_change[0]);
+    measure_change(h, &h->side[1], along, &side_change[1]);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            lanes of_00 = {0}, of_10 = {0}, of_11 = {0};
+            for (int k = 0; k < 2; k++) {
+                const side *s = &h->side[k];
+                const int apex = 3 * (2 + k);
+                lanes by_0 = turn(s, along, side_change[k].p[0], -1, i, j),
+                      by_1 = turn(s, along, side_change[k].p[1], 1, i, j);
+                lanes by_foot = s->gradient[i] * side_change[k].foot[0][j];
+                of_00 += by_foot + (s->foot - 1) * by_0;
+                of_10 -= by_foot + s->foot * by_0;
+                of_11 -= s->gradient[i] * side_change[k].foot[1][j] + s->foot * by_1;
+                lanes_store(ddq + LANES * (12 * (apex + i) + j), by_0);
+                lanes_store(ddq + LANES * (12 * (apex + i) + 3 + j), by_1);
+                lanes_store(ddq + LANES * (12 * (apex + i) + apex + j),
+                            turn(s, along, side_change[k].p[2], 0, i, j));
+            }
+            lanes_store(ddq + LANES * (12 * i + j), of_00);
+            lanes_store(ddq + LANES * (12 * (3 + i) + j), of_10);
+            lanes_store(ddq + LANES * (12 * (3 + i) + 3 + j), of_11);
+            lanes_store(ddq + LANES * (12 * (9 + i) + 6 + j), (lanes){0});
+        }
 }
 
-static void add_side(const hinge *h, const side *s, int apex, double *ddq)
+LANES_DISPATCH static void measure_lanes(const drape_elements *el, const int32_t *element, const double *x,
+                                         const double *internal, double *q, double *dq, double *ddq)
 {
-    double p[3][3], ds[3][3]; /* columns x0, x1, apex */
-    for (int i = 0; i < 3; i++) {
-        double in_plane = s->m[i] / s->altitude, along = h->direction[i] / h->length;
-        double rise = s->altitude * s->m[i] / (h->length * h->length);
-        p[0][i] = -(1 - s->foot) * in_plane - along;
-        p[1][i] = -s->foot * in_plane + along;
-        p[2][i] = in_plane;
-        ds[0][i] = -(1 - s->foot) * along - rise;
-        ds[1][i] = -s->foot * along + rise;
-        ds[2][i] = along;
-    }
-    const double weight[3] = {-1, 1, 0};
-    for (int c = 0; c < 3; c++) {
-        double dg[9];
-        normal_derivative(s, h, p[c], weight[c], dg);
-        add_rows(s, dg, ds[c], apex, c < 2 ? c : apex, ddq);
-    }
+    hinges h;
+    measure_hinges(el, element, x, &h);
+    for (int l = 0; l < LANES; l++)
+        q[l] = unwrap(h.theta[l], internal[element[l]]);
+    if (dq)
+        gradient(&h, dq);
+    if (ddq)
+        hessian(&h, ddq);
 }
 
 static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
                     const double *internal, double *q, double *dq, double *ddq)
 {
-    for (int32_t i = 0; i < count; i++) {
-        hinge h;
-        measure_hinge(el, first + i, x, &h);
-        q[i] = unwrap(h.theta, internal[first + i]);
-        if (dq)
-            gradient(&h, dq + 12 * (size_t)i);
-        if (ddq) {
-            memset(ddq + 144 * (size_t)i, 0, 144 * sizeof *ddq);
-            add_side(&h, &h.side[0], 2, ddq + 144 * (size_t)i);
-            add_side(&h, &h.side[1], 3, ddq + 144 * (size_t)i);
-        }
-    }
+    drape_measure_range(el, first, count, x, internal, q, dq, ddq, measure_lanes);
 }
 
 static double element_stiffness(const drape_cloth_view *cloth, int32_t hinge_number, double choice)
@@ -207,40 +234,57 @@ static double element_stiffness(const drape_cloth_view *cloth, int32_t hinge_num
            (cloth->triangle_area[beside[0]] + cloth->triangle_area[beside[1]]);
 }
 
+/* Altitudes and angles of the hinges from `first` on; lanes beyond the last repeat it. */
+typedef struct shapes {
+    double altitude[2][LANES], theta[LANES];
+} shapes;
+
+LANES_DISPATCH static void measure_shapes(const drape_elements *el, int32_t first, const double *x, shapes *s)
+{
+    hinges h;
+    int32_t element[LANES];
+    drape_lanes_elements(first, el->count, element);
+    measure_hinges(el, element, x, &h);
+    lanes_store(s->altitude[0], h.side[0].altitude);
+    lanes_store(s->altitude[1], h.side[1].altitude);
+    lanes_store(s->theta, h.theta);
+}
+
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     drape_status status = drape_term_reserve(builder, cloth->hinge_count, REST_COUNT);
     const drape_elements at_rest = {.count = cloth->hinge_count, .nodes = 4, .node = cloth->hinge};
+    shapes s;
     for (int32_t i = 0; !status && i < cloth->hinge_count; i++) {
-        hinge h;
-        measure_hinge(&at_rest, i, cloth->rest, &h);
+        int l = i % LANES;
+        if (l == 0)
+            measure_shapes(&at_rest, i, cloth->rest, &s);
         double rest[REST_COUNT] = {[REST_K] = element_stiffness(cloth, i, values[PARAM_STIFFNESS]),
-                                   [REST_THETA0] = values[PARAM_REST] == REST_FLAT ? 0 : h.theta,
-                                   [REST_ALTITUDE1] = h.side[0].altitude,
-                                   [REST_ALTITUDE2] = h.side[1].altitude};
+                                   [REST_THETA0] = values[PARAM_REST] == REST_FLAT ? 0 : s.theta[l],
+                                   [REST_ALTITUDE1] = s.altitude[0][l],
+                                   [REST_ALTITUDE2] = s.altitude[1][l]};
         drape_term_set(builder, i, cloth->hinge + 4 * (size_t)i, rest);
     }
     return status;
 }
 
-/* The angle of the mesh at rest: theta0 unless the rest is flat, and then the branch nearest to flat. */
-static void initial(const drape_elements *el, int32_t first, int32_t count, const double *x, double *after)
+/* after = the angle at x, on the branch nearest to that of before. */
+static void follow(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                   const double *before, double *after)
 {
+    shapes s;
     for (int32_t i = first; i < first + count; i++) {
-        hinge h;
-        measure_hinge(el, i, x, &h);
-        after[i] = unwrap(h.theta, el->rest[(size_t)REST_THETA0 * (size_t)el->count + (size_t)i]);
+        int l = (i - first) % LANES;
+        if (l == 0)
+            measure_shapes(el, i, x, &s);
+        after[i] = unwrap(s.theta[l], before[i]);
     }
 }
 
-static void commit(const drape_elements *el, int32_t first, int32_t count, const double *x,
-                   const double *before, double *after)
+/* The angle of the mesh at rest: theta0 unless the rest is flat, and then the branch nearest to flat. */
+static void initial(const drape_elements *el, int32_t first, int32_t count, const double *x, double *after)
 {
-    for (int32_t i = first; i < first + count; i++) {
-        hinge h;
-        measure_hinge(el, i, x, &h);
-        after[i] = unwrap(h.theta, before[i]);
-    }
+    follow(el, first, count, x, el->rest + (size_t)REST_THETA0 * (size_t)el->count, after);
 }
 
 static void keep_worst(drape_fault *worst, const char *reason, const char *what, int32_t element,
@@ -250,47 +294,50 @@ static void keep_worst(drape_fault *worst, const char *reason, const char *what,
         (drape_fault){.reason = reason, .what = what, .element = element, .value = value, .limit = limit};
 }
 
-/* Altitude over that at rest. */
-static double ratio_of(const drape_elements *el, int32_t element, const hinge *h, int s)
+/* Altitude over that at rest, of the hinge in a lane. */
+static double ratio_of(const drape_elements *el, int32_t element, const shapes *s, int lane, int k)
 {
-    return h->side[s].altitude / el->rest[(size_t)(REST_ALTITUDE1 + s) * (size_t)el->count + (size_t)element];
+    return s->altitude[k][lane] /
+           el->rest[(size_t)(REST_ALTITUDE1 + k) * (size_t)el->count + (size_t)element];
 }
 
-static bool altitude_fell(const drape_elements *el, int32_t element, const hinge *h, int s,
+static bool altitude_fell(const drape_elements *el, int32_t element, double ratio, int k,
                           const double *before)
 {
-    hinge was;
+    shapes was;
     if (!before)
         return true;
-    measure_hinge(el, element, before, &was);
-    return drape_fell(ratio_of(el, element, h, s), ratio_of(el, element, &was, s));
+    measure_shapes(el, element, before, &was);
+    return drape_fell(ratio, ratio_of(el, element, &was, 0, k));
 }
 
 /* The lowest altitude counts first: where a triangle has collapsed its angle means nothing. */
 static drape_status check(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault)
 {
-    drape_fault altitude = {.element = -1, .value = INFINITY}, turn = {.element = -1, .value = -INFINITY};
+    drape_fault altitude = {.element = -1, .value = INFINITY}, turned = {.element = -1, .value = -INFINITY};
     double min_altitude = el->params[PARAM_MIN_ALTITUDE], max_turn = el->params[PARAM_MAX_TURN];
+    shapes s;
     for (int32_t i = 0; i < el->count; i++) {
-        hinge h;
-        measure_hinge(el, i, x, &h);
-        for (int s = 0; s < 2; s++) {
-            double ratio = ratio_of(el, i, &h, s);
-            if (ratio < altitude.value && (ratio >= min_altitude || altitude_fell(el, i, &h, s, before)))
+        int l = i % LANES;
+        if (l == 0)
+            measure_shapes(el, i, x, &s);
+        for (int k = 0; k < 2; k++) {
+            double ratio = ratio_of(el, i, &s, l, k);
+            if (ratio < altitude.value && (ratio >= min_altitude || altitude_fell(el, i, ratio, k, before)))
                 keep_worst(&altitude, "altitude_collapse", "altitude / rest altitude", i, ratio,
                            min_altitude);
         }
-        double angle = fabs(unwrap(h.theta, internal[i]) - internal[i]);
-        if (angle > turn.value)
-            keep_worst(&turn, "hinge_branch", "turn of a hinge in one step [rad]", i, angle, max_turn);
+        double angle = fabs(unwrap(s.theta[l], internal[i]) - internal[i]);
+        if (angle > turned.value)
+            keep_worst(&turned, "hinge_branch", "turn of a hinge in one step [rad]", i, angle, max_turn);
     }
     if (altitude.value < min_altitude || el->count == 0) {
         *fault = altitude;
         return el->count == 0 ? DRAPE_OK : DRAPE_RETRY_DEGENERATE;
     }
-    *fault = turn;
-    return turn.value > max_turn ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
+    *fault = turned;
+    return turned.value > max_turn ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
 }
 
 const drape_term_ops drape_term_bend_hinge = {
@@ -305,7 +352,8 @@ const drape_term_ops drape_term_bend_hinge = {
     .has_internal = true,
     .build = build,
     .measure = measure,
-    .commit = commit,
+    .lanes = measure_lanes,
+    .commit = follow,
     .initial = initial,
     .check = check,
 };

@@ -20,15 +20,16 @@ static const drape_param params[PARAM_COUNT] = {
                         "retardation time: damping stiffness over elastic stiffness of every strain measure"},
 };
 
-static void law(const double *values, double k, double strain, double rate, double *force,
-                double *dforce_dstrain, double *dforce_drate, double *energy)
+static void law(const double *values, int32_t count, const double *k, const double *strain,
+                const double *rate, double *force, double *dforce_dstrain, double *dforce_drate,
+                double *energy)
 {
-    (void)strain;
-    double c = values[PARAM_BETA] * k;
-    *force = c * rate;
-    *dforce_dstrain = 0;
-    *dforce_drate = c;
-    *energy = 0;
+    (void)strain, (void)dforce_dstrain, (void)energy;
+    for (int32_t i = 0; i < count; i++) {
+        double c = values[PARAM_BETA] * k[i];
+        force[i] += c * rate[i];
+        dforce_drate[i] += c;
+    }
 }
 
 const drape_term_ops drape_term_damp_kelvin_voigt = {

@@ -903,11 +903,12 @@ START_TEST(malformed_colliders_are_refused)
 }
 END_TEST
 
-static void some_law(const double *params, double k, double strain, double rate, double *force,
-                     double *dforce_dstrain, double *dforce_drate, double *energy)
+static void some_law(const double *params, int32_t count, const double *k, const double *strain,
+                     const double *rate, double *force, double *dforce_dstrain, double *dforce_drate,
+                     double *energy)
 {
-    (void)params, (void)k, (void)strain, (void)rate;
-    *force = *dforce_dstrain = *dforce_drate = *energy = 0;
+    (void)params, (void)count, (void)k, (void)strain, (void)rate;
+    (void)force, (void)dforce_dstrain, (void)dforce_drate, (void)energy;
 }
 
 START_TEST(malformed_ops_are_refused)

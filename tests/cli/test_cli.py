@@ -1,9 +1,5 @@
 #!/usr/bin/env python3
-"""The program `drape` as its users meet it: exit codes, messages, files. TAP on stdout.
-
-DRAPE_BUILD is the folder of the build, DRAPE_SOURCE that of the sources; or: test_cli.py PROGRAM [SOURCES]. A test is a
-function test_*; its docstring is its name. Everything is written below a temporary folder.
-"""
+"""The program `drape` as its users meet it: exit codes, messages, files. See program.py."""
 import csv
 import glob
 import json
@@ -12,95 +8,13 @@ import pty
 import re
 import shutil
 import signal
-import struct
 import subprocess
 import sys
-import tempfile
 import time
-import traceback
 
-SOURCES = sys.argv[2] if len(sys.argv) > 2 else os.environ.get("DRAPE_SOURCE", os.path.dirname(__file__) + "/../..")
-PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRAPE_BUILD"] + "/drape")
-SOURCES = os.path.abspath(SOURCES)
-VERBS = ["run", "info", "check", "list"]
-LIMIT = 300  # [s] for one call: sanitizers are slow
+from program import LIMIT, PROGRAM, SOURCES, Skip, drape, equal, good, read_json, read_npy, read_steps, refused, run_tests, scene, write_scene
 
-
-class Skip(Exception):
-    pass
-
-
-def scene(**changes):
-    """16 nodes, one corner free to swing for 0.1 s: a run takes milliseconds."""
-    cloth = {
-        "name": "sheet",
-        "mesh": {"grid": "equilateral", "edges": 3, "edge_length": 0.1},
-        "material": {"young_modulus": 1e5, "thickness": 1e-3, "density": 200},
-        "terms": ["stretch.edge", "bend.hinge", {"type": "damp.kelvin_voigt", "beta": 1e-3}],
-        "pins": [{"corner": "top-left"}, {"corner": "top-right"}],
-    }
-    whole = {"drape": 1, "cloth": [cloth], "integrator": {"dt": 0.01}, "duration": 0.1, "frame_rate": 30}
-    for key, value in changes.items():
-        (cloth if key in cloth else whole)[key] = value
-    return whole
-
-
-def write_scene(**changes):
-    with open("scene.json", "w", encoding="utf-8") as file:
-        json.dump(scene(**changes), file, indent=1)
-    return "scene.json"
-
-
-def drape(*args, **options):
-    return subprocess.run([PROGRAM, *args], capture_output=True, text=True, timeout=LIMIT, **options)
-
-
-def equal(found, expected, what=""):
-    assert found == expected, f"{what}: found {found!r}, expected {expected!r}"
-
-
-def good(*args, **options):
-    result = drape(*args, **options)
-    equal((result.returncode, result.stderr), (0, ""), " ".join(args))
-    return result.stdout
-
-
-def refused(*args, says="", **options):
-    """Exit 2, one line, no result, and no file that was not there before."""
-    before = sorted(os.listdir("."))
-    result = drape(*args, **options)
-    equal(result.returncode, 2, " ".join(args) + ": " + result.stderr)
-    equal(result.stdout, "", " ".join(args))
-    assert re.fullmatch(r"[^\n]+\n", result.stderr), f"{args}: not one line: {result.stderr!r}"
-    assert says in result.stderr, f"{args}: {says!r} is not in {result.stderr!r}"
-    equal(sorted(os.listdir(".")), before, "files after " + " ".join(args))
-    return result.stderr
-
-
-def read_json(path):
-    with open(path, encoding="utf-8") as file:
-        return json.load(file)
-
-
-def read_steps(folder):
-    with open(folder + "/steps.csv", encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def read_npy(path):
-    """(frames, nodes, 3) and the numbers, by the format's definition."""
-    with open(path, "rb") as file:
-        data = file.read()
-    equal(data[:8], b"\x93NUMPY\x01\x00", "magic and version")
-    size = struct.unpack("<H", data[8:10])[0]
-    equal((10 + size) % 64, 0, "alignment of the data")
-    header = data[10:10 + size].decode("ascii")
-    equal(re.search(r"'descr': '(.*?)'", header).group(1), "<f8", "type")
-    equal(re.search(r"'fortran_order': (\w+)", header).group(1), "False", "order")
-    shape = tuple(int(n) for n in re.search(r"'shape': \((.*?)\)", header).group(1).split(","))
-    count = shape[0] * shape[1] * shape[2]
-    equal(len(data) - 10 - size, 8 * count, "bytes of data")
-    return shape, struct.unpack(f"<{count}d", data[10 + size:])
+VERBS = ["run", "report", "info", "check", "list", "render", "view"]
 
 
 # ---- Help and usage
@@ -169,6 +83,7 @@ def test_wrong_formats():
         line = refused(verb, "scene.json", says='/output/formats/1: unknown format "nyp"')
         assert re.match(r"scene\.json:\d+:\d+: ", line), line
     refused("run", "scene.json", "--out", "out", "--format", "npy,objj", says='did you mean "obj"?')
+    refused("run", "scene.json", "--out", "out", "--format", "glb", "--frame-rate", "1e6", says="/output/formats/0: glb: 100003 frames of 16 nodes")
     good("run", "scene.json", "--out", "out", "--format", "npy")
 
 
@@ -214,6 +129,72 @@ def test_run_files():
     equal([row["frame"] for row in energies], [str(i) for i in range(frames)])
     for key, value in summary["energy"].items():
         equal(float(energies[-1][key]), value, "the last row and the summary: " + key)
+
+
+def test_realtime():
+    """frames with a budget: times, misses and rungs are told, late frames are no failure, files as usual"""
+    write_scene()
+    for rate, row in (30, "newton_k"), (1e6, "newton_k"), (30, "be"):
+        text = good("run", "scene.json", "--realtime", "--integrator", row, "--frame-rate", str(rate), "--duration",
+                    "0.1" if rate < 1e6 else "2e-5", "--summary", "s.json", "--out", "out", "--format", "npy")
+        told = re.search(r"^realtime +(\d+) frames of [^:]+: p50 (\S+), p95 (\S+), p99 (\S+), worst (\S+) ms; (\d+) missed$",
+                         text, re.M)
+        assert told, text
+        times = [float(word) for word in told.group(2, 3, 4, 5)]
+        equal(times, sorted(times))
+        summary = read_json("s.json")
+        realtime = summary["realtime"]
+        equal((realtime["frames"], realtime["missed"]), (int(told.group(1)), int(told.group(6))))
+        equal(realtime["full"] + realtime["fewer"] + realtime["larger"], realtime["frames"])
+        assert abs(summary["time"] - (0.1 if rate < 1e6 else 2e-5)) < 1e-12, summary
+        assert realtime["worst"] >= realtime["p50"] > 0 and realtime["dropped"] >= 0
+        if rate == 1e6:  # a microsecond a frame is kept by no machine: frames that make a step miss, the others wait
+            assert realtime["missed"] > 0 and realtime["larger"] > 0, realtime
+        shape, _ = read_npy("out/positions.npy")
+        assert shape[0] >= 2, shape
+    assert "realtime" not in read_summary_without_budget()
+
+
+def read_summary_without_budget():
+    good("run", "scene.json", "--summary", "s.json")
+    return read_json("s.json")
+
+
+def test_scene_copy():
+    """the folder of a run has the scene as it was run, with its meshes, and running that gives the same bits"""
+    os.makedirs("scenes/meshes")
+    shutil.copy(SOURCES + "/examples/scenes/tube.obj", "scenes/meshes/tube.obj")
+    with open("scenes/meshes/wedge.obj", "w", encoding="ascii") as file:
+        file.write("v 0 -3 0\nv 1 -3 0\nv 0 -2 0\nv 0 -3 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    whole = scene(mesh={"file": "meshes/tube.obj"}, pins=[{"nodes": [0, 1]}], description='say "\u00e9" \\ \t',
+                  colliders=[{"type": "mesh", "file": "meshes/wedge.obj"}])
+    with open("scenes/one.json", "w", encoding="utf-8") as file:
+        json.dump(whole, file)
+    good("run", "scenes/one.json", "--dt", "0.005", "--out", "a/b")
+    kept = read_json("a/b/scene.json")
+    equal(kept["integrator"], {"dt": 0.005})
+    equal((kept["description"], kept["duration"]), (whole["description"], 0.1))
+    equal((kept["cloth"][0]["mesh"]["file"], kept["colliders"][0]["file"]), ("scene_mesh_0.obj", "scene_mesh_1.obj"))
+    shutil.rmtree("scenes")
+    os.rename("a/b", "moved")
+    good("run", "moved/scene.json", "--out", "again")
+    equal(read_json("again/summary.json")["hash"], read_json("moved/summary.json")["hash"])
+    equal(open("again/scene.json", "rb").read(), open("moved/scene.json", "rb").read())
+    good("run", SOURCES + "/examples/scenes/cs184_pinned2.json", "--duration", "0.02", "--out", "cs184")
+    equal(read_json("cs184/scene.json")["drape"], 1)
+    good("run", "cs184/scene.json", "--out", "ours")
+    equal(read_json("ours/summary.json")["hash"], read_json("cs184/summary.json")["hash"])
+
+
+def test_scene_in_the_folder():
+    """a scene that is itself the scene.json of the folder is never written over"""
+    write_scene()
+    before = open("scene.json", "rb").read()
+    good("run", "scene.json", "--out", ".")
+    equal(open("scene.json", "rb").read(), before)
+    files = sorted(os.listdir("."))
+    refused("run", "scene.json", "--out", "./", "--dt", "0.005", says="choose another folder")
+    equal((open("scene.json", "rb").read(), sorted(os.listdir("."))), (before, files))
 
 
 def test_last_frame():
@@ -606,6 +587,8 @@ def variants():
     yield False, scene(integrator={"max_iterations": 1.5})
     yield False, scene(controller={"type": "halving", "dt": 1})
     yield False, scene(output={"formats": ["npz"]})
+    yield True, scene(output={"formats": ["vtp", "pc2", "glb"], "up": "z"})
+    yield False, scene(output={"up": "x"})
     yield False, scene(output={"format": ["npy"]})
 
 
@@ -658,25 +641,4 @@ def test_schema_and_examples():
     walk(schema.schema)
 
 
-def main():
-    tests = [(name, test) for name, test in globals().items() if name.startswith("test_")]
-    print(f"1..{len(tests)}", flush=True)
-    failed = 0
-    for number, (_, test) in enumerate(tests, 1):
-        words = f"{number} - {test.__doc__}"
-        with tempfile.TemporaryDirectory() as folder:
-            os.chdir(folder)
-            try:
-                test()
-                print("ok", words, flush=True)
-            except Skip as reason:
-                print("ok", words, "# SKIP", reason, flush=True)
-            except Exception:  # pylint: disable=broad-except
-                failed += 1
-                print("not ok", words, flush=True)
-                print("# " + traceback.format_exc().rstrip().replace("\n", "\n# "), flush=True)
-            os.chdir("/")
-    return failed > 0
-
-
-sys.exit(main())
+sys.exit(run_tests(globals()))

@@ -428,9 +428,11 @@ START_TEST(every_row_writes_the_same_frames)
     ck_assert_int_eq(drape_recorder_frames(recorder), 3);
     ck_assert_int_eq(read_npy(w.out, &data), 3);
     free(data);
-    ck_assert_int_eq(count_files(w.out, ".obj"), 3);
+    ck_assert_int_eq(count_files(w.out, ".obj"), 3 + 1); /* one is the mesh of the point cache */
     ck_assert_int_eq(count_files(w.out, ".ply"), 3);
+    ck_assert_int_eq(count_files(w.out, ".vtp"), 3);
     ck_assert_int_eq(count_files(w.out, ".npy"), 1);
+    ck_assert_int_eq(count_files(w.out, ".part"), 0);
     drape_recorder_destroy(&recorder);
     tear_down(&w);
 }
@@ -438,10 +440,12 @@ END_TEST
 
 START_TEST(old_frames_are_removed_and_nothing_else)
 {
-    static const char *const old[] = {"frame_000001.obj", "frame_000123.ply", "frame_000123.obj",
-                                      "frame_1234567.obj", "frame_000124.obj.part"};
+    static const char *const old[] = {"frame_000001.obj",  "frame_000123.ply",      "frame_000123.obj",
+                                      "frame_1234567.obj", "frame_000124.obj.part", "frame_000001.vtp",
+                                      "frames.pvd",        "positions.pc2",         "positions.obj",
+                                      "positions.glb",     "positions.npy"};
     static const char *const other[] = {"frame_12345.obj",     "frame_000123.objx", "my_frame_000123.obj",
-                                        "frame_000123.vtp",    "frame_00012x.obj",  "frame_000123.obj.bak",
+                                        "frame_000123.stl",    "frame_00012x.obj",  "frame_000123.obj.bak",
                                         "frame_000123.OBJ.png"};
     world w;
     set_up(&w);
@@ -736,15 +740,156 @@ END_TEST
 
 START_TEST(full_disk_leaves_no_half_frame)
 {
+    static const struct {
+        const char *format, *file;
+    } rows[] = {{"obj", "frame_000000.obj"},
+                {"ply", "frame_000000.ply"},
+                {"vtp", "frame_000000.vtp"},
+                {"glb", "positions.glb"},
+                {"pc2", "positions.obj"}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        world w;
+        set_up(&w);
+        run_on_small_disk(&w, rows[i].format, 500, rows[i].file);
+        ck_assert_int_eq(count_files(w.out, rows[i].file), 0);
+        tear_down(&w);
+    }
+}
+END_TEST
+
+static uint32_t word_at(const char *data, size_t at)
+{
+    const unsigned char *b = (const unsigned char *)data + at;
+    return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
+}
+
+/* The samples of the point cache, which must be whole. */
+static uint32_t check_pc2(const world *w)
+{
+    size_t size;
+    char *data = slurp(in_folder(w->out, "positions.pc2"), &size);
+    ck_assert_uint_ge(size, 32);
+    ck_assert_int_eq(memcmp(data, "POINTCACHE2\0\1\0\0", 16), 0);
+    uint32_t points = word_at(data, 16), samples = word_at(data, 28);
+    ck_assert_uint_eq(points, NODES);
+    ck_assert_uint_eq(size, 32 + (size_t)samples * NODES * 12);
+    for (uint32_t i = 0; i < samples * NODES * 3; i++) {
+        float value;
+        memcpy(&value, data + 32 + 4 * (size_t)i, 4);
+        ck_assert(value == (float)w->seen.x[i / (NODES * 3)][i % (NODES * 3)]);
+    }
+    free(data);
+    return samples;
+}
+
+START_TEST(full_disk_leaves_a_valid_point_cache)
+{
     world w;
     set_up(&w);
-    run_on_small_disk(&w, "obj", 500, "frame_000000.obj");
-    ck_assert_int_eq(count_files(w.out, ".obj"), 0);
+    run_on_small_disk(&w, "pc2", 32 + 9 * NODES * 12 / 2 + 3000, "positions.pc2");
+    ck_assert_uint_ge(check_pc2(&w), 4);
     tear_down(&w);
+}
+END_TEST
+
+/* Of a binary glTF, to be freed by json_decref: its lengths fit the file. */
+static json_t *load_glb(const world *w)
+{
+    size_t size;
+    json_error_t error;
+    char *data = slurp(in_folder(w->out, "positions.glb"), &size);
+    ck_assert_uint_ge(size, 28);
+    ck_assert_int_eq(memcmp(data, "glTF\2\0\0", 8), 0);
+    ck_assert_uint_eq(word_at(data, 8), size);
+    uint32_t text = word_at(data, 12), binary = word_at(data, 20 + text);
+    ck_assert_uint_eq(28 + (size_t)text + binary, size);
+    json_t *json = json_loadb(data + 20, text, JSON_REJECT_DUPLICATES, &error);
+    ck_assert_msg(json != NULL, "%s", error.text);
+    json_t *buffer = json_array_get(json_object_get(json, "buffers"), 0);
+    ck_assert_int_eq(json_integer_value(json_object_get(buffer, "byteLength")), binary);
+    free(data);
+    return json;
+}
+
+static size_t count_targets(const json_t *json)
+{
+    json_t *mesh = json_array_get(json_object_get(json, "meshes"), 0);
+    json_t *primitive = json_array_get(json_object_get(mesh, "primitives"), 0);
+    size_t count = json_array_size(json_object_get(primitive, "targets"));
+    ck_assert_uint_eq(json_array_size(json_object_get(mesh, "weights")), count);
+    ck_assert_uint_eq(json_array_size(json_object_get(json, "accessors")),
+                      2 + count + 2 * json_array_size(json_object_get(json, "animations")));
+    return count;
+}
+
+/* 13 frames take 13 x 1 152 bytes; the room is enough for all but the last ones. */
+START_TEST(full_disk_leaves_a_valid_glb)
+{
+    world w;
     set_up(&w);
-    run_on_small_disk(&w, "ply", 500, "frame_000000.ply");
-    ck_assert_int_eq(count_files(w.out, ".ply"), 0);
+    run_on_small_disk(&w, "glb", 26000, "positions.glb");
+    json_t *json = load_glb(&w);
+    size_t targets = count_targets(json);
+    ck_assert(targets > 2 && targets < 12);
+    json_decref(json);
     tear_down(&w);
+}
+END_TEST
+
+/* Frames of the model at rest until one fails, on a disk that takes files of `size` bytes; how many were good. */
+static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
+{
+    static double field[NODES * 3];
+    static double strain[TRIANGLES * 2];
+    const drape_export_def def = {
+        .model = w->model, .folder = w->out, .frame_rate = RATE, .most_frames = 1000};
+    struct rlimit old;
+    drape_status status = DRAPE_OK;
+    int frames = 0;
+    void *state = calloc(1, ops->state_size);
+    ck_assert_int_eq(ops->open(w->ctx, &def, state), DRAPE_OK);
+    fill_disk(size, &old);
+    for (; !status && frames < 1000; frames++) {
+        const drape_frame frame = {.index = frames,
+                                   .time = frames / 3.0,
+                                   .positions = drape_model_rest_positions(w->model),
+                                   .velocities = field,
+                                   .strain = strain,
+                                   .energy_density = field};
+        status = ops->write(w->ctx, state, &frame);
+    }
+    ops->close(w->ctx, state);
+    free_disk(&old);
+    ck_assert_int_eq(status, DRAPE_E_FILE);
+    free(state);
+    return frames - 1;
+}
+
+/* However the disk fills up, the collection names whole frames alone: its entries outgrow the room, which the
+ * frames themselves, of some 9 kB, do not. */
+START_TEST(full_disk_leaves_a_valid_collection)
+{
+    for (size_t room = 12000; room < 12090; room += 5) {
+        world w;
+        size_t size;
+        const drape_exporter_ops *vtp;
+        set_up(&w);
+        ck_assert_int_eq(mkdir(in_folder(w.folder, "a"), 0777), 0);
+        ck_assert_int_eq(mkdir(w.out, 0777), 0);
+        ck_assert_int_eq(drape_exporter_find(w.ctx, "", "vtp", &vtp), DRAPE_OK);
+        int frames = write_frames(&w, vtp, room), named = 0;
+        ck_assert_ptr_nonnull(strstr(drape_context_message(w.ctx), "frames.pvd"));
+        char *data = slurp(in_folder(w.out, "frames.pvd"), &size);
+        ck_assert_uint_le(size, room);
+        ck_assert_str_eq(data + size - strlen("</Collection></VTKFile>\n"), "</Collection></VTKFile>\n");
+        ck_assert_ptr_eq(strstr(data, "</Collection>"), data + size - strlen("</Collection></VTKFile>\n"));
+        for (const char *at = data; (at = strstr(at, "<DataSet ")); at++)
+            named++;
+        ck_assert_int_eq(named, frames);
+        ck_assert_int_gt(frames, 100);
+        free(data);
+        tear_down(&w);
+    }
 }
 END_TEST
 
@@ -842,8 +987,8 @@ START_TEST(a_killed_run_leaves_whole_files)
     pid_t child = fork();
     if (child == 0) {
         drape_recorder *recorder;
-        const char *const formats[] = {"npy", "obj"};
-        const drape_recorder_def def = {w.out, formats, 2};
+        const char *const formats[] = {"npy", "obj", "vtp", "pc2", "glb"};
+        const drape_recorder_def def = {w.out, formats, 5};
         if (drape_recorder_create(w.ctx, w.sim, &def, &recorder) == DRAPE_OK &&
             drape_sim_observe(w.sim, kill_at_frame_5, NULL) == DRAPE_OK)
             drape_sim_advance(w.sim, 1);
@@ -854,7 +999,17 @@ START_TEST(a_killed_run_leaves_whole_files)
     ck_assert(WIFSIGNALED(end) && WTERMSIG(end) == SIGKILL);
     ck_assert_int_eq(read_npy(w.out, &data), 6);
     free(data);
-    ck_assert_int_eq(count_files(w.out, ".obj"), 6);
+    ck_assert_int_eq(count_files(w.out, ".obj"), 6 + 1);
+    ck_assert_int_eq(count_files(w.out, ".vtp"), 6);
+    data = slurp(in_folder(w.out, "frames.pvd"), &size);
+    ck_assert_ptr_nonnull(strstr(data, "frame_000005.vtp\"/>\n</Collection></VTKFile>\n"));
+    free(data);
+    data = slurp(in_folder(w.out, "positions.pc2"), &size);
+    ck_assert_uint_eq(word_at(data, 28), 6);
+    free(data);
+    json_t *json = load_glb(&w);
+    ck_assert_uint_eq(count_targets(json), 5);
+    json_decref(json);
     data = slurp(in_folder(w.out, "steps.csv"), &size);
     ck_assert_uint_gt(size, strlen(columns));
     ck_assert_int_eq(data[size - 1], '\n');
@@ -910,8 +1065,11 @@ START_TEST(each_allocation_may_fail)
     set_up(&w);
     drape_context *ctx = metered_context(&m);
     drape_recorder *recorder = NULL;
-    const char *const formats[] = {"npy", "obj", "ply"};
-    const drape_recorder_def def = {w.out, formats, 3};
+    const char *formats[32];
+    size_t count = 0;
+    for (; drape_exporters[count]; count++)
+        formats[count] = drape_exporters[count]->name;
+    const drape_recorder_def def = {w.out, formats, count};
     drape_status status = DRAPE_E_MEMORY;
     for (int n = 0; status; n++) {
         ck_assert_int_lt(n, 100);
@@ -1121,7 +1279,9 @@ SUITE("io", npy_is_exact, npy_is_valid_after_each_frame, the_last_frame_comes_on
       ply_parses_back, every_row_writes_the_same_frames, old_frames_are_removed_and_nothing_else,
       energies_are_of_the_state_at_or_after_the_frame, full_disk_leaves_whole_rows_of_energies,
       steps_has_a_row_for_each_attempt, steps_quotes_and_keeps_digits, full_disk_leaves_a_valid_npy,
-      full_disk_leaves_whole_rows, full_disk_leaves_no_half_frame, a_disk_full_from_the_start_is_told_at_once,
-      bad_folders_are_refused, unknown_formats_are_refused_before_anything_is_made,
-      too_many_observers_are_told, a_killed_run_leaves_whole_files, each_allocation_may_fail,
-      summary_is_complete, summary_is_always_json, summary_fails_whole, numbers_do_not_follow_the_locale)
+      full_disk_leaves_whole_rows, full_disk_leaves_no_half_frame, full_disk_leaves_a_valid_point_cache,
+      full_disk_leaves_a_valid_glb, full_disk_leaves_a_valid_collection,
+      a_disk_full_from_the_start_is_told_at_once, bad_folders_are_refused,
+      unknown_formats_are_refused_before_anything_is_made, too_many_observers_are_told,
+      a_killed_run_leaves_whole_files, each_allocation_may_fail, summary_is_complete, summary_is_always_json,
+      summary_fails_whole, numbers_do_not_follow_the_locale)

@@ -1,0 +1,338 @@
+/* block.c: see block.h. */
+#include "assemble/block.h"
+
+#include "base/lanes.h"
+#include "sparse/project.h"
+
+#define D DRAPE_MAX_ELEMENT_DOFS
+#define N DRAPE_BLOCK
+
+_Static_assert(LANES == DRAPE_LANES, "rows with lanes fill one");
+
+/* ---- Forces on measures ---- */
+
+static bool has_rates(const drape_term *term)
+{
+    return term->law_count > 0 || term->damping;
+}
+
+/* In step methods. */
+static void rates_of_history(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    const double *history = want->point->history + term->first_measure + b->first;
+    for (int32_t i = 0; i < b->count; i++)
+        b->rate[i] = want->point->weight * b->q[i] + history[i];
+}
+
+/* Generalised forces on the measures, their derivatives and energies, from q and its rate. */
+static void sum_stresses(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    const drape_elements *el = &term->elements;
+    const double *k = el->rest + b->first, *q0 = el->rest + (size_t)el->count + b->first;
+    const double elastic = want->conservative;
+    for (int32_t i = 0; i < b->count; i++) {
+        b->strain[i] = b->q[i] - q0[i];
+        b->by_strain[i] = elastic * k[i];
+        b->force[i] = b->by_strain[i] * b->strain[i];
+        b->energy[i] = 0.5 * b->force[i] * b->strain[i];
+        b->by_rate[i] = 0;
+    }
+    const double *c = want->dissipative && term->damping ? term->damping + b->first : NULL;
+    for (int32_t i = 0; c && i < b->count; i++) {
+        b->force[i] += c[i] * b->rate[i];
+        b->by_rate[i] = c[i];
+    }
+    for (int i = 0; i < term->law_count; i++) {
+        const drape_term *law = term->laws[i];
+        if (law->ops->dissipative ? want->dissipative : want->conservative)
+            law->ops->law(law->params, b->count, k, b->strain, b->rate, b->force, b->by_strain, b->by_rate,
+                          b->energy);
+    }
+}
+
+/* The weights of ddq and dq dq' in the Hessian. With `project` of the positive semidefinite part that is known
+ * without eigenvalues: f ddq where the measure is convex and pulls, and the Gauss-Newton part (Teran et al. 2005;
+ * Tamstorf & Grinspun 2013, 5). */
+static void weigh(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    const bool convex = term->ops->convex;
+    for (int32_t i = 0; i < b->count; i++) {
+        b->of_ddq[i] = b->force[i];
+        b->of_dq[i] = b->by_strain[i] + want->point->weight * b->by_rate[i];
+    }
+    for (int32_t i = 0; want->project > 0 && i < b->count; i++) {
+        const double ddq = convex ? fmax(0, b->of_ddq[i]) : 0, dq = fmax(0, b->of_dq[i]);
+        b->of_ddq[i] += want->project * (ddq - b->of_ddq[i]);
+        b->of_dq[i] += want->project * (dq - b->of_dq[i]);
+    }
+    for (int32_t i = 0; want->velocity && i < b->count; i++) {
+        b->of_ddq[i] = 0;
+        b->of_dq[i] = b->by_rate[i];
+    }
+}
+
+/* Whether the Hessian has the part df/dq' dq (ddq v)', which is not symmetric. */
+static bool is_lopsided(const drape_term *term, const drape_request *want)
+{
+    return has_rates(term) && want->dissipative && !want->point->history && !want->velocity && !want->project;
+}
+
+/* ---- Measures of pairs ---- */
+
+/* What pairs of one block share: component k of pair i at [k][i]. */
+typedef struct pairs {
+    double d[3][N];        /* from the first node to the second */
+    double approach[3][N]; /* v1 - v0, in continuous time */
+} pairs;
+
+static void rates_of_pairs(const drape_term *term, const drape_request *want, drape_block *b, pairs *p)
+{
+    const int32_t *node = term->elements.node + 2 * (size_t)b->first;
+    const double *v = want->point->v;
+    for (int r = 0; r < 3; r++)
+        for (int32_t i = 0; i < b->count; i++)
+            p->approach[r][i] =
+                v[3 * (size_t)node[2 * i + 1] + (size_t)r] - v[3 * (size_t)node[2 * i] + (size_t)r];
+    for (int32_t i = 0; i < b->count; i++)
+        b->rate[i] = b->per_length[i] * (p->d[0][i] * p->approach[0][i] + p->d[1][i] * p->approach[1][i] +
+                                         p->d[2][i] * p->approach[2][i]);
+}
+
+/* f P + w dq dq' = f c I + (w c^2 - f c/d.d) d d' */
+LANES_DISPATCH static void pair_blocks(drape_block *b, const pairs *p)
+{
+    double isotropic[N], along[N];
+    for (int i = 0; i < N; i++) {
+        double c = b->per_length[i],
+               square = p->d[0][i] * p->d[0][i] + p->d[1][i] * p->d[1][i] + p->d[2][i] * p->d[2][i];
+        isotropic[i] = b->of_ddq[i] * c;
+        along[i] = b->of_dq[i] * c * c - isotropic[i] / square;
+    }
+    for (int r = 0; r < 3; r++)
+        for (int s = 0; s < 3; s++)
+            for (int i = 0; i < N; i++)
+                b->hessian[(3 * r + s) * N + i] =
+                    along[i] * (p->d[r][i] * p->d[s][i]) + (r == s ? isotropic[i] : 0);
+}
+
+/* df/dq' dq (ddq v)', with ddq v = (-u, u), u = P (v1 - v0) */
+static void add_lopsided_pairs(drape_block *b, const pairs *p)
+{
+    for (int32_t i = 0; i < b->count; i++) {
+        const double c = b->per_length[i], d[3] = {p->d[0][i], p->d[1][i], p->d[2][i]};
+        const double radial = b->rate[i] / (c * (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
+        for (int s = 0; s < 3; s++) {
+            double u = b->by_rate[i] * c * c * (p->approach[s][i] - radial * d[s]);
+            for (int r = 0; r < 3; r++)
+                b->hessian[(3 * r + s) * N + i] += d[r] * u;
+        }
+    }
+}
+
+/* A tenth of the numbers of a gradient and Hessian, and loops without calls. */
+static void evaluate_pairs(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    pairs p;
+    double *compact = b->scratch;
+    term->ops->pair(&term->elements, b->first, b->count, want->point->x, b->q, compact, b->per_length);
+    for (int r = 0; r < 3; r++)
+        memcpy(p.d[r], compact + r * b->count, (size_t)b->count * sizeof *compact);
+    if (has_rates(term) && want->point->history)
+        rates_of_history(term, want, b);
+    else if (has_rates(term))
+        rates_of_pairs(term, want, b, &p);
+    sum_stresses(term, want, b);
+    for (int r = 0; r < 3; r++)
+        for (int32_t i = 0; i < b->count; i++)
+            b->gradient[r * N + i] = p.d[r][i] * (b->force[i] * b->per_length[i]);
+    if (!want->hessian)
+        return;
+    for (int32_t i = b->count; i < N; i++) /* the last block is not full: numbers that no one takes */
+        b->per_length[i] = b->of_ddq[i] = b->of_dq[i] = 0, p.d[0][i] = p.d[1][i] = p.d[2][i] = 1;
+    weigh(term, want, b);
+    pair_blocks(b, &p);
+    if (is_lopsided(term, want))
+        add_lopsided_pairs(b, &p);
+}
+
+/* ---- Other measures, side by side in lanes ---- */
+
+static void lay_out(int numbers, const double *from, int32_t count, double *to)
+{
+    for (int32_t i = 0; i < count; i++)
+        for (int k = 0; k < numbers; k++)
+            to[(i - i % LANES) * numbers + LANES * k + i % LANES] = from[i * numbers + k];
+}
+
+/* q, dq and, in b->hessian, ddq of the whole block. */
+static void measure(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    const drape_elements *el = &term->elements;
+    const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
+    const bool second = want->hessian && !want->velocity;
+    const int d = 3 * el->nodes;
+    if (!term->ops->lanes) {
+        term->ops->measure(el, b->first, b->count, want->point->x, internal, b->q, b->gradient,
+                           second ? b->scratch : NULL);
+        lay_out(d, b->gradient, b->count, b->dq);
+        if (second)
+            lay_out(d * d, b->scratch, b->count, b->hessian);
+        return;
+    }
+    for (int32_t i = 0; i < b->count; i += LANES) {
+        int32_t element[LANES];
+        for (int32_t l = 0; l < LANES; l++)
+            element[l] = b->first + (i + l < b->count ? i + l : b->count - 1);
+        term->ops->lanes(el, element, want->point->x, internal, b->q + i, b->dq + i * d,
+                         second ? b->hessian + i * d * d : NULL);
+    }
+}
+
+/* v of the nodes of element i. */
+static void gather(const drape_elements *el, int32_t element, const double *v, double *local)
+{
+    const int32_t *node = el->node + (size_t)element * (size_t)el->nodes;
+    for (int a = 0; a < el->nodes; a++)
+        memcpy(local + 3 * a, v + 3 * (size_t)node[a], 3 * sizeof *local);
+}
+
+static void rates_of_motion(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    const int d = 3 * term->elements.nodes;
+    for (int32_t i = 0; i < b->count; i++) {
+        double v[D];
+        const double *dq = b->dq + drape_block_start(b, i, d);
+        gather(&term->elements, b->first + i, want->point->v, v);
+        b->rate[i] = 0;
+        for (int k = 0; k < d; k++)
+            b->rate[i] += dq[LANES * k] * v[k];
+    }
+}
+
+/* The blocks on and below the diagonal. */
+LANES_DISPATCH static void measure_hessians(int d, drape_block *b)
+{
+    for (int32_t g = 0; g < b->count; g += LANES) {
+        const double *dq = b->dq + g * d;
+        double *h = b->hessian + g * d * d;
+        lanes of_ddq = lanes_load(b->of_ddq + g), of_dq = lanes_load(b->of_dq + g);
+        for (int i = 0; i < d; i++) {
+            lanes dq_i = of_dq * lanes_load(dq + LANES * i);
+            for (int j = 0; j < i - i % 3 + 3; j++) {
+                double *at = h + LANES * (d * i + j);
+                lanes_store(at, of_ddq * lanes_load(at) + dq_i * lanes_load(dq + LANES * j));
+            }
+        }
+    }
+}
+
+LANES_DISPATCH static void velocity_hessians(int d, drape_block *b)
+{
+    for (int32_t g = 0; g < b->count; g += LANES)
+        for (int i = 0; i < d; i++) {
+            lanes dq_i = lanes_load(b->of_dq + g) * lanes_load(b->dq + g * d + LANES * i);
+            for (int j = 0; j < i - i % 3 + 3; j++)
+                lanes_store(b->hessian + g * d * d + LANES * (d * i + j),
+                            dq_i * lanes_load(b->dq + g * d + LANES * j));
+        }
+}
+
+/* The whole of one element's Hessian, with the part that is not symmetric. */
+static void lopsided_hessian(const drape_term *term, const drape_request *want, drape_block *b, int32_t i)
+{
+    const int d = 3 * term->elements.nodes;
+    double *h = b->hessian + drape_block_start(b, i, d * d), v[D], along[D];
+    const double *dq = b->dq + drape_block_start(b, i, d);
+    gather(&term->elements, b->first + i, want->point->v, v);
+    for (int r = 0; r < d; r++)
+        for (int c = r - r % 3 + 3; c < d; c++)
+            h[LANES * (d * r + c)] = h[LANES * (d * c + r)];
+    for (int r = 0; r < d; r++) {
+        along[r] = 0;
+        for (int c = 0; c < d; c++)
+            along[r] += b->by_rate[i] * h[LANES * (d * r + c)] * v[c];
+    }
+    for (int r = 0; r < d; r++)
+        for (int c = 0; c < d; c++)
+            h[LANES * (d * r + c)] = b->of_ddq[i] * h[LANES * (d * r + c)] +
+                                     dq[LANES * r] * (b->of_dq[i] * dq[LANES * c] + along[c]);
+}
+
+static void hessians_of_measures(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    const int d = 3 * term->elements.nodes;
+    weigh(term, want, b);
+    b->mirrored = !is_lopsided(term, want);
+    if (want->velocity)
+        velocity_hessians(d, b);
+    else if (b->mirrored)
+        measure_hessians(d, b);
+    else
+        for (int32_t i = 0; i < b->count; i++)
+            lopsided_hessian(term, want, b, i);
+}
+
+static void evaluate_measures(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    const int d = 3 * term->elements.nodes;
+    b->stride = LANES;
+    measure(term, want, b);
+    if (has_rates(term) && want->point->history)
+        rates_of_history(term, want, b);
+    else if (has_rates(term))
+        rates_of_motion(term, want, b);
+    sum_stresses(term, want, b);
+    for (int32_t g = 0; g < b->count; g += LANES)
+        for (int k = 0; k < d; k++)
+            for (int l = 0; l < LANES; l++)
+                b->gradient[g * d + LANES * k + l] = b->force[g + l] * b->dq[g * d + LANES * k + l];
+    if (want->hessian)
+        hessians_of_measures(term, want, b);
+}
+
+/* ---- Energies and dissipations, one element after another ---- */
+
+static void evaluate_energies(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
+    term->ops->energy(&term->elements, b->first, b->count, want->point->x, internal, b->energy, b->gradient,
+                      want->hessian ? b->hessian : NULL);
+}
+
+static void evaluate_dissipations(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    const int d = 3 * term->elements.nodes;
+    const bool hessian = want->hessian;
+    memset(b->energy, 0, (size_t)b->count * sizeof *b->energy);
+    term->ops->dissipation(&term->elements, b->first, b->count, want->point->x, want->point->v, b->gradient,
+                           hessian ? b->hessian : NULL, hessian ? b->scratch : NULL);
+    for (int i = 0; hessian && i < b->count * d * d; i++)
+        b->hessian[i] = want->velocity ? b->scratch[i] : b->hessian[i] + want->point->weight * b->scratch[i];
+}
+
+static void project(int d, double share, double *h, double *positive)
+{
+    memcpy(positive, h, (size_t)(d * d) * sizeof *h);
+    drape_project(d, positive);
+    for (int i = 0; i < d * d; i++)
+        h[i] += share * (positive[i] - h[i]);
+}
+
+void drape_block_evaluate(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    b->pairs = term->ops->pair;
+    b->mirrored = false;
+    b->stride = 1;
+    if (term->ops->pair)
+        evaluate_pairs(term, want, b);
+    else if (term->ops->measure)
+        evaluate_measures(term, want, b);
+    else if (term->ops->energy)
+        evaluate_energies(term, want, b);
+    else
+        evaluate_dissipations(term, want, b);
+    const int d = 3 * term->elements.nodes;
+    const bool given = term->ops->measure; /* with its positive part already */
+    for (int32_t i = 0; want->hessian && want->project > 0 && !given && i < b->count; i++)
+        project(d, want->project, b->hessian + (size_t)i * (size_t)(d * d), b->scratch);
+}

@@ -1,0 +1,62 @@
+/*
+ * block.h: a block of elements of one term, evaluated: their forces and Hessians, not yet added anywhere. What
+ * is known of strain measures becomes forces here:
+ *     g = f dq,  f summed over elasticity, the elements' own dashpots and laws
+ *     H = f ddq + (df/dq + w df/dq') dq dq'                       step methods: q' = w q + history
+ *     H = f ddq + df/dq dq dq' + df/dq' dq (ddq v + w dq)'        continuous time: q' = dq . v
+ * Inner loops are over elements, so that compilers make vectors of them.
+ */
+#ifndef DRAPE_ASSEMBLE_BLOCK_H
+#define DRAPE_ASSEMBLE_BLOCK_H
+
+#include "assemble/system.h"
+
+#define DRAPE_BLOCK 32 /* elements: their Hessians stay in the cache */
+
+/* What a sum over a term is wanted for. */
+typedef struct drape_request {
+    const drape_point *point;
+    bool energy, hessian;
+    bool conservative, dissipative; /* which parts of the forces */
+    double project;                 /* share of the positive semidefinite part in Hessians, 0 to 1 */
+    bool velocity;                  /* the Hessian wanted is dg/dv alone */
+    bool remainder;                 /* only what is of no measure */
+    const bool *without;            /* (term_count) terms that are left out; NULL: none */
+} drape_request;
+
+/*
+ * With `pairs` the results are the force and the block of a pair: g = (-pull, pull), H = (block -block; -block
+ * block), component k of element i at [k DRAPE_BLOCK + i]. Else number k of element i lies at [start(i) + stride k], and
+ * `mirrored` says that of a Hessian the blocks above the diagonal are those below it, transposed, and not written.
+ */
+typedef struct drape_block {
+    int32_t first, count;
+    bool pairs, mirrored;
+    int stride; /* 1, or DRAPE_LANES: elements stand side by side */
+    double energy[DRAPE_BLOCK];
+    double gradient[DRAPE_BLOCK * DRAPE_MAX_ELEMENT_DOFS];
+    double hessian[DRAPE_BLOCK * DRAPE_MAX_ELEMENT_DOFS * DRAPE_MAX_ELEMENT_DOFS];
+    /* Of measures. */
+    double q[DRAPE_BLOCK], dq[DRAPE_BLOCK * DRAPE_MAX_ELEMENT_DOFS];
+    double per_length[DRAPE_BLOCK]; /* of pairs: dq = per_length (-d, d) */
+    double strain[DRAPE_BLOCK], rate[DRAPE_BLOCK];
+    double force[DRAPE_BLOCK], by_strain[DRAPE_BLOCK], by_rate[DRAPE_BLOCK];
+    double of_ddq[DRAPE_BLOCK],
+        of_dq[DRAPE_BLOCK]; /* H = of_ddq ddq + of_dq dq dq' + what is not symmetric */
+    double scratch[DRAPE_BLOCK * DRAPE_MAX_ELEMENT_DOFS * DRAPE_MAX_ELEMENT_DOFS];
+} drape_block;
+_Static_assert(DRAPE_BLOCK <= DRAPE_PAIR_BLOCK, "rows with pair take a block");
+_Static_assert(DRAPE_BLOCK % DRAPE_LANES == 0, "lanes fill a block");
+
+/* Where the numbers of an element start, if an element has so many. */
+static inline size_t drape_block_start(const drape_block *b, int32_t i, int numbers)
+{
+    if (b->stride == 1)
+        return (size_t)i * (size_t)numbers;
+    return (size_t)(i - i % DRAPE_LANES) * (size_t)numbers + (size_t)(i % DRAPE_LANES);
+}
+
+/* b->first and b->count say which elements. */
+void drape_block_evaluate(const drape_term *term, const drape_request *want, drape_block *b);
+
+#endif

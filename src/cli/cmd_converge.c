@@ -1,0 +1,31 @@
+/* cmd_converge.c: `drape converge`: orders in time and space. */
+#include "cli/lab.h"
+
+static const cli_option options[] = {
+    CLI_LAB_OPTIONS,
+    {"levels", CLI_NUMBER, "N", "refinements, 3 to 12 (default 6)", offsetof(cli_lab_request, levels), 12,
+     NULL},
+    {"space", CLI_FLAG, NULL, "also refine the grids of all cloths", offsetof(cli_lab_request, space), 0,
+     NULL},
+};
+
+static int main_converge(int argc, char **argv);
+
+const drape_verb drape_verb_converge = {
+    .name = "converge",
+    .operand = "SCENE",
+    .takes_scene = true,
+    .summary = "orders of convergence in time, and in space",
+    .details =
+        "Halves the step of every integrator again and again (ida: cuts rtol to a tenth), and the edges of "
+        "the\n"
+        "grids with --space; the distances between successive ends give the order, with its confidence.",
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .run = main_converge,
+};
+
+static int main_converge(int argc, char **argv)
+{
+    return cli_lab_main(&drape_verb_converge, 1, argc, argv);
+}

@@ -1,0 +1,173 @@
+/* lab.c: see lab.h. */
+#include "cli/lab.h"
+
+#include "cli/progress.h"
+#include "cli/signals.h"
+#include "drape/lab.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void show(void *user, int64_t done, int64_t total, double seconds_left)
+{
+    cli_progress_count(user, done, total, seconds_left);
+}
+
+static bool interrupted(void *user)
+{
+    (void)user;
+    return cli_interrupted();
+}
+
+/* "1/4" */
+static int read_shard(const cli_lab_request *request, drape_lab_def *def)
+{
+    int used = 0;
+    const char *text = request->shard;
+    if (!text)
+        return CLI_GO_ON;
+    if (sscanf(text, "%d/%d%n", &def->shard, &def->shards, &used) != 2 || text[used] || def->shard < 1 ||
+        def->shard > def->shards)
+        return cli_misuse(request->command.verb, "--shard \"%.60s\": it is I/N, with I from 1 to N, as 1/4",
+                          text);
+    return CLI_GO_ON;
+}
+
+/* What a command line becomes; freed by free_words. */
+typedef struct words {
+    drape_lab_setting *settings;
+    char *text;         /* of the integrators, cut at the commas */
+    const char **items; /* into it */
+    char *folder;
+} words;
+
+static void free_words(words *w)
+{
+    free(w->settings);
+    free(w->text);
+    free(w->items);
+    free(w->folder);
+}
+
+/* "be,ida" */
+static size_t split(words *w)
+{
+    size_t count = 0;
+    for (char *word = strtok(w->text, ","); word; word = strtok(NULL, ","))
+        w->items[count++] = word;
+    return count;
+}
+
+/* scenes/flag.json, tradeoff -> flag.tradeoff */
+static void name_folder(const char *scene, const char *verb, char *folder, size_t size)
+{
+    const char *slash = strrchr(scene, '/'), *name = slash ? slash + 1 : scene, *dot = strrchr(name, '.');
+    snprintf(folder, size, "%.*s.%s", dot ? (int)(dot - name) : (int)strlen(name), name, verb);
+}
+
+static bool make_words(const cli_lab_request *request, words *w)
+{
+    const cli_command *command = &request->command;
+    const char *rows = request->integrators ? request->integrators : "";
+    size_t room = strlen(command->operand) + strlen(command->verb) + 2;
+    w->settings = calloc(command->setting_count + 1, sizeof *w->settings);
+    w->text = strdup(rows);
+    w->items = calloc(strlen(rows) + 1, sizeof *w->items);
+    w->folder = calloc(room, 1);
+    if (!w->settings || !w->text || !w->items || !w->folder)
+        return false;
+    name_folder(command->operand, command->verb, w->folder, room);
+    for (size_t i = 0; i < command->setting_count; i++)
+        w->settings[i] = (drape_lab_setting){command->settings[i].pointer, command->settings[i].value};
+    return true;
+}
+
+static int make_def(const cli_lab_request *request, int default_jobs, words *w, cli_progress *progress,
+                    drape_lab_def *def)
+{
+    const cli_command *command = &request->command;
+    drape_lab_def_init(def, sizeof *def);
+    def->scene = command->operand;
+    def->folder = request->out ? request->out : w->folder;
+    def->settings = w->settings;
+    def->setting_count = command->setting_count;
+    def->integrators = w->items;
+    def->integrator_count = split(w);
+    def->axes = request->axes.items;
+    def->axis_count = request->axes.count;
+    def->space = request->space;
+    def->jobs = request->jobs ? request->jobs : default_jobs;
+    def->levels = request->levels ? request->levels : def->levels;
+    def->repeats = request->repeats ? request->repeats : def->repeats;
+    def->case_seconds = request->case_seconds > 0 ? request->case_seconds : def->case_seconds;
+    def->strain_limit = request->strain_limit > 0 ? request->strain_limit : def->strain_limit;
+    def->progress = show;
+    def->cancel = interrupted;
+    def->user = progress;
+    return read_shard(request, def);
+}
+
+/* What is wrong with the input is found before anything is run. */
+static int exit_code(drape_status status)
+{
+    switch (status) {
+    case DRAPE_OK:
+        return CLI_DONE;
+    case DRAPE_E_STOPPED:
+        return CLI_INTERRUPTED;
+    case DRAPE_E_ARGUMENT:
+    case DRAPE_E_PARSE:
+    case DRAPE_E_FILE:
+        return CLI_BAD_INPUT;
+    default:
+        return CLI_FAILED;
+    }
+}
+
+int cli_lab_conclude(drape_context *ctx, drape_status status, drape_lab_outcome *outcome, const char *out)
+{
+    if (status) {
+        fprintf(stderr, "%s\n", drape_context_message(ctx));
+    } else {
+        fputs(outcome->text ? outcome->text : "", stdout);
+        if (outcome->done == outcome->cases)
+            printf("report    %s/report.html\n", out);
+    }
+    drape_lab_outcome_free(outcome);
+    return exit_code(status);
+}
+
+static int run(const drape_verb *verb, const cli_lab_request *request, int default_jobs)
+{
+    drape_lab_def def;
+    drape_lab_outcome outcome;
+    drape_context *ctx = NULL;
+    cli_progress progress;
+    words w = {.settings = NULL};
+    if (!make_words(request, &w) || drape_context_create(NULL, &ctx)) {
+        free_words(&w);
+        return cli_misuse(verb->name, "out of memory");
+    }
+    int code = make_def(request, default_jobs, &w, &progress, &def);
+    if (code == CLI_GO_ON) {
+        cli_catch_signals();
+        cli_progress_begin(&progress, 1);
+        drape_status status = drape_lab_run(ctx, verb->name, &def, &outcome);
+        cli_progress_clear(&progress);
+        code = cli_lab_conclude(ctx, status, &outcome, def.folder);
+    }
+    drape_context_destroy(&ctx);
+    free_words(&w);
+    return code;
+}
+
+int cli_lab_main(const drape_verb *verb, int default_jobs, int argc, char **argv)
+{
+    cli_lab_request request = {.out = NULL};
+    int code = cli_parse(verb, argc, argv, &request.command);
+    if (code == CLI_GO_ON)
+        code = run(verb, &request, default_jobs);
+    cli_command_free(&request.command);
+    return code;
+}

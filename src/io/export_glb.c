@@ -1,0 +1,398 @@
+/*
+ * export_glb.c: folder/positions.glb: binary glTF 2.0. The mesh, all cloths in one, is the first frame; each later
+ * one is a morph target, its displacements in float32, and an animation of the targets' weights plays them: at the
+ * time of frame k weight k - 1 is 1 and the others are 0, and between two times they mix linearly, as positions do.
+ *
+ *     header                  12 bytes
+ *     JSON chunk              8 bytes and JSON of a fixed length, with blanks for what is not there yet
+ *     binary chunk            8 bytes, triangles, positions of the first frame, displacements of the others, and at
+ *                             the end, when all frames are known, times and weights
+ *
+ * After each frame its displacements are complete in the file before its few numbers are written into their blanks:
+ * a run that is killed leaves a valid file with all frames as morph targets, without the animation. That comes
+ * last because the weights are a matrix, frames x targets.
+ *
+ * glTF has y up and metres, as Drape has. Specification: Khronos, glTF 2.0, 3.6.2 (accessors), 3.7.2.2 (morph
+ * targets), 3.11 (animations), 4.4 (GLB).
+ */
+#include <float.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "io/export.h"
+
+#define FILE_NAME    "positions.glb"
+#define JSON_OFFSET  20
+#define MOST_FRAMES  16384                  /* their weights take 1 GiB */
+#define MOST_BYTES   (UINT32_MAX - 65535.0) /* lengths are 32 bits */
+#define FIXED_ROOM   4096                   /* JSON without the parts of a frame */
+#define TARGET_WIDTH 20                     /* ,{"POSITION":16385} */
+#define WEIGHT_WIDTH 2                      /* ,0 */
+#define BOUND_WIDTH  17                     /* -1.17549435e-38 and a comma */
+#define OPEN_WIDTH   11                     /* ,"targets":[ and ,"weights":[ */
+#define LENGTH_WIDTH 10
+#define ACCESSOR_HEAD                                                                                        \
+    ",{\"bufferView\":1,\"byteOffset\":%u,\"componentType\":5126,\"count\":%u,\"type\":\"VEC3\","
+#define ACCESSOR_ROOM (120 + 6 * BOUND_WIDTH)
+#define TIMES_ROOM    640
+
+/* Blanks in the JSON, to be filled later; from its beginning. */
+typedef struct blanks {
+    size_t buffer_length, view_length, views, accessors, times, targets_open, targets, targets_close,
+        weights_open, weights, weights_close, animation;
+} blanks;
+
+typedef struct glb_state {
+    const drape_export_def *def;
+    drape_file file;
+    uint32_t room;   /* frames that there is room for */
+    uint32_t frames; /* whole ones in the file */
+    char *json;      /* while the file is begun; then a scratch */
+    size_t json_size, used;
+    blanks at;
+    float *base;  /* (node_count x 3) positions of the first frame */
+    float *times; /* (room) */
+} glb_state;
+
+/* ---- JSON ---- */
+
+static void add(glb_state *glb, const char *format, ...) DRAPE_PRINTF(2, 3);
+static void add(glb_state *glb, const char *format, ...)
+{
+    va_list values;
+    va_start(values, format);
+    glb->used += (size_t)vsnprintf(glb->json + glb->used, glb->json_size - glb->used, format, values);
+    va_end(values);
+}
+
+/* Where the blanks begin. */
+static size_t add_blanks(glb_state *glb, size_t count)
+{
+    size_t at = glb->used;
+    memset(glb->json + at, ' ', count);
+    glb->used += count;
+    return at;
+}
+
+static uint32_t triangle_bytes(const glb_state *glb)
+{
+    return 12 * (uint32_t)drape_model_triangle_count(glb->def->model);
+}
+
+static uint32_t node_bytes(const glb_state *glb)
+{
+    return 12 * (uint32_t)drape_model_node_count(glb->def->model);
+}
+
+static void add_bounds(const float bounds[6], char *text, size_t size)
+{
+    snprintf(text, size, "\"min\":[%.9g,%.9g,%.9g],\"max\":[%.9g,%.9g,%.9g]}", bounds[0], bounds[1],
+             bounds[2], bounds[3], bounds[4], bounds[5]);
+}
+
+static void find_bounds(const glb_state *glb, const double *x, bool relative, float bounds[6])
+{
+    for (int k = 0; k < 3; k++) {
+        bounds[k] = FLT_MAX;
+        bounds[3 + k] = -FLT_MAX;
+    }
+    for (size_t i = 0; i < 3 * (size_t)drape_model_node_count(glb->def->model); i++) {
+        float value = relative ? (float)(x[i] - (double)glb->base[i]) : (float)x[i];
+        bounds[i % 3] = fminf(bounds[i % 3], value);
+        bounds[3 + i % 3] = fmaxf(bounds[3 + i % 3], value);
+    }
+}
+
+/* Positions of the first frame are accessor 1 in view 1. */
+static void add_buffers(glb_state *glb)
+{
+    add(glb, "\"buffers\":[{\"byteLength\":");
+    glb->at.buffer_length = add_blanks(glb, LENGTH_WIDTH);
+    add(glb, "}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":%" PRIu32 ",\"target\":34963}",
+        triangle_bytes(glb));
+    add(glb, ",{\"buffer\":0,\"byteOffset\":%" PRIu32 ",\"byteStride\":12,\"target\":34962,\"byteLength\":",
+        triangle_bytes(glb));
+    glb->at.view_length = add_blanks(glb, LENGTH_WIDTH);
+    add(glb, "}");
+    glb->at.views = add_blanks(glb, TIMES_ROOM / 2);
+    add(glb,
+        "],\"accessors\":[{\"bufferView\":0,\"componentType\":5125,\"count\":%" PRIu32
+        ",\"type\":\"SCALAR\"}",
+        triangle_bytes(glb) / 4);
+    glb->at.accessors = add_blanks(glb, (size_t)glb->room * ACCESSOR_ROOM);
+    glb->at.times = add_blanks(glb, TIMES_ROOM / 2);
+    add(glb, "]");
+}
+
+static void add_mesh(glb_state *glb)
+{
+    add(glb,
+        ",\"meshes\":[{\"name\":\"cloth\",\"primitives\":[{\"attributes\":{\"POSITION\":1},\"indices\":0,"
+        "\"material\":0");
+    glb->at.targets_open = add_blanks(glb, OPEN_WIDTH + 1);
+    glb->at.targets = add_blanks(glb, (size_t)glb->room * TARGET_WIDTH);
+    glb->at.targets_close = add_blanks(glb, 1);
+    add(glb, "}]");
+    glb->at.weights_open = add_blanks(glb, OPEN_WIDTH + 1);
+    glb->at.weights = add_blanks(glb, (size_t)glb->room * WEIGHT_WIDTH);
+    glb->at.weights_close = add_blanks(glb, 1);
+    add(glb, "}]");
+}
+
+static void make_json(glb_state *glb)
+{
+    add(glb,
+        "{\"asset\":{\"version\":\"2.0\",\"generator\":\"Drape "
+        "%s\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],"
+        "\"nodes\":[{\"name\":\"cloth\",\"mesh\":0}],\"materials\":[{\"name\":\"cloth\",\"doubleSided\":true,"
+        "\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.55,0.16,0.13,1],\"metallicFactor\":0,"
+        "\"roughnessFactor\":0.85}}],",
+        drape_version());
+    add_buffers(glb);
+    add_mesh(glb);
+    glb->at.animation = add_blanks(glb, TIMES_ROOM / 2);
+    add(glb, "}");
+    add_blanks(glb, 3 - (glb->used + 3) % 4);
+    glb->json_size = glb->used;
+}
+
+/* ---- The file ---- */
+
+static drape_status fill(glb_state *glb, size_t at, const char *format, ...) DRAPE_PRINTF(3, 4);
+static drape_status fill(glb_state *glb, size_t at, const char *format, ...)
+{
+    char text[TIMES_ROOM];
+    va_list values;
+    va_start(values, format);
+    int length = vsnprintf(text, sizeof text, format, values);
+    va_end(values);
+    return drape_file_overwrite(&glb->file, (off_t)(JSON_OFFSET + at), text, (size_t)length);
+}
+
+static drape_status write_word(glb_state *glb, off_t at, uint32_t word)
+{
+    unsigned char bytes[4];
+    for (int b = 0; b < 4; b++)
+        bytes[b] = (unsigned char)(word >> 8 * b);
+    return drape_file_overwrite(&glb->file, at, bytes, sizeof bytes);
+}
+
+/* All lengths, as the file is now. views: bytes of positions. */
+static drape_status write_lengths(glb_state *glb, uint32_t positions)
+{
+    off_t binary = JSON_OFFSET + (off_t)glb->json_size;
+    uint32_t size = (uint32_t)glb->file.kept, length = size - (uint32_t)binary - 8;
+    drape_status status = write_word(glb, binary, length);
+    if (!status)
+        status = write_word(glb, 8, size);
+    if (!status)
+        status = fill(glb, glb->at.buffer_length, "%10" PRIu32, length);
+    return status ? status : fill(glb, glb->at.view_length, "%10" PRIu32, positions);
+}
+
+static drape_status glb_clean(drape_context *ctx, const char *folder)
+{
+    return drape_export_clean(ctx, folder, FILE_NAME);
+}
+
+static drape_status glb_check(drape_context *ctx, const char *pointer, const drape_export_def *def)
+{
+    double frames = (double)def->most_frames, nodes = drape_model_node_count(def->model);
+    double bytes = 12.0 * drape_model_triangle_count(def->model) + 12 * nodes * frames + 4 * frames * frames +
+                   frames * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
+    if (frames <= MOST_FRAMES && bytes <= MOST_BYTES)
+        return DRAPE_OK;
+    return drape_fail_at(
+        ctx, DRAPE_E_ARGUMENT, pointer,
+        "glb: %.0f frames of %.0f nodes take %.3g bytes; a file has at most %d frames and 4 GiB: "
+        "lower the frame rate or take another format",
+        frames, nodes, bytes, MOST_FRAMES);
+}
+
+static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
+{
+    glb_state *glb = state;
+    glb->def = def;
+    glb->room = (uint32_t)def->most_frames;
+    glb->json_size = FIXED_ROOM + (size_t)glb->room * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
+    glb->json = drape_alloc(ctx, glb->json_size, 1);
+    glb->base = drape_alloc(ctx, 3 * (size_t)drape_model_node_count(def->model), sizeof *glb->base);
+    glb->times = drape_alloc(ctx, glb->room, sizeof *glb->times);
+    if (!glb->json || !glb->base || !glb->times)
+        return DRAPE_E_MEMORY;
+    make_json(glb);
+    return drape_export_begin(ctx, def->folder, FILE_NAME, &glb->file);
+}
+
+/* ---- Frames ---- */
+
+static void put_triangles(glb_state *glb)
+{
+    const int32_t *node = drape_model_triangles(glb->def->model);
+    for (size_t i = 0; i < triangle_bytes(glb) / 4; i++)
+        drape_file_put_word(&glb->file, (uint32_t)node[i]);
+}
+
+/* Everything at once: a file without positions would be none. */
+static drape_status write_first(glb_state *glb, const drape_frame *frame)
+{
+    float bounds[6];
+    char accessor[ACCESSOR_ROOM + 1];
+    uint32_t length = triangle_bytes(glb) + node_bytes(glb);
+    find_bounds(glb, frame->positions, false, bounds);
+    int head = snprintf(accessor, sizeof accessor, ACCESSOR_HEAD, 0u, node_bytes(glb) / 12);
+    add_bounds(bounds, accessor + head, sizeof accessor - (size_t)head);
+    memcpy(glb->json + glb->at.accessors, accessor, strlen(accessor));
+    snprintf(accessor, sizeof accessor, "%10" PRIu32, length);
+    memcpy(glb->json + glb->at.buffer_length, accessor, LENGTH_WIDTH);
+    snprintf(accessor, sizeof accessor, "%10" PRIu32, node_bytes(glb));
+    memcpy(glb->json + glb->at.view_length, accessor, LENGTH_WIDTH);
+
+    drape_file_put_text(&glb->file, "glTF");
+    drape_file_put_word(&glb->file, 2);
+    drape_file_put_word(&glb->file, (uint32_t)(JSON_OFFSET + glb->json_size + 8 + length));
+    drape_file_put_word(&glb->file, (uint32_t)glb->json_size);
+    drape_file_put_text(&glb->file, "JSON");
+    drape_file_put(&glb->file, glb->json, glb->json_size);
+    drape_file_put_word(&glb->file, length);
+    drape_file_put(&glb->file, "BIN", 4); /* with its 0 */
+    put_triangles(glb);
+    for (size_t i = 0; i < node_bytes(glb) / 4; i++) {
+        glb->base[i] = (float)frame->positions[i];
+        drape_file_put_float(&glb->file, glb->base[i]);
+    }
+    return drape_file_publish(&glb->file);
+}
+
+/* The frame's accessor, target and weight; the first target opens the lists. */
+static drape_status name_target(glb_state *glb, const drape_frame *frame)
+{
+    uint32_t target = glb->frames - 1;
+    float bounds[6];
+    char text[ACCESSOR_ROOM + 1];
+    find_bounds(glb, frame->positions, true, bounds);
+    int head =
+        snprintf(text, sizeof text, ACCESSOR_HEAD, glb->frames * node_bytes(glb), node_bytes(glb) / 12);
+    add_bounds(bounds, text + head, sizeof text - (size_t)head);
+    drape_status status = fill(glb, glb->at.accessors + (size_t)glb->frames * ACCESSOR_ROOM, "%s", text);
+    if (!status && target == 0)
+        status = fill(glb, glb->at.targets_close, "]");
+    if (!status)
+        status = fill(glb, target ? glb->at.targets + (size_t)target * TARGET_WIDTH : glb->at.targets_open,
+                      "%s{\"POSITION\":%" PRIu32 "}", target ? "," : ",\"targets\":[", glb->frames + 1);
+    if (!status && target == 0)
+        status = fill(glb, glb->at.weights_close, "]");
+    if (!status)
+        status = fill(glb, target ? glb->at.weights + (size_t)target * WEIGHT_WIDTH : glb->at.weights_open,
+                      "%s0", target ? "," : ",\"weights\":[");
+    return status;
+}
+
+static drape_status write_target(glb_state *glb, const drape_frame *frame)
+{
+    off_t before = glb->file.kept;
+    for (size_t i = 0; i < node_bytes(glb) / 4; i++)
+        drape_file_put_float(&glb->file, (float)(frame->positions[i] - (double)glb->base[i]));
+    drape_status status = drape_file_keep(&glb->file);
+    if (status)
+        return status;
+    status = write_lengths(glb, (glb->frames + 1) * node_bytes(glb));
+    if (status)
+        drape_file_cut(&glb->file, before);
+    return status ? status : name_target(glb, frame);
+}
+
+/* Times of an animation strictly increase, in float32. */
+static float time_of(const glb_state *glb, const drape_frame *frame)
+{
+    float time = (float)frame->time;
+    if (glb->frames > 0 && !(time > glb->times[glb->frames - 1]))
+        time = nextafterf(glb->times[glb->frames - 1], FLT_MAX);
+    return time;
+}
+
+static drape_status glb_write(drape_context *ctx, void *state, const drape_frame *frame)
+{
+    glb_state *glb = state;
+    if (glb->frames == glb->room)
+        return drape_fail(ctx, DRAPE_E_FILE,
+                          "\"%.500s\" has room for %" PRIu32 " frames, those of the scene's duration",
+                          glb->file.path, glb->room);
+    glb->times[glb->frames] = time_of(glb, frame);
+    drape_status status = glb->frames == 0 ? write_first(glb, frame) : write_target(glb, frame);
+    if (!status)
+        glb->frames++;
+    return status;
+}
+
+/* ---- The animation ---- */
+
+static void put_weights(glb_state *glb)
+{
+    for (uint32_t frame = 0; frame < glb->frames; frame++)
+        for (uint32_t target = 1; target < glb->frames; target++)
+            drape_file_put_float(&glb->file, frame == target);
+}
+
+static drape_status name_animation(glb_state *glb)
+{
+    uint32_t n = glb->frames, offset = triangle_bytes(glb) + n * node_bytes(glb);
+    drape_status status =
+        fill(glb, glb->at.views, ",{\"buffer\":0,\"byteOffset\":%" PRIu32 ",\"byteLength\":%" PRIu32 "}",
+             offset, 4 * n * n);
+    if (!status)
+        status = fill(
+            glb, glb->at.times,
+            ",{\"bufferView\":2,\"componentType\":5126,\"count\":%" PRIu32
+            ",\"type\":\"SCALAR\",\"min\":[%.9g],\"max\":[%.9g]},{\"bufferView\":2,\"byteOffset\":%" PRIu32
+            ",\"componentType\":5126,\"count\":%" PRIu32 ",\"type\":\"SCALAR\"}",
+            n, glb->times[0], glb->times[n - 1], 4 * n, n * (n - 1));
+    if (!status)
+        status =
+            fill(glb, glb->at.animation,
+                 ",\"animations\":[{\"name\":\"run\",\"channels\":[{\"sampler\":0,\"target\":{\"node\":0,"
+                 "\"path\":\"weights\"}}],\"samplers\":[{\"input\":%" PRIu32
+                 ",\"interpolation\":\"LINEAR\",\"output\":%" PRIu32 "}]}]",
+                 n + 1, n + 2);
+    return status;
+}
+
+/* Times and weights: n + n (n - 1) numbers. */
+static drape_status write_animation(glb_state *glb)
+{
+    for (uint32_t i = 0; i < glb->frames; i++)
+        drape_file_put_float(&glb->file, glb->times[i]);
+    put_weights(glb);
+    drape_status status = drape_file_keep(&glb->file);
+    if (!status)
+        status = write_lengths(glb, glb->frames * node_bytes(glb));
+    return status ? status : name_animation(glb);
+}
+
+static drape_status glb_close(drape_context *ctx, void *state)
+{
+    glb_state *glb = state;
+    drape_status status = glb->frames > 1 ? write_animation(glb) : DRAPE_OK;
+    drape_status closing = drape_file_close(&glb->file);
+    drape_file_destroy(&glb->file);
+    drape_free(ctx, glb->json);
+    drape_free(ctx, glb->base);
+    drape_free(ctx, glb->times);
+    return status ? status : closing;
+}
+
+const drape_exporter_ops drape_exporter_glb = {
+    .name = "glb",
+    .summary = "positions.glb: glTF 2.0 with a morph target a frame, float32, and an animation; y up",
+    .reference = "Khronos, glTF 2.0 specification, 2021 (ISO/IEC 12113)",
+    .state_size = sizeof(glb_state),
+    .y_up = true,
+    .check = glb_check,
+    .open = glb_open,
+    .clean = glb_clean,
+    .write = glb_write,
+    .close = glb_close,
+};

@@ -1,0 +1,266 @@
+/*
+ * export_vtp.c: folder/frame_000000.vtp, ...: a VTK XML file of PolyData a frame, and folder/frames.pvd, which
+ * gives each its time. Positions are float64, fields float32, appended raw, little endian. All cloths are in one
+ * mesh; the cells say which they belong to. Formats: VTK XML file formats (VTK User's Guide, 11th ed., section
+ * 19.3), ParaView's collections of them.
+ *
+ * The collection ends with the same line always: a frame is written over it, with the line after it, in one write.
+ */
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "io/export.h"
+
+#define PVD_NAME "frames.pvd"
+#define PVD_ROOM 256 /* for an entry and the end */
+
+static const char pvd_begin[] = "<?xml version=\"1.0\"?>\n"
+                                "<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
+                                "<Collection>\n";
+static const char pvd_end[] = "</Collection></VTKFile>\n";
+
+typedef struct vtp_state {
+    drape_frame_files frames;
+    drape_file pvd;
+    off_t entries_end; /* in the collection */
+} vtp_state;
+
+/* ---- The collection ---- */
+
+static drape_status pvd_open(drape_context *ctx, const char *folder, vtp_state *vtp)
+{
+    drape_status status = drape_export_begin(ctx, folder, PVD_NAME, &vtp->pvd);
+    if (status)
+        return status;
+    drape_file_put_text(&vtp->pvd, pvd_begin);
+    drape_file_put_text(&vtp->pvd, pvd_end);
+    vtp->entries_end = sizeof pvd_begin - 1;
+    return drape_file_publish(&vtp->pvd);
+}
+
+/* On a full disk the old end is put back where it was, in room that the file has. */
+static drape_status pvd_add(vtp_state *vtp, const drape_frame *frame)
+{
+    char text[PVD_ROOM];
+    int entry = snprintf(text, sizeof text,
+                         "<DataSet timestep=\"%.17g\" part=\"0\" file=\"" DRAPE_FRAME_NAME "\"/>\n",
+                         frame->time, frame->index, "vtp");
+    memcpy(text + entry, pvd_end, sizeof pvd_end);
+    size_t size = (size_t)entry + sizeof pvd_end - 1;
+    drape_status status = drape_file_overwrite(&vtp->pvd, vtp->entries_end, text, size);
+    if (!status) {
+        vtp->entries_end += entry;
+        return DRAPE_OK;
+    }
+    drape_file_restore(&vtp->pvd, vtp->entries_end, pvd_end, sizeof pvd_end - 1);
+    return status;
+}
+
+/* ---- A frame ---- */
+
+/* One array of the appended data. */
+typedef struct array {
+    const char *type, *name;
+    int components;
+    size_t count, size; /* of components, all together; bytes of one */
+    void (*put)(drape_file *file, const drape_model *model, const drape_frame *frame);
+} array;
+
+static void put_positions(drape_file *file, const drape_model *model, const drape_frame *frame)
+{
+    drape_file_put_doubles(file, frame->positions, 3 * (size_t)drape_model_node_count(model));
+}
+
+static void put_floats(drape_file *file, const double *values, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        drape_file_put_float(file, (float)values[i]);
+}
+
+static void put_velocities(drape_file *file, const drape_model *model, const drape_frame *frame)
+{
+    put_floats(file, frame->velocities, 3 * (size_t)drape_model_node_count(model));
+}
+
+static void put_densities(drape_file *file, const drape_model *model, const drape_frame *frame)
+{
+    put_floats(file, frame->energy_density, (size_t)drape_model_node_count(model));
+}
+
+static void put_pinned(drape_file *file, const drape_model *model, const drape_frame *frame)
+{
+    (void)frame;
+    drape_file_put(file, drape_model_pinned(model), (size_t)drape_model_node_count(model));
+}
+
+static void put_triangles(drape_file *file, const drape_model *model, const drape_frame *frame)
+{
+    const int32_t *node = drape_model_triangles(model);
+    (void)frame;
+    for (size_t i = 0; i < 3 * (size_t)drape_model_triangle_count(model); i++)
+        drape_file_put_word(file, (uint32_t)node[i]);
+}
+
+static void put_offsets(drape_file *file, const drape_model *model, const drape_frame *frame)
+{
+    (void)frame;
+    for (int32_t i = 1; i <= drape_model_triangle_count(model); i++)
+        drape_file_put_word(file, 3 * (uint32_t)i);
+}
+
+static void put_strains(drape_file *file, const drape_frame *frame, int which, int32_t count)
+{
+    for (int32_t i = 0; i < count; i++)
+        drape_file_put_float(file, (float)frame->strain[2 * (size_t)i + (size_t)which]);
+}
+
+static void put_largest_strains(drape_file *file, const drape_model *model, const drape_frame *frame)
+{
+    put_strains(file, frame, 0, drape_model_triangle_count(model));
+}
+
+static void put_least_strains(drape_file *file, const drape_model *model, const drape_frame *frame)
+{
+    put_strains(file, frame, 1, drape_model_triangle_count(model));
+}
+
+/* The mean of a triangle's nodes. */
+static void put_cell_densities(drape_file *file, const drape_model *model, const drape_frame *frame)
+{
+    const int32_t *node = drape_model_triangles(model);
+    const double *density = frame->energy_density;
+    for (int32_t i = 0; i < drape_model_triangle_count(model); i++, node += 3)
+        drape_file_put_float(file, (float)((density[node[0]] + density[node[1]] + density[node[2]]) / 3));
+}
+
+static void put_cloths(drape_file *file, const drape_model *model, const drape_frame *frame)
+{
+    (void)frame;
+    for (int32_t c = 0; c < drape_model_cloth_count(model); c++)
+        for (int32_t i = 0; i < drape_model_cloth(model, c).triangle_count; i++)
+            drape_file_put_word(file, (uint32_t)c);
+}
+
+enum { POINTS, CELL_FIELDS = 4, CORNERS = 8, ARRAY_COUNT = 10 };
+
+/* In the order of the appended data: points, point data, cell data, corners of the cells. */
+static void list_arrays(const drape_model *model, array list[ARRAY_COUNT])
+{
+    size_t nodes = (size_t)drape_model_node_count(model), cells = (size_t)drape_model_triangle_count(model);
+    const array all[ARRAY_COUNT] = {
+        {"Float64", "Points", 3, 3 * nodes, 8, put_positions},
+        {"Float32", "velocity", 3, 3 * nodes, 4, put_velocities},
+        {"Float32", "energy_density", 1, nodes, 4, put_densities},
+        {"UInt8", "pinned", 1, nodes, 1, put_pinned},
+        {"Float32", "strain_max", 1, cells, 4, put_largest_strains},
+        {"Float32", "strain_min", 1, cells, 4, put_least_strains},
+        {"Float32", "energy_density", 1, cells, 4, put_cell_densities},
+        {"Int32", "cloth", 1, cells, 4, put_cloths},
+        {"Int32", "connectivity", 1, 3 * cells, 4, put_triangles},
+        {"Int32", "offsets", 1, cells, 4, put_offsets},
+    };
+    memcpy(list, all, sizeof all);
+}
+
+/* Declares arrays first ... end - 1. Each is in the data after those before it, behind its size in 8 bytes. */
+static void put_declarations(drape_file *file, const array *list, int first, int end)
+{
+    uint64_t offset = 0;
+    for (int i = 0; i < end; i++) {
+        if (i >= first)
+            drape_file_print(
+                file,
+                "<DataArray type=\"%s\" Name=\"%s\" NumberOfComponents=\"%d\" format=\"appended\" "
+                "offset=\"%" PRIu64 "\"/>\n",
+                list[i].type, list[i].name, list[i].components, offset);
+        offset += 8 + list[i].count * list[i].size;
+    }
+}
+
+static void put_xml(drape_file *file, const drape_model *model, const drape_frame *frame, const array *list)
+{
+    drape_file_print(
+        file,
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" "
+        "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<PolyData>\n<FieldData>\n"
+        "<DataArray type=\"Float64\" Name=\"TimeValue\" NumberOfTuples=\"1\" format=\"ascii\">%.17g"
+        "</DataArray>\n</FieldData>\n",
+        frame->time);
+    drape_file_print(file,
+                     "<Piece NumberOfPoints=\"%" PRId32 "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" "
+                     "NumberOfStrips=\"0\" NumberOfPolys=\"%" PRId32 "\">\n<Points>\n",
+                     drape_model_node_count(model), drape_model_triangle_count(model));
+    put_declarations(file, list, POINTS, POINTS + 1);
+    drape_file_put_text(file, "</Points>\n<PointData Vectors=\"velocity\" Scalars=\"energy_density\">\n");
+    put_declarations(file, list, POINTS + 1, CELL_FIELDS);
+    drape_file_put_text(file, "</PointData>\n<CellData Scalars=\"strain_max\">\n");
+    put_declarations(file, list, CELL_FIELDS, CORNERS);
+    drape_file_put_text(file, "</CellData>\n<Polys>\n");
+    put_declarations(file, list, CORNERS, ARRAY_COUNT);
+    drape_file_put_text(file, "</Polys>\n</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_");
+}
+
+static void put_data(drape_file *file, const drape_model *model, const drape_frame *frame, const array *list)
+{
+    for (int i = 0; i < ARRAY_COUNT; i++) {
+        uint64_t size = list[i].count * list[i].size;
+        drape_file_put_word(file, (uint32_t)size);
+        drape_file_put_word(file, (uint32_t)(size >> 32));
+        list[i].put(file, model, frame);
+    }
+    drape_file_put_text(file, "\n</AppendedData>\n</VTKFile>\n");
+}
+
+static drape_status vtp_clean(drape_context *ctx, const char *folder)
+{
+    drape_status status = drape_frame_files_clean(ctx, folder, "vtp");
+    return status ? status : drape_export_clean(ctx, folder, PVD_NAME);
+}
+
+static drape_status vtp_open(drape_context *ctx, const drape_export_def *def, void *state)
+{
+    vtp_state *vtp = state;
+    drape_status status = drape_frame_files_open(ctx, def, "vtp", &vtp->frames);
+    return status ? status : pvd_open(ctx, def->folder, vtp);
+}
+
+static drape_status vtp_write(drape_context *ctx, void *state, const drape_frame *frame)
+{
+    vtp_state *vtp = state;
+    const drape_model *model = vtp->frames.model;
+    array list[ARRAY_COUNT];
+    (void)ctx;
+    list_arrays(model, list);
+    drape_status status = drape_frame_files_begin(&vtp->frames, frame->index);
+    if (status)
+        return status;
+    put_xml(&vtp->frames.file, model, frame, list);
+    put_data(&vtp->frames.file, model, frame, list);
+    status = drape_frame_files_end(&vtp->frames);
+    return status ? status : pvd_add(vtp, frame);
+}
+
+static drape_status vtp_close(drape_context *ctx, void *state)
+{
+    vtp_state *vtp = state;
+    (void)ctx;
+    drape_status status = drape_file_close(&vtp->pvd);
+    drape_file_destroy(&vtp->pvd);
+    drape_frame_files_close(&vtp->frames);
+    return status;
+}
+
+const drape_exporter_ops drape_exporter_vtp = {
+    .name = "vtp",
+    .summary = "frame_000000.vtp ... and frames.pvd: VTK PolyData a frame, float64, with velocity, energy "
+               "density and "
+               "strain, and their times",
+    .reference = "VTK User's Guide, 11th edition, section 19.3, XML file formats",
+    .state_size = sizeof(vtp_state),
+    .wants_fields = true,
+    .open = vtp_open,
+    .clean = vtp_clean,
+    .write = vtp_write,
+    .close = vtp_close,
+};

@@ -1,0 +1,35 @@
+/* run.h: one case: the scene with its settings, simulated and measured. */
+#ifndef DRAPE_LAB_RUN_H
+#define DRAPE_LAB_RUN_H
+
+#include "drape/lab.h"
+#include "lab/trace.h"
+
+#include <jansson.h>
+#include <stdatomic.h>
+
+/* What is simulated, and what of it is wanted. */
+typedef struct lab_request {
+    const drape_lab_def *def;    /* scene, settings of all cases, who may cancel */
+    const json_t *settings;      /* {pointer: value} of the case */
+    const lab_trace *reference;  /* NULL or no frames: nothing to compare with */
+    const lab_probe *probe;      /* NULL or no points: nowhere */
+    lab_trace *record;           /* its frames and, last, its end; NULL: not kept. Made here. */
+    double seconds;              /* CPU: a run that takes more is stopped */
+    int repeats;                 /* the least CPU time of so many counts */
+    const atomic_bool *given_up; /* NULL: nobody else gives the case up */
+} lab_request;
+
+/* The scene with its settings, and its model. Errors: as of drape_scene_load and drape_scene_compile; *scene is
+ * to be destroyed in any case. */
+drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drape_scene **scene);
+drape_status lab_load(drape_context *ctx, const lab_request *request, drape_model **model);
+
+/* Runs it. *result: what was measured, to be freed by the caller; a simulation that stops is a result.
+ * Errors: those of loading, DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
+drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **result);
+
+/* JSON has no NaN and no infinity: null. */
+json_t *lab_real(double value);
+
+#endif

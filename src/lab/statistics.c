@@ -1,0 +1,29 @@
+/* statistics.c: see statistics.h. */
+#include "lab/statistics.h"
+
+#include <gsl/gsl_cdf.h>
+#include <gsl/gsl_fit.h>
+#include <math.h>
+
+#define MOST       64
+#define CONFIDENCE 0.975 /* two-sided 95 % */
+
+lab_line lab_fit_power(const double *x, const double *y, size_t count)
+{
+    double u[MOST], v[MOST], cov00, cov01, cov11, squares;
+    lab_line line = {NAN, NAN, NAN, NAN};
+    size_t n = count < MOST ? count : MOST;
+    if (n < 2)
+        return line;
+    for (size_t i = 0; i < n; i++) {
+        u[i] = log(x[i]);
+        v[i] = log(y[i]);
+    }
+    gsl_fit_linear(u, 1, v, 1, n, &line.intercept, &line.slope, &cov00, &cov01, &cov11, &squares);
+    if (n > 2) {
+        double half = gsl_cdf_tdist_Pinv(CONFIDENCE, (double)n - 2) * sqrt(cov11);
+        line.low = line.slope - half;
+        line.high = line.slope + half;
+    }
+    return line;
+}

@@ -1,0 +1,15 @@
+/* statistics.h: straight lines through points, by GSL. */
+#ifndef DRAPE_LAB_STATISTICS_H
+#define DRAPE_LAB_STATISTICS_H
+
+#include <stddef.h>
+
+typedef struct lab_line {
+    double slope, intercept;
+    double low, high; /* bounds of the slope's 95 % confidence interval; NaN for fewer than 3 points */
+} lab_line;
+
+/* Least squares through (log x, log y) of positive points; count >= 2. */
+lab_line lab_fit_power(const double *x, const double *y, size_t count);
+
+#endif

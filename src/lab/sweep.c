@@ -1,0 +1,283 @@
+/* sweep.c: see sweep.h. */
+#include "lab/sweep.h"
+
+#include "base/clock.h"
+#include "io/file.h"
+#include "lab/run.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- Lines ---- */
+
+static bool is_line_file(const char *name)
+{
+    size_t length = strlen(name), ending = strlen(".jsonl");
+    return strncmp(name, "cases", 5) == 0 && length > ending && strcmp(name + length - ending, ".jsonl") == 0;
+}
+
+/* The case that a line is of; NULL: it is none of this experiment. */
+static json_t **place_of(lab *l, const json_t *line)
+{
+    json_t *number = json_object_get(line, "case");
+    json_int_t i = json_is_integer(number) ? json_integer_value(number) : -1;
+    if (i < 0 || (size_t)i >= l->count)
+        return NULL;
+    json_t *tags = json_object_get(json_array_get(l->cases, (size_t)i), "tags");
+    return json_equal(json_object_get(line, "tags"), tags) ? &l->results[i] : NULL;
+}
+
+static drape_status take_line(lab *l, const char *path, int64_t number, const char *text, int64_t *found)
+{
+    json_t *line = json_loads(text, JSON_REJECT_DUPLICATES, NULL);
+    json_t **place = line ? place_of(l, line) : NULL;
+    if (!place) {
+        json_decref(line);
+        return drape_fail(l->ctx, DRAPE_E_PARSE, "%.500s:%lld: no result of a case of this experiment", path,
+                          (long long)number);
+    }
+    *found += !*place;
+    if (*place)
+        json_decref(line);
+    else
+        *place = line;
+    return DRAPE_OK;
+}
+
+/* A last line without its end was cut short. */
+static drape_status read_file(lab *l, const char *path, int64_t *found)
+{
+    FILE *file = fopen(path, "r");
+    if (!file)
+        return drape_file_fail(l->ctx, "read", path, errno);
+    char *text = NULL;
+    size_t room = 0;
+    ssize_t length;
+    drape_status status = DRAPE_OK;
+    for (int64_t n = 1; !status && (length = getline(&text, &room, file)) > 0; n++)
+        if (text[length - 1] == '\n')
+            status = take_line(l, path, n, text, found);
+    if (ferror(file))
+        status = drape_file_fail(l->ctx, "read", path, errno);
+    free(text);
+    fclose(file);
+    return status;
+}
+
+drape_status lab_read_lines(lab *l, const char *folder, int64_t *found)
+{
+    DIR *entries = opendir(folder);
+    if (!entries)
+        return drape_file_fail(l->ctx, "read", folder, errno);
+    drape_status status = DRAPE_OK;
+    for (struct dirent *e = readdir(entries); e && !status; e = readdir(entries)) {
+        char path[4096];
+        if (!is_line_file(e->d_name))
+            continue;
+        snprintf(path, sizeof path, "%s/%s", folder, e->d_name);
+        status = read_file(l, path, found);
+    }
+    closedir(entries);
+    return status;
+}
+
+static void put_line(drape_file *file, const json_t *result)
+{
+    char *text = json_dumps(result, JSON_COMPACT | JSON_REAL_PRECISION(17));
+    drape_file_put_text(file, text ? text : "");
+    drape_file_put_text(file, "\n");
+    free(text);
+}
+
+/* A file with the lines of what this shard has, open to more where grows. */
+static drape_status begin_lines(lab *l, const char *name, int shard, int shards, drape_file *file)
+{
+    drape_status status = drape_file_create(l->ctx, strlen(l->folder) + strlen(name) + 1, file);
+    if (status)
+        return status;
+    drape_file_name(file, "%s/%s", l->folder, name);
+    status = drape_file_begin(file);
+    for (size_t i = 0; !status && i < l->count; i++)
+        if (l->results[i] && i % (size_t)shards == (size_t)(shard - 1))
+            put_line(file, l->results[i]);
+    return status;
+}
+
+drape_status lab_write_lines(lab *l, const char *name)
+{
+    drape_file file = {0};
+    drape_status status = begin_lines(l, name, 1, 1, &file);
+    if (!status)
+        status = drape_file_finish(&file);
+    drape_file_destroy(&file);
+    return status;
+}
+
+/* ---- Cases ---- */
+
+/* What the threads of a sweep share. All but the flag is read and written under the lock. */
+typedef struct sweep {
+    lab *l;
+    drape_file file;
+    pthread_mutex_t lock;
+    atomic_bool given_up;
+    size_t next;         /* case that nobody has yet */
+    int64_t done, total; /* of this shard */
+    int64_t before;      /* done when it began */
+    double start;        /* [s] wall */
+    drape_status status; /* the first failure; its message is set on l->ctx */
+} sweep;
+
+static bool is_ours(const lab *l, size_t i)
+{
+    return i % (size_t)l->def->shards == (size_t)(l->def->shard - 1) &&
+           !json_object_get(json_array_get(l->cases, i), "same_as");
+}
+
+static void stop(sweep *s, drape_status status)
+{
+    if (!s->status)
+        s->status = status;
+    atomic_store(&s->given_up, true);
+}
+
+/* The next case that wants running, or l->count. */
+static size_t draw_case(sweep *s)
+{
+    lab *l = s->l;
+    pthread_mutex_lock(&s->lock);
+    while (s->next < l->count && (!is_ours(l, s->next) || l->results[s->next]))
+        s->next++;
+    size_t mine = s->status ? l->count : s->next++;
+    pthread_mutex_unlock(&s->lock);
+    return mine < l->count ? mine : l->count;
+}
+
+static void tell_progress(sweep *s)
+{
+    const drape_lab_def *def = s->l->def;
+    double wall = drape_clock_seconds() - s->start;
+    int64_t fresh = s->done - s->before;
+    double left = fresh > 0 ? wall / (double)fresh * (double)(s->total - s->done) : NAN;
+    if (def->progress)
+        def->progress(def->user, s->done, s->total, left);
+}
+
+/* Numbers a result, and keeps it as a line. */
+static void keep(sweep *s, size_t i, json_t *result)
+{
+    lab *l = s->l;
+    json_t *tags = json_object_get(json_array_get(l->cases, i), "tags");
+    json_object_set_new(result, "case", json_integer((json_int_t)i));
+    json_object_set_new(result, "tags", json_deep_copy(tags));
+    if (l->reference.frames)
+        json_object_set_new(result, "reference_error_m", lab_real(l->reference_error));
+    l->results[i] = result;
+    s->done++;
+    put_line(&s->file, result);
+    drape_status status = drape_file_keep(&s->file);
+    if (status)
+        stop(s, status);
+    tell_progress(s);
+}
+
+static void settle(sweep *s, drape_context *ctx, size_t i, drape_status status, json_t *result)
+{
+    pthread_mutex_lock(&s->lock);
+    if (status)
+        stop(s, status == DRAPE_E_STOPPED && s->status ? status : /* given up for an earlier failure */
+                    drape_fail(s->l->ctx, status, "%s", drape_context_message(ctx)));
+    else
+        keep(s, i, result);
+    pthread_mutex_unlock(&s->lock);
+}
+
+static void *work(void *user)
+{
+    sweep *s = user;
+    lab *l = s->l;
+    const drape_lab_def *def = l->def;
+    drape_context *ctx = NULL;
+    locale_t old = drape_locale_enter();
+    if (drape_context_create(&l->ctx->def, &ctx)) {
+        pthread_mutex_lock(&s->lock);
+        stop(s, drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for a context"));
+        pthread_mutex_unlock(&s->lock);
+    }
+    for (size_t i = ctx ? draw_case(s) : l->count; i < l->count; i = draw_case(s)) {
+        json_t *result = NULL;
+        const lab_request request = {.def = def,
+                                     .settings = json_object_get(json_array_get(l->cases, i), "settings"),
+                                     .reference = &l->reference,
+                                     .probe = &l->probe,
+                                     .seconds = def->case_seconds,
+                                     .repeats = def->repeats,
+                                     .given_up = &s->given_up};
+        drape_status status = lab_run(ctx, &request, &result);
+        settle(s, ctx, i, status, result);
+    }
+    drape_context_destroy(&ctx);
+    drape_locale_leave(old);
+    return NULL;
+}
+
+static void run_threads(sweep *s)
+{
+    pthread_t threads[256];
+    int started = 0;
+    while (started < s->l->def->jobs && !pthread_create(&threads[started], NULL, work, s))
+        started++;
+    if (started == 0) {
+        stop(s, drape_fail(s->l->ctx, DRAPE_E_MEMORY, "no thread can be started"));
+        return;
+    }
+    for (int i = 0; i < started; i++)
+        pthread_join(threads[i], NULL);
+}
+
+static void count(sweep *s)
+{
+    for (size_t i = 0; i < s->l->count; i++)
+        if (is_ours(s->l, i)) {
+            s->total++;
+            s->done += s->l->results[i] != NULL;
+        }
+    s->before = s->done;
+}
+
+drape_status lab_sweep(lab *l)
+{
+    char name[64] = "cases.jsonl";
+    sweep s = {.l = l, .start = drape_clock_seconds()};
+    if (l->def->shards > 1)
+        snprintf(name, sizeof name, "cases-%d-of-%d.jsonl", l->def->shard, l->def->shards);
+    pthread_mutex_init(&s.lock, NULL);
+    atomic_init(&s.given_up, false);
+    count(&s);
+    s.status = begin_lines(l, name, l->def->shard, l->def->shards, &s.file);
+    if (!s.status)
+        s.status = drape_file_publish(&s.file);
+    if (!s.status && s.done < s.total)
+        run_threads(&s);
+    drape_status closed = drape_file_close(&s.file);
+    drape_file_destroy(&s.file);
+    pthread_mutex_destroy(&s.lock);
+    return s.status ? s.status : closed;
+}
+
+void lab_copy_same(lab *l)
+{
+    for (size_t i = 0; i < l->count; i++) {
+        json_t *one = json_array_get(l->cases, i), *same = json_object_get(one, "same_as");
+        json_t *source = same ? l->results[json_integer_value(same)] : NULL;
+        if (!source || l->results[i])
+            continue;
+        l->results[i] = json_copy(source);
+        json_object_set_new(l->results[i], "case", json_integer((json_int_t)i));
+        json_object_set(l->results[i], "tags", json_object_get(one, "tags"));
+    }
+}

@@ -1,0 +1,358 @@
+/*
+ * elimination.c: see elimination.h. Order by minimum degree (AMD) or, for larger ones where METIS is there, nested
+ * dissection; elimination tree with path compression (Liu 1990, The role of elimination trees in sparse
+ * factorization); postorder; rows of the columns from those of their children. Then a front is merged with its last
+ * child where the two take longer than the one, zeros included.
+ */
+#include "solvers/elimination.h"
+
+#include <amd.h>
+#include <stdlib.h>
+#include <string.h>
+#ifdef DRAPE_METIS
+#include <metis.h>
+#endif
+
+#define DISSECTED 1500 /* blocks; below, nested dissection fills no less than minimum degree */
+
+/* What only the making needs. */
+typedef struct maker {
+    drape_context *ctx;
+    const drape_pattern *pattern;
+    drape_elimination *e;
+    int32_t *parent, *post, *head, *next, *mark, *stack; /* (n) of columns; head, next: lists of children */
+    int32_t **rows;                                      /* (n) of fronts, as they are found */
+    int32_t *length;                                     /* (n) of rows */
+} maker;
+
+/* ---- Order and tree ---- */
+
+#ifdef DRAPE_METIS
+static bool dissect(maker *m)
+{
+    const drape_pattern *p = m->pattern;
+    idx_t n = p->block_count, at = 0, options[METIS_NOPTIONS];
+    idx_t *start = drape_alloc(m->ctx, (size_t)n + 1, sizeof *start);
+    idx_t *other = drape_alloc(m->ctx, (size_t)p->block_start[n] + 1, sizeof *other);
+    for (idx_t j = 0; start && other && j < n; j++) {
+        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++)
+            if (p->block_row[k] != j)
+                other[at++] = p->block_row[k];
+        start[j + 1] = at;
+    }
+    METIS_SetDefaultOptions(options);
+    bool done =
+        start && other && METIS_NodeND(&n, start, other, NULL, options, m->e->order, m->e->place) == METIS_OK;
+    drape_free(m->ctx, start);
+    drape_free(m->ctx, other);
+    return done;
+}
+_Static_assert(sizeof(idx_t) == sizeof(int32_t), "METIS orders with the pattern's integers");
+#endif
+
+static bool order(maker *m)
+{
+    const drape_pattern *p = m->pattern;
+#ifdef DRAPE_METIS
+    if (p->block_count >= DISSECTED)
+        return dissect(m);
+#endif
+    return amd_order(p->block_count, p->block_start, p->block_row, m->e->order, NULL, NULL) >= AMD_OK;
+}
+
+static void invert(maker *m)
+{
+    for (int32_t k = 0; k < m->e->n; k++)
+        m->e->place[m->e->order[k]] = k;
+}
+
+static void find_parents(maker *m)
+{
+    const drape_pattern *p = m->pattern;
+    int32_t *ancestor = m->mark;
+    for (int32_t j = 0; j < m->e->n; j++) {
+        const int32_t column = m->e->order[j];
+        m->parent[j] = ancestor[j] = -1;
+        for (int32_t k = p->block_start[column]; k < p->block_start[column + 1]; k++)
+            for (int32_t i = m->e->place[p->block_row[k]], up; i != -1 && i < j; i = up) {
+                up = ancestor[i];
+                ancestor[i] = j;
+                if (up == -1)
+                    m->parent[i] = j;
+            }
+    }
+}
+
+static void list_children(maker *m)
+{
+    for (int32_t j = 0; j < m->e->n; j++)
+        m->head[j] = -1;
+    for (int32_t j = m->e->n - 1; j >= 0; j--)
+        if (m->parent[j] >= 0) {
+            m->next[j] = m->head[m->parent[j]];
+            m->head[m->parent[j]] = j;
+        }
+}
+
+/* Depth first without recursion: a column is written when it has no children left. */
+static void find_postorder(maker *m)
+{
+    int32_t written = 0;
+    list_children(m);
+    for (int32_t root = 0; root < m->e->n; root++) {
+        int32_t depth = 0;
+        if (m->parent[root] >= 0)
+            continue;
+        m->stack[depth++] = root;
+        while (depth > 0) {
+            const int32_t j = m->stack[depth - 1], child = m->head[j];
+            if (child < 0) {
+                m->post[written++] = j;
+                depth--;
+            } else {
+                m->head[j] = m->next[child];
+                m->stack[depth++] = child;
+            }
+        }
+    }
+}
+
+/* The order becomes the tree's own, in which a front's columns are neighbours. */
+static void reorder(maker *m)
+{
+    for (int32_t k = 0; k < m->e->n; k++)
+        m->stack[k] = m->e->order[m->post[k]];
+    memcpy(m->e->order, m->stack, (size_t)m->e->n * sizeof *m->stack);
+    invert(m);
+    find_parents(m);
+}
+
+/* ---- Fronts ---- */
+
+/* Time of a front in arbitrary units: its arithmetic in tiles of 4 x 4 blocks, its memory, its administration. */
+static double cost_of(int32_t columns, int32_t rows)
+{
+    const double w = 3.0 * columns, r = 12.0 * ((rows + 3) / 4), d = 12.0 * ((columns + 3) / 4);
+    return (w * d * d / 3 + w * d * r + w * r * r) / 12 + 0.5 * w * (d + r) + 0.75 * r * r + 400;
+}
+
+static int compare(const void *a, const void *b)
+{
+    int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Rows below j of the columns j of the matrix and of the fronts that end in its children, into m->stack. */
+static int32_t gather_rows(maker *m, int32_t j)
+{
+    const drape_pattern *p = m->pattern;
+    const int32_t column = m->e->order[j];
+    int32_t count = 0;
+    for (int32_t k = p->block_start[column]; k < p->block_start[column + 1]; k++) {
+        const int32_t i = m->e->place[p->block_row[k]];
+        if (i > j && m->mark[i] != j) {
+            m->mark[i] = j;
+            m->stack[count++] = i;
+        }
+    }
+    for (int32_t f = m->head[j]; f >= 0; f = m->next[f])
+        for (int32_t k = 0; k < m->length[f]; k++) {
+            const int32_t i = m->rows[f][k];
+            if (i > j && m->mark[i] != j) {
+                m->mark[i] = j;
+                m->stack[count++] = i;
+            }
+        }
+    return count;
+}
+
+/* Front f ends: its rows are those of its first column that lie beyond its last; it waits for its parent's. */
+static void close_front(maker *m, int32_t f)
+{
+    drape_elimination *e = m->e;
+    const int32_t last = e->first[f + 1] - 1;
+    int32_t kept = 0;
+    for (int32_t k = 0; k < m->length[f]; k++)
+        if (m->rows[f][k] > last)
+            m->rows[f][kept++] = m->rows[f][k];
+    m->length[f] = kept;
+    if (kept > 0) {
+        const int32_t up = m->parent[last];
+        m->next[f] = m->head[up];
+        m->head[up] = f;
+    }
+}
+
+/* Columns with the same rows below them, one after another, are one front. */
+static bool find_fronts(maker *m)
+{
+    drape_elimination *e = m->e;
+    int32_t f = -1, before = 0; /* rows of column j - 1 */
+    for (int32_t j = 0; j < e->n; j++)
+        m->head[j] = m->mark[j] = -1;
+    for (int32_t j = 0; j < e->n; j++) {
+        const bool linked = j > 0 && m->parent[j - 1] == j;
+        if (f >= 0) { /* so that its rows are seen by j, or by who is above it */
+            e->first[f + 1] = j;
+            if (!linked)
+                close_front(m, f);
+        }
+        int32_t count = gather_rows(m, j);
+        for (int32_t k = 0; linked && k < m->length[f]; k++) {
+            const int32_t i = m->rows[f][k];
+            if (i > j && m->mark[i] != j) {
+                m->mark[i] = j;
+                m->stack[count++] = i;
+            }
+        }
+        if (linked && count == before - 1) {
+            before = count;
+            continue;
+        }
+        if (linked)
+            close_front(m, f);
+        e->first[++f] = j;
+        m->rows[f] = drape_alloc(m->ctx, (size_t)count, sizeof **m->rows);
+        if (!m->rows[f])
+            return false;
+        qsort(m->stack, (size_t)count, sizeof *m->stack, compare);
+        memcpy(m->rows[f], m->stack, (size_t)count * sizeof **m->rows);
+        m->length[f] = before = count;
+    }
+    if (f >= 0) {
+        e->first[f + 1] = e->n;
+        close_front(m, f);
+    }
+    e->count = f + 1;
+    return true;
+}
+
+/* Whether front f takes less time with its last child, g, as one. */
+static bool is_better_merged(const maker *m, int32_t first, int32_t middle, int32_t last, int32_t g,
+                             int32_t f)
+{
+    const int32_t w = last - first;
+    return cost_of(w, m->length[f]) <=
+           cost_of(middle - first, m->length[g]) + cost_of(last - middle, m->length[f]);
+}
+
+/* Fronts are pushed on a stack that is written over the list of them; the last child of the one on top lies below
+ * it. */
+static void merge_fronts(maker *m)
+{
+    drape_elimination *e = m->e;
+    int32_t top = -1;
+    for (int32_t f = 0; f < e->count; f++) {
+        const int32_t last = e->first[f + 1];
+        int32_t first = e->first[f];
+        while (top >= 0 && m->length[top] > 0 && m->rows[top][0] < last &&
+               is_better_merged(m, e->first[top], first, last, top, f)) {
+            first = e->first[top];
+            drape_free(m->ctx, m->rows[top]);
+            m->rows[top--] = NULL;
+        }
+        top++;
+        int32_t *rows = m->rows[f], length = m->length[f];
+        m->rows[f] = NULL;
+        m->rows[top] = rows;
+        m->length[top] = length;
+        e->first[top] = first;
+    }
+    e->count = top + 1;
+    e->first[e->count] = e->n;
+}
+
+/* ---- What stays ---- */
+
+int32_t drape_front_find(const drape_elimination *e, int32_t front, int32_t row)
+{
+    if (row < e->first[front + 1])
+        return row - e->first[front];
+    const int32_t *rows = e->row + e->row_start[front];
+    int32_t low = 0, high = drape_front_rows(e, front);
+    while (high - low > 1) {
+        int32_t middle = low + (high - low) / 2;
+        if (rows[middle] <= row)
+            low = middle;
+        else
+            high = middle;
+    }
+    return drape_front_columns(e, front) + low;
+}
+
+static drape_status keep(maker *m)
+{
+    drape_elimination *e = m->e;
+    int32_t *front_of = m->mark;
+    e->parent = drape_alloc(m->ctx, (size_t)e->count, sizeof *e->parent);
+    e->work = drape_alloc(m->ctx, (size_t)e->count, sizeof *e->work);
+    e->row_start = drape_alloc(m->ctx, (size_t)e->count + 1, sizeof *e->row_start);
+    if (!e->parent || !e->work || !e->row_start)
+        return DRAPE_E_MEMORY;
+    for (int32_t f = 0; f < e->count; f++) {
+        e->row_start[f + 1] = e->row_start[f] + m->length[f];
+        for (int32_t j = e->first[f]; j < e->first[f + 1]; j++)
+            front_of[j] = f;
+    }
+    e->row = drape_alloc(m->ctx, (size_t)e->row_start[e->count], sizeof *e->row);
+    e->in_parent = drape_alloc(m->ctx, (size_t)e->row_start[e->count], sizeof *e->in_parent);
+    if (!e->row || !e->in_parent)
+        return DRAPE_E_MEMORY;
+    for (int32_t f = 0; f < e->count; f++) {
+        memcpy(e->row + e->row_start[f], m->rows[f], (size_t)m->length[f] * sizeof *e->row);
+        e->parent[f] = m->length[f] > 0 ? front_of[m->rows[f][0]] : -1;
+        e->work[f] = cost_of(drape_front_columns(e, f), m->length[f]);
+    }
+    for (int32_t f = 0; f < e->count; f++)
+        for (int64_t k = e->row_start[f]; k < e->row_start[f + 1]; k++)
+            e->in_parent[k] = drape_front_find(e, e->parent[f], e->row[k]);
+    return DRAPE_OK;
+}
+
+static bool allocate(maker *m)
+{
+    const size_t n = (size_t)m->e->n;
+    int32_t **arrays[] = {&m->e->order, &m->e->place, &m->parent, &m->post,  &m->head,
+                          &m->next,     &m->mark,     &m->stack,  &m->length};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
+        if (!(*arrays[i] = drape_alloc(m->ctx, n, sizeof(int32_t))))
+            return false;
+    m->e->first = drape_alloc(m->ctx, n + 1, sizeof *m->e->first);
+    m->rows = drape_alloc(m->ctx, n, sizeof *m->rows);
+    return m->e->first && m->rows;
+}
+
+drape_status drape_elimination_create(drape_context *ctx, const drape_pattern *pattern, drape_elimination *e)
+{
+    maker m = {.ctx = ctx, .pattern = pattern, .e = e};
+    *e = (drape_elimination){.n = pattern->block_count};
+    bool good = allocate(&m) && order(&m);
+    if (good) {
+        invert(&m);
+        find_parents(&m);
+        find_postorder(&m);
+        reorder(&m);
+        good = find_fronts(&m);
+    }
+    drape_status status = good ? DRAPE_OK : DRAPE_E_MEMORY;
+    if (good) {
+        merge_fronts(&m);
+        status = keep(&m);
+    }
+    for (int32_t f = 0; m.rows && f < e->n; f++)
+        drape_free(ctx, m.rows[f]);
+    void *all[] = {m.parent, m.post, m.head, m.next, m.mark, m.stack, m.length, m.rows};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+        drape_free(ctx, all[i]);
+    if (status)
+        drape_elimination_free(ctx, e);
+    return status;
+}
+
+void drape_elimination_free(drape_context *ctx, drape_elimination *e)
+{
+    void *all[] = {e->order, e->place, e->first, e->parent, e->row_start, e->row, e->in_parent, e->work};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+        drape_free(ctx, all[i]);
+    memset(e, 0, sizeof *e);
+}

@@ -1,0 +1,118 @@
+"""The program `drape` as tests call it, scenes and files as they read them, and the loop over a file's tests.
+
+DRAPE_BUILD is the folder of the build, DRAPE_SOURCE that of the sources; or: test_x.py PROGRAM [SOURCES]. A test is a function
+test_*; its docstring is its name. Everything is written below a temporary folder. TAP on stdout.
+"""
+import csv
+import json
+import os
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+import traceback
+
+SOURCES = sys.argv[2] if len(sys.argv) > 2 else os.environ.get("DRAPE_SOURCE", os.path.dirname(__file__) + "/../..")
+PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRAPE_BUILD"] + "/drape")
+SOURCES = os.path.abspath(SOURCES)
+LIMIT = 300  # [s] for one call: sanitizers are slow
+
+
+class Skip(Exception):
+    pass
+
+
+def scene(**changes):
+    """16 nodes, one corner free to swing for 0.1 s: a run takes milliseconds."""
+    cloth = {
+        "name": "sheet",
+        "mesh": {"grid": "equilateral", "edges": 3, "edge_length": 0.1},
+        "material": {"young_modulus": 1e5, "thickness": 1e-3, "density": 200},
+        "terms": ["stretch.edge", "bend.hinge", {"type": "damp.kelvin_voigt", "beta": 1e-3}],
+        "pins": [{"corner": "top-left"}, {"corner": "top-right"}],
+    }
+    whole = {"drape": 1, "cloth": [cloth], "integrator": {"dt": 0.01}, "duration": 0.1, "frame_rate": 30}
+    for key, value in changes.items():
+        (cloth if key in cloth else whole)[key] = value
+    return whole
+
+
+def write_scene(**changes):
+    with open("scene.json", "w", encoding="utf-8") as file:
+        json.dump(scene(**changes), file, indent=1)
+    return "scene.json"
+
+
+def drape(*args, **options):
+    return subprocess.run([PROGRAM, *args], capture_output=True, text=True, timeout=LIMIT, **options)
+
+
+def equal(found, expected, what=""):
+    assert found == expected, f"{what}: found {found!r}, expected {expected!r}"
+
+
+def good(*args, **options):
+    result = drape(*args, **options)
+    equal((result.returncode, result.stderr), (0, ""), " ".join(args))
+    return result.stdout
+
+
+def refused(*args, says="", **options):
+    """Exit 2, one line, no result, and no file that was not there before."""
+    before = sorted(os.listdir("."))
+    result = drape(*args, **options)
+    equal(result.returncode, 2, " ".join(args) + ": " + result.stderr)
+    equal(result.stdout, "", " ".join(args))
+    assert re.fullmatch(r"[^\n]+\n", result.stderr), f"{args}: not one line: {result.stderr!r}"
+    assert says in result.stderr, f"{args}: {says!r} is not in {result.stderr!r}"
+    equal(sorted(os.listdir(".")), before, "files after " + " ".join(args))
+    return result.stderr
+
+
+def read_json(path):
+    with open(path, encoding="utf-8") as file:
+        return json.load(file)
+
+
+def read_steps(folder):
+    with open(folder + "/steps.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def read_npy(path):
+    """(frames, nodes, 3) and the numbers, by the format's definition."""
+    with open(path, "rb") as file:
+        data = file.read()
+    equal(data[:8], b"\x93NUMPY\x01\x00", "magic and version")
+    size = struct.unpack("<H", data[8:10])[0]
+    equal((10 + size) % 64, 0, "alignment of the data")
+    header = data[10:10 + size].decode("ascii")
+    equal(re.search(r"'descr': '(.*?)'", header).group(1), "<f8", "type")
+    equal(re.search(r"'fortran_order': (\w+)", header).group(1), "False", "order")
+    shape = tuple(int(n) for n in re.search(r"'shape': \((.*?)\)", header).group(1).split(","))
+    count = shape[0] * shape[1] * shape[2]
+    equal(len(data) - 10 - size, 8 * count, "bytes of data")
+    return shape, struct.unpack(f"<{count}d", data[10 + size:])
+
+
+def run_tests(module):
+    tests = [test for name, test in module.items() if name.startswith("test_")]
+    print(f"1..{len(tests)}", flush=True)
+    failed = 0
+    for number, test in enumerate(tests, 1):
+        words = f"{number} - {test.__doc__}"
+        with tempfile.TemporaryDirectory() as folder:
+            os.chdir(folder)
+            try:
+                test()
+                print("ok", words, flush=True)
+            except Skip as reason:
+                print("ok", words, "# SKIP", reason, flush=True)
+            except Exception:  # pylint: disable=broad-except
+                failed += 1
+                print("not ok", words, flush=True)
+                print("# " + traceback.format_exc().rstrip().replace("\n", "\n# "), flush=True)
+            os.chdir("/")
+    return failed > 0
+

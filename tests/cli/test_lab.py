@@ -1,0 +1,224 @@
+#!/usr/bin/env python3
+"""Experiments by the program: tradeoff, stability, converge, merge. See program.py."""
+import glob
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import json
+
+from program import PROGRAM, SOURCES, drape, equal, good, read_json, refused, run_tests, scene, write_scene
+
+AXES = ["--axis", "/integrator/dt=1e-3:1e-1:3log", "--axis", "/cloth/0/material/young_modulus=1e4:1e6:2log"]
+
+
+def lines(folder):
+    """{case: result} of all lines of a folder, without what differs between two runs."""
+    results = {}
+    for path in glob.glob(folder + "/cases*.jsonl"):
+        with open(path, encoding="utf-8") as file:
+            for line in file:
+                result = json.loads(line)
+                for key in ("cpu_s", "wall_s"):
+                    del result[key]
+                results[result["case"]] = result
+    return results
+
+
+def page_is_alone(path):
+    """A page with pictures, which asks nobody for anything."""
+    with open(path, encoding="utf-8") as file:
+        text = file.read()
+    assert "<figure><img" in text, "no picture"
+    equal(re.findall(r'(?:src|href)="(?!data:)[^"]*"', text), [], "what the page wants from elsewhere")
+    return text
+
+
+def test_tradeoff():
+    """tradeoff runs every row, names its reference's error, and writes CSV, lines, pictures, a page"""
+    write_scene()
+    out = good("tradeoff", "scene.json", "--out", "t", "--repeats", "1")
+    results = lines("t")
+    series = {result["tags"]["series"] for result in results.values()}
+    for row in ("be", "bdf2", "midpoint", "trbdf2", "verlet"):
+        assert row in series, row
+    assert {"ida, order 2", "ida, order 5", "be, error control", "be, linear solver klu"} <= series, series
+    about = read_json("t/reference.json")
+    for result in results.values():
+        equal(result["reference_error_m"], about["error_m"], "reference")
+    be = sorted((r["tags"]["value"], r["error_end_m"]) for r in results.values() if r["tags"]["series"] == "be")
+    # Order 1: from 1/60 s on each halving of dt takes the error to less than 0.7 of it.
+    assert all(fine < 0.7 * coarse for (_, fine), (dt, coarse) in zip(be, be[1:]) if dt < 0.02), be
+    tight = min(r["error_end_m"] for r in results.values() if r["tags"]["series"] == "ida, order 5")
+    assert tight < 0.01 * be[0][1], (tight, be)
+    assert "the cheapest is" in out and "The reference's error is estimated" in out, out
+    with open("t/results.csv", encoding="utf-8") as file:
+        rows = file.read().splitlines()
+    equal(len(rows), len(results) + 1, "rows of results.csv")
+    page_is_alone("t/report.html")
+    for result in results.values():
+        assert result["status"] == "ok" or result["tags"]["series"] in open("t/report.html", encoding="utf-8").read()
+
+
+def test_stability():
+    """stability tells clean from exploded cases, where the explicit limit says so"""
+    write_scene(duration=0.5)
+    good("stability", "scene.json", *AXES, "--integrators", "be,verlet", "--out", "s")
+    by_row = {}
+    for result in lines("s").values():
+        by_row.setdefault(result["tags"]["integrator"], []).append(result)
+    equal(sorted(by_row), ["be", "verlet"], "rows")
+    assert all(result["status"] == "ok" for result in by_row["be"]), by_row["be"]
+    for result in by_row["verlet"]:
+        dt, limit = result["tags"]["/integrator/dt"], result["explicit_limit_s"]
+        if dt > 4 * limit or dt < 0.5 * limit:
+            equal(result["status"] == "ok", dt < limit, f"verlet at dt {dt}, limit {limit}")
+    assert any(result["status"] == "ok" for result in by_row["verlet"]), "none is below the limit"
+    assert any(result["status"] != "ok" for result in by_row["verlet"]), "none is above the limit"
+    assert "exploded" in page_is_alone("s/report.html")
+
+
+def test_ignored_axis():
+    """a row that ignores an axis is run once along it"""
+    write_scene()
+    good("stability", "scene.json", *AXES, "--integrators", "ida", "--out", "s")
+    equal(len(lines("s")), 2, "cases that were run")
+    with open("s/results.csv", encoding="utf-8") as file:
+        equal(len(file.read().splitlines()), 7, "rows of results.csv")
+
+
+def test_converge():
+    """converge finds the orders of the rows"""
+    write_scene(duration=0.3)
+    out = good("converge", "scene.json", "--integrators", "be,bdf2,trbdf2", "--levels", "7", "--out", "c")
+    orders = dict(re.findall(r"^(\w+): order .*, ([\d.]+) at the last refinement", out, re.M))
+    # At the last of 7 refinements (dt 1/3840 s) the next term of the error is about dt / 0.01 s of the leading one.
+    for row, order in (("be", 1), ("bdf2", 2), ("trbdf2", 2)):
+        assert abs(float(orders[row]) - order) < 0.1, out
+    page_is_alone("c/report.html")
+
+
+def test_converge_in_space():
+    """converge refines the grids, and says where there is none"""
+    write_scene()
+    out = good("converge", "scene.json", "--integrators", "be", "--levels", "3", "--space", "--out", "c")
+    assert re.search(r"^space: order", out, re.M), out
+    nodes = [r["nodes"] for r in lines("c").values() if r["tags"]["series"] == "space"]
+    equal(sorted(nodes), [16, 49, 169], "nodes")
+    with open("sheet.obj", "w", encoding="utf-8") as file:
+        file.write("v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n")
+    write_scene(mesh={"file": "sheet.obj"}, pins=[{"nodes": [0]}])
+    refused("converge", "scene.json", "--space", "--out", "d", says="refines grids")
+
+
+def test_shards():
+    """shards together are what one run gives"""
+    write_scene()
+    command = ["stability", "scene.json", *AXES, "--integrators", "be,bdf2,verlet"]
+    good(*command, "--out", "whole")
+    for i in (1, 2, 3):
+        out = good(*command, "--shard", f"{i}/3", "--out", f"part{i}")
+    assert "when all cases are done" in out, out
+    missing = drape("merge", "part1", "part3", "--out", "some")
+    equal(missing.returncode, 1, "exit code of a merge that lacks cases")
+    assert "12 of 18" in missing.stdout, missing.stdout
+    good("merge", "part1", "part2", "part3", "--out", "merged")
+    equal(lines("merged"), lines("whole"), "results")
+    page_is_alone("merged/report.html")
+
+
+def test_resume():
+    """a sweep that is killed or interrupted goes on where it was, and ends with the same results"""
+    write_scene(duration=1)
+    command = ["stability", "scene.json", "--axis", "/integrator/dt=1e-3:1e-2:12log", "--axis",
+               "/cloth/0/material/young_modulus=1e4:1e6:12log", "--integrators", "be", "--jobs", "1"]
+    good(*command, "--out", "whole")
+    for end in (signal.SIGKILL, signal.SIGINT):
+        with subprocess.Popen([PROGRAM, *command, "--out", "part"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as child:
+            before = len(lines("part"))
+            for _ in range(600):
+                time.sleep(0.05)
+                if os.path.exists("part/cases.jsonl") and child.poll() is None and len(lines_there("part")) > before + 3:
+                    break
+            child.send_signal(end)
+            message = child.stderr.read().decode()
+            child.wait()
+        if end == signal.SIGINT and child.returncode != 0:
+            equal((child.returncode, message), (130, "interrupted\n"), "Ctrl-C")
+    there = len(lines_there("part"))
+    assert 0 < there, "nothing was kept"
+    good(*command, "--out", "part")
+    equal(lines("part"), lines("whole"), "results")
+
+
+def lines_there(folder):
+    """Whole lines of a file that may be growing."""
+    with open(folder + "/cases.jsonl", encoding="utf-8") as file:
+        return [line for line in file if line.endswith("\n")]
+
+
+def test_torn_line():
+    """a line that was cut short is run anew; one that is no result is told"""
+    write_scene()
+    command = ["stability", "scene.json", *AXES, "--integrators", "be", "--out", "s"]
+    good(*command)
+    whole = lines("s")
+    with open("s/cases.jsonl", encoding="utf-8") as file:
+        text = file.read()
+    with open("s/cases.jsonl", "w", encoding="utf-8") as file:
+        file.write(text[:-40])
+    good(*command)
+    equal(lines("s"), whole, "results")
+    with open("s/cases.jsonl", "w", encoding="utf-8") as file:
+        file.write("{\n" + text)
+    result = drape(*command)
+    equal((result.returncode, result.stdout), (2, ""), result.stderr)
+    assert "cases.jsonl:1: no result" in result.stderr, result.stderr
+
+
+def test_other_experiment():
+    """a folder with another experiment is left alone"""
+    write_scene()
+    good("stability", "scene.json", *AXES, "--integrators", "be", "--out", "s")
+    with open("s/experiment.json", encoding="utf-8") as file:
+        before = file.read()
+    refused("stability", "scene.json", *AXES, "--integrators", "bdf2", "--out", "s", says="another experiment")
+    write_scene(duration=0.2)
+    refused("stability", "scene.json", *AXES, "--integrators", "be", "--out", "s", says="another experiment")
+    with open("s/experiment.json", encoding="utf-8") as file:
+        equal(file.read(), before, "experiment.json")
+
+
+def test_wrong_words():
+    """wrong axes, rows, shards, folders: one line each, nothing written"""
+    write_scene()
+    two = ["--axis", "/integrator/dt=1e-3:1e-2:2log"]
+    refused("stability", "scene.json", "--out", "s", says="2 or 3 axes")
+    for axis, says in (("dt=1:2:3", "no pointer"), ("/integrator/dt=1:2", "three numbers"), ("/integrator/dt=1:2:3lin", "log, or nothing"),
+                       ("/integrator/dt=0:2:3log", "positive"), ("/integrator/dt=1:1:3", "different"), ("/integrator/dt=1:2:1", "2 to 1024")):
+        refused("stability", "scene.json", *two, "--axis", axis, "--out", "s", says=says)
+    refused("stability", "scene.json", *two, "--axis", "/integrator/tolerancee=1:2:2", "--out", "s", says="tolerancee")
+    refused("stability", "scene.json", *two, "--axis", "/cloth/0/material/density=-1:2:2", "--out", "s", says="density")
+    refused("tradeoff", "scene.json", "--integrators", "bee", "--out", "s", says="did you mean")
+    refused("tradeoff", "scene.json", "--integrators", "static", "--out", "s", says="no steps in time")
+    refused("tradeoff", "scene.json", "--shard", "3/2", "--out", "s", says="--shard")
+    refused("tradeoff", "scene.json", "--case-seconds", "0", "--out", "s", says="above 0")
+    refused("tradeoff", "nowhere.json", "--out", "s", says="nowhere.json")
+    refused("converge", "scene.json", "--levels", "2", "--out", "s", says="levels")
+    refused("merge", "nowhere", "--out", "s", says="nowhere")
+    refused("merge", "--out", "s", says="DIR")
+
+
+def test_over_budget():
+    """a case that takes too long is counted, not dropped"""
+    write_scene(duration=50)
+    out = good("tradeoff", "scene.json", "--integrators", "be", "--case-seconds", "0.05", "--set", "/duration=2", "--out", "t", "--repeats", "1")
+    late = [r for r in lines("t").values() if r["status"] == "over_budget"]
+    assert late, "none was late"
+    assert f"{len(late)} took more than their CPU time" in out, out
+
+
+sys.exit(run_tests(globals()))

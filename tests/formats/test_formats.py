@@ -1,0 +1,180 @@
+#!/usr/bin/env python3
+"""Frames as other programs read them. TAP on stdout.
+
+DRAPE_BUILD is the folder of the build; or: test_formats.py PROGRAM. Each reader is a script beside this one, run by the program
+that it is for: Debian's python3 (numpy, VTK), Blender, node (the Khronos validator of glTF). What is not installed is skipped,
+with the word how to get it. Readers print nothing where all is well, else what is wrong, with exit code 1.
+"""
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+
+PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRAPE_BUILD"] + "/drape")
+HERE = os.path.dirname(os.path.abspath(__file__))
+PYTHON = "/usr/bin/python3"  # Debian's, for which its packages are
+LIMIT = 300  # [s]
+FORMATS = "npy,obj,ply,vtp,pc2,glb"
+
+CLOTH = {"material": {"young_modulus": 1e4, "thickness": 1e-3, "density": 200}, "terms": ["stretch.edge", "bend.hinge"],
+         "pins": [{"corner": "top-left"}], "velocity": [0.3, 0, -0.2]}
+SCENE = {
+    "drape": 1,
+    "cloth": [{**CLOTH, "name": "first", "mesh": {"grid": "square", "columns": 7, "rows": 5, "width": 0.6, "height": 0.4}},
+              {**CLOTH, "name": "second", "mesh": {"grid": "equilateral", "edges": 4, "edge_length": 0.1,
+                                                   "transform": {"translate": [1, 0.5, 0]}}}],
+    "integrator": {"dt": 0.01}, "duration": 0.25, "frame_rate": 30}
+
+
+class Skip(Exception):
+    pass
+
+
+def need(there, what):
+    if not there:
+        raise Skip(what)
+
+
+def reader(command, what, folder, *args):
+    result = subprocess.run([*command, folder, *args], capture_output=True, text=True, timeout=LIMIT, check=False)
+    if result.returncode == 77:
+        raise Skip(what)
+    said = result.stdout + result.stderr
+    assert result.returncode == 0, f"{' '.join(command)}: {said}"
+    return said
+
+
+def read_numpy(folder, *args):
+    reader([PYTHON, HERE + "/read_numpy.py"], "no numpy for " + PYTHON + ": apt-get install python3-numpy", folder, *args)
+
+
+def read_vtk(folder, *args):
+    reader([PYTHON, HERE + "/read_vtk.py"], "no VTK for " + PYTHON + ": apt-get install python3-vtk9", folder, *args)
+
+
+def validate_gltf(folder):
+    node = shutil.which("node")
+    need(node, "no node: apt-get install nodejs npm")
+    if "NODE_PATH" not in os.environ and shutil.which("npm"):
+        os.environ["NODE_PATH"] = subprocess.run(["npm", "root", "-g"], capture_output=True, text=True, check=False).stdout.strip()
+    reader([node, HERE + "/validate_gltf.js"], "no glTF validator: npm install -g gltf-validator, or NODE_PATH", folder)
+
+
+def read_blender(folder, *args):
+    blender = shutil.which("blender")
+    need(blender, "no Blender: apt-get install blender")
+    # Its Python looks for its library beside the first python3 on the path, which may be another one.
+    path = {**os.environ, "PATH": "/usr/bin:/bin:" + os.environ.get("PATH", "")}
+    result = subprocess.run([blender, "-b", "--factory-startup", "--python-exit-code", "1", "--python", HERE + "/read_blender.py",
+                             "--", folder, *args], capture_output=True, text=True, timeout=LIMIT, check=False, env=path)
+    said = result.stdout + result.stderr
+    assert result.returncode == 0 and "read_blender: good" in said, said
+
+
+def run(folder, *args):
+    with open("scene.json", "w", encoding="utf-8") as file:
+        json.dump(SCENE, file)
+    result = subprocess.run([PROGRAM, "run", "scene.json", "--out", folder, "--format", FORMATS, *args],
+                            capture_output=True, text=True, timeout=LIMIT, check=False)
+    assert result.returncode == 0, result.stderr
+    with open(folder + "/summary.json", encoding="utf-8") as file:
+        assert json.load(file)["frames"] == 9  # eight at k / 30 s, one at the end
+    return folder
+
+
+def test_numpy():
+    """numpy: positions.npy, PLY, OBJ, PC2 and GLB have the same positions"""
+    read_numpy(run("out"))
+
+
+def test_vtk():
+    """VTK: positions to the bit, times, velocities, strains and energies, and PLY and OBJ by its readers"""
+    read_vtk(run("out"))
+
+
+def test_gltf():
+    """the Khronos validator finds nothing in the binary glTF"""
+    validate_gltf(run("out"))
+
+
+def test_blender():
+    """Blender: the Mesh Cache moves the mesh as the run does, and the binary glTF plays"""
+    read_blender(run("out"))
+
+
+def test_z_up():
+    """with z up frames are turned, but not those of npy and of glTF, which has y up by definition"""
+    read_numpy(run("out", "--set", "/output/up=z"), "z")
+    try:
+        read_vtk("out", "z")
+    except Skip:
+        pass
+
+
+def kill_after(frames, *args):
+    """A run that is killed when it has written so many frames."""
+    with open("scene.json", "w", encoding="utf-8") as file:
+        json.dump(SCENE, file)
+    with subprocess.Popen([PROGRAM, "run", "scene.json", "--out", "out", "--format", FORMATS, "--duration", "200", *args],
+                          stdout=subprocess.DEVNULL) as process:
+        end = time.monotonic() + LIMIT
+        while not os.path.exists(f"out/frame_{frames:06d}.vtp") and process.poll() is None and time.monotonic() < end:
+            time.sleep(0.002)
+        process.send_signal(signal.SIGKILL)
+    assert process.returncode == -signal.SIGKILL, process.returncode
+
+
+def test_killed():
+    """a run that is killed leaves files that their programs read, with all frames so far"""
+    kill_after(12)
+    done = 0
+    for check in (lambda: read_numpy("out", "y", "killed"), lambda: read_vtk("out", "y", "killed"), lambda: validate_gltf("out")):
+        try:
+            check()
+            done += 1
+        except Skip as reason:
+            last = reason
+    if not done:
+        raise last
+
+
+def test_full_disk():
+    """so does one whose disk is full: no file is longer than 200 kB"""
+    with open("scene.json", "w", encoding="utf-8") as file:
+        json.dump(SCENE, file)
+    for one in FORMATS.split(","):
+        result = subprocess.run(["/bin/sh", "-c", 'ulimit -f 400; exec "$0" "$@"', PROGRAM, "run", "scene.json", "--out", one, "--format",
+                                 one, "--duration", "20"], capture_output=True, text=True, timeout=LIMIT, check=False)
+        assert result.returncode == 1 and result.stderr.count("\n") == 1, (one, result.stderr)
+        assert not any(name.endswith(".part") for name in os.listdir(one)), os.listdir(one)
+    validate_gltf("glb")
+    read_vtk("vtp", "y", "alone")
+
+
+def main():
+    tests = [(name, test) for name, test in globals().items() if name.startswith("test_")]
+    print(f"1..{len(tests)}", flush=True)
+    failed = 0
+    for number, (_, test) in enumerate(tests, 1):
+        words = f"{number} - {test.__doc__}"
+        with tempfile.TemporaryDirectory() as folder:
+            os.chdir(folder)
+            try:
+                test()
+                print("ok", words, flush=True)
+            except Skip as reason:
+                print("ok", words, "# SKIP", reason, flush=True)
+            except Exception:  # pylint: disable=broad-except
+                failed += 1
+                print("not ok", words, flush=True)
+                print("# " + traceback.format_exc().rstrip().replace("\n", "\n# "), flush=True)
+            os.chdir("/")
+    return failed > 0
+
+
+sys.exit(main())

@@ -1,0 +1,120 @@
+/* test_lab.c: what experiments measure with: lines through powers, material points on other meshes, distances. */
+#include "lab/statistics.h"
+#include "lab/trace.h"
+#include "support/suite.h"
+
+#include <math.h>
+
+static drape_context *new_context(void)
+{
+    drape_context *ctx = NULL;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    return ctx;
+}
+
+static drape_model *sheet(drape_context *ctx, double columns, double rows)
+{
+    const drape_setting grid[] = {
+        {"columns", columns, NULL}, {"rows", rows, NULL}, {"width", 2, NULL}, {"height", 1, NULL}};
+    static const drape_setting material[] = {
+        {"young_modulus", 1e5, NULL}, {"thickness", 1e-3, NULL}, {"density", 200, NULL}};
+    static const int32_t pinned[] = {0};
+    drape_pin_def pin;
+    drape_cloth_def cloth;
+    drape_scene_def scene;
+    drape_model *model = NULL;
+    drape_scene_def_init(&scene, sizeof scene);
+    drape_cloth_def_init(&cloth, sizeof cloth);
+    drape_pin_def_init(&pin, sizeof pin);
+    pin.nodes = pinned;
+    pin.node_count = 1;
+    cloth.mesh.grid = (drape_row_def){"square", grid, 4};
+    cloth.material = material;
+    cloth.material_count = 3;
+    cloth.pins = &pin;
+    cloth.pin_count = 1;
+    scene.cloths = &cloth;
+    scene.cloth_count = 1;
+    ck_assert_int_eq(drape_model_create(ctx, &scene, &model), DRAPE_OK);
+    return model;
+}
+
+/* y = 3 x^2 exactly: the slope is 2 to rounding, with no doubt about it. */
+START_TEST(a_power_is_found_exactly)
+{
+    double x[6], y[6];
+    for (int i = 0; i < 6; i++) {
+        x[i] = ldexp(0.1, -i);
+        y[i] = 3 * x[i] * x[i];
+    }
+    lab_line line = lab_fit_power(x, y, 6);
+    ck_assert_double_eq_tol(line.slope, 2, 1e-12);
+    ck_assert_double_eq_tol(exp(line.intercept), 3, 1e-11);
+    ck_assert_double_eq_tol(line.high - line.low, 0, 1e-6);
+}
+END_TEST
+
+/* Residuals in logarithms of +d, -2d, +d at abscissae -1, 0, 1 (times log 2): slope as without them; its standard
+ * error is sqrt(6 d^2/1 / (2 log(2)^2)), and Student's t for one degree of freedom at 97.5 % is 12.7062. */
+START_TEST(confidence_is_students)
+{
+    const double d = 1e-3, x[] = {0.5, 1, 2}, y[] = {0.5 * exp(d), exp(-2 * d), 2 * exp(d)};
+    lab_line line = lab_fit_power(x, y, 3);
+    double half = 12.706204736 * sqrt(6 * d * d / (2 * log(2) * log(2)));
+    ck_assert_double_eq_tol(line.slope, 1, 1e-12);
+    ck_assert_double_eq_tol(line.high - line.slope, half, 1e-8);
+    ck_assert_double_eq_tol(line.slope - line.low, half, 1e-8);
+    ck_assert(isnan(lab_fit_power(x, y, 2).low));
+}
+END_TEST
+
+/* A field that is linear in the rest positions is linear in every triangle: taken at another mesh's nodes it is exact,
+ * whichever triangle a point on an edge is given to. */
+START_TEST(a_linear_field_is_taken_exactly)
+{
+    drape_context *ctx = new_context();
+    drape_model *coarse = sheet(ctx, 6, 4), *fine = sheet(ctx, 8, 9);
+    lab_probe probe;
+    size_t n = 3 * (size_t)drape_model_node_count(fine), points = (size_t)drape_model_node_count(coarse);
+    double *x = drape_alloc(ctx, n, sizeof *x), *out = drape_alloc(ctx, 3 * points, sizeof *out);
+    const double *rest = drape_model_rest_positions(fine), *at = drape_model_rest_positions(coarse);
+    ck_assert_int_eq(lab_probe_create(ctx, coarse, &probe), DRAPE_OK);
+    for (size_t i = 0; i < n; i += 3) {
+        x[i] = 1 + 2 * rest[i] - rest[i + 2];
+        x[i + 1] = 3 * rest[i + 2];
+        x[i + 2] = -rest[i];
+    }
+    lab_probe_take(&probe, fine, x, out);
+    for (size_t i = 0; i < 3 * points; i += 3) {
+        ck_assert_double_eq_tol(out[i], 1 + 2 * at[i] - at[i + 2], 1e-14);
+        ck_assert_double_eq_tol(out[i + 1], 3 * at[i + 2], 1e-14);
+        ck_assert_double_eq_tol(out[i + 2], -at[i], 1e-14);
+    }
+    lab_probe_free(&probe);
+    drape_free(ctx, x);
+    drape_free(ctx, out);
+    drape_model_destroy(&coarse);
+    drape_model_destroy(&fine);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* Pinned nodes do not count: all free ones moved by 5 is 5. */
+START_TEST(a_distance_is_of_the_free_nodes)
+{
+    drape_context *ctx = new_context();
+    drape_model *model = sheet(ctx, 3, 3);
+    double x[27] = {0}, y[27] = {0};
+    for (int i = 1; i < 9; i++) {
+        y[3 * i] = 3;
+        y[3 * i + 2] = -4;
+    }
+    y[1] = 1e3; /* the pinned one */
+    ck_assert_double_eq_tol(lab_distance(model, x, y), 5, 1e-14);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+SUITE("lab", a_power_is_found_exactly, confidence_is_students, a_linear_field_is_taken_exactly,
+      a_distance_is_of_the_free_nodes)
