@@ -428,7 +428,8 @@ typedef struct drape_attempt {
     bool accepted;
     int iterations;   /* Newton iterations */
     double residual;  /* of the free nodes at the end of the attempt, in the norm of the integrator [N] */
-    double tolerance; /* that it was to reach [N]; with the reason "rounding" what rounding alone leaves */
+    double tolerance; /* that it was to reach [N]; with the reason "rounding" what rounding alone leaves; NaN: the
+                         row promises none */
     drape_worst worst;
 } drape_attempt;
 
