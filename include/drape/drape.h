@@ -365,6 +365,16 @@ DRAPE_API drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_d
  * then nothing has changed. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, const double *v);
 
+/* Pulls a free node by a spring of stiffness [N/m] from it to target [m]: the force stiffness (target - x), in the
+ * equations of every step from the next one on, implicit where the integrator is. It replaces the one before;
+ * stiffness 0 lets go. The spring's energy is counted as elastic, and what moving its target takes as the work of a
+ * pin. Integrators start anew. Nothing is allocated. Not for observers. Errors: DRAPE_E_ARGUMENT (no such node, a
+ * pinned one, a stiffness below 0, not finite), and then nothing has changed. Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_pull(drape_sim *sim, int32_t node, double stiffness, const double target[3]);
+
+/* The force of that spring on its node in the present state [N]; 0 without one. */
+DRAPE_API void drape_sim_pull_force(const drape_sim *sim, double force[3]);
+
 /* The last accepted state: time [s], positions [m] and velocities [m/s], node_count x 3; valid until the next
  * call that changes the sim. */
 DRAPE_API double drape_sim_time(const drape_sim *sim);
@@ -414,7 +424,7 @@ typedef struct drape_worst {
         *what; /* "residual", "edge length / rest length", "altitude / rest altitude" ...; "" for none */
     const char *term;    /* the row that found it, "" for a node */
     int32_t element;     /* element number in that term of that cloth; -1 for a node */
-    int32_t node[4];     /* its nodes, numbers of the whole model; -1 past the last */
+    int32_t node[4];     /* its first nodes, numbers of the whole model; -1 past the last */
     int32_t cloth;       /* index of its cloth; -1 for none */
     double value, limit; /* in the unit of what */
 } drape_worst;

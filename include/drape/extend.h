@@ -59,6 +59,7 @@ typedef struct drape_material {
     double areal_density;      /* [kg/m2]; total mass over area where the mass is uniform */
     double membrane_stiffness; /* E h [N/m] */
     double flexural_rigidity;  /* D = E h^3 / (12 (1 - nu^2)) [N m] */
+    double bending_warp, bending_weft, bending_twist; /* of a measured fabric [N m]; NaN: it is none */
 } drape_material;
 
 /* One cloth at rest. Node numbers are local to the cloth. All arrays are const and live as long as the model
@@ -152,7 +153,7 @@ typedef struct drape_term_ops {
     const char *element_name;  /* "edge", "hinge", "node": for messages */
     int nodes;                 /* nodes an element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
     bool linear;               /* energy: its Hessian is zero and takes no sparsity */
-    bool potential_of_gravity; /* energy: counts as gravity, not as elastic */
+    bool potential_of_gravity; /* energy: a force from outside, counts as gravity, not as elastic */
     bool convex;               /* measure: its Hessian ddq is positive semidefinite, as of a length */
     bool has_internal;         /* internal variables in each element */
     int internal_count;        /* of an element, one after another; 0: one */

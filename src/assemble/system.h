@@ -11,6 +11,7 @@
 #ifndef DRAPE_ASSEMBLE_SYSTEM_H
 #define DRAPE_ASSEMBLE_SYSTEM_H
 
+#include "assemble/pull.h"
 #include "assemble/state.h"
 #include "contact/contact.h"
 
@@ -37,6 +38,11 @@ void drape_system_leave_constraints(drape_system *system);
 
 const drape_model *drape_system_model(const drape_system *system);
 int drape_system_threads(const drape_system *system);
+
+/* A spring that belongs to the system from now on, its energy to the elastic one; of stiffness 0: none. Its node is
+ * free. */
+void drape_system_set_pull(drape_system *system, const drape_pull *pull);
+const drape_pull *drape_system_pull(const drape_system *system);
 
 /* From now on the forces of contact belong to the system, if the model has any. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_add_contact(drape_system *system);

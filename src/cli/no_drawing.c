@@ -2,10 +2,17 @@
 #include "cli/cli.h"
 #include "cli/tables.h"
 
-static int refuse(int argc, char **argv)
+#include <string.h>
+
+extern const drape_verb drape_verb_render, drape_verb_view;
+
+static int refuse(const drape_verb *verb, int argc, char **argv)
 {
-    (void)argc;
-    return cli_misuse(argv[0],
+    if (argc > 1 && strcmp(argv[1], "--help") == 0) {
+        cli_print_help(verb);
+        return CLI_DONE;
+    }
+    return cli_misuse(verb->name,
                       "this drape was built without drawing: install Debian's libepoxy-dev, libpng-dev and "
                       "libglfw3-dev, and build anew with -Drender=enabled");
 }
@@ -16,10 +23,24 @@ bool cli_shading_row(int index, cli_row *row)
     return false;
 }
 
-const drape_verb drape_verb_render = {.name = "render",
-                                      .operand = "SCENE|RUN ...",
-                                      .summary = "pictures and films: not in this build",
-                                      .run = refuse};
+static int main_render(int argc, char **argv)
+{
+    return refuse(&drape_verb_render, argc, argv);
+}
 
-const drape_verb drape_verb_view = {
-    .name = "view", .operand = "SCENE", .summary = "a window: not in this build", .run = refuse};
+static int main_view(int argc, char **argv)
+{
+    return refuse(&drape_verb_view, argc, argv);
+}
+
+const drape_verb drape_verb_render = {.name = "render",
+                                      .operand = "SCENE|RUN",
+                                      .summary = "pictures and films: not in this build",
+                                      .details = "This drape was built without drawing.",
+                                      .run = main_render};
+
+const drape_verb drape_verb_view = {.name = "view",
+                                    .operand = "SCENE",
+                                    .summary = "a window: not in this build",
+                                    .details = "This drape was built without drawing.",
+                                    .run = main_view};

@@ -2,7 +2,7 @@
  * writes a file. */
 #include "cli/cli.h"
 
-#include "io/export.h"
+#include "io/recorder.h"
 #include "model/scene.h"
 
 #include <stdio.h>
@@ -19,10 +19,9 @@ static drape_status apply_settings(const cli_command *command, drape_scene *scen
 static drape_status check_formats(const cli_scene *s)
 {
     for (size_t i = 0; i < s->model->format_count; i++) {
-        const drape_exporter_ops *ops;
         char pointer[64];
         snprintf(pointer, sizeof pointer, "/output/formats/%zu", i);
-        drape_status status = drape_exporter_find(s->ctx, pointer, s->model->formats[i], &ops);
+        drape_status status = drape_recorder_check(s->ctx, s->sim, pointer, s->model->formats[i]);
         if (status) {
             drape_scene_locate_fault(s->scene);
             return status;
@@ -42,10 +41,8 @@ static drape_status load(const cli_command *command, const char *path, cli_scene
     if (!status)
         status = drape_scene_compile(s->scene, &s->model);
     if (!status)
-        status = check_formats(s);
-    if (!status)
         status = drape_sim_create(s->ctx, s->model, &def, &s->sim);
-    return status;
+    return status ? status : check_formats(s);
 }
 
 int cli_scene_load_from(const cli_command *command, const char *path, cli_scene *out)

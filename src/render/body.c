@@ -10,7 +10,7 @@
 #define FLAT_CELLS 12   /* of an endless body */
 #define FAR        1e4  /* reaches: from so far away the distance tells where a body ends */
 #define ENDLESS    2.0  /* reaches */
-#define TOUCH      1e-3 /* of a cell: how far into a face its own normal is taken */
+#define TOUCH      0.15 /* of the way to a face's middle: where its own normal is taken */
 #define CUT_STEPS  24   /* halvings: where an edge is cut */
 #define PLANE_PULL 1e-2 /* weight of the mean where the planes leave a point free */
 #define SETTLE     4    /* steps onto the surface */
@@ -182,11 +182,33 @@ static drape_status keep_point(drape_context *ctx, grid *g, const double *x)
     return DRAPE_OK;
 }
 
-static drape_status make_point(drape_context *ctx, grid *g, int i, int j, int k)
+/* A plane of the surface for each corner of the cell whose nearest point of it is in the cell: an edge of the body may
+ * pass through a cell of which no edge meets both of its sides. */
+static int add_nearest(const grid *g, const int *at, double (*cuts)[3], double (*normals)[3], int count)
 {
-    double cuts[12][3], normals[12][3], a[3], b[3], x[3];
-    int count = 0, at[3] = {i, j, k};
+    for (int corner = 0; corner < 8; corner++) {
+        double x[3], normal[3], low[3];
+        bool inside = true;
+        corner_at(g, at[0], at[1], at[2], low);
+        corner_at(g, at[0] + corner % 2, at[1] + corner / 2 % 2, at[2] + corner / 4, x);
+        double d = distance(g->collider, x, normal);
+        vec3_add_scaled(-d, normal, x);
+        for (int k = 0; k < 3; k++)
+            inside = inside && x[k] >= low[k] && x[k] <= low[k] + g->cell;
+        if (!inside)
+            continue;
+        memcpy(cuts[count], x, sizeof x);
+        memcpy(normals[count++], normal, sizeof normal);
+    }
+    return count;
+}
+
+/* Where the surface cuts the edges of the cell. */
+static int add_cuts(const grid *g, const int *at, double (*cuts)[3], double (*normals)[3])
+{
+    int count = 0;
     for (int edge = 0; edge < 12; edge++) {
+        double a[3], b[3];
         int axis = edge / 4, from[3], to[3];
         memcpy(from, at, sizeof from);
         from[(axis + 1) % 3] += edge % 2;
@@ -202,10 +224,19 @@ static drape_status make_point(drape_context *ctx, grid *g, int i, int j, int k)
         distance(g->collider, cuts[count], normals[count]);
         count++;
     }
+    return count;
+}
+
+static drape_status make_point(drape_context *ctx, grid *g, int i, int j, int k)
+{
+    double cuts[20][3], normals[20][3], x[3];
+    const int at[3] = {i, j, k};
+    int count = add_cuts(g, at, cuts, normals);
     size_t cell = corner_number(g, i, j, k);
     g->point[cell] = count ? (int32_t)g->point_count : -1;
     if (!count)
         return DRAPE_OK;
+    count = add_nearest(g, at, cuts, normals, count);
     fit_point((const double(*)[3])cuts, (const double(*)[3])normals, count, x);
     settle(g->collider, x);
     return keep_point(ctx, g, x);

@@ -61,7 +61,7 @@ drape_status drape_overlay_create(drape_context *ctx, int width, int height, dra
 {
     static const int sizes[] = {2, 2, 1, 4, 0};
     *overlay = (drape_overlay){.ctx = ctx, .width = width, .height = height};
-    overlay->unit = fmaxf(1, fminf((float)height / 720, (float)width / 960));
+    overlay->unit = fmaxf(0.75f, fminf((float)height / 720, (float)width / 960));
     overlay->quads = drape_alloc(ctx, (size_t)DRAPE_OVERLAY_QUADS * 6 * VERTEX, sizeof *overlay->quads);
     drape_status status = overlay->quads ? DRAPE_OK : DRAPE_E_MEMORY;
     if (!status)

@@ -62,7 +62,9 @@ static const char surface_main[] =
     "    s.at = at;\n"
     "    s.value = value;\n"
     "    s.piece = piece;\n"
-    "    s.sun = sunlight(shadow_at, dot(s.n, light));\n"
+    "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
+    "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
+    "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
     "    colour = vec4(encoded(shade(s)), 1.0);\n"
     "}\n";
 
@@ -109,7 +111,9 @@ static const char ground_main[] =
     "    s.at = at;\n"
     "    s.value = value;\n"
     "    s.piece = piece;\n"
-    "    s.sun = sunlight(shadow_at, dot(s.n, light));\n"
+    "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
+    "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
+    "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
     "    colour = vec4(ground(s), 1.0);\n"
     "}\n";
 
@@ -175,7 +179,7 @@ struct drape_painter {
     drape_context *ctx;
     drape_canvas canvas;
     drape_overlay overlay;
-    GLuint pattern, heights, environment, ramp;
+    GLuint textures[3], ramp; /* of the shadings, in the order of DRAPE_READS_*; 0: not made yet */
     GLuint shadow, shadow_buffer;
     GLuint empty; /* vertex array of what has no attributes */
     GLuint depth, body, ground, wall, wire, pin;
@@ -244,17 +248,30 @@ static void create_floor(drape_painter *p)
     drape_gl_mesh_fill(&p->floor, square, 6, false);
 }
 
+static drape_status make_texture(drape_painter *p, int which, const char *path)
+{
+    static drape_status (*const makers[])(drape_context *, const char *, GLuint *) = {
+        drape_texture_pattern, drape_texture_heights, drape_texture_environment};
+    return p->textures[which] ? DRAPE_OK : makers[which](p->ctx, path, &p->textures[which]);
+}
+
+static drape_status read_files(drape_painter *p, const drape_painter_def *def)
+{
+    const char *const paths[] = {def->pattern, def->heights, def->environment};
+    drape_status status = DRAPE_OK;
+    for (int i = 0; i < 3 && !status; i++)
+        if (paths[i])
+            status = make_texture(p, i, paths[i]);
+    return status;
+}
+
 static drape_status create_all(drape_painter *p, const drape_painter_def *def)
 {
     drape_status status = drape_canvas_create(p->ctx, def->width, def->height, &p->canvas);
     if (!status)
         status = drape_overlay_create(p->ctx, def->width, def->height, &p->overlay);
     if (!status)
-        status = drape_texture_pattern(p->ctx, def->pattern, &p->pattern);
-    if (!status)
-        status = drape_texture_heights(p->ctx, def->heights, &p->heights);
-    if (!status)
-        status = drape_texture_environment(p->ctx, def->environment, &p->environment);
+        status = read_files(p, def);
     if (!status && !create_programs(p))
         status = DRAPE_E_FILE;
     if (status)
@@ -283,7 +300,7 @@ void drape_painter_destroy(drape_painter **painter)
     drape_painter *p = *painter;
     if (!p)
         return;
-    const GLuint textures[] = {p->pattern, p->heights, p->environment, p->ramp, p->shadow};
+    const GLuint textures[] = {p->textures[0], p->textures[1], p->textures[2], p->ramp, p->shadow};
     const GLuint programs[] = {p->depth, p->body, p->ground, p->wall, p->wire, p->pin};
     glDeleteTextures(sizeof textures / sizeof *textures, textures);
     for (size_t i = 0; i < sizeof programs / sizeof *programs; i++)
@@ -307,6 +324,15 @@ const drape_canvas *drape_painter_canvas(const drape_painter *painter)
 drape_overlay *drape_painter_overlay(drape_painter *painter)
 {
     return &painter->overlay;
+}
+
+static drape_status make_textures(drape_painter *p, int reads)
+{
+    drape_status status = DRAPE_OK;
+    for (int i = 0; i < 3 && !status; i++)
+        if (reads & 1 << i)
+            status = make_texture(p, i, NULL);
+    return status;
 }
 
 /* Made when it is first asked for: a driver takes its time for each. */
@@ -347,14 +373,14 @@ static void set_lamp(const drape_stage *stage, float azimuth, panel_view *v)
 /* For programs of surfaces, which take their textures at these units. */
 static void use_surface(drape_painter *p, GLuint program, const panel_view *v, const drape_matrix *view)
 {
-    static const float nowhere[3] = {0}, front[3] = {0.50f, 0.062f, 0.048f}, back[3] = {0.62f, 0.46f, 0.30f};
+    static const float nowhere[3] = {0}, front[3] = {0.50f, 0.062f, 0.048f}, back[3] = {0.40f, 0.29f, 0.18f};
     const struct {
         const char *name;
         GLuint texture;
     } units[] = {{"shadow_map", p->shadow},
-                 {"picture", p->pattern},
-                 {"heights", p->heights},
-                 {"environment", p->environment},
+                 {"picture", p->textures[0]},
+                 {"heights", p->textures[1]},
+                 {"environment", p->textures[2]},
                  {"ramp", p->ramp}};
     glUseProgram(program);
     for (int i = 0; i < 5; i++) {
@@ -371,6 +397,8 @@ static void use_surface(drape_painter *p, GLuint program, const panel_view *v, c
     drape_gl_set_vec3(program, "front", front);
     drape_gl_set_vec3(program, "back", back);
     drape_gl_set_float(program, "soft", SOFT / SHADOW);
+    drape_gl_set_float(program, "texel_depth",
+                       2 * SHADOW_REACH / SHADOW / (4 * DEEP - 0.1f)); /* a texel's width as depth */
     drape_gl_set_float(program, "relief", 0);
     drape_gl_set_float(program, "spread", 1);
 }
@@ -389,7 +417,7 @@ static void draw_cloth(const drape_stage *stage)
 
 static void draw_bodies(const drape_stage *stage, GLuint program, bool endless)
 {
-    for (int32_t c = 0; c < stage->model->collider_count; c++) {
+    for (int32_t c = 0; c < stage->body_count; c++) {
         const drape_stage_body *body = &stage->bodies[c];
         if (body->shape.endless != endless)
             continue;
@@ -414,7 +442,7 @@ static void draw_shadows(drape_painter *p, const drape_stage *stage, const drape
     glDepthMask(GL_TRUE);
     glClear(GL_DEPTH_BUFFER_BIT);
     glEnable(GL_POLYGON_OFFSET_FILL);
-    glPolygonOffset(2.2f, 6);
+    glPolygonOffset(2, 4);
     use_surface(p, p->depth, v, &v->lamp);
     draw_bodies(stage, p->depth, false);
     drape_gl_set_vec3(p->depth, "offset", (const float[3]){0});
@@ -507,8 +535,9 @@ static drape_status draw_panel(drape_painter *p, const drape_picture *picture, i
     drape_stage *stage = panel->stage;
     GLuint program = shading_program(p, shading);
     panel_view v = {.left = box[0], .bottom = box[1], .width = box[2], .height = box[3]};
-    if (!program)
-        return DRAPE_E_FILE;
+    drape_status status = program ? make_textures(p, shading->reads) : DRAPE_E_FILE;
+    if (status)
+        return status;
     v.view = drape_camera_view(&picture->camera, (float)box[2] / (float)box[3], stage->radius);
     set_lamp(stage, picture->lamp_azimuth, &v);
     drape_stage_set(stage, &panel->moment, shading->wires);
@@ -568,6 +597,18 @@ static void put_legend(drape_painter *p, const drape_picture *picture)
                          field->shown * picture->high);
 }
 
+/* Behind lines of text, so that they are read over cloth, too. */
+static void put_veil(drape_overlay *o, const char *const *lines, float line)
+{
+    float widest = 0;
+    int count = 0;
+    for (; lines && lines[count]; count++)
+        widest = fmaxf(widest, drape_font_width(&o->font, lines[count]));
+    if (count > 0)
+        drape_overlay_box(o, 10 * o->unit, 9 * o->unit, widest + 20 * o->unit,
+                          (float)count * line + 10 * o->unit, (const float[]){1, 1, 1, 0.42f});
+}
+
 static void put_texts(drape_painter *p, const drape_picture *picture)
 {
     drape_overlay *o = &p->overlay;
@@ -583,6 +624,7 @@ static void put_texts(drape_painter *p, const drape_picture *picture)
             drape_overlay_box(o, (float)box[0] - 0.5f * o->unit, top, o->unit, (float)box[3],
                               (const float[]){1, 1, 1, 0.9f});
     }
+    put_veil(o, picture->lines, line);
     for (int i = 0; picture->lines && picture->lines[i]; i++)
         drape_overlay_text(o, left, 30 * o->unit + (float)i * line, DRAPE_LEFT, drape_ink, picture->lines[i]);
     if (picture->caption)

@@ -2,6 +2,7 @@
  * and no gap opens. */
 #include "render/skin.h"
 
+#include "base/vec3.h"
 #include "render/matrix.h"
 
 #include <math.h>
@@ -89,22 +90,29 @@ static void number_triangles(drape_skin *s)
 
 /* ---- Texture coordinates ---- */
 
-/* Of a grid: along its rows and columns, as long as they are at rest. */
+/* Of a grid: along its first row and across, as far as nodes lie there at rest. */
 static void unroll_grid(const drape_cloth *cloth, float *uv)
 {
     const drape_mesh *mesh = &cloth->mesh;
-    double width = 0, height = 0;
-    const double *a = mesh->x, *b = mesh->x + 3 * (size_t)(mesh->columns - 1),
-                 *c = mesh->x + 3 * (size_t)(mesh->rows - 1) * (size_t)mesh->columns;
-    for (int k = 0; k < 3; k++) {
-        width += (b[k] - a[k]) * (b[k] - a[k]);
-        height += (c[k] - a[k]) * (c[k] - a[k]);
-    }
-    double longer = sqrt(fmax(width, height));
+    const double *origin = mesh->x, *right = mesh->x + 3 * (size_t)(mesh->columns - 1),
+                 *last = mesh->x + 3 * (size_t)(mesh->rows - 1) * (size_t)mesh->columns;
+    double u[3], v[3], low = INFINITY, high[2] = {0, 0};
+    vec3_sub(right, origin, u);
+    vec3_sub(last, origin, v);
+    vec3_add_scaled(-vec3_dot(u, v) / vec3_dot(u, u), u, v);
     for (int32_t i = 0; i < mesh->node_count; i++) {
-        uv[2 * i] = (float)(sqrt(width) / longer * (i % mesh->columns) / fmax(1, mesh->columns - 1));
-        uv[2 * i + 1] =
-            (float)(sqrt(height) / longer * (double)(i / mesh->columns) / fmax(1, mesh->rows - 1));
+        double x[3];
+        vec3_sub(mesh->x + 3 * (size_t)i, origin, x);
+        uv[2 * i] = (float)(vec3_dot(x, u) / vec3_norm(u));
+        uv[2 * i + 1] = (float)(vec3_dot(x, v) / vec3_norm(v));
+        low = fmin(low, (double)uv[2 * i]);
+        high[0] = fmax(high[0], (double)uv[2 * i]);
+        high[1] = fmax(high[1], (double)uv[2 * i + 1]);
+    }
+    double longer = fmax(high[0] - low, high[1]);
+    for (int32_t i = 0; i < mesh->node_count; i++) {
+        uv[2 * i] = (float)(((double)uv[2 * i] - low) / longer);
+        uv[2 * i + 1] = (float)((double)uv[2 * i + 1] / longer);
     }
 }
 

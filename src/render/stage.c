@@ -13,6 +13,7 @@ static drape_status create_bodies(drape_stage *s)
     s->bodies = drape_alloc(s->ctx, (size_t)m->collider_count, sizeof *s->bodies);
     if (!s->bodies)
         return DRAPE_E_MEMORY;
+    s->body_count = m->collider_count;
     for (int32_t c = 0; c < m->collider_count && !status; c++) {
         drape_stage_body *body = &s->bodies[c];
         const drape_collider_pose pose = drape_collider_pose_at(&m->colliders[c], 0);
@@ -89,7 +90,7 @@ void drape_stage_free(drape_stage *stage)
 {
     if (!stage->ctx)
         return;
-    for (int32_t c = 0; stage->bodies && c < stage->model->collider_count; c++) {
+    for (int32_t c = 0; stage->bodies && c < stage->body_count; c++) {
         drape_gl_mesh_free(&stage->bodies[c].mesh);
         drape_body_free(stage->ctx, &stage->bodies[c].shape);
     }
@@ -104,7 +105,7 @@ void drape_stage_free(drape_stage *stage)
 
 static void place_bodies(drape_stage *s, double t)
 {
-    for (int32_t c = 0; c < s->model->collider_count; c++) {
+    for (int32_t c = 0; c < s->body_count; c++) {
         const drape_collider_pose pose = drape_collider_pose_at(&s->model->colliders[c], t);
         for (int k = 0; k < 3; k++)
             s->bodies[c].offset[k] = (float)pose.displacement[k];
@@ -119,7 +120,7 @@ void drape_stage_see(drape_stage *stage, const float *positions)
 
 void drape_stage_settle(drape_stage *stage)
 {
-    for (int32_t c = 0; c < stage->model->collider_count; c++)
+    for (int32_t c = 0; c < stage->body_count; c++)
         if (!stage->bodies[c].shape.endless)
             see(stage, stage->bodies[c].shape.vertex, stage->bodies[c].shape.vertex_count, 6,
                 stage->bodies[c].offset);
@@ -137,7 +138,7 @@ void drape_stage_frame(drape_stage *stage, drape_framing *framing, double t, con
     static const float nowhere[3] = {0};
     place_bodies(stage, t);
     drape_framing_add(framing, positions, (size_t)stage->model->node_count, nowhere);
-    for (int32_t c = 0; c < stage->model->collider_count; c++) {
+    for (int32_t c = 0; c < stage->body_count; c++) {
         const drape_stage_body *body = &stage->bodies[c];
         for (size_t i = 0; !body->shape.endless && i < body->shape.vertex_count; i++)
             drape_framing_add(framing, body->shape.vertex + 6 * i, 1, body->offset);

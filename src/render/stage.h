@@ -26,7 +26,8 @@ typedef struct drape_stage {
     const drape_model *model;
     drape_skin skin;
     drape_gl_mesh cloth, wires, pins;
-    drape_stage_body *bodies; /* (model->collider_count) */
+    drape_stage_body *bodies; /* (body_count): the model's colliders */
+    int32_t body_count;
     size_t wire_count, pin_count;
     float *pin;              /* (pinned nodes x 3) */
     float center[3], radius; /* [m] of what was framed: cloth over all moments, colliders that end */
@@ -37,7 +38,7 @@ typedef struct drape_stage {
 
 /* Errors: DRAPE_E_MEMORY. An OpenGL context is current. */
 drape_status drape_stage_create(drape_context *ctx, const drape_model *model, drape_stage *stage);
-void drape_stage_free(drape_stage *stage); /* an empty one is fine */
+void drape_stage_free(drape_stage *stage); /* an empty one is fine; so is one whose model is gone */
 
 /* These positions will be in the picture. After the last of them drape_stage_settle finds where shadows fall. */
 void drape_stage_see(drape_stage *stage, const float *positions);

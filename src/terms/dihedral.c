@@ -99,6 +99,18 @@ double drape_dihedral(const double x[12], double *g, double *h)
     return atan2(vec3_dot(direction, cross), vec3_dot(sides[0].n, sides[1].n));
 }
 
+void drape_dihedral_tie(double *g, double *h)
+{
+    for (int i = 0; g && i < 6; i++)
+        g[i] += g[9 + i % 3] / 2;
+    for (int i = 0; h && i < 12; i++)
+        for (int j = 0; j < 6; j++)
+            h[12 * i + j] += h[12 * i + 9 + j % 3] / 2;
+    for (int i = 0; h && i < 6; i++)
+        for (int j = 0; j < 9; j++)
+            h[12 * i + j] += h[12 * (9 + i % 3) + j] / 2;
+}
+
 double drape_nearest_branch(double angle, double reference)
 {
     static const double two_pi = 6.28318530717958647693;

@@ -7,6 +7,10 @@
  * h (12 x 12, symmetric); NULL: not wanted. */
 double drape_dihedral(const double x[12], double *g, double *h);
 
+/* Where x3 is (x0 + x1)/2 + a constant: its derivatives go to x0 and x1, by halves; the first 9 of g and h (9 x 9 of
+ * 12 x 12) are right then. */
+void drape_dihedral_tie(double *g, double *h);
+
 /* The branch of an angle, known up to 2 pi, that is nearest to reference. */
 double drape_nearest_branch(double angle, double reference);
 

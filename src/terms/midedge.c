@@ -244,7 +244,7 @@ static int gather_columns(const patch *p, double area, double b[3 * MIDEDGE_HING
 static void make_squares(patch *p, const double law[9])
 {
     const double area = p->cloth->triangle_area[p->triangle];
-    double c[9], b[3 * MIDEDGE_HINGES], f[9], l[9];
+    double c[9], b[3 * MIDEDGE_HINGES], f[9];
     const int free_edges = gather_columns(p, area, b, f);
     drape_midedge *out = p->out;
     out->rank = 3 - free_edges;
@@ -252,11 +252,12 @@ static void make_squares(patch *p, const double law[9])
         return;
     memcpy(c, law, sizeof c);
     drape_orthotropic_release(c, f, free_edges);
-    drape_orthotropic_squares(c, out->rank, out->k, l);
+    drape_orthotropic_squares(c, out->rank, out->k, out->l);
     for (int r = 0; r < out->rank; r++) {
+        const double *l = out->l + 3 * r;
         out->k[r] *= area;
         for (int j = 0; j < MIDEDGE_HINGES; j++) {
-            out->c[r][j] = l[3 * r] * b[3 * j] + l[3 * r + 1] * b[3 * j + 1] + l[3 * r + 2] * b[3 * j + 2];
+            out->c[r][j] = l[0] * b[3 * j] + l[1] * b[3 * j + 1] + l[2] * b[3 * j + 2];
             out->wide = out->wide || (j > 2 && out->c[r][j] != 0);
         }
     }

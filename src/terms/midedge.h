@@ -18,12 +18,10 @@ extern const int drape_midedge_hinge[MIDEDGE_HINGES][4];
 typedef struct drape_midedge {
     int32_t node[MIDEDGE_NODES]; /* local to the cloth; -1: there is none */
     bool clamped[3], free[3];    /* own edges: of a held direction; on the boundary */
+    bool wide;                   /* some c beyond the own hinges is not 0 */
     int rank;                    /* squares that the energy has: 3 less the free edges */
-    double k[3];                 /* [J/q2]: E = 1/2 sum k (q - q0)^2 */
-    double
-        c[3]
-         [MIDEDGE_HINGES]; /* [1/m] q = sum c theta; the angle of a clamped edge is that to its direction */
-    bool wide;             /* some c beyond the own hinges is not 0 */
+    /* E = 1/2 sum k (q - q0)^2 [J], q = l . K = sum c theta; theta of a clamped edge: to its direction. */
+    double k[3], l[9], c[3][MIDEDGE_HINGES];
 } drape_midedge;
 
 /* The patch of a triangle. law: C of orthotropic.h [N m]; values: the orthotropic ones. False where the plane of the

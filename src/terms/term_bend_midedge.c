@@ -3,7 +3,7 @@
  * normals at the middles of its edges (midedge.h), C the law of orthotropic.h.
  *
  * C = sum k l l', so E = 1/2 sum k (q - q0)^2 with q = l . K = sum c theta over nine hinges at most: each square is an
- * element, three a triangle and one less for each free edge. Where no triangle needs hinges beyond its own (grids) elements
+ * element, three a triangle and one less for each free edge. Where no triangle needs hinges beyond its own (lattices) elements
  * have 6 nodes, else 12; a hinge whose c is 0 is not there, and its nodes are the first again.
  *
  * A clamped edge has no second triangle but a direction in space: x3 = (x0 + x1)/2 + r, r at rest.
@@ -19,8 +19,19 @@
 #include <math.h>
 #include <string.h>
 
-enum { PARAM_REST = DRAPE_ORTHOTROPIC_COUNT, PARAM_MIN_ALTITUDE, PARAM_MAX_TURN };
-enum { LIST_REST = DRAPE_ORTHOTROPIC_DIRECTION + 1, LIST_MIN_ALTITUDE, LIST_MAX_TURN, LIST_COUNT };
+enum {
+    PARAM_REST = DRAPE_ORTHOTROPIC_COUNT,
+    PARAM_CURVATURE,
+    PARAM_MIN_ALTITUDE = PARAM_CURVATURE + 3,
+    PARAM_MAX_TURN
+};
+enum {
+    LIST_REST = DRAPE_ORTHOTROPIC_DIRECTION + 1,
+    LIST_CURVATURE,
+    LIST_MIN_ALTITUDE,
+    LIST_MAX_TURN,
+    LIST_COUNT
+};
 enum { REST_MESH, REST_FLAT };
 enum {
     REST_K,
@@ -37,7 +48,7 @@ static const char *const rest_choices[] = {"mesh", "flat", NULL};
 
 /* As a list the direction is one entry; among the values it takes three. */
 static const drape_param params[LIST_COUNT] = {
-    DRAPE_ORTHOTROPIC_PARAMS("N m", "E h^3/12 of the material", "twist",
+    DRAPE_ORTHOTROPIC_PARAMS("N m", "of the material: its fabric, or E h^3/12", "twist",
                              "torsional rigidity: a twist of curvature K12 takes 2 twist K12^2 per area"),
     [LIST_REST] = {.name = "rest",
                    .kind = DRAPE_PARAM_CHOICE,
@@ -45,6 +56,15 @@ static const drape_param params[LIST_COUNT] = {
                    .default_value = REST_MESH,
                    .choices = rest_choices,
                    .help = "rest curvature: that of the mesh, or flat"},
+    [LIST_CURVATURE] =
+        {.name = "curvature",
+         .kind = DRAPE_PARAM_VECTOR,
+         .unit = "1/m",
+         .default_value = 0,
+         .min = -1e9,
+         .max = 1e9,
+         .help = "added to the rest curvature: along the warp, along the weft, twist; positive towards "
+                 "the side from which triangles turn counterclockwise"},
     [LIST_MIN_ALTITUDE] = {.name = "min_altitude",
                            .kind = DRAPE_PARAM_NUMBER,
                            .unit = "1",
@@ -80,19 +100,6 @@ static bool clamp_of(const drape_elements *el, int32_t element, int hinge, doubl
     return vec3_dot(r, r) > 0;
 }
 
-/* Derivatives by x3 go to x0 and x1, by halves. */
-static void fold_clamp(double *g, double *h)
-{
-    for (int i = 0; g && i < 6; i++)
-        g[i] += g[9 + i % 3] / 2;
-    for (int i = 0; h && i < 12; i++)
-        for (int j = 0; j < 6; j++)
-            h[12 * i + j] += h[12 * i + 9 + j % 3] / 2;
-    for (int i = 0; h && i < 6; i++)
-        for (int j = 0; j < 9; j++)
-            h[12 * i + j] += h[12 * (9 + i % 3) + j] / 2;
-}
-
 /* The angle of a hinge of an element, with derivatives by its first nodes: 3 where it is clamped, else 4. */
 static double hinge_angle(const drape_elements *el, int32_t element, int hinge, const double *x, double *g,
                           double *h, int *nodes)
@@ -107,7 +114,7 @@ static double hinge_angle(const drape_elements *el, int32_t element, int hinge, 
         at[9 + i] = (at[i] + at[3 + i]) / 2 + r[i];
     const double theta = drape_dihedral(at, g, h);
     if (*nodes == 3)
-        fold_clamp(g, h);
+        drape_dihedral_tie(g, h);
     return theta;
 }
 
@@ -225,12 +232,24 @@ static double rest_measure(const drape_cloth_view *cloth, const int32_t *node, c
     return q;
 }
 
-static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+/* What the scene leaves to the material: of a measured fabric, or of an isotropic sheet. */
+static void law_of(const drape_material *m, const double *given, double law[9])
 {
-    const drape_material *m = &cloth->material;
-    double law[9];
+    double values[DRAPE_ORTHOTROPIC_COUNT];
+    const double measured[3] = {m->bending_warp, m->bending_weft, m->bending_twist};
+    memcpy(values, given, sizeof values);
+    for (int k = 0; k < 3; k++)
+        if (isnan(values[k]))
+            values[k] = measured[k];
     drape_orthotropic_law(values, m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio),
                           m->poisson_ratio, law);
+}
+
+static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+{
+    const double *bend = values + PARAM_CURVATURE;
+    double law[9];
+    law_of(&cloth->material, values, law);
     drape_status status = announce(cloth, values, law, builder);
     int32_t element = 0;
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
@@ -238,6 +257,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         drape_midedge_of(cloth, t, values, law, &patch);
         const int32_t *n = patch.node;
         for (int r = 0; r < patch.rank; r++) {
+            const double *l = patch.l + 3 * r;
             double rest[REST_COUNT_CLAMPED] = {0};
             int32_t node[MIDEDGE_NODES];
             rest[REST_K] = patch.k[r];
@@ -249,6 +269,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
             take_nodes(&patch, r, node);
             if (values[PARAM_REST] == REST_MESH)
                 rest[REST_Q0] = rest_measure(cloth, node, rest, REST_COUNT_CLAMPED);
+            rest[REST_Q0] += l[0] * bend[0] + l[1] * bend[1] + 2 * l[2] * bend[2];
             drape_term_set(builder, element++, node, rest);
         }
     }

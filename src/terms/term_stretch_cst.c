@@ -138,20 +138,9 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
                           const double *internal, drape_fault *fault)
 {
     (void)internal;
-    *fault = (drape_fault){.reason = "area_collapse",
-                           .what = "area / rest area",
-                           .element = -1,
-                           .value = INFINITY,
-                           .limit = el->params[PARAM_MIN_AREA]};
-    for (int32_t e = 0; e < el->count; e += 3) {
-        const double ratio = ratio_of(el, e, x);
-        if (ratio < fault->value &&
-            (ratio >= fault->limit || !before || drape_fell(ratio, ratio_of(el, e, before)))) {
-            fault->value = ratio;
-            fault->element = e;
-        }
-    }
-    return fault->value < fault->limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
+    *fault = (drape_fault){
+        .reason = "area_collapse", .what = "area / rest area", .limit = el->params[PARAM_MIN_AREA]};
+    return drape_check_ratios(el, x, before, 3, ratio_of, fault);
 }
 
 const drape_term_ops drape_term_stretch_cst = {

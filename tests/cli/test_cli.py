@@ -14,7 +14,7 @@ import time
 
 from program import LIMIT, PROGRAM, SOURCES, Skip, drape, equal, good, read_json, read_npy, read_steps, refused, run_tests, scene, write_scene
 
-VERBS = ["run", "info", "check", "list"]
+VERBS = ["run", "report", "info", "check", "list", "render", "view"]
 
 
 # ---- Help and usage
@@ -83,6 +83,7 @@ def test_wrong_formats():
         line = refused(verb, "scene.json", says='/output/formats/1: unknown format "nyp"')
         assert re.match(r"scene\.json:\d+:\d+: ", line), line
     refused("run", "scene.json", "--out", "out", "--format", "npy,objj", says='did you mean "obj"?')
+    refused("run", "scene.json", "--out", "out", "--format", "glb", "--frame-rate", "1e6", says="/output/formats/0: glb: 100003 frames of 16 nodes")
     good("run", "scene.json", "--out", "out", "--format", "npy")
 
 
