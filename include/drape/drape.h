@@ -137,6 +137,7 @@ typedef struct drape_pin_def {
     double box_min[3], box_max[3]; /* [m], rest coordinates after the transform; boundary included */
     const drape_track_key *track;  /* key_count keys; NULL: fixed */
     size_t key_count;
+    bool clamp; /* edges between its nodes keep the direction of the sheet, for bending terms that see it */
 } drape_pin_def;
 
 /* One piece of cloth. */
@@ -293,6 +294,8 @@ typedef struct drape_sim_def {
     double dt_min;     /* [s]; 0: the scene's */
     double frame_rate; /* [1/s] of frame events; 0: the scene's */
     int threads; /* threads that evaluate elements, 1 to 256; default 1; the result does not depend on it */
+    double realtime_step; /* [s] longest step that drape_sim_advance_realtime takes to keep up, and the most
+                             time that it owes; 0: four times dt */
 } drape_sim_def;
 
 DRAPE_API void drape_sim_def_init(drape_sim_def *def, size_t struct_size);
@@ -312,6 +315,39 @@ DRAPE_API void drape_sim_destroy(drape_sim **sim);
  * asked), DRAPE_E_ARGUMENT (t_end not finite); the message names time, step, reason and worst element. */
 DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);
 
+/* What a call of drape_sim_advance_realtime did. */
+typedef struct drape_realtime {
+    double time;    /* [s] simulated time that it came to */
+    double debt;    /* [s] of the frame, and of those before, that is owed to the next call; 0: it kept up */
+    double dropped; /* [s] given up in this call, because more was owed than may be */
+    double dropped_total; /* [s] since the sim was made */
+    double seconds;       /* [s] of wall clock that the call took, its observers included */
+    bool kept;            /* that was within the budget */
+    const char *rung;     /* "full"; "fewer iterations"; "larger steps": longer than dt, or time is owed */
+    int effort;           /* of the integrator: 0, as its parameters say, and up, cheaper */
+    int attempts, rejected;
+    double h;        /* [s] largest accepted step; 0: none was accepted */
+    double residual; /* [N] largest of the accepted steps, in the norm of the integrator; NaN: it has none */
+} drape_realtime;
+
+/* Advances by a frame in a given time: for games, previews, anything that must show a state when it is due. Makes
+ * frame_dt [s] and what earlier calls left over, in equal steps no longer than dt. If that is not expected to fit into
+ * budget_seconds of wall clock, by what steps took lately, then the integrator tries less hard (rows with efforts,
+ * such as "newton_k"), then steps are longer, up to realtime_step of the def, and then time is left over. The rung is
+ * chosen anew in each call, and a better one is returned to as soon as it fits.
+ *
+ * The work of a call is bounded: after its first accepted step none is begun that is not expected to end in time. Time owed is at most one longest step; what is more is dropped, simulated time then runs behind the
+ * clock for good, and late frames do not make later ones later. Steps follow the frames, so at another frame rate
+ * the state differs by the integrator's own error in h and nothing else. A later drape_sim_advance goes on with the
+ * scene's own steps. Which rung is taken depends on the clock, so two runs may differ; with a budget that is never
+ * reached they do not.
+ *
+ * *report, unless NULL, is filled whatever the status. Integrators and controllers that choose their own steps keep
+ * doing so, within the bound. Errors: as drape_sim_advance; DRAPE_E_ARGUMENT (frame_dt not in (0, 1e6], budget not in
+ * [0, 1e9], an integrator without time). */
+DRAPE_API drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double budget_seconds,
+                                                  drape_realtime *report);
+
 /* Puts the sim into a state of the host's own, from which the next advance starts: time [s], 0 to 1e9, before
  * or after the present one; positions [m] and velocities [m/s], node_count x 3, copied. Pinned nodes must lie
  * where their pins have them at t, to 1e-9 of the scene's size, and are put there exactly; the velocities of
@@ -328,6 +364,16 @@ DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);
  * lead out of. Not for observers. Errors: DRAPE_E_ARGUMENT (NULL, not finite, a pinned node elsewhere), and
  * then nothing has changed. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, const double *v);
+
+/* Pulls a free node by a spring of stiffness [N/m] from it to target [m]: the force stiffness (target - x), in the
+ * equations of every step from the next one on, implicit where the integrator is. It replaces the one before;
+ * stiffness 0 lets go. The spring's energy is counted as elastic, and what moving its target takes as the work of a
+ * pin. Integrators start anew. Nothing is allocated. Not for observers. Errors: DRAPE_E_ARGUMENT (no such node, a
+ * pinned one, a stiffness below 0, not finite), and then nothing has changed. Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_pull(drape_sim *sim, int32_t node, double stiffness, const double target[3]);
+
+/* The force of that spring on its node in the present state [N]; 0 without one. */
+DRAPE_API void drape_sim_pull_force(const drape_sim *sim, double force[3]);
 
 /* The last accepted state: time [s], positions [m] and velocities [m/s], node_count x 3; valid until the next
  * call that changes the sim. */
@@ -378,7 +424,7 @@ typedef struct drape_worst {
         *what; /* "residual", "edge length / rest length", "altitude / rest altitude" ...; "" for none */
     const char *term;    /* the row that found it, "" for a node */
     int32_t element;     /* element number in that term of that cloth; -1 for a node */
-    int32_t node[4];     /* its nodes, numbers of the whole model; -1 past the last */
+    int32_t node[4];     /* its first nodes, numbers of the whole model; -1 past the last */
     int32_t cloth;       /* index of its cloth; -1 for none */
     double value, limit; /* in the unit of what */
 } drape_worst;

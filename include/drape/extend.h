@@ -72,11 +72,13 @@ typedef struct drape_cloth_view {
     const int32_t *edge_triangle; /* (edge_count x 2) triangles beside the edge; second -1 on the boundary */
     const double *edge_length;    /* (edge_count) [m] */
     const int32_t *hinge; /* (hinge_count x 4) x0 x1 the shared edge, x2 x3 the apices of its two triangles */
-    const int32_t *hinge_edge; /* (hinge_count) */
-    const double *node_area;   /* (node_count) lumped, a third of each triangle [m2] */
-    const double *node_mass;   /* (node_count) lumped [kg] */
-    int32_t rows, columns;     /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
-    bool rectangular;          /* a grid whose cells are rectangles before its transform */
+    const int32_t *hinge_edge;    /* (hinge_count) */
+    const int32_t *triangle_edge; /* (triangle_count x 3) the edge from corner k to corner k + 1 */
+    const uint8_t *edge_clamped;  /* (edge_count) 1: a pin keeps the direction of the sheet across it */
+    const double *node_area;      /* (node_count) lumped, a third of each triangle [m2] */
+    const double *node_mass;      /* (node_count) lumped [kg] */
+    int32_t rows, columns;        /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
+    bool rectangular;             /* a grid whose cells are rectangles before its transform */
     drape_material material;
     double gravity[3]; /* [m/s2] */
 } drape_cloth_view;
@@ -89,6 +91,14 @@ typedef struct drape_term_builder drape_term_builder;
  * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count);
 
+/* The same for elements of fewer nodes than the row's, on this cloth. A node may stand in several places of an element,
+ * as its first does in places that are left over: its derivatives are the sum of theirs. */
+DRAPE_API drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t element_count, int nodes,
+                                                int rest_count);
+
+/* Says that elements of this cloth hold on to directions in space: their forces have a torque. */
+DRAPE_API void drape_term_anchor(drape_term_builder *builder);
+
 /* Sets element `element`: its nodes (local to the cloth) and its rest data. Measures keep k [J/q2] in rest[0]
  * and q0 in rest[1]; rows that are damped keep c >= 0 [J s/q2] in rest[2]. */
 DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes,
@@ -99,7 +109,7 @@ DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, cons
 DRAPE_API drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
     DRAPE_PRINTF(2, 3);
 
-#define DRAPE_MAX_ELEMENT_NODES 4
+#define DRAPE_MAX_ELEMENT_NODES 12
 #define DRAPE_MAX_ELEMENT_DOFS  (3 * DRAPE_MAX_ELEMENT_NODES)
 
 /* The elements of one term on one cloth, const after compile. */
@@ -142,11 +152,13 @@ typedef struct drape_term_ops {
     const char *element_name;  /* "edge", "hinge", "node": for messages */
     int nodes;                 /* nodes an element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
     bool linear;               /* energy: its Hessian is zero and takes no sparsity */
-    bool potential_of_gravity; /* energy: counts as gravity, not as elastic */
+    bool potential_of_gravity; /* energy: a force from outside, counts as gravity, not as elastic */
     bool convex;               /* measure: its Hessian ddq is positive semidefinite, as of a length */
-    bool has_internal;         /* one internal variable an element */
+    bool has_internal;         /* internal variables in each element */
+    int internal_count;        /* of an element, one after another; 0: one */
     bool constraint; /* an energy that keeps a limit: integrators that move nodes to keep limits do without */
     bool damped;     /* measure: a dashpot of its own in each element, force c q' on q */
+    bool distance;   /* measure: q is the distance of its two nodes, of all elements */
 
     /* Adds the elements of one cloth. Called once a cloth. Errors: what the builder returned. */
     drape_status (*build)(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder);

@@ -20,6 +20,8 @@ typedef struct drape_request {
     bool conservative, dissipative; /* which parts of the forces */
     double project;                 /* share of the positive semidefinite part in Hessians, 0 to 1 */
     bool velocity;                  /* the Hessian wanted is dg/dv alone */
+    bool remainder;                 /* only what is of no measure */
+    const bool *without;            /* (term_count) terms that are left out; NULL: none */
 } drape_request;
 
 /*

@@ -265,6 +265,8 @@ static bool contributes(const drape_summer *s, const drape_term *term, const dra
 {
     if (term->ops->law || drape_summer_leaves(s, term) || (to->values && !to->g && term->ops->linear))
         return false;
+    if (term->ops->measure && want->remainder)
+        return false;
     if (term->ops->measure)
         return want->conservative || term->law_count > 0 || term->damping;
     return term->ops->dissipation ? want->dissipative : want->conservative;
@@ -298,7 +300,8 @@ static void add_share(drape_summer *s, const drape_request *want, const drape_su
     for (int32_t i = 0; i < s->model->term_count; i++) {
         const drape_term *term = &s->model->terms[i];
         const reach *reaches = s->reaches ? s->reaches[i] : NULL;
-        const int32_t blocks = contributes(s, term, want, to) ? block_count(term) : 0;
+        const bool wanted = !(want->without && want->without[i]) && contributes(s, term, want, to);
+        const int32_t blocks = wanted ? block_count(term) : 0;
         for (int32_t k = 0; k < blocks; k++) {
             if (reaches && (reaches[k].high < own.first || reaches[k].low >= own.last))
                 continue;
@@ -342,4 +345,16 @@ void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_
     }
     if (energy)
         *energy = sum;
+}
+
+void drape_summer_pairs(drape_summer *s, const drape_term *term, const drape_request *want, double *h)
+{
+    static const int upper[6] = {0, 1, 2, 4, 5, 8};
+    drape_block *b = &s->blocks[0];
+    for (int32_t k = 0; k < block_count(term); k++) {
+        evaluate(term, want, k, b);
+        for (int32_t i = 0; i < b->count; i++)
+            for (int u = 0; u < 6; u++)
+                h[6 * (size_t)(b->first + i) + (size_t)u] = b->hessian[upper[u] * DRAPE_BLOCK + i];
+    }
 }

@@ -16,6 +16,7 @@ struct drape_system {
     drape_pattern wider;          /* with what contact couples */
     int32_t **blocks;    /* (term_count) as in the terms, for the wider one; NULL while there is none */
     drape_status status; /* of placing contact */
+    drape_pull pull;
 };
 
 static void forget_wider(drape_system *system)
@@ -67,6 +68,16 @@ const drape_model *drape_system_model(const drape_system *system)
 int drape_system_threads(const drape_system *system)
 {
     return drape_summer_threads(system->summer);
+}
+
+void drape_system_set_pull(drape_system *system, const drape_pull *pull)
+{
+    system->pull = *pull;
+}
+
+const drape_pull *drape_system_pull(const drape_system *system)
+{
+    return &system->pull;
 }
 
 /* Of the wider pattern and the terms' places in it. */
@@ -223,8 +234,16 @@ static drape_sums into_values(const drape_system *system, double *values)
 
 void drape_system_force(drape_system *system, const drape_point *point, double *g)
 {
-    const drape_request want = {.point = point, .conservative = true, .dissipative = true};
+    drape_system_force_without(system, point, NULL, g);
+}
+
+void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
+                                double *g)
+{
+    const drape_request want = {
+        .point = point, .conservative = true, .dissipative = true, .without = without};
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
+    drape_pull_add_gradient(&system->pull, point->x, g);
     if (place_contact(system, point))
         drape_contact_add_forces(system->contact, true, true, g);
 }
@@ -259,7 +278,40 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
     if (place_contact(system, point))
         drape_contact_add_jacobian(system->contact, point->weight, false, project > 0, system->pattern,
                                    values);
+    drape_pull_add_hessian(&system->pull, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
+}
+
+void drape_system_pairs(const drape_system *system, int32_t term, const drape_point *point, double *h)
+{
+    const drape_request want = {
+        .point = point, .hessian = true, .conservative = true, .dissipative = true, .project = true};
+    drape_summer_pairs(system->summer, &system->model->terms[term], &want, h);
+}
+
+void drape_system_remainder(drape_system *system, const drape_point *point, double *values)
+{
+    const drape_request want = {.point = point,
+                                .hessian = true,
+                                .conservative = true,
+                                .dissipative = true,
+                                .project = true,
+                                .remainder = true};
+    const drape_sums to = into_values(system, values);
+    drape_summer_add(system->summer, &want, &to);
+    if (place_contact(system, point))
+        drape_contact_add_jacobian(system->contact, point->weight, false, true, system->pattern, values);
+}
+
+bool drape_system_has_remainder(const drape_system *system)
+{
+    bool found = system->contact != NULL;
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        found = found || (drape_term_couples(term) && !term->ops->measure &&
+                          !drape_summer_leaves(system->summer, term));
+    }
+    return found;
 }
 
 void drape_system_damping(drape_system *system, const drape_point *point, double *values)
@@ -307,6 +359,7 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
             drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
         *(term->ops->potential_of_gravity ? gravity : elastic) += energy;
     }
+    *elastic += drape_pull_energy(&system->pull, point->x);
 }
 
 void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy)
@@ -359,7 +412,7 @@ static drape_worst worst_element(const drape_term *term, const drape_fault *faul
                          .cloth = term->cloth,
                          .value = fault->value,
                          .limit = fault->limit};
-    for (int a = 0; fault->element >= 0 && a < el->nodes; a++)
+    for (int a = 0; fault->element >= 0 && a < el->nodes && a < 4; a++)
         worst.node[a] = el->node[(size_t)fault->element * (size_t)el->nodes + (size_t)a];
     return worst;
 }

@@ -11,6 +11,7 @@
 #ifndef DRAPE_ASSEMBLE_SYSTEM_H
 #define DRAPE_ASSEMBLE_SYSTEM_H
 
+#include "assemble/pull.h"
 #include "assemble/state.h"
 #include "contact/contact.h"
 
@@ -38,6 +39,11 @@ void drape_system_leave_constraints(drape_system *system);
 const drape_model *drape_system_model(const drape_system *system);
 int drape_system_threads(const drape_system *system);
 
+/* A spring that belongs to the system from now on, its energy to the elastic one; of stiffness 0: none. Its node is
+ * free. */
+void drape_system_set_pull(drape_system *system, const drape_pull *pull);
+const drape_pull *drape_system_pull(const drape_system *system);
+
 /* From now on the forces of contact belong to the system, if the model has any. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_add_contact(drape_system *system);
 const drape_contact *drape_system_contact(const drape_system *system); /* NULL: there is none */
@@ -56,10 +62,24 @@ drape_status drape_system_status(const drape_system *system);
 /* g (node_count x 3) of all nodes, pinned ones too. */
 void drape_system_force(drape_system *system, const drape_point *point, double *g);
 
+/* The same without some terms (term_count): for callers that sum those themselves. */
+void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
+                                double *g);
+
 /* values (pattern.nonzeros) = mass_weight M + J over the free nodes. project: the share, 0 to 1, by which element
  * Hessians become positive semidefinite: H + project (H+ - H); those of contact do altogether, if it is not 0. */
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, double project,
                            double *values);
+
+/* What a matrix that is cheaper than J is made of (integrators/quasi.h), term by term.
+ *
+ * drape_system_pairs, of a term with pairs: the symmetric 3 x 3 block H of each element, xx xy xz yy yz zz, as
+ * (6 x element count), such that [H -H; -H H] is the positive semidefinite part of its Hessian.
+ * drape_system_remainder: values (pattern.nonzeros) = the part of J, energies with their positive part, that
+ * belongs to no strain measure, and contact; drape_system_has_remainder: whether there is any. */
+void drape_system_pairs(const drape_system *system, int32_t term, const drape_point *point, double *h);
+void drape_system_remainder(drape_system *system, const drape_point *point, double *values);
+bool drape_system_has_remainder(const drape_system *system);
 
 /* values (pattern.nonzeros) = D = dg/dv over the free nodes, in continuous time. */
 void drape_system_damping(drape_system *system, const drape_point *point, double *values);

@@ -59,8 +59,8 @@ typedef struct cli_setting {
 typedef struct cli_command {
     const char *verb;
     const char *operand; /* NULL: none, where it may be left out */
-    char **operands;     /* all of them, where a verb takes several */
-    size_t operand_count;
+    char **operands;     /* (operand_count) the first of them is operand */
+    int operand_count;
     cli_setting *settings;
     size_t setting_count;
     int threads; /* 0: not said */
@@ -69,7 +69,8 @@ typedef struct cli_command {
 typedef struct drape_verb {
     const char *name;
     const char *operand; /* "SCENE" in the help */
-    bool operand_optional, several_operands;
+    bool operand_optional;
+    int operands_most;   /* 0: one */
     bool takes_scene;    /* the options that change a scene */
     const char *summary; /* a line in the list of verbs */
     const char *details; /* lines of its help */
@@ -106,5 +107,8 @@ typedef struct cli_scene {
  * file. CLI_GO_ON, or CLI_BAD_INPUT after the fault was printed. cli_scene_free in any case. */
 int cli_scene_load(const cli_command *command, cli_scene *out);
 void cli_scene_free(cli_scene *scene);
+
+/* The same of a file that is not the operand, or in a folder that drape run wrote. */
+int cli_scene_load_from(const cli_command *command, const char *path, cli_scene *out);
 
 #endif

@@ -19,7 +19,7 @@ static int main_merge(int argc, char **argv);
 const drape_verb drape_verb_merge = {
     .name = "merge",
     .operand = "DIR...",
-    .several_operands = true,
+    .operands_most = 100000,
     .summary = "the shards of a sweep into one, with its report",
     .details =
         "Takes the lines of the folders of an experiment that ran in parts (--shard I/N), and makes the\n"
@@ -38,7 +38,7 @@ static int merge(const merge_request *request)
     if (drape_context_create(NULL, &ctx))
         return cli_misuse("merge", "out of memory");
     drape_status status = drape_lab_merge(ctx, (const char *const *)request->command.operands,
-                                          request->command.operand_count, request->out, &outcome);
+                                          (size_t)request->command.operand_count, request->out, &outcome);
     bool whole = outcome.done == outcome.cases;
     int code = cli_lab_conclude(ctx, status, &outcome, request->out);
     drape_context_destroy(&ctx);

@@ -1,6 +1,7 @@
 /* cmd_run.c: `drape run`: simulates a scene; frames, step log and summary into a folder. */
 #include "cli/cli.h"
 #include "cli/progress.h"
+#include "cli/realtime.h"
 #include "cli/signals.h"
 
 #include "base/clock.h"
@@ -18,6 +19,7 @@
 typedef struct run_request {
     cli_command command;
     const char *out, *summary;
+    bool realtime;
 } run_request;
 
 typedef struct run {
@@ -26,7 +28,8 @@ typedef struct run {
     drape_recorder *recorder; /* NULL without --out */
     char *summary_path;       /* in the folder of --out; NULL without it */
     cli_progress progress;
-    double start; /* [s] of the clock */
+    cli_realtime realtime; /* of --realtime */
+    double start;          /* [s] of the clock */
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
 } run;
@@ -89,7 +92,8 @@ static void write_summary(run *r, const char *path)
                                    .message = r->message,
                                    .frames = drape_recorder_frames(r->recorder),
                                    .wall_total = drape_clock_seconds() - r->start,
-                                   .wall_output = drape_recorder_seconds(r->recorder)};
+                                   .wall_output = drape_recorder_seconds(r->recorder),
+                                   .realtime = r->request->realtime ? &r->realtime.result : NULL};
     note(r, drape_summary_write(r->in.ctx, r->in.sim, &def, path));
 }
 
@@ -167,6 +171,8 @@ static void print_results(const run *r)
                (long long)s.unstable_modes);
     print_energy(r);
     print_wall(r, &s);
+    if (r->request->realtime)
+        cli_realtime_print(&r->realtime);
     if (r->recorder)
         printf("output    %lld frames, steps.csv, energy.csv, summary.json and scene.json in %s\n",
                (long long)drape_recorder_frames(r->recorder), r->request->out);
@@ -198,7 +204,8 @@ static void simulate(run *r)
         note(r, drape_sim_observe(r->in.sim, watch, r));
     if (!r->status) {
         cli_progress_begin(&r->progress, end);
-        note(r, drape_sim_advance(r->in.sim, end));
+        note(r, r->request->realtime ? cli_realtime_run(&r->realtime, &r->in)
+                                     : drape_sim_advance(r->in.sim, end));
         cli_progress_clear(&r->progress);
     }
     if (r->recorder)
@@ -243,6 +250,7 @@ static int load_and_run(const run_request *request)
         code = conclude(&r);
         drape_recorder_destroy(&r.recorder);
         drape_free(r.in.ctx, r.summary_path);
+        cli_realtime_free(&r.realtime);
     }
     cli_scene_free(&r.in);
     return code;
@@ -253,6 +261,8 @@ static const cli_option options[] = {
      "folder for frames, steps.csv, energy.csv, summary.json and scene.json; made if it is not there",
      offsetof(run_request, out), 0, NULL},
     {"summary", CLI_TEXT, "FILE", "write the summary there, too", offsetof(run_request, summary), 0, NULL},
+    {"realtime", CLI_FLAG, NULL, "frames of 1/frame_rate with that time as budget; tells how long they took",
+     offsetof(run_request, realtime), 0, NULL},
 };
 
 static int main_run(int argc, char **argv);

@@ -231,16 +231,18 @@ static int handle(const drape_verb *verb, const option_list *list, int code, cha
 
 static int take_operand(const drape_verb *verb, int argc, char **argv, cli_command *request)
 {
-    int count = argc - optind;
-    request->operands = argv + optind;
-    request->operand_count = (size_t)count;
-    if (count > 1 && !verb->several_operands)
+    int count = argc - optind, most = verb->operands_most ? verb->operands_most : 1;
+    if (count > most && most > 1)
+        return cli_misuse(verb->name, "at most %d operands are taken, %d are given", most, count);
+    if (count > most)
         return cli_misuse(verb->name, "one %s is taken, %d are given: \"%.60s\", \"%.60s\"%s", verb->operand,
                           count, argv[optind], argv[optind + 1], count > 2 ? " ..." : "");
     if (count < 1 && !verb->operand_optional)
         return cli_misuse(verb->name, "%s is missing; `drape %s --help` shows all", verb->operand,
                           verb->name);
     request->operand = count ? argv[optind] : NULL;
+    request->operands = argv + optind;
+    request->operand_count = count;
     return CLI_GO_ON;
 }
 

@@ -2,7 +2,7 @@
  * writes a file. */
 #include "cli/cli.h"
 
-#include "io/export.h"
+#include "io/recorder.h"
 #include "model/scene.h"
 
 #include <stdio.h>
@@ -19,10 +19,9 @@ static drape_status apply_settings(const cli_command *command, drape_scene *scen
 static drape_status check_formats(const cli_scene *s)
 {
     for (size_t i = 0; i < s->model->format_count; i++) {
-        const drape_exporter_ops *ops;
         char pointer[64];
         snprintf(pointer, sizeof pointer, "/output/formats/%zu", i);
-        drape_status status = drape_exporter_find(s->ctx, pointer, s->model->formats[i], &ops);
+        drape_status status = drape_recorder_check(s->ctx, s->sim, pointer, s->model->formats[i]);
         if (status) {
             drape_scene_locate_fault(s->scene);
             return status;
@@ -31,32 +30,35 @@ static drape_status check_formats(const cli_scene *s)
     return DRAPE_OK;
 }
 
-static drape_status load(const cli_command *command, cli_scene *s)
+static drape_status load(const cli_command *command, const char *path, cli_scene *s)
 {
     drape_sim_def def;
     drape_sim_def_init(&def, sizeof def);
     def.threads = command->threads ? command->threads : 1;
-    drape_status status = drape_scene_load(s->ctx, command->operand, &s->scene);
+    drape_status status = drape_scene_load(s->ctx, path, &s->scene);
     if (!status)
         status = apply_settings(command, s->scene);
     if (!status)
         status = drape_scene_compile(s->scene, &s->model);
     if (!status)
-        status = check_formats(s);
-    if (!status)
         status = drape_sim_create(s->ctx, s->model, &def, &s->sim);
-    return status;
+    return status ? status : check_formats(s);
 }
 
-int cli_scene_load(const cli_command *command, cli_scene *out)
+int cli_scene_load_from(const cli_command *command, const char *path, cli_scene *out)
 {
     *out = (cli_scene){.ctx = NULL};
     if (drape_context_create(NULL, &out->ctx))
         return cli_misuse(command->verb, "out of memory");
-    if (!load(command, out))
+    if (!load(command, path, out))
         return CLI_GO_ON;
     fprintf(stderr, "%s\n", drape_context_message(out->ctx));
     return CLI_BAD_INPUT;
+}
+
+int cli_scene_load(const cli_command *command, cli_scene *out)
+{
+    return cli_scene_load_from(command, command->operand, out);
 }
 
 void cli_scene_free(cli_scene *scene)

@@ -281,6 +281,8 @@ static json_t *key_value(const drape_scene_object *object, const drape_scene_key
         return words_of(object, key);
     case DRAPE_SCENE_WORDS:
         return array_of(words_of(object, key), key->at_least, 0);
+    case DRAPE_SCENE_BOOLEAN:
+        return typed("boolean");
     case DRAPE_SCENE_NUMBER:
         return ranged(key, "number", key->closed ? "minimum" : "exclusiveMinimum");
     case DRAPE_SCENE_INTEGER:

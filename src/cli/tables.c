@@ -4,6 +4,7 @@
 #include "colliders/colliders.h"
 #include "compile/compile.h"
 #include "control/control.h"
+#include "fields/fields.h"
 #include "io/export.h"
 #include "mesh/mesh.h"
 #include "solvers/linear.h"
@@ -116,6 +117,14 @@ static bool linear(int index, cli_row *row)
     return ops;
 }
 
+static bool field(int index, cli_row *row)
+{
+    const drape_field_ops *ops = drape_fields[index];
+    if (ops)
+        *row = (cli_row){.name = ops->name, .summary = ops->summary};
+    return ops;
+}
+
 static bool exporter(int index, cli_row *row)
 {
     const drape_exporter_ops *ops = drape_exporters[index];
@@ -141,6 +150,15 @@ const cli_table cli_linears = {"linear_solvers", "Linear solvers", "\"linear_sol
                                linear};
 const cli_table cli_exporters = {"exporters", "Frame formats", "\"formats\" of the output", exporter};
 
-const cli_table *const cli_tables[] = {&cli_grids,       &cli_imports,       &cli_materials, &cli_terms,
-                                       &cli_colliders,   &cli_self_contacts, &cli_contacts,  &cli_integrators,
-                                       &cli_controllers, &cli_linears,       &cli_exporters, NULL};
+const cli_table cli_fields = {"fields", "Fields",
+                              "what is told of a moment at each node; shadings of the same name", field};
+const cli_table cli_shadings = {"shadings", "Shadings", "--shade of drape render and drape view",
+                                cli_shading_row};
+
+const cli_table *const cli_tables[] = {&cli_grids,       &cli_imports,
+                                       &cli_materials,   &cli_terms,
+                                       &cli_colliders,   &cli_self_contacts,
+                                       &cli_contacts,    &cli_integrators,
+                                       &cli_controllers, &cli_linears,
+                                       &cli_exporters,   &cli_fields,
+                                       &cli_shadings,    NULL};

@@ -19,7 +19,10 @@ typedef struct cli_table {
 } cli_table;
 
 extern const cli_table cli_grids, cli_imports, cli_materials, cli_terms, cli_colliders, cli_self_contacts,
-    cli_contacts, cli_integrators, cli_controllers, cli_linears, cli_exporters;
+    cli_contacts, cli_integrators, cli_controllers, cli_linears, cli_exporters, cli_fields, cli_shadings;
+/* The row of a shading; none where the program was built without drawing. */
+bool cli_shading_row(int index, cli_row *row);
+
 extern const cli_table *const cli_tables[]; /* all of them, NULL-ended */
 
 #endif

@@ -20,14 +20,20 @@ struct drape_term_builder {
 
 drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count)
 {
+    return drape_term_reserve_nodes(builder, element_count, builder->term->ops->nodes, rest_count);
+}
+
+drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t element_count, int nodes,
+                                      int rest_count)
+{
     drape_elements *el = &builder->term->elements;
     drape_arena *arena = &builder->model->arena;
-    if (element_count < 0 || rest_count < 0 || el->node)
-        return drape_term_refuse(builder,
-                                 "the term announced %d elements with %d numbers of rest data, or twice",
-                                 (int)element_count, rest_count);
+    if (element_count < 0 || rest_count < 0 || nodes < 1 || nodes > builder->term->ops->nodes || el->node)
+        return drape_term_refuse(
+            builder, "the term announced %d elements of %d nodes with %d numbers of rest data, or twice",
+            (int)element_count, nodes, rest_count);
     el->count = element_count;
-    el->nodes = builder->term->ops->nodes;
+    el->nodes = nodes;
     el->rest_count = rest_count;
     el->params = builder->term->params;
     el->node = builder->node = drape_arena_take(
@@ -35,6 +41,11 @@ drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_cou
     el->rest = builder->rest = drape_arena_take(
         arena, builder->model->ctx, (size_t)element_count * (size_t)rest_count, sizeof *builder->rest);
     return builder->node && builder->rest ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
+void drape_term_anchor(drape_term_builder *builder)
+{
+    builder->term->anchored = true;
 }
 
 void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes, const double *rest)
@@ -99,6 +110,8 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
                               .edge_length = m->edge_length,
                               .hinge = m->hinge,
                               .hinge_edge = m->hinge_edge,
+                              .triangle_edge = m->triangle_edge,
+                              .edge_clamped = cloth->edge_clamped,
                               .node_area = m->node_area,
                               .node_mass = cloth->node_mass,
                               .rows = m->rows,
@@ -203,7 +216,7 @@ static drape_status tie(drape_model *model, int32_t c)
             continue;
         if (term->ops->has_internal) {
             term->first_internal = model->internal_count;
-            model->internal_count += term->elements.count;
+            model->internal_count += (int64_t)term->elements.count * drape_term_internals(term);
         }
         if (term->ops->measure) {
             measured = true;

@@ -16,6 +16,7 @@ typedef struct pin_place {
     char pointer[128];
     int32_t track;          /* number of its track, -1: fixed */
     int32_t *track_of_node; /* (node_count): -1 fixed or free */
+    uint8_t *clamped;       /* (node_count) 1: of a pin that clamps */
     int32_t taken;          /* nodes pinned so far by this pin */
 } pin_place;
 
@@ -35,6 +36,7 @@ static drape_status take_node(pin_place *pin, const char *key, int32_t local)
         return refuse(pin, key, text);
     }
     pin->model->pinned[node] = 1;
+    pin->clamped[node] |= pin->def->clamp;
     pin->track_of_node[node] = pin->track;
     pin->taken++;
     return DRAPE_OK;
@@ -186,7 +188,8 @@ static drape_status keep_track(pin_place *pin)
                                &model->tracks[pin->track]);
 }
 
-static drape_status pin_cloths(drape_model *model, const drape_scene_def *def, int32_t *track_of_node)
+static drape_status pin_cloths(drape_model *model, const drape_scene_def *def, int32_t *track_of_node,
+                               uint8_t *clamped)
 {
     drape_status status = DRAPE_OK;
     for (int32_t c = 0; c < model->cloth_count; c++)
@@ -194,13 +197,32 @@ static drape_status pin_cloths(drape_model *model, const drape_scene_def *def, i
             pin_place pin = {.model = model,
                              .cloth = &model->cloths[c],
                              .def = &def->cloths[c].pins[p],
-                             .track_of_node = track_of_node};
+                             .track_of_node = track_of_node,
+                             .clamped = clamped};
             snprintf(pin.pointer, sizeof pin.pointer, "/cloth/%d/pins/%zu", (int)c, p);
             status = keep_track(&pin);
             if (!status)
                 status = take_selection(&pin);
         }
     return status;
+}
+
+/* The edges that keep the direction of the sheet across them. */
+static drape_status clamp_edges(drape_model *model, const uint8_t *clamped)
+{
+    for (int32_t c = 0; c < model->cloth_count; c++) {
+        drape_cloth *cloth = &model->cloths[c];
+        const uint8_t *of_node = clamped + cloth->first_node;
+        cloth->edge_clamped = drape_arena_take(&model->arena, model->ctx, (size_t)cloth->mesh.edge_count,
+                                               sizeof *cloth->edge_clamped);
+        if (!cloth->edge_clamped)
+            return DRAPE_E_MEMORY;
+        for (int32_t e = 0; e < cloth->mesh.edge_count; e++) {
+            const int32_t *end = cloth->mesh.edge + 2 * (size_t)e;
+            cloth->edge_clamped[e] = of_node[end[0]] && of_node[end[1]];
+        }
+    }
+    return DRAPE_OK;
 }
 
 /* Numbers the free nodes in order and lists the moved ones. */
@@ -239,13 +261,17 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
     model->pinned = drape_arena_take(&model->arena, model->ctx, nodes, sizeof *model->pinned);
     model->free_of_node = drape_arena_take(&model->arena, model->ctx, nodes, sizeof *model->free_of_node);
     int32_t *track_of_node = drape_alloc(model->ctx, nodes, sizeof *track_of_node);
+    uint8_t *clamped = drape_alloc(model->ctx, nodes, sizeof *clamped);
     drape_status status = DRAPE_E_MEMORY;
-    if (model->tracks && model->pinned && model->free_of_node && track_of_node) {
+    if (model->tracks && model->pinned && model->free_of_node && track_of_node && clamped) {
         memset(track_of_node, 0xff, nodes * sizeof *track_of_node); /* all -1 */
-        status = pin_cloths(model, def, track_of_node);
+        status = pin_cloths(model, def, track_of_node, clamped);
+        if (!status)
+            status = clamp_edges(model, clamped);
         if (!status)
             status = number_nodes(model, track_of_node);
     }
+    drape_free(model->ctx, clamped);
     drape_free(model->ctx, track_of_node);
     return status;
 }

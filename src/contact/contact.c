@@ -8,7 +8,9 @@
 #include <math.h>
 #include <string.h>
 
-#define SEARCH_AHEAD 0.25 /* of a mean edge: how far points may move before a new search */
+#define SEARCH_AHEAD 0.25 /* of a mean edge: how far points may move before a new search, at least */
+#define MOST_AHEAD   0.5  /* and at most, */
+#define STEPS_AHEAD  1.5  /* or as far as one went in so many steps like the last */
 #define FIRST_ROOM   64   /* of the list of candidates */
 
 /* ---- Making and freeing ---- */
@@ -53,7 +55,8 @@ drape_status drape_contact_create(drape_context *ctx, const drape_model *model, 
     drape_status status = drape_search_create(ctx, model, &c->search);
     if (!status && !take_arrays(c))
         status = DRAPE_E_MEMORY;
-    c->margin = SEARCH_AHEAD * mean_edge(model);
+    c->mean_edge = mean_edge(model);
+    c->margin = c->next_margin = SEARCH_AHEAD * c->mean_edge;
     *out = c;
     if (status)
         drape_contact_destroy(out);
@@ -204,8 +207,10 @@ static void consider(void *user, const drape_pair *found)
     drape_contact *c = user;
     drape_pair pair = *found;
     const drape_placed now = drape_contact_placed(c, c->x);
+    if (c->status || drape_pair_is_apart(&pair, &now, pair.distance + 2 * c->margin))
+        return;
     pair.found = drape_pair_gap_value(&pair, &now);
-    if (pair.found - 2 * c->margin >= pair.distance || c->status)
+    if (pair.found - 2 * c->margin >= pair.distance)
         return;
     pair.distance = activation(c, &pair);
     if (pair.found - 2 * c->margin < pair.distance)
@@ -225,6 +230,7 @@ static drape_status search(drape_contact *c)
 {
     double start = drape_clock_seconds();
     c->count = 0;
+    c->margin = c->next_margin;
     c->status = DRAPE_OK;
     search_surfaces(c);
     drape_search_pairs(&c->search, c->x, NULL, 2 * c->margin, consider, c);
@@ -425,9 +431,21 @@ static void measure_start(drape_contact *c)
     }
 }
 
+/* A fast sheet is searched with a wider margin, once a step and not at every trial. x: the nodes at the end of the
+ * last step, whose beginning is still known. */
+static void look_ahead(drape_contact *c, const double *x)
+{
+    double most = 0;
+    for (size_t i = 0; c->known && i < (size_t)c->model->node_count; i++)
+        most = fmax(most, moved2(x + 3 * i, c->start + 3 * i));
+    c->next_margin =
+        c->mean_edge * fmin(fmax(SEARCH_AHEAD, STEPS_AHEAD * sqrt(most) / c->mean_edge), MOST_AHEAD);
+}
+
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
     double start = drape_clock_seconds();
+    look_ahead(c, x);
     drape_status status = drape_contact_go(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}});
     if (!status)
         status = lag(c);

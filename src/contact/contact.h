@@ -44,7 +44,8 @@ const double *drape_contact_on_colliders(const drape_contact *contact);
 double drape_contact_potential(drape_contact *contact); /* [J] */
 
 /* Adds dg/dx + weight dg/dv, or dg/dv alone, of pairs of free nodes to values in the pattern, which has them.
- * positive: the positive semidefinite part of the Hessians of the energy. */
+ * positive: the positive semidefinite part of the Hessians of the energy, and a symmetric matrix above friction's
+ * dg/dv in place of its derivatives. */
 void drape_contact_add_jacobian(drape_contact *contact, double weight, bool velocity_only, bool positive,
                                 const drape_pattern *pattern, double *values);
 

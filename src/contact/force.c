@@ -178,6 +178,18 @@ void drape_contact_friction(const drape_gap *gap, const drape_contact_law *law, 
     }
 }
 
+void drape_contact_friction_bound(const drape_gap *gap, const drape_contact_law *law, double lambda,
+                                  double v[4][3], double *dgdv)
+{
+    int d = 3 * gap->points;
+    double scale = law->friction * lambda * slip_of(gap, law, v).a;
+    const double *n = gap->normal;
+    for (int i = 0; i < d; i++)
+        for (int j = 0; j < d; j++)
+            dgdv[D * i + j] =
+                gap->c[i / 3] * gap->c[j / 3] * scale * ((i % 3 == j % 3) - n[i % 3] * n[j % 3]);
+}
+
 /* With F = a u_t: dg_i = mu (lambda F dc_i + c_i F dlambda + c_i lambda dF), and
  * du_t = P du - (n.u) dn - n (u.dn),  du = sum v_i dc_i. */
 void drape_contact_friction_slope(const drape_gap *gap, const drape_contact_law *law, double v[4][3],

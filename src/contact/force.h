@@ -50,6 +50,11 @@ void drape_contact_positive(const drape_gap *gap, const drape_contact_law *law, 
 void drape_contact_friction(const drape_gap *gap, const drape_contact_law *law, double lambda, double v[4][3],
                             double *g, double *dgdv);
 
+/* A symmetric matrix above dg/dv: c_i c_j mu lambda f(y)/|u_t| (I - n n'). What slides is stiff in it the way it goes
+ * too, so that a step by it does not turn its friction round. */
+void drape_contact_friction_bound(const drape_gap *gap, const drape_contact_law *law, double lambda,
+                                  double v[4][3], double *dgdv);
+
 /* Adds to dgdx (12 x 12) how that friction changes with lambda, c and normal. */
 void drape_contact_friction_slope(const drape_gap *gap, const drape_contact_law *law, double v[4][3],
                                   double *dgdx);

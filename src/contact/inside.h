@@ -26,10 +26,12 @@ struct drape_contact {
     double *searched;          /* (points x 3) positions of the last search */
     drape_collider_pose *pose; /* (collider_count) */
     drape_collider_pose *searched_pose, *start_pose;
-    bool known;        /* there was a search */
-    double margin;     /* how far points may move before a new one [m] */
-    double moved;      /* how far one has, where it was last placed [m] */
-    drape_pair *pairs; /* (count of room) candidates, surfaces too */
+    bool known;         /* there was a search */
+    double mean_edge;   /* [m] */
+    double margin;      /* how far points may move before a new one [m] */
+    double next_margin; /* of the next search */
+    double moved;       /* how far one has, where it was last placed [m] */
+    drape_pair *pairs;  /* (count of room) candidates, surfaces too */
     int32_t count, room;
     bool listed; /* the touches are those of x, and of the colliders at listed_pose */
     drape_touch

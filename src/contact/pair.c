@@ -4,6 +4,7 @@
 #include "base/vec3.h"
 #include "contact/closest.h"
 
+#include <math.h>
 #include <string.h>
 
 #define PARALLEL_WIDTH                                                                                       \
@@ -77,6 +78,37 @@ static void touching_normal(const drape_pair *pair, const drape_placed *at, doub
         normal[k] = sign * n[k] / length;
 }
 
+/* Whether the boxes around both pieces are further apart than reach; false for numbers that are none. */
+static bool are_apart(drape_pair_kind kind, double x[4][3], double reach)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++) {
+        bool face = kind == DRAPE_PAIR_TRIANGLE;
+        double low = x[0][k], high = low, other = x[1][k], least = face ? other : x[2][k], most = least;
+        if (face) {
+            least = x[2][k] < least ? x[2][k] : least;
+            most = x[2][k] > most ? x[2][k] : most;
+        } else {
+            low = other < low ? other : low;
+            high = other > high ? other : high;
+        }
+        least = x[3][k] < least ? x[3][k] : least;
+        most = x[3][k] > most ? x[3][k] : most;
+        double between = least > high ? least - high : low > most ? low - most : 0;
+        sum += between * between;
+    }
+    return sum > reach * reach;
+}
+
+bool drape_pair_is_apart(const drape_pair *pair, const drape_placed *at, double gap)
+{
+    double x[4][3];
+    if (!finders[pair->kind])
+        return false;
+    drape_pair_gather(pair, at->x, x);
+    return are_apart(pair->kind, x, gap + pair->radius);
+}
+
 static bool touch_surface(const drape_pair *pair, const drape_placed *at, drape_touch *touch)
 {
     touch->gap = surface(pair, at, touch->closest.normal, NULL);
@@ -94,6 +126,9 @@ bool drape_pair_touch(const drape_pair *pair, const drape_placed *at, const doub
     if (!finders[pair->kind])
         return touch_surface(pair, at, touch);
     drape_pair_gather(pair, at->x, x);
+    touch->gap = INFINITY;
+    if (are_apart(pair->kind, x, pair->distance + pair->radius))
+        return false;
     finders[pair->kind](x, &touch->closest);
     touch->gap = touch->closest.distance - pair->radius;
     if (!(touch->gap < pair->distance))

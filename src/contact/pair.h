@@ -36,6 +36,10 @@ int drape_pair_points(const drape_pair *pair);
 void drape_pair_gather(const drape_pair *pair, const double *from, double local[4][3]);
 double drape_pair_gap_value(const drape_pair *pair, const drape_placed *at);
 
+/* Whether the gap is seen at once to be above `gap`, from boxes around the pieces; most candidates are so. False says
+ * nothing. */
+bool drape_pair_is_apart(const drape_pair *pair, const drape_placed *at, double gap);
+
 /* A pair at an instant at which it acts. */
 typedef struct drape_touch {
     drape_pair pair; /* its first closest.points nodes have a part in it */

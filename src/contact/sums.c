@@ -10,7 +10,7 @@
 
 #define D 12
 #define PATTERN_AHEAD                                                                                        \
-    1 /* of the margin: what comes nearer than that has its place when the pattern is made */
+    0.25 /* of a mean edge: so near to acting, a pair has its place when a pattern is made */
 
 /* ---- Forces ---- */
 
@@ -67,25 +67,23 @@ static void add_touch(drape_contact *c, const drape_touch *touch, bool normal, b
     scatter(c, &touch->pair, gap.points, local, g);
 }
 
-static void friction_of_lagged(drape_contact *c, const drape_lagged *l, double *g, double *dgdv)
+static void add_lagged(drape_contact *c, const drape_lagged *l, double *g)
 {
-    double v[4][3];
+    double v[4][3], local[D];
     drape_contact_law law = drape_contact_law_of(c, &l->pair);
     gather_velocities(c, &l->pair, l->gap.points, v);
-    drape_contact_friction(&l->gap, &law, l->lambda, v, g, dgdv);
+    drape_contact_friction(&l->gap, &law, l->lambda, v, local, NULL);
+    scatter(c, &l->pair, l->gap.points, local, g);
 }
 
 void drape_contact_add_forces(drape_contact *c, bool normal, bool friction, double *g)
 {
-    double start = drape_clock_seconds(), local[D];
+    double start = drape_clock_seconds();
     memset(c->on_collider, 0, 3 * (size_t)c->model->collider_count * sizeof *c->on_collider);
     for (int32_t i = 0; i < c->touch_count; i++)
         add_touch(c, &c->touches[i], normal, friction, g);
-    for (int32_t i = 0; friction && i < c->lagged_count; i++) {
-        const drape_lagged *l = &c->lagged[i];
-        friction_of_lagged(c, l, local, NULL);
-        scatter(c, &l->pair, l->gap.points, local, g);
-    }
+    for (int32_t i = 0; friction && i < c->lagged_count; i++)
+        add_lagged(c, &c->lagged[i], g);
     c->seconds += drape_clock_seconds() - start;
 }
 
@@ -145,51 +143,59 @@ static void add_weighted(int d, double weight, const double *from, double *h)
             h[D * i + j] += weight * from[D * i + j];
 }
 
-/* dg/dx + weight dg/dv of what touches, or dg/dv alone. */
-static void touch_jacobian(drape_contact *c, const drape_pair *pair, const drape_gap *gap, double weight,
-                           bool velocity_only, bool positive, double *h)
+/* What of the derivatives is wanted: dg/dx + weight dg/dv, or weight dg/dv alone. */
+typedef struct request {
+    double weight;
+    bool velocity_only, positive;
+} request;
+
+/* Adds weight dg/dv of friction with the normal force lambda. */
+static void friction_jacobian(drape_contact *c, const request *want, const drape_pair *pair,
+                              const drape_gap *gap, double lambda, double *h)
 {
-    drape_contact_law law = drape_contact_law_of(c, pair);
     double v[4][3], g[D], dgdv[D * D];
-    int d = 3 * gap->points;
-    if (velocity_only)
-        memset(h, 0, D * (size_t)d * sizeof *h);
-    else if (positive)
-        drape_contact_positive(gap, &law, h);
-    else
-        drape_contact_normal(gap, &law, g, h);
-    if (c->model->contact.lagged || !(law.friction > 0))
-        return;
+    drape_contact_law law = drape_contact_law_of(c, pair);
     gather_velocities(c, pair, gap->points, v);
-    drape_contact_friction(gap, &law, drape_contact_normal_force(gap, &law), v, g, dgdv);
-    add_weighted(d, velocity_only ? 1 : weight, dgdv, h);
-    if (!velocity_only)
+    if (want->positive)
+        drape_contact_friction_bound(gap, &law, lambda, v, dgdv);
+    else
+        drape_contact_friction(gap, &law, lambda, v, g, dgdv);
+    add_weighted(3 * gap->points, want->weight, dgdv, h);
+    if (!want->velocity_only && !want->positive && !c->model->contact.lagged)
         drape_contact_friction_slope(gap, &law, v, h);
 }
 
-static void lagged_jacobian(drape_contact *c, const drape_lagged *l, double weight, double *h)
+static void touch_jacobian(drape_contact *c, const request *want, const drape_pair *pair,
+                           const drape_gap *gap, double *h)
 {
-    double g[D], dgdv[D * D];
-    int d = 3 * l->gap.points;
-    friction_of_lagged(c, l, g, dgdv);
-    memset(h, 0, D * (size_t)d * sizeof *h);
-    add_weighted(d, weight, dgdv, h);
+    drape_contact_law law = drape_contact_law_of(c, pair);
+    double g[D];
+    if (want->velocity_only)
+        memset(h, 0, D * 3 * (size_t)gap->points * sizeof *h);
+    else if (want->positive)
+        drape_contact_positive(gap, &law, h);
+    else
+        drape_contact_normal(gap, &law, g, h);
+    if (law.friction > 0 && !c->model->contact.lagged)
+        friction_jacobian(c, want, pair, gap, drape_contact_normal_force(gap, &law), h);
 }
 
 void drape_contact_add_jacobian(drape_contact *c, double weight, bool velocity_only, bool positive,
                                 const drape_pattern *pattern, double *values)
 {
     double start = drape_clock_seconds(), h[D * D];
+    const request want = {velocity_only ? 1 : weight, velocity_only, positive};
     for (int32_t i = 0; i < c->touch_count; i++) {
         const drape_pair *pair = &c->touches[i].pair;
         drape_gap gap;
         drape_contact_gap(c, &c->touches[i], true, &gap);
-        touch_jacobian(c, pair, &gap, weight, velocity_only, positive, h);
+        touch_jacobian(c, &want, pair, &gap, h);
         add_blocks(c, pair->node, gap.points, h, pattern, values);
     }
     for (int32_t i = 0; i < c->lagged_count; i++) {
         const drape_lagged *l = &c->lagged[i];
-        lagged_jacobian(c, l, velocity_only ? 1 : weight, h);
+        memset(h, 0, sizeof h);
+        friction_jacobian(c, &want, &l->pair, &l->gap, l->lambda, h);
         add_blocks(c, l->pair.node, l->gap.points, h, pattern, values);
     }
     c->seconds += drape_clock_seconds() - start;
@@ -235,7 +241,7 @@ static bool list_coupling(drape_contact *c, int32_t count, const drape_pair *pai
 static bool is_near(const drape_contact *c, const drape_pair *pair)
 {
     const drape_placed now = drape_contact_placed(c, c->x);
-    double near = pair->distance + PATTERN_AHEAD * c->margin;
+    double near = pair->distance + PATTERN_AHEAD * c->mean_edge;
     return drape_contact_may(pair, c->moved, near) && drape_pair_gap_value(pair, &now) < near;
 }
 

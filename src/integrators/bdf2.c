@@ -170,6 +170,7 @@ const drape_integrator_ops drape_integrator_bdf2 = {
     .create = create,
     .step = step,
     .restart = restart,
+    .residual = drape_implicit_residual,
     .work = drape_implicit_work,
     .bytes = bytes,
     .destroy = destroy,

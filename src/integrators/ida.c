@@ -588,7 +588,7 @@ static drape_work work(const void *state)
     drape_work work = s->work;
     if (s->linear) {
         work.factorizations = s->linear->factorizations;
-        work.linear_iterations = s->linear->solves;
+        work.linear_iterations = s->linear->iterations;
         work.factor_seconds = s->linear->factor_seconds;
         work.solve_seconds = s->linear->solve_seconds;
     }

@@ -20,12 +20,18 @@ static bool create_arrays(drape_implicit *s)
            (s->dissipated || !s->model->has_dissipation);
 }
 
+drape_status drape_implicit_init_arrays(drape_context *ctx, drape_system *system, drape_implicit *s)
+{
+    *s = (drape_implicit){.ctx = ctx, .system = system, .model = drape_system_model(system)};
+    return create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
+}
+
 drape_status drape_implicit_init(drape_context *ctx, drape_system *system, const double *values,
                                  drape_implicit *s)
 {
-    *s = (drape_implicit){.ctx = ctx, .system = system, .model = drape_system_model(system)};
+    drape_status status = drape_implicit_init_arrays(ctx, system, s);
     s->inertial_guess = values[DRAPE_NEWTON_PREDICTOR] == 0;
-    return create_arrays(s) ? drape_newton_create(ctx, system, values, &s->newton) : DRAPE_E_MEMORY;
+    return status ? status : drape_newton_create(ctx, system, values, &s->newton);
 }
 
 void drape_implicit_free(drape_implicit *s)
@@ -96,10 +102,10 @@ double drape_implicit_collider_work(const drape_implicit *s, double t0, double t
     return work;
 }
 
-static double pin_work(const drape_implicit *s, const drape_state *in, const drape_state *out)
+static double pin_work(const drape_implicit *s, const double *g, const drape_state *in,
+                       const drape_state *out)
 {
     const drape_model *m = s->model;
-    const double *g = drape_newton_force(s->newton);
     double work = 0;
     for (int32_t i = 0; i < m->moved_count; i++)
         for (int k = 0; k < 3; k++) {
@@ -110,16 +116,22 @@ static double pin_work(const drape_implicit *s, const drape_state *in, const dra
 }
 
 /* The forces on colliders are those of the last residual, which was at the solution. */
-void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_state *out,
-                          drape_step_info *info)
+void drape_implicit_audit_at(drape_implicit *s, const drape_point *point, const double *g,
+                             const drape_state *in, const drape_state *out, drape_step_info *info)
 {
-    info->pin_work += pin_work(s, in, out) + drape_implicit_collider_work(s, in->t, out->t);
+    info->pin_work += pin_work(s, g, in, out) + drape_implicit_collider_work(s, in->t, out->t);
     if (!s->dissipated)
         return;
-    drape_system_dissipation(s->system, drape_newton_point(s->newton), s->dissipated);
+    drape_system_dissipation(s->system, point, s->dissipated);
     for (size_t i = 0; i < 3 * (size_t)s->model->node_count; i++)
         info->dissipated += s->dissipated[i] * (out->x[i] - in->x[i]);
     info->dissipated += drape_implicit_collider_work(s, in->t, out->t);
+}
+
+void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_state *out,
+                          drape_step_info *info)
+{
+    drape_implicit_audit_at(s, drape_newton_point(s->newton), drape_newton_force(s->newton), in, out, info);
 }
 
 void drape_implicit_destroy(void **state)
@@ -151,16 +163,26 @@ void drape_implicit_restart(void *state, const drape_state *from)
     drape_newton_forget_factors(((drape_implicit *)state)->newton);
 }
 
+const double *drape_implicit_residual(const void *state)
+{
+    return drape_newton_residual(((const drape_implicit *)state)->newton);
+}
+
 drape_work drape_implicit_work(const void *state)
 {
     return drape_newton_work(((const drape_implicit *)state)->newton);
 }
 
-size_t drape_implicit_bytes(const void *state)
+size_t drape_implicit_array_bytes(const drape_implicit *s)
 {
-    const drape_implicit *s = state;
     size_t nodes = 3 * (size_t)s->model->node_count, dofs = 3 * (size_t)s->model->free_count;
     size_t doubles = 2 * nodes + 2 * dofs + (s->history ? (size_t)s->model->measure_count : 0) +
                      (s->dissipated ? nodes : 0);
-    return doubles * sizeof(double) + drape_newton_bytes(s->newton);
+    return doubles * sizeof(double);
+}
+
+size_t drape_implicit_bytes(const void *state)
+{
+    const drape_implicit *s = state;
+    return drape_implicit_array_bytes(s) + drape_newton_bytes(s->newton);
 }

@@ -11,7 +11,7 @@ typedef struct drape_implicit {
     drape_context *ctx;
     drape_system *system;
     const drape_model *model;
-    drape_newton *newton;
+    drape_newton *newton;    /* NULL in rows that iterate by themselves */
     double *x_base, *v_base; /* nodes: see drape_newton_problem */
     double *inertia, *d;     /* free DOFs */
     double *history;         /* measures; NULL where no law wants rates */
@@ -20,7 +20,9 @@ typedef struct drape_implicit {
     double t, span[2]; /* [s] of the base: where colliders stand, and the way to there */
 } drape_implicit;
 
-/* For rows that embed it: on failure what was taken is freed by drape_implicit_free. */
+/* For rows that embed it, with a Newton solver or without one: on failure what was taken is freed by
+ * drape_implicit_free. */
+drape_status drape_implicit_init_arrays(drape_context *ctx, drape_system *system, drape_implicit *implicit);
 drape_status drape_implicit_init(drape_context *ctx, drape_system *system, const double *values,
                                  drape_implicit *implicit);
 void drape_implicit_free(drape_implicit *implicit);
@@ -30,8 +32,10 @@ drape_status drape_implicit_create(drape_context *ctx, drape_system *system, con
                                    void **state);
 void drape_implicit_destroy(void **state);
 void drape_implicit_restart(void *state, const drape_state *from);
+const double *drape_implicit_residual(const void *state);
 drape_work drape_implicit_work(const void *state);
 size_t drape_implicit_bytes(const void *state);
+size_t drape_implicit_array_bytes(const drape_implicit *implicit); /* without the Newton solver */
 
 /* Free nodes stand where they were, at rest; pinned ones where their tracks have them at time t, span after
  * in. */
@@ -58,5 +62,9 @@ double drape_implicit_collider_work(const drape_implicit *implicit, double t0, d
  * is not theirs to speed up their own mass. */
 void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out,
                           drape_step_info *info);
+
+/* The same where the last evaluation was at this point and gave g. */
+void drape_implicit_audit_at(drape_implicit *implicit, const drape_point *point, const double *g,
+                             const drape_state *in, const drape_state *out, drape_step_info *info);
 
 #endif

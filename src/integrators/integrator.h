@@ -14,8 +14,10 @@ typedef struct drape_step_info {
     double h;           /* [s] the step that was taken; a row that chooses its own sets it */
     int iterations;
     double residual, tolerance; /* [N] */
-    bool lenient; /* the caller asked for no guard but that numbers are finite (on_failure accept) */
-    bool usable;  /* with a status > 0: the caller asked to go on with what there is (on_failure accept) */
+    bool
+        lenient; /* the caller asked for no guard but that numbers are finite and nothing passes through anything
+                   * (on_failure accept) */
+    bool usable; /* with a status > 0: the caller asked to go on with what there is (on_failure accept) */
     double dissipated; /* [J] work that dissipative terms took in this step */
     double pin_work;   /* [J] work that moving pins put in */
     bool committed;    /* out->internal is set, its elements were checked along the way */
@@ -68,6 +70,12 @@ typedef struct drape_integrator_ops {
     /* Positions (node_count x 3) at a time within the last step. NULL: cubic Hermite between the states
      * serves. */
     void (*interpolate)(void *state, double t, double *x);
+    /* F of the free DOFs (3 free_count [N]) where the solver of the last step left it. NULL: it solves for none. */
+    const double *(*residual)(const void *state);
+    /* How hard a step tries, for a mode that must keep a deadline: 0, as the parameters say, to efforts - 1, the
+     * cheapest. NULL: there is one effort. */
+    int efforts;
+    void (*set_effort)(void *state, int effort);
     drape_work (*work)(const void *state);
     size_t (*bytes)(const void *state);
     void (*destroy)(void **state);

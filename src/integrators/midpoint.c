@@ -53,6 +53,7 @@ const drape_integrator_ops drape_integrator_midpoint = {
     .create = drape_implicit_create,
     .step = step,
     .restart = drape_implicit_restart,
+    .residual = drape_implicit_residual,
     .work = drape_implicit_work,
     .bytes = drape_implicit_bytes,
     .destroy = drape_implicit_destroy,

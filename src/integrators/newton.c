@@ -110,6 +110,15 @@ const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {
                                     .default_value = 0,
                                     .choices = drape_linears_words,
                                     .help = "a row of the linear solvers"},
+    [DRAPE_NEWTON_LINEAR_TOLERANCE] = {.name = "linear_tolerance",
+                                       .unit = "1",
+                                       .default_value = 1e-3,
+                                       .min = 1e-14,
+                                       .max = 1,
+                                       .open_max = true,
+                                       .help =
+                                           "share of the residual that iterative linear solvers leave in a "
+                                           "correction"},
 };
 
 struct drape_newton {
@@ -411,6 +420,8 @@ drape_status drape_newton_create(drape_context *ctx, drape_system *system, const
         status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
                                          drape_system_pattern(system), drape_system_threads(s->system),
                                          &s->linear);
+    if (!status && s->n > 0)
+        s->linear->tolerance = values[DRAPE_NEWTON_LINEAR_TOLERANCE];
     if (!status && s->n > 0 && (s->ahead || s->trial)) {
         s->linear->owner = s;
         s->linear->solver->ops->solve = solve_and_globalize;
@@ -578,6 +589,19 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     return s->nonfinite ? blame_element(s, status, info) : status;
 }
 
+/* A guess that no step may end in is worse than none: springs beyond their limit, say, pull with forces far above
+ * any that act. */
+static void improve_guess(drape_newton *s, double *d)
+{
+    const char *reason;
+    drape_worst worst;
+    if (s->ahead) /* from d = 0 */
+        scale(d, free_share(s, s->x, d), s->n);
+    place(s, d);
+    if (drape_system_check(s->system, s->x, s->problem->x_base, s->problem->internal, &reason, &worst))
+        memset(d, 0, (size_t)s->n * sizeof *d);
+}
+
 drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *problem, double *d,
                                 drape_step_info *info)
 {
@@ -591,8 +615,7 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *pro
     bool keep =
         s->values[DRAPE_NEWTON_METHOD] == METHOD_MODIFIED && s->factored_mass_weight == problem->mass_weight;
     KINSetNoInitSetup(s->kin, keep);
-    if (s->ahead) /* the guess, from d = 0 */
-        scale(d, free_share(s, s->x, d), s->n);
+    improve_guess(s, d);
     N_VSetArrayPointer(d, s->unknown);
     int strategy = s->values[DRAPE_NEWTON_GLOBALIZATION] == GLOBAL_LINE_SEARCH ? KIN_LINESEARCH : KIN_NONE;
     drape_status status = status_of(KINSol(s->kin, s->unknown, strategy, s->ones, s->ones), &info->reason);
@@ -612,6 +635,11 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *pro
 const drape_point *drape_newton_point(const drape_newton *newton)
 {
     return &newton->point;
+}
+
+const double *drape_newton_residual(const drape_newton *newton)
+{
+    return newton->f;
 }
 
 const double *drape_newton_force(const drape_newton *newton)
@@ -634,7 +662,7 @@ drape_work drape_newton_work(const drape_newton *newton)
     drape_work work = newton->work;
     if (newton->linear) {
         work.factorizations = newton->linear->factorizations;
-        work.linear_iterations = newton->linear->solves;
+        work.linear_iterations = newton->linear->iterations;
         work.factor_seconds = newton->linear->factor_seconds;
         work.solve_seconds = newton->linear->solve_seconds;
     }

@@ -24,6 +24,7 @@ enum {
     DRAPE_NEWTON_PREDICTOR,
     DRAPE_NEWTON_PROJECT,
     DRAPE_NEWTON_LINEAR_SOLVER,
+    DRAPE_NEWTON_LINEAR_TOLERANCE,
     DRAPE_NEWTON_PARAM_COUNT
 };
 extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
@@ -54,6 +55,8 @@ drape_status drape_newton_solve(drape_newton *newton, const drape_newton_problem
 /* The point of the last evaluation, which after a solve is its solution, and g there (nodes). */
 const drape_point *drape_newton_point(const drape_newton *newton);
 const double *drape_newton_force(const drape_newton *newton);
+/* F there (free DOFs). */
+const double *drape_newton_residual(const drape_newton *newton);
 
 /* The parameter values it was made with, in the order of drape_newton_params. */
 const double *drape_newton_values(const drape_newton *newton);

@@ -208,6 +208,7 @@ const drape_integrator_ops drape_integrator_trbdf2 = {
     .create = create,
     .step = step,
     .restart = drape_implicit_restart,
+    .residual = drape_implicit_residual,
     .work = drape_implicit_work,
     .bytes = bytes,
     .destroy = destroy,

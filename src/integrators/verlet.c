@@ -25,6 +25,7 @@
 
 #include "base/clock.h"
 #include "base/finite.h"
+#include "base/lanes.h"
 #include "base/vec3.h"
 #include "integrators/stability.h"
 
@@ -176,9 +177,12 @@ typedef struct verlet_state {
     double values[PARAM_COUNT];
     double keep;        /* c */
     double *g, *g1;     /* nodes: forces with their sign turned */
-    double *x0, *moved; /* nodes: at the start of the substep; before nodes are moved */
+    double *x0;         /* nodes: at the start of the substep */
+    double *pins;       /* nodes: where those that move are at its end */
+    double *inverse;    /* nodes: 1/mass [1/kg], three times each; 0 where pinned */
     double *v_ahead;    /* nodes: velocity form with forces that depend on v */
     double *dissipated; /* nodes; NULL where nothing dissipates */
+    drape_verlet_force *force;
     drape_verlet_contact contact;
     drape_verlet_limit limit;
     drape_verlet_self *self; /* NULL: cloth does not meet cloth */
@@ -202,9 +206,10 @@ static void destroy(void **state)
     verlet_state *s = *state;
     if (!s)
         return;
-    double *const all[] = {s->g, s->g1, s->x0, s->moved, s->v_ahead, s->dissipated};
+    double *const all[] = {s->g, s->g1, s->x0, s->pins, s->inverse, s->v_ahead, s->dissipated};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         drape_free(s->ctx, all[i]);
+    drape_verlet_force_destroy(&s->force);
     drape_verlet_limit_free(s->ctx, &s->limit);
     drape_verlet_self_destroy(&s->self);
     drape_spectrum_destroy(&s->spectrum);
@@ -215,10 +220,13 @@ static void destroy(void **state)
 static bool create_arrays(verlet_state *s)
 {
     size_t nodes = 3 * (size_t)s->model->node_count;
-    double **const always[] = {&s->g, &s->g1, &s->x0, &s->moved};
+    double **const always[] = {&s->g, &s->g1, &s->x0, &s->pins, &s->inverse};
     for (size_t i = 0; i < sizeof always / sizeof *always; i++)
         if (!(*always[i] = drape_alloc(s->ctx, nodes, sizeof(double))))
             return false;
+    for (int32_t f = 0; f < s->model->free_count; f++)
+        for (size_t k = 0, i = (size_t)s->model->node_of_free[f]; k < 3; k++)
+            s->inverse[3 * i + k] = 1 / s->model->mass[i];
     if (!s->model->has_dissipation)
         return true;
     s->v_ahead = drape_alloc(s->ctx, nodes, sizeof(double));
@@ -230,6 +238,8 @@ static drape_status create_parts(verlet_state *s)
 {
     const double *values = s->values;
     drape_status status = create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
+    if (!status)
+        status = drape_verlet_force_create(s->ctx, s->system, &s->force);
     if (!status && !isnan(values[PARAM_STRAIN_LIMIT]))
         status = drape_verlet_limit_create(s->ctx, s->model, values[PARAM_STRAIN_LIMIT],
                                            (int)values[PARAM_STRAIN_LIMIT_ITERATIONS],
@@ -266,7 +276,7 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
 static void evaluate(verlet_state *s, const substep *sub, double t, const double *v, double *g)
 {
     double start = drape_clock_seconds();
-    drape_system_force(s->system, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal}, g);
+    drape_verlet_force_sum(s->force, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal}, g);
     s->work.residual_seconds += drape_clock_seconds() - start;
     s->work.residuals++;
     drape_verlet_rub(&s->contact, t, sub->x, v, g);
@@ -293,11 +303,11 @@ static void start_pins(verlet_state *s, const substep *sub)
     const drape_model *m = s->model;
     if (m->moved_count == 0)
         return;
-    drape_model_place_pins(m, sub->t, s->moved);
+    drape_model_place_pins(m, sub->t, s->pins);
     for (int32_t i = 0; i < m->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)m->moved_node[i] + k;
-            sub->v[at] = (s->moved[at] - sub->x[at]) / sub->h;
+            sub->v[at] = (s->pins[at] - sub->x[at]) / sub->h;
         }
 }
 
@@ -327,19 +337,33 @@ static void damp(verlet_state *s, const substep *sub)
     sub->info->dissipated += 0.5 * (1 - s->keep * s->keep) * taken;
 }
 
-/* v += w a, x += h v of the free nodes; pins to where they are at the end. */
+/* v -= w g/m, x0 = x, x += h v of all numbers; inverse is 0 where x stays. */
+LANES_DISPATCH static void move_all(size_t n, double w, double h, const double *restrict inverse,
+                                    const double *restrict g, double *restrict v, double *restrict x,
+                                    double *restrict x0)
+{
+    for (size_t i = 0; i < n; i++) {
+        v[i] -= w * inverse[i] * g[i];
+        x0[i] = x[i];
+        x[i] += inverse[i] > 0 ? h * v[i] : 0;
+    }
+}
+
+/* Pins go to where they are at the end. */
 static void move(const verlet_state *s, const substep *sub, double w)
 {
-    const drape_model *m = s->model;
-    for (int32_t f = 0; f < m->free_count; f++) {
-        size_t at = 3 * (size_t)m->node_of_free[f];
-        double by = w / m->mass[m->node_of_free[f]];
-        for (size_t k = at; k < at + 3; k++) {
-            sub->v[k] -= by * s->g[k];
-            sub->x[k] += sub->h * sub->v[k];
-        }
-    }
-    drape_model_place_pins(m, sub->t, sub->x);
+    move_all(3 * (size_t)s->model->node_count, w, sub->h, s->inverse, s->g, sub->v, sub->x, s->x0);
+    drape_model_place_pins(s->model, sub->t, sub->x);
+}
+
+/* v = (x - x0)/h of what is not pinned. */
+LANES_DISPATCH static void take_velocities(size_t n, double h, const double *restrict inverse,
+                                           const double *restrict x, const double *restrict x0,
+                                           double *restrict v)
+{
+    double per = 1 / h;
+    for (size_t i = 0; i < n; i++)
+        v[i] = inverse[i] > 0 ? (x[i] - x0[i]) * per : v[i];
 }
 
 /* Whatever moves nodes beside the forces, and what it does to their velocities. */
@@ -349,21 +373,17 @@ static void project(verlet_state *s, const substep *sub)
     if (!s->self && m->collider_count == 0 && s->limit.count == 0)
         return;
     double start = drape_clock_seconds();
-    size_t nodes = 3 * (size_t)m->node_count;
-    memcpy(s->moved, sub->x, nodes * sizeof *s->moved);
     if (s->self)
         drape_verlet_self_push(s->self, sub->share, sub->x);
     drape_verlet_project(&s->contact, sub->t0, sub->t, s->x0, sub->x);
     if (s->limit.count > 0)
         drape_verlet_limit_lengths(&s->limit, sub->x);
-    for (size_t i = 0; i < nodes; i++)
-        sub->v[i] += (sub->x[i] - s->moved[i]) / sub->h;
+    take_velocities(3 * (size_t)m->node_count, sub->h, s->inverse, sub->x, s->x0, sub->v);
     s->work.contact_seconds += drape_clock_seconds() - start;
 }
 
 static void substep_position(verlet_state *s, const substep *sub)
 {
-    memcpy(s->x0, sub->x, 3 * (size_t)s->model->node_count * sizeof *s->x0);
     start_pins(s, sub);
     evaluate(s, sub, sub->t0, sub->v, s->g);
     audit_dissipation(s, sub, 1, sub->v);
@@ -390,7 +410,6 @@ static const double *velocity_ahead(const verlet_state *s, const substep *sub)
 static void substep_velocity(verlet_state *s, const substep *sub, bool first)
 {
     const drape_model *m = s->model;
-    memcpy(s->x0, sub->x, 3 * (size_t)m->node_count * sizeof *s->x0);
     start_pins(s, sub);
     damp(s, sub);
     if (first || s->v_ahead || s->contact.rule == DRAPE_VERLET_BOSON) {
@@ -541,8 +560,8 @@ static size_t bytes(const void *state)
 {
     const verlet_state *s = state;
     size_t nodes = 3 * (size_t)s->model->node_count;
-    size_t limit = (size_t)s->limit.count * (2 * sizeof *s->limit.node + sizeof *s->limit.longest);
-    return sizeof *s + (s->dissipated ? 6 : 4) * nodes * sizeof(double) + limit +
+    return sizeof *s + (s->dissipated ? 7 : 5) * nodes * sizeof(double) +
+           drape_verlet_limit_bytes(&s->limit) + drape_verlet_force_bytes(s->force) +
            (s->self ? drape_verlet_self_bytes(s->self) : 0) + drape_spectrum_bytes(s->spectrum);
 }
 

@@ -7,6 +7,17 @@
 
 #include "integrators/integrator.h"
 
+/* ---- Forces: verlet_force.c ---- */
+
+typedef struct drape_verlet_force drape_verlet_force;
+
+drape_status drape_verlet_force_create(drape_context *ctx, drape_system *system, drape_verlet_force **out);
+void drape_verlet_force_destroy(drape_verlet_force **force);
+size_t drape_verlet_force_bytes(const drape_verlet_force *force);
+
+/* The same as drape_system_force, up to rounding. */
+void drape_verlet_force_sum(drape_verlet_force *force, const drape_point *point, double *g);
+
 /* ---- Colliders: verlet_contact.c ---- */
 
 enum { DRAPE_VERLET_CS184, DRAPE_VERLET_BOSON };
@@ -29,19 +40,27 @@ void drape_verlet_rub(const drape_verlet_contact *contact, double t, const doubl
 
 /* ---- The limit of strains: verlet_limit.c ---- */
 
+typedef struct drape_verlet_patch drape_verlet_patch;
+
 typedef struct drape_verlet_limit {
     int32_t count;
     int32_t *node;   /* (count x 2) */
     double *longest; /* (count) [m] */
-    uint8_t *pinned; /* of the model */
-    int passes;      /* at most */
-    double slack;    /* a length over the longest that is near enough, -1 */
+    double *square;  /* (count) [m2] of the longest, as patches look at them */
+    int32_t patch_count;
+    drape_verlet_patch *patch;
+    int32_t node_count;
+    double *x;             /* planes (3 x node_count) */
+    const uint8_t *pinned; /* of the model */
+    int passes;            /* at most */
+    double slack;          /* a length over the longest that is near enough, -1 */
 } drape_verlet_limit;
 
 /* All springs: the elements of two nodes of every term that measures a strain. */
 drape_status drape_verlet_limit_create(drape_context *ctx, const drape_model *model, double limit, int passes,
                                        double tolerance, drape_verlet_limit *out);
 void drape_verlet_limit_free(drape_context *ctx, drape_verlet_limit *limit);
+size_t drape_verlet_limit_bytes(const drape_verlet_limit *limit);
 void drape_verlet_limit_lengths(const drape_verlet_limit *limit, double *x);
 
 /* ---- Cloth against cloth: verlet_self.c ---- */

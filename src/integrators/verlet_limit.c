@@ -6,11 +6,32 @@
  * enough of them.
  *
  * All springs take part, of any stiffness, in the order in which CS184 makes them: by their later node.
+ *
+ * Most of them are not too long. They are looked at in patches: some nodes in a row whose springs reach back by
+ * the same steps, as inside of a grid, so that the springs of one step are a loop over arrays without indices. A
+ * node of which no spring is too long is done, as long as none of its nodes is moved before its turn: one after the
+ * other none would have moved. The springs of others, and those that are in no patch, are taken one after the other.
  */
+#include "base/lanes.h"
 #include "base/vec3.h"
+#include "integrators/planes.h"
 #include "integrators/verlet.h"
 
+#include <math.h>
+
 #include <string.h>
+
+#define PATCH_NODES 16 /* at most: few enough that most patches have no spring that is too long */
+#define FEWEST      4  /* nodes of a patch that is looked at at once */
+#define MOST_STEPS  8  /* springs a node */
+
+/* Springs first ... first + steps x nodes - 1: of each node the same number, spring `step` of node `from` + i joins
+ * it with from + i - back[step]. steps 0: any springs, `nodes` of them. */
+struct drape_verlet_patch {
+    int32_t first, nodes, steps, from;
+    int32_t back[MOST_STEPS];
+    int32_t reach; /* springs of a node and of one this much later, or less, may have a node in common */
+};
 
 static bool is_spring(const drape_term *term)
 {
@@ -54,20 +75,127 @@ static void place_springs(const drape_model *m, double limit, int32_t *start, dr
     }
 }
 
+/* ---- Patches ---- */
+
+static int32_t step_of(const drape_verlet_limit *l, int32_t spring)
+{
+    const int32_t *node = l->node + 2 * (size_t)spring;
+    return node[0] > node[1] ? node[0] - node[1] : node[1] - node[0];
+}
+
+/* Springs of the node whose first is `first`. */
+static int32_t count_steps(const drape_verlet_limit *l, int32_t first)
+{
+    int32_t end = first, node = later(l->node + 2 * (size_t)first);
+    while (end < l->count && later(l->node + 2 * (size_t)end) == node)
+        end++;
+    return end - first;
+}
+
+static bool has_same_steps(const drape_verlet_limit *l, const drape_verlet_patch *p, int32_t first)
+{
+    if (first >= l->count || later(l->node + 2 * (size_t)first) != p->from + p->nodes ||
+        count_steps(l, first) != p->steps)
+        return false;
+    for (int32_t s = 0; s < p->steps; s++)
+        if (step_of(l, first + s) != p->back[s])
+            return false;
+    return true;
+}
+
+/* Node i of a patch touches i and i - back[s]: what is in common with node j before it needs i - j to be a step or
+ * the difference of two. */
+static int32_t reach_of(const drape_verlet_patch *p)
+{
+    int32_t reach = 0;
+    for (int32_t s = 0; s < p->steps; s++)
+        for (int32_t t = -1; t < p->steps; t++) {
+            int32_t apart = p->back[s] - (t < 0 ? 0 : p->back[t]);
+            if (apart < PATCH_NODES && apart > reach)
+                reach = apart;
+        }
+    return reach;
+}
+
+static drape_verlet_patch patch_at(const drape_verlet_limit *l, int32_t first)
+{
+    drape_verlet_patch p = {.first = first, .steps = count_steps(l, first), .nodes = 1};
+    p.from = later(l->node + 2 * (size_t)first);
+    if (p.steps > MOST_STEPS)
+        return (drape_verlet_patch){.first = first, .nodes = p.steps};
+    for (int32_t s = 0; s < p.steps; s++)
+        p.back[s] = step_of(l, first + s);
+    while (p.nodes < PATCH_NODES && has_same_steps(l, &p, first + p.steps * p.nodes))
+        p.nodes++;
+    if (p.nodes < FEWEST)
+        return (drape_verlet_patch){.first = first, .nodes = p.steps * p.nodes};
+    p.reach = reach_of(&p);
+    return p;
+}
+
+/* Springs that are looked at at once, where those of a patch are in the order of steps, not of nodes. */
+static void place_squares(drape_verlet_limit *l, const drape_verlet_patch *p)
+{
+    for (int32_t s = 0; s < p->steps; s++)
+        for (int32_t i = 0; i < p->nodes; i++) {
+            double longest = l->longest[p->first + i * p->steps + s];
+            l->square[p->first + s * p->nodes + i] = longest * longest;
+        }
+}
+
+/* Neighbours without steps are one patch. */
+static int32_t find_patches(drape_verlet_limit *l, drape_verlet_patch *out)
+{
+    int32_t count = 0;
+    bool open = false;
+    for (int32_t first = 0; first < l->count;) {
+        const drape_verlet_patch p = patch_at(l, first);
+        first += p.nodes * (p.steps > 0 ? p.steps : 1);
+        if (out && p.steps > 0)
+            place_squares(l, &p);
+        if (open && p.steps == 0) {
+            if (out)
+                out[count - 1].nodes += p.nodes;
+            continue;
+        }
+        if (out)
+            out[count] = p;
+        open = p.steps == 0;
+        count++;
+    }
+    return count;
+}
+
+/* ---- Making ---- */
+
+static bool create_arrays(drape_context *ctx, const drape_model *m, drape_verlet_limit *out)
+{
+    out->node = drape_alloc(ctx, 2 * (size_t)out->count, sizeof *out->node);
+    out->longest = drape_alloc(ctx, (size_t)out->count, sizeof *out->longest);
+    out->square = drape_alloc(ctx, (size_t)out->count, sizeof *out->square);
+    out->x = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *out->x);
+    return out->node && out->longest && out->square && out->x;
+}
+
 drape_status drape_verlet_limit_create(drape_context *ctx, const drape_model *m, double limit, int passes,
                                        double tolerance, drape_verlet_limit *out)
 {
     int32_t *start = drape_alloc(ctx, (size_t)m->node_count + 1, sizeof *start);
-    *out = (drape_verlet_limit){.pinned = m->pinned, .passes = passes, .slack = 1 + tolerance};
+    *out = (drape_verlet_limit){
+        .pinned = m->pinned, .node_count = m->node_count, .passes = passes, .slack = 1 + tolerance};
     if (!start)
         return DRAPE_E_MEMORY;
     count_springs(m, start);
     out->count = start[m->node_count];
-    out->node = drape_alloc(ctx, 2 * (size_t)out->count, sizeof *out->node);
-    out->longest = drape_alloc(ctx, (size_t)out->count, sizeof *out->longest);
-    bool taken = out->node && out->longest;
-    if (taken)
+    bool taken = create_arrays(ctx, m, out);
+    if (taken) {
         place_springs(m, limit, start, out);
+        out->patch_count = find_patches(out, NULL);
+        out->patch = drape_alloc(ctx, (size_t)out->patch_count, sizeof *out->patch);
+        taken = out->patch;
+    }
+    if (taken)
+        find_patches(out, out->patch);
     drape_free(ctx, start);
     return taken ? DRAPE_OK : DRAPE_E_MEMORY;
 }
@@ -76,35 +204,104 @@ void drape_verlet_limit_free(drape_context *ctx, drape_verlet_limit *limit)
 {
     drape_free(ctx, limit->node);
     drape_free(ctx, limit->longest);
+    drape_free(ctx, limit->square);
+    drape_free(ctx, limit->patch);
+    drape_free(ctx, limit->x);
 }
 
-static void shorten(const drape_verlet_limit *l, const int32_t *node, double by, const double d[3], double *x)
+size_t drape_verlet_limit_bytes(const drape_verlet_limit *l)
+{
+    return (size_t)l->count * (2 * sizeof *l->node + sizeof *l->longest + sizeof *l->square) +
+           (size_t)l->patch_count * sizeof *l->patch +
+           (l->count > 0 ? 3 * (size_t)l->node_count * sizeof *l->x : 0);
+}
+
+/* ---- Passes ---- */
+
+static void shorten(const drape_verlet_limit *l, const int32_t *node, double by, const double d[3])
 {
     bool held0 = l->pinned[node[0]], held1 = l->pinned[node[1]];
     double share0 = held0 ? 0 : held1 ? 1 : 0.5, share1 = held1 ? 0 : held0 ? 1 : 0.5;
-    vec3_add_scaled(share0 * by, d, x + 3 * (size_t)node[0]);
-    vec3_add_scaled(-share1 * by, d, x + 3 * (size_t)node[1]);
+    for (size_t k = 0; k < 3; k++) {
+        double *x = l->x + k * (size_t)l->node_count;
+        x[node[0]] += share0 * by * d[k];
+        x[node[1]] -= share1 * by * d[k];
+    }
 }
 
-/* The largest square of a length over the longest that it met. */
-static double pass(const drape_verlet_limit *l, double *x)
+/* One after the other; worst: the largest square of a length over the longest so far. *moved is set where a spring
+ * was too long. */
+static double limit_each(const drape_verlet_limit *l, int32_t first, int32_t count, double worst, bool *moved)
 {
-    double worst = 0;
-    for (int32_t i = 0; i < l->count; i++) {
-        const int32_t *node = l->node + 2 * (size_t)i;
-        double d[3], longest = l->longest[i];
-        vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], d);
+    const double *x = l->x, *y = x + l->node_count, *z = y + l->node_count;
+    for (int32_t i = first; i < first + count; i++) {
+        const int32_t *node = l->node + 2 * (size_t)i, a = node[0], b = node[1];
+        double d[3] = {x[b] - x[a], y[b] - y[a], z[b] - z[a]}, longest = l->longest[i];
         double square = vec3_dot(d, d);
         if (!(square > longest * longest))
             continue;
-        worst = fmax(worst, l->pinned[node[0]] && l->pinned[node[1]] ? 0 : square / (longest * longest));
-        shorten(l, node, 1 - longest / sqrt(square), d, x);
+        worst = fmax(worst, l->pinned[a] && l->pinned[b] ? 0 : square / (longest * longest));
+        *moved = true;
+        shorten(l, node, 1 - longest / sqrt(square), d);
+    }
+    return worst;
+}
+
+/* By how much the squares of the lengths of each node's springs are above what they may be, at most; 0 where none
+ * is. True: it is some node. */
+LANES_DISPATCH static bool find_excess(const drape_verlet_limit *l, const drape_verlet_patch *p,
+                                       double excess[PATCH_NODES])
+{
+    const double *x = l->x + p->from, *y = x + l->node_count, *z = y + l->node_count;
+    double most = 0;
+    memset(excess, 0, PATCH_NODES * sizeof *excess);
+    for (int32_t s = 0; s < p->steps; s++) {
+        const double *bx = x - p->back[s], *by = y - p->back[s], *bz = z - p->back[s];
+        const double *square = l->square + p->first + s * p->nodes;
+        for (int32_t i = 0; i < p->nodes; i++) {
+            double dx = bx[i] - x[i], dy = by[i] - y[i], dz = bz[i] - z[i];
+            double over = dx * dx + dy * dy + dz * dz - square[i];
+            excess[i] = over > excess[i] ? over : excess[i];
+        }
+    }
+    for (int32_t i = 0; i < PATCH_NODES; i++)
+        most = excess[i] > most ? excess[i] : most;
+    return most > 0;
+}
+
+static double limit_patch(const drape_verlet_limit *l, const drape_verlet_patch *p, double worst)
+{
+    double excess[PATCH_NODES];
+    int32_t unknown =
+        0; /* of nodes before this one it is not known any more whether they may be left as they are */
+    if (!find_excess(l, p, excess))
+        return worst;
+    for (int32_t i = 0; i < p->nodes; i++) {
+        bool moved = false;
+        if (excess[i] > 0 || i < unknown)
+            worst = limit_each(l, p->first + i * p->steps, p->steps, worst, &moved);
+        if (moved)
+            unknown = i + p->reach + 1;
+    }
+    return worst;
+}
+
+/* The largest square of a length over the longest that it met. */
+static double pass(const drape_verlet_limit *l)
+{
+    double worst = 0;
+    for (int32_t k = 0; k < l->patch_count; k++) {
+        const drape_verlet_patch *p = &l->patch[k];
+        bool moved;
+        worst = p->steps > 0 ? limit_patch(l, p, worst) : limit_each(l, p->first, p->nodes, worst, &moved);
     }
     return worst;
 }
 
 void drape_verlet_limit_lengths(const drape_verlet_limit *l, double *x)
 {
-    for (int k = 0; k < l->passes && pass(l, x) > l->slack * l->slack; k++)
+    planes_from((size_t)l->node_count, x, l->x);
+    for (int k = 0; k < l->passes && pass(l) > l->slack * l->slack; k++)
         ;
+    planes_to((size_t)l->node_count, l->x, x);
 }

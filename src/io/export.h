@@ -36,7 +36,11 @@ typedef struct drape_exporter_ops {
     bool wants_fields;
     bool y_up; /* always: its frames are never turned */
 
-    /* Errors: DRAPE_E_FILE, DRAPE_E_MEMORY, DRAPE_E_ARGUMENT (more than the format can hold). */
+    /* Optional: refuses at pointer what is more than the format can hold, before anything is written; folder is NULL.
+     * Errors: DRAPE_E_ARGUMENT. */
+    drape_status (*check)(drape_context *ctx, const char *pointer, const drape_export_def *def);
+
+    /* Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
     drape_status (*open)(drape_context *ctx, const drape_export_def *def, void *state);
     /* Removes what an earlier run left in folder in this format, and nothing else. Called for every row,
      * whatever is written now: frames of two runs must not lie side by side. */

@@ -198,26 +198,23 @@ static drape_status glb_clean(drape_context *ctx, const char *folder)
     return drape_export_clean(ctx, folder, FILE_NAME);
 }
 
-static drape_status check_size(drape_context *ctx, const drape_export_def *def)
+static drape_status glb_check(drape_context *ctx, const char *pointer, const drape_export_def *def)
 {
     double frames = (double)def->most_frames, nodes = drape_model_node_count(def->model);
     double bytes = 12.0 * drape_model_triangle_count(def->model) + 12 * nodes * frames + 4 * frames * frames +
                    frames * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
     if (frames <= MOST_FRAMES && bytes <= MOST_BYTES)
         return DRAPE_OK;
-    return drape_fail(
-        ctx, DRAPE_E_ARGUMENT,
-        "glb: %.0f frames of %.0f nodes take %.3g bytes; a file has at most %d frames and 4 GiB: lower "
-        "the frame rate or take another format",
+    return drape_fail_at(
+        ctx, DRAPE_E_ARGUMENT, pointer,
+        "glb: %.0f frames of %.0f nodes take %.3g bytes; a file has at most %d frames and 4 GiB: "
+        "lower the frame rate or take another format",
         frames, nodes, bytes, MOST_FRAMES);
 }
 
 static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
     glb_state *glb = state;
-    drape_status status = check_size(ctx, def);
-    if (status)
-        return status;
     glb->def = def;
     glb->room = (uint32_t)def->most_frames;
     glb->json_size = FIXED_ROOM + (size_t)glb->room * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
@@ -393,6 +390,7 @@ const drape_exporter_ops drape_exporter_glb = {
     .reference = "Khronos, glTF 2.0 specification, 2021 (ISO/IEC 12113)",
     .state_size = sizeof(glb_state),
     .y_up = true,
+    .check = glb_check,
     .open = glb_open,
     .clean = glb_clean,
     .write = glb_write,

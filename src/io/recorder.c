@@ -25,8 +25,8 @@ typedef struct output {
 struct drape_recorder {
     drape_context *ctx;
     drape_sim *sim;
-    char *folder; /* without a slash at its end */
-    drape_export_def def;
+    char *folder;         /* without a slash at its end */
+    drape_export_def def; /* of the formats */
     output *outputs;
     size_t output_count;
     double *fields; /* room for those of a frame; NULL where no format wants any */
@@ -173,6 +173,30 @@ static drape_status check_def(drape_context *ctx, const drape_sim *sim, const dr
     return DRAPE_OK;
 }
 
+/* One at t = 0, one each 1 / frame_rate, one at the end. */
+static int64_t most_frames(const drape_sim *sim)
+{
+    const double counted = drape_model_duration(sim->model) * sim->frame_rate;
+    return counted < MOST_FRAMES ? (int64_t)counted + 3 : MOST_FRAMES;
+}
+
+static drape_export_def def_of(const drape_sim *sim, const char *folder)
+{
+    return (drape_export_def){.model = sim->model,
+                              .folder = folder,
+                              .frame_rate = sim->frame_rate,
+                              .most_frames = most_frames(sim)};
+}
+
+drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, const char *pointer,
+                                  const char *format)
+{
+    const drape_exporter_ops *ops;
+    const drape_export_def def = def_of(sim, NULL);
+    drape_status status = drape_exporter_find(ctx, pointer, format, &ops);
+    return status || !ops->check ? status : ops->check(ctx, pointer, &def);
+}
+
 static bool is_chosen(const drape_recorder *r, const drape_exporter_ops *ops)
 {
     for (size_t i = 0; i < r->output_count; i++)
@@ -188,7 +212,9 @@ static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < def->format_count; i++) {
         const drape_exporter_ops *ops;
-        drape_status status = drape_exporter_find(r->ctx, "", def->formats[i], &ops);
+        drape_status status = drape_recorder_check(r->ctx, r->sim, "", def->formats[i]);
+        if (!status)
+            status = drape_exporter_find(r->ctx, "", def->formats[i], &ops);
         if (status)
             return status;
         if (is_chosen(r, ops))
@@ -237,19 +263,9 @@ static drape_status clean_folder(drape_recorder *r)
     return status;
 }
 
-/* One at t = 0, one each 1 / frame_rate, one at the end. */
-static int64_t most_frames(const drape_sim *sim)
-{
-    const double counted = drape_model_duration(sim->model) * sim->frame_rate;
-    return counted < MOST_FRAMES ? (int64_t)counted + 3 : MOST_FRAMES;
-}
-
 static drape_status open_files(drape_recorder *r)
 {
-    r->def = (drape_export_def){.model = r->sim->model,
-                                .folder = r->folder,
-                                .frame_rate = r->sim->frame_rate,
-                                .most_frames = most_frames(r->sim)};
+    r->def = def_of(r->sim, r->folder);
     drape_status status = clean_folder(r);
     for (size_t i = 0; i < r->output_count && !status; i++) {
         output *o = &r->outputs[i];

@@ -13,6 +13,11 @@ typedef struct drape_recorder_def {
 
 typedef struct drape_recorder drape_recorder;
 
+/* Whether a format can hold a run of the sim's scene; faults at pointer ("/output/formats/0", or "" for none).
+ * Errors: DRAPE_E_ARGUMENT (there is no such format, it cannot). */
+drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, const char *pointer,
+                                  const char *format);
+
 /* Opens all files, replacing those of an earlier run, and begins to observe the sim. All memory is taken
  * here. Failures of writing stop the advance of the sim with DRAPE_E_FILE; their message is set on ctx, which
  * should be the sim's. A sim cannot be left by an observer: it must not advance after the recorder was

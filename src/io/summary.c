@@ -131,6 +131,19 @@ static json_t *strain(const drape_statistics *s)
     return with_reals(json_object(), bounds, LENGTH(bounds));
 }
 
+static json_t *realtime(const drape_summary_realtime *r)
+{
+    const count_item counts[] = {{"frames", r->frames},
+                                 {"missed", r->missed},
+                                 {"full", r->full},
+                                 {"fewer", r->fewer},
+                                 {"larger", r->larger}};
+    const real_item times[] = {{"budget", r->budget},  {"p50", r->p50},     {"p95", r->p95},
+                               {"p99", r->p99},        {"worst", r->worst}, {"debt", r->debt},
+                               {"dropped", r->dropped}};
+    return with_reals(with_counts(json_object(), counts, LENGTH(counts)), times, LENGTH(times));
+}
+
 static json_t *hash(const drape_sim *sim)
 {
     char digits[17];
@@ -158,6 +171,8 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     object = with(object, "strain", strain(&s));
     if (s.stability_known)
         object = with(object, "equilibrium", stability(&s));
+    if (def->realtime)
+        object = with(object, "realtime", realtime(def->realtime));
     return with(object, "hash", hash(sim));
 }
 

@@ -132,9 +132,10 @@ drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drap
 void drape_mesh_drop_topology(drape_context *ctx, drape_mesh *mesh)
 {
     drape_free(ctx, mesh->edge_triangle);
+    drape_free(ctx, mesh->triangle_edge);
     drape_free(ctx, mesh->hinge);
     drape_free(ctx, mesh->hinge_edge);
-    mesh->edge_triangle = mesh->hinge = mesh->hinge_edge = NULL;
+    mesh->edge_triangle = mesh->triangle_edge = mesh->hinge = mesh->hinge_edge = NULL;
 }
 
 void drape_mesh_free(drape_context *ctx, drape_mesh *mesh)
@@ -143,6 +144,7 @@ void drape_mesh_free(drape_context *ctx, drape_mesh *mesh)
     drape_free(ctx, mesh->triangle);
     drape_free(ctx, mesh->edge);
     drape_free(ctx, mesh->edge_triangle);
+    drape_free(ctx, mesh->triangle_edge);
     drape_free(ctx, mesh->hinge);
     drape_free(ctx, mesh->hinge_edge);
     drape_free(ctx, mesh->triangle_area);

@@ -15,6 +15,7 @@ typedef struct drape_mesh {
     int32_t *edge;          /* (edge_count x 2) lower node first, ordered by (lower, higher) */
     int32_t *edge_triangle; /* (edge_count x 2) triangles beside the edge, lower first; second -1 on the
                                boundary */
+    int32_t *triangle_edge; /* (triangle_count x 3) the edge from corner k to corner k + 1 */
     int32_t
         *hinge; /* (hinge_count x 4): x0 x1 the edge, x2 the apex of its first triangle, x3 of its second */
     int32_t *hinge_edge;   /* (hinge_count) in the order of edges */
@@ -110,7 +111,7 @@ drape_status drape_mesh_measure(drape_context *ctx, drape_mesh *mesh);
  * failure. */
 drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
                              const char *folder, drape_mesh *mesh);
-/* Frees what only the building of terms needs: edge_triangle and the hinges. Their pointers become NULL. */
+/* Frees what only the building of terms needs: edge_triangle, triangle_edge and the hinges. Their pointers become NULL. */
 void drape_mesh_drop_topology(drape_context *ctx, drape_mesh *mesh);
 
 void drape_mesh_free(drape_context *ctx, drape_mesh *mesh); /* leaves it empty; an empty one is fine */

@@ -54,9 +54,11 @@ static drape_status allocate_edges(drape_context *ctx, drape_mesh *mesh)
 {
     mesh->edge = drape_alloc(ctx, (size_t)mesh->edge_count, 2 * sizeof *mesh->edge);
     mesh->edge_triangle = drape_alloc(ctx, (size_t)mesh->edge_count, 2 * sizeof *mesh->edge_triangle);
+    mesh->triangle_edge = drape_alloc(ctx, (size_t)mesh->triangle_count, 3 * sizeof *mesh->triangle_edge);
     mesh->hinge = drape_alloc(ctx, (size_t)mesh->hinge_count, 4 * sizeof *mesh->hinge);
     mesh->hinge_edge = drape_alloc(ctx, (size_t)mesh->hinge_count, sizeof *mesh->hinge_edge);
-    const bool complete = mesh->edge && mesh->edge_triangle && mesh->hinge && mesh->hinge_edge;
+    const bool complete =
+        mesh->edge && mesh->edge_triangle && mesh->triangle_edge && mesh->hinge && mesh->hinge_edge;
     return complete ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
@@ -76,6 +78,8 @@ static void fill_edges(const int32_t *side, const int32_t *order, drape_mesh *me
         const int32_t *same = order + first, *ends = side + 2 * (size_t)same[0];
         mesh->edge[2 * (size_t)edge] = ends[0];
         mesh->edge[2 * (size_t)edge + 1] = ends[1];
+        for (int32_t k = 0; k < length; k++)
+            mesh->triangle_edge[same[k]] = edge;
         mesh->edge_triangle[2 * (size_t)edge] = same[0] / 3;
         mesh->edge_triangle[2 * (size_t)edge + 1] = length == 2 ? same[1] / 3 : -1;
         if (length == 2) {

@@ -15,6 +15,7 @@ typedef struct drape_term {
     drape_elements elements; /* node numbers of the whole model */
     int32_t *block; /* (count x nodes x nodes) block of each node pair in the pattern, -1 pinned; NULL: no
                        sparsity */
+    bool anchored;  /* its elements hold on to directions in space */
     int64_t first_internal;               /* its internal variables in a state; -1 for none */
     int64_t first_measure;                /* its measures in the list of all measures; -1 for none */
     const struct drape_term *const *laws; /* laws of the cloth, on this measure */
@@ -26,6 +27,12 @@ typedef struct drape_term {
 static inline bool drape_term_couples(const drape_term *term)
 {
     return !term->ops->law && !term->ops->linear && term->elements.count > 0;
+}
+
+/* Internal variables of an element. */
+static inline int drape_term_internals(const drape_term *term)
+{
+    return term->ops->internal_count > 0 ? term->ops->internal_count : term->ops->has_internal;
 }
 
 static inline drape_coupling drape_term_coupling(const drape_term *term)
@@ -50,8 +57,9 @@ typedef struct drape_cloth {
     double scale[3], rotate[4], translate[3];
     double material_values[8]; /* in the order of drape_material_params */
     drape_material material;
-    double *node_mass;  /* (mesh.node_count) [kg] */
-    double velocity[3]; /* [m/s] at t = 0 */
+    double *node_mass;     /* (mesh.node_count) [kg] */
+    uint8_t *edge_clamped; /* (mesh.edge_count) 1: both its nodes are held by pins that clamp */
+    double velocity[3];    /* [m/s] at t = 0 */
     int32_t first_node, first_triangle;
     const struct drape_term **laws; /* (law_count) */
     int law_count;

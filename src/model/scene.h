@@ -36,6 +36,7 @@ typedef enum drape_scene_kind {
     DRAPE_SCENE_TEXT,     /* a string for people */
     DRAPE_SCENE_WORD,     /* a string that is not empty */
     DRAPE_SCENE_WORDS,    /* an array of them */
+    DRAPE_SCENE_BOOLEAN,  /* true or false */
     DRAPE_SCENE_NUMBER,   /* from min to max, min excluded unless closed */
     DRAPE_SCENE_INTEGER,  /* from min to max */
     DRAPE_SCENE_INTEGERS, /* an array of them */

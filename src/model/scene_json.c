@@ -83,6 +83,8 @@ static const char *kind_text(drape_scene_kind kind)
         return "a string, not empty";
     case DRAPE_SCENE_WORDS:
         return "an array of strings, none empty";
+    case DRAPE_SCENE_BOOLEAN:
+        return "true or false";
     case DRAPE_SCENE_NUMBER:
         return "a number";
     case DRAPE_SCENE_INTEGER:
@@ -203,6 +205,15 @@ static drape_status read_version(reader *r, const drape_scene_key *key, json_t *
     describe_number(json_number_value(value), given, sizeof given);
     return drape_fail_at(r->ctx, DRAPE_E_VERSION, r->at.text,
                          "a scene of version %s; this library reads version %d", given, DRAPE_SCENE_FORM);
+}
+
+static drape_status read_boolean(reader *r, const drape_scene_key *key, json_t *value, char *def)
+{
+    bool given = json_is_true(value);
+    if (!json_is_boolean(value))
+        return refuse(r, key, value);
+    memcpy(def + key->offset, &given, sizeof given);
+    return DRAPE_OK;
 }
 
 static drape_status read_number(reader *r, const drape_scene_key *key, json_t *value, char *def)
@@ -575,7 +586,7 @@ static drape_status read_value(reader *r, const drape_scene_key *key, json_t *va
         [DRAPE_SCENE_SCALE] = read_scale,       [DRAPE_SCENE_ROTATION] = read_rotation,
         [DRAPE_SCENE_BOX] = read_box,           [DRAPE_SCENE_TRACK] = read_track,
         [DRAPE_SCENE_OBJECT] = read_child,      [DRAPE_SCENE_OBJECTS] = read_children,
-        [DRAPE_SCENE_ROWS] = read_children,
+        [DRAPE_SCENE_ROWS] = read_children,     [DRAPE_SCENE_BOOLEAN] = read_boolean,
     };
     return readers[key->kind](r, key, value, def);
 }

@@ -28,6 +28,9 @@ static const drape_scene_key pin_keys[] = {
      .help = "nodes inside, rest coordinates after the transform, boundary included"},
     {"track", DRAPE_SCENE_TRACK, ARRAY(drape_pin_def, track, key_count), .at_least = 1, .unit = "s and m",
      .help = "displacement from rest, linear between the times; default none: fixed"},
+    {"clamp", DRAPE_SCENE_BOOLEAN, IN(drape_pin_def, clamp),
+     .help = "edges between these nodes keep the direction of the sheet across them, in bend.midedge; "
+             "default false"},
 };
 static const char *const pin_selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
 

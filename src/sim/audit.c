@@ -56,18 +56,22 @@ drape_energy drape_sim_energy(drape_sim *sim)
     return sim->energy;
 }
 
-void drape_sim_energy_density(drape_sim *sim, double *density)
+void drape_sim_energy_density_at(drape_sim *sim, const double *x, double *density)
 {
-    if (!sim || !density)
-        return;
     const drape_state *state = drape_sim_state(sim);
-    const drape_point point = {.x = state->x, .v = state->v, .internal = state->internal, .t = state->t};
+    const drape_point point = {.x = x, .v = state->v, .internal = state->internal, .t = state->t};
     drape_system_node_energy(sim->system, &point, density);
     for (int32_t c = 0; c < sim->model->cloth_count; c++) {
         const drape_cloth *cloth = &sim->model->cloths[c];
         for (int32_t i = 0; i < cloth->mesh.node_count; i++)
             density[cloth->first_node + i] /= cloth->mesh.node_area[i];
     }
+}
+
+void drape_sim_energy_density(drape_sim *sim, double *density)
+{
+    if (sim && density)
+        drape_sim_energy_density_at(sim, drape_sim_state(sim)->x, density);
 }
 
 void drape_sim_reset_energy(drape_sim *sim)

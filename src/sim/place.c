@@ -87,6 +87,7 @@ static void start_anew(drape_sim *sim, double t_before)
     sim->before = sim->past[0] = sim->past[1] = -1;
     memset(sim->scratch, 0, sizeof sim->scratch);
     sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+    drape_sim_leave_realtime(sim);
     drape_schedule_init(&sim->schedule, sim->schedule.stepping, sim->schedule.dt, t);
     if (t != t_before) /* else the frame at t may have been told */
         sim->next_frame = first_frame(sim);

@@ -31,6 +31,10 @@ static drape_status read_def(drape_context *ctx, const drape_sim_def *given, dra
     def->struct_size = sizeof *def;
     if (def->threads < 1 || def->threads > MAX_THREADS)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "threads = %d; it is 1 to %d", def->threads, MAX_THREADS);
+    if (!(def->realtime_step >= 0 && def->realtime_step <= 1e6))
+        return drape_fail(ctx, DRAPE_E_ARGUMENT,
+                          "realtime_step = %g; it is in (0, 1e6] s, or 0 for four times dt",
+                          def->realtime_step);
     if (!(def->frame_rate >= 0 && def->frame_rate <= 1e6))
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
                           "frame_rate = %g; it is in (0, 1e6] 1/s, or 0 for the scene's", def->frame_rate);
@@ -94,6 +98,7 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
                        .past = {-1, -1},
                        .ctx = ctx,
                        .model = model,
+                       .realtime = {.longest_asked = def.realtime_step},
                        .frame_rate = def.frame_rate > 0 ? def.frame_rate : model->frame_rate};
     status = create_parts(sim, &def);
     if (status) {

@@ -23,6 +23,20 @@ typedef struct drape_audit {
     double best;                 /* largest numerical dissipation so far */
 } drape_audit;
 
+#define DRAPE_MAX_EFFORTS 8
+
+/* What the mode with a budget keeps from call to call. */
+typedef struct drape_realtime_memory {
+    bool active;                    /* the last advance was one of these */
+    double dt, longest;             /* [s] nominal step, and the longest to keep up with */
+    double longest_asked;           /* [s] of the def; 0: it did not say */
+    double debt, dropped;           /* [s] owed to the next call; dropped so far */
+    double cost[DRAPE_MAX_EFFORTS]; /* [s] expected of an attempt; 0: unknown */
+    int effort;                     /* of the integrator, 0 the hardest */
+    bool stretched;                 /* steps were longer than dt, or time was left over */
+    double cap;                     /* [s] longer steps were rejected lately; INFINITY: none were */
+} drape_realtime_memory;
+
 struct drape_sim {
     drape_context *ctx;
     drape_arena arena;
@@ -47,6 +61,7 @@ struct drape_sim {
     drape_reason reasons[DRAPE_MAX_REASONS];
     int reason_count;
     drape_audit audit;
+    drape_realtime_memory realtime;
     drape_energy energy, made;     /* of the present state; of the one that was attempted last */
     bool energy_known, made_known; /* whether they are */
 };
@@ -60,6 +75,9 @@ static inline const drape_state *drape_sim_state(const drape_sim *sim)
  * info->worst says how much. */
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info *info);
 
+/* drape_sim_energy_density at other positions (node_count x 3), internal variables those of the present state. */
+void drape_sim_energy_density_at(drape_sim *sim, const double *x, double *density);
+
 /* The step is accepted: its work counts. */
 void drape_sim_book(drape_sim *sim, const drape_step_info *info);
 
@@ -68,6 +86,12 @@ void drape_sim_reset_energy(drape_sim *sim);
 
 /* Of a badly distorted present state: the clause of a message that names its worst edge or triangle; else "". */
 void drape_sim_describe_distortion(const drape_sim *sim, char *text, size_t size);
+
+/* One attempt at the step that the schedule handed out, judged and told, with its frames. *attempt: what it was. */
+drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *attempt);
+
+/* Back to the scene's own steps and all efforts, and no time is owed. */
+void drape_sim_leave_realtime(drape_sim *sim);
 
 /* Tells the observers. 0 to go on, else the negative status to stop with. */
 drape_status drape_sim_tell(drape_sim *sim, const drape_event *event);

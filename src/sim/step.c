@@ -26,16 +26,16 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
         info->reason = "nonfinite";
         return DRAPE_RETRY_NONFINITE;
     }
-    if (info->committed || info->lenient)
+    if (info->committed)
         return DRAPE_OK;
-    if (drape_sim_ran_away(sim, next, info)) {
+    if (!info->lenient && drape_sim_ran_away(sim, next, info)) {
         info->reason = "energy";
         return DRAPE_RETRY_REJECTED;
     }
     const drape_state *before = drape_sim_state(sim);
     drape_status status =
         drape_system_check_contact(sim->system, next->x, next->t, &info->reason, &info->worst);
-    if (status)
+    if (status || info->lenient)
         return status;
     return drape_system_check(sim->system, next->x, before->x, before->internal, &info->reason, &info->worst);
 }
@@ -250,23 +250,24 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
 }
 
 /* The frames inside an accepted step belong to it even if an observer stops the run there. */
-static drape_status step(drape_sim *sim, double t1, double h)
+drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *attempt)
 {
     drape_status stop = DRAPE_OK;
     double start = drape_clock_seconds();
-    drape_attempt record = try_step(sim, t1, h, &stop);
+    *attempt = try_step(sim, t1, h, &stop);
     sim->statistics.wall_steps += drape_clock_seconds() - start;
-    log_rejection(sim, &record);
-    drape_status told = tell_attempt(sim, &record);
-    drape_status framed = record.accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
+    log_rejection(sim, attempt);
+    drape_status told = tell_attempt(sim, attempt);
+    drape_status framed = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
     if (stop)
-        return explain(sim, stop, &record);
+        return explain(sim, stop, attempt);
     return told ? told : framed;
 }
 
 drape_status drape_sim_advance(drape_sim *sim, double t_end)
 {
     double t1, h;
+    drape_attempt attempt;
     if (!sim)
         return DRAPE_E_ARGUMENT;
     sim->ctx->message[0] = 0; /* what it says after a failure is of this advance */
@@ -274,8 +275,9 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_advance: t_end is not finite");
     drape_status status =
         drape_sim_emit_frames(sim); /* the first, and those that an observer's stop left over */
+    drape_sim_leave_realtime(sim);
     drape_schedule_aim(&sim->schedule, t_end);
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h))
-        status = step(sim, t1, h);
+        status = drape_sim_step(sim, t1, h, &attempt);
     return status;
 }

@@ -41,6 +41,10 @@ struct drape_linear_ops {
     drape_status (*factor_definite)(void *state, const double *values);
     /* x = A^-1 b, b untouched. */
     drape_status (*solve)(void *state, const double *b, double *x);
+    /* The same with the residual only reduced to a share `tolerance`, in a norm of the row's own; *iterations: how
+     * many it took. NULL: it is direct. */
+    drape_status (*solve_inexact)(void *state, const double *b, double *x, double tolerance,
+                                  int64_t *iterations);
     void (*destroy)(void **state);
     /* Bytes that it takes, factors included. */
     size_t (*bytes)(const void *state);

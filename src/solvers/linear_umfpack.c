@@ -13,7 +13,6 @@
 #include <umfpack.h>
 
 #define MIN_RCOND 1e-15 /* below: singular to working precision */
-#define MAX_KEPT  32e6  /* [bytes] larger pieces are mapped afresh in any case */
 
 typedef SuiteSparse_long index_t;
 
@@ -56,16 +55,6 @@ static void set_control(double *control)
     control[UMFPACK_IRSTEP] = 0;
 }
 
-/* UMFPACK takes much and gives most of it back at each factorisation. glibc's malloc maps pieces as large as
- * these afresh, a page fault a page, until it has seen a larger one freed; then it keeps them in the heap. At
- * 1 600 nodes a factorisation takes 25 ms instead of 35. */
-static void keep_heap(const double *info)
-{
-    double bytes = 2 * info[UMFPACK_VARIABLE_PEAK_ESTIMATE] * info[UMFPACK_SIZE_OF_UNIT];
-    void *volatile piece = malloc((size_t)fmin(bytes, MAX_KEPT)); /* else it would be optimised away */
-    free(piece);
-}
-
 static drape_status create(drape_context *ctx, const drape_pattern *pattern, void **state)
 {
     umfpack_state *s = drape_alloc(ctx, 1, sizeof *s);
@@ -83,10 +72,8 @@ static drape_status create(drape_context *ctx, const drape_pattern *pattern, voi
     }
     index_t code = umfpack_dl_symbolic(pattern->n, pattern->n, indices(pattern->column),
                                        indices(pattern->row), NULL, &s->symbolic, s->control, s->info);
-    if (code == UMFPACK_OK) {
-        keep_heap(s->info);
+    if (code == UMFPACK_OK)
         return DRAPE_OK;
-    }
     drape_status status = code == UMFPACK_ERROR_out_of_memory ? DRAPE_E_MEMORY : DRAPE_E_SOLVER;
     destroy(state);
     return drape_fail(ctx, status, "%sUMFPACK cannot analyse the %lld x %lld Jacobian: status %d",

@@ -56,9 +56,13 @@ static int setup(SUNLinearSolver solver, SUNMatrix matrix)
 drape_status drape_sun_linear_solve(drape_sun_linear *linear, const double *b, double *x)
 {
     double start = drape_clock_seconds();
-    linear->status = linear->ops->solve(linear->state, b, x);
+    int64_t iterations = 1;
+    if (linear->ops->solve_inexact && linear->tolerance > 0)
+        linear->status = linear->ops->solve_inexact(linear->state, b, x, linear->tolerance, &iterations);
+    else
+        linear->status = linear->ops->solve(linear->state, b, x);
     linear->solve_seconds += drape_clock_seconds() - start;
-    linear->solves++;
+    linear->iterations += iterations;
     return linear->status;
 }
 

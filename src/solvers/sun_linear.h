@@ -24,7 +24,8 @@ typedef struct drape_sun_linear {
     SUNMatrix matrix;
     bool definite; /* the next factorisations refuse what is not positive definite, where the row can tell */
     int threads;
-    int64_t factorizations, solves;
+    double tolerance;                   /* share of the residual that iterative rows may leave; 0: none */
+    int64_t factorizations, iterations; /* of iterative rows; of direct ones, solves */
     double factor_seconds, solve_seconds;
     drape_status status; /* of the last factor or solve */
 } drape_sun_linear;

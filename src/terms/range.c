@@ -63,3 +63,20 @@ void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count,
     for (int32_t i = 0; i < count; i++)
         l[i] = sqrt(dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i]);
 }
+
+drape_status drape_check_ratios(const drape_elements *el, const double *x, const double *before,
+                                int32_t every, drape_ratio *ratio_of, drape_fault *fault)
+{
+    fault->element = -1;
+    fault->value = INFINITY;
+    for (int32_t e = 0; e < el->count; e += every) {
+        double ratio = ratio_of(el, e, x);
+        if (!(ratio < fault->value))
+            continue;
+        if (ratio < fault->limit && before && !drape_fell(ratio, ratio_of(el, e, before)))
+            continue;
+        fault->value = ratio;
+        fault->element = e;
+    }
+    return fault->value < fault->limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
+}

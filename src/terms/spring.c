@@ -218,17 +218,6 @@ drape_status drape_spring_check(const drape_elements *el, const double *x, const
     (void)internal;
     *fault = (drape_fault){.reason = "spring_collapse",
                            .what = "spring length / rest length",
-                           .element = -1,
-                           .value = INFINITY,
                            .limit = el->params[DRAPE_SPRING_MIN_LENGTH]};
-    for (int32_t e = 0; e < el->count; e++) {
-        double ratio = ratio_of(el, e, x);
-        if (!(ratio < fault->value))
-            continue;
-        if (ratio < fault->limit && before && !drape_fell(ratio, ratio_of(el, e, before)))
-            continue;
-        fault->value = ratio;
-        fault->element = e;
-    }
-    return fault->value < fault->limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
+    return drape_check_ratios(el, x, before, 1, ratio_of, fault);
 }

@@ -20,6 +20,7 @@ const drape_term_ops drape_term_spring_bend = {
     .element_name = "spring",
     .nodes = 2,
     .damped = true,
+    .distance = true,
     .build = build,
     .convex = true,
     .measure = drape_spring_measure,

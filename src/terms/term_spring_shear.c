@@ -18,6 +18,7 @@ const drape_term_ops drape_term_spring_shear = {
     .element_name = "spring",
     .nodes = 2,
     .damped = true,
+    .distance = true,
     .build = build,
     .convex = true,
     .measure = drape_spring_measure,

@@ -132,21 +132,9 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
                           const double *internal, drape_fault *fault)
 {
     (void)internal;
-    *fault = (drape_fault){.reason = "edge_collapse",
-                           .what = "edge length / rest length",
-                           .element = -1,
-                           .value = INFINITY,
-                           .limit = el->params[PARAM_COLLAPSE]};
-    for (int32_t e = 0; e < el->count; e++) {
-        double ratio = ratio_of(el, e, x);
-        if (!(ratio < fault->value))
-            continue;
-        if (ratio < fault->limit && before && !drape_fell(ratio, ratio_of(el, e, before)))
-            continue;
-        fault->value = ratio;
-        fault->element = e;
-    }
-    return fault->value < fault->limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
+    *fault = (drape_fault){
+        .reason = "edge_collapse", .what = "edge length / rest length", .limit = el->params[PARAM_COLLAPSE]};
+    return drape_check_ratios(el, x, before, 1, ratio_of, fault);
 }
 
 const drape_term_ops drape_term_stretch_edge = {

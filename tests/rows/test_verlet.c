@@ -328,6 +328,81 @@ START_TEST(strains_are_limited)
 }
 END_TEST
 
+/* 33 x 12 nodes, moved at random by up to `by`, with all kinds of springs. */
+static scene shaken(double by, double *x)
+{
+    scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': " GRID ", " MATERIAL
+                          ", 'terms': [{'type': 'spring.structural', 'stiffness': 30, 'gradient': 0.4},"
+                          "{'type': 'spring.shear', 'stiffness': 20, 'damping': 0.01},"
+                          "{'type': 'spring.bend', 'stiffness': 10, 'rest_scale': 0.9},"
+                          "{'type': 'drag.viscous', 'coefficient': 0.1}],"
+                          "'pins': [{'corner': 'top-left'}, {'nodes': [200]}]}], 'duration': 1}",
+                          33, 12, 3.2, 1.1, 0.3);
+    uint64_t seed = 11;
+    for (size_t i = 0; i < 3 * (size_t)s.model->node_count; i++) {
+        seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+        x[i] = s.model->rest[i] + by * ((double)(seed >> 11) / 4503599627370496.0 - 1);
+    }
+    return s;
+}
+
+/* Limits each spring after the other, as the rule says. */
+static void limit_by_hand(const drape_verlet_limit *l, double *x)
+{
+    for (int32_t i = 0; i < l->count; i++) {
+        double *a = x + 3 * (size_t)l->node[2 * i], *b = x + 3 * (size_t)l->node[2 * i + 1], d[3];
+        vec3_sub(b, a, d);
+        double square = vec3_dot(d, d), by = 1 - l->longest[i] / sqrt(square);
+        bool held = l->pinned[l->node[2 * i]], held1 = l->pinned[l->node[2 * i + 1]];
+        if (!(square > l->longest[i] * l->longest[i]))
+            continue;
+        vec3_add_scaled((held ? 0 : held1 ? 1 : 0.5) * by, d, a);
+        vec3_add_scaled(-(held1 ? 0 : held ? 1 : 0.5) * by, d, b);
+    }
+}
+
+/* Whether many, few or no springs are too long, looking at them in patches gives the bits of one after the other. */
+START_TEST(patches_are_one_spring_after_the_other)
+{
+    static const double moves[] = {0.001, 0.005, 0.01, 0.02, 0.05, 0.2};
+    for (int k = 0; k < 6; k++) {
+        double x[3 * 33 * 12], y[3 * 33 * 12];
+        scene s = shaken(moves[k], x);
+        drape_verlet_limit limit;
+        ck_assert_int_eq(drape_verlet_limit_create(s.ctx, s.model, 0.1, 1, 1e-9, &limit), DRAPE_OK);
+        for (int again = 0; again < 5; again++) {
+            memcpy(y, x, sizeof x);
+            drape_verlet_limit_lengths(&limit, x);
+            limit_by_hand(&limit, y);
+            ck_assert_msg(memcmp(x, y, sizeof x) == 0, "moved by %g, pass %d", moves[k], again);
+        }
+        drape_verlet_limit_free(s.ctx, &limit);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* Springs in runs, weight once and the rest by the system: the sums of the system in another order. A node has 12
+ * springs of up to 3 N, so that each of its sums is off by less than 50 roundings of that. */
+START_TEST(forces_are_those_of_the_system)
+{
+    double x[3 * 33 * 12], v[3 * 33 * 12], g[3 * 33 * 12], expected[3 * 33 * 12];
+    scene s = shaken(0.05, x);
+    const drape_setting settings[] = {number("substeps", 1)};
+    start(&s, settings, 1, "fixed", 0.01);
+    drape_verlet_force *force = NULL;
+    for (size_t i = 0; i < sizeof v / sizeof *v; i++)
+        v[i] = sin(3.1 * (double)i);
+    ck_assert_int_eq(drape_verlet_force_create(s.ctx, s.sim->system, &force), DRAPE_OK);
+    drape_verlet_force_sum(force, &(drape_point){.x = x, .v = v}, g);
+    drape_system_force(s.sim->system, &(drape_point){.x = x, .v = v}, expected);
+    for (size_t i = 0; i < sizeof g / sizeof *g; i++)
+        ck_assert_double_eq_tol(g[i], expected[i], 50 * 3 * 2.3e-16);
+    drape_verlet_force_destroy(&force);
+    scene_close(&s);
+}
+END_TEST
+
 /* ---- Cloth against cloth ---- */
 
 /* The rule without boxes: every point against every other, in the order of their numbers. */
@@ -418,4 +493,5 @@ SUITE("verlet", the_position_form_is_the_recurrence_of_positions, a_state_restar
       omega_is_that_of_a_chain, the_limit_is_the_limit, steps_follow_the_limit, a_blow_up_is_said,
       a_plane_stops_as_in_cs184, friction_is_against_the_moving_surface, a_sphere_pushes_along_its_radius,
       a_floor_keeps_the_place_as_in_boson, friction_on_forces_as_in_boson, strains_are_limited,
-      boxes_find_all_pairs, own_boxes_miss_what_cs184_misses)
+      patches_are_one_spring_after_the_other, forces_are_those_of_the_system, boxes_find_all_pairs,
+      own_boxes_miss_what_cs184_misses)

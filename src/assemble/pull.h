@@ -1,0 +1,45 @@
+/* pull.h: a spring from a node to a point of space, by which a host drags cloth: E = k/2 |x - target|^2. */
+#ifndef DRAPE_ASSEMBLE_PULL_H
+#define DRAPE_ASSEMBLE_PULL_H
+
+#include "model/model.h"
+
+typedef struct drape_pull {
+    int32_t node;
+    double stiffness; /* k [N/m]; 0: there is none */
+    double target[3]; /* [m] */
+} drape_pull;
+
+static inline double drape_pull_energy(const drape_pull *pull, const double *x)
+{
+    double sum = 0;
+    for (int k = 0; pull->stiffness > 0 && k < 3; k++) {
+        double way = x[3 * (size_t)pull->node + (size_t)k] - pull->target[k];
+        sum += pull->stiffness * way * way / 2;
+    }
+    return sum;
+}
+
+/* Adds its gradient to g (node_count x 3). */
+static inline void drape_pull_add_gradient(const drape_pull *pull, const double *x, double *g)
+{
+    for (size_t k = 0; pull->stiffness > 0 && k < 3; k++) {
+        size_t at = 3 * (size_t)pull->node + k;
+        g[at] += pull->stiffness * (x[at] - pull->target[k]);
+    }
+}
+
+/* Adds its Hessian to values in the pattern; the node is free. */
+static inline void drape_pull_add_hessian(const drape_pull *pull, const drape_model *model,
+                                          const drape_pattern *pattern, double *values)
+{
+    if (!(pull->stiffness > 0))
+        return;
+    int64_t stride;
+    int32_t j = model->free_of_node[pull->node];
+    double *to = drape_pattern_at(pattern, values, j, pattern->diagonal[j], &stride);
+    for (int c = 0; c < 3; c++)
+        to[c * stride + c] += pull->stiffness;
+}
+
+#endif

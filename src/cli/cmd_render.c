@@ -1,0 +1,424 @@
+/* cmd_render.c: `drape render`: scenes and finished runs to pictures and films. */
+#include "cli/frames.h"
+#include "cli/signals.h"
+#include "cli/tables.h"
+
+#include "base/param.h"
+#include "io/file.h"
+#include "render/film.h"
+#include "render/images.h"
+#include "render/offscreen.h"
+#include "render/painter.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define DEFAULT_WIDTH  1280
+#define DEFAULT_HEIGHT 720
+#define LEAST_SIDE     16
+#define LEAST_RANGE    1e-9 /* of a field whose values are all the same */
+
+typedef struct render_request {
+    cli_command command;
+    const char *out, *shade, *size, *camera, *range, *frame, *texture, *height, *environment;
+    int every;
+    bool compare, small;
+} render_request;
+
+typedef struct render {
+    const render_request *request;
+    cli_frames_def frames;
+    int width, height;
+    double azimuth, elevation, zoom; /* of the camera */
+    double low, high;                /* of the field; NaN: of what is there */
+    const drape_shading *shading;
+    bool film, picture; /* what is made; else a folder of pictures */
+    cli_source *sources;
+    int source_count;
+    drape_context *ctx;
+    drape_offscreen *offscreen;
+    drape_painter *painter;
+    drape_stage *stages;
+    drape_camera view;
+    uint8_t *pixels;
+} render;
+
+bool cli_shading_row(int index, cli_row *row)
+{
+    const drape_shading *shading = drape_shadings[index];
+    if (shading)
+        *row = (cli_row){.name = shading->name, .summary = shading->summary, .reference = shading->reference};
+    return shading;
+}
+
+/* ---- The command line ---- */
+
+/* count numbers between commas, nothing after them. */
+static bool read_numbers(const char *text, double *values, int least, int most)
+{
+    int count = 0;
+    char *end;
+    for (; count < most; text = end + 1) {
+        values[count] = strtod(text, &end);
+        if (end == text || !isfinite(values[count]))
+            return false;
+        count++;
+        if (*end != ',')
+            return *end == 0 && count >= least;
+    }
+    return false;
+}
+
+static int read_shade(render *r)
+{
+    const char *name = r->request->shade ? r->request->shade : "diffuse";
+    size_t count = 0;
+    while (drape_shadings_words[count])
+        count++;
+    r->shading = drape_shading_find(name);
+    if (r->shading)
+        return CLI_GO_ON;
+    const char *meant = drape_did_you_mean(name, drape_shadings_words, count);
+    return cli_misuse("render",
+                      "--shade \"%.60s\": there is no such shading%s%s%s; `drape list shadings` shows all",
+                      name, meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+}
+
+static int read_size(render *r)
+{
+    char end;
+    r->width = DEFAULT_WIDTH;
+    r->height = DEFAULT_HEIGHT;
+    if (r->request->size &&
+        (sscanf(r->request->size, "%5dx%5d%c", &r->width, &r->height, &end) != 2 || r->width < LEAST_SIDE ||
+         r->height < LEAST_SIDE || r->width > DRAPE_MAX_PICTURE || r->height > DRAPE_MAX_PICTURE))
+        return cli_misuse("render", "--size \"%.60s\": it is WIDTHxHEIGHT, each %d to %d pixels",
+                          r->request->size, LEAST_SIDE, DRAPE_MAX_PICTURE);
+    return CLI_GO_ON;
+}
+
+static int read_camera(render *r)
+{
+    double v[3] = {DRAPE_CAMERA_AZIMUTH, DRAPE_CAMERA_ELEVATION, 1};
+    if (r->request->camera && (!read_numbers(r->request->camera, v, 2, 3) || fabs(v[1]) > 90 ||
+                               fabs(v[0]) > 3600 || v[2] < 0.01 || v[2] > 100))
+        return cli_misuse("render",
+                          "--camera \"%.60s\": it is azimuth,elevation[,zoom]: degrees, elevation -90 to 90, "
+                          "zoom 0.01 to 100",
+                          r->request->camera);
+    r->azimuth = v[0];
+    r->elevation = v[1];
+    r->zoom = v[2];
+    return CLI_GO_ON;
+}
+
+static int read_range(render *r)
+{
+    double v[2] = {NAN, NAN};
+    if (r->request->range && !r->shading->field)
+        return cli_misuse("render", "--range: the shading \"%s\" shows no field", r->shading->name);
+    if (r->request->range && (!read_numbers(r->request->range, v, 2, 2) || v[0] >= v[1]))
+        return cli_misuse("render", "--range \"%.60s\": it is low,high, in %s", r->request->range,
+                          r->shading->field->shown_unit);
+    double shown = r->shading->field ? r->shading->field->shown : 1;
+    r->low = v[0] / shown;
+    r->high = v[1] / shown;
+    return CLI_GO_ON;
+}
+
+static bool ends_with(const char *text, const char *ending)
+{
+    size_t length = strlen(text), size = strlen(ending);
+    return length > size && strcmp(text + length - size, ending) == 0;
+}
+
+static int read_out(render *r)
+{
+    const render_request *q = r->request;
+    char *end = NULL;
+    if (!q->out)
+        return cli_misuse("render",
+                          "--out is missing: a picture (.png), a film (.mp4, .webm, .gif) or a folder");
+    r->film = drape_film_knows(q->out);
+    r->picture = ends_with(q->out, ".png");
+    long frame = q->frame ? strtol(q->frame, &end, 10) : CLI_LAST_FRAME;
+    if (q->frame && (!*q->frame || *end || frame < 0 || frame > 1000000000))
+        return cli_misuse("render", "--frame \"%.60s\": it is a number from 0", q->frame);
+    if (q->frame && !r->picture)
+        return cli_misuse("render", "--frame is for a picture: --out NAME.png");
+    if (q->every && r->picture)
+        return cli_misuse("render", "--every is for films and folders; --frame N is for a picture");
+    if (!q->compare && q->command.operand_count > 1)
+        return cli_misuse("render", "%d operands are given; --compare puts them side by side",
+                          q->command.operand_count);
+    if (r->film && drape_film_check(r->ctx))
+        return cli_misuse("render", "%s", drape_context_message(r->ctx));
+    r->frames = (cli_frames_def){.every = r->picture || !q->every ? 1 : q->every,
+                                 .one = r->picture ? (int)frame : -1,
+                                 .field = r->shading->field};
+    return CLI_GO_ON;
+}
+
+static int read_request(render *r)
+{
+    int (*const readers[])(render *) = {read_shade, read_size, read_camera, read_range, read_out};
+    int code = CLI_GO_ON;
+    for (size_t i = 0; i < sizeof readers / sizeof *readers && code == CLI_GO_ON; i++)
+        code = readers[i](r);
+    return code;
+}
+
+/* ---- Making ready ---- */
+
+static int report(const render *r, int code)
+{
+    fprintf(stderr, "drape render: %s\n", drape_context_message(r->ctx));
+    return code;
+}
+
+static int open_sources(render *r)
+{
+    const cli_command *command = &r->request->command;
+    int code = CLI_GO_ON;
+    r->sources = drape_alloc(r->ctx, (size_t)command->operand_count, sizeof *r->sources);
+    if (!r->sources)
+        return report(r, CLI_FAILED);
+    for (int i = 0; i < command->operand_count && code == CLI_GO_ON; i++) {
+        code = cli_source_open(command, command->operands[i], &r->frames, &r->sources[i]);
+        r->source_count++;
+    }
+    return code;
+}
+
+/* Before anything is simulated: what cannot be drawn is found at once. */
+static int open_painter(render *r)
+{
+    const drape_painter_def def = {.width = r->width,
+                                   .height = r->height,
+                                   .pattern = r->request->texture,
+                                   .heights = r->request->height,
+                                   .environment = r->request->environment};
+    drape_status status = drape_offscreen_create(r->ctx, &r->offscreen);
+    if (!status)
+        status = drape_painter_create(r->ctx, &def, &r->painter);
+    if (!status && !(r->pixels = drape_alloc(r->ctx, (size_t)r->width * (size_t)r->height, 4)))
+        status = DRAPE_E_MEMORY;
+    return status ? report(r, CLI_BAD_INPUT) : CLI_GO_ON;
+}
+
+static int fill_sources(render *r)
+{
+    int code = CLI_GO_ON;
+    for (int i = 0; i < r->source_count && code == CLI_GO_ON; i++)
+        code = cli_source_fill(&r->frames, &r->sources[i]);
+    return code;
+}
+
+/* One camera for all panels and all frames. */
+static int set_stages(render *r)
+{
+    float aspect = drape_painter_aspect(r->painter, r->source_count);
+    drape_framing framing = drape_framing_begin((float)r->azimuth, (float)r->elevation, aspect);
+    r->stages = drape_alloc(r->ctx, (size_t)r->source_count, sizeof *r->stages);
+    if (!r->stages)
+        return report(r, CLI_FAILED);
+    for (int i = 0; i < r->source_count; i++) {
+        drape_stage *stage = &r->stages[i];
+        const drape_reel *reel = &r->sources[i].reel;
+        if (drape_stage_create(r->ctx, r->sources[i].in.model, stage))
+            return report(r, CLI_FAILED);
+        for (size_t k = 0; k < reel->count; k++) {
+            drape_stage_see(stage, drape_reel_positions(reel, k));
+            drape_stage_frame(stage, &framing, reel->times[k], drape_reel_positions(reel, k));
+        }
+        drape_stage_settle(stage);
+    }
+    r->view = drape_framing_end(&framing, (float)r->azimuth, (float)r->elevation, (float)r->zoom);
+    return CLI_GO_ON;
+}
+
+/* Of all values of all runs, unless it was given; with 0 where they do not reach it. */
+static void set_range(render *r)
+{
+    double low = 0, high = 0;
+    if (!r->shading->field || !isnan(r->low))
+        return;
+    for (int i = 0; i < r->source_count; i++) {
+        low = fmin(low, r->sources[i].reel.low);
+        high = fmax(high, r->sources[i].reel.high);
+    }
+    r->low = low;
+    r->high = high - low > LEAST_RANGE ? high : low + LEAST_RANGE;
+}
+
+/* ---- Drawing ---- */
+
+/* Frame k of the first run, and of the others what they have at its time. */
+static drape_status draw(render *r, size_t k)
+{
+    drape_panel panels[DRAPE_MAX_PANELS];
+    char caption[48];
+    double t = r->sources[0].reel.times[k];
+    for (int i = 0; i < r->source_count; i++) {
+        const cli_source *s = &r->sources[i];
+        size_t at = i == 0 ? k : drape_reel_at(&s->reel, t);
+        panels[i] = (drape_panel){.stage = &r->stages[i],
+                                  .moment = {.t = s->reel.times[at],
+                                             .positions = drape_reel_positions(&s->reel, at),
+                                             .values = drape_reel_values(&s->reel, at)},
+                                  .label = r->source_count > 1 ? s->label : NULL};
+    }
+    snprintf(caption, sizeof caption, "t = %.3f s", t);
+    const drape_picture picture = {.panels = panels,
+                                   .panel_count = r->source_count,
+                                   .shading = r->shading,
+                                   .low = r->low,
+                                   .high = r->high,
+                                   .camera = r->view,
+                                   .lamp_azimuth = (float)r->azimuth - 48,
+                                   .caption = r->picture ? NULL : caption};
+    drape_status status = drape_painter_draw(r->painter, &picture);
+    return status ? status : drape_canvas_read(r->ctx, drape_painter_canvas(r->painter), r->pixels);
+}
+
+static drape_status make_picture(render *r)
+{
+    drape_status status = draw(r, 0);
+    return status
+               ? status
+               : drape_png_write(r->ctx, r->request->out, r->pixels, r->width, r->height, r->request->small);
+}
+
+static drape_status make_film(render *r)
+{
+    drape_film *film = NULL;
+    const drape_reel *reel = &r->sources[0].reel;
+    double rate = drape_model_frame_rate(r->sources[0].in.model) / r->frames.every;
+    drape_status status = drape_film_begin(r->ctx, r->request->out, r->width, r->height, rate, &film);
+    for (size_t k = 0; k < reel->count && !status && !cli_interrupted(); k++) {
+        status = draw(r, k);
+        if (!status)
+            status = drape_film_add(film, r->pixels);
+    }
+    if (!status && !cli_interrupted())
+        return drape_film_end(&film);
+    char message[DRAPE_MESSAGE_SIZE];
+    snprintf(message, sizeof message, "%s", drape_context_message(r->ctx));
+    drape_film_abandon(&film);
+    return status ? drape_fail(r->ctx, status, "%s", message) : DRAPE_OK;
+}
+
+static drape_status make_folder(render *r)
+{
+    size_t size = strlen(r->request->out) + sizeof "/frame_0000000000.png";
+    char *path = drape_alloc(r->ctx, size, 1);
+    if (!path)
+        return DRAPE_E_MEMORY;
+    snprintf(path, size, "%s", r->request->out);
+    drape_status status = drape_folder_make(r->ctx, path);
+    for (size_t k = 0; k < r->sources[0].reel.count && !status && !cli_interrupted(); k++) {
+        snprintf(path, size, "%s/frame_%05zu.png", r->request->out, k);
+        status = draw(r, k);
+        if (!status)
+            status = drape_png_write(r->ctx, path, r->pixels, r->width, r->height, r->request->small);
+    }
+    drape_free(r->ctx, path);
+    return status;
+}
+
+static int make(render *r)
+{
+    bool incomplete = false;
+    drape_status status = r->film ? make_film(r) : r->picture ? make_picture(r) : make_folder(r);
+    if (status)
+        return report(r, CLI_FAILED);
+    if (cli_interrupted())
+        return CLI_INTERRUPTED;
+    for (int i = 0; i < r->source_count; i++)
+        incomplete |= r->sources[i].incomplete;
+    printf("%s: %zu frame%s, %d x %d, %s\n", r->request->out, r->sources[0].reel.count,
+           r->sources[0].reel.count == 1 ? "" : "s", r->width, r->height, r->shading->name);
+    return incomplete ? CLI_FAILED : CLI_DONE;
+}
+
+static int run(render *r)
+{
+    int (*const stages[])(render *) = {read_request, open_sources, open_painter, fill_sources, set_stages};
+    int code = CLI_GO_ON;
+    for (size_t i = 0; i < sizeof stages / sizeof *stages && code == CLI_GO_ON; i++)
+        code = stages[i](r);
+    if (code != CLI_GO_ON)
+        return code;
+    set_range(r);
+    return make(r);
+}
+
+static void release(render *r)
+{
+    for (int i = 0; i < r->source_count; i++) {
+        if (r->stages)
+            drape_stage_free(&r->stages[i]);
+        cli_source_free(&r->sources[i]);
+    }
+    drape_painter_destroy(&r->painter);
+    drape_offscreen_destroy(&r->offscreen);
+    drape_free(r->ctx, r->stages);
+    drape_free(r->ctx, r->sources);
+    drape_free(r->ctx, r->pixels);
+}
+
+#define AT(member) offsetof(render_request, member)
+static const cli_option options[] = {
+    {"out", CLI_TEXT, "FILE|DIR",
+     "x.png: one frame; x.mp4, x.webm, x.gif: a film, by ffmpeg; else a folder of frames", AT(out), 0, NULL},
+    {"frame", CLI_TEXT, "N", "the frame of a picture, from 0; the last without it", AT(frame), 0, NULL},
+    {"every", CLI_NUMBER, "N", "each Nth frame of a film or folder", AT(every), 1000000, NULL},
+    {"shade", CLI_TEXT, "ROW", "how cloth is coloured, diffuse without it; `drape list shadings` shows all",
+     AT(shade), 0, NULL},
+    {"size", CLI_TEXT, "WxH", "pixels, 1280x720 without it", AT(size), 0, NULL},
+    {"camera", CLI_TEXT, "A,E[,Z]",
+     "azimuth and elevation in degrees, zoom; 32,24,1 without it, always framing all", AT(camera), 0, NULL},
+    {"range", CLI_TEXT, "LOW,HIGH",
+     "of the colours of a field, in the legend's unit; of its values without it", AT(range), 0, NULL},
+    {"compare", CLI_FLAG, NULL, "several scenes or runs side by side, by time", AT(compare), 0, NULL},
+    {"texture", CLI_TEXT, "PNG", "picture on the cloth", AT(texture), 0, NULL},
+    {"height", CLI_TEXT, "PNG", "height map of bump and displacement, in red", AT(height), 0, NULL},
+    {"environment", CLI_TEXT, "PNG", "the world that mirror, refraction and pbr show: longitude x latitude",
+     AT(environment), 0, NULL},
+    {"small", CLI_FLAG, NULL, "PNG files as small as they get, slower", AT(small), 0, NULL},
+};
+
+static int main_render(int argc, char **argv);
+
+const drape_verb drape_verb_render = {
+    .name = "render",
+    .operand = "SCENE|RUN",
+    .operands_most = DRAPE_MAX_PANELS,
+    .takes_scene = true,
+    .summary = "pictures and films of a scene or a finished run",
+    .details =
+        "Draws a scene, which is simulated, or a folder that drape run --out wrote. It needs no display.\n"
+        "With --compare several are put side by side in one picture or film.",
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .run = main_render,
+};
+
+static int main_render(int argc, char **argv)
+{
+    render_request request = {.out = NULL};
+    render r = {.request = &request};
+    int code = cli_parse(&drape_verb_render, argc, argv, &request.command);
+    if (code == CLI_GO_ON && drape_context_create(NULL, &r.ctx))
+        code = cli_misuse("render", "out of memory");
+    if (code == CLI_GO_ON) {
+        cli_catch_signals();
+        code = run(&r);
+        release(&r);
+    }
+    drape_context_destroy(&r.ctx);
+    cli_command_free(&request.command);
+    return code;
+}

@@ -1,0 +1,207 @@
+/* frames.c: see frames.h. */
+#include "cli/frames.h"
+
+#include "cli/progress.h"
+#include "cli/signals.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+/* ---- Opening ---- */
+
+static bool is_folder(const char *path)
+{
+    struct stat info;
+    return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
+}
+
+static int report(const cli_source *s, int code)
+{
+    fprintf(stderr, "%s\n", drape_context_message(s->in.ctx));
+    return code;
+}
+
+/* "runs/be/" -> "be", "a/sphere_drape.json" -> "sphere_drape" */
+static void make_label(const char *operand, char *label, size_t size)
+{
+    const char *end = operand + strlen(operand), *begin;
+    while (end > operand && end[-1] == '/')
+        end--;
+    for (begin = end; begin > operand && begin[-1] != '/'; begin--)
+        ;
+    if (end - begin > 5 && strncmp(end - 5, ".json", 5) == 0)
+        end -= 5;
+    snprintf(label, size, "%.*s", (int)(end - begin), begin);
+}
+
+static int open_run(const cli_command *command, cli_source *s)
+{
+    struct stat info;
+    size_t size = strlen(s->operand) + sizeof "/scene.json";
+    char *path = malloc(size);
+    if (!path)
+        return cli_misuse(command->verb, "out of memory");
+    snprintf(path, size, "%s/scene.json", s->operand);
+    int code = stat(path, &info) == 0
+                   ? cli_scene_load_from(command, path, &s->in)
+                   : cli_misuse(command->verb, "%s: there is no scene.json in it; drape run --out writes it",
+                                s->operand);
+    free(path);
+    if (code == CLI_GO_ON && drape_run_open(s->in.ctx, s->operand, s->in.model, &s->run))
+        code = report(s, CLI_BAD_INPUT);
+    return code;
+}
+
+static int check_def(const cli_command *command, const cli_frames_def *def, const cli_source *s)
+{
+    if (def->one >= 0 && s->run.frames > 0 && (size_t)def->one >= s->run.frames)
+        return cli_misuse(command->verb, "--frame %d: %s has the frames 0 to %zu", def->one, s->operand,
+                          s->run.frames - 1);
+    if (def->field && def->field->of_steps && s->run.frames > 0)
+        return cli_misuse(command->verb,
+                          "--shade %s: a run's frames do not have it; give the scene, which is "
+                          "simulated again: %s/scene.json",
+                          def->field->name, s->operand);
+    return CLI_GO_ON;
+}
+
+int cli_source_open(const cli_command *command, const char *operand, const cli_frames_def *def,
+                    cli_source *out)
+{
+    *out = (cli_source){.operand = operand};
+    make_label(operand, out->label, sizeof out->label);
+    int code = is_folder(operand) ? open_run(command, out) : cli_scene_load_from(command, operand, &out->in);
+    if (code == CLI_GO_ON)
+        code = check_def(command, def, out);
+    if (code == CLI_GO_ON &&
+        drape_reel_create(out->in.ctx, (size_t)out->in.model->node_count, def->field, &out->reel))
+        code = report(out, CLI_BAD_INPUT);
+    return code;
+}
+
+void cli_source_free(cli_source *source)
+{
+    drape_reel_free(&source->reel);
+    drape_run_close(&source->run);
+    cli_scene_free(&source->in);
+}
+
+/* ---- From a run ---- */
+
+/* Velocities between the frames beside this one, for fields that want them. */
+static drape_status put_state(cli_source *s, size_t frame, double *x, double *v, double *beside)
+{
+    drape_run *run = &s->run;
+    size_t before = frame > 0 ? frame - 1 : frame, after = frame + 1 < run->frames ? frame + 1 : frame;
+    double span = run->times[after] - run->times[before];
+    drape_status status = drape_run_read(run, after, v);
+    if (!status)
+        status = drape_run_read(run, before, beside);
+    if (!status)
+        status = drape_run_read(run, frame, x);
+    for (size_t i = 0; i < 3 * run->nodes; i++)
+        v[i] = span > 0 ? (v[i] - beside[i]) / span : 0;
+    return status ? status : drape_sim_set_state(s->in.sim, run->times[frame], x, v);
+}
+
+static drape_status read_frame(const cli_frames_def *def, cli_source *s, size_t frame, double *room)
+{
+    size_t n = 3 * s->run.nodes;
+    drape_status status =
+        def->field ? put_state(s, frame, room, room + n, room + 2 * n) : drape_run_read(&s->run, frame, room);
+    return status ? status : drape_reel_add(&s->reel, s->run.times[frame], room, s->in.sim, def->field);
+}
+
+static int read_frames(const cli_frames_def *def, cli_source *s)
+{
+    double *room = drape_alloc(s->in.ctx, 9 * s->run.nodes, sizeof *room);
+    drape_status status = room ? DRAPE_OK : DRAPE_E_MEMORY;
+    size_t last = s->run.frames - 1, only = def->one == CLI_LAST_FRAME ? last : (size_t)def->one;
+    if (!status && def->one != -1)
+        status = read_frame(def, s, only, room);
+    for (size_t i = 0; def->one == -1 && i <= last && !status && !cli_interrupted(); i += (size_t)def->every)
+        status = read_frame(def, s, i, room);
+    drape_free(s->in.ctx, room);
+    if (status)
+        return report(s, CLI_FAILED);
+    return cli_interrupted() ? CLI_INTERRUPTED : CLI_GO_ON;
+}
+
+/* ---- From a simulation ---- */
+
+typedef struct watch {
+    const cli_frames_def *def;
+    cli_source *source;
+    cli_progress progress;
+    double last; /* [s] of the last frame that was kept */
+    bool enough; /* the one frame is there */
+} watch;
+
+static drape_status keep(watch *w, double t, const double *x)
+{
+    w->last = t;
+    return drape_reel_add(&w->source->reel, t, x, w->source->in.sim, w->def->field);
+}
+
+static drape_status observe(void *user, const drape_event *event)
+{
+    watch *w = user;
+    if (event->kind == DRAPE_EVENT_ATTEMPT) {
+        if (w->progress.on)
+            cli_progress_show(&w->progress, drape_sim_time(event->sim),
+                              drape_sim_statistics(event->sim).steps_rejected);
+        if (!cli_interrupted())
+            return DRAPE_OK;
+        drape_context_set_message(w->source->in.ctx, "t=%.9g: interrupted", drape_sim_time(event->sim));
+        return DRAPE_E_STOPPED;
+    }
+    if (w->def->one == CLI_LAST_FRAME || (w->def->one >= 0 && event->frame != w->def->one) ||
+        event->frame % w->def->every != 0)
+        return DRAPE_OK;
+    drape_status status = keep(w, event->time, event->positions);
+    w->enough = w->def->one >= 0;
+    return status ? status : w->enough ? DRAPE_E_STOPPED : DRAPE_OK;
+}
+
+/* The state that the simulation ends with, unless the last frame has it. */
+static drape_status keep_end(watch *w)
+{
+    double t = drape_sim_time(w->source->in.sim);
+    bool due =
+        w->def->one == CLI_LAST_FRAME || (w->def->one == -1 && (w->source->reel.count == 0 || t > w->last));
+    return due ? keep(w, t, drape_sim_positions(w->source->in.sim)) : DRAPE_OK;
+}
+
+static int simulate(const cli_frames_def *def, cli_source *s)
+{
+    watch w = {.def = def, .source = s};
+    double end = drape_model_duration(s->in.model);
+    drape_status status = drape_sim_observe(s->in.sim, observe, &w);
+    cli_progress_begin(&w.progress, end);
+    if (!status)
+        status = drape_sim_advance(s->in.sim, end);
+    cli_progress_clear(&w.progress);
+    if (w.enough)
+        return CLI_GO_ON;
+    s->incomplete = status != DRAPE_OK;
+    if (status)
+        report(s, CLI_FAILED);
+    if (cli_interrupted())
+        return CLI_INTERRUPTED;
+    if (status == DRAPE_E_ARGUMENT || status == DRAPE_E_MEMORY)
+        return CLI_FAILED;
+    if (keep_end(&w))
+        return report(s, CLI_FAILED);
+    if (s->reel.count > 0)
+        return CLI_GO_ON;
+    fprintf(stderr, "--frame %d: %s has fewer frames\n", def->one, s->operand);
+    return CLI_BAD_INPUT;
+}
+
+int cli_source_fill(const cli_frames_def *def, cli_source *source)
+{
+    return source->run.frames > 0 ? read_frames(def, source) : simulate(def, source);
+}

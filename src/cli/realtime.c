@@ -1,0 +1,92 @@
+/* realtime.c: see realtime.h. */
+#include "cli/realtime.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static drape_status keep(cli_realtime *r, drape_context *ctx, double seconds)
+{
+    if (r->count == r->room) {
+        size_t room = r->room ? 2 * r->room : 256;
+        double *more = realloc(r->seconds, room * sizeof *more);
+        if (!more)
+            return drape_fail_memory(ctx, room * sizeof *more);
+        r->seconds = more;
+        r->room = room;
+    }
+    r->seconds[r->count++] = seconds;
+    return DRAPE_OK;
+}
+
+static void count(drape_summary_realtime *s, const drape_realtime *frame)
+{
+    bool full = strcmp(frame->rung, "full") == 0, fewer = strcmp(frame->rung, "fewer iterations") == 0;
+    s->frames++;
+    s->missed += !frame->kept;
+    s->full += full;
+    s->fewer += fewer;
+    s->larger += !full && !fewer;
+    s->debt = frame->debt;
+    s->dropped = frame->dropped_total;
+}
+
+static int compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Nearest rank. */
+static double percentile(const cli_realtime *r, double share)
+{
+    size_t rank = (size_t)ceil(share * (double)r->count);
+    return r->count ? r->seconds[rank > 0 ? rank - 1 : 0] : 0;
+}
+
+static void summarise(cli_realtime *r)
+{
+    if (r->count > 0)
+        qsort(r->seconds, r->count, sizeof *r->seconds, compare);
+    r->result.p50 = percentile(r, 0.5);
+    r->result.p95 = percentile(r, 0.95);
+    r->result.p99 = percentile(r, 0.99);
+    r->result.worst = percentile(r, 1);
+}
+
+drape_status cli_realtime_run(cli_realtime *r, const cli_scene *scene)
+{
+    double end = drape_model_duration(scene->model), frame = 1 / drape_model_frame_rate(scene->model);
+    drape_status status = DRAPE_OK;
+    r->result.budget = frame;
+    while (!status && end - drape_sim_time(scene->sim) - r->result.debt > 1e-9 * frame) {
+        drape_realtime report;
+        double left = end - drape_sim_time(scene->sim) - r->result.debt;
+        status = drape_sim_advance_realtime(scene->sim, fmin(frame, left), frame, &report);
+        count(&r->result, &report);
+        drape_status kept = keep(r, scene->ctx, report.seconds);
+        status = status ? status : kept;
+    }
+    if (!status) /* what is still owed has no deadline any more */
+        status = drape_sim_advance(scene->sim, end);
+    summarise(r);
+    return status;
+}
+
+void cli_realtime_print(const cli_realtime *r)
+{
+    const drape_summary_realtime *s = &r->result;
+    printf("realtime  %lld frames of %.4g ms: p50 %.4g, p95 %.4g, p99 %.4g, worst %.4g ms; %lld missed\n",
+           (long long)s->frames, 1e3 * s->budget, 1e3 * s->p50, 1e3 * s->p95, 1e3 * s->p99, 1e3 * s->worst,
+           (long long)s->missed);
+    printf("rungs     full %lld, fewer iterations %lld, larger steps %lld; %.4g s owed at the end, %.4g s "
+           "dropped\n",
+           (long long)s->full, (long long)s->fewer, (long long)s->larger, s->debt, s->dropped);
+}
+
+void cli_realtime_free(cli_realtime *r)
+{
+    free(r->seconds);
+    r->seconds = NULL;
+}

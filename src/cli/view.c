@@ -1,0 +1,339 @@
+/*
+ * view.c: see view.h. A model does not change: a change is a value of the scene, a new model of it, and a sim that is
+ * put into the state that was there.
+ */
+#include "cli/view.h"
+
+#include "base/clock.h"
+#include "model/scene.h"
+#include "model/track.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MOVE_TIME  0.1  /* [s] that a step of a movable takes */
+#define PULL_RATE  60.0 /* [1/s] frequency of the dragged node's own mass on the spring, many times over */
+#define PULL_NODES 40.0 /* masses of a node that the spring is meant for */
+
+/* ---- Making ---- */
+
+static void note(cli_view *v, const char *text)
+{
+    snprintf(v->message, sizeof v->message, "%s", text);
+}
+
+static void add_movable(cli_view *v, const char *pointer, const char *name, const drape_track_key *keys,
+                        size_t count)
+{
+    if (v->movable_count == VIEW_MOVABLES)
+        return;
+    view_movable *m = &v->movables[v->movable_count++];
+    snprintf(m->pointer, sizeof m->pointer, "%s", pointer);
+    snprintf(m->name, sizeof m->name, "%.60s", name);
+    if (count > 0)
+        drape_track_displacement(keys, count, drape_sim_time(v->in.sim), m->displacement);
+}
+
+static void list_movables(cli_view *v)
+{
+    drape_scene_def def;
+    char pointer[64], name[100];
+    v->movable_count = 0;
+    if (drape_scene_to_def(v->in.scene, &def))
+        return;
+    for (size_t i = 0; i < def.collider_count; i++) {
+        snprintf(pointer, sizeof pointer, "/colliders/%zu/track", i);
+        snprintf(name, sizeof name, "%.50s", v->in.model->colliders[i].name);
+        add_movable(v, pointer, name, def.colliders[i].track, def.colliders[i].key_count);
+    }
+    for (size_t c = 0; c < def.cloth_count; c++)
+        for (size_t p = 0; p < def.cloths[c].pin_count; p++) {
+            snprintf(pointer, sizeof pointer, "/cloth/%zu/pins/%zu/track", c, p);
+            snprintf(name, sizeof name, "pin %zu of %.40s", p, v->in.model->cloths[c].name);
+            add_movable(v, pointer, name, def.cloths[c].pins[p].track, def.cloths[c].pins[p].key_count);
+        }
+}
+
+int view_open(const cli_command *command, cli_view *v)
+{
+    *v = (cli_view){.command = command,
+                    .stiffness = 1,
+                    .damping = 1,
+                    .gravity = 1,
+                    .integrator = -1,
+                    .pulled = -1,
+                    .paused = true};
+    int code = cli_scene_load(command, &v->in);
+    if (code == CLI_GO_ON)
+        list_movables(v);
+    return code;
+}
+
+void view_free(cli_view *v)
+{
+    cli_scene_free(&v->in);
+}
+
+/* ---- Running ---- */
+
+void view_advance(cli_view *v, bool one_step)
+{
+    drape_sim *sim = v->in.sim;
+    double t = drape_sim_time(sim), start = drape_clock_seconds();
+    int64_t before = drape_sim_statistics(sim).newton_iterations;
+    double ahead = one_step ? view_dt(v) : 1 / drape_model_frame_rate(v->in.model);
+    drape_status status = drape_sim_advance(sim, t + ahead);
+    v->step_seconds = drape_clock_seconds() - start;
+    v->iterations = drape_sim_statistics(sim).newton_iterations - before;
+    v->message[0] = 0;
+    if (!status)
+        return;
+    note(v, drape_context_message(v->in.ctx));
+    v->paused = true;
+}
+
+static drape_status set_pull(cli_view *v, drape_sim *sim)
+{
+    const drape_model *m = v->in.model;
+    double mass = v->pulled >= 0 ? m->mass[v->pulled] : 0;
+    return v->pulled < 0 ? DRAPE_OK
+                         : drape_sim_pull(sim, v->pulled, PULL_NODES * mass * PULL_RATE * PULL_RATE, v->pull);
+}
+
+/* A model of the scene as it is now, and a sim in the state that was there, or at the start. */
+static drape_status rebuild(cli_view *v, bool keep_state)
+{
+    drape_model *model = NULL;
+    drape_sim *sim = NULL, *old = v->in.sim;
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.threads = v->command->threads ? v->command->threads : 1;
+    drape_status status = drape_scene_compile(v->in.scene, &model);
+    if (!status)
+        status = drape_sim_create(v->in.ctx, model, &def, &sim);
+    if (!status && keep_state)
+        status = drape_sim_set_state(sim, drape_sim_time(old), drape_sim_positions(old),
+                                     drape_sim_velocities(old));
+    if (status) {
+        drape_sim_destroy(&sim);
+        drape_model_destroy(&model);
+        return status;
+    }
+    drape_sim_destroy(&v->in.sim);
+    drape_model_destroy(&v->in.model);
+    v->in.model = model;
+    v->in.sim = sim;
+    return set_pull(v, sim);
+}
+
+void view_reset(cli_view *v)
+{
+    v->pulled = -1;
+    v->message[0] = 0;
+    if (rebuild(v, false))
+        note(v, drape_context_message(v->in.ctx));
+}
+
+/* ---- Changes ---- */
+
+static drape_status set_number(cli_view *v, const char *pointer, double value)
+{
+    char text[40];
+    snprintf(text, sizeof text, "%.17g", value);
+    return drape_scene_set(v->in.scene, pointer, text);
+}
+
+/* The parameters of this name of all terms, each term at its place in the scene: gravity's comes last and has none. */
+static drape_status scale_terms(cli_view *v, const char *name, double factor, int *changed)
+{
+    const drape_model *m = v->in.model;
+    drape_status status = DRAPE_OK;
+    int place = 0;
+    for (int32_t i = 0; i < m->term_count && !status; i++) {
+        const drape_term *term = &m->terms[i];
+        place = i > 0 && m->terms[i - 1].cloth == term->cloth ? place + 1 : 0;
+        for (int p = 0; p < term->ops->param_count && !status; p++) {
+            char pointer[120];
+            if (strcmp(term->ops->params[p].name, name) != 0 ||
+                term->ops->params[p].kind != DRAPE_PARAM_NUMBER || isnan(term->params[p]))
+                continue;
+            snprintf(pointer, sizeof pointer, "/cloth/%d/terms/%d/%s", (int)term->cloth, place, name);
+            status = set_number(v, pointer, factor * term->params[p]);
+            *changed += !status;
+        }
+    }
+    return status;
+}
+
+/* After values were set: the model of them. A refusal is undone by setting what was there: the factor's inverse on
+ * the model that stayed. */
+static bool commit(cli_view *v, drape_status status, int changed, const char *what)
+{
+    v->message[0] = 0;
+    if (!status && changed == 0) {
+        snprintf(v->message, sizeof v->message, "this scene has no %s to change", what);
+        return false;
+    }
+    if (!status)
+        status = rebuild(v, true);
+    if (status)
+        note(v, drape_context_message(v->in.ctx));
+    return !status;
+}
+
+static drape_status set_stiffness(cli_view *v, double factor, int *changed)
+{
+    const drape_model *m = v->in.model;
+    drape_status status = scale_terms(v, "stiffness", factor, changed);
+    for (int32_t c = 0; c < m->cloth_count && !status; c++) {
+        char pointer[80];
+        snprintf(pointer, sizeof pointer, "/cloth/%d/material/young_modulus", (int)c);
+        status = set_number(v, pointer, factor * m->cloths[c].material.young_modulus);
+        *changed += !status;
+    }
+    return status;
+}
+
+bool view_scale_stiffness(cli_view *v, double factor)
+{
+    int changed = 0;
+    drape_status set = set_stiffness(v, factor, &changed);
+    bool good = commit(v, set, changed, "stiffness");
+    if (!good)
+        set_stiffness(v, 1, &changed);
+    v->stiffness *= good ? factor : 1;
+    return good;
+}
+
+static drape_status set_damping(cli_view *v, double factor, int *changed)
+{
+    static const char *const names[] = {"beta", "damping", "coefficient"};
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; i < sizeof names / sizeof *names && !status; i++)
+        status = scale_terms(v, names[i], factor, changed);
+    return status;
+}
+
+bool view_scale_damping(cli_view *v, double factor)
+{
+    int changed = 0;
+    drape_status set = set_damping(v, factor, &changed);
+    bool good = commit(v, set, changed, "damping");
+    if (!good)
+        set_damping(v, 1, &changed);
+    v->damping *= good ? factor : 1;
+    return good;
+}
+
+static drape_status set_gravity(cli_view *v, double factor)
+{
+    const double *g = v->in.model->gravity;
+    char text[120];
+    snprintf(text, sizeof text, "[%.17g, %.17g, %.17g]", factor * g[0], factor * g[1], factor * g[2]);
+    return drape_scene_set(v->in.scene, "/gravity", text);
+}
+
+bool view_scale_gravity(cli_view *v, double factor)
+{
+    const double *g = v->in.model->gravity;
+    bool any = g[0] != 0 || g[1] != 0 || g[2] != 0;
+    bool good = commit(v, set_gravity(v, factor), any, "gravity");
+    if (!good)
+        set_gravity(v, 1);
+    v->gravity *= good ? factor : 1;
+    return good;
+}
+
+double view_dt(const cli_view *v)
+{
+    return drape_chosen_integrator_value(&v->in.sim->chosen, "dt", 1 / drape_model_frame_rate(v->in.model));
+}
+
+const char *view_integrator(const cli_view *v)
+{
+    return v->in.sim->chosen.integrator->name;
+}
+
+bool view_scale_dt(cli_view *v, double factor)
+{
+    double dt = view_dt(v);
+    bool good = commit(v, set_number(v, "/integrator/dt", factor * dt), 1, "dt");
+    if (!good)
+        set_number(v, "/integrator/dt", dt);
+    return good;
+}
+
+/* Rows without motion in time have nothing to show. */
+bool view_next_integrator(cli_view *v, int step)
+{
+    const char *now = view_integrator(v);
+    int count = 0, at = 0;
+    for (; drape_integrators[count]; count++)
+        if (strcmp(drape_integrators[count]->name, now) == 0)
+            at = count;
+    do
+        at = (at + step + count) % count;
+    while (drape_integrators[at]->timeless);
+    char before[64];
+    snprintf(before, sizeof before, "%s", now);
+    bool good = commit(v, drape_scene_set(v->in.scene, "/integrator/method", drape_integrators[at]->name), 1,
+                       "integrator");
+    if (!good)
+        drape_scene_set(v->in.scene, "/integrator/method", before);
+    return good;
+}
+
+static drape_status set_track(cli_view *v, const view_movable *m, const double *to)
+{
+    double t = drape_sim_time(v->in.sim);
+    const double *from = m->displacement;
+    char text[300];
+    snprintf(text, sizeof text, "[[%.17g, [%.17g, %.17g, %.17g]], [%.17g, [%.17g, %.17g, %.17g]]]", t,
+             from[0], from[1], from[2], t + MOVE_TIME, to[0], to[1], to[2]);
+    return drape_scene_set(v->in.scene, m->pointer, text);
+}
+
+/* Where the track has it now: it may be on its way. */
+static void find_displacement(cli_view *v, view_movable *m, int index)
+{
+    int saved = v->moved;
+    list_movables(v);
+    v->moved = saved;
+    *m = v->movables[index];
+}
+
+bool view_move(cli_view *v, const double way[3])
+{
+    view_movable m;
+    double to[3];
+    if (v->movable_count == 0)
+        return commit(v, DRAPE_OK, 0, "colliders and pins");
+    find_displacement(v, &m, v->moved);
+    for (int k = 0; k < 3; k++)
+        to[k] = m.displacement[k] + way[k];
+    bool good = commit(v, set_track(v, &m, to), 1, "track");
+    if (!good) {
+        char message[sizeof v->message];
+        snprintf(message, sizeof message, "%s", v->message);
+        set_track(v, &m, m.displacement);
+        note(v, message);
+    }
+    return good;
+}
+
+void view_pull(cli_view *v, int32_t node, const double target[3])
+{
+    const double nowhere[3] = {0};
+    if (v->pulled >= 0 && v->pulled != node)
+        drape_sim_pull(v->in.sim, v->pulled, 0, nowhere);
+    v->pulled = node;
+    if (node < 0)
+        return;
+    memcpy(v->pull, target, sizeof v->pull);
+    if (set_pull(v, v->in.sim)) {
+        note(v, drape_context_message(v->in.ctx));
+        v->pulled = -1;
+    }
+}

@@ -1,0 +1,36 @@
+/* field_strain.c: the largest principal strain of the sheet. A node has the mean of its triangles, by their area at
+ * rest. */
+#include "fields/fields.h"
+
+#include <string.h>
+
+static drape_status measure(drape_sim *sim, const double *x, double *values)
+{
+    const drape_model *m = sim->model;
+    double *strain = drape_alloc(sim->ctx, 2 * (size_t)m->triangle_count, sizeof *strain);
+    if (!strain)
+        return DRAPE_E_MEMORY;
+    drape_model_strain(m, x, strain);
+    memset(values, 0, (size_t)m->node_count * sizeof *values);
+    for (int32_t c = 0; c < m->cloth_count; c++) {
+        const drape_cloth *cloth = &m->cloths[c];
+        for (int32_t t = 0; t < cloth->mesh.triangle_count; t++) {
+            const size_t at = (size_t)(cloth->first_triangle + t);
+            for (int k = 0; k < 3; k++)
+                values[m->triangle[3 * at + (size_t)k]] += strain[2 * at] * cloth->mesh.triangle_area[t] / 3;
+        }
+        for (int32_t i = 0; i < cloth->mesh.node_count; i++)
+            values[cloth->first_node + i] /= cloth->mesh.node_area[i];
+    }
+    drape_free(sim->ctx, strain);
+    return DRAPE_OK;
+}
+
+const drape_field_ops drape_field_strain = {
+    .name = "strain",
+    .unit = "1",
+    .summary = "largest principal strain of the sheet",
+    .shown = 100,
+    .shown_unit = "%",
+    .measure = measure,
+};

@@ -1,0 +1,63 @@
+/* validate.h: references of physics: what a scene gives against what is known. */
+#ifndef DRAPE_LAB_VALIDATE_H
+#define DRAPE_LAB_VALIDATE_H
+
+#include "sim/sim.h"
+
+/* A scene while a reference is measured in it. */
+typedef struct drape_lab_run {
+    drape_context *ctx;
+    drape_model *model;
+    drape_sim *sim;
+    double parameter; /* of the case */
+} drape_lab_run;
+
+/* Makes a sim of a scene's text, in which ' stands for ". drape_lab_close in any case. */
+drape_status drape_lab_open(drape_context *ctx, const char *text, drape_lab_run *run);
+void drape_lab_close(drape_lab_run *run);
+
+/* How a case ended. */
+typedef enum drape_outcome {
+    DRAPE_OUTCOME_PASS,
+    DRAPE_OUTCOME_FAIL,
+    DRAPE_OUTCOME_DOCUMENTED, /* not the reference, but what this model is known to give instead */
+    DRAPE_OUTCOME_STOPPED     /* the simulation did */
+} drape_outcome;
+
+/* One reference: a row. Its cases differ in one parameter. */
+typedef struct drape_reference {
+    const char *name, *quantity, *unit;
+    const char *parameter; /* what the cases differ in; NULL: nothing */
+    const char *model;     /* the terms and the mesh */
+    const char *source;
+    double tolerance;         /* relative; of the documented value where there is one */
+    const double *parameters; /* (case_count) */
+    int case_count;
+    double (*expected)(double parameter);
+    double (*documented)(
+        double parameter); /* what the model converges to instead; NULL: it has no such error */
+    /* The text of the scene; load: what is searched, else 0. As snprintf. */
+    int (*scene)(double parameter, double load, char *text, size_t size);
+    /* Advances the sim and measures. */
+    drape_status (*measure)(drape_lab_run *run, double *value);
+    /* Thresholds: the quantity is the load, between these shares of the expected one, above which measure is > 0. */
+    double low, high;
+} drape_reference;
+extern const drape_reference *const drape_references[]; /* NULL-ended */
+
+typedef struct drape_validation {
+    double parameter, expected, documented, obtained, error; /* error: relative, of the one it is held to */
+    double seconds;                                          /* of CPU */
+    drape_outcome verdict;
+    char message[512]; /* of a simulation that stopped */
+} drape_validation;
+
+/* Runs one case. Errors: DRAPE_E_MEMORY alone: all else is a verdict. */
+drape_status drape_validate(drape_context *ctx, const drape_reference *reference, int index,
+                            drape_validation *out);
+
+const char *drape_outcome_name(drape_outcome verdict);
+
+#define DRAPE_LAB_TEXT 4096 /* of a scene, at most */
+
+#endif

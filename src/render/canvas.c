@@ -1,0 +1,102 @@
+/* canvas.c: see canvas.h. Shaders write sRGB, once a pixel: a framebuffer that did it would turn each sample into it
+ * and back, which costs a processor that draws as much as all else. */
+#include "render/canvas.h"
+
+#include <string.h>
+
+#define SAMPLES 4
+
+static GLuint buffer(int samples, GLenum format, int width, int height, GLenum attachment)
+{
+    GLuint name;
+    glGenRenderbuffers(1, &name);
+    glBindRenderbuffer(GL_RENDERBUFFER, name);
+    glRenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, width, height);
+    glFramebufferRenderbuffer(GL_FRAMEBUFFER, attachment, GL_RENDERBUFFER, name);
+    return name;
+}
+
+drape_status drape_canvas_create(drape_context *ctx, int width, int height, drape_canvas *canvas)
+{
+    GLint most = 0;
+    *canvas = (drape_canvas){.width = width, .height = height};
+    glGetIntegerv(GL_MAX_SAMPLES, &most);
+    int samples = most < SAMPLES ? most : SAMPLES;
+    glGenFramebuffers(1, &canvas->many);
+    glBindFramebuffer(GL_FRAMEBUFFER, canvas->many);
+    canvas->colour = buffer(samples, GL_RGBA8, width, height, GL_COLOR_ATTACHMENT0);
+    canvas->depth = buffer(samples, GL_DEPTH_COMPONENT24, width, height, GL_DEPTH_ATTACHMENT);
+    bool whole = glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+    glGenFramebuffers(1, &canvas->one);
+    glBindFramebuffer(GL_FRAMEBUFFER, canvas->one);
+    canvas->resolved = buffer(0, GL_RGBA8, width, height, GL_COLOR_ATTACHMENT0);
+    whole = whole && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+    drape_status status = drape_gl_check(ctx, "make the buffers of a picture");
+    if (!status && !whole)
+        status = drape_fail(ctx, DRAPE_E_FILE, "OpenGL has no picture of %d x %d pixels", width, height);
+    if (status)
+        drape_canvas_free(canvas);
+    return status;
+}
+
+void drape_canvas_free(drape_canvas *canvas)
+{
+    if (!canvas->many)
+        return;
+    glDeleteFramebuffers(1, &canvas->many);
+    glDeleteFramebuffers(1, &canvas->one);
+    glDeleteRenderbuffers(1, &canvas->colour);
+    glDeleteRenderbuffers(1, &canvas->depth);
+    glDeleteRenderbuffers(1, &canvas->resolved);
+    *canvas = (drape_canvas){.width = 0};
+}
+
+void drape_canvas_begin(const drape_canvas *canvas)
+{
+    glBindFramebuffer(GL_FRAMEBUFFER, canvas->many);
+    glViewport(0, 0, canvas->width, canvas->height);
+    glDisable(GL_FRAMEBUFFER_SRGB);
+    glEnable(GL_MULTISAMPLE);
+    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+}
+
+static void resolve(const drape_canvas *canvas)
+{
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, canvas->many);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, canvas->one);
+    glBlitFramebuffer(0, 0, canvas->width, canvas->height, 0, 0, canvas->width, canvas->height,
+                      GL_COLOR_BUFFER_BIT, GL_NEAREST);
+}
+
+/* OpenGL's rows go up. */
+static void flip(uint8_t *pixels, size_t row, int height)
+{
+    for (int a = 0, b = height - 1; a < b; a++, b--)
+        for (size_t i = 0; i < row; i++) {
+            uint8_t kept = pixels[(size_t)a * row + i];
+            pixels[(size_t)a * row + i] = pixels[(size_t)b * row + i];
+            pixels[(size_t)b * row + i] = kept;
+        }
+}
+
+drape_status drape_canvas_read(drape_context *ctx, const drape_canvas *canvas, uint8_t *pixels)
+{
+    size_t row = 4 * (size_t)canvas->width;
+    resolve(canvas);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, canvas->one);
+    glPixelStorei(GL_PACK_ALIGNMENT, 1);
+    glReadPixels(0, 0, canvas->width, canvas->height, GL_RGBA, GL_UNSIGNED_BYTE, pixels);
+    flip(pixels, row, canvas->height);
+    for (size_t i = 3; i < row * (size_t)canvas->height; i += 4)
+        pixels[i] = 255;
+    return drape_gl_check(ctx, "read a picture");
+}
+
+void drape_canvas_show(const drape_canvas *canvas, int width, int height)
+{
+    resolve(canvas);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, canvas->one);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
+    glBlitFramebuffer(0, 0, canvas->width, canvas->height, 0, 0, width, height, GL_COLOR_BUFFER_BIT,
+                      GL_NEAREST);
+}

@@ -1,0 +1,257 @@
+/* film.c: see film.h. */
+#include "render/film.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#define PROGRAM   "ffmpeg"
+#define MAX_WORDS 48
+#define LAST_LINE 240
+#define PROTOCOL  "file:" /* so that no name is taken for an option or a network's */
+
+extern char **environ;
+
+/* What ffmpeg is told of each kind: its words, parted by blanks. Sides of films are even. */
+typedef struct kind {
+    const char *ending, *words;
+} kind;
+
+#define EVEN "crop=trunc(iw/2)*2:trunc(ih/2)*2"
+static const kind kinds[] = {
+    {".mp4",
+     "-vf " EVEN
+     " -c:v libx264 -preset medium -crf 17 -pix_fmt yuv420p -colorspace bt709 -movflags +faststart -f mp4"},
+    {".webm", "-vf " EVEN " -c:v libvpx-vp9 -crf 24 -b:v 0 -row-mt 1 -cpu-used 4 -pix_fmt yuv420p -f webm"},
+    {".gif", "-filter_complex "
+             "split[a][b];[a]palettegen=stats_mode=diff[p];[b][p]paletteuse=dither=bayer:bayer_scale=4 "
+             "-loop 0 -f gif"},
+};
+
+struct drape_film {
+    drape_context *ctx;
+    char *path, *part; /* the film's name, and, after file:, the one it has until it is whole */
+    pid_t child;
+    int pipe, errors; /* to ffmpeg; a file without a name that it complains into */
+    size_t bytes;     /* of a picture */
+};
+
+static const kind *kind_of(const char *path)
+{
+    size_t length = strlen(path);
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
+        size_t ending = strlen(kinds[i].ending);
+        if (length > ending && strcasecmp(path + length - ending, kinds[i].ending) == 0)
+            return &kinds[i];
+    }
+    return NULL;
+}
+
+bool drape_film_knows(const char *path)
+{
+    return kind_of(path) != NULL;
+}
+
+drape_status drape_film_check(drape_context *ctx)
+{
+    const char *list = getenv("PATH");
+    char path[4096];
+    for (const char *folder = list ? list : "/bin:/usr/bin"; *folder;) {
+        int length = (int)strcspn(folder, ":");
+        snprintf(path, sizeof path, "%.*s/" PROGRAM, length, folder);
+        if (access(path, X_OK) == 0)
+            return DRAPE_OK;
+        folder += length + (folder[length] == ':');
+    }
+    return drape_fail(ctx, DRAPE_E_FILE,
+                      "there is no " PROGRAM
+                      " to make a film with: install it, or name a folder for pictures");
+}
+
+/* Splits text at blanks into words, in place. */
+static int add_words(char *text, char **words, int count)
+{
+    for (char *word = text; *word && count < MAX_WORDS - 2;) {
+        words[count++] = word;
+        word += strcspn(word, " ");
+        if (*word)
+            *word++ = 0;
+    }
+    return count;
+}
+
+/* The child has the pipe as its standard input, and both outputs in the file of errors. */
+static drape_status spawn(drape_film *film, char **words, int reading)
+{
+    posix_spawn_file_actions_t actions;
+    int error = posix_spawn_file_actions_init(&actions);
+    if (!error)
+        error = posix_spawn_file_actions_adddup2(&actions, reading, STDIN_FILENO);
+    if (!error)
+        error = posix_spawn_file_actions_adddup2(&actions, film->errors, STDOUT_FILENO);
+    if (!error)
+        error = posix_spawn_file_actions_adddup2(&actions, film->errors, STDERR_FILENO);
+    if (!error)
+        error = posix_spawnp(&film->child, PROGRAM, &actions, NULL, words, environ);
+    posix_spawn_file_actions_destroy(&actions);
+    if (!error)
+        return DRAPE_OK;
+    film->child = 0;
+    return drape_fail(film->ctx, DRAPE_E_FILE, "cannot start " PROGRAM ": %s", strerror(error));
+}
+
+static int open_errors(void)
+{
+    char name[] = "/tmp/drape-film-XXXXXX";
+    int fd = mkstemp(name);
+    if (fd >= 0) {
+        unlink(name);
+        fcntl(fd, F_SETFD, FD_CLOEXEC);
+    }
+    return fd;
+}
+
+static drape_status start(drape_film *film, int width, int height, double rate)
+{
+    char input[200], words[600], *all[MAX_WORDS] = {PROGRAM};
+    int ends[2];
+    snprintf(
+        input, sizeof input,
+        "-hide_banner -loglevel error -nostdin -y -f rawvideo -pix_fmt rgba -s %dx%d -r %.10g -i pipe:0 -an",
+        width, height, rate);
+    snprintf(words, sizeof words, "%s", kind_of(film->path)->words);
+    int count = add_words(input, all, 1);
+    count = add_words(words, all, count);
+    all[count++] = film->part;
+    film->errors = open_errors();
+    if (film->errors < 0 || pipe(ends) != 0)
+        return drape_fail(film->ctx, DRAPE_E_FILE, "cannot make a pipe to " PROGRAM ": %s", strerror(errno));
+    film->pipe = fcntl(ends[1], F_DUPFD_CLOEXEC, 3);
+    close(ends[1]);
+    fcntl(ends[0], F_SETFD, FD_CLOEXEC);
+    drape_status status = spawn(film, all, ends[0]);
+    close(ends[0]);
+    return status;
+}
+
+drape_status drape_film_begin(drape_context *ctx, const char *path, int width, int height, double rate,
+                              drape_film **out)
+{
+    size_t size = strlen(path) + sizeof PROTOCOL ".part";
+    drape_film *film = *out = drape_alloc(ctx, 1, sizeof *film);
+    if (!film)
+        return DRAPE_E_MEMORY;
+    *film = (drape_film){.ctx = ctx, .pipe = -1, .errors = -1, .bytes = 4 * (size_t)width * (size_t)height};
+    film->path = drape_copy_text(ctx, path);
+    film->part = drape_alloc(ctx, size, 1);
+    drape_status status = film->path && film->part ? DRAPE_OK : DRAPE_E_MEMORY;
+    if (!status) {
+        snprintf(film->part, size, PROTOCOL "%s.part", path);
+        status = start(film, width, height, rate);
+    }
+    if (status)
+        drape_film_abandon(out);
+    return status;
+}
+
+/* The last line that ffmpeg left, or what became of it. */
+static void last_words(const drape_film *film, int result, char *text, size_t size)
+{
+    char tail[LAST_LINE + 1] = "";
+    off_t length = lseek(film->errors, 0, SEEK_END), from = length > LAST_LINE ? length - LAST_LINE : 0;
+    ssize_t got = length > 0 ? pread(film->errors, tail, LAST_LINE, from) : 0;
+    while (got > 0 && (tail[got - 1] == '\n' || tail[got - 1] == ' '))
+        got--;
+    tail[got > 0 ? got : 0] = 0;
+    const char *line = strrchr(tail, '\n');
+    if (got > 0)
+        snprintf(text, size, "%s", line ? line + 1 : tail);
+    else if (WIFSIGNALED(result))
+        snprintf(text, size, "it was ended by signal %d", WTERMSIG(result));
+    else
+        snprintf(text, size, "it ended with exit code %d", WEXITSTATUS(result));
+}
+
+static int wait_for(drape_film *film)
+{
+    int result = 0;
+    if (film->pipe >= 0)
+        close(film->pipe);
+    film->pipe = -1;
+    while (film->child > 0 && waitpid(film->child, &result, 0) < 0 && errno == EINTR)
+        ;
+    film->child = 0;
+    return result;
+}
+
+static drape_status died(drape_film *film)
+{
+    char text[LAST_LINE + 40];
+    last_words(film, wait_for(film), text, sizeof text);
+    return drape_fail(film->ctx, DRAPE_E_FILE, "%s: " PROGRAM " gave up: %s", film->path, text);
+}
+
+drape_status drape_film_add(drape_film *film, const uint8_t *pixels)
+{
+    for (size_t done = 0; done < film->bytes;) {
+        ssize_t wrote = write(film->pipe, pixels + done, film->bytes - done);
+        if (wrote < 0 && errno != EINTR)
+            return died(film);
+        done += wrote > 0 ? (size_t)wrote : 0;
+    }
+    return DRAPE_OK;
+}
+
+static const char *part_of(const drape_film *film)
+{
+    return film->part + strlen(PROTOCOL);
+}
+
+static void release(drape_film **out)
+{
+    drape_film *film = *out;
+    if (film->errors >= 0)
+        close(film->errors);
+    drape_free(film->ctx, film->path);
+    drape_free(film->ctx, film->part);
+    drape_free(film->ctx, film);
+    *out = NULL;
+}
+
+drape_status drape_film_end(drape_film **out)
+{
+    drape_film *film = *out;
+    char text[LAST_LINE + 40];
+    int result = wait_for(film);
+    drape_status status = DRAPE_OK;
+    if (!WIFEXITED(result) || WEXITSTATUS(result) != 0) {
+        last_words(film, result, text, sizeof text);
+        status = drape_fail(film->ctx, DRAPE_E_FILE, "%s: " PROGRAM " failed: %s", film->path, text);
+    } else if (rename(part_of(film), film->path) != 0) {
+        status = drape_fail(film->ctx, DRAPE_E_FILE, "cannot name the film \"%s\": %s", film->path,
+                            strerror(errno));
+    }
+    if (status)
+        remove(part_of(film));
+    release(out);
+    return status;
+}
+
+void drape_film_abandon(drape_film **out)
+{
+    if (!out || !*out)
+        return;
+    if ((*out)->child > 0)
+        kill((*out)->child, SIGTERM);
+    wait_for(*out);
+    if ((*out)->part)
+        remove(part_of(*out));
+    release(out);
+}

@@ -1,0 +1,142 @@
+/* gl.c: see gl.h. */
+#include "render/gl.h"
+
+#include <string.h>
+
+#define MAX_PIECES 12
+#define LOG_SIZE   400
+
+/* The first line of what the driver says. */
+static GLuint fail(drape_context *ctx, const char *name, const char *stage, char *log)
+{
+    log[strcspn(log, "\n")] = 0;
+    drape_fail(ctx, DRAPE_E_FILE, "the OpenGL driver refuses the %s shader of \"%s\": %s", stage, name, log);
+    return 0;
+}
+
+static GLuint compile(drape_context *ctx, const char *name, const char *stage, GLenum kind,
+                      const char *const *pieces)
+{
+    const char *all[MAX_PIECES] = {"#version 330 core\n"};
+    char log[LOG_SIZE] = "";
+    int count = 1;
+    GLint good = 0;
+    while (*pieces && count < MAX_PIECES)
+        all[count++] = *pieces++;
+    GLuint shader = glCreateShader(kind);
+    glShaderSource(shader, count, all, NULL);
+    glCompileShader(shader);
+    glGetShaderiv(shader, GL_COMPILE_STATUS, &good);
+    if (good)
+        return shader;
+    glGetShaderInfoLog(shader, sizeof log, NULL, log);
+    glDeleteShader(shader);
+    return fail(ctx, name, stage, log);
+}
+
+GLuint drape_gl_program(drape_context *ctx, const char *name, const char *const *vertex,
+                        const char *const *fragment)
+{
+    char log[LOG_SIZE] = "";
+    GLint good = 0;
+    GLuint first = compile(ctx, name, "vertex", GL_VERTEX_SHADER, vertex);
+    GLuint second = first ? compile(ctx, name, "fragment", GL_FRAGMENT_SHADER, fragment) : 0;
+    if (!second) {
+        glDeleteShader(first);
+        return 0;
+    }
+    GLuint program = glCreateProgram();
+    glAttachShader(program, first);
+    glAttachShader(program, second);
+    glLinkProgram(program);
+    glDeleteShader(first);
+    glDeleteShader(second);
+    glGetProgramiv(program, GL_LINK_STATUS, &good);
+    if (good)
+        return program;
+    glGetProgramInfoLog(program, sizeof log, NULL, log);
+    glDeleteProgram(program);
+    return fail(ctx, name, "linked", log);
+}
+
+void drape_gl_mesh_create(drape_gl_mesh *mesh, const int *sizes, bool per_instance)
+{
+    size_t offset = 0;
+    *mesh = (drape_gl_mesh){.floats = 0};
+    for (int i = 0; sizes[i]; i++)
+        mesh->floats += sizes[i];
+    glGenVertexArrays(1, &mesh->array);
+    glGenBuffers(1, &mesh->vertices);
+    glGenBuffers(1, &mesh->indices);
+    glBindVertexArray(mesh->array);
+    glBindBuffer(GL_ARRAY_BUFFER, mesh->vertices);
+    glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, mesh->indices);
+    for (GLuint i = 0; sizes[i]; i++) {
+        glEnableVertexAttribArray(i);
+        glVertexAttribPointer(i, sizes[i], GL_FLOAT, GL_FALSE, mesh->floats * (GLsizei)sizeof(float),
+                              (const char *)NULL + offset * sizeof(float));
+        glVertexAttribDivisor(i, per_instance ? 1 : 0);
+        offset += (size_t)sizes[i];
+    }
+    glBindVertexArray(0);
+}
+
+void drape_gl_mesh_fill(drape_gl_mesh *mesh, const float *vertices, size_t vertex_count, bool often)
+{
+    glBindBuffer(GL_ARRAY_BUFFER, mesh->vertices);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(vertex_count * (size_t)mesh->floats * sizeof *vertices),
+                 vertices, often ? GL_STREAM_DRAW : GL_STATIC_DRAW);
+}
+
+void drape_gl_mesh_index(drape_gl_mesh *mesh, const uint32_t *indices, size_t count)
+{
+    glBindVertexArray(mesh->array);
+    glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(count * sizeof *indices), indices, GL_STATIC_DRAW);
+    glBindVertexArray(0);
+    mesh->index_count = (GLsizei)count;
+}
+
+void drape_gl_mesh_free(drape_gl_mesh *mesh)
+{
+    if (!mesh->array)
+        return;
+    glDeleteVertexArrays(1, &mesh->array);
+    glDeleteBuffers(1, &mesh->vertices);
+    glDeleteBuffers(1, &mesh->indices);
+    *mesh = (drape_gl_mesh){.floats = 0};
+}
+
+void drape_gl_set_int(GLuint program, const char *name, int value)
+{
+    glUniform1i(glGetUniformLocation(program, name), value);
+}
+
+void drape_gl_set_float(GLuint program, const char *name, float value)
+{
+    glUniform1f(glGetUniformLocation(program, name), value);
+}
+
+void drape_gl_set_vec2(GLuint program, const char *name, float x, float y)
+{
+    glUniform2f(glGetUniformLocation(program, name), x, y);
+}
+
+void drape_gl_set_vec3(GLuint program, const char *name, const float *value)
+{
+    glUniform3fv(glGetUniformLocation(program, name), 1, value);
+}
+
+void drape_gl_set_matrix(GLuint program, const char *name, const float *value)
+{
+    glUniformMatrix4fv(glGetUniformLocation(program, name), 1, GL_FALSE, value);
+}
+
+drape_status drape_gl_check(drape_context *ctx, const char *deed)
+{
+    GLenum error = glGetError();
+    if (error == GL_NO_ERROR)
+        return DRAPE_OK;
+    return drape_fail(ctx, error == GL_OUT_OF_MEMORY ? DRAPE_E_MEMORY : DRAPE_E_FILE,
+                      "OpenGL cannot %s: error 0x%04x%s", deed, (unsigned)error,
+                      error == GL_OUT_OF_MEMORY ? ", out of memory" : "");
+}

@@ -1,0 +1,292 @@
+/* images.c: see images.h. */
+#include "render/images.h"
+
+#include "io/file.h"
+
+#include <math.h>
+#include <png.h>
+#include <stdio.h>
+#include <string.h>
+
+#define PATTERN  1024 /* pixels of a side */
+#define SKY      1024 /* and half as many high */
+#define RAMP     256
+#define CHECKS   8  /* along a side of the pattern */
+#define WEAVES   64 /* threads along a side of the relief */
+#define DIAMONDS 9
+#define PI       3.14159265358979323846
+
+/* ---- Files ---- */
+
+static drape_status put_file(drape_context *ctx, const char *path, const void *data, size_t size)
+{
+    drape_file file;
+    drape_status status = drape_file_create(ctx, strlen(path), &file);
+    if (status)
+        return status;
+    drape_file_name(&file, "%s", path);
+    status = drape_file_begin(&file);
+    if (!status) {
+        drape_file_put(&file, data, size);
+        status = drape_file_finish(&file);
+    }
+    drape_file_destroy(&file);
+    return status;
+}
+
+drape_status drape_png_write(drape_context *ctx, const char *path, const uint8_t *pixels, int width,
+                             int height, bool small)
+{
+    png_image image = {.version = PNG_IMAGE_VERSION,
+                       .width = (png_uint_32)width,
+                       .height = (png_uint_32)height,
+                       .format = PNG_FORMAT_RGB,
+                       .flags = small ? 0 : PNG_IMAGE_FLAG_FAST};
+    size_t count = (size_t)width * (size_t)height;
+    png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
+    uint8_t *rgb = drape_alloc(ctx, count, 3), *data = rgb ? drape_alloc(ctx, size, 1) : NULL;
+    drape_status status = data ? DRAPE_OK : DRAPE_E_MEMORY;
+    for (size_t i = 0; data && i < count; i++)
+        memcpy(rgb + 3 * i, pixels + 4 * i, 3);
+    if (data && !png_image_write_to_memory(&image, data, &size, 0, rgb, 0, NULL))
+        status = drape_fail(ctx, DRAPE_E_FILE, "cannot write \"%s\": %s", path, image.message);
+    if (!status)
+        status = put_file(ctx, path, data, size);
+    drape_free(ctx, data);
+    drape_free(ctx, rgb);
+    return status;
+}
+
+drape_status drape_png_read(drape_context *ctx, const char *path, uint8_t **pixels, int *width, int *height)
+{
+    png_image image = {.version = PNG_IMAGE_VERSION};
+    *pixels = NULL;
+    if (!png_image_begin_read_from_file(&image, path))
+        return drape_fail(ctx, DRAPE_E_FILE, "cannot read \"%s\" as a PNG: %s", path, image.message);
+    image.format = PNG_FORMAT_RGBA;
+    drape_status status = DRAPE_OK;
+    if (image.width > 16384 || image.height > 16384)
+        status = drape_fail(ctx, DRAPE_E_FILE, "\"%s\" has %u x %u pixels; at most 16384 a side", path,
+                            (unsigned)image.width, (unsigned)image.height);
+    if (!status && !(*pixels = drape_alloc(ctx, PNG_IMAGE_SIZE(image), 1)))
+        status = DRAPE_E_MEMORY;
+    if (!status && !png_image_finish_read(&image, NULL, *pixels, 0, NULL))
+        status = drape_fail(ctx, DRAPE_E_FILE, "cannot read \"%s\" as a PNG: %s", path, image.message);
+    *width = (int)image.width;
+    *height = (int)image.height;
+    png_image_free(&image);
+    if (status) {
+        drape_free(ctx, *pixels);
+        *pixels = NULL;
+    }
+    return status;
+}
+
+/* ---- Textures ---- */
+
+static GLuint upload(GLint kind, int width, int height, GLenum type, const void *pixels)
+{
+    GLuint name;
+    glGenTextures(1, &name);
+    glBindTexture(GL_TEXTURE_2D, name);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    glTexImage2D(GL_TEXTURE_2D, 0, kind, width, height, 0, GL_RGBA, type, pixels);
+    glGenerateMipmap(GL_TEXTURE_2D);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    return name;
+}
+
+/* Of a file, its rows turned so that v goes up. */
+static drape_status upload_file(drape_context *ctx, const char *path, GLint kind, GLuint *out)
+{
+    uint8_t *pixels;
+    int width = 0, height = 0;
+    drape_status status = drape_png_read(ctx, path, &pixels, &width, &height);
+    if (status)
+        return status;
+    size_t row = 4 * (size_t)width;
+    for (size_t a = 0, b = (size_t)height - 1; a < b; a++, b--)
+        for (size_t i = 0; i < row; i++) {
+            uint8_t kept = pixels[a * row + i];
+            pixels[a * row + i] = pixels[b * row + i];
+            pixels[b * row + i] = kept;
+        }
+    *out = upload(kind, width, height, GL_UNSIGNED_BYTE, pixels);
+    drape_free(ctx, pixels);
+    return DRAPE_OK;
+}
+
+static drape_status upload_bytes(drape_context *ctx, GLint kind,
+                                 void (*paint)(double u, double v, uint8_t *to), GLuint *out)
+{
+    uint8_t *pixels = drape_alloc(ctx, (size_t)PATTERN * PATTERN, 4);
+    if (!pixels)
+        return DRAPE_E_MEMORY;
+    for (int j = 0; j < PATTERN; j++)
+        for (int i = 0; i < PATTERN; i++)
+            paint((i + 0.5) / PATTERN, (j + 0.5) / PATTERN, pixels + 4 * ((size_t)j * PATTERN + (size_t)i));
+    *out = upload(kind, PATTERN, PATTERN, GL_UNSIGNED_BYTE, pixels);
+    drape_free(ctx, pixels);
+    return DRAPE_OK;
+}
+
+static bool in_box(double x, double y, double x0, double y0, double x1, double y1)
+{
+    return x >= x0 && x <= x1 && y >= y0 && y <= y1;
+}
+
+/* A letter that tells left from right and up from down, in a unit square. */
+static bool in_letter(double x, double y)
+{
+    return in_box(x, y, 0.28, 0.16, 0.42, 0.84) || in_box(x, y, 0.28, 0.70, 0.74, 0.84) ||
+           in_box(x, y, 0.28, 0.44, 0.64, 0.57);
+}
+
+/* Checks in two blues with fine lines between, and in each fourth light one the letter. */
+static void paint_pattern(double u, double v, uint8_t *to)
+{
+    static const uint8_t dark[] = {38, 70, 118}, light[] = {232, 226, 212}, red[] = {198, 68, 52},
+                         line[] = {24, 44, 78};
+    double x = u * CHECKS, y = v * CHECKS;
+    int i = (int)x, j = (int)y;
+    x -= i;
+    y -= j;
+    const uint8_t *colour = (i + j) % 2 ? light : dark;
+    if (fmin(fmin(x, 1 - x), fmin(y, 1 - y)) < 0.03)
+        colour = line;
+    else if ((i + j) % 2 && i % 2 == 1 && in_letter(x, y))
+        colour = red;
+    memcpy(to, colour, 3);
+    to[3] = 255;
+}
+
+/* Diamonds of raised thread, metal, each with a knot in it, over a fine weave. */
+static void paint_heights(double u, double v, uint8_t *to)
+{
+    double warp = sin(PI * 2 * WEAVES * u) * cos(PI * 2 * WEAVES * v);
+    double x = fabs(fmod(u * DIAMONDS, 1) - 0.5), y = fabs(fmod(v * DIAMONDS, 1) - 0.5);
+    double across = x + y, corner = 1 - across; /* from a diamond's middle, and from the next one's */
+    double band = exp(-pow((across - 0.36) / 0.045, 2)), knot = 1 / (1 + exp((across - 0.14) / 0.015)),
+           dot = 1 / (1 + exp((corner - 0.10) / 0.012));
+    double metal = fmin(1, band + knot + dot);
+    double height = 0.22 + 0.50 * metal + 0.05 * (1 - metal) * warp;
+    to[0] = to[1] = to[2] = (uint8_t)lround(255 * fmin(1, fmax(0, height)));
+    to[3] = (uint8_t)lround(255 * fmin(1, fmax(0, 1.6 * metal - 0.3)));
+}
+
+drape_status drape_texture_pattern(drape_context *ctx, const char *path, GLuint *out)
+{
+    return path ? upload_file(ctx, path, GL_SRGB8_ALPHA8, out)
+                : upload_bytes(ctx, GL_SRGB8_ALPHA8, paint_pattern, out);
+}
+
+drape_status drape_texture_heights(drape_context *ctx, const char *path, GLuint *out)
+{
+    return path ? upload_file(ctx, path, GL_RGBA8, out) : upload_bytes(ctx, GL_RGBA8, paint_heights, out);
+}
+
+/* ---- The environment ---- */
+
+static double smooth(double from, double to, double x)
+{
+    double s = fmin(1, fmax(0, (x - from) / (to - from)));
+    return s * s * (3 - 2 * s);
+}
+
+/* A lamp with soft edges: how much of it is seen in a direction. */
+static double lamp(double longitude, double latitude, double at, double high, double wide, double tall)
+{
+    double along = remainder(longitude - at, 2 * PI);
+    return smooth(wide, 0.86 * wide, fabs(along)) * smooth(tall, 0.86 * tall, fabs(latitude - high));
+}
+
+/* A floor of tiles that fades with distance, walls that lighten upwards, and three lamps. */
+static void paint_sky(double u, double v, float *to)
+{
+    double longitude = 2 * PI * (u - 0.5), latitude = PI * (v - 0.5), up = sin(latitude);
+    double wall = 0.07 + 0.42 * pow(smooth(-0.05, 1.0, up), 1.3), floor = smooth(0.012, -0.012, up);
+    double away = cos(latitude) / fmax(0.02, -up), x = away * sin(longitude), z = away * cos(longitude);
+    double tile = smooth(-0.06, 0.06, sin(2.2 * x) * sin(2.2 * z)), far = smooth(7, 2, away);
+    double ground = 0.15 + 0.22 * tile * far;
+    const double cool[3] = {0.80, 0.94, 1.16}, warm[3] = {1.10, 1.0, 0.86};
+    double lamps = 7.0 * lamp(longitude, latitude, -0.9, 0.62, 0.42, 0.22) +
+                   3.2 * lamp(longitude, latitude, 1.3, 0.50, 0.14, 0.40) +
+                   2.6 * lamp(longitude, latitude, 2.9, 0.34, 0.50, 0.08);
+    for (int k = 0; k < 3; k++)
+        to[k] = (float)((1 - floor) * wall * 1.5 * cool[k] + floor * ground * warm[k] + lamps * warm[k]);
+    to[3] = 1;
+}
+
+drape_status drape_texture_environment(drape_context *ctx, const char *path, GLuint *out)
+{
+    drape_status status = DRAPE_OK;
+    if (path) {
+        status = upload_file(ctx, path, GL_SRGB8_ALPHA8, out);
+    } else {
+        float *pixels = drape_alloc(ctx, (size_t)SKY * SKY / 2, 4 * sizeof *pixels);
+        if (!pixels)
+            return DRAPE_E_MEMORY;
+        for (int j = 0; j < SKY / 2; j++)
+            for (int i = 0; i < SKY; i++)
+                paint_sky((i + 0.5) / SKY, (j + 0.5) / (SKY / 2), pixels + 4 * ((size_t)j * SKY + (size_t)i));
+        *out = upload(GL_RGBA16F, SKY, SKY / 2, GL_FLOAT, pixels);
+        drape_free(ctx, pixels);
+    }
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    return status;
+}
+
+/* ---- The colours of fields ---- */
+
+/* OKLab to linear RGB: https://bottosson.github.io/posts/oklab, 2020. */
+static void from_oklab(const double *lab, double *rgb)
+{
+    double l = lab[0] + 0.3963377774 * lab[1] + 0.2158037573 * lab[2];
+    double m = lab[0] - 0.1055613458 * lab[1] - 0.0638541728 * lab[2];
+    double s = lab[0] - 0.0894841775 * lab[1] - 1.2914855480 * lab[2];
+    l = l * l * l;
+    m = m * m * m;
+    s = s * s * s;
+    rgb[0] = 4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s;
+    rgb[1] = -1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s;
+    rgb[2] = -0.0041960863 * l - 0.7034186147 * m + 1.7076147010 * s;
+}
+
+static bool is_colour(const double *rgb)
+{
+    for (int k = 0; k < 3; k++)
+        if (rgb[k] < 0 || rgb[k] > 1)
+            return false;
+    return true;
+}
+
+/* The hue runs from violet, 310 degrees, down to yellow, 105; the chroma is what the screen has there, at most. */
+void drape_ramp(double s, float rgb[3])
+{
+    double hue = (310 - 205 * pow(s, 1.1)) * PI / 180, chroma = 0.15, colour[3];
+    double lab[3] = {0.26 + 0.66 * s, 0, 0};
+    do {
+        lab[1] = chroma * cos(hue);
+        lab[2] = chroma * sin(hue);
+        from_oklab(lab, colour);
+        chroma -= 0.002;
+    } while (!is_colour(colour) && chroma > 0);
+    for (int k = 0; k < 3; k++)
+        rgb[k] = (float)fmin(1, fmax(0, colour[k]));
+}
+
+GLuint drape_texture_ramp(void)
+{
+    float pixels[RAMP][4];
+    GLuint name;
+    for (int i = 0; i < RAMP; i++) {
+        drape_ramp(i / (RAMP - 1.0), pixels[i]);
+        pixels[i][3] = 1;
+    }
+    name = upload(GL_RGBA16F, RAMP, 1, GL_FLOAT, pixels);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    return name;
+}

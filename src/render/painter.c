@@ -1,0 +1,652 @@
+/* painter.c: see painter.h. */
+#include "render/painter.h"
+
+#include "render/images.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define SHADOW       2048   /* texels of a side */
+#define SOFT         1.5f   /* texels between the comparisons with it */
+#define LAMP_HEIGHT  54.0f  /* [degrees] */
+#define SHADOW_REACH 1.3f   /* radii around what was framed */
+#define DEEP         5.0f   /* radii along the light */
+#define RELIEF       0.016f /* of the longer side of the largest cloth */
+#define WIRE         1.25f  /* pixels at 720 rows */
+#define WIRE_SHARE   0.16f  /* of the mean edge as it is seen, at most */
+#define PIN          11.0f  /* pixels at 720 rows */
+#define MAX_SHADINGS 64
+#define RADIANS      0.017453292519943295f
+
+/* ---- Sources ---- */
+
+static const char surface_vertex[] =
+    "layout(location = 0) in vec3 at_place;\n"
+    "layout(location = 1) in vec3 at_normal;\n"
+    "layout(location = 2) in vec3 at_tangent;\n"
+    "layout(location = 3) in vec2 at_uv;\n"
+    "layout(location = 4) in float at_value;\n"
+    "layout(location = 5) in float at_piece;\n"
+    "uniform mat4 view, lamp;\n"
+    "uniform vec3 offset;\n"
+    "uniform float relief, spread;\n"
+    "uniform sampler2D heights;\n"
+    "out vec3 place, normal, tangent;\n"
+    "out vec2 at;\n"
+    "out float value, piece;\n"
+    "out vec4 shadow_at;\n"
+    "void main() {\n"
+    "    float rise = relief > 0.0 ? relief * textureLod(heights, at_uv, 0.0).r : 0.0;\n"
+    "    place = spread * at_place + offset + rise * at_normal;\n"
+    "    normal = at_normal;\n"
+    "    tangent = at_tangent;\n"
+    "    at = at_uv;\n"
+    "    value = at_value;\n"
+    "    piece = at_piece;\n"
+    "    shadow_at = lamp * vec4(place, 1.0);\n"
+    "    gl_Position = view * vec4(place, 1.0);\n"
+    "}\n";
+
+/* What is known of the point, then its colour. */
+static const char surface_main[] =
+    "void main() {\n"
+    "    Surface s;\n"
+    "    s.p = place;\n"
+    "    s.v = normalize(eye - place);\n"
+    "    s.side = gl_FrontFacing ? 1.0 : -1.0;\n"
+    "    vec3 n = normalize(normal) * s.side;\n"
+    "    float away = dot(n, s.v); // a smooth normal may look away where its triangle does not\n"
+    "    s.n = normalize(away < 0.02 ? n + (0.02 - away) * s.v : n);\n"
+    "    s.t = normalize(tangent - dot(tangent, s.n) * s.n + 1e-9 * s.v);\n"
+    "    s.at = at;\n"
+    "    s.value = value;\n"
+    "    s.piece = piece;\n"
+    "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
+    "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
+    "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
+    "    colour = vec4(encoded(shade(s)), 1.0);\n"
+    "}\n";
+
+static const char body_source[] =
+    "vec3 shade(Surface s) {\n"
+    "    vec3 h = normalize(light + s.v);\n"
+    "    return vec3(0.42, 0.45, 0.50) * arriving(s) / PI * 1.9 + 0.06 * power(dot(s.n, h), 24.0) * s.sun;\n"
+    "}\n";
+
+static const char ground_source[] =
+    "uniform vec3 center;\n"
+    "uniform float radius, spacing, solid;\n"
+    "\n"
+    "// Lines of a square lattice on the plane.\n"
+    "float lattice(Surface s) {\n"
+    "    vec3 u = normalize(abs(s.n.y) > 0.7 ? cross(s.n, vec3(0.0, 0.0, 1.0)) : cross(vec3(0.0, 1.0, 0.0), "
+    "s.n));\n"
+    "    vec2 q = vec2(dot(s.p, u), dot(s.p, cross(s.n, u))) / spacing, w = fwidth(q) + 1e-6;\n"
+    "    vec2 near = abs(fract(q - 0.5) - 0.5) / w;\n"
+    "    float line = 1.0 - min(min(near.x, near.y), 1.0);\n"
+    "    return line * clamp(0.5 / max(w.x, w.y) - 1.0, 0.0, 1.0);\n"
+    "}\n"
+    "\n"
+    "// Fades into the wall. Without a ground in the scene only the shadow is seen.\n"
+    "vec3 ground(Surface s) {\n"
+    "    float away = length(s.p - center) / radius, fade = 1.0 - smoothstep(1.3, 3.4, away);\n"
+    "    float shadow = (1.0 - s.sun) * max(0.0, s.n.y);\n"
+    "    if (solid < 0.5) return mix(wall(), vec3(0.24, 0.26, 0.31), 0.40 * shadow * fade);\n"
+    "    s.sun = max(s.sun, 0.12);\n"
+    "    vec3 c = vec3(0.60, 0.60, 0.61) * (1.0 - 0.16 * lattice(s)) * arriving(s) / PI;\n"
+    "    return mix(wall(), encoded(c), fade);\n"
+    "}\n";
+
+static const char ground_main[] =
+    "void main() {\n"
+    "    Surface s;\n"
+    "    s.p = place;\n"
+    "    s.v = normalize(eye - place);\n"
+    "    s.side = gl_FrontFacing ? 1.0 : -1.0;\n"
+    "    vec3 n = normalize(normal) * s.side;\n"
+    "    float away = dot(n, s.v); // a smooth normal may look away where its triangle does not\n"
+    "    s.n = normalize(away < 0.02 ? n + (0.02 - away) * s.v : n);\n"
+    "    s.t = normalize(tangent - dot(tangent, s.n) * s.n + 1e-9 * s.v);\n"
+    "    s.at = at;\n"
+    "    s.value = value;\n"
+    "    s.piece = piece;\n"
+    "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
+    "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
+    "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
+    "    colour = vec4(ground(s), 1.0);\n"
+    "}\n";
+
+static const char wall_vertex[] =
+    "void main() {\n"
+    "    vec2 at = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);\n"
+    "    gl_Position = vec4(at, 1.0, 1.0);\n"
+    "}\n";
+static const char wall_source[] =
+    "uniform vec4 box;\n"
+    "// A wall that is lit from above, sRGB; noise of half a step keeps it from banding.\n"
+    "vec3 wall() {\n"
+    "    vec2 at = (gl_FragCoord.xy - box.xy) / box.zw * 2.0 - 1.0;\n"
+    "    float up = 0.5 + 0.5 * at.y;\n"
+    "    vec3 c = mix(vec3(0.80, 0.81, 0.825), vec3(0.935, 0.94, 0.95), up * up * (3.0 - 2.0 * up));\n"
+    "    float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715)))) - 0.5;\n"
+    "    return c - 0.03 * dot(at, at) * vec3(1.0, 0.95, 0.9) + noise / 255.0;\n"
+    "}\n";
+static const char wall_main[] = "out vec4 colour;\n"
+                                "void main() { colour = vec4(wall(), 1.0); }\n";
+
+/* A ribbon between two points, as wide as it is to look. */
+static const char wire_vertex[] =
+    "layout(location = 0) in vec3 from;\n"
+    "layout(location = 1) in vec3 to;\n"
+    "uniform mat4 view;\n"
+    "uniform vec3 eye;\n"
+    "uniform vec2 size;\n"
+    "uniform float width;\n"
+    "void main() {\n"
+    "    vec4 a = view * vec4(from + 0.003 * (eye - from), 1.0), b = view * vec4(to + 0.003 * (eye - to), "
+    "1.0);\n"
+    "    vec2 way = (b.xy / b.w - a.xy / a.w) * size;\n"
+    "    vec2 side = length(way) > 1e-6 ? normalize(vec2(-way.y, way.x)) : vec2(0.0);\n"
+    "    vec4 p = gl_VertexID < 2 ? a : b;\n"
+    "    p.xy += (gl_VertexID % 2 == 0 ? 1.0 : -1.0) * width * side / size * p.w;\n"
+    "    gl_Position = p;\n"
+    "}\n";
+static const char wire_fragment[] = "out vec4 colour;\n"
+                                    "uniform vec4 ink;\n"
+                                    "void main() { colour = ink; }\n";
+
+static const char pin_vertex[] = "layout(location = 0) in vec3 at;\n"
+                                 "uniform mat4 view;\n"
+                                 "uniform vec3 eye;\n"
+                                 "uniform float width;\n"
+                                 "void main() {\n"
+                                 "    gl_Position = view * vec4(at + 0.006 * (eye - at), 1.0);\n"
+                                 "    gl_PointSize = width;\n"
+                                 "}\n";
+static const char pin_fragment[] =
+    "out vec4 colour;\n"
+    "uniform float width;\n"
+    "void main() {\n"
+    "    float r = length(gl_PointCoord - 0.5) * width, rim = 0.5 * width - 0.5;\n"
+    "    vec3 c = mix(vec3(0.0, 0.86, 0.92), vec3(0.0, 0.42, 0.47), smoothstep(0.70 * rim, 0.78 * rim, r));\n"
+    "    colour = vec4(c, clamp(rim - r + 0.5, 0.0, 1.0));\n"
+    "}\n";
+
+static const char depth_fragment[] = "void main() {}\n";
+
+struct drape_painter {
+    drape_context *ctx;
+    drape_canvas canvas;
+    drape_overlay overlay;
+    GLuint textures[3], ramp; /* of the shadings, in the order of DRAPE_READS_*; 0: not made yet */
+    GLuint shadow, shadow_buffer;
+    GLuint empty; /* vertex array of what has no attributes */
+    GLuint depth, body, ground, wall, wire, pin;
+    GLuint shadings[MAX_SHADINGS]; /* 0: not made yet */
+    drape_gl_mesh floor;
+};
+
+/* ---- Making and freeing ---- */
+
+static GLuint surface_program(drape_context *ctx, const char *name, const char *const *source)
+{
+    const char *const *p = drape_shading_prelude;
+    return drape_gl_program(ctx, name, (const char *const[]){surface_vertex, NULL},
+                            (const char *const[]){p[0], p[1], p[2], source[0], source[1], source[2], NULL});
+}
+
+static GLuint program(drape_context *ctx, const char *name, const char *vertex, const char *first,
+                      const char *second)
+{
+    return drape_gl_program(ctx, name, (const char *const[]){vertex, NULL},
+                            (const char *const[]){first, second, NULL});
+}
+
+static bool create_programs(drape_painter *p)
+{
+    static const char *const body[] = {body_source, surface_main, NULL}, *const ground[] = {wall_source,
+                                                                                            ground_source,
+                                                                                            ground_main};
+    p->depth = program(p->ctx, "depth", surface_vertex, depth_fragment, NULL);
+    p->body = p->depth ? surface_program(p->ctx, "body", body) : 0;
+    p->ground = p->body ? surface_program(p->ctx, "ground", ground) : 0;
+    p->wall = p->ground ? program(p->ctx, "wall", wall_vertex, wall_source, wall_main) : 0;
+    p->wire = p->wall ? program(p->ctx, "wire", wire_vertex, wire_fragment, NULL) : 0;
+    p->pin = p->wire ? program(p->ctx, "pin", pin_vertex, pin_fragment, NULL) : 0;
+    return p->pin;
+}
+
+static void create_shadow(drape_painter *p)
+{
+    static const float lit[] = {1, 1, 1, 1};
+    glGenTextures(1, &p->shadow);
+    glBindTexture(GL_TEXTURE_2D, p->shadow);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT24, SHADOW, SHADOW, 0, GL_DEPTH_COMPONENT,
+                 GL_UNSIGNED_INT, NULL);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_BORDER);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_BORDER);
+    glTexParameterfv(GL_TEXTURE_2D, GL_TEXTURE_BORDER_COLOR, lit);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
+    glGenFramebuffers(1, &p->shadow_buffer);
+    glBindFramebuffer(GL_FRAMEBUFFER, p->shadow_buffer);
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, p->shadow, 0);
+    glDrawBuffer(GL_NONE);
+    glReadBuffer(GL_NONE);
+}
+
+/* A square of two units, level. */
+static void create_floor(drape_painter *p)
+{
+    static const int sizes[] = {3, 3, 0};
+    static const float square[] = {-1, 0, 1, 0, 1, 0, 1, 0, 1,  0, 1, 0, 1,  0, -1, 0, 1, 0,
+                                   -1, 0, 1, 0, 1, 0, 1, 0, -1, 0, 1, 0, -1, 0, -1, 0, 1, 0};
+    drape_gl_mesh_create(&p->floor, sizes, false);
+    drape_gl_mesh_fill(&p->floor, square, 6, false);
+}
+
+static drape_status make_texture(drape_painter *p, int which, const char *path)
+{
+    static drape_status (*const makers[])(drape_context *, const char *, GLuint *) = {
+        drape_texture_pattern, drape_texture_heights, drape_texture_environment};
+    return p->textures[which] ? DRAPE_OK : makers[which](p->ctx, path, &p->textures[which]);
+}
+
+static drape_status read_files(drape_painter *p, const drape_painter_def *def)
+{
+    const char *const paths[] = {def->pattern, def->heights, def->environment};
+    drape_status status = DRAPE_OK;
+    for (int i = 0; i < 3 && !status; i++)
+        if (paths[i])
+            status = make_texture(p, i, paths[i]);
+    return status;
+}
+
+static drape_status create_all(drape_painter *p, const drape_painter_def *def)
+{
+    drape_status status = drape_canvas_create(p->ctx, def->width, def->height, &p->canvas);
+    if (!status)
+        status = drape_overlay_create(p->ctx, def->width, def->height, &p->overlay);
+    if (!status)
+        status = read_files(p, def);
+    if (!status && !create_programs(p))
+        status = DRAPE_E_FILE;
+    if (status)
+        return status;
+    p->ramp = drape_texture_ramp();
+    glGenVertexArrays(1, &p->empty);
+    create_shadow(p);
+    create_floor(p);
+    return drape_gl_check(p->ctx, "make ready to draw");
+}
+
+drape_status drape_painter_create(drape_context *ctx, const drape_painter_def *def, drape_painter **out)
+{
+    *out = drape_alloc(ctx, 1, sizeof **out);
+    if (!*out)
+        return DRAPE_E_MEMORY;
+    (*out)->ctx = ctx;
+    drape_status status = create_all(*out, def);
+    if (status)
+        drape_painter_destroy(out);
+    return status;
+}
+
+void drape_painter_destroy(drape_painter **painter)
+{
+    drape_painter *p = *painter;
+    if (!p)
+        return;
+    const GLuint textures[] = {p->textures[0], p->textures[1], p->textures[2], p->ramp, p->shadow};
+    const GLuint programs[] = {p->depth, p->body, p->ground, p->wall, p->wire, p->pin};
+    glDeleteTextures(sizeof textures / sizeof *textures, textures);
+    for (size_t i = 0; i < sizeof programs / sizeof *programs; i++)
+        glDeleteProgram(programs[i]);
+    for (int i = 0; i < MAX_SHADINGS; i++)
+        glDeleteProgram(p->shadings[i]);
+    glDeleteFramebuffers(1, &p->shadow_buffer);
+    glDeleteVertexArrays(1, &p->empty);
+    drape_gl_mesh_free(&p->floor);
+    drape_overlay_free(&p->overlay);
+    drape_canvas_free(&p->canvas);
+    drape_free(p->ctx, p);
+    *painter = NULL;
+}
+
+const drape_canvas *drape_painter_canvas(const drape_painter *painter)
+{
+    return &painter->canvas;
+}
+
+drape_overlay *drape_painter_overlay(drape_painter *painter)
+{
+    return &painter->overlay;
+}
+
+static drape_status make_textures(drape_painter *p, int reads)
+{
+    drape_status status = DRAPE_OK;
+    for (int i = 0; i < 3 && !status; i++)
+        if (reads & 1 << i)
+            status = make_texture(p, i, NULL);
+    return status;
+}
+
+/* Made when it is first asked for: a driver takes its time for each. */
+static GLuint shading_program(drape_painter *p, const drape_shading *shading)
+{
+    int i = 0;
+    while (i + 1 < MAX_SHADINGS && drape_shadings[i] && drape_shadings[i] != shading)
+        i++;
+    if (!p->shadings[i])
+        p->shadings[i] = surface_program(p->ctx, shading->name,
+                                         (const char *const[]){shading->source, surface_main, NULL});
+    return p->shadings[i];
+}
+
+/* ---- One panel ---- */
+
+/* What is the same for all that is drawn in a panel. */
+typedef struct panel_view {
+    drape_view view;
+    drape_matrix lamp;               /* from space to the lamp's map */
+    float light[3];                  /* towards the lamp */
+    int left, bottom, width, height; /* pixels */
+} panel_view;
+
+static void set_lamp(const drape_stage *stage, float azimuth, panel_view *v)
+{
+    const drape_camera camera = {.azimuth = azimuth, .elevation = LAMP_HEIGHT};
+    drape_view lamp = drape_camera_view(&camera, 1, 1);
+    float reach = stage->radius, eye[3];
+    memcpy(v->light, lamp.axes[2], sizeof v->light);
+    for (int k = 0; k < 3; k++)
+        eye[k] = stage->center[k] + DEEP * reach * v->light[k];
+    drape_matrix look = drape_look((const float(*)[3])lamp.axes, eye);
+    drape_matrix box = drape_orthographic(SHADOW_REACH * reach, 0.1f * reach, 4 * DEEP * reach);
+    v->lamp = drape_multiply(&box, &look);
+}
+
+/* For programs of surfaces, which take their textures at these units. */
+static void use_surface(drape_painter *p, GLuint program, const panel_view *v, const drape_matrix *view)
+{
+    static const float nowhere[3] = {0}, front[3] = {0.50f, 0.062f, 0.048f}, back[3] = {0.40f, 0.29f, 0.18f};
+    const struct {
+        const char *name;
+        GLuint texture;
+    } units[] = {{"shadow_map", p->shadow},
+                 {"picture", p->textures[0]},
+                 {"heights", p->textures[1]},
+                 {"environment", p->textures[2]},
+                 {"ramp", p->ramp}};
+    glUseProgram(program);
+    for (int i = 0; i < 5; i++) {
+        glActiveTexture(GL_TEXTURE0 + (GLenum)i);
+        glBindTexture(GL_TEXTURE_2D, program == p->depth && i == 0 ? 0 : units[i].texture);
+        drape_gl_set_int(program, units[i].name, i);
+    }
+    glActiveTexture(GL_TEXTURE0);
+    drape_gl_set_matrix(program, "view", view->m);
+    drape_gl_set_matrix(program, "lamp", v->lamp.m);
+    drape_gl_set_vec3(program, "eye", v->view.eye);
+    drape_gl_set_vec3(program, "light", v->light);
+    drape_gl_set_vec3(program, "offset", nowhere);
+    drape_gl_set_vec3(program, "front", front);
+    drape_gl_set_vec3(program, "back", back);
+    drape_gl_set_float(program, "soft", SOFT / SHADOW);
+    drape_gl_set_float(program, "texel_depth",
+                       2 * SHADOW_REACH / SHADOW / (4 * DEEP - 0.1f)); /* a texel's width as depth */
+    drape_gl_set_float(program, "relief", 0);
+    drape_gl_set_float(program, "spread", 1);
+}
+
+static void draw_vertices(const drape_gl_mesh *mesh, size_t count)
+{
+    glBindVertexArray(mesh->array);
+    glDrawArrays(GL_TRIANGLES, 0, (GLsizei)count);
+}
+
+static void draw_cloth(const drape_stage *stage)
+{
+    glBindVertexArray(stage->cloth.array);
+    glDrawElements(GL_TRIANGLES, stage->cloth.index_count, GL_UNSIGNED_INT, NULL);
+}
+
+static void draw_bodies(const drape_stage *stage, GLuint program, bool endless)
+{
+    for (int32_t c = 0; c < stage->body_count; c++) {
+        const drape_stage_body *body = &stage->bodies[c];
+        if (body->shape.endless != endless)
+            continue;
+        drape_gl_set_vec3(program, "offset", body->offset);
+        draw_vertices(&body->mesh, body->shape.vertex_count);
+    }
+}
+
+static float relief_of(const drape_stage *stage, const drape_shading *shading)
+{
+    return shading->displaced ? RELIEF * (float)stage->model->length / 1.4142f : 0;
+}
+
+/* What the lamp sees. */
+static void draw_shadows(drape_painter *p, const drape_stage *stage, const drape_shading *shading,
+                         const panel_view *v)
+{
+    glBindFramebuffer(GL_FRAMEBUFFER, p->shadow_buffer);
+    glViewport(0, 0, SHADOW, SHADOW);
+    glDisable(GL_SCISSOR_TEST);
+    glEnable(GL_DEPTH_TEST);
+    glDepthMask(GL_TRUE);
+    glClear(GL_DEPTH_BUFFER_BIT);
+    glEnable(GL_POLYGON_OFFSET_FILL);
+    glPolygonOffset(2, 4);
+    use_surface(p, p->depth, v, &v->lamp);
+    draw_bodies(stage, p->depth, false);
+    drape_gl_set_vec3(p->depth, "offset", (const float[3]){0});
+    drape_gl_set_float(p->depth, "relief", relief_of(stage, shading));
+    draw_cloth(stage);
+    glDisable(GL_POLYGON_OFFSET_FILL);
+}
+
+static void set_box(GLuint program, const panel_view *v)
+{
+    glUniform4f(glGetUniformLocation(program, "box"), (float)v->left, (float)v->bottom, (float)v->width,
+                (float)v->height);
+}
+
+/* Where nothing else is. */
+static void draw_wall(const drape_painter *p, const panel_view *v)
+{
+    glUseProgram(p->wall);
+    set_box(p->wall, v);
+    glBindVertexArray(p->empty);
+    glDepthFunc(GL_LEQUAL);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+static float round_length(float rough)
+{
+    float power = powf(10, floorf(log10f(rough))), s = rough / power;
+    return power * (s < 1.5f ? 1.0f : s < 3.5f ? 2.0f : s < 7.5f ? 5.0f : 10.0f);
+}
+
+/* Endless colliders, and where there are none a floor for the shadow. */
+static void draw_ground(drape_painter *p, const drape_stage *stage, const panel_view *v)
+{
+    use_surface(p, p->ground, v, &v->view.matrix);
+    drape_gl_set_vec3(p->ground, "center", stage->center);
+    drape_gl_set_float(p->ground, "radius", stage->radius);
+    drape_gl_set_float(p->ground, "spacing", round_length(stage->radius / 3));
+    drape_gl_set_float(p->ground, "solid", stage->has_ground);
+    set_box(p->ground, v);
+    glEnable(GL_CULL_FACE);
+    draw_bodies(stage, p->ground, true);
+    if (!stage->has_ground) {
+        drape_gl_set_float(p->ground, "spread", 3.5f * stage->radius);
+        drape_gl_set_vec3(p->ground, "offset",
+                          (const float[]){stage->center[0], stage->floor, stage->center[2]});
+        draw_vertices(&p->floor, 6);
+    }
+    glDisable(GL_CULL_FACE);
+}
+
+/* The mean edge, in pixels, at the camera's distance. */
+static float seen_edge(const drape_stage *stage, const drape_camera *camera, const panel_view *v)
+{
+    const drape_model *m = stage->model;
+    double sum = 0;
+    for (int32_t e = 0; e < m->edge_count; e++)
+        sum += m->edge_length[e];
+    return (float)(sum / m->edge_count) / (2 * camera->distance * v->view.ty) * (float)v->height;
+}
+
+static void draw_wires(const drape_painter *p, const drape_stage *stage, const drape_camera *camera,
+                       const panel_view *v)
+{
+    float width = fminf(WIRE * p->overlay.unit, WIRE_SHARE * seen_edge(stage, camera, v));
+    const float thin = fminf(1, width); /* below a pixel a line is fainter, not thinner */
+    glEnable(GL_BLEND);
+    glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+    glUseProgram(p->wire);
+    drape_gl_set_matrix(p->wire, "view", v->view.matrix.m);
+    drape_gl_set_vec3(p->wire, "eye", v->view.eye);
+    drape_gl_set_vec2(p->wire, "size", (float)v->width, (float)v->height);
+    drape_gl_set_float(p->wire, "width", fmaxf(1, width));
+    glUniform4f(glGetUniformLocation(p->wire, "ink"), 0.80f, 0.11f, 0.10f, thin);
+    glBindVertexArray(stage->wires.array);
+    glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, (GLsizei)stage->wire_count);
+    glEnable(GL_PROGRAM_POINT_SIZE);
+    glUseProgram(p->pin);
+    drape_gl_set_matrix(p->pin, "view", v->view.matrix.m);
+    drape_gl_set_vec3(p->pin, "eye", v->view.eye);
+    drape_gl_set_float(p->pin, "width", PIN * p->overlay.unit);
+    glBindVertexArray(stage->pins.array);
+    glDrawArrays(GL_POINTS, 0, (GLsizei)stage->pin_count);
+    glDisable(GL_BLEND);
+}
+
+static drape_status draw_panel(drape_painter *p, const drape_picture *picture, int index, const int *box)
+{
+    const drape_panel *panel = &picture->panels[index];
+    const drape_shading *shading = picture->shading;
+    drape_stage *stage = panel->stage;
+    GLuint program = shading_program(p, shading);
+    panel_view v = {.left = box[0], .bottom = box[1], .width = box[2], .height = box[3]};
+    drape_status status = program ? make_textures(p, shading->reads) : DRAPE_E_FILE;
+    if (status)
+        return status;
+    v.view = drape_camera_view(&picture->camera, (float)box[2] / (float)box[3], stage->radius);
+    set_lamp(stage, picture->lamp_azimuth, &v);
+    drape_stage_set(stage, &panel->moment, shading->wires);
+    draw_shadows(p, stage, shading, &v);
+    glBindFramebuffer(GL_FRAMEBUFFER, p->canvas.many);
+    glViewport(box[0], box[1], box[2], box[3]);
+    use_surface(p, program, &v, &v.view.matrix);
+    drape_gl_set_vec2(program, "range", (float)picture->low, (float)picture->high);
+    drape_gl_set_float(program, "relief", relief_of(stage, shading));
+    draw_cloth(stage);
+    use_surface(p, p->body, &v, &v.view.matrix);
+    glEnable(GL_CULL_FACE);
+    draw_bodies(stage, p->body, false);
+    glDisable(GL_CULL_FACE);
+    draw_ground(p, stage, &v);
+    draw_wall(p, &v);
+    if (shading->wires)
+        draw_wires(p, stage, &picture->camera, &v);
+    return DRAPE_OK;
+}
+
+/* ---- The picture ---- */
+
+static int columns_of(int panel_count)
+{
+    return panel_count <= 3 ? panel_count : (int)ceil(sqrt(panel_count));
+}
+
+/* x, y from below, width, height. */
+static void panel_box(const drape_painter *p, int panel_count, int index, int *box)
+{
+    int columns = columns_of(panel_count), rows = (panel_count + columns - 1) / columns;
+    int column = index % columns, row = rows - 1 - index / columns;
+    box[0] = column * p->canvas.width / columns;
+    box[1] = row * p->canvas.height / rows;
+    box[2] = (column + 1) * p->canvas.width / columns - box[0];
+    box[3] = (row + 1) * p->canvas.height / rows - box[1];
+}
+
+float drape_painter_aspect(const drape_painter *painter, int panel_count)
+{
+    int box[4];
+    panel_box(painter, panel_count, 0, box);
+    return (float)box[2] / (float)box[3];
+}
+
+static void put_legend(drape_painter *p, const drape_picture *picture)
+{
+    const drape_field_ops *field = picture->shading->field;
+    drape_overlay *o = &p->overlay;
+    char title[80];
+    if (!field)
+        return;
+    snprintf(title, sizeof title, "%s [%s]", field->name, field->shown_unit);
+    drape_overlay_legend(o, (float)o->width - 22 * o->unit, (float)o->height - 26 * o->unit,
+                         0.36f * (float)o->height, title, field->shown * picture->low,
+                         field->shown * picture->high);
+}
+
+/* Behind lines of text, so that they are read over cloth, too. */
+static void put_veil(drape_overlay *o, const char *const *lines, float line)
+{
+    float widest = 0;
+    int count = 0;
+    for (; lines && lines[count]; count++)
+        widest = fmaxf(widest, drape_font_width(&o->font, lines[count]));
+    if (count > 0)
+        drape_overlay_box(o, 10 * o->unit, 9 * o->unit, widest + 20 * o->unit,
+                          (float)count * line + 10 * o->unit, (const float[]){1, 1, 1, 0.42f});
+}
+
+static void put_texts(drape_painter *p, const drape_picture *picture)
+{
+    drape_overlay *o = &p->overlay;
+    float left = 20 * o->unit, line = 21 * o->unit;
+    for (int i = 0; i < picture->panel_count; i++) {
+        int box[4];
+        panel_box(p, picture->panel_count, i, box);
+        float top = (float)(o->height - box[1] - box[3]);
+        if (picture->panels[i].label)
+            drape_overlay_text(o, (float)box[0] + left, top + 30 * o->unit, DRAPE_LEFT, drape_ink,
+                               picture->panels[i].label);
+        if (box[0] > 0)
+            drape_overlay_box(o, (float)box[0] - 0.5f * o->unit, top, o->unit, (float)box[3],
+                              (const float[]){1, 1, 1, 0.9f});
+    }
+    put_veil(o, picture->lines, line);
+    for (int i = 0; picture->lines && picture->lines[i]; i++)
+        drape_overlay_text(o, left, 30 * o->unit + (float)i * line, DRAPE_LEFT, drape_ink, picture->lines[i]);
+    if (picture->caption)
+        drape_overlay_text(o, left, (float)o->height - 22 * o->unit, DRAPE_LEFT, drape_faint,
+                           picture->caption);
+}
+
+drape_status drape_painter_draw(drape_painter *painter, const drape_picture *picture)
+{
+    drape_status status = DRAPE_OK;
+    glDisable(GL_SCISSOR_TEST);
+    drape_canvas_begin(&painter->canvas);
+    for (int i = 0; i < picture->panel_count && !status; i++) {
+        int box[4];
+        panel_box(painter, picture->panel_count, i, box);
+        status = draw_panel(painter, picture, i, box);
+    }
+    if (status)
+        return status;
+    glViewport(0, 0, painter->canvas.width, painter->canvas.height);
+    put_legend(painter, picture);
+    put_texts(painter, picture);
+    drape_overlay_draw(&painter->overlay);
+    return drape_gl_check(painter->ctx, "draw a picture");
+}

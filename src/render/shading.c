@@ -1,0 +1,102 @@
+/* shading.c: see shading.h. */
+#include "render/shading.h"
+
+#include <string.h>
+
+static const char inputs[] =
+    "in vec3 place, normal, tangent;\n"
+    "in vec2 at;\n"
+    "in float value, piece;\n"
+    "in vec4 shadow_at;\n"
+    "out vec4 colour;\n"
+    "uniform vec3 eye, light, front, back;\n"
+    "uniform vec2 range;\n"
+    "uniform float relief, soft, texel_depth;\n"
+    "uniform sampler2DShadow shadow_map;\n"
+    "uniform sampler2D picture, heights, environment, ramp;\n"
+    "const float PI = 3.14159265;\n"
+    "\n"
+    "struct Surface {\n"
+    "    vec3 p, n, t, v;    // point, normal to the eye, tangent along u, direction of the eye\n"
+    "    vec2 at;            // texture coordinates\n"
+    "    float value, piece; // of the field; number of the cloth\n"
+    "    float sun;          // how much of the lamp reaches it\n"
+    "    float side;         // 1: the front is seen, -1: the back\n"
+    "};\n";
+
+static const char lights[] =
+    "// The part of the lamp that is seen from here: four comparisons around the point, each between four "
+    "texels.\n"
+    "float sunlight(vec4 q, float facing) {\n"
+    "    vec3 s = q.xyz * 0.5 + 0.5;\n"
+    "    if (facing <= 0.0) return 0.0;\n"
+    "    s.z -= texel_depth * (1.0 + 3.5 * min(sqrt(1.0 - facing * facing) / facing, 12.0));\n"
+    "    if (any(lessThan(s, vec3(0.0))) || any(greaterThan(s, vec3(1.0)))) return 1.0;\n"
+    "    vec2 a = soft * vec2(0.94, 0.34), b = soft * vec2(-0.34, 0.94);\n"
+    "    return 0.25 * (texture(shadow_map, vec3(s.xy + a, s.z)) + texture(shadow_map, vec3(s.xy - a, s.z)) "
+    "+\n"
+    "                   texture(shadow_map, vec3(s.xy + b, s.z)) + texture(shadow_map, vec3(s.xy - b, "
+    "s.z)));\n"
+    "}\n"
+    "\n"
+    "const vec3 LAMP = vec3(2.60, 2.46, 2.28);\n"
+    "vec3 ambient(vec3 n) {\n"
+    "    return mix(vec3(0.40, 0.37, 0.35), vec3(0.74, 0.80, 0.90), 0.5 + 0.5 * n.y) * 0.56;\n"
+    "}\n"
+    "\n"
+    "// Light that arrives, for a matt surface: the lamp, the room, and a little from where we stand.\n"
+    "vec3 arriving(Surface s, vec3 n) {\n"
+    "    return LAMP * s.sun * max(0.0, dot(n, light)) + ambient(n) + 0.16 * max(0.0, dot(n, s.v));\n"
+    "}\n"
+    "vec3 arriving(Surface s) { return arriving(s, s.n); }\n"
+    "\n"
+    "// Colours of several pieces of cloth differ.\n"
+    "vec3 tint(Surface s) {\n"
+    "    vec3 c = s.side > 0.0 ? front : back;\n"
+    "    float k = mod(s.piece, 3.0);\n"
+    "    return k < 0.5 ? c : k < 1.5 ? c.zyx : c.yzx;\n"
+    "}\n";
+
+static const char surroundings[] =
+    "// The world around in a direction; blur: 0 to 1.\n"
+    "vec3 world(vec3 d, float blur) {\n"
+    "    vec2 u = vec2(atan(d.x, d.z) / (2.0 * PI) + 0.5, asin(clamp(d.y, -1.0, 1.0)) / PI + 0.5);\n"
+    "    return textureLod(environment, u, blur * 6.5).rgb;\n"
+    "}\n"
+    "\n"
+    "// The normal of the relief in the height map: its slopes along the tangents.\n"
+    "vec3 bumped(Surface s, float height) {\n"
+    "    vec2 d = vec2(1.0 / 1024.0, 0.0);\n"
+    "    float du = texture(heights, s.at + d).r - texture(heights, s.at - d).r;\n"
+    "    float dv = texture(heights, s.at + d.yx).r - texture(heights, s.at - d.yx).r;\n"
+    "    vec3 across = cross(s.n, s.t) * s.side;\n"
+    "    return normalize(s.n - s.side * height / (2.0 * d.x) * (du * s.t + dv * across));\n"
+    "}\n"
+    "\n"
+    "// From linear light to what a screen is told (IEC 61966-2-1).\n"
+    "vec3 encoded(vec3 c) {\n"
+    "    c = clamp(c, 0.0, 1.0);\n"
+    "    return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));\n"
+    "}\n"
+    "\n"
+    "float power(float x, float k) { return pow(max(x, 0.0), k); }\n"
+    "float schlick(float cosine, float f0) { return f0 + (1.0 - f0) * power(1.0 - cosine, 5.0); }\n";
+
+const char *const drape_shading_prelude[] = {inputs, lights, surroundings, NULL};
+
+/* Colours are to be read, so light changes them little. */
+const char drape_shading_field_source[] =
+    "vec3 shade(Surface s) {\n"
+    "    float x = clamp((s.value - range.x) / (range.y - range.x), 0.0, 1.0);\n"
+    "    vec3 c = texture(ramp, vec2(x * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;\n"
+    "    float form = 0.70 + 0.22 * max(0.0, dot(s.n, s.v)) + 0.16 * s.sun * max(0.0, dot(s.n, light));\n"
+    "    return c * min(form, 1.06);\n"
+    "}\n";
+
+const drape_shading *drape_shading_find(const char *name)
+{
+    for (int i = 0; drape_shadings[i]; i++)
+        if (strcmp(drape_shadings[i]->name, name) == 0)
+            return drape_shadings[i];
+    return NULL;
+}

@@ -1,0 +1,35 @@
+/*
+ * shading.h: the ways to colour cloth, rows of one table. A row is the constant drape_shading_<word> of
+ * shade_<word>.c: a function `vec3 shade(Surface s)` in GLSL, in linear RGB, over what shading.c gives to all.
+ */
+#ifndef DRAPE_RENDER_SHADING_H
+#define DRAPE_RENDER_SHADING_H
+
+#include "fields/fields.h"
+
+/* Textures that a shading reads: made when the first that does is drawn. */
+enum { DRAPE_READS_PATTERN = 1, DRAPE_READS_HEIGHTS = 2, DRAPE_READS_ENVIRONMENT = 4 };
+
+typedef struct drape_shading {
+    const char *name, *summary;
+    const char *reference;        /* NULL: none */
+    const char *source;           /* GLSL */
+    const drape_field_ops *field; /* what is shown in colours; NULL: none */
+    int reads;                    /* sum of DRAPE_READS_* */
+    bool wires;                   /* the mesh's edges and the pinned nodes are drawn, too */
+    bool displaced;               /* points are moved along their normals by the height map */
+} drape_shading;
+
+extern const drape_shading *const drape_shadings[]; /* NULL-ended */
+extern const char *const drape_shadings_words[];
+
+/* NULL: there is none of that name. */
+const drape_shading *drape_shading_find(const char *name);
+
+/* GLSL that all surfaces share: what is known of a point, light, shadow, the world around. NULL-ended. */
+extern const char *const drape_shading_prelude[];
+
+/* How fields are coloured. */
+extern const char drape_shading_field_source[];
+
+#endif

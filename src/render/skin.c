@@ -1,0 +1,438 @@
+/* skin.c: see skin.h. A point of an edge depends on that edge's ends alone, so the triangles beside it share it
+ * and no gap opens. */
+#include "render/skin.h"
+
+#include "base/vec3.h"
+#include "render/matrix.h"
+
+#include <math.h>
+#include <string.h>
+
+#define DRAWN_TRIANGLES 36000 /* about as many are drawn where the mesh is coarser */
+#define MOST_PIECES     8
+#define BULGE           0.35f /* sine of the angle from edge to plane at which a curve is half as round */
+
+/* ---- Numbers ---- */
+
+/* Edges are ordered by (lower, higher) node over the whole model. */
+static int32_t find_edge(const drape_model *m, int32_t a, int32_t b)
+{
+    int32_t lower = a < b ? a : b, higher = a < b ? b : a, first = 0, last = m->edge_count - 1;
+    while (first < last) {
+        int32_t middle = first + (last - first) / 2;
+        const int32_t *edge = m->edge + 2 * (size_t)middle;
+        if (edge[0] < lower || (edge[0] == lower && edge[1] < higher))
+            first = middle + 1;
+        else
+            last = middle;
+    }
+    return first;
+}
+
+static void number_edges(drape_skin *s)
+{
+    const drape_model *m = s->model;
+    for (size_t i = 0; i < 3 * (size_t)m->triangle_count; i++) {
+        int32_t a = m->triangle[i], b = m->triangle[i - i % 3 + (i + 1) % 3];
+        int32_t e = find_edge(m, a, b);
+        s->triangle_edge[i] = a < b ? e : -1 - e;
+    }
+}
+
+static size_t inner_points(int level)
+{
+    return (size_t)(level - 1) * (size_t)(level - 2) / 2;
+}
+
+/* Point (i, j) of triangle t: i steps from corner 0 to 1, j from corner 0 to 2. */
+static uint32_t point_number(const drape_skin *s, int32_t t, int i, int j)
+{
+    const drape_model *m = s->model;
+    const int32_t *corner = m->triangle + 3 * (size_t)t, *edge = s->triangle_edge + 3 * (size_t)t;
+    int n = s->level, k = n - i - j, side = -1, along = 0;
+    if (k == n || i == n || j == n)
+        return (uint32_t)corner[k == n ? 0 : i == n ? 1 : 2];
+    if (j == 0)
+        side = 0, along = i;
+    else if (k == 0)
+        side = 1, along = j;
+    else if (i == 0)
+        side = 2, along = k;
+    if (side >= 0) {
+        int32_t e = edge[side] >= 0 ? edge[side] : -1 - edge[side];
+        along = edge[side] >= 0 ? along : n - along;
+        return (uint32_t)((size_t)m->node_count + (size_t)e * (size_t)(n - 1) + (size_t)(along - 1));
+    }
+    size_t before = 0; /* inner points of the rows j' < j */
+    for (int row = 1; row < j; row++)
+        before += (size_t)(n - 1 - row);
+    return (uint32_t)((size_t)m->node_count + (size_t)m->edge_count * (size_t)(n - 1) +
+                      (size_t)t * inner_points(n) + before + (size_t)(i - 1));
+}
+
+static void number_triangles(drape_skin *s)
+{
+    uint32_t *to = s->index;
+    for (int32_t t = 0; t < s->model->triangle_count; t++)
+        for (int j = 0; j < s->level; j++)
+            for (int i = 0; i + j < s->level; i++) {
+                *to++ = point_number(s, t, i, j);
+                *to++ = point_number(s, t, i + 1, j);
+                *to++ = point_number(s, t, i, j + 1);
+                if (i + j + 1 == s->level)
+                    continue;
+                *to++ = point_number(s, t, i + 1, j);
+                *to++ = point_number(s, t, i + 1, j + 1);
+                *to++ = point_number(s, t, i, j + 1);
+            }
+    s->index_count = (size_t)(to - s->index);
+}
+
+/* ---- Texture coordinates ---- */
+
+/* Of a grid: along its first row and across, as far as nodes lie there at rest. */
+static void unroll_grid(const drape_cloth *cloth, float *uv)
+{
+    const drape_mesh *mesh = &cloth->mesh;
+    const double *origin = mesh->x, *right = mesh->x + 3 * (size_t)(mesh->columns - 1),
+                 *last = mesh->x + 3 * (size_t)(mesh->rows - 1) * (size_t)mesh->columns;
+    double u[3], v[3], low = INFINITY, high[2] = {0, 0};
+    vec3_sub(right, origin, u);
+    vec3_sub(last, origin, v);
+    vec3_add_scaled(-vec3_dot(u, v) / vec3_dot(u, u), u, v);
+    for (int32_t i = 0; i < mesh->node_count; i++) {
+        double x[3];
+        vec3_sub(mesh->x + 3 * (size_t)i, origin, x);
+        uv[2 * i] = (float)(vec3_dot(x, u) / vec3_norm(u));
+        uv[2 * i + 1] = (float)(vec3_dot(x, v) / vec3_norm(v));
+        low = fmin(low, (double)uv[2 * i]);
+        high[0] = fmax(high[0], (double)uv[2 * i]);
+        high[1] = fmax(high[1], (double)uv[2 * i + 1]);
+    }
+    double longer = fmax(high[0] - low, high[1]);
+    for (int32_t i = 0; i < mesh->node_count; i++) {
+        uv[2 * i] = (float)(((double)uv[2 * i] - low) / longer);
+        uv[2 * i + 1] = (float)((double)uv[2 * i + 1] / longer);
+    }
+}
+
+/* Of other meshes: seen along the shortest side of their box. */
+static void flatten(const drape_cloth *cloth, float *uv)
+{
+    const drape_mesh *mesh = &cloth->mesh;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    int shortest = 0;
+    for (size_t i = 0; i < 3 * (size_t)mesh->node_count; i++) {
+        low[i % 3] = fmin(low[i % 3], mesh->x[i]);
+        high[i % 3] = fmax(high[i % 3], mesh->x[i]);
+    }
+    for (int k = 1; k < 3; k++)
+        if (high[k] - low[k] < high[shortest] - low[shortest])
+            shortest = k;
+    int u = (shortest + 1) % 3, v = (shortest + 2) % 3;
+    double longer = fmax(high[u] - low[u], high[v] - low[v]);
+    for (size_t i = 0; i < (size_t)mesh->node_count; i++) {
+        uv[2 * i] = (float)((mesh->x[3 * i + (size_t)u] - low[u]) / longer);
+        uv[2 * i + 1] = (float)((mesh->x[3 * i + (size_t)v] - low[v]) / longer);
+    }
+}
+
+/* Seen from the front, where triangles run counterclockwise, so must their texture: else it is read mirrored. */
+static bool is_mirrored(const drape_mesh *mesh, const float *uv)
+{
+    double area = 0;
+    for (size_t t = 0; t < (size_t)mesh->triangle_count; t++) {
+        const float *a = uv + 2 * mesh->triangle[3 * t], *b = uv + 2 * mesh->triangle[3 * t + 1],
+                    *c = uv + 2 * mesh->triangle[3 * t + 2];
+        area += (double)((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+    }
+    return area < 0;
+}
+
+static void unroll(const drape_cloth *cloth, float *uv)
+{
+    const drape_mesh *mesh = &cloth->mesh;
+    float highest = 0;
+    if (mesh->rows > 0)
+        unroll_grid(cloth, uv);
+    else
+        flatten(cloth, uv);
+    if (!is_mirrored(mesh, uv))
+        return;
+    for (int32_t i = 0; i < mesh->node_count; i++)
+        highest = fmaxf(highest, uv[2 * i + 1]);
+    for (int32_t i = 0; i < mesh->node_count; i++)
+        uv[2 * i + 1] = highest - uv[2 * i + 1];
+}
+
+/* ---- Making and freeing ---- */
+
+static int choose_level(const drape_model *m)
+{
+    double pieces = sqrt(DRAWN_TRIANGLES / fmax(1, m->triangle_count));
+    return pieces < 1 ? 1 : pieces > MOST_PIECES ? MOST_PIECES : (int)lround(pieces);
+}
+
+static bool allocate(drape_skin *s)
+{
+    const drape_model *m = s->model;
+    drape_context *ctx = s->ctx;
+    size_t nodes = (size_t)m->node_count, triangles = (size_t)m->triangle_count, level = (size_t)s->level;
+    s->vertex_count = nodes + (size_t)m->edge_count * (level - 1) + triangles * inner_points(s->level);
+    s->segment_count = (size_t)m->edge_count * level;
+    s->triangle_edge = drape_alloc(ctx, 3 * triangles, sizeof *s->triangle_edge);
+    s->uv = drape_alloc(ctx, 2 * nodes, sizeof *s->uv);
+    s->normal = drape_alloc(ctx, 3 * nodes, sizeof *s->normal);
+    s->tangent = drape_alloc(ctx, 3 * nodes, sizeof *s->tangent);
+    s->cloth = drape_alloc(ctx, nodes, sizeof *s->cloth);
+    s->vertex = drape_alloc(ctx, s->vertex_count, sizeof *s->vertex);
+    s->index = drape_alloc(ctx, 3 * triangles * level * level, sizeof *s->index);
+    s->segment = drape_alloc(ctx, 6 * s->segment_count, sizeof *s->segment);
+    return s->triangle_edge && s->uv && s->normal && s->tangent && s->cloth && s->vertex && s->index &&
+           s->segment;
+}
+
+drape_status drape_skin_create(drape_context *ctx, const drape_model *model, drape_skin *skin)
+{
+    *skin = (drape_skin){.ctx = ctx, .model = model, .level = choose_level(model)};
+    if (!allocate(skin)) {
+        drape_skin_free(skin);
+        return DRAPE_E_MEMORY;
+    }
+    number_edges(skin);
+    number_triangles(skin);
+    for (int32_t c = 0; c < model->cloth_count; c++) {
+        const drape_cloth *cloth = &model->cloths[c];
+        unroll(cloth, skin->uv + 2 * (size_t)cloth->first_node);
+        for (int32_t i = 0; i < cloth->mesh.node_count; i++)
+            skin->cloth[cloth->first_node + i] = (float)c;
+    }
+    return DRAPE_OK;
+}
+
+void drape_skin_free(drape_skin *skin)
+{
+    void *const all[] = {skin->triangle_edge, skin->uv,    skin->normal, skin->tangent,
+                         skin->cloth,         skin->index, skin->vertex, skin->segment};
+    for (size_t i = 0; skin->ctx && i < sizeof all / sizeof *all; i++)
+        drape_free(skin->ctx, all[i]);
+    *skin = (drape_skin){.level = 0};
+}
+
+/* ---- Normals and tangents of the nodes ---- */
+
+static void subtract(const float *a, const float *b, float *out)
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = a[k] - b[k];
+}
+
+/* The cross product of two sides is twice the area long: the sum is weighted by area. So is the direction in which
+ * u grows, e1 dv2 - e2 dv1 over the determinant of the uv, whose sign alone counts. */
+static void add_triangle(drape_skin *s, const float *x, const int32_t *corner)
+{
+    const float *uv[3];
+    float e1[3], e2[3], normal[3], along[3];
+    for (int k = 0; k < 3; k++)
+        uv[k] = s->uv + 2 * (size_t)corner[k];
+    subtract(x + 3 * (size_t)corner[1], x + 3 * (size_t)corner[0], e1);
+    subtract(x + 3 * (size_t)corner[2], x + 3 * (size_t)corner[0], e2);
+    drape_cross(e1, e2, normal);
+    float du1 = uv[1][0] - uv[0][0], dv1 = uv[1][1] - uv[0][1];
+    float du2 = uv[2][0] - uv[0][0], dv2 = uv[2][1] - uv[0][1];
+    float sign = du1 * dv2 - du2 * dv1 < 0 ? -1.0f : 1.0f, area = sqrtf(drape_dot(normal, normal));
+    for (int k = 0; k < 3; k++)
+        along[k] = sign * (e1[k] * dv2 - e2[k] * dv1);
+    drape_normalize(along);
+    for (int c = 0; c < 3; c++)
+        for (int k = 0; k < 3; k++) {
+            s->normal[3 * (size_t)corner[c] + (size_t)k] += normal[k];
+            s->tangent[3 * (size_t)corner[c] + (size_t)k] += area * along[k];
+        }
+}
+
+/* Across the normal. */
+static void straighten(const float *normal, float *tangent)
+{
+    float along = drape_dot(normal, tangent);
+    for (int k = 0; k < 3; k++)
+        tangent[k] -= along * normal[k];
+    drape_normalize(tangent);
+}
+
+static void fit_nodes(drape_skin *s, const float *x, const float *values)
+{
+    const drape_model *m = s->model;
+    memset(s->normal, 0, 3 * (size_t)m->node_count * sizeof *s->normal);
+    memset(s->tangent, 0, 3 * (size_t)m->node_count * sizeof *s->tangent);
+    for (int32_t t = 0; t < m->triangle_count; t++)
+        add_triangle(s, x, m->triangle + 3 * (size_t)t);
+    for (size_t i = 0; i < (size_t)m->node_count; i++) {
+        drape_skin_vertex *v = &s->vertex[i];
+        drape_normalize(s->normal + 3 * i);
+        straighten(s->normal + 3 * i, s->tangent + 3 * i);
+        memcpy(v->p, x + 3 * i, sizeof v->p);
+        memcpy(v->n, s->normal + 3 * i, sizeof v->n);
+        memcpy(v->t, s->tangent + 3 * i, sizeof v->t);
+        memcpy(v->uv, s->uv + 2 * i, sizeof v->uv);
+        v->value = values ? values[i] : 0;
+        v->cloth = s->cloth[i];
+    }
+}
+
+/* ---- Points between ---- */
+
+/* The inner control point of a curve from a to b that leaves a across its normal, less a: the way there projected
+ * into a's plane, a third of it. Where the mesh is folded more sharply than it resolves, the curve would bulge into
+ * the next layer: there it stays straight. */
+static void leave(const drape_skin_vertex *a, const drape_skin_vertex *b, float *out)
+{
+    subtract(b->p, a->p, out);
+    float w = drape_dot(out, a->n), length = drape_dot(out, out),
+          sharp = w * w / (BULGE * BULGE * length + 1e-30f);
+    w /= 1 + sharp * sharp;
+    for (int k = 0; k < 3; k++)
+        out[k] = (out[k] - w * a->n[k]) / 3;
+}
+
+/* The normal in the middle of a curve: the mean of its ends' reflected at the plane between them. */
+static void middle_normal(const drape_skin_vertex *a, const drape_skin_vertex *b, float *out)
+{
+    float way[3], sum[3];
+    subtract(b->p, a->p, way);
+    for (int k = 0; k < 3; k++)
+        sum[k] = a->n[k] + b->n[k];
+    float length = drape_dot(way, way), w = length > 0 ? 2 * drape_dot(way, sum) / length : 0;
+    for (int k = 0; k < 3; k++)
+        out[k] = sum[k] - w * way[k];
+    drape_normalize(out);
+}
+
+/* What is linear: w of the corners. */
+static void blend(const drape_skin_vertex *const *corner, const float *w, int count, drape_skin_vertex *out)
+{
+    memset(out, 0, sizeof *out);
+    for (int c = 0; c < count; c++) {
+        for (int k = 0; k < 3; k++)
+            out->t[k] += w[c] * corner[c]->t[k];
+        for (int k = 0; k < 2; k++)
+            out->uv[k] += w[c] * corner[c]->uv[k];
+        out->value += w[c] * corner[c]->value;
+    }
+    out->cloth = corner[0]->cloth;
+}
+
+static void finish(drape_skin_vertex *v)
+{
+    drape_normalize(v->n);
+    straighten(v->n, v->t);
+}
+
+static void fit_edge(drape_skin *s, int32_t e)
+{
+    const drape_model *m = s->model;
+    const drape_skin_vertex *const ends[2] = {&s->vertex[m->edge[2 * (size_t)e]],
+                                              &s->vertex[m->edge[2 * (size_t)e + 1]]};
+    drape_skin_vertex *to = &s->vertex[(size_t)m->node_count + (size_t)e * (size_t)(s->level - 1)];
+    float from_a[3], from_b[3], normal[3];
+    leave(ends[0], ends[1], from_a);
+    leave(ends[1], ends[0], from_b);
+    middle_normal(ends[0], ends[1], normal);
+    for (int i = 1; i < s->level; i++, to++) {
+        float u = (float)i / (float)s->level, w = 1 - u;
+        blend(ends, (float[]){w, u}, 2, to);
+        for (int k = 0; k < 3; k++) {
+            to->p[k] = w * w * w * ends[0]->p[k] + 3 * w * w * u * (ends[0]->p[k] + from_a[k]) +
+                       3 * w * u * u * (ends[1]->p[k] + from_b[k]) + u * u * u * ends[1]->p[k];
+            to->n[k] = w * w * ends[0]->n[k] + u * u * ends[1]->n[k] + w * u * normal[k];
+        }
+        finish(to);
+    }
+}
+
+/* The control net of a triangle: two points on each side, one inside; and the normals of its sides' middles. */
+typedef struct patch {
+    const drape_skin_vertex *corner[3];
+    float side[3][2][3]; /* from corner k towards k + 1: near k, near k + 1 */
+    float inside[3], normal[3][3];
+} patch;
+
+static void make_patch(const drape_skin *s, int32_t t, patch *p)
+{
+    for (int k = 0; k < 3; k++)
+        p->corner[k] = &s->vertex[s->model->triangle[3 * (size_t)t + (size_t)k]];
+    for (int k = 0; k < 3; k++) {
+        const drape_skin_vertex *a = p->corner[k], *b = p->corner[(k + 1) % 3];
+        leave(a, b, p->side[k][0]);
+        leave(b, a, p->side[k][1]);
+        for (int i = 0; i < 3; i++) {
+            p->side[k][0][i] += a->p[i];
+            p->side[k][1][i] += b->p[i];
+        }
+        middle_normal(a, b, p->normal[k]);
+    }
+    for (int i = 0; i < 3; i++) {
+        float sum = 0, corners = 0;
+        for (int k = 0; k < 3; k++) {
+            sum += p->side[k][0][i] + p->side[k][1][i];
+            corners += p->corner[k]->p[i];
+        }
+        p->inside[i] = sum / 4 - corners / 6; /* E + (E - V) / 2 */
+    }
+}
+
+/* At the weights w of the corners. */
+static void fit_inner(const patch *p, const float *w, drape_skin_vertex *to)
+{
+    blend(p->corner, w, 3, to);
+    for (int i = 0; i < 3; i++) {
+        float x = 6 * w[0] * w[1] * w[2] * p->inside[i], n = 0;
+        for (int k = 0; k < 3; k++) {
+            float a = w[k], b = w[(k + 1) % 3];
+            x += a * a * a * p->corner[k]->p[i] + 3 * a * a * b * p->side[k][0][i] +
+                 3 * a * b * b * p->side[k][1][i];
+            n += a * a * p->corner[k]->n[i] + a * b * p->normal[k][i];
+        }
+        to->p[i] = x;
+        to->n[i] = n;
+    }
+    finish(to);
+}
+
+static void fit_triangle(drape_skin *s, int32_t t)
+{
+    patch p;
+    float n = (float)s->level;
+    make_patch(s, t, &p);
+    for (int j = 1; j < s->level; j++)
+        for (int i = 1; i + j < s->level; i++)
+            fit_inner(&p, (float[]){(n - (float)i - (float)j) / n, (float)i / n, (float)j / n},
+                      &s->vertex[point_number(s, t, i, j)]);
+}
+
+void drape_skin_fit(drape_skin *skin, const float *positions, const float *values)
+{
+    fit_nodes(skin, positions, values);
+    for (int32_t e = 0; skin->level > 1 && e < skin->model->edge_count; e++)
+        fit_edge(skin, e);
+    for (int32_t t = 0; skin->level > 2 && t < skin->model->triangle_count; t++)
+        fit_triangle(skin, t);
+}
+
+void drape_skin_wire(drape_skin *skin)
+{
+    const drape_model *m = skin->model;
+    float *to = skin->segment;
+    for (int32_t e = 0; e < m->edge_count; e++) {
+        const drape_skin_vertex *last = &skin->vertex[m->edge[2 * (size_t)e]];
+        for (int i = 1; i <= skin->level; i++, to += 6) {
+            const drape_skin_vertex *next =
+                i == skin->level ? &skin->vertex[m->edge[2 * (size_t)e + 1]]
+                                 : &skin->vertex[(size_t)m->node_count +
+                                                 (size_t)e * (size_t)(skin->level - 1) + (size_t)(i - 1)];
+            memcpy(to, last->p, sizeof last->p);
+            memcpy(to + 3, next->p, sizeof next->p);
+            last = next;
+        }
+    }
+}

@@ -1,0 +1,39 @@
+/* data.h: what the page shows of a run: numbers and texts as JSON, frames as 16 bit integers in base64. */
+#ifndef DRAPE_REPORT_DATA_H
+#define DRAPE_REPORT_DATA_H
+
+#include "io/file.h"
+#include "report/record.h"
+
+/* A field of the nodes over all kept frames: number i stands for low + i step. */
+typedef struct drape_report_field {
+    const char *name, *unit;
+    int width; /* numbers a node */
+    double low[3], step[3];
+} drape_report_field;
+
+#define DRAPE_REPORT_FIELDS 3 /* positions, strain, speed */
+
+typedef struct drape_report_data {
+    const drape_record *run;
+    int64_t kept;                /* frames in the page */
+    int64_t *frame;              /* (kept) their numbers */
+    double *x, *v;               /* (node_count x 3) of the frame in work */
+    double *other;               /* (node_count x 3) of one beside it */
+    double *strain;              /* (triangle_count x 2) */
+    double *weight;              /* (node_count) area of the triangles around [m2] */
+    double *node_strain, *speed; /* (node_count) */
+    drape_report_field fields[DRAPE_REPORT_FIELDS];
+} drape_report_data;
+
+/* Chooses frames that take at most most_bytes in the page, evenly, the first and the last among them, and finds the
+ * ranges of the fields. drape_report_data_free in any case. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status drape_report_data_make(const drape_record *run, size_t most_bytes, drape_report_data *data);
+void drape_report_data_free(drape_report_data *data);
+
+/* Add to the page: the JSON, in which no < stands; the kept frames of one field, and the triangles. */
+drape_status drape_report_put_json(const drape_report_data *data, drape_file *file);
+drape_status drape_report_put_field(const drape_report_data *data, int field, drape_file *file);
+void drape_report_put_triangles(const drape_report_data *data, drape_file *file);
+
+#endif

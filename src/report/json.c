@@ -1,0 +1,246 @@
+/* json.c: what the page shows of a run in numbers and texts. jansson passes NULL on: a failed allocation anywhere
+ * ends as a NULL at the top. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/param.h"
+#include "colliders/colliders.h"
+#include "report/data.h"
+
+#define MOST_ROWS 20000 /* of a table in the page */
+
+static json_t *with(json_t *object, const char *key, json_t *value)
+{
+    if (json_object_set_new(object, key, value) == 0)
+        return object;
+    json_decref(object);
+    return NULL;
+}
+
+static json_t *and_also(json_t *array, json_t *value)
+{
+    if (json_array_append_new(array, value) == 0)
+        return array;
+    json_decref(array);
+    return NULL;
+}
+
+static json_t *number(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
+static json_t *numbers(const double *values, size_t count)
+{
+    json_t *array = json_array();
+    for (size_t i = 0; i < count; i++)
+        array = and_also(array, number(values[i]));
+    return array;
+}
+
+/* A name may be in any encoding: what is not UTF-8 becomes a question mark. */
+static json_t *text(const char *bytes)
+{
+    json_t *string = json_string(bytes);
+    if (string)
+        return string;
+    char copy[256];
+    size_t i = 0;
+    for (; bytes[i] && i + 1 < sizeof copy; i++)
+        copy[i] = bytes[i];
+    copy[i] = 0;
+    for (char *c = copy; *c; c++)
+        if ((unsigned char)*c > 127)
+            *c = '?';
+    return json_string(copy);
+}
+
+/* ---- Tables ---- */
+
+/* Columns of a table: numbers, or texts where a column is none. */
+typedef struct columns {
+    const char *const *names;
+    size_t count;
+    size_t text_from; /* columns from here on are texts */
+    int64_t every;    /* so many rows, one is taken; and each row whose column `keep` is "0" */
+    int keep;         /* -1: none */
+    json_t *arrays[DRAPE_MOST_COLUMNS];
+} columns;
+
+static void count_row(void *user, int64_t row, char *const *cells)
+{
+    (void)user, (void)row, (void)cells;
+}
+
+static void take_row(void *user, int64_t row, char *const *cells)
+{
+    columns *c = user;
+    if (row % c->every && !(c->keep >= 0 && strcmp(cells[c->keep], "0") == 0))
+        return;
+    for (size_t i = 0; i < c->count; i++)
+        c->arrays[i] =
+            and_also(c->arrays[i], i < c->text_from ? number(strtod(cells[i], NULL)) : text(cells[i]));
+}
+
+/* {"rows": all of them, "every": n, "columns": {name: [...]}} */
+static drape_status read_columns(const drape_record *run, const char *name, columns *c, json_t **out)
+{
+    int64_t rows = 0;
+    drape_status status = drape_record_rows(run, name, c->names, c->count, count_row, NULL, &rows);
+    if (status)
+        return status;
+    c->every = rows / MOST_ROWS + 1;
+    for (size_t i = 0; i < c->count; i++)
+        c->arrays[i] = json_array();
+    status = drape_record_rows(run, name, c->names, c->count, take_row, c, &rows);
+    json_t *object = json_object();
+    for (size_t i = 0; i < c->count; i++)
+        object = with(object, c->names[i], c->arrays[i]);
+    *out = with(with(with(json_object(), "rows", json_integer((json_int_t)rows)), "every",
+                     json_integer((json_int_t)c->every)),
+                "columns", object);
+    return status;
+}
+
+static drape_status read_steps(const drape_record *run, json_t **out)
+{
+    static const char *const names[] = {"t",        "h",         "accepted", "iterations",
+                                        "residual", "tolerance", "reason"};
+    columns c = {.names = names, .count = 7, .text_from = 6, .keep = 2};
+    return read_columns(run, "steps.csv", &c, out);
+}
+
+static drape_status read_energies(const drape_record *run, json_t **out)
+{
+    static const char *const names[] = {"t_state", "kinetic",    "elastic",   "gravity",
+                                        "contact", "dissipated", "numerical", "total"};
+    columns c = {.names = names, .count = 8, .text_from = 8, .keep = -1};
+    return read_columns(run, "energy.csv", &c, out);
+}
+
+/* ---- Scene ---- */
+
+static json_t *parameters(const drape_collider *collider)
+{
+    json_t *object = json_object();
+    for (int i = 0; i < collider->ops->param_count; i++) {
+        const drape_param *param = &collider->ops->params[i];
+        const double *value = collider->values + drape_param_place(collider->ops->params, i);
+        object = with(object, param->name,
+                      drape_param_width(param) > 1 ? numbers(value, (size_t)drape_param_width(param))
+                                                   : number(*value));
+    }
+    return object;
+}
+
+/* Where a collider has triangles of its own they are drawn, else what its type and parameters say. */
+static json_t *shape(const drape_collider_shape *shape)
+{
+    json_t *corners = json_array();
+    for (size_t i = 0; i < 3 * (size_t)shape->triangle_count; i++)
+        corners = and_also(corners, json_integer(shape->triangle[i]));
+    return with(with(json_object(), "points", numbers(shape->point, 3 * (size_t)shape->point_count)),
+                "triangles", corners);
+}
+
+static json_t *collider(const drape_report_data *data, const drape_collider *c)
+{
+    json_t *object = with(json_object(), "type", text(c->ops->name));
+    object = with(object, "name", text(c->name));
+    object = with(object, "parameters", parameters(c));
+    if (c->shape.triangle_count > 0)
+        object = with(object, "shape", shape(&c->shape));
+    if (c->track.key_count == 0)
+        return object;
+    json_t *way = json_array();
+    for (int64_t k = 0; k < data->kept; k++) {
+        drape_collider_pose pose = drape_collider_pose_at(c, data->run->times[data->frame[k]]);
+        way = and_also(way, numbers(pose.displacement, 3));
+    }
+    return with(object, "displacements", way);
+}
+
+static json_t *colliders(const drape_report_data *data)
+{
+    json_t *array = json_array();
+    for (int32_t i = 0; i < data->run->model->collider_count; i++)
+        array = and_also(array, collider(data, &data->run->model->colliders[i]));
+    return array;
+}
+
+static json_t *pinned(const drape_model *model)
+{
+    json_t *array = json_array();
+    for (int32_t i = 0; i < model->node_count; i++)
+        if (model->pinned[i])
+            array = and_also(array, json_integer(i));
+    return array;
+}
+
+static json_t *fields(const drape_report_data *data)
+{
+    json_t *array = json_array();
+    for (int f = 0; f < DRAPE_REPORT_FIELDS; f++) {
+        const drape_report_field *field = &data->fields[f];
+        json_t *object = with(json_object(), "name", json_string(field->name));
+        object = with(object, "unit", json_string(field->unit));
+        object = with(object, "low", numbers(field->low, (size_t)field->width));
+        array = and_also(array, with(object, "step", numbers(field->step, (size_t)field->width)));
+    }
+    return array;
+}
+
+static json_t *frames(const drape_report_data *data)
+{
+    json_t *times = json_array(), *kept = json_array();
+    for (int64_t k = 0; k < data->kept; k++) {
+        times = and_also(times, number(data->run->times[data->frame[k]]));
+        kept = and_also(kept, json_integer((json_int_t)data->frame[k]));
+    }
+    json_t *object = with(json_object(), "all", json_integer((json_int_t)data->run->frames));
+    return with(with(object, "times", times), "numbers", kept);
+}
+
+/* ---- All of it ---- */
+
+/* In a page the end of a script must not be in its text; < is in JSON within strings alone. */
+static int put_safe(const char *bytes, size_t size, void *file)
+{
+    size_t from = 0;
+    for (size_t i = 0; i < size; i++)
+        if (bytes[i] == '<') {
+            drape_file_put(file, bytes + from, i - from);
+            drape_file_put_text(file, "\\u003c");
+            from = i + 1;
+        }
+    drape_file_put(file, bytes + from, size - from);
+    return 0;
+}
+
+drape_status drape_report_put_json(const drape_report_data *data, drape_file *file)
+{
+    const drape_record *run = data->run;
+    json_t *steps = NULL, *energies = NULL;
+    drape_status status = read_steps(run, &steps);
+    if (!status)
+        status = read_energies(run, &energies);
+    json_t *json = with(json_object(), "version", json_string(drape_version()));
+    const char *slash = strrchr(run->folder, '/');
+    json = with(json, "name", text(slash && slash[1] ? slash + 1 : run->folder));
+    json = with(json, "scene", text(run->scene_text));
+    json = with(json, "summary", run->summary ? json_incref(run->summary) : json_null());
+    json = with(json, "nodes", json_integer(run->model->node_count));
+    json = with(json, "triangles", json_integer(run->model->triangle_count));
+    json = with(json, "length", number(run->model->length));
+    json = with(json, "pinned", pinned(run->model));
+    json = with(json, "colliders", colliders(data));
+    json = with(json, "frames", frames(data));
+    json = with(json, "fields", fields(data));
+    json = with(json, "steps", steps);
+    json = with(json, "energies", energies);
+    if (!status && (!json || json_dump_callback(json, put_safe, file, JSON_COMPACT | JSON_REAL_PRECISION(9))))
+        status = drape_fail_memory(run->ctx, 1);
+    json_decref(json);
+    return status;
+}

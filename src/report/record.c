@@ -1,0 +1,295 @@
+/* record.c: see record.h. */
+#include "report/record.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "io/file.h"
+#include "io/scene_copy.h"
+#include "model/scene.h"
+
+#define NPY_MAGIC   "\x93NUMPY\x01"
+#define NPY_HEADER  128 /* as the exporter writes it; any other length is read, too */
+#define SCENE_LIMIT ((off_t)64 << 20)
+
+/* folder/name; NULL: no memory. */
+static char *path_of(const drape_record *run, const char *name)
+{
+    size_t size = strlen(run->folder) + strlen(name) + 2;
+    char *path = drape_alloc(run->ctx, size, 1);
+    if (path)
+        snprintf(path, size, "%s/%s", run->folder, name);
+    return path;
+}
+
+/* ---- Scene and summary ---- */
+
+/* A whole file with a 0 behind it. */
+static drape_status read_text(const drape_record *run, const char *path, char **out)
+{
+    struct stat info;
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0 || fstat(fd, &info) || !S_ISREG(info.st_mode) || info.st_size > SCENE_LIMIT) {
+        int error = fd < 0 ? errno : EFBIG;
+        if (fd >= 0)
+            close(fd);
+        return drape_file_fail(run->ctx, "read", path, error);
+    }
+    size_t size = (size_t)info.st_size, used = 0;
+    ssize_t count = 1;
+    *out = drape_alloc(run->ctx, size + 1, 1);
+    while (*out && used < size && (count = read(fd, *out + used, size - used)) > 0)
+        used += (size_t)count;
+    drape_status status = !*out       ? DRAPE_E_MEMORY
+                          : count < 0 ? drape_file_fail(run->ctx, "read", path, errno)
+                                      : 0;
+    close(fd);
+    return status;
+}
+
+static drape_status read_scene(drape_record *run)
+{
+    char *path = path_of(run, DRAPE_SCENE_COPY);
+    drape_status status = path ? read_text(run, path, &run->scene_text) : DRAPE_E_MEMORY;
+    if (status == DRAPE_E_FILE)
+        status = drape_fail(run->ctx, DRAPE_E_FILE,
+                            "\"%.500s\" is not the folder of a run: it has no " DRAPE_SCENE_COPY
+                            " that can be read; `drape run SCENE --out DIR` writes one",
+                            run->folder);
+    if (!status)
+        status = drape_model_load(run->ctx, path, &run->model);
+    drape_free(run->ctx, path);
+    return status;
+}
+
+static drape_status read_summary(drape_record *run)
+{
+    char *path = path_of(run, "summary.json");
+    if (!path)
+        return DRAPE_E_MEMORY;
+    run->summary = json_load_file(path, 0, NULL);
+    drape_free(run->ctx, path);
+    return DRAPE_OK;
+}
+
+/* ---- Frames ---- */
+
+static drape_status not_positions(const drape_record *run, const char *path, const char *what)
+{
+    return drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": %s", path, what);
+}
+
+/* frames x nodes x 3, float64: as export_npy.c writes it. */
+static drape_status read_header(drape_record *run, const char *path)
+{
+    char header[NPY_HEADER + 1] = "";
+    int32_t nodes = 0;
+    struct stat info;
+    ssize_t size = pread(run->positions, header, NPY_HEADER, 0);
+    const char *shape =
+        size == NPY_HEADER && memcmp(header, NPY_MAGIC, 7) == 0 ? strstr(header + 10, "'shape': (") : NULL;
+    if (!shape || !strstr(header + 10, "'<f8'") ||
+        sscanf(shape, "'shape': (%" SCNd64 ", %" SCNd32 ", 3)", &run->frames, &nodes) != 2)
+        return not_positions(run, path, "it is not an array of float64, frames x nodes x 3, of `drape run`");
+    run->data = 10 + (off_t)((unsigned char)header[8] | (unsigned char)header[9] << 8);
+    if (nodes != run->model->node_count)
+        return drape_fail(run->ctx, DRAPE_E_PARSE,
+                          "\"%.500s\": it has %" PRId32 " nodes, the scene of the folder has %" PRId32, path,
+                          nodes, run->model->node_count);
+    if (fstat(run->positions, &info) || run->frames < 1 ||
+        (info.st_size - run->data) / (24 * (off_t)nodes) < run->frames)
+        return not_positions(run, path, "it has no frame, or less data than its header says");
+    return DRAPE_OK;
+}
+
+static drape_status open_positions(drape_record *run)
+{
+    char *path = path_of(run, "positions.npy");
+    if (!path)
+        return DRAPE_E_MEMORY;
+    run->positions = open(path, O_RDONLY | O_CLOEXEC);
+    drape_status status =
+        run->positions < 0
+            ? drape_fail(run->ctx, DRAPE_E_FILE, "cannot read \"%.500s\": %s; the format npy writes it", path,
+                         strerror(errno))
+            : read_header(run, path);
+    drape_free(run->ctx, path);
+    return status;
+}
+
+drape_status drape_record_read(const drape_record *run, int64_t frame, double *x)
+{
+    size_t size = 24 * (size_t)run->model->node_count, used = 0;
+    while (used < size) {
+        ssize_t count = pread(run->positions, (char *)x + used, size - used,
+                              run->data + (off_t)frame * (off_t)size + (off_t)used);
+        if (count < 0 && errno == EINTR)
+            continue;
+        if (count <= 0)
+            return drape_file_fail(run->ctx, "read frames of", run->folder, count < 0 ? errno : EIO);
+        used += (size_t)count;
+    }
+    return DRAPE_OK;
+}
+
+/* ---- Tables ---- */
+
+/* Splits a line of CSV (RFC 4180) in place; the number of cells, at most room. */
+static size_t split(char *line, char **cells, size_t room)
+{
+    size_t count = 0;
+    char *in = line;
+    while (count < room) {
+        char *out = in;
+        cells[count++] = out;
+        if (*in == '"')
+            for (in++; *in && (*in != '"' || *++in == '"'); in++)
+                *out++ = *in;
+        else
+            while (*in && *in != ',')
+                *out++ = *in++;
+        bool more = *in == ',';
+        in += more;
+        *out = 0;
+        if (!more)
+            break;
+    }
+    return count;
+}
+
+#define MOST_CELLS 64 /* of a line */
+
+typedef struct table {
+    const char *const *columns;
+    size_t count;
+    size_t place[DRAPE_MOST_COLUMNS]; /* of each column in a line */
+} table;
+
+static const char *find_columns(table *t, char *header)
+{
+    char *names[MOST_CELLS];
+    size_t found = split(header, names, MOST_CELLS);
+    for (size_t i = 0; i < t->count; i++) {
+        size_t k = 0;
+        while (k < found && strcmp(names[k], t->columns[i]) != 0)
+            k++;
+        if (k == found)
+            return t->columns[i];
+        t->place[i] = k;
+    }
+    return NULL;
+}
+
+/* A line without its end; false for the end of the file, and for one that a killed run left. */
+static bool next_line(FILE *file, char **line, size_t *room)
+{
+    ssize_t length = getline(line, room, file);
+    if (length < 1 || (*line)[length - 1] != '\n')
+        return false;
+    (*line)[length - 1] = 0;
+    return true;
+}
+
+static int64_t read_rows(FILE *file, const table *t, char **line, size_t *room, drape_row_reader *reader,
+                         void *user)
+{
+    int64_t rows = 0;
+    while (next_line(file, line, room)) {
+        char *cells[MOST_CELLS], *wanted[DRAPE_MOST_COLUMNS], none[] = "";
+        size_t found = split(*line, cells, MOST_CELLS);
+        for (size_t i = 0; i < t->count; i++)
+            wanted[i] = t->place[i] < found ? cells[t->place[i]] : none;
+        reader(user, rows++, wanted);
+    }
+    return rows;
+}
+
+static drape_status read_table(const drape_record *run, const char *path, table *t, drape_row_reader *reader,
+                               void *user, int64_t *rows)
+{
+    char *line = NULL;
+    size_t room = 0;
+    FILE *file = fopen(path, "r");
+    if (!file)
+        return drape_file_fail(run->ctx, "read", path, errno);
+    const char *missing = next_line(file, &line, &room) ? find_columns(t, line) : t->columns[0];
+    if (!missing)
+        *rows = read_rows(file, t, &line, &room, reader, user);
+    int error = ferror(file) ? errno : 0;
+    free(line);
+    fclose(file);
+    if (missing)
+        return drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": there is no column \"%s\"", path, missing);
+    return error ? drape_file_fail(run->ctx, "read", path, error) : DRAPE_OK;
+}
+
+drape_status drape_record_rows(const drape_record *run, const char *name, const char *const *columns,
+                               size_t count, drape_row_reader *reader, void *user, int64_t *rows)
+{
+    table t = {.columns = columns, .count = count};
+    char *path = path_of(run, name);
+    if (!path)
+        return DRAPE_E_MEMORY;
+    drape_status status = read_table(run, path, &t, reader, user, rows);
+    drape_free(run->ctx, path);
+    return status;
+}
+
+static void take_time(void *user, int64_t row, char *const *cells)
+{
+    const drape_record *run = user;
+    if (row < run->frames)
+        run->times[row] = strtod(cells[0], NULL);
+}
+
+/* A killed run may have a frame more than rows, as frames come first. */
+static drape_status read_times(drape_record *run)
+{
+    static const char *const columns[] = {"t"};
+    int64_t rows = 0;
+    run->times = drape_alloc(run->ctx, (size_t)run->frames, sizeof *run->times);
+    if (!run->times)
+        return DRAPE_E_MEMORY;
+    drape_status status = drape_record_rows(run, "energy.csv", columns, 1, take_time, run, &rows);
+    if (!status && rows < 1)
+        return drape_fail(run->ctx, DRAPE_E_PARSE,
+                          "\"%.500s\": energy.csv has no row: the run wrote no frame", run->folder);
+    run->frames = rows < run->frames ? rows : run->frames;
+    return status;
+}
+
+/* ---- All of it ---- */
+
+drape_status drape_record_open(drape_context *ctx, const char *folder, drape_record *run)
+{
+    *run = (drape_record){.ctx = ctx, .positions = -1};
+    run->folder = drape_copy_text(ctx, folder);
+    if (!run->folder)
+        return DRAPE_E_MEMORY;
+    for (size_t n = strlen(run->folder); n > 1 && run->folder[n - 1] == '/'; n--)
+        run->folder[n - 1] = 0;
+    drape_status status = read_scene(run);
+    if (!status)
+        status = open_positions(run);
+    if (!status)
+        status = read_times(run);
+    return status ? status : read_summary(run);
+}
+
+void drape_record_close(drape_record *run)
+{
+    if (run->positions >= 0)
+        close(run->positions);
+    json_decref(run->summary);
+    drape_model_destroy(&run->model);
+    drape_free(run->ctx, run->scene_text);
+    drape_free(run->ctx, run->times);
+    drape_free(run->ctx, run->folder);
+    *run = (drape_record){.positions = -1};
+}

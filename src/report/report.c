@@ -1,0 +1,98 @@
+/* report.c: see report.h. The page is that of page.html, with style and scripts in it, made by embed.py when Drape
+ * is built; the data of the run stand between its two parts. */
+#include "report/report.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "report/data.h"
+#include "report/page.h"
+
+#define DEFAULT_NAME "report.html"
+
+static void begin_block(drape_file *file, const char *id)
+{
+    drape_file_print(file, "<script type=\"text/plain\" id=\"%s\">", id);
+}
+
+static void end_block(drape_file *file)
+{
+    drape_file_put_text(file, "</script>\n");
+}
+
+static drape_status put_page(const drape_report_data *data, drape_file *file)
+{
+    drape_file_put(file, drape_page_head, drape_page_head_size);
+    begin_block(file, "run");
+    drape_status status = drape_report_put_json(data, file);
+    end_block(file);
+    begin_block(file, "triangles");
+    drape_report_put_triangles(data, file);
+    end_block(file);
+    for (int f = 0; !status && f < DRAPE_REPORT_FIELDS; f++) {
+        begin_block(file, data->fields[f].name);
+        status = drape_report_put_field(data, f, file);
+        end_block(file);
+    }
+    drape_file_put(file, drape_page_tail, drape_page_tail_size);
+    return status;
+}
+
+/* The page is not begun before the run was read once. */
+static drape_status write_page(const drape_report_data *data, const char *path, bool *input, int64_t *bytes)
+{
+    drape_file file = {0};
+    drape_context *ctx = data->run->ctx;
+    *input = false;
+    drape_status status = drape_file_create(ctx, strlen(path), &file);
+    if (status)
+        return status;
+    drape_file_name(&file, "%s", path);
+    status = drape_file_begin(&file);
+    if (!status) {
+        status = put_page(data, &file);
+        *input = status == DRAPE_E_PARSE || status == DRAPE_E_FILE;
+    }
+    if (!status) {
+        status = drape_file_finish(&file);
+        *bytes = (int64_t)file.size;
+    }
+    drape_file_destroy(&file);
+    return status;
+}
+
+static drape_status write_run(const drape_record *run, const drape_report_def *def,
+                              drape_report_result *result, bool *input)
+{
+    drape_report_data data;
+    drape_status status = drape_report_data_make(run, def->most_bytes, &data);
+    result->frames = run->frames;
+    result->kept = data.kept;
+    if (!status)
+        status = write_page(&data, result->path, input, &result->bytes);
+    drape_report_data_free(&data);
+    return status;
+}
+
+drape_status drape_report_write(drape_context *ctx, const drape_report_def *def, drape_report_result *result,
+                                bool *input)
+{
+    drape_record run;
+    locale_t old = drape_locale_enter();
+    *input = true;
+    *result = (drape_report_result){.frames = 0};
+    int length = def->out ? snprintf(result->path, sizeof result->path, "%s", def->out)
+                          : snprintf(result->path, sizeof result->path, "%s/" DEFAULT_NAME, def->run);
+    drape_status status =
+        length < (int)sizeof result->path
+            ? drape_record_open(ctx, def->run, &run)
+            : drape_fail(ctx, DRAPE_E_ARGUMENT, "the name of the page is longer than %zu bytes",
+                         sizeof result->path - 1);
+    if (length < (int)sizeof result->path) {
+        if (!status)
+            status = write_run(&run, def, result, input);
+        drape_record_close(&run);
+    }
+    drape_locale_leave(old);
+    return status;
+}

@@ -1,0 +1,68 @@
+// run.js: the data of the page: JSON, and arrays in base64, little endian.
+
+const element = (id) => document.getElementById(id);
+
+function bytesOf(id) {
+  const text = atob(element(id).textContent);
+  const bytes = new Uint8Array(text.length);
+  for (let i = 0; i < bytes.length; i++) bytes[i] = text.charCodeAt(i);
+  return bytes.buffer;
+}
+
+const run = JSON.parse(element('run').textContent);
+run.corners = new Uint32Array(bytesOf('triangles'));
+run.times = run.frames.times;
+run.field = {};
+for (const field of run.fields) {
+  run.field[field.name] = { ...field, levels: new Uint16Array(bytesOf(field.name)), width: field.low.length };
+}
+run.end = run.times[run.times.length - 1];
+run.begin = run.times[0];
+
+// The kept frame at or before a time, and how far the time is on the way to the next one.
+function frameAt(time) {
+  const times = run.times;
+  let low = 0, high = times.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (times[middle] <= time) low = middle;
+    else high = middle - 1;
+  }
+  const next = Math.min(low + 1, times.length - 1);
+  const span = times[next] - times[low];
+  return { frame: low, next, part: span > 0 ? Math.min(Math.max((time - times[low]) / span, 0), 1) : 0 };
+}
+
+// A field of all nodes at a time, into an array: linear between two frames.
+function fieldAt(name, time, out) {
+  const { levels, low, step, width } = run.field[name];
+  const { frame, next, part } = frameAt(time);
+  const size = run.nodes * width, from = frame * size, to = next * size;
+  for (let i = 0; i < size; i++) {
+    const a = levels[from + i];
+    out[i] = low[i % width] + step[i % width] * (a + part * (levels[to + i] - a));
+  }
+  return out;
+}
+
+// The values below which the shares a and b of all numbers of a field lie: a colour scale that no single node spoils.
+function quantiles(name, a, b) {
+  const { levels, low, step } = run.field[name];
+  const counts = new Uint32Array(65536), stride = Math.max(1, Math.floor(levels.length / 2e6));
+  let total = 0;
+  for (let i = 0; i < levels.length; i += stride, total++) counts[levels[i]]++;
+  const at = (share) => {
+    let level = 0;
+    for (let seen = counts[0]; seen < share * total && level < 65535; seen += counts[level]) level++;
+    return low[0] + step[0] * level;
+  };
+  return [at(a), at(b)];
+}
+
+function format(value, digits = 4) {
+  if (value === null || value === undefined || Number.isNaN(value)) return 'none';
+  if (value === 0) return '0';
+  const size = Math.abs(value);
+  if (size >= 1e6 || size < 1e-3) return value.toExponential(digits - 2).replace('e+', 'e');
+  return String(Number(value.toPrecision(digits)));
+}

@@ -1,0 +1,232 @@
+/*
+ * realtime.c: an advance with a budget. What is owed, the frame and what earlier frames left over, is made in equal
+ * steps no longer than dt, so that at any frame rate a step is the same equations at its own h. Where that does not
+ * fit into the budget, by what steps cost lately, the integrator tries less hard (efforts), then steps are longer
+ * than dt, then time is left over. Left-over time above one longest step is dropped: late frames must not
+ * make later ones later.
+ *
+ * The work of a call is bounded: after its first accepted step it begins no other that it does not expect to end in
+ * time. A step that takes longer than a frame is made once in several frames: those between show the state before.
+ */
+#include "base/clock.h"
+#include "sim/sim.h"
+
+#include <math.h>
+
+#define KEEP    0.9  /* of the budget: a rung that is expected to take more is left */
+#define RECOVER 0.6  /* of the budget: a better one is returned to where it is expected to take less */
+#define LEARN   0.3  /* weight of the last attempt in what one is expected to cost */
+#define CHEAPER 0.7  /* of the cost of the effort above, before it was measured */
+#define STRETCH 4    /* longest step, in dt, where the def does not say */
+#define SAME    1e-9 /* of dt: rounding of the host's sum of frames */
+
+static int effort_count(const drape_sim *sim)
+{
+    int count = sim->chosen.integrator->efforts;
+    return count < 1 ? 1 : count > DRAPE_MAX_EFFORTS ? DRAPE_MAX_EFFORTS : count;
+}
+
+static void set_effort(drape_sim *sim, int effort)
+{
+    if (sim->chosen.integrator->set_effort)
+        sim->chosen.integrator->set_effort(sim->integrator, effort);
+    sim->realtime.effort = effort;
+}
+
+/* ---- What steps cost ---- */
+
+/* Expected seconds of an attempt; 0: none was made yet. */
+static double expected(const drape_sim *sim, int effort)
+{
+    const double *cost = sim->realtime.cost;
+    int known = effort;
+    while (known > 0 && cost[known] == 0)
+        known--;
+    return cost[known] * pow(CHEAPER, effort - known);
+}
+
+/* All efforts get slower or faster with the machine: their ratios stay. */
+static void learn(drape_sim *sim, double seconds)
+{
+    double *cost = sim->realtime.cost, *own = &cost[sim->realtime.effort];
+    double before = *own;
+    *own = before == 0 ? seconds : (1 - LEARN) * before + LEARN * seconds;
+    for (int e = 0; before > 0 && e < effort_count(sim); e++)
+        if (e != sim->realtime.effort)
+            cost[e] *= *own / before;
+}
+
+/* ---- The rung ---- */
+
+typedef struct plan {
+    int effort;
+    int64_t steps;
+    double h; /* [s] */
+} plan;
+
+static int64_t steps_of(double owed, double h)
+{
+    return (int64_t)fmax(1, ceil(owed / h - SAME));
+}
+
+/* The hardest effort whose steps fit; a better one than now is returned to one at a time. */
+static bool plan_effort(const drape_sim *sim, double owed, double budget, plan *out)
+{
+    int now = sim->realtime.effort;
+    int64_t steps = steps_of(owed, fmin(sim->realtime.dt, sim->realtime.cap));
+    for (int e = now > 0 ? now - 1 : 0; e < effort_count(sim); e++) {
+        double share = e < now || sim->realtime.stretched ? RECOVER : KEEP;
+        if ((double)steps * expected(sim, e) > share * budget)
+            continue;
+        *out = (plan){.effort = e, .steps = steps, .h = owed / (double)steps};
+        return true;
+    }
+    return false;
+}
+
+/* Steps at the least effort, longer than dt: as many as fit; where not even one does, one for so many frames that it
+ * costs no more than their budgets, and none before that many are owed. */
+static plan plan_stretched(const drape_sim *sim, double owed, double frame, double budget)
+{
+    int effort = effort_count(sim) - 1;
+    double longest = fmin(sim->realtime.longest, sim->realtime.cap);
+    double fit = KEEP * budget / expected(sim, effort);
+    int64_t most = steps_of(owed, sim->realtime.dt);
+    if (fit < 1 && owed < (1 - SAME) * fmin(longest, ceil(1 / fit) * frame))
+        return (plan){.effort = effort};
+    int64_t steps = fit < 1 ? 1 : fit < (double)most ? (int64_t)fit : most;
+    return (plan){.effort = effort, .steps = steps, .h = fmin(owed / (double)steps, longest)};
+}
+
+static plan make_plan(const drape_sim *sim, double owed, double frame, double budget)
+{
+    plan p;
+    return plan_effort(sim, owed, budget, &p) ? p : plan_stretched(sim, owed, frame, budget);
+}
+
+/* ---- A call ---- */
+
+/* Steps of h from now on where the sim counts them; rows and controllers that choose their own do that here, too. */
+static void aim(drape_sim *sim, const plan *p, double end)
+{
+    drape_schedule *s = &sim->schedule;
+    if (s->stepping == DRAPE_STEPS_COUNTED)
+        drape_schedule_init(s, s->stepping, p->h, drape_sim_state(sim)->t);
+    drape_schedule_aim(s, end);
+}
+
+static drape_status take_steps(drape_sim *sim, double deadline, drape_realtime *report)
+{
+    drape_status status = drape_sim_emit_frames(sim);
+    double t1, h;
+    while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {
+        drape_attempt attempt;
+        double start = drape_clock_seconds();
+        if (report->h > 0 && start + expected(sim, sim->realtime.effort) > deadline)
+            break;
+        status = drape_sim_step(sim, t1, h, &attempt);
+        learn(sim, drape_clock_seconds() - start);
+        report->attempts++;
+        report->rejected += !attempt.accepted;
+        report->h = attempt.accepted ? fmax(report->h, attempt.h) : report->h;
+        report->residual = attempt.accepted ? fmax(report->residual, attempt.residual) : report->residual;
+    }
+    return status;
+}
+
+/* After a rejection the next call does not try again what was refused in this one; later ones do. */
+static void bound_steps(drape_realtime_memory *m, const drape_realtime *report)
+{
+    if (report->rejected > 0 && report->h > 0)
+        m->cap = report->h;
+    else
+        m->cap = m->cap < m->longest ? 2 * m->cap : INFINITY;
+}
+
+/* What was not made is owed to the next call, or dropped. */
+static void settle(drape_sim *sim, double goal, drape_realtime *report)
+{
+    drape_realtime_memory *m = &sim->realtime;
+    double left = goal - drape_sim_state(sim)->t;
+    m->debt = left > SAME * m->dt ? fmin(left, m->longest) : 0;
+    report->dropped = left > m->longest ? left - m->longest : 0;
+    m->dropped += report->dropped;
+    m->stretched = report->h > (1 + SAME) * m->dt || m->debt > 0;
+    bound_steps(m, report);
+    report->time = drape_sim_state(sim)->t;
+    report->debt = m->debt;
+    report->dropped_total = m->dropped;
+}
+
+static const char *rung_name(const drape_sim *sim)
+{
+    if (sim->realtime.stretched)
+        return "larger steps";
+    return sim->realtime.effort > 0 ? "fewer iterations" : "full";
+}
+
+static drape_status check_arguments(drape_sim *sim, double frame_dt, double budget)
+{
+    if (!(frame_dt > 0 && frame_dt <= 1e6))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "drape_sim_advance_realtime: frame_dt = %g s; it is in (0, 1e6]", frame_dt);
+    if (!(budget >= 0 && budget <= 1e9))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "drape_sim_advance_realtime: budget = %g s; it is 0 to 1e9", budget);
+    if (sim->chosen.integrator->timeless)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "drape_sim_advance_realtime: the integrator \"%s\" has no time",
+                          sim->chosen.integrator->name);
+    return DRAPE_OK;
+}
+
+static void enter(drape_sim *sim)
+{
+    drape_realtime_memory *m = &sim->realtime;
+    if (m->active)
+        return;
+    m->active = true;
+    m->cap = INFINITY;
+    m->dt = drape_chosen_integrator_value(&sim->chosen, "dt", 1 / sim->frame_rate);
+    m->longest = m->longest_asked > 0 ? fmax(m->longest_asked, m->dt) : STRETCH * m->dt;
+}
+
+drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double budget, drape_realtime *out)
+{
+    drape_realtime report = {.rung = "full"};
+    double start = drape_clock_seconds();
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    sim->ctx->message[0] = 0;
+    drape_status status = check_arguments(sim, frame_dt, budget);
+    if (!status) {
+        enter(sim);
+        double owed = sim->realtime.debt + frame_dt, goal = drape_sim_state(sim)->t + owed;
+        const plan p = make_plan(sim, owed, frame_dt, budget);
+        set_effort(sim, p.effort);
+        if (p.steps > 0) {
+            aim(sim, &p, goal);
+            status = take_steps(sim, start + budget, &report);
+        }
+        settle(sim, goal, &report);
+        report.rung = rung_name(sim);
+        report.effort = sim->realtime.effort;
+        report.seconds = drape_clock_seconds() - start;
+        report.kept = report.seconds <= budget;
+    }
+    if (out)
+        *out = report;
+    return status;
+}
+
+void drape_sim_leave_realtime(drape_sim *sim)
+{
+    drape_realtime_memory *m = &sim->realtime;
+    if (!m->active)
+        return;
+    m->active = m->stretched = false;
+    m->debt = 0;
+    set_effort(sim, 0);
+    if (sim->schedule.stepping == DRAPE_STEPS_COUNTED)
+        drape_schedule_init(&sim->schedule, sim->schedule.stepping, m->dt, drape_sim_state(sim)->t);
+}

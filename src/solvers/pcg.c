@@ -1,0 +1,63 @@
+/* pcg.c: see pcg.h. */
+#include "solvers/pcg.h"
+
+#include <string.h>
+
+static double dot(const double *a, const double *b, int64_t n)
+{
+    double sum = 0;
+    for (int64_t i = 0; i < n; i++)
+        sum += a[i] * b[i];
+    return sum;
+}
+
+/* A direction of no positive curvature before the first step: the preconditioned residual itself is taken, which
+ * descends. */
+static void stop_indefinite(drape_pcg *s, double *x)
+{
+    s->definite = false;
+    if (s->iterations == 0)
+        memcpy(x, s->p, (size_t)s->n * sizeof *x);
+}
+
+static void advance(drape_pcg *s, double a, double *x)
+{
+    for (int64_t i = 0; i < s->n; i++) {
+        x[i] += a * s->p[i];
+        s->r[i] -= a * s->q[i];
+    }
+    s->iterations++;
+}
+
+static void turn(drape_pcg *s, double b)
+{
+    for (int64_t i = 0; i < s->n; i++)
+        s->p[i] = s->z[i] + b * s->p[i];
+}
+
+void drape_pcg_solve(drape_pcg *s, const double *b, double *x)
+{
+    size_t bytes = (size_t)s->n * sizeof *x;
+    s->iterations = 0;
+    s->definite = true;
+    memset(x, 0, bytes);
+    memcpy(s->r, b, bytes);
+    s->precondition(s->owner, s->r, s->z);
+    memcpy(s->p, s->z, bytes);
+    double size = dot(s->r, s->z, s->n), goal = s->tolerance * s->tolerance * size;
+    s->converged = size == 0;
+    while (!s->converged && s->iterations < s->max_iterations) {
+        s->multiply(s->owner, s->p, s->q);
+        double curvature = dot(s->p, s->q, s->n);
+        if (!(curvature > 0)) {
+            stop_indefinite(s, x);
+            return;
+        }
+        advance(s, size / curvature, x);
+        s->precondition(s->owner, s->r, s->z);
+        double before = size;
+        size = dot(s->r, s->z, s->n);
+        s->converged = size <= goal;
+        turn(s, size / before);
+    }
+}

@@ -1,0 +1,60 @@
+/* load.c: see load.h. */
+#include "terms/load.h"
+
+#include <math.h>
+
+enum { ALL, TOP, BOTTOM, LEFT, RIGHT };
+const char *const drape_load_edges[] = {
+    [ALL] = "all", [TOP] = "top", [BOTTOM] = "bottom", [LEFT] = "left", [RIGHT] = "right", NULL};
+
+/* As a pin's: a coordinate that is meant to lie on the side of the box lies in it. */
+#define ROUND_OFF 1e-14
+
+static bool in_box(const double *x, const double *low, const double *high)
+{
+    for (int k = 0; k < 3; k++) {
+        const double slack = ROUND_OFF * fmax(fabs(x[k]), 1);
+        if (!(x[k] >= low[k] - slack && x[k] <= high[k] + slack))
+            return false;
+    }
+    return true;
+}
+
+static bool on_side(const drape_cloth_view *cloth, int side, int32_t node)
+{
+    const int32_t row = node / cloth->columns, column = node % cloth->columns;
+    return side == TOP      ? row == 0
+           : side == BOTTOM ? row == cloth->rows - 1
+           : side == LEFT   ? column == 0
+                            : column == cloth->columns - 1;
+}
+
+bool drape_load_takes(const drape_cloth_view *cloth, const double *values, int32_t e)
+{
+    const int side = (int)values[DRAPE_LOAD_EDGE];
+    const int32_t *end = cloth->edge + 2 * (size_t)e;
+    if (cloth->edge_triangle[2 * (size_t)e + 1] >= 0)
+        return false;
+    for (int k = 0; k < 2; k++)
+        if ((side != ALL && !on_side(cloth, side, end[k])) ||
+            !in_box(cloth->rest + 3 * (size_t)end[k], values + DRAPE_LOAD_BOX_MIN,
+                    values + DRAPE_LOAD_BOX_MAX))
+            return false;
+    return true;
+}
+
+drape_status drape_load_count(const drape_cloth_view *cloth, const double *values,
+                              drape_term_builder *builder, int32_t *count)
+{
+    const int side = (int)values[DRAPE_LOAD_EDGE];
+    *count = 0;
+    if (side != ALL && cloth->columns == 0)
+        return drape_term_refuse(builder,
+                                 "\"edge\": \"%s\" is a side of a grid; this mesh is none: give a box",
+                                 drape_load_edges[side]);
+    for (int32_t e = 0; e < cloth->edge_count; e++)
+        *count += drape_load_takes(cloth, values, e);
+    if (*count == 0)
+        return drape_term_refuse(builder, "no edge of the boundary of the mesh lies in the box");
+    return DRAPE_OK;
+}

@@ -1,0 +1,47 @@
+/* load.h: which edges of the boundary a load is on. */
+#ifndef DRAPE_TERMS_LOAD_H
+#define DRAPE_TERMS_LOAD_H
+
+#include "drape/extend.h"
+
+/* The parameters that all loads begin with, as a list and among the values, where a box takes three a corner. */
+enum { DRAPE_LOAD_LIST_EDGE, DRAPE_LOAD_LIST_BOX_MIN, DRAPE_LOAD_LIST_BOX_MAX, DRAPE_LOAD_LIST_COUNT };
+enum {
+    DRAPE_LOAD_EDGE,
+    DRAPE_LOAD_BOX_MIN,
+    DRAPE_LOAD_BOX_MAX = DRAPE_LOAD_BOX_MIN + 3,
+    DRAPE_LOAD_COUNT = DRAPE_LOAD_BOX_MAX + 3
+};
+
+extern const char *const drape_load_edges[];
+
+/* How many edges; the status of a refusal where the mesh has none such, or is no grid and a side is asked for. */
+drape_status drape_load_count(const drape_cloth_view *cloth, const double *values,
+                              drape_term_builder *builder, int32_t *count);
+
+/* Whether edge e is one of them. */
+bool drape_load_takes(const drape_cloth_view *cloth, const double *values, int32_t e);
+
+#define DRAPE_LOAD_PARAMS                                                                                    \
+    [DRAPE_LOAD_LIST_EDGE] = {.name = "edge",                                                                \
+                              .kind = DRAPE_PARAM_CHOICE,                                                    \
+                              .unit = "1",                                                                   \
+                              .default_value = 0,                                                            \
+                              .choices = drape_load_edges,                                                   \
+                              .help = "a side of a grid, or all of the boundary"},                           \
+    [DRAPE_LOAD_LIST_BOX_MIN] = {.name = "box_min",                                                          \
+                                 .kind = DRAPE_PARAM_VECTOR,                                                 \
+                                 .unit = "m",                                                                \
+                                 .default_value = -1e9,                                                      \
+                                 .min = -1e9,                                                                \
+                                 .max = 1e9,                                                                 \
+                                 .help = "only edges with both ends in this box, at rest"},                  \
+    [DRAPE_LOAD_LIST_BOX_MAX] = {.name = "box_max",                                                          \
+                                 .kind = DRAPE_PARAM_VECTOR,                                                 \
+                                 .unit = "m",                                                                \
+                                 .default_value = 1e9,                                                       \
+                                 .min = -1e9,                                                                \
+                                 .max = 1e9,                                                                 \
+                                 .help = "its other corner"}
+
+#endif

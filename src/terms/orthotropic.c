@@ -1,0 +1,106 @@
+/* orthotropic.c: see orthotropic.h. */
+#include "terms/orthotropic.h"
+
+#include "base/vec3.h"
+
+#include <math.h>
+#include <string.h>
+
+#define STEEP 1e-6 /* share of the warp that must lie in the plane of a triangle */
+
+void drape_orthotropic_law(const double *values, double strip, double poisson, double c[9])
+{
+    const double given_warp = values[DRAPE_ORTHOTROPIC_WARP], given_weft = values[DRAPE_ORTHOTROPIC_WEFT];
+    const double given_shear = values[DRAPE_ORTHOTROPIC_SHEAR], given_nu = values[DRAPE_ORTHOTROPIC_POISSON];
+    const double warp = isnan(given_warp) ? strip : given_warp, weft = isnan(given_weft) ? strip : given_weft;
+    const double nu = isnan(given_nu) ? poisson : given_nu, mean = sqrt(warp * weft);
+    const double law[9] = {warp / (1 - nu * nu),
+                           nu * mean / (1 - nu * nu),
+                           0,
+                           nu * mean / (1 - nu * nu),
+                           weft / (1 - nu * nu),
+                           0,
+                           0,
+                           0,
+                           isnan(given_shear) ? mean / (2 * (1 + nu)) : given_shear};
+    memcpy(c, law, sizeof law);
+}
+
+static bool is_isotropic(const double c[9])
+{
+    return c[0] == c[4] && fabs(2 * c[8] - (c[0] - c[1])) <= 1e-12 * c[0];
+}
+
+/* a, less its part along the unit vector n, of length 1; false where little is left. */
+static bool flatten(const double a[3], const double n[3], double out[3])
+{
+    const double along = vec3_dot(a, n);
+    for (int i = 0; i < 3; i++)
+        out[i] = a[i] - along * n[i];
+    const double length = vec3_norm(out);
+    if (!(length > STEEP * vec3_norm(a)))
+        return false;
+    for (int i = 0; i < 3; i++)
+        out[i] /= length;
+    return true;
+}
+
+bool drape_orthotropic_frame(const double *values, const double *const corner[3], const double c[9],
+                             double axes[6], double flat[6])
+{
+    const double *warp = values + DRAPE_ORTHOTROPIC_DIRECTION;
+    const double x_axis[3] = {1, 0, 0};
+    double a[3], b[3], n[3];
+    vec3_sub(corner[1], corner[0], a);
+    vec3_sub(corner[2], corner[0], b);
+    vec3_cross(a, b, n);
+    const double twice_area = vec3_norm(n);
+    for (int i = 0; i < 3; i++)
+        n[i] /= twice_area;
+    if (!flatten(vec3_norm(warp) > 0 ? warp : x_axis, n, axes)) {
+        if (!is_isotropic(c))
+            return false;
+        flatten(a, n, axes);
+    }
+    vec3_cross(n, axes, axes + 3);
+    for (int k = 0; k < 2; k++) {
+        flat[k] = 0;
+        flat[2 + k] = vec3_dot(a, axes + 3 * k);
+        flat[4 + k] = vec3_dot(b, axes + 3 * k);
+    }
+    return true;
+}
+
+/* Cholesky's decomposition with the largest pivot next. */
+void drape_orthotropic_squares(const double c[9], int rank, double k[3], double l[9])
+{
+    double rest[9];
+    memcpy(rest, c, sizeof rest);
+    for (int r = 0; r < rank; r++) {
+        int p = 0;
+        for (int i = 1; i < 3; i++)
+            p = rest[4 * i] > rest[4 * p] ? i : p;
+        k[r] = rest[4 * p];
+        for (int i = 0; i < 3; i++)
+            l[3 * r + i] = rest[3 * i + p] / k[r];
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++)
+                rest[3 * i + j] -= k[r] * l[3 * r + i] * l[3 * r + j];
+    }
+}
+
+/* One column after another: C - C f f' C/(f' C f). */
+void drape_orthotropic_release(double c[9], const double *f, int count)
+{
+    for (int n = 0; n < count; n++) {
+        double cf[3] = {0}, work = 0;
+        for (int i = 0; i < 3; i++) {
+            for (int j = 0; j < 3; j++)
+                cf[i] += c[3 * i + j] * f[3 * n + j];
+            work += f[3 * n + i] * cf[i];
+        }
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++)
+                c[3 * i + j] -= cf[i] * cf[j] / work;
+    }
+}

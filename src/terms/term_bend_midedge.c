@@ -1,0 +1,357 @@
+/*
+ * bend.midedge: bending of every triangle, E = A/2 (K - K0)' C (K - K0), K = (K11, K22, 2 K12) its shape operator with
+ * normals at the middles of its edges (midedge.h), C the law of orthotropic.h.
+ *
+ * C = sum k l l', so E = 1/2 sum k (q - q0)^2 with q = l . K = sum c theta over nine hinges at most: each square is an
+ * element, three a triangle and one less for each free edge. Where no triangle needs hinges beyond its own (grids) elements
+ * have 6 nodes, else 12; a hinge whose c is 0 is not there, and its nodes are the first again.
+ *
+ * A clamped edge has no second triangle but a direction in space: x3 = (x0 + x1)/2 + r, r at rest.
+ *
+ * The internal variables are the nine angles of the last accepted state: each is taken on the branch nearest to it.
+ */
+#include "base/vec3.h"
+#include "terms/dihedral.h"
+#include "terms/midedge.h"
+#include "terms/orthotropic.h"
+#include "terms/terms.h"
+
+#include <math.h>
+#include <string.h>
+
+enum {
+    PARAM_REST = DRAPE_ORTHOTROPIC_COUNT,
+    PARAM_CURVATURE,
+    PARAM_MIN_ALTITUDE = PARAM_CURVATURE + 3,
+    PARAM_MAX_TURN
+};
+enum {
+    LIST_REST = DRAPE_ORTHOTROPIC_DIRECTION + 1,
+    LIST_CURVATURE,
+    LIST_MIN_ALTITUDE,
+    LIST_MAX_TURN,
+    LIST_COUNT
+};
+enum { REST_MESH, REST_FLAT };
+enum {
+    REST_K,
+    REST_Q0,
+    REST_ALTITUDE, /* least of the triangle [m] */
+    REST_C,
+    REST_COUNT = REST_C + MIDEDGE_HINGES,
+    REST_CLAMP =
+        REST_COUNT, /* of edges: three numbers each, 0 where it is none; only if some edge is clamped */
+    REST_COUNT_CLAMPED = REST_CLAMP + 9
+};
+
+static const char *const rest_choices[] = {"mesh", "flat", NULL};
+
+/* As a list the direction is one entry; among the values it takes three. */
+static const drape_param params[LIST_COUNT] = {
+    DRAPE_ORTHOTROPIC_PARAMS("N m", "E h^3/12 of the material", "twist",
+                             "torsional rigidity: a twist of curvature K12 takes 2 twist K12^2 per area"),
+    [LIST_REST] = {.name = "rest",
+                   .kind = DRAPE_PARAM_CHOICE,
+                   .unit = "1",
+                   .default_value = REST_MESH,
+                   .choices = rest_choices,
+                   .help = "rest curvature: that of the mesh, or flat"},
+    [LIST_CURVATURE] =
+        {.name = "curvature",
+         .kind = DRAPE_PARAM_VECTOR,
+         .unit = "1/m",
+         .default_value = 0,
+         .min = -1e9,
+         .max = 1e9,
+         .help = "added to the rest curvature: along the warp, along the weft, twist; positive towards "
+                 "the side from which triangles turn counterclockwise"},
+    [LIST_MIN_ALTITUDE] = {.name = "min_altitude",
+                           .kind = DRAPE_PARAM_NUMBER,
+                           .unit = "1",
+                           .default_value = 1e-6,
+                           .min = 0,
+                           .max = 1,
+                           .open_max = true,
+                           .help = "a step that takes an altitude of a triangle below this share of its "
+                                   "least one at rest is rejected"},
+    [LIST_MAX_TURN] =
+        {.name = "max_turn",
+         .kind = DRAPE_PARAM_NUMBER,
+         .unit = "rad",
+         .default_value = 2.8,
+         .min = 0,
+         .max = 3.14159265358979,
+         .open_min = true,
+         .help = "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"},
+};
+
+static double rest_of(const drape_elements *el, int item, int32_t element)
+{
+    return el->rest[(size_t)item * (size_t)el->count + (size_t)element];
+}
+
+/* The direction r of an own edge; false where it is not clamped. */
+static bool clamp_of(const drape_elements *el, int32_t element, int hinge, double r[3])
+{
+    if (el->rest_count == REST_COUNT || hinge > 2)
+        return false;
+    for (int i = 0; i < 3; i++)
+        r[i] = rest_of(el, REST_CLAMP + 3 * hinge + i, element);
+    return vec3_dot(r, r) > 0;
+}
+
+/* The angle of a hinge of an element, with derivatives by its first nodes: 3 where it is clamped, else 4. */
+static double hinge_angle(const drape_elements *el, int32_t element, int hinge, const double *x, double *g,
+                          double *h, int *nodes)
+{
+    const int32_t *node = el->node + (size_t)element * (size_t)el->nodes;
+    const int *local = drape_midedge_hinge[hinge];
+    double at[12], r[3];
+    *nodes = clamp_of(el, element, hinge, r) ? 3 : 4;
+    for (int a = 0; a < *nodes; a++)
+        memcpy(at + 3 * a, x + 3 * (size_t)node[local[a]], 3 * sizeof *at);
+    for (int i = 0; *nodes == 3 && i < 3; i++)
+        at[9 + i] = (at[i] + at[3 + i]) / 2 + r[i];
+    const double theta = drape_dihedral(at, g, h);
+    if (*nodes == 3)
+        drape_dihedral_tie(g, h);
+    return theta;
+}
+
+static void measure_one(const drape_elements *el, int32_t element, const double *x, const double *before,
+                        double *q, double *dq, double *ddq)
+{
+    const int d = 3 * el->nodes;
+    *q = 0;
+    if (dq)
+        memset(dq, 0, (size_t)d * sizeof *dq);
+    if (ddq)
+        memset(ddq, 0, (size_t)(d * d) * sizeof *ddq);
+    for (int k = 0; k < MIDEDGE_HINGES; k++) {
+        const double c = rest_of(el, REST_C + k, element);
+        const int *local = drape_midedge_hinge[k];
+        double g[12], h[144];
+        int nodes;
+        if (c == 0)
+            continue;
+        const double theta = hinge_angle(el, element, k, x, dq ? g : NULL, ddq ? h : NULL, &nodes);
+        *q += c * drape_nearest_branch(theta, before[k]);
+        for (int i = 0; dq && i < 3 * nodes; i++)
+            dq[3 * local[i / 3] + i % 3] += c * g[i];
+        for (int i = 0; ddq && i < 3 * nodes; i++)
+            for (int j = 0; j < 3 * nodes; j++)
+                ddq[d * (3 * local[i / 3] + i % 3) + 3 * local[j / 3] + j % 3] += c * h[12 * i + j];
+    }
+}
+
+static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                    const double *internal, double *q, double *dq, double *ddq)
+{
+    const size_t d = 3 * (size_t)el->nodes;
+    for (int32_t i = 0; i < count; i++)
+        measure_one(el, first + i, x, internal + MIDEDGE_HINGES * (size_t)(first + i), q + i,
+                    dq ? dq + d * (size_t)i : NULL, ddq ? ddq + d * d * (size_t)i : NULL);
+}
+
+/* ---- Building ---- */
+
+static drape_status refuse_plane(drape_term_builder *builder, int32_t triangle)
+{
+    return drape_term_refuse(
+        builder,
+        "the warp stands upright on triangle %d of the mesh; \"warp_direction\" is a direction "
+        "that lies in the sheet",
+        (int)triangle);
+}
+
+/* How many elements, of how many nodes, with how many numbers. */
+static drape_status announce(const drape_cloth_view *cloth, const double *values, const double law[9],
+                             drape_term_builder *builder)
+{
+    int64_t count = 0;
+    bool wide = false, clamped = false;
+    drape_midedge patch;
+    for (int32_t t = 0; t < cloth->triangle_count; t++) {
+        if (!drape_midedge_of(cloth, t, values, law, &patch))
+            return refuse_plane(builder, t);
+        count += patch.rank;
+        wide = wide || patch.wide;
+        clamped = clamped || patch.clamped[0] || patch.clamped[1] || patch.clamped[2];
+    }
+    if (count > INT32_MAX)
+        return drape_term_refuse(builder, "the mesh is too large: %.0f elements; at most %d", (double)count,
+                                 INT32_MAX);
+    if (clamped)
+        drape_term_anchor(builder);
+    return drape_term_reserve_nodes(builder, (int32_t)count, wide ? MIDEDGE_NODES : MIDEDGE_NEAR,
+                                    clamped ? REST_COUNT_CLAMPED : REST_COUNT);
+}
+
+static double least_altitude(const double *x0, const double *x1, const double *x2)
+{
+    double a[3], b[3], c[3], n[3];
+    vec3_sub(x1, x0, a);
+    vec3_sub(x2, x0, b);
+    vec3_sub(x2, x1, c);
+    vec3_cross(a, b, n);
+    return vec3_norm(n) / sqrt(fmax(vec3_dot(a, a), fmax(vec3_dot(b, b), vec3_dot(c, c))));
+}
+
+/* From the middle of a clamped edge away from the triangle, in its plane. */
+static void take_clamps(const drape_cloth_view *cloth, const drape_midedge *patch, double *rest)
+{
+    for (int i = 0; i < 3; i++) {
+        const double *a = cloth->rest + 3 * (size_t)patch->node[i],
+                     *b = cloth->rest + 3 * (size_t)patch->node[(i + 1) % 3];
+        const double *apex = cloth->rest + 3 * (size_t)patch->node[(i + 2) % 3];
+        for (int k = 0; patch->clamped[i] && k < 3; k++)
+            rest[3 * i + k] = (a[k] + b[k]) / 2 - apex[k];
+    }
+}
+
+/* The nodes of the hinges that square r has; in the places of others the first node. */
+static void take_nodes(const drape_midedge *patch, int r, int32_t node[MIDEDGE_NODES])
+{
+    for (int a = 0; a < MIDEDGE_NODES; a++)
+        node[a] = patch->node[a < 3 ? a : 0];
+    for (int h = 0; h < MIDEDGE_HINGES; h++)
+        for (int a = 0; patch->c[r][h] != 0 && a < 4; a++)
+            if (patch->node[drape_midedge_hinge[h][a]] >= 0)
+                node[drape_midedge_hinge[h][a]] = patch->node[drape_midedge_hinge[h][a]];
+}
+
+/* q at rest, by the function that steps take it from: rest is rest to the last bit. */
+static double rest_measure(const drape_cloth_view *cloth, const int32_t *node, const double *rest,
+                           int rest_count)
+{
+    static const double flat[MIDEDGE_HINGES] = {0};
+    const drape_elements one = {
+        .count = 1, .nodes = MIDEDGE_NODES, .rest_count = rest_count, .node = node, .rest = rest};
+    double q;
+    measure_one(&one, 0, cloth->rest, flat, &q, NULL, NULL);
+    return q;
+}
+
+static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+{
+    const drape_material *m = &cloth->material;
+    const double *bend = values + PARAM_CURVATURE;
+    double law[9];
+    drape_orthotropic_law(values, m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio),
+                          m->poisson_ratio, law);
+    drape_status status = announce(cloth, values, law, builder);
+    int32_t element = 0;
+    for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
+        drape_midedge patch;
+        drape_midedge_of(cloth, t, values, law, &patch);
+        const int32_t *n = patch.node;
+        for (int r = 0; r < patch.rank; r++) {
+            const double *l = patch.l + 3 * r;
+            double rest[REST_COUNT_CLAMPED] = {0};
+            int32_t node[MIDEDGE_NODES];
+            rest[REST_K] = patch.k[r];
+            rest[REST_ALTITUDE] =
+                least_altitude(cloth->rest + 3 * (size_t)n[0], cloth->rest + 3 * (size_t)n[1],
+                               cloth->rest + 3 * (size_t)n[2]);
+            memcpy(rest + REST_C, patch.c[r], sizeof patch.c[r]);
+            take_clamps(cloth, &patch, rest + REST_CLAMP);
+            take_nodes(&patch, r, node);
+            if (values[PARAM_REST] == REST_MESH)
+                rest[REST_Q0] = rest_measure(cloth, node, rest, REST_COUNT_CLAMPED);
+            rest[REST_Q0] += l[0] * bend[0] + l[1] * bend[1] + 2 * l[2] * bend[2];
+            drape_term_set(builder, element++, node, rest);
+        }
+    }
+    return status;
+}
+
+/* ---- Internal variables ---- */
+
+static void turn_angles(const drape_elements *el, int32_t element, const double *x, const double *before,
+                        double *after)
+{
+    for (int k = 0; k < MIDEDGE_HINGES; k++) {
+        int nodes;
+        after[k] = rest_of(el, REST_C + k, element) == 0
+                       ? 0
+                       : drape_nearest_branch(hinge_angle(el, element, k, x, NULL, NULL, &nodes), before[k]);
+    }
+}
+
+static void initial(const drape_elements *el, int32_t first, int32_t count, const double *x, double *after)
+{
+    static const double flat[MIDEDGE_HINGES] = {0};
+    for (int32_t e = first; e < first + count; e++)
+        turn_angles(el, e, x, flat, after + MIDEDGE_HINGES * (size_t)e);
+}
+
+static void commit(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                   const double *before, double *after)
+{
+    for (int32_t e = first; e < first + count; e++)
+        turn_angles(el, e, x, before + MIDEDGE_HINGES * (size_t)e, after + MIDEDGE_HINGES * (size_t)e);
+}
+
+/* ---- Checking ---- */
+
+static double altitude_ratio(const drape_elements *el, int32_t element, const double *x)
+{
+    const int32_t *n = el->node + (size_t)element * (size_t)el->nodes;
+    return least_altitude(x + 3 * (size_t)n[0], x + 3 * (size_t)n[1], x + 3 * (size_t)n[2]) /
+           rest_of(el, REST_ALTITUDE, element);
+}
+
+static double largest_turn(const drape_elements *el, int32_t element, const double *x, const double *before)
+{
+    double after[MIDEDGE_HINGES], turn = 0;
+    turn_angles(el, element, x, before, after);
+    for (int k = 0; k < MIDEDGE_HINGES; k++)
+        if (after[k] != 0)
+            turn = fmax(turn, fabs(after[k] - before[k]));
+    return turn;
+}
+
+/* The lowest altitude counts first: where a triangle has collapsed its angles mean nothing. */
+static drape_status check(const drape_elements *el, const double *x, const double *before,
+                          const double *internal, drape_fault *fault)
+{
+    drape_fault low = {"altitude_collapse", "altitude / least rest altitude", -1, INFINITY,
+                       el->params[PARAM_MIN_ALTITUDE]};
+    drape_fault turned = {"hinge_branch", "turn of a hinge in one step [rad]", -1, 0,
+                          el->params[PARAM_MAX_TURN]};
+    for (int32_t e = 0; e < el->count; e++) {
+        const double ratio = altitude_ratio(el, e, x),
+                     turn = largest_turn(el, e, x, internal + MIDEDGE_HINGES * (size_t)e);
+        if (ratio < low.value &&
+            (ratio >= low.limit || !before || drape_fell(ratio, altitude_ratio(el, e, before)))) {
+            low.value = ratio;
+            low.element = e;
+        }
+        if (turn > turned.value) {
+            turned.value = turn;
+            turned.element = e;
+        }
+    }
+    *fault = low.value < low.limit ? low : turned;
+    return low.value < low.limit || turned.value > turned.limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
+}
+
+const drape_term_ops drape_term_bend_midedge = {
+    .struct_size = sizeof(drape_term_ops),
+    .name = "bend.midedge",
+    .summary = "bending of every triangle, a plate with the true Poisson ratio on any mesh: E = A/2 (K - "
+               "K0)'C(K - K0)",
+    .reference =
+        "Grinspun, Gingold, Reisman & Zorin 2006, section 4, the turns of the normals from the nodes",
+    .params = params,
+    .param_count = LIST_COUNT,
+    .element_name = "square",
+    .nodes = MIDEDGE_NODES,
+    .has_internal = true,
+    .internal_count = MIDEDGE_HINGES,
+    .build = build,
+    .measure = measure,
+    .commit = commit,
+    .initial = initial,
+    .check = check,
+};

@@ -1,0 +1,70 @@
+/* load.line: a dead force per length on edges of the boundary: E = -f . (x0 + x1) L/2, L the length at rest. Linear: no
+ * Hessian. */
+#include "terms/load.h"
+#include "terms/terms.h"
+
+enum { LIST_FORCE = DRAPE_LOAD_LIST_COUNT, LIST_COUNT };
+enum { PARAM_FORCE = DRAPE_LOAD_COUNT };
+enum { REST_HALF_X, REST_HALF_Y, REST_HALF_Z, REST_COUNT }; /* of the force on an edge [N] */
+
+static const drape_param params[LIST_COUNT] = {
+    DRAPE_LOAD_PARAMS,
+    [LIST_FORCE] = {.name = "force",
+                    .kind = DRAPE_PARAM_VECTOR,
+                    .unit = "N/m",
+                    .default_value = 0,
+                    .min = -1e12,
+                    .max = 1e12,
+                    .help = "force per length of the edge at rest; it keeps its direction"},
+};
+
+static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+{
+    int32_t count, next = 0;
+    drape_status status = drape_load_count(cloth, values, builder, &count);
+    if (!status)
+        status = drape_term_reserve(builder, count, REST_COUNT);
+    for (int32_t e = 0; !status && e < cloth->edge_count; e++) {
+        double half[REST_COUNT];
+        if (!drape_load_takes(cloth, values, e))
+            continue;
+        for (int k = 0; k < REST_COUNT; k++)
+            half[k] = values[PARAM_FORCE + k] * cloth->edge_length[e] / 2;
+        drape_term_set(builder, next++, cloth->edge + 2 * (size_t)e, half);
+    }
+    return status;
+}
+
+static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                   const double *internal, double *e, double *g, double *hess)
+{
+    (void)internal;
+    (void)hess;
+    for (int32_t i = 0; i < count; i++) {
+        const int32_t *node = el->node + 2 * (size_t)(first + i);
+        double sum = 0;
+        for (int k = 0; k < 6; k++) {
+            const double force = el->rest[(size_t)(k % 3) * (size_t)el->count + (size_t)(first + i)];
+            sum -= force * x[3 * (size_t)node[k / 3] + (size_t)(k % 3)];
+            if (g)
+                g[6 * (size_t)i + (size_t)k] = -force;
+        }
+        if (e)
+            e[i] = sum;
+    }
+}
+
+const drape_term_ops drape_term_load_line = {
+    .struct_size = sizeof(drape_term_ops),
+    .name = "load.line",
+    .summary = "a force per length on edges of the boundary, that keeps its direction",
+    .reference = "work of a dead load, lumped by halves",
+    .params = params,
+    .param_count = LIST_COUNT,
+    .element_name = "edge",
+    .nodes = 2,
+    .linear = true,
+    .potential_of_gravity = true,
+    .build = build,
+    .energy = energy,
+};

@@ -1,0 +1,158 @@
+/*
+ * stretch.cst: a membrane of constant-strain triangles with the law of Saint Venant and Kirchhoff,
+ *     E = A/2 e' C e,  e = (E11, E22, 2 E12),  Green's strain E = (F'F - I)/2,  F = sum x_a grad N_a,
+ * C the law of orthotropic.h, grad N_a at rest. C = sum k l l', so E = A/2 sum k (q - q0)^2, and each square is an element,
+ * three a triangle. With d1 = x1 - x0, d2 = x2 - x0 and the gradients B_a of N_a:
+ *     q = 1/2 (W11 d1.d1 + W22 d2.d2) + W12 d1.d2,  W_ab = l1 B_a1 B_b1 + l2 B_a2 B_b2 + l3 (B_a1 B_b2 + B_a2 B_b1)
+ * so its Hessian is constant, W in each of the three directions. (Bonet & Wood 2008, Nonlinear Continuum Mechanics
+ * for Finite Element Analysis, 6.3; Volino, Magnenat-Thalmann & Faure 2009.)
+ */
+#include "base/vec3.h"
+#include "terms/orthotropic.h"
+#include "terms/terms.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { PARAM_MIN_AREA = DRAPE_ORTHOTROPIC_COUNT };
+enum { LIST_MIN_AREA = DRAPE_ORTHOTROPIC_DIRECTION + 1, LIST_COUNT };
+enum { REST_K, REST_Q0, REST_W11, REST_W12, REST_W22, REST_AREA, REST_COUNT };
+
+/* As a list the direction is one entry; among the values it takes three. */
+static const drape_param params[LIST_COUNT] = {
+    DRAPE_ORTHOTROPIC_PARAMS("N/m", "E h of the material", "shear", "resistance to shear, force per length"),
+    [LIST_MIN_AREA] =
+        {.name = "min_area",
+         .kind = DRAPE_PARAM_NUMBER,
+         .unit = "1",
+         .default_value = 1e-6,
+         .min = 0,
+         .max = 1,
+         .open_max = true,
+         .help = "a step that takes the area of a triangle below this share of its rest is rejected"},
+};
+
+static double rest_of(const drape_elements *el, int item, int32_t element)
+{
+    return el->rest[(size_t)item * (size_t)el->count + (size_t)element];
+}
+
+static void sides(const drape_elements *el, int32_t element, const double *x, double d1[3], double d2[3])
+{
+    const int32_t *node = el->node + 3 * (size_t)element;
+    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], d1);
+    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], d2);
+}
+
+static double measure_of(const double w[3], const double d1[3], const double d2[3])
+{
+    return 0.5 * (w[0] * vec3_dot(d1, d1) + w[2] * vec3_dot(d2, d2)) + w[1] * vec3_dot(d1, d2);
+}
+
+/* The nodes' weights: those of x1 and x2, and of x0 what makes sums zero. */
+static void hessian(const double w[3], double *ddq)
+{
+    const double m[9] = {w[0] + 2 * w[1] + w[2], -w[0] - w[1], -w[1] - w[2], -w[0] - w[1], w[0], w[1],
+                         -w[1] - w[2],           w[1],         w[2]};
+    memset(ddq, 0, 81 * sizeof *ddq);
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b < 3; b++)
+            for (int i = 0; i < 3; i++)
+                ddq[9 * (3 * a + i) + 3 * b + i] = m[3 * a + b];
+}
+
+static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                    const double *internal, double *q, double *dq, double *ddq)
+{
+    (void)internal;
+    for (int32_t i = 0; i < count; i++) {
+        const double w[3] = {rest_of(el, REST_W11, first + i), rest_of(el, REST_W12, first + i),
+                             rest_of(el, REST_W22, first + i)};
+        double d1[3], d2[3];
+        sides(el, first + i, x, d1, d2);
+        q[i] = measure_of(w, d1, d2);
+        for (int k = 0; dq && k < 3; k++) {
+            double *g = dq + 9 * (size_t)i;
+            g[3 + k] = w[0] * d1[k] + w[1] * d2[k];
+            g[6 + k] = w[1] * d1[k] + w[2] * d2[k];
+            g[k] = -g[3 + k] - g[6 + k];
+        }
+        if (ddq)
+            hessian(w, ddq + 81 * (size_t)i);
+    }
+}
+
+/* W of one square from l and the rest triangle in the plane: the gradients of N1 and N2. */
+static void weights(const double l[3], const double flat[6], double w[3])
+{
+    const double twice = flat[2] * flat[5] - flat[3] * flat[4];
+    const double b1[2] = {flat[5] / twice, -flat[4] / twice}, b2[2] = {-flat[3] / twice, flat[2] / twice};
+    w[0] = l[0] * b1[0] * b1[0] + l[1] * b1[1] * b1[1] + 2 * l[2] * b1[0] * b1[1];
+    w[1] = l[0] * b1[0] * b2[0] + l[1] * b1[1] * b2[1] + l[2] * (b1[0] * b2[1] + b1[1] * b2[0]);
+    w[2] = l[0] * b2[0] * b2[0] + l[1] * b2[1] * b2[1] + 2 * l[2] * b2[0] * b2[1];
+}
+
+static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+{
+    double law[9], k[3], l[9];
+    if (cloth->triangle_count > INT32_MAX / 3)
+        return drape_term_refuse(builder, "the mesh has %d triangles; at most %d", (int)cloth->triangle_count,
+                                 INT32_MAX / 3);
+    drape_orthotropic_law(values, cloth->material.membrane_stiffness, cloth->material.poisson_ratio, law);
+    drape_orthotropic_squares(law, 3, k, l);
+    drape_status status = drape_term_reserve(builder, 3 * cloth->triangle_count, REST_COUNT);
+    for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
+        const int32_t *node = cloth->triangle + 3 * (size_t)t;
+        const double *const corner[3] = {cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
+                                         cloth->rest + 3 * (size_t)node[2]};
+        double axes[6], flat[6], w[3], d1[3], d2[3];
+        if (!drape_orthotropic_frame(values, corner, law, axes, flat))
+            return drape_term_refuse(
+                builder,
+                "the warp stands upright on triangle %d of the mesh; \"warp_direction\" is a "
+                "direction that lies in the sheet",
+                (int)t);
+        vec3_sub(corner[1], corner[0], d1);
+        vec3_sub(corner[2], corner[0], d2);
+        for (int r = 0; r < 3; r++) {
+            const double area = cloth->triangle_area[t];
+            weights(l + 3 * r, flat, w);
+            drape_term_set(
+                builder, 3 * t + r, node,
+                (const double[REST_COUNT]){k[r] * area, measure_of(w, d1, d2), w[0], w[1], w[2], area});
+        }
+    }
+    return status;
+}
+
+/* Area over that at rest. */
+static double ratio_of(const drape_elements *el, int32_t element, const double *x)
+{
+    double d1[3], d2[3], normal[3];
+    sides(el, element, x, d1, d2);
+    vec3_cross(d1, d2, normal);
+    return vec3_norm(normal) / 2 / rest_of(el, REST_AREA, element);
+}
+
+static drape_status check(const drape_elements *el, const double *x, const double *before,
+                          const double *internal, drape_fault *fault)
+{
+    (void)internal;
+    *fault = (drape_fault){
+        .reason = "area_collapse", .what = "area / rest area", .limit = el->params[PARAM_MIN_AREA]};
+    return drape_check_ratios(el, x, before, 3, ratio_of, fault);
+}
+
+const drape_term_ops drape_term_stretch_cst = {
+    .struct_size = sizeof(drape_term_ops),
+    .name = "stretch.cst",
+    .summary = "stretching and shear of every triangle, isotropic or woven: E = A/2 e'C e of Green's strain",
+    .reference = "Bonet & Wood 2008, 6.3; Volino, Magnenat-Thalmann & Faure 2009",
+    .params = params,
+    .param_count = LIST_COUNT,
+    .element_name = "square",
+    .nodes = 3,
+    .build = build,
+    .measure = measure,
+    .check = check,
+};

@@ -1,0 +1,493 @@
+#!/usr/bin/env python3
+"""`drape render` and `drape view`: pictures that are looked at by numbers. TAP on stdout.
+
+DRAPE_BUILD is the folder of the build; or: test_render.py PROGRAM. A test is a function test_*; its docstring is its name. What
+a machine lacks (a driver, ffmpeg, Xvfb, numpy) skips what needs it. With GOLDEN=write the golden pictures are made anew.
+"""
+import json
+import os
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+import zlib
+
+try:
+    import numpy
+except ImportError:
+    numpy = None
+
+PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRAPE_BUILD"] + "/drape")
+GOLDEN = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "golden", "render")
+LIMIT = 300  # [s] for one call: sanitizers are slow
+SIZE = (320, 200)
+
+
+class Skip(Exception):
+    pass
+
+
+# ---- Scenes, calls, pictures
+
+
+def write_scene(name="ball.json", **changes):
+    """A cloth of 13 x 13 nodes that has just fallen on a ball."""
+    cloth = {
+        "mesh": {"grid": "square", "columns": 13, "rows": 13, "width": 1, "height": 1,
+                 "transform": {"translate": [-0.5, 0.52, 0.5]}},
+        "material": {"young_modulus": 1e4, "thickness": 1e-3, "density": 200},
+        "terms": ["stretch.edge", "bend.hinge", {"type": "damp.kelvin_voigt", "beta": 0.01}],
+    }
+    whole = {"drape": 1, "cloth": [cloth], "gravity": [0, -9.81, 0],
+             "colliders": [{"type": "sphere", "center": [0, 0.25, 0], "radius": 0.25, "friction": 0.3},
+                           {"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0]}],
+             "contact": {"distance": 0.01, "friction": "lagged"},
+             "integrator": {"dt": 0.01, "tolerance": 1e-5}, "duration": 0.25, "frame_rate": 20}
+    for key, value in changes.items():
+        (cloth if key in cloth else whole)[key] = value
+    for key in [key for key, value in whole.items() if value is None]:
+        del whole[key]
+    with open(name, "w", encoding="utf-8") as file:
+        json.dump(whole, file)
+    return name
+
+
+def drape(*args, env=None, **options):
+    return subprocess.run([PROGRAM, *args], capture_output=True, text=True, timeout=LIMIT,
+                          env={**os.environ, **(env or {})}, **options)
+
+
+def equal(found, expected, what=""):
+    assert found == expected, f"{what}: found {found!r}, expected {expected!r}"
+
+
+def good(*args, **options):
+    result = drape(*args, **options)
+    equal((result.returncode, result.stderr), (0, ""), " ".join(args))
+    return result.stdout
+
+
+def one_line(result, code, says):
+    equal(result.returncode, code, result.stderr)
+    equal(result.stderr.count("\n"), 1, result.stderr)
+    assert says in result.stderr, f"{says!r} is not in {result.stderr!r}"
+
+
+def render(*args, out="x.png", size=SIZE):
+    good("render", *args, "--out", out, "--size", f"{size[0]}x{size[1]}")
+    return read_png(out)
+
+
+def read_png(path):
+    """(height, width, 3) of a PNG of 8 bits without a palette."""
+    with open(path, "rb") as file:
+        data = file.read()
+    equal(data[:8], b"\x89PNG\r\n\x1a\n", path)
+    at, packed = 8, b""
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        if kind == b"IHDR":
+            width, height, depth, colour = struct.unpack(">IIBB", data[at + 8:at + 18])
+        if kind == b"IDAT":
+            packed += data[at + 8:at + 8 + length]
+        at += 12 + length
+    assert depth == 8 and colour in (2, 6), f"{path}: depth {depth}, colour type {colour}"
+    step = 3 if colour == 2 else 4
+    raw = numpy.frombuffer(zlib.decompress(packed), numpy.uint8).reshape(height, 1 + step * width)
+    rows = numpy.zeros((height, step * width), numpy.uint8)
+    for y in range(height):
+        rows[y] = unfilter(raw[y, 0], raw[y, 1:], rows[y - 1] if y else numpy.zeros(step * width, numpy.uint8), step)
+    return rows.reshape(height, width, step)[:, :, :3].astype(int)
+
+
+def unfilter(kind, line, above, step):
+    """One row of a PNG (its specification, 9.2)."""
+    if kind == 0:
+        return line
+    if kind == 2:
+        return line + above
+    if kind == 1:
+        return numpy.add.accumulate(line.reshape(-1, step), axis=0, dtype=numpy.uint8).reshape(-1)
+    out = numpy.zeros(len(line), int)
+    up = above.astype(int)
+    for i, value in enumerate(line.astype(int)):
+        a, b, c = (out[i - step] if i >= step else 0), up[i], (up[i - step] if i >= step else 0)
+        if kind == 3:
+            guess = (a + b) // 2
+        else:
+            p = a + b - c
+            guess = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
+        out[i] = (value + guess) & 255
+    return out.astype(numpy.uint8)
+
+
+def write_png(path, pixels):
+    height, width, _ = pixels.shape
+    rows = b"".join(b"\0" + pixels[y].astype(numpy.uint8).tobytes() for y in range(height))
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    with open(path, "wb") as file:
+        file.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
+                   + chunk(b"IDAT", zlib.compress(rows, 9)) + chunk(b"IEND", b""))
+
+
+def need_pictures():
+    if numpy is None:
+        raise Skip("no numpy here")
+    probe = drape("render", write_scene("probe.json", duration=0.01), "--out", "probe.png", "--size", "64x64")
+    if probe.returncode == 2 and ("without drawing" in probe.stderr or "draw without a display" in probe.stderr):
+        raise Skip(probe.stderr.strip())
+    equal(probe.returncode, 0, probe.stderr)
+
+
+def need(program):
+    if not shutil.which(program):
+        raise Skip(f"no {program} here")
+
+
+def shadings():
+    lines = good("list", "shadings").splitlines()[1:]
+    return [line.split()[0] for line in lines if line.startswith("  ") and line[2] != " "]
+
+
+# ---- Pictures
+
+
+def test_shadings():
+    """every shading draws the cloth: it differs from the floor, has light and shade, and nothing in it is black; twice the same bytes"""
+    need_pictures()
+    good("run", write_scene(), "--out", "ball", "--format", "npy")
+    empty = render("ball", "--camera", "30,89.9,0.02", out="empty.png")  # from far above: floor alone
+    for shade in shadings():
+        source = "ball.json" if shade == "residual" else "ball"
+        image = render(source, "--shade", shade, out="a.png")
+        equal(image.shape, (SIZE[1], SIZE[0], 3), shade)
+        middle = image[90:110, 150:170].astype(float)  # the camera frames the cloth: that is its middle
+        assert abs(middle.mean(axis=(0, 1)) - empty.mean(axis=(0, 1))).max() > 8, f"{shade}: the middle looks like the floor"
+        cloth = image[60:140, 100:220]
+        assert cloth.sum(axis=2).min() > 24, f"{shade}: black at {cloth.sum(axis=2).min()}"
+        assert cloth.std() > 6, f"{shade}: all of one colour"
+        if shade in ("wireframe", "pbr", "strain"):
+            render(source, "--shade", shade, out="b.png")
+            with open("a.png", "rb") as a, open("b.png", "rb") as b:
+                assert a.read() == b.read(), f"{shade}: two pictures differ"
+
+
+def test_golden():
+    """pictures are those that were looked at: drivers may differ by rounding and at edges, 2 of 255 in the mean"""
+    need_pictures()
+    good("run", write_scene(), "--out", "ball", "--format", "npy")
+    for shade in ("diffuse", "texture", "wireframe", "normals", "pbr", "mirror", "strain"):
+        image = render("ball", "--shade", shade, size=(160, 100))
+        path = os.path.join(GOLDEN, shade + ".png")
+        if os.environ.get("GOLDEN") == "write":
+            os.makedirs(GOLDEN, exist_ok=True)
+            write_png(path, image)
+        away = abs(image - read_png(path))
+        assert away.mean() < 2, f"{shade}: {away.mean():.2f} of 255 in the mean, {away.max()} at most"
+
+
+def test_run_and_scene():
+    """a scene and its finished run give the same picture, byte for byte, and so does the scene that the run keeps"""
+    need_pictures()
+    good("run", write_scene(), "--out", "ball", "--format", "npy", "--dt", "0.0125")
+    render("ball", out="a.png")
+    render("ball.json", "--dt", "0.0125", out="b.png")
+    render("ball/scene.json", out="c.png")
+    data = [open(name, "rb").read() for name in ("a.png", "b.png", "c.png")]
+    assert data[0] == data[1] == data[2]
+
+
+def test_texture():
+    """a texture lies on the cloth as it lies in its file, seen from the front; from below it is mirrored"""
+    need_pictures()
+    picture = numpy.zeros((64, 64, 3), int)
+    picture[:32, :32], picture[:32, 32:] = (255, 0, 0), (0, 255, 0)  # red, green above
+    picture[32:, :32], picture[32:, 32:] = (0, 0, 255), (255, 255, 0)  # blue, yellow below
+    write_png("quarters.png", picture)
+    write_scene(colliders=None, contact=None)
+    top = render("ball.json", "--frame", "0", "--texture", "quarters.png", "--shade", "texture", "--camera", "0,89.9")
+    below = render("ball.json", "--frame", "0", "--texture", "quarters.png", "--shade", "texture", "--camera", "0,-89.9")
+
+    def corners(image):
+        return ["".join("RGB"[k] for k in range(3) if image[y, x, k] > 0.6 * image[y, x].max())
+                for y, x in ((75, 135), (75, 185), (125, 135), (125, 185))]
+    equal(corners(top), ["R", "G", "B", "RG"], "from above")
+    equal(corners(below), ["B", "RG", "R", "G"], "from below, turned over its left to right axis")
+
+
+def test_light():
+    """the side to the lamp is lit and the other is not, from the front as from the back"""
+    need_pictures()
+    write_scene(colliders=None, contact=None,
+                mesh={"grid": "square", "columns": 13, "rows": 13, "width": 1, "height": 1, "orientation": "vertical"})
+    light = [render("ball.json", "--frame", "0", "--camera", f"{azimuth},10")[80:120, 140:180].mean() for azimuth in (0, 180)]
+    assert min(light) > 70, f"a face is not lit: {light}"
+
+
+def test_legend():
+    """a field has its ramp in the picture, with the range that was asked for"""
+    need_pictures()
+    good("run", write_scene(), "--out", "ball", "--format", "npy")
+    low = render("ball", "--shade", "strain", "--range", "0,1000", out="low.png", size=(640, 400))
+    high = render("ball", "--shade", "strain", "--range", "-1000,0", out="high.png", size=(640, 400))
+    bar = low[250:380, 560:620]
+    assert (abs(bar - high[250:380, 560:620]).max(axis=2) > 40).any(), "the numbers of the legend do not change"
+    assert low[180:200, 310:330].mean() + 60 < high[180:200, 310:330].mean(), "low is dark, high is light"
+
+
+# ---- Films and folders
+
+
+def frames_of(path):
+    out = subprocess.run(["ffprobe", "-v", "error", "-count_frames", "-show_entries", "stream=width,height,nb_read_frames",
+                          "-of", "csv=p=0", path], capture_output=True, text=True, timeout=LIMIT, check=True).stdout
+    return tuple(int(n) for n in out.strip().split(",")[:3])
+
+
+def test_films():
+    """films have the frames of the run, each Nth of them, at even sizes where the format wants that"""
+    need_pictures()
+    need("ffmpeg")
+    need("ffprobe")
+    good("run", write_scene(), "--out", "ball", "--format", "npy")
+    good("render", "ball", "--out", "a.mp4", "--size", "161x101")
+    equal(frames_of("a.mp4"), (160, 100, 6), "mp4")
+    good("render", "ball", "--out", "a.gif", "--size", "161x101", "--every", "2")
+    equal(frames_of("a.gif"), (161, 101, 3), "gif")
+    good("render", "ball.json", "--out", "a.webm", "--size", "160x100")
+    equal(frames_of("a.webm"), (160, 100, 6), "webm")
+    equal([name for name in os.listdir(".") if name.endswith(".part")], [], "leftovers")
+
+
+def test_folder():
+    """a folder gets a picture for each frame; they move"""
+    need_pictures()
+    good("render", write_scene(), "--out", "frames", "--size", "160x100")
+    equal(sorted(os.listdir("frames")), [f"frame_{k:05}.png" for k in range(6)])
+    assert (read_png("frames/frame_00000.png") != read_png("frames/frame_00005.png")).any()
+
+
+def test_compare():
+    """runs stand side by side under one camera, by time"""
+    need_pictures()
+    write_scene()
+    good("run", "ball.json", "--out", "be", "--format", "npy")
+    good("run", "ball.json", "--out", "fine", "--format", "npy", "--dt", "0.005", "--frame-rate", "40")
+    both = render("--compare", "be", "be", size=(320, 120))
+    left, right = both[30:, :158], both[30:, 160:318]  # below the labels
+    assert (abs(left[:, 2:] - right[:, 2:]) > 3).mean() < 0.01, "the same run twice is not the same panel"
+    good("render", "--compare", "be", "fine", "--out", "both", "--size", "320x120")
+    equal(len(os.listdir("both")), 6, "the frames of the first")
+    one_line(drape("render", "be", "fine", "--out", "x.png"), 2, "--compare")
+
+
+# ---- What goes wrong
+
+
+def test_refused():
+    """wrong command lines and folders are one line and exit 2, and write nothing"""
+    need_pictures()
+    write_scene()
+    os.mkdir("empty")
+    before = sorted(os.listdir("."))
+    cases = [(["ball.json"], "--out is missing"),
+             (["ball.json", "--out", "x.png", "--shade", "difuse"], 'did you mean "diffuse"'),
+             (["ball.json", "--out", "x.png", "--size", "10x10"], "16 to 8192"),
+             (["ball.json", "--out", "x.png", "--size", "100"], "WIDTHxHEIGHT"),
+             (["ball.json", "--out", "x.png", "--camera", "1"], "azimuth,elevation"),
+             (["ball.json", "--out", "x.png", "--camera", "1,91"], "-90 to 90"),
+             (["ball.json", "--out", "x.png", "--frame", "-1"], "--frame"),
+             (["ball.json", "--out", "frames", "--frame", "1"], "--frame is for a picture"),
+             (["ball.json", "--out", "x.png", "--range", "0,1"], "shows no field"),
+             (["ball.json", "--out", "x.png", "--shade", "strain", "--range", "1,0"], "low,high"),
+             (["ball.json", "--out", "x.png", "--texture", "none.png"], "none.png"),
+             (["ball.json", "--out", "x.png", "--texture", "ball.json"], "as a PNG"),
+             (["empty", "--out", "x.png"], "scene.json"),
+             (["none.json", "--out", "x.png"], "none.json")]
+    for args, says in cases:
+        one_line(drape("render", *args), 2, says)
+    equal(sorted(os.listdir(".")), before, "files")
+
+
+def test_no_driver():
+    """without a driver of EGL it is one line and exit 2, and the program runs scenes as ever"""
+    need_pictures()
+    env = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent", "__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}
+    one_line(drape("render", write_scene(), "--out", "x.png", env=env), 2, "libgl1-mesa-dri")
+    assert not os.path.exists("x.png")
+    good("run", "ball.json", "--duration", "0.02", env=env)
+
+
+def test_no_ffmpeg():
+    """without ffmpeg a film is one line and exit 2; an ffmpeg that dies is one line with its last words, exit 1, no file"""
+    need_pictures()
+    os.mkdir("bin")
+    one_line(drape("render", write_scene(), "--out", "x.mp4", env={"PATH": os.path.abspath("bin")}), 2, "ffmpeg")
+    for script, says in (("echo first; echo 'no such codec' >&2; exit 3", "no such codec"), ("exit 4", "exit code 4"),
+                         ("kill -9 $$", "signal 9")):
+        with open("bin/ffmpeg", "w", encoding="utf-8") as file:
+            file.write("#!/bin/sh\n" + script + "\n")
+        os.chmod("bin/ffmpeg", 0o755)
+        path = os.path.abspath("bin") + ":" + os.environ["PATH"]
+        one_line(drape("render", "ball.json", "--out", "x.mp4", env={"PATH": path}), 1, says)
+    equal([name for name in os.listdir(".") if name.startswith("x.")], [], "files")
+
+
+def test_broken_run():
+    """a run whose frames are cut off, or of another scene, says so"""
+    need_pictures()
+    good("run", write_scene(), "--out", "ball", "--format", "npy")
+    size = os.path.getsize("ball/positions.npy")
+    with open("ball/positions.npy", "r+b") as file:
+        file.truncate(size - 100)
+    one_line(drape("render", "ball", "--out", "x.png"), 1, "shorter than it says")
+    os.remove("ball/positions.npy")
+    one_line(drape("render", "ball", "--out", "x.png"), 2, "--format npy")
+    write_scene(mesh={"grid": "square", "columns": 3, "rows": 3, "width": 1, "height": 1}, colliders=None, contact=None)
+    good("run", "ball.json", "--out", "small", "--format", "npy")
+    shutil.copy("small/positions.npy", "ball/positions.npy")
+    one_line(drape("render", "ball", "--out", "x.png"), 2, "it has 9 nodes, its scene 169")
+
+
+# ---- The window
+
+
+class Screen:
+    """A display without a screen, whose picture is a file."""
+
+    def __enter__(self):
+        need("Xvfb")
+        need("xdotool")
+        read, write = os.pipe()
+        self.server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "640x480x24", "-fbdir", "."],
+                                       pass_fds=[write], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        os.close(write)
+        with os.fdopen(read) as file:
+            number = file.readline().strip()
+        if not number:
+            raise Skip("Xvfb does not start")
+        self.env = {**os.environ, "DISPLAY": ":" + number}
+        return self
+
+    def __exit__(self, *_):
+        self.server.terminate()
+        self.server.wait()
+
+    def do(self, *words):
+        subprocess.run(["xdotool", *words], env=self.env, check=True, timeout=LIMIT, capture_output=True)
+
+    def look(self):
+        """(480, 640, 3): the format of xwd, 25 numbers, a name, colours of 12 bytes, rows of blue, green, red, 0."""
+        with open("Xvfb_screen0", "rb") as file:
+            data = file.read()
+        head = struct.unpack(">25I", data[:100])
+        at, width, height, stride = head[0] + 12 * head[19], head[4], head[5], head[12]
+        rows = numpy.frombuffer(data, numpy.uint8, stride * height, at).reshape(height, stride)
+        return rows[:, :4 * width].reshape(height, width, 4)[:, :, 2::-1].astype(int)
+
+    def wait(self, what, condition):
+        end = time.monotonic() + float(os.environ.get("WAIT", 120))
+        while time.monotonic() < end:
+            image = self.look()
+            if condition(image):
+                return image
+            time.sleep(0.1)
+        write_png("last.png", image)
+        if os.environ.get("KEEP"):
+            shutil.copy("last.png", os.environ["KEEP"])
+        raise AssertionError(f"after two minutes: {what}")
+
+
+def reds(image):
+    return (image[:, :, 0] > 110) & (image[:, :, 0] > 2 * image[:, :, 2])
+
+
+def test_view():
+    """a window starts paused, runs, steps, is dragged at, changes its integrator, step and shading, and quits"""
+    need_pictures()
+    write_scene(colliders=None, contact=None, duration=5, frame_rate=60, pins=[{"corner": "top-left"}, {"corner": "top-right"}])
+    with open("ball.json", encoding="utf-8") as file:
+        scene = json.load(file)
+    scene["cloth"][0]["pins"] = [{"corner": "top-left"}, {"corner": "top-right"}]
+    scene.pop("pins", None)
+    with open("ball.json", "w", encoding="utf-8") as file:
+        json.dump(scene, file)
+    with Screen() as screen:
+        view = subprocess.Popen([PROGRAM, "view", "ball.json", "--size", "640x480"], env=screen.env, text=True,
+                                stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        try:
+            def shown(image):
+                return reds(image).sum() > 4000
+            first = screen.wait("no cloth is seen", shown)
+            time.sleep(0.5)
+            lower = slice(200, 460)  # below the readout
+            assert (screen.look()[lower] == first[lower]).all(), "it moves though it is paused"
+            screen.do("key", "n", "key", "n")
+            screen.wait("a step changes nothing", lambda image: (image != first).any())
+            screen.do("key", "space")
+            moved = screen.wait("it does not run", lambda image: (image[lower] != first[lower]).mean() > 0.02)
+            screen.do("key", "i", "key", "d", "key", "k", "key", "g", "key", "p")
+            time.sleep(0.5)
+            ys, xs = numpy.nonzero(reds(screen.look()))
+            x, y = int(numpy.median(xs)), int(numpy.median(ys))
+            screen.do("mousemove", str(x), str(y), "mousedown", "1", "mousemove", str(x + 12), str(y - 12), "mousemove",
+                      str(x + 60), str(y - 60))
+            blue = screen.wait("no spring is seen",
+                               lambda image: (image[:, :, 2] - image[:, :, 0] > 60).sum() > 20)
+            screen.do("mouseup", "1", "key", "s")
+            screen.do("mousemove", "600", "440", "mousedown", "1", "mousemove", "560", "430", "mouseup", "1")
+            assert moved.shape == blue.shape
+            screen.do("key", "Escape")
+            out, err = view.communicate(timeout=LIMIT)
+        finally:
+            if view.poll() is None:
+                view.send_signal(signal.SIGKILL)
+                view.wait()
+    equal((view.returncode, err), (0, ""), "view")
+    for part in ("bdf2", "dt = 0.00666667 s", "shade blinn_phong", "stiffness x 0.6667", "gravity x 0.6667"):
+        assert part in out, f"{part!r} is not in {out!r}"
+    assert not out.startswith("t = 0 s"), out
+
+
+def test_no_display():
+    """without a display the window is one line and exit 2"""
+    need_pictures()
+    env = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    result = subprocess.run([PROGRAM, "view", write_scene()], capture_output=True, text=True, timeout=LIMIT, env=env)
+    one_line(result, 2, "there is no display")
+
+
+def main():
+    tests = [(name, function) for name, function in globals().items() if name.startswith("test_")]
+    only = os.environ.get("ONLY")
+    tests = [(name, function) for name, function in tests if not only or only in name]
+    print(f"1..{len(tests)}")
+    failed = 0
+    for number, (name, function) in enumerate(tests, 1):
+        title = function.__doc__.strip()
+        with tempfile.TemporaryDirectory() as folder:
+            home = os.getcwd()
+            os.chdir(folder)
+            try:
+                function()
+                print(f"ok {number} - {title}", flush=True)
+            except Skip as reason:
+                print(f"ok {number} - {title} # SKIP {reason}", flush=True)
+            except Exception:
+                failed += 1
+                for line in traceback.format_exc().splitlines():
+                    print(f"# {line}")
+                print(f"not ok {number} - {title}", flush=True)
+            finally:
+                os.chdir(home)
+    return failed > 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,254 @@
+/*
+ * test_realtime.c: the rung for real time, and the advance with a budget.
+ *
+ * A second that a clock measures is no ground for a test: budgets here are either never reached (an hour) or never
+ * kept (a nanosecond), and what lies between is for the bench.
+ */
+#include "support/scene.h"
+
+#define PLENTY  3600.0 /* [s] */
+#define NOTHING 1e-9
+
+#define HUNG                                                                                                 \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 16, 'rows': 16, 'width': 1, 'height': "   \
+    "1},"                                                                                                    \
+    "'material': {'young_modulus': 968246, 'thickness': 1.0328e-3, 'areal_density': 0.2},"                   \
+    "'terms': ['stretch.edge', 'bend.hinge' %s], 'pins': [{'corner': 'top-left'}, {'corner': "               \
+    "'top-right'}]}],"                                                                                       \
+    "'integrator': {'method': '%s' %s}, 'duration': 4}"
+
+static double distance(const scene *a, const scene *b)
+{
+    const double *x = drape_sim_positions(a->sim), *y = drape_sim_positions(b->sim);
+    double sum = 0;
+    for (size_t i = 0; i < 3 * (size_t)a->model->node_count; i++)
+        sum += (x[i] - y[i]) * (x[i] - y[i]);
+    return sqrt(sum / a->model->node_count);
+}
+
+static drape_realtime advance(scene *s, double frame, double budget)
+{
+    drape_realtime report;
+    drape_status status = drape_sim_advance_realtime(s->sim, frame, budget, &report);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
+    return report;
+}
+
+/* ---- The rung ---- */
+
+/* One and two iterations against the converged step, on a sheet that falls by half a metre: the errors of one step are those of
+ * Newton's second iterate, quadratic in the guess's h^2 dv/2 ~ 1 mm, and of conjugate gradients to a tenth; 2 % of the
+ * way is a bound with room, the goal of the bench. Two are better by more than half. */
+START_TEST(few_iterations_are_near_the_converged_step)
+{
+    scene exact = scene_open(HUNG, "", "be", "");
+    scene_advance(&exact, 0.5);
+    double errors[2];
+    for (int k = 1; k <= 2; k++) {
+        scene s = scene_open(HUNG, "", "newton_k", k == 1 ? "" : ", 'iterations': 2");
+        scene_advance(&s, 0.5);
+        errors[k - 1] = distance(&exact, &s);
+        ck_assert_int_eq(s.rejected, 0);
+        drape_statistics work = drape_sim_statistics(s.sim);
+        ck_assert_int_eq(work.newton_iterations, 30 * k);
+        ck_assert_int_gt(work.linear_iterations, work.newton_iterations);
+        scene_close(&s);
+    }
+    ck_assert_msg(errors[0] < 0.02 && errors[1] < 0.5 * errors[0], "%g m, %g m", errors[0], errors[1]);
+    scene_close(&exact);
+}
+END_TEST
+
+/* With enough iterations and digits it is backward Euler: both are within their residuals of the same equations, for
+ * which a residual of 1e-9 N a node moves it by h^2 F/m = 2.8e-4 x 1e-9/8e-4 m a step. */
+START_TEST(with_many_iterations_it_is_backward_euler)
+{
+    scene exact = scene_open(HUNG, "", "be", ", 'tolerance': 1e-9");
+    scene s = scene_open(
+        HUNG, "", "newton_k",
+        ", 'iterations': 40, 'tolerance': 1e-9, 'linear_tolerance': 1e-6, 'max_linear_iterations': 500");
+    scene_advance(&exact, 0.2);
+    scene_advance(&s, 0.2);
+    ck_assert_double_lt(s.residual, 1e-9);
+    ck_assert_double_lt(distance(&exact, &s), 1e-7);
+    scene_close(&exact);
+    scene_close(&s);
+}
+END_TEST
+
+/* Contact, friction, damping and drag belong to it: a damped sheet with drag falls onto a sphere and stays on it. */
+START_TEST(contact_and_damping_are_in_it)
+{
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 13, 'rows': 13, 'width': 0.6, "
+        "'height': 0.6,"
+        " 'orientation': 'horizontal'}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, "
+        "'areal_density': 0.2},"
+        " 'terms': ['stretch.edge', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 0.005},"
+        " {'type': 'drag.viscous', 'coefficient': 0.1}]}],"
+        " 'colliders': [{'type': 'sphere', 'center': [0.3, -0.25, -0.3], 'radius': 0.2, 'friction': 0.4}],"
+        " 'integrator': {'method': 'newton_k', 'iterations': 4}, 'duration': 1}");
+    scene_advance(&s, 1);
+    const double *x = drape_sim_positions(s.sim);
+    double lowest = INFINITY, near = INFINITY;
+    for (int32_t i = 0; i < s.model->node_count; i++) {
+        const double d[3] = {x[3 * i] - 0.3, x[3 * i + 1] + 0.25, x[3 * i + 2] + 0.3};
+        near = fmin(near, sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
+        lowest = fmin(lowest, x[3 * i + 1]);
+    }
+    ck_assert_double_gt(near, 0.2); /* nothing is in it */
+    ck_assert_double_lt(near, 0.21);
+    ck_assert_double_gt(lowest, -1);
+    ck_assert_double_lt(drape_sim_statistics(s.sim).strain_max, 0.2);
+    ck_assert_double_gt(drape_sim_energy(s.sim).dissipated, 0);
+    scene_close(&s);
+}
+END_TEST
+
+/* ---- Frame rates ---- */
+
+static scene at_rate(const char *terms, const char *more, double rate, double end)
+{
+    scene s = scene_open(HUNG, terms, "newton_k", more);
+    for (int k = 0; k < (int)lround(rate * end); k++) {
+        drape_realtime r = advance(&s, 1 / rate, PLENTY);
+        ck_assert(r.kept && r.debt == 0 && strcmp(r.rung, "full") == 0 && r.effort == 0);
+    }
+    ck_assert_double_eq_tol(drape_sim_time(s.sim), end, 1e-9);
+    return s;
+}
+
+/* At 30 Hz a frame is two steps of dt, so nothing at all changes; at 120 Hz one of dt/2. Backward Euler is of first
+ * order: the state at rate r is off by C/r, so 60 and 120 Hz differ by half of what a step of 1/30 and 1/60 do, up to
+ * second order, for which there is a quarter. */
+START_TEST(frame_rates_differ_by_the_order_of_the_method)
+{
+    const char *damping =
+        ", {'type': 'damp.kelvin_voigt', 'beta': 0.01}, {'type': 'drag.viscous', 'coefficient': 0.2}";
+    scene slow = at_rate(damping, ", 'dt': 0.03333333333333333, 'iterations': 6", 30, 0.3);
+    scene two = at_rate(damping, ", 'iterations': 6", 30, 0.3);
+    scene one = at_rate(damping, ", 'iterations': 6", 60, 0.3);
+    scene fast = at_rate(damping, ", 'iterations': 6", 120, 0.3);
+    ck_assert_double_lt(distance(&two, &one), 1e-9);
+    double coarse = distance(&slow, &one), fine = distance(&one, &fast);
+    ck_assert_msg(fine > 0.25 * coarse && fine < 0.75 * coarse, "%g m, %g m", coarse, fine);
+    scene_close(&slow);
+    scene_close(&two);
+    scene_close(&one);
+    scene_close(&fast);
+}
+END_TEST
+
+/* What does not move knows no steps: heavily damped, the sheet comes to hang the same at 30, 60 and 120 Hz. What is
+ * left of its motion after 3 s falls as exp(-t c/2m) with c/m = 5/0.2 per second or faster: below rounding. The
+ * slowest way to rest is overdamped sideways swinging, g/L m/c = 0.4/s, from some mm: stiffness and drag are told by
+ * the lowest node. Its height differs by the square of that. */
+START_TEST(what_rests_does_not_know_the_frame_rate)
+{
+    double lowest[3];
+    for (int k = 0; k < 3; k++) {
+        scene s = at_rate(", {'type': 'drag.viscous', 'coefficient': 1}", "", 30 << k, 3);
+        lowest[k] = drape_sim_positions(s.sim)[3 * (16 * 15 + 8) + 1];
+        ck_assert_double_lt(lowest[k], -0.9);
+        scene_close(&s);
+    }
+    ck_assert_double_eq_tol(lowest[0], lowest[1], 1e-3);
+    ck_assert_double_eq_tol(lowest[1], lowest[2], 1e-3);
+}
+END_TEST
+
+/* ---- Budgets ---- */
+
+/* A budget that nothing fits into: steps grow to the longest, of which there is at most one a call; what is owed stays
+ * below it, and the rest is dropped. Then there is time again: within a few frames the rung is the full one and nothing
+ * is owed. */
+START_TEST(it_degrades_and_recovers)
+{
+    scene s = scene_open(HUNG, "", "newton_k", "");
+    const double frame = 1.0 / 60, longest = 4 * frame;
+    double first = drape_sim_time(s.sim), dropped = 0;
+    drape_realtime r = advance(&s, frame, PLENTY);
+    ck_assert_str_eq(r.rung, "full");
+    for (int k = 0; k < 40; k++) {
+        r = advance(&s, frame, NOTHING);
+        dropped += r.dropped;
+        ck_assert_int_le(r.attempts - r.rejected, 1);
+        ck_assert_double_le(r.debt, longest * (1 + 1e-9));
+        ck_assert_double_eq_tol(r.dropped_total, dropped, 1e-12);
+        ck_assert_double_le(r.h, longest * (1 + 1e-9));
+        ck_assert(k == 0 || strcmp(r.rung, "larger steps") == 0);
+        ck_assert(r.attempts == 0 || !r.kept);
+    }
+    ck_assert_double_eq_tol(drape_sim_time(s.sim) + r.debt + dropped - first, 41 * frame, 1e-9);
+    ck_assert_int_le(drape_sim_statistics(s.sim).steps_accepted, 22); /* a step for some frames each */
+    for (int k = 0; k < 6; k++)
+        r = advance(&s, frame, PLENTY);
+    ck_assert(strcmp(r.rung, "full") == 0 && r.effort == 0 && r.debt == 0 && r.kept);
+    ck_assert_double_le(r.h, frame * (1 + 1e-9));
+    ck_assert_double_lt(drape_sim_statistics(s.sim).strain_max, 1);
+    scene_close(&s);
+}
+END_TEST
+
+/* A frame that was owed once does not make the next ones later: one step too slow in a hundred. */
+START_TEST(one_late_frame_is_made_up_for)
+{
+    scene s = scene_open(HUNG, "", "newton_k", "");
+    for (int k = 0; k < 30; k++) {
+        drape_realtime r = advance(&s, 1.0 / 60, k == 10 ? NOTHING : PLENTY);
+        if (k > 12)
+            ck_assert(r.debt == 0 && r.kept);
+    }
+    ck_assert_double_eq_tol(drape_sim_time(s.sim), 0.5, 1e-9);
+    scene_close(&s);
+}
+END_TEST
+
+/* Rows that choose their own steps, and rows without efforts, keep the same promise; a plain advance goes on with the
+ * scene's own steps. */
+START_TEST(every_row_with_a_time_takes_frames)
+{
+    for (int i = 0; drape_integrators[i]; i++) {
+        drape_realtime r;
+        scene s = scene_model(HUNG, "", "be", ", 'tolerance': 1e-4");
+        drape_sim_def def;
+        drape_sim_def_init(&def, sizeof def);
+        def.integrator = drape_integrators[i]->name;
+        scene_start(&s, &def);
+        drape_status status = drape_sim_advance_realtime(s.sim, 0.02, PLENTY, &r);
+        if (drape_integrators[i]->timeless) {
+            ck_assert_int_eq(status, DRAPE_E_ARGUMENT);
+            ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx), "no time"));
+        } else {
+            ck_assert_msg(status == DRAPE_OK, "%s: %s", def.integrator, drape_context_message(s.ctx));
+            ck_assert_double_eq_tol(drape_sim_time(s.sim), 0.02, 1e-12);
+            ck_assert(r.time == drape_sim_time(s.sim) && r.kept && r.attempts > 0 && r.h > 0);
+            ck_assert_int_eq(drape_sim_advance(s.sim, 0.1), DRAPE_OK);
+            ck_assert_double_eq(drape_sim_time(s.sim), 0.1);
+        }
+        scene_close(&s);
+    }
+}
+END_TEST
+
+START_TEST(wrong_arguments_are_told)
+{
+    static const double wrong[][2] = {{0, 1},    {-1, 1},    {NAN, 1},       {2e6, 1},
+                                      {0.1, -1}, {0.1, NAN}, {0.1, INFINITY}};
+    scene s = scene_open(HUNG, "", "newton_k", "");
+    drape_realtime r;
+    for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
+        ck_assert_int_eq(drape_sim_advance_realtime(s.sim, wrong[k][0], wrong[k][1], &r), DRAPE_E_ARGUMENT);
+        ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx), "drape_sim_advance_realtime"));
+        ck_assert_double_eq(drape_sim_time(s.sim), 0);
+    }
+    ck_assert_int_eq(drape_sim_advance_realtime(NULL, 1, 1, &r), DRAPE_E_ARGUMENT);
+    ck_assert_int_eq(drape_sim_advance_realtime(s.sim, 0.1, PLENTY, NULL), DRAPE_OK);
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("realtime", few_iterations_are_near_the_converged_step, with_many_iterations_it_is_backward_euler,
+      contact_and_damping_are_in_it, frame_rates_differ_by_the_order_of_the_method,
+      what_rests_does_not_know_the_frame_rate, it_degrades_and_recovers, one_late_frame_is_made_up_for,
+      every_row_with_a_time_takes_frames, wrong_arguments_are_told)

@@ -1,0 +1,142 @@
+/* test_field_rows.c: what is told of a moment at each node, against closed forms. */
+#include "fields/fields.h"
+#include "support/scene.h"
+#include "support/suite.h"
+
+#include <math.h>
+#include <string.h>
+
+static const char sheet[] = "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 4, "
+                            "'width': 0.5, 'height': 0.3},"
+                            " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
+                            " 'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'nodes': [0]}]}],"
+                            " 'gravity': [0, -9.81, 0], 'integrator': {'method': '%s', 'dt': 0.01, "
+                            "'tolerance': 1e-6}, 'duration': 1%s}";
+
+#define NODES 24
+
+static double values[NODES];
+
+static drape_status measure(scene *h, const char *name, const double *x)
+{
+    for (int i = 0; drape_fields[i]; i++)
+        if (strcmp(drape_fields[i]->name, name) == 0)
+            return drape_fields[i]->measure(h->sim, x, values);
+    ck_abort_msg("there is no field %s", name);
+    return DRAPE_OK;
+}
+
+/* Under x -> (1.04 x, 0.97 z), sheared and turned, the largest principal strain is that of the matrix: for
+ * F = R [a s; 0 b] it is ((a + b)^2 + s^2)^1/2 / 2 + ((a - b)^2 + s^2)^1/2 / 2 - 1 in every triangle, and so in every
+ * node, to the rounding of squares of numbers near 1. */
+START_TEST(strain_of_a_homogeneous_stretch_is_exact)
+{
+    scene h = scene_open(sheet, "be", "");
+    const double a = 1.04, b = 0.97, s = 0.03, turn = 0.7;
+    double want = 0.5 * (hypot(a + b, s) + hypot(a - b, s)) - 1, x[3 * NODES], worst = 0;
+    for (int i = 0; i < NODES; i++) {
+        const double *r = h.model->rest + 3 * i;
+        double u = a * r[0] + s * r[2], w = b * r[2];
+        x[3 * i] = u;
+        x[3 * i + 1] = 0.3 + sin(turn) * w;
+        x[3 * i + 2] = cos(turn) * w;
+    }
+    ck_assert_int_eq(measure(&h, "strain", x), DRAPE_OK);
+    for (int i = 0; i < NODES; i++)
+        worst = fmax(worst, fabs(values[i] - want));
+    assert_below(worst, 1e-14);
+    scene_close(&h);
+}
+END_TEST
+
+/* Density times area sums to the elastic energy of the sim, and no density is negative. Sums of 24 and of some hundred
+ * positive numbers in two orders: to 1e-13 of the sum. */
+START_TEST(energy_density_sums_to_the_energy)
+{
+    scene h = scene_open(sheet, "be", "");
+    double sum = 0;
+    ck_assert_int_eq(drape_sim_advance(h.sim, 0.2), DRAPE_OK);
+    ck_assert_int_eq(measure(&h, "energy", drape_sim_positions(h.sim)), DRAPE_OK);
+    for (int i = 0; i < NODES; i++) {
+        ck_assert(values[i] >= 0);
+        sum += values[i] * h.model->cloths[0].mesh.node_area[i];
+    }
+    double elastic = drape_sim_energy(h.sim).elastic;
+    ck_assert(elastic > 1e-6);
+    assert_below(fabs(sum - elastic), 1e-13 * elastic);
+    scene_close(&h);
+}
+END_TEST
+
+START_TEST(velocity_is_the_speed)
+{
+    scene h = scene_open(sheet, "be", "");
+    ck_assert_int_eq(drape_sim_advance(h.sim, 0.1), DRAPE_OK);
+    ck_assert_int_eq(measure(&h, "velocity", drape_sim_positions(h.sim)), DRAPE_OK);
+    for (int i = 0; i < NODES; i++) {
+        const double *v = drape_sim_velocities(h.sim) + 3 * i;
+        ck_assert(fabs(values[i] - sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])) <= 1e-16 * values[i]);
+    }
+    ck_assert(values[0] == 0 && values[NODES - 1] > 0.1);
+    scene_close(&h);
+}
+END_TEST
+
+static drape_status keep_residual(void *user, const drape_event *event)
+{
+    if (event->kind == DRAPE_EVENT_ATTEMPT && event->attempt->accepted)
+        *(double *)user = event->attempt->residual;
+    return DRAPE_OK;
+}
+
+/* The step log has the largest component; a node's vector is between that and sqrt(3) of it. A row that solves no
+ * equations says so. */
+START_TEST(residual_is_that_of_the_last_step)
+{
+    scene h = scene_open(sheet, "be", "");
+    double logged = -1, largest = 0;
+    ck_assert_int_eq(drape_sim_observe(h.sim, keep_residual, &logged), DRAPE_OK);
+    ck_assert_int_eq(measure(&h, "residual", drape_sim_positions(h.sim)), DRAPE_OK);
+    ck_assert(values[5] == 0); /* before the first step there is none */
+    ck_assert_int_eq(drape_sim_advance(h.sim, 0.05), DRAPE_OK);
+    ck_assert_int_eq(measure(&h, "residual", drape_sim_positions(h.sim)), DRAPE_OK);
+    for (int i = 0; i < NODES; i++)
+        largest = fmax(largest, values[i]);
+    ck_assert(logged > 0);
+    ck_assert(largest >= logged * (1 - 1e-15) && largest <= sqrt(3) * logged * (1 + 1e-15));
+    scene_close(&h);
+    h = scene_open(sheet, "verlet", "");
+    ck_assert_int_eq(measure(&h, "residual", drape_sim_positions(h.sim)), DRAPE_E_ARGUMENT);
+    ck_assert_str_eq(drape_context_message(h.ctx),
+                     "residual: the integrator \"verlet\" solves no equations of a step by Newton");
+    scene_close(&h);
+}
+END_TEST
+
+/* The floor carries the sheet: a node's force is upright there, so sizes add up like forces, to the weight of what is
+ * free. The pin's share by bending, and what still moves after 3 s, are below a hundredth of it. */
+START_TEST(contact_forces_carry_the_weight)
+{
+    scene h = scene_open(sheet, "be",
+                         ", 'colliders': [{'type': 'plane', 'point': [0, -0.002, 0], 'normal': [0, 1, 0]}],"
+                         " 'contact': {'distance': 0.005}");
+    double force = 0, weight = 0;
+    ck_assert_msg(drape_sim_advance(h.sim, 3) == DRAPE_OK, "%s", drape_context_message(h.ctx));
+    ck_assert_int_eq(measure(&h, "contact", drape_sim_positions(h.sim)), DRAPE_OK);
+    for (int i = 1; i < NODES; i++) { /* node 0 is pinned near the floor */
+        force += values[i];
+        weight += 9.81 * h.model->mass[i];
+    }
+    printf("# forces %.6g N, weight %.6g N\n", force, weight);
+    ck_assert(force > 0.99 * weight && force < 1.01 * weight); /* the pin takes a share by bending */
+    scene_close(&h);
+    h = scene_open(sheet, "verlet",
+                   ", 'colliders': [{'type': 'plane', 'point': [0, -1, 0], 'normal': [0, 1, 0]}]");
+    ck_assert_int_eq(measure(&h, "contact", drape_sim_positions(h.sim)), DRAPE_E_ARGUMENT);
+    ck_assert_ptr_nonnull(strstr(drape_context_message(h.ctx), "moves nodes out of what they meet"));
+    scene_close(&h);
+}
+END_TEST
+
+SUITE("field_rows", strain_of_a_homogeneous_stretch_is_exact, energy_density_sums_to_the_energy,
+      velocity_is_the_speed, residual_is_that_of_the_last_step, contact_forces_carry_the_weight)

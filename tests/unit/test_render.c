@@ -1,0 +1,249 @@
+/* test_render.c: what is computed before anything is drawn: surfaces, colours, letters, the camera, frames. */
+#include "render/body.h"
+#include "render/camera.h"
+#include "render/font.h"
+#include "render/images.h"
+#include "render/shading.h"
+#include "render/skin.h"
+#include "support/scene.h"
+#include "support/suite.h"
+
+#include <math.h>
+#include <string.h>
+
+#define CLOTH                                                                                                \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 1, 'height': "     \
+    "1%s},"                                                                                                  \
+    " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}],"   \
+    " 'duration': 1%s}"
+
+/* ---- Colliders ---- */
+
+static const char colliders[] =
+    ", 'colliders': [{'type': 'sphere', 'center': [0.1, 2, 0], 'radius': 0.3},"
+    " {'type': 'capsule', 'a': [0, 3, 0], 'b': [0.4, 3.2, 0.1], 'radius': 0.1},"
+    " {'type': 'box', 'center': [0, 5, 0], 'size': [0.5, 0.3, 0.7], 'rotate': [1, 2, 3, 30]},"
+    " {'type': 'cylinder', 'a': [0, 7, 0], 'b': [0.3, 7.5, 0], 'radius': 0.2},"
+    " {'type': 'plane', 'point': [0, -1, 0], 'normal': [0.1, 1, 0]}]";
+
+/* Every point lies on the surface: it was brought there by Newton steps on the exact distance, and is then rounded to
+ * a float of at most 8 m, 5e-7. Normals have the length 1 and look outwards. */
+START_TEST(bodies_lie_on_their_surface)
+{
+    scene h = scene_model(CLOTH, "", colliders);
+    const drape_model *model = h.model;
+    for (int32_t c = 0; c < model->collider_count; c++) {
+        const drape_collider *collider = &model->colliders[c];
+        drape_body body;
+        double off = 0;
+        ck_assert_int_eq(drape_body_create(h.ctx, collider, (const double[3]){0}, 4, &body), DRAPE_OK);
+        ck_assert_int_eq(body.endless, strcmp(collider->ops->name, "plane") == 0);
+        ck_assert(body.vertex_count > 100 && body.vertex_count % 3 == 0);
+        for (size_t i = 0; i < body.vertex_count; i++) {
+            const float *v = body.vertex + 6 * i;
+            const double x[3] = {v[0], v[1], v[2]};
+            double d = collider->ops->distance(collider->values, &collider->shape, x, NULL, NULL);
+            off = fmax(off, fabs(d));
+            ck_assert(fabsf(drape_dot(v + 3, v + 3) - 1) < 1e-5f);
+        }
+        assert_below(off, 5e-7);
+        drape_body_free(h.ctx, &body);
+    }
+    scene_close(&h);
+}
+END_TEST
+
+/* A box's corners are found: the extremes of its points are those of the box, of half lengths .25, .15, .35 without a
+ * turn, to the pull of the mean, 1 in 100 of a cell of 0.7 m / 56. */
+START_TEST(corners_of_a_box_are_sharp)
+{
+    scene h = scene_model(CLOTH, "",
+                          ", 'colliders': [{'type': 'box', 'center': [0, 0, 0], 'size': [0.5, 0.3, 0.7]}]");
+    const drape_model *model = h.model;
+    drape_body body;
+    float nearest = 1;
+    ck_assert_int_eq(drape_body_create(h.ctx, &model->colliders[0], (const double[3]){0}, 2, &body),
+                     DRAPE_OK);
+    for (size_t i = 0; i < body.vertex_count; i++) {
+        const float *v = body.vertex + 6 * i;
+        nearest = fminf(nearest, hypotf(hypotf(v[0] - 0.25f, v[1] - 0.15f), v[2] - 0.35f));
+    }
+    assert_below((double)nearest, 0.01 * 0.7 / 56);
+    drape_body_free(h.ctx, &body);
+    scene_close(&h);
+}
+END_TEST
+
+/* ---- Cloth ---- */
+
+/* Nodes on a sphere of radius 1, an eighth of it over the sheet: normals by area weighting are within the square of an
+ * edge's angle, 0.12 rad, and curved points nearer to the sphere than the flat triangles are, whose middles lie an
+ * eighth of that square inside. Nodes are drawn where they are. */
+START_TEST(cloth_is_drawn_round_through_its_nodes)
+{
+    drape_skin skin;
+    scene h = scene_model(CLOTH, "", "");
+    const drape_model *model = h.model;
+    float x[3 * 81];
+    for (size_t i = 0; i < 81; i++) {
+        double u = model->rest[3 * i] - 0.5, w = model->rest[3 * i + 2] + 0.5, y = sqrt(1 - u * u - w * w);
+        x[3 * i] = (float)u;
+        x[3 * i + 1] = (float)y;
+        x[3 * i + 2] = (float)w;
+    }
+    ck_assert_int_eq(drape_skin_create(h.ctx, model, &skin), DRAPE_OK);
+    ck_assert_int_ge(skin.level, 4);
+    drape_skin_fit(&skin, x, NULL);
+    double off_normal = 0, off_sphere = 0;
+    for (size_t i = 0; i < skin.vertex_count; i++) {
+        const drape_skin_vertex *v = &skin.vertex[i];
+        float way = drape_dot(v->p, v->p), inner = fmaxf(fabsf(v->p[0]), fabsf(v->p[2]));
+        if (i < 81)
+            ck_assert(memcmp(v->p, x + 3 * i, sizeof v->p) == 0);
+        ck_assert(fabsf(drape_dot(v->t, v->n)) < 1e-5f && v->t[0] > 0.5f);
+        if (inner > 0.37f) /* at the rim a normal has triangles on one side alone */
+            continue;
+        off_normal = fmax(off_normal, acos(fmin(1, (double)(drape_dot(v->p, v->n) / sqrtf(way)))));
+        off_sphere = fmax(off_sphere, fabs(sqrt((double)way) - 1));
+    }
+    assert_below(off_normal, 0.16 * 0.16);
+    assert_below(off_sphere, 0.16 * 0.16 / 8 / 2);
+    for (size_t i = 0; i < skin.index_count; i++)
+        ck_assert(skin.index[i] < skin.vertex_count);
+    drape_skin_free(&skin);
+    scene_close(&h);
+}
+END_TEST
+
+/* Every triangle runs as its mesh's does: the normal by its corners is on the side of the smooth one. On a flat sheet
+ * the texture is as long as wide, u along x, v away from the first row, seen from the front not mirrored. */
+START_TEST(texture_is_not_mirrored)
+{
+    static const char *const orientations[] = {"", ", 'orientation': 'vertical'"};
+    for (int o = 0; o < 2; o++) {
+        drape_skin skin;
+        float x[3 * 81];
+        scene h = scene_model(CLOTH, orientations[o], "");
+        const drape_model *model = h.model;
+        ck_assert_int_eq(drape_skin_create(h.ctx, model, &skin), DRAPE_OK);
+        for (size_t i = 0; i < 3 * 81; i++)
+            x[i] = (float)model->rest[i];
+        drape_skin_fit(&skin, x, NULL);
+        for (size_t i = 0; i < skin.index_count; i += 3) {
+            const drape_skin_vertex *a = &skin.vertex[skin.index[i]], *b = &skin.vertex[skin.index[i + 1]],
+                                    *c = &skin.vertex[skin.index[i + 2]];
+            float area =
+                (b->uv[0] - a->uv[0]) * (c->uv[1] - a->uv[1]) - (b->uv[1] - a->uv[1]) * (c->uv[0] - a->uv[0]);
+            float e1[3], e2[3], n[3];
+            for (int k = 0; k < 3; k++) {
+                e1[k] = b->p[k] - a->p[k];
+                e2[k] = c->p[k] - a->p[k];
+            }
+            drape_cross(e1, e2, n);
+            ck_assert(area > 0 && drape_dot(n, a->n) > 0);
+        }
+        drape_skin_free(&skin);
+        scene_close(&h);
+    }
+}
+END_TEST
+
+/* ---- Colours, letters, camera ---- */
+
+/* Lightness in OKLab: the cube root of luminance comes near it (the weights of its L are all positive and sum to 1).
+ * It rises in each of 256 steps, and each half of the ramp has its half of it, to a tenth. */
+START_TEST(ramp_is_even_in_lightness)
+{
+    double last = -1, middle = 0, first = 0;
+    for (int i = 0; i < 256; i++) {
+        float c[3];
+        drape_ramp(i / 255.0, c);
+        double l =
+            cbrt(0.4122214708 * (double)c[0] + 0.5363325363 * (double)c[1] + 0.0514459929 * (double)c[2]);
+        double m =
+            cbrt(0.2119034982 * (double)c[0] + 0.6806995451 * (double)c[1] + 0.1073969566 * (double)c[2]);
+        double s =
+            cbrt(0.0883024619 * (double)c[0] + 0.2817188376 * (double)c[1] + 0.6299787005 * (double)c[2]);
+        double lightness = 0.2104542553 * l + 0.7936177850 * m - 0.0040720468 * s;
+        ck_assert_msg(lightness > last, "%d: %g after %g", i, lightness, last);
+        last = lightness;
+        first = i == 0 ? lightness : first;
+        middle = i == 127 ? lightness : middle;
+    }
+    ck_assert(fabs((middle - first) / (last - first) - 0.5) < 0.05);
+}
+END_TEST
+
+/* All of ASCII that is printed has strokes within its cell; what is not known is a box. */
+START_TEST(letters_are_all_there)
+{
+    drape_context *ctx = NULL;
+    drape_font font;
+    char text[] = "x";
+    const char *units = "²·°×", *unknown = "€";
+    float advance;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    ck_assert_int_eq(drape_font_create(ctx, 12, &font), DRAPE_OK);
+    for (char c = 33; c < 127; c++) {
+        if (strchr("$&@`", c))
+            continue; /* no unit and no name of ours has these */
+        const char *at = text;
+        text[0] = c;
+        int glyph = drape_font_next(&font, &at, &advance), ink = 0;
+        ck_assert_msg(glyph > 0, "%c", c);
+        for (int j = 0; j < font.cell_height; j++)
+            for (int i = 0; i < font.cell_width; i++)
+                ink += font.alpha[j * font.cell_width * DRAPE_FONT_CELLS + glyph * font.cell_width + i];
+        ck_assert_msg(ink > 255, "%c", c);
+    }
+    for (int i = 0; i < 4; i++)
+        ck_assert_int_gt(drape_font_next(&font, &units, &advance), 0);
+    ck_assert_int_eq(drape_font_next(&font, &unknown, &advance), 0);
+    ck_assert_int_eq(drape_font_next(&font, &unknown, &advance), -1);
+    drape_font_free(ctx, &font);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* All points are in the picture, and the outermost touch the margin of 1/1.12 on two sides, to rounding. */
+START_TEST(camera_frames_what_it_is_shown)
+{
+    const float points[][3] = {{0, 0, 0}, {1, 0.2f, 0}, {0.3f, -2, 0.5f}, {-0.7f, 0.4f, 1.5f}};
+    const float nowhere[3] = {0};
+    for (int azimuth = -170; azimuth < 180; azimuth += 35)
+        for (int elevation = -80; elevation <= 80; elevation += 40) {
+            drape_framing f = drape_framing_begin((float)azimuth, (float)elevation, 1.6f);
+            drape_framing_add(&f, points[0], 4, nowhere);
+            drape_camera camera = drape_framing_end(&f, (float)azimuth, (float)elevation, 1);
+            drape_view view = drape_camera_view(&camera, 1.6f, 2);
+            float out[2] = {0, 0}, deep = -1;
+            for (int i = 0; i < 4; i++) {
+                float q[4];
+                for (int r = 0; r < 4; r++)
+                    q[r] = view.matrix.m[r] * points[i][0] + view.matrix.m[4 + r] * points[i][1] +
+                           view.matrix.m[8 + r] * points[i][2] + view.matrix.m[12 + r];
+                ck_assert(q[3] > 0);
+                deep = fmaxf(deep, fabsf(q[2] / q[3]));
+                for (int k = 0; k < 2; k++)
+                    out[k] = fmaxf(out[k], fabsf(q[k] / q[3]));
+            }
+            ck_assert(deep < 1);
+            ck_assert_msg(fabsf(fmaxf(out[0], out[1]) - 1 / 1.12f) < 1e-4f, "%d %d: %g %g", azimuth,
+                          elevation, (double)out[0], (double)out[1]);
+        }
+}
+END_TEST
+
+START_TEST(shadings_are_found_by_name)
+{
+    for (int i = 0; drape_shadings[i]; i++) {
+        ck_assert_ptr_eq(drape_shading_find(drape_shadings[i]->name), drape_shadings[i]);
+        ck_assert(drape_shadings[i]->summary && strstr(drape_shadings[i]->source, "vec3 shade(Surface s)"));
+    }
+    ck_assert_ptr_null(drape_shading_find("lambert"));
+}
+END_TEST
+
+SUITE("render", bodies_lie_on_their_surface, corners_of_a_box_are_sharp,
+      cloth_is_drawn_round_through_its_nodes, texture_is_not_mirrored, ramp_is_even_in_lightness,
+      letters_are_all_there, camera_frames_what_it_is_shown, shadings_are_found_by_name)
