@@ -589,6 +589,16 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     return s->nonfinite ? blame_element(s, status, info) : status;
 }
 
+/* A guess beyond a limit is worse than none: springs that are too long pull with forces far above any that act. */
+static void improve_guess(drape_newton *s, double *d)
+{
+    if (s->ahead) /* from d = 0 */
+        scale(d, free_share(s, s->x, d), s->n);
+    place(s, d);
+    if (drape_system_breaks_limit(s->system, s->x, s->problem->x_base, s->problem->internal))
+        memset(d, 0, (size_t)s->n * sizeof *d);
+}
+
 drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *problem, double *d,
                                 drape_step_info *info)
 {
@@ -602,8 +612,7 @@ drape_status drape_newton_solve(drape_newton *s, const drape_newton_problem *pro
     bool keep =
         s->values[DRAPE_NEWTON_METHOD] == METHOD_MODIFIED && s->factored_mass_weight == problem->mass_weight;
     KINSetNoInitSetup(s->kin, keep);
-    if (s->ahead) /* the guess, from d = 0 */
-        scale(d, free_share(s, s->x, d), s->n);
+    improve_guess(s, d);
     N_VSetArrayPointer(d, s->unknown);
     int strategy = s->values[DRAPE_NEWTON_GLOBALIZATION] == GLOBAL_LINE_SEARCH ? KIN_LINESEARCH : KIN_NONE;
     drape_status status = status_of(KINSol(s->kin, s->unknown, strategy, s->ones, s->ones), &info->reason);
