@@ -1,4 +1,5 @@
-/* lab.h: experiments: what a scene gives against what is known. The only folder that uses GSL; the library does without. */
+/* lab.h: experiments: what a scene gives against what is known. The only folder that uses GSL; the library
+ * does without. */
 #ifndef DRAPE_LAB_LAB_H
 #define DRAPE_LAB_LAB_H
 
@@ -40,7 +41,8 @@ typedef struct drape_reference {
     int (*scene)(double parameter, double load, char *text, size_t size);
     /* Advances the sim and measures. */
     drape_status (*measure)(drape_lab_run *run, double *value);
-    /* Thresholds: the quantity is the load, between these shares of the expected one, above which measure is > 0. */
+    /* Thresholds: the quantity is the load, between these shares of the expected one, above which measure is
+     * > 0. */
     double low, high;
 } drape_reference;
 extern const drape_reference *const drape_references[]; /* NULL-ended */
