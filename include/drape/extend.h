@@ -92,8 +92,8 @@ typedef struct drape_term_builder drape_term_builder;
  * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count);
 
-/* The same for elements of fewer nodes than the row's, on this cloth. A node may stand in several places of an element,
- * as its first does in places that are left over: its derivatives are the sum of theirs. */
+/* The same for elements of fewer nodes than the row's, on this cloth. A node may stand in several places of an
+ * element, as its first does in places that are left over: its derivatives are the sum of theirs. */
 DRAPE_API drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t element_count, int nodes,
                                                 int rest_count);
 

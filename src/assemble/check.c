@@ -149,7 +149,7 @@ static int first_place(const drape_elements *el, int32_t e, int a)
     return a;
 }
 
-/* What stands in further places of a node is added to its first: derivatives by nodes instead of by places. */
+/* What stands in further places of a node is added to its first: derivatives by nodes, not by places. */
 static void gather_places(const drape_elements *el, int32_t e, local *l)
 {
     const int d = 3 * el->nodes;

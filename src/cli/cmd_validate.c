@@ -1,4 +1,5 @@
-/* cmd_validate.c: `drape validate`: what scenes give against what is known, as a table, as Markdown, as JSON. */
+/* cmd_validate.c: `drape validate`: what scenes give against what is known, as a table, as Markdown, as
+ * JSON. */
 #include "cli/cli.h"
 #include "lab/validate.h"
 

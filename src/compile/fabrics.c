@@ -1,11 +1,12 @@
 /*
- * fabrics.c: measured fabrics. Feng, Huang, Xu & Wang 2022, Learning-based bending stiffness parameter estimation by a drape
- * tester (ACM TOG 41, 6), measured the areal density and, by cantilever tests, the bending rigidity of strips of 618 fabrics
- * along warp, weft and the diagonal; here are some lines of their data set, by number: the linear coefficient in SI. Their
- * tensile stiffness was not measured: it is the scene's young_modulus and thickness.
+ * fabrics.c: measured fabrics. Feng, Huang, Xu & Wang 2022, Learning-based bending stiffness parameter
+ * estimation by a drape tester (ACM TOG 41, 6), measured the areal density and, by cantilever tests, the
+ * bending rigidity of strips of 618 fabrics along warp, weft and the diagonal; here are some lines of their
+ * data set, by number: the linear coefficient in SI. Their tensile stiffness was not measured: it is the
+ * scene's young_modulus and thickness.
  *
- * A strip at 45 degrees of an orthotropic plate has 4/B45 = 1/B1 + 1/B2 - 2 nu/sqrt(B1 B2) + 1/twist; nu = 0, as it was not
- * measured either.
+ * A strip at 45 degrees of an orthotropic plate has 4/B45 = 1/B1 + 1/B2 - 2 nu/sqrt(B1 B2) + 1/twist; nu = 0,
+ * as it was not measured either.
  */
 #include "compile/fabrics.h"
 

@@ -1,5 +1,6 @@
-/* bending_length: ASTM D1388 pushes a strip over an edge until the chord to its end falls to 41.5 degrees, and takes the
- * bending length as half of the overhang: there G = 8, within 0.04 %. The rod's own angle at G = 8 is 41.487 degrees. */
+/* bending_length: ASTM D1388 pushes a strip over an edge until the chord to its end falls to 41.5 degrees,
+ * and takes the bending length as half of the overhang: there G = 8, within 0.04 %. The rod's own angle at G
+ * = 8 is 41.487 degrees. */
 #include "lab/rod.h"
 #include "lab/strip.h"
 

@@ -1,6 +1,7 @@
-/* cantilever: a strip clamped level bends under its own weight: drop over reach of its end, for G = rho g L^3/B. Without
- * lateral contraction (nu = 0) strip and rod are the same. At small G the membrane is made soft, so that forces are
- * far above the rounding of its; at large G thin, so that its stretch stays below 1e-4. */
+/* cantilever: a strip clamped level bends under its own weight: drop over reach of its end, for G = rho g
+ * L^3/B. Without lateral contraction (nu = 0) strip and rod are the same. At small G the membrane is made
+ * soft, so that forces are far above the rounding of its; at large G thin, so that its stretch stays below
+ * 1e-4. */
 #include "lab/rod.h"
 #include "lab/strip.h"
 

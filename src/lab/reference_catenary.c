@@ -1,5 +1,5 @@
-/* catenary: a heavy strip of length 1.2 m between two ends 1 m apart: its sag. Hardly stiff against bending; the right end is
- * brought from 1.2 m. */
+/* catenary: a heavy strip of length 1.2 m between two ends 1 m apart: its sag. Hardly stiff against bending;
+ * the right end is brought from 1.2 m. */
 #include "lab/rod.h"
 #include "lab/strip.h"
 

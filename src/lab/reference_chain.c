@@ -1,6 +1,7 @@
-/* chain: frequencies of a hanging chain. The strip is brought to equilibrium, then started with the velocity of a mode; how
- * long two of its periods take is read off the crossings of the mode. Steps are 1/200 of a period: the implicit
- * midpoint rule is slow by (2 pi/200)^2/12 = 8e-5; the strip is 0.05 % longer than at rest. */
+/* chain: frequencies of a hanging chain. The strip is brought to equilibrium, then started with the velocity
+ * of a mode; how long two of its periods take is read off the crossings of the mode. Steps are 1/200 of a
+ * period: the implicit midpoint rule is slow by (2 pi/200)^2/12 = 8e-5; the strip is 0.05 % longer than at
+ * rest. */
 #include "lab/strip.h"
 
 #include <gsl/gsl_sf_bessel.h>

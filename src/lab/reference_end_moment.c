@@ -1,4 +1,5 @@
-/* end_moment: a strip clamped level with a moment at its end becomes an arc of curvature M/B: how far the end rises. */
+/* end_moment: a strip clamped level with a moment at its end becomes an arc of curvature M/B: how far the end
+ * rises. */
 #include "lab/strip.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
-/* fabric: ASTM D1388 on measured fabrics: a strip along the warp, of twice the bending length (B/(rho g))^(1/3), pushed over an
- * edge, has its chord at 41.5 degrees, 41.487 by the rod: what a preset says is what the test of its source measures. */
+/* fabric: ASTM D1388 on measured fabrics: a strip along the warp, of twice the bending length (B/(rho
+ * g))^(1/3), pushed over an edge, has its chord at 41.5 degrees, 41.487 by the rod: what a preset says is
+ * what the test of its source measures. */
 #include "compile/fabrics.h"
 #include "lab/rod.h"
 #include "lab/strip.h"

@@ -1,5 +1,5 @@
-/* free_fall: backward Euler lets a sheet fall by g h^2 n (n + 1)/2 in n steps, exactly: the share (n + 1)/n of what gravity
- * does. Held to the digits that tolerance and rounding leave. */
+/* free_fall: backward Euler lets a sheet fall by g h^2 n (n + 1)/2 in n steps, exactly: the share (n + 1)/n
+ * of what gravity does. Held to the digits that tolerance and rounding leave. */
 #include "lab/strip.h"
 
 #include <stdio.h>

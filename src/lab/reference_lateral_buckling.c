@@ -1,6 +1,6 @@
-/* lateral_buckling: the weight under which a strip, clamped at one end with its width upright, turns aside. It bends about
- * its width with E I = B w and twists with G J = E h^3 w/(6 (1 + nu)) = 2 B w/(1 + nu): nu counts. The sag in its own plane
- * is (h/w)^2 of what it would be aside. */
+/* lateral_buckling: the weight under which a strip, clamped at one end with its width upright, turns aside.
+ * It bends about its width with E I = B w and twists with G J = E h^3 w/(6 (1 + nu)) = 2 B w/(1 + nu): nu
+ * counts. The sag in its own plane is (h/w)^2 of what it would be aside. */
 #include "lab/rod.h"
 #include "lab/strip.h"
 
@@ -8,7 +8,8 @@
 
 static const double ratios[] = {0.35, 0};
 
-/* beta'' + q^2 t^4/(4 E I G J) beta = 0 (Prandtl 1899, Michell 1899): q L^3 = 12.8538 sqrt(E I G J), here over B w. */
+/* beta'' + q^2 t^4/(4 E I G J) beta = 0 (Prandtl 1899, Michell 1899): q L^3 = 12.8538 sqrt(E I G J), here
+ * over B w. */
 static double expected(double nu)
 {
     return 2 * sqrt(drape_rod_threshold(4, 20, 60)) * sqrt(2 / (1 + nu));

@@ -1,5 +1,6 @@
-/* oscillator: two nodes on an elastic sheet, its other side held: backward Euler leaves 1/(1 + (omega h)^2) of the energy in each
- * step. k = E h w/L = 1 N/m, half of 1 kg moves: omega^2 = 2. At strains of 1e-5 the sheet is linear to 1e-5. */
+/* oscillator: two nodes on an elastic sheet, its other side held: backward Euler leaves 1/(1 + (omega h)^2)
+ * of the energy in each step. k = E h w/L = 1 N/m, half of 1 kg moves: omega^2 = 2. At strains of 1e-5 the
+ * sheet is linear to 1e-5. */
 #include "lab/strip.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
-/* pendulum: the period of two nodes on a stiff sheet that hangs from an axis, over that of small swings. Steps are 1/400 of the
- * latter: the implicit midpoint rule is slow by (2 pi/400)^2/12 = 2e-5; the sheet stretches by less than 1e-4. */
+/* pendulum: the period of two nodes on a stiff sheet that hangs from an axis, over that of small swings.
+ * Steps are 1/400 of the latter: the implicit midpoint rule is slow by (2 pi/400)^2/12 = 2e-5; the sheet
+ * stretches by less than 1e-4. */
 #include "lab/strip.h"
 
 #include <gsl/gsl_sf_ellint.h>

@@ -1,5 +1,5 @@
-/* plate_clamped: a square plate, its sides clamped: the deflection in its middle. Its error falls with the square of the
- * mesh size, from 1.2 % at 33 rows. */
+/* plate_clamped: a square plate, its sides clamped: the deflection in its middle. Its error falls with the
+ * square of the mesh size, from 1.2 % at 33 rows. */
 #include "lab/plate.h"
 
 static const double ratios[] = {0.3};

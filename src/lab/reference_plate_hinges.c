@@ -1,5 +1,6 @@
-/* plate_hinges: the supported plate of hinges on grids of right triangles. It does not converge to the plate: its energy
- * is not that of an isotropic one. The documented shares are those at 160 rows; they hold within 1 % from 40 on. */
+/* plate_hinges: the supported plate of hinges on grids of right triangles. It does not converge to the plate:
+ * its energy is not that of an isotropic one. The documented shares are those at 160 rows; they hold within 1
+ * % from 40 on. */
 #include "lab/plate.h"
 
 static const double parallel[] = {0, 1};

@@ -1,4 +1,5 @@
-/* rest_curvature: a strip whose rest is an arc, clamped at one end, starts flat: its end comes to rest on the arc. */
+/* rest_curvature: a strip whose rest is an arc, clamped at one end, starts flat: its end comes to rest on the
+ * arc. */
 #include "lab/strip.h"
 
 #include <math.h>

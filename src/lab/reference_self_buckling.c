@@ -1,5 +1,6 @@
-/* self_buckling: the weight under which an upright strip, clamped at its foot, buckles. Here it stands along x and gravity
- * is along -x: it stays straight, and the signs of the eigenvalues of its Hessian tell whether it would stay so. */
+/* self_buckling: the weight under which an upright strip, clamped at its foot, buckles. Here it stands along
+ * x and gravity is along -x: it stays straight, and the signs of the eigenvalues of its Hessian tell whether
+ * it would stay so. */
 #include "lab/rod.h"
 #include "lab/strip.h"
 

@@ -1,8 +1,8 @@
 /*
  * rod.c: see rod.h. With t from the free end and psi the angle from the vertical,
  *     psi'' = (G t + P) sin psi,  psi'(0) = 0,  psi(1) = pi/2,  drop = int cos psi,  reach = int sin psi.
- * psi(0) is as small as exp(-G^(1/2)); it is sought by its logarithm, on which psi(1) depends smoothly, so that shooting
- * from the free end loses no digits.
+ * psi(0) is as small as exp(-G^(1/2)); it is sought by its logarithm, on which psi(1) depends smoothly, so
+ * that shooting from the free end loses no digits.
  */
 #include "lab/rod.h"
 
@@ -50,8 +50,8 @@ typedef struct rod {
     double weight, force;
 } rod;
 
-/* y: psi, psi', drop, reach. Past the level the rod goes straight on, so that psi(1) rises with psi(0): else it would turn
- * over, and there would be more than one root. */
+/* y: psi, psi', drop, reach. Past the level the rod goes straight on, so that psi(1) rises with psi(0): else
+ * it would turn over, and there would be more than one root. */
 static int rod_rate(double t, const double y[], double dy[], void *context)
 {
     const rod *r = context;

@@ -2,11 +2,12 @@
 #ifndef DRAPE_LAB_ROD_H
 #define DRAPE_LAB_ROD_H
 
-/* The tip of a rod of length 1, clamped level, under its weight G = q L^3/B and a force P = F L^2/B at its end, both
- * downwards: how far it hangs down and reaches. */
+/* The tip of a rod of length 1, clamped level, under its weight G = q L^3/B and a force P = F L^2/B at its
+ * end, both downwards: how far it hangs down and reaches. */
 void drape_rod_tip(double weight, double force, double *drop, double *reach);
 
-/* The least k > 0 with y(1) = 0 for y'' + k t^power y = 0, y(0) = 1, y'(0) = 0; it lies between low and high. */
+/* The least k > 0 with y(1) = 0 for y'' + k t^power y = 0, y(0) = 1, y'(0) = 0; it lies between low and
+ * high. */
 double drape_rod_threshold(double power, double low, double high);
 
 /* The root of f between low and high, where its signs differ. */

@@ -79,7 +79,8 @@ drape_status lab_unstable_modes(drape_lab_run *run, double *value)
     return status;
 }
 
-/* The distance within which a dozen nodes lie, give or take: the mean area of a node is that of the sheet over them. */
+/* The distance within which a dozen nodes lie, give or take: the mean area of a node is that of the sheet
+ * over them. */
 static double neighbourhood(const drape_lab_run *run)
 {
     const double *rest = drape_model_rest_positions(run->model);

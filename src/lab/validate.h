@@ -40,7 +40,8 @@ typedef struct drape_reference {
     int (*scene)(double parameter, double load, char *text, size_t size);
     /* Advances the sim and measures. */
     drape_status (*measure)(drape_lab_run *run, double *value);
-    /* Thresholds: the quantity is the load, between these shares of the expected one, above which measure is > 0. */
+    /* Thresholds: the quantity is the load, between these shares of the expected one, above which measure is
+     * > 0. */
     double low, high;
 } drape_reference;
 extern const drape_reference *const drape_references[]; /* NULL-ended */

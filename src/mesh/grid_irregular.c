@@ -1,7 +1,8 @@
 /*
- * grid_irregular.c: a rectangle of columns x rows nodes out of line. Node (r, c) is that of the grid "square", inside
- * moved by up to `jitter` of a cell in both directions, on the sides along them; cells are split along their shorter
- * diagonal. What a scheme owes to the symmetry of a mesh is lost here: so do results that depend on it show.
+ * grid_irregular.c: a rectangle of columns x rows nodes out of line. Node (r, c) is that of the grid
+ * "square", inside moved by up to `jitter` of a cell in both directions, on the sides along them; cells are
+ * split along their shorter diagonal. What a scheme owes to the symmetry of a mesh is lost here: so do
+ * results that depend on it show.
  */
 #include <math.h>
 #include <stdio.h>

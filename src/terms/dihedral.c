@@ -1,6 +1,6 @@
 /*
- * dihedral.c: see dihedral.h. With e = x1 - x0, and for each triangle its apex a, unit normal n, altitude H over e,
- * foot s = (a - x0).e/|e|^2 and in-plane unit vector m from the edge to the apex:
+ * dihedral.c: see dihedral.h. With e = x1 - x0, and for each triangle its apex a, unit normal n, altitude H
+ * over e, foot s = (a - x0).e/|e|^2 and in-plane unit vector m from the edge to the apex:
  *     theta = atan2(ehat . (n2 x n1), n1 . n2)
  *     gradient: g_a = n/H,  g_0 = -sum (1 - s_t) g_t,  g_1 = -sum s_t g_t
  * and the Hessian by the derivatives of the barycentric coordinates p_a = m/H, p_0 = -(1 - s) m/H - ehat/|e|,

@@ -4,7 +4,8 @@
 
 #include "drape/extend.h"
 
-/* The parameters that all loads begin with, as a list and among the values, where a box takes three a corner. */
+/* The parameters that all loads begin with, as a list and among the values, where a box takes three a
+ * corner. */
 enum { DRAPE_LOAD_LIST_EDGE, DRAPE_LOAD_LIST_BOX_MIN, DRAPE_LOAD_LIST_BOX_MAX, DRAPE_LOAD_LIST_COUNT };
 enum {
     DRAPE_LOAD_EDGE,
@@ -15,7 +16,8 @@ enum {
 
 extern const char *const drape_load_edges[];
 
-/* How many edges; the status of a refusal where the mesh has none such, or is no grid and a side is asked for. */
+/* How many edges; the status of a refusal where the mesh has none such, or is no grid and a side is asked
+ * for. */
 drape_status drape_load_count(const drape_cloth_view *cloth, const double *values,
                               drape_term_builder *builder, int32_t *count);
 

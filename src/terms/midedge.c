@@ -1,19 +1,21 @@
 /*
  * midedge.c: the shape operator of a triangle with normals at the middles of its edges,
  *     K = 1/A sum_i L_i (theta_i/2 + phi_i) nu_i nu_i'
- * over its edges: L length, nu the outward normal in the plane, theta the hinge's angle, phi by how much the normal of
- * the edge turns from the mean of its two triangles' (Grinspun, Gingold, Reisman & Zorin 2006, Computing discrete shape
- * operators on general meshes, section 4). Since K A = sum L (slope across the edge) nu, and the slope is one number for
- * both triangles, sums of K over triangles telescope: a constant moment is in equilibrium on any mesh.
+ * over its edges: L length, nu the outward normal in the plane, theta the hinge's angle, phi by how much the
+ * normal of the edge turns from the mean of its two triangles' (Grinspun, Gingold, Reisman & Zorin 2006,
+ * Computing discrete shape operators on general meshes, section 4). Since K A = sum L (slope across the edge)
+ * nu, and the slope is one number for both triangles, sums of K over triangles telescope: a constant moment
+ * is in equilibrium on any mesh.
  *
- * The normals are usually unknowns of their own, or phi is 0. With phi = 0 K is exact where the two triangles of
- * every edge are images of each other in a point; elsewhere it is not, and plates on irregular meshes converge to 5 to 15 %
- * too stiff. Here phi is the linear function of the angles of the five hinges of the two triangles that makes K exact for
- * every quadratic deflection, the smallest such: phi_i = sum c_ij theta_j. It sees the same from both sides. So there are
- * no further unknowns, and deflections converge with the square of the mesh size on any mesh. On symmetric meshes c = 0.
+ * The normals are usually unknowns of their own, or phi is 0. With phi = 0 K is exact where the two triangles
+ * of every edge are images of each other in a point; elsewhere it is not, and plates on irregular meshes
+ * converge to 5 to 15 % too stiff. Here phi is the linear function of the angles of the five hinges of the
+ * two triangles that makes K exact for every quadratic deflection, the smallest such: phi_i = sum c_ij
+ * theta_j. It sees the same from both sides. So there are no further unknowns, and deflections converge with
+ * the square of the mesh size on any mesh. On symmetric meshes c = 0.
  *
- * The slope across a free edge has nothing that holds it: it is where the energy is least, M_nn = 0. Across a clamped one
- * the normal keeps its direction, and theta_i/2 + phi_i is the angle of the triangle to it.
+ * The slope across a free edge has nothing that holds it: it is where the energy is least, M_nn = 0. Across a
+ * clamped one the normal keeps its direction, and theta_i/2 + phi_i is the angle of the triangle to it.
  *
  * No bending is lost: K = 0 on both sides of an edge makes theta/2 + phi = theta/2 - phi = 0.
  */
@@ -25,9 +27,11 @@
 #include <math.h>
 #include <string.h>
 
-#define SMALLEST_RATIO                                                                                       \
-    1e-4             /* of eigenvalues: below, the hinges hardly tell this curvature, and phi leaves it */
-#define NOTHING 1e-9 /* a coefficient that is rounding [1] */
+/* Of eigenvalues: below, the hinges hardly tell this curvature, and phi leaves it. */
+#define SMALLEST_RATIO 1e-4
+
+/* A coefficient that is rounding [1]. */
+#define NOTHING 1e-9
 
 const int drape_midedge_hinge[MIDEDGE_HINGES][4] = {{0, 1, 2, 3}, {1, 2, 0, 4},  {2, 0, 1, 5},
                                                     {0, 3, 1, 6}, {3, 1, 0, 7},  {1, 4, 2, 8},
@@ -189,8 +193,8 @@ static void least_solution(const double *m, int n, const double target[3], doubl
         c[j] = m[j] * y[0] + m[n + j] * y[1] + m[2 * n + j] * y[2];
 }
 
-/* phi of own edge i from the open hinges of its two triangles: a quadratic about the middle of the edge has no slope
- * there. */
+/* phi of own edge i from the open hinges of its two triangles: a quadratic about the middle of the edge has
+ * no slope there. */
 static void find_phi(patch *p, int i)
 {
     const int near[5] = {i, (i + 1) % 3, (i + 2) % 3, 3 + 2 * i, 4 + 2 * i};
@@ -219,7 +223,8 @@ static void find_phi(patch *p, int i)
 
 /* ---- K ---- */
 
-/* How K = (K11, K22, 2 K12) depends on the angle of each hinge: b (9 x 3); f: on the slopes of the free edges. */
+/* How K = (K11, K22, 2 K12) depends on the angle of each hinge: b (9 x 3); f: on the slopes of the free
+ * edges. */
 static int gather_columns(const patch *p, double area, double b[3 * MIDEDGE_HINGES], double f[9])
 {
     int count = 0;

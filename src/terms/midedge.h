@@ -1,9 +1,9 @@
 /*
  * midedge.h: the shape operator of a triangle from the angles of the hinges around it.
  *
- * Local nodes: 0 1 2 the triangle; 3 + i the apex beyond its edge i, from node i to node i + 1; 6 + 2 i and 7 + 2 i the
- * apices beyond the two other edges of that neighbour. Hinges: 0 1 2 those of its own edges; 3 + 2 i and 4 + 2 i those
- * of its neighbour's.
+ * Local nodes: 0 1 2 the triangle; 3 + i the apex beyond its edge i, from node i to node i + 1; 6 + 2 i and 7
+ * + 2 i the apices beyond the two other edges of that neighbour. Hinges: 0 1 2 those of its own edges; 3 + 2
+ * i and 4 + 2 i those of its neighbour's.
  */
 #ifndef DRAPE_TERMS_MIDEDGE_H
 #define DRAPE_TERMS_MIDEDGE_H
@@ -24,8 +24,8 @@ typedef struct drape_midedge {
     double k[3], l[9], c[3][MIDEDGE_HINGES];
 } drape_midedge;
 
-/* The patch of a triangle. law: C of orthotropic.h [N m]; values: the orthotropic ones. False where the plane of the
- * triangle does not hold the warp. */
+/* The patch of a triangle. law: C of orthotropic.h [N m]; values: the orthotropic ones. False where the plane
+ * of the triangle does not hold the warp. */
 bool drape_midedge_of(const drape_cloth_view *cloth, int32_t triangle, const double *values,
                       const double law[9], drape_midedge *out);
 

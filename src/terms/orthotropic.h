@@ -1,9 +1,10 @@
 /*
- * orthotropic.h: the elastic law of a woven sheet, in tension or in bending: energy per area 1/2 s' C s of s = (s11,
- * s22, 2 s12), the axes along warp and weft,
- *     C = [c11 c12 0; c12 c22 0; 0 0 c66],  c11 = warp/(1 - nu^2), c22 = weft/(1 - nu^2), c12 = nu sqrt(c11 c22)
- * where warp and weft are the stiffnesses of strips with free sides, as they are measured, and nu^2 = nu12 nu21.
- * Equal stiffnesses and c66 = (1 - nu)/2 c11 are an isotropic sheet.
+ * orthotropic.h: the elastic law of a woven sheet, in tension or in bending: energy per area 1/2 s' C s of s
+ * = (s11, s22, 2 s12), the axes along warp and weft,
+ *     C = [c11 c12 0; c12 c22 0; 0 0 c66],
+ *     c11 = warp/(1 - nu^2), c22 = weft/(1 - nu^2), c12 = nu sqrt(c11 c22)
+ * where warp and weft are the stiffnesses of strips with free sides, as they are measured, and nu^2 = nu12
+ * nu21. Equal stiffnesses and c66 = (1 - nu)/2 c11 are an isotropic sheet.
  */
 #ifndef DRAPE_TERMS_ORTHOTROPIC_H
 #define DRAPE_TERMS_ORTHOTROPIC_H
@@ -20,19 +21,21 @@ enum {
     DRAPE_ORTHOTROPIC_COUNT = DRAPE_ORTHOTROPIC_DIRECTION + 3
 };
 
-/* C (3 x 3) from values, of which those that are NaN are taken from an isotropic strip: its stiffness and nu. */
+/* C (3 x 3) from values, of which those that are NaN are taken from an isotropic strip: its stiffness and
+ * nu. */
 void drape_orthotropic_law(const double *values, double strip, double poisson, double c[9]);
 
-/* Two orthonormal axes (3 each) in the plane of a triangle at rest, the first along the warp, or along any direction
- * where the law has none; and its corners in them (3 x 2), the first at 0. Returns false where the plane does not
- * hold the warp. */
+/* Two orthonormal axes (3 each) in the plane of a triangle at rest, the first along the warp, or along any
+ * direction where the law has none; and its corners in them (3 x 2), the first at 0. Returns false where the
+ * plane does not hold the warp. */
 bool drape_orthotropic_frame(const double *values, const double *const corner[3], const double c[9],
                              double axes[6], double flat[6]);
 
 /* C = sum k_i l_i l_i': rank, at most 3, pairs k > 0, l (3). The first `rank` pivots, largest first. */
 void drape_orthotropic_squares(const double c[9], int rank, double k[3], double l[9]);
 
-/* C where the energy is least over s = f t for any t (count, at most 2): the columns f (count x 3) do no work. */
+/* C where the energy is least over s = f t for any t (count, at most 2): the columns f (count x 3) do no
+ * work. */
 void drape_orthotropic_release(double c[9], const double *f, int count);
 
 /* The parameters: the unit of warp, weft and shear, and what they are by default. */

@@ -1,14 +1,16 @@
 /*
- * bend.midedge: bending of every triangle, E = A/2 (K - K0)' C (K - K0), K = (K11, K22, 2 K12) its shape operator with
- * normals at the middles of its edges (midedge.h), C the law of orthotropic.h.
+ * bend.midedge: bending of every triangle, E = A/2 (K - K0)' C (K - K0), K = (K11, K22, 2 K12) its shape
+ * operator with normals at the middles of its edges (midedge.h), C the law of orthotropic.h.
  *
- * C = sum k l l', so E = 1/2 sum k (q - q0)^2 with q = l . K = sum c theta over nine hinges at most: each square is an
- * element, three a triangle and one less for each free edge. Where no triangle needs hinges beyond its own (lattices) elements
- * have 6 nodes, else 12; a hinge whose c is 0 is not there, and its nodes are the first again.
+ * C = sum k l l', so E = 1/2 sum k (q - q0)^2 with q = l . K = sum c theta over nine hinges at most: each
+ * square is an element, three a triangle and one less for each free edge. Where no triangle needs hinges
+ * beyond its own (lattices) elements have 6 nodes, else 12; a hinge whose c is 0 is not there, and its nodes
+ * are the first again.
  *
  * A clamped edge has no second triangle but a direction in space: x3 = (x0 + x1)/2 + r, r at rest.
  *
- * The internal variables are the nine angles of the last accepted state: each is taken on the branch nearest to it.
+ * The internal variables are the nine angles of the last accepted state: each is taken on the branch nearest
+ * to it.
  */
 #include "base/vec3.h"
 #include "terms/dihedral.h"

@@ -1,5 +1,5 @@
-/* load.line: a dead force per length on edges of the boundary: E = -f . (x0 + x1) L/2, L the length at rest. Linear: no
- * Hessian. */
+/* load.line: a dead force per length on edges of the boundary: E = -f . (x0 + x1) L/2, L the length at rest.
+ * Linear: no Hessian. */
 #include "terms/load.h"
 #include "terms/terms.h"
 

@@ -1,8 +1,9 @@
 /*
- * load.moment: a moment per length on edges of the boundary, about each edge: E = M L theta, theta the angle from the
- * triangle to the direction r in space that it had at rest, as of a hinge whose second apex is (x0 + x1)/2 + r, and L the
- * length at rest. It bends a strip to the curvature M/D, however far: M follows the edge, and since it has a potential
- * its Hessian is symmetric. Where the edge turns in its own plane the moment is about where it is.
+ * load.moment: a moment per length on edges of the boundary, about each edge: E = M L theta, theta the angle
+ * from the triangle to the direction r in space that it had at rest, as of a hinge whose second apex is (x0 +
+ * x1)/2 + r, and L the length at rest. It bends a strip to the curvature M/D, however far: M follows the
+ * edge, and since it has a potential its Hessian is symmetric. Where the edge turns in its own plane the
+ * moment is about where it is.
  *
  * The internal variable is the angle of the last accepted state: the next is on the branch nearest to it.
  */

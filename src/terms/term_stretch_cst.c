@@ -1,11 +1,12 @@
 /*
  * stretch.cst: a membrane of constant-strain triangles with the law of Saint Venant and Kirchhoff,
  *     E = A/2 e' C e,  e = (E11, E22, 2 E12),  Green's strain E = (F'F - I)/2,  F = sum x_a grad N_a,
- * C the law of orthotropic.h, grad N_a at rest. C = sum k l l', so E = A/2 sum k (q - q0)^2, and each square is an element,
- * three a triangle. With d1 = x1 - x0, d2 = x2 - x0 and the gradients B_a of N_a:
- *     q = 1/2 (W11 d1.d1 + W22 d2.d2) + W12 d1.d2,  W_ab = l1 B_a1 B_b1 + l2 B_a2 B_b2 + l3 (B_a1 B_b2 + B_a2 B_b1)
- * so its Hessian is constant, W in each of the three directions. (Bonet & Wood 2008, Nonlinear Continuum Mechanics
- * for Finite Element Analysis, 6.3; Volino, Magnenat-Thalmann & Faure 2009.)
+ * C the law of orthotropic.h, grad N_a at rest. C = sum k l l', so E = A/2 sum k (q - q0)^2, and each square
+ * is an element, three a triangle. With d1 = x1 - x0, d2 = x2 - x0 and the gradients B_a of N_a:
+ *     q = 1/2 (W11 d1.d1 + W22 d2.d2) + W12 d1.d2,
+ *     W_ab = l1 B_a1 B_b1 + l2 B_a2 B_b2 + l3 (B_a1 B_b2 + B_a2 B_b1)
+ * so its Hessian is constant, W in each of the three directions. (Bonet & Wood 2008, Nonlinear Continuum
+ * Mechanics for Finite Element Analysis, 6.3; Volino, Magnenat-Thalmann & Faure 2009.)
  */
 #include "base/vec3.h"
 #include "terms/orthotropic.h"

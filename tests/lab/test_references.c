@@ -1,5 +1,5 @@
-/* test_references.c: the references of drape validate that take a second or two; what GSL says of them against the digits of
- * other sources; a reference can fail. All of them are run by `drape validate`. */
+/* test_references.c: the references of drape validate that take a second or two; what GSL says of them
+ * against the digits of other sources; a reference can fail. All of them are run by `drape validate`. */
 #include "lab/rod.h"
 #include "lab/validate.h"
 #include "support/suite.h"

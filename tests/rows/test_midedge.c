@@ -1,6 +1,7 @@
 /*
- * test_midedge.c: what bend.midedge promises of any mesh: it is exact for every quadratic deflection, in equilibrium under a
- * constant moment, six nodes wide on symmetric ones, and its clamps have exact derivatives and hold.
+ * test_midedge.c: what bend.midedge promises of any mesh: it is exact for every quadratic deflection, in
+ * equilibrium under a constant moment, six nodes wide on symmetric ones, and its clamps have exact
+ * derivatives and hold.
  */
 #include <stdio.h>
 
@@ -18,7 +19,7 @@ static drape_model *sheet(drape_context *ctx, const drape_setting *settings, siz
     return make_model(ctx, &(model_def){.mesh = mesh, .terms = &term, .term_count = 1});
 }
 
-/* Of a node: how many elements have it, and whether one of them has fewer squares than three, so touches the boundary. */
+/* Whether a node is on the boundary: inside there are as many edges as triangles around it. */
 static bool near_boundary(const drape_model *m, int32_t node)
 {
     int32_t around = 0;
@@ -27,7 +28,7 @@ static bool near_boundary(const drape_model *m, int32_t node)
             around++;
     for (int32_t t = 0; t < 3 * m->triangle_count; t++)
         around -= m->triangle[t] == node;
-    return around != 0; /* inside there are as many edges as triangles around a node */
+    return around != 0;
 }
 
 static void deflect(const drape_model *m, const double bend[3], double *x)
@@ -40,8 +41,8 @@ static void deflect(const drape_model *m, const double bend[3], double *x)
     }
 }
 
-/* Triangles without a free edge have three squares in a row of the same first three nodes; their energy is A/2 b'Cb. The warp
- * is x, the weft -z: b12 changes its sign, but stands alone in C. */
+/* Triangles without a free edge have three squares in a row of the same first three nodes; their energy is
+ * A/2 b'Cb. The warp is x, the weft -z: b12 changes its sign, but stands alone in C. */
 static void check_energies(const drape_model *m, const double *x, const double law[4], const double bend[3])
 {
     static const double flat[9 * 3000];
@@ -69,7 +70,8 @@ static void check_energies(const drape_model *m, const double *x, const double l
         }
         w[0] = u[1] * v[2] - u[2] * v[1], w[1] = u[2] * v[0] - u[0] * v[2], w[2] = u[0] * v[1] - u[1] * v[0];
         area2 = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-        /* Slopes are below 2 SLOPE on a sheet of 0.5 m, their squares 4e-8; coefficients below 1e-9 were left out. */
+        /* Slopes are below 2 SLOPE on a sheet of 0.5 m, their squares 4e-8; coefficients below 1e-9 were left
+         * out. */
         ck_assert_double_eq_tol(energy / (density * area2 / 2), 1, 1e-6);
         whole++;
         e += 2;
@@ -98,8 +100,9 @@ START_TEST(quadratics_are_exact)
 }
 END_TEST
 
-/* Where the two triangles of every edge are images of each other in its middle the turns of the normals are 0, and elements
- * have six nodes. Alternating diagonals are mirror images across sides of cells: they need twelve, as others do. */
+/* Where the two triangles of every edge are images of each other in its middle the turns of the normals are
+ * 0, and elements have six nodes. Alternating diagonals are mirror images across sides of cells: they need
+ * twelve, as others do. */
 START_TEST(symmetric_grids_need_six_nodes)
 {
     drape_context *ctx = make_context();
@@ -150,8 +153,8 @@ START_TEST(clamps_have_exact_derivatives)
 }
 END_TEST
 
-/* A sheet on one row of pins turns about it as on an axis: its Hessian at rest has one mode without stiffness. A clamp
- * takes that away. */
+/* A sheet on one row of pins turns about it as on an axis: its Hessian at rest has one mode without
+ * stiffness. A clamp takes that away. */
 START_TEST(clamps_hold)
 {
     drape_context *ctx = make_context();
@@ -166,7 +169,8 @@ START_TEST(clamps_hold)
             x[3 * i + 2] = m->rest[3 * i + 2];
         }
         drape_system_energy(system, &(drape_point){.x = x, .internal = internal}, &elastic, &gravity);
-        /* Where it is clamped the turn of 0.1 is bent within a cell of 0.1 m: at least D/2 kappa^2 over a fourth of a cell. */
+        /* Where it is clamped the turn of 0.1 is bent within a cell of 0.1 m: at least D/2 kappa^2 over a
+         * fourth of a cell. */
         const double rigidity = m->cloths[0].material.flexural_rigidity, kappa = 0.1 / 0.1;
         if (clamp)
             ck_assert_double_ge(elastic, rigidity / 2 * kappa * kappa * 0.4 * 0.1 / 4);
@@ -181,7 +185,8 @@ START_TEST(clamps_hold)
 }
 END_TEST
 
-/* The sum of C K over triangles telescopes: under a constant moment forces stand on the boundary and next to it alone. */
+/* The sum of C K over triangles telescopes: under a constant moment forces stand on the boundary and next to
+ * it alone. */
 START_TEST(constant_moments_are_in_equilibrium)
 {
     drape_context *ctx = make_context();
