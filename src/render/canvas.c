@@ -71,11 +71,14 @@ static void resolve(const drape_canvas *canvas)
 /* OpenGL's rows go up. */
 static void flip(uint8_t *pixels, size_t row, int height)
 {
+    uint8_t kept[4096];
     for (int a = 0, b = height - 1; a < b; a++, b--)
-        for (size_t i = 0; i < row; i++) {
-            uint8_t kept = pixels[(size_t)a * row + i];
-            pixels[(size_t)a * row + i] = pixels[(size_t)b * row + i];
-            pixels[(size_t)b * row + i] = kept;
+        for (size_t i = 0; i < row; i += sizeof kept) {
+            size_t size = row - i < sizeof kept ? row - i : sizeof kept;
+            uint8_t *upper = pixels + (size_t)a * row + i, *lower = pixels + (size_t)b * row + i;
+            memcpy(kept, upper, size);
+            memcpy(upper, lower, size);
+            memcpy(lower, kept, size);
         }
 }
 

@@ -74,47 +74,34 @@ static const char body_source[] =
     "    return vec3(0.42, 0.45, 0.50) * arriving(s) / PI * 1.9 + 0.06 * power(dot(s.n, h), 24.0) * s.sun;\n"
     "}\n";
 
+/* Most pixels of a picture are ground: it has no more than it needs, and its light is mixed as it is seen, in
+ * sRGB. */
 static const char ground_source[] =
     "uniform vec3 center;\n"
     "uniform float radius, spacing, solid;\n"
     "\n"
     "// Lines of a square lattice on the plane.\n"
-    "float lattice(Surface s) {\n"
-    "    vec3 u = normalize(abs(s.n.y) > 0.7 ? cross(s.n, vec3(0.0, 0.0, 1.0)) : cross(vec3(0.0, 1.0, 0.0), "
-    "s.n));\n"
-    "    vec2 q = vec2(dot(s.p, u), dot(s.p, cross(s.n, u))) / spacing, w = fwidth(q) + 1e-6;\n"
-    "    vec2 near = abs(fract(q - 0.5) - 0.5) / w;\n"
+    "float lattice(vec2 q) {\n"
+    "    vec2 w = fwidth(q) + 1e-6, near = abs(fract(q - 0.5) - 0.5) / w;\n"
     "    float line = 1.0 - min(min(near.x, near.y), 1.0);\n"
     "    return line * clamp(0.5 / max(w.x, w.y) - 1.0, 0.0, 1.0);\n"
     "}\n"
     "\n"
     "// Fades into the wall. Without a ground in the scene only the shadow is seen.\n"
-    "vec3 ground(Surface s) {\n"
-    "    float away = length(s.p - center) / radius, fade = 1.0 - smoothstep(1.3, 3.4, away);\n"
-    "    float shadow = (1.0 - s.sun) * max(0.0, s.n.y);\n"
-    "    if (solid < 0.5) return mix(wall(), vec3(0.24, 0.26, 0.31), 0.40 * shadow * fade);\n"
-    "    s.sun = max(s.sun, 0.12);\n"
-    "    vec3 c = vec3(0.60, 0.60, 0.61) * (1.0 - 0.16 * lattice(s)) * arriving(s) / PI;\n"
-    "    return mix(wall(), encoded(c), fade);\n"
-    "}\n";
-
-static const char ground_main[] =
     "void main() {\n"
-    "    Surface s;\n"
-    "    s.p = place;\n"
-    "    s.v = normalize(eye - place);\n"
-    "    s.side = gl_FrontFacing ? 1.0 : -1.0;\n"
-    "    vec3 n = normalize(normal) * s.side;\n"
-    "    float away = dot(n, s.v); // a smooth normal may look away where its triangle does not\n"
-    "    s.n = normalize(away < 0.02 ? n + (0.02 - away) * s.v : n);\n"
-    "    s.t = normalize(tangent - dot(tangent, s.n) * s.n + 1e-9 * s.v);\n"
-    "    s.at = at;\n"
-    "    s.value = value;\n"
-    "    s.piece = piece;\n"
-    "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
-    "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
-    "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
-    "    colour = vec4(ground(s), 1.0);\n"
+    "    vec3 u = abs(normal.y) > 0.7 ? vec3(normal.y, -normal.x, 0.0) : vec3(normal.z, 0.0, -normal.x);\n"
+    "    u *= inversesqrt(dot(u, u)) / spacing;\n"
+    "    vec3 c = wall(), far = (place - center) / radius;\n"
+    "    float line = solid < 0.5 ? 0.0 : lattice(vec2(dot(place, u), dot(place, cross(normal, u))));\n"
+    "    float fade = 1.0 - smoothstep(1.3, 3.4, sqrt(dot(far, far))), facing = dot(normal, light);\n"
+    "    if (fade > 0.0) {\n"
+    "        float sun = sunlight(shadow_at, facing);\n"
+    "        vec3 lit = mix(vec3(0.40, 0.41, 0.425), vec3(0.745, 0.735, 0.725), sun * min(1.2 * facing, "
+    "1.0));\n"
+    "        vec3 shade = mix(c, vec3(0.24, 0.26, 0.31), 0.40 * (1.0 - sun) * max(normal.y, 0.0));\n"
+    "        c = mix(c, solid < 0.5 ? shade : lit * (1.0 - 0.07 * line), fade);\n"
+    "    }\n"
+    "    colour = vec4(c, 1.0);\n"
     "}\n";
 
 static const char wall_vertex[] =
@@ -207,7 +194,7 @@ static bool create_programs(drape_painter *p)
 {
     static const char *const body[] = {body_source, surface_main, NULL}, *const ground[] = {wall_source,
                                                                                             ground_source,
-                                                                                            ground_main};
+                                                                                            NULL};
     p->depth = program(p->ctx, "depth", surface_vertex, depth_fragment, NULL);
     p->body = p->depth ? surface_program(p->ctx, "body", body) : 0;
     p->ground = p->body ? surface_program(p->ctx, "ground", ground) : 0;
