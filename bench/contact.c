@@ -3,15 +3,16 @@
  * other like an accordion, and sinks together: after the first steps all layers touch. Wall time of a step by
  * stages, at CS184's thickness and at a tenth of it.
  *
- *     contact [--csv FILE] [NODES A SIDE ...]      default 20 50 100
+ *     contact [--csv FILE] [--steps WARM COUNT] [NODES A SIDE ...]      default 6 4, 20 50 100
  */
 #include "bench.h"
 
 #include "contact/contact.h"
 
-#define WARM  6 /* steps before the clock */
-#define STEPS 4
-#define FLAT  0.1 /* [m] of a fold between two turns */
+#define FLAT 0.1 /* [m] of a fold between two turns */
+
+static int warm = 6; /* steps before the clock */
+static int steps = 4;
 
 /* The point at arc length s of an accordion: flat parts of FLAT, turns of radius r, from the floor up. */
 static void fold(double s, double r, double lowest, double *x, double *y)
@@ -43,9 +44,9 @@ static void lay(drape_context *ctx, drape_sim *sim, int side, double r, double l
     free(v);
 }
 
-static void advance(drape_context *ctx, drape_sim *sim, int steps)
+static void advance(drape_context *ctx, drape_sim *sim, int count)
 {
-    if (drape_sim_advance(sim, drape_sim_time(sim) + steps / 60.0))
+    if (drape_sim_advance(sim, drape_sim_time(sim) + count / 60.0))
         bench_fail(ctx, "a step");
 }
 
@@ -80,21 +81,21 @@ static void measure(drape_context *ctx, int side, double thickness, double frict
         side, side, friction, thickness, friction);
     drape_sim *sim = bench_sim(ctx, model, "be", NULL, NULL, NULL);
     lay(ctx, sim, side, r, 0.0015);
-    advance(ctx, sim, WARM);
+    advance(ctx, sim, warm);
     stages a = read_stages(sim);
-    advance(ctx, sim, STEPS);
+    advance(ctx, sim, steps);
     stages b = read_stages(sim);
     int32_t active = drape_contact_active((drape_contact *)drape_system_contact(sim->system), &least);
     double step = b.step - a.step;
     printf("%6d %10g %8g %8d %10.1f %6.1f %10.1f %8.1f %8.1f\n", side * side, thickness, friction,
-           (int)active, 1e3 * step / STEPS, (double)(b.iterations - a.iterations) / STEPS,
+           (int)active, 1e3 * step / steps, (double)(b.iterations - a.iterations) / steps,
            100 * (b.contact - a.contact) / step, 100 * (b.search - a.search) / step,
            100 * (b.factor - a.factor) / step);
     fflush(stdout);
     if (csv) {
         bench_csv_row(csv);
         fprintf(csv, "%d,%g,%g,%d,%g,%g,%g,%g,%g\n", side * side, thickness, friction, (int)active,
-                1e3 * step / STEPS, (double)(b.iterations - a.iterations) / STEPS,
+                1e3 * step / steps, (double)(b.iterations - a.iterations) / steps,
                 100 * (b.contact - a.contact) / step, 100 * (b.search - a.search) / step,
                 100 * (b.factor - a.factor) / step);
     }
@@ -107,14 +108,23 @@ int main(int argc, char **argv)
     const char *file = NULL;
     int sides[16] = {20, 50, 100}, count = 3, first = 1;
     if (argc > 1 && strcmp(argv[1], "--help") == 0)
-        return puts("contact [--csv FILE] [NODES A SIDE ...]") < 0;
-    if (argc > 2 && strcmp(argv[1], "--csv") == 0) {
-        file = argv[2];
-        first = 3;
+        return puts("contact [--csv FILE] [--steps WARM COUNT] [NODES A SIDE ...]") < 0;
+    if (argc > first + 1 && strcmp(argv[first], "--csv") == 0) {
+        file = argv[first + 1];
+        first += 2;
+    }
+    if (argc > first + 2 && strcmp(argv[first], "--steps") == 0) {
+        warm = atoi(argv[first + 1]);
+        steps = atoi(argv[first + 2]);
+        first += 3;
     }
     for (int i = first; i < argc && i - first < 16; i++) {
         sides[i - first] = atoi(argv[i]);
         count = i - first + 1;
+    }
+    if (warm < 0 || steps < 1) {
+        fputs("contact: at least one step is measured\n", stderr);
+        return 2;
     }
     FILE *csv = bench_csv(file, "nodes,thickness_m,friction,active_pairs,step_ms,iterations,contact_percent,"
                                 "search_percent,factor_percent");

@@ -39,7 +39,7 @@ typedef struct run {
     }
 #define BOSON(method_, step_, knob_, ...)                                                                    \
     {                                                                                                        \
-        .scene = "verlet_100", .knob = knob_, .method = method_, .step = step_, .time = 3.6, .limit = NONE,   \
+        .scene = "verlet_100", .knob = knob_, .method = method_, .step = step_, .time = 3.6, .limit = NONE,  \
         .settings = {                                                                                        \
             __VA_ARGS__                                                                                      \
         }                                                                                                    \

@@ -81,6 +81,16 @@ static void print_depth(FILE *csv, double depth)
         fputc(',', csv);
 }
 
+/* A value may be a list: its commas would be columns. */
+static void print_settings(const request *r)
+{
+    for (int i = 0; i < r->set_count; i++) {
+        fprintf(r->csv, "%s%s=", i ? " " : "", r->set[i].pointer);
+        for (const char *c = r->set[i].value; *c; c++)
+            fputc(*c == ',' ? ';' : *c, r->csv);
+    }
+}
+
 static void report(const request *r, const char *path, drape_sim *sim, const watched *w, drape_status status,
                    double cpu)
 {
@@ -105,8 +115,7 @@ static void report(const request *r, const char *path, drape_sim *sim, const wat
     if (!r->csv)
         return;
     bench_csv_row(r->csv);
-    for (int i = 0; i < r->set_count; i++)
-        fprintf(r->csv, "%s%s=%s", i ? " " : "", r->set[i].pointer, r->set[i].value);
+    print_settings(r);
     fprintf(r->csv, ",%s,%s,%d,%lld,%lld,%lld,%.2f,%.1f", name_of(path), drape_status_name(status),
             (int)w->audit.model->node_count, (long long)s.steps_accepted, (long long)s.steps_rejected,
             (long long)s.newton_iterations, cpu, share);

@@ -436,9 +436,11 @@ typedef struct drape_attempt {
     drape_status status; /* > 0 with accepted: on_failure "accept" took an unconverged state */
     const char *reason;  /* "converged", "max_iterations", ...: a short token, static */
     bool accepted;
-    int iterations;   /* Newton iterations */
-    double residual;  /* of the free nodes at the end of the attempt, in the norm of the integrator [N] */
-    double tolerance; /* that it was to reach [N]; with the reason "rounding" what rounding alone leaves */
+    int iterations;  /* Newton iterations */
+    double residual; /* of the free nodes at the end of the attempt, in the norm of the integrator [N] */
+    double
+        tolerance; /* that it was to reach [N]; with the reason "rounding" what rounding alone leaves; NaN: the
+                         row promises none */
     drape_worst worst;
 } drape_attempt;
 

@@ -436,6 +436,21 @@ drape_status drape_system_check(const drape_system *system, const double *x, con
     return DRAPE_OK;
 }
 
+bool drape_system_breaks_limit(const drape_system *system, const double *x, const double *before,
+                               const double *internal)
+{
+    for (int32_t i = 0; i < system->model->term_count; i++) {
+        const drape_term *term = &system->model->terms[i];
+        drape_fault fault;
+        if (!term->ops->constraint || !term->ops->check || drape_summer_leaves(system->summer, term))
+            continue;
+        const double *own = term->first_internal >= 0 ? internal + term->first_internal : NULL;
+        if (term->ops->check(&term->elements, x, before, own, &fault))
+            return true;
+    }
+    return false;
+}
+
 drape_worst drape_system_worst_dof(const drape_system *system, const double *free_vector, const char *what,
                                    double limit)
 {

@@ -121,6 +121,10 @@ void drape_system_term(drape_system *system, int32_t term, const drape_point *po
 drape_status drape_system_check(const drape_system *system, const double *x, const double *before,
                                 const double *internal, const char **reason, drape_worst *worst);
 
+/* Whether x is beyond a limit that a term with `constraint` keeps: drape_system_check of those alone. */
+bool drape_system_breaks_limit(const drape_system *system, const double *x, const double *before,
+                               const double *internal);
+
 /* Whether on the straight way from the beginning of the step to y something passes through something. */
 bool drape_system_crosses(drape_system *system, const double *y, double t);
 

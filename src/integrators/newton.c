@@ -589,16 +589,13 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     return s->nonfinite ? blame_element(s, status, info) : status;
 }
 
-/* A guess that no step may end in is worse than none: springs beyond their limit, say, pull with forces far above
- * any that act. */
+/* A guess beyond a limit is worse than none: springs that are too long pull with forces far above any that act. */
 static void improve_guess(drape_newton *s, double *d)
 {
-    const char *reason;
-    drape_worst worst;
     if (s->ahead) /* from d = 0 */
         scale(d, free_share(s, s->x, d), s->n);
     place(s, d);
-    if (drape_system_check(s->system, s->x, s->problem->x_base, s->problem->internal, &reason, &worst))
+    if (drape_system_breaks_limit(s->system, s->x, s->problem->x_base, s->problem->internal))
         memset(d, 0, (size_t)s->n * sizeof *d);
 }
 

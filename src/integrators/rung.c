@@ -196,9 +196,9 @@ drape_status drape_rung_finish(drape_rung *s, drape_status status, const drape_s
 {
     drape_system *system = s->base.system;
     info->residual = drape_rung_residual(s);
-    info->tolerance = fmax(info->residual, tolerance);
+    info->tolerance = NAN; /* the residual is told, not promised */
     if (status != DRAPE_RETRY_DEGENERATE)
-        info->worst = drape_system_worst_dof(system, s->f, "residual [N]", info->tolerance);
+        info->worst = drape_system_worst_dof(system, s->f, "residual [N]", tolerance);
     if (!status)
         status = drape_system_status(system);
     if (status)
