@@ -59,6 +59,7 @@ typedef struct drape_material {
     double areal_density;      /* [kg/m2]; total mass over area where the mass is uniform */
     double membrane_stiffness; /* E h [N/m] */
     double flexural_rigidity;  /* D = E h^3 / (12 (1 - nu^2)) [N m] */
+    double bending_warp, bending_weft, bending_twist; /* of a measured fabric [N m]; NaN: it is none */
 } drape_material;
 
 /* One cloth at rest. Node numbers are local to the cloth. All arrays are const and live as long as the model

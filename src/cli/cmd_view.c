@@ -45,7 +45,7 @@ typedef struct window_view {
     double x, y; /* of the pointer */
     float depth; /* [m] of the dragged node from the eye */
     bool help, changed, quit;
-    double frame_seconds;
+    double frame_seconds, step_seconds; /* of the last frame that was shown */
 } window_view;
 
 /* ---- What is drawn ---- */
@@ -147,7 +147,7 @@ static void put_lines(const window_view *w, char lines[LINES][LINE])
     snprintf(lines[n++], LINE, "%s   t = %.3f s   %s   dt = %.4g s", v->paused ? "paused" : "running",
              drape_sim_time(v->in.sim), view_integrator(v), view_dt(v));
     snprintf(lines[n++], LINE, "frame %.1f ms, of it steps %.1f ms", 1e3 * w->frame_seconds,
-             1e3 * v->step_seconds);
+             1e3 * w->step_seconds);
     snprintf(lines[n++], LINE, "steps %lld, rejected %lld, iterations %lld (last frame %lld)",
              (long long)s.steps_accepted, (long long)s.steps_rejected, (long long)s.newton_iterations,
              (long long)v->iterations);
@@ -523,12 +523,14 @@ static drape_status loop(window_view *w)
         if (status || (w->v.paused && !w->changed))
             continue;
         w->changed = false;
-        if (!w->v.paused)
+        bool ran = !w->v.paused;
+        if (ran)
             view_advance(&w->v, false);
         status = take_frame(w);
         if (!status)
             status = draw(w);
         w->frame_seconds = drape_clock_seconds() - start;
+        w->step_seconds = ran ? w->v.step_seconds : 0;
     }
     return status;
 }

@@ -56,7 +56,7 @@ static void print_overview(void)
 {
     puts("drape: a cloth simulator\n\nusage: drape VERB [arguments]\n");
     for (int i = 0; drape_verbs[i]; i++)
-        printf("  %-8s %-16s %s\n", drape_verbs[i]->name, drape_verbs[i]->operand, drape_verbs[i]->summary);
+        printf("  %-10s %-15s %s\n", drape_verbs[i]->name, drape_verbs[i]->operand, drape_verbs[i]->summary);
     puts("\n  drape VERB --help   what a verb takes\n"
          "  drape --version     the version\n\n"
          "Exit codes: 0 done, 1 the simulation, a check or the output failed, 2 bad input, 130 interrupted.");

@@ -2,6 +2,7 @@
  * material.c: from Young's modulus, Poisson's ratio, thickness and a density to membrane stiffness E h,
  * flexural rigidity D = E h^3/(12 (1 - nu^2)) and lumped masses.
  */
+#include "compile/fabrics.h"
 #include "compile/stages.h"
 
 #include <math.h>
@@ -68,6 +69,14 @@ const drape_param drape_material_params[DRAPE_MATERIAL_PARAM_COUNT] = {
          .default_value = MASS_AREA,
          .choices = mass_choices,
          .help = "area: lumped, a third of each triangle to each node; uniform: the same on every node"},
+    [DRAPE_MATERIAL_FABRIC] =
+        {.name = "fabric",
+         .kind = DRAPE_PARAM_CHOICE,
+         .unit = "1",
+         .default_value = 0,
+         .choices = drape_fabric_names,
+         .help = "a measured one: its areal density where none is given, and what bend.midedge takes "
+                 "for warp, weft and twist"},
 };
 
 static double total_area(const drape_mesh *mesh)
@@ -84,6 +93,11 @@ static drape_status total_mass(drape_context *ctx, const char *pointer, const do
     double density = values[DRAPE_MATERIAL_DENSITY], areal = values[DRAPE_MATERIAL_AREAL_DENSITY];
     double total = values[DRAPE_MATERIAL_TOTAL_MASS];
     int given = !isnan(density) + !isnan(areal) + !isnan(total);
+    const drape_fabric *fabric = &drape_fabrics[(int)values[DRAPE_MATERIAL_FABRIC]];
+    if (given == 0 && fabric->areal_density > 0) {
+        *mass = area * fabric->areal_density;
+        return DRAPE_OK;
+    }
     if (given != 1)
         return drape_fail_at(
             ctx, DRAPE_E_ARGUMENT, pointer,
@@ -95,7 +109,12 @@ static drape_status total_mass(drape_context *ctx, const char *pointer, const do
 
 static drape_material resolve(const double *values, double mass, double area)
 {
-    drape_material m = {.young_modulus = values[DRAPE_MATERIAL_YOUNG_MODULUS],
+    const drape_fabric *fabric = &drape_fabrics[(int)values[DRAPE_MATERIAL_FABRIC]];
+    const bool measured = fabric->warp > 0;
+    drape_material m = {.bending_warp = measured ? fabric->warp : NAN,
+                        .bending_weft = measured ? fabric->weft : NAN,
+                        .bending_twist = measured ? drape_fabric_twist(fabric) : NAN,
+                        .young_modulus = values[DRAPE_MATERIAL_YOUNG_MODULUS],
                         .poisson_ratio = values[DRAPE_MATERIAL_POISSON_RATIO],
                         .thickness = values[DRAPE_MATERIAL_THICKNESS],
                         .areal_density = mass / area};

@@ -14,8 +14,10 @@ typedef struct drape_step_info {
     double h;           /* [s] the step that was taken; a row that chooses its own sets it */
     int iterations;
     double residual, tolerance; /* [N] */
-    bool lenient; /* the caller asked for no guard but that numbers are finite (on_failure accept) */
-    bool usable;  /* with a status > 0: the caller asked to go on with what there is (on_failure accept) */
+    bool
+        lenient; /* the caller asked for no guard but that numbers are finite and nothing passes through anything
+                   * (on_failure accept) */
+    bool usable; /* with a status > 0: the caller asked to go on with what there is (on_failure accept) */
     double dissipated; /* [J] work that dissipative terms took in this step */
     double pin_work;   /* [J] work that moving pins put in */
     bool committed;    /* out->internal is set, its elements were checked along the way */

@@ -32,7 +32,7 @@ static void invert_block(double a[6])
 
 static void multiply_scalars(const drape_quasi *s, const double *x, double *y)
 {
-    const drape_quasi_scalar *c = &s->scalar;
+    const drape_scalar *c = &s->scalar;
     for (int32_t i = 0; i < s->nodes; i++) {
         double sum[3] = {0};
         for (int32_t k = c->start[i]; k < c->start[i + 1]; k++) {
@@ -101,20 +101,6 @@ static void precondition(const void *owner, const double *r, double *z)
 }
 
 /* ---- Update ---- */
-
-/* Linear in both weights, so it is summed anew only where they change: where the step does. */
-static void sum_scalars(drape_quasi *s, double weight, double mass_weight)
-{
-    drape_quasi_scalar *c = &s->scalar;
-    if (weight == s->weight && mass_weight == s->mass_weight)
-        return;
-    for (int32_t k = 0; k < c->start[s->nodes]; k++)
-        c->sum[k] = c->elastic[k] + (c->damping ? weight * c->damping[k] : 0);
-    for (int32_t i = 0; i < s->nodes; i++)
-        c->sum[c->diagonal[i]] += mass_weight * s->model->mass[s->model->node_of_free[i]];
-    s->weight = weight;
-    s->mass_weight = mass_weight;
-}
 
 static void evaluate_pairs(drape_quasi *s, const drape_point *point)
 {
@@ -212,7 +198,7 @@ static void sum_coarse_pairs(drape_quasi *s)
     drape_quasi_coarse *c = &s->coarse;
     size_t slots = (size_t)c->pattern.block_start[c->pattern.block_count];
     for (size_t k = 0; k < slots; k++) {
-        double scalar = c->elastic[k] + s->weight * c->damping[k] + s->mass_weight * c->mass[k];
+        double scalar = c->elastic[k] + s->scalar.weight * c->damping[k] + s->scalar.mass_weight * c->mass[k];
         memcpy(c->sum + 6 * k, (double[6]){scalar, 0, 0, scalar, 0, scalar}, 6 * sizeof(double));
     }
     for (int32_t p = 0; p < s->pairs; p++) {
@@ -288,7 +274,7 @@ drape_status drape_quasi_update(drape_quasi *s, const drape_point *point, double
     drape_status status = evaluate_remainder(s, point);
     if (status)
         return status;
-    sum_scalars(s, point->weight, mass_weight);
+    drape_scalar_weigh(&s->scalar, point->weight, mass_weight);
     evaluate_pairs(s, point);
     invert_diagonal(s);
     return factor_coarse(s);
@@ -348,29 +334,10 @@ void drape_quasi_destroy(drape_quasi **out)
     drape_prolong_free(s->ctx, &c->prolong);
     drape_pattern_free(s->ctx, &c->pattern);
     drape_quasi_free_room(s);
-    void *all[] = {s->pair,
-                   s->h,
-                   s->scalar.start,
-                   s->scalar.column,
-                   s->scalar.diagonal,
-                   s->scalar.elastic,
-                   s->scalar.damping,
-                   s->scalar.sum,
-                   c->elastic,
-                   c->damping,
-                   c->mass,
-                   c->pair_start,
-                   c->slot,
-                   c->weight,
-                   c->sum,
-                   c->values,
-                   c->b,
-                   c->x,
-                   s->inverse,
-                   s->pcg.r,
-                   s->pcg.z,
-                   s->pcg.p,
-                   s->pcg.q};
+    drape_scalar_free(s->ctx, &s->scalar);
+    void *all[] = {s->pair,       s->h,     s->inverse, c->elastic, c->damping, c->mass,
+                   c->pair_start, c->slot,  c->weight,  c->sum,     c->values,  c->b,
+                   c->x,          s->pcg.r, s->pcg.z,   s->pcg.p,   s->pcg.q};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         drape_free(s->ctx, all[i]);
     drape_free(s->ctx, s);
@@ -398,14 +365,12 @@ size_t drape_quasi_bytes(const drape_quasi *s)
     const drape_prolong *p = &c->prolong;
     const drape_pattern *fine = drape_system_pattern(s->system);
     size_t pairs = (size_t)s->pairs, nodes = (size_t)s->nodes, added = (size_t)c->pair_start[pairs];
-    size_t blocks = (size_t)s->model->pattern.block_start[nodes],
-           slots = (size_t)c->pattern.block_start[c->pattern.block_count];
-    size_t doubles = 6 * pairs + (s->scalar.damping ? 3 : 2) * blocks + 6 * nodes + 12 * nodes +
-                     (size_t)p->start[nodes] + added + 9 * slots + 2 * (size_t)c->pattern.nonzeros +
-                     2 * (size_t)c->pattern.n;
-    size_t indices = 2 * pairs + blocks + 3 * nodes + (size_t)p->start[nodes] + added + 2 * slots + 2 * pairs;
+    size_t slots = (size_t)c->pattern.block_start[c->pattern.block_count];
+    size_t doubles = 6 * pairs + 6 * nodes + 12 * nodes + (size_t)p->start[nodes] + added + 9 * slots +
+                     2 * (size_t)c->pattern.nonzeros + 2 * (size_t)c->pattern.n;
+    size_t indices = 2 * pairs + nodes + (size_t)p->start[nodes] + added + 2 * slots + 2 * pairs;
     size_t lower = s->remainder.values ? ((size_t)fine->block_start[nodes] + nodes) / 2 : 0;
     doubles += s->remainder.values ? (size_t)fine->nonzeros + 9 * lower : 0;
-    return sizeof *s + doubles * sizeof(double) + (indices + 2 * lower) * sizeof(int32_t) +
-           c->row->bytes(c->solver);
+    return sizeof *s + drape_scalar_bytes(&s->scalar) + doubles * sizeof(double) +
+           (indices + 2 * lower) * sizeof(int32_t) + c->row->bytes(c->solver);
 }

@@ -3,11 +3,9 @@
  * few inexact Newton iterations:
  *     A = m_w M + C (x) I + sum over pairs [H -H; -H H] + R
  * H: 3 x 3, of measures that depend on the distance of two nodes, positive part, at each update.
- * C: of all other measures, bending above all: one scalar a pair of nodes, constant. It is the trace of each 3 x 3
- *    block of their Hessian at rest; since (tr B)^2 <= 3 |B|^2 it bounds the Hessian of one measure up to a factor
- *    of 3, and where all gradients of a measure are parallel, as those of a hinge are, without one. Liu, Bouaziz &
- *    Kavan 2017 take such a matrix for all terms; on stretching it holds the sheet back across itself, by
- *    thousands of times its inertia, and ten iterations do not undo that.
+ * C: of all other measures, bending above all: one scalar a pair of nodes, constant (scalar.h). Liu, Bouaziz & Kavan
+ *    2017 take such a matrix for all terms; on stretching it holds the sheet back across itself, by thousands of
+ *    times its inertia, and ten iterations do not undo that (projective.c).
  * R: energies and dissipation that are of no measure, and contact, as they are.
  *
  * It is solved by conjugate gradients with two parts added: the inverse of the diagonal blocks, and the

@@ -27,86 +27,6 @@ static drape_status list_pairs(drape_quasi *s)
     return DRAPE_OK;
 }
 
-/* ---- The scalar part ---- */
-
-/* Adds the Hessians at rest of all measures that are no pairs, with the weight w of rates. Strains are zero there,
- * so they are k_eff dq dq'. */
-static void add_rest_hessians(drape_quasi *s, const double *internal, const double *at_rest, double w,
-                              double *values)
-{
-    const drape_model *m = s->model;
-    const drape_point point = {.x = m->rest, .v = at_rest, .internal = internal, .weight = w};
-    for (int32_t t = 0; t < m->term_count; t++)
-        if (m->terms[t].ops->measure && !is_pairs(&m->terms[t]))
-            drape_system_term(s->system, t, &point, NULL, NULL, values);
-}
-
-static double trace_at(const drape_pattern *p, double *values, int32_t column, int32_t block)
-{
-    int64_t stride;
-    const double *a = drape_pattern_at(p, values, column, block, &stride);
-    return a[0] + a[stride + 1] + a[2 * stride + 2];
-}
-
-/* The traces of the blocks, at weight 0 and by weight; those that are zero but for the diagonal are left out. */
-static drape_status pack_scalars(drape_quasi *s, double *elastic, double *damped)
-{
-    const drape_pattern *p = &s->model->pattern;
-    drape_quasi_scalar *c = &s->scalar;
-    size_t rows = (size_t)p->block_count, blocks = (size_t)p->block_start[rows];
-    int32_t at = 0;
-    c->start = drape_alloc(s->ctx, rows + 1, sizeof *c->start);
-    c->diagonal = drape_alloc(s->ctx, rows, sizeof *c->diagonal);
-    c->column = drape_alloc(s->ctx, blocks, sizeof *c->column);
-    c->elastic = drape_alloc(s->ctx, blocks, sizeof *c->elastic);
-    c->sum = drape_alloc(s->ctx, blocks, sizeof *c->sum);
-    if (damped)
-        c->damping = drape_alloc(s->ctx, blocks, sizeof *c->damping);
-    if (!c->start || !c->diagonal || !c->column || !c->elastic || !c->sum || (damped && !c->damping))
-        return DRAPE_E_MEMORY;
-    for (int32_t j = 0; j < p->block_count; j++) {
-        c->start[j] = at;
-        for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++) {
-            double e = trace_at(p, elastic, j, k), d = damped ? trace_at(p, damped, j, k) - e : 0;
-            if (k == p->diagonal[j])
-                c->diagonal[j] = at;
-            else if (e == 0 && d == 0)
-                continue;
-            c->column[at] = p->block_row[k];
-            c->elastic[at] = e;
-            if (damped)
-                c->damping[at] = d;
-            at++;
-        }
-    }
-    c->start[p->block_count] = at;
-    return DRAPE_OK;
-}
-
-static drape_status build_scalars(drape_quasi *s)
-{
-    const drape_model *m = s->model;
-    size_t n = (size_t)m->pattern.nonzeros;
-    drape_arena arena = {0};
-    drape_state rest;
-    double *values[2] = {drape_alloc(s->ctx, n, sizeof(double)),
-                         m->has_dissipation ? drape_alloc(s->ctx, n, sizeof(double)) : NULL};
-    drape_status status = values[0] && (values[1] || !m->has_dissipation) ? DRAPE_OK : DRAPE_E_MEMORY;
-    if (!status)
-        status = drape_state_create(s->ctx, &arena, m, &rest);
-    if (!status) {
-        memset(rest.v, 0, 3 * (size_t)m->node_count * sizeof *rest.v);
-        for (int w = 0; w < 2; w++)
-            if (values[w])
-                add_rest_hessians(s, rest.internal, rest.v, w, values[w]);
-        status = pack_scalars(s, values[0], values[1]);
-    }
-    drape_arena_free(&arena, s->ctx);
-    drape_free(s->ctx, values[0]);
-    drape_free(s->ctx, values[1]);
-    return status;
-}
-
 /* ---- The coarse space ---- */
 
 /* The free nodes and the edges of the mesh between them. */
@@ -186,7 +106,7 @@ static drape_status build_coarse_scalars(drape_quasi *s)
 {
     drape_quasi_coarse *c = &s->coarse;
     const drape_prolong *p = &c->prolong;
-    const drape_quasi_scalar *f = &s->scalar;
+    const drape_scalar *f = &s->scalar;
     size_t slots = (size_t)c->pattern.block_start[c->pattern.block_count];
     c->elastic = drape_alloc(s->ctx, slots, sizeof *c->elastic);
     c->damping = drape_alloc(s->ctx, slots, sizeof *c->damping);
@@ -323,7 +243,7 @@ drape_status drape_quasi_build(drape_quasi *s, int spacing)
 {
     drape_status status = list_pairs(s);
     if (!status)
-        status = build_scalars(s);
+        status = drape_scalar_build(s->ctx, s->system, false, &s->scalar);
     if (!status)
         status = build_coarse(s, spacing);
     return status ? status : drape_quasi_make_room(s);

@@ -3,16 +3,10 @@
 #define DRAPE_INTEGRATORS_QUASI_PARTS_H
 
 #include "integrators/quasi.h"
+#include "integrators/scalar.h"
 #include "solvers/linear.h"
 #include "solvers/pcg.h"
 #include "solvers/prolong.h"
-
-/* One scalar a pair of nodes, in rows: the entries of row i are start[i] ... start[i + 1] - 1. */
-typedef struct drape_quasi_scalar {
-    int32_t *start, *column, *diagonal;
-    double *elastic, *damping; /* damping NULL: there is none */
-    double *sum;               /* m_w M + elastic + w damping */
-} drape_quasi_scalar;
 
 /* The matrix on the coarse space. Its pattern's blocks are the slots. */
 typedef struct drape_quasi_coarse {
@@ -44,12 +38,11 @@ struct drape_quasi {
     int32_t nodes, pairs; /* free nodes; pairs of all terms that have some */
     int32_t *pair;        /* (pairs x 2) free nodes, -1 pinned */
     double *h;            /* (6 x pairs) */
-    drape_quasi_scalar scalar;
+    drape_scalar scalar;
     drape_quasi_coarse coarse;
     drape_quasi_remainder remainder;
     double *inverse; /* (6 x nodes) of the diagonal blocks */
     drape_pcg pcg;
-    double weight, mass_weight; /* that scalar.sum is for; 0: none yet */
     int64_t factorizations;
     double factor_seconds;
 };

@@ -16,10 +16,10 @@ static double expected(double nu)
 
 static int scene(double nu, double weight, char *text, size_t size)
 {
-    const strip s = {.columns = 81,
-                     .rows = 7,
-                     .width = 0.06,
-                     .thickness = 0.002,
+    const strip s = {.columns = 121,
+                     .rows = 5,
+                     .width = 0.03,
+                     .thickness = 0.001,
                      .poisson = nu,
                      .orientation = "vertical",
                      .gravity = {0, -strip_gravity(weight), 0},

@@ -179,7 +179,7 @@ struct drape_painter {
     drape_context *ctx;
     drape_canvas canvas;
     drape_overlay overlay;
-    GLuint pattern, heights, environment, ramp;
+    GLuint textures[3], ramp; /* of the shadings, in the order of DRAPE_READS_*; 0: not made yet */
     GLuint shadow, shadow_buffer;
     GLuint empty; /* vertex array of what has no attributes */
     GLuint depth, body, ground, wall, wire, pin;
@@ -248,17 +248,30 @@ static void create_floor(drape_painter *p)
     drape_gl_mesh_fill(&p->floor, square, 6, false);
 }
 
+static drape_status make_texture(drape_painter *p, int which, const char *path)
+{
+    static drape_status (*const makers[])(drape_context *, const char *, GLuint *) = {
+        drape_texture_pattern, drape_texture_heights, drape_texture_environment};
+    return p->textures[which] ? DRAPE_OK : makers[which](p->ctx, path, &p->textures[which]);
+}
+
+static drape_status read_files(drape_painter *p, const drape_painter_def *def)
+{
+    const char *const paths[] = {def->pattern, def->heights, def->environment};
+    drape_status status = DRAPE_OK;
+    for (int i = 0; i < 3 && !status; i++)
+        if (paths[i])
+            status = make_texture(p, i, paths[i]);
+    return status;
+}
+
 static drape_status create_all(drape_painter *p, const drape_painter_def *def)
 {
     drape_status status = drape_canvas_create(p->ctx, def->width, def->height, &p->canvas);
     if (!status)
         status = drape_overlay_create(p->ctx, def->width, def->height, &p->overlay);
     if (!status)
-        status = drape_texture_pattern(p->ctx, def->pattern, &p->pattern);
-    if (!status)
-        status = drape_texture_heights(p->ctx, def->heights, &p->heights);
-    if (!status)
-        status = drape_texture_environment(p->ctx, def->environment, &p->environment);
+        status = read_files(p, def);
     if (!status && !create_programs(p))
         status = DRAPE_E_FILE;
     if (status)
@@ -287,7 +300,7 @@ void drape_painter_destroy(drape_painter **painter)
     drape_painter *p = *painter;
     if (!p)
         return;
-    const GLuint textures[] = {p->pattern, p->heights, p->environment, p->ramp, p->shadow};
+    const GLuint textures[] = {p->textures[0], p->textures[1], p->textures[2], p->ramp, p->shadow};
     const GLuint programs[] = {p->depth, p->body, p->ground, p->wall, p->wire, p->pin};
     glDeleteTextures(sizeof textures / sizeof *textures, textures);
     for (size_t i = 0; i < sizeof programs / sizeof *programs; i++)
@@ -311,6 +324,15 @@ const drape_canvas *drape_painter_canvas(const drape_painter *painter)
 drape_overlay *drape_painter_overlay(drape_painter *painter)
 {
     return &painter->overlay;
+}
+
+static drape_status make_textures(drape_painter *p, int reads)
+{
+    drape_status status = DRAPE_OK;
+    for (int i = 0; i < 3 && !status; i++)
+        if (reads & 1 << i)
+            status = make_texture(p, i, NULL);
+    return status;
 }
 
 /* Made when it is first asked for: a driver takes its time for each. */
@@ -356,9 +378,9 @@ static void use_surface(drape_painter *p, GLuint program, const panel_view *v, c
         const char *name;
         GLuint texture;
     } units[] = {{"shadow_map", p->shadow},
-                 {"picture", p->pattern},
-                 {"heights", p->heights},
-                 {"environment", p->environment},
+                 {"picture", p->textures[0]},
+                 {"heights", p->textures[1]},
+                 {"environment", p->textures[2]},
                  {"ramp", p->ramp}};
     glUseProgram(program);
     for (int i = 0; i < 5; i++) {
@@ -513,8 +535,9 @@ static drape_status draw_panel(drape_painter *p, const drape_picture *picture, i
     drape_stage *stage = panel->stage;
     GLuint program = shading_program(p, shading);
     panel_view v = {.left = box[0], .bottom = box[1], .width = box[2], .height = box[3]};
-    if (!program)
-        return DRAPE_E_FILE;
+    drape_status status = program ? make_textures(p, shading->reads) : DRAPE_E_FILE;
+    if (status)
+        return status;
     v.view = drape_camera_view(&picture->camera, (float)box[2] / (float)box[3], stage->radius);
     set_lamp(stage, picture->lamp_azimuth, &v);
     drape_stage_set(stage, &panel->moment, shading->wires);

@@ -19,7 +19,8 @@ typedef struct drape_painter_def {
     const char *pattern, *heights, *environment; /* PNG files; NULL: the program's own */
 } drape_painter_def;
 
-/* Errors: DRAPE_E_FILE (a PNG, a shader, the driver), DRAPE_E_MEMORY. */
+/* The names of files need only live until it returns. Errors: DRAPE_E_FILE (a PNG, a shader, the driver),
+ * DRAPE_E_MEMORY. */
 drape_status drape_painter_create(drape_context *ctx, const drape_painter_def *def, drape_painter **out);
 void drape_painter_destroy(drape_painter **painter);
 

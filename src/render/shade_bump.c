@@ -5,6 +5,7 @@ const drape_shading drape_shading_bump = {
     .name = "bump",
     .summary = "matt, with the slopes of the height map: --height, or a woven relief",
     .reference = "Blinn 1978",
+    .reads = DRAPE_READS_HEIGHTS,
     .source = "vec3 shade(Surface s) {\n"
               "    vec3 n = bumped(s, 0.007);\n"
               "    vec3 h = normalize(light + s.v);\n"

@@ -5,6 +5,7 @@ const drape_shading drape_shading_pbr = {
     .name = "pbr",
     .summary = "metallic-roughness: silk with threads of gold where the height map has metal",
     .reference = "Cook & Torrance 1982; GGX, Walter et al. 2007",
+    .reads = DRAPE_READS_HEIGHTS | DRAPE_READS_ENVIRONMENT,
     .source =
         "// Trowbridge and Reitz's distribution of facets, Smith's joint shadowing, Schlick's Fresnel term.\n"
         "vec3 shade(Surface s) {\n"

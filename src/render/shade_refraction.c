@@ -4,6 +4,7 @@
 const drape_shading drape_shading_refraction = {
     .name = "refraction",
     .summary = "glass: the world around, bent at the surface and mirrored at its rim",
+    .reads = DRAPE_READS_ENVIRONMENT,
     .source = "vec3 shade(Surface s) {\n"
               "    float f = schlick(dot(s.n, s.v), 0.06);\n"
               "    vec3 through = vec3(world(refract(-s.v, s.n, 1.0 / 1.42), 0.06).r, world(refract(-s.v, "

@@ -7,11 +7,15 @@
 
 #include "fields/fields.h"
 
+/* Textures that a shading reads: made when the first that does is drawn. */
+enum { DRAPE_READS_PATTERN = 1, DRAPE_READS_HEIGHTS = 2, DRAPE_READS_ENVIRONMENT = 4 };
+
 typedef struct drape_shading {
     const char *name, *summary;
     const char *reference;        /* NULL: none */
     const char *source;           /* GLSL */
     const drape_field_ops *field; /* what is shown in colours; NULL: none */
+    int reads;                    /* sum of DRAPE_READS_* */
     bool wires;                   /* the mesh's edges and the pinned nodes are drawn, too */
     bool displaced;               /* points are moved along their normals by the height map */
 } drape_shading;

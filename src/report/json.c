@@ -113,7 +113,7 @@ static drape_status read_steps(const drape_record *run, json_t **out)
 
 static drape_status read_energies(const drape_record *run, json_t **out)
 {
-    static const char *const names[] = {"t",       "kinetic",    "elastic",   "gravity",
+    static const char *const names[] = {"t_state", "kinetic",    "elastic",   "gravity",
                                         "contact", "dissipated", "numerical", "total"};
     columns c = {.names = names, .count = 8, .text_from = 8, .keep = -1};
     return read_columns(run, "energy.csv", &c, out);

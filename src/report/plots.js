@@ -19,11 +19,18 @@ function ticksOf(low, high, count) {
   return ticks;
 }
 
-const decades = (low, high) => {
+// Logarithms of powers of ten in a range of logarithms; of a few numbers between where there are not two; else of its middle.
+function decades(low, high) {
   const first = Math.ceil(low - 1e-9), last = Math.floor(high + 1e-9), stride = Math.max(1, Math.ceil((last - first) / 4)), ticks = [];
   for (let k = first; k <= last; k += stride) ticks.push(k);
-  return ticks;
-};
+  if (ticks.length > 1) return ticks;
+  const finer = [];
+  for (let k = Math.floor(low); k <= high; k++) {
+    for (const digit of [1, 2, 3, 5]) finer.push(k + Math.log10(digit));
+  }
+  const shown = finer.filter((tick) => tick >= low && tick <= high);
+  return shown.length > 1 ? shown : [(low + high) / 2];
+}
 
 // A series: {name, color, t: [], y: [], steps: y holds from t to the next one, on, unit}. Values that are null are gaps.
 class Plot {
@@ -128,8 +135,7 @@ class Plot {
     image.replaceChildren();
     const right = width - MARGIN.right, bottom = height - MARGIN.bottom;
     const ticks = this.log ? decades(this.low, this.high) : ticksOf(this.low, this.high, height > 150 ? 5 : 3);
-    const shown = this.log && ticks.length === 0 ? [(this.low + this.high) / 2] : ticks;
-    for (const tick of shown) {
+    for (const tick of ticks) {
       const y = this.y(this.log ? 10 ** tick : tick);
       image.append(svg('line', { class: 'grid', x1: MARGIN.left, x2: right, y1: y, y2: y }));
       image.append(svg('text', { x: MARGIN.left - 6, y: y + 4, 'text-anchor': 'end' }, format(this.log ? 10 ** tick : tick, 3)));
@@ -185,13 +191,14 @@ function valueAt({ t, y, steps }, time) {
 
 // ---- The plots of a run
 
+// At the times of the states that the energies are of.
 function energyPlot() {
   const c = run.energies.columns;
   const change = (values) => values.map((x) => (x === null || values[0] === null ? null : x - values[0]));
   const series = [
     ['kinetic', c.kinetic], ['elastic', c.elastic], ['gravity, change', change(c.gravity)], ['contact', c.contact],
     ['dissipated', c.dissipated], ['numerical', c.numerical], ['total, change', change(c.total)]]
-    .map(([name, y], i) => ({ name, y, t: c.t, color: `var(--c${i})` }))
+    .map(([name, y], i) => ({ name, y, t: c.t_state, color: `var(--c${i})` }))
     .filter(({ y }) => y.some((x) => x));
   return new Plot({ title: 'Energy', unit: 'J', series });
 }

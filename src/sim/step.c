@@ -26,16 +26,16 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
         info->reason = "nonfinite";
         return DRAPE_RETRY_NONFINITE;
     }
-    if (info->committed || info->lenient)
+    if (info->committed)
         return DRAPE_OK;
-    if (drape_sim_ran_away(sim, next, info)) {
+    if (!info->lenient && drape_sim_ran_away(sim, next, info)) {
         info->reason = "energy";
         return DRAPE_RETRY_REJECTED;
     }
     const drape_state *before = drape_sim_state(sim);
     drape_status status =
         drape_system_check_contact(sim->system, next->x, next->t, &info->reason, &info->worst);
-    if (status)
+    if (status || info->lenient)
         return status;
     return drape_system_check(sim->system, next->x, before->x, before->internal, &info->reason, &info->worst);
 }

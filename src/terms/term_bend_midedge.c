@@ -3,7 +3,7 @@
  * normals at the middles of its edges (midedge.h), C the law of orthotropic.h.
  *
  * C = sum k l l', so E = 1/2 sum k (q - q0)^2 with q = l . K = sum c theta over nine hinges at most: each square is an
- * element, three a triangle and one less for each free edge. Where no triangle needs hinges beyond its own (grids) elements
+ * element, three a triangle and one less for each free edge. Where no triangle needs hinges beyond its own (lattices) elements
  * have 6 nodes, else 12; a hinge whose c is 0 is not there, and its nodes are the first again.
  *
  * A clamped edge has no second triangle but a direction in space: x3 = (x0 + x1)/2 + r, r at rest.
@@ -48,7 +48,7 @@ static const char *const rest_choices[] = {"mesh", "flat", NULL};
 
 /* As a list the direction is one entry; among the values it takes three. */
 static const drape_param params[LIST_COUNT] = {
-    DRAPE_ORTHOTROPIC_PARAMS("N m", "E h^3/12 of the material", "twist",
+    DRAPE_ORTHOTROPIC_PARAMS("N m", "of the material: its fabric, or E h^3/12", "twist",
                              "torsional rigidity: a twist of curvature K12 takes 2 twist K12^2 per area"),
     [LIST_REST] = {.name = "rest",
                    .kind = DRAPE_PARAM_CHOICE,
@@ -232,13 +232,24 @@ static double rest_measure(const drape_cloth_view *cloth, const int32_t *node, c
     return q;
 }
 
-static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+/* What the scene leaves to the material: of a measured fabric, or of an isotropic sheet. */
+static void law_of(const drape_material *m, const double *given, double law[9])
 {
-    const drape_material *m = &cloth->material;
-    const double *bend = values + PARAM_CURVATURE;
-    double law[9];
+    double values[DRAPE_ORTHOTROPIC_COUNT];
+    const double measured[3] = {m->bending_warp, m->bending_weft, m->bending_twist};
+    memcpy(values, given, sizeof values);
+    for (int k = 0; k < 3; k++)
+        if (isnan(values[k]))
+            values[k] = measured[k];
     drape_orthotropic_law(values, m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio),
                           m->poisson_ratio, law);
+}
+
+static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
+{
+    const double *bend = values + PARAM_CURVATURE;
+    double law[9];
+    law_of(&cloth->material, values, law);
     drape_status status = announce(cloth, values, law, builder);
     int32_t element = 0;
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {

@@ -131,6 +131,35 @@ def test_run_files():
         equal(float(energies[-1][key]), value, "the last row and the summary: " + key)
 
 
+def test_realtime():
+    """frames with a budget: times, misses and rungs are told, late frames are no failure, files as usual"""
+    write_scene()
+    for rate, row in (30, "newton_k"), (1e6, "newton_k"), (30, "be"):
+        text = good("run", "scene.json", "--realtime", "--integrator", row, "--frame-rate", str(rate), "--duration",
+                    "0.1" if rate < 1e6 else "2e-5", "--summary", "s.json", "--out", "out", "--format", "npy")
+        told = re.search(r"^realtime +(\d+) frames of [^:]+: p50 (\S+), p95 (\S+), p99 (\S+), worst (\S+) ms; (\d+) missed$",
+                         text, re.M)
+        assert told, text
+        times = [float(word) for word in told.group(2, 3, 4, 5)]
+        equal(times, sorted(times))
+        summary = read_json("s.json")
+        realtime = summary["realtime"]
+        equal((realtime["frames"], realtime["missed"]), (int(told.group(1)), int(told.group(6))))
+        equal(realtime["full"] + realtime["fewer"] + realtime["larger"], realtime["frames"])
+        assert abs(summary["time"] - (0.1 if rate < 1e6 else 2e-5)) < 1e-12, summary
+        assert realtime["worst"] >= realtime["p50"] > 0 and realtime["dropped"] >= 0
+        if rate == 1e6:  # a microsecond a frame is kept by no machine: frames that make a step miss, the others wait
+            assert realtime["missed"] > 0 and realtime["larger"] > 0, realtime
+        shape, _ = read_npy("out/positions.npy")
+        assert shape[0] >= 2, shape
+    assert "realtime" not in read_summary_without_budget()
+
+
+def read_summary_without_budget():
+    good("run", "scene.json", "--summary", "s.json")
+    return read_json("s.json")
+
+
 def test_scene_copy():
     """the folder of a run has the scene as it was run, with its meshes, and running that gives the same bits"""
     os.makedirs("scenes/meshes")

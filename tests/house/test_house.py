@@ -104,7 +104,7 @@ def all_is_built(files):
         list_file = "tests/meson.build" if path.startswith("tests/") else f"{folder}/meson.build"
         if folder == "src/cli" and list_file not in files:
             list_file = "meson.build"
-        words = re.findall(r"'([^']+)'", files.get(list_file, ""))
+        words = re.findall(r"'([^'\n]*)'", files.get(list_file, ""))
         stem = name[:-2]
         if not any(word in (stem, name) or word.endswith("/" + name) or stem.endswith("_" + word) for word in words):
             complaints.append(f"{path}: is not named in {list_file}")

@@ -103,7 +103,7 @@ def test_contents():
     rows = read("out/steps.csv").splitlines()
     assert data["steps"]["rows"] == len(rows) - 1 == len(data["steps"]["columns"]["t"])
     assert 0 in data["steps"]["columns"]["accepted"], "some attempt is rejected in this scene"
-    assert len(data["energies"]["columns"]["t"]) == frames == len(data["frames"]["times"])
+    assert len(data["energies"]["columns"]["t_state"]) == frames == len(data["frames"]["times"])
     summary = json.loads(read("out/summary.json"))
     assert list(data["summary"]) == list(summary) and data["summary"]["hash"] == summary["hash"]
     assert all(abs(data["summary"]["energy"][name] - value) <= 1e-8 * abs(value) for name, value in summary["energy"].items())

@@ -504,6 +504,32 @@ START_TEST(a_sheet_of_many_supernodes)
 }
 END_TEST
 
+/* Ordered by minimum degree and, where METIS is built, by nested dissection; with several branches for the threads and
+ * fronts that they share. */
+START_TEST(threads_give_the_same_bits)
+{
+    static const int32_t sides[] = {24, 45};
+    for (int i = 0; drape_linears[i]; i++)
+        for (size_t k = 0; drape_linears[i]->use_threads && k < sizeof sides / sizeof *sides; k++) {
+            const drape_linear_ops *ops = drape_linears[i];
+            sheet q = open_sheet(sides[k]);
+            void *solver = NULL;
+            ck_assert_int_eq(ops->create(q.ctx, &q.p, &solver), DRAPE_OK);
+            fill_sheet(&q, 1.01, 7);
+            for (int threads = 1; threads <= 5; threads += 2) {
+                double *x = threads == 1 ? q.x : q.again;
+                ops->use_threads(solver, threads);
+                ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
+                ck_assert_int_eq(ops->solve(solver, q.b, x), DRAPE_OK);
+                ck_assert_mem_eq(x, q.x, (size_t)q.p.n * sizeof *x);
+            }
+            check_residual(&q, true, ops->name);
+            ops->destroy(&solver);
+            close_sheet(&q);
+        }
+}
+END_TEST
+
 /* What a row falls back to is made when it is needed: definite matrices do not pay for it, and where there is no
  * memory then, the row says so, has no factors, and does the work when asked again. */
 START_TEST(no_memory_for_the_fallback)
@@ -603,4 +629,5 @@ SUITE("linears", rows_are_well_formed, random_systems_are_solved,
       several_right_hand_sides_of_one_factorisation, broken_matrices_are_told_and_good_ones_work_again,
       a_right_hand_side_that_is_not_finite_is_told, kept_pivots_that_become_zero_are_chosen_again,
       a_small_part_that_is_not_symmetric_is_not_lost, fallbacks_are_counted, a_sheet_of_many_supernodes,
-      no_memory_for_the_fallback, made_again_on_other_patterns, auto_picks_by_size_and_says_so)
+      threads_give_the_same_bits, no_memory_for_the_fallback, made_again_on_other_patterns,
+      auto_picks_by_size_and_says_so)

@@ -1,0 +1,128 @@
+/* test_references.c: the references of drape validate that take a second or two; what GSL says of them against the digits of
+ * other sources; a reference can fail. All of them are run by `drape validate`. */
+#include "lab/rod.h"
+#include "lab/validate.h"
+#include "support/suite.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const drape_reference *find(const char *name)
+{
+    for (int i = 0; drape_references[i]; i++)
+        if (strcmp(drape_references[i]->name, name) == 0)
+            return drape_references[i];
+    ck_abort_msg("there is no reference %s", name);
+    return NULL;
+}
+
+static drape_validation run(const drape_reference *reference, int index)
+{
+    drape_context *ctx = NULL;
+    drape_validation v;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    ck_assert_int_eq(drape_validate(ctx, reference, index, &v), DRAPE_OK);
+    drape_context_destroy(&ctx);
+    return v;
+}
+
+/* A case by name and number. */
+static void check(const char *name, int index, drape_outcome outcome)
+{
+    const drape_validation v = run(find(name), index);
+    ck_assert_msg(v.verdict == outcome, "%s %g: %s, %.8g obtained, %.8g expected; %s", name, v.parameter,
+                  drape_outcome_name(v.verdict), v.obtained, v.expected, v.message);
+}
+
+/* Digits of physics texts and of independent programs; they were computed to all that are here. */
+START_TEST(expected_values_are_those_of_other_sources)
+{
+    static const struct {
+        const char *name;
+        int index;
+        double value, digits;
+    } known[] = {{"cantilever", 2, 0.1245617664, 1e-10},
+                 {"cantilever", 3, 1.06680232, 1e-8},
+                 {"cantilever", 4, 5.888104623, 1e-9},
+                 {"bending_length", 0, 41.487, 5e-4},
+                 {"self_buckling", 0, 7.83735, 5e-6},
+                 {"end_load", 0, 0.30172077, 1e-8},
+                 {"end_load", 2, 0.66996418, 1e-8},
+                 {"plate_supported", 0, 0.00406235, 5e-9},
+                 {"catenary", 0, 0.29234380, 1e-8},
+                 {"pendulum", 2, 1.7622037, 1e-7},
+                 {"chain", 0, 3.766067, 1e-6}};
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+        const drape_reference *r = find(known[i].name);
+        ck_assert_double_eq_tol(r->expected(r->parameters[known[i].index]), known[i].value, known[i].digits);
+    }
+    /* q L^3 = 12.8538 sqrt(E I G J), which is B w sqrt(2/(1 + nu)) */
+    ck_assert_double_eq_tol(find("lateral_buckling")->expected(0) / sqrt(2), 12.8538, 5e-5);
+}
+END_TEST
+
+START_TEST(quick_references_pass)
+{
+    check("cantilever", 2, DRAPE_OUTCOME_PASS);
+    check("rest_curvature", 0, DRAPE_OUTCOME_PASS);
+    check("end_moment", 1, DRAPE_OUTCOME_PASS);
+    check("self_buckling", 0, DRAPE_OUTCOME_PASS);
+    check("pendulum", 1, DRAPE_OUTCOME_PASS);
+    check("free_fall", 0, DRAPE_OUTCOME_PASS);
+    check("oscillator", 1, DRAPE_OUTCOME_PASS);
+    check("fabric", 2, DRAPE_OUTCOME_PASS);
+}
+END_TEST
+
+START_TEST(hinges_show_their_model_error)
+{
+    check("plate_hinges", 0, DRAPE_OUTCOME_DOCUMENTED);
+}
+END_TEST
+
+static double one_per_cent_off(double parameter)
+{
+    return 1.01 * find("rest_curvature")->expected(parameter);
+}
+
+static int broken_scene(double parameter, double load, char *text, size_t size)
+{
+    (void)parameter, (void)load;
+    return snprintf(text, size, "{'drape': 1}");
+}
+
+START_TEST(references_can_fail)
+{
+    drape_reference wrong = *find("rest_curvature");
+    wrong.expected = one_per_cent_off;
+    ck_assert_int_eq(run(&wrong, 0).verdict, DRAPE_OUTCOME_FAIL);
+    wrong.scene = broken_scene;
+    const drape_validation v = run(&wrong, 0);
+    ck_assert_int_eq(v.verdict, DRAPE_OUTCOME_STOPPED);
+    ck_assert_ptr_nonnull(strstr(v.message, "cloth"));
+    ck_assert(isnan(v.obtained));
+}
+END_TEST
+
+START_TEST(rows_are_whole)
+{
+    int count = 0;
+    for (; drape_references[count]; count++) {
+        const drape_reference *r = drape_references[count];
+        char text[DRAPE_LAB_TEXT];
+        ck_assert(r->name && r->quantity && r->unit && r->model && r->source && r->measure &&
+                  r->tolerance > 0);
+        ck_assert(r->case_count > 0 && (r->case_count == 1 || r->parameter));
+        for (int i = 0; i < r->case_count; i++) {
+            ck_assert(isfinite(r->expected(r->parameters[i])));
+            const int length = r->scene(r->parameters[i], 1, text, sizeof text);
+            ck_assert(length > 0 && length < DRAPE_LAB_TEXT);
+        }
+    }
+    ck_assert_int_ge(count, 12);
+}
+END_TEST
+
+SUITE("references", expected_values_are_those_of_other_sources, quick_references_pass,
+      hinges_show_their_model_error, references_can_fail, rows_are_whole)
