@@ -9,15 +9,25 @@
 #include "base/vec3.h"
 #include "contact/bvh.h"
 
-/* Six times the volume of the tetrahedron a b c d. */
+#include <float.h>
+#include <math.h>
+
+#define ROUNDINGS 8 /* of coordinates, differences, products, sums */
+
+/* Six times the volume of the tetrahedron a b c d; 0 where it is no more than the rounding of its coordinates: what
+ * lies in a plane crosses nothing in it. */
 static double volume(const double *a, const double *b, const double *c, const double *d)
 {
-    double u[3], v[3], w[3], n[3];
+    double u[3], v[3], w[3], n[3], largest = 0;
     vec3_sub(b, a, u);
     vec3_sub(c, a, v);
     vec3_sub(d, a, w);
     vec3_cross(u, v, n);
-    return vec3_dot(n, w);
+    for (int k = 0; k < 3; k++)
+        largest = fmax(largest, fmax(fmax(fabs(a[k]), fabs(b[k])), fmax(fabs(c[k]), fabs(d[k]))));
+    double lu = vec3_norm(u), lv = vec3_norm(v), lw = vec3_norm(w), six = vec3_dot(n, w);
+    double rounding = ROUNDINGS * DBL_EPSILON * (lu * lv * lw + largest * (lu * lv + lv * lw + lw * lu));
+    return fabs(six) > rounding ? six : 0;
 }
 
 static bool crosses(const double *x, const int32_t *edge, const int32_t *triangle)
@@ -28,7 +38,8 @@ static bool crosses(const double *x, const int32_t *edge, const int32_t *triangl
     const double *p = x + 3 * (size_t)edge[0], *q = x + 3 * (size_t)edge[1];
     const double *a = x + 3 * (size_t)triangle[0], *b = x + 3 * (size_t)triangle[1],
                  *c = x + 3 * (size_t)triangle[2];
-    if ((volume(a, b, c, p) > 0) == (volume(a, b, c, q) > 0))
+    double above = volume(a, b, c, p), below = volume(a, b, c, q);
+    if (above == 0 || below == 0 || (above > 0) == (below > 0))
         return false;
     bool ab = volume(p, q, a, b) > 0;
     return ab == (volume(p, q, b, c) > 0) && ab == (volume(p, q, c, a) > 0);

@@ -152,7 +152,7 @@ END_TEST
     "[0.65,[-0.78,0.022,0]]]"
 
 /* A square sheet folded onto itself and one that crumples, 20 points a side, at CS184's thickness and a tenth of it.
- * bench/results/folds.csv has 50 and 80. */
+ * bench/results/folds.csv has 50, and the fold at 80. */
 START_TEST(no_edge_passes_a_triangle)
 {
     static const beginning folds[] = {

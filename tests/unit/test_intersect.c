@@ -110,4 +110,37 @@ START_TEST(sheets_apart_have_none)
 }
 END_TEST
 
-SUITE("intersect", crossing_sheets_are_counted_as_by_all_pairs, sheets_apart_have_none)
+/* A flat sheet, however it is turned, has nothing that crosses: its volumes are rounding. */
+START_TEST(a_flat_sheet_has_none)
+{
+    static const drape_setting grid[] = {
+        {"columns", 17, NULL}, {"rows", 13, NULL}, {"width", 1.3, NULL}, {"height", 0.7, NULL}};
+    static const drape_setting material[] = {
+        {"young_modulus", 1e5, NULL}, {"thickness", 1e-3, NULL}, {"density", 200, NULL}};
+    for (int k = 0; k < 36; k++) {
+        drape_context *ctx = NULL;
+        drape_model *model = NULL;
+        drape_cloth_def cloth;
+        drape_scene_def scene;
+        drape_intersections found;
+        ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+        drape_cloth_def_init(&cloth, sizeof cloth);
+        drape_scene_def_init(&scene, sizeof scene);
+        cloth.mesh.grid = (drape_row_def){"square", grid, 4};
+        cloth.material = material;
+        cloth.material_count = 3;
+        const double turn[4] = {k % 2, k % 3, 1, 10.0 * k - 175};
+        memcpy(cloth.mesh.rotate, turn, sizeof turn);
+        cloth.mesh.translate[0] = k;
+        scene.cloths = &cloth;
+        scene.cloth_count = 1;
+        ck_assert_int_eq(drape_model_create(ctx, &scene, &model), DRAPE_OK);
+        ck_assert_int_eq(drape_find_intersections(ctx, model, model->rest, &found), DRAPE_OK);
+        ck_assert_int_eq(found.count, 0);
+        drape_model_destroy(&model);
+        drape_context_destroy(&ctx);
+    }
+}
+END_TEST
+
+SUITE("intersect", crossing_sheets_are_counted_as_by_all_pairs, sheets_apart_have_none, a_flat_sheet_has_none)
