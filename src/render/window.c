@@ -12,22 +12,21 @@ struct drape_window {
     GLFWwindow *handle;
     drape_input inputs[MAX_INPUTS];
     int count, taken;
-    bool ready; /* GLFW is */
+    bool ready;  /* GLFW is */
+    double x, y; /* of the pointer, as the events tell: asked for, it is where it went since */
 };
 
 static void put(GLFWwindow *handle, drape_input input)
 {
     drape_window *w = glfwGetWindowUserPointer(handle);
-    double x, y;
     int width, height, pixels, rows;
     if (w->count == MAX_INPUTS)
         return;
-    glfwGetCursorPos(handle, &x, &y);
     glfwGetWindowSize(handle, &width, &height);
     glfwGetFramebufferSize(handle, &pixels, &rows);
     if (input.kind != DRAPE_INPUT_SCROLL) {
-        input.x = width > 0 ? x * pixels / width : x;
-        input.y = height > 0 ? y * rows / height : y;
+        input.x = width > 0 ? w->x * pixels / width : w->x;
+        input.y = height > 0 ? w->y * rows / height : w->y;
     }
     w->inputs[w->count++] = input;
 }
@@ -74,7 +73,9 @@ static void on_button(GLFWwindow *handle, int button, int action, int mods)
 
 static void on_move(GLFWwindow *handle, double x, double y)
 {
-    (void)x, (void)y;
+    drape_window *w = glfwGetWindowUserPointer(handle);
+    w->x = x;
+    w->y = y;
     put(handle, (drape_input){.kind = DRAPE_INPUT_MOVE,
                               .shift = is_held(handle, GLFW_KEY_LEFT_SHIFT, GLFW_KEY_RIGHT_SHIFT),
                               .ctrl = is_held(handle, GLFW_KEY_LEFT_CONTROL, GLFW_KEY_RIGHT_CONTROL)});
@@ -110,6 +111,7 @@ static drape_status open_window(drape_window *w, const char *title, int width, i
     glfwSwapInterval(1);
     glfwSetWindowUserPointer(w->handle, w);
     glfwSetKeyCallback(w->handle, on_key);
+    glfwGetCursorPos(w->handle, &w->x, &w->y);
     glfwSetMouseButtonCallback(w->handle, on_button);
     glfwSetCursorPosCallback(w->handle, on_move);
     glfwSetScrollCallback(w->handle, on_scroll);
