@@ -18,6 +18,23 @@ drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_
                                2 * (size_t)(rows - 1) * (size_t)(columns - 1), mesh);
 }
 
+drape_status drape_grid_check_size(drape_context *ctx, const char *pointer, int64_t columns, int64_t rows)
+{
+    if (columns * rows <= DRAPE_MAX_NODES)
+        return DRAPE_OK;
+    char place[sizeof ctx->pointer];
+    snprintf(place, sizeof place, "%s/columns", pointer);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
+                         "%lld columns x %lld rows are %lld nodes; at most %d are allowed",
+                         (long long)columns, (long long)rows, (long long)(columns * rows), DRAPE_MAX_NODES);
+}
+
+double drape_grid_random(uint64_t *seed)
+{
+    *seed = *seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return (double)(*seed >> 11) / 4503599627370496.0 - 1;
+}
+
 static int32_t *put(int32_t *triangle, int32_t a, int32_t b, int32_t c, bool flip)
 {
     triangle[0] = a;
@@ -26,17 +43,20 @@ static int32_t *put(int32_t *triangle, int32_t a, int32_t b, int32_t c, bool fli
     return triangle + 3;
 }
 
+int32_t *drape_grid_split(int32_t *triangle, int32_t a, int32_t columns, bool falling, bool flip)
+{
+    const int32_t b = a + 1, c = a + columns, d = c + 1;
+    int32_t *next = put(triangle, a, b, falling ? d : c, flip);
+    return put(next, falling ? a : b, d, c, flip);
+}
+
 void drape_grid_triangulate(drape_mesh *mesh, const bool falling[2][2], bool flip)
 {
     int32_t *next = mesh->triangle;
     for (int32_t row = 0; row + 1 < mesh->rows; row++)
-        for (int32_t column = 0; column + 1 < mesh->columns; column++) {
-            const int32_t a = row * mesh->columns + column, b = a + 1;
-            const int32_t c = a + mesh->columns, d = c + 1;
-            const bool from_a_to_d = falling[row % 2][column % 2];
-            next = put(next, a, b, from_a_to_d ? d : c, flip);
-            next = put(next, from_a_to_d ? a : b, d, c, flip);
-        }
+        for (int32_t column = 0; column + 1 < mesh->columns; column++)
+            next = drape_grid_split(next, row * mesh->columns + column, mesh->columns,
+                                    falling[row % 2][column % 2], flip);
 }
 
 static drape_status unknown_grid(drape_context *ctx, const char *pointer, const char *type)

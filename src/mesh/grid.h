@@ -4,6 +4,12 @@
 
 #include "mesh/mesh.h"
 
+/* DRAPE_MAX_NODES is not passed by the product; the fault is at pointer/columns. Errors: DRAPE_E_ARGUMENT. */
+drape_status drape_grid_check_size(drape_context *ctx, const char *pointer, int64_t columns, int64_t rows);
+
+/* Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX): the same everywhere. */
+double drape_grid_random(uint64_t *seed);
+
 /* Room for rows x columns nodes and the triangles between them. Faults are reported at pointer. */
 drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_t rows, int32_t columns,
                                  drape_mesh *mesh);
@@ -16,8 +22,10 @@ drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_
  *
  * falling[r % 2][c % 2]: the cell is split from A to D into A B D and A D C, else from B to C into A B C and
  * B D C. Seen as drawn the triangles turn counterclockwise; with flip they turn clockwise. The triangles of a
- * cell follow each other, cells in the order of their A.
+ * cell follow each other, cells in the order of their A. drape_grid_split does one cell, of corner A = a, and returns
+ * where the next goes.
  */
+int32_t *drape_grid_split(int32_t *triangle, int32_t a, int32_t columns, bool falling, bool flip);
 void drape_grid_triangulate(drape_mesh *mesh, const bool falling[2][2], bool flip);
 
 #endif

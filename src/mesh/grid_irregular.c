@@ -5,7 +5,6 @@
  * results that depend on it show.
  */
 #include <math.h>
-#include <stdio.h>
 
 #include "mesh/grid.h"
 
@@ -67,13 +66,6 @@ static const drape_param params[PARAM_COUNT] = {
                      .help = "the plane of the sheet: y = 0 or z = 0"},
 };
 
-/* Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX): the same everywhere. */
-static double next_random(uint64_t *seed)
-{
-    *seed = *seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-    return (double)(*seed >> 11) / 4503599627370496.0 - 1;
-}
-
 static void place_nodes(const double *values, bool vertical, drape_mesh *mesh)
 {
     const int32_t last_row = mesh->rows - 1, last_column = mesh->columns - 1;
@@ -82,7 +74,7 @@ static void place_nodes(const double *values, bool vertical, drape_mesh *mesh)
     double *x = mesh->x;
     for (int32_t r = 0; r < mesh->rows; r++)
         for (int32_t c = 0; c < mesh->columns; c++, x += 3) {
-            const double along = jitter * next_random(&seed), down = jitter * next_random(&seed);
+            const double along = jitter * drape_grid_random(&seed), down = jitter * drape_grid_random(&seed);
             const double u = c == 0 || c == last_column ? c : c + along,
                          w = r == 0 || r == last_row ? r : r + down;
             x[0] = u * values[WIDTH] / last_column;
@@ -102,27 +94,19 @@ static void split_cells(bool vertical, drape_mesh *mesh)
     int32_t *next = mesh->triangle;
     for (int32_t r = 0; r + 1 < mesh->rows; r++)
         for (int32_t k = 0; k + 1 < mesh->columns; k++) {
-            const int32_t a = r * mesh->columns + k, b = a + 1, c = a + mesh->columns, d = c + 1;
-            const bool falling = distance(mesh, a, d) <= distance(mesh, b, c);
-            const int32_t triangles[6] = {a, b, falling ? d : c, falling ? a : b, d, c};
-            for (int i = 0; i < 6; i++)
-                next[vertical && i % 3 > 0 ? i + 3 - 2 * (i % 3) : i] = triangles[i];
-            next += 6;
+            const int32_t a = r * mesh->columns + k, c = a + mesh->columns;
+            const bool falling = distance(mesh, a, c + 1) <= distance(mesh, a + 1, c);
+            next = drape_grid_split(next, a, mesh->columns, falling, vertical);
         }
 }
 
 static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
 {
     const bool vertical = values[ORIENTATION] == VERTICAL;
-    if (values[COLUMNS] * values[ROWS] > DRAPE_MAX_NODES) {
-        char place[sizeof ctx->pointer];
-        snprintf(place, sizeof place, "%s/columns", pointer);
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
-                             "%.0f columns x %.0f rows; at most %d nodes are allowed", values[COLUMNS],
-                             values[ROWS], DRAPE_MAX_NODES);
-    }
-    drape_status status =
-        drape_grid_allocate(ctx, pointer, (int32_t)values[ROWS], (int32_t)values[COLUMNS], mesh);
+    const int32_t columns = (int32_t)values[COLUMNS], rows = (int32_t)values[ROWS];
+    drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
+    if (!status)
+        status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
     if (status)
         return status;
     place_nodes(values, vertical, mesh);

@@ -10,7 +10,6 @@
  * that one: alternating ones do not make the sheet stiffer along one diagonal than along the other.
  */
 #include <math.h>
-#include <stdio.h>
 
 #include "mesh/grid.h"
 
@@ -74,17 +73,6 @@ static const drape_param params[PARAM_COUNT] = {
                    "nodes are off the plane by up to this, at random and always the same: breaks symmetry"},
 };
 
-static drape_status check_node_count(drape_context *ctx, const char *pointer, int64_t columns, int64_t rows)
-{
-    if (columns * rows <= DRAPE_MAX_NODES)
-        return DRAPE_OK;
-    char place[sizeof ctx->pointer];
-    snprintf(place, sizeof place, "%s/columns", pointer);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
-                         "%lld columns x %lld rows are %lld nodes; at most %d are allowed",
-                         (long long)columns, (long long)rows, (long long)(columns * rows), DRAPE_MAX_NODES);
-}
-
 static void place_nodes(drape_mesh *mesh, double width, double height, bool vertical)
 {
     double *x = mesh->x;
@@ -97,14 +85,11 @@ static void place_nodes(drape_mesh *mesh, double width, double height, bool vert
         }
 }
 
-/* Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX): the same everywhere. */
 static void add_noise(drape_mesh *mesh, double size, bool vertical)
 {
     uint64_t seed = 1;
-    for (size_t i = 0; size > 0 && i < (size_t)mesh->node_count; i++) {
-        seed = seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-        mesh->x[3 * i + (vertical ? 2 : 1)] += size * ((double)(seed >> 11) / 4503599627370496.0 - 1);
-    }
+    for (size_t i = 0; size > 0 && i < (size_t)mesh->node_count; i++)
+        mesh->x[3 * i + (vertical ? 2 : 1)] += size * drape_grid_random(&seed);
 }
 
 static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
@@ -114,7 +99,7 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
     const int32_t columns = (int32_t)values[COLUMNS], rows = (int32_t)values[ROWS];
     const bool vertical = values[ORIENTATION] == VERTICAL;
 
-    drape_status status = check_node_count(ctx, pointer, columns, rows);
+    drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
     if (!status)
         status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
     if (status)
