@@ -107,14 +107,13 @@ static drape_status spawn(drape_film *film, char **words, int reading)
     return drape_fail(film->ctx, DRAPE_E_FILE, "cannot start " PROGRAM ": %s", strerror(error));
 }
 
+/* A file without a name: what the program has to say. */
 static int open_errors(void)
 {
-    char name[] = "/tmp/drape-film-XXXXXX";
-    int fd = mkstemp(name);
-    if (fd >= 0) {
-        unlink(name);
-        fcntl(fd, F_SETFD, FD_CLOEXEC);
-    }
+    FILE *file = tmpfile();
+    int fd = file ? fcntl(fileno(file), F_DUPFD_CLOEXEC, 3) : -1;
+    if (file)
+        fclose(file);
     return fd;
 }
 
