@@ -93,7 +93,7 @@ static void put_line(drape_file *file, const json_t *result)
     free(text);
 }
 
-/* A file with the lines of what this shard has, open to more where grows. */
+/* A file with the lines of what this shard has, not yet under its name. */
 static drape_status begin_lines(lab *l, const char *name, int shard, int shards, drape_file *file)
 {
     drape_status status = drape_file_create(l->ctx, strlen(l->folder) + strlen(name) + 1, file);

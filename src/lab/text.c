@@ -1,7 +1,7 @@
 /* text.c: see text.h. */
 #include "lab/text.h"
 
-#include "io/file.h"
+#include "io/csv.h"
 
 #include <errno.h>
 #include <math.h>
@@ -14,14 +14,19 @@ extern char **environ;
 
 /* ---- Files ---- */
 
+static drape_status begin_file(lab *l, const char *name, drape_file *file)
+{
+    drape_status status = drape_file_create(l->ctx, strlen(l->folder) + strlen(name) + 1, file);
+    if (status)
+        return status;
+    drape_file_name(file, "%s/%s", l->folder, name);
+    return drape_file_begin(file);
+}
+
 drape_status lab_write_text(lab *l, const char *name, const char *text, size_t size)
 {
     drape_file file = {0};
-    drape_status status = drape_file_create(l->ctx, strlen(l->folder) + strlen(name) + 1, &file);
-    if (!status) {
-        drape_file_name(&file, "%s/%s", l->folder, name);
-        status = drape_file_begin(&file);
-    }
+    drape_status status = begin_file(l, name, &file);
     if (!status) {
         drape_file_put(&file, text, size);
         status = drape_file_finish(&file);
@@ -55,20 +60,22 @@ drape_status lab_read_text(drape_context *ctx, const char *folder, const char *n
 
 /* ---- CSV ---- */
 
-static void put_field(FILE *out, const json_t *value)
+static void put_field(drape_file *file, const json_t *value)
 {
-    if (json_is_string(value) && strpbrk(json_string_value(value), ",\"\n")) {
-        fputc('"', out);
-        for (const char *c = json_string_value(value); *c; c++)
-            fprintf(out, *c == '"' ? "\"\"" : "%c", *c);
-        fputc('"', out);
-    } else if (json_is_string(value)) {
-        fputs(json_string_value(value), out);
-    } else if (json_is_real(value)) {
-        fprintf(out, "%.10g", json_real_value(value));
-    } else if (json_is_integer(value)) {
-        fprintf(out, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
-    }
+    if (json_is_real(value))
+        drape_file_print(file, ",%.10g", json_real_value(value));
+    else if (json_is_integer(value))
+        drape_csv_put_integer(file, json_integer_value(value));
+    else
+        drape_csv_put_text(file, json_string_value(value));
+}
+
+/* The members of an object that are columns, in their order. */
+static void put_fields(drape_file *file, json_t *columns, const json_t *object)
+{
+    const char *key;
+    json_t *unused;
+    json_object_foreach(columns, key, unused) put_field(file, json_object_get(object, key));
 }
 
 /* Adds the scalar members of an object to the columns. */
@@ -82,45 +89,41 @@ static void add_columns(json_t *columns, const json_t *object)
         json_object_set_new(columns, key, json_true());
 }
 
-drape_status lab_write_csv(lab *l)
+static void put_table(const lab *l, json_t *tags, json_t *columns, drape_file *file)
 {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
-    json_t *tags = json_object(), *columns = json_object();
     const char *key;
     json_t *unused;
-    if (!out || !tags || !columns)
-        return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for results.csv");
+    drape_file_put_text(file, "case");
+    json_object_foreach(tags, key, unused) drape_file_print(file, ",%s", key);
+    json_object_foreach(columns, key, unused) drape_file_print(file, ",%s", key);
+    for (size_t i = 0; i < l->count; i++) {
+        if (!l->results[i])
+            continue;
+        drape_file_print(file, "\n%zu", i);
+        put_fields(file, tags, json_object_get(l->results[i], "tags"));
+        put_fields(file, columns, l->results[i]);
+    }
+    drape_file_put_text(file, "\n");
+}
+
+drape_status lab_write_csv(lab *l)
+{
+    drape_file file = {0};
+    json_t *tags = json_object(), *columns = json_object();
     for (size_t i = 0; i < l->count; i++) {
         add_columns(tags, json_object_get(l->results[i], "tags"));
         add_columns(columns, l->results[i]);
     }
     json_object_del(columns, "case");
-    fputs("case", out);
-    json_object_foreach(tags, key, unused) fprintf(out, ",%s", key);
-    json_object_foreach(columns, key, unused) fprintf(out, ",%s", key);
-    for (size_t i = 0; i < l->count; i++) {
-        if (!l->results[i])
-            continue;
-        fprintf(out, "\n%zu", i);
-        json_object_foreach(tags, key, unused)
-        {
-            fputc(',', out);
-            put_field(out, json_object_get(json_object_get(l->results[i], "tags"), key));
-        }
-        json_object_foreach(columns, key, unused)
-        {
-            fputc(',', out);
-            put_field(out, json_object_get(l->results[i], key));
-        }
+    drape_status status = tags && columns ? begin_file(l, "results.csv", &file)
+                                          : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for results.csv");
+    if (!status) {
+        put_table(l, tags, columns, &file);
+        status = drape_file_finish(&file);
     }
-    fputc('\n', out);
-    fclose(out);
+    drape_file_destroy(&file);
     json_decref(tags);
     json_decref(columns);
-    drape_status status = lab_write_text(l, "results.csv", text, size);
-    free(text);
     return status;
 }
 
