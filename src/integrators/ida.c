@@ -8,7 +8,7 @@
  *     (K + c_j D + c_j^2 M) dx = r2 + (D + c_j M) r1:
  * the matrix of a backward Euler step of size 1/c_j, with the same pattern and the same linear solvers.
  * IDA keeps Jacobian and factors while c_j stays near theirs; that is most of its advantage over one
- * factorisation an iteration.
+ * factorisation an iteration. When the iteration with old factors has converged is ida_newton.h's to say.
  *
  * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative
  * part would make the error depend on where the scene lies. The maximum order is 2 at loose tolerances,
@@ -19,6 +19,7 @@
  */
 #include "base/clock.h"
 #include "base/finite.h"
+#include "integrators/ida_newton.h"
 #include "integrators/integrator.h"
 #include "integrators/tolerance.h"
 #include "model/track.h"
@@ -46,7 +47,9 @@ enum {
 #define NEWTON_SHARE 0.33 /* of the error tolerance that is left to the Newton iteration */
 /* New factors past a change of c_j by (1 - d)/(1 + d). IDA's own 0.25 takes a quarter more residuals for
  * as many factors. */
-#define CJ_CHANGE        0.1
+#define CJ_CHANGE 0.1
+/* Of the energy of a scene. At rtol 1e-3 a smooth fall swings by half a percent: more is of waves that are fed. */
+#define GAIN             0.02
 #define MAX_ERROR_FAILS  10 /* error test failures in one step */
 #define MAX_SOLVER_FAILS 10 /* convergence failures in one step */
 
@@ -96,6 +99,7 @@ typedef struct ida_state {
     void *ida;
     N_Vector y, rate, weights, between; /* (x, v), (x', v'), absolute tolerances, dense output */
     drape_sun_linear *linear;
+    drape_ida_newton newton;
     double *x, *v, *g;        /* nodes: where the residual was evaluated last, and g there */
     double *damping;          /* D (nonzeros); NULL where nothing dissipates */
     double *reduced;          /* right-hand side of the reduced system (n) */
@@ -104,6 +108,7 @@ typedef struct ida_state {
     const double *internal;   /* of the last accepted state */
     double span[2];           /* [s] no track has a key inside: where the slopes of tracks are taken */
     double reached;           /* time of IDA's state; NaN: it must start anew */
+    double from;              /* time that the last good step began at; NaN: none */
     double powers[2];         /* [W] taken by dissipation and put in by pins, at the time reached */
     bool nonfinite, crossing; /* why the last residual was refused */
     drape_status fitted;      /* of the last change of the pattern: < 0 ends the run */
@@ -196,6 +201,7 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
     if (s->damping)
         drape_system_damping(s->system, &point, s->damping);
     s->factored_cj = cj;
+    drape_ida_newton_forget(&s->newton);
     s->work.jacobians++;
     s->work.jacobian_seconds += drape_clock_seconds() - start;
     return 0;
@@ -236,6 +242,7 @@ static void destroy(void **state)
         return;
     if (s->ida)
         IDAFree(&s->ida);
+    drape_ida_newton_free(&s->newton);
     drape_sun_linear_destroy(&s->linear);
     N_Vector vectors[] = {s->y, s->rate, s->weights, s->between};
     for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
@@ -299,7 +306,8 @@ static bool configure(ida_state *s)
     bool good = !IDAInit(s->ida, residual, 0, s->y, s->rate) && !IDASetUserData(s->ida, s) &&
                 !IDASVtolerances(s->ida, 0, s->weights) &&
                 !IDASetLinearSolver(s->ida, s->linear->solver, s->linear->matrix) &&
-                !IDASetJacFn(s->ida, jacobian) && !IDASetMaxOrd(s->ida, (int)s->values[PARAM_MAX_ORDER]) &&
+                drape_ida_newton_attach(&s->newton, s->ida, s->y, s->sun) && !IDASetJacFn(s->ida, jacobian) &&
+                !IDASetMaxOrd(s->ida, (int)s->values[PARAM_MAX_ORDER]) &&
                 !IDASetMaxErrTestFails(s->ida, MAX_ERROR_FAILS) &&
                 !IDASetMaxConvFails(s->ida, MAX_SOLVER_FAILS) &&
                 !IDASetNonlinConvCoef(s->ida, NEWTON_SHARE) && !IDASetDeltaCjLSetup(s->ida, CJ_CHANGE);
@@ -314,7 +322,8 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
     *state = s;
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (ida_state){.ctx = ctx, .system = system, .model = drape_system_model(system), .reached = NAN};
+    *s = (ida_state){
+        .ctx = ctx, .system = system, .model = drape_system_model(system), .reached = NAN, .from = NAN};
     s->n = 3 * (int64_t)s->model->free_count;
     memcpy(s->values, values, sizeof s->values);
     drape_status status = create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
@@ -530,6 +539,9 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     info->tolerance = info->residual = NAN; /* IDA bounds errors, not residuals */
     if (exhausted(s, in, info))
         return DRAPE_E_STEP_TOO_SMALL;
+    if (in->t == s->from) /* the sim did not take the last step, which IDA had: mostly for its energy */
+        s->newton.strict = true;
+    s->from = NAN;
     info->reason = "solver";
     drape_status status = prepare(s, in, end, h, &t, info); /* t is where all goes that has no free nodes */
     if (!status && s->n > 0) {
@@ -557,6 +569,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     memcpy(out->x, s->x, 3 * (size_t)s->model->node_count * sizeof *out->x);
     memcpy(out->v, s->v, 3 * (size_t)s->model->node_count * sizeof *out->v);
     out->t = t;
+    s->from = in->t;
     info->h = t - in->t;
     info->reason = "converged";
     audit(s, in, out, info);
@@ -579,7 +592,10 @@ static void interpolate(void *state, double t, double *x)
 static void restart(void *state, const drape_state *from)
 {
     (void)from;
-    ((ida_state *)state)->reached = NAN;
+    ida_state *s = state;
+    s->reached = s->from = NAN;
+    s->newton.strict = false;
+    drape_ida_newton_forget(&s->newton);
 }
 
 static drape_work work(const void *state)
@@ -615,6 +631,7 @@ const drape_integrator_ops drape_integrator_ida = {
     .param_count = PARAM_COUNT,
     .create = create,
     .own_steps = true,
+    .gain = GAIN,
     .step = step,
     .interpolate = interpolate,
     .restart = restart,

@@ -53,6 +53,9 @@ typedef struct drape_integrator_ops {
      * upper bound, out->t the end of the advance, which a step may reach and not pass; the row sets out->t
      * to where it came. */
     bool own_steps;
+    /* What a run may gain from nowhere, as a share of the energy that the scene had to offer; 0: a tenth, for
+     * rows that conserve energy and let it swing. */
+    double gain;
     /* Between the states of a step there is no motion, so no frames. */
     bool timeless;
     /* The row keeps contact and limits by moving nodes: forces that stand for them (contact of the model,
