@@ -30,6 +30,7 @@ struct drape_contact {
     double mean_edge;   /* [m] */
     double margin;      /* how far points may move before a new one [m] */
     double next_margin; /* of the next search */
+    double aim;         /* of the way from `start`: so much further is the next search made */
     double moved;       /* how far one has, where it was last placed [m] */
     drape_pair *pairs;  /* (count of room) candidates, surfaces too */
     int32_t count, room;
