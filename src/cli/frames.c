@@ -12,7 +12,7 @@
 
 /* ---- Opening ---- */
 
-static bool is_folder(const char *path)
+bool cli_is_folder(const char *path)
 {
     struct stat info;
     return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
@@ -40,6 +40,11 @@ static void make_label(const char *operand, char *label, size_t size)
 static int open_run(const cli_command *command, cli_source *s)
 {
     struct stat info;
+    if (command->setting_count > 0)
+        return cli_misuse(command->verb,
+                          "--%s: %s is a finished run, which it does not change; give the scene, which is "
+                          "simulated again: %s/scene.json",
+                          command->settings[0].option, s->operand, s->operand);
     size_t size = strlen(s->operand) + sizeof "/scene.json";
     char *path = malloc(size);
     if (!path)
@@ -73,7 +78,8 @@ int cli_source_open(const cli_command *command, const char *operand, const cli_f
 {
     *out = (cli_source){.operand = operand};
     make_label(operand, out->label, sizeof out->label);
-    int code = is_folder(operand) ? open_run(command, out) : cli_scene_load_from(command, operand, &out->in);
+    int code =
+        cli_is_folder(operand) ? open_run(command, out) : cli_scene_load_from(command, operand, &out->in);
     if (code == CLI_GO_ON)
         code = check_def(command, def, out);
     if (code == CLI_GO_ON &&
@@ -136,13 +142,12 @@ typedef struct watch {
     const cli_frames_def *def;
     cli_source *source;
     cli_progress progress;
-    double last; /* [s] of the last frame that was kept */
+    double last; /* [s] of the last frame, kept or not */
     bool enough; /* the one frame is there */
 } watch;
 
 static drape_status keep(watch *w, double t, const double *x)
 {
-    w->last = t;
     return drape_reel_add(&w->source->reel, t, x, w->source->in.sim, w->def->field);
 }
 
@@ -158,6 +163,7 @@ static drape_status observe(void *user, const drape_event *event)
         drape_context_set_message(w->source->in.ctx, "t=%.9g: interrupted", drape_sim_time(event->sim));
         return DRAPE_E_STOPPED;
     }
+    w->last = event->time;
     if (w->def->one == CLI_LAST_FRAME || (w->def->one >= 0 && event->frame != w->def->one) ||
         event->frame % w->def->every != 0)
         return DRAPE_OK;

@@ -16,6 +16,8 @@ typedef struct cli_frames_def {
 
 #define CLI_LAST_FRAME (-2)
 
+bool cli_is_folder(const char *path);
+
 typedef struct cli_source {
     const char *operand;
     char label[80]; /* for the picture */

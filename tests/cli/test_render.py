@@ -266,11 +266,27 @@ def test_films():
 
 
 def test_folder():
-    """a folder gets a picture for each frame; they move"""
+    """a folder gets a picture for each frame; they move; those of an earlier run go, and nothing else does"""
     need_pictures()
     good("render", write_scene(), "--out", "frames", "--size", "160x100")
     equal(sorted(os.listdir("frames")), [f"frame_{k:05}.png" for k in range(6)])
     assert (read_png("frames/frame_00000.png") != read_png("frames/frame_00005.png")).any()
+    others = ["frame_000000.obj", "frame_0001.png", "frames.png", "my_frame_00001.png"]
+    for name in others:
+        with open("frames/" + name, "w", encoding="utf-8") as file:
+            file.write("mine")
+    good("render", "ball.json", "--out", "frames", "--size", "160x100", "--every", "2")  # as of a run: 0, 2, 4
+    equal(sorted(os.listdir("frames")), sorted(others + [f"frame_{k:05}.png" for k in range(3)]))
+
+
+def test_endings():
+    """the ending of a name counts in letters of any size; a folder has none, or a slash behind it, or is there already"""
+    need_pictures()
+    render(write_scene(), out="x.PNG")
+    good("render", "ball.json", "--out", "v1.2/", "--size", "64x64", "--every", "5")
+    good("render", "ball.json", "--out", "v1.2", "--size", "64x64", "--every", "5")
+    good("render", "ball.json", "--out", "../" + os.path.basename(os.getcwd()) + "/.hidden", "--size", "64x64", "--every", "5")
+    equal(os.listdir("v1.2"), os.listdir(".hidden"), "folders")
 
 
 def test_compare():
@@ -293,7 +309,7 @@ def test_compare():
 def test_refused():
     """wrong command lines and folders are one line and exit 2, and write nothing"""
     need_pictures()
-    write_scene()
+    good("run", write_scene(), "--out", "ball", "--format", "npy")
     os.mkdir("empty")
     before = sorted(os.listdir("."))
     cases = [(["ball.json"], "--out is missing"),
@@ -306,8 +322,18 @@ def test_refused():
              (["ball.json", "--out", "frames", "--frame", "1"], "--frame is for a picture"),
              (["ball.json", "--out", "x.png", "--range", "0,1"], "shows no field"),
              (["ball.json", "--out", "x.png", "--shade", "strain", "--range", "1,0"], "low,high"),
-             (["ball.json", "--out", "x.png", "--texture", "none.png"], "none.png"),
-             (["ball.json", "--out", "x.png", "--texture", "ball.json"], "as a PNG"),
+             (["ball.json", "--out", "x.png", "--shade", "texture", "--texture", "none.png"], "none.png"),
+             (["ball.json", "--out", "x.png", "--shade", "texture", "--texture", "ball.json"], "as a PNG"),
+             (["ball.json", "--out", "x.png", "--texture", "x.png"], '"diffuse" does not show it; --shade may be texture'),
+             (["ball.json", "--out", "x.png", "--shade", "texture", "--height", "x.png"], "--shade may be bump, displacement, pbr"),
+             (["ball.json", "--out", "x.png", "--shade", "strain", "--environment", "x.png"], "mirror, refraction, pbr"),
+             (["ball.json", "--out", "x.bmp"], 'there is no ".bmp"; .png is a picture, .mp4, .webm, .gif are films'),
+             (["ball.json", "--out", "./a.b/x.jpeg"], 'there is no ".jpeg"'),
+             (["ball.json", "--out", "x.PNG", "--every", "2"], "--every is for films"),
+             (["ball.json", "--out", "x.png", "--out", "y.png"], "--out is given twice"),
+             (["ball.json", "--out", "x.png", "--dt", "0.01", "--dt", "0.02"], "--dt is given twice"),
+             (["ball", "--out", "x.png", "--dt", "0.01"], "--dt: ball is a finished run"),
+             (["ball.json", "ball", "--compare", "--out", "x.png", "--set", "/duration=1"], "--set: ball is a finished run"),
              (["empty", "--out", "x.png"], "scene.json"),
              (["none.json", "--out", "x.png"], "none.json")]
     for args, says in cases:
