@@ -372,13 +372,16 @@ def test_broken_run():
     size = os.path.getsize("ball/positions.npy")
     with open("ball/positions.npy", "r+b") as file:
         file.truncate(size - 100)
-    one_line(drape("render", "ball", "--out", "x.png"), 1, "shorter than it says")
+    one_line(drape("render", "ball", "--out", "x.png"), 2, "less data than its header says")
     os.remove("ball/positions.npy")
     one_line(drape("render", "ball", "--out", "x.png"), 2, "--format npy")
     write_scene(mesh={"grid": "square", "columns": 3, "rows": 3, "width": 1, "height": 1}, colliders=None, contact=None)
     good("run", "ball.json", "--out", "small", "--format", "npy")
     shutil.copy("small/positions.npy", "ball/positions.npy")
-    one_line(drape("render", "ball", "--out", "x.png"), 2, "it has 9 nodes, its scene 169")
+    one_line(drape("render", "ball", "--out", "x.png"), 2, "it has 9 nodes, the scene of the folder has 169")
+    os.remove("small/energy.csv")
+    one_line(drape("render", "small", "--out", "x.png"), 2, "energy.csv")
+    one_line(drape("report", "small"), 2, "energy.csv")
 
 
 # ---- The window
