@@ -273,7 +273,8 @@ static int fill_sources(render *r)
 /* One camera for all panels and all frames. */
 static int set_stages(render *r)
 {
-    float aspect = drape_painter_aspect(r->painter, r->source_count);
+    const drape_picture picture = {.panel_count = r->source_count, .shading = r->shading};
+    float aspect = drape_painter_aspect(r->painter, &picture);
     drape_framing framing = drape_framing_begin((float)r->azimuth, (float)r->elevation, aspect);
     r->stages = drape_alloc(r->ctx, (size_t)r->source_count, sizeof *r->stages);
     if (!r->stages)
@@ -331,7 +332,6 @@ static drape_status draw(render *r, size_t k)
                                    .low = r->low,
                                    .high = r->high,
                                    .camera = r->view,
-                                   .lamp_azimuth = (float)r->azimuth - 48,
                                    .caption = r->picture ? NULL : caption};
     drape_status status = drape_painter_draw(r->painter, &picture);
     return status ? status : drape_canvas_read(r->ctx, drape_painter_canvas(r->painter), r->pixels);
