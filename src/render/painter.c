@@ -76,7 +76,7 @@ static const char surface_main[] =
 static const char body_source[] =
     "vec3 shade(Surface s) {\n"
     "    vec3 h = normalize(light + s.v);\n"
-    "    return vec3(0.42, 0.45, 0.50) * arriving(s) / PI * 1.9 + 0.06 * power(dot(s.n, h), 24.0) * s.sun;\n"
+    "    return vec3(0.42, 0.45, 0.50) * arriving(s) / PI * 1.5 + 0.06 * power(dot(s.n, h), 24.0) * s.sun;\n"
     "}\n";
 
 /* Most pixels of a picture are ground: it has no more than it needs, and its light is mixed as it is seen, in
@@ -364,7 +364,7 @@ drape_view drape_painter_view(const drape_painter *painter, const drape_picture 
 typedef struct panel_view {
     drape_view view;
     drape_matrix lamp;               /* from space to the lamp's map */
-    float light[3];                  /* towards the lamp */
+    float light[3], window[3];       /* towards the lamp, and towards a window across from it */
     int left, bottom, width, height; /* pixels */
     float clear, reach;              /* of the shading; [m] that a bent ray goes on */
     GLuint behind;                   /* texture; 0: none */
@@ -376,6 +376,8 @@ static void set_lamp(const drape_stage *stage, panel_view *v)
     drape_view lamp = drape_camera_view(&camera, 1, 1);
     float reach = stage->radius, eye[3];
     memcpy(v->light, lamp.axes[2], sizeof v->light);
+    memcpy(v->window, (const float[]){-v->light[0], 0.3f, -v->light[2]}, sizeof v->window);
+    drape_normalize(v->window);
     for (int k = 0; k < 3; k++)
         eye[k] = stage->center[k] + DEEP * reach * v->light[k];
     drape_matrix look = drape_look((const float(*)[3])lamp.axes, eye);
@@ -409,6 +411,7 @@ static void use_surface(drape_painter *p, GLuint program, const panel_view *v, c
     drape_gl_set_matrix(program, "lamp", v->lamp.m);
     drape_gl_set_vec3(program, "eye", v->view.eye);
     drape_gl_set_vec3(program, "light", v->light);
+    drape_gl_set_vec3(program, "window", v->window);
     drape_gl_set_vec3(program, "offset", nowhere);
     drape_gl_set_vec3(program, "front", front);
     drape_gl_set_vec3(program, "back", back);

@@ -221,6 +221,13 @@ def test_texture():
                 for y, x in ((75, 135), (75, 185), (125, 135), (125, 185))]
     equal(corners(top), ["R", "G", "B", "RG"], "from above")
     equal(corners(below), ["B", "RG", "R", "G"], "from below, turned over its left to right axis")
+    for turn in (0, 180):  # what hangs has its texture upright, whichever row is the upper one
+        write_scene(colliders=None, contact=None,
+                    mesh={"grid": "square", "columns": 13, "rows": 13, "width": 1, "height": 1, "orientation": "vertical",
+                          "transform": {"rotate": [0, 0, 1, turn]}})
+        seen = [corners(render("ball.json", "--frame", "0", "--texture", "quarters.png", "--shade", "texture", "--camera", f"{side},0"))
+                for side in (0, 180)]
+        assert ["R", "G", "B", "RG"] in seen and ["G", "R", "RG", "B"] in seen, f"hanging, turned by {turn}: {seen}"
 
 
 def test_light():
