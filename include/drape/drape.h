@@ -405,6 +405,8 @@ typedef struct drape_statistics {
     int64_t steps_unconverged; /* of the accepted: taken although unconverged, by on_failure "accept" */
     double h_min, h_max;       /* [s] of accepted steps; 0 before the first */
     int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
+    /* [s] of a clock on a wall. Those after wall_steps are parts of it, none of them a part of another: residual and
+     * Jacobian are without their contact. */
     double wall_setup, wall_steps, wall_residual, wall_jacobian, wall_factor, wall_solve, wall_contact;
     double strain_min, strain_max; /* |e|/L - 1 over all edges and accepted steps */
     bool stability_known;   /* "static" found an equilibrium and the signs of its Hessian's eigenvalues */

@@ -2,6 +2,7 @@
 #include "assemble/system.h"
 
 #include "assemble/sum.h"
+#include "base/clock.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -112,6 +113,11 @@ drape_status drape_system_add_contact(drape_system *system)
 const drape_contact *drape_system_contact(const drape_system *system)
 {
     return system->contact;
+}
+
+double drape_system_clock(const drape_system *system)
+{
+    return drape_clock_seconds() - drape_contact_seconds(system->contact);
 }
 
 drape_status drape_system_begin(drape_system *system, const drape_state *in)

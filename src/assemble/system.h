@@ -48,6 +48,10 @@ const drape_pull *drape_system_pull(const drape_system *system);
 drape_status drape_system_add_contact(drape_system *system);
 const drape_contact *drape_system_contact(const drape_system *system); /* NULL: there is none */
 
+/* A clock that stands while contact is at work, which has one of its own: parts of a step timed by it are parts beside
+ * that one. [s] */
+double drape_system_clock(const drape_system *system);
+
 /* A step begins at a state: contact is compared with it until the next. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
 

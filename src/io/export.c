@@ -71,8 +71,8 @@ drape_status drape_export_begin(drape_context *ctx, const char *folder, const ch
 
 /* ---- A file a frame ---- */
 
-/* frame_, six digits or more, a dot, the ending; or that with ".part", which a killed run left. */
-static bool is_frame_file(const char *name, const char *ending)
+/* frame_, so many digits or more, a dot, the ending; or that with ".part", which a killed run left. */
+static bool is_frame_file(const char *name, size_t least, const char *ending)
 {
     size_t word = strlen(FRAME_WORD);
     if (strncmp(name, FRAME_WORD, word) != 0)
@@ -80,13 +80,14 @@ static bool is_frame_file(const char *name, const char *ending)
     size_t digits = strspn(name + word, "0123456789");
     const char *rest = name + word + digits;
     size_t length = strlen(ending);
-    if (digits < 6 || *rest != '.' || strncmp(rest + 1, ending, length) != 0)
+    if (digits < least || *rest != '.' || strncmp(rest + 1, ending, length) != 0)
         return false;
     rest += 1 + length;
     return !*rest || strcmp(rest, DRAPE_FILE_PART) == 0;
 }
 
-drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, const char *ending)
+drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, size_t digits,
+                                     const char *ending)
 {
     DIR *dir = opendir(folder);
     if (!dir)
@@ -94,7 +95,8 @@ drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, con
     drape_status status = DRAPE_OK;
     struct dirent *entry;
     while (errno = 0, !status && (entry = readdir(dir))) {
-        if (is_frame_file(entry->d_name, ending) && unlinkat(dirfd(dir), entry->d_name, 0) && errno != ENOENT)
+        if (is_frame_file(entry->d_name, digits, ending) && unlinkat(dirfd(dir), entry->d_name, 0) &&
+            errno != ENOENT)
             status = drape_file_fail(ctx, "remove the old frame", entry->d_name, errno);
     }
     if (!status && errno)

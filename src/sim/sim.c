@@ -168,7 +168,6 @@ drape_statistics drape_sim_statistics(const drape_sim *sim)
     s.wall_jacobian = work.jacobian_seconds;
     s.wall_factor = work.factor_seconds;
     s.wall_solve = work.solve_seconds;
-    s.wall_contact = work.contact_seconds + drape_contact_seconds(drape_system_contact(sim->system));
     return s;
 }
 
