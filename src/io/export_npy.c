@@ -79,6 +79,33 @@ static drape_status npy_write(drape_context *ctx, void *state, const drape_frame
     return status;
 }
 
+static void npy_archive(void *state, drape_archive *a)
+{
+    npy_state *npy = state;
+    drape_archive_int64(a, &npy->frames);
+    drape_export_archive_size(a, &npy->file.kept);
+}
+
+/* The count first: at any moment there is at least what the header says. */
+static drape_status npy_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
+                               drape_archive *a)
+{
+    npy_state *npy = state;
+    (void)frames;
+    npy->node_count = drape_model_node_count(def->model);
+    npy_archive(npy, a);
+    drape_status status =
+        a->status ? a->status : drape_export_reopen(ctx, def->folder, FILE_NAME, npy->file.kept, &npy->file);
+    if (!status)
+        status = write_count(npy, npy->frames);
+    return status ? status : drape_file_trim(&npy->file);
+}
+
+static drape_status npy_sync(void *state)
+{
+    return drape_file_sync(&((npy_state *)state)->file);
+}
+
 static drape_status npy_close(drape_context *ctx, void *state)
 {
     npy_state *npy = state;
@@ -97,5 +124,8 @@ const drape_exporter_ops drape_exporter_npy = {
     .open = npy_open,
     .clean = npy_clean,
     .write = npy_write,
+    .archive = npy_archive,
+    .resume = npy_resume,
+    .sync = npy_sync,
     .close = npy_close,
 };
