@@ -42,10 +42,8 @@ drape_status drape_csv_open(drape_context *ctx, const char *folder, const char *
     if (status)
         return status;
     drape_file_name(file, "%s/%s", folder, name);
-    if (kept >= 0) {
-        status = drape_file_reopen(file, kept);
-        return status ? status : drape_file_trim(file);
-    }
+    if (kept >= 0)
+        return drape_file_reopen(file, kept);
     status = drape_file_begin(file);
     if (status)
         return status;

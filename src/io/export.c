@@ -152,7 +152,13 @@ drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def
         if (stat(frames->file.path, &info))
             status = drape_file_fail(ctx, "go on with", frames->file.path, errno);
     }
-    return status ? status : remove_frames(ctx, def->folder, ending, count);
+    return status;
+}
+
+drape_status drape_frame_files_cut(drape_context *ctx, void *state, int64_t frames)
+{
+    const drape_frame_files *files = state;
+    return remove_frames(ctx, files->folder, files->ending, frames);
 }
 
 void drape_frame_files_archive(void *state, drape_archive *a)

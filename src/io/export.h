@@ -52,12 +52,13 @@ typedef struct drape_exporter_ops {
     drape_status (*write)(drape_context *ctx, void *state, const drape_frame *frame);
 
     /* For checkpoints. archive: what it knows of the frames so far, between frames. resume: in place of open, of a run
-     * that was left: takes the memory, reads what archive wrote, checks that the `frames` frames are there, goes on behind
-     * them and takes away what is after. sync: waits until the disk has all that was written; NULL: it has, with
-     * durable. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+     * that was left: takes the memory, reads what archive wrote, checks that the `frames` frames are there, and changes
+     * nothing; then cut: takes away what is after them, to go on behind them. sync: waits until the disk has all that was
+     * written; NULL: it has, with durable. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
     void (*archive)(void *state, drape_archive *a);
     drape_status (*resume)(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
                            drape_archive *a);
+    drape_status (*cut)(drape_context *ctx, void *state, int64_t frames);
     drape_status (*sync)(void *state);
 
     /* Errors: DRAPE_E_FILE; all is released nevertheless. */
@@ -102,12 +103,13 @@ drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, con
 /* Takes the memory. Errors: DRAPE_E_MEMORY. */
 drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *def, const char *ending,
                                     drape_frame_files *frames);
-/* The same where `frames` frames are there: later ones are removed. Errors: DRAPE_E_FILE (one is not there),
- * DRAPE_E_MEMORY. */
+/* The same where `count` frames are there already. Errors: DRAPE_E_FILE (one is not there), DRAPE_E_MEMORY. */
 drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def *def, const char *ending,
                                       int64_t count, drape_frame_files *frames);
-/* Nothing: the frames' number says it all. */
+/* Of a state that begins with a drape_frame_files: nothing, as the number of frames says it all; and the removal of those
+ * after so many. */
 void drape_frame_files_archive(void *state, drape_archive *a);
+drape_status drape_frame_files_cut(drape_context *ctx, void *state, int64_t frames);
 /* Begins the file of one frame, to be filled and ended by drape_frame_files_end. Errors: DRAPE_E_FILE. */
 drape_status drape_frame_files_begin(drape_frame_files *frames, int64_t frame);
 /* Gives the frame's file its name and closes it. Errors: DRAPE_E_FILE; there is no such frame then. */

@@ -50,6 +50,7 @@ typedef struct glb_state {
     drape_file file;
     uint32_t room;   /* frames that there is room for */
     uint32_t frames; /* whole ones in the file */
+    bool live;       /* the file ends with them: it may go on there */
     char *json;      /* while the file is begun; then a scratch */
     size_t json_size, used;
     blanks at;
@@ -330,6 +331,7 @@ static drape_status glb_write(drape_context *ctx, void *state, const drape_frame
     drape_status status = glb->frames == 0 ? write_first(glb, frame) : write_target(glb, frame);
     if (!status)
         glb->frames++;
+    glb->live = glb->frames > 0;
     return status;
 }
 
@@ -438,7 +440,7 @@ static drape_status blank_rest(glb_state *glb)
     return status;
 }
 
-/* The animation and targets go before the data they point to. */
+/* Before its first frame it has no file. */
 static drape_status glb_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
                                drape_archive *a)
 {
@@ -448,16 +450,25 @@ static drape_status glb_resume(drape_context *ctx, const drape_export_def *def, 
     if (status)
         return status;
     glb_archive(glb, a);
-    if (a->status)
+    if (a->status || glb->frames == 0)
         return a->status;
-    if (glb->frames == 0) /* it has no file before its first frame */
-        return drape_export_begin(ctx, def->folder, FILE_NAME, &glb->file);
-    status = drape_export_reopen(ctx, def->folder, FILE_NAME, glb->file.kept, &glb->file);
-    if (!status)
-        status = blank_rest(glb);
+    return drape_export_reopen(ctx, def->folder, FILE_NAME, glb->file.kept, &glb->file);
+}
+
+/* The animation and targets go before the data they point to. */
+static drape_status glb_cut(drape_context *ctx, void *state, int64_t frames)
+{
+    glb_state *glb = state;
+    (void)frames;
+    if (glb->frames == 0)
+        return drape_export_begin(ctx, glb->def->folder, FILE_NAME, &glb->file);
+    drape_status status = blank_rest(glb);
     if (!status)
         status = write_lengths(glb, glb->frames * node_bytes(glb));
-    return status ? status : drape_file_trim(&glb->file);
+    if (!status)
+        status = drape_file_trim(&glb->file);
+    glb->live = !status;
+    return status;
 }
 
 static drape_status glb_sync(void *state)
@@ -469,7 +480,7 @@ static drape_status glb_sync(void *state)
 static drape_status glb_close(drape_context *ctx, void *state)
 {
     glb_state *glb = state;
-    drape_status status = glb->frames > 1 && glb->file.open ? write_animation(glb) : DRAPE_OK;
+    drape_status status = glb->frames > 1 && glb->live ? write_animation(glb) : DRAPE_OK;
     drape_status closing = drape_file_close(&glb->file);
     drape_file_destroy(&glb->file);
     drape_free(ctx, glb->json);
@@ -490,6 +501,7 @@ const drape_exporter_ops drape_exporter_glb = {
     .write = glb_write,
     .archive = glb_archive,
     .resume = glb_resume,
+    .cut = glb_cut,
     .sync = glb_sync,
     .close = glb_close,
 };

@@ -86,18 +86,26 @@ static void npy_archive(void *state, drape_archive *a)
     drape_export_archive_size(a, &npy->file.kept);
 }
 
-/* The count first: at any moment there is at least what the header says. */
 static drape_status npy_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
                                drape_archive *a)
 {
     npy_state *npy = state;
-    (void)frames;
     npy->node_count = drape_model_node_count(def->model);
     npy_archive(npy, a);
-    drape_status status =
-        a->status ? a->status : drape_export_reopen(ctx, def->folder, FILE_NAME, npy->file.kept, &npy->file);
-    if (!status)
-        status = write_count(npy, npy->frames);
+    if (drape_archive_good(a) && npy->frames != frames)
+        drape_archive_fail(a, DRAPE_E_PARSE,
+                           "the checkpoint has %lld frames and another number in " FILE_NAME,
+                           (long long)frames);
+    return a->status ? a->status
+                     : drape_export_reopen(ctx, def->folder, FILE_NAME, npy->file.kept, &npy->file);
+}
+
+/* The count first: at any moment there is at least what the header says. */
+static drape_status npy_cut(drape_context *ctx, void *state, int64_t frames)
+{
+    npy_state *npy = state;
+    (void)ctx;
+    drape_status status = write_count(npy, frames);
     return status ? status : drape_file_trim(&npy->file);
 }
 
@@ -126,6 +134,7 @@ const drape_exporter_ops drape_exporter_npy = {
     .write = npy_write,
     .archive = npy_archive,
     .resume = npy_resume,
+    .cut = npy_cut,
     .sync = npy_sync,
     .close = npy_close,
 };

@@ -74,5 +74,6 @@ const drape_exporter_ops drape_exporter_obj = {
     .write = obj_write,
     .archive = drape_frame_files_archive,
     .resume = obj_resume,
+    .cut = drape_frame_files_cut,
     .close = obj_close,
 };

@@ -104,19 +104,26 @@ static drape_status check_mesh(drape_context *ctx, const drape_export_def *def, 
     return status ? status : drape_file_close(&pc2->mesh);
 }
 
-/* The count first: at any moment there is at least what the header says. */
 static drape_status pc2_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
                                drape_archive *a)
 {
     pc2_state *pc2 = state;
-    (void)frames;
     pc2->def = def;
     pc2_archive(pc2, a);
+    if (drape_archive_good(a) && pc2->samples != frames)
+        drape_archive_fail(a, DRAPE_E_PARSE,
+                           "the checkpoint has %lld frames and another number in " FILE_NAME,
+                           (long long)frames);
     drape_status status = a->status ? a->status : check_mesh(ctx, def, pc2);
-    if (!status)
-        status = drape_export_reopen(ctx, def->folder, FILE_NAME, pc2->file.kept, &pc2->file);
-    if (!status)
-        status = write_count(pc2, pc2->samples);
+    return status ? status : drape_export_reopen(ctx, def->folder, FILE_NAME, pc2->file.kept, &pc2->file);
+}
+
+/* The count first: at any moment there is at least what the header says. */
+static drape_status pc2_cut(drape_context *ctx, void *state, int64_t frames)
+{
+    pc2_state *pc2 = state;
+    (void)ctx, (void)frames;
+    drape_status status = write_count(pc2, pc2->samples);
     return status ? status : drape_file_trim(&pc2->file);
 }
 
@@ -147,6 +154,7 @@ const drape_exporter_ops drape_exporter_pc2 = {
     .write = pc2_write,
     .archive = pc2_archive,
     .resume = pc2_resume,
+    .cut = pc2_cut,
     .sync = pc2_sync,
     .close = pc2_close,
 };

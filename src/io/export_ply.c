@@ -80,5 +80,6 @@ const drape_exporter_ops drape_exporter_ply = {
     .write = ply_write,
     .archive = drape_frame_files_archive,
     .resume = ply_resume,
+    .cut = drape_frame_files_cut,
     .close = ply_close,
 };

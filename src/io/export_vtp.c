@@ -246,20 +246,26 @@ static void vtp_archive(void *state, drape_archive *a)
     drape_export_archive_size(a, &((vtp_state *)state)->entries_end);
 }
 
-/* The collection's end over what comes after, then the cut: at any moment it ends well. */
 static drape_status vtp_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
                                drape_archive *a)
 {
     vtp_state *vtp = state;
-    const size_t end = sizeof pvd_end - 1;
     vtp_archive(vtp, a);
     drape_status status =
         a->status ? a->status : drape_frame_files_resume(ctx, def, "vtp", frames, &vtp->frames);
+    return status ? status
+                  : drape_export_reopen(ctx, def->folder, PVD_NAME,
+                                        vtp->entries_end + (off_t)sizeof pvd_end - 1, &vtp->pvd);
+}
+
+/* The collection's end over what comes after, then the cut: at any moment it ends well. */
+static drape_status vtp_cut(drape_context *ctx, void *state, int64_t frames)
+{
+    vtp_state *vtp = state;
+    drape_status status = drape_file_overwrite(&vtp->pvd, vtp->entries_end, pvd_end, sizeof pvd_end - 1);
     if (!status)
-        status = drape_export_reopen(ctx, def->folder, PVD_NAME, vtp->entries_end + (off_t)end, &vtp->pvd);
-    if (!status)
-        status = drape_file_overwrite(&vtp->pvd, vtp->entries_end, pvd_end, end);
-    return status ? status : drape_file_trim(&vtp->pvd);
+        status = drape_file_trim(&vtp->pvd);
+    return status ? status : drape_frame_files_cut(ctx, &vtp->frames, frames);
 }
 
 static drape_status vtp_sync(void *state)
@@ -290,6 +296,7 @@ const drape_exporter_ops drape_exporter_vtp = {
     .write = vtp_write,
     .archive = vtp_archive,
     .resume = vtp_resume,
+    .cut = vtp_cut,
     .sync = vtp_sync,
     .close = vtp_close,
 };

@@ -364,6 +364,17 @@ static drape_status open_files(drape_recorder *r)
     return status ? status : drape_energy_open(r->ctx, r->folder, -1, &r->energies);
 }
 
+/* All that is after the frames of the checkpoint; not before all files were found to have these. */
+static drape_status cut_files(drape_recorder *r)
+{
+    drape_status status = drape_file_trim(&r->steps);
+    if (!status)
+        status = drape_file_trim(&r->energies);
+    for (size_t i = 0; i < r->output_count && !status; i++)
+        status = r->outputs[i].ops->cut(r->ctx, r->outputs[i].state, r->frames);
+    return status;
+}
+
 /* Those of formats that are not written now are no part of the run; nothing else has changed them. */
 static drape_status resume_files(drape_recorder *r, drape_archive *a)
 {
@@ -381,7 +392,9 @@ static drape_status resume_files(drape_recorder *r, drape_archive *a)
         status = drape_archive_end(a);
     if (!status)
         status = drape_steps_open(r->ctx, r->folder, steps, &r->steps);
-    return status ? status : drape_energy_open(r->ctx, r->folder, energies, &r->energies);
+    if (!status)
+        status = drape_energy_open(r->ctx, r->folder, energies, &r->energies);
+    return status ? status : cut_files(r);
 }
 
 static drape_status prepare_checkpoints(drape_recorder *r, const drape_recorder_def *def)

@@ -5,11 +5,14 @@
  * A sim that is restored is made anew beside the present one and takes its place when all went well: nothing of what the
  * present one kept can have a part in it, and a failure at any moment leaves the present one as it is.
  */
+#include "base/finite.h"
 #include "sim/sim.h"
 
+#include <math.h>
 #include <stdio.h>
 
 #define MOST_LEVELS 60
+#define LONGEST     1e9 /* [s] as the duration of a scene */
 #define REASON_ROOM 64
 #define MEMORY_NAME "checkpoint in memory"
 
@@ -22,6 +25,9 @@ static void archive_state(const drape_model *m, drape_state *state, drape_archiv
     drape_archive_doubles(a, state->x, n);
     drape_archive_doubles(a, state->v, n);
     drape_archive_doubles(a, state->internal, (size_t)m->internal_count);
+    if (drape_archive_is_reading(a) &&
+        !(isfinite(state->t) && drape_all_finite(state->x, n) && drape_all_finite(state->v, n)))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a state that is not finite");
 }
 
 static bool is_place(int index, int least, int count)
@@ -40,12 +46,22 @@ static void archive_states(drape_sim *sim, drape_archive *a)
         if (drape_archive_good(a) && !is_place(*places[i], i < 2 ? 0 : -1, count))
             drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a state %d of %d", *places[i], count);
     }
+    if (drape_archive_good(a) &&
+        (sim->next == sim->now || sim->next == sim->past[0] || sim->next == sim->past[1]))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no state to step to");
     for (int i = 0; i < count && drape_archive_good(a); i++)
         if (i == sim->now || i == sim->before || i == sim->past[0] || i == sim->past[1])
             archive_state(sim->model, &sim->states[i], a);
 }
 
 /* ---- What the driver keeps ---- */
+
+/* Of what ends a loop over steps or frames. */
+static bool is_schedule(const drape_schedule *s)
+{
+    return s->level >= 0 && s->level <= MOST_LEVELS && s->part >= 0 && s->part < (int64_t)1 << s->level &&
+           s->count >= 0 && !(s->dt < 0) && !isnan(s->dt);
+}
 
 static void archive_schedule(drape_schedule *s, drape_archive *a)
 {
@@ -60,8 +76,8 @@ static void archive_schedule(drape_schedule *s, drape_archive *a)
     drape_archive_int64(a, &s->part);
     drape_archive_bool(a, &s->stepped);
     drape_archive_bool(a, &s->cut);
-    if (drape_archive_good(a) && !(s->level >= 0 && s->level <= MOST_LEVELS))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint halved a step %d times", s->level);
+    if (drape_archive_good(a) && !is_schedule(s))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step that could come next");
 }
 
 static void archive_energy(drape_energy *e, drape_archive *a)
@@ -110,6 +126,15 @@ static void archive_reasons(drape_sim *sim, drape_archive *a)
     }
 }
 
+/* Between the frames of the step that led here; rows without time have none but the first. */
+static bool is_next_frame(const drape_sim *sim)
+{
+    const drape_state *before = &sim->states[sim->before >= 0 ? sim->before : sim->now];
+    double least = before->t * sim->frame_rate - 2, most = drape_sim_state(sim)->t * sim->frame_rate + 2,
+           next = (double)sim->next_frame;
+    return next >= 0 && next <= most && (next >= least || sim->chosen.integrator->timeless);
+}
+
 static void archive_statistics(drape_sim *sim, drape_archive *a)
 {
     drape_statistics *s = &sim->statistics;
@@ -123,6 +148,8 @@ static void archive_statistics(drape_sim *sim, drape_archive *a)
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         drape_archive_double(a, numbers[i]);
     archive_reasons(sim, a);
+    if (drape_archive_is_reading(a) && !is_next_frame(sim))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no frame that could come next");
 }
 
 static void archive_realtime(drape_sim *sim, drape_archive *a)
@@ -139,6 +166,10 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
     drape_archive_int(a, &m->effort);
     if (drape_archive_good(a) && !is_place(m->effort, 0, efforts))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an effort %d of %d", m->effort, efforts);
+    if (drape_archive_good(a) && m->active &&
+        !(m->dt > 0 && m->longest >= m->dt && m->longest <= LONGEST && m->debt >= 0 &&
+          m->debt <= m->longest && m->cap > 0))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step for a budget");
     if (drape_archive_is_reading(a) && sim->chosen.integrator->set_effort)
         sim->chosen.integrator->set_effort(sim->integrator, m->effort);
 }

@@ -77,6 +77,15 @@ static void archive_steps(IDAMem s, drape_archive *a)
         archive_long(a, counts[i]);
 }
 
+/* Orders are places in the history. */
+static void check_orders(const struct IDAMemRec *s, drape_archive *a)
+{
+    const int most = s->ida_maxord, orders[] = {s->ida_kk, s->ida_kused, s->ida_knew};
+    for (int i = 0; i < 3 && drape_archive_good(a); i++)
+        if (orders[i] < 0 || orders[i] > most)
+            drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has the order %d of %d", orders[i], most);
+}
+
 /* What the first IDASolve does before its first step, and no later one. False: it fails. */
 static bool set_up(IDAMem s)
 {
@@ -91,6 +100,7 @@ bool drape_ida_archive(void *ida, drape_archive *a)
     drape_archive_mark(a, "ida");
     archive_history(s, a);
     archive_steps(s, a);
+    check_orders(s, a);
     if (drape_archive_is_reading(a) && s->ida_SetupDone && !set_up(s))
         drape_archive_fail(a, DRAPE_E_SOLVER, "IDA does not go on from the checkpoint");
     return true;

@@ -6,37 +6,11 @@
 #include <inttypes.h>
 
 #include "solvers/linear.h"
+#include "support/bytes.h"
 #include "support/scene.h"
 
 #define MIDDLE 0.08 /* [s] where it is saved */
 #define END    0.16
-
-/* ---- Bytes ---- */
-
-typedef struct bytes {
-    unsigned char *data;
-    size_t size, room;
-} bytes;
-
-static drape_status keep_bytes(void *user, const void *data, size_t size)
-{
-    bytes *b = user;
-    if (b->size + size > b->room) {
-        b->room = 2 * (b->size + size);
-        b->data = realloc(b->data, b->room);
-        ck_assert_ptr_nonnull(b->data);
-    }
-    memcpy(b->data + b->size, data, size);
-    b->size += size;
-    return DRAPE_OK;
-}
-
-static bytes save(drape_sim *sim)
-{
-    bytes b = {0};
-    ck_assert_int_eq(drape_sim_save_to(sim, keep_bytes, &b), DRAPE_OK);
-    return b;
-}
 
 /* ---- Scenes ---- */
 
@@ -108,7 +82,7 @@ static drape_status watch(void *user, const drape_event *event)
     w->frames = mix(w->frames, event->positions, n);
     w->frames = mix(w->frames, event->velocities, n);
     if (event->frame == w->save_at) {
-        w->saved = save(event->sim);
+        w->saved = bytes_save(event->sim);
         w->frames_saved = w->frames;
         w->attempts_saved = w->attempts;
     }
@@ -163,7 +137,7 @@ static void check(scene *s, const char *what)
     watcher whole = {.save_at = 20}, from_frame = {.save_at = -1}, from_middle = {.save_at = -1};
     drape_sim *sim = make_sim(s, &whole);
     drape_status first = go(sim, MIDDLE);
-    bytes middle = save(sim);
+    bytes middle = bytes_save(sim);
     uint64_t frames = whole.frames, attempts = whole.attempts;
     drape_status second = first ? first : go(sim, END);
     ck_assert_msg(whole.saved.size > 0 || first, "%s: no frame 20", what);
