@@ -114,6 +114,23 @@ static void same_end(drape_sim *a, drape_sim *b, const char *what)
     same_counts(a, b, what);
 }
 
+/* Forces of contact where it stands, lagged friction too, which is of the step that led there. */
+static void same_contact(drape_sim *a, drape_sim *b, const char *what)
+{
+    size_t n = 3 * (size_t)drape_sim_model(a)->node_count;
+    double *g[2] = {calloc(n, sizeof(double)), calloc(n, sizeof(double))};
+    drape_sim *const sims[2] = {a, b};
+    for (int i = 0; i < 2; i++) {
+        const drape_state *at = drape_sim_state(sims[i]);
+        const drape_point point = {
+            .x = at->x, .v = at->v, .internal = at->internal, .t = at->t, .span = {at->t, at->t}};
+        drape_system_contact_part(sims[i]->system, &point, true, g[i], NULL);
+    }
+    ck_assert_msg(memcmp(g[0], g[1], n * sizeof(double)) == 0, "%s: other forces of contact", what);
+    free(g[0]);
+    free(g[1]);
+}
+
 /* Goes on; a scene may come to an end that it cannot pass, and then both must. */
 static drape_status go(drape_sim *sim, double t)
 {
@@ -138,6 +155,8 @@ static void check(scene *s, const char *what)
     drape_sim *sim = make_sim(s, &whole);
     drape_status first = go(sim, MIDDLE);
     bytes middle = bytes_save(sim);
+    drape_sim *at_middle = make_sim(s, NULL);
+    go(at_middle, MIDDLE);
     uint64_t frames = whole.frames, attempts = whole.attempts;
     drape_status second = first ? first : go(sim, END);
     ck_assert_msg(whole.saved.size > 0 || first, "%s: no frame 20", what);
@@ -147,6 +166,9 @@ static void check(scene *s, const char *what)
     ck_assert_int_eq(drape_sim_observe(other, watch, &from_middle), DRAPE_OK);
     drape_status status = drape_sim_restore_from(other, middle.data, middle.size);
     ck_assert_msg(status == DRAPE_OK, "%s: %s", what, drape_context_message(s->ctx));
+    if (!first) /* else the one that goes on has gone on */
+        same_contact(at_middle, other, what);
+    drape_sim_destroy(&at_middle);
     from_middle.frames = frames;
     from_middle.attempts = attempts;
     ck_assert_int_eq(first ? first : go(other, END), second);
@@ -263,5 +285,67 @@ START_TEST(cloth_on_cloth_goes_on)
 }
 END_TEST
 
-SUITE("rows/checkpoint", every_integrator_goes_on, every_way_of_newton_goes_on, every_linear_solver_goes_on,
-      every_controller_goes_on, cloth_on_cloth_goes_on)
+/* A node that is pulled, a start of the host's own, frames with a budget that is never reached. */
+START_TEST(what_a_host_did_goes_on)
+{
+    for (int i = 0; drape_integrators[i]; i++) {
+        const char *name = drape_integrators[i]->name;
+        if (drape_integrators[i]->timeless)
+            continue;
+        scene s = scene_model(SHEET, 4, "", "", name, "", "halving");
+        drape_sim *one = make_sim(&s, NULL), *other = make_sim(&s, NULL);
+        const double target[3] = {0.1, 0.05, 0.1};
+        ck_assert_int_eq(go(one, MIDDLE), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_set_state(one, 0.05, drape_sim_positions(one), drape_sim_velocities(one)),
+                         DRAPE_E_ARGUMENT); /* the pin was elsewhere then */
+        ck_assert_int_eq(
+            drape_sim_set_state(one, MIDDLE, drape_sim_positions(one), drape_sim_velocities(one)), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_pull(one, 7, 0.5, target), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_advance_realtime(one, 0.017, 1e9, NULL), DRAPE_OK);
+        bytes saved = bytes_save(one), again = bytes_save(one);
+        ck_assert_uint_eq(saved.size, again.size);
+        ck_assert_mem_eq(saved.data, again.data, saved.size);
+        ck_assert_int_eq(drape_sim_restore_from(other, saved.data, saved.size), DRAPE_OK);
+        double force[2][3];
+        drape_sim_pull_force(one, force[0]);
+        drape_sim_pull_force(other, force[1]);
+        ck_assert_mem_eq(force[0], force[1], sizeof *force);
+        ck_assert(force[0][0] != 0);
+        for (int k = 0; k < 2; k++) {
+            drape_sim *sim = k ? other : one;
+            ck_assert_int_eq(drape_sim_advance_realtime(sim, 0.021, 1e9, NULL), DRAPE_OK);
+            ck_assert_int_eq(go(sim, END), DRAPE_OK);
+        }
+        same_end(one, other, name);
+        free(saved.data);
+        free(again.data);
+        drape_sim_destroy(&one);
+        drape_sim_destroy(&other);
+        scene_close(&s);
+    }
+}
+END_TEST
+
+/* An equilibrium says after it whether it is stable. */
+START_TEST(an_equilibrium_goes_on)
+{
+    scene s = scene_model(SHEET, 3, "", "", "static", "", "halving");
+    drape_sim *one = make_sim(&s, NULL), *other = make_sim(&s, NULL);
+    ck_assert_int_eq(go(one, MIDDLE), DRAPE_OK);
+    bytes saved = bytes_save(one);
+    ck_assert_int_eq(drape_sim_restore_from(other, saved.data, saved.size), DRAPE_OK);
+    ck_assert(drape_sim_statistics(other).stability_known);
+    same_end(one, other, "equilibrium");
+    ck_assert_int_eq(go(one, END), DRAPE_OK);
+    ck_assert_int_eq(go(other, END), DRAPE_OK);
+    same_end(one, other, "equilibrium");
+    free(saved.data);
+    drape_sim_destroy(&one);
+    drape_sim_destroy(&other);
+    scene_close(&s);
+}
+END_TEST
+
+SUITE("rows/checkpoint", what_a_host_did_goes_on, an_equilibrium_goes_on, every_integrator_goes_on,
+      every_way_of_newton_goes_on, every_linear_solver_goes_on, every_controller_goes_on,
+      cloth_on_cloth_goes_on)
