@@ -52,6 +52,9 @@ const drape_contact *drape_system_contact(const drape_system *system); /* NULL: 
  * that one. [s] */
 double drape_system_clock(const drape_system *system);
 
+/* What it knows besides the model, into an archive or, where it was just made, out of it. */
+void drape_system_archive(drape_system *system, drape_archive *a);
+
 /* A step begins at a state: contact is compared with it until the next. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
 

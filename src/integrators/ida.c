@@ -23,6 +23,7 @@
 #include "integrators/tolerance.h"
 #include "model/track.h"
 #include "solvers/sun_linear.h"
+#include "solvers/sundials_memory.h"
 
 #include <ida/ida.h>
 #include <math.h>
@@ -168,22 +169,28 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
     return drape_system_status(s->system) ? -1 : s->nonfinite || s->crossing ? 1 : 0;
 }
 
-/* Contact may couple what it did not before: then the matrices are made anew. */
-static drape_status fit_pattern(ida_state *s, const drape_point *point)
+/* The system has another pattern: the matrices are made anew. */
+static drape_status adopt_pattern(ida_state *s)
 {
-    bool changed;
-    s->fitted = drape_system_fit(s->system, point, &changed);
-    s->linear->stale |= changed;
-    if (s->fitted || !s->linear->stale)
-        return s->fitted;
     const drape_pattern *pattern = drape_system_pattern(s->system);
     if (s->dissipated) {
         drape_free(s->ctx, s->damping);
         s->damping = drape_alloc(s->ctx, (size_t)pattern->nonzeros, sizeof *s->damping);
         if (!s->damping)
-            return s->fitted = DRAPE_E_MEMORY;
+            return DRAPE_E_MEMORY;
     }
-    return s->fitted = drape_sun_linear_adopt(s->linear, pattern);
+    return drape_sun_linear_adopt(s->linear, pattern);
+}
+
+/* Contact may couple what it did not before. */
+static drape_status fit_pattern(ida_state *s, const drape_point *point)
+{
+    bool changed;
+    s->fitted = drape_system_fit(s->system, point, &changed);
+    s->linear->stale |= changed;
+    if (!s->fitted && s->linear->stale)
+        s->fitted = adopt_pattern(s);
+    return s->fitted;
 }
 
 /* Without contact, and without the solver's part of fit_pattern. */
@@ -616,6 +623,35 @@ static drape_work work(const void *state)
     return work;
 }
 
+/* Its factors are kept from step to step, with c_j and D. */
+static void archive_factors(ida_state *s, drape_archive *a)
+{
+    if (drape_archive_is_reading(a) && drape_system_pattern(s->system) != s->linear->pattern)
+        drape_archive_note(a, adopt_pattern(s));
+    drape_archive_double(a, &s->factored_cj);
+    if (s->damping && drape_archive_good(a))
+        drape_archive_doubles(a, s->damping, (size_t)drape_system_pattern(s->system)->nonzeros);
+    drape_sun_linear_archive(s->linear, a, s->factored_cj != 0);
+}
+
+static void archive(void *state, drape_archive *a)
+{
+    ida_state *s = state;
+    int64_t counted = s->counted;
+    drape_archive_double(a, &s->reached);
+    drape_archive_doubles(a, s->powers, 2);
+    drape_archive_double(a, &s->second);
+    drape_archive_int64(a, &s->steps);
+    drape_archive_int64(a, &counted);
+    s->counted = (long)counted;
+    drape_work_archive(&s->work, a);
+    if (s->n == 0)
+        return;
+    archive_factors(s, a);
+    if (!drape_ida_archive(s->ida, a) && a->reading)
+        s->reached = NAN;
+}
+
 static size_t bytes(const void *state)
 {
     const ida_state *s = state;
@@ -641,6 +677,7 @@ const drape_integrator_ops drape_integrator_ida = {
     .interpolate = interpolate,
     .restart = restart,
     .work = work,
+    .archive = archive,
     .bytes = bytes,
     .destroy = destroy,
 };

@@ -6,6 +6,7 @@
 #define DRAPE_INTEGRATORS_INTEGRATOR_H
 
 #include "assemble/system.h"
+#include "base/archive.h"
 #include "base/param.h"
 
 /* What a step has to say of itself. */
@@ -41,6 +42,8 @@ typedef struct drape_work {
     int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
     double residual_seconds, jacobian_seconds, factor_seconds, solve_seconds, contact_seconds;
 } drape_work;
+
+void drape_work_archive(drape_work *work, drape_archive *a);
 
 typedef struct drape_integrator_ops {
     const char *name, *summary, *reference;
@@ -80,6 +83,10 @@ typedef struct drape_integrator_ops {
     int efforts;
     void (*set_effort)(void *state, int effort);
     drape_work (*work)(const void *state);
+    /* All that the next steps depend on besides the state they start from, and the work done: into an archive or,
+     * where this was just made for a system of the same model with the same pattern, out of it. What has the same
+     * bits however it came about is left out. */
+    void (*archive)(void *state, drape_archive *a);
     size_t (*bytes)(const void *state);
     void (*destroy)(void **state);
 } drape_integrator_ops;
