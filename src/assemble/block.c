@@ -299,13 +299,32 @@ static void evaluate_energies(const drape_term *term, const drape_request *want,
                       want->hessian ? b->hessian : NULL);
 }
 
+/* h -= dg/dv W, where the wind on an element's nodes changes as they move. */
+static void carry_wind(const drape_term *term, const double *gradient, const double *dg_dv, int32_t element,
+                       double *h)
+{
+    const drape_elements *el = &term->elements;
+    const int32_t *node = el->node + (size_t)element * (size_t)el->nodes;
+    const int d = 3 * el->nodes;
+    for (int row = 0; row < d; row++)
+        for (int a = 0; a < el->nodes; a++) {
+            const double *w = gradient + 9 * (size_t)node[a], *by = dg_dv + d * row + 3 * a;
+            for (int c = 0; c < 3; c++)
+                h[d * row + 3 * a + c] -= by[0] * w[c] + by[1] * w[3 + c] + by[2] * w[6 + c];
+        }
+}
+
 static void evaluate_dissipations(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const int d = 3 * term->elements.nodes;
-    const bool hessian = want->hessian;
+    const bool hessian = want->hessian, wind = want->against && term->ops->in_medium;
     memset(b->energy, 0, (size_t)b->count * sizeof *b->energy);
-    term->ops->dissipation(&term->elements, b->first, b->count, want->point->x, want->point->v, b->gradient,
-                           hessian ? b->hessian : NULL, hessian ? b->scratch : NULL);
+    term->ops->dissipation(&term->elements, b->first, b->count, want->point->x,
+                           wind ? want->against : want->point->v, b->gradient, hessian ? b->hessian : NULL,
+                           hessian ? b->scratch : NULL);
+    for (int32_t i = 0; wind && hessian && !want->velocity && i < b->count; i++)
+        carry_wind(term, want->wind_gradient, b->scratch + (size_t)i * (size_t)(d * d), b->first + i,
+                   b->hessian + (size_t)i * (size_t)(d * d));
     for (int i = 0; hessian && i < b->count * d * d; i++)
         b->hessian[i] = want->velocity ? b->scratch[i] : b->hessian[i] + want->point->weight * b->scratch[i];
 }

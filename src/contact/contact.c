@@ -4,7 +4,6 @@
 #include "base/clock.h"
 #include "base/finite.h"
 #include "base/vec3.h"
-#include "model/track.h"
 
 #include <math.h>
 #include <string.h>
@@ -47,15 +46,16 @@ static bool take_arrays(drape_contact *c)
            c->searched_pose && c->start_pose && c->listed_pose && c->on_collider;
 }
 
-drape_status drape_contact_create(drape_context *ctx, const drape_model *model, drape_contact **out)
+drape_status drape_contact_create(drape_context *ctx, const drape_motion *motion, drape_contact **out)
 {
+    const drape_model *model = motion->model;
     *out = NULL;
     if (model->collider_count == 0 && !model->contact.self)
         return DRAPE_OK;
     drape_contact *c = drape_alloc(ctx, 1, sizeof *c);
     if (!c)
         return DRAPE_E_MEMORY;
-    *c = (drape_contact){.ctx = ctx, .model = model};
+    *c = (drape_contact){.ctx = ctx, .model = model, .motion = motion};
     c->law.velocity = model->contact.friction_velocity;
     drape_status status = drape_search_create(ctx, model, &c->search);
     if (!status && !take_arrays(c))
@@ -125,17 +125,18 @@ void *drape_contact_grow(drape_context *ctx, void *list, int32_t count, int32_t 
 
 /* ---- Placing ---- */
 
-static void pose_at(const drape_collider *collider, double t, const double span[2], drape_collider_pose *pose)
+static void pose_at(const drape_motion *motion, int32_t collider, double t, const double span[2],
+                    drape_collider_pose *pose)
 {
     double before[3], after[3];
     memset(pose, 0, sizeof *pose);
-    if (collider->track.key_count == 0)
+    if (!drape_motion_moves_collider(motion, collider))
         return;
-    drape_track_displacement(collider->track.keys, collider->track.key_count, t, pose->displacement);
+    drape_motion_collider(motion, collider, t, pose->displacement);
     if (!(span[1] > span[0]))
         return;
-    drape_track_displacement(collider->track.keys, collider->track.key_count, span[0], before);
-    drape_track_displacement(collider->track.keys, collider->track.key_count, span[1], after);
+    drape_motion_collider(motion, collider, span[0], before);
+    drape_motion_collider(motion, collider, span[1], after);
     for (int k = 0; k < 3; k++)
         pose->velocity[k] = (after[k] - before[k]) / (span[1] - span[0]);
 }
@@ -143,7 +144,7 @@ static void pose_at(const drape_collider *collider, double t, const double span[
 void drape_contact_pose(drape_contact *c, double t, const double span[2])
 {
     for (int32_t i = 0; i < c->model->collider_count; i++)
-        pose_at(&c->model->colliders[i], t, span, &c->pose[i]);
+        pose_at(c->motion, i, t, span, &c->pose[i]);
 }
 
 /* Nodes as given, points of colliders as posed. */

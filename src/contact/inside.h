@@ -19,6 +19,7 @@ typedef struct drape_lagged {
 struct drape_contact {
     drape_context *ctx;
     const drape_model *model;
+    const drape_motion *motion; /* of its colliders */
     drape_search search;
     drape_contact_law law;     /* all but the distance and stiffness of a pair */
     double *x, *v;             /* (points x 3) where it was last placed */

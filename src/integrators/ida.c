@@ -15,13 +15,13 @@
  * because BDF 3 to 5 are not A-stable and feed energy into undamped waves; it is 5 when the tolerance
  * resolves them.
  *
- * Pins that move have kinks at the keys of their tracks: IDA stops there and starts again.
+ * Pins that move have kinks at the keys of their tracks, and where a host sends them elsewhere: IDA stops there and
+ * starts again.
  */
 #include "base/finite.h"
 #include "integrators/ida_newton.h"
 #include "integrators/integrator.h"
 #include "integrators/tolerance.h"
-#include "model/track.h"
 #include "solvers/sun_linear.h"
 #include "solvers/sundials_memory.h"
 
@@ -93,6 +93,7 @@ typedef struct ida_state {
     drape_context *ctx;
     drape_system *system;
     const drape_model *model;
+    const drape_motion *motion;
     double values[PARAM_COUNT];
     int64_t n; /* free DOFs; the system has 2 n unknowns */
     SUNContext sun;
@@ -106,7 +107,7 @@ typedef struct ida_state {
     double *dissipated;       /* nodes; NULL where nothing dissipates */
     double factored_cj;       /* c_j of the factors */
     const double *internal;   /* of the last accepted state */
-    double span[2];           /* [s] no track has a key inside: where the slopes of tracks are taken */
+    double span[2];           /* [s] no pin or collider has a kink inside */
     double reached;           /* time of IDA's state; NaN: it must start anew */
     double from;              /* time that the last good step began at; NaN: none */
     double powers[2];         /* [W] taken by dissipation and put in by pins, at the time reached */
@@ -125,17 +126,14 @@ static size_t node_at(const ida_state *s, int64_t i)
     return 3 * (size_t)s->model->node_of_free[i / 3] + (size_t)(i % 3);
 }
 
-/* Within a step no track has a key, so the velocity of pins is the slope of their tracks at any time
- * inside. */
+/* Within a step no pin has a kink, so its velocity is that of the piece that any time inside is of. */
 static void place_pins(ida_state *s, double t)
 {
-    const drape_model *m = s->model;
-    drape_model_place_pins(m, t, s->x);
-    for (int32_t i = 0; i < m->moved_count; i++) {
-        const drape_track *track = &m->tracks[m->moved_track[i]];
-        drape_track_velocity(track->keys, track->key_count, (s->span[0] + s->span[1]) / 2,
-                             s->v + 3 * (size_t)m->moved_node[i]);
-    }
+    const drape_motion *m = s->motion;
+    drape_motion_place_pins(m, t, s->x);
+    for (int32_t i = 0; i < m->moved_count; i++)
+        drape_motion_pin_velocity(m, i, t, (s->span[0] + s->span[1]) / 2,
+                                  s->v + 3 * (size_t)m->moved_node[i]);
 }
 
 static drape_point place(ida_state *s, double t, const double *y)
@@ -334,8 +332,12 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
     *state = s;
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (ida_state){
-        .ctx = ctx, .system = system, .model = drape_system_model(system), .reached = NAN, .from = NAN};
+    *s = (ida_state){.ctx = ctx,
+                     .system = system,
+                     .model = drape_system_model(system),
+                     .motion = drape_system_motion(system),
+                     .reached = NAN,
+                     .from = NAN};
     s->n = 3 * (int64_t)s->model->free_count;
     memcpy(s->values, values, sizeof s->values);
     drape_status status = create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
@@ -426,14 +428,13 @@ static void begin(ida_state *s, const drape_state *in)
     s->internal = in->internal;
 }
 
-/* Of forces on colliders (NULL: no contact) that move. */
-static double collider_power(const ida_state *s, const double *force)
+/* At time t, of forces on colliders (NULL: no contact) that move. */
+static double collider_power(const ida_state *s, double t, const double *force)
 {
     double power = 0;
     for (int32_t c = 0; force && c < s->model->collider_count; c++) {
-        const drape_track *track = &s->model->colliders[c].track;
         double v[3];
-        drape_track_velocity(track->keys, track->key_count, (s->span[0] + s->span[1]) / 2, v);
+        drape_motion_collider_velocity(s->motion, c, t, (s->span[0] + s->span[1]) / 2, v);
         for (int k = 0; k < 3; k++)
             power += force[3 * c + k] * v[k];
     }
@@ -445,6 +446,7 @@ static double collider_power(const ida_state *s, const double *force)
 static void measure_powers(ida_state *s, double t, double powers[2])
 {
     const drape_model *m = s->model;
+    const drape_motion *motion = s->motion;
     const drape_point point = {
         .x = s->x, .v = s->v, .internal = s->internal, .t = t, .span = {s->span[0], s->span[1]}};
     powers[0] = powers[1] = 0;
@@ -452,14 +454,16 @@ static void measure_powers(ida_state *s, double t, double powers[2])
         drape_system_dissipation(s->system, &point, s->dissipated);
         for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
             powers[0] += s->dissipated[i] * s->v[i];
-        powers[0] += collider_power(s, drape_system_on_colliders(s->system));
+        powers[0] += collider_power(s, t, drape_system_on_colliders(s->system));
     }
-    if (m->moved_count > 0 || m->collider_count > 0)
+    if (motion->moved_count > 0 || m->collider_count > 0)
         drape_system_force(s->system, &point, s->g);
-    powers[1] += collider_power(s, drape_system_on_colliders(s->system));
-    for (int32_t i = 0; i < m->moved_count; i++)
-        for (size_t k = 0; k < 3; k++)
-            powers[1] += s->g[3 * (size_t)m->moved_node[i] + k] * s->v[3 * (size_t)m->moved_node[i] + k];
+    powers[1] += collider_power(s, t, drape_system_on_colliders(s->system));
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            size_t at = 3 * (size_t)motion->moved_node[i] + k;
+            powers[1] += s->g[at] * s->v[at];
+        }
 }
 
 /* Work by the trapezoidal rule. */
@@ -486,11 +490,11 @@ static void count_iterations(ida_state *s, drape_step_info *info)
 static drape_status prepare(ida_state *s, const drape_state *in, double end, double h, double *first,
                             drape_step_info *info)
 {
-    double stop = drape_model_next_kink(s->model, in->t, end);
+    double stop = drape_motion_next_kink(s->motion, in->t, end);
     begin(s, in);
     s->span[0] = in->t;
     s->span[1] = stop;
-    if (s->n > 0 && s->reached != in->t) {
+    if (s->n > 0 && (s->reached != in->t || drape_motion_at_kink(s->motion, in->t))) {
         drape_status status = start(s, in, info);
         if (status)
             return status;
@@ -585,7 +589,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     info->h = t - in->t;
     info->reason = "converged";
     audit(s, in, out, info);
-    s->reached = drape_model_at_kink(s->model, t) ? NAN : t;
+    s->reached = t;
     s->steps -= t == end;
     return DRAPE_OK;
 }
@@ -593,7 +597,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
 static void interpolate(void *state, double t, double *x)
 {
     ida_state *s = state;
-    drape_model_place_pins(s->model, t, x);
+    drape_motion_place_pins(s->motion, t, x);
     if (s->n == 0 || IDAGetDky(s->ida, t, 0, s->between))
         return;
     const double *y = N_VGetArrayPointer(s->between);
@@ -673,6 +677,7 @@ const drape_integrator_ops drape_integrator_ida = {
     .create = create,
     .own_steps = true,
     .gain = GAIN,
+    .smooth_forces = true,
     .step = step,
     .interpolate = interpolate,
     .restart = restart,

@@ -11,6 +11,7 @@ typedef struct drape_implicit {
     drape_context *ctx;
     drape_system *system;
     const drape_model *model;
+    const drape_motion *motion;
     drape_newton *newton;    /* NULL in rows that iterate by themselves */
     double *x_base, *v_base; /* nodes: see drape_newton_problem */
     double *inertia, *d;     /* free DOFs */

@@ -70,6 +70,8 @@ typedef struct drape_integrator_ops {
                          drape_step_info *info);
     /* The next step starts anew from a state that this integrator did not make, or after a rejection. */
     void (*restart)(void *state, const drape_state *from);
+    /* Its next step relies on forces that are smooth from step to step: where they jump it must start anew. */
+    bool smooth_forces;
     /* The stability limit at a state, for steps of size h: a function of the state alone. NULL: stable for any
      * h. */
     void (*stability)(void *state, const drape_state *at, double h, drape_stability *out);
