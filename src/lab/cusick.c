@@ -7,7 +7,7 @@
 
 /* The area inside the shadow of the outer rim, by its corners. Folds that hang under others would be counted with their
  * sign; specimens of 30 cm do not do that. */
-double cusick_coefficient(const drape_lab_run *run, int32_t spokes)
+double cusick_coefficient(const drape_reference_run *run, int32_t spokes)
 {
     const int32_t nodes = drape_model_node_count(run->model);
     const double *rim = drape_sim_positions(run->sim) + 3 * (size_t)(nodes - spokes);

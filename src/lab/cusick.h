@@ -9,6 +9,6 @@
 #define CUSICK_OUTER 0.15
 
 /* The share of the overhang's area that its shadow has. Needs nodes of the grid "annulus". spokes: columns of it. */
-double cusick_coefficient(const drape_lab_run *run, int32_t spokes);
+double cusick_coefficient(const drape_reference_run *run, int32_t spokes);
 
 #endif

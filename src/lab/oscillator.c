@@ -19,18 +19,18 @@ int oscillator_scene(const char *integrator, double angle, char *text, size_t si
         -OSCILLATOR_SPEED, integrator, angle / OSCILLATOR_OMEGA);
 }
 
-drape_status oscillator_advance(drape_lab_run *run, double angle, int steps)
+drape_status oscillator_advance(drape_reference_run *run, double angle, int steps)
 {
     return drape_sim_advance(run->sim, drape_sim_time(run->sim) + steps * angle / OSCILLATOR_OMEGA);
 }
 
-double oscillator_energy(const drape_lab_run *run)
+double oscillator_energy(const drape_reference_run *run)
 {
     const drape_energy e = drape_sim_energy(run->sim);
     return e.kinetic + e.elastic;
 }
 
-drape_status oscillator_amplitude(drape_lab_run *run, double angle, int from, int to, double *value)
+drape_status oscillator_amplitude(drape_reference_run *run, double angle, int from, int to, double *value)
 {
     drape_status status = from ? oscillator_advance(run, angle, from) : DRAPE_OK;
     const double before = oscillator_energy(run);
@@ -41,13 +41,13 @@ drape_status oscillator_amplitude(drape_lab_run *run, double angle, int from, in
 }
 
 /* How far a free node is from its rest. */
-static double position(const drape_lab_run *run)
+static double position(const drape_reference_run *run)
 {
     const size_t at = 3 * 2 + 2;
     return drape_sim_positions(run->sim)[at] - drape_model_rest_positions(run->model)[at];
 }
 
-drape_status oscillator_phase(drape_lab_run *run, double angle, double *value)
+drape_status oscillator_phase(drape_reference_run *run, double angle, double *value)
 {
     double x[3] = {0}, product = 0, square = 0;
     drape_status status = DRAPE_OK;

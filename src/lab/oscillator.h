@@ -13,16 +13,16 @@ int oscillator_scene(const char *integrator, double angle, char *text, size_t si
 #define OSCILLATOR_OMEGA 1.41421356237309504880
 
 /* Advances by so many steps of omega h = angle. */
-drape_status oscillator_advance(drape_lab_run *run, double angle, int steps);
+drape_status oscillator_advance(drape_reference_run *run, double angle, int steps);
 
 /* Kinetic and elastic energy. */
-double oscillator_energy(const drape_lab_run *run);
+double oscillator_energy(const drape_reference_run *run);
 
 /* The share of the amplitude that a step leaves, from the energies after `from` and after `to` steps. */
-drape_status oscillator_amplitude(drape_lab_run *run, double angle, int from, int to, double *value);
+drape_status oscillator_amplitude(drape_reference_run *run, double angle, int from, int to, double *value);
 
 /* The angle of a step over omega h: every method that advances x and v by one matrix of determinant 1 has
  * x(n+1) + x(n-1) = 2 cos(angle) x(n). */
-drape_status oscillator_phase(drape_lab_run *run, double angle, double *value);
+drape_status oscillator_phase(drape_reference_run *run, double angle, double *value);
 
 #endif

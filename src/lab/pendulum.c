@@ -35,7 +35,7 @@ int pendulum_scene(const char *integrator, double degrees, char *text, size_t si
 }
 
 /* From the first to the second crossing of the vertical is half a period. */
-drape_status pendulum_measure(drape_lab_run *run, double *value)
+drape_status pendulum_measure(drape_reference_run *run, double *value)
 {
     const size_t at = 3 * 2 + 2; /* z of the first node of the lower row */
     double z = drape_sim_positions(run->sim)[at], crossing[2] = {NAN, NAN};

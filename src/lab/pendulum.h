@@ -9,7 +9,7 @@
 int pendulum_scene(const char *integrator, double degrees, char *text, size_t size);
 
 /* The period over that of small swings, from the first two crossings of the vertical. */
-drape_status pendulum_measure(drape_lab_run *run, double *value);
+drape_status pendulum_measure(drape_reference_run *run, double *value);
 
 /* T/T0 = 2/pi K(sin(a/2)) */
 double pendulum_period(double degrees);

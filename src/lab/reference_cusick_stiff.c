@@ -73,7 +73,7 @@ static int scene(double nu, double load, char *text, size_t size)
 }
 
 /* The mean of the outer rim. */
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     drape_status status = lab_advance(run);
     const int32_t nodes = drape_model_node_count(run->model);

@@ -34,7 +34,7 @@ static int scene(double mu, double load, char *text, size_t size)
                     -GRAVITY, mu);
 }
 
-static double mean(const drape_lab_run *run)
+static double mean(const drape_reference_run *run)
 {
     const int32_t nodes = drape_model_node_count(run->model);
     double sum = 0;
@@ -44,7 +44,7 @@ static double mean(const drape_lab_run *run)
 }
 
 /* At rest on the barrier: backward Euler's damping, by itself, takes too long. */
-static drape_status push(drape_lab_run *run)
+static drape_status push(drape_reference_run *run)
 {
     const size_t n = 3 * (size_t)drape_model_node_count(run->model);
     double *x = calloc(2 * n, sizeof *x), *v = x + n;
@@ -58,7 +58,7 @@ static drape_status push(drape_lab_run *run)
 }
 
 /* Twice as long as it takes to stop. */
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     drape_status status = push(run);
     const double before = mean(run);

@@ -33,7 +33,7 @@ static int scene(double degrees, double mu, char *text, size_t size)
 }
 
 /* 1 where it stays. 1e-3 less friction than it takes is a speed of 1e-3 g sin a after a second, 17 times CREEP or more. */
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     const int32_t nodes = drape_model_node_count(run->model);
     double speed = 0;

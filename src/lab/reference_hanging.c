@@ -51,7 +51,7 @@ static int scene(double place, double load, char *text, size_t size)
 }
 
 /* Of the lowest nodes, which are those of the lower edge. */
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     drape_status status = lab_advance(run);
     const double *rest = drape_model_rest_positions(run->model), *x = drape_sim_positions(run->sim);

@@ -18,7 +18,7 @@ static int scene(double angle, double load, char *text, size_t size)
     return oscillator_scene("'method': 'be'", angle, text, size);
 }
 
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     drape_status status = oscillator_amplitude(run, run->parameter, 0, STEPS, value);
     *value *= *value;

@@ -20,7 +20,7 @@ static int scene(double count, double load, char *text, size_t size)
                             1, text, size);
 }
 
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     drape_status status = drape_sim_advance(run->sim, 2 * PI * run->parameter / OSCILLATOR_OMEGA);
     *value = drape_sim_velocities(run->sim)[3 * 2 + 2] / -OSCILLATOR_SPEED;

@@ -17,7 +17,7 @@ static int scene(double angle, double load, char *text, size_t size)
     return oscillator_scene("'method': 'midpoint'", angle, text, size);
 }
 
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     return oscillator_phase(run, run->parameter, value);
 }

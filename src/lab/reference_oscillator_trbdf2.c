@@ -22,7 +22,7 @@ static int scene(double angle, double load, char *text, size_t size)
     return oscillator_scene("'method': 'trbdf2'", angle, text, size);
 }
 
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     return oscillator_amplitude(run, run->parameter, 0, STEPS, value);
 }

@@ -22,7 +22,7 @@ static drape_validation run(const drape_reference *reference, int index)
     drape_context *ctx = NULL;
     drape_validation v;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    ck_assert_int_eq(drape_validate(ctx, reference, index, &v), DRAPE_OK);
+    ck_assert_int_eq(drape_validate(ctx, reference, index, NULL, NULL, &v), DRAPE_OK);
     drape_context_destroy(&ctx);
     return v;
 }
