@@ -5,6 +5,7 @@
 #include "colliders/colliders.h"
 
 #include <math.h>
+#include <string.h>
 
 #define ACROSS 6    /* parts of a side: 28 points of a face are looked at */
 #define TOUCH  1e-9 /* [m] deep is not inside: what contact allows */
@@ -32,7 +33,9 @@ int32_t drape_sim_inside(const drape_sim *sim, int32_t collider, double *deepest
     if (!sim || collider < 0 || collider >= sim->model->collider_count)
         return -1;
     const drape_model *m = sim->model;
-    const drape_collider_pose pose = drape_collider_pose_at(&m->colliders[collider], drape_sim_time(sim));
+    const drape_collider_motion motion = drape_sim_collider(sim, collider);
+    drape_collider_pose pose = {{0}, {0}};
+    memcpy(pose.displacement, motion.displacement, sizeof pose.displacement);
     for (int32_t f = 0; f < m->triangle_count; f++) {
         double depth =
             deepest_of(&m->colliders[collider], &pose, drape_sim_positions(sim), m->triangle + 3 * (size_t)f);
