@@ -172,7 +172,7 @@ def test_shadings():
         cloth = image[60:140, 100:220]
         assert cloth.sum(axis=2).min() > 24, f"{shade}: black at {cloth.sum(axis=2).min()}"
         assert cloth.std() > 6, f"{shade}: all of one colour"
-        if shade in ("wireframe", "pbr", "strain"):
+        if shade in ("wireframe", "refraction", "pbr", "strain"):
             render(source, "--shade", shade, out="b.png")
             with open("a.png", "rb") as a, open("b.png", "rb") as b:
                 assert a.read() == b.read(), f"{shade}: two pictures differ"
