@@ -22,6 +22,8 @@ typedef struct drape_request {
     bool velocity;                  /* the Hessian wanted is dg/dv alone */
     bool remainder;                 /* only what is of no measure */
     const bool *without;            /* (term_count) terms that are left out; NULL: none */
+    const double *against;          /* (node_count x 3) v against the medium; NULL: it rests */
+    const double *wind_gradient;    /* (node_count x 3 x 3), beside it */
 } drape_request;
 
 /*

@@ -185,7 +185,7 @@ static int simulate(const cli_frames_def *def, cli_source *s)
     watch w = {.def = def, .source = s};
     double end = drape_model_duration(s->in.model);
     drape_status status = drape_sim_observe(s->in.sim, observe, &w);
-    cli_progress_begin(&w.progress, end);
+    cli_progress_begin(&w.progress, 0, end);
     if (!status)
         status = drape_sim_advance(s->in.sim, end);
     cli_progress_clear(&w.progress);

@@ -4,6 +4,7 @@
 
 #include "base/finite.h"
 #include "solvers/sun_linear.h"
+#include "solvers/sundials_memory.h"
 
 #include <float.h>
 #include <kinsol/kinsol.h>
@@ -639,6 +640,21 @@ const drape_point *drape_newton_point(const drape_newton *newton)
     return &newton->point;
 }
 
+/* Contact may couple there what it did not where the last solve was. */
+drape_status drape_newton_matrix(drape_newton *s, const drape_point *point, double mass_weight,
+                                 const drape_pattern **pattern, const double **values)
+{
+    s->point = *point;
+    drape_newton_forget_factors(s);
+    drape_status status = fit_pattern(s);
+    if (status)
+        return status;
+    drape_system_jacobian(s->system, point, mass_weight, 0, s->linear->values);
+    *pattern = drape_system_pattern(s->system);
+    *values = s->linear->values;
+    return DRAPE_OK;
+}
+
 const double *drape_newton_residual(const drape_newton *newton)
 {
     return newton->f;
@@ -657,6 +673,24 @@ const double *drape_newton_values(const drape_newton *newton)
 void drape_newton_forget_factors(drape_newton *newton)
 {
     newton->factored_mass_weight = 0;
+}
+
+/* Modified Newton goes on with its factors, and watches the residual by what it was in the solve before. */
+void drape_newton_archive(drape_newton *s, drape_archive *a)
+{
+    const bool modified = s->values[DRAPE_NEWTON_METHOD] == METHOD_MODIFIED;
+    drape_archive_mark(a, "newton");
+    drape_archive_doubles(a, s->f, (size_t)s->n);
+    drape_archive_double(a, &s->enough);
+    drape_archive_double(a, &s->factored_mass_weight);
+    drape_work_archive(&s->work, a);
+    if (s->n == 0)
+        return;
+    if (drape_archive_is_reading(a))
+        drape_archive_note(a, drape_sun_linear_adopt_other(s->linear, drape_system_pattern(s->system)));
+    drape_sun_linear_archive(s->linear, a, modified && s->factored_mass_weight != 0);
+    if (modified && !drape_kinsol_archive(s->kin, a) && a->reading)
+        drape_newton_forget_factors(s);
 }
 
 drape_work drape_newton_work(const drape_newton *newton)

@@ -237,6 +237,14 @@ static drape_work work(const void *state)
     return work;
 }
 
+static void archive(void *state, drape_archive *a)
+{
+    newton_k *s = state;
+    drape_rung_archive(&s->rung, a);
+    if (s->quasi)
+        drape_quasi_archive(s->quasi, a);
+}
+
 static size_t bytes(const void *state)
 {
     const newton_k *s = state;
@@ -257,6 +265,7 @@ const drape_integrator_ops drape_integrator_newton_k = {
     .efforts = sizeof efforts / sizeof *efforts,
     .set_effort = set_effort,
     .work = work,
+    .archive = archive,
     .bytes = bytes,
     .destroy = destroy,
 };

@@ -48,6 +48,17 @@ void drape_rung_restart(void *state, const drape_state *from)
     s->past_time[0] = s->past_time[1] = s->past_end = NAN;
 }
 
+void drape_rung_archive(drape_rung *s, drape_archive *a)
+{
+    drape_archive_mark(a, "rung");
+    drape_archive_double(a, &s->past_end);
+    for (int k = 0; k < 2; k++) {
+        drape_archive_double(a, &s->past_time[k]);
+        drape_archive_doubles(a, s->past[k], s->nodes);
+    }
+    drape_work_archive(&s->work, a);
+}
+
 size_t drape_rung_bytes(const drape_rung *s)
 {
     return sizeof *s + drape_implicit_array_bytes(&s->base) +

@@ -53,6 +53,7 @@ typedef struct glb_state {
     drape_file file;
     uint32_t room;   /* frames that there is room for */
     uint32_t frames; /* whole ones in the file */
+    bool live;       /* the file ends with them: it may go on there */
     char *json;      /* while the file is begun; then a scratch */
     size_t json_size, used;
     blanks at;
@@ -253,9 +254,8 @@ static drape_status glb_check(drape_context *ctx, const char *pointer, const dra
         frames, nodes, bytes, MOST_FRAMES);
 }
 
-static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
+static drape_status take_rooms(drape_context *ctx, const drape_export_def *def, glb_state *glb)
 {
-    glb_state *glb = state;
     glb->def = def;
     glb->room = (uint32_t)def->most_frames;
     glb->json_size = FIXED_ROOM + (size_t)glb->room * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
@@ -268,7 +268,13 @@ static drape_status glb_open(drape_context *ctx, const drape_export_def *def, vo
     if (!glb->json || !glb->base || !glb->upright || !glb->normal || !glb->times)
         return DRAPE_E_MEMORY;
     make_json(glb);
-    return drape_export_begin(ctx, def->folder, FILE_NAME, &glb->file);
+    return DRAPE_OK;
+}
+
+static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
+{
+    drape_status status = take_rooms(ctx, def, state);
+    return status ? status : drape_export_begin(ctx, def->folder, FILE_NAME, &((glb_state *)state)->file);
 }
 
 /* ---- Frames ---- */
@@ -384,6 +390,7 @@ static drape_status glb_write(drape_context *ctx, void *state, const drape_frame
     drape_status status = glb->frames == 0 ? write_first(glb, frame) : write_target(glb, frame);
     if (!status)
         glb->frames++;
+    glb->live = glb->frames > 0;
     return status;
 }
 
@@ -431,10 +438,108 @@ static drape_status write_animation(glb_state *glb)
     return status ? status : name_animation(glb);
 }
 
+/* ---- Checkpoints ---- */
+
+static void glb_archive(void *state, drape_archive *a)
+{
+    glb_state *glb = state;
+    int64_t frames = glb->frames;
+    drape_archive_int64(a, &frames);
+    if (a->reading && (frames < 0 || frames > glb->room))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %lld frames of %u", (long long)frames,
+                           glb->room);
+    if (a->status)
+        return;
+    glb->frames = (uint32_t)frames;
+    drape_export_archive_size(a, &glb->file.kept);
+    drape_archive_bytes(a, glb->base, node_bytes(glb));
+    drape_archive_bytes(a, glb->times, glb->frames * sizeof *glb->times);
+}
+
+/* Over what was written from one item of a list on. */
+static drape_status blank_items(glb_state *glb, size_t list, size_t width, uint32_t from)
+{
+    size_t begin = list + from * width, end = list + glb->room * width;
+    char blank[1024];
+    drape_status status = DRAPE_OK;
+    memset(blank, ' ', sizeof blank);
+    while (!status && begin < end) {
+        size_t part = end - begin < sizeof blank ? end - begin : sizeof blank;
+        status = drape_file_overwrite(&glb->file, (off_t)(JSON_OFFSET + begin), blank, part);
+        begin += part;
+    }
+    return status;
+}
+
+/* All that frames after those that there are, and the animation, put into the blanks. */
+static drape_status blank_rest(glb_state *glb)
+{
+    const blanks *at = &glb->at;
+    uint32_t n = glb->frames;
+    const struct {
+        size_t begin, width;
+    } lists[] = {{at->accessors, ACCESSOR_ROOM}, {at->targets, TARGET_WIDTH}, {at->weights, WEIGHT_WIDTH}};
+    const struct {
+        size_t begin, size;
+        bool kept;
+    } pieces[] = {{at->views, TIMES_ROOM / 2, false},     {at->times, TIMES_ROOM / 2, false},
+                  {at->animation, TIMES_ROOM / 2, false}, {at->targets_open, OPEN_WIDTH + 1, n > 1},
+                  {at->targets_close, 1, n > 1},          {at->weights_open, OPEN_WIDTH + 1, n > 1},
+                  {at->weights_close, 1, n > 1}};
+    char blank[TIMES_ROOM];
+    drape_status status = DRAPE_OK;
+    memset(blank, ' ', sizeof blank);
+    for (size_t i = 0; !status && i < sizeof pieces / sizeof *pieces; i++)
+        if (!pieces[i].kept)
+            status = drape_file_overwrite(&glb->file, (off_t)(JSON_OFFSET + pieces[i].begin), blank,
+                                          pieces[i].size);
+    /* accessor k is of frame k, target and weight k of frame k + 1 */
+    for (size_t i = 0; !status && i < sizeof lists / sizeof *lists; i++)
+        status = blank_items(glb, lists[i].begin, lists[i].width, i == 0 || n == 0 ? n : n - 1);
+    return status;
+}
+
+/* Before its first frame it has no file. */
+static drape_status glb_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
+                               drape_archive *a)
+{
+    glb_state *glb = state;
+    (void)frames;
+    drape_status status = take_rooms(ctx, def, glb);
+    if (status)
+        return status;
+    glb_archive(glb, a);
+    if (a->status || glb->frames == 0)
+        return a->status;
+    return drape_export_reopen(ctx, def->folder, FILE_NAME, glb->file.kept, &glb->file);
+}
+
+/* The animation and targets go before the data they point to. */
+static drape_status glb_cut(drape_context *ctx, void *state, int64_t frames)
+{
+    glb_state *glb = state;
+    (void)frames;
+    if (glb->frames == 0)
+        return drape_export_begin(ctx, glb->def->folder, FILE_NAME, &glb->file);
+    drape_status status = blank_rest(glb);
+    if (!status)
+        status = write_lengths(glb, glb->frames * node_bytes(glb));
+    if (!status)
+        status = drape_file_trim(&glb->file);
+    glb->live = !status;
+    return status;
+}
+
+static drape_status glb_sync(void *state)
+{
+    glb_state *glb = state;
+    return glb->frames > 0 ? drape_file_sync(&glb->file) : DRAPE_OK;
+}
+
 static drape_status glb_close(drape_context *ctx, void *state)
 {
     glb_state *glb = state;
-    drape_status status = glb->frames > 1 ? write_animation(glb) : DRAPE_OK;
+    drape_status status = glb->frames > 1 && glb->live ? write_animation(glb) : DRAPE_OK;
     drape_status closing = drape_file_close(&glb->file);
     drape_file_destroy(&glb->file);
     drape_free(ctx, glb->json);
@@ -456,5 +561,9 @@ const drape_exporter_ops drape_exporter_glb = {
     .open = glb_open,
     .clean = glb_clean,
     .write = glb_write,
+    .archive = glb_archive,
+    .resume = glb_resume,
+    .cut = glb_cut,
+    .sync = glb_sync,
     .close = glb_close,
 };

@@ -51,8 +51,11 @@ static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
     if (!status)
         status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
+    if (status == DRAPE_E_STOPPED)
+        info->reason = "cancelled";
     if (status && !info->usable)
         return status;
+    info->pin_work += drape_system_push_work(sim->system, drape_sim_state(sim)->x, next->x);
     drape_status degenerate = check(sim, info);
     if (degenerate)
         info->usable = false;
@@ -195,6 +198,8 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
     char worst[400], residual[100] = "", distortion[200] = "";
     if (stop == DRAPE_E_MEMORY) /* the allocator said it */
         return stop;
+    if (stop == DRAPE_E_STOPPED)
+        return drape_sim_heed(sim);
     describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
     if (attempt->worst.element < 0) /* a node says where, an element may say why */
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
@@ -285,7 +290,10 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
         drape_sim_emit_frames(sim); /* the first, and those that an observer's stop left over */
     drape_sim_leave_realtime(sim);
     drape_schedule_aim(&sim->schedule, t_end);
-    while (!status && drape_schedule_next(&sim->schedule, &t1, &h))
-        status = drape_sim_step(sim, t1, h, &attempt);
+    while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {
+        status = drape_sim_heed(sim);
+        if (!status)
+            status = drape_sim_step(sim, t1, h, &attempt);
+    }
     return status;
 }

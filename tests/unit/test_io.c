@@ -585,7 +585,7 @@ START_TEST(steps_quotes_and_keeps_digits)
     size_t size;
     drape_file file;
     set_up(&w);
-    ck_assert_int_eq(drape_steps_open(w.ctx, w.folder, &file), DRAPE_OK);
+    ck_assert_int_eq(drape_steps_open(w.ctx, w.folder, -1, &file), DRAPE_OK);
     for (int i = 0; i < 3; i++)
         ck_assert_int_eq(drape_steps_write(&file, rows[i], &energy), DRAPE_OK);
     ck_assert_int_eq(drape_file_close(&file), DRAPE_OK);
