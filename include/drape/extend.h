@@ -180,6 +180,12 @@ typedef struct drape_term_ops {
     void (*lanes)(const drape_elements *el, const int32_t *element, const double *x, const double *internal,
                   double *q, double *dq, double *ddq);
 
+    /* Optional, beside measure: the ddq with which force ddq is its positive semidefinite part, given the force of
+     * each element, so (ddq)+ where it pulls and (ddq)- where it pushes; ddq (count x d x d, symmetric). Without it,
+     * and without convex, what is made positive loses force ddq, and with it the stiffness that tension gives. */
+    void (*positive)(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                     const double *internal, const double *force, double *ddq);
+
     /* e [J] (count), g [N] (count x d), hess [N/m] (count x d x d, symmetric). */
     void (*energy)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                    const double *internal, double *e, double *g, double *hess);
@@ -210,10 +216,13 @@ typedef struct drape_term_ops {
      * fault: else no step could lead out of it. before NULL: none is excused. check NULL: none can be. */
     drape_status (*check)(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault);
+
+    /* dissipation: it is in a medium. v is the velocity against it, less by the wind of drape_sim_set_wind. */
+    bool in_medium;
 } drape_term_ops;
 
-/* Registers a term of the host's own: scenes compiled with this context may name it from then on. ops must
- * outlive the context and every model compiled with it. Errors: DRAPE_E_ARGUMENT (not well formed, name
+/* Registers a term of the host's own: scenes compiled with this context may name it from then on. *ops is copied; what
+ * it points to must outlive the context and every model compiled with it. Ops of an older, shorter version are read. Errors: DRAPE_E_ARGUMENT (not well formed, name
  * taken, more than 32), DRAPE_E_VERSION (struct_size). */
 DRAPE_API drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *ops);
 

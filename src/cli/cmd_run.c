@@ -208,12 +208,14 @@ static void print_wall(const run *r, const drape_statistics *s)
     } parts[] = {{"residual", s->wall_residual},
                  {"Jacobian", s->wall_jacobian},
                  {"factor", s->wall_factor},
-                 {"solve", s->wall_solve}};
+                 {"solve", s->wall_solve},
+                 {"contact", s->wall_contact}};
     double steps = s->wall_steps > 0 ? s->wall_steps : 1;
     printf("wall      %.4g s; %.4g ms a step", r->wall,
            s->steps_accepted ? 1e3 * s->wall_steps / (double)s->steps_accepted : 0.0);
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
-        printf("%s %s %.0f %%", i ? "," : ":", parts[i].name, 100 * parts[i].seconds / steps);
+        if (parts[i].seconds > 0)
+            printf("%s %s %.0f %%", i ? "," : ":", parts[i].name, 100 * parts[i].seconds / steps);
     fputc('\n', stdout);
 }
 

@@ -51,7 +51,8 @@ void cli_progress_begin(cli_progress *p, double from, double end)
         return;
     p->start = drape_clock_seconds();
     p->width = terminal_width();
-    cli_progress_show(p, from, 0);
+    if (end > 0)
+        cli_progress_show(p, from, 0);
 }
 
 static void fill_bar(double share, char bar[BAR + 1])
@@ -103,9 +104,15 @@ void cli_progress_count(cli_progress *p, int64_t done, int64_t total, double sec
         draw(p, line);
 }
 
-void cli_progress_clear(cli_progress *p)
+void cli_progress_hide(cli_progress *p)
 {
     if (p->on)
         draw(p, "");
+    p->shown = -INFINITY;
+}
+
+void cli_progress_clear(cli_progress *p)
+{
+    cli_progress_hide(p);
     p->on = false;
 }

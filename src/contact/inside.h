@@ -19,6 +19,7 @@ typedef struct drape_lagged {
 struct drape_contact {
     drape_context *ctx;
     const drape_model *model;
+    const drape_motion *motion; /* of its colliders */
     drape_search search;
     drape_contact_law law;     /* all but the distance and stiffness of a pair */
     double *x, *v;             /* (points x 3) where it was last placed */
@@ -31,6 +32,7 @@ struct drape_contact {
     double mean_edge;   /* [m] */
     double margin;      /* how far points may move before a new one [m] */
     double next_margin; /* of the next search */
+    double aim;         /* of the way from `start`: so much further is the next search made */
     double moved;       /* how far one has, where it was last placed [m] */
     drape_pair *pairs;  /* (count of room) candidates, surfaces too */
     int32_t count, room;

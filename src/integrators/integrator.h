@@ -56,6 +56,9 @@ typedef struct drape_integrator_ops {
      * upper bound, out->t the end of the advance, which a step may reach and not pass; the row sets out->t
      * to where it came. */
     bool own_steps;
+    /* What a run may gain from nowhere, as a share of the energy that the scene had to offer; 0: a tenth, for
+     * rows that conserve energy and let it swing. */
+    double gain;
     /* Between the states of a step there is no motion, so no frames. */
     bool timeless;
     /* The row keeps contact and limits by moving nodes: forces that stand for them (contact of the model,
@@ -67,6 +70,8 @@ typedef struct drape_integrator_ops {
                          drape_step_info *info);
     /* The next step starts anew from a state that this integrator did not make, or after a rejection. */
     void (*restart)(void *state, const drape_state *from);
+    /* Its next step relies on forces that are smooth from step to step: where they jump it must start anew. */
+    bool smooth_forces;
     /* The stability limit at a state, for steps of size h: a function of the state alone. NULL: stable for any
      * h. */
     void (*stability)(void *state, const drape_state *at, double h, drape_stability *out);

@@ -154,10 +154,10 @@ static drape_status correct(newton_k *s)
 {
     drape_rung *r = &s->rung;
     int most = efforts[s->effort].linear_iterations;
-    double start = drape_clock_seconds(), w = r->point.weight;
+    double start = drape_system_clock(r->base.system), w = r->point.weight;
     drape_status status = drape_quasi_update(s->quasi, &r->point, w * w);
     r->work.jacobians++;
-    r->work.jacobian_seconds += drape_clock_seconds() - start;
+    r->work.jacobian_seconds += drape_system_clock(r->base.system) - start;
     if (status)
         return status;
     start = drape_clock_seconds();

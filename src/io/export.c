@@ -89,9 +89,9 @@ void drape_export_archive_size(drape_archive *a, off_t *size)
 
 /* ---- A file a frame ---- */
 
-/* frame_, six digits or more, a dot, the ending; or that with ".part", which a killed run left. *frame: its number; of the
- * latter none is kept. */
-static bool is_frame_file(const char *name, const char *ending, int64_t *frame)
+/* frame_, so many digits or more, a dot, the ending; or that with ".part", which a killed run left. *frame: its number;
+ * of the latter none is kept. */
+static bool is_frame_file(const char *name, size_t least, const char *ending, int64_t *frame)
 {
     size_t word = strlen(FRAME_WORD);
     if (strncmp(name, FRAME_WORD, word) != 0)
@@ -99,7 +99,7 @@ static bool is_frame_file(const char *name, const char *ending, int64_t *frame)
     size_t digits = strspn(name + word, "0123456789");
     const char *rest = name + word + digits;
     size_t length = strlen(ending);
-    if (digits < 6 || *rest != '.' || strncmp(rest + 1, ending, length) != 0)
+    if (digits < least || *rest != '.' || strncmp(rest + 1, ending, length) != 0)
         return false;
     rest += 1 + length;
     *frame = *rest ? INT64_MAX : (int64_t)strtoll(name + word, NULL, 10);
@@ -107,7 +107,8 @@ static bool is_frame_file(const char *name, const char *ending, int64_t *frame)
 }
 
 /* Removes frames from one on. */
-static drape_status remove_frames(drape_context *ctx, const char *folder, const char *ending, int64_t from)
+static drape_status remove_frames(drape_context *ctx, const char *folder, size_t digits, const char *ending,
+                                  int64_t from)
 {
     DIR *dir = opendir(folder);
     if (!dir)
@@ -116,7 +117,7 @@ static drape_status remove_frames(drape_context *ctx, const char *folder, const 
     struct dirent *entry;
     int64_t frame;
     while (errno = 0, !status && (entry = readdir(dir))) {
-        if (is_frame_file(entry->d_name, ending, &frame) && frame >= from &&
+        if (is_frame_file(entry->d_name, digits, ending, &frame) && frame >= from &&
             unlinkat(dirfd(dir), entry->d_name, 0) && errno != ENOENT)
             status = drape_file_fail(ctx, "remove the old frame", entry->d_name, errno);
     }
@@ -126,9 +127,10 @@ static drape_status remove_frames(drape_context *ctx, const char *folder, const 
     return status;
 }
 
-drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, const char *ending)
+drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, size_t digits,
+                                     const char *ending)
 {
-    return remove_frames(ctx, folder, ending, 0);
+    return remove_frames(ctx, folder, digits, ending, 0);
 }
 
 drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *def, const char *ending,
@@ -158,7 +160,7 @@ drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def
 drape_status drape_frame_files_cut(drape_context *ctx, void *state, int64_t frames)
 {
     const drape_frame_files *files = state;
-    return remove_frames(ctx, files->folder, files->ending, frames);
+    return remove_frames(ctx, files->folder, DRAPE_FRAME_DIGITS, files->ending, frames);
 }
 
 void drape_frame_files_archive(void *state, drape_archive *a)

@@ -98,8 +98,12 @@ typedef struct drape_frame_files {
     drape_file file;
 } drape_frame_files;
 
-/* Removes the files of that pattern, and only those, from the folder. Errors: DRAPE_E_FILE. */
-drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, const char *ending);
+#define DRAPE_FRAME_DIGITS 6 /* in those names, at least */
+
+/* Removes the files of that pattern, with that many digits or more, and only those, from the folder. Errors:
+ * DRAPE_E_FILE. */
+drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, size_t digits,
+                                     const char *ending);
 /* Takes the memory. Errors: DRAPE_E_MEMORY. */
 drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *def, const char *ending,
                                     drape_frame_files *frames);

@@ -9,7 +9,7 @@
 
 static drape_status obj_clean(drape_context *ctx, const char *folder)
 {
-    return drape_frame_files_clean(ctx, folder, "obj");
+    return drape_frame_files_clean(ctx, folder, DRAPE_FRAME_DIGITS, "obj");
 }
 
 static drape_status obj_open(drape_context *ctx, const drape_export_def *def, void *state)

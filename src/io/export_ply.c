@@ -11,7 +11,7 @@
 
 static drape_status ply_clean(drape_context *ctx, const char *folder)
 {
-    return drape_frame_files_clean(ctx, folder, "ply");
+    return drape_frame_files_clean(ctx, folder, DRAPE_FRAME_DIGITS, "ply");
 }
 
 static drape_status ply_open(drape_context *ctx, const drape_export_def *def, void *state)

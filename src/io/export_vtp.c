@@ -214,7 +214,7 @@ static void put_data(drape_file *file, const drape_model *model, const drape_fra
 
 static drape_status vtp_clean(drape_context *ctx, const char *folder)
 {
-    drape_status status = drape_frame_files_clean(ctx, folder, "vtp");
+    drape_status status = drape_frame_files_clean(ctx, folder, DRAPE_FRAME_DIGITS, "vtp");
     return status ? status : drape_export_clean(ctx, folder, PVD_NAME);
 }
 

@@ -10,10 +10,9 @@
 
 void drape_sim_def_init(drape_sim_def *def, size_t struct_size)
 {
+    const drape_sim_def defaults = {.struct_size = struct_size, .threads = 1};
     memset(def, 0, struct_size);
-    def->struct_size = struct_size;
-    if (struct_size >= sizeof *def)
-        def->threads = 1;
+    memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
 }
 
 /* Reads a def of this or an older, shorter version. */
@@ -49,7 +48,8 @@ static drape_status create_states(drape_sim *sim)
     size_t n = 3 * (size_t)sim->model->node_count;
     sim->frame = drape_arena_take(&sim->arena, sim->ctx, n, sizeof *sim->frame);
     sim->frame_velocity = drape_arena_take(&sim->arena, sim->ctx, n, sizeof *sim->frame_velocity);
-    return status ? status : sim->frame && sim->frame_velocity ? DRAPE_OK : DRAPE_E_MEMORY;
+    sim->read = drape_arena_take(&sim->arena, sim->ctx, n, sizeof *sim->read);
+    return status ? status : sim->frame && sim->frame_velocity && sim->read ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
 static drape_status create_parts(drape_sim *sim, int threads)
@@ -57,6 +57,8 @@ static drape_status create_parts(drape_sim *sim, int threads)
     drape_status status = create_states(sim);
     if (!status)
         status = drape_system_create(sim->ctx, sim->model, threads, &sim->system);
+    if (!status)
+        drape_system_watch(sim->system, &sim->cancel);
     bool projects = !status && sim->chosen.integrator->projects_contact;
     if (!status && projects)
         drape_system_leave_constraints(sim->system);
@@ -169,6 +171,26 @@ const double *drape_sim_velocities(const drape_sim *sim)
     return sim ? drape_sim_state(sim)->v : NULL;
 }
 
+void drape_sim_normals(const drape_sim *sim, double *normals)
+{
+    if (sim)
+        drape_model_normals(sim->model, drape_sim_state(sim)->x, normals);
+}
+
+/* A store to an atomic without a lock: safe in a signal handler. */
+void drape_sim_cancel(drape_sim *sim)
+{
+    if (sim)
+        atomic_store(&sim->cancel, true);
+}
+
+drape_status drape_sim_heed(drape_sim *sim)
+{
+    if (!atomic_exchange(&sim->cancel, false))
+        return DRAPE_OK;
+    return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: cancelled", drape_sim_state(sim)->t);
+}
+
 const drape_model *drape_sim_model(const drape_sim *sim)
 {
     return sim ? sim->model : NULL;
@@ -196,7 +218,6 @@ drape_statistics drape_sim_statistics(const drape_sim *sim)
     s.wall_jacobian = work.jacobian_seconds;
     s.wall_factor = work.factor_seconds;
     s.wall_solve = work.solve_seconds;
-    s.wall_contact = work.contact_seconds + drape_contact_seconds(drape_system_contact(sim->system));
     return s;
 }
 

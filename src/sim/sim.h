@@ -54,6 +54,8 @@ struct drape_sim {
     double frame_rate;
     int64_t next_frame;
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
+    double *read;                   /* (node_count x 3) scratch of what is read between steps */
+    atomic_bool cancel;             /* the advance that runs, or the next, is to stop */
     drape_observer *observers[DRAPE_MAX_OBSERVERS];
     void *observer_users[DRAPE_MAX_OBSERVERS];
     int observer_count;
@@ -106,6 +108,9 @@ void drape_sim_describe_distortion(const drape_sim *sim, char *text, size_t size
 
 /* One attempt at the step that the schedule handed out, judged and told, with its frames. *attempt: what it was. */
 drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *attempt);
+
+/* Ends the advance if somebody has cancelled it, and takes the cancelling back: DRAPE_E_STOPPED, with its message. */
+drape_status drape_sim_heed(drape_sim *sim);
 
 /* Back to the scene's own steps and all efforts, and no time is owed. */
 void drape_sim_leave_realtime(drape_sim *sim);
