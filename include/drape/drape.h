@@ -519,7 +519,7 @@ typedef drape_status drape_write(void *user, const void *bytes, size_t size);
  *
  * drape_sim_save writes a file: under another name first, then to the disk, then under its own, so that at any moment, a
  * crash of the machine too, there is the file before or the new one whole. It takes a buffer of 64 KiB and gives it back;
- * drape_sim_save_to takes no memory. Sizes: some 100 bytes a node, for "ida" and modified Newton that of a matrix, too.
+ * drape_sim_save_to takes no memory. Sizes: 100 to 400 bytes a node; for "ida" and modified Newton a matrix beside.
  *
  * Errors: DRAPE_E_ARGUMENT (NULL), DRAPE_E_MEMORY, DRAPE_E_FILE; what `write` returned. The sim is as it was.
  * Thread-safety: as the sim. */
