@@ -488,6 +488,8 @@ typedef struct drape_statistics {
     int64_t steps_unconverged; /* of the accepted: taken although unconverged, by on_failure "accept" */
     double h_min, h_max;       /* [s] of accepted steps; 0 before the first */
     int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
+    /* [s] of a clock on a wall. Those after wall_steps are parts of it, none of them a part of another: residual and
+     * Jacobian are without their contact. */
     double wall_setup, wall_steps, wall_residual, wall_jacobian, wall_factor, wall_solve, wall_contact;
     double strain_min, strain_max; /* |e|/L - 1 over all edges and accepted steps */
     bool stability_known;   /* "static" found an equilibrium and the signs of its Hessian's eigenvalues */
@@ -498,6 +500,39 @@ DRAPE_API drape_statistics drape_sim_statistics(const drape_sim *sim);
 /* Reasons for which attempts were rejected, with their counts: "max_iterations", "line_search",
  * "edge_collapse" ..., "other" for all past the 31st. index runs from 0; *count is 0 and the result NULL past the last. */
 DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t *count);
+
+/* ---- Checkpoints ---- */
+
+/* Takes size bytes, in the order in which they come. DRAPE_OK to go on; a negative status to stop with, whose message it
+ * may have set by drape_context_set_message. */
+typedef drape_status drape_write(void *user, const void *bytes, size_t size);
+
+/* Saves a sim between two calls that advance it, so that a sim of the same model goes on from there with the same bits:
+ * states, what integrator, controller, contact and linear solver know of the past, the energies and statistics so far, the
+ * number of the next frame, pulls, pushes and where the host has pins and colliders go. Not saved are observers, the field
+ * of wind, and what a host's own terms or colliders keep. May also be called by
+ * an observer of a frame: the frames that are left of the step are told after drape_sim_restore, by the next advance.
+ *
+ * drape_sim_save writes a file: under another name first, then to the disk, then under its own, so that at any moment, a
+ * crash of the machine too, there is the file before or the new one whole. It takes a buffer of 64 KiB and gives it back;
+ * drape_sim_save_to takes no memory. Sizes: some 100 bytes a node, for "ida" and modified Newton that of a matrix, too.
+ *
+ * Errors: DRAPE_E_ARGUMENT (NULL), DRAPE_E_MEMORY, DRAPE_E_FILE; what `write` returned. The sim is as it was.
+ * Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_save(drape_sim *sim, const char *path);
+DRAPE_API drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, void *user);
+
+/* Puts a sim, whatever it did before, where the saved one was; bytes (size) need only live during the call. The sim was
+ * made with the model of the saved one, or one from the same scene, by the same build, with the same integrator,
+ * controller, their settings and frame rate; threads may differ. Its observers and its wind stay; observers are told nothing. Arrays that
+ * the sim gave out before are no longer valid. A sim is made beside the present one for it: for the time of the call there are
+ * both. With a SUNDIALS without its private headers (docs/checkpoints.md) "ida" starts anew from the state.
+ *
+ * A file of `drape run --checkpoint-every` is such a one, too. Errors, and then the sim is as it was: DRAPE_E_ARGUMENT
+ * (NULL, another model, row or setting), DRAPE_E_VERSION (another build), DRAPE_E_PARSE (damaged, or no checkpoint),
+ * DRAPE_E_FILE, DRAPE_E_MEMORY, DRAPE_E_SOLVER. Not for observers. Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_restore(drape_sim *sim, const char *path);
+DRAPE_API drape_status drape_sim_restore_from(drape_sim *sim, const void *bytes, size_t size);
 
 /* ---- Observers ---- */
 

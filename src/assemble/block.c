@@ -52,17 +52,17 @@ static void sum_stresses(const drape_term *term, const drape_request *want, drap
 
 /* The weights of ddq and dq dq' in the Hessian. With `project` of the positive semidefinite part that is known
  * without eigenvalues: f ddq where the measure is convex and pulls, and the Gauss-Newton part (Teran et al. 2005;
- * Tamstorf & Grinspun 2013, 5). */
+ * Tamstorf & Grinspun 2013, 5). A row that splits ddq by itself (`positive`) keeps the weight. */
 static void weigh(const drape_term *term, const drape_request *want, drape_block *b)
 {
-    const bool convex = term->ops->convex;
+    const bool convex = term->ops->convex, split = term->ops->positive;
     for (int32_t i = 0; i < b->count; i++) {
         b->of_ddq[i] = b->force[i];
         b->of_dq[i] = b->by_strain[i] + want->point->weight * b->by_rate[i];
     }
     for (int32_t i = 0; want->project > 0 && i < b->count; i++) {
         const double ddq = convex ? fmax(0, b->of_ddq[i]) : 0, dq = fmax(0, b->of_dq[i]);
-        b->of_ddq[i] += want->project * (ddq - b->of_ddq[i]);
+        b->of_ddq[i] += split ? 0 : want->project * (ddq - b->of_ddq[i]);
         b->of_dq[i] += want->project * (dq - b->of_dq[i]);
     }
     for (int32_t i = 0; want->velocity && i < b->count; i++) {
@@ -258,10 +258,26 @@ static void lopsided_hessian(const drape_term *term, const drape_request *want, 
                                      dq[LANES * r] * (b->of_dq[i] * dq[LANES * c] + along[c]);
 }
 
+/* ddq in b->hessian, moved by the share of project to the part of it that its force makes positive. */
+static void split_hessians(const drape_term *term, const drape_request *want, drape_block *b)
+{
+    const drape_elements *el = &term->elements;
+    const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
+    const int size = 9 * el->nodes * el->nodes;
+    term->ops->positive(el, b->first, b->count, want->point->x, internal, b->force, b->scratch);
+    for (int32_t i = 0; i < b->count; i++) {
+        double *h = b->hessian + drape_block_start(b, i, size);
+        for (int k = 0; k < size; k++)
+            h[LANES * k] += want->project * (b->scratch[i * size + k] - h[LANES * k]);
+    }
+}
+
 static void hessians_of_measures(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const int d = 3 * term->elements.nodes;
     weigh(term, want, b);
+    if (term->ops->positive && want->project > 0 && !want->velocity)
+        split_hessians(term, want, b);
     b->mirrored = !is_lopsided(term, want);
     if (want->velocity)
         velocity_hessians(d, b);

@@ -2,6 +2,8 @@
 #include "assemble/system.h"
 
 #include "assemble/sum.h"
+#include "base/clock.h"
+#include "base/finite.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -124,6 +126,13 @@ drape_status drape_system_set_wind(drape_system *system, drape_wind_field *field
     return drape_wind_set(system->ctx, system->model, field, user, &system->wind);
 }
 
+void drape_system_swap_wind(drape_system *a, drape_system *b)
+{
+    const drape_wind wind = a->wind;
+    a->wind = b->wind;
+    b->wind = wind;
+}
+
 void drape_system_add_loads(const drape_system *system, const double *x, double *g)
 {
     drape_pull_add_gradient(&system->pull, x, g);
@@ -180,6 +189,11 @@ const drape_contact *drape_system_contact(const drape_system *system)
     return system->contact;
 }
 
+double drape_system_clock(const drape_system *system)
+{
+    return drape_clock_seconds() - drape_contact_seconds(system->contact);
+}
+
 drape_status drape_system_begin(drape_system *system, const drape_state *in)
 {
     system->status = DRAPE_OK;
@@ -231,11 +245,10 @@ static drape_status place_terms(drape_system *system)
     return DRAPE_OK;
 }
 
-static drape_status widen(drape_system *system)
+/* With these pairs (x 4 nodes) besides the terms. */
+static drape_status widen(drape_system *system, int32_t pairs, const int32_t *nodes)
 {
     const drape_model *model = system->model;
-    const int32_t *nodes = NULL;
-    int32_t pairs = drape_contact_couplings(system->contact, &nodes);
     drape_coupling *couplings = drape_alloc(system->ctx, (size_t)model->term_count + 1, sizeof *couplings);
     int count = 0;
     if (pairs < 0 || !couplings) {
@@ -267,7 +280,51 @@ drape_status drape_system_fit(drape_system *system, const drape_point *point, bo
     if (drape_contact_fits(system->contact, system->pattern))
         return DRAPE_OK;
     *changed = true;
-    return widen(system);
+    const int32_t *nodes = NULL;
+    int32_t pairs = drape_contact_couplings(system->contact, &nodes);
+    return widen(system, pairs, nodes);
+}
+
+static void archive_pull(drape_system *system, drape_archive *a)
+{
+    const drape_model *m = system->model;
+    drape_pull *pull = &system->pull;
+    drape_archive_int32(a, &pull->node);
+    drape_archive_double(a, &pull->stiffness);
+    drape_archive_doubles(a, pull->target, 3);
+    if (drape_archive_is_reading(a) && pull->stiffness > 0 &&
+        (pull->node < 0 || pull->node >= m->node_count || m->pinned[pull->node]))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pulls node %d, which is not free",
+                           (int)pull->node);
+}
+
+static void archive_push(drape_system *system, drape_archive *a)
+{
+    const size_t n = 3 * (size_t)system->model->node_count;
+    drape_archive_bool(a, &system->pushed);
+    if (system->pushed && drape_archive_good(a))
+        drape_archive_doubles(a, system->push, n);
+    if (drape_archive_is_reading(a) && !drape_all_finite(system->push, n))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pushes with a force that is not finite");
+}
+
+/* A wider pattern is made of what was near when the one before it was too narrow: that list is kept. */
+void drape_system_archive(drape_system *system, drape_archive *a)
+{
+    bool contact = system->contact != NULL, wider = system->blocks != NULL;
+    const int32_t *nodes = NULL;
+    drape_archive_mark(a, "system");
+    archive_pull(system, a);
+    archive_push(system, a);
+    drape_motion_archive(system->motion, a);
+    drape_archive_same(a, "whether there is contact", contact);
+    if (contact)
+        drape_contact_archive(system->contact, a);
+    drape_archive_bool(a, &wider);
+    if (!drape_archive_is_reading(a) || !contact || !wider)
+        return;
+    int32_t pairs = drape_contact_coupled(system->contact, &nodes);
+    drape_archive_note(a, widen(system, pairs, nodes));
 }
 
 const double *drape_system_on_colliders(const drape_system *system)

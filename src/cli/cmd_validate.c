@@ -1,8 +1,11 @@
 /* cmd_validate.c: `drape validate`: what scenes give against what is known, as a table, as Markdown, as
  * JSON. */
 #include "cli/cli.h"
-#include "lab/validate.h"
+#include "cli/progress.h"
+#include "cli/signals.h"
+#include "lab/record.h"
 
+#include "base/clock.h"
 #include "base/param.h"
 
 #include <errno.h>
@@ -11,20 +14,19 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #define MOST_NAMES 64
 
 typedef struct validate_request {
     cli_command command;
     bool json, markdown;
-    const char *scenes;
+    const char *scenes, *out;
 } validate_request;
 
 /* How results are printed. */
 typedef struct validate_style {
     void (*begin)(void);
-    void (*row)(const drape_reference *reference, const drape_validation *v);
+    void (*row)(const lab_record *record);
     void (*end)(const int counts[4]);
 } validate_style;
 
@@ -36,8 +38,10 @@ static void text_begin(void)
            "limit", "verdict");
 }
 
-static void text_row(const drape_reference *reference, const drape_validation *v)
+static void text_row(const lab_record *record)
 {
+    const drape_reference *reference = record->reference;
+    const drape_validation *v = &record->v;
     char parameter[24] = "";
     if (reference->parameter)
         snprintf(parameter, sizeof parameter, "%.6g", v->parameter);
@@ -64,8 +68,10 @@ static void markdown_begin(void)
         "|---|---|---|---|---|---|---|---|---|---|\n");
 }
 
-static void markdown_row(const drape_reference *reference, const drape_validation *v)
+static void markdown_row(const lab_record *record)
 {
+    const drape_reference *reference = record->reference;
+    const drape_validation *v = &record->v;
     char parameter[200] = "";
     if (reference->parameter)
         snprintf(parameter, sizeof parameter, "%s = %.6g", reference->parameter, v->parameter);
@@ -85,27 +91,15 @@ static void markdown_end(const int counts[4])
 
 static int json_rows;
 
-static json_t *number(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
-
 static void json_begin(void)
 {
     json_rows = 0;
     printf("[");
 }
 
-static void json_row(const drape_reference *reference, const drape_validation *v)
+static void json_row(const lab_record *record)
 {
-    static const char *const verdicts[] = {"pass", "fail", "model_error", "stopped"};
-    json_t *row = json_pack("{s:s, s:s, s:s, s:s*, s:s, s:s, s:f, s:o, s:o, s:o, s:o, s:f, s:s, s:s, s:f}",
-                            "name", reference->name, "quantity", reference->quantity, "unit", reference->unit,
-                            "parameter", reference->parameter, "model", reference->model, "source",
-                            reference->source, "value", v->parameter, "expected", number(v->expected),
-                            "documented", number(v->documented), "obtained", number(v->obtained), "error",
-                            number(v->obtained / v->expected - 1), "tolerance", reference->tolerance,
-                            "verdict", verdicts[v->verdict], "message", v->message, "cpu_s", v->seconds);
+    json_t *row = lab_record_json(record);
     char *text = row ? json_dumps(row, JSON_REAL_PRECISION(17)) : NULL;
     printf("%s\n%s", json_rows++ ? "," : "", text ? text : "{}");
     free(text);
@@ -154,30 +148,105 @@ static int find(const char *name, const drape_reference **only)
                       meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
 }
 
+static bool interrupted(void *user)
+{
+    (void)user;
+    return cli_interrupted();
+}
+
+/* The cases of a run, and how far it is. */
+typedef struct run {
+    drape_context *ctx;
+    lab_record *records;
+    size_t count, found; /* found: done before */
+    drape_file file;     /* of their lines; not there without --out */
+    cli_progress progress;
+    double start; /* [s] of the clock */
+} run;
+
+/* By simulations: a search is several of them. */
+static void show_progress(run *r, size_t next)
+{
+    double done = 0, left = 0;
+    for (size_t i = 0; i < r->count; i++) {
+        const int runs = drape_validate_runs(r->records[i].reference);
+        if (!r->records[i].done)
+            left += runs;
+        else if (i < next)
+            done += runs;
+    }
+    const double wall = drape_clock_seconds() - r->start;
+    cli_progress_count(&r->progress, (int64_t)next, (int64_t)r->count, done > 0 ? wall / done * left : NAN);
+}
+
+static drape_status run_case(run *r, lab_record *record)
+{
+    drape_status status =
+        drape_validate(r->ctx, record->reference, record->index, interrupted, NULL, &record->v);
+    record->done = !status;
+    return status || !r->file.open ? status : lab_record_keep(&r->file, record);
+}
+
+static drape_status run_cases(run *r, const validate_style *style, int counts[4])
+{
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < r->count; i++) {
+        lab_record *record = &r->records[i];
+        show_progress(r, i);
+        if (!record->done)
+            status = run_case(r, record);
+        if (status)
+            break;
+        counts[record->v.verdict]++;
+        cli_progress_hide(&r->progress);
+        style->row(record);
+        fflush(stdout);
+    }
+    cli_progress_clear(&r->progress);
+    return status;
+}
+
+static int conclude(const run *r, const validate_request *request, drape_status status, const int counts[4])
+{
+    int done = 0;
+    for (int k = 0; k < 4; k++)
+        done += counts[k];
+    if (status == DRAPE_E_STOPPED) {
+        fprintf(stderr, "interrupted: %d of %zu cases are done%s\n", done, r->count,
+                request->out ? "; the same command goes on"
+                             : "; with --out DIR the same command would go on");
+        return CLI_INTERRUPTED;
+    }
+    if (status)
+        fprintf(stderr, "%s\n", drape_context_message(r->ctx));
+    return status || counts[DRAPE_OUTCOME_FAIL] + counts[DRAPE_OUTCOME_STOPPED] ? CLI_FAILED : CLI_DONE;
+}
+
 static int run_references(drape_context *ctx, const validate_request *request, const drape_reference *only)
 {
     static const validate_style text = {text_begin, text_row, text_end},
                                 markdown = {markdown_begin, markdown_row, markdown_end},
                                 json = {json_begin, json_row, json_end};
     const validate_style *style = request->json ? &json : request->markdown ? &markdown : &text;
+    run r = {.ctx = ctx, .start = drape_clock_seconds()};
     int counts[4] = {0};
-    style->begin();
-    for (int i = 0; drape_references[i]; i++)
-        for (int k = 0; k < drape_references[i]->case_count && (!only || only == drape_references[i]); k++) {
-            drape_validation v;
-            if (isatty(STDERR_FILENO))
-                fprintf(stderr, "%s %d/%d ...\r", drape_references[i]->name, k + 1,
-                        drape_references[i]->case_count);
-            if (drape_validate(ctx, drape_references[i], k, &v)) {
-                fprintf(stderr, "%s\n", drape_context_message(ctx));
-                return CLI_FAILED;
-            }
-            counts[v.verdict]++;
-            style->row(drape_references[i], &v);
-            fflush(stdout);
-        }
-    style->end(counts);
-    return counts[DRAPE_OUTCOME_FAIL] + counts[DRAPE_OUTCOME_STOPPED] ? CLI_FAILED : CLI_DONE;
+    r.records = lab_records_make(ctx, only, &r.count);
+    drape_status status = r.records ? DRAPE_OK : DRAPE_E_MEMORY;
+    if (!status && request->out)
+        status = lab_records_open(ctx, request->out, r.records, r.count, &r.file, &r.found);
+    if (!status) {
+        cli_catch_signals();
+        style->begin();
+        cli_progress_begin(&r.progress, 0, 0);
+        status = run_cases(&r, style, counts);
+        style->end(counts);
+        fflush(stdout);
+    }
+    const drape_status closed = drape_file_close(&r.file);
+    const int code = conclude(&r, request, status ? status : closed, counts);
+    drape_file_destroy(&r.file);
+    drape_free(ctx, r.records);
+    return code;
 }
 
 static int validate(const validate_request *request, drape_context *ctx)
@@ -206,6 +275,8 @@ static int validate(const validate_request *request, drape_context *ctx)
 static const cli_option options[] = {
     {"json", CLI_FLAG, NULL, "one array of objects, one a case", offsetof(validate_request, json), 0, NULL},
     {"markdown", CLI_FLAG, NULL, "a table for a page", offsetof(validate_request, markdown), 0, NULL},
+    {"out", CLI_TEXT, "DIR", "keep a line of JSON a case; the same command goes on where it was stopped",
+     offsetof(validate_request, out), 0, NULL},
     {"scenes", CLI_TEXT, "DIR", "run nothing: write the scene of every case into DIR",
      offsetof(validate_request, scenes), 0, NULL},
 };

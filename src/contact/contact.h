@@ -10,6 +10,7 @@
 #ifndef DRAPE_CONTACT_CONTACT_H
 #define DRAPE_CONTACT_CONTACT_H
 
+#include "base/archive.h"
 #include "contact/search.h"
 #include "model/motion.h"
 
@@ -54,6 +55,12 @@ void drape_contact_add_jacobian(drape_contact *contact, double weight, bool velo
  * for a pattern that will serve a while: four nodes each, valid until the next call. */
 bool drape_contact_fits(drape_contact *contact, const drape_pattern *pattern);
 int32_t drape_contact_couplings(drape_contact *contact, const int32_t **nodes);
+
+int32_t drape_contact_coupled(const drape_contact *contact, const int32_t **nodes); /* the list made last */
+
+/* The last search and the beginning of the step, from which all else follows, into an archive or, where this was just
+ * made, out of it. */
+void drape_contact_archive(drape_contact *contact, drape_archive *a);
 
 /* The largest fraction of the way from x to y, colliders resting where they are at time t, on which no two
  * pieces pass through each other; a margin is kept. x, y: (node_count x 3). */

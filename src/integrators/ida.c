@@ -8,7 +8,7 @@
  *     (K + c_j D + c_j^2 M) dx = r2 + (D + c_j M) r1:
  * the matrix of a backward Euler step of size 1/c_j, with the same pattern and the same linear solvers.
  * IDA keeps Jacobian and factors while c_j stays near theirs; that is most of its advantage over one
- * factorisation an iteration.
+ * factorisation an iteration. When the iteration with old factors has converged is ida_newton.h's to say.
  *
  * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative
  * part would make the error depend on where the scene lies. The maximum order is 2 at loose tolerances,
@@ -18,11 +18,12 @@
  * Pins that move have kinks at the keys of their tracks, and where a host sends them elsewhere: IDA stops there and
  * starts again.
  */
-#include "base/clock.h"
 #include "base/finite.h"
+#include "integrators/ida_newton.h"
 #include "integrators/integrator.h"
 #include "integrators/tolerance.h"
 #include "solvers/sun_linear.h"
+#include "solvers/sundials_memory.h"
 
 #include <ida/ida.h>
 #include <math.h>
@@ -46,7 +47,9 @@ enum {
 #define NEWTON_SHARE 0.33 /* of the error tolerance that is left to the Newton iteration */
 /* New factors past a change of c_j by (1 - d)/(1 + d). IDA's own 0.25 takes a quarter more residuals for
  * as many factors. */
-#define CJ_CHANGE        0.1
+#define CJ_CHANGE 0.1
+/* Of the energy of a scene. At rtol 1e-3 a smooth fall swings by half a percent: more is of waves that are fed. */
+#define GAIN             0.02
 #define MAX_ERROR_FAILS  10 /* error test failures in one step */
 #define MAX_SOLVER_FAILS 10 /* convergence failures in one step */
 
@@ -97,6 +100,7 @@ typedef struct ida_state {
     void *ida;
     N_Vector y, rate, weights, between; /* (x, v), (x', v'), absolute tolerances, dense output */
     drape_sun_linear *linear;
+    drape_ida_newton newton;
     double *x, *v, *g;        /* nodes: where the residual was evaluated last, and g there */
     double *damping;          /* D (nonzeros); NULL where nothing dissipates */
     double *reduced;          /* right-hand side of the reduced system (n) */
@@ -105,6 +109,7 @@ typedef struct ida_state {
     const double *internal;   /* of the last accepted state */
     double span[2];           /* [s] no pin or collider has a kink inside */
     double reached;           /* time of IDA's state; NaN: it must start anew */
+    double from;              /* time that the last good step began at; NaN: none */
     double powers[2];         /* [W] taken by dissipation and put in by pins, at the time reached */
     bool nonfinite, crossing; /* why the last residual was refused */
     drape_status fitted;      /* of the last change of the pattern: < 0 ends the run */
@@ -148,7 +153,7 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
 {
     ida_state *s = user;
     const double *v = N_VGetArrayPointer(y) + s->n, *xp = N_VGetArrayPointer(rate), *vp = xp + s->n;
-    double *f = N_VGetArrayPointer(out), start = drape_clock_seconds();
+    double *f = N_VGetArrayPointer(out), start = drape_system_clock(s->system);
     drape_point point = place(s, t, N_VGetArrayPointer(y));
     drape_system_force(s->system, &point, s->g);
     for (int64_t i = 0; i < s->n; i++) {
@@ -158,26 +163,38 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
     s->nonfinite = !drape_all_finite(f, 2 * (size_t)s->n);
     s->crossing = !s->nonfinite && drape_system_crosses(s->system, s->x, t);
     s->work.residuals++;
-    s->work.residual_seconds += drape_clock_seconds() - start;
+    s->work.residual_seconds += drape_system_clock(s->system) - start;
     return drape_system_status(s->system) ? -1 : s->nonfinite || s->crossing ? 1 : 0;
 }
 
-/* Contact may couple what it did not before: then the matrices are made anew. */
-static drape_status fit_pattern(ida_state *s, const drape_point *point)
+/* The system has another pattern: the matrices are made anew. */
+static drape_status adopt_pattern(ida_state *s)
 {
-    bool changed;
-    s->fitted = drape_system_fit(s->system, point, &changed);
-    s->linear->stale |= changed;
-    if (s->fitted || !s->linear->stale)
-        return s->fitted;
     const drape_pattern *pattern = drape_system_pattern(s->system);
     if (s->dissipated) {
         drape_free(s->ctx, s->damping);
         s->damping = drape_alloc(s->ctx, (size_t)pattern->nonzeros, sizeof *s->damping);
         if (!s->damping)
-            return s->fitted = DRAPE_E_MEMORY;
+            return DRAPE_E_MEMORY;
     }
-    return s->fitted = drape_sun_linear_adopt(s->linear, pattern);
+    return drape_sun_linear_adopt(s->linear, pattern);
+}
+
+/* Contact may couple what it did not before. */
+static drape_status fit_pattern(ida_state *s, const drape_point *point)
+{
+    bool changed;
+    s->fitted = drape_system_fit(s->system, point, &changed);
+    s->linear->stale |= changed;
+    if (!s->fitted && s->linear->stale)
+        s->fitted = adopt_pattern(s);
+    return s->fitted;
+}
+
+/* Without contact, and without the solver's part of fit_pattern. */
+static double jacobian_clock(const ida_state *s)
+{
+    return drape_system_clock(s->system) - s->linear->factor_seconds;
 }
 
 static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_Vector r, SUNMatrix matrix,
@@ -185,7 +202,7 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
 {
     (void)rate, (void)r, (void)matrix, (void)a, (void)b, (void)c;
     ida_state *s = user;
-    double start = drape_clock_seconds();
+    double start = jacobian_clock(s);
     drape_point point = place(s, t, N_VGetArrayPointer(y));
     point.weight = cj;
     if (fit_pattern(s, &point))
@@ -194,8 +211,9 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
     if (s->damping)
         drape_system_damping(s->system, &point, s->damping);
     s->factored_cj = cj;
+    drape_ida_newton_forget(&s->newton);
     s->work.jacobians++;
-    s->work.jacobian_seconds += drape_clock_seconds() - start;
+    s->work.jacobian_seconds += jacobian_clock(s) - start;
     return 0;
 }
 
@@ -234,6 +252,7 @@ static void destroy(void **state)
         return;
     if (s->ida)
         IDAFree(&s->ida);
+    drape_ida_newton_free(&s->newton);
     drape_sun_linear_destroy(&s->linear);
     N_Vector vectors[] = {s->y, s->rate, s->weights, s->between};
     for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
@@ -297,7 +316,8 @@ static bool configure(ida_state *s)
     bool good = !IDAInit(s->ida, residual, 0, s->y, s->rate) && !IDASetUserData(s->ida, s) &&
                 !IDASVtolerances(s->ida, 0, s->weights) &&
                 !IDASetLinearSolver(s->ida, s->linear->solver, s->linear->matrix) &&
-                !IDASetJacFn(s->ida, jacobian) && !IDASetMaxOrd(s->ida, (int)s->values[PARAM_MAX_ORDER]) &&
+                drape_ida_newton_attach(&s->newton, s->ida, s->y, s->sun) && !IDASetJacFn(s->ida, jacobian) &&
+                !IDASetMaxOrd(s->ida, (int)s->values[PARAM_MAX_ORDER]) &&
                 !IDASetMaxErrTestFails(s->ida, MAX_ERROR_FAILS) &&
                 !IDASetMaxConvFails(s->ida, MAX_SOLVER_FAILS) &&
                 !IDASetNonlinConvCoef(s->ida, NEWTON_SHARE) && !IDASetDeltaCjLSetup(s->ida, CJ_CHANGE);
@@ -316,7 +336,8 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
                      .system = system,
                      .model = drape_system_model(system),
                      .motion = drape_system_motion(system),
-                     .reached = NAN};
+                     .reached = NAN,
+                     .from = NAN};
     s->n = 3 * (int64_t)s->model->free_count;
     memcpy(s->values, values, sizeof s->values);
     drape_status status = create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
@@ -534,6 +555,9 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     info->tolerance = info->residual = NAN; /* IDA bounds errors, not residuals */
     if (exhausted(s, in, info))
         return DRAPE_E_STEP_TOO_SMALL;
+    if (in->t == s->from) /* the sim did not take the last step, which IDA had: mostly for its energy */
+        s->newton.strict = true;
+    s->from = NAN;
     info->reason = "solver";
     drape_status status = prepare(s, in, end, h, &t, info); /* t is where all goes that has no free nodes */
     if (!status && s->n > 0) {
@@ -561,6 +585,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     memcpy(out->x, s->x, 3 * (size_t)s->model->node_count * sizeof *out->x);
     memcpy(out->v, s->v, 3 * (size_t)s->model->node_count * sizeof *out->v);
     out->t = t;
+    s->from = in->t;
     info->h = t - in->t;
     info->reason = "converged";
     audit(s, in, out, info);
@@ -583,7 +608,10 @@ static void interpolate(void *state, double t, double *x)
 static void restart(void *state, const drape_state *from)
 {
     (void)from;
-    ((ida_state *)state)->reached = NAN;
+    ida_state *s = state;
+    s->reached = s->from = NAN;
+    s->newton.strict = false;
+    drape_ida_newton_forget(&s->newton);
 }
 
 static drape_work work(const void *state)
@@ -597,6 +625,35 @@ static drape_work work(const void *state)
         work.solve_seconds = s->linear->solve_seconds;
     }
     return work;
+}
+
+/* Its factors are kept from step to step, with c_j and D. */
+static void archive_factors(ida_state *s, drape_archive *a)
+{
+    if (drape_archive_is_reading(a) && drape_system_pattern(s->system) != s->linear->pattern)
+        drape_archive_note(a, adopt_pattern(s));
+    drape_archive_double(a, &s->factored_cj);
+    if (s->damping && drape_archive_good(a))
+        drape_archive_doubles(a, s->damping, (size_t)drape_system_pattern(s->system)->nonzeros);
+    drape_sun_linear_archive(s->linear, a, s->factored_cj != 0);
+}
+
+static void archive(void *state, drape_archive *a)
+{
+    ida_state *s = state;
+    int64_t counted = s->counted;
+    drape_archive_double(a, &s->reached);
+    drape_archive_doubles(a, s->powers, 2);
+    drape_archive_double(a, &s->second);
+    drape_archive_int64(a, &s->steps);
+    drape_archive_int64(a, &counted);
+    s->counted = (long)counted;
+    drape_work_archive(&s->work, a);
+    if (s->n == 0)
+        return;
+    archive_factors(s, a);
+    if (!drape_ida_archive(s->ida, a) && a->reading)
+        s->reached = NAN;
 }
 
 static size_t bytes(const void *state)
@@ -619,11 +676,13 @@ const drape_integrator_ops drape_integrator_ida = {
     .param_count = PARAM_COUNT,
     .create = create,
     .own_steps = true,
+    .gain = GAIN,
     .smooth_forces = true,
     .step = step,
     .interpolate = interpolate,
     .restart = restart,
     .work = work,
+    .archive = archive,
     .bytes = bytes,
     .destroy = destroy,
 };

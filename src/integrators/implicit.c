@@ -167,6 +167,11 @@ const double *drape_implicit_residual(const void *state)
     return drape_newton_residual(((const drape_implicit *)state)->newton);
 }
 
+void drape_implicit_archive(void *state, drape_archive *a)
+{
+    drape_newton_archive(((drape_implicit *)state)->newton, a);
+}
+
 drape_work drape_implicit_work(const void *state)
 {
     return drape_newton_work(((const drape_implicit *)state)->newton);

@@ -35,6 +35,7 @@ void drape_implicit_destroy(void **state);
 void drape_implicit_restart(void *state, const drape_state *from);
 const double *drape_implicit_residual(const void *state);
 drape_work drape_implicit_work(const void *state);
+void drape_implicit_archive(void *state, drape_archive *a);
 size_t drape_implicit_bytes(const void *state);
 size_t drape_implicit_array_bytes(const drape_implicit *implicit); /* without the Newton solver */
 

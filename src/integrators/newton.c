@@ -2,9 +2,9 @@
  * judgement are ours. */
 #include "integrators/newton.h"
 
-#include "base/clock.h"
 #include "base/finite.h"
 #include "solvers/sun_linear.h"
+#include "solvers/sundials_memory.h"
 
 #include <float.h>
 #include <kinsol/kinsol.h>
@@ -164,7 +164,7 @@ static void place(drape_newton *s, const double *d)
 static bool evaluate(drape_newton *s, const double *d)
 {
     const drape_newton_problem *p = s->problem;
-    double start = drape_clock_seconds();
+    double start = drape_system_clock(s->system);
     place(s, d);
     drape_system_force(s->system, &s->point, s->g);
     for (int64_t i = 0; i < s->n; i++) {
@@ -173,7 +173,7 @@ static bool evaluate(drape_newton *s, const double *d)
         s->f[i] = inertia + s->g[3 * (int64_t)node + i % 3];
     }
     s->work.residuals++;
-    s->work.residual_seconds += drape_clock_seconds() - start;
+    s->work.residual_seconds += drape_system_clock(s->system) - start;
     return drape_all_finite(s->f, (size_t)s->n);
 }
 
@@ -203,10 +203,16 @@ static drape_status fit_pattern(drape_newton *s)
     return s->fitted;
 }
 
+/* Without contact, and without the solver's part of fit_pattern. */
+static double jacobian_clock(const drape_newton *s)
+{
+    return drape_system_clock(s->system) - s->linear->factor_seconds;
+}
+
 /* J(d) into the values of the solver. */
 static drape_status assemble(drape_newton *s, const double *d)
 {
-    double start = drape_clock_seconds();
+    double start = jacobian_clock(s);
     place(s, d); /* the residual may have been tried elsewhere since */
     drape_status status = fit_pattern(s);
     if (status)
@@ -215,7 +221,7 @@ static drape_status assemble(drape_newton *s, const double *d)
                           s->values[DRAPE_NEWTON_PROJECT] != 0 ? 1 : s->positive, s->linear->values);
     s->factored_mass_weight = s->problem->mass_weight;
     s->work.jacobians++;
-    s->work.jacobian_seconds += drape_clock_seconds() - start;
+    s->work.jacobian_seconds += jacobian_clock(s) - start;
     return DRAPE_OK;
 }
 
@@ -634,6 +640,21 @@ const drape_point *drape_newton_point(const drape_newton *newton)
     return &newton->point;
 }
 
+/* Contact may couple there what it did not where the last solve was. */
+drape_status drape_newton_matrix(drape_newton *s, const drape_point *point, double mass_weight,
+                                 const drape_pattern **pattern, const double **values)
+{
+    s->point = *point;
+    drape_newton_forget_factors(s);
+    drape_status status = fit_pattern(s);
+    if (status)
+        return status;
+    drape_system_jacobian(s->system, point, mass_weight, 0, s->linear->values);
+    *pattern = drape_system_pattern(s->system);
+    *values = s->linear->values;
+    return DRAPE_OK;
+}
+
 const double *drape_newton_residual(const drape_newton *newton)
 {
     return newton->f;
@@ -652,6 +673,24 @@ const double *drape_newton_values(const drape_newton *newton)
 void drape_newton_forget_factors(drape_newton *newton)
 {
     newton->factored_mass_weight = 0;
+}
+
+/* Modified Newton goes on with its factors, and watches the residual by what it was in the solve before. */
+void drape_newton_archive(drape_newton *s, drape_archive *a)
+{
+    const bool modified = s->values[DRAPE_NEWTON_METHOD] == METHOD_MODIFIED;
+    drape_archive_mark(a, "newton");
+    drape_archive_doubles(a, s->f, (size_t)s->n);
+    drape_archive_double(a, &s->enough);
+    drape_archive_double(a, &s->factored_mass_weight);
+    drape_work_archive(&s->work, a);
+    if (s->n == 0)
+        return;
+    if (drape_archive_is_reading(a))
+        drape_archive_note(a, drape_sun_linear_adopt_other(s->linear, drape_system_pattern(s->system)));
+    drape_sun_linear_archive(s->linear, a, modified && s->factored_mass_weight != 0);
+    if (modified && !drape_kinsol_archive(s->kin, a) && a->reading)
+        drape_newton_forget_factors(s);
 }
 
 drape_work drape_newton_work(const drape_newton *newton)

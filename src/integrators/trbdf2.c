@@ -210,6 +210,7 @@ const drape_integrator_ops drape_integrator_trbdf2 = {
     .restart = drape_implicit_restart,
     .residual = drape_implicit_residual,
     .work = drape_implicit_work,
+    .archive = drape_implicit_archive,
     .bytes = bytes,
     .destroy = destroy,
 };

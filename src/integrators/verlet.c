@@ -565,6 +565,12 @@ static drape_work work(const void *state)
     return ((const verlet_state *)state)->work;
 }
 
+/* Lists of near points give the same bits whenever they were made. */
+static void archive(void *state, drape_archive *a)
+{
+    drape_work_archive(&((verlet_state *)state)->work, a);
+}
+
 static size_t bytes(const void *state)
 {
     const verlet_state *s = state;
@@ -588,6 +594,7 @@ const drape_integrator_ops drape_integrator_verlet = {
     .restart = restart,
     .stability = stability,
     .work = work,
+    .archive = archive,
     .bytes = bytes,
     .destroy = destroy,
 };

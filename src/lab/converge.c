@@ -185,7 +185,7 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count)
         out,
         "set terminal svg size 900,560 dynamic font 'sans-serif,13' background '#ffffff' name 'converge'\n"
         "cd '%s'\nset output 'converge.svg'\nset logscale xy\nset format '10^{%%T}'\n"
-        "set grid lc rgb '#dddddd'\nset key outside right top\n"
+        "set grid lc rgb '#dddddd'\nset key outside right top noenhanced\n"
         "set xlabel 'dt [s], rtol, or edge over that of the coarsest mesh'\n"
         "set ylabel 'way of the end to the next refinement, RMS [m]'\n",
         l->folder);

@@ -25,7 +25,7 @@ int plate_scene(const char *mesh, const char *terms, double poisson, bool clamp,
         mesh, modulus, poisson, THICKNESS, terms, held, held, held, held, -PRESSURE);
 }
 
-drape_status plate_measure(drape_lab_run *run, double *value)
+drape_status plate_measure(drape_reference_run *run, double *value)
 {
     drape_status status = lab_advance(run);
     *value = lab_deflection(run, 0.5, -0.5) / PRESSURE;

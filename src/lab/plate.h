@@ -8,7 +8,7 @@
 int plate_scene(const char *mesh, const char *terms, double poisson, bool clamp, char *text, size_t size);
 
 /* w D/(q a^4) in the middle. */
-drape_status plate_measure(drape_lab_run *run, double *value);
+drape_status plate_measure(drape_reference_run *run, double *value);
 
 /* Of a plate supported on all sides, by Navier's double series: it does not depend on nu. */
 double plate_navier(void);

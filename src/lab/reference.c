@@ -13,9 +13,11 @@
 
 #define RUNGS       6
 #define BUDGET      20.0 /* case_seconds that each ladder may take */
-#define GOOD_ENOUGH 1e-8 /* of the scene's size: no second ladder is tried */
+#define BEST        1e-8 /* of the scene's size: a ladder ends there */
+#define GOOD_ENOUGH 1e-5 /* of the scene's size: no second ladder is tried */
 #define GROWTH      2.5  /* a rung costs so much more than the one before, until measured */
 #define ENDIAN      "little endian doubles: frames x nodes x 3, the last one the end"
+#define FINAL       "reference"
 
 typedef struct ladder {
     const char *method, *knob; /* pointer of what changes */
@@ -29,11 +31,13 @@ static const ladder ladders[] = {
     {"trbdf2", "/integrator/dt", 1.0 / 960, 0.5, NULL, 0},
 };
 
+/* How far a ladder was climbed. Kept in the folder after each rung, so that an interrupted climb goes on. */
 typedef struct climb {
     lab_trace best; /* of the last rung */
     double error;   /* distance of its end to that of the rung before; INFINITY: there is none */
     double knob;
-    const ladder *ladder;
+    int rungs;          /* climbed */
+    double took, spent; /* CPU [s] of the last rung, of all */
 } climb;
 
 static json_t *settings_of(const ladder *one, double knob)
@@ -62,43 +66,22 @@ static const double *end_of(const lab_trace *trace)
     return trace->x + trace->size * (size_t)(trace->frames - 1);
 }
 
-static drape_status climb_ladder(lab *l, const drape_model *model, const ladder *one, double enough, climb *c)
-{
-    double left = BUDGET * l->def->case_seconds, knob = one->first, took = 0;
-    drape_status status = DRAPE_OK;
-    *c = (climb){.error = INFINITY, .ladder = one};
-    for (int k = 0; k < RUNGS && !status && GROWTH * took < left && c->error > enough;
-         k++, knob *= one->ratio) {
-        lab_trace trace = {.ctx = NULL};
-        bool good;
-        double start = drape_clock_thread_seconds();
-        status = run_rung(l, one, knob, left, &trace, &good);
-        took = drape_clock_thread_seconds() - start;
-        left -= took;
-        if (!good) {
-            lab_trace_free(&trace);
-            break;
-        }
-        c->error = c->best.frames ? lab_distance(model, end_of(&trace), end_of(&c->best)) : INFINITY;
-        c->knob = knob;
-        lab_trace_free(&c->best);
-        c->best = trace;
-    }
-    return status;
-}
-
 /* ---- Keeping it ---- */
 
-static drape_status keep(lab *l, const climb *c)
+static drape_status keep(lab *l, const char *name, const ladder *one, const climb *c)
 {
+    char file[64];
     size_t bytes = c->best.size * (size_t)c->best.frames * sizeof(double);
-    drape_status status = lab_write_text(l, "reference.f64", (const char *)c->best.x, bytes);
-    json_t *about = json_pack("{s:s, s:s, s:f, s:f, s:I, s:I, s:s}", "method", c->ladder->method, "knob",
-                              c->ladder->knob, "value", c->knob, "error_m", c->error, "frames",
-                              (json_int_t)c->best.frames, "size", (json_int_t)c->best.size, "format", ENDIAN);
-    char *text = about ? json_dumps(about, JSON_INDENT(1)) : NULL;
+    snprintf(file, sizeof file, "%s.f64", name);
+    drape_status status = lab_write_text(l, file, (const char *)c->best.x, bytes);
+    json_t *about = json_pack("{s:s, s:s, s:f, s:o, s:I, s:I, s:s, s:i, s:f, s:f}", "method", one->method,
+                              "knob", one->knob, "value", c->knob, "error_m", lab_real(c->error), "frames",
+                              (json_int_t)c->best.frames, "size", (json_int_t)c->best.size, "format", ENDIAN,
+                              "rungs", c->rungs, "took_s", c->took, "spent_s", c->spent);
+    char *text = about ? json_dumps(about, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
+    snprintf(file, sizeof file, "%s.json", name);
     if (!status)
-        status = text ? lab_write_text(l, "reference.json", text, strlen(text))
+        status = text ? lab_write_text(l, file, text, strlen(text))
                       : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for the reference");
     free(text);
     json_decref(about);
@@ -106,21 +89,28 @@ static drape_status keep(lab *l, const climb *c)
 }
 
 /* Both files are there and fit each other: an earlier run's. */
-static bool read_back(lab *l)
+static bool read_back(lab *l, const char *name, climb *c)
 {
-    char *text = NULL, *data = NULL;
+    char file[64], *text = NULL, *data = NULL;
     size_t length = 0, bytes = 0;
-    bool read = !lab_read_text(l->ctx, l->folder, "reference.json", &text, &length) &&
-                !lab_read_text(l->ctx, l->folder, "reference.f64", &data, &bytes);
+    snprintf(file, sizeof file, "%s.json", name);
+    bool read = !lab_read_text(l->ctx, l->folder, file, &text, &length);
+    snprintf(file, sizeof file, "%s.f64", name);
+    read = read && !lab_read_text(l->ctx, l->folder, file, &data, &bytes);
     json_t *about = read ? json_loadb(text, length, 0, NULL) : NULL;
     int64_t frames = json_integer_value(json_object_get(about, "frames"));
     size_t size = (size_t)json_integer_value(json_object_get(about, "size"));
     bool fits = about && frames > 0 && bytes == size * (size_t)frames * sizeof(double) &&
-                !lab_trace_create(l->ctx, size, frames, &l->reference);
+                !lab_trace_create(l->ctx, size, frames, &c->best);
     if (fits) {
-        memcpy(l->reference.x, data, bytes);
-        l->reference.frames = frames;
-        l->reference_error = lab_number(about, "error_m");
+        const double error = lab_number(about, "error_m");
+        memcpy(c->best.x, data, bytes);
+        c->best.frames = frames;
+        c->error = isnan(error) ? INFINITY : error;
+        c->knob = lab_number(about, "value");
+        c->rungs = (int)json_integer_value(json_object_get(about, "rungs"));
+        c->took = lab_number(about, "took_s");
+        c->spent = lab_number(about, "spent_s");
     }
     free(text);
     free(data);
@@ -128,20 +118,96 @@ static bool read_back(lab *l)
     return fits;
 }
 
-static drape_status climb_all(lab *l, const drape_model *model, climb *best)
+static void forget(const lab *l, const char *name)
 {
+    static const char *const endings[] = {"json", "f64"};
+    for (int i = 0; i < 2; i++) {
+        char path[4096];
+        snprintf(path, sizeof path, "%s/%s.%s", l->folder, name, endings[i]);
+        remove(path);
+    }
+}
+
+/* ---- Climbing ---- */
+
+static void name_ladder(const ladder *one, char *name, size_t size)
+{
+    snprintf(name, size, FINAL "-%s", one->method);
+}
+
+/* One rung. *good: it ended; else the climb is where it was. */
+static drape_status step_up(lab *l, const drape_model *model, const ladder *one, climb *c, bool *good)
+{
+    lab_trace trace = {.ctx = NULL};
+    const double knob = c->rungs ? c->knob * one->ratio : one->first, start = drape_clock_thread_seconds();
+    drape_status status = run_rung(l, one, knob, BUDGET * l->def->case_seconds - c->spent, &trace, good);
+    c->took = drape_clock_thread_seconds() - start;
+    c->spent += c->took;
+    if (!*good) {
+        lab_trace_free(&trace);
+        return status;
+    }
+    c->error = c->best.frames ? lab_distance(model, end_of(&trace), end_of(&c->best)) : INFINITY;
+    c->knob = knob;
+    c->rungs++;
+    lab_trace_free(&c->best);
+    c->best = trace;
+    return status;
+}
+
+static drape_status climb_ladder(lab *l, const drape_model *model, const ladder *one, climb *c)
+{
+    char name[64];
+    bool good = true;
     drape_status status = DRAPE_OK;
-    double enough = GOOD_ENOUGH * model->length;
+    *c = (climb){.error = INFINITY};
+    name_ladder(one, name, sizeof name);
+    read_back(l, name, c);
+    while (!status && good && c->rungs < RUNGS && c->error > BEST * model->length &&
+           GROWTH * c->took < BUDGET * l->def->case_seconds - c->spent) {
+        status = step_up(l, model, one, c, &good);
+        if (!status && good)
+            status = keep(l, name, one, c);
+    }
+    return status;
+}
+
+/* *which: of the ladders; -1: none ended twice. */
+static drape_status climb_all(lab *l, const drape_model *model, climb *best, int *which)
+{
+    const int count = sizeof ladders / sizeof *ladders;
+    drape_status status = DRAPE_OK;
     *best = (climb){.error = INFINITY};
-    for (size_t i = 0; !status && i < sizeof ladders / sizeof *ladders && !(best->error < enough); i++) {
+    *which = -1;
+    for (int i = 0; !status && i < count && !(best->error < GOOD_ENOUGH * model->length); i++) {
         climb c;
-        status = climb_ladder(l, model, &ladders[i], enough, &c);
+        status = climb_ladder(l, model, &ladders[i], &c);
         if (!status && c.error < best->error) {
             lab_trace_free(&best->best);
             *best = c;
+            *which = i;
         } else {
             lab_trace_free(&c.best);
         }
+    }
+    return status;
+}
+
+static drape_status choose(lab *l, const drape_model *model, climb *best)
+{
+    int which;
+    drape_status status = climb_all(l, model, best, &which);
+    if (!status && which < 0)
+        return drape_fail(l->ctx, DRAPE_E_SOLVER,
+                          "no reference: neither ida nor trbdf2 ends twice within %g s; give more by "
+                          "--case-seconds, or a shorter duration",
+                          BUDGET * l->def->case_seconds);
+    if (!status)
+        status = keep(l, FINAL, &ladders[which], best);
+    for (size_t i = 0; !status && i < sizeof ladders / sizeof *ladders; i++) {
+        char name[64];
+        name_ladder(&ladders[i], name, sizeof name);
+        forget(l, name);
     }
     return status;
 }
@@ -150,27 +216,21 @@ drape_status lab_make_reference(lab *l)
 {
     drape_model *model = NULL;
     climb best = {.error = INFINITY};
-    if (read_back(l))
-        return DRAPE_OK;
-    if (l->def->progress)
-        l->def->progress(l->def->user, 0, 0, NAN);
-    const lab_request request = {.def = l->def};
-    drape_status status = lab_load(l->ctx, &request, &model);
-    if (!status)
-        status = climb_all(l, model, &best);
-    if (!status && !best.best.frames)
-        status = drape_fail(l->ctx, DRAPE_E_SOLVER,
-                            "no reference: neither ida nor trbdf2 ends twice within %g s; give more by "
-                            "--case-seconds, or a shorter duration",
-                            BUDGET * l->def->case_seconds);
-    if (!status)
-        status = keep(l, &best);
-    if (!status) {
-        l->reference = best.best;
-        l->reference_error = best.error;
-    } else {
-        lab_trace_free(&best.best);
+    drape_status status = DRAPE_OK;
+    if (!read_back(l, FINAL, &best)) {
+        const lab_request request = {.def = l->def};
+        if (l->def->progress)
+            l->def->progress(l->def->user, 0, 0, NAN);
+        status = lab_load(l->ctx, &request, &model);
+        if (!status)
+            status = choose(l, model, &best);
+        drape_model_destroy(&model);
     }
-    drape_model_destroy(&model);
-    return status;
+    if (status) {
+        lab_trace_free(&best.best);
+        return status;
+    }
+    l->reference = best.best;
+    l->reference_error = best.error;
+    return DRAPE_OK;
 }

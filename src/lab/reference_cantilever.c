@@ -26,7 +26,7 @@ static int scene(double weight, double load, char *text, size_t size)
     return strip_scene(&s, text, size);
 }
 
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     double tip[3];
     drape_status status = lab_advance(run);

@@ -41,7 +41,7 @@ static int scene(double unused, double load, char *text, size_t size)
         LENGTH, SPAN - LENGTH);
 }
 
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     const size_t nodes = (size_t)drape_model_node_count(run->model);
     double *x = calloc(3 * nodes, sizeof *x);

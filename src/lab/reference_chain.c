@@ -36,7 +36,7 @@ static int scene(double mode, double load, char *text, size_t size)
 }
 
 /* How much of a mode there is: other modes are orthogonal to it by the mass. */
-static double amplitude(const drape_lab_run *run, const double *mode)
+static double amplitude(const drape_reference_run *run, const double *mode)
 {
     const double *mass = drape_model_masses(run->model), *x = drape_sim_positions(run->sim);
     double sum = 0;
@@ -46,7 +46,7 @@ static double amplitude(const drape_lab_run *run, const double *mode)
 }
 
 /* Times of four crossings of 0 after the start: two periods. */
-static drape_status swing(drape_lab_run *run, const double *mode, double dt, double *omega)
+static drape_status swing(drape_reference_run *run, const double *mode, double dt, double *omega)
 {
     double now = 0, crossing = 0;
     drape_status status = DRAPE_OK;
@@ -64,7 +64,7 @@ static drape_status swing(drape_lab_run *run, const double *mode, double dt, dou
     return status;
 }
 
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     const size_t n = 3 * (size_t)drape_model_node_count(run->model);
     const double *rest = drape_model_rest_positions(run->model);

@@ -38,7 +38,7 @@ static int scene(double place, double load, char *text, size_t size)
                     f->areal_density * GRAVITY * length * length / 10 / 205 * 1e-4);
 }
 
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     double tip[3];
     drape_status status = lab_advance(run);

@@ -28,7 +28,7 @@ static int scene(double n, double load, char *text, size_t size)
                     -GRAVITY, TIME / n, TIME);
 }
 
-static drape_status measure(drape_lab_run *run, double *value)
+static drape_status measure(drape_reference_run *run, double *value)
 {
     double tip[3];
     drape_status status = lab_advance(run);

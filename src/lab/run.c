@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#define SHORT 0.2 /* [s] CPU: what takes longer is not repeated more than once */
+#define SHORT 1.0 /* [s] CPU: what takes longer is not repeated; noise is a small share of it */
 
 /* What is watched while a case runs. */
 typedef struct watcher {
@@ -229,7 +229,7 @@ static json_t *describe(const lab_request *request, const drape_model *model, co
 /* Whether another repeat would tell more. */
 static bool repeats(const lab_request *request, const outcome *o, int done)
 {
-    return done < request->repeats && !o->status && (o->cpu < SHORT || done < 2);
+    return done < request->repeats && !o->status && o->cpu < SHORT;
 }
 
 static drape_status simulate(drape_context *ctx, const lab_request *request, const drape_model *model,

@@ -27,12 +27,12 @@ double strip_gravity(double weight)
     return weight * STRIP_RIGIDITY / STRIP_DENSITY;
 }
 
-drape_status lab_advance(drape_lab_run *run)
+drape_status lab_advance(drape_reference_run *run)
 {
     return drape_sim_advance(run->sim, drape_model_duration(run->model));
 }
 
-drape_status lab_settle(drape_lab_run *run, double *x)
+drape_status lab_settle(drape_reference_run *run, double *x)
 {
     drape_sim_def def;
     drape_sim *sim = NULL;
@@ -50,7 +50,7 @@ drape_status lab_settle(drape_lab_run *run, double *x)
     return status;
 }
 
-void lab_tip(const drape_lab_run *run, double tip[3])
+void lab_tip(const drape_reference_run *run, double tip[3])
 {
     const double *rest = drape_model_rest_positions(run->model), *x = drape_sim_positions(run->sim);
     const int32_t nodes = drape_model_node_count(run->model);
@@ -69,7 +69,7 @@ void lab_tip(const drape_lab_run *run, double tip[3])
         tip[k] /= count;
 }
 
-drape_status lab_unstable_modes(drape_lab_run *run, double *value)
+drape_status lab_unstable_modes(drape_reference_run *run, double *value)
 {
     drape_status status = lab_advance(run);
     const drape_statistics statistics = drape_sim_statistics(run->sim);
@@ -81,7 +81,7 @@ drape_status lab_unstable_modes(drape_lab_run *run, double *value)
 
 /* The distance within which a dozen nodes lie, give or take: the mean area of a node is that of the sheet
  * over them. */
-static double neighbourhood(const drape_lab_run *run)
+static double neighbourhood(const drape_reference_run *run)
 {
     const double *rest = drape_model_rest_positions(run->model);
     const int32_t nodes = drape_model_node_count(run->model);
@@ -94,7 +94,7 @@ static double neighbourhood(const drape_lab_run *run)
     return 2 * sqrt((high[0] - low[0]) * (high[1] - low[1]) / nodes);
 }
 
-double lab_deflection(const drape_lab_run *run, double x, double z)
+double lab_deflection(const drape_reference_run *run, double x, double z)
 {
     enum { MOST = 64, TERMS = 6 };
     const double *rest = drape_model_rest_positions(run->model), *at = drape_sim_positions(run->sim);

@@ -23,18 +23,18 @@ int strip_scene(const strip *s, char *text, size_t size);
 double strip_gravity(double weight);
 
 /* Advances to the end of the scene. */
-drape_status lab_advance(drape_lab_run *run);
+drape_status lab_advance(drape_reference_run *run);
 
 /* The equilibrium that is near the state of the sim, by "static", into x (node_count x 3). */
-drape_status lab_settle(drape_lab_run *run, double *x);
+drape_status lab_settle(drape_reference_run *run, double *x);
 
 /* The mean position of the nodes that had the largest x at rest. */
-void lab_tip(const drape_lab_run *run, double tip[3]);
+void lab_tip(const drape_reference_run *run, double tip[3]);
 
 /* Of the equilibrium that was found: how many modes are unstable; DRAPE_E_SOLVER if it is not known. */
-drape_status lab_unstable_modes(drape_lab_run *run, double *value);
+drape_status lab_unstable_modes(drape_reference_run *run, double *value);
 
 /* The deflection along -y in the middle (x, z) of a plate: of the quadratic through the nodes around. */
-double lab_deflection(const drape_lab_run *run, double x, double z);
+double lab_deflection(const drape_reference_run *run, double x, double z);
 
 #endif

@@ -293,11 +293,12 @@ static void write_script(const lab *l, FILE *out, const chart *c)
 {
     size_t first[128], count = list_series(l, first, 128);
     bool drawn[128], any = false;
-    fprintf(out,
-            "set terminal svg size 900,560 dynamic font 'sans-serif,13' background '#ffffff' name '%s'\n"
-            "cd '%s'\nset output '%s.svg'\nset logscale xy\nset format '10^{%%T}'\n"
-            "set grid lc rgb '#dddddd'\nset key outside right top\nset xlabel '%s'\nset ylabel '%s'\n",
-            c->file, l->folder, c->file, c->x_label, c->y_label);
+    fprintf(
+        out,
+        "set terminal svg size 900,560 dynamic font 'sans-serif,13' background '#ffffff' name '%s'\n"
+        "cd '%s'\nset output '%s.svg'\nset logscale xy\nset format '10^{%%T}'\n"
+        "set grid lc rgb '#dddddd'\nset key outside right top noenhanced\nset xlabel '%s'\nset ylabel '%s'\n",
+        c->file, l->folder, c->file, c->x_label, c->y_label);
     for (size_t k = 0; k < count; k++)
         drawn[k] = write_points(l, out, k, lab_tag_word(l->results[first[k]], "series"), c) > 0;
     for (size_t k = 0; k < count; k++) {

@@ -4,17 +4,23 @@
 
 #include "sim/sim.h"
 
+/* Whether to stop. Called after every step: it must only look. */
+typedef bool drape_validate_cancel(void *user);
+
 /* A scene while a reference is measured in it. */
-typedef struct drape_lab_run {
+typedef struct drape_reference_run {
     drape_context *ctx;
     drape_model *model;
     drape_sim *sim;
-    double parameter; /* of the case */
-} drape_lab_run;
+    double parameter;              /* of the case */
+    drape_validate_cancel *cancel; /* whether to stop; NULL: never */
+    void *user;                    /* of cancel */
+} drape_reference_run;
 
-/* Makes a sim of a scene's text, in which ' stands for ". drape_lab_close in any case. */
-drape_status drape_lab_open(drape_context *ctx, const char *text, drape_lab_run *run);
-void drape_lab_close(drape_lab_run *run);
+/* Fills the model and the sim from a scene's text, in which ' stands for "; the other members are set before.
+ * drape_reference_close in any case. */
+drape_status drape_reference_open(drape_reference_run *run, const char *text);
+void drape_reference_close(drape_reference_run *run);
 
 /* How a case ended. */
 typedef enum drape_outcome {
@@ -39,7 +45,7 @@ typedef struct drape_reference {
     /* The text of the scene; load: what is searched, else 0. As snprintf. */
     int (*scene)(double parameter, double load, char *text, size_t size);
     /* Advances the sim and measures. */
-    drape_status (*measure)(drape_lab_run *run, double *value);
+    drape_status (*measure)(drape_reference_run *run, double *value);
     /* Thresholds: the quantity is the load, between these shares of the expected one, above which measure is
      * > 0. */
     double low, high;
@@ -53,9 +59,16 @@ typedef struct drape_validation {
     char message[512]; /* of a simulation that stopped */
 } drape_validation;
 
-/* Runs one case. Errors: DRAPE_E_MEMORY alone: all else is a verdict. */
+/* Runs one case. cancel: see drape_reference_run. Errors: DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancel said so): all else is a
+ * verdict. */
 drape_status drape_validate(drape_context *ctx, const drape_reference *reference, int index,
-                            drape_validation *out);
+                            drape_validate_cancel *cancel, void *user, drape_validation *out);
+
+/* Simulations that a case takes: those of a search are several. */
+int drape_validate_runs(const drape_reference *reference);
+
+/* What expected and documented are, and how far what was obtained is from them. */
+void drape_validate_judge(const drape_reference *reference, drape_validation *v);
 
 const char *drape_outcome_name(drape_outcome verdict);
 

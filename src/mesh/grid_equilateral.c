@@ -1,18 +1,19 @@
 /*
  * grid_equilateral.c: a sheet of equilateral triangles, in the plane y = 0, normal +y. With e edges of length
- * l on each side, node (r, c) is at
+ * l in each row and s strips of triangles, as many as edges unless the scene says how many, node (r, c) is at
  *
- *     x = (c + (r odd ? 1/2 : 0)) l,    z = -r sqrt(3)/2 l,    0 <= r, c <= e.
+ *     x = (c + (r odd ? 1/2 : 0)) l,    z = -r sqrt(3)/2 l,    0 <= c <= e,  0 <= r <= s.
  *
  * A row lies half an edge right or left of the row before, so the short diagonal of its cells changes with
  * the row: B-C from an even to an odd row, A-D from an odd to an even one (letters: grid.h). Of the cloth
- * that results every edge has length l; it has 2 e^2 triangles, e (3 e + 2) edges and e (3 e - 2) hinges.
+ * that results every edge has length l; with s = e it has 2 e^2 triangles, e (3 e + 2) edges and e (3 e - 2)
+ * hinges.
  */
 #include <math.h>
 
 #include "mesh/grid.h"
 
-enum { EDGES, EDGE_LENGTH, PARAM_COUNT };
+enum { EDGES, EDGE_LENGTH, STRIPS, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
     [EDGES] = {.name = "edges",
@@ -30,20 +31,29 @@ static const drape_param params[PARAM_COUNT] = {
                      .max = 1e9,
                      .open_min = true,
                      .help = "length of every edge"},
+    [STRIPS] = {.name = "strips",
+                .kind = DRAPE_PARAM_INTEGER,
+                .unit = "1",
+                .default_value = NAN,
+                .derived = "as many as edges",
+                .min = 1,
+                .max = 16383,
+                .help = "strips of triangles, one less than rows of nodes"},
 };
 
 static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
 {
     static const bool falling[2][2] = {{false, false}, {true, true}};
-    const int32_t side = (int32_t)values[EDGES] + 1;
+    const int32_t columns = (int32_t)values[EDGES] + 1,
+                  rows = isnan(values[STRIPS]) ? columns : (int32_t)values[STRIPS] + 1;
     const double length = values[EDGE_LENGTH];
 
-    const drape_status status = drape_grid_allocate(ctx, pointer, side, side, mesh);
+    const drape_status status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);
     if (status)
         return status;
     double *x = mesh->x;
-    for (int32_t row = 0; row < side; row++)
-        for (int32_t column = 0; column < side; column++, x += 3) {
+    for (int32_t row = 0; row < rows; row++)
+        for (int32_t column = 0; column < columns; column++, x += 3) {
             x[0] = (column + (row % 2 ? 0.5 : 0.0)) * length;
             x[1] = 0;
             x[2] = -row * (sqrt(3.0) / 2 * length);

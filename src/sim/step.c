@@ -254,13 +254,21 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     return record_of(sim, t, &info, refused ? DRAPE_RETRY_REJECTED : status, verdict == DRAPE_ACCEPT);
 }
 
+/* Of this step and all else that asked for contact, energies that are told for example. */
+static double contact_seconds(const drape_sim *sim)
+{
+    return sim->chosen.integrator->work(sim->integrator).contact_seconds +
+           drape_contact_seconds(drape_system_contact(sim->system));
+}
+
 /* The frames inside an accepted step belong to it even if an observer stops the run there. */
 drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *attempt)
 {
     drape_status stop = DRAPE_OK;
-    double start = drape_clock_seconds();
+    double start = drape_clock_seconds(), contact = contact_seconds(sim);
     *attempt = try_step(sim, t1, h, &stop);
     sim->statistics.wall_steps += drape_clock_seconds() - start;
+    sim->statistics.wall_contact += contact_seconds(sim) - contact;
     log_rejection(sim, attempt);
     drape_status told = tell_attempt(sim, attempt);
     drape_status framed = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;

@@ -1,102 +1,43 @@
-/*
- * dihedral.c: see dihedral.h. With e = x1 - x0, and for each triangle its apex a, unit normal n, altitude H
- * over e, foot s = (a - x0).e/|e|^2 and in-plane unit vector m from the edge to the apex:
- *     theta = atan2(ehat . (n2 x n1), n1 . n2)
- *     gradient: g_a = n/H,  g_0 = -sum (1 - s_t) g_t,  g_1 = -sum s_t g_t
- * and the Hessian by the derivatives of the barycentric coordinates p_a = m/H, p_0 = -(1 - s) m/H - ehat/|e|,
- * p_1 = -s m/H + ehat/|e|:
- *     d g_a/d k = -(p_k n' + n p_k')/H + w_k n ehat'/(|e| H),  w_0 = -1, w_1 = 1, w_a = 0
- *     ds/da = ehat/|e|,  ds/dx0 = -((1 - s) e + H m)/|e|^2,  ds/dx1 = (-s e + H m)/|e|^2
- * Tamstorf & Grinspun 2013, Discrete bending forces and their Jacobians, has the same in closed form.
- */
+/* dihedral.c: see dihedral.h. */
 #include "terms/dihedral.h"
 
-#include "base/vec3.h"
-
-#include <math.h>
-#include <string.h>
-
-/* One triangle: see the head of the file. */
-typedef struct side {
-    double n[3], m[3], altitude, foot;
-} side;
-
-static side measure_side(const double *origin, const double *apex, const double direction[3], double length,
-                         double sign)
+/* Number k of the hinge in lane l is at [LANES k + l]. */
+LANES_DISPATCH static void evaluate(const double *x, double *theta, double *g, double *h)
 {
-    side s;
-    double d[3], normal[3];
-    vec3_sub(apex, origin, d);
-    vec3_cross(direction, d, normal);
-    s.altitude = vec3_norm(normal); /* |ehat x d| */
-    s.foot = vec3_dot(d, direction) / length;
-    for (int i = 0; i < 3; i++) {
-        s.n[i] = sign * normal[i] / s.altitude;
-        s.m[i] = (d[i] - s.foot * length * direction[i]) / s.altitude;
-    }
-    return s;
-}
-
-static void gradient(const side sides[2], double *g)
-{
-    for (int i = 0; i < 3; i++) {
-        double g2 = sides[0].n[i] / sides[0].altitude, g3 = sides[1].n[i] / sides[1].altitude;
-        g[i] = -(1 - sides[0].foot) * g2 - (1 - sides[1].foot) * g3;
-        g[3 + i] = -sides[0].foot * g2 - sides[1].foot * g3;
-        g[6 + i] = g2;
-        g[9 + i] = g3;
-    }
-}
-
-/* The columns of one node, number `column`, in the rows that one triangle gives. p, w, ds: of that node. */
-static void add_columns(const side *s, const double direction[3], double length, const double p[3], double w,
-                        const double ds[3], int apex, int column, double *h)
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            double a = (w * s->n[i] * direction[j] / length - p[i] * s->n[j] - s->n[i] * p[j]) / s->altitude;
-            double b = s->n[i] / s->altitude * ds[j];
-            h[12 * i + 3 * column + j] += b - (1 - s->foot) * a;
-            h[12 * (3 + i) + 3 * column + j] -= b + s->foot * a;
-            h[12 * (3 * apex + i) + 3 * column + j] += a;
-        }
-}
-
-static void add_side(const side *s, const double direction[3], double length, int apex, double *h)
-{
-    double p[3][3], ds[3][3]; /* of x0, x1, the apex */
-    for (int i = 0; i < 3; i++) {
-        double in_plane = s->m[i] / s->altitude, along = direction[i] / length;
-        double rise = s->altitude * s->m[i] / (length * length);
-        p[0][i] = -(1 - s->foot) * in_plane - along;
-        p[1][i] = -s->foot * in_plane + along;
-        p[2][i] = in_plane;
-        ds[0][i] = -(1 - s->foot) * along - rise;
-        ds[1][i] = -s->foot * along + rise;
-        ds[2][i] = along;
-    }
-    for (int c = 0; c < 3; c++)
-        add_columns(s, direction, length, p[c], c == 0 ? -1 : c == 1, ds[c], apex, c < 2 ? c : apex, h);
-}
-
-double drape_dihedral(const double x[12], double *g, double *h)
-{
-    double direction[3], cross[3];
-    vec3_sub(x + 3, x, direction);
-    const double length = vec3_norm(direction);
-    for (int i = 0; i < 3; i++)
-        direction[i] /= length;
-    const side sides[2] = {measure_side(x, x + 6, direction, length, 1),
-                           measure_side(x, x + 9, direction, length, -1)};
+    lanes corner[4][3];
+    drape_dihedral_lanes d;
+    for (int k = 0; k < 12; k++)
+        corner[k / 3][k % 3] = lanes_load(x + LANES * k);
+    drape_dihedral_measure(corner, &d);
+    lanes_store(theta, d.theta);
     if (g)
-        gradient(sides, g);
-    if (h) {
-        memset(h, 0, 144 * sizeof *h);
-        add_side(&sides[0], direction, length, 2, h);
-        add_side(&sides[1], direction, length, 3, h);
+        drape_dihedral_gradient(&d, g);
+    if (h)
+        drape_dihedral_hessian(&d, h);
+}
+
+/* h of one lane, with the blocks above the diagonal. */
+static void take_hessian(const double *from, double *h)
+{
+    for (int i = 0; i < 12; i++)
+        for (int j = 0; j < i - i % 3 + 3; j++)
+            h[12 * i + j] = h[12 * j + i] = from[LANES * (12 * i + j)];
+}
+
+void drape_dihedrals(int count, const double *x, double *theta, double *g, double *h)
+{
+    double side_by_side[12 * LANES], angle[LANES], gradient[12 * LANES], hessian[144 * LANES];
+    for (int k = 0; k < 12; k++)
+        for (int l = 0; l < LANES; l++)
+            side_by_side[LANES * k + l] = x[12 * (l < count ? l : 0) + k];
+    evaluate(side_by_side, angle, g ? gradient : NULL, h ? hessian : NULL);
+    for (int l = 0; l < count; l++) {
+        theta[l] = angle[l];
+        for (int k = 0; g && k < 12; k++)
+            g[12 * l + k] = gradient[LANES * k + l];
+        if (h)
+            take_hessian(hessian + l, h + 144 * l);
     }
-    vec3_cross(sides[1].n, sides[0].n, cross);
-    return atan2(vec3_dot(direction, cross), vec3_dot(sides[0].n, sides[1].n));
 }
 
 void drape_dihedral_tie(double *g, double *h)

@@ -1,18 +1,5 @@
 /*
- * bend.hinge: a torsion spring along each inner edge, on the angle theta between its two triangles.
- *
- * Edge x0 x1, apices x2 x3, e = x1 - x0. For triangle t with apex a: unit normal n, along n1 = e x (x2 - x0)
- * for one and n2 = (x3 - x0) x e for the other; altitude H over e; foot s = (a - x0).e/|e|^2; and m the
- * in-plane unit vector from the edge to the apex.
- *     theta = atan2(ehat . (n2 x n1), n1 . n2), never acos, which loses all digits when flat
- *     gradient: g_a = n/H,  g_0 = -sum (1 - s_t) g_t,  g_1 = -sum s_t g_t
- * The Hessian follows by differentiating these, with the gradients of the barycentric coordinates:
- *     p_a = m/H,  p_0 = -(1 - s) m/H - ehat/|e|,  p_1 = -s m/H + ehat/|e|
- *     d g_a/d a  = -(p_a n' + n p_a')/H
- *     d g_a/d x0 = -(p_0 n' + n p_0')/H - n ehat'/(|e| H)
- *     d g_a/d x1 = -(p_1 n' + n p_1')/H + n ehat'/(|e| H)
- *     ds/da = ehat/|e|,  ds/dx0 = -((1 - s) e + H m)/|e|^2,  ds/dx1 = (-s e + H m)/|e|^2
- * Tamstorf & Grinspun 2013, Discrete bending forces and their Jacobians, has the same in closed form.
+ * bend.hinge: a torsion spring along each inner edge, on the angle theta between its two triangles (dihedral.h).
  *
  * E = 1/2 k (theta - theta0)^2.
  * consistent: k = D |e|^2/(A1 + A2), D = E h^3/(12 (1 - nu^2)). Its bending Poisson ratio is -1/3 on the
@@ -25,6 +12,7 @@
  * pi.
  */
 #include "base/lanes.h"
+#include "terms/dihedral.h"
 #include "terms/terms.h"
 
 #include <math.h>
@@ -33,8 +21,6 @@ enum { PARAM_STIFFNESS, PARAM_REST, PARAM_MIN_ALTITUDE, PARAM_MAX_TURN, PARAM_CO
 enum { STIFFNESS_CONSISTENT, STIFFNESS_REPORT };
 enum { REST_MESH, REST_FLAT };
 enum { REST_K, REST_THETA0, REST_ALTITUDE1, REST_ALTITUDE2, REST_COUNT };
-
-static const double pi = 3.14159265358979323846;
 
 static const char *const stiffness_choices[] = {"consistent", "report", NULL};
 static const char *const rest_choices[] = {"mesh", "flat", NULL};
@@ -73,147 +59,31 @@ static const drape_param params[PARAM_COUNT] = {
          .help = "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"},
 };
 
-/* One triangle of a hinge: see the head of the file. Four hinges at once. */
-typedef struct side {
-    lanes n[3], m[3];
-    lanes gradient[3]; /* n/H */
-    lanes altitude, per_altitude, foot;
-} side;
-
-typedef struct hinges {
-    lanes direction[3], per_length; /* ehat, 1/|e| */
-    side side[2];
-    lanes theta; /* in (-pi, pi] */
-} hinges;
-
-LANES_INLINE void measure_side(const lanes origin[3], const lanes apex[3], const hinges *h, double sign,
-                               side *s)
-{
-    lanes d[3], normal[3];
-    for (int i = 0; i < 3; i++)
-        d[i] = apex[i] - origin[i];
-    lanes_cross(h->direction, d, normal);
-    lanes along = lanes_dot(d, h->direction);
-    s->altitude = lanes_sqrt(lanes_dot(normal, normal)); /* |ehat x d| */
-    s->per_altitude = 1 / s->altitude;
-    s->foot = along * h->per_length;
-    for (int i = 0; i < 3; i++) {
-        s->n[i] = sign * normal[i] * s->per_altitude;
-        s->m[i] = (d[i] - along * h->direction[i]) * s->per_altitude;
-        s->gradient[i] = s->n[i] * s->per_altitude;
-    }
-}
-
+/* Four hinges, of elements by their numbers. */
 LANES_INLINE void measure_hinges(const drape_elements *el, const int32_t element[LANES], const double *x,
-                                 hinges *h)
+                                 drape_dihedral_lanes *h)
 {
-    lanes corner[4][3], cross[3];
+    lanes corner[4][3];
     for (int a = 0; a < 4; a++) {
         int32_t node[LANES];
         for (int l = 0; l < LANES; l++)
             node[l] = el->node[4 * (size_t)element[l] + (size_t)a];
         lanes_gather(x, node, corner[a]);
     }
-    for (int i = 0; i < 3; i++)
-        h->direction[i] = corner[1][i] - corner[0][i];
-    h->per_length = 1 / lanes_sqrt(lanes_dot(h->direction, h->direction));
-    for (int i = 0; i < 3; i++)
-        h->direction[i] *= h->per_length;
-    measure_side(corner[0], corner[2], h, 1, &h->side[0]);
-    measure_side(corner[0], corner[3], h, -1, &h->side[1]);
-    lanes_cross(h->side[1].n, h->side[0].n, cross);
-    lanes sine = lanes_dot(h->direction, cross), cosine = lanes_dot(h->side[0].n, h->side[1].n);
-    for (int l = 0; l < LANES; l++)
-        h->theta[l] = atan2(sine[l], cosine[l]);
-}
-
-/* The branch of theta that is nearest to reference. */
-static inline double unwrap(double theta, double reference)
-{
-    return theta + 2 * pi * round((reference - theta) / (2 * pi));
-}
-
-/* dq: g_0 g_1 g_2 g_3 */
-LANES_INLINE void gradient(const hinges *h, double *dq)
-{
-    const side *s = h->side;
-    for (int i = 0; i < 3; i++) {
-        lanes_store(dq + LANES * i, (s[0].foot - 1) * s[0].gradient[i] + (s[1].foot - 1) * s[1].gradient[i]);
-        lanes_store(dq + LANES * (3 + i), -s[0].foot * s[0].gradient[i] - s[1].foot * s[1].gradient[i]);
-        lanes_store(dq + LANES * (6 + i), s[0].gradient[i]);
-        lanes_store(dq + LANES * (9 + i), s[1].gradient[i]);
-    }
-}
-
-/* d g_a/d column = -(p n' + n p')/H + w n ehat'/(|e| H), at (i, j) */
-LANES_INLINE lanes turn(const side *s, const lanes along[3], const lanes p[3], double w, int i, int j)
-{
-    return s->gradient[i] * (w * along[j] - p[j]) - p[i] * s->gradient[j];
-}
-
-/* p and the gradients of s at the three nodes of a side: x0, x1, apex. That of s at the apex is in no block on or
- * below the diagonal. */
-typedef struct change {
-    lanes p[3][3], foot[2][3];
-} change;
-
-LANES_INLINE void measure_change(const hinges *h, const side *s, const lanes along[3], change *c)
-{
-    for (int i = 0; i < 3; i++) {
-        lanes in_plane = s->m[i] * s->per_altitude;
-        lanes rise = s->altitude * s->m[i] * h->per_length * h->per_length;
-        c->p[0][i] = (s->foot - 1) * in_plane - along[i];
-        c->p[1][i] = along[i] - s->foot * in_plane;
-        c->p[2][i] = in_plane;
-        c->foot[0][i] = (s->foot - 1) * along[i] - rise;
-        c->foot[1][i] = rise - s->foot * along[i];
-    }
-}
-
-/* The blocks on and below the diagonal. Both sides add to those of the edge; there is none between the apices. */
-LANES_INLINE void hessian(const hinges *h, double *ddq)
-{
-    lanes along[3];
-    change side_change[2];
-    for (int i = 0; i < 3; i++)
-        along[i] = h->direction[i] * h->per_length;
-    measure_change(h, &h->side[0], along, &side_change[0]);
-    measure_change(h, &h->side[1], along, &side_change[1]);
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            lanes of_00 = {0}, of_10 = {0}, of_11 = {0};
-            for (int k = 0; k < 2; k++) {
-                const side *s = &h->side[k];
-                const int apex = 3 * (2 + k);
-                lanes by_0 = turn(s, along, side_change[k].p[0], -1, i, j),
-                      by_1 = turn(s, along, side_change[k].p[1], 1, i, j);
-                lanes by_foot = s->gradient[i] * side_change[k].foot[0][j];
-                of_00 += by_foot + (s->foot - 1) * by_0;
-                of_10 -= by_foot + s->foot * by_0;
-                of_11 -= s->gradient[i] * side_change[k].foot[1][j] + s->foot * by_1;
-                lanes_store(ddq + LANES * (12 * (apex + i) + j), by_0);
-                lanes_store(ddq + LANES * (12 * (apex + i) + 3 + j), by_1);
-                lanes_store(ddq + LANES * (12 * (apex + i) + apex + j),
-                            turn(s, along, side_change[k].p[2], 0, i, j));
-            }
-            lanes_store(ddq + LANES * (12 * i + j), of_00);
-            lanes_store(ddq + LANES * (12 * (3 + i) + j), of_10);
-            lanes_store(ddq + LANES * (12 * (3 + i) + 3 + j), of_11);
-            lanes_store(ddq + LANES * (12 * (9 + i) + 6 + j), (lanes){0});
-        }
+    drape_dihedral_measure(corner, h);
 }
 
 LANES_DISPATCH static void measure_lanes(const drape_elements *el, const int32_t *element, const double *x,
                                          const double *internal, double *q, double *dq, double *ddq)
 {
-    hinges h;
+    drape_dihedral_lanes h;
     measure_hinges(el, element, x, &h);
     for (int l = 0; l < LANES; l++)
-        q[l] = unwrap(h.theta[l], internal[element[l]]);
+        q[l] = drape_nearest_branch(h.theta[l], internal[element[l]]);
     if (dq)
-        gradient(&h, dq);
+        drape_dihedral_gradient(&h, dq);
     if (ddq)
-        hessian(&h, ddq);
+        drape_dihedral_hessian(&h, ddq);
 }
 
 static void measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
@@ -241,7 +111,7 @@ typedef struct shapes {
 
 LANES_DISPATCH static void measure_shapes(const drape_elements *el, int32_t first, const double *x, shapes *s)
 {
-    hinges h;
+    drape_dihedral_lanes h;
     int32_t element[LANES];
     drape_lanes_elements(first, el->count, element);
     measure_hinges(el, element, x, &h);
@@ -277,7 +147,7 @@ static void follow(const drape_elements *el, int32_t first, int32_t count, const
         int l = (i - first) % LANES;
         if (l == 0)
             measure_shapes(el, i, x, &s);
-        after[i] = unwrap(s.theta[l], before[i]);
+        after[i] = drape_nearest_branch(s.theta[l], before[i]);
     }
 }
 
@@ -328,7 +198,7 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
                 keep_worst(&altitude, "altitude_collapse", "altitude / rest altitude", i, ratio,
                            min_altitude);
         }
-        double angle = fabs(unwrap(s.theta[l], internal[i]) - internal[i]);
+        double angle = fabs(drape_nearest_branch(s.theta[l], internal[i]) - internal[i]);
         if (angle > turned.value)
             keep_worst(&turned, "hinge_branch", "turn of a hinge in one step [rad]", i, angle, max_turn);
     }

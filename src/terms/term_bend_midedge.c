@@ -102,47 +102,76 @@ static bool clamp_of(const drape_elements *el, int32_t element, int hinge, doubl
     return vec3_dot(r, r) > 0;
 }
 
-/* The angle of a hinge of an element, with derivatives by its first nodes: 3 where it is clamped, else 4. */
-static double hinge_angle(const drape_elements *el, int32_t element, int hinge, const double *x, double *g,
-                          double *h, int *nodes)
+/* As many hinges of an element as fill the lanes: which they are, of how many nodes (3 where it is clamped, else 4), and
+ * their angles, with derivatives by these nodes. */
+typedef struct hinges {
+    int count, number[LANES], nodes[LANES];
+    double theta[LANES], g[12 * LANES], h[144 * LANES];
+} hinges;
+
+/* The corners of a hinge; returns of how many nodes they are. */
+static int corners_of(const drape_elements *el, int32_t element, int hinge, const double *x, double at[12])
 {
     const int32_t *node = el->node + (size_t)element * (size_t)el->nodes;
     const int *local = drape_midedge_hinge[hinge];
-    double at[12], r[3];
-    *nodes = clamp_of(el, element, hinge, r) ? 3 : 4;
-    for (int a = 0; a < *nodes; a++)
+    double r[3];
+    const int nodes = clamp_of(el, element, hinge, r) ? 3 : 4;
+    for (int a = 0; a < nodes; a++)
         memcpy(at + 3 * a, x + 3 * (size_t)node[local[a]], 3 * sizeof *at);
-    for (int i = 0; *nodes == 3 && i < 3; i++)
+    for (int i = 0; nodes == 3 && i < 3; i++)
         at[9 + i] = (at[i] + at[3 + i]) / 2 + r[i];
-    const double theta = drape_dihedral(at, g, h);
-    if (*nodes == 3)
-        drape_dihedral_tie(g, h);
-    return theta;
+    return nodes;
+}
+
+/* Those from number `from` on; returns the number to go on with. Those whose c is 0 are not there. */
+static int measure_hinges(const drape_elements *el, int32_t element, int from, const double *x, bool first,
+                          bool second, hinges *s)
+{
+    double at[12 * LANES];
+    s->count = 0;
+    for (; from < MIDEDGE_HINGES && s->count < LANES; from++) {
+        if (rest_of(el, REST_C + from, element) == 0)
+            continue;
+        s->number[s->count] = from;
+        s->nodes[s->count] = corners_of(el, element, from, x, at + 12 * s->count);
+        s->count++;
+    }
+    if (s->count > 0)
+        drape_dihedrals(s->count, at, s->theta, first ? s->g : NULL, second ? s->h : NULL);
+    for (int i = 0; i < s->count; i++)
+        if (s->nodes[i] == 3)
+            drape_dihedral_tie(first ? s->g + 12 * i : NULL, second ? s->h + 144 * i : NULL);
+    return from;
+}
+
+/* c times the derivatives of hinge i. d: numbers of a gradient. */
+static void add_hinge(const hinges *s, int i, double c, int d, double *dq, double *ddq)
+{
+    const int *local = drape_midedge_hinge[s->number[i]];
+    for (int k = 0; dq && k < 3 * s->nodes[i]; k++)
+        dq[3 * local[k / 3] + k % 3] += c * s->g[12 * i + k];
+    for (int k = 0; ddq && k < 3 * s->nodes[i]; k++)
+        for (int j = 0; j < 3 * s->nodes[i]; j++)
+            ddq[d * (3 * local[k / 3] + k % 3) + 3 * local[j / 3] + j % 3] += c * s->h[144 * i + 12 * k + j];
 }
 
 static void measure_one(const drape_elements *el, int32_t element, const double *x, const double *before,
                         double *q, double *dq, double *ddq)
 {
     const int d = 3 * el->nodes;
+    hinges s;
     *q = 0;
     if (dq)
         memset(dq, 0, (size_t)d * sizeof *dq);
     if (ddq)
         memset(ddq, 0, (size_t)(d * d) * sizeof *ddq);
-    for (int k = 0; k < MIDEDGE_HINGES; k++) {
-        const double c = rest_of(el, REST_C + k, element);
-        const int *local = drape_midedge_hinge[k];
-        double g[12], h[144];
-        int nodes;
-        if (c == 0)
-            continue;
-        const double theta = hinge_angle(el, element, k, x, dq ? g : NULL, ddq ? h : NULL, &nodes);
-        *q += c * drape_nearest_branch(theta, before[k]);
-        for (int i = 0; dq && i < 3 * nodes; i++)
-            dq[3 * local[i / 3] + i % 3] += c * g[i];
-        for (int i = 0; ddq && i < 3 * nodes; i++)
-            for (int j = 0; j < 3 * nodes; j++)
-                ddq[d * (3 * local[i / 3] + i % 3) + 3 * local[j / 3] + j % 3] += c * h[12 * i + j];
+    for (int from = 0; from < MIDEDGE_HINGES;) {
+        from = measure_hinges(el, element, from, x, dq, ddq, &s);
+        for (int i = 0; i < s.count; i++) {
+            const double c = rest_of(el, REST_C + s.number[i], element);
+            *q += c * drape_nearest_branch(s.theta[i], before[s.number[i]]);
+            add_hinge(&s, i, c, d, dq, ddq);
+        }
     }
 }
 
@@ -280,14 +309,16 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
 
 /* ---- Internal variables ---- */
 
+/* 0 for hinges that are not there. */
 static void turn_angles(const drape_elements *el, int32_t element, const double *x, const double *before,
                         double *after)
 {
-    for (int k = 0; k < MIDEDGE_HINGES; k++) {
-        int nodes;
-        after[k] = rest_of(el, REST_C + k, element) == 0
-                       ? 0
-                       : drape_nearest_branch(hinge_angle(el, element, k, x, NULL, NULL, &nodes), before[k]);
+    hinges s;
+    memset(after, 0, MIDEDGE_HINGES * sizeof *after);
+    for (int from = 0; from < MIDEDGE_HINGES;) {
+        from = measure_hinges(el, element, from, x, false, false, &s);
+        for (int i = 0; i < s.count; i++)
+            after[s.number[i]] = drape_nearest_branch(s.theta[i], before[s.number[i]]);
     }
 }
 

@@ -71,12 +71,12 @@ static double rest_of(const drape_elements *el, int item, int32_t element)
 static double angle(const drape_elements *el, int32_t element, const double *x, double g[12], double h[144])
 {
     const int32_t *node = el->node + 3 * (size_t)element;
-    double at[12];
+    double at[12], theta;
     for (int a = 0; a < 3; a++)
         memcpy(at + 3 * a, x + 3 * (size_t)node[a], 3 * sizeof *at);
     for (int i = 0; i < 3; i++)
         at[9 + i] = (at[i] + at[3 + i]) / 2 + rest_of(el, REST_X + i, element);
-    const double theta = drape_dihedral(at, g, h);
+    drape_dihedrals(1, at, &theta, g, h);
     drape_dihedral_tie(g, h);
     return theta;
 }

@@ -7,6 +7,10 @@
  *     W_ab = l1 B_a1 B_b1 + l2 B_a2 B_b2 + l3 (B_a1 B_b2 + B_a2 B_b1)
  * so its Hessian is constant, W in each of the three directions. (Bonet & Wood 2008, Nonlinear Continuum
  * Mechanics for Finite Element Analysis, 6.3; Volino, Magnenat-Thalmann & Faure 2009.)
+ *
+ * f W is the stiffness that the stress f l gives: W = B' L B with L = (l1 l3; l3 l2), so its positive part is that of
+ * f L, the tensions of the stress, found at rest: L = L+ + L-, by its eigenvalues. Without it a sheet under tension would
+ * be as limp sideways in Newton's matrix as one without, and its steps too long by the ratio of the two.
  */
 #include "base/vec3.h"
 #include "terms/orthotropic.h"
@@ -17,7 +21,18 @@
 
 enum { PARAM_MIN_AREA = DRAPE_ORTHOTROPIC_COUNT };
 enum { LIST_MIN_AREA = DRAPE_ORTHOTROPIC_DIRECTION + 1, LIST_COUNT };
-enum { REST_K, REST_Q0, REST_W11, REST_W12, REST_W22, REST_AREA, REST_COUNT };
+enum {
+    REST_K,
+    REST_Q0,
+    REST_W11,
+    REST_W12,
+    REST_W22,
+    REST_PULL11,
+    REST_PULL12,
+    REST_PULL22,
+    REST_AREA,
+    REST_COUNT
+};
 
 /* As a list the direction is one entry; among the values it takes three. */
 static const drape_param params[LIST_COUNT] = {
@@ -83,6 +98,33 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
     }
 }
 
+/* W where the force pulls: of L+; where it pushes: of L- = L - L+. */
+static void positive(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                     const double *internal, const double *force, double *ddq)
+{
+    (void)x, (void)internal;
+    for (int32_t i = 0; i < count; i++) {
+        double w[3];
+        for (int k = 0; k < 3; k++) {
+            const double pulls = rest_of(el, REST_PULL11 + k, first + i);
+            w[k] = force[i] > 0 ? pulls : rest_of(el, REST_W11 + k, first + i) - pulls;
+        }
+        hessian(w, ddq + 81 * (size_t)i);
+    }
+}
+
+/* L+ of L, both as (L11, L22, L12): the eigenvalues are mean +- radius, and L+ is a share of L and one of the
+ * identity where they differ in sign. */
+static void tension_part(const double l[3], double plus[3])
+{
+    const double mean = (l[0] + l[1]) / 2, radius = hypot((l[0] - l[1]) / 2, l[2]);
+    const double high = fmax(0, mean + radius), low = fmax(0, mean - radius);
+    const double share = radius > 0 ? (high - low) / (2 * radius) : 0, rest = (high + low) / 2 - share * mean;
+    plus[0] = share * l[0] + rest;
+    plus[1] = share * l[1] + rest;
+    plus[2] = share * l[2];
+}
+
 /* W of one square from l and the rest triangle in the plane: the gradients of N1 and N2. */
 static void weights(const double l[3], const double flat[6], double w[3])
 {
@@ -106,7 +148,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         const int32_t *node = cloth->triangle + 3 * (size_t)t;
         const double *const corner[3] = {cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
                                          cloth->rest + 3 * (size_t)node[2]};
-        double axes[6], flat[6], w[3], d1[3], d2[3];
+        double axes[6], flat[6], w[3], plus[3], pull[3], d1[3], d2[3];
         if (!drape_orthotropic_frame(values, corner, law, axes, flat))
             return drape_term_refuse(
                 builder,
@@ -118,9 +160,11 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         for (int r = 0; r < 3; r++) {
             const double area = cloth->triangle_area[t];
             weights(l + 3 * r, flat, w);
-            drape_term_set(
-                builder, 3 * t + r, node,
-                (const double[REST_COUNT]){k[r] * area, measure_of(w, d1, d2), w[0], w[1], w[2], area});
+            tension_part(l + 3 * r, plus);
+            weights(plus, flat, pull);
+            drape_term_set(builder, 3 * t + r, node,
+                           (const double[REST_COUNT]){k[r] * area, measure_of(w, d1, d2), w[0], w[1], w[2],
+                                                      pull[0], pull[1], pull[2], area});
         }
     }
     return status;
@@ -155,5 +199,6 @@ const drape_term_ops drape_term_stretch_cst = {
     .nodes = 3,
     .build = build,
     .measure = measure,
+    .positive = positive,
     .check = check,
 };

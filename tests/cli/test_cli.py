@@ -55,6 +55,8 @@ def test_wrong_usage():
     refused("run", "scene.json", "--threads", "257", says="1 to 256")
     refused("run", "scene.json", "--set", "integrator.dt=1", says="/pointer=value")
     refused("run", "scene.json", "--set", "/integrator/dt", says="/pointer=value")
+    refused("run", "scene.json", "--dt", "0.01", "--dt", "0.02", says="--dt is given twice")
+    refused("info", "scene.json", "--json", "--json", says="--json is given twice")
     refused("list", "klo", says='did you mean "klu"?')
     refused("list", "terms", "--schema", says="--schema")
 

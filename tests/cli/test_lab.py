@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """Experiments by the program: tradeoff, stability, converge, merge. See program.py."""
+import csv
 import glob
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,6 +14,7 @@ import json
 
 from program import PROGRAM, SOURCES, drape, equal, good, read_json, refused, run_tests, scene, write_scene
 
+CASES = 79  # of drape validate
 AXES = ["--axis", "/integrator/dt=1e-3:1e-1:3log", "--axis", "/cloth/0/material/young_modulus=1e4:1e6:2log"]
 
 
@@ -128,6 +131,89 @@ def test_shards():
     good("merge", "part1", "part2", "part3", "--out", "merged")
     equal(lines("merged"), lines("whole"), "results")
     page_is_alone("merged/report.html")
+
+
+def merged_is(whole, folder, merged):
+    """The lines and the table of the parts are those of one run."""
+    good("merge", folder, "--out", merged)
+    equal(lines(merged), lines(whole), "results of " + folder)
+    numbers = ("cpu_s", "wall_s")
+    tables = []
+    for name in (merged, whole):
+        with open(name + "/results.csv", encoding="utf-8", newline="") as file:
+            tables.append([{k: v for k, v in row.items() if k not in numbers} for row in csv.DictReader(file)])
+    equal(tables[0], tables[1], "results.csv of " + folder)
+
+
+def test_recipes():
+    """the recipes for GNU parallel, xargs and an array of Slurm give what one run gives"""
+    write_scene()
+    command = ["stability", "scene.json", *AXES, "--integrators", "be,verlet"]
+    recipes = SOURCES + "/examples/sweep/"
+    good(*command, "--out", "whole")
+    if shutil.which("parallel"):
+        subprocess.run([recipes + "parallel", "5", PROGRAM, *command, "--out", "by_parallel"], check=True, capture_output=True)
+        equal(len(glob.glob("by_parallel/cases-*-of-5.jsonl")), 5, "shards")
+        merged_is("whole", "by_parallel", "merged_parallel")
+    os.mkdir("bin")  # all programs but parallel that the recipe wants
+    for name in ("bash", "seq", "nproc", "xargs", "sed"):
+        os.symlink(shutil.which(name), "bin/" + name)
+    subprocess.run([recipes + "parallel", "5", PROGRAM, *command, "--out", "by_xargs"], check=True, capture_output=True,
+                   env={**os.environ, "PATH": os.path.abspath("bin")})
+    merged_is("whole", "by_xargs", "merged_xargs")
+    # What Slurm sets in each task of an array; the tasks run in any order.
+    for task in (3, 1, 2):
+        subprocess.run(["bash", recipes + "array.sbatch", PROGRAM, *command, "--out", "by_array"], check=True, capture_output=True,
+                       env={**os.environ, "SLURM_ARRAY_TASK_ID": str(task), "SLURM_ARRAY_TASK_COUNT": "3", "SLURM_CPUS_PER_TASK": "2"})
+    merged_is("whole", "by_array", "merged_array")
+
+
+def test_validate_goes_on():
+    """validate --out keeps its cases and goes on after Ctrl-C"""
+    with subprocess.Popen([PROGRAM, "validate", "--out", "v"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as child:
+        for _ in range(6000):
+            time.sleep(0.02)
+            if os.path.exists("v/cases.jsonl") and lines_there("v"):
+                break
+        child.send_signal(signal.SIGINT)
+        table, message = (text.decode() for text in child.communicate())
+    equal(child.returncode, 130, "exit code")
+    kept = [json.loads(line) for line in lines_there("v")]
+    equal(message, f"interrupted: {len(kept)} of {CASES} cases are done; the same command goes on\n", "message")
+    assert table.count("pass") == len(kept) + 1, table  # and "passed" in the last line
+    # The lines are of these cases: what is changed in them shows in the table, a case of another name is left out.
+    kept[0]["obtained"] = 2 * kept[0]["expected"]
+    with open("v/cases.jsonl", "w", encoding="utf-8") as file:
+        file.write(json.dumps(kept[0]) + "\n" + json.dumps({**kept[0], "scene_hash": "0"}) + "\n{\"name")
+    result = drape("validate", "cantilever", "--json", "--out", "v") if kept[0]["name"] == "cantilever" else None
+    rows = json.loads(result.stdout)
+    equal((rows[0]["verdict"], result.returncode), ("fail", 1), "a line that is wrong")
+    equal(rows[0]["cpu_s"], kept[0]["cpu_s"], "it was not run again")
+    equal([row["verdict"] for row in rows[1:]], ["pass"] * (len(rows) - 1), "the others")
+
+
+def test_reference_goes_on():
+    """the reference of tradeoff is kept rung by rung: a run that was killed does not climb them again"""
+    write_scene(duration=0.3)
+    command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
+    with subprocess.Popen([PROGRAM, *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as child:
+        for _ in range(6000):
+            if os.path.exists("t/reference-ida.json") or child.poll() is not None:
+                break
+            time.sleep(0.001)
+        child.kill()
+    assert os.path.exists("t/reference-ida.json") or os.path.exists("t/reference.json"), os.listdir("t")
+    if not os.path.exists("t/reference.json"):
+        # What is kept is taken as it is: with an error that ends the ladder there are no more rungs.
+        about = read_json("t/reference-ida.json")
+        about["error_m"] = 1e-12
+        with open("t/reference-ida.json", "w", encoding="utf-8") as file:
+            json.dump(about, file)
+        good(*command)
+        equal(read_json("t/reference.json"), about, "the reference")
+    else:
+        good(*command)
+    assert not glob.glob("t/reference-*"), "what is left of the climb"
 
 
 def test_resume():

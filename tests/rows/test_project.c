@@ -188,5 +188,55 @@ START_TEST(nan_stays)
 }
 END_TEST
 
+/* ---- The membrane ---- */
+
+static drape_model *membrane(drape_context *ctx)
+{
+    const drape_row_def term = {"stretch.cst", NULL, 0};
+    return make_model(ctx, &(model_def){.mesh = MESH_IRREGULAR, .terms = &term, .term_count = 1});
+}
+
+/* The Jacobian of a sheet that is stretched by these factors along x and z, exact and projected. Returns the largest
+ * entry of their difference over that of the exact one. */
+static double projected_away(drape_context *ctx, const drape_model *m, double along, double across)
+{
+    const size_t values = (size_t)m->pattern.nonzeros;
+    double *x = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *x),
+           *v = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *v),
+           *exact = drape_alloc(ctx, values, sizeof *exact), *projected = drape_alloc(ctx, values, sizeof *x);
+    drape_system *system = NULL;
+    double most = 0, away = 0;
+    ck_assert(x && v && exact && projected);
+    ck_assert_int_eq(drape_system_create(ctx, m, 1, &system), DRAPE_OK);
+    for (int32_t i = 0; i < m->node_count; i++) {
+        const double *rest = m->rest + 3 * (size_t)i;
+        x[3 * i] = along * rest[0], x[3 * i + 1] = rest[1], x[3 * i + 2] = across * rest[2];
+    }
+    const drape_point point = {.x = x, .v = v};
+    drape_system_jacobian(system, &point, 0, 0, exact);
+    drape_system_jacobian(system, &point, 0, 1, projected);
+    for (size_t i = 0; i < values; i++) {
+        most = fmax(most, fabs(exact[i]));
+        away = fmax(away, fabs(projected[i] - exact[i]));
+    }
+    drape_system_destroy(&system);
+    drape_free(ctx, x), drape_free(ctx, v), drape_free(ctx, exact), drape_free(ctx, projected);
+    return away / most;
+}
+
+/* Equal tension both ways: f1 L1 = (S, nu S), f2 L2 = (0, (1 - nu) S), f3 = 0: all of it pulls, and nothing is lost.
+ * Compressed as much, all of the stress is lost: S/E = .02 (1 + .01)/(1 - nu) of a stiffness of 1 or so. */
+START_TEST(the_membrane_keeps_its_tension)
+{
+    drape_context *ctx = NULL;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    drape_model *m = membrane(ctx);
+    ck_assert_double_le(projected_away(ctx, m, 1.02, 1.02), 1e-13);
+    ck_assert_double_ge(projected_away(ctx, m, 0.98, 0.98), 1e-3);
+    drape_model_destroy(&m);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 SUITE("project", it_is_the_nearest, it_does_not_depend_on_the_unit, a_positive_matrix_keeps_its_bits,
-      a_negative_matrix_becomes_zero, two_by_two, three_by_three, nan_stays)
+      a_negative_matrix_becomes_zero, two_by_two, three_by_three, nan_stays, the_membrane_keeps_its_tension)

@@ -264,6 +264,70 @@ START_TEST(square_defaults)
 }
 END_TEST
 
+START_TEST(equilateral_strips)
+{
+    drape_context *ctx = new_context();
+    const drape_setting settings[] = {{"edges", 2, NULL}, {"edge_length", 0.1, NULL}, {"strips", 5, NULL}};
+    drape_mesh_def def;
+    drape_mesh_def_init(&def, sizeof def);
+    def.grid = (drape_row_def){"equilateral", settings, 3};
+    drape_mesh mesh = make(ctx, &def);
+    ck_assert_int_eq(mesh.rows, 6);
+    ck_assert_int_eq(mesh.columns, 3);
+    ck_assert_int_eq(mesh.triangle_count, 2 * 2 * 5);
+    ck_assert_double_eq_tol(mesh.x[3 * 17 + 2], -5 * sqrt(3) / 2 * 0.1, 1e-15);
+    drape_mesh_free(ctx, &mesh);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* Twice the area of a triangle of the plane y = 0, positive where it turns counterclockwise seen from +y. */
+static double twice_area(const drape_mesh *mesh, int32_t t)
+{
+    const double *a = mesh->x + 3 * mesh->triangle[3 * t], *b = mesh->x + 3 * mesh->triangle[3 * t + 1],
+                 *c = mesh->x + 3 * mesh->triangle[3 * t + 2];
+    return (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2]);
+}
+
+/* Its triangles all look up, and fill what lies between the polygons of its two rims; it is closed, so V - E + F = 0
+ * and the rims alone are boundary. */
+START_TEST(annuli)
+{
+    enum { ROWS = 4, SPOKES = 7 };
+    drape_context *ctx = new_context();
+    const drape_setting settings[] = {{"rows", ROWS, NULL},
+                                      {"columns", SPOKES, NULL},
+                                      {"inner_radius", 0.5, NULL},
+                                      {"outer_radius", 2, NULL}};
+    drape_mesh_def def;
+    drape_mesh_def_init(&def, sizeof def);
+    def.grid = (drape_row_def){"annulus", settings, 4};
+    drape_mesh mesh = make(ctx, &def);
+    double area = 0;
+    ck_assert_int_eq(mesh.triangle_count, 2 * (ROWS - 1) * SPOKES);
+    for (int32_t t = 0; t < mesh.triangle_count; t++) {
+        ck_assert_double_gt(twice_area(&mesh, t), 0);
+        area += twice_area(&mesh, t) / 2;
+    }
+    for (int32_t i = 0; i < mesh.node_count; i++)
+        ck_assert_double_eq_tol(hypot(mesh.x[3 * i], mesh.x[3 * i + 2]), 0.5 + (i / SPOKES) * 0.5, 1e-15);
+    const double polygon = SPOKES * sin(2 * acos(-1.0) / SPOKES) / 2;
+    ck_assert_double_eq_tol(area, polygon * (4 - 0.25), 1e-13);
+    int edges = 0;
+    for (int32_t a = 0; a < mesh.node_count; a++)
+        for (int32_t b = a + 1; b < mesh.node_count; b++)
+            edges += has_edge(&mesh, a, b);
+    ck_assert_int_eq(mesh.node_count - edges + mesh.triangle_count, 0);
+    drape_mesh_free(ctx, &mesh);
+    drape_setting wrong[4];
+    memcpy(wrong, settings, sizeof wrong);
+    wrong[3].number = 0.5;
+    def.grid.settings = wrong;
+    assert_refused(&def, "/m/outer_radius: 0.5 m; it is larger than inner_radius, 0.5 m");
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 START_TEST(grid_faults)
 {
     drape_setting s[6];
@@ -281,12 +345,12 @@ START_TEST(grid_faults)
     def = equilateral(s, 3, 5e8);
     assert_refused(&def, "/m: node 3 is at (1.5e+09, 0, 0) m; coordinates must be finite and within 1e+09 m");
     def.grid.type = "equilaterale";
-    assert_refused(
-        &def,
-        "/m/grid: unknown grid \"equilaterale\"; known are equilateral, square, irregular; did you mean "
-        "\"equilateral\"?");
+    assert_refused(&def, "/m/grid: unknown grid \"equilaterale\"; known are equilateral, square, irregular, "
+                         "annulus; did you mean "
+                         "\"equilateral\"?");
     def.grid.type = "hexagons";
-    assert_refused(&def, "/m/grid: unknown grid \"hexagons\"; known are equilateral, square, irregular");
+    assert_refused(&def,
+                   "/m/grid: unknown grid \"hexagons\"; known are equilateral, square, irregular, annulus");
     def = square(s, 1, 2, "parallel", "vertical");
     assert_refused(&def, "/m/columns: 1 is not allowed; columns is an integer in [2, 134217728]");
     def = square(s, 20000, 20000, "parallel", "vertical");
@@ -593,8 +657,9 @@ START_TEST(every_failed_allocation_is_reported_and_none_leaks)
 END_TEST
 
 SUITE("mesh", equilateral_counts_and_positions, equilateral_triangles_are_equilateral, square_grids,
-      square_defaults, grid_faults, too_many_nodes_are_refused_before_memory_is_taken,
-      transform_scales_then_rotates_then_translates, rotation_is_exact_at_right_angles_and_right_between,
-      identity_transform_changes_no_bit, transform_faults, exactly_one_source, array_faults,
-      two_closed_fans_at_one_node_are_refused, closed_and_inconsistently_wound_meshes_are_fine,
-      measures_of_a_known_triangle, a_node_of_high_degree, every_failed_allocation_is_reported_and_none_leaks)
+      square_defaults, equilateral_strips, annuli, grid_faults,
+      too_many_nodes_are_refused_before_memory_is_taken, transform_scales_then_rotates_then_translates,
+      rotation_is_exact_at_right_angles_and_right_between, identity_transform_changes_no_bit,
+      transform_faults, exactly_one_source, array_faults, two_closed_fans_at_one_node_are_refused,
+      closed_and_inconsistently_wound_meshes_are_fine, measures_of_a_known_triangle, a_node_of_high_degree,
+      every_failed_allocation_is_reported_and_none_leaks)

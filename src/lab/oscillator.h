@@ -1,0 +1,28 @@
+/* oscillator.h: two nodes on an elastic sheet, its other side held: what a time integrator makes of an oscillation. */
+#ifndef DRAPE_LAB_OSCILLATOR_H
+#define DRAPE_LAB_OSCILLATOR_H
+
+#include "lab/validate.h"
+
+/* k = E h w/L = 1 N/m, half of 1 kg moves: omega^2 = 2. It starts at rest length with the speed OSCILLATOR_SPEED; at
+ * strains of 1e-5 the sheet is linear to 1e-5. integrator: members of the scene's integrator besides dt and tolerance.
+ */
+int oscillator_scene(const char *integrator, double angle, char *text, size_t size);
+
+#define OSCILLATOR_SPEED 1e-5 /* [m/s] */
+#define OSCILLATOR_OMEGA 1.41421356237309504880
+
+/* Advances by so many steps of omega h = angle. */
+drape_status oscillator_advance(drape_reference_run *run, double angle, int steps);
+
+/* Kinetic and elastic energy. */
+double oscillator_energy(const drape_reference_run *run);
+
+/* The share of the amplitude that a step leaves, from the energies after `from` and after `to` steps. */
+drape_status oscillator_amplitude(drape_reference_run *run, double angle, int from, int to, double *value);
+
+/* The angle of a step over omega h: every method that advances x and v by one matrix of determinant 1 has
+ * x(n+1) + x(n-1) = 2 cos(angle) x(n). */
+drape_status oscillator_phase(drape_reference_run *run, double angle, double *value);
+
+#endif

@@ -1,0 +1,44 @@
+/* oscillator_bdf2: on z' = i omega z the formula 3/2 z1 - 2 z0 + 1/2 z_ = i omega h z1 has the roots
+ * (2 +- sqrt(1 + 2 i omega h))/(3 - 2 i omega h); the larger is what a step leaves of the amplitude once the other has
+ * died: below 0.35^15 after the steps that are not measured. */
+#include "lab/oscillator.h"
+
+#include <complex.h>
+#include <math.h>
+
+#define FIRST 15
+#define LAST  25
+
+static const double angles[] = {0.1, 0.5, 2};
+
+static double expected(double angle)
+{
+    const double complex z = I * angle;
+    return cabs((2 + csqrt(1 + 2 * z)) / (3 - 2 * z));
+}
+
+static int scene(double angle, double load, char *text, size_t size)
+{
+    (void)load;
+    return oscillator_scene("'method': 'bdf2'", angle, text, size);
+}
+
+static drape_status measure(drape_reference_run *run, double *value)
+{
+    return oscillator_amplitude(run, run->parameter, FIRST, LAST, value);
+}
+
+const drape_reference drape_reference_oscillator_bdf2 = {
+    .name = "oscillator_bdf2",
+    .quantity = "share of the amplitude left by a step",
+    .unit = "1",
+    .parameter = "omega h",
+    .model = "stretch.cst; square; bdf2",
+    .source = "roots of (3/2 - i omega h) r^2 - 2 r + 1/2; .990401 at omega h = .5",
+    .tolerance = 1e-4,
+    .parameters = angles,
+    .case_count = sizeof angles / sizeof *angles,
+    .expected = expected,
+    .scene = scene,
+    .measure = measure,
+};

@@ -1,0 +1,117 @@
+/*
+ * grid_annulus.c: a ring between two circles about the y axis, in the plane y = 0, normal +y. Rows are circles from the
+ * inner to the outer one, so that pins of row 0, or of the edge "top", hold the inner rim, and "bottom" is the outer;
+ * columns are spokes, and the last is beside the first. Every second circle is turned by half a spoke. Node (r, c):
+ *
+ *     R = inner + r (outer - inner)/(circles - 1),  a = 2 pi (c + (r odd ? 1/2 : 0))/spokes,
+ *     x = R cos a,  z = -R sin a
+ */
+#include <math.h>
+#include <stdio.h>
+
+#include "mesh/grid.h"
+
+enum { CIRCLES, SPOKES, INNER, OUTER, PARAM_COUNT };
+
+static const drape_param params[PARAM_COUNT] = {
+    [CIRCLES] = {.name = "rows",
+                 .kind = DRAPE_PARAM_INTEGER,
+                 .unit = "1",
+                 .default_value = NAN,
+                 .min = 2,
+                 .max = DRAPE_MAX_NODES / 3,
+                 .help = "circles of nodes, the inner one first; columns x rows is at most 2^28"},
+    [SPOKES] = {.name = "columns",
+                .kind = DRAPE_PARAM_INTEGER,
+                .unit = "1",
+                .default_value = NAN,
+                .min = 3,
+                .max = DRAPE_MAX_NODES / 2,
+                .help = "nodes on each circle"},
+    [INNER] = {.name = "inner_radius",
+               .kind = DRAPE_PARAM_NUMBER,
+               .unit = "m",
+               .default_value = NAN,
+               .min = 0,
+               .max = 1e9,
+               .open_min = true,
+               .help = "radius of the hole"},
+    [OUTER] = {.name = "outer_radius",
+               .kind = DRAPE_PARAM_NUMBER,
+               .unit = "m",
+               .default_value = NAN,
+               .min = 0,
+               .max = 1e9,
+               .open_min = true,
+               .help = "radius of the rim; larger than inner_radius"},
+};
+
+static void place_nodes(const double *values, drape_mesh *mesh)
+{
+    const double two_pi = 6.28318530717958647693, inner = values[INNER],
+                 step = (values[OUTER] - inner) / (mesh->rows - 1);
+    double *x = mesh->x;
+    for (int32_t r = 0; r < mesh->rows; r++)
+        for (int32_t c = 0; c < mesh->columns; c++, x += 3) {
+            const double angle = two_pi * (c + (r % 2 ? 0.5 : 0)) / mesh->columns, radius = inner + r * step;
+            x[0] = radius * cos(angle);
+            x[1] = 0;
+            x[2] = -radius * sin(angle);
+        }
+}
+
+static int32_t *put(int32_t *next, int32_t a, int32_t b, int32_t c)
+{
+    next[0] = a, next[1] = b, next[2] = c;
+    return next + 3;
+}
+
+/* Letters as in grid.h, r outwards. A node of a turned circle lies between two of the next. */
+static void split_cells(drape_mesh *mesh)
+{
+    int32_t *next = mesh->triangle;
+    for (int32_t r = 0; r + 1 < mesh->rows; r++)
+        for (int32_t k = 0; k < mesh->columns; k++) {
+            const int32_t after = (k + 1) % mesh->columns, row = r * mesh->columns;
+            const int32_t a = row + k, b = row + after, c = a + mesh->columns, d = b + mesh->columns;
+            next = put(next, a, r % 2 ? d : c, b);
+            next = put(next, r % 2 ? a : b, c, d);
+        }
+}
+
+static drape_status check_radii(drape_context *ctx, const char *pointer, const double *values)
+{
+    char place[sizeof ctx->pointer];
+    if (values[OUTER] > values[INNER])
+        return DRAPE_OK;
+    snprintf(place, sizeof place, "%s/outer_radius", pointer);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "%g m; it is larger than inner_radius, %g m",
+                         values[OUTER], values[INNER]);
+}
+
+static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
+{
+    const int32_t columns = (int32_t)values[SPOKES], rows = (int32_t)values[CIRCLES];
+    const drape_mesh_source source = {.pointer = pointer};
+    drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
+    if (!status)
+        status = check_radii(ctx, pointer, values);
+    if (!status)
+        status = drape_mesh_allocate(ctx, &source, (size_t)rows * (size_t)columns,
+                                     2 * (size_t)(rows - 1) * (size_t)columns, mesh);
+    if (status)
+        return status;
+    mesh->rows = rows;
+    mesh->columns = columns;
+    place_nodes(values, mesh);
+    split_cells(mesh);
+    return DRAPE_OK;
+}
+
+const drape_grid_ops drape_grid_annulus = {
+    .name = "annulus",
+    .summary = "a ring between two circles: what overhangs the disc of a drape tester",
+    .params = params,
+    .param_count = PARAM_COUNT,
+    .generate = generate,
+};
