@@ -541,6 +541,13 @@ void drape_system_measures(drape_system *system, const drape_point *point, doubl
     }
 }
 
+void drape_system_stress(drape_system *system, const drape_point *point, const double *along, double *stress)
+{
+    const drape_request want = {
+        .point = point, .conservative = true, .dissipative = along, .along = along, .stress = stress};
+    drape_summer_stress(system->summer, &want);
+}
+
 /* ---- Finding what is wrong ---- */
 
 static drape_worst worst_element(const drape_term *term, const drape_fault *fault)

@@ -26,6 +26,8 @@ typedef struct drape_point {
     const double *internal; /* (internal_count) of the last accepted state */
     double weight;          /* w [1/s]: v = w x + const, and q' = w q + history */
     const double *history;  /* (measure_count) [q/s]; NULL: q' = grad q . v, as in continuous time */
+    const double *stress;   /* (measure_count) the forces on measures that weigh their second derivatives in a
+                               Jacobian; NULL: those here */
     double t;               /* [s] where colliders stand */
     double span[2];         /* [s] over which their velocity is taken; equal: they rest */
 } drape_point;
@@ -142,6 +144,10 @@ double drape_system_way(drape_system *system, const double *x, const double *y, 
 
 /* q of all measures (measure_count). */
 void drape_system_measures(drape_system *system, const drape_point *point, double *q);
+
+/* The forces f on all measures, dE/dq and laws (measure_count), to first order where the nodes go on by `along`
+ * (node_count x 3); NULL: here, and without what is dissipative. */
+void drape_system_stress(drape_system *system, const drape_point *point, const double *along, double *stress);
 
 /* One term alone, for checks and profiles: adds its g to g, its J to values; *energy gets its energy. Any of
  * the three may be NULL. */

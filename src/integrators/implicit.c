@@ -52,6 +52,7 @@ void drape_implicit_base(drape_implicit *s, const drape_state *in, double t, dou
     size_t nodes = 3 * (size_t)m->node_count;
     s->t = s->span[1] = t;
     s->span[0] = in->t;
+    s->x_start = in->x;
     memcpy(s->x_base, in->x, nodes * sizeof *s->x_base);
     memset(s->v_base, 0, nodes * sizeof *s->v_base);
     drape_motion_place_pins(s->motion, t, s->x_base);
@@ -73,6 +74,7 @@ drape_status drape_implicit_solve(drape_implicit *s, const double *internal, con
 {
     const drape_newton_problem problem = {.x_base = s->x_base,
                                           .v_base = s->v_base,
+                                          .x_start = s->x_start,
                                           .weight = weight,
                                           .mass_weight = mass_weight,
                                           .inertia = s->inertia,

@@ -18,7 +18,8 @@ typedef struct drape_implicit {
     double *history;         /* measures; NULL where no law wants rates */
     double *dissipated;      /* nodes; NULL where nothing dissipates */
     bool inertial_guess;
-    double t, span[2]; /* [s] of the base: where colliders stand, and the way to there */
+    const double *x_start; /* nodes: see drape_newton_problem */
+    double t, span[2];     /* [s] of the base: where colliders stand, and the way to there */
 } drape_implicit;
 
 /* For rows that embed it, with a Newton solver or without one: on failure what was taken is freed by

@@ -34,9 +34,11 @@ typedef struct drape_newton drape_newton;
 /* One system. Arrays of nodes are (node_count x 3), of free DOFs (dofs). */
 typedef struct drape_newton_problem {
     const double *x_base, *v_base; /* nodes: at d = 0; pinned ones where they are at the end of the step */
-    double weight;                 /* w [1/s] */
-    double mass_weight;            /* m_w [1/s2] */
-    const double *inertia;         /* p, free DOFs [m] */
+    /* nodes: where the step, or its stage, goes from; NULL: neither the mixed iteration (mixed.h) nor chords */
+    const double *x_start;
+    double weight;         /* w [1/s] */
+    double mass_weight;    /* m_w [1/s2] */
+    const double *inertia; /* p, free DOFs [m] */
     const double *internal;
     const double *history; /* of the measures' rates, see drape_point */
     double t, span[2];     /* [s] where colliders stand, and the step, see drape_point */

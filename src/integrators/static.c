@@ -157,6 +157,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     double dt = values[DRAPE_NEWTON_DT], tolerance = values[DRAPE_NEWTON_TOLERANCE];
     info->h = h;
     drape_implicit_base(&s->common, in, out->t, 1);
+    s->common.x_start = NULL;        /* corrections are too large for forces to first order in them */
     s->common.span[0] = s->common.t; /* colliders rest */
     memset(s->common.v_base, 0, nodes * sizeof *s->common.v_base);
     memcpy(out->x, s->common.x_base, nodes * sizeof *out->x);

@@ -59,6 +59,7 @@ static drape_status solve(trbdf2_state *s, const double *internal, double w, dra
     drape_implicit *c = &s->common;
     const drape_newton_problem problem = {.x_base = c->x_base,
                                           .v_base = c->v_base,
+                                          .x_start = c->x_start,
                                           .weight = w,
                                           .mass_weight = w * w,
                                           .inertia = c->inertia,
@@ -153,6 +154,7 @@ static drape_status differentiate(trbdf2_state *s, const drape_state *in, double
 {
     drape_implicit *c = &s->common;
     drape_implicit_base(c, in, out->t, h);
+    c->x_start = s->xg;
     for (int32_t i = 0; i < c->motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)c->motion->moved_node[i] + k;
