@@ -39,7 +39,8 @@ typedef struct drape_realtime_memory {
 } drape_realtime_memory;
 
 struct drape_sim {
-    atomic_bool cancel; /* the advance that runs, or the next, is to stop; first, of the handle, whatever it holds */
+    atomic_bool
+        cancel; /* the advance that runs, or the next, is to stop; first, of the handle, whatever it holds */
     drape_context *ctx;
     drape_arena arena;
     const drape_model *model;
