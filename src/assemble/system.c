@@ -3,6 +3,7 @@
 
 #include "assemble/sum.h"
 #include "base/clock.h"
+#include "base/finite.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -123,6 +124,13 @@ double drape_system_push_work(const drape_system *system, const double *x, const
 drape_status drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user)
 {
     return drape_wind_set(system->ctx, system->model, field, user, &system->wind);
+}
+
+void drape_system_swap_wind(drape_system *a, drape_system *b)
+{
+    const drape_wind wind = a->wind;
+    a->wind = b->wind;
+    b->wind = wind;
 }
 
 void drape_system_add_loads(const drape_system *system, const double *x, double *g)
@@ -290,6 +298,16 @@ static void archive_pull(drape_system *system, drape_archive *a)
                            (int)pull->node);
 }
 
+static void archive_push(drape_system *system, drape_archive *a)
+{
+    const size_t n = 3 * (size_t)system->model->node_count;
+    drape_archive_bool(a, &system->pushed);
+    if (system->pushed && drape_archive_good(a))
+        drape_archive_doubles(a, system->push, n);
+    if (drape_archive_is_reading(a) && !drape_all_finite(system->push, n))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pushes with a force that is not finite");
+}
+
 /* A wider pattern is made of what was near when the one before it was too narrow: that list is kept. */
 void drape_system_archive(drape_system *system, drape_archive *a)
 {
@@ -297,6 +315,8 @@ void drape_system_archive(drape_system *system, drape_archive *a)
     const int32_t *nodes = NULL;
     drape_archive_mark(a, "system");
     archive_pull(system, a);
+    archive_push(system, a);
+    drape_motion_archive(system->motion, a);
     drape_archive_same(a, "whether there is contact", contact);
     if (contact)
         drape_contact_archive(system->contact, a);

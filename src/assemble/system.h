@@ -61,6 +61,9 @@ double drape_system_push_work(const drape_system *system, const double *x, const
 /* A medium that moves, from now on. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user);
 
+/* The winds of two systems of one model change places. */
+void drape_system_swap_wind(drape_system *a, drape_system *b);
+
 /* Adds what a host does to nodes at x, pull and push, to g (node_count x 3): a part of drape_system_force. */
 void drape_system_add_loads(const drape_system *system, const double *x, double *g);
 

@@ -1,8 +1,10 @@
 /* motion.c: see motion.h. */
 #include "model/motion.h"
 
+#include "base/finite.h"
 #include "model/track.h"
 
+#include <math.h>
 #include <string.h>
 
 /* ---- Making and freeing ---- */
@@ -197,8 +199,8 @@ void drape_motion_pin_velocity(const drape_motion *motion, int32_t i, double t, 
     velocity_of(pin_track(motion, i), &motion->pin_way[i], t, within, v);
 }
 
-void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double span, const double x[3],
-                           const double *v)
+/* The number of a pin among the moved ones, of which it is one from now on. */
+static int32_t find_place(drape_motion *motion, int32_t node)
 {
     int32_t i = motion->place[node];
     if (i < 0) {
@@ -206,6 +208,13 @@ void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double 
         motion->moved_node[i] = node;
         motion->moved_track[i] = -1;
     }
+    return i;
+}
+
+void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double span, const double x[3],
+                           const double *v)
+{
+    int32_t i = find_place(motion, node);
     double from[3];
     place_pin(motion, i, t, from);
     send(pin_track(motion, i), &motion->pin_way[i], t, span, from, x, v);
@@ -248,6 +257,63 @@ void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t
     double from[3];
     drape_motion_collider(motion, collider, t, from);
     send(&motion->model->colliders[collider].track, &motion->collider_way[collider], t, span, from, x, v);
+}
+
+/* ---- In a checkpoint ---- */
+
+static bool is_way(const drape_way *way)
+{
+    bool good = isfinite(way->t[0]) && isfinite(way->t[1]) && way->t[0] <= way->t[1];
+    for (int i = 0; i < 2; i++)
+        good = good && drape_all_finite(way->x[i], 3) && drape_all_finite(way->v[i], 3);
+    return good;
+}
+
+static void archive_way(drape_way *way, drape_archive *a)
+{
+    drape_archive_bool(a, &way->given);
+    if (!way->given || !drape_archive_good(a))
+        return;
+    drape_archive_bool(a, &way->smooth);
+    drape_archive_doubles(a, way->t, 2);
+    for (int i = 0; i < 2; i++) {
+        drape_archive_doubles(a, way->x[i], 3);
+        drape_archive_doubles(a, way->v[i], 3);
+    }
+    if (drape_archive_is_reading(a) && !is_way(way))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves something along no way");
+}
+
+/* Those with a track come first, in the model's order; the others as the host named them. */
+static void archive_place(drape_motion *motion, int32_t i, drape_archive *a)
+{
+    int32_t node = a->reading ? -1 : motion->moved_node[i];
+    drape_archive_int32(a, &node);
+    if (!drape_archive_is_reading(a))
+        return;
+    bool good = node >= 0 && node < motion->model->node_count && motion->model->pinned[node] &&
+                (i < motion->model->moved_count ? motion->place[node] == i : motion->place[node] < 0);
+    if (good)
+        find_place(motion, node);
+    else
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves node %d, which is no pin", (int)node);
+}
+
+void drape_motion_archive(drape_motion *motion, drape_archive *a)
+{
+    int32_t count = motion->moved_count;
+    drape_archive_mark(a, "motion");
+    drape_archive_int32(a, &count);
+    if (drape_archive_good(a) &&
+        (count < motion->model->moved_count || count > (int32_t)pinned_count(motion->model)))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves %d pins", (int)count);
+    for (int32_t i = 0; i < count && drape_archive_good(a); i++) {
+        archive_place(motion, i, a);
+        if (drape_archive_good(a))
+            archive_way(&motion->pin_way[i], a);
+    }
+    for (int32_t c = 0; c < motion->model->collider_count && drape_archive_good(a); c++)
+        archive_way(&motion->collider_way[c], a);
 }
 
 /* ---- All of them ---- */

@@ -5,6 +5,7 @@
 #ifndef DRAPE_MODEL_MOTION_H
 #define DRAPE_MODEL_MOTION_H
 
+#include "base/archive.h"
 #include "model/model.h"
 
 /* A cubic from its first moment to its last, at rest before and after: x and v at both. x is a position of a pin, a
@@ -31,6 +32,9 @@ typedef struct drape_motion {
 drape_status drape_motion_create(drape_context *ctx, const drape_model *model, drape_motion **out);
 void drape_motion_destroy(drape_motion **motion);
 size_t drape_motion_bytes(const drape_motion *motion);
+
+/* The ways of the host, and which pins have one. */
+void drape_motion_archive(drape_motion *motion, drape_archive *archive);
 
 /* Writes the positions of moved pins at time t; other entries of x (node_count x 3) stay. */
 void drape_motion_place_pins(const drape_motion *motion, double t, double *x);

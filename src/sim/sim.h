@@ -39,6 +39,8 @@ typedef struct drape_realtime_memory {
 } drape_realtime_memory;
 
 struct drape_sim {
+    atomic_bool
+        cancel; /* the advance that runs, or the next, is to stop; first, of the handle, whatever it holds */
     drape_context *ctx;
     drape_arena arena;
     const drape_model *model;
@@ -55,7 +57,6 @@ struct drape_sim {
     int64_t next_frame;
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
     double *read;                   /* (node_count x 3) scratch of what is read between steps */
-    atomic_bool cancel;             /* the advance that runs, or the next, is to stop */
     drape_observer *observers[DRAPE_MAX_OBSERVERS];
     void *observer_users[DRAPE_MAX_OBSERVERS];
     int observer_count;

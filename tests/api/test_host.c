@@ -665,6 +665,71 @@ START_TEST(normals_are_of_length_one)
 }
 END_TEST
 
+/* ---- Checkpoints ---- */
+
+typedef struct bytes {
+    char data[1 << 20];
+    size_t size;
+} bytes;
+
+static drape_status keep(void *user, const void *data, size_t size)
+{
+    bytes *b = user;
+    if (size > sizeof b->data - b->size)
+        return DRAPE_E_MEMORY;
+    memcpy(b->data + b->size, data, size);
+    b->size += size;
+    return DRAPE_OK;
+}
+
+/* Ways that begin in one frame and end in another. */
+static void send_all(host *h, field *f, double sign)
+{
+    const int32_t nodes[2] = {0, 3};
+    const double *rest = drape_model_rest_positions(h->model);
+    const double to[6] = {rest[0], rest[1] + 0.02 * sign, rest[2], rest[9], rest[10], rest[11] + 0.03 * sign};
+    const double v[6] = {0.3 * sign}, by[3] = {0, 0, -0.05 * sign};
+    double push[60] = {0};
+    push[3 * 12] = 0.02 * sign;
+    good(h, drape_sim_move_pins(h->sim, 2, nodes, 2 * FRAME, to, v));
+    good(h, drape_sim_move_collider(h->sim, 0, 3 * FRAME, by, NULL));
+    good(h, drape_sim_push(h->sim, push));
+    good(h, drape_sim_set_wind(h->sim, blow, f));
+}
+
+/* Saved while pins and colliders are on their ways, restored into a sim that sent them elsewhere: the same bits to the
+ * end, under its own wind; and the restored one is cancelled by its own flag, raised before or after. */
+START_TEST(a_checkpoint_keeps_what_the_host_moves)
+{
+    static bytes saved;
+    for (int i = 0; i < METHODS; i++) {
+        failing_allocator memory[2] = {{0}, {0}};
+        char method[64], ball[256];
+        snprintf(method, sizeof method, "'method': '%s', 'dt': 0.0078125", methods[i]);
+        snprintf(ball, sizeof ball, BALL, "");
+        host one = open_scene(&memory[0], SHEET, ", 'drag.wind'", "{'edge': 'top'}", method, ball),
+             two = open_scene(&memory[1], SHEET, ", 'drag.wind'", "{'edge': 'top'}", method, ball);
+        field f = {.w0 = {1, 0, -1}, .w1 = {0, 2, 0}};
+        saved.size = 0;
+        send_all(&one, &f, 1);
+        good(&one, drape_sim_advance(one.sim, FRAME));
+        good(&one, drape_sim_save_to(one.sim, keep, &saved));
+        good(&one, drape_sim_advance(one.sim, 4 * FRAME));
+        send_all(&two, &f, -1);
+        good(&two, drape_sim_advance(two.sim, 2 * FRAME));
+        drape_sim_cancel(two.sim);
+        good(&two, drape_sim_restore_from(two.sim, saved.data, saved.size));
+        says(&two, drape_sim_advance(two.sim, 4 * FRAME), DRAPE_E_STOPPED, "cancelled");
+        good(&two, drape_sim_advance(two.sim, 4 * FRAME));
+        ck_assert_msg(drape_sim_hash(one.sim) == drape_sim_hash(two.sim), "%s", methods[i]);
+        drape_sim_cancel(two.sim);
+        says(&two, drape_sim_advance(two.sim, 5 * FRAME), DRAPE_E_STOPPED, "cancelled");
+        close_scene(&one, &memory[0]);
+        close_scene(&two, &memory[1]);
+    }
+}
+END_TEST
+
 /* ---- All of it ---- */
 
 typedef struct job {
@@ -814,5 +879,5 @@ SUITE("host", pins_go_where_they_are_sent, a_host_is_as_good_as_a_track, velocit
       a_push_does_its_work, every_integrator_is_pushed, springs_of_verlet_are_pushed_and_pulled,
       contact_carries_the_weight, wind_takes_cloth_along, a_steady_wind_is_that_of_the_row,
       a_field_without_gradient_takes_longer, a_cancelled_advance_can_go_on, a_step_can_be_cancelled,
-      a_signal_and_a_thread_can_cancel, normals_are_of_length_one, hosts_in_threads_share_a_model,
-      a_host_needs_no_memory, wrong_arguments_are_refused)
+      a_signal_and_a_thread_can_cancel, normals_are_of_length_one, a_checkpoint_keeps_what_the_host_moves,
+      hosts_in_threads_share_a_model, a_host_needs_no_memory, wrong_arguments_are_refused)
