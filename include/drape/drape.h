@@ -12,7 +12,8 @@
  * a model outlives its sims.
  *
  * Threads. A context and a scene belong to one thread at a time. A model is read-only: several threads may
- * read it and run sims on it, each thread with a context of its own. A sim belongs to one thread at a time.
+ * read it and run sims on it, each thread with a context of its own. A sim belongs to one thread at a time;
+ * drape_sim_cancel alone may be called from any.
  */
 #ifndef DRAPE_DRAPE_H
 #define DRAPE_DRAPE_H
@@ -42,7 +43,7 @@ typedef enum drape_status {
     DRAPE_E_STEP_TOO_SMALL = -5, /* below dt_min, or max_steps of them; the last accepted state stays */
     DRAPE_E_SOLVER = -6,  /* a step failed and no smaller step may be tried, or the solver cannot be set up */
     DRAPE_E_VERSION = -7, /* a struct or a file of another version of Drape */
-    DRAPE_E_STOPPED = -8  /* an observer asked to stop */
+    DRAPE_E_STOPPED = -8  /* an observer or drape_sim_cancel asked to stop */
 } drape_status;
 
 /* The status' name in lower case without the prefix: "ok", "retry_nonlinear", "e_step_too_small"; "unknown"
@@ -87,6 +88,9 @@ DRAPE_API const char *drape_context_message(const drape_context *ctx);
 
 /* ---- Scene in memory: what a host fills instead of a scene file ---- */
 
+/* Defs of this section begin with struct_size, set by their _init; those of an array are of one size. Settings, rows and
+ * keys of tracks have none: they stay as they are. */
+
 /* One parameter by name. Numbers and integers go into number with text and vector NULL; choices and file
  * names into text; booleans as text "true" or "false", or as number 0 or 1; vectors into vector. */
 typedef struct drape_setting {
@@ -105,7 +109,8 @@ typedef struct drape_row_def {
     size_t setting_count;
 } drape_row_def;
 
-/* A triangle mesh: one of three sources. Exactly one of grid.type, file, positions is set. */
+/* A triangle mesh: one of three sources. Exactly one of grid.type, file, positions is set. It lies inside the def of a
+ * cloth and grows into what is reserved. */
 typedef struct drape_mesh_def {
     drape_row_def grid;       /* a row of the grids: "equilateral", "square" */
     const char *file;         /* an OBJ or PLY file, by its ending */
@@ -115,6 +120,7 @@ typedef struct drape_mesh_def {
     double scale[3];     /* default 1 1 1; applied first */
     double rotate[4];    /* axis x y z and angle [degrees]; default none; applied second */
     double translate[3]; /* [m]; default 0; applied last */
+    void *reserved[4];   /* NULL */
 } drape_mesh_def;
 
 /* Displacement of pinned nodes from their rest positions, or of a collider from where its parameters put it,
@@ -127,6 +133,7 @@ typedef struct drape_track_key {
 /* Nodes of one cloth held fixed, or moved along a track. Exactly one of nodes, corner, edge, row (>= 0),
  * has_box selects them. corner, edge and row exist on grids only. */
 typedef struct drape_pin_def {
+    size_t struct_size;
     const int32_t *nodes; /* node_count node numbers of this cloth */
     size_t node_count;
     const char
@@ -142,6 +149,7 @@ typedef struct drape_pin_def {
 
 /* One piece of cloth. */
 typedef struct drape_cloth_def {
+    size_t struct_size;
     const char *name; /* NULL: "cloth0", "cloth1" ... */
     drape_mesh_def mesh;
     const drape_setting
@@ -156,6 +164,7 @@ typedef struct drape_cloth_def {
 
 /* A rigid obstacle: a row of the colliders with its parameters. Initialise with drape_collider_def_init. */
 typedef struct drape_collider_def {
+    size_t struct_size;
     drape_row_def row;            /* "plane", "sphere" ... */
     const char *name;             /* NULL: "collider0", "collider1" ... */
     double friction;              /* Coulomb's mu between it and cloth [1], [0, 1000]; default 0 */
@@ -312,7 +321,8 @@ DRAPE_API void drape_sim_destroy(drape_sim **sim);
  * below 1e-9 dt joins the step before. A t_end not after the present time, but for rounding, does nothing. On
  * failure the state is that of the last accepted step. Errors: DRAPE_E_STEP_TOO_SMALL (halving gave up; "ida"
  * took max_steps), DRAPE_E_SOLVER (a step failed under the controller "fixed"), DRAPE_E_STOPPED (an observer
- * asked), DRAPE_E_ARGUMENT (t_end not finite); the message names time, step, reason and worst element. */
+ * asked, or drape_sim_cancel), DRAPE_E_ARGUMENT (t_end not finite); the message names time, step, reason and worst
+ * element. */
 DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);
 
 /* What a call of drape_sim_advance_realtime did. */
@@ -375,6 +385,56 @@ DRAPE_API drape_status drape_sim_pull(drape_sim *sim, int32_t node, double stiff
 /* The force of that spring on its node in the present state [N]; 0 without one. */
 DRAPE_API void drape_sim_pull_force(const drape_sim *sim, double force[3]);
 
+/* Makes the advance that is running, or else the next one, return DRAPE_E_STOPPED with the last accepted state: before
+ * its next step, or at the next evaluation of forces within one, which is then forgotten and counted as rejected
+ * ("cancelled"). A later advance goes on from there. Thread-safety: may be called from any thread and from a signal
+ * handler, as long as the sim lives. NULL is fine. */
+DRAPE_API void drape_sim_cancel(drape_sim *sim);
+
+/* ---- Sim: what a host moves ----
+ *
+ * For a host that has its own idea of where things are, frame by frame: it says where pins and colliders are to be at
+ * the end of the frame, advances by the frame, and says the next. Nothing here allocates, but for the first
+ * drape_sim_set_wind; none is for observers; after an error nothing has changed. Thread-safety: as the sim. */
+
+/* Sends pinned nodes, fixed ones and ones on tracks alike, on ways of the host's: node nodes[i] goes in the next
+ * `seconds` of simulated time from where it is to positions[3 i ...] [m], where it then rests, or goes on by the next
+ * call. velocities (count x 3 [m/s]): with how much it comes there, on a cubic from its present position and velocity,
+ * so that calls from frame to frame make a smooth motion; NULL: straight, at one speed. A node that was sent once is
+ * the host's for good: its track no longer counts. drape_sim_set_state leaves such nodes where the state has them, at
+ * rest.
+ *
+ * The way is known to the integrator in full: any step inside it, and any frame, has pins where the way has them. A
+ * jump of velocity is a kink, at which "ida" starts anew. Errors: DRAPE_E_ARGUMENT (no such node, one that is free, the
+ * same one twice is not looked for; seconds not in (0, 1e9], not finite or beyond 1e9 m or m/s). */
+DRAPE_API drape_status drape_sim_move_pins(drape_sim *sim, int32_t count, const int32_t *nodes,
+                                           double seconds, const double *positions, const double *velocities);
+
+/* The same for a collider as a whole: to a displacement [m] from where its parameters put it. `drape_sim_collider` tells
+ * where it is. */
+DRAPE_API drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double seconds,
+                                               const double displacement[3], const double *velocity);
+
+/* Pushes nodes: forces (node_count x 3 [N], copied) act from the next step on, the same whatever the nodes do, until
+ * they are replaced; NULL: none. On a pinned node they are taken up by its pin. Their work counts as that of pins. "ida"
+ * starts anew. Errors: DRAPE_E_ARGUMENT (not finite). */
+DRAPE_API drape_status drape_sim_push(drape_sim *sim, const double *forces);
+
+/* The velocity of the medium at time t [s] at count points: wind (count x 3 [m/s]) at x (count x 3 [m]). gradient,
+ * unless NULL, gets dwind_i/dx_j at [9 p + 3 i + j] [1/s]; it comes filled with zeros, and a field that leaves them
+ * loses convergence, not accuracy: Newton's matrix then lacks that part. wind comes filled with zeros, too. Called
+ * several times a step within drape_sim_advance, in its thread, at states that are only tried: the same t and x must
+ * give the same wind, and within one advance it is to be smooth in t. */
+typedef void drape_wind_field(void *user, double t, int32_t count, const double *x, double *wind,
+                              double *gradient);
+
+/* Moves the medium that drag terms are in ("drag.wind", added to its own steady wind, "drag.viscous", and a host's with
+ * in_medium); field NULL: it rests again. Errors: DRAPE_E_ARGUMENT (no term of the model is in a medium),
+ * DRAPE_E_MEMORY. */
+DRAPE_API drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *field, void *user);
+
+/* ---- Sim: what can be read ---- */
+
 /* The last accepted state: time [s], positions [m] and velocities [m/s], node_count x 3; valid until the next
  * call that changes the sim. */
 DRAPE_API double drape_sim_time(const drape_sim *sim);
@@ -386,9 +446,37 @@ DRAPE_API const drape_model *drape_sim_model(const drape_sim *sim);
  * else. */
 DRAPE_API uint64_t drape_sim_hash(const drape_sim *sim);
 
+/* How many triangles of the cloth reach into a collider of the scene, counted from 0, by more than 1e-9 m; by 28 points of
+ * each. With implicit rows and `ida` none does that did not in the beginning (docs/contact.md). *deepest, if not NULL:
+ * how deep [m]. -1: there is no such collider. */
+DRAPE_API int32_t drape_sim_inside(const drape_sim *sim, int32_t collider, double *deepest);
+
+/* Normals of the last accepted state (node_count x 3 [1]): the mean of the triangles around a node weighted by their
+ * areas, of length 1, counterclockwise outside; 0 where those add up to nothing. drape_model_normals: at other
+ * positions x (node_count x 3 [m]). */
+DRAPE_API void drape_sim_normals(const drape_sim *sim, double *normals);
+DRAPE_API void drape_model_normals(const drape_model *model, const double *x, double *normals);
+
+/* Forces in the last accepted state, into arrays of the host's (node_count x 3 [N]).
+ *
+ * drape_sim_reactions: what pins do to pinned nodes, 0 on free ones: the force that keeps a node on its way against
+ * cloth, gravity, contact and push, without what it takes to speed up the node's own mass. Rates that damping laws take
+ * from a step are those of the velocities here.
+ *
+ * drape_sim_contact_forces: of contact and friction, with colliders and between layers, on every node;
+ * drape_sim_collider_force: of cloth on one collider, as a whole. Colliders have the mean velocity of the last step, so
+ * ask before moving them on. An integrator that moves nodes out of what they meet ("verlet") has no such forces, and
+ * says so. Errors: DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. Thread-safety: as the sim. Not for observers. */
+DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);
+DRAPE_API drape_status drape_sim_contact_forces(drape_sim *sim, double *forces);
+DRAPE_API drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3]);
+
+/* Where a collider is in the last accepted state, as drape_model_collider, with the host's moves. */
+DRAPE_API drape_collider_motion drape_sim_collider(const drape_sim *sim, int32_t collider);
+
 /* Energies of the last accepted state [J]. kinetic: of the free nodes, as the motion of pinned ones is prescribed. gravity: the potential, zero at the origin. dissipated: the work
  * that damping and drag terms took since t = 0 or drape_sim_set_state. numerical: what is missing otherwise, the integrator's own
- * dissipation (negative: gain), after the work of moving pins. */
+ * dissipation (negative: gain), after the work of pins and colliders that move and of drape_sim_push. */
 typedef struct drape_energy {
     double kinetic, elastic, gravity, contact, dissipated, numerical;
 } drape_energy;
@@ -405,6 +493,8 @@ typedef struct drape_statistics {
     int64_t steps_unconverged; /* of the accepted: taken although unconverged, by on_failure "accept" */
     double h_min, h_max;       /* [s] of accepted steps; 0 before the first */
     int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
+    /* [s] of a clock on a wall. Those after wall_steps are parts of it, none of them a part of another: residual and
+     * Jacobian are without their contact. */
     double wall_setup, wall_steps, wall_residual, wall_jacobian, wall_factor, wall_solve, wall_contact;
     double strain_min, strain_max; /* |e|/L - 1 over all edges and accepted steps */
     bool stability_known;   /* "static" found an equilibrium and the signs of its Hessian's eigenvalues */
@@ -415,6 +505,38 @@ DRAPE_API drape_statistics drape_sim_statistics(const drape_sim *sim);
 /* Reasons for which attempts were rejected, with their counts: "max_iterations", "line_search",
  * "edge_collapse" ..., "other" for all past the 31st. index runs from 0; *count is 0 and the result NULL past the last. */
 DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t *count);
+
+/* ---- Checkpoints ---- */
+
+/* Takes size bytes, in the order in which they come. DRAPE_OK to go on; a negative status to stop with, whose message it
+ * may have set by drape_context_set_message. */
+typedef drape_status drape_write(void *user, const void *bytes, size_t size);
+
+/* Saves a sim between two calls that advance it, so that a sim of the same model goes on from there with the same bits:
+ * states, what integrator, controller, contact and linear solver know of the past, the energies and statistics so far, the
+ * number of the next frame. Not saved are observers, and what a host's own terms or colliders keep. May also be called by
+ * an observer of a frame: the frames that are left of the step are told after drape_sim_restore, by the next advance.
+ *
+ * drape_sim_save writes a file: under another name first, then to the disk, then under its own, so that at any moment, a
+ * crash of the machine too, there is the file before or the new one whole. It takes a buffer of 64 KiB and gives it back;
+ * drape_sim_save_to takes no memory. Sizes: 100 to 400 bytes a node; for "ida" and modified Newton a matrix beside.
+ *
+ * Errors: DRAPE_E_ARGUMENT (NULL), DRAPE_E_MEMORY, DRAPE_E_FILE; what `write` returned. The sim is as it was.
+ * Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_save(drape_sim *sim, const char *path);
+DRAPE_API drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, void *user);
+
+/* Puts a sim, whatever it did before, where the saved one was; bytes (size) need only live during the call. The sim was
+ * made with the model of the saved one, or one from the same scene, by the same build, with the same integrator,
+ * controller, their settings and frame rate; threads may differ. Its observers stay and are told nothing. Arrays that
+ * the sim gave out before are no longer valid. A sim is made beside the present one for it: for the time of the call there are
+ * both. With a SUNDIALS without its private headers (docs/checkpoints.md) "ida" starts anew from the state.
+ *
+ * A file of `drape run --checkpoint-every` is such a one, too. Errors, and then the sim is as it was: DRAPE_E_ARGUMENT
+ * (NULL, another model, row or setting), DRAPE_E_VERSION (another build), DRAPE_E_PARSE (damaged, or no checkpoint),
+ * DRAPE_E_FILE, DRAPE_E_MEMORY, DRAPE_E_SOLVER. Not for observers. Thread-safety: as the sim. */
+DRAPE_API drape_status drape_sim_restore(drape_sim *sim, const char *path);
+DRAPE_API drape_status drape_sim_restore_from(drape_sim *sim, const void *bytes, size_t size);
 
 /* ---- Observers ---- */
 

@@ -216,10 +216,13 @@ typedef struct drape_term_ops {
      * fault: else no step could lead out of it. before NULL: none is excused. check NULL: none can be. */
     drape_status (*check)(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault);
+
+    /* dissipation: it is in a medium. v is the velocity against it, less by the wind of drape_sim_set_wind. */
+    bool in_medium;
 } drape_term_ops;
 
-/* Registers a term of the host's own: scenes compiled with this context may name it from then on. ops must
- * outlive the context and every model compiled with it. Errors: DRAPE_E_ARGUMENT (not well formed, name
+/* Registers a term of the host's own: scenes compiled with this context may name it from then on. *ops is copied; what
+ * it points to must outlive the context and every model compiled with it. Ops of an older, shorter version are read. Errors: DRAPE_E_ARGUMENT (not well formed, name
  * taken, more than 32), DRAPE_E_VERSION (struct_size). */
 DRAPE_API drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *ops);
 

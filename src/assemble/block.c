@@ -50,14 +50,25 @@ static void sum_stresses(const drape_term *term, const drape_request *want, drap
     }
 }
 
+/* The forces on measures where the nodes go, which changes the measures by `ahead`. */
+static void write_stress(const drape_term *term, const drape_request *want, const drape_block *b,
+                         const double *ahead)
+{
+    double *to = want->stress + term->first_measure + b->first;
+    for (int32_t i = 0; i < b->count; i++)
+        to[i] = b->force[i] + (b->by_strain[i] + want->point->weight * b->by_rate[i]) * ahead[i];
+}
+
 /* The weights of ddq and dq dq' in the Hessian. With `project` of the positive semidefinite part that is known
  * without eigenvalues: f ddq where the measure is convex and pulls, and the Gauss-Newton part (Teran et al. 2005;
  * Tamstorf & Grinspun 2013, 5). A row that splits ddq by itself (`positive`) keeps the weight. */
 static void weigh(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const bool convex = term->ops->convex, split = term->ops->positive;
+    const double *force =
+        want->point->stress ? want->point->stress + term->first_measure + b->first : b->force;
     for (int32_t i = 0; i < b->count; i++) {
-        b->of_ddq[i] = b->force[i];
+        b->of_ddq[i] = force[i];
         b->of_dq[i] = b->by_strain[i] + want->point->weight * b->by_rate[i];
     }
     for (int32_t i = 0; want->project > 0 && i < b->count; i++) {
@@ -85,17 +96,25 @@ typedef struct pairs {
     double approach[3][N]; /* v1 - v0, in continuous time */
 } pairs;
 
-static void rates_of_pairs(const drape_term *term, const drape_request *want, drape_block *b, pairs *p)
+/* dq . v with v of the nodes, and in p->approach v1 - v0. */
+static void pairs_along(const drape_term *term, const double *v, const drape_block *b, pairs *p, double *rate)
 {
     const int32_t *node = term->elements.node + 2 * (size_t)b->first;
-    const double *v = want->point->v;
     for (int r = 0; r < 3; r++)
         for (int32_t i = 0; i < b->count; i++)
             p->approach[r][i] =
                 v[3 * (size_t)node[2 * i + 1] + (size_t)r] - v[3 * (size_t)node[2 * i] + (size_t)r];
     for (int32_t i = 0; i < b->count; i++)
-        b->rate[i] = b->per_length[i] * (p->d[0][i] * p->approach[0][i] + p->d[1][i] * p->approach[1][i] +
-                                         p->d[2][i] * p->approach[2][i]);
+        rate[i] = b->per_length[i] * (p->d[0][i] * p->approach[0][i] + p->d[1][i] * p->approach[1][i] +
+                                      p->d[2][i] * p->approach[2][i]);
+}
+
+static void stress_of_pairs(const drape_term *term, const drape_request *want, drape_block *b, pairs *p)
+{
+    double ahead[N] = {0};
+    if (want->along)
+        pairs_along(term, want->along, b, p, ahead);
+    write_stress(term, want, b, ahead);
 }
 
 /* f P + w dq dq' = f c I + (w c^2 - f c/d.d) d d' */
@@ -140,8 +159,10 @@ static void evaluate_pairs(const drape_term *term, const drape_request *want, dr
     if (has_rates(term) && want->point->history)
         rates_of_history(term, want, b);
     else if (has_rates(term))
-        rates_of_pairs(term, want, b, &p);
+        pairs_along(term, want->point->v, b, &p, b->rate);
     sum_stresses(term, want, b);
+    if (want->stress)
+        stress_of_pairs(term, want, b, &p);
     for (int r = 0; r < 3; r++)
         for (int32_t i = 0; i < b->count; i++)
             b->gradient[r * N + i] = p.d[r][i] * (b->force[i] * b->per_length[i]);
@@ -196,17 +217,26 @@ static void gather(const drape_elements *el, int32_t element, const double *v, d
         memcpy(local + 3 * a, v + 3 * (size_t)node[a], 3 * sizeof *local);
 }
 
-static void rates_of_motion(const drape_term *term, const drape_request *want, drape_block *b)
+/* dq . v with v of the nodes. */
+static void measures_along(const drape_term *term, const double *nodes, const drape_block *b, double *rate)
 {
     const int d = 3 * term->elements.nodes;
     for (int32_t i = 0; i < b->count; i++) {
         double v[D];
         const double *dq = b->dq + drape_block_start(b, i, d);
-        gather(&term->elements, b->first + i, want->point->v, v);
-        b->rate[i] = 0;
+        gather(&term->elements, b->first + i, nodes, v);
+        rate[i] = 0;
         for (int k = 0; k < d; k++)
-            b->rate[i] += dq[LANES * k] * v[k];
+            rate[i] += dq[LANES * k] * v[k];
     }
+}
+
+static void stress_of_measures(const drape_term *term, const drape_request *want, const drape_block *b)
+{
+    double ahead[N] = {0};
+    if (want->along)
+        measures_along(term, want->along, b, ahead);
+    write_stress(term, want, b, ahead);
 }
 
 /* The blocks on and below the diagonal. */
@@ -264,7 +294,7 @@ static void split_hessians(const drape_term *term, const drape_request *want, dr
     const drape_elements *el = &term->elements;
     const double *internal = term->first_internal >= 0 ? want->point->internal + term->first_internal : NULL;
     const int size = 9 * el->nodes * el->nodes;
-    term->ops->positive(el, b->first, b->count, want->point->x, internal, b->force, b->scratch);
+    term->ops->positive(el, b->first, b->count, want->point->x, internal, b->of_ddq, b->scratch);
     for (int32_t i = 0; i < b->count; i++) {
         double *h = b->hessian + drape_block_start(b, i, size);
         for (int k = 0; k < size; k++)
@@ -296,8 +326,10 @@ static void evaluate_measures(const drape_term *term, const drape_request *want,
     if (has_rates(term) && want->point->history)
         rates_of_history(term, want, b);
     else if (has_rates(term))
-        rates_of_motion(term, want, b);
+        measures_along(term, want->point->v, b, b->rate);
     sum_stresses(term, want, b);
+    if (want->stress)
+        stress_of_measures(term, want, b);
     for (int32_t g = 0; g < b->count; g += LANES)
         for (int k = 0; k < d; k++)
             for (int l = 0; l < LANES; l++)
@@ -315,13 +347,32 @@ static void evaluate_energies(const drape_term *term, const drape_request *want,
                       want->hessian ? b->hessian : NULL);
 }
 
+/* h -= dg/dv W, where the wind on an element's nodes changes as they move. */
+static void carry_wind(const drape_term *term, const double *gradient, const double *dg_dv, int32_t element,
+                       double *h)
+{
+    const drape_elements *el = &term->elements;
+    const int32_t *node = el->node + (size_t)element * (size_t)el->nodes;
+    const int d = 3 * el->nodes;
+    for (int row = 0; row < d; row++)
+        for (int a = 0; a < el->nodes; a++) {
+            const double *w = gradient + 9 * (size_t)node[a], *by = dg_dv + d * row + 3 * a;
+            for (int c = 0; c < 3; c++)
+                h[d * row + 3 * a + c] -= by[0] * w[c] + by[1] * w[3 + c] + by[2] * w[6 + c];
+        }
+}
+
 static void evaluate_dissipations(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const int d = 3 * term->elements.nodes;
-    const bool hessian = want->hessian;
+    const bool hessian = want->hessian, wind = want->against && term->ops->in_medium;
     memset(b->energy, 0, (size_t)b->count * sizeof *b->energy);
-    term->ops->dissipation(&term->elements, b->first, b->count, want->point->x, want->point->v, b->gradient,
-                           hessian ? b->hessian : NULL, hessian ? b->scratch : NULL);
+    term->ops->dissipation(&term->elements, b->first, b->count, want->point->x,
+                           wind ? want->against : want->point->v, b->gradient, hessian ? b->hessian : NULL,
+                           hessian ? b->scratch : NULL);
+    for (int32_t i = 0; wind && hessian && !want->velocity && i < b->count; i++)
+        carry_wind(term, want->wind_gradient, b->scratch + (size_t)i * (size_t)(d * d), b->first + i,
+                   b->hessian + (size_t)i * (size_t)(d * d));
     for (int i = 0; hessian && i < b->count * d * d; i++)
         b->hessian[i] = want->velocity ? b->scratch[i] : b->hessian[i] + want->point->weight * b->scratch[i];
 }

@@ -311,6 +311,17 @@ static void add_share(drape_summer *s, const drape_request *want, const drape_su
     }
 }
 
+/* Of each term a share of its blocks. */
+static void stress_of_share(drape_summer *s, const drape_request *want, int thread)
+{
+    for (int32_t i = 0; i < s->model->term_count; i++) {
+        const drape_term *term = &s->model->terms[i];
+        const int64_t blocks = term->ops->measure ? block_count(term) : 0;
+        for (int64_t k = blocks * thread / s->threads; k < blocks * (thread + 1) / s->threads; k++)
+            evaluate(term, want, (int32_t)k, &s->blocks[thread]);
+    }
+}
+
 /* What all threads are to do. */
 typedef struct order {
     drape_summer *summer;
@@ -328,6 +339,17 @@ static void add_round(void *user, int64_t thread)
 void drape_summer_add(drape_summer *s, const drape_request *want, const drape_sums *to)
 {
     drape_parallel(s->threads, s->threads, add_round, &(order){s, want, to});
+}
+
+static void stress_round(void *user, int64_t thread)
+{
+    const order *o = user;
+    stress_of_share(o->summer, o->want, (int)thread);
+}
+
+void drape_summer_stress(drape_summer *s, const drape_request *want)
+{
+    drape_parallel(s->threads, s->threads, stress_round, &(order){.summer = s, .want = want});
 }
 
 void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_request *want,

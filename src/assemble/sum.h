@@ -39,6 +39,9 @@ void drape_summer_add(drape_summer *summer, const drape_request *want, const dra
 void drape_summer_add_term(drape_summer *summer, const drape_term *term, const drape_request *want,
                            const drape_sums *to, double *energy);
 
+/* The forces on the measures of all terms, into want->stress. */
+void drape_summer_stress(drape_summer *summer, const drape_request *want);
+
 /* Of a term of pairs: the block of each element, xx xy xz yy yz zz, as (element count x 6). want->hessian is set. */
 void drape_summer_pairs(drape_summer *summer, const drape_term *term, const drape_request *want, double *h);
 

@@ -2,6 +2,7 @@
 #include "assemble/system.h"
 
 #include "assemble/sum.h"
+#include "base/clock.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -16,7 +17,12 @@ struct drape_system {
     drape_pattern wider;          /* with what contact couples */
     int32_t **blocks;    /* (term_count) as in the terms, for the wider one; NULL while there is none */
     drape_status status; /* of placing contact */
+    drape_motion *motion;
     drape_pull pull;
+    double *push; /* (node_count x 3) */
+    bool pushed;
+    drape_wind wind;
+    const atomic_bool *cancel; /* NULL: nobody does */
 };
 
 static void forget_wider(drape_system *system)
@@ -38,6 +44,11 @@ drape_status drape_system_create(drape_context *ctx, const drape_model *model, i
         return DRAPE_E_MEMORY;
     *system = (drape_system){.ctx = ctx, .model = model, .pattern = &model->pattern};
     drape_status status = drape_summer_create(ctx, model, threads, &system->summer);
+    if (!status)
+        status = drape_motion_create(ctx, model, &system->motion);
+    system->push = drape_alloc(ctx, 3 * (size_t)model->node_count, sizeof *system->push);
+    if (!status && !system->push)
+        status = DRAPE_E_MEMORY;
     if (status)
         drape_system_destroy(out);
     return status;
@@ -51,6 +62,9 @@ void drape_system_destroy(drape_system **system)
     drape_contact_destroy(&(*system)->contact);
     forget_wider(*system);
     drape_summer_destroy(&(*system)->summer);
+    drape_motion_destroy(&(*system)->motion);
+    drape_wind_free(ctx, &(*system)->wind);
+    drape_free(ctx, (*system)->push);
     drape_free(ctx, *system);
     *system = NULL;
 }
@@ -80,6 +94,57 @@ const drape_pull *drape_system_pull(const drape_system *system)
     return &system->pull;
 }
 
+const drape_motion *drape_system_motion(const drape_system *system)
+{
+    return system->motion;
+}
+
+drape_motion *drape_system_steer(drape_system *system)
+{
+    return system->motion;
+}
+
+void drape_system_set_push(drape_system *system, const double *force)
+{
+    size_t size = 3 * (size_t)system->model->node_count * sizeof *system->push;
+    system->pushed = force;
+    if (force)
+        memcpy(system->push, force, size);
+}
+
+double drape_system_push_work(const drape_system *system, const double *x, const double *y)
+{
+    double work = 0;
+    for (size_t i = 0; system->pushed && i < 3 * (size_t)system->model->node_count; i++)
+        work += system->push[i] * (y[i] - x[i]);
+    return work;
+}
+
+drape_status drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user)
+{
+    return drape_wind_set(system->ctx, system->model, field, user, &system->wind);
+}
+
+void drape_system_add_loads(const drape_system *system, const double *x, double *g)
+{
+    drape_pull_add_gradient(&system->pull, x, g);
+    for (size_t i = 0; system->pushed && i < 3 * (size_t)system->model->node_count; i++)
+        g[i] -= system->push[i];
+}
+
+void drape_system_watch(drape_system *system, const atomic_bool *cancel)
+{
+    system->cancel = cancel;
+}
+
+bool drape_system_cancelled(drape_system *system)
+{
+    bool cancelled = system->cancel && atomic_load(system->cancel);
+    if (cancelled && !system->status)
+        system->status = DRAPE_E_STOPPED;
+    return cancelled;
+}
+
 /* Of the wider pattern and the terms' places in it. */
 static size_t wider_bytes(const drape_system *system)
 {
@@ -99,19 +164,26 @@ static size_t wider_bytes(const drape_system *system)
 size_t drape_system_bytes(const drape_system *system)
 {
     return sizeof *system + drape_summer_bytes(system->summer) + drape_contact_bytes(system->contact) +
-           wider_bytes(system);
+           wider_bytes(system) + drape_motion_bytes(system->motion) +
+           drape_wind_bytes(&system->wind, system->model) +
+           3 * (size_t)system->model->node_count * sizeof *system->push;
 }
 
 /* ---- Contact ---- */
 
 drape_status drape_system_add_contact(drape_system *system)
 {
-    return drape_contact_create(system->ctx, system->model, &system->contact);
+    return drape_contact_create(system->ctx, system->motion, &system->contact);
 }
 
 const drape_contact *drape_system_contact(const drape_system *system)
 {
     return system->contact;
+}
+
+double drape_system_clock(const drape_system *system)
+{
+    return drape_clock_seconds() - drape_contact_seconds(system->contact);
 }
 
 drape_status drape_system_begin(drape_system *system, const drape_state *in)
@@ -165,11 +237,10 @@ static drape_status place_terms(drape_system *system)
     return DRAPE_OK;
 }
 
-static drape_status widen(drape_system *system)
+/* With these pairs (x 4 nodes) besides the terms. */
+static drape_status widen(drape_system *system, int32_t pairs, const int32_t *nodes)
 {
     const drape_model *model = system->model;
-    const int32_t *nodes = NULL;
-    int32_t pairs = drape_contact_couplings(system->contact, &nodes);
     drape_coupling *couplings = drape_alloc(system->ctx, (size_t)model->term_count + 1, sizeof *couplings);
     int count = 0;
     if (pairs < 0 || !couplings) {
@@ -201,7 +272,39 @@ drape_status drape_system_fit(drape_system *system, const drape_point *point, bo
     if (drape_contact_fits(system->contact, system->pattern))
         return DRAPE_OK;
     *changed = true;
-    return widen(system);
+    const int32_t *nodes = NULL;
+    int32_t pairs = drape_contact_couplings(system->contact, &nodes);
+    return widen(system, pairs, nodes);
+}
+
+static void archive_pull(drape_system *system, drape_archive *a)
+{
+    const drape_model *m = system->model;
+    drape_pull *pull = &system->pull;
+    drape_archive_int32(a, &pull->node);
+    drape_archive_double(a, &pull->stiffness);
+    drape_archive_doubles(a, pull->target, 3);
+    if (drape_archive_is_reading(a) && pull->stiffness > 0 &&
+        (pull->node < 0 || pull->node >= m->node_count || m->pinned[pull->node]))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pulls node %d, which is not free",
+                           (int)pull->node);
+}
+
+/* A wider pattern is made of what was near when the one before it was too narrow: that list is kept. */
+void drape_system_archive(drape_system *system, drape_archive *a)
+{
+    bool contact = system->contact != NULL, wider = system->blocks != NULL;
+    const int32_t *nodes = NULL;
+    drape_archive_mark(a, "system");
+    archive_pull(system, a);
+    drape_archive_same(a, "whether there is contact", contact);
+    if (contact)
+        drape_contact_archive(system->contact, a);
+    drape_archive_bool(a, &wider);
+    if (!drape_archive_is_reading(a) || !contact || !wider)
+        return;
+    int32_t pairs = drape_contact_coupled(system->contact, &nodes);
+    drape_archive_note(a, widen(system, pairs, nodes));
 }
 
 const double *drape_system_on_colliders(const drape_system *system)
@@ -232,6 +335,18 @@ static drape_sums into_values(const drape_system *system, double *values)
     return (drape_sums){.values = values, .pattern = system->pattern, .blocks = system->blocks};
 }
 
+/* Terms in a medium are told how fast it is at the point. */
+static void feel_wind(drape_system *system, drape_request *want)
+{
+    const drape_point *point = want->point;
+    if (!system->wind.field)
+        return;
+    drape_wind_feel(&system->wind, system->model->node_count, point->t, point->x, point->v,
+                    want->hessian && !want->velocity);
+    want->against = system->wind.against;
+    want->wind_gradient = system->wind.gradient;
+}
+
 void drape_system_force(drape_system *system, const drape_point *point, double *g)
 {
     drape_system_force_without(system, point, NULL, g);
@@ -240,17 +355,19 @@ void drape_system_force(drape_system *system, const drape_point *point, double *
 void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
                                 double *g)
 {
-    const drape_request want = {
-        .point = point, .conservative = true, .dissipative = true, .without = without};
+    drape_request want = {.point = point, .conservative = true, .dissipative = true, .without = without};
+    drape_system_cancelled(system);
+    feel_wind(system, &want);
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
-    drape_pull_add_gradient(&system->pull, point->x, g);
+    drape_system_add_loads(system, point->x, g);
     if (place_contact(system, point))
         drape_contact_add_forces(system->contact, true, true, g);
 }
 
 void drape_system_dissipation(drape_system *system, const drape_point *point, double *g)
 {
-    const drape_request want = {.point = point, .dissipative = true};
+    drape_request want = {.point = point, .dissipative = true};
+    feel_wind(system, &want);
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
     if (place_contact(system, point))
         drape_contact_add_forces(system->contact, false, true, g);
@@ -271,9 +388,10 @@ static void add_masses(const drape_system *system, double mass_weight, double *v
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, double project,
                            double *values)
 {
-    const drape_request want = {
+    drape_request want = {
         .point = point, .hessian = true, .conservative = true, .dissipative = true, .project = project};
     const drape_sums to = into_values(system, values);
+    feel_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
         drape_contact_add_jacobian(system->contact, point->weight, false, project > 0, system->pattern,
@@ -291,13 +409,14 @@ void drape_system_pairs(const drape_system *system, int32_t term, const drape_po
 
 void drape_system_remainder(drape_system *system, const drape_point *point, double *values)
 {
-    const drape_request want = {.point = point,
-                                .hessian = true,
-                                .conservative = true,
-                                .dissipative = true,
-                                .project = true,
-                                .remainder = true};
+    drape_request want = {.point = point,
+                          .hessian = true,
+                          .conservative = true,
+                          .dissipative = true,
+                          .project = true,
+                          .remainder = true};
     const drape_sums to = into_values(system, values);
+    feel_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
         drape_contact_add_jacobian(system->contact, point->weight, false, true, system->pattern, values);
@@ -316,8 +435,9 @@ bool drape_system_has_remainder(const drape_system *system)
 
 void drape_system_damping(drape_system *system, const drape_point *point, double *values)
 {
-    const drape_request want = {.point = point, .hessian = true, .velocity = true, .dissipative = true};
+    drape_request want = {.point = point, .hessian = true, .velocity = true, .dissipative = true};
     const drape_sums to = into_values(system, values);
+    feel_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
         drape_contact_add_jacobian(system->contact, 0, true, false, system->pattern, values);
@@ -378,9 +498,10 @@ void drape_system_term(drape_system *system, int32_t term, const drape_point *po
                        double *g, double *values)
 {
     const drape_term *t = &system->model->terms[term];
-    const drape_request want = {
+    drape_request want = {
         .point = point, .energy = energy, .hessian = values, .conservative = true, .dissipative = true};
     drape_sums to = into_values(system, t->block ? values : NULL);
+    feel_wind(system, &want);
     to.g = g;
     if (energy)
         *energy = 0;
@@ -398,6 +519,13 @@ void drape_system_measures(drape_system *system, const drape_point *point, doubl
         term->ops->measure(&term->elements, 0, term->elements.count, point->x, internal,
                            q + term->first_measure, NULL, NULL);
     }
+}
+
+void drape_system_stress(drape_system *system, const drape_point *point, const double *along, double *stress)
+{
+    const drape_request want = {
+        .point = point, .conservative = true, .dissipative = along, .along = along, .stress = stress};
+    drape_summer_stress(system->summer, &want);
 }
 
 /* ---- Finding what is wrong ---- */

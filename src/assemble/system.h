@@ -11,8 +11,11 @@
 #ifndef DRAPE_ASSEMBLE_SYSTEM_H
 #define DRAPE_ASSEMBLE_SYSTEM_H
 
+#include <stdatomic.h>
+
 #include "assemble/pull.h"
 #include "assemble/state.h"
+#include "assemble/wind.h"
 #include "contact/contact.h"
 
 typedef struct drape_system drape_system;
@@ -23,6 +26,8 @@ typedef struct drape_point {
     const double *internal; /* (internal_count) of the last accepted state */
     double weight;          /* w [1/s]: v = w x + const, and q' = w q + history */
     const double *history;  /* (measure_count) [q/s]; NULL: q' = grad q . v, as in continuous time */
+    const double *stress;   /* (measure_count) the forces on measures that weigh their second derivatives in a
+                               Jacobian; NULL: those here */
     double t;               /* [s] where colliders stand */
     double span[2];         /* [s] over which their velocity is taken; equal: they rest */
 } drape_point;
@@ -44,9 +49,36 @@ int drape_system_threads(const drape_system *system);
 void drape_system_set_pull(drape_system *system, const drape_pull *pull);
 const drape_pull *drape_system_pull(const drape_system *system);
 
+/* Where pins and colliders are, on the tracks of the model and on the ways of a host. */
+const drape_motion *drape_system_motion(const drape_system *system);
+drape_motion *drape_system_steer(drape_system *system);
+
+/* Forces of a host on nodes (node_count x 3) [N], copied; NULL: none. They are the same at any x and belong to the
+ * system from now on, without an energy: their work from x to y [J]. */
+void drape_system_set_push(drape_system *system, const double *force);
+double drape_system_push_work(const drape_system *system, const double *x, const double *y);
+
+/* A medium that moves, from now on. Errors: DRAPE_E_MEMORY. */
+drape_status drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user);
+
+/* Adds what a host does to nodes at x, pull and push, to g (node_count x 3): a part of drape_system_force. */
+void drape_system_add_loads(const drape_system *system, const double *x, double *g);
+
+/* A flag that may be raised at any time: from the next force on drape_system_status is DRAPE_E_STOPPED, until a step
+ * begins without it. drape_system_cancelled looks at it at once. */
+void drape_system_watch(drape_system *system, const atomic_bool *cancel);
+bool drape_system_cancelled(drape_system *system);
+
 /* From now on the forces of contact belong to the system, if the model has any. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_add_contact(drape_system *system);
 const drape_contact *drape_system_contact(const drape_system *system); /* NULL: there is none */
+
+/* A clock that stands while contact is at work, which has one of its own: parts of a step timed by it are parts beside
+ * that one. [s] */
+double drape_system_clock(const drape_system *system);
+
+/* What it knows besides the model, into an archive or, where it was just made, out of it. */
+void drape_system_archive(drape_system *system, drape_archive *a);
 
 /* A step begins at a state: contact is compared with it until the next. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
@@ -56,7 +88,7 @@ drape_status drape_system_begin(drape_system *system, const drape_state *in);
 const drape_pattern *drape_system_pattern(const drape_system *system);
 drape_status drape_system_fit(drape_system *system, const drape_point *point, bool *changed);
 
-/* The first failure since drape_system_begin of what has no status of its own: memory for contacts. */
+/* The first failure since drape_system_begin of what has no status of its own: memory for contacts, cancelling. */
 drape_status drape_system_status(const drape_system *system);
 
 /* g (node_count x 3) of all nodes, pinned ones too. */
@@ -109,6 +141,10 @@ double drape_system_way(drape_system *system, const double *x, const double *y, 
 
 /* q of all measures (measure_count). */
 void drape_system_measures(drape_system *system, const drape_point *point, double *q);
+
+/* The forces f on all measures, dE/dq and laws (measure_count), to first order where the nodes go on by `along`
+ * (node_count x 3); NULL: here, and without what is dissipative. */
+void drape_system_stress(drape_system *system, const drape_point *point, const double *along, double *stress);
 
 /* One term alone, for checks and profiles: adds its g to g, its J to values; *energy gets its energy. Any of
  * the three may be NULL. */

@@ -16,10 +16,10 @@ struct drape_context {
     char message[DRAPE_MESSAGE_SIZE];
     char pointer[256]; /* JSON pointer of the last fault, "" for none: the scene reader finds line and column
                           by it */
-    char text[DRAPE_MESSAGE_SIZE]; /* the message without its place */
-    const drape_term_ops *host_terms[DRAPE_MAX_HOST_TERMS];
+    char text[DRAPE_MESSAGE_SIZE];                   /* the message without its place */
+    drape_term_ops host_terms[DRAPE_MAX_HOST_TERMS]; /* copies, of this version's size */
     int host_term_count;
-    const drape_collider_ops *host_colliders[DRAPE_MAX_HOST_COLLIDERS];
+    drape_collider_ops host_colliders[DRAPE_MAX_HOST_COLLIDERS];
     int host_collider_count;
 };
 

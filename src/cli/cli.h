@@ -51,6 +51,7 @@ typedef struct cli_option {
 
 /* A scene value of the command line. */
 typedef struct cli_setting {
+    const char *option; /* its name on the command line */
     const char *pointer, *value;
     char *memory; /* of either; NULL: none was needed */
 } cli_setting;

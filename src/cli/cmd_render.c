@@ -4,7 +4,7 @@
 #include "cli/tables.h"
 
 #include "base/param.h"
-#include "io/file.h"
+#include "io/export.h"
 #include "render/film.h"
 #include "render/images.h"
 #include "render/offscreen.h"
@@ -14,11 +14,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 #define DEFAULT_WIDTH  1280
 #define DEFAULT_HEIGHT 720
 #define LEAST_SIDE     16
 #define LEAST_RANGE    1e-9 /* of a field whose values are all the same */
+#define PICTURE_DIGITS 5    /* in the name of a frame, at least */
 
 typedef struct render_request {
     cli_command command;
@@ -128,21 +130,72 @@ static int read_range(render *r)
     return CLI_GO_ON;
 }
 
-static bool ends_with(const char *text, const char *ending)
+/* Files that the shading does not read are none that were meant. */
+static int read_images(render *r)
 {
-    size_t length = strlen(text), size = strlen(ending);
-    return length > size && strcmp(text + length - size, ending) == 0;
+    const render_request *q = r->request;
+    const struct {
+        const char *option, *file;
+        int reads;
+    } images[] = {{"texture", q->texture, DRAPE_READS_PATTERN},
+                  {"height", q->height, DRAPE_READS_HEIGHTS},
+                  {"environment", q->environment, DRAPE_READS_ENVIRONMENT}};
+    for (size_t i = 0; i < sizeof images / sizeof *images; i++) {
+        char names[120] = "";
+        size_t used = 0;
+        if (!images[i].file || r->shading->reads & images[i].reads)
+            continue;
+        for (int k = 0; drape_shadings[k] && used < sizeof names; k++)
+            if (drape_shadings[k]->reads & images[i].reads)
+                used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : "",
+                                         drape_shadings[k]->name);
+        return cli_misuse("render", "--%s: the shading \"%s\" does not show it; --shade may be %s",
+                          images[i].option, r->shading->name, names);
+    }
+    return CLI_GO_ON;
+}
+
+/* ".png" of "a.b/x.png"; "" of a name that has no dot but at its beginning, or ends in a slash. */
+static const char *ending_of(const char *path)
+{
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+    const char *dot = strrchr(name + strspn(name, "."), '.');
+    return dot ? dot : "";
+}
+
+/* ".mp4, .webm" ... */
+static const char *film_endings(char *text, size_t size)
+{
+    size_t used = 0;
+    for (int i = 0; drape_film_ending(i) && used < size; i++)
+        used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", drape_film_ending(i));
+    return text;
+}
+
+/* What is made is in the ending of its name. A folder that is there already may be called as it is. */
+static int read_kind(render *r)
+{
+    char films[80];
+    const char *out = r->request->out;
+    if (!out)
+        return cli_misuse("render", "--out is missing: a picture (.png), a film (%s) or a folder",
+                          film_endings(films, sizeof films));
+    const char *ending = ending_of(out);
+    r->film = drape_film_knows(out);
+    r->picture = strcasecmp(ending, ".png") == 0;
+    if (r->film || r->picture || !*ending || cli_is_folder(out))
+        return CLI_GO_ON;
+    return cli_misuse(
+        "render",
+        "--out \"%.200s\": there is no \"%.20s\"; .png is a picture, %s are films, and a folder "
+        "for pictures has no ending, or a / at its end",
+        out, ending, film_endings(films, sizeof films));
 }
 
 static int read_out(render *r)
 {
     const render_request *q = r->request;
     char *end = NULL;
-    if (!q->out)
-        return cli_misuse("render",
-                          "--out is missing: a picture (.png), a film (.mp4, .webm, .gif) or a folder");
-    r->film = drape_film_knows(q->out);
-    r->picture = ends_with(q->out, ".png");
     long frame = q->frame ? strtol(q->frame, &end, 10) : CLI_LAST_FRAME;
     if (q->frame && (!*q->frame || *end || frame < 0 || frame > 1000000000))
         return cli_misuse("render", "--frame \"%.60s\": it is a number from 0", q->frame);
@@ -163,7 +216,8 @@ static int read_out(render *r)
 
 static int read_request(render *r)
 {
-    int (*const readers[])(render *) = {read_shade, read_size, read_camera, read_range, read_out};
+    int (*const readers[])(render *) = {read_shade,  read_size, read_camera, read_range,
+                                        read_images, read_kind, read_out};
     int code = CLI_GO_ON;
     for (size_t i = 0; i < sizeof readers / sizeof *readers && code == CLI_GO_ON; i++)
         code = readers[i](r);
@@ -219,7 +273,8 @@ static int fill_sources(render *r)
 /* One camera for all panels and all frames. */
 static int set_stages(render *r)
 {
-    float aspect = drape_painter_aspect(r->painter, r->source_count);
+    const drape_picture picture = {.panel_count = r->source_count, .shading = r->shading};
+    float aspect = drape_painter_aspect(r->painter, &picture);
     drape_framing framing = drape_framing_begin((float)r->azimuth, (float)r->elevation, aspect);
     r->stages = drape_alloc(r->ctx, (size_t)r->source_count, sizeof *r->stages);
     if (!r->stages)
@@ -277,7 +332,6 @@ static drape_status draw(render *r, size_t k)
                                    .low = r->low,
                                    .high = r->high,
                                    .camera = r->view,
-                                   .lamp_azimuth = (float)r->azimuth - 48,
                                    .caption = r->picture ? NULL : caption};
     drape_status status = drape_painter_draw(r->painter, &picture);
     return status ? status : drape_canvas_read(r->ctx, drape_painter_canvas(r->painter), r->pixels);
@@ -318,8 +372,10 @@ static drape_status make_folder(render *r)
         return DRAPE_E_MEMORY;
     snprintf(path, size, "%s", r->request->out);
     drape_status status = drape_folder_make(r->ctx, path);
+    if (!status) /* frames of two runs must not lie side by side */
+        status = drape_frame_files_clean(r->ctx, r->request->out, PICTURE_DIGITS, "png");
     for (size_t k = 0; k < r->sources[0].reel.count && !status && !cli_interrupted(); k++) {
-        snprintf(path, size, "%s/frame_%05zu.png", r->request->out, k);
+        snprintf(path, size, "%s/frame_%0*zu.png", r->request->out, PICTURE_DIGITS, k);
         status = draw(r, k);
         if (!status)
             status = drape_png_write(r->ctx, path, r->pixels, r->width, r->height, r->request->small);
@@ -372,7 +428,8 @@ static void release(render *r)
 #define AT(member) offsetof(render_request, member)
 static const cli_option options[] = {
     {"out", CLI_TEXT, "FILE|DIR",
-     "x.png: one frame; x.mp4, x.webm, x.gif: a film, by ffmpeg; else a folder of frames", AT(out), 0, NULL},
+     "x.png: one frame; x.mp4, x.webm, x.gif: a film, by ffmpeg; without an ending: a folder of frames",
+     AT(out), 0, NULL},
     {"frame", CLI_TEXT, "N", "the frame of a picture, from 0; the last without it", AT(frame), 0, NULL},
     {"every", CLI_NUMBER, "N", "each Nth frame of a film or folder", AT(every), 1000000, NULL},
     {"shade", CLI_TEXT, "ROW", "how cloth is coloured, diffuse without it; `drape list shadings` shows all",
@@ -384,7 +441,8 @@ static const cli_option options[] = {
      "of the colours of a field, in the legend's unit; of its values without it", AT(range), 0, NULL},
     {"compare", CLI_FLAG, NULL, "several scenes or runs side by side, by time", AT(compare), 0, NULL},
     {"texture", CLI_TEXT, "PNG", "picture on the cloth", AT(texture), 0, NULL},
-    {"height", CLI_TEXT, "PNG", "height map of bump and displacement, in red", AT(height), 0, NULL},
+    {"height", CLI_TEXT, "PNG", "height map of bump, displacement and pbr, in red; its alpha is metal in pbr",
+     AT(height), 0, NULL},
     {"environment", CLI_TEXT, "PNG", "the world that mirror, refraction and pbr show: longitude x latitude",
      AT(environment), 0, NULL},
     {"small", CLI_FLAG, NULL, "PNG files as small as they get, slower", AT(small), 0, NULL},

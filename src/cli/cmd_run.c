@@ -5,11 +5,13 @@
 #include "cli/signals.h"
 
 #include "base/clock.h"
+#include "io/checkpoint.h"
 #include "io/recorder.h"
 #include "io/scene_copy.h"
 #include "io/summary.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,7 +21,8 @@
 typedef struct run_request {
     cli_command command;
     const char *out, *summary;
-    bool realtime;
+    bool realtime, resume;
+    int checkpoint_every; /* frames; 0: none */
 } run_request;
 
 typedef struct run {
@@ -27,9 +30,12 @@ typedef struct run {
     cli_scene in;
     drape_recorder *recorder; /* NULL without --out */
     char *summary_path;       /* in the folder of --out; NULL without it */
+    void *checkpoint;         /* the file that the run goes on from; NULL: it begins */
+    drape_archive archive;    /* of it */
     cli_progress progress;
     cli_realtime realtime; /* of --realtime */
-    double start;          /* [s] of the clock */
+    double start;          /* [s] of the clock, less what the run took before a checkpoint */
+    double wall;           /* [s] that it took */
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
 } run;
@@ -63,25 +69,81 @@ static drape_status keep_scene(const run *r)
                : drape_scene_copy(r->in.ctx, r->in.scene, r->in.model, path, folder);
 }
 
+static bool keeps_checkpoints(const run *r)
+{
+    return r->request->resume || r->request->checkpoint_every > 0;
+}
+
+static drape_recorder_def recorder_def(const run *r)
+{
+    return (drape_recorder_def){.folder = r->request->out,
+                                .formats = (const char *const *)r->in.model->formats,
+                                .format_count = r->in.model->format_count,
+                                .checkpoints = keeps_checkpoints(r),
+                                .checkpoint_every = r->request->checkpoint_every,
+                                .start = r->start};
+}
+
+static char *path_in_folder(const run *r, const char *name)
+{
+    size_t size = strlen(r->request->out) + strlen(name) + 2;
+    char *path = drape_alloc(r->in.ctx, size, 1);
+    if (path)
+        snprintf(path, size, "%s/%s", r->request->out, name);
+    return path;
+}
+
+/* Of a run that goes on, the recorder is there already, and so is the scene. */
 static drape_status begin_output(run *r)
 {
-    const drape_model *model = r->in.model;
-    const char *folder = r->request->out;
-    if (!folder)
+    if (!r->request->out)
         return DRAPE_OK;
-    size_t size = strlen(folder) + sizeof "/summary.json";
-    r->summary_path = drape_alloc(r->in.ctx, size, 1);
+    r->summary_path = path_in_folder(r, "summary.json");
     if (!r->summary_path)
         return DRAPE_E_MEMORY;
-    snprintf(r->summary_path, size, "%s/summary.json", folder);
-    const drape_recorder_def def = {.folder = folder,
-                                    .formats = (const char *const *)model->formats,
-                                    .format_count = model->format_count};
-    drape_status status = drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder);
+    if (drape_recorder_is_finished(r->recorder))
+        return DRAPE_OK;
+    const bool begins = !r->recorder;
+    const drape_recorder_def def = recorder_def(r);
+    drape_status status = begins ? drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder) : DRAPE_OK;
     if (status)
         return status;
     remove_old_summary(r->summary_path);
-    return keep_scene(r);
+    return begins ? keep_scene(r) : DRAPE_OK;
+}
+
+/* ---- Going on ---- */
+
+/* The sim where the checkpoint in the folder has it, and a recorder that goes on there. A folder without one: a run that
+ * begins. */
+static drape_status go_on(run *r)
+{
+    bool there;
+    size_t size;
+    char *path = path_in_folder(r, DRAPE_CHECKPOINT_NAME);
+    if (!path)
+        return DRAPE_E_MEMORY;
+    drape_status status = drape_checkpoint_read(r->in.ctx, path, &there, &r->checkpoint, &size);
+    if (!status && there)
+        status = drape_archive_read_from(&r->archive, r->in.ctx, path, r->checkpoint, size);
+    if (!status && there)
+        status = drape_sim_read(r->in.sim, &r->archive);
+    const drape_recorder_def def = recorder_def(r);
+    if (!status && there)
+        status = drape_recorder_resume(r->in.ctx, r->in.sim, &def, &r->archive, &r->recorder);
+    r->start -= drape_recorder_wall(r->recorder);
+    drape_free(r->in.ctx, path);
+    return status;
+}
+
+/* Nothing was written where it is refused. */
+static int resume(run *r)
+{
+    drape_status status = r->request->resume ? go_on(r) : DRAPE_OK;
+    if (!status)
+        return CLI_GO_ON;
+    fprintf(stderr, "%s\n", drape_context_message(r->in.ctx));
+    return CLI_BAD_INPUT;
 }
 
 static void write_summary(run *r, const char *path)
@@ -91,7 +153,7 @@ static void write_summary(run *r, const char *path)
     const drape_summary_def def = {.status = r->status,
                                    .message = r->message,
                                    .frames = drape_recorder_frames(r->recorder),
-                                   .wall_total = drape_clock_seconds() - r->start,
+                                   .wall_total = r->wall,
                                    .wall_output = drape_recorder_seconds(r->recorder),
                                    .realtime = r->request->realtime ? &r->realtime.result : NULL};
     note(r, drape_summary_write(r->in.ctx, r->in.sim, &def, path));
@@ -146,13 +208,26 @@ static void print_wall(const run *r, const drape_statistics *s)
     } parts[] = {{"residual", s->wall_residual},
                  {"Jacobian", s->wall_jacobian},
                  {"factor", s->wall_factor},
-                 {"solve", s->wall_solve}};
+                 {"solve", s->wall_solve},
+                 {"contact", s->wall_contact}};
     double steps = s->wall_steps > 0 ? s->wall_steps : 1;
-    printf("wall      %.4g s; %.4g ms a step", drape_clock_seconds() - r->start,
+    printf("wall      %.4g s; %.4g ms a step", r->wall,
            s->steps_accepted ? 1e3 * s->wall_steps / (double)s->steps_accepted : 0.0);
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
-        printf("%s %s %.0f %%", i ? "," : ":", parts[i].name, 100 * parts[i].seconds / steps);
+        if (parts[i].seconds > 0)
+            printf("%s %s %.0f %%", i ? "," : ":", parts[i].name, 100 * parts[i].seconds / steps);
     fputc('\n', stdout);
+}
+
+/* Nothing where all is well: a scene without colliders has no such line, and one that comes out of them neither. */
+static void print_inside(const run *r)
+{
+    double deepest;
+    int32_t faces;
+    for (int32_t c = 0; (faces = drape_sim_inside(r->in.sim, c, &deepest)) >= 0; c++)
+        if (faces > 0)
+            printf("inside    %d triangle%s of the cloth reach%s into %s, up to %.3g m deep\n", (int)faces,
+                   faces == 1 ? "" : "s", faces == 1 ? "es" : "", r->in.model->colliders[c].name, deepest);
 }
 
 static void print_results(const run *r)
@@ -170,6 +245,7 @@ static void print_results(const run *r)
         printf("equilibrium %s, %lld unstable modes\n", s.unstable_modes == 0 ? "stable" : "unstable",
                (long long)s.unstable_modes);
     print_energy(r);
+    print_inside(r);
     print_wall(r, &s);
     if (r->request->realtime)
         cli_realtime_print(&r->realtime);
@@ -195,21 +271,42 @@ static drape_status watch(void *user, const drape_event *event)
     return DRAPE_E_STOPPED;
 }
 
-static void simulate(run *r)
+static void advance(run *r)
 {
     double end = drape_model_duration(r->in.model);
-    cli_catch_signals();
-    note(r, begin_output(r));
-    if (!r->status)
-        note(r, drape_sim_observe(r->in.sim, watch, r));
-    if (!r->status) {
-        cli_progress_begin(&r->progress, end);
-        note(r, r->request->realtime ? cli_realtime_run(&r->realtime, &r->in)
-                                     : drape_sim_advance(r->in.sim, end));
-        cli_progress_clear(&r->progress);
-    }
+    note(r, drape_sim_observe(r->in.sim, watch, r));
+    if (r->status)
+        return;
+    cli_progress_begin(&r->progress, drape_sim_time(r->in.sim), end);
+    note(r,
+         r->request->realtime ? cli_realtime_run(&r->realtime, &r->in) : drape_sim_advance(r->in.sim, end));
+    cli_progress_clear(&r->progress);
+}
+
+/* Of an interrupted run before its last frame, which is none of the whole run's; of one that is done after it. */
+static void finish(run *r)
+{
+    const bool keeps = r->recorder && keeps_checkpoints(r);
+    if (keeps && r->status == DRAPE_E_STOPPED)
+        note(r, drape_recorder_checkpoint(r->recorder));
     if (r->recorder)
         note(r, drape_recorder_finish(r->recorder));
+    if (keeps && !r->status)
+        note(r, drape_recorder_checkpoint(r->recorder));
+    r->wall = keeps && !r->status ? drape_recorder_wall(r->recorder) : drape_clock_seconds() - r->start;
+}
+
+static void simulate(run *r)
+{
+    const bool done = drape_recorder_is_finished(r->recorder);
+    cli_catch_signals();
+    note(r, begin_output(r));
+    if (!r->status && !done)
+        advance(r);
+    if (done)
+        r->wall = drape_recorder_wall(r->recorder);
+    else
+        finish(r);
     write_summary(r, r->summary_path);
     write_summary(r, r->request->summary);
 }
@@ -239,18 +336,39 @@ static int check_folder(const run_request *request)
                       request->out);
 }
 
+static int check_checkpoints(const run_request *request)
+{
+    const char *verb = request->command.verb;
+    if (!request->resume && request->checkpoint_every == 0)
+        return CLI_GO_ON;
+    const char *option = request->resume ? "resume" : "checkpoint-every";
+    if (!request->out)
+        return cli_misuse(verb, "--%s needs --out: a checkpoint lies in the folder of its run", option);
+    if (request->realtime)
+        return cli_misuse(verb, "--%s does not go with --realtime, whose steps depend on the clock", option);
+    return CLI_GO_ON;
+}
+
 static int load_and_run(const run_request *request)
 {
     run r = {.request = request, .start = drape_clock_seconds()};
-    int code = cli_scene_load(&request->command, &r.in);
+    int code = check_checkpoints(request);
+    if (code != CLI_GO_ON)
+        return code;
+    code = cli_scene_load(&request->command, &r.in);
     if (code == CLI_GO_ON)
         code = check_folder(request);
+    if (code == CLI_GO_ON)
+        code = resume(&r);
     if (code == CLI_GO_ON) {
         simulate(&r);
         code = conclude(&r);
-        drape_recorder_destroy(&r.recorder);
+    }
+    drape_recorder_destroy(&r.recorder);
+    cli_realtime_free(&r.realtime);
+    if (r.in.ctx) {
         drape_free(r.in.ctx, r.summary_path);
-        cli_realtime_free(&r.realtime);
+        drape_free(r.in.ctx, r.checkpoint);
     }
     cli_scene_free(&r.in);
     return code;
@@ -261,6 +379,11 @@ static const cli_option options[] = {
      "folder for frames, steps.csv, energy.csv, summary.json and scene.json; made if it is not there",
      offsetof(run_request, out), 0, NULL},
     {"summary", CLI_TEXT, "FILE", "write the summary there, too", offsetof(run_request, summary), 0, NULL},
+    {"checkpoint-every", CLI_NUMBER, "N", "save the run in DIR/checkpoint.drape with every N-th frame",
+     offsetof(run_request, checkpoint_every), INT_MAX, NULL},
+    {"resume", CLI_FLAG, NULL,
+     "go on from the checkpoint in DIR, of the same scene; from the beginning where there is none",
+     offsetof(run_request, resume), 0, NULL},
     {"realtime", CLI_FLAG, NULL, "frames of 1/frame_rate with that time as budget; tells how long they took",
      offsetof(run_request, realtime), 0, NULL},
 };
@@ -273,7 +396,9 @@ const drape_verb drape_verb_run = {
     .takes_scene = true,
     .summary = "simulate a scene; frames, step log and summary into a folder",
     .details = "Simulates a scene. Without --out nothing is written but the results on the standard output.\n"
-               "Ctrl-C ends the run after the step in progress and keeps what was written.",
+               "Ctrl-C ends the run after the step in progress and keeps what was written.\n"
+               "A run with --checkpoint-every that was killed goes on with --resume, and ends as if it had "
+               "not been.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .run = main_run,

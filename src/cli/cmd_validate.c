@@ -237,7 +237,7 @@ static int run_references(drape_context *ctx, const validate_request *request, c
     if (!status) {
         cli_catch_signals();
         style->begin();
-        cli_progress_begin(&r.progress, 0);
+        cli_progress_begin(&r.progress, 0, 0);
         status = run_cases(&r, style, counts);
         style->end(counts);
         fflush(stdout);

@@ -19,14 +19,18 @@
 #define STEP   0.04  /* of the scene's size: of a movable */
 #define SCALE  1.5
 #define IDLE   0.05 /* [s] that a paused window waits for input */
-#define LINES  14
-#define LINE   110
+#define LINES  16
+#define LINE   120
+#define COLUMN 320   /* pixels at 720 rows: of the state or the keys, at the left */
+#define WIDEST 0.42f /* of the window, at most */
 
 typedef struct view_request {
     cli_command command;
     const char *shade, *size;
     bool running;
 } view_request;
+
+typedef enum side { PANEL_STATE, PANEL_KEYS, PANEL_NONE, PANEL_COUNT } side;
 
 typedef enum drag { DRAG_NONE, DRAG_TURN, DRAG_PAN, DRAG_NODE } drag;
 
@@ -44,7 +48,8 @@ typedef struct window_view {
     drag drag;
     double x, y; /* of the pointer */
     float depth; /* [m] of the dragged node from the eye */
-    bool help, changed, quit;
+    side shown;  /* at the left */
+    bool changed, quit;
     double frame_seconds, step_seconds; /* of the last frame that was shown */
 } window_view;
 
@@ -107,10 +112,25 @@ static drape_status make_stage(window_view *w)
     return DRAPE_OK;
 }
 
+/* Of one panel, without its lines. */
+static drape_picture picture_of(const window_view *w, const drape_panel *panel)
+{
+    const drape_overlay *o = drape_painter_overlay(w->painter);
+    float column = w->shown == PANEL_NONE ? 0 : fminf(COLUMN * o->unit, WIDEST * (float)o->width);
+    return (drape_picture){.panels = panel,
+                           .panel_count = 1,
+                           .shading = shading_of(w),
+                           .low = w->low,
+                           .high = w->high > w->low ? w->high : w->low + 1e-9,
+                           .camera = w->camera,
+                           .column = column};
+}
+
 /* The start has to fit, and as far as it may hang down. */
 static void set_camera(window_view *w)
 {
-    float aspect = drape_painter_aspect(w->painter, 1);
+    const drape_picture picture = picture_of(w, NULL);
+    float aspect = drape_painter_aspect(w->painter, &picture);
     drape_framing framing = drape_framing_begin(DRAPE_CAMERA_AZIMUTH, DRAPE_CAMERA_ELEVATION, aspect);
     const float *x = drape_reel_positions(&w->reel, 0);
     drape_stage_frame(&w->stage, &framing, 0, x);
@@ -133,7 +153,9 @@ static void set_camera(window_view *w)
 
 static drape_view view_of(const window_view *w)
 {
-    return drape_camera_view(&w->camera, drape_painter_aspect(w->painter, 1), w->stage.radius);
+    const drape_panel panel = {.stage = (drape_stage *)&w->stage};
+    drape_picture picture = picture_of(w, &panel);
+    return drape_painter_view(w->painter, &picture, 0);
 }
 
 static void put_lines(const window_view *w, char lines[LINES][LINE])
@@ -144,35 +166,47 @@ static void put_lines(const window_view *w, char lines[LINES][LINE])
     double force[3];
     int n = 0;
     drape_sim_pull_force(v->in.sim, force);
-    snprintf(lines[n++], LINE, "%s   t = %.3f s   %s   dt = %.4g s", v->paused ? "paused" : "running",
-             drape_sim_time(v->in.sim), view_integrator(v), view_dt(v));
-    snprintf(lines[n++], LINE, "frame %.1f ms, of it steps %.1f ms", 1e3 * w->frame_seconds,
+    snprintf(lines[n++], LINE, "%s\tt = %.3f s", v->paused ? "paused" : "running", drape_sim_time(v->in.sim));
+    snprintf(lines[n++], LINE, "integrator\t%s, dt = %.4g s", view_integrator(v), view_dt(v));
+    snprintf(lines[n++], LINE, "frame\t%.1f ms, of it steps %.1f", 1e3 * w->frame_seconds,
              1e3 * w->step_seconds);
-    snprintf(lines[n++], LINE, "steps %lld, rejected %lld, iterations %lld (last frame %lld)",
-             (long long)s.steps_accepted, (long long)s.steps_rejected, (long long)s.newton_iterations,
+    snprintf(lines[n++], LINE, "steps\t%lld, rejected %lld", (long long)s.steps_accepted,
+             (long long)s.steps_rejected);
+    snprintf(lines[n++], LINE, "iterations\t%lld, last frame %lld", (long long)s.newton_iterations,
              (long long)v->iterations);
-    snprintf(lines[n++], LINE, "energy %.4g J: kinetic %.3g, elastic %.3g, gravity %.3g, contact %.3g",
-             e.kinetic + e.elastic + e.gravity + e.contact, e.kinetic, e.elastic, e.gravity, e.contact);
-    snprintf(lines[n++], LINE, "stiffness x %.3g   damping x %.3g   gravity x %.3g   shade %s", v->stiffness,
-             v->damping, v->gravity, shading_of(w)->name);
+    snprintf(lines[n++], LINE, "energy\t%.4g J", e.kinetic + e.elastic + e.gravity + e.contact);
+    snprintf(lines[n++], LINE, "\tkinetic %.3g, elastic %.3g, gravity %.3g, contact %.3g", e.kinetic,
+             e.elastic, e.gravity, e.contact);
+    snprintf(lines[n++], LINE, "stiffness\tx %.3g", v->stiffness);
+    snprintf(lines[n++], LINE, "damping\tx %.3g", v->damping);
+    snprintf(lines[n++], LINE, "gravity\tx %.3g", v->gravity);
+    snprintf(lines[n++], LINE, "shading\t%s", shading_of(w)->name);
     if (v->movable_count > 0)
-        snprintf(lines[n++], LINE, "arrows move: %s", v->movables[v->moved].name);
+        snprintf(lines[n++], LINE, "arrows\tmove %s", v->movables[v->moved].name);
     if (v->pulled >= 0)
-        snprintf(lines[n++], LINE, "pull on node %d: %.3g N", (int)v->pulled,
-                 sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]));
+        snprintf(lines[n++], LINE, "pull\t%.3g N on node %d",
+                 sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]), (int)v->pulled);
     if (v->message[0])
         snprintf(lines[n++], LINE, "! %.100s", v->message);
     lines[n][0] = 0;
 }
 
-static const char *const help_lines[] = {
-    "space, P   run or pause          N   one step          R   from the start          Esc, Q   quit",
-    "left drag   turn, or pull a node          right drag   pan          wheel   zoom          C   camera "
-    "back",
-    "I   next integrator     D d   time step     K k   stiffness     B b   damping     G g   gravity (shift: "
-    "more)",
-    "S   next shading (shift: back)     tab, arrows, page keys   move a collider or pin     H   hide this",
-    NULL};
+static const char *const help_lines[] = {"space, P\trun or pause",
+                                         "N\tone step",
+                                         "R\tfrom the start",
+                                         "Esc, Q\tquit",
+                                         "left drag\tpull a node; beside it turn",
+                                         "right drag\tpan",
+                                         "wheel\tzoom",
+                                         "C\tcamera back",
+                                         "S\tnext shading",
+                                         "I\tnext integrator",
+                                         "D K B G\ttime step, stiffness, damping, gravity: less",
+                                         "shift\tmore, or back",
+                                         "tab\tnext collider or pin",
+                                         "arrows\tmove it, page keys up and down",
+                                         "H\thide this; once more: show the state",
+                                         NULL};
 
 static bool project(const window_view *w, const drape_view *view, const float *p, float *x, float *y,
                     float *depth)
@@ -209,27 +243,20 @@ static void mark_pull(window_view *w)
 static drape_status draw(window_view *w)
 {
     char text[LINES][LINE];
-    const char *lines[LINES + 8];
+    const char *state[LINES + 1];
     int count = 0;
     put_lines(w, text);
     for (; text[count][0]; count++)
-        lines[count] = text[count];
-    for (int i = 0; w->help && help_lines[i]; i++)
-        lines[count++] = help_lines[i];
-    lines[count] = NULL;
+        state[count] = text[count];
+    state[count] = NULL;
+    const char *const *const panels[PANEL_COUNT] = {[PANEL_STATE] = state, [PANEL_KEYS] = help_lines};
     const drape_panel panel = {.stage = &w->stage,
                                .moment = {.t = w->reel.times[0],
                                           .positions = drape_reel_positions(&w->reel, 0),
                                           .values = drape_reel_values(&w->reel, 0)}};
-    const drape_picture picture = {.panels = &panel,
-                                   .panel_count = 1,
-                                   .shading = shading_of(w),
-                                   .low = w->low,
-                                   .high = w->high > w->low ? w->high : w->low + 1e-9,
-                                   .camera = w->camera,
-                                   .lamp_azimuth = DRAPE_CAMERA_AZIMUTH - 48,
-                                   .caption = w->help ? NULL : "H: help",
-                                   .lines = lines};
+    drape_picture picture = picture_of(w, &panel);
+    picture.lines = panels[w->shown];
+    picture.caption = w->shown == PANEL_KEYS ? NULL : "H: keys";
     if (w->v.pulled >= 0)
         mark_pull(w);
     drape_status status = drape_painter_draw(w->painter, &picture);
@@ -300,10 +327,10 @@ static void camera_back(window_view *w, int sign)
     (void)sign;
     w->camera = w->home;
 }
-static void toggle_help(window_view *w, int sign)
+static void next_panel(window_view *w, int sign)
 {
     (void)sign;
-    w->help = !w->help;
+    w->shown = (w->shown + 1) % PANEL_COUNT;
 }
 static void next_shading(window_view *w, int sign)
 {
@@ -376,7 +403,7 @@ static const struct {
             {'Q', quit},
             {DRAPE_KEY_ESCAPE, quit},
             {'C', camera_back},
-            {'H', toggle_help},
+            {'H', next_panel},
             {'S', next_shading},
             {'I', next_integrator},
             {'D', scale_dt},
@@ -426,8 +453,8 @@ static void point_at(const window_view *w, double x, double y, float depth, doub
 {
     const drape_view view = view_of(w);
     const drape_canvas *canvas = drape_painter_canvas(w->painter);
-    float across = (2 * (float)x / (float)canvas->width - 1) * view.tx * depth;
-    float upright = (1 - 2 * (float)y / (float)canvas->height) * view.ty * depth;
+    float across = (2 * (float)x / (float)canvas->width - 1 - view.center[0]) * view.tx * depth;
+    float upright = (1 - 2 * (float)y / (float)canvas->height - view.center[1]) * view.ty * depth;
     for (int k = 0; k < 3; k++)
         p[k] = (double)(view.eye[k] + across * view.axes[0][k] + upright * view.axes[1][k] -
                         depth * view.axes[2][k]);

@@ -4,6 +4,7 @@
 #include "cli/progress.h"
 #include "cli/signals.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,7 +13,7 @@
 
 /* ---- Opening ---- */
 
-static bool is_folder(const char *path)
+bool cli_is_folder(const char *path)
 {
     struct stat info;
     return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
@@ -39,26 +40,29 @@ static void make_label(const char *operand, char *label, size_t size)
 
 static int open_run(const cli_command *command, cli_source *s)
 {
-    struct stat info;
-    size_t size = strlen(s->operand) + sizeof "/scene.json";
-    char *path = malloc(size);
-    if (!path)
+    char *path = NULL;
+    if (command->setting_count > 0)
+        return cli_misuse(command->verb,
+                          "--%s is of a simulation, and %s is a finished run; give its scene, which is "
+                          "simulated again: %s/scene.json",
+                          command->settings[0].option, s->operand, s->operand);
+    drape_context *ctx = NULL;
+    if (drape_context_create(NULL, &ctx))
         return cli_misuse(command->verb, "out of memory");
-    snprintf(path, size, "%s/scene.json", s->operand);
-    int code = stat(path, &info) == 0
+    int code = drape_record_scene(ctx, s->operand, &path) == DRAPE_OK
                    ? cli_scene_load_from(command, path, &s->in)
-                   : cli_misuse(command->verb, "%s: there is no scene.json in it; drape run --out writes it",
-                                s->operand);
-    free(path);
-    if (code == CLI_GO_ON && drape_run_open(s->in.ctx, s->operand, s->in.model, &s->run))
+                   : cli_misuse(command->verb, "%s", drape_context_message(ctx));
+    drape_free(ctx, path);
+    drape_context_destroy(&ctx);
+    if (code == CLI_GO_ON && drape_record_open(s->in.ctx, s->operand, s->in.model->node_count, &s->run))
         code = report(s, CLI_BAD_INPUT);
     return code;
 }
 
 static int check_def(const cli_command *command, const cli_frames_def *def, const cli_source *s)
 {
-    if (def->one >= 0 && s->run.frames > 0 && (size_t)def->one >= s->run.frames)
-        return cli_misuse(command->verb, "--frame %d: %s has the frames 0 to %zu", def->one, s->operand,
+    if (def->one >= 0 && s->run.frames > 0 && def->one >= s->run.frames)
+        return cli_misuse(command->verb, "--frame %d: %s has the frames 0 to %" PRId64, def->one, s->operand,
                           s->run.frames - 1);
     if (def->field && def->field->of_steps && s->run.frames > 0)
         return cli_misuse(command->verb,
@@ -73,7 +77,8 @@ int cli_source_open(const cli_command *command, const char *operand, const cli_f
 {
     *out = (cli_source){.operand = operand};
     make_label(operand, out->label, sizeof out->label);
-    int code = is_folder(operand) ? open_run(command, out) : cli_scene_load_from(command, operand, &out->in);
+    int code =
+        cli_is_folder(operand) ? open_run(command, out) : cli_scene_load_from(command, operand, &out->in);
     if (code == CLI_GO_ON)
         code = check_def(command, def, out);
     if (code == CLI_GO_ON &&
@@ -85,44 +90,44 @@ int cli_source_open(const cli_command *command, const char *operand, const cli_f
 void cli_source_free(cli_source *source)
 {
     drape_reel_free(&source->reel);
-    drape_run_close(&source->run);
+    drape_record_close(&source->run);
     cli_scene_free(&source->in);
 }
 
 /* ---- From a run ---- */
 
 /* Velocities between the frames beside this one, for fields that want them. */
-static drape_status put_state(cli_source *s, size_t frame, double *x, double *v, double *beside)
+static drape_status put_state(cli_source *s, int64_t frame, double *x, double *v, double *beside)
 {
-    drape_run *run = &s->run;
-    size_t before = frame > 0 ? frame - 1 : frame, after = frame + 1 < run->frames ? frame + 1 : frame;
+    drape_record *run = &s->run;
+    int64_t before = frame > 0 ? frame - 1 : frame, after = frame + 1 < run->frames ? frame + 1 : frame;
     double span = run->times[after] - run->times[before];
-    drape_status status = drape_run_read(run, after, v);
+    drape_status status = drape_record_read(run, after, v);
     if (!status)
-        status = drape_run_read(run, before, beside);
+        status = drape_record_read(run, before, beside);
     if (!status)
-        status = drape_run_read(run, frame, x);
-    for (size_t i = 0; i < 3 * run->nodes; i++)
+        status = drape_record_read(run, frame, x);
+    for (size_t i = 0; i < 3 * (size_t)run->nodes; i++)
         v[i] = span > 0 ? (v[i] - beside[i]) / span : 0;
     return status ? status : drape_sim_set_state(s->in.sim, run->times[frame], x, v);
 }
 
-static drape_status read_frame(const cli_frames_def *def, cli_source *s, size_t frame, double *room)
+static drape_status read_frame(const cli_frames_def *def, cli_source *s, int64_t frame, double *room)
 {
-    size_t n = 3 * s->run.nodes;
-    drape_status status =
-        def->field ? put_state(s, frame, room, room + n, room + 2 * n) : drape_run_read(&s->run, frame, room);
+    size_t n = 3 * (size_t)s->run.nodes;
+    drape_status status = def->field ? put_state(s, frame, room, room + n, room + 2 * n)
+                                     : drape_record_read(&s->run, frame, room);
     return status ? status : drape_reel_add(&s->reel, s->run.times[frame], room, s->in.sim, def->field);
 }
 
 static int read_frames(const cli_frames_def *def, cli_source *s)
 {
-    double *room = drape_alloc(s->in.ctx, 9 * s->run.nodes, sizeof *room);
+    double *room = drape_alloc(s->in.ctx, 9 * (size_t)s->run.nodes, sizeof *room);
     drape_status status = room ? DRAPE_OK : DRAPE_E_MEMORY;
-    size_t last = s->run.frames - 1, only = def->one == CLI_LAST_FRAME ? last : (size_t)def->one;
+    int64_t last = s->run.frames - 1, only = def->one == CLI_LAST_FRAME ? last : def->one;
     if (!status && def->one != -1)
         status = read_frame(def, s, only, room);
-    for (size_t i = 0; def->one == -1 && i <= last && !status && !cli_interrupted(); i += (size_t)def->every)
+    for (int64_t i = 0; def->one == -1 && i <= last && !status && !cli_interrupted(); i += def->every)
         status = read_frame(def, s, i, room);
     drape_free(s->in.ctx, room);
     if (status)
@@ -136,13 +141,12 @@ typedef struct watch {
     const cli_frames_def *def;
     cli_source *source;
     cli_progress progress;
-    double last; /* [s] of the last frame that was kept */
+    double last; /* [s] of the last frame, kept or not */
     bool enough; /* the one frame is there */
 } watch;
 
 static drape_status keep(watch *w, double t, const double *x)
 {
-    w->last = t;
     return drape_reel_add(&w->source->reel, t, x, w->source->in.sim, w->def->field);
 }
 
@@ -158,6 +162,7 @@ static drape_status observe(void *user, const drape_event *event)
         drape_context_set_message(w->source->in.ctx, "t=%.9g: interrupted", drape_sim_time(event->sim));
         return DRAPE_E_STOPPED;
     }
+    w->last = event->time;
     if (w->def->one == CLI_LAST_FRAME || (w->def->one >= 0 && event->frame != w->def->one) ||
         event->frame % w->def->every != 0)
         return DRAPE_OK;
@@ -180,7 +185,7 @@ static int simulate(const cli_frames_def *def, cli_source *s)
     watch w = {.def = def, .source = s};
     double end = drape_model_duration(s->in.model);
     drape_status status = drape_sim_observe(s->in.sim, observe, &w);
-    cli_progress_begin(&w.progress, end);
+    cli_progress_begin(&w.progress, 0, end);
     if (!status)
         status = drape_sim_advance(s->in.sim, end);
     cli_progress_clear(&w.progress);

@@ -4,8 +4,8 @@
 
 #include "cli/cli.h"
 
+#include "io/record.h"
 #include "render/reel.h"
-#include "render/run.h"
 
 /* Which frames are wanted. */
 typedef struct cli_frames_def {
@@ -16,13 +16,15 @@ typedef struct cli_frames_def {
 
 #define CLI_LAST_FRAME (-2)
 
+bool cli_is_folder(const char *path);
+
 typedef struct cli_source {
     const char *operand;
     char label[80]; /* for the picture */
     cli_scene in;
-    drape_run run;   /* of a folder; empty: the scene is simulated */
-    drape_reel reel; /* filled by cli_source_fill */
-    bool incomplete; /* the simulation stopped: its frames so far are there */
+    drape_record run; /* of a folder; empty: the scene is simulated */
+    drape_reel reel;  /* filled by cli_source_fill */
+    bool incomplete;  /* the simulation stopped: its frames so far are there */
 } cli_source;
 
 /* Opens a scene or a run. CLI_GO_ON, or CLI_BAD_INPUT after the fault was printed. cli_source_free in any case. */

@@ -149,7 +149,7 @@ static int run(const drape_verb *verb, const cli_lab_request *request, int defau
     int code = make_def(request, default_jobs, &w, &progress, &def);
     if (code == CLI_GO_ON) {
         cli_catch_signals();
-        cli_progress_begin(&progress, 0);
+        cli_progress_begin(&progress, 0, 0);
         drape_status status = drape_lab_run(ctx, verb->name, &def, &outcome);
         cli_progress_clear(&progress);
         code = cli_lab_conclude(ctx, status, &outcome);

@@ -34,6 +34,7 @@ static const cli_option scene_options[] = {
 /* The options of a verb: its own, then the scene's. */
 typedef struct option_list {
     const cli_option *options[MAX_OPTIONS];
+    bool given[MAX_OPTIONS];
     size_t count;
 } option_list;
 
@@ -97,10 +98,11 @@ static int no_memory(const cli_command *command)
     return cli_misuse(command->verb, "out of memory for the command line");
 }
 
-static int add_setting(cli_command *command, const char *pointer, const char *value, char *memory)
+static int add_setting(cli_command *command, const cli_option *option, const char *pointer, const char *value,
+                       char *memory)
 {
     command->settings[command->setting_count++] =
-        (cli_setting){.pointer = pointer, .value = value, .memory = memory};
+        (cli_setting){.option = option->name, .pointer = pointer, .value = value, .memory = memory};
     return CLI_GO_ON;
 }
 
@@ -152,7 +154,7 @@ static int take_number(cli_command *command, const cli_option *option, const cha
 
 static int take_value(cli_command *command, const cli_option *option, const char *argument)
 {
-    return add_setting(command, option->pointer, argument, NULL);
+    return add_setting(command, option, option->pointer, argument, NULL);
 }
 
 static int take_set(cli_command *command, const cli_option *option, const char *argument)
@@ -166,7 +168,7 @@ static int take_set(cli_command *command, const cli_option *option, const char *
         return no_memory(command);
     memcpy(pointer, argument, (size_t)(equals - argument));
     pointer[equals - argument] = 0;
-    return add_setting(command, pointer, equals + 1, pointer);
+    return add_setting(command, option, pointer, equals + 1, pointer);
 }
 
 /* "a,b" -> ["a","b"]; "" -> [] */
@@ -182,7 +184,7 @@ static int take_list(cli_command *command, const cli_option *option, const char 
     }
     char *text = good ? json_dumps(array, JSON_COMPACT) : NULL;
     json_decref(array);
-    return text ? add_setting(command, option->pointer, text, text)
+    return text ? add_setting(command, option, option->pointer, text, text)
                 : cli_misuse(command->verb, "--%s \"%.60s\": it is words between commas, in UTF-8",
                              option->name, argument);
 }
@@ -194,6 +196,21 @@ static int take(cli_command *command, const cli_option *option, const char *argu
         [CLI_LIST] = take_list, [CLI_SET] = take_set,   [CLI_TEXTS] = take_texts,   [CLI_REAL] = take_real,
     };
     return takers[option->kind](command, option, argument);
+}
+
+/* Of two values the first would be lost without a word. */
+static bool may_repeat(const cli_option *option)
+{
+    return option->kind == CLI_SET || option->kind == CLI_TEXTS;
+}
+
+static int take_once(cli_command *command, option_list *list, size_t index, const char *argument)
+{
+    const cli_option *option = list->options[index];
+    if (list->given[index] && !may_repeat(option))
+        return cli_misuse(command->verb, "--%s is given twice", option->name);
+    list->given[index] = true;
+    return take(command, option, argument);
 }
 
 /* ---- The line ---- */
@@ -208,15 +225,14 @@ static void make_table(const option_list *list, struct option *table)
 }
 
 /* code: what getopt_long returned. */
-static int handle(const drape_verb *verb, const option_list *list, int code, char **argv,
-                  cli_command *request)
+static int handle(const drape_verb *verb, option_list *list, int code, char **argv, cli_command *request)
 {
     if (code == HELP_VALUE) {
         cli_print_help(verb);
         return CLI_DONE;
     }
     if (code >= FIRST_VALUE)
-        return take(request, list->options[code - FIRST_VALUE], optarg);
+        return take_once(request, list, (size_t)(code - FIRST_VALUE), optarg);
     if (code == ':')
         return cli_misuse(verb->name, "%s needs an argument; `drape %s --help` shows all", argv[optind - 1],
                           verb->name);
@@ -249,7 +265,7 @@ static int take_operand(const drape_verb *verb, int argc, char **argv, cli_comma
 int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *request)
 {
     struct option table[MAX_OPTIONS + 2] = {{0}};
-    const option_list list = list_options(verb);
+    option_list list = list_options(verb);
     int code, result = CLI_GO_ON;
     request->verb = verb->name;
     request->settings = calloc((size_t)argc, sizeof *request->settings);

@@ -44,15 +44,15 @@ static void draw(const cli_progress *p, const char *line)
     fputs(padded, stderr);
 }
 
-void cli_progress_begin(cli_progress *p, double end)
+void cli_progress_begin(cli_progress *p, double from, double end)
 {
-    *p = (cli_progress){.on = isatty(STDERR_FILENO), .end = end, .shown = -INFINITY};
+    *p = (cli_progress){.on = isatty(STDERR_FILENO), .from = from, .end = end, .shown = -INFINITY};
     if (!p->on)
         return;
     p->start = drape_clock_seconds();
     p->width = terminal_width();
     if (end > 0)
-        cli_progress_show(p, 0, 0);
+        cli_progress_show(p, from, 0);
 }
 
 static void fill_bar(double share, char bar[BAR + 1])
@@ -79,11 +79,11 @@ void cli_progress_show(cli_progress *p, double time, int64_t rejected)
     double now;
     if (!is_due(p, &now))
         return;
-    double share = time / p->end, wall = now - p->start;
+    double share = time / p->end, wall = now - p->start, made = time - p->from;
     fill_bar(share, bar);
-    time_text(time > 0 ? wall * (p->end - time) / time : INFINITY, eta, sizeof eta);
+    time_text(made > 0 ? wall * (p->end - time) / made : INFINITY, eta, sizeof eta);
     snprintf(line, sizeof line, "[%s] %3.0f %%  %.4g of %.4g s  %.3gx real time  ETA %s  %lld rejected", bar,
-             100 * share, time, p->end, wall > 0 ? time / wall : 0.0, eta, (long long)rejected);
+             100 * share, time, p->end, wall > 0 ? made / wall : 0.0, eta, (long long)rejected);
     draw(p, line);
 }
 

@@ -7,12 +7,12 @@
 
 typedef struct cli_progress {
     bool on;
-    double end;          /* [s] simulated */
+    double from, end;    /* [s] simulated: where the run goes on, and to */
     double start, shown; /* [s] of the clock: begin of the run, last time that the line was drawn */
     int width;           /* columns that the line may take */
 } cli_progress;
 
-void cli_progress_begin(cli_progress *progress, double end); /* end 0: of cases, not of a time */
+void cli_progress_begin(cli_progress *progress, double from, double end); /* end 0: of cases, not of a time */
 void cli_progress_show(cli_progress *progress, double time,
                        int64_t rejected); /* at most ten times a second */
 /* Cases of a sweep; total 0: what they are compared with is made. */

@@ -75,7 +75,7 @@ static const drape_term_ops *row(const drape_context *ctx, int i)
         built_in++;
     if (i < built_in)
         return drape_terms[i];
-    return i - built_in < ctx->host_term_count ? ctx->host_terms[i - built_in] : NULL;
+    return i - built_in < ctx->host_term_count ? &ctx->host_terms[i - built_in] : NULL;
 }
 
 static drape_status find_row(drape_context *ctx, const char *pointer, const char *name,
@@ -264,24 +264,32 @@ static bool well_formed(const drape_term_ops *ops)
         ops->law ? ops->nodes == 0 : ops->nodes >= 1 && ops->nodes <= DRAPE_MAX_ELEMENT_NODES && ops->build;
     bool internal = !ops->has_internal || (ops->commit && ops->initial);
     return ops->name && ops->summary && ops->reference && ops->element_name && kinds == 1 && sized &&
-           internal && (!ops->damped || ops->measure) && ops->param_count >= 0 &&
-           ops->param_count <= DRAPE_MAX_PARAMS;
+           internal && (!ops->damped || ops->measure) && (!ops->in_medium || ops->dissipation) &&
+           ops->param_count >= 0 && ops->param_count <= DRAPE_MAX_PARAMS;
 }
 
-drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *ops)
+/* The first version's ops ended here. */
+#define LEAST_SIZE offsetof(drape_term_ops, in_medium)
+
+drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *given)
 {
-    if (!ctx || !ops)
+    drape_term_ops own = {0}, *ops = &own;
+    if (!ctx || !given)
         return DRAPE_E_ARGUMENT;
-    if (ops->struct_size != sizeof *ops)
-        return drape_fail(ctx, DRAPE_E_VERSION, "the ops of a term have %zu bytes; this library's have %zu",
-                          ops->struct_size, sizeof *ops);
+    if (given->struct_size < LEAST_SIZE || given->struct_size > sizeof own)
+        return drape_fail(
+            ctx, DRAPE_E_VERSION,
+            "the ops of a term have %zu bytes; this library's have %zu, an older one's %zu or more",
+            given->struct_size, sizeof own, LEAST_SIZE);
+    memcpy(&own, given, given->struct_size);
     if (!well_formed(ops))
-        return drape_fail(ctx, DRAPE_E_ARGUMENT,
-                          "the ops of term \"%s\" are not well formed: name, summary, reference, "
-                          "element_name, exactly one of measure, "
-                          "energy, dissipation, law; nodes 1 to %d and build but for a law; commit and "
-                          "initial with has_internal; damped with a measure alone",
-                          ops->name ? ops->name : "?", DRAPE_MAX_ELEMENT_NODES);
+        return drape_fail(
+            ctx, DRAPE_E_ARGUMENT,
+            "the ops of term \"%s\" are not well formed: name, summary, reference, "
+            "element_name, exactly one of measure, "
+            "energy, dissipation, law; nodes 1 to %d and build but for a law; commit and "
+            "initial with has_internal; damped with a measure alone, in_medium with a dissipation",
+            ops->name ? ops->name : "?", DRAPE_MAX_ELEMENT_NODES);
     const drape_term_ops *other = NULL;
     for (int i = 0; (other = row(ctx, i)) != NULL; i++)
         if (strcmp(other->name, ops->name) == 0)
@@ -289,6 +297,6 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *op
     if (ctx->host_term_count == DRAPE_MAX_HOST_TERMS)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "term \"%s\": a context holds at most %d terms of the host",
                           ops->name, DRAPE_MAX_HOST_TERMS);
-    ctx->host_terms[ctx->host_term_count++] = ops;
+    ctx->host_terms[ctx->host_term_count++] = own;
     return DRAPE_OK;
 }

@@ -4,8 +4,6 @@
 
 #include <stdio.h>
 
-#define MOST_COLLIDERS 4096
-
 /* count of what, but no array, or an array with a hole. */
 static drape_status refuse(drape_context *ctx, const char *pointer, const char *what)
 {
@@ -73,10 +71,10 @@ static drape_status check_contact(drape_context *ctx, const drape_scene_def *def
 {
     if (def->collider_count > 0 && !def->colliders)
         return refuse(ctx, "/colliders", "the array of colliders");
-    if (def->collider_count > MOST_COLLIDERS)
+    if (def->collider_count > DRAPE_MOST_COLLIDERS)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/colliders",
                              "the scene has %zu colliders; it has at most %d", def->collider_count,
-                             MOST_COLLIDERS);
+                             DRAPE_MOST_COLLIDERS);
     drape_status status = check_settings(ctx, "/contact", def->contact, def->contact_count);
     if (!status)
         status = check_settings(ctx, "/self_contact", def->self_contact, def->self_contact_count);

@@ -20,7 +20,7 @@ static const drape_collider_ops *row(const drape_context *ctx, int i)
         built_in++;
     if (i < built_in)
         return drape_colliders[i];
-    return i - built_in < ctx->host_collider_count ? ctx->host_colliders[i - built_in] : NULL;
+    return i - built_in < ctx->host_collider_count ? &ctx->host_colliders[i - built_in] : NULL;
 }
 
 static drape_status find_row(drape_context *ctx, const char *pointer, const char *name,
@@ -115,15 +115,21 @@ static bool well_formed(const drape_collider_ops *ops)
     return named && sized && drape_param_place(ops->params, ops->param_count) <= DRAPE_MAX_PARAMS;
 }
 
-drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *ops)
+/* The first version's ops ended here: `smooth` may be missing, and a collider without it is met by its triangles. */
+#define LEAST_SIZE offsetof(drape_collider_ops, smooth)
+
+drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *given)
 {
+    drape_collider_ops own = {0}, *ops = &own;
     const drape_collider_ops *other = NULL;
-    if (!ctx || !ops)
+    if (!ctx || !given)
         return DRAPE_E_ARGUMENT;
-    if (ops->struct_size != sizeof *ops)
-        return drape_fail(ctx, DRAPE_E_VERSION,
-                          "the ops of a collider have %zu bytes; this library's have %zu", ops->struct_size,
-                          sizeof *ops);
+    if (given->struct_size < LEAST_SIZE || given->struct_size > sizeof own)
+        return drape_fail(
+            ctx, DRAPE_E_VERSION,
+            "the ops of a collider have %zu bytes; this library's have %zu, an older one's %zu or more",
+            given->struct_size, sizeof own, LEAST_SIZE);
+    memcpy(&own, given, given->struct_size);
     if (!well_formed(ops))
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
                           "the ops of collider \"%s\" are not well formed: name, summary, reference, shape, "
@@ -136,6 +142,6 @@ drape_status drape_context_add_collider(drape_context *ctx, const drape_collider
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
                           "collider \"%s\": a context holds at most %d colliders of the host", ops->name,
                           DRAPE_MAX_HOST_COLLIDERS);
-    ctx->host_colliders[ctx->host_collider_count++] = ops;
+    ctx->host_colliders[ctx->host_collider_count++] = own;
     return DRAPE_OK;
 }

@@ -226,9 +226,9 @@ static drape_status gather(drape_model *model)
 
 static drape_status compile_cloths(drape_model *model, const drape_scene_def *def)
 {
-    if (def->cloth_count == 0 || def->cloth_count > 1 << 20)
+    if (def->cloth_count == 0 || def->cloth_count > DRAPE_MOST_CLOTHS)
         return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/cloth",
-                             "the scene has %zu cloths; it has 1 to %d", def->cloth_count, 1 << 20);
+                             "the scene has %zu cloths; it has 1 to %d", def->cloth_count, DRAPE_MOST_CLOTHS);
     model->cloths = drape_arena_take(&model->arena, model->ctx, def->cloth_count, sizeof *model->cloths);
     if (!model->cloths)
         return DRAPE_E_MEMORY;

@@ -2,16 +2,20 @@
 #include "contact/inside.h"
 
 #include "base/clock.h"
+#include "base/finite.h"
 #include "base/vec3.h"
-#include "model/track.h"
 
 #include <math.h>
 #include <string.h>
 
 #define SEARCH_AHEAD 0.25 /* of a mean edge: how far points may move before a new search, at least */
-#define MOST_AHEAD   0.5  /* and at most, */
+#define MOST_AHEAD   0.4  /* and at most, */
 #define STEPS_AHEAD  1.5  /* or as far as one went in so many steps like the last */
-#define FIRST_ROOM   64   /* of the list of candidates */
+#define GOING_ON     1.0  /* of the last step's way: where points are searched at the beginning of one, */
+#define GOING_BACK                                                                                           \
+    -0.5 /* and of the way to a trial: half back to the beginning, as the next may start there. */
+#define AIM_FAR    0.8 /* Of the margin: how far from where points are that may be */
+#define FIRST_ROOM 64  /* of the list of candidates */
 
 /* ---- Making and freeing ---- */
 
@@ -42,15 +46,16 @@ static bool take_arrays(drape_contact *c)
            c->searched_pose && c->start_pose && c->listed_pose && c->on_collider;
 }
 
-drape_status drape_contact_create(drape_context *ctx, const drape_model *model, drape_contact **out)
+drape_status drape_contact_create(drape_context *ctx, const drape_motion *motion, drape_contact **out)
 {
+    const drape_model *model = motion->model;
     *out = NULL;
     if (model->collider_count == 0 && !model->contact.self)
         return DRAPE_OK;
     drape_contact *c = drape_alloc(ctx, 1, sizeof *c);
     if (!c)
         return DRAPE_E_MEMORY;
-    *c = (drape_contact){.ctx = ctx, .model = model};
+    *c = (drape_contact){.ctx = ctx, .model = model, .motion = motion};
     c->law.velocity = model->contact.friction_velocity;
     drape_status status = drape_search_create(ctx, model, &c->search);
     if (!status && !take_arrays(c))
@@ -120,17 +125,18 @@ void *drape_contact_grow(drape_context *ctx, void *list, int32_t count, int32_t 
 
 /* ---- Placing ---- */
 
-static void pose_at(const drape_collider *collider, double t, const double span[2], drape_collider_pose *pose)
+static void pose_at(const drape_motion *motion, int32_t collider, double t, const double span[2],
+                    drape_collider_pose *pose)
 {
     double before[3], after[3];
     memset(pose, 0, sizeof *pose);
-    if (collider->track.key_count == 0)
+    if (!drape_motion_moves_collider(motion, collider))
         return;
-    drape_track_displacement(collider->track.keys, collider->track.key_count, t, pose->displacement);
+    drape_motion_collider(motion, collider, t, pose->displacement);
     if (!(span[1] > span[0]))
         return;
-    drape_track_displacement(collider->track.keys, collider->track.key_count, span[0], before);
-    drape_track_displacement(collider->track.keys, collider->track.key_count, span[1], after);
+    drape_motion_collider(motion, collider, span[0], before);
+    drape_motion_collider(motion, collider, span[1], after);
     for (int k = 0; k < 3; k++)
         pose->velocity[k] = (after[k] - before[k]) / (span[1] - span[0]);
 }
@@ -138,7 +144,7 @@ static void pose_at(const drape_collider *collider, double t, const double span[
 void drape_contact_pose(drape_contact *c, double t, const double span[2])
 {
     for (int32_t i = 0; i < c->model->collider_count; i++)
-        pose_at(&c->model->colliders[i], t, span, &c->pose[i]);
+        pose_at(c->motion, i, t, span, &c->pose[i]);
 }
 
 /* Nodes as given, points of colliders as posed. */
@@ -171,12 +177,17 @@ static double moved2(const double *a, const double *b)
     return vec3_dot(d, d);
 }
 
-/* The furthest that a point is from where the last search had it; INFINITY without any. */
+/* The furthest that a point is from where the last search had it; INFINITY without any, and where a position is no
+ * number. */
 double drape_contact_moved(const drape_contact *c, const double *x)
 {
     double most = 0;
-    for (size_t i = 0; c->known && i < (size_t)c->search.points; i++)
-        most = fmax(most, moved2(x + 3 * i, c->searched + 3 * i));
+    for (size_t i = 0; c->known && i < (size_t)c->search.points; i++) {
+        const double moved = moved2(x + 3 * i, c->searched + 3 * i);
+        if (isnan(moved))
+            return INFINITY;
+        most = moved > most ? moved : most;
+    }
     for (int32_t i = 0; i < c->model->collider_count; i++)
         most = fmax(most, moved2(c->pose[i].displacement, c->searched_pose[i].displacement));
     return c->known ? sqrt(most) : INFINITY;
@@ -199,6 +210,8 @@ static double activation(const drape_contact *c, const drape_pair *pair)
     if (pair->collider >= 0)
         return pair->distance;
     const drape_placed rest = drape_contact_placed(c, c->search.rest);
+    if (drape_pair_is_apart(pair, &rest, 2 * pair->distance)) /* most of them, for less than the gap takes */
+        return pair->distance;
     return fmin(pair->distance, 0.5 * drape_pair_gap_value(pair, &rest));
 }
 
@@ -206,7 +219,7 @@ static void consider(void *user, const drape_pair *found)
 {
     drape_contact *c = user;
     drape_pair pair = *found;
-    const drape_placed now = drape_contact_placed(c, c->x);
+    const drape_placed now = drape_contact_placed(c, c->searched);
     if (c->status || drape_pair_is_apart(&pair, &now, pair.distance + 2 * c->margin))
         return;
     pair.found = drape_pair_gap_value(&pair, &now);
@@ -226,19 +239,37 @@ static void search_surfaces(drape_contact *c)
         }
 }
 
+static double longest_way(const drape_contact *c, const double *x)
+{
+    double most = 0;
+    for (size_t i = 0; i < (size_t)c->model->node_count; i++)
+        most = fmax(most, moved2(x + 3 * i, c->start + 3 * i));
+    return sqrt(most);
+}
+
+/* Not where points are, but where they will be, or may return to: what is found serves for as far before as after. */
+static void aim(drape_contact *c)
+{
+    const double way = c->known ? longest_way(c, c->x) : 0, most = AIM_FAR * c->margin;
+    const double share = fabs(c->aim) * way > most ? copysign(most / way, c->aim) : c->aim;
+    memcpy(c->searched, c->x, 3 * (size_t)c->search.points * sizeof *c->x);
+    for (size_t i = 0; way > 0 && i < 3 * (size_t)c->model->node_count; i++)
+        c->searched[i] += share * (c->x[i] - c->start[i]);
+}
+
 static drape_status search(drape_contact *c)
 {
     double start = drape_clock_seconds();
     c->count = 0;
     c->margin = c->next_margin;
     c->status = DRAPE_OK;
+    aim(c);
     search_surfaces(c);
-    drape_search_pairs(&c->search, c->x, NULL, 2 * c->margin, consider, c);
-    memcpy(c->searched, c->x, 3 * (size_t)c->search.points * sizeof *c->x);
+    drape_search_pairs(&c->search, c->searched, NULL, 2 * c->margin, consider, c);
     memcpy(c->searched_pose, c->pose, (size_t)c->model->collider_count * sizeof *c->pose);
-    c->moved = 0;
     c->search_seconds += drape_clock_seconds() - start;
     c->known = c->status == DRAPE_OK;
+    c->moved = drape_contact_moved(c, c->x);
     return c->status;
 }
 
@@ -431,15 +462,13 @@ static void measure_start(drape_contact *c)
     }
 }
 
-/* A fast sheet is searched with a wider margin, once a step and not at every trial. x: the nodes at the end of the
- * last step, whose beginning is still known. */
+/* A fast sheet is searched with a wider margin and ahead of itself, once in a step or two and not at every trial. x: the
+ * nodes at the end of the last step, whose beginning is still known. */
 static void look_ahead(drape_contact *c, const double *x)
 {
-    double most = 0;
-    for (size_t i = 0; c->known && i < (size_t)c->model->node_count; i++)
-        most = fmax(most, moved2(x + 3 * i, c->start + 3 * i));
-    c->next_margin =
-        c->mean_edge * fmin(fmax(SEARCH_AHEAD, STEPS_AHEAD * sqrt(most) / c->mean_edge), MOST_AHEAD);
+    const double way = c->known ? longest_way(c, x) : 0;
+    c->next_margin = fmin(fmax(SEARCH_AHEAD * c->mean_edge, STEPS_AHEAD * way), MOST_AHEAD * c->mean_edge);
+    c->aim = GOING_ON;
 }
 
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
@@ -447,13 +476,111 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
     double start = drape_clock_seconds();
     look_ahead(c, x);
     drape_status status = drape_contact_go(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}});
+    c->aim = GOING_BACK;
     if (!status)
         status = lag(c);
     if (!status) {
         measure_start(c);
+        c->begun = true;
         memcpy(c->start, c->x, 3 * (size_t)c->search.points * sizeof *c->x);
         memcpy(c->start_pose, c->pose, (size_t)c->model->collider_count * sizeof *c->pose);
     }
     c->seconds += drape_clock_seconds() - start;
     return status;
+}
+
+/* ---- In a checkpoint ---- */
+
+/* Candidates as a search at these positions finds them. */
+static drape_status search_at(drape_contact *c, const double *x, const drape_collider_pose *pose,
+                              double margin)
+{
+    memcpy(c->x, x, 3 * (size_t)c->search.points * sizeof *x);
+    memcpy(c->pose, pose, (size_t)c->model->collider_count * sizeof *pose);
+    c->next_margin = margin;
+    c->aim = 0;
+    return search(c);
+}
+
+/* What acted where the step began follows from the positions alone: a search there finds it. */
+static drape_status begin_again(drape_contact *c, double margin)
+{
+    drape_status status = search_at(c, c->start, c->start_pose, margin);
+    if (!status)
+        status = list_touches(c);
+    if (!status)
+        status = lag(c);
+    if (!status)
+        measure_start(c);
+    return status;
+}
+
+/* Which candidates there are, and so what a pattern is made for, follows from where the last search was: c->to and
+ * c->listed_pose. */
+static drape_status recall(drape_contact *c, double margin, double next_margin, bool known)
+{
+    drape_status status = c->begun ? begin_again(c, margin) : DRAPE_OK;
+    if (!status && known)
+        status = search_at(c, c->to, c->listed_pose, margin);
+    c->known = known;
+    c->aim = c->begun ? GOING_BACK : 0;
+    c->listed = false;
+    c->margin = margin;
+    c->next_margin = next_margin;
+    return status;
+}
+
+static void archive_couplings(drape_contact *c, drape_archive *a)
+{
+    int32_t count = c->coupling_count;
+    drape_archive_int32(a, &count);
+    if (a->reading)
+        c->coupling_count = 0;
+    for (int32_t i = 0; i < count && drape_archive_good(a); i++) {
+        int32_t *list = drape_contact_grow(c->ctx, c->coupling, i, &c->coupling_room, 4 * sizeof *list);
+        if (!list) {
+            drape_archive_note(a, DRAPE_E_MEMORY);
+            return;
+        }
+        c->coupling = list;
+        drape_archive_bytes(a, list + 4 * (size_t)i, 4 * sizeof *list);
+        for (size_t k = 0; k < 4 && drape_archive_good(a); k++)
+            if (list[4 * (size_t)i + k] < 0 || list[4 * (size_t)i + k] >= c->model->node_count)
+                drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint couples a node that is not there");
+        c->coupling_count = i + 1;
+    }
+}
+
+/* A search wants numbers. */
+static bool is_sound(const drape_contact *c, double margin, double next_margin)
+{
+    size_t n = 3 * (size_t)c->search.points;
+    return drape_all_finite(c->to, n) && drape_all_finite(c->start, n) && margin >= 0 &&
+           margin <= c->model->length && next_margin >= 0 && next_margin <= c->model->length;
+}
+
+void drape_contact_archive(drape_contact *c, drape_archive *a)
+{
+    size_t points = 3 * (size_t)c->search.points, poses = 6 * (size_t)c->model->collider_count;
+    double margin = c->margin, next_margin = c->next_margin, seconds[2] = {c->seconds, c->search_seconds};
+    bool known = c->known;
+    drape_archive_mark(a, "contact");
+    drape_archive_bool(a, &known);
+    drape_archive_bool(a, &c->begun);
+    drape_archive_double(a, &margin);
+    drape_archive_double(a, &next_margin);
+    drape_archive_doubles(a, a->reading ? c->to : c->searched, points);
+    drape_archive_doubles(a, (a->reading ? c->listed_pose : c->searched_pose)->displacement, poses);
+    drape_archive_doubles(a, c->start, points);
+    drape_archive_doubles(a, c->start_pose->displacement, poses);
+    archive_couplings(c, a);
+    drape_archive_doubles(a, seconds, 2);
+    if (!drape_archive_is_reading(a))
+        return;
+    if (!is_sound(c, margin, next_margin))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has positions that are no numbers");
+    else
+        drape_archive_note(a, recall(c, margin, next_margin, known));
+    c->seconds = seconds[0];
+    c->search_seconds = seconds[1];
 }

@@ -10,7 +10,9 @@
 #ifndef DRAPE_CONTACT_CONTACT_H
 #define DRAPE_CONTACT_CONTACT_H
 
+#include "base/archive.h"
 #include "contact/search.h"
+#include "model/motion.h"
 
 typedef struct drape_contact drape_contact;
 
@@ -22,7 +24,7 @@ typedef struct drape_contact_at {
 } drape_contact_at;
 
 /* *out is NULL for a model without colliders and without self-contact. Errors: DRAPE_E_MEMORY. */
-drape_status drape_contact_create(drape_context *ctx, const drape_model *model, drape_contact **out);
+drape_status drape_contact_create(drape_context *ctx, const drape_motion *motion, drape_contact **out);
 void drape_contact_destroy(drape_contact **contact);
 size_t drape_contact_bytes(const drape_contact *contact);
 double drape_contact_seconds(const drape_contact *contact);        /* spent in all functions here */
@@ -53,6 +55,12 @@ void drape_contact_add_jacobian(drape_contact *contact, double weight, bool velo
  * for a pattern that will serve a while: four nodes each, valid until the next call. */
 bool drape_contact_fits(drape_contact *contact, const drape_pattern *pattern);
 int32_t drape_contact_couplings(drape_contact *contact, const int32_t **nodes);
+
+int32_t drape_contact_coupled(const drape_contact *contact, const int32_t **nodes); /* the list made last */
+
+/* The last search and the beginning of the step, from which all else follows, into an archive or, where this was just
+ * made, out of it. */
+void drape_contact_archive(drape_contact *contact, drape_archive *a);
 
 /* The largest fraction of the way from x to y, colliders resting where they are at time t, on which no two
  * pieces pass through each other; a margin is kept. x, y: (node_count x 3). */

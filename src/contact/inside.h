@@ -19,6 +19,7 @@ typedef struct drape_lagged {
 struct drape_contact {
     drape_context *ctx;
     const drape_model *model;
+    const drape_motion *motion; /* of its colliders */
     drape_search search;
     drape_contact_law law;     /* all but the distance and stiffness of a pair */
     double *x, *v;             /* (points x 3) where it was last placed */
@@ -27,9 +28,11 @@ struct drape_contact {
     drape_collider_pose *pose; /* (collider_count) */
     drape_collider_pose *searched_pose, *start_pose;
     bool known;         /* there was a search */
+    bool begun;         /* a step was: start is of it */
     double mean_edge;   /* [m] */
     double margin;      /* how far points may move before a new one [m] */
     double next_margin; /* of the next search */
+    double aim;         /* of the way from `start`: so much further is the next search made */
     double moved;       /* how far one has, where it was last placed [m] */
     drape_pair *pairs;  /* (count of room) candidates, surfaces too */
     int32_t count, room;
@@ -41,8 +44,8 @@ struct drape_contact {
     drape_collider_pose *listed_pose;
     drape_lagged *lagged; /* (lagged_count of lagged_room) */
     int32_t lagged_count, lagged_room;
-    int32_t *coupling; /* (coupling_room x 4) */
-    int32_t coupling_room;
+    int32_t *coupling; /* (coupling_count of coupling_room x 4) */
+    int32_t coupling_count, coupling_room;
     double *start;      /* (points x 3) of the step */
     double *start_gaps; /* of surfaces: (node_count) the deepest that a node lay in any collider, at most 0 */
     double start_least; /* the smallest feature gap that a collider had, at most 0 [m] */

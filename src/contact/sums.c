@@ -247,7 +247,7 @@ static bool is_near(const drape_contact *c, const drape_pair *pair)
 
 int32_t drape_contact_couplings(drape_contact *c, const int32_t **nodes)
 {
-    int32_t count = 0;
+    int32_t count = c->coupling_count = 0;
     for (int32_t i = 0; i < c->count; i++)
         if (c->pairs[i].collider < 0 && is_near(c, &c->pairs[i]) &&
             !list_coupling(c, count++, &c->pairs[i], 4))
@@ -257,5 +257,11 @@ int32_t drape_contact_couplings(drape_contact *c, const int32_t **nodes)
             !list_coupling(c, count++, &c->lagged[i].pair, c->lagged[i].gap.points))
             return -1;
     *nodes = c->coupling;
-    return count;
+    return c->coupling_count = count;
+}
+
+int32_t drape_contact_coupled(const drape_contact *c, const int32_t **nodes)
+{
+    *nodes = c->coupling;
+    return c->coupling_count;
 }

@@ -151,6 +151,29 @@ static void restart(void *state, const drape_state *from)
     drape_implicit_restart(state, from);
 }
 
+static void archive_past(const bdf2_state *s, past *p, drape_archive *a)
+{
+    const drape_model *m = s->common.model;
+    size_t nodes = 3 * (size_t)m->node_count;
+    drape_archive_bool(a, &p->known);
+    if (!p->known)
+        return;
+    drape_archive_double(a, &p->t);
+    drape_archive_double(a, &p->h);
+    drape_archive_doubles(a, p->dx, nodes);
+    drape_archive_doubles(a, p->dv, nodes);
+    if (p->dq)
+        drape_archive_doubles(a, p->dq, (size_t)m->measure_count);
+}
+
+static void archive(void *state, drape_archive *a)
+{
+    bdf2_state *s = state;
+    archive_past(s, &s->past, a);
+    archive_past(s, &s->made, a);
+    drape_implicit_archive(state, a);
+}
+
 static size_t bytes(const void *state)
 {
     const bdf2_state *s = state;
@@ -172,6 +195,7 @@ const drape_integrator_ops drape_integrator_bdf2 = {
     .restart = restart,
     .residual = drape_implicit_residual,
     .work = drape_implicit_work,
+    .archive = archive,
     .bytes = bytes,
     .destroy = destroy,
 };

@@ -8,21 +8,22 @@
  *     (K + c_j D + c_j^2 M) dx = r2 + (D + c_j M) r1:
  * the matrix of a backward Euler step of size 1/c_j, with the same pattern and the same linear solvers.
  * IDA keeps Jacobian and factors while c_j stays near theirs; that is most of its advantage over one
- * factorisation an iteration.
+ * factorisation an iteration. When the iteration with old factors has converged is ida_newton.h's to say.
  *
  * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative
  * part would make the error depend on where the scene lies. The maximum order is 2 at loose tolerances,
  * because BDF 3 to 5 are not A-stable and feed energy into undamped waves; it is 5 when the tolerance
  * resolves them.
  *
- * Pins that move have kinks at the keys of their tracks: IDA stops there and starts again.
+ * Pins that move have kinks at the keys of their tracks, and where a host sends them elsewhere: IDA stops there and
+ * starts again.
  */
-#include "base/clock.h"
 #include "base/finite.h"
+#include "integrators/ida_newton.h"
 #include "integrators/integrator.h"
 #include "integrators/tolerance.h"
-#include "model/track.h"
 #include "solvers/sun_linear.h"
+#include "solvers/sundials_memory.h"
 
 #include <ida/ida.h>
 #include <math.h>
@@ -46,7 +47,9 @@ enum {
 #define NEWTON_SHARE 0.33 /* of the error tolerance that is left to the Newton iteration */
 /* New factors past a change of c_j by (1 - d)/(1 + d). IDA's own 0.25 takes a quarter more residuals for
  * as many factors. */
-#define CJ_CHANGE        0.1
+#define CJ_CHANGE 0.1
+/* Of the energy of a scene. At rtol 1e-3 a smooth fall swings by half a percent: more is of waves that are fed. */
+#define GAIN             0.02
 #define MAX_ERROR_FAILS  10 /* error test failures in one step */
 #define MAX_SOLVER_FAILS 10 /* convergence failures in one step */
 
@@ -90,20 +93,23 @@ typedef struct ida_state {
     drape_context *ctx;
     drape_system *system;
     const drape_model *model;
+    const drape_motion *motion;
     double values[PARAM_COUNT];
     int64_t n; /* free DOFs; the system has 2 n unknowns */
     SUNContext sun;
     void *ida;
     N_Vector y, rate, weights, between; /* (x, v), (x', v'), absolute tolerances, dense output */
     drape_sun_linear *linear;
+    drape_ida_newton newton;
     double *x, *v, *g;        /* nodes: where the residual was evaluated last, and g there */
     double *damping;          /* D (nonzeros); NULL where nothing dissipates */
     double *reduced;          /* right-hand side of the reduced system (n) */
     double *dissipated;       /* nodes; NULL where nothing dissipates */
     double factored_cj;       /* c_j of the factors */
     const double *internal;   /* of the last accepted state */
-    double span[2];           /* [s] no track has a key inside: where the slopes of tracks are taken */
+    double span[2];           /* [s] no pin or collider has a kink inside */
     double reached;           /* time of IDA's state; NaN: it must start anew */
+    double from;              /* time that the last good step began at; NaN: none */
     double powers[2];         /* [W] taken by dissipation and put in by pins, at the time reached */
     bool nonfinite, crossing; /* why the last residual was refused */
     drape_status fitted;      /* of the last change of the pattern: < 0 ends the run */
@@ -120,17 +126,14 @@ static size_t node_at(const ida_state *s, int64_t i)
     return 3 * (size_t)s->model->node_of_free[i / 3] + (size_t)(i % 3);
 }
 
-/* Within a step no track has a key, so the velocity of pins is the slope of their tracks at any time
- * inside. */
+/* Within a step no pin has a kink, so its velocity is that of the piece that any time inside is of. */
 static void place_pins(ida_state *s, double t)
 {
-    const drape_model *m = s->model;
-    drape_model_place_pins(m, t, s->x);
-    for (int32_t i = 0; i < m->moved_count; i++) {
-        const drape_track *track = &m->tracks[m->moved_track[i]];
-        drape_track_velocity(track->keys, track->key_count, (s->span[0] + s->span[1]) / 2,
-                             s->v + 3 * (size_t)m->moved_node[i]);
-    }
+    const drape_motion *m = s->motion;
+    drape_motion_place_pins(m, t, s->x);
+    for (int32_t i = 0; i < m->moved_count; i++)
+        drape_motion_pin_velocity(m, i, t, (s->span[0] + s->span[1]) / 2,
+                                  s->v + 3 * (size_t)m->moved_node[i]);
 }
 
 static drape_point place(ida_state *s, double t, const double *y)
@@ -150,7 +153,7 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
 {
     ida_state *s = user;
     const double *v = N_VGetArrayPointer(y) + s->n, *xp = N_VGetArrayPointer(rate), *vp = xp + s->n;
-    double *f = N_VGetArrayPointer(out), start = drape_clock_seconds();
+    double *f = N_VGetArrayPointer(out), start = drape_system_clock(s->system);
     drape_point point = place(s, t, N_VGetArrayPointer(y));
     drape_system_force(s->system, &point, s->g);
     for (int64_t i = 0; i < s->n; i++) {
@@ -160,26 +163,38 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
     s->nonfinite = !drape_all_finite(f, 2 * (size_t)s->n);
     s->crossing = !s->nonfinite && drape_system_crosses(s->system, s->x, t);
     s->work.residuals++;
-    s->work.residual_seconds += drape_clock_seconds() - start;
+    s->work.residual_seconds += drape_system_clock(s->system) - start;
     return drape_system_status(s->system) ? -1 : s->nonfinite || s->crossing ? 1 : 0;
 }
 
-/* Contact may couple what it did not before: then the matrices are made anew. */
-static drape_status fit_pattern(ida_state *s, const drape_point *point)
+/* The system has another pattern: the matrices are made anew. */
+static drape_status adopt_pattern(ida_state *s)
 {
-    bool changed;
-    s->fitted = drape_system_fit(s->system, point, &changed);
-    s->linear->stale |= changed;
-    if (s->fitted || !s->linear->stale)
-        return s->fitted;
     const drape_pattern *pattern = drape_system_pattern(s->system);
     if (s->dissipated) {
         drape_free(s->ctx, s->damping);
         s->damping = drape_alloc(s->ctx, (size_t)pattern->nonzeros, sizeof *s->damping);
         if (!s->damping)
-            return s->fitted = DRAPE_E_MEMORY;
+            return DRAPE_E_MEMORY;
     }
-    return s->fitted = drape_sun_linear_adopt(s->linear, pattern);
+    return drape_sun_linear_adopt(s->linear, pattern);
+}
+
+/* Contact may couple what it did not before. */
+static drape_status fit_pattern(ida_state *s, const drape_point *point)
+{
+    bool changed;
+    s->fitted = drape_system_fit(s->system, point, &changed);
+    s->linear->stale |= changed;
+    if (!s->fitted && s->linear->stale)
+        s->fitted = adopt_pattern(s);
+    return s->fitted;
+}
+
+/* Without contact, and without the solver's part of fit_pattern. */
+static double jacobian_clock(const ida_state *s)
+{
+    return drape_system_clock(s->system) - s->linear->factor_seconds;
 }
 
 static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_Vector r, SUNMatrix matrix,
@@ -187,7 +202,7 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
 {
     (void)rate, (void)r, (void)matrix, (void)a, (void)b, (void)c;
     ida_state *s = user;
-    double start = drape_clock_seconds();
+    double start = jacobian_clock(s);
     drape_point point = place(s, t, N_VGetArrayPointer(y));
     point.weight = cj;
     if (fit_pattern(s, &point))
@@ -196,8 +211,9 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
     if (s->damping)
         drape_system_damping(s->system, &point, s->damping);
     s->factored_cj = cj;
+    drape_ida_newton_forget(&s->newton);
     s->work.jacobians++;
-    s->work.jacobian_seconds += drape_clock_seconds() - start;
+    s->work.jacobian_seconds += jacobian_clock(s) - start;
     return 0;
 }
 
@@ -236,6 +252,7 @@ static void destroy(void **state)
         return;
     if (s->ida)
         IDAFree(&s->ida);
+    drape_ida_newton_free(&s->newton);
     drape_sun_linear_destroy(&s->linear);
     N_Vector vectors[] = {s->y, s->rate, s->weights, s->between};
     for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
@@ -299,7 +316,8 @@ static bool configure(ida_state *s)
     bool good = !IDAInit(s->ida, residual, 0, s->y, s->rate) && !IDASetUserData(s->ida, s) &&
                 !IDASVtolerances(s->ida, 0, s->weights) &&
                 !IDASetLinearSolver(s->ida, s->linear->solver, s->linear->matrix) &&
-                !IDASetJacFn(s->ida, jacobian) && !IDASetMaxOrd(s->ida, (int)s->values[PARAM_MAX_ORDER]) &&
+                drape_ida_newton_attach(&s->newton, s->ida, s->y, s->sun) && !IDASetJacFn(s->ida, jacobian) &&
+                !IDASetMaxOrd(s->ida, (int)s->values[PARAM_MAX_ORDER]) &&
                 !IDASetMaxErrTestFails(s->ida, MAX_ERROR_FAILS) &&
                 !IDASetMaxConvFails(s->ida, MAX_SOLVER_FAILS) &&
                 !IDASetNonlinConvCoef(s->ida, NEWTON_SHARE) && !IDASetDeltaCjLSetup(s->ida, CJ_CHANGE);
@@ -314,7 +332,12 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
     *state = s;
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (ida_state){.ctx = ctx, .system = system, .model = drape_system_model(system), .reached = NAN};
+    *s = (ida_state){.ctx = ctx,
+                     .system = system,
+                     .model = drape_system_model(system),
+                     .motion = drape_system_motion(system),
+                     .reached = NAN,
+                     .from = NAN};
     s->n = 3 * (int64_t)s->model->free_count;
     memcpy(s->values, values, sizeof s->values);
     drape_status status = create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
@@ -405,14 +428,13 @@ static void begin(ida_state *s, const drape_state *in)
     s->internal = in->internal;
 }
 
-/* Of forces on colliders (NULL: no contact) that move. */
-static double collider_power(const ida_state *s, const double *force)
+/* At time t, of forces on colliders (NULL: no contact) that move. */
+static double collider_power(const ida_state *s, double t, const double *force)
 {
     double power = 0;
     for (int32_t c = 0; force && c < s->model->collider_count; c++) {
-        const drape_track *track = &s->model->colliders[c].track;
         double v[3];
-        drape_track_velocity(track->keys, track->key_count, (s->span[0] + s->span[1]) / 2, v);
+        drape_motion_collider_velocity(s->motion, c, t, (s->span[0] + s->span[1]) / 2, v);
         for (int k = 0; k < 3; k++)
             power += force[3 * c + k] * v[k];
     }
@@ -424,6 +446,7 @@ static double collider_power(const ida_state *s, const double *force)
 static void measure_powers(ida_state *s, double t, double powers[2])
 {
     const drape_model *m = s->model;
+    const drape_motion *motion = s->motion;
     const drape_point point = {
         .x = s->x, .v = s->v, .internal = s->internal, .t = t, .span = {s->span[0], s->span[1]}};
     powers[0] = powers[1] = 0;
@@ -431,14 +454,16 @@ static void measure_powers(ida_state *s, double t, double powers[2])
         drape_system_dissipation(s->system, &point, s->dissipated);
         for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
             powers[0] += s->dissipated[i] * s->v[i];
-        powers[0] += collider_power(s, drape_system_on_colliders(s->system));
+        powers[0] += collider_power(s, t, drape_system_on_colliders(s->system));
     }
-    if (m->moved_count > 0 || m->collider_count > 0)
+    if (motion->moved_count > 0 || m->collider_count > 0)
         drape_system_force(s->system, &point, s->g);
-    powers[1] += collider_power(s, drape_system_on_colliders(s->system));
-    for (int32_t i = 0; i < m->moved_count; i++)
-        for (size_t k = 0; k < 3; k++)
-            powers[1] += s->g[3 * (size_t)m->moved_node[i] + k] * s->v[3 * (size_t)m->moved_node[i] + k];
+    powers[1] += collider_power(s, t, drape_system_on_colliders(s->system));
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        for (size_t k = 0; k < 3; k++) {
+            size_t at = 3 * (size_t)motion->moved_node[i] + k;
+            powers[1] += s->g[at] * s->v[at];
+        }
 }
 
 /* Work by the trapezoidal rule. */
@@ -465,11 +490,11 @@ static void count_iterations(ida_state *s, drape_step_info *info)
 static drape_status prepare(ida_state *s, const drape_state *in, double end, double h, double *first,
                             drape_step_info *info)
 {
-    double stop = drape_model_next_kink(s->model, in->t, end);
+    double stop = drape_motion_next_kink(s->motion, in->t, end);
     begin(s, in);
     s->span[0] = in->t;
     s->span[1] = stop;
-    if (s->n > 0 && s->reached != in->t) {
+    if (s->n > 0 && (s->reached != in->t || drape_motion_at_kink(s->motion, in->t))) {
         drape_status status = start(s, in, info);
         if (status)
             return status;
@@ -530,6 +555,9 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     info->tolerance = info->residual = NAN; /* IDA bounds errors, not residuals */
     if (exhausted(s, in, info))
         return DRAPE_E_STEP_TOO_SMALL;
+    if (in->t == s->from) /* the sim did not take the last step, which IDA had: mostly for its energy */
+        s->newton.strict = true;
+    s->from = NAN;
     info->reason = "solver";
     drape_status status = prepare(s, in, end, h, &t, info); /* t is where all goes that has no free nodes */
     if (!status && s->n > 0) {
@@ -557,10 +585,11 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     memcpy(out->x, s->x, 3 * (size_t)s->model->node_count * sizeof *out->x);
     memcpy(out->v, s->v, 3 * (size_t)s->model->node_count * sizeof *out->v);
     out->t = t;
+    s->from = in->t;
     info->h = t - in->t;
     info->reason = "converged";
     audit(s, in, out, info);
-    s->reached = drape_model_at_kink(s->model, t) ? NAN : t;
+    s->reached = t;
     s->steps -= t == end;
     return DRAPE_OK;
 }
@@ -568,7 +597,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
 static void interpolate(void *state, double t, double *x)
 {
     ida_state *s = state;
-    drape_model_place_pins(s->model, t, x);
+    drape_motion_place_pins(s->motion, t, x);
     if (s->n == 0 || IDAGetDky(s->ida, t, 0, s->between))
         return;
     const double *y = N_VGetArrayPointer(s->between);
@@ -579,7 +608,10 @@ static void interpolate(void *state, double t, double *x)
 static void restart(void *state, const drape_state *from)
 {
     (void)from;
-    ((ida_state *)state)->reached = NAN;
+    ida_state *s = state;
+    s->reached = s->from = NAN;
+    s->newton.strict = false;
+    drape_ida_newton_forget(&s->newton);
 }
 
 static drape_work work(const void *state)
@@ -593,6 +625,38 @@ static drape_work work(const void *state)
         work.solve_seconds = s->linear->solve_seconds;
     }
     return work;
+}
+
+/* Its factors are kept from step to step, with c_j and D. */
+static void archive_factors(ida_state *s, drape_archive *a)
+{
+    if (drape_archive_is_reading(a) && drape_system_pattern(s->system) != s->linear->pattern)
+        drape_archive_note(a, adopt_pattern(s));
+    drape_archive_double(a, &s->factored_cj);
+    if (s->damping && drape_archive_good(a))
+        drape_archive_doubles(a, s->damping, (size_t)drape_system_pattern(s->system)->nonzeros);
+    drape_sun_linear_archive(s->linear, a, s->factored_cj != 0);
+}
+
+static void archive(void *state, drape_archive *a)
+{
+    ida_state *s = state;
+    int64_t counted = s->counted;
+    drape_archive_double(a, &s->reached);
+    drape_archive_double(a, &s->from);
+    drape_archive_double(a, &s->newton.left);
+    drape_archive_bool(a, &s->newton.strict);
+    drape_archive_doubles(a, s->powers, 2);
+    drape_archive_double(a, &s->second);
+    drape_archive_int64(a, &s->steps);
+    drape_archive_int64(a, &counted);
+    s->counted = (long)counted;
+    drape_work_archive(&s->work, a);
+    if (s->n == 0)
+        return;
+    archive_factors(s, a);
+    if (!drape_ida_archive(s->ida, a) && a->reading)
+        s->reached = NAN;
 }
 
 static size_t bytes(const void *state)
@@ -615,10 +679,13 @@ const drape_integrator_ops drape_integrator_ida = {
     .param_count = PARAM_COUNT,
     .create = create,
     .own_steps = true,
+    .gain = GAIN,
+    .smooth_forces = true,
     .step = step,
     .interpolate = interpolate,
     .restart = restart,
     .work = work,
+    .archive = archive,
     .bytes = bytes,
     .destroy = destroy,
 };

@@ -1,8 +1,6 @@
 /* implicit.c: see implicit.h. */
 #include "integrators/implicit.h"
 
-#include "model/track.h"
-
 #include <string.h>
 
 static bool create_arrays(drape_implicit *s)
@@ -22,7 +20,10 @@ static bool create_arrays(drape_implicit *s)
 
 drape_status drape_implicit_init_arrays(drape_context *ctx, drape_system *system, drape_implicit *s)
 {
-    *s = (drape_implicit){.ctx = ctx, .system = system, .model = drape_system_model(system)};
+    *s = (drape_implicit){.ctx = ctx,
+                          .system = system,
+                          .model = drape_system_model(system),
+                          .motion = drape_system_motion(system)};
     return create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
@@ -51,12 +52,13 @@ void drape_implicit_base(drape_implicit *s, const drape_state *in, double t, dou
     size_t nodes = 3 * (size_t)m->node_count;
     s->t = s->span[1] = t;
     s->span[0] = in->t;
+    s->x_start = in->x;
     memcpy(s->x_base, in->x, nodes * sizeof *s->x_base);
     memset(s->v_base, 0, nodes * sizeof *s->v_base);
-    drape_model_place_pins(m, t, s->x_base);
-    for (int32_t i = 0; i < m->moved_count; i++)
+    drape_motion_place_pins(s->motion, t, s->x_base);
+    for (int32_t i = 0; i < s->motion->moved_count; i++)
         for (int k = 0; k < 3; k++) {
-            size_t at = 3 * (size_t)m->moved_node[i] + (size_t)k;
+            size_t at = 3 * (size_t)s->motion->moved_node[i] + (size_t)k;
             s->v_base[at] = (s->x_base[at] - in->x[at]) / span;
         }
 }
@@ -72,6 +74,7 @@ drape_status drape_implicit_solve(drape_implicit *s, const double *internal, con
 {
     const drape_newton_problem problem = {.x_base = s->x_base,
                                           .v_base = s->v_base,
+                                          .x_start = s->x_start,
                                           .weight = weight,
                                           .mass_weight = mass_weight,
                                           .inertia = s->inertia,
@@ -90,12 +93,11 @@ double drape_implicit_collider_work(const drape_implicit *s, double t0, double t
     const double *force = drape_system_on_colliders(s->system);
     double work = 0;
     for (int32_t c = 0; force && c < m->collider_count; c++) {
-        const drape_track *track = &m->colliders[c].track;
         double before[3], after[3];
-        if (track->key_count == 0)
+        if (!drape_motion_moves_collider(s->motion, c))
             continue;
-        drape_track_displacement(track->keys, track->key_count, t0, before);
-        drape_track_displacement(track->keys, track->key_count, t1, after);
+        drape_motion_collider(s->motion, c, t0, before);
+        drape_motion_collider(s->motion, c, t1, after);
         for (int k = 0; k < 3; k++)
             work += force[3 * c + k] * (after[k] - before[k]);
     }
@@ -105,11 +107,10 @@ double drape_implicit_collider_work(const drape_implicit *s, double t0, double t
 static double pin_work(const drape_implicit *s, const double *g, const drape_state *in,
                        const drape_state *out)
 {
-    const drape_model *m = s->model;
     double work = 0;
-    for (int32_t i = 0; i < m->moved_count; i++)
+    for (int32_t i = 0; i < s->motion->moved_count; i++)
         for (int k = 0; k < 3; k++) {
-            size_t at = 3 * (size_t)m->moved_node[i] + (size_t)k;
+            size_t at = 3 * (size_t)s->motion->moved_node[i] + (size_t)k;
             work += g[at] * (out->x[at] - in->x[at]);
         }
     return work;
@@ -166,6 +167,11 @@ void drape_implicit_restart(void *state, const drape_state *from)
 const double *drape_implicit_residual(const void *state)
 {
     return drape_newton_residual(((const drape_implicit *)state)->newton);
+}
+
+void drape_implicit_archive(void *state, drape_archive *a)
+{
+    drape_newton_archive(((drape_implicit *)state)->newton, a);
 }
 
 drape_work drape_implicit_work(const void *state)

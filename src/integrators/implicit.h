@@ -11,13 +11,15 @@ typedef struct drape_implicit {
     drape_context *ctx;
     drape_system *system;
     const drape_model *model;
+    const drape_motion *motion;
     drape_newton *newton;    /* NULL in rows that iterate by themselves */
     double *x_base, *v_base; /* nodes: see drape_newton_problem */
     double *inertia, *d;     /* free DOFs */
     double *history;         /* measures; NULL where no law wants rates */
     double *dissipated;      /* nodes; NULL where nothing dissipates */
     bool inertial_guess;
-    double t, span[2]; /* [s] of the base: where colliders stand, and the way to there */
+    const double *x_start; /* nodes: see drape_newton_problem */
+    double t, span[2];     /* [s] of the base: where colliders stand, and the way to there */
 } drape_implicit;
 
 /* For rows that embed it, with a Newton solver or without one: on failure what was taken is freed by
@@ -34,6 +36,7 @@ void drape_implicit_destroy(void **state);
 void drape_implicit_restart(void *state, const drape_state *from);
 const double *drape_implicit_residual(const void *state);
 drape_work drape_implicit_work(const void *state);
+void drape_implicit_archive(void *state, drape_archive *a);
 size_t drape_implicit_bytes(const void *state);
 size_t drape_implicit_array_bytes(const drape_implicit *implicit); /* without the Newton solver */
 

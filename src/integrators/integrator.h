@@ -6,6 +6,7 @@
 #define DRAPE_INTEGRATORS_INTEGRATOR_H
 
 #include "assemble/system.h"
+#include "base/archive.h"
 #include "base/param.h"
 
 /* What a step has to say of itself. */
@@ -42,6 +43,8 @@ typedef struct drape_work {
     double residual_seconds, jacobian_seconds, factor_seconds, solve_seconds, contact_seconds;
 } drape_work;
 
+void drape_work_archive(drape_work *work, drape_archive *a);
+
 typedef struct drape_integrator_ops {
     const char *name, *summary, *reference;
     int order;                 /* of convergence in h */
@@ -53,6 +56,9 @@ typedef struct drape_integrator_ops {
      * upper bound, out->t the end of the advance, which a step may reach and not pass; the row sets out->t
      * to where it came. */
     bool own_steps;
+    /* What a run may gain from nowhere, as a share of the energy that the scene had to offer; 0: a tenth, for
+     * rows that conserve energy and let it swing. */
+    double gain;
     /* Between the states of a step there is no motion, so no frames. */
     bool timeless;
     /* The row keeps contact and limits by moving nodes: forces that stand for them (contact of the model,
@@ -64,6 +70,8 @@ typedef struct drape_integrator_ops {
                          drape_step_info *info);
     /* The next step starts anew from a state that this integrator did not make, or after a rejection. */
     void (*restart)(void *state, const drape_state *from);
+    /* Its next step relies on forces that are smooth from step to step: where they jump it must start anew. */
+    bool smooth_forces;
     /* The stability limit at a state, for steps of size h: a function of the state alone. NULL: stable for any
      * h. */
     void (*stability)(void *state, const drape_state *at, double h, drape_stability *out);
@@ -77,6 +85,10 @@ typedef struct drape_integrator_ops {
     int efforts;
     void (*set_effort)(void *state, int effort);
     drape_work (*work)(const void *state);
+    /* All that the next steps depend on besides the state they start from, and the work done: into an archive or,
+     * where this was just made for a system of the same model with the same pattern, out of it. What has the same
+     * bits however it came about is left out. */
+    void (*archive)(void *state, drape_archive *a);
     size_t (*bytes)(const void *state);
     void (*destroy)(void **state);
 } drape_integrator_ops;

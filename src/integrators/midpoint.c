@@ -55,6 +55,7 @@ const drape_integrator_ops drape_integrator_midpoint = {
     .restart = drape_implicit_restart,
     .residual = drape_implicit_residual,
     .work = drape_implicit_work,
+    .archive = drape_implicit_archive,
     .bytes = drape_implicit_bytes,
     .destroy = drape_implicit_destroy,
 };

@@ -2,9 +2,10 @@
  * judgement are ours. */
 #include "integrators/newton.h"
 
-#include "base/clock.h"
 #include "base/finite.h"
+#include "integrators/mixed.h"
 #include "solvers/sun_linear.h"
+#include "solvers/sundials_memory.h"
 
 #include <float.h>
 #include <kinsol/kinsol.h>
@@ -33,6 +34,7 @@ static const char *const predictor_choices[] = {"inertial", "rest", NULL};
     1e3 /* of the scene's size, a node: KINSOL's own limit depends on the guess and is 1 for d = 0 */
 #define WORK_SHARE        0.5 /* of the work along a correction: so much may be left on the far side */
 #define MOST_TRIALS       8   /* of the line search, by bisection */
+#define MOST_CHORDS       2   /* corrections more, with the factors of one */
 #define SHORT_STEP        0.5
 #define LEAST_SHARE       1e-3 /* of the positive part, that an indefinite matrix is given */
 #define MORE_SHARE        4    /* times as much is tried next */
@@ -137,6 +139,8 @@ struct drape_newton {
     double *ahead;               /* nodes: where a correction would lead; NULL without contact */
     double *x, *v, *g;           /* nodes: where the residual was evaluated last, and g there */
     double *f;                   /* free DOFs: F there */
+    double *chord, *minus_f;     /* free DOFs: of chords; NULL without trial */
+    drape_mixed mixed;           /* with trial */
     bool searched;               /* there is trial: the line search ended on it */
     bool nonfinite;              /* a residual was */
     drape_status fitted;         /* of the last change of the pattern: < 0 ends the solve */
@@ -164,7 +168,7 @@ static void place(drape_newton *s, const double *d)
 static bool evaluate(drape_newton *s, const double *d)
 {
     const drape_newton_problem *p = s->problem;
-    double start = drape_clock_seconds();
+    double start = drape_system_clock(s->system);
     place(s, d);
     drape_system_force(s->system, &s->point, s->g);
     for (int64_t i = 0; i < s->n; i++) {
@@ -173,7 +177,7 @@ static bool evaluate(drape_newton *s, const double *d)
         s->f[i] = inertia + s->g[3 * (int64_t)node + i % 3];
     }
     s->work.residuals++;
-    s->work.residual_seconds += drape_clock_seconds() - start;
+    s->work.residual_seconds += drape_system_clock(s->system) - start;
     return drape_all_finite(s->f, (size_t)s->n);
 }
 
@@ -203,19 +207,26 @@ static drape_status fit_pattern(drape_newton *s)
     return s->fitted;
 }
 
+/* Without contact, and without the solver's part of fit_pattern. */
+static double jacobian_clock(const drape_newton *s)
+{
+    return drape_system_clock(s->system) - s->linear->factor_seconds;
+}
+
 /* J(d) into the values of the solver. */
 static drape_status assemble(drape_newton *s, const double *d)
 {
-    double start = drape_clock_seconds();
+    double start = jacobian_clock(s);
     place(s, d); /* the residual may have been tried elsewhere since */
     drape_status status = fit_pattern(s);
     if (status)
         return status;
+    s->point.stress = drape_mixed_stress(&s->mixed);
     drape_system_jacobian(s->system, &s->point, s->problem->mass_weight,
                           s->values[DRAPE_NEWTON_PROJECT] != 0 ? 1 : s->positive, s->linear->values);
     s->factored_mass_weight = s->problem->mass_weight;
     s->work.jacobians++;
-    s->work.jacobian_seconds += drape_clock_seconds() - start;
+    s->work.jacobian_seconds += jacobian_clock(s) - start;
     return DRAPE_OK;
 }
 
@@ -318,6 +329,53 @@ static drape_status descend(drape_newton *s, N_Vector x, N_Vector b)
     return status ? status : drape_sun_linear_solve(s->linear, minus_f, p);
 }
 
+/* KINSOL stops at the largest component; this bound on it implies the bound in the norm that was asked for.
+ */
+static double max_norm_bound(const drape_newton *s)
+{
+    double tolerance = s->values[DRAPE_NEWTON_TOLERANCE], norm = s->values[DRAPE_NEWTON_NORM];
+    if (norm == NORM_L1)
+        return tolerance / (double)s->n;
+    return norm == NORM_L2 ? tolerance / sqrt((double)s->n) : tolerance;
+}
+
+static double largest(const double *f, int64_t n)
+{
+    double most = 0;
+    for (int64_t i = 0; i < n; i++)
+        most = fmax(most, fabs(f[i]));
+    return most;
+}
+
+/* Where factors served so well that they will do for the rest, what is left is corrected with them: a chord costs a
+ * tenth of a Newton iteration. F is known at the end of the correction p; `first` is what it was before, and its fall is
+ * expected once more of each chord. What does not fall is undone. */
+static drape_status add_chords(drape_newton *s, double *p, double first)
+{
+    const double *d = N_VGetArrayPointer(s->unknown), bound = max_norm_bound(s);
+    double before = largest(s->f, s->n), rate = before / first;
+    for (int left = MOST_CHORDS; left > 0 && before > bound && before * pow(rate, left) <= bound; left--) {
+        for (int64_t i = 0; i < s->n; i++)
+            s->minus_f[i] = -s->f[i];
+        drape_status status = drape_sun_linear_solve(s->linear, s->minus_f, s->chord);
+        if (status)
+            return status;
+        for (int64_t i = 0; i < s->n; i++)
+            s->trial[i] = d[i] + (p[i] + s->chord[i]);
+        s->searched = evaluate(s, s->trial);
+        double after = s->searched ? largest(s->f, s->n) : INFINITY;
+        if (!(after < before)) {
+            s->searched = false;
+            return DRAPE_OK;
+        }
+        for (int64_t i = 0; i < s->n; i++)
+            p[i] += s->chord[i];
+        rate = after / before;
+        before = after;
+    }
+    return DRAPE_OK;
+}
+
 /* After a short step the next matrix is the positive part, after a whole one the exact one again. */
 static drape_status globalize(drape_newton *s, N_Vector x, N_Vector b)
 {
@@ -328,11 +386,16 @@ static drape_status globalize(drape_newton *s, N_Vector x, N_Vector b)
     if (s->ahead)
         scale(p, free_share(s, s->x, p), s->n);
     double start = s->trial ? -dot(N_VGetArrayPointer(b), p, s->n) : 0;
-    if (start < 0) {
-        double a = search_along(s, p, start);
-        scale(p, a, s->n);
-        s->positive = a < SHORT_STEP;
-    }
+    if (start >= 0)
+        return DRAPE_OK;
+    drape_mixed_correct(&s->mixed, &s->point, p);
+    double a = search_along(s, p, start);
+    scale(p, a, s->n);
+    s->positive = a < SHORT_STEP;
+    if (a != 1)
+        drape_mixed_forget(&s->mixed);
+    else if (s->searched && !s->ahead && s->mixed.wanted)
+        return add_chords(s, p, largest(N_VGetArrayPointer(b), s->n));
     return DRAPE_OK;
 }
 
@@ -357,12 +420,17 @@ static drape_status create_vectors(drape_newton *s)
     s->g = drape_alloc(s->ctx, nodes, sizeof *s->g);
     s->f = drape_alloc(s->ctx, (size_t)s->n, sizeof *s->f);
     bool searches = s->values[DRAPE_NEWTON_GLOBALIZATION] == GLOBAL_WORK;
-    if (searches)
+    if (searches) {
         s->trial = drape_alloc(s->ctx, (size_t)s->n, sizeof *s->trial);
+        s->chord = drape_alloc(s->ctx, (size_t)s->n, sizeof *s->chord);
+        s->minus_f = drape_alloc(s->ctx, (size_t)s->n, sizeof *s->minus_f);
+    }
     if (drape_system_contact(s->system))
         s->ahead = drape_alloc(s->ctx, nodes, sizeof *s->ahead);
     if (!s->x || !s->v || !s->g || !s->f || (drape_system_contact(s->system) && !s->ahead) ||
-        (searches && !s->trial))
+        (searches && (!s->trial || !s->chord || !s->minus_f)))
+        return DRAPE_E_MEMORY;
+    if (searches && drape_mixed_init(s->ctx, s->system, &s->mixed))
         return DRAPE_E_MEMORY;
     s->unknown = N_VMake_Serial(s->n, s->f, s->sun);
     s->ones = N_VNew_Serial(s->n, s->sun);
@@ -370,16 +438,6 @@ static drape_status create_vectors(drape_newton *s)
         return drape_fail_memory(s->ctx, (size_t)s->n * sizeof(double));
     N_VConst(1, s->ones);
     return DRAPE_OK;
-}
-
-/* KINSOL stops at the largest component; this bound on it implies the bound in the norm that was asked for.
- */
-static double max_norm_bound(const drape_newton *s)
-{
-    double tolerance = s->values[DRAPE_NEWTON_TOLERANCE], norm = s->values[DRAPE_NEWTON_NORM];
-    if (norm == NORM_L1)
-        return tolerance / (double)s->n;
-    return norm == NORM_L2 ? tolerance / sqrt((double)s->n) : tolerance;
 }
 
 static bool configure(drape_newton *s)
@@ -456,6 +514,9 @@ void drape_newton_destroy(drape_newton **newton)
     drape_free(s->ctx, s->f);
     drape_free(s->ctx, s->ahead);
     drape_free(s->ctx, s->trial);
+    drape_free(s->ctx, s->chord);
+    drape_free(s->ctx, s->minus_f);
+    drape_mixed_free(&s->mixed);
     drape_free(s->ctx, s);
     *newton = NULL;
 }
@@ -531,6 +592,10 @@ static void begin(drape_newton *s, const drape_newton_problem *problem)
     s->nonfinite = s->searched = false;
     s->positive = 0;
     s->fitted = DRAPE_OK;
+    drape_point start = s->point;
+    start.x = problem->x_start;
+    if (s->trial)
+        drape_mixed_begin(&s->mixed, start.x ? &start : NULL);
 }
 
 /* KINSOL's counters start anew with each KINSol. */
@@ -634,6 +699,21 @@ const drape_point *drape_newton_point(const drape_newton *newton)
     return &newton->point;
 }
 
+/* Contact may couple there what it did not where the last solve was. */
+drape_status drape_newton_matrix(drape_newton *s, const drape_point *point, double mass_weight,
+                                 const drape_pattern **pattern, const double **values)
+{
+    s->point = *point;
+    drape_newton_forget_factors(s);
+    drape_status status = fit_pattern(s);
+    if (status)
+        return status;
+    drape_system_jacobian(s->system, point, mass_weight, 0, s->linear->values);
+    *pattern = drape_system_pattern(s->system);
+    *values = s->linear->values;
+    return DRAPE_OK;
+}
+
 const double *drape_newton_residual(const drape_newton *newton)
 {
     return newton->f;
@@ -654,6 +734,24 @@ void drape_newton_forget_factors(drape_newton *newton)
     newton->factored_mass_weight = 0;
 }
 
+/* Modified Newton goes on with its factors, and watches the residual by what it was in the solve before. */
+void drape_newton_archive(drape_newton *s, drape_archive *a)
+{
+    const bool modified = s->values[DRAPE_NEWTON_METHOD] == METHOD_MODIFIED;
+    drape_archive_mark(a, "newton");
+    drape_archive_doubles(a, s->f, (size_t)s->n);
+    drape_archive_double(a, &s->enough);
+    drape_archive_double(a, &s->factored_mass_weight);
+    drape_work_archive(&s->work, a);
+    if (s->n == 0)
+        return;
+    if (drape_archive_is_reading(a))
+        drape_archive_note(a, drape_sun_linear_adopt_other(s->linear, drape_system_pattern(s->system)));
+    drape_sun_linear_archive(s->linear, a, modified && s->factored_mass_weight != 0);
+    if (modified && !drape_kinsol_archive(s->kin, a) && a->reading)
+        drape_newton_forget_factors(s);
+}
+
 drape_work drape_newton_work(const drape_newton *newton)
 {
     drape_work work = newton->work;
@@ -671,6 +769,8 @@ size_t drape_newton_bytes(const drape_newton *newton)
     size_t nodes = 3 * (size_t)newton->model->node_count, n = (size_t)newton->n;
     size_t values = (size_t)drape_system_pattern(newton->system)->nonzeros;
     size_t factors = newton->linear ? newton->linear->ops->bytes(newton->linear->state) : 0;
-    size_t searches = (newton->ahead ? nodes : 0) + (newton->trial ? n : 0);
+    size_t searches = (newton->ahead ? nodes : 0) + (newton->trial ? 3 * n : 0);
+    if (newton->trial)
+        factors += drape_mixed_bytes(&newton->mixed);
     return (3 * nodes + 8 * n + searches + values) * sizeof(double) + factors; /* KINSOL keeps 6 vectors */
 }

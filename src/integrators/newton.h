@@ -34,9 +34,11 @@ typedef struct drape_newton drape_newton;
 /* One system. Arrays of nodes are (node_count x 3), of free DOFs (dofs). */
 typedef struct drape_newton_problem {
     const double *x_base, *v_base; /* nodes: at d = 0; pinned ones where they are at the end of the step */
-    double weight;                 /* w [1/s] */
-    double mass_weight;            /* m_w [1/s2] */
-    const double *inertia;         /* p, free DOFs [m] */
+    /* nodes: where the step, or its stage, goes from; NULL: neither the mixed iteration (mixed.h) nor chords */
+    const double *x_start;
+    double weight;         /* w [1/s] */
+    double mass_weight;    /* m_w [1/s2] */
+    const double *inertia; /* p, free DOFs [m] */
     const double *internal;
     const double *history; /* of the measures' rates, see drape_point */
     double t, span[2];     /* [s] where colliders stand, and the step, see drape_point */
@@ -58,11 +60,19 @@ const double *drape_newton_force(const drape_newton *newton);
 /* F there (free DOFs). */
 const double *drape_newton_residual(const drape_newton *newton);
 
+/* J at a point with a weight of its own, in the pattern that the system has there; valid until the next solve. The
+ * factors are forgotten. Errors: DRAPE_E_MEMORY. */
+drape_status drape_newton_matrix(drape_newton *newton, const drape_point *point, double mass_weight,
+                                 const drape_pattern **pattern, const double **values);
+
 /* The parameter values it was made with, in the order of drape_newton_params. */
 const double *drape_newton_values(const drape_newton *newton);
 
 /* The factors belong to another system now: modified Newton must not reuse them. */
 void drape_newton_forget_factors(drape_newton *newton);
+
+/* What it keeps from solve to solve. */
+void drape_newton_archive(drape_newton *newton, drape_archive *a);
 
 drape_work drape_newton_work(const drape_newton *newton);
 size_t drape_newton_bytes(const drape_newton *newton);

@@ -154,10 +154,10 @@ static drape_status correct(newton_k *s)
 {
     drape_rung *r = &s->rung;
     int most = efforts[s->effort].linear_iterations;
-    double start = drape_clock_seconds(), w = r->point.weight;
+    double start = drape_system_clock(r->base.system), w = r->point.weight;
     drape_status status = drape_quasi_update(s->quasi, &r->point, w * w);
     r->work.jacobians++;
-    r->work.jacobian_seconds += drape_clock_seconds() - start;
+    r->work.jacobian_seconds += drape_system_clock(r->base.system) - start;
     if (status)
         return status;
     start = drape_clock_seconds();
@@ -237,6 +237,14 @@ static drape_work work(const void *state)
     return work;
 }
 
+static void archive(void *state, drape_archive *a)
+{
+    newton_k *s = state;
+    drape_rung_archive(&s->rung, a);
+    if (s->quasi)
+        drape_quasi_archive(s->quasi, a);
+}
+
 static size_t bytes(const void *state)
 {
     const newton_k *s = state;
@@ -257,6 +265,7 @@ const drape_integrator_ops drape_integrator_newton_k = {
     .efforts = sizeof efforts / sizeof *efforts,
     .set_effort = set_effort,
     .work = work,
+    .archive = archive,
     .bytes = bytes,
     .destroy = destroy,
 };

@@ -78,7 +78,9 @@ typedef struct projective {
     klu_l_common common;
     klu_l_symbolic *symbolic;
     klu_l_numeric *numeric;
-    double *z; /* (3 x free nodes) by coordinates */
+    double chosen_for; /* [1/s] the weight of the matrix that the pivots were chosen for */
+    bool refactored;   /* since */
+    double *z;         /* (3 x free nodes) by coordinates */
     SUNContext sun;
     void *kin;
     N_Vector unknown, ones;
@@ -116,10 +118,13 @@ static drape_status factor(projective *s, double weight)
     double start = drape_clock_seconds();
     if (!drape_scalar_weigh(&s->scalar, weight, weight * weight) && s->numeric)
         return DRAPE_OK;
+    s->refactored = s->numeric != NULL;
     if (s->numeric)
         klu_l_refactor(s->column, s->row, s->scalar.sum, s->symbolic, s->numeric, &s->common);
-    else
+    else {
+        s->chosen_for = weight;
         s->numeric = klu_l_factor(s->column, s->row, s->scalar.sum, s->symbolic, &s->common);
+    }
     s->rung.work.factorizations++;
     s->rung.work.factor_seconds += drape_clock_seconds() - start;
     if (!s->numeric && s->common.status == KLU_OUT_OF_MEMORY)
@@ -276,6 +281,33 @@ static drape_work work(const void *state)
     return ((const projective *)state)->rung.work;
 }
 
+/* The same factorisations again: those by kept pivots have other roundings. */
+static void factor_again(projective *s, bool factored, double chosen_for, bool refactored, double weight,
+                         drape_archive *a)
+{
+    drape_status status = factored ? factor(s, chosen_for) : DRAPE_OK;
+    if (!status && refactored) {
+        s->scalar.weight = 0; /* also where it is the same matrix */
+        status = factor(s, weight);
+    }
+    if (status)
+        drape_archive_fail(a, DRAPE_E_SOLVER, "the matrix of the checkpoint has no factors here");
+}
+
+static void archive(void *state, drape_archive *a)
+{
+    projective *s = state;
+    bool factored = s->numeric != NULL, refactored = s->refactored;
+    double chosen_for = s->chosen_for, weight = s->scalar.weight;
+    drape_archive_bool(a, &factored);
+    drape_archive_bool(a, &refactored);
+    drape_archive_double(a, &chosen_for);
+    drape_archive_double(a, &weight);
+    if (drape_archive_is_reading(a))
+        factor_again(s, factored, chosen_for, refactored, weight, a);
+    drape_rung_archive(&s->rung, a);
+}
+
 /* KLU's factors and KINSOL's 2 m + 4 vectors are in it. */
 static size_t bytes(const void *state)
 {
@@ -301,6 +333,7 @@ const drape_integrator_ops drape_integrator_projective = {
     .efforts = sizeof efforts / sizeof *efforts,
     .set_effort = set_effort,
     .work = work,
+    .archive = archive,
     .bytes = bytes,
     .destroy = destroy,
 };

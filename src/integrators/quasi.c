@@ -344,6 +344,17 @@ void drape_quasi_destroy(drape_quasi **out)
     *out = NULL;
 }
 
+/* A step begins with an update: of the factors only what later ones depend on. */
+void drape_quasi_archive(drape_quasi *s, drape_archive *a)
+{
+    drape_archive_mark(a, "quasi");
+    if (drape_archive_is_reading(a))
+        drape_archive_note(a, drape_quasi_make_room(s));
+    drape_archive_int64(a, &s->factorizations);
+    drape_archive_double(a, &s->factor_seconds);
+    drape_linear_archive(s->coarse.row, s->coarse.solver, a, NULL);
+}
+
 int32_t drape_quasi_coarse_nodes(const drape_quasi *s)
 {
     return s->coarse.prolong.coarse;

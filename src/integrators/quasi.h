@@ -35,6 +35,9 @@ int drape_quasi_solve(drape_quasi *quasi, const double *b, double *x, double tol
 /* y = A x, for tests. */
 void drape_quasi_multiply(const drape_quasi *quasi, const double *x, double *y);
 
+/* What it keeps from update to update. */
+void drape_quasi_archive(drape_quasi *quasi, drape_archive *a);
+
 int32_t drape_quasi_coarse_nodes(const drape_quasi *quasi);
 int64_t drape_quasi_factorizations(const drape_quasi *quasi);
 double drape_quasi_factor_seconds(const drape_quasi *quasi);

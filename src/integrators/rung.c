@@ -1,7 +1,6 @@
 /* rung.c: see rung.h. */
 #include "integrators/rung.h"
 
-#include "base/clock.h"
 #include "base/finite.h"
 
 #include <math.h>
@@ -47,6 +46,17 @@ void drape_rung_restart(void *state, const drape_state *from)
     drape_rung *s = state;
     (void)from;
     s->past_time[0] = s->past_time[1] = s->past_end = NAN;
+}
+
+void drape_rung_archive(drape_rung *s, drape_archive *a)
+{
+    drape_archive_mark(a, "rung");
+    drape_archive_double(a, &s->past_end);
+    for (int k = 0; k < 2; k++) {
+        drape_archive_double(a, &s->past_time[k]);
+        drape_archive_doubles(a, s->past[k], s->nodes);
+    }
+    drape_work_archive(&s->work, a);
 }
 
 size_t drape_rung_bytes(const drape_rung *s)
@@ -113,7 +123,7 @@ static void set_point(drape_rung *s, const drape_state *in, double h)
 bool drape_rung_evaluate(drape_rung *s, const double *d)
 {
     const drape_implicit *b = &s->base;
-    double start = drape_clock_seconds(), w = s->point.weight;
+    double start = drape_system_clock(b->system), w = s->point.weight;
     for (size_t i = 0; i < s->dofs; i++) {
         size_t at = drape_implicit_at(b, i);
         s->x[at] = b->x_base[at] + d[i];
@@ -124,7 +134,7 @@ bool drape_rung_evaluate(drape_rung *s, const double *d)
         s->f[i] = w * w * b->model->mass[b->model->node_of_free[i / 3]] * (d[i] - b->inertia[i]) +
                   s->g[drape_implicit_at(b, i)];
     s->work.residuals++;
-    s->work.residual_seconds += drape_clock_seconds() - start;
+    s->work.residual_seconds += drape_system_clock(b->system) - start;
     return drape_all_finite(s->f, s->dofs);
 }
 

@@ -30,6 +30,7 @@ typedef struct drape_rung {
 drape_status drape_rung_init(drape_context *ctx, drape_system *system, drape_rung *rung);
 void drape_rung_free(drape_rung *rung);
 void drape_rung_restart(void *state, const drape_state *from);
+void drape_rung_archive(drape_rung *rung, drape_archive *a); /* its past and its work */
 size_t drape_rung_bytes(const drape_rung *rung);
 
 /* Goes to the guess of a step; its residual is evaluated. */

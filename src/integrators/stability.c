@@ -109,7 +109,7 @@ static void start(drape_spectrum *s, size_t n)
 static void product(drape_spectrum *s, const drape_state *at, double *y, const double *from)
 {
     const drape_model *m = s->model;
-    const drape_point point = {.x = s->x, .v = s->v, .internal = at->internal};
+    const drape_point point = {.x = s->x, .v = s->v, .internal = at->internal, .t = at->t};
     double most = 0;
     for (size_t i = 0; i < 3 * (size_t)m->free_count; i++)
         most = fmax(most, fabs(s->u[i]) * s->root[i / 3]);
@@ -182,7 +182,7 @@ static double largest(drape_spectrum *s, const drape_state *at, double *y, const
 void drape_spectrum_largest(drape_spectrum *s, const drape_state *at, double *omega, double *damping)
 {
     const drape_model *m = s->model;
-    const drape_point rest = {.x = s->x, .v = s->v, .internal = at->internal};
+    const drape_point rest = {.x = s->x, .v = s->v, .internal = at->internal, .t = at->t};
     memcpy(s->x, at->x, 3 * (size_t)m->node_count * sizeof *s->x);
     memset(s->v, 0, 3 * (size_t)m->node_count * sizeof *s->v);
     drape_system_force(s->system, &rest, s->g0);

@@ -24,7 +24,6 @@
 typedef struct static_state {
     drape_implicit common; /* first */
     double *internal;      /* of the terms, along the way */
-    double *values;        /* Hessian (nonzeros) */
     bool stability_known;
     int64_t unstable_modes;
 } static_state;
@@ -37,7 +36,6 @@ static void destroy(void **state)
     drape_context *ctx = s->common.ctx;
     drape_implicit_free(&s->common);
     drape_free(ctx, s->internal);
-    drape_free(ctx, s->values);
     drape_free(ctx, s);
     *state = NULL;
 }
@@ -52,8 +50,7 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
     const drape_model *m = drape_system_model(system);
     if (!status) {
         s->internal = drape_alloc(ctx, (size_t)m->internal_count, sizeof *s->internal);
-        s->values = drape_alloc(ctx, (size_t)m->pattern.nonzeros, sizeof *s->values);
-        if (!s->internal || !s->values)
+        if (!s->internal)
             status = DRAPE_E_MEMORY;
     }
     if (status)
@@ -142,11 +139,13 @@ static drape_status follow(static_state *s, double weight, double tolerance, dra
 static drape_status judge_stability(static_state *s, const drape_state *out)
 {
     const drape_point point = {.x = out->x, .v = s->common.v_base, .internal = s->internal, .t = s->common.t};
+    const drape_pattern *pattern;
+    const double *values;
     if (s->common.model->free_count == 0)
         return DRAPE_OK;
-    drape_system_jacobian(s->common.system, &point, 0, false, s->values);
-    return drape_inertia(s->common.ctx, &s->common.model->pattern, s->values, &s->unstable_modes,
-                         &s->stability_known);
+    drape_status status = drape_newton_matrix(s->common.newton, &point, 0, &pattern, &values);
+    return status ? status
+                  : drape_inertia(s->common.ctx, pattern, values, &s->unstable_modes, &s->stability_known);
 }
 
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
@@ -158,6 +157,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     double dt = values[DRAPE_NEWTON_DT], tolerance = values[DRAPE_NEWTON_TOLERANCE];
     info->h = h;
     drape_implicit_base(&s->common, in, out->t, 1);
+    s->common.x_start = NULL;        /* corrections are too large for forces to first order in them */
     s->common.span[0] = s->common.t; /* colliders rest */
     memset(s->common.v_base, 0, nodes * sizeof *s->common.v_base);
     memcpy(out->x, s->common.x_base, nodes * sizeof *out->x);
@@ -183,12 +183,18 @@ static drape_work work(const void *state)
     return work;
 }
 
+static void archive(void *state, drape_archive *a)
+{
+    static_state *s = state;
+    drape_archive_bool(a, &s->stability_known);
+    drape_archive_int64(a, &s->unstable_modes);
+    drape_implicit_archive(state, a);
+}
+
 static size_t bytes(const void *state)
 {
     const static_state *s = state;
-    return drape_implicit_bytes(state) +
-           ((size_t)s->common.model->internal_count + (size_t)s->common.model->pattern.nonzeros) *
-               sizeof(double);
+    return drape_implicit_bytes(state) + (size_t)s->common.model->internal_count * sizeof(double);
 }
 
 const drape_integrator_ops drape_integrator_static = {
@@ -204,6 +210,7 @@ const drape_integrator_ops drape_integrator_static = {
     .step = step,
     .restart = drape_implicit_restart,
     .work = work,
+    .archive = archive,
     .bytes = bytes,
     .destroy = destroy,
 };

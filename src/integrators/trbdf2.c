@@ -59,6 +59,7 @@ static drape_status solve(trbdf2_state *s, const double *internal, double w, dra
     drape_implicit *c = &s->common;
     const drape_newton_problem problem = {.x_base = c->x_base,
                                           .v_base = c->v_base,
+                                          .x_start = c->x_start,
                                           .weight = w,
                                           .mass_weight = w * w,
                                           .inertia = c->inertia,
@@ -96,12 +97,12 @@ static void add_work(trbdf2_state *s, const double *from, const double *to, doub
         c->x_base[i] = (from[i] + to[i]) / 2;
         c->v_base[i] = (to[i] - from[i]) / span;
     }
-    if (c->model->moved_count > 0 || c->model->collider_count > 0)
+    if (c->motion->moved_count > 0 || c->model->collider_count > 0)
         drape_system_force(c->system, &point, s->g0);
     info->pin_work += drape_implicit_collider_work(c, t, t + span);
-    for (int32_t i = 0; i < c->model->moved_count; i++)
+    for (int32_t i = 0; i < c->motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
-            size_t at = 3 * (size_t)c->model->moved_node[i] + k;
+            size_t at = 3 * (size_t)c->motion->moved_node[i] + k;
             info->pin_work += s->g0[at] * (to[at] - from[at]);
         }
     if (!c->dissipated)
@@ -153,9 +154,10 @@ static drape_status differentiate(trbdf2_state *s, const drape_state *in, double
 {
     drape_implicit *c = &s->common;
     drape_implicit_base(c, in, out->t, h);
-    for (int32_t i = 0; i < c->model->moved_count; i++)
+    c->x_start = s->xg;
+    for (int32_t i = 0; i < c->motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
-            size_t at = 3 * (size_t)c->model->moved_node[i] + k;
+            size_t at = 3 * (size_t)c->motion->moved_node[i] + k;
             c->v_base[at] = w * (c->x_base[at] - s->xg[at] - A0 * (s->xg[at] - in->x[at]));
         }
     for (size_t i = 0; i < 3 * (size_t)c->model->free_count; i++) {
@@ -210,6 +212,7 @@ const drape_integrator_ops drape_integrator_trbdf2 = {
     .restart = drape_implicit_restart,
     .residual = drape_implicit_residual,
     .work = drape_implicit_work,
+    .archive = drape_implicit_archive,
     .bytes = bytes,
     .destroy = destroy,
 };

@@ -174,6 +174,7 @@ typedef struct verlet_state {
     drape_context *ctx;
     drape_system *system;
     const drape_model *model;
+    const drape_motion *motion;
     double values[PARAM_COUNT];
     double keep;        /* c */
     double *g, *g1;     /* nodes: forces with their sign turned */
@@ -257,10 +258,14 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
     *state = s;
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (verlet_state){.ctx = ctx, .system = system, .model = drape_system_model(system)};
+    *s = (verlet_state){.ctx = ctx,
+                        .system = system,
+                        .model = drape_system_model(system),
+                        .motion = drape_system_motion(system)};
     memcpy(s->values, values, sizeof s->values);
     s->keep = 1 - values[PARAM_DAMPING] / 100;
     s->contact = (drape_verlet_contact){.model = s->model,
+                                        .motion = s->motion,
                                         .rule = (int)values[PARAM_CONTACT],
                                         .offset = values[PARAM_SURFACE_OFFSET],
                                         .friction_range = values[PARAM_FRICTION_RANGE],
@@ -276,20 +281,22 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
 static void evaluate(verlet_state *s, const substep *sub, double t, const double *v, double *g)
 {
     double start = drape_clock_seconds();
-    drape_verlet_force_sum(s->force, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal}, g);
+    drape_verlet_force_sum(
+        s->force, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal, .t = t, .span = {t, t}}, g);
     s->work.residual_seconds += drape_clock_seconds() - start;
     s->work.residuals++;
     drape_verlet_rub(&s->contact, t, sub->x, v, g);
 }
 
-/* Adds half of the power of the dissipative forces at x and v over the substep. */
-static void audit_dissipation(verlet_state *s, const substep *sub, double share, const double *v)
+/* Adds a share of the power of the dissipative forces at x, v and t over the substep. */
+static void audit_dissipation(verlet_state *s, const substep *sub, double share, double t, const double *v)
 {
     double power = 0;
     if (!s->dissipated)
         return;
-    drape_system_dissipation(s->system, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal},
-                             s->dissipated);
+    drape_system_dissipation(
+        s->system, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal, .t = t, .span = {t, t}},
+        s->dissipated);
     for (size_t i = 0; i < 3 * (size_t)s->model->node_count; i++)
         power += s->dissipated[i] * v[i];
     sub->info->dissipated += share * sub->h * power;
@@ -300,10 +307,10 @@ static void audit_dissipation(verlet_state *s, const substep *sub, double share,
 /* Velocities of pins that move: their mean over the substep. */
 static void start_pins(verlet_state *s, const substep *sub)
 {
-    const drape_model *m = s->model;
+    const drape_motion *m = s->motion;
     if (m->moved_count == 0)
         return;
-    drape_model_place_pins(m, sub->t, s->pins);
+    drape_motion_place_pins(m, sub->t, s->pins);
     for (int32_t i = 0; i < m->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)m->moved_node[i] + k;
@@ -314,7 +321,7 @@ static void start_pins(verlet_state *s, const substep *sub)
 /* Work of the pins that move, against g. */
 static void audit_pins(verlet_state *s, const substep *sub, const double *g, double share)
 {
-    const drape_model *m = s->model;
+    const drape_motion *m = s->motion;
     for (int32_t i = 0; i < m->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)m->moved_node[i] + k;
@@ -353,7 +360,7 @@ LANES_DISPATCH static void move_all(size_t n, double w, double h, const double *
 static void move(const verlet_state *s, const substep *sub, double w)
 {
     move_all(3 * (size_t)s->model->node_count, w, sub->h, s->inverse, s->g, sub->v, sub->x, s->x0);
-    drape_model_place_pins(s->model, sub->t, sub->x);
+    drape_motion_place_pins(s->motion, sub->t, sub->x);
 }
 
 /* v = (x - x0)/h of what is not pinned. */
@@ -386,7 +393,7 @@ static void substep_position(verlet_state *s, const substep *sub)
 {
     start_pins(s, sub);
     evaluate(s, sub, sub->t0, sub->v, s->g);
-    audit_dissipation(s, sub, 1, sub->v);
+    audit_dissipation(s, sub, 1, sub->t0, sub->v);
     audit_pins(s, sub, s->g, 1);
     damp(s, sub);
     move(s, sub, sub->h);
@@ -419,13 +426,13 @@ static void substep_velocity(verlet_state *s, const substep *sub, bool first)
         s->g = s->g1;
         s->g1 = swap;
     }
-    audit_dissipation(s, sub, 0.5, sub->v);
+    audit_dissipation(s, sub, 0.5, sub->t0, sub->v);
     audit_pins(s, sub, s->g, 0.5);
     move(s, sub, 0.5 * sub->h);
     project(s, sub);
     const double *ahead = velocity_ahead(s, sub);
     evaluate(s, sub, sub->t, ahead, s->g1);
-    audit_dissipation(s, sub, 0.5, ahead);
+    audit_dissipation(s, sub, 0.5, sub->t, ahead);
     audit_pins(s, sub, s->g1, 0.5);
     for (int32_t f = 0; f < m->free_count; f++)
         vec3_add_scaled(-0.5 * sub->h / m->mass[m->node_of_free[f]], s->g1 + 3 * (size_t)m->node_of_free[f],
@@ -526,6 +533,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     memcpy(out->v, in->v, nodes * sizeof *out->v);
     info->reason = "converged";
     for (int64_t k = 0; k < n; k++) {
+        if (drape_system_cancelled(s->system))
+            return drape_system_status(s->system);
         const substep sub = {.t0 = in->t + (double)k / (double)n * (out->t - in->t),
                              .t =
                                  k + 1 == n ? out->t : in->t + (double)(k + 1) / (double)n * (out->t - in->t),
@@ -556,6 +565,12 @@ static drape_work work(const void *state)
     return ((const verlet_state *)state)->work;
 }
 
+/* Lists of near points give the same bits whenever they were made. */
+static void archive(void *state, drape_archive *a)
+{
+    drape_work_archive(&((verlet_state *)state)->work, a);
+}
+
 static size_t bytes(const void *state)
 {
     const verlet_state *s = state;
@@ -579,6 +594,7 @@ const drape_integrator_ops drape_integrator_verlet = {
     .restart = restart,
     .stability = stability,
     .work = work,
+    .archive = archive,
     .bytes = bytes,
     .destroy = destroy,
 };

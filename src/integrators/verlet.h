@@ -24,6 +24,7 @@ enum { DRAPE_VERLET_CS184, DRAPE_VERLET_BOSON };
 
 typedef struct drape_verlet_contact {
     const drape_model *model;
+    const drape_motion *motion; /* of its colliders */
     int rule;
     double offset;         /* [m] CS184: how far outside of a flat surface a node is put */
     double friction_range; /* [m] Boson: friction acts up to this far from a surface */

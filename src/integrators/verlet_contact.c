@@ -21,6 +21,15 @@
 
 #include <string.h>
 
+/* Where a collider is, and how fast. */
+static drape_collider_pose pose_at(const drape_motion *motion, int32_t collider, double t)
+{
+    drape_collider_pose pose;
+    drape_motion_collider(motion, collider, t, pose.displacement);
+    drape_motion_collider_velocity(motion, collider, t, t, pose.velocity);
+    return pose;
+}
+
 /* A collider over one substep. */
 typedef struct pose {
     const drape_collider *collider;
@@ -85,11 +94,12 @@ static void rub(const drape_verlet_contact *contact, const drape_collider *c, co
         g[k] = contact->friction_drag * slip[k] - (pull > 0 ? left / pull * tangential[k] : 0);
 }
 
-static void rub_on(const drape_verlet_contact *contact, const drape_collider *c, double t, const double *x,
+static void rub_on(const drape_verlet_contact *contact, int32_t collider, double t, const double *x,
                    const double *v, double *g)
 {
     const drape_model *m = contact->model;
-    const drape_collider_pose pose_now = drape_collider_pose_at(c, t);
+    const drape_collider *c = &m->colliders[collider];
+    const drape_collider_pose pose_now = pose_at(contact->motion, collider, t);
     double n[3];
     for (int32_t f = 0; f < m->free_count; f++) {
         size_t i = 3 * (size_t)m->node_of_free[f];
@@ -104,7 +114,7 @@ void drape_verlet_rub(const drape_verlet_contact *contact, double t, const doubl
     if (contact->rule != DRAPE_VERLET_BOSON)
         return;
     for (int32_t c = 0; c < contact->model->collider_count; c++)
-        rub_on(contact, &contact->model->colliders[c], t, x, v, g);
+        rub_on(contact, c, t, x, v, g);
 }
 
 /* ---- Both ---- */
@@ -133,8 +143,8 @@ void drape_verlet_project(const drape_verlet_contact *contact, double t0, double
 {
     for (int32_t c = 0; c < contact->model->collider_count; c++) {
         pose p = {.collider = &contact->model->colliders[c]};
-        const drape_collider_pose before = drape_collider_pose_at(p.collider, t0);
-        p.at = drape_collider_pose_at(p.collider, t);
+        const drape_collider_pose before = pose_at(contact->motion, c, t0);
+        p.at = pose_at(contact->motion, c, t);
         vec3_sub(p.at.displacement, before.displacement, p.way);
         project_on(contact, &p, x0, x);
     }

@@ -206,5 +206,6 @@ void drape_verlet_force_sum(drape_verlet_force *f, const drape_point *point, dou
         planes_add_to(n, f->g, g);
     } else {
         planes_to(n, f->g, g);
+        drape_system_add_loads(f->system, point->x, g);
     }
 }

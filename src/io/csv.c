@@ -34,3 +34,19 @@ void drape_csv_put_text(drape_file *file, const char *text)
         drape_file_put(file, *text == '"' ? "\"\"" : text, *text == '"' ? 2 : 1);
     drape_file_put_text(file, "\"");
 }
+
+drape_status drape_csv_open(drape_context *ctx, const char *folder, const char *name, const char *columns,
+                            off_t kept, drape_file *file)
+{
+    drape_status status = drape_file_create(ctx, strlen(folder) + strlen(name) + 2, file);
+    if (status)
+        return status;
+    drape_file_name(file, "%s/%s", folder, name);
+    if (kept >= 0)
+        return drape_file_reopen(file, kept);
+    status = drape_file_begin(file);
+    if (status)
+        return status;
+    drape_file_put_text(file, columns);
+    return drape_file_publish(file);
+}

@@ -8,7 +8,6 @@
 #include "io/energy.h"
 
 #include <inttypes.h>
-#include <string.h>
 
 #include "io/csv.h"
 
@@ -16,17 +15,9 @@
 
 static const char columns[] = "frame,t,t_state,kinetic,elastic,gravity,contact,dissipated,numerical,total\n";
 
-drape_status drape_energy_open(drape_context *ctx, const char *folder, drape_file *file)
+drape_status drape_energy_open(drape_context *ctx, const char *folder, off_t kept, drape_file *file)
 {
-    drape_status status = drape_file_create(ctx, strlen(folder) + sizeof FILE_NAME, file);
-    if (status)
-        return status;
-    drape_file_name(file, "%s/" FILE_NAME, folder);
-    status = drape_file_begin(file);
-    if (status)
-        return status;
-    drape_file_put_text(file, columns);
-    return drape_file_publish(file);
+    return drape_csv_open(ctx, folder, FILE_NAME, columns, kept, file);
 }
 
 drape_status drape_energy_write(drape_file *file, const drape_energy_row *row)

@@ -11,9 +11,8 @@ typedef struct drape_energy_row {
     drape_energy energy;
 } drape_energy_row;
 
-/* Takes the memory, and puts a file with the line of column names in the place of any that is there. Destroy
- * the file also after a failure. Errors: DRAPE_E_MEMORY, DRAPE_E_FILE. */
-drape_status drape_energy_open(drape_context *ctx, const char *folder, drape_file *file);
+/* As drape_csv_open. */
+drape_status drape_energy_open(drape_context *ctx, const char *folder, off_t kept, drape_file *file);
 
 /* Adds a row, in the C locale. On failure the file ends with the row before. Errors: DRAPE_E_FILE. */
 drape_status drape_energy_write(drape_file *file, const drape_energy_row *row);

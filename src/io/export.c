@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -69,10 +70,28 @@ drape_status drape_export_begin(drape_context *ctx, const char *folder, const ch
     return drape_file_begin(file);
 }
 
+drape_status drape_export_reopen(drape_context *ctx, const char *folder, const char *name, off_t size,
+                                 drape_file *file)
+{
+    drape_status status = drape_file_create(ctx, strlen(folder) + strlen(name) + 2, file);
+    if (status)
+        return status;
+    drape_file_name(file, "%s/%s", folder, name);
+    return drape_file_reopen(file, size);
+}
+
+void drape_export_archive_size(drape_archive *a, off_t *size)
+{
+    int64_t bytes = *size;
+    drape_archive_int64(a, &bytes);
+    *size = (off_t)bytes;
+}
+
 /* ---- A file a frame ---- */
 
-/* frame_, six digits or more, a dot, the ending; or that with ".part", which a killed run left. */
-static bool is_frame_file(const char *name, const char *ending)
+/* frame_, so many digits or more, a dot, the ending; or that with ".part", which a killed run left. *frame: its number;
+ * of the latter none is kept. */
+static bool is_frame_file(const char *name, size_t least, const char *ending, int64_t *frame)
 {
     size_t word = strlen(FRAME_WORD);
     if (strncmp(name, FRAME_WORD, word) != 0)
@@ -80,21 +99,26 @@ static bool is_frame_file(const char *name, const char *ending)
     size_t digits = strspn(name + word, "0123456789");
     const char *rest = name + word + digits;
     size_t length = strlen(ending);
-    if (digits < 6 || *rest != '.' || strncmp(rest + 1, ending, length) != 0)
+    if (digits < least || *rest != '.' || strncmp(rest + 1, ending, length) != 0)
         return false;
     rest += 1 + length;
+    *frame = *rest ? INT64_MAX : (int64_t)strtoll(name + word, NULL, 10);
     return !*rest || strcmp(rest, DRAPE_FILE_PART) == 0;
 }
 
-drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, const char *ending)
+/* Removes frames from one on. */
+static drape_status remove_frames(drape_context *ctx, const char *folder, size_t digits, const char *ending,
+                                  int64_t from)
 {
     DIR *dir = opendir(folder);
     if (!dir)
         return drape_file_fail(ctx, "read the folder", folder, errno);
     drape_status status = DRAPE_OK;
     struct dirent *entry;
+    int64_t frame;
     while (errno = 0, !status && (entry = readdir(dir))) {
-        if (is_frame_file(entry->d_name, ending) && unlinkat(dirfd(dir), entry->d_name, 0) && errno != ENOENT)
+        if (is_frame_file(entry->d_name, digits, ending, &frame) && frame >= from &&
+            unlinkat(dirfd(dir), entry->d_name, 0) && errno != ENOENT)
             status = drape_file_fail(ctx, "remove the old frame", entry->d_name, errno);
     }
     if (!status && errno)
@@ -103,13 +127,45 @@ drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, con
     return status;
 }
 
+drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, size_t digits,
+                                     const char *ending)
+{
+    return remove_frames(ctx, folder, digits, ending, 0);
+}
+
 drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *def, const char *ending,
                                     drape_frame_files *frames)
 {
     frames->model = def->model;
     frames->folder = def->folder;
     frames->ending = ending;
-    return drape_file_create(ctx, strlen(def->folder) + NAME_ROOM, &frames->file);
+    drape_status status = drape_file_create(ctx, strlen(def->folder) + NAME_ROOM, &frames->file);
+    frames->file.durable = def->durable;
+    return status;
+}
+
+drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def *def, const char *ending,
+                                      int64_t count, drape_frame_files *frames)
+{
+    struct stat info;
+    drape_status status = drape_frame_files_open(ctx, def, ending, frames);
+    for (int64_t k = 0; !status && k < count; k++) {
+        drape_file_name(&frames->file, "%s/" DRAPE_FRAME_NAME, frames->folder, k, ending);
+        if (stat(frames->file.path, &info))
+            status = drape_file_fail(ctx, "go on with", frames->file.path, errno);
+    }
+    return status;
+}
+
+drape_status drape_frame_files_cut(drape_context *ctx, void *state, int64_t frames)
+{
+    const drape_frame_files *files = state;
+    return remove_frames(ctx, files->folder, DRAPE_FRAME_DIGITS, files->ending, frames);
+}
+
+void drape_frame_files_archive(void *state, drape_archive *a)
+{
+    (void)state, (void)a;
 }
 
 drape_status drape_frame_files_begin(drape_frame_files *frames, int64_t frame)

@@ -2,6 +2,7 @@
 #ifndef DRAPE_IO_EXPORT_H
 #define DRAPE_IO_EXPORT_H
 
+#include "base/archive.h"
 #include "io/file.h"
 
 /* What is written where, known before the first frame. All of it lives until close. */
@@ -10,6 +11,7 @@ typedef struct drape_export_def {
     const char *folder;  /* without a slash at its end */
     double frame_rate;   /* [1/s] */
     int64_t most_frames; /* that a run of the scene's duration writes, the one at its end included */
+    bool durable;        /* a checkpoint may say of each frame that it is on the disk */
 } drape_export_def;
 
 /* A frame. Vectors are turned where another axis points up than in the scene. */
@@ -49,6 +51,16 @@ typedef struct drape_exporter_ops {
     /* Errors: DRAPE_E_FILE. */
     drape_status (*write)(drape_context *ctx, void *state, const drape_frame *frame);
 
+    /* For checkpoints. archive: what it knows of the frames so far, between frames. resume: in place of open, of a run
+     * that was left: takes the memory, reads what archive wrote, checks that the `frames` frames are there, and changes
+     * nothing; then cut: takes away what is after them, to go on behind them. sync: waits until the disk has all that was
+     * written; NULL: it has, with durable. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+    void (*archive)(void *state, drape_archive *a);
+    drape_status (*resume)(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
+                           drape_archive *a);
+    drape_status (*cut)(drape_context *ctx, void *state, int64_t frames);
+    drape_status (*sync)(void *state);
+
     /* Errors: DRAPE_E_FILE; all is released nevertheless. */
     drape_status (*close)(drape_context *ctx, void *state);
 } drape_exporter_ops;
@@ -68,6 +80,14 @@ drape_status drape_export_clean(drape_context *ctx, const char *folder, const ch
  * DRAPE_E_MEMORY. */
 drape_status drape_export_begin(drape_context *ctx, const char *folder, const char *name, drape_file *file);
 
+/* Takes the memory and opens the file again that an earlier run left, to go on behind its first size bytes, as
+ * drape_file_reopen. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status drape_export_reopen(drape_context *ctx, const char *folder, const char *name, off_t size,
+                                 drape_file *file);
+
+/* The number of bytes that a file keeps. */
+void drape_export_archive_size(drape_archive *a, off_t *size);
+
 /* ---- For formats with a file a frame, folder/frame_000000.ENDING ---- */
 
 #define DRAPE_FRAME_NAME "frame_%06" PRId64 ".%s"
@@ -78,11 +98,22 @@ typedef struct drape_frame_files {
     drape_file file;
 } drape_frame_files;
 
-/* Removes the files of that pattern, and only those, from the folder. Errors: DRAPE_E_FILE. */
-drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, const char *ending);
+#define DRAPE_FRAME_DIGITS 6 /* in those names, at least */
+
+/* Removes the files of that pattern, with that many digits or more, and only those, from the folder. Errors:
+ * DRAPE_E_FILE. */
+drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, size_t digits,
+                                     const char *ending);
 /* Takes the memory. Errors: DRAPE_E_MEMORY. */
 drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *def, const char *ending,
                                     drape_frame_files *frames);
+/* The same where `count` frames are there already. Errors: DRAPE_E_FILE (one is not there), DRAPE_E_MEMORY. */
+drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def *def, const char *ending,
+                                      int64_t count, drape_frame_files *frames);
+/* Of a state that begins with a drape_frame_files: nothing, as the number of frames says it all; and the removal of those
+ * after so many. */
+void drape_frame_files_archive(void *state, drape_archive *a);
+drape_status drape_frame_files_cut(drape_context *ctx, void *state, int64_t frames);
 /* Begins the file of one frame, to be filled and ended by drape_frame_files_end. Errors: DRAPE_E_FILE. */
 drape_status drape_frame_files_begin(drape_frame_files *frames, int64_t frame);
 /* Gives the frame's file its name and closes it. Errors: DRAPE_E_FILE; there is no such frame then. */

@@ -1,12 +1,12 @@
 /*
  * export_glb.c: folder/positions.glb: binary glTF 2.0. The mesh, all cloths in one, is the first frame; each later
- * one is a morph target, its displacements in float32, and an animation of the targets' weights plays them: at the
+ * one is a morph target, its displacements in float32, with normals, and an animation of the targets' weights plays them: at the
  * time of frame k weight k - 1 is 1 and the others are 0, and between two times they mix linearly, as positions do.
  *
  *     header                  12 bytes
  *     JSON chunk              8 bytes and JSON of a fixed length, with blanks for what is not there yet
- *     binary chunk            8 bytes, triangles, positions of the first frame, displacements of the others, and at
- *                             the end, when all frames are known, times and weights
+ *     binary chunk            8 bytes, triangles, positions and normals of the first frame, what the others differ by
+ *                             from them, and at the end, when all frames are known, times and weights
  *
  * After each frame its displacements are complete in the file before its few numbers are written into their blanks:
  * a run that is killed leaves a valid file with all frames as morph targets, without the animation. That comes
@@ -22,6 +22,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/vec3.h"
 #include "io/export.h"
 
 #define FILE_NAME    "positions.glb"
@@ -29,14 +30,16 @@
 #define MOST_FRAMES  16384                  /* their weights take 1 GiB */
 #define MOST_BYTES   (UINT32_MAX - 65535.0) /* lengths are 32 bits */
 #define FIXED_ROOM   4096                   /* JSON without the parts of a frame */
-#define TARGET_WIDTH 20                     /* ,{"POSITION":16385} */
+#define TARGET_WIDTH 36                     /* ,{"POSITION":32769,"NORMAL":32770} */
 #define WEIGHT_WIDTH 2                      /* ,0 */
 #define BOUND_WIDTH  17                     /* -1.17549435e-38 and a comma */
 #define OPEN_WIDTH   11                     /* ,"targets":[ and ,"weights":[ */
 #define LENGTH_WIDTH 10
 #define ACCESSOR_HEAD                                                                                        \
     ",{\"bufferView\":1,\"byteOffset\":%u,\"componentType\":5126,\"count\":%u,\"type\":\"VEC3\","
-#define ACCESSOR_ROOM (120 + 6 * BOUND_WIDTH)
+#define BOUNDS_ROOM   (120 + 6 * BOUND_WIDTH)
+#define NORMALS_ROOM  100
+#define ACCESSOR_ROOM (BOUNDS_ROOM + NORMALS_ROOM) /* both of a frame */
 #define TIMES_ROOM    640
 
 /* Blanks in the JSON, to be filled later; from its beginning. */
@@ -50,11 +53,14 @@ typedef struct glb_state {
     drape_file file;
     uint32_t room;   /* frames that there is room for */
     uint32_t frames; /* whole ones in the file */
+    bool live;       /* the file ends with them: it may go on there */
     char *json;      /* while the file is begun; then a scratch */
     size_t json_size, used;
     blanks at;
-    float *base;  /* (node_count x 3) positions of the first frame */
-    float *times; /* (room) */
+    float *base;    /* (node_count x 3) positions of the first frame */
+    float *upright; /* (node_count x 3) normals of it */
+    double *normal; /* (node_count x 3) of the frame in work */
+    float *times;   /* (room) */
 } glb_state;
 
 /* ---- JSON ---- */
@@ -87,6 +93,42 @@ static uint32_t node_bytes(const glb_state *glb)
     return 12 * (uint32_t)drape_model_node_count(glb->def->model);
 }
 
+/* Positions and normals. */
+static uint32_t frame_bytes(const glb_state *glb)
+{
+    return 2 * node_bytes(glb);
+}
+
+/* The mean of the normals of the triangles around a node, weighted by area; upwards where they cancel. */
+static void find_normals(glb_state *glb, const double *x)
+{
+    const drape_model *model = glb->def->model;
+    const int32_t *node = drape_model_triangles(model);
+    memset(glb->normal, 0, 3 * (size_t)drape_model_node_count(model) * sizeof *glb->normal);
+    for (size_t t = 0; t < (size_t)drape_model_triangle_count(model); t++, node += 3) {
+        const double *a = x + 3 * (size_t)node[0];
+        double ab[3], ac[3], n[3];
+        vec3_sub(x + 3 * (size_t)node[1], a, ab);
+        vec3_sub(x + 3 * (size_t)node[2], a, ac);
+        vec3_cross(ab, ac, n);
+        for (int k = 0; k < 3; k++)
+            vec3_add_scaled(1, n, glb->normal + 3 * (size_t)node[k]);
+    }
+    for (size_t i = 0; i < (size_t)drape_model_node_count(model); i++) {
+        double *n = glb->normal + 3 * i, length = vec3_norm(n);
+        for (int k = 0; k < 3; k++)
+            n[k] = length > 0 ? n[k] / length : k == 1;
+    }
+}
+
+/* The accessor of a frame's normals, without bounds. */
+static void name_normals(const glb_state *glb, uint32_t frame, char text[NORMALS_ROOM])
+{
+    int length = snprintf(text, NORMALS_ROOM, ACCESSOR_HEAD, frame * frame_bytes(glb) + node_bytes(glb),
+                          node_bytes(glb) / 12);
+    text[length - 1] = '}'; /* in place of the comma */
+}
+
 static void add_bounds(const float bounds[6], char *text, size_t size)
 {
     snprintf(text, size, "\"min\":[%.9g,%.9g,%.9g],\"max\":[%.9g,%.9g,%.9g]}", bounds[0], bounds[1],
@@ -106,7 +148,7 @@ static void find_bounds(const glb_state *glb, const double *x, bool relative, fl
     }
 }
 
-/* Positions of the first frame are accessor 1 in view 1. */
+/* Positions and normals of frame k are accessors 2 k + 1 and 2 k + 2 in view 1. */
 static void add_buffers(glb_state *glb)
 {
     add(glb, "\"buffers\":[{\"byteLength\":");
@@ -129,9 +171,9 @@ static void add_buffers(glb_state *glb)
 
 static void add_mesh(glb_state *glb)
 {
-    add(glb,
-        ",\"meshes\":[{\"name\":\"cloth\",\"primitives\":[{\"attributes\":{\"POSITION\":1},\"indices\":0,"
-        "\"material\":0");
+    add(glb, ",\"meshes\":[{\"name\":\"cloth\",\"primitives\":[{\"attributes\":{\"POSITION\":1,\"NORMAL\":2},"
+             "\"indices\":0,"
+             "\"material\":0");
     glb->at.targets_open = add_blanks(glb, OPEN_WIDTH + 1);
     glb->at.targets = add_blanks(glb, (size_t)glb->room * TARGET_WIDTH);
     glb->at.targets_close = add_blanks(glb, 1);
@@ -201,7 +243,7 @@ static drape_status glb_clean(drape_context *ctx, const char *folder)
 static drape_status glb_check(drape_context *ctx, const char *pointer, const drape_export_def *def)
 {
     double frames = (double)def->most_frames, nodes = drape_model_node_count(def->model);
-    double bytes = 12.0 * drape_model_triangle_count(def->model) + 12 * nodes * frames + 4 * frames * frames +
+    double bytes = 12.0 * drape_model_triangle_count(def->model) + 24 * nodes * frames + 4 * frames * frames +
                    frames * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
     if (frames <= MOST_FRAMES && bytes <= MOST_BYTES)
         return DRAPE_OK;
@@ -212,19 +254,27 @@ static drape_status glb_check(drape_context *ctx, const char *pointer, const dra
         frames, nodes, bytes, MOST_FRAMES);
 }
 
-static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
+static drape_status take_rooms(drape_context *ctx, const drape_export_def *def, glb_state *glb)
 {
-    glb_state *glb = state;
     glb->def = def;
     glb->room = (uint32_t)def->most_frames;
     glb->json_size = FIXED_ROOM + (size_t)glb->room * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
     glb->json = drape_alloc(ctx, glb->json_size, 1);
-    glb->base = drape_alloc(ctx, 3 * (size_t)drape_model_node_count(def->model), sizeof *glb->base);
+    size_t count = 3 * (size_t)drape_model_node_count(def->model);
+    glb->base = drape_alloc(ctx, count, sizeof *glb->base);
+    glb->upright = drape_alloc(ctx, count, sizeof *glb->upright);
+    glb->normal = drape_alloc(ctx, count, sizeof *glb->normal);
     glb->times = drape_alloc(ctx, glb->room, sizeof *glb->times);
-    if (!glb->json || !glb->base || !glb->times)
+    if (!glb->json || !glb->base || !glb->upright || !glb->normal || !glb->times)
         return DRAPE_E_MEMORY;
     make_json(glb);
-    return drape_export_begin(ctx, def->folder, FILE_NAME, &glb->file);
+    return DRAPE_OK;
+}
+
+static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
+{
+    drape_status status = take_rooms(ctx, def, state);
+    return status ? status : drape_export_begin(ctx, def->folder, FILE_NAME, &((glb_state *)state)->file);
 }
 
 /* ---- Frames ---- */
@@ -241,14 +291,16 @@ static drape_status write_first(glb_state *glb, const drape_frame *frame)
 {
     float bounds[6];
     char accessor[ACCESSOR_ROOM + 1];
-    uint32_t length = triangle_bytes(glb) + node_bytes(glb);
+    uint32_t length = triangle_bytes(glb) + frame_bytes(glb);
     find_bounds(glb, frame->positions, false, bounds);
     int head = snprintf(accessor, sizeof accessor, ACCESSOR_HEAD, 0u, node_bytes(glb) / 12);
     add_bounds(bounds, accessor + head, sizeof accessor - (size_t)head);
     memcpy(glb->json + glb->at.accessors, accessor, strlen(accessor));
+    name_normals(glb, 0, accessor);
+    memcpy(glb->json + glb->at.accessors + BOUNDS_ROOM, accessor, strlen(accessor));
     snprintf(accessor, sizeof accessor, "%10" PRIu32, length);
     memcpy(glb->json + glb->at.buffer_length, accessor, LENGTH_WIDTH);
-    snprintf(accessor, sizeof accessor, "%10" PRIu32, node_bytes(glb));
+    snprintf(accessor, sizeof accessor, "%10" PRIu32, frame_bytes(glb));
     memcpy(glb->json + glb->at.view_length, accessor, LENGTH_WIDTH);
 
     drape_file_put_text(&glb->file, "glTF");
@@ -264,6 +316,11 @@ static drape_status write_first(glb_state *glb, const drape_frame *frame)
         glb->base[i] = (float)frame->positions[i];
         drape_file_put_float(&glb->file, glb->base[i]);
     }
+    find_normals(glb, frame->positions);
+    for (size_t i = 0; i < node_bytes(glb) / 4; i++) {
+        glb->upright[i] = (float)glb->normal[i];
+        drape_file_put_float(&glb->file, glb->upright[i]);
+    }
     return drape_file_publish(&glb->file);
 }
 
@@ -275,14 +332,19 @@ static drape_status name_target(glb_state *glb, const drape_frame *frame)
     char text[ACCESSOR_ROOM + 1];
     find_bounds(glb, frame->positions, true, bounds);
     int head =
-        snprintf(text, sizeof text, ACCESSOR_HEAD, glb->frames * node_bytes(glb), node_bytes(glb) / 12);
+        snprintf(text, sizeof text, ACCESSOR_HEAD, glb->frames * frame_bytes(glb), node_bytes(glb) / 12);
     add_bounds(bounds, text + head, sizeof text - (size_t)head);
-    drape_status status = fill(glb, glb->at.accessors + (size_t)glb->frames * ACCESSOR_ROOM, "%s", text);
+    size_t at = glb->at.accessors + (size_t)glb->frames * ACCESSOR_ROOM;
+    drape_status status = fill(glb, at, "%s", text);
+    name_normals(glb, glb->frames, text);
+    if (!status)
+        status = fill(glb, at + BOUNDS_ROOM, "%s", text);
     if (!status && target == 0)
         status = fill(glb, glb->at.targets_close, "]");
     if (!status)
         status = fill(glb, target ? glb->at.targets + (size_t)target * TARGET_WIDTH : glb->at.targets_open,
-                      "%s{\"POSITION\":%" PRIu32 "}", target ? "," : ",\"targets\":[", glb->frames + 1);
+                      "%s{\"POSITION\":%" PRIu32 ",\"NORMAL\":%" PRIu32 "}", target ? "," : ",\"targets\":[",
+                      2 * glb->frames + 1, 2 * glb->frames + 2);
     if (!status && target == 0)
         status = fill(glb, glb->at.weights_close, "]");
     if (!status)
@@ -296,10 +358,13 @@ static drape_status write_target(glb_state *glb, const drape_frame *frame)
     off_t before = glb->file.kept;
     for (size_t i = 0; i < node_bytes(glb) / 4; i++)
         drape_file_put_float(&glb->file, (float)(frame->positions[i] - (double)glb->base[i]));
+    find_normals(glb, frame->positions);
+    for (size_t i = 0; i < node_bytes(glb) / 4; i++)
+        drape_file_put_float(&glb->file, (float)(glb->normal[i] - (double)glb->upright[i]));
     drape_status status = drape_file_keep(&glb->file);
     if (status)
         return status;
-    status = write_lengths(glb, (glb->frames + 1) * node_bytes(glb));
+    status = write_lengths(glb, (glb->frames + 1) * frame_bytes(glb));
     if (status)
         drape_file_cut(&glb->file, before);
     return status ? status : name_target(glb, frame);
@@ -325,6 +390,7 @@ static drape_status glb_write(drape_context *ctx, void *state, const drape_frame
     drape_status status = glb->frames == 0 ? write_first(glb, frame) : write_target(glb, frame);
     if (!status)
         glb->frames++;
+    glb->live = glb->frames > 0;
     return status;
 }
 
@@ -339,7 +405,7 @@ static void put_weights(glb_state *glb)
 
 static drape_status name_animation(glb_state *glb)
 {
-    uint32_t n = glb->frames, offset = triangle_bytes(glb) + n * node_bytes(glb);
+    uint32_t n = glb->frames, offset = triangle_bytes(glb) + n * frame_bytes(glb);
     drape_status status =
         fill(glb, glb->at.views, ",{\"buffer\":0,\"byteOffset\":%" PRIu32 ",\"byteLength\":%" PRIu32 "}",
              offset, 4 * n * n);
@@ -356,7 +422,7 @@ static drape_status name_animation(glb_state *glb)
                  ",\"animations\":[{\"name\":\"run\",\"channels\":[{\"sampler\":0,\"target\":{\"node\":0,"
                  "\"path\":\"weights\"}}],\"samplers\":[{\"input\":%" PRIu32
                  ",\"interpolation\":\"LINEAR\",\"output\":%" PRIu32 "}]}]",
-                 n + 1, n + 2);
+                 2 * n + 1, 2 * n + 2);
     return status;
 }
 
@@ -368,25 +434,126 @@ static drape_status write_animation(glb_state *glb)
     put_weights(glb);
     drape_status status = drape_file_keep(&glb->file);
     if (!status)
-        status = write_lengths(glb, glb->frames * node_bytes(glb));
+        status = write_lengths(glb, glb->frames * frame_bytes(glb));
     return status ? status : name_animation(glb);
+}
+
+/* ---- Checkpoints ---- */
+
+static void glb_archive(void *state, drape_archive *a)
+{
+    glb_state *glb = state;
+    int64_t frames = glb->frames;
+    drape_archive_int64(a, &frames);
+    if (a->reading && (frames < 0 || frames > glb->room))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %lld frames of %u", (long long)frames,
+                           glb->room);
+    if (a->status)
+        return;
+    glb->frames = (uint32_t)frames;
+    drape_export_archive_size(a, &glb->file.kept);
+    drape_archive_bytes(a, glb->base, node_bytes(glb));
+    drape_archive_bytes(a, glb->times, glb->frames * sizeof *glb->times);
+}
+
+/* Over what was written from one item of a list on. */
+static drape_status blank_items(glb_state *glb, size_t list, size_t width, uint32_t from)
+{
+    size_t begin = list + from * width, end = list + glb->room * width;
+    char blank[1024];
+    drape_status status = DRAPE_OK;
+    memset(blank, ' ', sizeof blank);
+    while (!status && begin < end) {
+        size_t part = end - begin < sizeof blank ? end - begin : sizeof blank;
+        status = drape_file_overwrite(&glb->file, (off_t)(JSON_OFFSET + begin), blank, part);
+        begin += part;
+    }
+    return status;
+}
+
+/* All that frames after those that there are, and the animation, put into the blanks. */
+static drape_status blank_rest(glb_state *glb)
+{
+    const blanks *at = &glb->at;
+    uint32_t n = glb->frames;
+    const struct {
+        size_t begin, width;
+    } lists[] = {{at->accessors, ACCESSOR_ROOM}, {at->targets, TARGET_WIDTH}, {at->weights, WEIGHT_WIDTH}};
+    const struct {
+        size_t begin, size;
+        bool kept;
+    } pieces[] = {{at->views, TIMES_ROOM / 2, false},     {at->times, TIMES_ROOM / 2, false},
+                  {at->animation, TIMES_ROOM / 2, false}, {at->targets_open, OPEN_WIDTH + 1, n > 1},
+                  {at->targets_close, 1, n > 1},          {at->weights_open, OPEN_WIDTH + 1, n > 1},
+                  {at->weights_close, 1, n > 1}};
+    char blank[TIMES_ROOM];
+    drape_status status = DRAPE_OK;
+    memset(blank, ' ', sizeof blank);
+    for (size_t i = 0; !status && i < sizeof pieces / sizeof *pieces; i++)
+        if (!pieces[i].kept)
+            status = drape_file_overwrite(&glb->file, (off_t)(JSON_OFFSET + pieces[i].begin), blank,
+                                          pieces[i].size);
+    /* accessor k is of frame k, target and weight k of frame k + 1 */
+    for (size_t i = 0; !status && i < sizeof lists / sizeof *lists; i++)
+        status = blank_items(glb, lists[i].begin, lists[i].width, i == 0 || n == 0 ? n : n - 1);
+    return status;
+}
+
+/* Before its first frame it has no file. */
+static drape_status glb_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
+                               drape_archive *a)
+{
+    glb_state *glb = state;
+    (void)frames;
+    drape_status status = take_rooms(ctx, def, glb);
+    if (status)
+        return status;
+    glb_archive(glb, a);
+    if (a->status || glb->frames == 0)
+        return a->status;
+    return drape_export_reopen(ctx, def->folder, FILE_NAME, glb->file.kept, &glb->file);
+}
+
+/* The animation and targets go before the data they point to. */
+static drape_status glb_cut(drape_context *ctx, void *state, int64_t frames)
+{
+    glb_state *glb = state;
+    (void)frames;
+    if (glb->frames == 0)
+        return drape_export_begin(ctx, glb->def->folder, FILE_NAME, &glb->file);
+    drape_status status = blank_rest(glb);
+    if (!status)
+        status = write_lengths(glb, glb->frames * node_bytes(glb));
+    if (!status)
+        status = drape_file_trim(&glb->file);
+    glb->live = !status;
+    return status;
+}
+
+static drape_status glb_sync(void *state)
+{
+    glb_state *glb = state;
+    return glb->frames > 0 ? drape_file_sync(&glb->file) : DRAPE_OK;
 }
 
 static drape_status glb_close(drape_context *ctx, void *state)
 {
     glb_state *glb = state;
-    drape_status status = glb->frames > 1 ? write_animation(glb) : DRAPE_OK;
+    drape_status status = glb->frames > 1 && glb->live ? write_animation(glb) : DRAPE_OK;
     drape_status closing = drape_file_close(&glb->file);
     drape_file_destroy(&glb->file);
     drape_free(ctx, glb->json);
     drape_free(ctx, glb->base);
+    drape_free(ctx, glb->upright);
+    drape_free(ctx, glb->normal);
     drape_free(ctx, glb->times);
     return status ? status : closing;
 }
 
 const drape_exporter_ops drape_exporter_glb = {
     .name = "glb",
-    .summary = "positions.glb: glTF 2.0 with a morph target a frame, float32, and an animation; y up",
+    .summary =
+        "positions.glb: glTF 2.0 with a morph target a frame, float32, normals, and an animation; y up",
     .reference = "Khronos, glTF 2.0 specification, 2021 (ISO/IEC 12113)",
     .state_size = sizeof(glb_state),
     .y_up = true,
@@ -394,5 +561,9 @@ const drape_exporter_ops drape_exporter_glb = {
     .open = glb_open,
     .clean = glb_clean,
     .write = glb_write,
+    .archive = glb_archive,
+    .resume = glb_resume,
+    .cut = glb_cut,
+    .sync = glb_sync,
     .close = glb_close,
 };

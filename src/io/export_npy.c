@@ -79,6 +79,41 @@ static drape_status npy_write(drape_context *ctx, void *state, const drape_frame
     return status;
 }
 
+static void npy_archive(void *state, drape_archive *a)
+{
+    npy_state *npy = state;
+    drape_archive_int64(a, &npy->frames);
+    drape_export_archive_size(a, &npy->file.kept);
+}
+
+static drape_status npy_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
+                               drape_archive *a)
+{
+    npy_state *npy = state;
+    npy->node_count = drape_model_node_count(def->model);
+    npy_archive(npy, a);
+    if (drape_archive_good(a) && npy->frames != frames)
+        drape_archive_fail(a, DRAPE_E_PARSE,
+                           "the checkpoint has %lld frames and another number in " FILE_NAME,
+                           (long long)frames);
+    return a->status ? a->status
+                     : drape_export_reopen(ctx, def->folder, FILE_NAME, npy->file.kept, &npy->file);
+}
+
+/* The count first: at any moment there is at least what the header says. */
+static drape_status npy_cut(drape_context *ctx, void *state, int64_t frames)
+{
+    npy_state *npy = state;
+    (void)ctx;
+    drape_status status = write_count(npy, frames);
+    return status ? status : drape_file_trim(&npy->file);
+}
+
+static drape_status npy_sync(void *state)
+{
+    return drape_file_sync(&((npy_state *)state)->file);
+}
+
 static drape_status npy_close(drape_context *ctx, void *state)
 {
     npy_state *npy = state;
@@ -97,5 +132,9 @@ const drape_exporter_ops drape_exporter_npy = {
     .open = npy_open,
     .clean = npy_clean,
     .write = npy_write,
+    .archive = npy_archive,
+    .resume = npy_resume,
+    .cut = npy_cut,
+    .sync = npy_sync,
     .close = npy_close,
 };

@@ -9,7 +9,7 @@
 
 static drape_status obj_clean(drape_context *ctx, const char *folder)
 {
-    return drape_frame_files_clean(ctx, folder, "obj");
+    return drape_frame_files_clean(ctx, folder, DRAPE_FRAME_DIGITS, "obj");
 }
 
 static drape_status obj_open(drape_context *ctx, const drape_export_def *def, void *state)
@@ -50,6 +50,13 @@ static drape_status obj_write(drape_context *ctx, void *state, const drape_frame
     return drape_frame_files_end(frames);
 }
 
+static drape_status obj_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
+                               drape_archive *a)
+{
+    (void)a;
+    return drape_frame_files_resume(ctx, def, "obj", frames, state);
+}
+
 static drape_status obj_close(drape_context *ctx, void *state)
 {
     (void)ctx;
@@ -65,5 +72,8 @@ const drape_exporter_ops drape_exporter_obj = {
     .open = obj_open,
     .clean = obj_clean,
     .write = obj_write,
+    .archive = drape_frame_files_archive,
+    .resume = obj_resume,
+    .cut = drape_frame_files_cut,
     .close = obj_close,
 };

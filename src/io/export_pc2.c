@@ -46,7 +46,10 @@ static drape_status pc2_open(drape_context *ctx, const drape_export_def *def, vo
         return status;
     put_header(pc2);
     status = drape_file_publish(&pc2->file);
-    return status ? status : drape_export_begin(ctx, def->folder, MESH_NAME, &pc2->mesh);
+    if (!status)
+        status = drape_export_begin(ctx, def->folder, MESH_NAME, &pc2->mesh);
+    pc2->mesh.durable = def->durable;
+    return status;
 }
 
 static drape_status write_mesh(pc2_state *pc2, const drape_frame *frame)
@@ -87,6 +90,48 @@ static drape_status pc2_write(drape_context *ctx, void *state, const drape_frame
     return status;
 }
 
+static void pc2_archive(void *state, drape_archive *a)
+{
+    pc2_state *pc2 = state;
+    drape_archive_int32(a, &pc2->samples);
+    drape_export_archive_size(a, &pc2->file.kept);
+}
+
+/* The mesh was written with the first frame, and closed. */
+static drape_status check_mesh(drape_context *ctx, const drape_export_def *def, pc2_state *pc2)
+{
+    drape_status status = drape_export_reopen(ctx, def->folder, MESH_NAME, 1, &pc2->mesh);
+    return status ? status : drape_file_close(&pc2->mesh);
+}
+
+static drape_status pc2_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
+                               drape_archive *a)
+{
+    pc2_state *pc2 = state;
+    pc2->def = def;
+    pc2_archive(pc2, a);
+    if (drape_archive_good(a) && pc2->samples != frames)
+        drape_archive_fail(a, DRAPE_E_PARSE,
+                           "the checkpoint has %lld frames and another number in " FILE_NAME,
+                           (long long)frames);
+    drape_status status = a->status ? a->status : check_mesh(ctx, def, pc2);
+    return status ? status : drape_export_reopen(ctx, def->folder, FILE_NAME, pc2->file.kept, &pc2->file);
+}
+
+/* The count first: at any moment there is at least what the header says. */
+static drape_status pc2_cut(drape_context *ctx, void *state, int64_t frames)
+{
+    pc2_state *pc2 = state;
+    (void)ctx, (void)frames;
+    drape_status status = write_count(pc2, pc2->samples);
+    return status ? status : drape_file_trim(&pc2->file);
+}
+
+static drape_status pc2_sync(void *state)
+{
+    return drape_file_sync(&((pc2_state *)state)->file);
+}
+
 static drape_status pc2_close(drape_context *ctx, void *state)
 {
     pc2_state *pc2 = state;
@@ -107,5 +152,9 @@ const drape_exporter_ops drape_exporter_pc2 = {
     .open = pc2_open,
     .clean = pc2_clean,
     .write = pc2_write,
+    .archive = pc2_archive,
+    .resume = pc2_resume,
+    .cut = pc2_cut,
+    .sync = pc2_sync,
     .close = pc2_close,
 };

@@ -11,7 +11,7 @@
 
 static drape_status ply_clean(drape_context *ctx, const char *folder)
 {
-    return drape_frame_files_clean(ctx, folder, "ply");
+    return drape_frame_files_clean(ctx, folder, DRAPE_FRAME_DIGITS, "ply");
 }
 
 static drape_status ply_open(drape_context *ctx, const drape_export_def *def, void *state)
@@ -56,6 +56,13 @@ static drape_status ply_write(drape_context *ctx, void *state, const drape_frame
     return drape_frame_files_end(frames);
 }
 
+static drape_status ply_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
+                               drape_archive *a)
+{
+    (void)a;
+    return drape_frame_files_resume(ctx, def, "ply", frames, state);
+}
+
 static drape_status ply_close(drape_context *ctx, void *state)
 {
     (void)ctx;
@@ -71,5 +78,8 @@ const drape_exporter_ops drape_exporter_ply = {
     .open = ply_open,
     .clean = ply_clean,
     .write = ply_write,
+    .archive = drape_frame_files_archive,
+    .resume = ply_resume,
+    .cut = drape_frame_files_cut,
     .close = ply_close,
 };

@@ -214,7 +214,7 @@ static void put_data(drape_file *file, const drape_model *model, const drape_fra
 
 static drape_status vtp_clean(drape_context *ctx, const char *folder)
 {
-    drape_status status = drape_frame_files_clean(ctx, folder, "vtp");
+    drape_status status = drape_frame_files_clean(ctx, folder, DRAPE_FRAME_DIGITS, "vtp");
     return status ? status : drape_export_clean(ctx, folder, PVD_NAME);
 }
 
@@ -241,6 +241,38 @@ static drape_status vtp_write(drape_context *ctx, void *state, const drape_frame
     return status ? status : pvd_add(vtp, frame);
 }
 
+static void vtp_archive(void *state, drape_archive *a)
+{
+    drape_export_archive_size(a, &((vtp_state *)state)->entries_end);
+}
+
+static drape_status vtp_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
+                               drape_archive *a)
+{
+    vtp_state *vtp = state;
+    vtp_archive(vtp, a);
+    drape_status status =
+        a->status ? a->status : drape_frame_files_resume(ctx, def, "vtp", frames, &vtp->frames);
+    return status ? status
+                  : drape_export_reopen(ctx, def->folder, PVD_NAME,
+                                        vtp->entries_end + (off_t)sizeof pvd_end - 1, &vtp->pvd);
+}
+
+/* The collection's end over what comes after, then the cut: at any moment it ends well. */
+static drape_status vtp_cut(drape_context *ctx, void *state, int64_t frames)
+{
+    vtp_state *vtp = state;
+    drape_status status = drape_file_overwrite(&vtp->pvd, vtp->entries_end, pvd_end, sizeof pvd_end - 1);
+    if (!status)
+        status = drape_file_trim(&vtp->pvd);
+    return status ? status : drape_frame_files_cut(ctx, &vtp->frames, frames);
+}
+
+static drape_status vtp_sync(void *state)
+{
+    return drape_file_sync(&((vtp_state *)state)->pvd);
+}
+
 static drape_status vtp_close(drape_context *ctx, void *state)
 {
     vtp_state *vtp = state;
@@ -262,5 +294,9 @@ const drape_exporter_ops drape_exporter_vtp = {
     .open = vtp_open,
     .clean = vtp_clean,
     .write = vtp_write,
+    .archive = vtp_archive,
+    .resume = vtp_resume,
+    .cut = vtp_cut,
+    .sync = vtp_sync,
     .close = vtp_close,
 };

@@ -49,7 +49,7 @@ static int settle(drape_file *file, int error)
     return error;
 }
 
-static void abandon(drape_file *file)
+void drape_file_abandon(drape_file *file)
 {
     if (!file->open)
         return;
@@ -59,7 +59,7 @@ static void abandon(drape_file *file)
 
 void drape_file_destroy(drape_file *file)
 {
-    abandon(file);
+    drape_file_abandon(file);
     if (file->path)
         drape_free(file->ctx, file->path);
     *file = (drape_file){0};
@@ -178,10 +178,22 @@ drape_status drape_file_publish(drape_file *file)
     return DRAPE_OK;
 }
 
+/* 0 or errno. What cannot be synced, a pipe, has no disk to wait for. */
+static int sync_descriptor(int fd)
+{
+    int code;
+    do
+        code = fsync(fd);
+    while (code && errno == EINTR);
+    return code && errno != EINVAL && errno != ENOTSUP ? errno : 0;
+}
+
 /* Closed first: some file systems tell only then that there was no room. */
 drape_status drape_file_finish(drape_file *file)
 {
     flush(file);
+    if (file->durable && !file->error)
+        file->error = sync_descriptor(file->fd);
     int closing = close_descriptor(file);
     int error = settle(file, file->error ? file->error : closing);
     return error ? drape_file_fail(file->ctx, "write", file->path, error) : DRAPE_OK;
@@ -230,6 +242,49 @@ void drape_file_restore(drape_file *file, off_t offset, const void *data, size_t
         drape_file_cut(file, offset + (off_t)size);
 }
 
+drape_status drape_file_sync(drape_file *file)
+{
+    int error = file->open ? sync_descriptor(file->fd) : 0;
+    return error ? drape_file_fail(file->ctx, "write", file->path, error) : DRAPE_OK;
+}
+
+/* Whether it is a file that has as much as it should; says what is wrong. */
+static drape_status check_reopened(drape_file *file, off_t size)
+{
+    struct stat info;
+    if (fstat(file->fd, &info))
+        return drape_file_fail(file->ctx, "go on with", file->path, errno);
+    if (!S_ISREG(info.st_mode))
+        return drape_fail(file->ctx, DRAPE_E_FILE, "cannot go on with \"%.500s\": it is no regular file",
+                          file->path);
+    if (info.st_size < size)
+        return drape_fail(file->ctx, DRAPE_E_FILE,
+                          "cannot go on with \"%.500s\": it has %lld bytes, and had %lld at the checkpoint",
+                          file->path, (long long)info.st_size, (long long)size);
+    return lseek(file->fd, size, SEEK_SET) == size
+               ? DRAPE_OK
+               : drape_file_fail(file->ctx, "go on with", file->path, errno);
+}
+
+drape_status drape_file_reopen(drape_file *file, off_t size)
+{
+    *file->part = 0;
+    file->fd = open(file->path, O_WRONLY | O_CLOEXEC | O_NONBLOCK);
+    if (file->fd < 0)
+        return drape_file_fail(file->ctx, "go on with", file->path, errno);
+    file->open = true;
+    file->used = 0;
+    file->error = 0;
+    file->size = file->kept = size;
+    return check_reopened(file, size);
+}
+
+drape_status drape_file_trim(drape_file *file)
+{
+    return ftruncate(file->fd, file->kept) == 0 ? DRAPE_OK
+                                                : drape_file_fail(file->ctx, "cut", file->path, errno);
+}
+
 drape_status drape_file_close(drape_file *file)
 {
     int error = file->open ? close_descriptor(file) : 0;
@@ -259,4 +314,25 @@ drape_status drape_folder_make(drape_context *ctx, char *path)
     if (!error)
         error = make_one(path);
     return error ? drape_file_fail(ctx, "make the folder", path, error) : DRAPE_OK;
+}
+
+static int sync_folder(const char *folder)
+{
+    int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0)
+        return errno == EACCES ? 0 : errno; /* a folder that may be written and not read */
+    int error = sync_descriptor(fd);
+    close(fd);
+    return error;
+}
+
+drape_status drape_folder_sync(drape_context *ctx, char *path)
+{
+    char *slash = strrchr(path, '/');
+    if (slash && slash > path)
+        *slash = 0;
+    int error = sync_folder(!slash ? "." : slash == path ? "/" : path);
+    if (slash)
+        *slash = '/';
+    return error ? drape_file_fail(ctx, "write the folder of", path, error) : DRAPE_OK;
 }

@@ -3,7 +3,8 @@
  *
  * A file is begun under a temporary name beside its own, filled through a buffer, and gets its own by a
  * rename. Some files then grow by records: a record that does not fit on the disk is cut off again. A killed
- * process leaves whole files and whole records; a power failure is not guarded against (nothing is synced).
+ * process leaves whole files and whole records; a power failure is guarded against where a file is durable, for what
+ * there was when drape_file_sync or drape_file_finish returned and the folder was synced.
  * Plain write(2) instead of stdio: no heap per file, and errno belongs to the call that failed.
  */
 #ifndef DRAPE_IO_FILE_H
@@ -25,6 +26,7 @@ typedef struct drape_file {
     size_t used; /* bytes in the buffer */
     int fd;
     bool open;
+    bool durable;     /* finishing it waits until the disk has it */
     int error;        /* errno of the first write that failed since the last record, 0 for none */
     off_t size, kept; /* bytes written; bytes of whole records */
 } drape_file;
@@ -33,6 +35,7 @@ typedef struct drape_file {
 drape_status drape_file_create(drape_context *ctx, size_t path_length, drape_file *file);
 /* Closes without a word and frees; a file not published is removed. */
 void drape_file_destroy(drape_file *file);
+void drape_file_abandon(drape_file *file); /* the same, but it may be named and begun again */
 
 /* The name for the next drape_file_begin, printf style. */
 void drape_file_name(drape_file *file, const char *format, ...) DRAPE_PRINTF(2, 3);
@@ -70,6 +73,18 @@ void drape_file_restore(drape_file *file, off_t offset, const void *data, size_t
 
 /* Cuts a published file to its first size bytes, as far as it can. */
 void drape_file_cut(drape_file *file, off_t size);
+
+/* Opens a published file again that an earlier process left, to go on behind its first size bytes; it has at least so
+ * many. Overwrite what must be before drape_file_trim ends it there. Errors: DRAPE_E_FILE. */
+drape_status drape_file_reopen(drape_file *file, off_t size);
+drape_status drape_file_trim(drape_file *file);
+
+/* Waits until the disk has all that a growing file keeps. Errors: DRAPE_E_FILE. */
+drape_status drape_file_sync(drape_file *file);
+
+/* Waits until the disk has the names of the files that lie beside path. path is changed during the call. Errors:
+ * DRAPE_E_FILE. */
+drape_status drape_folder_sync(drape_context *ctx, char *path);
 
 /* Closes a file that grew; does nothing to one that is not open. Errors: DRAPE_E_FILE. */
 drape_status drape_file_close(drape_file *file);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "io/checkpoint.h"
 #include "io/energy.h"
 #include "io/export.h"
 #include "io/steps.h"
@@ -32,6 +33,9 @@ struct drape_recorder {
     double *fields; /* room for those of a frame; NULL where no format wants any */
     double *turned; /* room for positions and velocities with z up; NULL where no format wants these */
     drape_file steps, energies;
+    drape_file checkpoint; /* where checkpoints are written; without memory: none are */
+    int64_t every;         /* frames; 0: none by itself */
+    double start, wall;    /* [s] of the clock when the run began; that it had taken at the last checkpoint */
     int64_t frames;
     double last_time; /* [s] of the last frame */
     bool moved;       /* a step was accepted after the last frame */
@@ -52,10 +56,11 @@ static scope scope_enter(void)
     return (scope){.start = drape_clock_seconds(), .locale = drape_locale_enter()};
 }
 
+/* A finished run takes no more time. */
 static void scope_leave(drape_recorder *r, scope s)
 {
     drape_locale_leave(s.locale);
-    r->seconds += drape_clock_seconds() - s.start;
+    r->seconds += r->finished ? 0 : drape_clock_seconds() - s.start;
 }
 
 /* The first failure stands for all after it. */
@@ -134,6 +139,83 @@ static void write_frame(drape_recorder *r, double time, const double *positions,
     r->moved = false;
 }
 
+/* ---- Checkpoints ---- */
+
+/* The name of each format, so that the order of a scene's list is part of it. */
+static void archive_formats(drape_recorder *r, drape_archive *a)
+{
+    drape_archive_same(a, "the number of formats", (int64_t)r->output_count);
+    for (size_t i = 0; i < r->output_count && drape_archive_good(a); i++) {
+        char there[32];
+        snprintf(there, sizeof there, "%s", r->outputs[i].ops->name);
+        drape_archive_text(a, there, sizeof there);
+        if (drape_archive_good(a) && strcmp(there, r->outputs[i].ops->name) != 0)
+            drape_archive_fail(a, DRAPE_E_ARGUMENT,
+                               "the checkpoint has frames in \"%s\"; here they are in \"%s\"", there,
+                               r->outputs[i].ops->name);
+    }
+}
+
+static void archive_duration(drape_recorder *r, drape_archive *a)
+{
+    double here = r->sim->model->duration, there = here;
+    drape_archive_double(a, &there);
+    if (drape_archive_good(a) && there != here)
+        drape_archive_fail(a, DRAPE_E_ARGUMENT, "the checkpoint is of a run of %.9g s; this one has %.9g s",
+                           there, here);
+}
+
+/* All but the outputs' own. */
+static void archive_progress(drape_recorder *r, drape_archive *a)
+{
+    drape_archive_mark(a, "recorder");
+    archive_formats(r, a);
+    archive_duration(r, a);
+    drape_archive_same(a, "whether frames have z up", r->sim->model->z_up);
+    drape_archive_bool(a, &r->finished);
+    drape_archive_int64(a, &r->frames);
+    drape_archive_double(a, &r->last_time);
+    drape_archive_bool(a, &r->moved);
+    drape_archive_double(a, &r->seconds);
+    drape_archive_double(a, &r->wall);
+    drape_export_archive_size(a, &r->steps.kept);
+    drape_export_archive_size(a, &r->energies.kept);
+}
+
+/* A checkpoint must not say of a frame that it is there before the disk has it. */
+static drape_status sync_files(drape_recorder *r)
+{
+    drape_status status = drape_file_sync(&r->steps);
+    if (!status)
+        status = drape_file_sync(&r->energies);
+    for (size_t i = 0; i < r->output_count && !status; i++)
+        if (r->outputs[i].ops->sync && r->outputs[i].open)
+            status = r->outputs[i].ops->sync(r->outputs[i].state);
+    return status ? status : drape_folder_sync(r->ctx, r->checkpoint.path);
+}
+
+static drape_status write_checkpoint(drape_recorder *r)
+{
+    drape_archive a;
+    drape_status status = sync_files(r);
+    if (status)
+        return status;
+    r->wall = drape_clock_seconds() - r->start;
+    drape_checkpoint_begin(&a, r->ctx, &r->checkpoint);
+    drape_sim_archive_identity(r->sim, &a);
+    drape_sim_archive(r->sim, &a);
+    archive_progress(r, &a);
+    for (size_t i = 0; i < r->output_count && !r->finished; i++)
+        r->outputs[i].ops->archive(r->outputs[i].state, &a);
+    return drape_checkpoint_end(&a, &r->checkpoint);
+}
+
+static void write_due_checkpoint(drape_recorder *r)
+{
+    if (!r->failure && r->every > 0 && r->frames % r->every == 0)
+        note(r, write_checkpoint(r));
+}
+
 static void write_attempt(drape_recorder *r, const drape_attempt *attempt)
 {
     drape_energy energy = drape_sim_energy(r->sim);
@@ -155,6 +237,7 @@ static drape_status observe(void *user, const drape_event *event)
         break;
     case DRAPE_EVENT_FRAME:
         write_frame(r, event->time, event->positions, event->velocities);
+        write_due_checkpoint(r);
         break;
     }
     scope_leave(r, s);
@@ -263,21 +346,74 @@ static drape_status clean_folder(drape_recorder *r)
     return status;
 }
 
+/* A checkpoint of an earlier run goes first: its frames are about to. */
 static drape_status open_files(drape_recorder *r)
 {
-    r->def = def_of(r->sim, r->folder);
-    drape_status status = clean_folder(r);
+    drape_status status = drape_export_clean(r->ctx, r->folder, DRAPE_CHECKPOINT_NAME);
+    if (!status)
+        status = drape_export_clean(r->ctx, r->folder, DRAPE_CHECKPOINT_NAME DRAPE_FILE_PART);
+    if (!status)
+        status = clean_folder(r);
     for (size_t i = 0; i < r->output_count && !status; i++) {
         output *o = &r->outputs[i];
         o->open = true; /* close is due after an open that failed, too */
         status = o->ops->open(r->ctx, &r->def, o->state);
     }
     if (!status)
-        status = drape_steps_open(r->ctx, r->folder, &r->steps);
-    return status ? status : drape_energy_open(r->ctx, r->folder, &r->energies);
+        status = drape_steps_open(r->ctx, r->folder, -1, &r->steps);
+    return status ? status : drape_energy_open(r->ctx, r->folder, -1, &r->energies);
 }
 
-static drape_status set_up(drape_recorder *r, const drape_recorder_def *def)
+/* All that is after the frames of the checkpoint; not before all files were found to have these. */
+static drape_status cut_files(drape_recorder *r)
+{
+    drape_status status = drape_file_trim(&r->steps);
+    if (!status)
+        status = drape_file_trim(&r->energies);
+    for (size_t i = 0; i < r->output_count && !status; i++)
+        status = r->outputs[i].ops->cut(r->ctx, r->outputs[i].state, r->frames);
+    return status;
+}
+
+/* Those of formats that are not written now are no part of the run; nothing else has changed them. */
+static drape_status resume_files(drape_recorder *r, drape_archive *a)
+{
+    archive_progress(r, a);
+    drape_status status = a->status;
+    off_t steps = r->steps.kept, energies = r->energies.kept;
+    if (status || r->finished)
+        return status ? status : drape_archive_end(a);
+    for (size_t i = 0; i < r->output_count && !status; i++) {
+        output *o = &r->outputs[i];
+        o->open = true;
+        status = o->ops->resume(r->ctx, &r->def, o->state, r->frames, a);
+    }
+    if (!status)
+        status = drape_archive_end(a);
+    if (!status)
+        status = drape_steps_open(r->ctx, r->folder, steps, &r->steps);
+    if (!status)
+        status = drape_energy_open(r->ctx, r->folder, energies, &r->energies);
+    return status ? status : cut_files(r);
+}
+
+static drape_status prepare_checkpoints(drape_recorder *r, const drape_recorder_def *def)
+{
+    r->every = def->checkpoint_every;
+    r->start = def->start;
+    r->def = def_of(r->sim, r->folder);
+    r->def.durable = def->checkpoints;
+    if (!def->checkpoints)
+        return DRAPE_OK;
+    drape_status status =
+        drape_file_create(r->ctx, strlen(r->folder) + sizeof DRAPE_CHECKPOINT_NAME, &r->checkpoint);
+    if (!status)
+        drape_file_name(&r->checkpoint, "%s/" DRAPE_CHECKPOINT_NAME, r->folder);
+    return status;
+}
+
+/* a NULL: a run from its beginning. */
+static drape_status set_up(drape_recorder *r, const drape_recorder_def *def, drape_archive *a)
 {
     drape_status status = choose_outputs(r, def);
     if (!status)
@@ -285,7 +421,10 @@ static drape_status set_up(drape_recorder *r, const drape_recorder_def *def)
     if (!status)
         status = make_folder(r, def->folder);
     if (!status)
-        status = open_files(r);
+        status = prepare_checkpoints(r, def);
+    if (!status)
+        status = a ? resume_files(r, a) : open_files(r);
+    r->start -= r->wall;
     if (!status) /* last: a sim cannot be left */
         status = drape_sim_observe(r->sim, observe, r);
     return status;
@@ -303,8 +442,8 @@ static void close_files(drape_recorder *r)
     note(r, drape_file_close(&r->energies));
 }
 
-drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
-                                   drape_recorder **out)
+static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
+                           drape_archive *a, drape_recorder **out)
 {
     if (!out)
         return DRAPE_E_ARGUMENT;
@@ -318,7 +457,7 @@ drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const dra
     r->ctx = ctx;
     r->sim = sim;
     scope s = scope_enter();
-    note(r, set_up(r, def));
+    note(r, set_up(r, def, a));
     scope_leave(r, s);
     if (r->failure) {
         close_files(r);
@@ -327,6 +466,18 @@ drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const dra
     }
     *out = r;
     return status;
+}
+
+drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
+                                   drape_recorder **out)
+{
+    return create(ctx, sim, def, NULL, out);
+}
+
+drape_status drape_recorder_resume(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
+                                   drape_archive *a, drape_recorder **out)
+{
+    return create(ctx, sim, def, a, out);
 }
 
 /* ---- Closing */
@@ -345,9 +496,31 @@ drape_status drape_recorder_finish(drape_recorder *r)
     if (!r->failure && last_frame_is_due(r))
         write_frame(r, drape_sim_time(r->sim), drape_sim_positions(r->sim), drape_sim_velocities(r->sim));
     close_files(r);
-    r->finished = true;
     scope_leave(r, s);
+    r->finished = true;
     return report(r);
+}
+
+drape_status drape_recorder_checkpoint(drape_recorder *r)
+{
+    if (r->failure)
+        return report(r);
+    if (!r->checkpoint.path)
+        return drape_fail(r->ctx, DRAPE_E_ARGUMENT, "the recorder was made without checkpoints");
+    locale_t old = drape_locale_enter();
+    note(r, write_checkpoint(r));
+    drape_locale_leave(old);
+    return report(r);
+}
+
+bool drape_recorder_is_finished(const drape_recorder *recorder)
+{
+    return recorder && recorder->finished;
+}
+
+double drape_recorder_wall(const drape_recorder *recorder)
+{
+    return recorder ? recorder->wall : 0;
 }
 
 void drape_recorder_destroy(drape_recorder **recorder)
@@ -363,6 +536,7 @@ void drape_recorder_destroy(drape_recorder **recorder)
     drape_free(r->ctx, r->turned);
     drape_file_destroy(&r->steps);
     drape_file_destroy(&r->energies);
+    drape_file_destroy(&r->checkpoint);
     drape_free(r->ctx, r->folder);
     drape_free(r->ctx, r);
     *recorder = NULL;

@@ -5,7 +5,6 @@
 #include "io/steps.h"
 
 #include <inttypes.h>
-#include <string.h>
 
 #include "io/csv.h"
 
@@ -15,17 +14,9 @@ static const char columns[] = "attempt,t,h,accepted,status,reason,iterations,res
                               "kinetic,elastic,gravity,contact,dissipated,numerical,"
                               "worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit\n";
 
-drape_status drape_steps_open(drape_context *ctx, const char *folder, drape_file *file)
+drape_status drape_steps_open(drape_context *ctx, const char *folder, off_t kept, drape_file *file)
 {
-    drape_status status = drape_file_create(ctx, strlen(folder) + sizeof FILE_NAME, file);
-    if (status)
-        return status;
-    drape_file_name(file, "%s/" FILE_NAME, folder);
-    status = drape_file_begin(file);
-    if (status)
-        return status;
-    drape_file_put_text(file, columns);
-    return drape_file_publish(file);
+    return drape_csv_open(ctx, folder, FILE_NAME, columns, kept, file);
 }
 
 static void put_energy(drape_file *file, const drape_energy *energy)

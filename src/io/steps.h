@@ -4,9 +4,8 @@
 
 #include "io/file.h"
 
-/* Takes the memory, and puts a file with the line of column names in the place of any that is there. Destroy
- * the file also after a failure. Errors: DRAPE_E_MEMORY, DRAPE_E_FILE. */
-drape_status drape_steps_open(drape_context *ctx, const char *folder, drape_file *file);
+/* As drape_csv_open. */
+drape_status drape_steps_open(drape_context *ctx, const char *folder, off_t kept, drape_file *file);
 
 /* Adds a row, in the C locale. energy: of the state kept after the attempt. On failure the file ends with the
  * row before. Errors: DRAPE_E_FILE. */

@@ -121,38 +121,3 @@ int32_t drape_model_cloth_of(const drape_model *model, int32_t node)
         c++;
     return c;
 }
-
-static double track_next_kink(const drape_track *track, double t, double end)
-{
-    for (size_t i = 0; i < track->key_count; i++)
-        if (track->keys[i].time > t && track->keys[i].time < end)
-            end = track->keys[i].time;
-    return end;
-}
-
-double drape_model_next_kink(const drape_model *model, double t, double end)
-{
-    for (int32_t k = 0; k < model->track_count; k++)
-        end = track_next_kink(&model->tracks[k], t, end);
-    for (int32_t k = 0; k < model->collider_count; k++)
-        end = track_next_kink(&model->colliders[k].track, t, end);
-    return end;
-}
-
-static bool track_at_kink(const drape_track *track, double t)
-{
-    for (size_t i = 0; i < track->key_count; i++)
-        if (track->keys[i].time == t)
-            return true;
-    return false;
-}
-
-bool drape_model_at_kink(const drape_model *model, double t)
-{
-    bool found = false;
-    for (int32_t k = 0; k < model->track_count; k++)
-        found = found || track_at_kink(&model->tracks[k], t);
-    for (int32_t k = 0; k < model->collider_count; k++)
-        found = found || track_at_kink(&model->colliders[k].track, t);
-    return found;
-}

@@ -132,10 +132,6 @@ struct drape_model {
 /* Writes the positions that tracks give pinned nodes at time t; other entries of x (node_count x 3) stay. */
 void drape_model_place_pins(const drape_model *model, double t, double *x);
 
-/* The next time after t, before end, at which some pin's or collider's velocity jumps; else end. */
-double drape_model_next_kink(const drape_model *model, double t, double end);
-bool drape_model_at_kink(const drape_model *model, double t);
-
 /* The cloth that a node belongs to. */
 int32_t drape_model_cloth_of(const drape_model *model, int32_t node);
 

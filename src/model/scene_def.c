@@ -35,19 +35,19 @@ void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size)
 
 void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size)
 {
-    drape_cloth_def defaults = {.name = NULL};
+    drape_cloth_def defaults = {.struct_size = struct_size};
     drape_mesh_def_init(&defaults.mesh, sizeof defaults.mesh);
     give(def, struct_size, &defaults, sizeof defaults);
 }
 
 void drape_collider_def_init(drape_collider_def *def, size_t struct_size)
 {
-    const drape_collider_def defaults = {.friction = 0};
+    const drape_collider_def defaults = {.struct_size = struct_size};
     give(def, struct_size, &defaults, sizeof defaults);
 }
 
 void drape_pin_def_init(drape_pin_def *def, size_t struct_size)
 {
-    const drape_pin_def defaults = {.row = -1};
+    const drape_pin_def defaults = {.struct_size = struct_size, .row = -1};
     give(def, struct_size, &defaults, sizeof defaults);
 }

@@ -67,7 +67,7 @@ drape_camera drape_framing_end(const drape_framing *f, float azimuth, float elev
 
 drape_view drape_camera_view(const drape_camera *camera, float aspect, float radius)
 {
-    drape_view view;
+    drape_view view = {.center = {0, 0}};
     set_axes(camera->azimuth, camera->elevation, view.axes);
     set_angles(aspect, &view.tx, &view.ty);
     for (int k = 0; k < 3; k++)
@@ -78,4 +78,16 @@ drape_view drape_camera_view(const drape_camera *camera, float aspect, float rad
     drape_matrix lens = drape_perspective(view.tx, view.ty, near, far);
     view.matrix = drape_multiply(&lens, &look);
     return view;
+}
+
+void drape_view_widen(drape_view *view, const float low[2], const float high[2])
+{
+    for (int k = 0; k < 2; k++) {
+        float center = (high[k] + low[k]) / 2, share = (high[k] - low[k]) / 2;
+        for (int c = 0; c < 4; c++)
+            view->matrix.m[4 * c + k] =
+                share * view->matrix.m[4 * c + k] + center * view->matrix.m[4 * c + 3];
+        view->center[k] = center;
+        *(k ? &view->ty : &view->tx) /= share;
+    }
 }

@@ -21,6 +21,7 @@ typedef struct drape_view {
     drape_matrix matrix;      /* from space to the picture */
     float eye[3], axes[3][3]; /* right, up, back */
     float tx, ty;             /* tangents of half of the angles of view */
+    float center[2];          /* of the lens in the picture, whose sides are at -1 and 1 */
 } drape_view;
 
 /* Points that are to be seen, as they come: the extremes along the four sides of the view. */
@@ -40,5 +41,8 @@ drape_camera drape_framing_end(const drape_framing *framing, float azimuth, floa
 
 /* radius: of what is to be seen around the target, for near and far. */
 drape_view drape_camera_view(const drape_camera *camera, float aspect, float radius);
+
+/* Makes it the view of a larger picture, of which it is the part from low to high, in that one's sides -1 and 1. */
+void drape_view_widen(drape_view *view, const float low[2], const float high[2]);
 
 #endif

@@ -45,6 +45,8 @@ void drape_canvas_free(drape_canvas *canvas)
         return;
     glDeleteFramebuffers(1, &canvas->many);
     glDeleteFramebuffers(1, &canvas->one);
+    glDeleteFramebuffers(1, &canvas->aside);
+    glDeleteTextures(1, &canvas->copied);
     glDeleteRenderbuffers(1, &canvas->colour);
     glDeleteRenderbuffers(1, &canvas->depth);
     glDeleteRenderbuffers(1, &canvas->resolved);
@@ -60,12 +62,37 @@ void drape_canvas_begin(const drape_canvas *canvas)
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
 }
 
-static void resolve(const drape_canvas *canvas)
+/* One sample a pixel, into another framebuffer. */
+static void resolve(const drape_canvas *canvas, GLuint to)
 {
     glBindFramebuffer(GL_READ_FRAMEBUFFER, canvas->many);
-    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, canvas->one);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, to);
     glBlitFramebuffer(0, 0, canvas->width, canvas->height, 0, 0, canvas->width, canvas->height,
                       GL_COLOR_BUFFER_BIT, GL_NEAREST);
+}
+
+static void make_copy(drape_canvas *canvas)
+{
+    glGenTextures(1, &canvas->copied);
+    glBindTexture(GL_TEXTURE_2D, canvas->copied);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, canvas->width, canvas->height, 0, GL_RGBA, GL_UNSIGNED_BYTE,
+                 NULL);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+    glGenFramebuffers(1, &canvas->aside);
+    glBindFramebuffer(GL_FRAMEBUFFER, canvas->aside);
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, canvas->copied, 0);
+}
+
+GLuint drape_canvas_copy(drape_canvas *canvas)
+{
+    if (!canvas->copied)
+        make_copy(canvas);
+    resolve(canvas, canvas->aside);
+    glBindFramebuffer(GL_FRAMEBUFFER, canvas->many);
+    return canvas->copied;
 }
 
 /* OpenGL's rows go up. */
@@ -85,7 +112,7 @@ static void flip(uint8_t *pixels, size_t row, int height)
 drape_status drape_canvas_read(drape_context *ctx, const drape_canvas *canvas, uint8_t *pixels)
 {
     size_t row = 4 * (size_t)canvas->width;
-    resolve(canvas);
+    resolve(canvas, canvas->one);
     glBindFramebuffer(GL_READ_FRAMEBUFFER, canvas->one);
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
     glReadPixels(0, 0, canvas->width, canvas->height, GL_RGBA, GL_UNSIGNED_BYTE, pixels);
@@ -97,7 +124,7 @@ drape_status drape_canvas_read(drape_context *ctx, const drape_canvas *canvas, u
 
 void drape_canvas_show(const drape_canvas *canvas, int width, int height)
 {
-    resolve(canvas);
+    resolve(canvas, canvas->one);
     glBindFramebuffer(GL_READ_FRAMEBUFFER, canvas->one);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
     glBlitFramebuffer(0, 0, canvas->width, canvas->height, 0, 0, width, height, GL_COLOR_BUFFER_BIT,

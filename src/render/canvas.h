@@ -10,6 +10,7 @@ typedef struct drape_canvas {
     int width, height;
     GLuint many, colour, depth; /* with samples */
     GLuint one, resolved;       /* a sample a pixel */
+    GLuint aside, copied;       /* the same with a texture; 0: not made yet */
 } drape_canvas;
 
 /* Errors: DRAPE_E_MEMORY, DRAPE_E_FILE (the driver has no such framebuffer). */
@@ -18,6 +19,9 @@ void drape_canvas_free(drape_canvas *canvas); /* an empty one is fine */
 
 /* What follows is drawn into it. */
 void drape_canvas_begin(const drape_canvas *canvas);
+
+/* A texture of what was drawn so far; drawing goes on. */
+GLuint drape_canvas_copy(drape_canvas *canvas);
 
 /* Reads the pixels (width x height x 4, the upper row first, sRGB, alpha 255). */
 drape_status drape_canvas_read(drape_context *ctx, const drape_canvas *canvas, uint8_t *pixels);

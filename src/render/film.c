@@ -59,6 +59,11 @@ bool drape_film_knows(const char *path)
     return kind_of(path) != NULL;
 }
 
+const char *drape_film_ending(int index)
+{
+    return (size_t)index < sizeof kinds / sizeof *kinds ? kinds[index].ending : NULL;
+}
+
 drape_status drape_film_check(drape_context *ctx)
 {
     const char *list = getenv("PATH");

@@ -7,8 +7,9 @@
 
 typedef struct drape_film drape_film;
 
-/* Whether a name ends as one of the films: .mp4 .webm .gif. */
+/* Whether a name ends as one of the films, in letters of any size. */
 bool drape_film_knows(const char *path);
+const char *drape_film_ending(int index); /* ".mp4"; NULL past the last */
 
 /* DRAPE_E_FILE where there is no ffmpeg to run. */
 drape_status drape_film_check(drape_context *ctx);

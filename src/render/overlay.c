@@ -10,6 +10,8 @@
 #define VERTEX    9     /* floats: x y, u v, kind, r g b a */
 #define TEXT_SIZE 11.5f /* pixels of a capital at 720 rows */
 #define TICKS     7
+#define NUMBER    40 /* pixels at 720 rows: a number of the legend, as %.4g has them */
+#define LEGEND    11 /* around it */
 
 enum { KIND_BOX, KIND_TEXT, KIND_RAMP };
 
@@ -149,7 +151,7 @@ void drape_overlay_legend(drape_overlay *o, float right, float bottom, float tal
         snprintf(text, sizeof text, "%.4g", fabs(value) < 1e-9 * step ? 0 : value);
         most = fmaxf(most, drape_font_width(&o->font, text));
     }
-    float left = roundf(right - wide - gap - most), top = roundf(bottom - tall), margin = 11 * u;
+    float left = roundf(right - wide - gap - most), top = roundf(bottom - tall), margin = LEGEND * u;
     float panel = fminf(left, right - drape_font_width(&o->font, title)) - margin;
     drape_overlay_box(o, panel, top - 32 * u - margin / 2, right + margin - panel,
                       tall + 32 * u + 1.5f * margin, (const float[]){1, 1, 1, 0.62f});
@@ -166,6 +168,11 @@ void drape_overlay_legend(drape_overlay *o, float right, float bottom, float tal
         drape_overlay_text(o, left + wide + gap, y + o->font.height / 2, DRAPE_LEFT, drape_ink, text);
     }
     drape_overlay_text(o, right, top - 14 * u, DRAPE_RIGHT, drape_ink, title);
+}
+
+float drape_overlay_legend_width(const drape_overlay *o, const char *title)
+{
+    return fmaxf(drape_font_width(&o->font, title), (16 + 7 + NUMBER) * o->unit) + 2 * LEGEND * o->unit;
 }
 
 void drape_overlay_draw(drape_overlay *o)

@@ -35,6 +35,9 @@ void drape_overlay_text(drape_overlay *overlay, float x, float y, drape_align al
 void drape_overlay_legend(drape_overlay *overlay, float right, float bottom, float tall, const char *title,
                           double low, double high);
 
+/* How wide that is, whatever the numbers. */
+float drape_overlay_legend_width(const drape_overlay *overlay, const char *title);
+
 /* Draws what was collected and forgets it. */
 void drape_overlay_draw(drape_overlay *overlay);
 

@@ -2,13 +2,16 @@
 #include "render/painter.h"
 
 #include "render/images.h"
+#include "render/layout.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#define SHADOW       2048   /* texels of a side */
-#define SOFT         1.5f   /* texels between the comparisons with it */
+#define SHADOW 2048 /* texels of a side */
+#define SOFT   1.5f /* texels between the comparisons with it */
+#define LAMP_AZIMUTH                                                                                         \
+    -16.0f /* [degrees], as a camera's: the lamp stands in the room, whoever looks from where */
 #define LAMP_HEIGHT  54.0f  /* [degrees] */
 #define SHADOW_REACH 1.3f   /* radii around what was framed */
 #define DEEP         5.0f   /* radii along the light */
@@ -16,6 +19,7 @@
 #define WIRE         1.25f  /* pixels at 720 rows */
 #define WIRE_SHARE   0.16f  /* of the mean edge as it is seen, at most */
 #define PIN          11.0f  /* pixels at 720 rows */
+#define REFRACTED    0.45f  /* radii that a bent ray goes on */
 #define MAX_SHADINGS 64
 #define RADIANS      0.017453292519943295f
 
@@ -30,14 +34,15 @@ static const char surface_vertex[] =
     "layout(location = 5) in float at_piece;\n"
     "uniform mat4 view, lamp;\n"
     "uniform vec3 offset;\n"
-    "uniform float relief, spread;\n"
+    "uniform float relief, spread, grain; // grain: of the mesh that is drawn, in texture coordinates\n"
     "uniform sampler2D heights;\n"
     "out vec3 place, normal, tangent;\n"
     "out vec2 at;\n"
     "out float value, piece;\n"
     "out vec4 shadow_at;\n"
     "void main() {\n"
-    "    float rise = relief > 0.0 ? relief * textureLod(heights, at_uv, 0.0).r : 0.0;\n"
+    "    float level = relief > 0.0 ? log2(max(1.0, grain * float(textureSize(heights, 0).x))) : 0.0;\n"
+    "    float rise = relief > 0.0 ? relief * textureLod(heights, at_uv, level).r : 0.0;\n"
     "    place = spread * at_place + offset + rise * at_normal;\n"
     "    normal = at_normal;\n"
     "    tangent = at_tangent;\n"
@@ -64,6 +69,8 @@ static const char surface_main[] =
     "    s.piece = piece;\n"
     "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
     "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
+    "    if (relief > 0.0) facing = dot(s.n, light); // the slopes of a relief are those of its map, not of "
+    "its mesh\n"
     "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
     "    colour = vec4(encoded(shade(s)), 1.0);\n"
     "}\n";
@@ -71,7 +78,7 @@ static const char surface_main[] =
 static const char body_source[] =
     "vec3 shade(Surface s) {\n"
     "    vec3 h = normalize(light + s.v);\n"
-    "    return vec3(0.42, 0.45, 0.50) * arriving(s) / PI * 1.9 + 0.06 * power(dot(s.n, h), 24.0) * s.sun;\n"
+    "    return vec3(0.42, 0.45, 0.50) * arriving(s) / PI * 1.5 + 0.06 * power(dot(s.n, h), 24.0) * s.sun;\n"
     "}\n";
 
 /* Most pixels of a picture are ground: it has no more than it needs, and its light is mixed as it is seen, in
@@ -336,25 +343,54 @@ static GLuint shading_program(drape_painter *p, const drape_shading *shading)
 
 /* ---- One panel ---- */
 
+float drape_painter_aspect(const drape_painter *painter, const drape_picture *picture)
+{
+    const drape_rectangle b = drape_layout_inner(&painter->overlay, picture, 0);
+    return (float)b.width / (float)b.height;
+}
+
+drape_view drape_painter_view(const drape_painter *painter, const drape_picture *picture, int panel)
+{
+    const drape_rectangle inner = drape_layout_inner(&painter->overlay, picture, panel);
+    const drape_rectangle whole = drape_layout_whole(&painter->overlay, picture, panel);
+    float left = (float)(inner.left - whole.left), right = left + (float)inner.width;
+    const float low[2] = {2 * left / (float)whole.width - 1, -1};
+    const float high[2] = {2 * right / (float)whole.width - 1, 1};
+    drape_view view = drape_camera_view(&picture->camera, (float)inner.width / (float)inner.height,
+                                        picture->panels[panel].stage->radius);
+    drape_view_widen(&view, low, high);
+    return view;
+}
+
 /* What is the same for all that is drawn in a panel. */
 typedef struct panel_view {
     drape_view view;
     drape_matrix lamp;               /* from space to the lamp's map */
-    float light[3];                  /* towards the lamp */
+    float light[3], window[3];       /* towards the lamp, and towards a window across from it */
     int left, bottom, width, height; /* pixels */
+    float clear, reach;              /* of the shading; [m] that a bent ray goes on */
+    GLuint behind;                   /* texture; 0: none */
 } panel_view;
 
-static void set_lamp(const drape_stage *stage, float azimuth, panel_view *v)
+static void set_lamp(const drape_stage *stage, panel_view *v)
 {
-    const drape_camera camera = {.azimuth = azimuth, .elevation = LAMP_HEIGHT};
+    const drape_camera camera = {.azimuth = LAMP_AZIMUTH, .elevation = LAMP_HEIGHT};
     drape_view lamp = drape_camera_view(&camera, 1, 1);
     float reach = stage->radius, eye[3];
     memcpy(v->light, lamp.axes[2], sizeof v->light);
+    memcpy(v->window, (const float[]){-v->light[0], 0.3f, -v->light[2]}, sizeof v->window);
+    drape_normalize(v->window);
     for (int k = 0; k < 3; k++)
         eye[k] = stage->center[k] + DEEP * reach * v->light[k];
     drape_matrix look = drape_look((const float(*)[3])lamp.axes, eye);
     drape_matrix box = drape_orthographic(SHADOW_REACH * reach, 0.1f * reach, 4 * DEEP * reach);
     v->lamp = drape_multiply(&box, &look);
+}
+
+static void set_box(GLuint program, const char *name, const panel_view *v)
+{
+    glUniform4f(glGetUniformLocation(program, name), (float)v->left, (float)v->bottom, (float)v->width,
+                (float)v->height);
 }
 
 /* For programs of surfaces, which take their textures at these units. */
@@ -364,13 +400,10 @@ static void use_surface(drape_painter *p, GLuint program, const panel_view *v, c
     const struct {
         const char *name;
         GLuint texture;
-    } units[] = {{"shadow_map", p->shadow},
-                 {"picture", p->textures[0]},
-                 {"heights", p->textures[1]},
-                 {"environment", p->textures[2]},
-                 {"ramp", p->ramp}};
+    } units[] = {{"shadow_map", p->shadow},       {"picture", p->textures[0]}, {"heights", p->textures[1]},
+                 {"environment", p->textures[2]}, {"ramp", p->ramp},           {"behind", v->behind}};
     glUseProgram(program);
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 6; i++) {
         glActiveTexture(GL_TEXTURE0 + (GLenum)i);
         glBindTexture(GL_TEXTURE_2D, program == p->depth && i == 0 ? 0 : units[i].texture);
         drape_gl_set_int(program, units[i].name, i);
@@ -380,14 +413,27 @@ static void use_surface(drape_painter *p, GLuint program, const panel_view *v, c
     drape_gl_set_matrix(program, "lamp", v->lamp.m);
     drape_gl_set_vec3(program, "eye", v->view.eye);
     drape_gl_set_vec3(program, "light", v->light);
+    drape_gl_set_vec3(program, "window", v->window);
     drape_gl_set_vec3(program, "offset", nowhere);
     drape_gl_set_vec3(program, "front", front);
     drape_gl_set_vec3(program, "back", back);
     drape_gl_set_float(program, "soft", SOFT / SHADOW);
     drape_gl_set_float(program, "texel_depth",
                        2 * SHADOW_REACH / SHADOW / (4 * DEEP - 0.1f)); /* a texel's width as depth */
+    drape_gl_set_float(program, "clear", v->clear);
+    drape_gl_set_float(program, "reach", v->reach);
+    drape_gl_set_vec2(program, "pixels", (float)p->canvas.width, (float)p->canvas.height);
+    set_box(program, "panel", v);
     drape_gl_set_float(program, "relief", 0);
     drape_gl_set_float(program, "spread", 1);
+}
+
+static float mean_edge(const drape_model *m)
+{
+    double sum = 0;
+    for (int32_t e = 0; e < m->edge_count; e++)
+        sum += m->edge_length[e];
+    return (float)(sum / m->edge_count);
 }
 
 static void draw_vertices(const drape_gl_mesh *mesh, size_t count)
@@ -413,9 +459,12 @@ static void draw_bodies(const drape_stage *stage, GLuint program, bool endless)
     }
 }
 
-static float relief_of(const drape_stage *stage, const drape_shading *shading)
+/* The points of the mesh cannot show what is finer than they lie. */
+static void set_relief(GLuint program, const drape_stage *stage, const drape_shading *shading)
 {
-    return shading->displaced ? RELIEF * (float)stage->model->length / 1.4142f : 0;
+    float side = (float)stage->model->length / 1.4142f;
+    drape_gl_set_float(program, "relief", shading->displaced ? RELIEF * side : 0);
+    drape_gl_set_float(program, "grain", mean_edge(stage->model) / (float)stage->skin.level / side);
 }
 
 /* What the lamp sees. */
@@ -433,22 +482,16 @@ static void draw_shadows(drape_painter *p, const drape_stage *stage, const drape
     use_surface(p, p->depth, v, &v->lamp);
     draw_bodies(stage, p->depth, false);
     drape_gl_set_vec3(p->depth, "offset", (const float[3]){0});
-    drape_gl_set_float(p->depth, "relief", relief_of(stage, shading));
+    set_relief(p->depth, stage, shading);
     draw_cloth(stage);
     glDisable(GL_POLYGON_OFFSET_FILL);
-}
-
-static void set_box(GLuint program, const panel_view *v)
-{
-    glUniform4f(glGetUniformLocation(program, "box"), (float)v->left, (float)v->bottom, (float)v->width,
-                (float)v->height);
 }
 
 /* Where nothing else is. */
 static void draw_wall(const drape_painter *p, const panel_view *v)
 {
     glUseProgram(p->wall);
-    set_box(p->wall, v);
+    set_box(p->wall, "box", v);
     glBindVertexArray(p->empty);
     glDepthFunc(GL_LEQUAL);
     glDrawArrays(GL_TRIANGLES, 0, 3);
@@ -468,7 +511,7 @@ static void draw_ground(drape_painter *p, const drape_stage *stage, const panel_
     drape_gl_set_float(p->ground, "radius", stage->radius);
     drape_gl_set_float(p->ground, "spacing", round_length(stage->radius / 3));
     drape_gl_set_float(p->ground, "solid", stage->has_ground);
-    set_box(p->ground, v);
+    set_box(p->ground, "box", v);
     glEnable(GL_CULL_FACE);
     draw_bodies(stage, p->ground, true);
     if (!stage->has_ground) {
@@ -483,11 +526,7 @@ static void draw_ground(drape_painter *p, const drape_stage *stage, const panel_
 /* The mean edge, in pixels, at the camera's distance. */
 static float seen_edge(const drape_stage *stage, const drape_camera *camera, const panel_view *v)
 {
-    const drape_model *m = stage->model;
-    double sum = 0;
-    for (int32_t e = 0; e < m->edge_count; e++)
-        sum += m->edge_length[e];
-    return (float)(sum / m->edge_count) / (2 * camera->distance * v->view.ty) * (float)v->height;
+    return mean_edge(stage->model) / (2 * camera->distance * v->view.ty) * (float)v->height;
 }
 
 static void draw_wires(const drape_painter *p, const drape_stage *stage, const drape_camera *camera,
@@ -515,32 +554,62 @@ static void draw_wires(const drape_painter *p, const drape_stage *stage, const d
     glDisable(GL_BLEND);
 }
 
-static drape_status draw_panel(drape_painter *p, const drape_picture *picture, int index, const int *box)
+static void draw_shaded(drape_painter *p, const drape_picture *picture, const drape_stage *stage,
+                        GLuint program, const panel_view *v)
+{
+    use_surface(p, program, v, &v->view.matrix);
+    drape_gl_set_vec2(program, "range", (float)picture->low, (float)picture->high);
+    set_relief(program, stage, picture->shading);
+    draw_cloth(stage);
+}
+
+static void draw_around(drape_painter *p, const drape_stage *stage, const panel_view *v)
+{
+    use_surface(p, p->body, v, &v->view.matrix);
+    glEnable(GL_CULL_FACE);
+    draw_bodies(stage, p->body, false);
+    glDisable(GL_CULL_FACE);
+    draw_ground(p, stage, v);
+    draw_wall(p, v);
+}
+
+/* Cloth first, as what it hides is not drawn then, unless it is seen through. */
+static void draw_scene(drape_painter *p, const drape_picture *picture, const drape_stage *stage,
+                       GLuint program, panel_view *v)
+{
+    bool through = picture->shading->reads & DRAPE_READS_BEHIND;
+    if (!through)
+        draw_shaded(p, picture, stage, program, v);
+    draw_around(p, stage, v);
+    if (!through)
+        return;
+    v->behind = drape_canvas_copy(&p->canvas);
+    draw_shaded(p, picture, stage, program, v);
+}
+
+static drape_status draw_panel(drape_painter *p, const drape_picture *picture, int index)
 {
     const drape_panel *panel = &picture->panels[index];
     const drape_shading *shading = picture->shading;
     drape_stage *stage = panel->stage;
     GLuint program = shading_program(p, shading);
-    panel_view v = {.left = box[0], .bottom = box[1], .width = box[2], .height = box[3]};
+    const drape_rectangle whole = drape_layout_whole(&p->overlay, picture, index);
+    panel_view v = {.left = whole.left,
+                    .bottom = whole.bottom,
+                    .width = whole.width,
+                    .height = whole.height,
+                    .clear = shading->clear,
+                    .reach = REFRACTED * stage->radius};
     drape_status status = program ? make_textures(p, shading->reads) : DRAPE_E_FILE;
     if (status)
         return status;
-    v.view = drape_camera_view(&picture->camera, (float)box[2] / (float)box[3], stage->radius);
-    set_lamp(stage, picture->lamp_azimuth, &v);
+    v.view = drape_painter_view(p, picture, index);
+    set_lamp(stage, &v);
     drape_stage_set(stage, &panel->moment, shading->wires);
     draw_shadows(p, stage, shading, &v);
     glBindFramebuffer(GL_FRAMEBUFFER, p->canvas.many);
-    glViewport(box[0], box[1], box[2], box[3]);
-    use_surface(p, program, &v, &v.view.matrix);
-    drape_gl_set_vec2(program, "range", (float)picture->low, (float)picture->high);
-    drape_gl_set_float(program, "relief", relief_of(stage, shading));
-    draw_cloth(stage);
-    use_surface(p, p->body, &v, &v.view.matrix);
-    glEnable(GL_CULL_FACE);
-    draw_bodies(stage, p->body, false);
-    glDisable(GL_CULL_FACE);
-    draw_ground(p, stage, &v);
-    draw_wall(p, &v);
+    glViewport(v.left, v.bottom, v.width, v.height);
+    draw_scene(p, picture, stage, program, &v);
     if (shading->wires)
         draw_wires(p, stage, &picture->camera, &v);
     return DRAPE_OK;
@@ -548,92 +617,17 @@ static drape_status draw_panel(drape_painter *p, const drape_picture *picture, i
 
 /* ---- The picture ---- */
 
-static int columns_of(int panel_count)
-{
-    return panel_count <= 3 ? panel_count : (int)ceil(sqrt(panel_count));
-}
-
-/* x, y from below, width, height. */
-static void panel_box(const drape_painter *p, int panel_count, int index, int *box)
-{
-    int columns = columns_of(panel_count), rows = (panel_count + columns - 1) / columns;
-    int column = index % columns, row = rows - 1 - index / columns;
-    box[0] = column * p->canvas.width / columns;
-    box[1] = row * p->canvas.height / rows;
-    box[2] = (column + 1) * p->canvas.width / columns - box[0];
-    box[3] = (row + 1) * p->canvas.height / rows - box[1];
-}
-
-float drape_painter_aspect(const drape_painter *painter, int panel_count)
-{
-    int box[4];
-    panel_box(painter, panel_count, 0, box);
-    return (float)box[2] / (float)box[3];
-}
-
-static void put_legend(drape_painter *p, const drape_picture *picture)
-{
-    const drape_field_ops *field = picture->shading->field;
-    drape_overlay *o = &p->overlay;
-    char title[80];
-    if (!field)
-        return;
-    snprintf(title, sizeof title, "%s [%s]", field->name, field->shown_unit);
-    drape_overlay_legend(o, (float)o->width - 22 * o->unit, (float)o->height - 26 * o->unit,
-                         0.36f * (float)o->height, title, field->shown * picture->low,
-                         field->shown * picture->high);
-}
-
-/* Behind lines of text, so that they are read over cloth, too. */
-static void put_veil(drape_overlay *o, const char *const *lines, float line)
-{
-    float widest = 0;
-    int count = 0;
-    for (; lines && lines[count]; count++)
-        widest = fmaxf(widest, drape_font_width(&o->font, lines[count]));
-    if (count > 0)
-        drape_overlay_box(o, 10 * o->unit, 9 * o->unit, widest + 20 * o->unit,
-                          (float)count * line + 10 * o->unit, (const float[]){1, 1, 1, 0.42f});
-}
-
-static void put_texts(drape_painter *p, const drape_picture *picture)
-{
-    drape_overlay *o = &p->overlay;
-    float left = 20 * o->unit, line = 21 * o->unit;
-    for (int i = 0; i < picture->panel_count; i++) {
-        int box[4];
-        panel_box(p, picture->panel_count, i, box);
-        float top = (float)(o->height - box[1] - box[3]);
-        if (picture->panels[i].label)
-            drape_overlay_text(o, (float)box[0] + left, top + 30 * o->unit, DRAPE_LEFT, drape_ink,
-                               picture->panels[i].label);
-        if (box[0] > 0)
-            drape_overlay_box(o, (float)box[0] - 0.5f * o->unit, top, o->unit, (float)box[3],
-                              (const float[]){1, 1, 1, 0.9f});
-    }
-    put_veil(o, picture->lines, line);
-    for (int i = 0; picture->lines && picture->lines[i]; i++)
-        drape_overlay_text(o, left, 30 * o->unit + (float)i * line, DRAPE_LEFT, drape_ink, picture->lines[i]);
-    if (picture->caption)
-        drape_overlay_text(o, left, (float)o->height - 22 * o->unit, DRAPE_LEFT, drape_faint,
-                           picture->caption);
-}
-
 drape_status drape_painter_draw(drape_painter *painter, const drape_picture *picture)
 {
     drape_status status = DRAPE_OK;
     glDisable(GL_SCISSOR_TEST);
     drape_canvas_begin(&painter->canvas);
-    for (int i = 0; i < picture->panel_count && !status; i++) {
-        int box[4];
-        panel_box(painter, picture->panel_count, i, box);
-        status = draw_panel(painter, picture, i, box);
-    }
+    for (int i = 0; i < picture->panel_count && !status; i++)
+        status = draw_panel(painter, picture, i);
     if (status)
         return status;
     glViewport(0, 0, painter->canvas.width, painter->canvas.height);
-    put_legend(painter, picture);
-    put_texts(painter, picture);
+    drape_layout_put(&painter->overlay, picture);
     drape_overlay_draw(&painter->overlay);
     return drape_gl_check(painter->ctx, "draw a picture");
 }

@@ -36,13 +36,17 @@ typedef struct drape_picture {
     const drape_shading *shading;
     double low, high; /* of its field, in the field's unit */
     drape_camera camera;
-    float lamp_azimuth;       /* [degrees] as the camera's: where the lamp stands */
+    float column;             /* pixels at the left that the camera leaves to the lines */
     const char *caption;      /* below, at the left; NULL: none */
     const char *const *lines; /* above, at the left, one below the other; NULL-ended; NULL: none */
 } drape_picture;
 
-/* Width over height of a panel. */
-float drape_painter_aspect(const drape_painter *painter, int panel_count);
+/* Width over height of what a camera frames: a panel, without the column of lines and the strip of the legend. Of the
+ * picture panels, camera and lines are not asked for. */
+float drape_painter_aspect(const drape_painter *painter, const drape_picture *picture);
+
+/* How a panel is seen. */
+drape_view drape_painter_view(const drape_painter *painter, const drape_picture *picture, int panel);
 
 /* Draws; drape_canvas_read and drape_canvas_show take it from the canvas. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_painter_draw(drape_painter *painter, const drape_picture *picture);

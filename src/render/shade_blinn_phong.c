@@ -9,6 +9,6 @@ const drape_shading drape_shading_blinn_phong = {
         "vec3 shade(Surface s) {\n"
         "    vec3 h = normalize(light + s.v);\n"
         "    float shine = 0.55 * power(dot(s.n, h), 48.0) * s.sun + 0.10 * power(dot(s.n, s.v), 24.0);\n"
-        "    return tint(s) * arriving(s) / PI * 1.7 + shine * LAMP / 2.6;\n"
+        "    return tint(s) * arriving(s) / PI * 1.45 + shine * LAMP / 2.6;\n"
         "}\n",
 };

@@ -9,7 +9,7 @@ const drape_shading drape_shading_displacement = {
     .source = "vec3 shade(Surface s) {\n"
               "    vec3 n = bumped(s, 0.016);\n"
               "    float h = texture(heights, s.at).r;\n"
-              "    return tint(s) * (0.70 + 0.45 * h) * arriving(s, n) / PI * 1.9;\n"
+              "    return tint(s) * (0.70 + 0.45 * h) * arriving(s, n) / PI * 1.65;\n"
               "}\n",
     .displaced = true,
 };

@@ -12,7 +12,8 @@ const drape_shading drape_shading_pbr = {
         "    float metal = texture(heights, s.at).a;\n"
         "    vec3 n = bumped(s, 0.005), h = normalize(light + s.v);\n"
         "    vec3 base = mix(tint(s) * vec3(0.42, 0.30, 0.55), vec3(1.00, 0.72, 0.30), metal);\n"
-        "    float rough = mix(0.55, 0.30, metal), a = rough * rough, a2 = a * a;\n"
+        "    float rough = mix(0.55, 0.30, metal), a2 = widened(rough * rough * rough * rough, n);\n"
+        "    rough = pow(a2, 0.25);\n"
         "    float nl = max(dot(n, light), 0.0), nv = max(dot(n, s.v), 0.02), nh = max(dot(n, h), 0.0);\n"
         "    float d = nh * nh * (a2 - 1.0) + 1.0;\n"
         "    float facets = a2 / (PI * d * d);\n"
@@ -23,6 +24,7 @@ const drape_shading drape_shading_pbr = {
         "    vec3 matt = (1.0 - metal) * base / PI;\n"
         "    vec3 direct = (matt * (1.0 - f) + f * facets * seen) * nl * LAMP * 2.2 * s.sun;\n"
         "    vec3 rim = f0 + (max(vec3(1.0 - rough), f0) - f0) * power(1.0 - nv, 5.0);\n"
-        "    return direct + matt * ambient(n) * 2.2 + rim * world(reflect(-s.v, n), rough) * 1.25;\n"
+        "    return direct + matt * room(n) * 2.2 + rim * world(reflect(-s.v, n), min(1.0, 1.6 * rough)) * "
+        "1.25;\n"
         "}\n",
 };

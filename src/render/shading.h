@@ -7,8 +7,14 @@
 
 #include "fields/fields.h"
 
-/* Textures that a shading reads: made when the first that does is drawn. */
-enum { DRAPE_READS_PATTERN = 1, DRAPE_READS_HEIGHTS = 2, DRAPE_READS_ENVIRONMENT = 4 };
+/* Textures that a shading reads: made when the first that does is drawn. Behind is the picture without cloth: cloth is
+ * drawn last then. */
+enum {
+    DRAPE_READS_PATTERN = 1,
+    DRAPE_READS_HEIGHTS = 2,
+    DRAPE_READS_ENVIRONMENT = 4,
+    DRAPE_READS_BEHIND = 8
+};
 
 typedef struct drape_shading {
     const char *name, *summary;
@@ -18,6 +24,7 @@ typedef struct drape_shading {
     int reads;                    /* sum of DRAPE_READS_* */
     bool wires;                   /* the mesh's edges and the pinned nodes are drawn, too */
     bool displaced;               /* points are moved along their normals by the height map */
+    float clear;                  /* share of the lamp's light that goes through: shadows are lighter */
 } drape_shading;
 
 extern const drape_shading *const drape_shadings[]; /* NULL-ended */

@@ -149,20 +149,45 @@ static bool is_mirrored(const drape_mesh *mesh, const float *uv)
     return area < 0;
 }
 
+/* Of cloth that hangs at rest: its texture must not stand on its head. The slope of a line fitted to height over v. */
+static bool is_upside_down(const drape_mesh *mesh, const float *uv)
+{
+    double n = mesh->node_count, y = 0, v = 0, product = 0, square = 0;
+    for (int32_t i = 0; i < mesh->node_count; i++) {
+        y += mesh->x[3 * i + 1] / n;
+        v += (double)uv[2 * i + 1] / n;
+    }
+    for (int32_t i = 0; i < mesh->node_count; i++) {
+        double above = mesh->x[3 * i + 1] - y, along = (double)uv[2 * i + 1] - v;
+        product += above * along;
+        square += above * above;
+    }
+    return product < 0 && product * product > 1e-6 * square;
+}
+
+/* u (k 0) or v (k 1) runs the other way. */
+static void reverse(const drape_mesh *mesh, float *uv, int k)
+{
+    float highest = 0;
+    for (int32_t i = 0; i < mesh->node_count; i++)
+        highest = fmaxf(highest, uv[2 * i + k]);
+    for (int32_t i = 0; i < mesh->node_count; i++)
+        uv[2 * i + k] = highest - uv[2 * i + k];
+}
+
 static void unroll(const drape_cloth *cloth, float *uv)
 {
     const drape_mesh *mesh = &cloth->mesh;
-    float highest = 0;
     if (mesh->rows > 0)
         unroll_grid(cloth, uv);
     else
         flatten(cloth, uv);
-    if (!is_mirrored(mesh, uv))
+    if (is_mirrored(mesh, uv))
+        reverse(mesh, uv, 1);
+    if (!is_upside_down(mesh, uv))
         return;
-    for (int32_t i = 0; i < mesh->node_count; i++)
-        highest = fmaxf(highest, uv[2 * i + 1]);
-    for (int32_t i = 0; i < mesh->node_count; i++)
-        uv[2 * i + 1] = highest - uv[2 * i + 1];
+    reverse(mesh, uv, 0);
+    reverse(mesh, uv, 1);
 }
 
 /* ---- Making and freeing ---- */

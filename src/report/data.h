@@ -2,8 +2,7 @@
 #ifndef DRAPE_REPORT_DATA_H
 #define DRAPE_REPORT_DATA_H
 
-#include "io/file.h"
-#include "report/record.h"
+#include "report/source.h"
 
 /* A field of the nodes over all kept frames: number i stands for low + i step. */
 typedef struct drape_report_field {
@@ -15,7 +14,7 @@ typedef struct drape_report_field {
 #define DRAPE_REPORT_FIELDS 3 /* positions, strain, speed */
 
 typedef struct drape_report_data {
-    const drape_record *run;
+    const drape_report_source *run;
     int64_t kept;                /* frames in the page */
     int64_t *frame;              /* (kept) their numbers */
     double *x, *v;               /* (node_count x 3) of the frame in work */
@@ -28,7 +27,8 @@ typedef struct drape_report_data {
 
 /* Chooses frames that take at most most_bytes in the page, evenly, the first and the last among them, and finds the
  * ranges of the fields. drape_report_data_free in any case. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
-drape_status drape_report_data_make(const drape_record *run, size_t most_bytes, drape_report_data *data);
+drape_status drape_report_data_make(const drape_report_source *run, size_t most_bytes,
+                                    drape_report_data *data);
 void drape_report_data_free(drape_report_data *data);
 
 /* Add to the page: the JSON, in which no < stands; the kept frames of one field, and the triangles. */

@@ -32,12 +32,12 @@ static void find_strain(const drape_report_data *d)
 /* Centred differences of positions; one-sided at the ends of the run. */
 static drape_status find_speed(const drape_report_data *d, int64_t frame)
 {
-    const drape_record *run = d->run;
-    int64_t before = frame > 0 ? frame - 1 : 0, after = frame + 1 < run->frames ? frame + 1 : frame;
-    double h = run->times[after] - run->times[before];
-    drape_status status = drape_record_read(run, before, d->other);
+    const drape_report_source *run = d->run;
+    int64_t before = frame > 0 ? frame - 1 : 0, after = frame + 1 < run->record.frames ? frame + 1 : frame;
+    double h = run->record.times[after] - run->record.times[before];
+    drape_status status = drape_record_read(&run->record, before, d->other);
     if (!status)
-        status = drape_record_read(run, after, d->v);
+        status = drape_record_read(&run->record, after, d->v);
     for (int32_t i = 0; !status && i < run->model->node_count; i++) {
         double way[3];
         vec3_sub(d->v + 3 * (size_t)i, d->other + 3 * (size_t)i, way);
@@ -53,7 +53,7 @@ static const double *values_of(const drape_report_data *d, int field)
 
 static drape_status load(const drape_report_data *d, int64_t frame)
 {
-    drape_status status = drape_record_read(d->run, frame, d->x);
+    drape_status status = drape_record_read(&d->run->record, frame, d->x);
     if (status)
         return status;
     find_strain(d);
@@ -63,14 +63,14 @@ static drape_status load(const drape_report_data *d, int64_t frame)
 /* ---- Which frames, and ranges ---- */
 
 /* 16 bits a number, and in base64 four thirds of that. */
-static double bytes_a_frame(const drape_record *run)
+static double bytes_a_frame(const drape_report_source *run)
 {
     return 5 * 2 * 4.0 / 3 * run->model->node_count;
 }
 
 static drape_status choose_frames(drape_report_data *d, size_t most_bytes)
 {
-    int64_t all = d->run->frames;
+    int64_t all = d->run->record.frames;
     double room = floor((double)most_bytes / bytes_a_frame(d->run));
     d->kept = room < 2 ? 2 : room < (double)all ? (int64_t)room : all;
     d->kept = d->kept < all ? d->kept : all;
@@ -139,7 +139,8 @@ static drape_status take_room(drape_report_data *d)
     return DRAPE_OK;
 }
 
-drape_status drape_report_data_make(const drape_record *run, size_t most_bytes, drape_report_data *data)
+drape_status drape_report_data_make(const drape_report_source *run, size_t most_bytes,
+                                    drape_report_data *data)
 {
     *data = (drape_report_data){.run = run};
     drape_status status = take_room(data);

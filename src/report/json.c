@@ -84,16 +84,16 @@ static void take_row(void *user, int64_t row, char *const *cells)
 }
 
 /* {"rows": all of them, "every": n, "columns": {name: [...]}} */
-static drape_status read_columns(const drape_record *run, const char *name, columns *c, json_t **out)
+static drape_status read_columns(const drape_report_source *run, const char *name, columns *c, json_t **out)
 {
     int64_t rows = 0;
-    drape_status status = drape_record_rows(run, name, c->names, c->count, count_row, NULL, &rows);
+    drape_status status = drape_record_rows(&run->record, name, c->names, c->count, count_row, NULL, &rows);
     if (status)
         return status;
     c->every = rows / MOST_ROWS + 1;
     for (size_t i = 0; i < c->count; i++)
         c->arrays[i] = json_array();
-    status = drape_record_rows(run, name, c->names, c->count, take_row, c, &rows);
+    status = drape_record_rows(&run->record, name, c->names, c->count, take_row, c, &rows);
     json_t *object = json_object();
     for (size_t i = 0; i < c->count; i++)
         object = with(object, c->names[i], c->arrays[i]);
@@ -103,7 +103,7 @@ static drape_status read_columns(const drape_record *run, const char *name, colu
     return status;
 }
 
-static drape_status read_steps(const drape_record *run, json_t **out)
+static drape_status read_steps(const drape_report_source *run, json_t **out)
 {
     static const char *const names[] = {"t",        "h",         "accepted", "iterations",
                                         "residual", "tolerance", "reason"};
@@ -111,7 +111,7 @@ static drape_status read_steps(const drape_record *run, json_t **out)
     return read_columns(run, "steps.csv", &c, out);
 }
 
-static drape_status read_energies(const drape_record *run, json_t **out)
+static drape_status read_energies(const drape_report_source *run, json_t **out)
 {
     static const char *const names[] = {"t_state", "kinetic",    "elastic",   "gravity",
                                         "contact", "dissipated", "numerical", "total"};
@@ -155,7 +155,7 @@ static json_t *collider(const drape_report_data *data, const drape_collider *c)
         return object;
     json_t *way = json_array();
     for (int64_t k = 0; k < data->kept; k++) {
-        drape_collider_pose pose = drape_collider_pose_at(c, data->run->times[data->frame[k]]);
+        drape_collider_pose pose = drape_collider_pose_at(c, data->run->record.times[data->frame[k]]);
         way = and_also(way, numbers(pose.displacement, 3));
     }
     return with(object, "displacements", way);
@@ -195,10 +195,10 @@ static json_t *frames(const drape_report_data *data)
 {
     json_t *times = json_array(), *kept = json_array();
     for (int64_t k = 0; k < data->kept; k++) {
-        times = and_also(times, number(data->run->times[data->frame[k]]));
+        times = and_also(times, number(data->run->record.times[data->frame[k]]));
         kept = and_also(kept, json_integer((json_int_t)data->frame[k]));
     }
-    json_t *object = with(json_object(), "all", json_integer((json_int_t)data->run->frames));
+    json_t *object = with(json_object(), "all", json_integer((json_int_t)data->run->record.frames));
     return with(with(object, "times", times), "numbers", kept);
 }
 
@@ -220,14 +220,14 @@ static int put_safe(const char *bytes, size_t size, void *file)
 
 drape_status drape_report_put_json(const drape_report_data *data, drape_file *file)
 {
-    const drape_record *run = data->run;
+    const drape_report_source *run = data->run;
     json_t *steps = NULL, *energies = NULL;
     drape_status status = read_steps(run, &steps);
     if (!status)
         status = read_energies(run, &energies);
     json_t *json = with(json_object(), "version", json_string(drape_version()));
-    const char *slash = strrchr(run->folder, '/');
-    json = with(json, "name", text(slash && slash[1] ? slash + 1 : run->folder));
+    const char *slash = strrchr(run->record.folder, '/');
+    json = with(json, "name", text(slash && slash[1] ? slash + 1 : run->record.folder));
     json = with(json, "scene", text(run->scene_text));
     json = with(json, "summary", run->summary ? json_incref(run->summary) : json_null());
     json = with(json, "nodes", json_integer(run->model->node_count));

@@ -92,16 +92,25 @@ function lines(title, pairs) {
   return group;
 }
 
+// Parts that add up to the whole: what steps take beside theirs, and what is in no step, are named, too.
+function shares(wall) {
+  const inner = ['residual', 'jacobian', 'factor', 'solve', 'contact'].map((name) => [name, wall[name] || 0]);
+  const sum = (pairs) => pairs.reduce((total, [, x]) => total + x, 0);
+  const all = [...inner, ['rest of the steps', Math.max(wall.steps - sum(inner), 0)], ['setup', wall.setup || 0], ['output', wall.output || 0]];
+  all.push(['start and end', Math.max(wall.total - sum(all), 0)]);
+  const share = (x) => `${format(x, 3)} s, ${(100 * x / (wall.total || 1)).toFixed(1)} %`;
+  return [['total', `${format(wall.total, 3)} s`], ...all.filter(([, x]) => x > 0).map(([name, x]) => [name, share(x)])];
+}
+
 function summarize(s) {
   const percent = (x) => `${format(100 * x, 3)} %`;
-  const share = (x) => `${format(x, 3)} s, ${Math.round(100 * x / (s.wall_s.total || 1))} %`;
   const numbers = (object, unit) => Object.entries(object).map(([name, value]) => [name, `${format(value)}${unit}`]);
   return [
-    lines('Model', [['nodes', s.nodes], ['triangles', run.triangles], ['unknowns', s.dofs], ['nonzeros', s.nnz], ['least edge strain', percent(s.strain.min)], ['largest', percent(s.strain.max)]]),
+    lines('Model', [['nodes', s.nodes], ['triangles', run.triangles], ['unknowns', s.dofs], ['nonzeros', s.nnz], ['least strain', percent(s.strain.min)], ['largest strain', percent(s.strain.max)]]),
     lines('Steps', [['simulated', `${format(s.time)} s`], ['accepted', s.steps.accepted], ['rejected', s.steps.rejected],
       ...Object.entries(s.steps.reasons || {}), ['unconverged', s.steps.unconverged || null], ['shortest', `${format(s.steps.h_min, 3)} s`], ['longest', `${format(s.steps.h_max, 3)} s`]]),
     lines('Newton', Object.entries(s.newton).map(([name, value]) => [name.replace('_', ' '), value])),
-    lines('Wall time', [['total', `${format(s.wall_s.total, 3)} s`], ...['residual', 'jacobian', 'factor', 'solve', 'contact', 'output'].map((name) => [name, share(s.wall_s[name] || 0)])]),
+    lines('Wall time', shares(s.wall_s)),
     lines('Energy at the end', numbers(s.energy, ' J')),
     lines('Result', [['status', s.status], ['message', s.message || null], ['frames', s.frames], ['hash', s.hash], ['Drape', s.version],
       ['equilibrium', s.equilibrium && (s.equilibrium.stable ? 'stable' : `unstable, ${s.equilibrium.unstable_modes} modes`)]])];

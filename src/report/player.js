@@ -44,7 +44,7 @@ vec4 shaded() {
   vec3 view = normalize(eye - at), m = normalize(n);
   bool away = dot(m, view) < 0.0;
   if (away) m = -m;
-  float key = max(dot(m, light), 0.0), fill = max(dot(m, normalize(vec3(-light.x, 0.35, -light.z))), 0.0);
+  float key = max(dot(m, light), 0.0), fill = max(dot(m, normalize(vec3(-light.x, 0.3, -light.z))), 0.0);
   float sky = 0.5 + 0.5 * m.y;
   if (kind == 4) {
     float far = length(at - disk.xyz) / disk.w;
@@ -52,12 +52,12 @@ vec4 shaded() {
   }
   if (kind == 1) {
     vec3 base = texture(colors, vec2(clamp((v - range.x) / max(range.y - range.x, 1e-30), 0.0, 1.0), 0.5)).rgb;
-    return vec4(encoded(linear(base) * (0.62 + 0.33 * key + 0.1 * sky)), alpha);
+    return vec4(encoded(linear(base) * (0.58 + 0.25 * key + 0.1 * sky + 0.12 * max(dot(m, view), 0.0))), alpha);
   }
   vec3 base = linear(away ? back : front);
   vec3 h = normalize(light + view);
   float shine = 0.12 * pow(max(dot(m, h), 0.0), 40.0), edge = 0.1 * pow(1.0 - abs(dot(m, view)), 3.0);
-  return vec4(encoded(base * (0.24 * sky + 0.2 + 0.8 * key + 0.24 * fill) + shine + edge * sky), alpha);
+  return vec4(encoded(base * (0.24 * sky + 0.16 + 0.8 * key + 0.3 * fill + 0.1 * max(dot(m, view), 0.0)) + shine + edge * sky), alpha);
 }
 void main() {
   vec4 color = shaded();
@@ -110,11 +110,15 @@ function boundsOf(lows, highs) {
   return { center, radius: Math.hypot(...sub(highs, lows)) / 2 || 1 };
 }
 
+// The lamp stands in the room, whoever looks from where: that of drape render, 54 degrees up and at -16 of the azimuth.
+const LIGHT = unit([Math.tan(Math.PI / 5) * Math.sin(-0.279), 1, Math.tan(Math.PI / 5) * Math.cos(-0.279)]);
+
 class Player {
   constructor(canvas) {
     this.gl = canvas.getContext('webgl2', { antialias: true, stencil: true, alpha: true, preserveDrawingBuffer: true });
     if (!this.gl) throw new Error('no WebGL 2');
     this.canvas = canvas;
+    this.light = LIGHT;
     this.positions = new Float32Array(3 * run.nodes);
     this.normals = new Float32Array(3 * run.nodes);
     this.values = new Float32Array(run.nodes);
@@ -205,7 +209,7 @@ class Player {
     this.target = [...this.bounds.center];
     this.yaw = 0.55;
     this.pitch = 0.32;
-    this.distance = 3.0 * this.bounds.radius;
+    this.distance = 2.7 * this.bounds.radius;
   }
 
   eye() {
@@ -301,8 +305,6 @@ class Player {
     const eye = this.eye(), reach = this.distance + 6 * this.bounds.radius;
     const wide = 2 * Math.atan(Math.tan(0.28) * Math.max(1, 1.2 * height / width)); // a narrow view keeps the cloth whole
     const camera = multiply(perspective(wide, width / height, 0.004 * reach, reach), lookAt(eye, this.target));
-    const side = [Math.cos(this.yaw), 0, -Math.sin(this.yaw)], ahead = [Math.sin(this.yaw), 0, Math.cos(this.yaw)];
-    this.light = unit(along(along([0, 1, 0], -0.5, side), 0.45, ahead));
     gl.uniformMatrix4fv(this.at.camera, false, camera);
     gl.uniform3fv(this.at.eye, eye);
     gl.uniform3fv(this.at.light, this.light);

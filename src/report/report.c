@@ -61,12 +61,12 @@ static drape_status write_page(const drape_report_data *data, const char *path, 
     return status;
 }
 
-static drape_status write_run(const drape_record *run, const drape_report_def *def,
+static drape_status write_run(const drape_report_source *run, const drape_report_def *def,
                               drape_report_result *result, bool *input)
 {
     drape_report_data data;
     drape_status status = drape_report_data_make(run, def->most_bytes, &data);
-    result->frames = run->frames;
+    result->frames = run->record.frames;
     result->kept = data.kept;
     if (!status)
         status = write_page(&data, result->path, input, &result->bytes);
@@ -77,7 +77,7 @@ static drape_status write_run(const drape_record *run, const drape_report_def *d
 drape_status drape_report_write(drape_context *ctx, const drape_report_def *def, drape_report_result *result,
                                 bool *input)
 {
-    drape_record run;
+    drape_report_source run;
     locale_t old = drape_locale_enter();
     *input = true;
     *result = (drape_report_result){.frames = 0};
@@ -85,13 +85,13 @@ drape_status drape_report_write(drape_context *ctx, const drape_report_def *def,
                           : snprintf(result->path, sizeof result->path, "%s/" DEFAULT_NAME, def->run);
     drape_status status =
         length < (int)sizeof result->path
-            ? drape_record_open(ctx, def->run, &run)
+            ? drape_report_source_open(ctx, def->run, &run)
             : drape_fail(ctx, DRAPE_E_ARGUMENT, "the name of the page is longer than %zu bytes",
                          sizeof result->path - 1);
     if (length < (int)sizeof result->path) {
         if (!status)
             status = write_run(&run, def, result, input);
-        drape_record_close(&run);
+        drape_report_source_close(&run);
     }
     drape_locale_leave(old);
     return status;

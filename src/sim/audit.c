@@ -20,7 +20,7 @@
 /* Of the energy that a scene had to offer so far. Rows that conserve energy, or bound an error, let it swing by
  * some per cent. */
 #define STEP_GAIN 0.25 /* gained in one step */
-#define RUN_GAIN  0.5  /* gained since numerical dissipation was at its largest */
+#define RUN_GAIN  0.1  /* gained since numerical dissipation was at its largest, if the row does not say */
 
 static double kinetic(const drape_model *model, const double *v)
 {
@@ -152,6 +152,7 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
     const drape_energy e = drape_sim_energy(sim);
     const drape_energy made = measure(sim, out, drape_sim_state(sim)->internal,
                                       audit->dissipated + info->dissipated, audit->pin_work + info->pin_work);
+    const double most = sim->chosen.integrator->gain > 0 ? sim->chosen.integrator->gain : RUN_GAIN;
     double quiet = scene_energy(m), gain = e.numerical - made.numerical,
            scale = offered(audit, &made, info, quiet), run = audit->best - made.numerical;
     sim->made = made;
@@ -160,9 +161,9 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
         info->worst = gain_at(m, out->v, "energy from nowhere / kinetic energy", gain / made.kinetic, SHARE);
     else if (gain > STEP_GAIN * scale)
         info->worst = gain_at(m, out->v, "energy from nowhere / energy of the run", gain / scale, STEP_GAIN);
-    else if (gain > 0 && run > RUN_GAIN * scale)
-        info->worst = gain_at(m, out->v, "energy from nowhere since its least / energy of the run",
-                              run / scale, RUN_GAIN);
+    else if (gain > UNNOTICED * scale && run > most * scale)
+        info->worst =
+            gain_at(m, out->v, "energy from nowhere since its least / energy of the run", run / scale, most);
     else
         return false;
     return true;

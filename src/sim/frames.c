@@ -38,7 +38,7 @@ static void interpolate(drape_sim *sim, const drape_state *before, double t)
         return;
     }
     hermite(before, now, t, n, sim->frame);
-    drape_model_place_pins(sim->model, t, sim->frame);
+    drape_motion_place_pins(drape_system_motion(sim->system), t, sim->frame);
 }
 
 /* Contact still compares with the state before: the last step began there. */
@@ -58,7 +58,7 @@ static drape_status make_frame(drape_sim *sim, const drape_state *before, double
     drape_status status = check(sim, t);
     if (status > 0) {
         straight(before, now, t, n, sim->frame);
-        drape_model_place_pins(sim->model, t, sim->frame);
+        drape_motion_place_pins(drape_system_motion(sim->system), t, sim->frame);
         status = check(sim, t);
     }
     if (status > 0)

@@ -3,8 +3,6 @@
 #include "model/scene.h"
 #include "sim/choose.h"
 
-#include <string.h>
-
 static drape_status compile(drape_context *ctx, const drape_scene_def *def, drape_model **out)
 {
     drape_chosen chosen;
@@ -19,16 +17,15 @@ static drape_status compile(drape_context *ctx, const drape_scene_def *def, drap
 drape_status drape_model_create(drape_context *ctx, const drape_scene_def *given, drape_model **out)
 {
     drape_scene_def def;
+    drape_arena arena = {NULL, 0};
     if (!ctx || !out)
         return DRAPE_E_ARGUMENT;
     *out = NULL;
-    if (!given || given->struct_size == 0 || given->struct_size > sizeof def)
-        return drape_fail(ctx, DRAPE_E_VERSION,
-                          "the scene def was not initialised by drape_scene_def_init of this version");
-    drape_scene_def_init(&def, sizeof def);
-    memcpy(&def, given, given->struct_size);
-    def.struct_size = sizeof def;
-    return compile(ctx, &def, out);
+    drape_status status = drape_compile_read_def(ctx, &arena, given, &def);
+    if (!status)
+        status = compile(ctx, &def, out);
+    drape_arena_free(&arena, ctx);
+    return status;
 }
 
 drape_status drape_scene_compile(drape_scene *scene, drape_model **out)

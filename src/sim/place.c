@@ -33,25 +33,36 @@ static drape_status check_given(const drape_sim *sim, double t, const double *x,
     return DRAPE_OK;
 }
 
-/* Pinned nodes where their pins have them at the time of the state. */
-static void place_pinned(const drape_model *m, drape_state *state)
+/* Pinned nodes where their pins have them at the time of the state; those that a host has moved where it has them
+ * now. */
+static void place_pinned(const drape_sim *sim, const double *given, drape_state *state)
 {
+    const drape_model *m = sim->model;
+    const drape_motion *motion = drape_system_motion(sim->system);
     for (int32_t i = 0; i < m->node_count; i++)
         if (m->pinned[i])
             memcpy(state->x + 3 * (size_t)i, m->rest + 3 * (size_t)i, 3 * sizeof *state->x);
-    drape_model_place_pins(m, state->t, state->x);
+    drape_motion_place_pins(motion, state->t, state->x);
+    for (int32_t i = 0; i < motion->moved_count; i++) {
+        size_t at = 3 * (size_t)motion->moved_node[i];
+        if (motion->pin_way[i].given)
+            memcpy(state->x + at, given + at, 3 * sizeof *state->x);
+    }
 }
 
-/* Fixed nodes have no velocity; moved ones keep what was given, until a step gives them the mean of their
- * way. */
-static void stop_fixed(const drape_model *m, const double *given, drape_state *state)
+/* Fixed nodes have no velocity, nor have those that rest where the host put them; others that move keep what was
+ * given, until a step gives them the mean of their way. */
+static void stop_fixed(const drape_sim *sim, const double *given, drape_state *state)
 {
+    const drape_model *m = sim->model;
+    const drape_motion *motion = drape_system_motion(sim->system);
     for (int32_t i = 0; i < m->node_count; i++)
         if (m->pinned[i])
             memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
-    for (int32_t i = 0; i < m->moved_count; i++) {
-        size_t at = 3 * (size_t)m->moved_node[i];
-        memcpy(state->v + at, given + at, 3 * sizeof *state->v);
+    for (int32_t i = 0; i < motion->moved_count; i++) {
+        size_t at = 3 * (size_t)motion->moved_node[i];
+        if (!motion->pin_way[i].given)
+            memcpy(state->v + at, given + at, 3 * sizeof *state->v);
     }
 }
 
@@ -106,11 +117,12 @@ drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, cons
     next->t = t;
     memcpy(next->x, x, 3 * (size_t)m->node_count * sizeof *x);
     memcpy(next->v, v, 3 * (size_t)m->node_count * sizeof *v);
-    place_pinned(m, next);
-    stop_fixed(m, v, next);
+    place_pinned(sim, x, next);
+    stop_fixed(sim, v, next);
     status = check_pinned(sim, x, next);
     if (status)
         return status;
+    drape_motion_hold_pins(drape_system_steer(sim->system), next->x);
     drape_state_commit(m, now, next);
     sim->next = sim->now;
     sim->now = (int)(next - sim->states);

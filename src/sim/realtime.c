@@ -124,6 +124,9 @@ static drape_status take_steps(drape_sim *sim, double deadline, drape_realtime *
         double start = drape_clock_seconds();
         if (report->h > 0 && start + expected(sim, sim->realtime.effort) > deadline)
             break;
+        status = drape_sim_heed(sim);
+        if (status)
+            break;
         status = drape_sim_step(sim, t1, h, &attempt);
         learn(sim, drape_clock_seconds() - start);
         report->attempts++;

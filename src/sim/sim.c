@@ -10,10 +10,9 @@
 
 void drape_sim_def_init(drape_sim_def *def, size_t struct_size)
 {
+    const drape_sim_def defaults = {.struct_size = struct_size, .threads = 1};
     memset(def, 0, struct_size);
-    def->struct_size = struct_size;
-    if (struct_size >= sizeof *def)
-        def->threads = 1;
+    memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
 }
 
 /* Reads a def of this or an older, shorter version. */
@@ -49,16 +48,17 @@ static drape_status create_states(drape_sim *sim)
     size_t n = 3 * (size_t)sim->model->node_count;
     sim->frame = drape_arena_take(&sim->arena, sim->ctx, n, sizeof *sim->frame);
     sim->frame_velocity = drape_arena_take(&sim->arena, sim->ctx, n, sizeof *sim->frame_velocity);
-    return status ? status : sim->frame && sim->frame_velocity ? DRAPE_OK : DRAPE_E_MEMORY;
+    sim->read = drape_arena_take(&sim->arena, sim->ctx, n, sizeof *sim->read);
+    return status ? status : sim->frame && sim->frame_velocity && sim->read ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-static drape_status create_parts(drape_sim *sim, const drape_sim_def *def)
+static drape_status create_parts(drape_sim *sim, int threads)
 {
-    drape_status status = drape_choose(sim->ctx, sim->model, def, &sim->chosen);
+    drape_status status = create_states(sim);
     if (!status)
-        status = create_states(sim);
+        status = drape_system_create(sim->ctx, sim->model, threads, &sim->system);
     if (!status)
-        status = drape_system_create(sim->ctx, sim->model, def->threads, &sim->system);
+        drape_system_watch(sim->system, &sim->cancel);
     bool projects = !status && sim->chosen.integrator->projects_contact;
     if (!status && projects)
         drape_system_leave_constraints(sim->system);
@@ -77,6 +77,43 @@ static drape_stepping stepping_of(const drape_chosen *chosen)
     return chosen->controller->own_steps ? DRAPE_STEPS_PROPOSED : DRAPE_STEPS_COUNTED;
 }
 
+static drape_sim empty_sim(drape_context *ctx, const drape_model *model, double frame_rate,
+                           double longest_asked)
+{
+    return (drape_sim){.next = 1,
+                       .before = -1,
+                       .past = {-1, -1},
+                       .ctx = ctx,
+                       .model = model,
+                       .realtime = {.longest_asked = longest_asked},
+                       .frame_rate = frame_rate};
+}
+
+/* Makes all that a sim with its choices needs. */
+static drape_status start_sim(drape_sim *sim, int threads)
+{
+    drape_status status = create_parts(sim, threads);
+    if (status)
+        return status;
+    drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
+                        drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
+    drape_sim_reset_energy(sim);
+    return DRAPE_OK;
+}
+
+drape_status drape_sim_create_like(const drape_sim *like, drape_sim **out)
+{
+    drape_sim *sim = *out = drape_alloc(like->ctx, 1, sizeof *sim);
+    if (!sim)
+        return DRAPE_E_MEMORY;
+    *sim = empty_sim(like->ctx, like->model, like->frame_rate, like->realtime.longest_asked);
+    sim->chosen = like->chosen;
+    drape_status status = start_sim(sim, drape_system_threads(like->system));
+    if (status)
+        drape_sim_destroy(out);
+    return status;
+}
+
 drape_status drape_sim_create(drape_context *ctx, const drape_model *model, const drape_sim_def *given,
                               drape_sim **out)
 {
@@ -93,21 +130,14 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
     drape_sim *sim = drape_alloc(ctx, 1, sizeof *sim);
     if (!sim)
         return DRAPE_E_MEMORY;
-    *sim = (drape_sim){.next = 1,
-                       .before = -1,
-                       .past = {-1, -1},
-                       .ctx = ctx,
-                       .model = model,
-                       .realtime = {.longest_asked = def.realtime_step},
-                       .frame_rate = def.frame_rate > 0 ? def.frame_rate : model->frame_rate};
-    status = create_parts(sim, &def);
+    *sim = empty_sim(ctx, model, def.frame_rate > 0 ? def.frame_rate : model->frame_rate, def.realtime_step);
+    status = drape_choose(ctx, model, &def, &sim->chosen);
+    if (!status)
+        status = start_sim(sim, def.threads);
     if (status) {
         drape_sim_destroy(&sim);
         return status;
     }
-    drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
-                        drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
-    drape_sim_reset_energy(sim);
     sim->statistics.wall_setup = drape_clock_seconds() - start;
     *out = sim;
     return DRAPE_OK;
@@ -141,6 +171,26 @@ const double *drape_sim_velocities(const drape_sim *sim)
     return sim ? drape_sim_state(sim)->v : NULL;
 }
 
+void drape_sim_normals(const drape_sim *sim, double *normals)
+{
+    if (sim)
+        drape_model_normals(sim->model, drape_sim_state(sim)->x, normals);
+}
+
+/* A store to an atomic without a lock: safe in a signal handler. */
+void drape_sim_cancel(drape_sim *sim)
+{
+    if (sim)
+        atomic_store(&sim->cancel, true);
+}
+
+drape_status drape_sim_heed(drape_sim *sim)
+{
+    if (!atomic_exchange(&sim->cancel, false))
+        return DRAPE_OK;
+    return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: cancelled", drape_sim_state(sim)->t);
+}
+
 const drape_model *drape_sim_model(const drape_sim *sim)
 {
     return sim ? sim->model : NULL;
@@ -168,7 +218,6 @@ drape_statistics drape_sim_statistics(const drape_sim *sim)
     s.wall_jacobian = work.jacobian_seconds;
     s.wall_factor = work.factor_seconds;
     s.wall_solve = work.solve_seconds;
-    s.wall_contact = work.contact_seconds + drape_contact_seconds(drape_system_contact(sim->system));
     return s;
 }
 

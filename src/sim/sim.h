@@ -2,6 +2,7 @@
 #ifndef DRAPE_SIM_SIM_H
 #define DRAPE_SIM_SIM_H
 
+#include "base/archive.h"
 #include "base/arena.h"
 #include "sim/choose.h"
 #include "sim/schedule.h"
@@ -53,6 +54,8 @@ struct drape_sim {
     double frame_rate;
     int64_t next_frame;
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
+    double *read;                   /* (node_count x 3) scratch of what is read between steps */
+    atomic_bool cancel;             /* the advance that runs, or the next, is to stop */
     drape_observer *observers[DRAPE_MAX_OBSERVERS];
     void *observer_users[DRAPE_MAX_OBSERVERS];
     int observer_count;
@@ -62,9 +65,25 @@ struct drape_sim {
     int reason_count;
     drape_audit audit;
     drape_realtime_memory realtime;
-    drape_energy energy, made;     /* of the present state; of the one that was attempted last */
-    bool energy_known, made_known; /* whether they are */
+    drape_energy energy, made;         /* of the present state; of the one that was attempted last */
+    bool energy_known, made_known;     /* whether they are */
+    uint64_t model_hash, choices_hash; /* of what a checkpoint is of; identity_known: they are */
+    bool identity_known;
 };
+
+/* Another one with the same choices, at the beginning. */
+drape_status drape_sim_create_like(const drape_sim *like, drape_sim **out);
+
+/* All that the next steps, frames and statistics depend on besides the model and the choices: into an archive or, where
+ * the sim was just made, out of it. */
+void drape_sim_archive(drape_sim *sim, drape_archive *a);
+
+/* What a checkpoint must be of: the model, the choices, the build. Reading fails where they are others. */
+void drape_sim_archive_identity(drape_sim *sim, drape_archive *a);
+
+/* drape_sim_archive of a checkpoint in memory that begins with a sim, into *sim: made anew beside it, so that *sim is as
+ * it was after a failure. What follows in the archive is the caller's. */
+drape_status drape_sim_read(drape_sim *sim, drape_archive *a);
 
 static inline const drape_state *drape_sim_state(const drape_sim *sim)
 {
@@ -89,6 +108,9 @@ void drape_sim_describe_distortion(const drape_sim *sim, char *text, size_t size
 
 /* One attempt at the step that the schedule handed out, judged and told, with its frames. *attempt: what it was. */
 drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *attempt);
+
+/* Ends the advance if somebody has cancelled it, and takes the cancelling back: DRAPE_E_STOPPED, with its message. */
+drape_status drape_sim_heed(drape_sim *sim);
 
 /* Back to the scene's own steps and all efforts, and no time is owed. */
 void drape_sim_leave_realtime(drape_sim *sim);

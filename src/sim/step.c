@@ -51,8 +51,11 @@ static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
     if (!status)
         status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
+    if (status == DRAPE_E_STOPPED)
+        info->reason = "cancelled";
     if (status && !info->usable)
         return status;
+    info->pin_work += drape_system_push_work(sim->system, drape_sim_state(sim)->x, next->x);
     drape_status degenerate = check(sim, info);
     if (degenerate)
         info->usable = false;
@@ -195,6 +198,8 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
     char worst[400], residual[100] = "", distortion[200] = "";
     if (stop == DRAPE_E_MEMORY) /* the allocator said it */
         return stop;
+    if (stop == DRAPE_E_STOPPED)
+        return drape_sim_heed(sim);
     describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
     if (attempt->worst.element < 0) /* a node says where, an element may say why */
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
@@ -249,13 +254,21 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     return record_of(sim, t, &info, refused ? DRAPE_RETRY_REJECTED : status, verdict == DRAPE_ACCEPT);
 }
 
+/* Of this step and all else that asked for contact, energies that are told for example. */
+static double contact_seconds(const drape_sim *sim)
+{
+    return sim->chosen.integrator->work(sim->integrator).contact_seconds +
+           drape_contact_seconds(drape_system_contact(sim->system));
+}
+
 /* The frames inside an accepted step belong to it even if an observer stops the run there. */
 drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *attempt)
 {
     drape_status stop = DRAPE_OK;
-    double start = drape_clock_seconds();
+    double start = drape_clock_seconds(), contact = contact_seconds(sim);
     *attempt = try_step(sim, t1, h, &stop);
     sim->statistics.wall_steps += drape_clock_seconds() - start;
+    sim->statistics.wall_contact += contact_seconds(sim) - contact;
     log_rejection(sim, attempt);
     drape_status told = tell_attempt(sim, attempt);
     drape_status framed = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
@@ -277,7 +290,10 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
         drape_sim_emit_frames(sim); /* the first, and those that an observer's stop left over */
     drape_sim_leave_realtime(sim);
     drape_schedule_aim(&sim->schedule, t_end);
-    while (!status && drape_schedule_next(&sim->schedule, &t1, &h))
-        status = drape_sim_step(sim, t1, h, &attempt);
+    while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {
+        status = drape_sim_heed(sim);
+        if (!status)
+            status = drape_sim_step(sim, t1, h, &attempt);
+    }
     return status;
 }

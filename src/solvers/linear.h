@@ -7,6 +7,7 @@
 #ifndef DRAPE_SOLVERS_LINEAR_H
 #define DRAPE_SOLVERS_LINEAR_H
 
+#include "base/archive.h"
 #include "sparse/pattern.h"
 
 typedef struct drape_linear_ops drape_linear_ops;
@@ -45,6 +46,11 @@ struct drape_linear_ops {
      * many it took. NULL: it is direct. */
     drape_status (*solve_inexact)(void *state, const double *b, double *x, double tolerance,
                                   int64_t *iterations);
+    /* What has a part in later factors besides their values, such as pivots that are kept, into an archive or, where
+     * the state was just made for the same pattern, out of it. values: those of the last factor, if its factors are
+     * to stand again after a reading; NULL: factor comes before any solve. NULL: factors follow from values alone.
+     * Callers use drape_linear_archive. */
+    void (*archive)(void *state, drape_archive *a, const double *values);
     void (*destroy)(void **state);
     /* Bytes that it takes, factors included. */
     size_t (*bytes)(const void *state);
@@ -54,6 +60,14 @@ struct drape_linear_ops {
 
 extern const drape_linear_ops *const drape_linears[]; /* NULL-ended */
 extern const char *const drape_linears_words[];       /* their names, NULL-ended */
+
+/* Archives a solver; values as in its row, NULL where its last factor failed, too. */
+void drape_linear_archive(const drape_linear_ops *row, void *state, drape_archive *a, const double *values);
+
+/* The same for a row's own solver of general matrices, which is made for the first of them: *solver NULL before. */
+void drape_linear_archive_general(const drape_linear_ops *row, drape_context *ctx,
+                                  const drape_pattern *pattern, void **solver, drape_archive *a,
+                                  const double *values);
 
 /* The row with the largest best_from, or general_from, that is not above n unknowns. */
 const drape_linear_ops *drape_linear_best(int64_t n);

@@ -72,6 +72,12 @@ static drape_status solve(void *state, const double *b, double *x)
     return s->row->solve(s->solver, b, x);
 }
 
+static void archive(void *state, drape_archive *a, const double *values)
+{
+    auto_state *s = state;
+    drape_linear_archive(s->row, s->solver, a, values);
+}
+
 static size_t bytes(const void *state)
 {
     const auto_state *s = state;
@@ -102,6 +108,7 @@ const drape_linear_ops drape_linear_auto = {
     .factor = factor,
     .factor_definite = factor_definite,
     .solve = solve,
+    .archive = archive,
     .destroy = destroy,
     .bytes = bytes,
     .report = report,

@@ -474,6 +474,19 @@ static drape_status solve(void *state, const double *b, double *x)
     return drape_all_finite(x, n) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
+static void archive(void *state, drape_archive *a, const double *values)
+{
+    cholmod_state *s = state;
+    drape_archive_int64(a, &s->fallbacks);
+    drape_archive_bool(a, &s->by_general);
+    drape_archive_bool(a, &s->factored);
+    drape_linear_archive_general(s->general_row, s->ctx, s->pattern, &s->general, a,
+                                 s->by_general ? values : NULL);
+    if (drape_archive_is_reading(a) && values && s->factored && !s->by_general &&
+        factor_any(s, values, false))
+        drape_archive_fail(a, DRAPE_E_SOLVER, "a matrix of the checkpoint has no Cholesky factors here");
+}
+
 static size_t bytes(const void *state)
 {
     const cholmod_state *s = state;
@@ -504,6 +517,7 @@ const drape_linear_ops drape_linear_cholmod = {
     .factor = factor,
     .factor_definite = factor_definite,
     .solve = solve,
+    .archive = archive,
     .destroy = destroy,
     .bytes = bytes,
     .report = report,

@@ -2,13 +2,15 @@
  * klu: sparse LU by KLU (Davis & Palamadai Natarajan 2010), the reference solver. AMD ordering, because the
  * pattern is symmetric; no block triangular form, because the mesh is connected. The first factorisation
  * chooses pivots; later ones keep them (refactor), which takes no heap, and are done afresh where the kept
- * pivots turn out to be too small.
+ * pivots turn out to be too small. The factors of a matrix depend on the one that its pivots were chosen for: its
+ * values are kept, so that a checkpoint can choose them again.
  */
 #include "solvers/linear.h"
 
 #include "base/finite.h"
 
 #include <klu.h>
+#include <string.h>
 
 #define ORDER_AMD 0
 #define MIN_RCOND 1e-15 /* below: singular to working precision; a fresh choice of pivots is tried first */
@@ -19,6 +21,8 @@ typedef struct klu_state {
     klu_l_common common;
     klu_l_symbolic *symbolic;
     klu_l_numeric *numeric; /* NULL before the first and after a failed factorisation */
+    double *chosen_for;     /* (nonzeros) the values that its pivots were chosen for */
+    bool refactored;        /* it was factored with other values since */
 } klu_state;
 
 _Static_assert(sizeof(SuiteSparse_long) == sizeof(int64_t),
@@ -37,6 +41,7 @@ static void destroy(void **state)
         return;
     klu_l_free_numeric(&s->numeric, &s->common);
     klu_l_free_symbolic(&s->symbolic, &s->common);
+    drape_free(s->ctx, s->chosen_for);
     drape_free(s->ctx, s);
     *state = NULL;
 }
@@ -52,6 +57,11 @@ static drape_status create(drape_context *ctx, const drape_pattern *pattern, voi
     klu_l_defaults(&s->common);
     s->common.ordering = ORDER_AMD;
     s->common.btf = 0;
+    s->chosen_for = drape_alloc(ctx, (size_t)pattern->nonzeros, sizeof *s->chosen_for);
+    if (!s->chosen_for) {
+        destroy(state);
+        return DRAPE_E_MEMORY;
+    }
     s->symbolic = klu_l_analyze(pattern->n, indices(pattern->column), indices(pattern->row), &s->common);
     if (s->symbolic)
         return DRAPE_OK;
@@ -71,6 +81,7 @@ static bool well_conditioned(klu_state *s)
 static bool refactor(klu_state *s, double *values)
 {
     const drape_pattern *p = s->pattern;
+    s->refactored = true;
     return s->numeric &&
            klu_l_refactor(indices(p->column), indices(p->row), values, s->symbolic, s->numeric, &s->common) &&
            s->common.status == KLU_OK && well_conditioned(s);
@@ -80,6 +91,9 @@ static bool factor_afresh(klu_state *s, double *values)
 {
     const drape_pattern *p = s->pattern;
     klu_l_free_numeric(&s->numeric, &s->common);
+    s->refactored = false;
+    if (values != s->chosen_for)
+        memcpy(s->chosen_for, values, (size_t)p->nonzeros * sizeof *values);
     s->numeric = klu_l_factor(indices(p->column), indices(p->row), values, s->symbolic, &s->common);
     return s->numeric && s->common.status == KLU_OK && well_conditioned(s);
 }
@@ -106,10 +120,28 @@ static drape_status solve(void *state, const double *b, double *x)
     return drape_all_finite(x, (size_t)s->pattern->n) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
+/* Factors by kept pivots have other roundings than those that chose them: what was done is done again. */
+static void archive(void *state, drape_archive *a, const double *values)
+{
+    klu_state *s = state;
+    bool there = s->numeric != NULL, refactored = s->refactored;
+    drape_archive_bool(a, &there);
+    drape_archive_bool(a, &refactored);
+    if (!there)
+        return;
+    drape_archive_doubles(a, s->chosen_for, (size_t)s->pattern->nonzeros);
+    if (!drape_archive_is_reading(a))
+        return;
+    if (!factor_afresh(s, s->chosen_for) ||
+        (values && refactored && !refactor(s, (double *)(uintptr_t)values)))
+        drape_archive_fail(a, DRAPE_E_SOLVER, "a matrix of the checkpoint has no factors by \"klu\" here");
+    s->refactored = refactored;
+}
+
 static size_t bytes(const void *state)
 {
     const klu_state *s = state;
-    return s->common.memusage;
+    return s->common.memusage + (size_t)s->pattern->nonzeros * sizeof *s->chosen_for;
 }
 
 const drape_linear_ops drape_linear_klu = {
@@ -121,6 +153,7 @@ const drape_linear_ops drape_linear_klu = {
     .create = create,
     .factor = factor,
     .solve = solve,
+    .archive = archive,
     .destroy = destroy,
     .bytes = bytes,
 };

@@ -329,6 +329,27 @@ static drape_status solve(void *state, const double *b, double *x)
     return solve_inexact(state, b, x, EXACT, &iterations);
 }
 
+/* The coarse matrix is kept as it was: it may be of an earlier matrix than that of the general row. */
+static void archive(void *state, drape_archive *a, const double *values)
+{
+    pcg_state *s = state;
+    const bool coarse = s->coarse_row->archive != NULL || values;
+    drape_archive_int64(a, &s->fallbacks);
+    drape_archive_bool(a, &s->by_general);
+    drape_archive_bool(a, &s->factored);
+    drape_linear_archive_general(s->general_row, s->ctx, s->pattern, &s->general, a,
+                                 s->by_general ? values : NULL);
+    if (coarse)
+        drape_archive_doubles(a, s->coarse_values, (size_t)s->coarse.nonzeros);
+    bool stands = values && s->factored && !s->by_general;
+    drape_linear_archive(s->coarse_row, s->coarse_solver, a, stands ? s->coarse_values : NULL);
+    if (!drape_archive_is_reading(a) || !values)
+        return;
+    memcpy(s->values, values, (size_t)s->pattern->nonzeros * sizeof *values);
+    if (stands)
+        invert_diagonal(s);
+}
+
 static size_t bytes(const void *state)
 {
     const pcg_state *s = state;
@@ -362,6 +383,7 @@ const drape_linear_ops drape_linear_pcg = {
     .factor = factor,
     .solve = solve,
     .solve_inexact = solve_inexact,
+    .archive = archive,
     .destroy = destroy,
     .bytes = bytes,
     .report = report,

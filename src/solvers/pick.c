@@ -1,4 +1,5 @@
-/* pick.c: which row is the fastest of this build for a number of unknowns, by what each row says of itself. */
+/* pick.c: which row is the fastest of this build for a number of unknowns, by what each row says of itself; and what all
+ * rows archive in the same way. */
 #include "solvers/linear.h"
 
 static int64_t best_from(const drape_linear_ops *row)
@@ -31,4 +32,27 @@ const drape_linear_ops *drape_linear_best(int64_t n)
 const drape_linear_ops *drape_linear_general(int64_t n)
 {
     return pick(n, general_from);
+}
+
+void drape_linear_archive(const drape_linear_ops *row, void *state, drape_archive *a, const double *values)
+{
+    bool factored = values != NULL;
+    drape_archive_bool(a, &factored);
+    if (row->archive)
+        row->archive(state, a, values);
+    else if (drape_archive_is_reading(a) && values && row->factor(state, values))
+        drape_archive_fail(a, DRAPE_E_SOLVER, "a matrix of the checkpoint has no factors by \"%s\" here",
+                           row->name);
+}
+
+void drape_linear_archive_general(const drape_linear_ops *row, drape_context *ctx,
+                                  const drape_pattern *pattern, void **solver, drape_archive *a,
+                                  const double *values)
+{
+    bool there = *solver != NULL;
+    drape_archive_bool(a, &there);
+    if (drape_archive_is_reading(a) && there && !*solver)
+        drape_archive_note(a, row->create(ctx, pattern, solver));
+    if (drape_archive_good(a) && there)
+        drape_linear_archive(row, *solver, a, values);
 }

@@ -90,6 +90,8 @@ drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const d
     linear->ctx = ctx;
     linear->ops = ops;
     linear->threads = threads;
+    linear->pattern = pattern;
+    linear->nonzeros = pattern->nonzeros;
     linear->values = drape_alloc(ctx, (size_t)pattern->nonzeros, sizeof *linear->values);
     linear->solver = SUNLinSolNewEmpty(sun);
     linear->matrix = SUNMatNewEmpty(sun);
@@ -120,6 +122,8 @@ drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_patter
     if (linear->state)
         linear->ops->destroy(&linear->state);
     drape_free(linear->ctx, linear->values);
+    linear->pattern = pattern;
+    linear->nonzeros = pattern->nonzeros;
     linear->values = drape_alloc(linear->ctx, (size_t)pattern->nonzeros, sizeof *linear->values);
     if (!linear->values)
         return DRAPE_E_MEMORY;
@@ -127,6 +131,28 @@ drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_patter
     linear->stale = status != DRAPE_OK;
     linear->factor_seconds += drape_clock_seconds() - start;
     return status;
+}
+
+drape_status drape_sun_linear_adopt_other(drape_sun_linear *linear, const drape_pattern *pattern)
+{
+    return linear->pattern == pattern ? DRAPE_OK : drape_sun_linear_adopt(linear, pattern);
+}
+
+void drape_sun_linear_archive(drape_sun_linear *linear, drape_archive *a, bool factors)
+{
+    bool there = linear->state && !linear->stale;
+    drape_archive_mark(a, linear->ops->name);
+    drape_archive_int64(a, &linear->factorizations);
+    drape_archive_int64(a, &linear->iterations);
+    drape_archive_double(a, &linear->factor_seconds);
+    drape_archive_double(a, &linear->solve_seconds);
+    drape_archive_bool(a, &there);
+    if (!there)
+        return;
+    drape_archive_same(a, "the number of nonzeros", linear->nonzeros);
+    if (factors)
+        drape_archive_doubles(a, linear->values, (size_t)linear->nonzeros);
+    drape_linear_archive(linear->ops, linear->state, a, factors ? linear->values : NULL);
 }
 
 void drape_sun_linear_destroy(drape_sun_linear **out)

@@ -20,6 +20,8 @@ typedef struct drape_sun_linear {
     bool stale;     /* the system's pattern has changed since: it must adopt it before it is used again */
     void *owner;    /* of an integrator that reduces its system to this one before it solves */
     double *values; /* (nonzeros) where the Jacobian is assembled */
+    const drape_pattern *pattern; /* of the matrix */
+    int64_t nonzeros;
     SUNLinearSolver solver;
     SUNMatrix matrix;
     bool definite; /* the next factorisations refuse what is not positive definite, where the row can tell */
@@ -36,7 +38,13 @@ drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const d
 /* Another pattern from now on: the values are cleared, the solver is analysed anew. Errors: as of create; then
  * it can only be destroyed, or adopt again. */
 drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_pattern *pattern);
+/* The same, unless it is the pattern that it has. */
+drape_status drape_sun_linear_adopt_other(drape_sun_linear *linear, const drape_pattern *pattern);
 void drape_sun_linear_destroy(drape_sun_linear **linear);
+
+/* Work done, and what the solver archives; factors: those there are will be used again. Where it is read, the solver
+ * was made for the pattern that it had. */
+void drape_sun_linear_archive(drape_sun_linear *linear, drape_archive *a, bool factors);
 
 /* Factors the values, time and work counted: what the SUNLinearSolver does. */
 drape_status drape_sun_linear_factor(drape_sun_linear *linear);

@@ -73,4 +73,5 @@ const drape_term_ops drape_term_drag_viscous = {
     .build = build,
     .dissipation = dissipation,
     .dissipative = true,
+    .in_medium = true,
 };

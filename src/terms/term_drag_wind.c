@@ -153,4 +153,5 @@ const drape_term_ops drape_term_drag_wind = {
     .build = build,
     .dissipation = dissipation,
     .dissipative = true,
+    .in_medium = true,
 };

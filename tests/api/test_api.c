@@ -293,6 +293,124 @@ START_TEST(shorter_defs_of_older_callers_are_read)
 }
 END_TEST
 
+/* The def of which only the first `size` bytes were known, count of them one after another, as an older caller's array
+ * has them; behind the last there is nothing. */
+static void *as_older(const void *defs, size_t count, size_t full, size_t size)
+{
+    char *older = malloc(count * size);
+    ck_assert_ptr_nonnull(older);
+    for (size_t i = 0; i < count; i++) {
+        memcpy(older + i * size, (const char *)defs + i * full, size);
+        memcpy(older + i * size, &size, sizeof size);
+    }
+    return older;
+}
+
+/* Of each def, every shorter version: one that ends before each of its members. What a caller left at its default is what
+ * it would have been. */
+START_TEST(every_older_def_is_read)
+{
+    static const size_t sims[] = {offsetof(drape_sim_def, controller),
+                                  offsetof(drape_sim_def, dt),
+                                  offsetof(drape_sim_def, dt_min),
+                                  offsetof(drape_sim_def, frame_rate),
+                                  offsetof(drape_sim_def, threads),
+                                  offsetof(drape_sim_def, realtime_step),
+                                  sizeof(drape_sim_def)},
+                        scenes[] = {offsetof(drape_scene_def, formats),
+                                    offsetof(drape_scene_def, folder),
+                                    offsetof(drape_scene_def, colliders),
+                                    offsetof(drape_scene_def, self_contact),
+                                    offsetof(drape_scene_def, contact),
+                                    offsetof(drape_scene_def, up),
+                                    sizeof(drape_scene_def)},
+                        pins[] = {offsetof(drape_pin_def, clamp), sizeof(drape_pin_def)},
+                        cloths[] = {sizeof(drape_cloth_def) - sizeof(double[3]), sizeof(drape_cloth_def)};
+    drape_context *ctx = make_context();
+    host_scene s;
+    fill_scene(&s);
+    memset(s.cloth.velocity, 0, sizeof s.cloth.velocity);
+    drape_model *model = NULL;
+    ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_OK);
+    uint64_t expected = hash_after(ctx, model, 0.05);
+    for (size_t i = 0; i < sizeof sims / sizeof *sims; i++) {
+        drape_sim_def *def = malloc(sims[i]);
+        drape_sim *sim = NULL;
+        drape_sim_def_init(def, sims[i]);
+        ck_assert_msg(drape_sim_create(ctx, model, def, &sim) == DRAPE_OK, "%zu bytes: %s", sims[i],
+                      drape_context_message(ctx));
+        ck_assert_int_eq(drape_sim_advance(sim, 0.05), DRAPE_OK);
+        ck_assert_uint_eq(drape_sim_hash(sim), expected);
+        drape_sim_destroy(&sim);
+        free(def);
+    }
+    for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++)
+        for (size_t p = 0; p < sizeof pins / sizeof *pins; p++)
+            for (size_t c = 0; c < sizeof cloths / sizeof *cloths; c++) {
+                drape_model *same = NULL;
+                drape_cloth_def cloth = s.cloth;
+                drape_scene_def scene = s.scene;
+                void *older_pins = as_older(s.pins, 2, sizeof *s.pins, pins[p]);
+                cloth.pins = older_pins;
+                void *older_cloth = as_older(&cloth, 1, sizeof cloth, cloths[c]);
+                scene.cloths = older_cloth;
+                void *older_scene = as_older(&scene, 1, sizeof scene, scenes[i]);
+                ck_assert_msg(drape_model_create(ctx, older_scene, &same) == DRAPE_OK, "%zu %zu %zu: %s",
+                              scenes[i], pins[p], cloths[c], drape_context_message(ctx));
+                ck_assert_uint_eq(hash_after(ctx, same, 0.05), expected);
+                drape_model_destroy(&same);
+                free(older_scene), free(older_cloth), free(older_pins);
+            }
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* A collider of an older caller, and parts that were zeroed, too long, or of two sizes in one array. */
+START_TEST(defs_in_arrays_are_checked)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = NULL;
+    drape_collider_def colliders[2];
+    const double center[3] = {0, -1, 0};
+    const drape_setting ball[] = {{.name = "center", .vector = center, .vector_count = 3},
+                                  {.name = "radius", .number = 0.1}};
+    host_scene s;
+    fill_scene(&s);
+    for (int i = 0; i < 2; i++) {
+        drape_collider_def_init(&colliders[i], sizeof colliders[i]);
+        colliders[i].row = (drape_row_def){"sphere", ball, 2};
+    }
+    void *older = as_older(colliders, 2, sizeof *colliders, offsetof(drape_collider_def, track));
+    s.scene.colliders = older;
+    s.scene.collider_count = 2;
+    ck_assert_msg(drape_model_create(ctx, &s.scene, &model) == DRAPE_OK, "%s", drape_context_message(ctx));
+    ck_assert_int_eq(drape_model_collider_count(model), 2);
+    drape_model_destroy(&model);
+    free(older);
+    for (int i = 0; i < 5; i++) {
+        const char *says = i < 2   ? "drape_collider_def_init"
+                           : i < 4 ? "drape_pin_def_init"
+                                   : "drape_cloth_def_init";
+        fill_scene(&s);
+        s.scene.colliders = colliders;
+        s.scene.collider_count = 2;
+        colliders[0].struct_size = sizeof *colliders + (i == 0 ? 8 : 0);
+        colliders[1].struct_size = i == 1 ? 0 : sizeof *colliders;
+        if (i == 2)
+            s.pins[0].struct_size = 0;
+        else if (i == 3)
+            s.pins[1].struct_size -= 8;
+        else if (i == 4)
+            s.cloth.struct_size = 3;
+        ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_VERSION);
+        check_message(ctx, says);
+        ck_assert_ptr_null(model);
+    }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 static void *some_memory(void *user, size_t size)
 {
     (void)user;
@@ -860,6 +978,30 @@ START_TEST(a_collider_of_the_host_works)
 }
 END_TEST
 
+/* Ops that an older caller has, shorter and gone after they were registered: the library has its own. */
+START_TEST(ops_are_copied_and_may_be_older)
+{
+    drape_context *ctx = make_context(), *other = make_context();
+    drape_model *model, *same;
+    void *term = as_older(&attract, 1, sizeof attract, offsetof(drape_term_ops, in_medium)),
+         *shape = as_older(&blob, 1, sizeof blob, offsetof(drape_collider_ops, smooth));
+    ck_assert_int_eq(drape_context_add_term(ctx, term), DRAPE_OK);
+    ck_assert_int_eq(drape_context_add_collider(ctx, shape), DRAPE_OK);
+    free(term);
+    free(shape);
+    ck_assert_int_eq(drape_context_add_term(other, &attract), DRAPE_OK);
+    ck_assert_int_eq(compile_text(ctx, ATTRACTED("{'type': 'host.attract', 'stiffness': 10}"), &model),
+                     DRAPE_OK);
+    ck_assert_int_eq(compile_text(other, ATTRACTED("{'type': 'host.attract', 'stiffness': 10}"), &same),
+                     DRAPE_OK);
+    ck_assert_uint_eq(hash_after(ctx, model, 0.2), hash_after(other, same, 0.2));
+    drape_model_destroy(&same);
+    drape_model_destroy(&model);
+    drape_context_destroy(&other);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 START_TEST(malformed_colliders_are_refused)
 {
     drape_context *ctx = make_context();
@@ -914,7 +1056,7 @@ static void some_law(const double *params, int32_t count, const double *k, const
 START_TEST(malformed_ops_are_refused)
 {
     drape_context *ctx = make_context();
-    for (int i = 0; i < 14; i++) {
+    for (int i = 0; i < 16; i++) {
         drape_term_ops ops = attract;
         const char *says = "not well formed";
         drape_status expected = DRAPE_E_ARGUMENT;
@@ -925,7 +1067,7 @@ START_TEST(malformed_ops_are_refused)
             says = "the ops of a term have 0 bytes";
             break;
         case 1:
-            ops.struct_size--;
+            ops.struct_size++;
             expected = DRAPE_E_VERSION;
             says = "bytes";
             break;
@@ -965,6 +1107,14 @@ START_TEST(malformed_ops_are_refused)
             break;
         case 13:
             ops.damped = true; /* its dashpots would be on a measure, which it has not */
+            break;
+        case 14:
+            ops.in_medium = true; /* an energy has no velocity */
+            break;
+        case 15:
+            ops.struct_size = offsetof(drape_term_ops, in_medium) - 1;
+            expected = DRAPE_E_VERSION;
+            says = "an older one's";
             break;
         }
         ck_assert_msg(drape_context_add_term(ctx, &ops) == expected, "case %d", i);
@@ -1644,14 +1794,14 @@ END_TEST
 
 SUITE("api", destroying_nothing_is_fine, destroy_writes_null, null_arguments_are_told, no_model_has_nothing,
       defs_that_were_not_initialised_are_refused, shorter_defs_of_older_callers_are_read,
-      half_an_allocator_is_refused, sim_defs_are_checked, an_end_that_is_no_time_is_refused,
-      zeroed_parts_of_a_scene_are_refused, a_scene_in_memory_is_the_same_as_in_a_file,
-      the_hash_sees_all_of_the_state, a_model_can_be_read, an_override_is_a_value_of_the_scene,
-      a_term_of_the_host_works, faults_of_a_term_of_the_host_are_told_at_its_place, malformed_ops_are_refused,
-      a_context_holds_32_terms, colliders_of_a_scene_can_be_asked,
-      a_collider_in_memory_is_the_same_as_in_a_file, a_collider_of_the_host_works,
-      malformed_colliders_are_refused, frames_come_in_time, advances_may_be_cut_up,
-      statistics_agree_with_what_was_told, a_state_of_the_host_is_where_a_run_starts,
+      every_older_def_is_read, defs_in_arrays_are_checked, half_an_allocator_is_refused, sim_defs_are_checked,
+      an_end_that_is_no_time_is_refused, zeroed_parts_of_a_scene_are_refused,
+      a_scene_in_memory_is_the_same_as_in_a_file, the_hash_sees_all_of_the_state, a_model_can_be_read,
+      an_override_is_a_value_of_the_scene, a_term_of_the_host_works, ops_are_copied_and_may_be_older,
+      faults_of_a_term_of_the_host_are_told_at_its_place, malformed_ops_are_refused, a_context_holds_32_terms,
+      colliders_of_a_scene_can_be_asked, a_collider_in_memory_is_the_same_as_in_a_file,
+      a_collider_of_the_host_works, malformed_colliders_are_refused, frames_come_in_time,
+      advances_may_be_cut_up, statistics_agree_with_what_was_told, a_state_of_the_host_is_where_a_run_starts,
       a_state_of_another_sim_is_taken_to_the_bit, the_past_does_not_count_after_a_state_was_set,
       states_of_the_host_are_checked, frames_follow_the_time_of_a_state, a_push_repeats_no_frame,
       more_reasons_than_there_is_room_for_are_other, a_failure_names_what_is_distorted,

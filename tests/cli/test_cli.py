@@ -55,6 +55,8 @@ def test_wrong_usage():
     refused("run", "scene.json", "--threads", "257", says="1 to 256")
     refused("run", "scene.json", "--set", "integrator.dt=1", says="/pointer=value")
     refused("run", "scene.json", "--set", "/integrator/dt", says="/pointer=value")
+    refused("run", "scene.json", "--dt", "0.01", "--dt", "0.02", says="--dt is given twice")
+    refused("info", "scene.json", "--json", "--json", says="--json is given twice")
     refused("list", "klo", says='did you mean "klu"?')
     refused("list", "terms", "--schema", says="--schema")
 
@@ -509,6 +511,8 @@ def test_info_of_contact():
     equal((found["contact"]["distance"]["default"], found["contact"]["friction"]["value"]), (True, "implicit"))
     equal(found["self_contact"], {"thickness": {"value": 0.002, "unit": "m", "default": False},
                                   "friction": {"value": 0, "unit": "1", "default": True}})
+    found = json.loads(good("info", "scene.json", "--json", "--integrator", "verlet"))  # moves nodes, has no such forces
+    equal(("contact" in found, list(found["self_contact"])), (False, ["thickness"]))
 
 
 # ---- The schema

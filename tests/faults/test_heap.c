@@ -234,22 +234,31 @@ START_TEST(no_heap_call_in_contact)
 }
 END_TEST
 
-/* Frames and step log are written through buffers that were taken before. */
+/* Frames, step log and checkpoints are written through buffers that were taken before. */
 START_TEST(no_heap_call_for_output)
 {
-    static const char *const formats[] = {"npy", "obj", "ply"};
-    char folder[] = "/tmp/drape-heap-XXXXXX", command[64];
-    ck_assert_ptr_nonnull(mkdtemp(folder));
-    scene s = open_scene("'linear_solver': 'klu'", true);
-    drape_recorder *recorder = NULL;
-    const drape_recorder_def def = {.folder = folder, .formats = formats, .format_count = 3};
-    ck_assert_int_eq(drape_recorder_create(s.ctx, s.sim, &def, &recorder), DRAPE_OK);
-    ck_assert_int_eq(count_steps(&s), 0);
-    ck_assert_int_gt(drape_recorder_frames(recorder), 25);
-    drape_recorder_destroy(&recorder);
-    scene_close(&s);
-    snprintf(command, sizeof command, "rm -rf %s", folder);
-    ck_assert_int_eq(system(command), 0);
+    static const char *const formats[] = {"npy", "obj", "ply", "vtp", "pc2", "glb"};
+    static const char *const rows[] = {"be", "ida", "bdf2"};
+    for (int k = 0; k < 6; k++) {
+        char folder[] = "/tmp/drape-heap-XXXXXX", command[64], integrator[100];
+        ck_assert_ptr_nonnull(mkdtemp(folder));
+        snprintf(integrator, sizeof integrator,
+                 "'method': '%s', 'linear_solver': 'klu', 'newton': 'modified'", rows[k / 2]);
+        scene s = open_scene(integrator, true);
+        drape_recorder *recorder = NULL;
+        const drape_recorder_def def = {.folder = folder,
+                                        .formats = formats,
+                                        .format_count = 6,
+                                        .checkpoints = k % 2,
+                                        .checkpoint_every = k % 2 ? 2 : 0};
+        ck_assert_int_eq(drape_recorder_create(s.ctx, s.sim, &def, &recorder), DRAPE_OK);
+        ck_assert_int_eq(count_steps(&s), 0);
+        ck_assert_int_gt(drape_recorder_frames(recorder), 25);
+        drape_recorder_destroy(&recorder);
+        scene_close(&s);
+        snprintf(command, sizeof command, "rm -rf %s", folder);
+        ck_assert_int_eq(system(command), 0);
+    }
 }
 END_TEST
 

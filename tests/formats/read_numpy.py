@@ -86,6 +86,18 @@ assert (accessor(primitive["indices"]).reshape(-1, 3) == triangles).all()
 for k in range(1, count):
     error = np.abs(base.astype(float) + targets[k - 1] - x[k])
     assert (error <= 2.0**-24 * np.abs(targets[k - 1]) + 1e-30).all(), (k, error.max())
+# Normals: of the triangles around a node, by area; a morph target has the difference to the first. Three roundings to float32.
+upright = accessor(primitive["attributes"]["NORMAL"])
+leaning = [accessor(target["NORMAL"]) for target in primitive["targets"]]
+assert len(leaning) == len(targets)
+for k in range(count):
+    a, b, c = (x[k][triangles[:, i]] for i in range(3))
+    normal = np.zeros_like(x[k])
+    for i in range(3):
+        np.add.at(normal, triangles[:, i], np.cross(b - a, c - a))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    found = upright.astype(float) + (leaning[k - 1] if k else 0)
+    assert np.abs(found - normal).max() < 3 * 2.0**-24, (k, np.abs(found - normal).max())
 if not killed:
     sampler = gltf["animations"][0]["samplers"][0]
     times, weights = accessor(sampler["input"])[:, 0], accessor(sampler["output"]).reshape(count, count - 1)

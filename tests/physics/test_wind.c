@@ -51,6 +51,43 @@ START_TEST(derivatives_in_a_wind)
 }
 END_TEST
 
+/* A wind that turns, is sheared and changes with time, as a host may give it: dw/dx is its matrix. */
+static void swirl(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
+{
+    static const double matrix[9] = {0.7, -2.1, 0.4, 1.9, -0.6, 0.3, -0.8, 1.1, 0.5};
+    (void)user;
+    for (int32_t p = 0; p < count; p++)
+        for (int i = 0; i < 3; i++) {
+            wind[3 * p + i] = 2.385 + t;
+            for (int j = 0; j < 3; j++)
+                wind[3 * p + i] += matrix[3 * i + j] * x[3 * p + j];
+            for (int j = 0; gradient && j < 3; j++)
+                gradient[9 * p + 3 * i + j] = matrix[3 * i + j];
+        }
+}
+
+/* dg/dx has what the wind changes as nodes move, dg/dv not: of both drags, of their sum in the system, and of D. */
+START_TEST(derivatives_in_the_wind_of_a_host)
+{
+    static drape_check_row rows[DRAPE_MAX_CHECK_ROWS];
+    scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 5, "
+                         "'width': 0.5, 'height': 0.4}, 'material': {'young_modulus': 1e5, 'thickness': "
+                         "1e-3, 'density': 200}, 'terms': ['stretch.edge', {'type': 'drag.wind', 'wind': "
+                         "[3, -2, 1.5]}, {'type': 'drag.viscous', 'coefficient': 0.7}]}], 'duration': 1}");
+    for (int still = 0; still < 2; still++) {
+        int count = 0, drags = 0;
+        ck_assert_int_eq(drape_sim_set_wind(s.sim, still ? NULL : swirl, NULL), DRAPE_OK);
+        ck_assert_int_eq(drape_check_derivatives(s.ctx, s.sim->system, 3, rows, &count), DRAPE_OK);
+        for (int i = 0; i < count; i++) {
+            ck_assert_msg(rows[i].pass, "%s of %s is off by %g", rows[i].what, rows[i].term, rows[i].error);
+            drags += strncmp(rows[i].term, "drag.", 5) == 0;
+        }
+        ck_assert_int_ge(drags, 2);
+    }
+    scene_close(&s);
+}
+END_TEST
+
 /*
  * A level sheet stays flat: the shares of weight and wind of a node are the same. Backward Euler's v1 = v0 + h (k u1 |u1| - g),
  * u = w - v, k = rho C/(2 sigma), is for the wind it meets, u1 = u0 + h g - h k u1^2, the positive root
@@ -83,4 +120,5 @@ START_TEST(a_level_sheet_falls_and_flies)
 }
 END_TEST
 
-SUITE("wind", force_on_a_flat_sheet, derivatives_in_a_wind, a_level_sheet_falls_and_flies)
+SUITE("wind", force_on_a_flat_sheet, derivatives_in_a_wind, derivatives_in_the_wind_of_a_host,
+      a_level_sheet_falls_and_flies)

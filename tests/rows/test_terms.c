@@ -446,6 +446,53 @@ START_TEST(dissipation_takes_power)
 }
 END_TEST
 
+/* What Newton takes the forces on measures for, ahead of a correction p: their change is df/dx . p, here a difference
+ * of fourth order whose step makes the error some 1e-13 of the forces' own size. */
+static void check_stress(drape_context *ctx, const variant *v, const drape_model *model)
+{
+    static const double at[4] = {-2, -1, 1, 2}, weight[4] = {1, -8, 8, -1};
+    const double step = 1e-4;
+    const size_t n = (size_t)model->measure_count;
+    if (n == 0)
+        return;
+    state s = make_state(ctx, model, 13, 0.01);
+    drape_system *system = make_system(ctx, model, 1);
+    double *p = drape_arena_take(&s.arena, ctx, s.n, sizeof *p),
+           *x = drape_arena_take(&s.arena, ctx, s.n, sizeof *x);
+    double *here = drape_arena_take(&s.arena, ctx, n, sizeof *here),
+           *ahead = drape_arena_take(&s.arena, ctx, n, sizeof *ahead);
+    double *sum = drape_arena_take(&s.arena, ctx, n, sizeof *sum),
+           *moved = drape_arena_take(&s.arena, ctx, n, sizeof *moved);
+    drape_system_stress(system, &s.point, p, here); /* p is 0 yet */
+    uint64_t seed = 17;
+    for (size_t i = 0; i < s.n; i++)
+        p[i] = 0.1 * random_number(&seed);
+    drape_system_stress(system, &s.point, p, ahead);
+    memset(sum, 0, n * sizeof *sum);
+    memset(s.g, 0, s.n * sizeof *s.g);
+    for (int k = 0; k < 4; k++) {
+        drape_point point = s.point;
+        for (size_t i = 0; i < s.n; i++)
+            x[i] = s.x[i] + at[k] * step * p[i];
+        point.x = x;
+        drape_system_stress(system, &point, s.g, moved);
+        for (size_t i = 0; i < n; i++)
+            sum[i] += weight[k] * moved[i] / (12 * step);
+    }
+    for (size_t i = 0; i < n; i++)
+        sum[i] -= ahead[i] - here[i];
+    const double size = fmax(largest(here, n), largest(ahead, n)), error = largest(sum, n);
+    ck_assert_msg(error <= 1e-7 * size, "%s: %g of %g", name_of(v), error, size);
+    drape_system_destroy(&system);
+    drape_arena_free(&s.arena, ctx);
+}
+
+START_TEST(forces_ahead_agree_with_differences)
+{
+    for_all_variants(check_stress);
+}
+END_TEST
+
 /* ---- Interface ---- */
 
 /* What a row says of one element does not depend on the range it is asked in, nor on what else is wanted. */
@@ -510,12 +557,17 @@ static void check_threads(drape_context *ctx, const variant *v, const drape_mode
     double *g = drape_arena_take(&s.arena, ctx, s.n, sizeof *g);
     double *j1 = drape_arena_take(&s.arena, ctx, values, sizeof *j1);
     double *j2 = drape_arena_take(&s.arena, ctx, values, sizeof *j2);
+    const size_t measures = (size_t)model->measure_count;
+    double *f1 = drape_arena_take(&s.arena, ctx, measures + 1, sizeof *f1);
+    double *f2 = drape_arena_take(&s.arena, ctx, measures + 1, sizeof *f2);
     for (int threads = 1; threads <= 3; threads++) {
         drape_system *system = make_system(ctx, model, threads);
         drape_system_force(system, &s.point, threads == 1 ? s.g : g);
         drape_system_jacobian(system, &s.point, 3600, false, threads == 1 ? j1 : j2);
         ck_assert_msg(threads == 1 || memcmp(g, s.g, s.n * sizeof *g) == 0, "%s: force", name_of(v));
         ck_assert_msg(threads == 1 || memcmp(j1, j2, values * sizeof *j1) == 0, "%s: Jacobian", name_of(v));
+        drape_system_stress(system, &s.point, s.v, threads == 1 ? f1 : f2);
+        ck_assert_msg(threads == 1 || memcmp(f1, f2, measures * sizeof *f1) == 0, "%s: stress", name_of(v));
         drape_system_destroy(&system);
     }
     drape_arena_free(&s.arena, ctx);
@@ -561,5 +613,5 @@ END_TEST
 
 SUITE("terms", rows_are_well_formed, derivatives_agree_with_differences, mistakes_are_found,
       dashpots_need_their_number, energy_does_not_change_with_rigid_motion, no_force_at_rest,
-      dissipation_takes_power, elements_do_not_depend_on_the_range, threads_give_the_same_bits,
-      projected_jacobians_are_positive)
+      dissipation_takes_power, forces_ahead_agree_with_differences, elements_do_not_depend_on_the_range,
+      threads_give_the_same_bits, projected_jacobians_are_positive)

@@ -282,8 +282,13 @@ END_TEST
 START_TEST(friction_on_forces_as_in_boson)
 {
     scene s = flyers("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], 'friction': 0.25}");
-    const drape_verlet_contact rule = {
-        .model = s.model, .rule = DRAPE_VERLET_BOSON, .friction_range = 0.5, .friction_drag = 0.5};
+    drape_motion *motion = NULL;
+    ck_assert_int_eq(drape_motion_create(s.ctx, s.model, &motion), DRAPE_OK);
+    const drape_verlet_contact rule = {.model = s.model,
+                                       .motion = motion,
+                                       .rule = DRAPE_VERLET_BOSON,
+                                       .friction_range = 0.5,
+                                       .friction_drag = 0.5};
     const double x[12] = {0, 0.4, 0, 0, 0.4, 0, 0, 0.4, 0, 0, 0.6, 0};
     const double v[12] = {0.2, 0.1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     double g[12] = {-3, 8, 0, 0, 8, 0, -3, -8, 0, -3, 8, 0};
@@ -291,6 +296,7 @@ START_TEST(friction_on_forces_as_in_boson)
     drape_verlet_rub(&rule, 0, x, v, g);
     for (int i = 0; i < 12; i++)
         ck_assert_double_eq_tol(g[i], expected[i], 1e-15);
+    drape_motion_destroy(&motion);
     scene_close(&s);
 }
 END_TEST

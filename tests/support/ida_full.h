@@ -2,7 +2,7 @@
  * ida_full.h: IDA without Drape's reduction, to compare with: the system of 2 n unknowns as it stands,
  *     y = (x, v),  F = [x' - v ; M v' + g(x, v)],  dF/dy + c_j dF/dy' = [c_j I, -I ; K, D + c_j M],
  * in SUNDIALS' own sparse matrix, factored by SUNDIALS' own KLU. IDA is set as src/integrators/ida.c sets
- * it, so in exact arithmetic both take the same steps. Pins must stand still.
+ * it, with the same test of convergence, so in exact arithmetic both take the same steps. Pins must stand still.
  *
  * SUNDIALS clears a sparse matrix before every Jacobian, indices too. The Jacobian here writes every value
  * and no index, so the matrix's zero is made to do nothing.
@@ -17,6 +17,7 @@
 #include <sunmatrix/sunmatrix_sparse.h>
 
 #include "assemble/system.h"
+#include "integrators/ida_newton.h"
 #include "solvers/sundials_compat.h"
 
 /* As in ida.c. */
@@ -39,6 +40,7 @@ typedef struct ida_full {
     N_Vector y, rate, tolerances;
     SUNMatrix matrix;
     SUNLinearSolver solver;
+    drape_ida_newton newton; /* the ida_full must stay where it is */
     long residuals, jacobians;
 } ida_full;
 
@@ -100,6 +102,7 @@ static inline int ida_full_jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
             *to++ = f->d[k] + (p->row[k] == j ? cj * ida_full_mass(f, j) : 0);
     }
+    drape_ida_newton_forget(&f->newton);
     f->jacobians++;
     return 0;
 }
@@ -129,6 +132,7 @@ static inline void ida_full_close(ida_full *f)
 {
     if (f->ida)
         IDAFree(&f->ida);
+    drape_ida_newton_free(&f->newton);
     if (f->solver)
         SUNLinSolFree(f->solver);
     if (f->matrix)
@@ -181,6 +185,7 @@ static inline bool ida_full_configure(ida_full *f, int max_order, int ordering)
     return !SUNLinSol_KLUSetOrdering(f->solver, ordering) &&
            !IDAInit(f->ida, ida_full_residual, 0, f->y, f->rate) && !IDASetUserData(f->ida, f) &&
            !IDASVtolerances(f->ida, 0, f->tolerances) && !IDASetLinearSolver(f->ida, f->solver, f->matrix) &&
+           drape_ida_newton_attach(&f->newton, f->ida, f->y, f->sun) &&
            !IDASetJacFn(f->ida, ida_full_jacobian) && !IDASetMaxOrd(f->ida, max_order) &&
            !IDASetMaxErrTestFails(f->ida, IDA_FULL_FAILS) && !IDASetMaxConvFails(f->ida, IDA_FULL_FAILS) &&
            !IDASetNonlinConvCoef(f->ida, IDA_FULL_NEWTON_SHARE) &&

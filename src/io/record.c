@@ -1,81 +1,50 @@
 /* record.c: see record.h. */
-#include "report/record.h"
+#include "io/record.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "io/file.h"
 #include "io/scene_copy.h"
-#include "model/scene.h"
 
-#define NPY_MAGIC   "\x93NUMPY\x01"
-#define NPY_HEADER  128 /* as the exporter writes it; any other length is read, too */
-#define SCENE_LIMIT ((off_t)64 << 20)
+#define NPY_MAGIC  "\x93NUMPY\x01"
+#define NPY_HEADER 128 /* as the exporter writes it; any other length is read, too */
 
-/* folder/name; NULL: no memory. */
-static char *path_of(const drape_record *run, const char *name)
+/* ---- Names ---- */
+
+char *drape_record_path(drape_context *ctx, const char *folder, const char *name)
 {
-    size_t size = strlen(run->folder) + strlen(name) + 2;
-    char *path = drape_alloc(run->ctx, size, 1);
+    size_t size = strlen(folder) + strlen(name) + 2;
+    char *path = drape_alloc(ctx, size, 1);
     if (path)
-        snprintf(path, size, "%s/%s", run->folder, name);
+        snprintf(path, size, "%s/%s", folder, name);
     return path;
 }
 
-/* ---- Scene and summary ---- */
-
-/* A whole file with a 0 behind it. */
-static drape_status read_text(const drape_record *run, const char *path, char **out)
+static char *path_of(const drape_record *run, const char *name)
 {
-    struct stat info;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0 || fstat(fd, &info) || !S_ISREG(info.st_mode) || info.st_size > SCENE_LIMIT) {
-        int error = fd < 0 ? errno : EFBIG;
-        if (fd >= 0)
-            close(fd);
-        return drape_file_fail(run->ctx, "read", path, error);
-    }
-    size_t size = (size_t)info.st_size, used = 0;
-    ssize_t count = 1;
-    *out = drape_alloc(run->ctx, size + 1, 1);
-    while (*out && used < size && (count = read(fd, *out + used, size - used)) > 0)
-        used += (size_t)count;
-    drape_status status = !*out       ? DRAPE_E_MEMORY
-                          : count < 0 ? drape_file_fail(run->ctx, "read", path, errno)
-                                      : 0;
-    close(fd);
-    return status;
+    return drape_record_path(run->ctx, run->folder, name);
 }
 
-static drape_status read_scene(drape_record *run)
+drape_status drape_record_scene(drape_context *ctx, const char *folder, char **path)
 {
-    char *path = path_of(run, DRAPE_SCENE_COPY);
-    drape_status status = path ? read_text(run, path, &run->scene_text) : DRAPE_E_MEMORY;
-    if (status == DRAPE_E_FILE)
-        status = drape_fail(run->ctx, DRAPE_E_FILE,
-                            "\"%.500s\" is not the folder of a run: it has no " DRAPE_SCENE_COPY
-                            " that can be read; `drape run SCENE --out DIR` writes one",
-                            run->folder);
-    if (!status)
-        status = drape_model_load(run->ctx, path, &run->model);
-    drape_free(run->ctx, path);
-    return status;
-}
-
-static drape_status read_summary(drape_record *run)
-{
-    char *path = path_of(run, "summary.json");
-    if (!path)
+    *path = drape_record_path(ctx, folder, DRAPE_SCENE_COPY);
+    if (!*path)
         return DRAPE_E_MEMORY;
-    run->summary = json_load_file(path, 0, NULL);
-    drape_free(run->ctx, path);
-    return DRAPE_OK;
+    if (access(*path, R_OK) == 0)
+        return DRAPE_OK;
+    drape_free(ctx, *path);
+    *path = NULL;
+    return drape_fail(ctx, DRAPE_E_FILE,
+                      "\"%.500s\" is not the folder of a run: it has no " DRAPE_SCENE_COPY
+                      " that can be read; `drape run SCENE --out DIR` writes one",
+                      folder);
 }
 
 /* ---- Frames ---- */
@@ -94,14 +63,16 @@ static drape_status read_header(drape_record *run, const char *path)
     ssize_t size = pread(run->positions, header, NPY_HEADER, 0);
     const char *shape =
         size == NPY_HEADER && memcmp(header, NPY_MAGIC, 7) == 0 ? strstr(header + 10, "'shape': (") : NULL;
-    if (!shape || !strstr(header + 10, "'<f8'") ||
+    if (!shape || !strstr(header + 10, "'<f8'") || !strstr(header + 10, "'fortran_order': False") ||
         sscanf(shape, "'shape': (%" SCNd64 ", %" SCNd32 ", 3)", &run->frames, &nodes) != 2)
-        return not_positions(run, path, "it is not an array of float64, frames x nodes x 3, of `drape run`");
+        return not_positions(
+            run, path,
+            "it is not an array of float64, frames x nodes x 3, C order, as `drape run` writes it");
     run->data = 10 + (off_t)((unsigned char)header[8] | (unsigned char)header[9] << 8);
-    if (nodes != run->model->node_count)
+    if (nodes != run->nodes)
         return drape_fail(run->ctx, DRAPE_E_PARSE,
                           "\"%.500s\": it has %" PRId32 " nodes, the scene of the folder has %" PRId32, path,
-                          nodes, run->model->node_count);
+                          nodes, run->nodes);
     if (fstat(run->positions, &info) || run->frames < 1 ||
         (info.st_size - run->data) / (24 * (off_t)nodes) < run->frames)
         return not_positions(run, path, "it has no frame, or less data than its header says");
@@ -116,7 +87,8 @@ static drape_status open_positions(drape_record *run)
     run->positions = open(path, O_RDONLY | O_CLOEXEC);
     drape_status status =
         run->positions < 0
-            ? drape_fail(run->ctx, DRAPE_E_FILE, "cannot read \"%.500s\": %s; the format npy writes it", path,
+            ? drape_fail(run->ctx, DRAPE_E_FILE,
+                         "cannot read \"%.500s\": %s; `drape run --out` writes it with --format npy", path,
                          strerror(errno))
             : read_header(run, path);
     drape_free(run->ctx, path);
@@ -125,7 +97,7 @@ static drape_status open_positions(drape_record *run)
 
 drape_status drape_record_read(const drape_record *run, int64_t frame, double *x)
 {
-    size_t size = 24 * (size_t)run->model->node_count, used = 0;
+    size_t size = 24 * (size_t)run->nodes, used = 0;
     while (used < size) {
         ssize_t count = pread(run->positions, (char *)x + used, size - used,
                               run->data + (off_t)frame * (off_t)size + (off_t)used);
@@ -236,7 +208,9 @@ drape_status drape_record_rows(const drape_record *run, const char *name, const 
     char *path = path_of(run, name);
     if (!path)
         return DRAPE_E_MEMORY;
+    locale_t old = drape_locale_enter();
     drape_status status = read_table(run, path, &t, reader, user, rows);
+    drape_locale_leave(old);
     drape_free(run->ctx, path);
     return status;
 }
@@ -261,34 +235,33 @@ static drape_status read_times(drape_record *run)
         return drape_fail(run->ctx, DRAPE_E_PARSE,
                           "\"%.500s\": energy.csv has no row: the run wrote no frame", run->folder);
     run->frames = rows < run->frames ? rows : run->frames;
+    for (int64_t i = 0; i < run->frames && !status; i++)
+        if (!isfinite(run->times[i]))
+            status = drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": energy.csv has no time in row %" PRId64,
+                                run->folder, i + 1);
     return status;
 }
 
 /* ---- All of it ---- */
 
-drape_status drape_record_open(drape_context *ctx, const char *folder, drape_record *run)
+drape_status drape_record_open(drape_context *ctx, const char *folder, int32_t nodes, drape_record *run)
 {
-    *run = (drape_record){.ctx = ctx, .positions = -1};
+    *run = (drape_record){.ctx = ctx, .positions = -1, .nodes = nodes};
     run->folder = drape_copy_text(ctx, folder);
     if (!run->folder)
         return DRAPE_E_MEMORY;
     for (size_t n = strlen(run->folder); n > 1 && run->folder[n - 1] == '/'; n--)
         run->folder[n - 1] = 0;
-    drape_status status = read_scene(run);
-    if (!status)
-        status = open_positions(run);
-    if (!status)
-        status = read_times(run);
-    return status ? status : read_summary(run);
+    drape_status status = open_positions(run);
+    return status ? status : read_times(run);
 }
 
 void drape_record_close(drape_record *run)
 {
+    if (!run->ctx)
+        return;
     if (run->positions >= 0)
         close(run->positions);
-    json_decref(run->summary);
-    drape_model_destroy(&run->model);
-    drape_free(run->ctx, run->scene_text);
     drape_free(run->ctx, run->times);
     drape_free(run->ctx, run->folder);
     *run = (drape_record){.positions = -1};

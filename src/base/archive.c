@@ -1,0 +1,225 @@
+/* archive.c: see archive.h. */
+#include "base/archive.h"
+
+#include "base/hash.h"
+
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#define FORMAT     1
+#define MAGIC      "DRAPE\r\n\x1a" /* text tools that change line ends break it at its beginning */
+#define MAGIC_SIZE 8
+#define HEAD       (MAGIC_SIZE + sizeof(uint32_t))
+#define TAIL       (2 * sizeof(uint64_t))
+#define MARK_ROOM  32
+
+drape_status drape_archive_fail(drape_archive *a, drape_status status, const char *format, ...)
+{
+    char text[DRAPE_MESSAGE_SIZE / 2];
+    va_list values;
+    if (a->status)
+        return a->status;
+    va_start(values, format);
+    vsnprintf(text, sizeof text, format, values);
+    va_end(values);
+    a->status = status;
+    return drape_fail(a->ctx, status, "%.400s: %s", a->name, text);
+}
+
+void drape_archive_note(drape_archive *a, drape_status status)
+{
+    if (!a->status)
+        a->status = status;
+}
+
+/* ---- Writing ---- */
+
+static void flush(drape_archive *a)
+{
+    if (!a->status && a->used > 0) {
+        a->hash = drape_hash_bytes(a->hash, a->buffer, a->used);
+        drape_archive_note(a, a->write(a->user, a->buffer, a->used));
+    }
+    a->used = 0;
+}
+
+static void put(drape_archive *a, const void *data, size_t size)
+{
+    const unsigned char *from = data;
+    a->size += size;
+    while (size > 0) {
+        size_t room = DRAPE_ARCHIVE_BUFFER - a->used, part = size < room ? size : room;
+        memcpy(a->buffer + a->used, from, part);
+        a->used += part;
+        from += part;
+        size -= part;
+        if (a->used == DRAPE_ARCHIVE_BUFFER)
+            flush(a);
+    }
+}
+
+void drape_archive_write_to(drape_archive *a, drape_context *ctx, const char *name, drape_write *write,
+                            void *user)
+{
+    const uint32_t format = FORMAT;
+    a->ctx = ctx;
+    a->name = name;
+    a->reading = false;
+    a->status = DRAPE_OK;
+    a->write = write;
+    a->user = user;
+    a->hash = DRAPE_HASH_START;
+    a->used = 0;
+    a->size = 0;
+    put(a, MAGIC, MAGIC_SIZE);
+    put(a, &format, sizeof format);
+}
+
+/* ---- Reading ---- */
+
+/* The text is there as far as the size says. */
+static drape_status check_whole(drape_archive *a, size_t size)
+{
+    uint64_t length, hash;
+    uint32_t format;
+    if (size < HEAD + TAIL || memcmp(a->from, MAGIC, MAGIC_SIZE) != 0)
+        return drape_archive_fail(a, DRAPE_E_PARSE, "it is no checkpoint of Drape");
+    memcpy(&length, a->from + size - TAIL, sizeof length);
+    memcpy(&hash, a->from + size - sizeof hash, sizeof hash);
+    if (length != size - TAIL || drape_hash_bytes(DRAPE_HASH_START, a->from, size - sizeof hash) != hash)
+        return drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint is damaged: its checksum is wrong");
+    memcpy(&format, a->from + MAGIC_SIZE, sizeof format);
+    if (format != FORMAT)
+        return drape_archive_fail(a, DRAPE_E_VERSION,
+                                  "the checkpoint is of format %" PRIu32 "; this build reads format %d",
+                                  format, FORMAT);
+    return DRAPE_OK;
+}
+
+drape_status drape_archive_read_from(drape_archive *a, drape_context *ctx, const char *name,
+                                     const void *bytes, size_t size)
+{
+    a->ctx = ctx;
+    a->name = name;
+    a->reading = true;
+    a->status = DRAPE_OK;
+    a->from = bytes;
+    a->size = HEAD;
+    a->end = 0;
+    if (!check_whole(a, size))
+        a->end = size - TAIL;
+    return a->status;
+}
+
+static void get(drape_archive *a, void *data, size_t size)
+{
+    if (size > a->end - a->size) {
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint ends too soon");
+        memset(data, 0, size);
+        return;
+    }
+    memcpy(data, a->from + a->size, size);
+    a->size += size;
+}
+
+/* ---- Parts ---- */
+
+void drape_archive_bytes(drape_archive *a, void *data, size_t size)
+{
+    if (a->status && a->reading)
+        memset(data, 0, size);
+    else if (a->status || size == 0)
+        return;
+    else if (a->reading)
+        get(a, data, size);
+    else
+        put(a, data, size);
+}
+
+void drape_archive_doubles(drape_archive *a, double *values, size_t count)
+{
+    drape_archive_bytes(a, values, count * sizeof *values);
+}
+
+void drape_archive_double(drape_archive *a, double *value)
+{
+    drape_archive_bytes(a, value, sizeof *value);
+}
+
+void drape_archive_int64(drape_archive *a, int64_t *value)
+{
+    drape_archive_bytes(a, value, sizeof *value);
+}
+
+void drape_archive_int32(drape_archive *a, int32_t *value)
+{
+    drape_archive_bytes(a, value, sizeof *value);
+}
+
+void drape_archive_int(drape_archive *a, int *value)
+{
+    drape_archive_bytes(a, value, sizeof *value);
+}
+
+void drape_archive_bool(drape_archive *a, bool *value)
+{
+    unsigned char byte = *value;
+    drape_archive_bytes(a, &byte, 1);
+    *value = byte != 0;
+}
+
+void drape_archive_text(drape_archive *a, char *text, size_t size)
+{
+    int64_t length = a->reading ? 0 : (int64_t)strlen(text);
+    drape_archive_int64(a, &length);
+    if (length < 0 || (uint64_t)length >= size) {
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a text of %" PRId64 " bytes", length);
+        length = 0;
+    }
+    drape_archive_bytes(a, text, (size_t)length);
+    text[length] = 0;
+}
+
+void drape_archive_mark(drape_archive *a, const char *name)
+{
+    char found[MARK_ROOM];
+    snprintf(found, sizeof found, "%s", name);
+    drape_archive_text(a, found, sizeof found);
+    if (!a->status && strcmp(found, name) != 0)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has \"%s\" where \"%s\" is expected", found,
+                           name);
+}
+
+void drape_archive_same(drape_archive *a, const char *what, int64_t value)
+{
+    int64_t there = value;
+    drape_archive_int64(a, &there);
+    if (!a->status && there != value)
+        drape_archive_fail(a, DRAPE_E_ARGUMENT,
+                           "the checkpoint is of something else: %s is %" PRId64 " there, %" PRId64 " here",
+                           what, there, value);
+}
+
+/* ---- The end ---- */
+
+static void put_tail(drape_archive *a)
+{
+    const uint64_t length = a->size;
+    put(a, &length, sizeof length);
+    flush(a);
+    const uint64_t hash = a->hash;
+    put(a, &hash, sizeof hash);
+    flush(a);
+}
+
+drape_status drape_archive_end(drape_archive *a)
+{
+    drape_archive_mark(a, "end");
+    if (!a->reading)
+        put_tail(a);
+    else if (!a->status && a->size != a->end)
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint goes on where it should end");
+    return a->status;
+}

@@ -1,0 +1,272 @@
+/* motion.c: see motion.h. */
+#include "model/motion.h"
+
+#include "model/track.h"
+
+#include <string.h>
+
+/* ---- Making and freeing ---- */
+
+static size_t pinned_count(const drape_model *m)
+{
+    return (size_t)(m->node_count - m->free_count);
+}
+
+static void take_tracks(drape_motion *motion)
+{
+    const drape_model *m = motion->model;
+    motion->moved_count = m->moved_count;
+    for (int32_t i = 0; i < m->node_count; i++)
+        motion->place[i] = -1;
+    for (int32_t i = 0; i < m->moved_count; i++) {
+        motion->moved_node[i] = m->moved_node[i];
+        motion->moved_track[i] = m->moved_track[i];
+        motion->place[m->moved_node[i]] = i;
+    }
+}
+
+drape_status drape_motion_create(drape_context *ctx, const drape_model *model, drape_motion **out)
+{
+    drape_motion *motion = drape_alloc(ctx, 1, sizeof *motion);
+    *out = motion;
+    if (!motion)
+        return DRAPE_E_MEMORY;
+    *motion = (drape_motion){.ctx = ctx, .model = model};
+    motion->moved_node = drape_alloc(ctx, pinned_count(model), sizeof *motion->moved_node);
+    motion->moved_track = drape_alloc(ctx, pinned_count(model), sizeof *motion->moved_track);
+    motion->place = drape_alloc(ctx, (size_t)model->node_count, sizeof *motion->place);
+    motion->pin_way = drape_alloc(ctx, pinned_count(model), sizeof *motion->pin_way);
+    motion->collider_way = drape_alloc(ctx, (size_t)model->collider_count, sizeof *motion->collider_way);
+    if (!motion->moved_node || !motion->moved_track || !motion->place || !motion->pin_way ||
+        !motion->collider_way) {
+        drape_motion_destroy(out);
+        return DRAPE_E_MEMORY;
+    }
+    take_tracks(motion);
+    return DRAPE_OK;
+}
+
+void drape_motion_destroy(drape_motion **motion)
+{
+    drape_motion *m = *motion;
+    if (!m)
+        return;
+    drape_free(m->ctx, m->moved_node);
+    drape_free(m->ctx, m->moved_track);
+    drape_free(m->ctx, m->place);
+    drape_free(m->ctx, m->pin_way);
+    drape_free(m->ctx, m->collider_way);
+    drape_free(m->ctx, m);
+    *motion = NULL;
+}
+
+size_t drape_motion_bytes(const drape_motion *motion)
+{
+    const drape_model *m = motion->model;
+    return sizeof *motion + (size_t)m->node_count * sizeof *motion->place +
+           pinned_count(m) *
+               (sizeof *motion->moved_node + sizeof *motion->moved_track + sizeof *motion->pin_way) +
+           (size_t)m->collider_count * sizeof *motion->collider_way;
+}
+
+/* ---- A way ---- */
+
+/* Hermite's cubic, at s = (t - t0)/(t1 - t0) of the way. */
+static void way_displacement(const drape_way *w, double t, double x[3])
+{
+    if (t <= w->t[0] || t >= w->t[1]) {
+        memcpy(x, w->x[t >= w->t[1]], 3 * sizeof *x);
+        return;
+    }
+    double h = w->t[1] - w->t[0], s = (t - w->t[0]) / h;
+    double rise = s * s * (3 - 2 * s), leave = s * (1 - s) * (1 - s), arrive = s * s * (s - 1);
+    for (int k = 0; k < 3; k++)
+        x[k] = w->x[0][k] + rise * (w->x[1][k] - w->x[0][k]) + h * (leave * w->v[0][k] + arrive * w->v[1][k]);
+}
+
+static void way_velocity(const drape_way *w, double t, double within, double v[3])
+{
+    memset(v, 0, 3 * sizeof *v);
+    if (within < w->t[0] || within >= w->t[1])
+        return;
+    double h = w->t[1] - w->t[0], s = (t - w->t[0]) / h;
+    for (int k = 0; k < 3; k++)
+        v[k] = 6 * s * (1 - s) * (w->x[1][k] - w->x[0][k]) / h + (1 - s) * (1 - 3 * s) * w->v[0][k] +
+               s * (3 * s - 2) * w->v[1][k];
+}
+
+static bool rests(const double v[3])
+{
+    return v[0] == 0 && v[1] == 0 && v[2] == 0;
+}
+
+/* ---- A track or a way ---- */
+
+static void displacement_of(const drape_track *track, const drape_way *way, double t, double x[3])
+{
+    if (way->given)
+        way_displacement(way, t, x);
+    else if (track && track->key_count > 0)
+        drape_track_displacement(track->keys, track->key_count, t, x);
+    else
+        memset(x, 0, 3 * sizeof *x);
+}
+
+static void velocity_of(const drape_track *track, const drape_way *way, double t, double within, double v[3])
+{
+    if (way->given)
+        way_velocity(way, t, within, v);
+    else if (track && track->key_count > 0)
+        drape_track_velocity(track->keys, track->key_count, within, v);
+    else
+        memset(v, 0, 3 * sizeof *v);
+}
+
+/* Its end is one unless it comes to rest there; its beginning unless it goes on as before. */
+static double next_kink_of(const drape_track *track, const drape_way *way, double t, double end)
+{
+    for (int i = 0; way->given && i < 2; i++)
+        if (way->t[i] > t && way->t[i] < end && !(i == 0 ? way->smooth : rests(way->v[1])))
+            end = way->t[i];
+    for (size_t i = 0; !way->given && track && i < track->key_count; i++)
+        if (track->keys[i].time > t && track->keys[i].time < end)
+            end = track->keys[i].time;
+    return end;
+}
+
+static bool at_kink_of(const drape_track *track, const drape_way *way, double t)
+{
+    if (way->given)
+        return (t == way->t[0] && !way->smooth) || (t == way->t[1] && !rests(way->v[1]));
+    for (size_t i = 0; track && i < track->key_count; i++)
+        if (track->keys[i].time == t)
+            return true;
+    return false;
+}
+
+/* The velocity that leads to where it is at t, and whether it is known: not at the key of a track, nor where the host
+ * has changed its mind about the same moment. */
+static bool leading_velocity(const drape_track *track, const drape_way *way, double t, double v[3])
+{
+    if (way->given && (t == way->t[0] || t == way->t[1])) {
+        memcpy(v, way->v[t == way->t[1]], 3 * sizeof *v);
+        return t == way->t[1] || way->smooth;
+    }
+    velocity_of(track, way, t, t, v);
+    return way->given || !track || track->key_count == 0;
+}
+
+static void send(const drape_track *track, drape_way *way, double t, double span, const double from[3],
+                 const double to[3], const double *v)
+{
+    drape_way next = {.given = true, .t = {t, t + span}};
+    memcpy(next.x[0], from, sizeof next.x[0]);
+    memcpy(next.x[1], to, sizeof next.x[1]);
+    next.smooth = leading_velocity(track, way, t, next.v[0]) && v;
+    if (v)
+        memcpy(next.v[1], v, sizeof next.v[1]);
+    for (int k = 0; !v && k < 3; k++)
+        next.v[0][k] = next.v[1][k] = (to[k] - from[k]) / span;
+    *way = next;
+}
+
+/* ---- Pins ---- */
+
+static const drape_track *pin_track(const drape_motion *motion, int32_t i)
+{
+    return motion->moved_track[i] >= 0 ? &motion->model->tracks[motion->moved_track[i]] : NULL;
+}
+
+/* Ways of pins are positions, so that one comes to exactly where the host wants it. */
+static void place_pin(const drape_motion *motion, int32_t i, double t, double x[3])
+{
+    const double *rest = motion->model->rest + 3 * (size_t)motion->moved_node[i];
+    displacement_of(pin_track(motion, i), &motion->pin_way[i], t, x);
+    for (int k = 0; !motion->pin_way[i].given && k < 3; k++)
+        x[k] = rest[k] + x[k];
+}
+
+void drape_motion_place_pins(const drape_motion *motion, double t, double *x)
+{
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        place_pin(motion, i, t, x + 3 * (size_t)motion->moved_node[i]);
+}
+
+void drape_motion_pin_velocity(const drape_motion *motion, int32_t i, double t, double within, double v[3])
+{
+    velocity_of(pin_track(motion, i), &motion->pin_way[i], t, within, v);
+}
+
+void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double span, const double x[3],
+                           const double *v)
+{
+    int32_t i = motion->place[node];
+    if (i < 0) {
+        i = motion->place[node] = motion->moved_count++;
+        motion->moved_node[i] = node;
+        motion->moved_track[i] = -1;
+    }
+    double from[3];
+    place_pin(motion, i, t, from);
+    send(pin_track(motion, i), &motion->pin_way[i], t, span, from, x, v);
+}
+
+void drape_motion_hold_pins(drape_motion *motion, const double *x)
+{
+    for (int32_t i = 0; i < motion->moved_count; i++) {
+        drape_way *way = &motion->pin_way[i];
+        if (!way->given)
+            continue;
+        *way = (drape_way){.given = true, .smooth = true};
+        memcpy(way->x[0], x + 3 * (size_t)motion->moved_node[i], sizeof way->x[0]);
+        memcpy(way->x[1], way->x[0], sizeof way->x[1]);
+    }
+}
+
+/* ---- Colliders ---- */
+
+bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider)
+{
+    return motion->collider_way[collider].given || motion->model->colliders[collider].track.key_count > 0;
+}
+
+void drape_motion_collider(const drape_motion *motion, int32_t collider, double t, double displacement[3])
+{
+    displacement_of(&motion->model->colliders[collider].track, &motion->collider_way[collider], t,
+                    displacement);
+}
+
+void drape_motion_collider_velocity(const drape_motion *motion, int32_t collider, double t, double within,
+                                    double v[3])
+{
+    velocity_of(&motion->model->colliders[collider].track, &motion->collider_way[collider], t, within, v);
+}
+
+void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t, double span,
+                                const double x[3], const double *v)
+{
+    double from[3];
+    drape_motion_collider(motion, collider, t, from);
+    send(&motion->model->colliders[collider].track, &motion->collider_way[collider], t, span, from, x, v);
+}
+
+/* ---- All of them ---- */
+
+double drape_motion_next_kink(const drape_motion *motion, double t, double end)
+{
+    for (int32_t i = 0; i < motion->moved_count; i++)
+        end = next_kink_of(pin_track(motion, i), &motion->pin_way[i], t, end);
+    for (int32_t c = 0; c < motion->model->collider_count; c++)
+        end = next_kink_of(&motion->model->colliders[c].track, &motion->collider_way[c], t, end);
+    return end;
+}
+
+bool drape_motion_at_kink(const drape_motion *motion, double t)
+{
+    bool found = false;
+    for (int32_t i = 0; !found && i < motion->moved_count; i++)
+        found = at_kink_of(pin_track(motion, i), &motion->pin_way[i], t);
+    for (int32_t c = 0; !found && c < motion->model->collider_count; c++)
+        found = at_kink_of(&motion->model->colliders[c].track, &motion->collider_way[c], t);
+    return found;
+}

@@ -1,0 +1,31 @@
+/* normals.c: normals of nodes. The cross product of two edges of a triangle is its normal, as long as twice its area:
+ * their sum around a node is the mean weighted by area. */
+#include "base/vec3.h"
+#include "model/model.h"
+
+#include <math.h>
+#include <string.h>
+
+static void add_triangle(const double *x, const int32_t *node, double *normals)
+{
+    double a[3], b[3], m[3];
+    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], a);
+    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], b);
+    vec3_cross(a, b, m);
+    for (int i = 0; i < 3; i++)
+        vec3_add_scaled(1, m, normals + 3 * (size_t)node[i]);
+}
+
+void drape_model_normals(const drape_model *model, const double *x, double *normals)
+{
+    if (!model || !x || !normals)
+        return;
+    memset(normals, 0, 3 * (size_t)model->node_count * sizeof *normals);
+    for (size_t t = 0; t < (size_t)model->triangle_count; t++)
+        add_triangle(x, model->triangle + 3 * t, normals);
+    for (size_t i = 0; i < (size_t)model->node_count; i++) {
+        double *n = normals + 3 * i, length = vec3_norm(n);
+        for (int k = 0; k < 3; k++)
+            n[k] = length > 0 ? n[k] / length : 0;
+    }
+}

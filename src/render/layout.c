@@ -1,0 +1,161 @@
+/* layout.c: see layout.h. */
+#include "render/layout.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define STRIP  0.25f /* of the picture, at most: for the legend */
+#define MARGIN 20    /* pixels at 720 rows, as all here */
+#define LINE   21
+#define LEGEND 120 /* from its low to its high end, at least */
+#define TAB    112 /* from the beginning of a line to what stands behind its tab */
+
+static const float veil[4] = {1, 1, 1, 0.62f};
+
+/* ---- Where panels are ---- */
+
+static void legend_title(const drape_shading *shading, char *title, size_t size)
+{
+    snprintf(title, size, "%s [%s]", shading->field->name, shading->field->shown_unit);
+}
+
+/* Pixels at the right that belong to the legend. */
+static int strip_of(const drape_overlay *o, const drape_picture *picture)
+{
+    char title[80];
+    if (!picture->shading->field)
+        return 0;
+    legend_title(picture->shading, title, sizeof title);
+    float wide = drape_overlay_legend_width(o, title) + MARGIN * o->unit;
+    return (int)fminf(wide, STRIP * (float)o->width);
+}
+
+static int columns_of(int panel_count)
+{
+    return panel_count <= 3 ? panel_count : (int)ceil(sqrt(panel_count));
+}
+
+drape_rectangle drape_layout_inner(const drape_overlay *overlay, const drape_picture *picture, int panel)
+{
+    int count = picture->panel_count, columns = columns_of(count), rows = (count + columns - 1) / columns;
+    int column = panel % columns, row = rows - 1 - panel / columns;
+    int left = (int)picture->column, width = overlay->width - left - strip_of(overlay, picture);
+    drape_rectangle b = {.left = left + column * width / columns, .bottom = row * overlay->height / rows};
+    b.width = left + (column + 1) * width / columns - b.left;
+    b.height = (row + 1) * overlay->height / rows - b.bottom;
+    return b;
+}
+
+drape_rectangle drape_layout_whole(const drape_overlay *overlay, const drape_picture *picture, int panel)
+{
+    drape_rectangle b = drape_layout_inner(overlay, picture, panel);
+    int columns = columns_of(picture->panel_count), right = b.left + b.width;
+    if (panel % columns == columns - 1)
+        right = overlay->width;
+    if (panel % columns == 0)
+        b.left = 0;
+    b.width = right - b.left;
+    return b;
+}
+
+/* ---- What lies flat ---- */
+
+static void put_legend(drape_overlay *o, const drape_picture *picture)
+{
+    const drape_field_ops *field = picture->shading->field;
+    char title[80];
+    if (!field)
+        return;
+    legend_title(picture->shading, title, sizeof title);
+    drape_overlay_legend(o, (float)o->width - 22 * o->unit, (float)o->height - 26 * o->unit,
+                         fminf(fmaxf(0.36f * (float)o->height, LEGEND * o->unit), 0.6f * (float)o->height),
+                         title, field->shown * picture->low, field->shown * picture->high);
+}
+
+static void put_labels(drape_overlay *o, const drape_picture *picture)
+{
+    for (int i = 0; i < picture->panel_count; i++) {
+        const drape_rectangle b = drape_layout_whole(o, picture, i);
+        const char *label = picture->panels[i].label;
+        float top = (float)(o->height - b.bottom - b.height), x = (float)b.left + MARGIN * o->unit;
+        if (b.left > 0)
+            drape_overlay_box(o, (float)b.left - o->unit, top, 2 * o->unit, (float)b.height,
+                              (const float[]){1, 1, 1, 0.9f});
+        if (!label)
+            continue;
+        drape_overlay_box(o, x - 9 * o->unit, top + 12 * o->unit,
+                          drape_font_width(&o->font, label) + 18 * o->unit, 26 * o->unit, veil);
+        drape_overlay_text(o, x, top + 30 * o->unit, DRAPE_LEFT, drape_ink, label);
+    }
+}
+
+/* Text from x on, broken at blanks so that it ends before right; how many lines it took. Without a colour it is not
+ * put. */
+static int put_wrapped(drape_overlay *o, float x, float y, float right, const float *colour, const char *text)
+{
+    int lines = 0;
+    while (*text || lines == 0) {
+        char line[200] = "";
+        size_t length = 0;
+        for (size_t next = strcspn(text, " ");; next += 1 + strcspn(text + next + 1, " ")) {
+            char more[sizeof line];
+            snprintf(more, sizeof more, "%.*s", (int)next, text);
+            if (length > 0 && x + drape_font_width(&o->font, more) > right)
+                break;
+            memcpy(line, more, sizeof line);
+            length = next;
+            if (!text[next])
+                break;
+        }
+        if (colour)
+            drape_overlay_text(o, x, y + (float)lines * LINE * o->unit, DRAPE_LEFT, colour, line);
+        text += length;
+        text += strspn(text, " ");
+        lines++;
+    }
+    return lines;
+}
+
+/* What stands before a tab is the name of what stands behind it. */
+static int put_line(drape_overlay *o, float x, float y, float right, bool put, const char *text)
+{
+    const char *tab = strchr(text, '\t');
+    char name[80];
+    if (!tab)
+        return put_wrapped(o, x, y, right, put ? drape_ink : NULL, text);
+    snprintf(name, sizeof name, "%.*s", (int)(tab - text), text);
+    if (put)
+        drape_overlay_text(o, x, y, DRAPE_LEFT, drape_faint, name);
+    return put_wrapped(o, x + TAB * o->unit, y, right, put ? drape_ink : NULL, tab + 1);
+}
+
+static int put_all(drape_overlay *o, const drape_picture *picture, bool put)
+{
+    float left = MARGIN * o->unit, right = picture->column > 0 ? picture->column : (float)o->width - left;
+    int count = 0;
+    for (int i = 0; picture->lines[i]; i++)
+        count += put_line(o, left, (30 + (float)count * LINE) * o->unit, right, put, picture->lines[i]);
+    return count;
+}
+
+/* Over a veil, so that they are read over cloth, too. */
+static void put_lines(drape_overlay *o, const drape_picture *picture)
+{
+    if (!picture->lines || !picture->lines[0])
+        return;
+    float wide = picture->column > 0 ? picture->column : (float)o->width;
+    drape_overlay_box(o, 10 * o->unit, 9 * o->unit, wide - 4 * o->unit,
+                      ((float)put_all(o, picture, false) * LINE + 12) * o->unit, veil);
+    put_all(o, picture, true);
+}
+
+void drape_layout_put(drape_overlay *overlay, const drape_picture *picture)
+{
+    put_legend(overlay, picture);
+    put_labels(overlay, picture);
+    put_lines(overlay, picture);
+    if (picture->caption)
+        drape_overlay_text(overlay, MARGIN * overlay->unit, (float)overlay->height - 22 * overlay->unit,
+                           DRAPE_LEFT, drape_faint, picture->caption);
+}

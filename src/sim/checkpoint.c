@@ -1,0 +1,244 @@
+/*
+ * checkpoint.c: a sim as bytes, from which another sim of the same model goes on with the same bits. What is archived is
+ * what the next steps depend on; all else follows from it, or from the model.
+ *
+ * A sim that is restored is made anew beside the present one and takes its place when all went well: nothing of what the
+ * present one kept can have a part in it, and a failure at any moment leaves the present one as it is.
+ */
+#include "base/finite.h"
+#include "sim/sim.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#define MOST_LEVELS 60
+#define LONGEST     1e9 /* [s] as the duration of a scene */
+#define REASON_ROOM 64
+#define MEMORY_NAME "checkpoint in memory"
+
+/* ---- States ---- */
+
+static void archive_state(const drape_model *m, drape_state *state, drape_archive *a)
+{
+    size_t n = 3 * (size_t)m->node_count;
+    drape_archive_double(a, &state->t);
+    drape_archive_doubles(a, state->x, n);
+    drape_archive_doubles(a, state->v, n);
+    drape_archive_doubles(a, state->internal, (size_t)m->internal_count);
+    if (drape_archive_is_reading(a) &&
+        !(isfinite(state->t) && drape_all_finite(state->x, n) && drape_all_finite(state->v, n)))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a state that is not finite");
+}
+
+static bool is_place(int index, int least, int count)
+{
+    return index >= least && index < count;
+}
+
+/* The present one, and those before it that are still asked for; what the next attempt writes to is left out. */
+static void archive_states(drape_sim *sim, drape_archive *a)
+{
+    const int count = 2 + sim->chosen.controller->pasts;
+    int *const places[] = {&sim->now, &sim->next, &sim->before, &sim->past[0], &sim->past[1]};
+    drape_archive_mark(a, "states");
+    for (int i = 0; i < 5; i++) {
+        drape_archive_int(a, places[i]);
+        if (drape_archive_good(a) && !is_place(*places[i], i < 2 ? 0 : -1, count))
+            drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a state %d of %d", *places[i], count);
+    }
+    if (drape_archive_good(a) &&
+        (sim->next == sim->now || sim->next == sim->past[0] || sim->next == sim->past[1]))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no state to step to");
+    for (int i = 0; i < count && drape_archive_good(a); i++)
+        if (i == sim->now || i == sim->before || i == sim->past[0] || i == sim->past[1])
+            archive_state(sim->model, &sim->states[i], a);
+}
+
+/* ---- What the driver keeps ---- */
+
+/* Of what ends a loop over steps or frames. */
+static bool is_schedule(const drape_schedule *s)
+{
+    return s->level >= 0 && s->level <= MOST_LEVELS && s->part >= 0 && s->part < (int64_t)1 << s->level &&
+           s->count >= 0 && !(s->dt < 0) && !isnan(s->dt);
+}
+
+static void archive_schedule(drape_schedule *s, drape_archive *a)
+{
+    double *const times[] = {
+        &s->end,          &s->now,          &s->dt, &s->limit, &s->tried, &s->start, &s->interval_start,
+        &s->interval_end, &s->interval_size};
+    drape_archive_mark(a, "schedule");
+    for (size_t i = 0; i < sizeof times / sizeof *times; i++)
+        drape_archive_double(a, times[i]);
+    drape_archive_int64(a, &s->count);
+    drape_archive_int(a, &s->level);
+    drape_archive_int64(a, &s->part);
+    drape_archive_bool(a, &s->stepped);
+    drape_archive_bool(a, &s->cut);
+    if (drape_archive_good(a) && !is_schedule(s))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step that could come next");
+}
+
+static void archive_energy(drape_energy *e, drape_archive *a)
+{
+    double *const parts[] = {&e->kinetic, &e->elastic,    &e->gravity,
+                             &e->contact, &e->dissipated, &e->numerical};
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++)
+        drape_archive_double(a, parts[i]);
+}
+
+static void archive_audit(drape_sim *sim, drape_archive *a)
+{
+    drape_audit *audit = &sim->audit;
+    double *const sums[] = {&audit->start,   &audit->start_gravity, &audit->dissipated, &audit->pin_work,
+                            &audit->offered, &audit->lowest,        &audit->best};
+    drape_archive_mark(a, "audit");
+    for (size_t i = 0; i < sizeof sums / sizeof *sums; i++)
+        drape_archive_double(a, sums[i]);
+    drape_archive_bool(a, &sim->energy_known);
+    archive_energy(&sim->energy, a);
+}
+
+/* A reason is static text where it was counted; where it is read, the sim keeps it. */
+static void archive_reason(drape_sim *sim, drape_reason *reason, drape_archive *a)
+{
+    char text[REASON_ROOM];
+    snprintf(text, sizeof text, "%s", a->reading ? "" : reason->reason);
+    drape_archive_text(a, text, sizeof text);
+    drape_archive_int64(a, &reason->count);
+    if (!a->reading)
+        return;
+    reason->reason = drape_arena_text(&sim->arena, sim->ctx, text);
+    if (!reason->reason)
+        drape_archive_note(a, DRAPE_E_MEMORY);
+}
+
+static void archive_reasons(drape_sim *sim, drape_archive *a)
+{
+    int count = sim->reason_count;
+    drape_archive_int(a, &count);
+    if (drape_archive_good(a) && !is_place(count, 0, DRAPE_MAX_REASONS + 1))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has %d reasons for rejections", count);
+    for (int i = 0; i < count && drape_archive_good(a); i++) {
+        archive_reason(sim, &sim->reasons[i], a);
+        sim->reason_count = drape_archive_good(a) ? i + 1 : i;
+    }
+}
+
+/* Between the frames of the step that led here; rows without time have none but the first. */
+static bool is_next_frame(const drape_sim *sim)
+{
+    const drape_state *before = &sim->states[sim->before >= 0 ? sim->before : sim->now];
+    double least = before->t * sim->frame_rate - 2, most = drape_sim_state(sim)->t * sim->frame_rate + 2,
+           next = (double)sim->next_frame;
+    return next >= 0 && next <= most && (next >= least || sim->chosen.integrator->timeless);
+}
+
+static void archive_statistics(drape_sim *sim, drape_archive *a)
+{
+    drape_statistics *s = &sim->statistics;
+    int64_t *const counts[] = {&s->steps_accepted, &s->steps_rejected, &s->steps_unconverged, &sim->attempts,
+                               &sim->next_frame};
+    double *const numbers[] = {&s->h_min,      &s->h_max,      &s->wall_setup,
+                               &s->wall_steps, &s->strain_min, &s->strain_max};
+    drape_archive_mark(a, "statistics");
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
+        drape_archive_int64(a, counts[i]);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        drape_archive_double(a, numbers[i]);
+    archive_reasons(sim, a);
+    if (drape_archive_is_reading(a) && !is_next_frame(sim))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no frame that could come next");
+}
+
+static void archive_realtime(drape_sim *sim, drape_archive *a)
+{
+    drape_realtime_memory *m = &sim->realtime;
+    double *const numbers[] = {&m->dt, &m->longest, &m->debt, &m->dropped, &m->cap};
+    int efforts = sim->chosen.integrator->efforts < 1 ? 1 : sim->chosen.integrator->efforts;
+    drape_archive_mark(a, "realtime");
+    drape_archive_bool(a, &m->active);
+    drape_archive_bool(a, &m->stretched);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        drape_archive_double(a, numbers[i]);
+    drape_archive_doubles(a, m->cost, DRAPE_MAX_EFFORTS);
+    drape_archive_int(a, &m->effort);
+    if (drape_archive_good(a) && !is_place(m->effort, 0, efforts))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an effort %d of %d", m->effort, efforts);
+    if (drape_archive_good(a) && m->active &&
+        !(m->dt > 0 && m->longest >= m->dt && m->longest <= LONGEST && m->debt >= 0 &&
+          m->debt <= m->longest && m->cap > 0))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step for a budget");
+    if (drape_archive_is_reading(a) && sim->chosen.integrator->set_effort)
+        sim->chosen.integrator->set_effort(sim->integrator, m->effort);
+}
+
+void drape_sim_archive(drape_sim *sim, drape_archive *a)
+{
+    archive_states(sim, a);
+    drape_archive_doubles(a, sim->scratch, sizeof sim->scratch / sizeof *sim->scratch);
+    archive_schedule(&sim->schedule, a);
+    archive_audit(sim, a);
+    archive_statistics(sim, a);
+    archive_realtime(sim, a);
+    drape_system_archive(sim->system, a);
+    drape_archive_mark(a, "integrator");
+    if (drape_archive_good(a))
+        sim->chosen.integrator->archive(sim->integrator, a);
+}
+
+/* ---- For hosts ---- */
+
+/* The contents change places, but for those who look on. */
+static void take_place(drape_sim *sim, drape_sim *made)
+{
+    drape_sim old = *sim;
+    *sim = *made;
+    for (int i = 0; i < old.observer_count; i++) {
+        sim->observers[i] = old.observers[i];
+        sim->observer_users[i] = old.observer_users[i];
+    }
+    sim->observer_count = old.observer_count;
+    *made = old;
+}
+
+drape_status drape_sim_read(drape_sim *sim, drape_archive *a)
+{
+    drape_sim *made = NULL;
+    drape_sim_archive_identity(sim, a);
+    if (drape_archive_good(a))
+        drape_archive_note(a, drape_sim_create_like(sim, &made));
+    if (drape_archive_good(a))
+        drape_sim_archive(made, a);
+    if (drape_archive_good(a))
+        take_place(sim, made);
+    drape_sim_destroy(&made);
+    return a->status;
+}
+
+drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, void *user)
+{
+    drape_archive a;
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    if (!write)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_save_to: there is no function to write");
+    drape_archive_write_to(&a, sim->ctx, MEMORY_NAME, write, user);
+    drape_sim_archive_identity(sim, &a);
+    drape_sim_archive(sim, &a);
+    return drape_archive_end(&a);
+}
+
+/* What a run adds for its files is none of the sim's. */
+drape_status drape_sim_restore_from(drape_sim *sim, const void *bytes, size_t size)
+{
+    drape_archive a;
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    if (!bytes)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_restore_from: there are no bytes");
+    if (!drape_archive_read_from(&a, sim->ctx, MEMORY_NAME, bytes, size))
+        drape_sim_read(sim, &a);
+    return a.status;
+}

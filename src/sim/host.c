@@ -1,0 +1,219 @@
+/* host.c: what a host moves while a sim runs: pins, colliders, forces, the medium. */
+#include "base/finite.h"
+#include "sim/sim.h"
+
+#include <math.h>
+
+#define LONGEST  1e9 /* [s] as the duration of a scene */
+#define FARTHEST 1e9 /* [m], [m/s], as the keys of a track */
+
+static bool is_way(const double *x, const double *v)
+{
+    bool good = x != NULL;
+    for (int k = 0; good && k < 3; k++)
+        good = fabs(x[k]) <= FARTHEST && (!v || fabs(v[k]) <= FARTHEST);
+    return good;
+}
+
+static drape_status check_seconds(const drape_sim *sim, const char *function, double seconds)
+{
+    double t = drape_sim_state(sim)->t;
+    if (seconds > 0 && seconds <= LONGEST && t + seconds > t)
+        return DRAPE_OK;
+    return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: seconds = %g; it is in (0, %g], and moves the time",
+                      function, seconds, LONGEST);
+}
+
+/* ---- Pins ---- */
+
+static drape_status check_pin(const drape_sim *sim, int32_t node, const double *x, const double *v)
+{
+    const drape_model *m = sim->model;
+    if (node < 0 || node >= m->node_count)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_move_pins: node %d; there are 0 to %d",
+                          (int)node, (int)m->node_count - 1);
+    if (!m->pinned[node])
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "drape_sim_move_pins: node %d is free; only pinned ones are moved", (int)node);
+    if (!is_way(x, v))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "drape_sim_move_pins: position and velocity of node %d must be within %g m and m/s",
+                          (int)node, FARTHEST);
+    return DRAPE_OK;
+}
+
+drape_status drape_sim_move_pins(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
+                                 const double *positions, const double *velocities)
+{
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    if (count < 0 || (count > 0 && (!nodes || !positions)))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "drape_sim_move_pins: %d nodes, but no list of them or of positions", (int)count);
+    drape_status status = check_seconds(sim, "drape_sim_move_pins", seconds);
+    for (int32_t i = 0; !status && i < count; i++)
+        status = check_pin(sim, nodes[i], positions + 3 * (size_t)i,
+                           velocities ? velocities + 3 * (size_t)i : NULL);
+    for (int32_t i = 0; !status && i < count; i++)
+        drape_motion_send_pin(drape_system_steer(sim->system), nodes[i], drape_sim_state(sim)->t, seconds,
+                              positions + 3 * (size_t)i, velocities ? velocities + 3 * (size_t)i : NULL);
+    return status;
+}
+
+/* ---- Colliders ---- */
+
+static drape_status check_collider(const drape_sim *sim, const char *function, int32_t collider)
+{
+    if (collider >= 0 && collider < sim->model->collider_count)
+        return DRAPE_OK;
+    return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: collider %d; the model has %d", function,
+                      (int)collider, (int)sim->model->collider_count);
+}
+
+drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double seconds,
+                                     const double displacement[3], const double *velocity)
+{
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    drape_status status = check_collider(sim, "drape_sim_move_collider", collider);
+    if (!status)
+        status = check_seconds(sim, "drape_sim_move_collider", seconds);
+    if (!status && !is_way(displacement, velocity))
+        status = drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                            "drape_sim_move_collider: displacement and velocity must be within %g m and m/s",
+                            FARTHEST);
+    if (!status)
+        drape_motion_send_collider(drape_system_steer(sim->system), collider, drape_sim_state(sim)->t,
+                                   seconds, displacement, velocity);
+    return status;
+}
+
+drape_collider_motion drape_sim_collider(const drape_sim *sim, int32_t collider)
+{
+    if (!sim || collider < 0 || collider >= sim->model->collider_count)
+        return (drape_collider_motion){.name = "", .type = ""};
+    double t = drape_sim_state(sim)->t;
+    const drape_motion *motion = drape_system_motion(sim->system);
+    drape_collider_motion at = drape_model_collider(sim->model, collider, t);
+    drape_motion_collider(motion, collider, t, at.displacement);
+    drape_motion_collider_velocity(motion, collider, t, t, at.velocity);
+    return at;
+}
+
+/* ---- Forces ---- */
+
+/* Rows that go by how forces went before start anew; others take them as they come. */
+static void forces_jump(drape_sim *sim)
+{
+    if (sim->chosen.integrator->smooth_forces)
+        sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
+}
+
+drape_status drape_sim_push(drape_sim *sim, const double *forces)
+{
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    if (forces && !drape_all_finite(forces, 3 * (size_t)sim->model->node_count))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_push: a force is not finite");
+    drape_system_set_push(sim->system, forces);
+    forces_jump(sim);
+    return DRAPE_OK;
+}
+
+drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *field, void *user)
+{
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    if (field && !drape_wind_is_felt(sim->model))
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "drape_sim_set_wind: no term of the model is in a medium, as drag.wind is");
+    drape_status status = drape_system_set_wind(sim->system, field, user);
+    if (!status)
+        forces_jump(sim);
+    return status;
+}
+
+/* ---- Reading forces ---- */
+
+/* The present state; colliders move as in the last step. */
+static drape_status place(drape_sim *sim, drape_point *point)
+{
+    const drape_state *now = drape_sim_state(sim);
+    double before = sim->before >= 0 ? sim->states[sim->before].t : now->t;
+    *point = (drape_point){
+        .x = now->x, .v = now->v, .internal = now->internal, .t = now->t, .span = {before, now->t}};
+    return sim->before < 0 ? drape_system_begin(sim->system, now) : DRAPE_OK; /* else a step has */
+}
+
+/* That somebody cancels the next advance is no fault of reading. */
+static drape_status read_status(const drape_sim *sim)
+{
+    drape_status status = drape_system_status(sim->system);
+    return status == DRAPE_E_STOPPED ? DRAPE_OK : status;
+}
+
+drape_status drape_sim_reactions(drape_sim *sim, double *forces)
+{
+    drape_point point;
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    if (!forces)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_reactions: there is no array");
+    drape_status status = place(sim, &point);
+    if (status)
+        return status;
+    drape_system_force(sim->system, &point, forces);
+    for (int32_t f = 0; f < sim->model->free_count; f++)
+        for (int k = 0; k < 3; k++)
+            forces[3 * (size_t)sim->model->node_of_free[f] + (size_t)k] = 0;
+    return read_status(sim);
+}
+
+static drape_status check_has_contact(const drape_sim *sim, const char *function)
+{
+    const drape_model *m = sim->model;
+    if (!sim->chosen.integrator->projects_contact || (m->collider_count == 0 && !m->contact.self))
+        return DRAPE_OK;
+    return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                      "%s: the integrator \"%s\" moves nodes out of what they meet and has no force",
+                      function, sim->chosen.integrator->name);
+}
+
+drape_status drape_sim_contact_forces(drape_sim *sim, double *forces)
+{
+    drape_point point;
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    if (!forces)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_contact_forces: there is no array");
+    drape_status status = check_has_contact(sim, "drape_sim_contact_forces");
+    if (!status)
+        status = place(sim, &point);
+    if (status)
+        return status;
+    drape_system_contact_part(sim->system, &point, true, forces, NULL);
+    for (size_t i = 0; i < 3 * (size_t)sim->model->node_count; i++)
+        forces[i] = forces[i] != 0 ? -forces[i] : 0;
+    return read_status(sim);
+}
+
+drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3])
+{
+    drape_point point;
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    if (!force)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_force: there is no array");
+    drape_status status = check_collider(sim, "drape_sim_collider_force", collider);
+    if (!status)
+        status = check_has_contact(sim, "drape_sim_collider_force");
+    if (!status)
+        status = place(sim, &point);
+    if (status)
+        return status;
+    drape_system_contact_part(sim->system, &point, true, sim->read, NULL);
+    const double *on = drape_system_on_colliders(sim->system);
+    for (int k = 0; k < 3; k++)
+        force[k] = on && on[3 * collider + k] != 0 ? -on[3 * collider + k] : 0;
+    return read_status(sim);
+}

@@ -1,0 +1,191 @@
+/*
+ * identity.c: what a checkpoint is of. The same model is the same numbers after compile, however the scene was written:
+ * names, comments, files and the run's duration have no part. The same build has the same solvers: bits depend on them.
+ */
+#include "base/hash.h"
+#include "sim/sim.h"
+#include "solvers/linear.h"
+#include "solvers/sundials_compat.h"
+
+#include <inttypes.h>
+#include <klu.h>
+#include <stdio.h>
+#include <string.h>
+
+#define ROW_ROOM   64
+#define BUILD_ROOM 320
+
+#ifdef DRAPE_METIS
+#define METIS " metis"
+#else
+#define METIS ""
+#endif
+
+/* ---- The model ---- */
+
+static uint64_t add(uint64_t hash, const void *data, size_t size)
+{
+    return size > 0 ? drape_hash_bytes(hash, data, size) : hash;
+}
+
+static uint64_t add_integer(uint64_t hash, int64_t value)
+{
+    return add(hash, &value, sizeof value);
+}
+
+static uint64_t add_doubles(uint64_t hash, const double *values, size_t count)
+{
+    return add(hash, values, count * sizeof *values);
+}
+
+static uint64_t add_text(uint64_t hash, const char *text)
+{
+    return add(hash, text, strlen(text) + 1);
+}
+
+static uint64_t add_track(uint64_t hash, const drape_track *track)
+{
+    hash = add_integer(hash, (int64_t)track->key_count);
+    for (size_t k = 0; k < track->key_count; k++) {
+        hash = add_doubles(hash, &track->keys[k].time, 1);
+        hash = add_doubles(hash, track->keys[k].displacement, 3);
+    }
+    return hash;
+}
+
+static uint64_t add_term(uint64_t hash, const drape_term *term)
+{
+    const drape_elements *el = &term->elements;
+    const int64_t sizes[] = {term->cloth, el->count, el->nodes, el->rest_count, term->law_count};
+    size_t count = (size_t)el->count;
+    hash = add_text(hash, term->ops->name);
+    hash = add(hash, sizes, sizeof sizes);
+    hash = add_doubles(hash, term->params, DRAPE_MAX_PARAMS);
+    hash = add(hash, el->node, count * (size_t)el->nodes * sizeof *el->node);
+    hash = add_doubles(hash, el->rest, count * (size_t)el->rest_count);
+    return add_doubles(hash, term->damping, term->damping ? count : 0);
+}
+
+static uint64_t add_collider(uint64_t hash, const drape_collider *collider)
+{
+    const drape_collider_shape *s = &collider->shape;
+    const int64_t sizes[] = {s->point_count, s->segment_count, s->triangle_count, s->inscribed};
+    hash = add_text(hash, collider->ops->name);
+    hash = add_doubles(hash, collider->values, DRAPE_MAX_PARAMS);
+    hash = add(hash, sizes, sizeof sizes);
+    hash = add_doubles(hash, s->point, 3 * (size_t)s->point_count);
+    hash = add(hash, s->segment, 2 * (size_t)s->segment_count * sizeof *s->segment);
+    hash = add(hash, s->triangle, 3 * (size_t)s->triangle_count * sizeof *s->triangle);
+    hash = add_doubles(hash, &s->radius, 1);
+    hash = add_doubles(hash, &collider->friction, 1);
+    return add_track(hash, &collider->track);
+}
+
+static uint64_t add_contact(uint64_t hash, const drape_contact_def *c)
+{
+    const double values[] = {c->distance, c->stiffness,      c->friction_velocity, c->lagged,
+                             c->self,     c->self_thickness, c->self_friction};
+    return add_doubles(hash, values, sizeof values / sizeof *values);
+}
+
+static uint64_t add_nodes(uint64_t hash, const drape_model *m)
+{
+    size_t nodes = (size_t)m->node_count;
+    hash = add_doubles(hash, m->rest, 3 * nodes);
+    hash = add_doubles(hash, m->velocity, 3 * nodes);
+    hash = add_doubles(hash, m->mass, nodes);
+    hash = add(hash, m->triangle, 3 * (size_t)m->triangle_count * sizeof *m->triangle);
+    hash = add_doubles(hash, m->edge_length, (size_t)m->edge_count);
+    hash = add(hash, m->pinned, nodes);
+    hash = add(hash, m->moved_node, (size_t)m->moved_count * sizeof *m->moved_node);
+    return add(hash, m->moved_track, (size_t)m->moved_count * sizeof *m->moved_track);
+}
+
+static uint64_t model_hash(const drape_model *m)
+{
+    const int64_t sizes[] = {m->cloth_count, m->term_count,  m->node_count,     m->triangle_count,
+                             m->edge_count,  m->moved_count, m->collider_count, m->internal_count};
+    uint64_t hash = add(DRAPE_HASH_START, sizes, sizeof sizes);
+    hash = add_nodes(hash, m);
+    for (int32_t i = 0; i < m->track_count; i++)
+        hash = add_track(hash, &m->tracks[i]);
+    for (int32_t i = 0; i < m->term_count; i++)
+        hash = add_term(hash, &m->terms[i]);
+    for (int32_t i = 0; i < m->collider_count; i++)
+        hash = add_collider(hash, &m->colliders[i]);
+    return add_contact(add_doubles(hash, m->gravity, 3), &m->contact);
+}
+
+/* ---- The choices ---- */
+
+/* Values of parameters that nobody set may be NaN, of the same bits everywhere. */
+static uint64_t choices_hash(const drape_sim *sim)
+{
+    const drape_chosen *c = &sim->chosen;
+    const drape_param *of_integrator = c->integrator->params, *of_controller = c->controller->params;
+    uint64_t hash = add_doubles(DRAPE_HASH_START, &sim->frame_rate, 1);
+    hash = add_doubles(hash, c->integrator_values,
+                       (size_t)drape_param_place(of_integrator, c->integrator->param_count));
+    return add_doubles(hash, c->controller_values,
+                       (size_t)drape_param_place(of_controller, c->controller->param_count));
+}
+
+/* ---- The build ---- */
+
+static void describe_build(char *text, size_t size)
+{
+    size_t used = (size_t)snprintf(text, size, "Drape %s, compiler %s, SUNDIALS %s, KLU %d.%d.%d%s, solvers",
+                                   drape_version(), __VERSION__, SUNDIALS_VERSION, KLU_MAIN_VERSION,
+                                   KLU_SUB_VERSION, KLU_SUBSUB_VERSION, METIS);
+    for (int i = 0; drape_linears_words[i] && used < size; i++)
+        used += (size_t)snprintf(text + used, size - used, " %s", drape_linears_words[i]);
+}
+
+static void archive_build(drape_archive *a)
+{
+    char here[BUILD_ROOM], there[BUILD_ROOM];
+    describe_build(here, sizeof here);
+    memcpy(there, here, sizeof there);
+    drape_archive_text(a, there, sizeof there);
+    if (drape_archive_good(a) && strcmp(there, here) != 0)
+        drape_archive_fail(a, DRAPE_E_VERSION, "the checkpoint is of another build (%.150s); this is %.150s",
+                           there, here);
+}
+
+static void archive_row(drape_archive *a, const char *what, const char *name)
+{
+    char there[ROW_ROOM];
+    snprintf(there, sizeof there, "%s", name);
+    drape_archive_text(a, there, sizeof there);
+    if (drape_archive_good(a) && strcmp(there, name) != 0)
+        drape_archive_fail(a, DRAPE_E_ARGUMENT, "the checkpoint is of the %s \"%.60s\"; here it is \"%s\"",
+                           what, there, name);
+}
+
+static void archive_hash(drape_archive *a, const char *what, uint64_t hash)
+{
+    uint64_t there = hash;
+    drape_archive_bytes(a, &there, sizeof there);
+    if (drape_archive_good(a) && there != hash)
+        drape_archive_fail(a, DRAPE_E_ARGUMENT,
+                           "the checkpoint is of %s: %016" PRIx64 " there, %016" PRIx64 " here", what, there,
+                           hash);
+}
+
+void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
+{
+    const drape_model *m = sim->model;
+    if (!sim->identity_known) {
+        sim->model_hash = model_hash(m);
+        sim->choices_hash = choices_hash(sim);
+        sim->identity_known = true;
+    }
+    drape_archive_mark(a, "identity");
+    archive_build(a);
+    archive_row(a, "integrator", sim->chosen.integrator->name);
+    archive_row(a, "controller", sim->chosen.controller->name);
+    drape_archive_same(a, "the number of nodes", m->node_count);
+    drape_archive_same(a, "the number of free nodes", m->free_count);
+    archive_hash(a, "another model", sim->model_hash);
+    archive_hash(a, "other settings of integrator, controller or frame rate", sim->choices_hash);
+}

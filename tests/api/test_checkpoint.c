@@ -1,0 +1,162 @@
+/* test_checkpoint.c: a host that saves a sim and restores it: the public header alone. */
+#include <pthread.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "drape/drape.h"
+#include "support/bytes.h"
+#include "support/suite.h"
+
+static const char text[] =
+    "{\"drape\": 1, \"cloth\": [{\"name\": \"sheet\","
+    " \"mesh\": {\"grid\": \"equilateral\", \"edges\": 5, \"edge_length\": 0.1},"
+    " \"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200},"
+    " \"terms\": [\"stretch.edge\", \"bend.hinge\", {\"type\": \"damp.kelvin_voigt\", \"beta\": 1e-3}],"
+    " \"pins\": [{\"nodes\": [0]}, {\"corner\": \"top-right\", \"track\": [[0, [0,0,0]], [1, [0,0.5,0]]]}]}],"
+    " \"integrator\": {\"method\": \"%s\", \"dt\": 0.01}, \"duration\": 1, \"frame_rate\": 30}";
+
+static drape_context *make_context(void)
+{
+    drape_context *ctx = NULL;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    return ctx;
+}
+
+static drape_model *make_model(drape_context *ctx, const char *integrator)
+{
+    char whole[2048];
+    drape_scene *scene = NULL;
+    drape_model *model = NULL;
+    snprintf(whole, sizeof whole, text, integrator);
+    ck_assert_int_eq(drape_scene_parse(ctx, whole, "s.json", &scene), DRAPE_OK);
+    ck_assert_msg(drape_scene_compile(scene, &model) == DRAPE_OK, "%s", drape_context_message(ctx));
+    drape_scene_destroy(&scene);
+    return model;
+}
+
+static drape_sim *make_sim(drape_context *ctx, const drape_model *model, int threads)
+{
+    drape_sim *sim = NULL;
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.threads = threads;
+    ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
+    return sim;
+}
+
+static drape_status count_frames(void *user, const drape_event *event)
+{
+    *(int *)user += event->kind == DRAPE_EVENT_FRAME;
+    return DRAPE_OK;
+}
+
+/* To a file and back, in another sim of another model of the same scene, with other threads; observers stay. */
+START_TEST(a_file_is_taken_by_another_sim)
+{
+    static const char *const rows[] = {"be", "bdf2", "ida", "verlet"};
+    for (int k = 0; k < 4; k++) {
+        char path[] = "/tmp/drape-api-XXXXXX";
+        int fd = mkstemp(path), frames[2] = {0};
+        ck_assert_int_ge(fd, 0);
+        close(fd);
+        drape_context *ctx = make_context(), *second = make_context();
+        drape_model *model = make_model(ctx, rows[k]), *same = make_model(second, rows[k]);
+        drape_sim *sim = make_sim(ctx, model, 1), *other = make_sim(second, same, 2);
+        ck_assert_int_eq(drape_sim_observe(sim, count_frames, &frames[0]), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_observe(other, count_frames, &frames[1]), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_advance(sim, 0.25), DRAPE_OK);
+        ck_assert_msg(drape_sim_save(sim, path) == DRAPE_OK, "%s", drape_context_message(ctx));
+        int before = frames[0];
+        ck_assert_msg(drape_sim_restore(other, path) == DRAPE_OK, "%s", drape_context_message(second));
+        ck_assert(drape_sim_time(other) == drape_sim_time(sim));
+        ck_assert_uint_eq(drape_sim_hash(other), drape_sim_hash(sim));
+        ck_assert_int_eq(frames[1], 0);
+        ck_assert_int_eq(drape_sim_advance(sim, 0.5), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_advance(other, 0.5), DRAPE_OK);
+        ck_assert_uint_eq(drape_sim_hash(other), drape_sim_hash(sim));
+        ck_assert_int_eq(frames[1], frames[0] - before);
+        drape_sim_destroy(&sim);
+        drape_sim_destroy(&other);
+        drape_model_destroy(&model);
+        drape_model_destroy(&same);
+        drape_context_destroy(&ctx);
+        drape_context_destroy(&second);
+        unlink(path);
+    }
+}
+END_TEST
+
+/* Back in time and on again, as often as one likes. */
+START_TEST(a_sim_is_taken_back)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_model(ctx, "bdf2");
+    drape_sim *sim = make_sim(ctx, model, 1);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
+    bytes here = bytes_save(sim);
+    uint64_t first = 0;
+    for (int k = 0; k < 5; k++) {
+        ck_assert_int_eq(drape_sim_advance(sim, 0.3), DRAPE_OK);
+        first = k == 0 ? drape_sim_hash(sim) : first;
+        ck_assert_uint_eq(drape_sim_hash(sim), first);
+        ck_assert_int_eq(drape_sim_statistics(sim).steps_accepted, 30);
+        ck_assert_int_eq(drape_sim_advance(sim, 0.31 + 0.1 * k), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_restore_from(sim, here.data, here.size), DRAPE_OK);
+    }
+    free(here.data);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* One model, a sim and a context of its own in each thread, all restored from the same bytes. */
+typedef struct worker {
+    const drape_model *model;
+    const bytes *from;
+    uint64_t hash;
+} worker;
+
+static void *go_on(void *user)
+{
+    worker *w = user;
+    drape_context *ctx = NULL;
+    drape_sim *sim = NULL;
+    if (drape_context_create(NULL, &ctx) == DRAPE_OK &&
+        drape_sim_create(ctx, w->model, NULL, &sim) == DRAPE_OK &&
+        drape_sim_restore_from(sim, w->from->data, w->from->size) == DRAPE_OK &&
+        drape_sim_advance(sim, 0.4) == DRAPE_OK)
+        w->hash = drape_sim_hash(sim);
+    drape_sim_destroy(&sim);
+    drape_context_destroy(&ctx);
+    return NULL;
+}
+
+START_TEST(threads_are_restored_beside_each_other)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_model(ctx, "be");
+    drape_sim *sim = make_sim(ctx, model, 1);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.2), DRAPE_OK);
+    bytes here = bytes_save(sim);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.4), DRAPE_OK);
+    worker workers[4];
+    pthread_t threads[4];
+    for (int k = 0; k < 4; k++) {
+        workers[k] = (worker){.model = model, .from = &here};
+        ck_assert_int_eq(pthread_create(&threads[k], NULL, go_on, &workers[k]), 0);
+    }
+    for (int k = 0; k < 4; k++) {
+        ck_assert_int_eq(pthread_join(threads[k], NULL), 0);
+        ck_assert_uint_eq(workers[k].hash, drape_sim_hash(sim));
+    }
+    free(here.data);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+SUITE("api/checkpoint", a_file_is_taken_by_another_sim, a_sim_is_taken_back,
+      threads_are_restored_beside_each_other)

@@ -1,0 +1,818 @@
+/* test_host.c: what a host does while a sim runs, by the public header alone: it moves pins and colliders, pushes,
+ * blows, cancels, and reads forces. */
+#include <float.h>
+#include <math.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/time.h>
+
+#include "drape/extend.h"
+#include "support/failing_allocator.h"
+#include "support/suite.h"
+
+/* ---- Helpers ---- */
+
+typedef struct host {
+    drape_context *ctx;
+    drape_model *model;
+    drape_sim *sim;
+} host;
+
+/* A scene in which apostrophes stand for quotation marks, with memory of its own. */
+static host open_scene(failing_allocator *memory, const char *format, ...)
+{
+    char text[4096];
+    host h = {.ctx = failing_context(memory)};
+    drape_scene *scene = NULL;
+    va_list values;
+    va_start(values, format);
+    int length = vsnprintf(text, sizeof text, format, values);
+    va_end(values);
+    ck_assert(length > 0 && length < (int)sizeof text);
+    for (char *c = text; *c; c++)
+        *c = *c == '\'' ? '"' : *c;
+    drape_status status = drape_scene_parse(h.ctx, text, "s.json", &scene);
+    if (!status)
+        status = drape_scene_compile(scene, &h.model);
+    if (!status)
+        status = drape_sim_create(h.ctx, h.model, NULL, &h.sim);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(h.ctx));
+    drape_scene_destroy(&scene);
+    return h;
+}
+
+static void close_scene(host *h, failing_allocator *memory)
+{
+    drape_sim_destroy(&h->sim);
+    drape_model_destroy(&h->model);
+    drape_context_destroy(&h->ctx);
+    ck_assert_int_eq(memory->live, 0);
+}
+
+static void good(const host *h, drape_status status)
+{
+    ck_assert_msg(status == DRAPE_OK, "%s: %s", drape_status_name(status), drape_context_message(h->ctx));
+}
+
+static void says(const host *h, drape_status status, drape_status expected, const char *part)
+{
+    ck_assert_int_eq(status, expected);
+    ck_assert_msg(strstr(drape_context_message(h->ctx), part) != NULL, "\"%s\" is not in: %s", part,
+                  drape_context_message(h->ctx));
+}
+
+static double distance(const double *a, const double *b)
+{
+    return hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+}
+
+/* A square sheet of 5 x 4 nodes, the top row pinned; more of the cloth, and the rest of the scene. */
+#define SHEET                                                                                                \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 4, 'width': 0.5, 'height': "   \
+    "0.375, 'orientation': 'vertical'}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': "   \
+    "200}, 'terms': ['stretch.edge', 'bend.hinge'%s], 'pins': [%s]}], 'integrator': {%s}, 'frame_rate': "    \
+    "64, %s 'duration': 1}"
+
+/* The integrators that have time. */
+static const char *const methods[] = {"be",       "bdf2",       "midpoint", "trbdf2",
+                                      "newton_k", "projective", "verlet",   "ida"};
+enum { METHODS = sizeof methods / sizeof *methods };
+
+#define FRAME (1.0 / 64) /* [s], exact in binary */
+
+/* ---- Pins ---- */
+
+typedef struct watch {
+    double worst; /* [m] */
+    double speed[3], from[3], t0;
+    int frames;
+} watch;
+
+/* Node 0 goes from `from` at `speed`: at each frame between, too. */
+static drape_status watch_pin(void *user, const drape_event *event)
+{
+    watch *w = user;
+    double expected[3];
+    if (event->kind != DRAPE_EVENT_FRAME)
+        return DRAPE_OK;
+    for (int k = 0; k < 3; k++)
+        expected[k] = w->from[k] + w->speed[k] * (event->time - w->t0);
+    w->worst = fmax(w->worst, distance(expected, event->positions));
+    w->frames++;
+    return DRAPE_OK;
+}
+
+/* A fixed pin and one on a track, sent straight: where they are to be at the end, to the bit, and on the line between
+ * to rounding (1 m, some ten operations); and where they rest afterwards. */
+START_TEST(pins_go_where_they_are_sent)
+{
+    for (int i = 0; i < METHODS; i++) {
+        failing_allocator memory = {0};
+        host h = open_scene(
+            &memory, SHEET, "",
+            "{'corner': 'top-left'}, {'corner': 'top-right', 'track': [[0, [0,0,0]], [9, [0,0,9]]]}", "", "");
+        drape_sim_def def;
+        drape_sim_def_init(&def, sizeof def);
+        def.integrator = methods[i];
+        def.dt = FRAME / 4;
+        def.frame_rate = 4 / FRAME;
+        drape_sim_destroy(&h.sim);
+        good(&h, drape_sim_create(h.ctx, h.model, &def, &h.sim));
+        watch w = {.speed = {0.3, -0.2, 0.1}};
+        good(&h, drape_sim_observe(h.sim, watch_pin, &w));
+        const int32_t nodes[2] = {0, 4};
+        for (int f = 1; f <= 4; f++) {
+            double to[6];
+            for (int k = 0; k < 3; k++) {
+                to[k] = drape_model_rest_positions(h.model)[k] + w.speed[k] * f * FRAME;
+                to[3 + k] = drape_model_rest_positions(h.model)[12 + k] + 0.1 * f * FRAME;
+            }
+            good(&h, drape_sim_move_pins(h.sim, 2, nodes, FRAME, to, NULL));
+            good(&h, drape_sim_advance(h.sim, f * FRAME));
+            ck_assert_msg(memcmp(drape_sim_positions(h.sim), to, 3 * sizeof *to) == 0, "%s", methods[i]);
+            ck_assert(memcmp(drape_sim_positions(h.sim) + 12, to + 3, 3 * sizeof *to) == 0);
+        }
+        ck_assert_int_eq(w.frames, 17);
+        ck_assert_double_le(w.worst, 20 * DBL_EPSILON);
+        double at[3];
+        memcpy(at, drape_sim_positions(h.sim), sizeof at);
+        good(&h, drape_sim_advance(h.sim, 6 * FRAME));
+        ck_assert(memcmp(drape_sim_positions(h.sim), at, sizeof at) == 0);
+        close_scene(&h, &memory);
+    }
+}
+END_TEST
+
+/* A pin that the host sends along the pieces of a track, from key to key, is that track: the same steps, but for the
+ * rounding of positions, which Newton's tolerance of 1e-9 N on springs of some 10 N/m makes up to 1e-10 m of. */
+START_TEST(a_host_is_as_good_as_a_track)
+{
+    static const char track[] =
+        "{'corner': 'top-left'}, {'corner': 'top-right', 'track': [[0, [0,0,0]], [0.0625, [0,0.02,0.01]], "
+        "[0.125, [-0.01,0.01,0.03]], [0.1875, [0,0,0]]]}";
+    static const double keys[3][3] = {{0, 0.02, 0.01}, {-0.01, 0.01, 0.03}, {0, 0, 0}};
+    static const char *const settings[] = {"'method': 'be', 'dt': 0.0078125, 'tolerance': 1e-9",
+                                           "'method': 'ida', 'rtol': 1e-5"};
+    for (int i = 0; i < 2; i++) {
+        failing_allocator memory[2] = {{0}, {0}};
+        host on = open_scene(&memory[0], SHEET, "", track, settings[i], ""),
+             by = open_scene(&memory[1], SHEET, "", "{'corner': 'top-left'}, {'corner': 'top-right'}",
+                             settings[i], "");
+        const int32_t node = 4;
+        for (int k = 0; k < 3; k++) {
+            double to[3], worst = 0;
+            for (int c = 0; c < 3; c++)
+                to[c] = drape_model_rest_positions(by.model)[12 + c] + keys[k][c];
+            good(&by, drape_sim_move_pins(by.sim, 1, &node, 0.0625, to, NULL));
+            good(&by, drape_sim_advance(by.sim, 0.0625 * (k + 1)));
+            good(&on, drape_sim_advance(on.sim, 0.0625 * (k + 1)));
+            for (int n = 0; n < 20; n++)
+                worst = fmax(worst, distance(drape_sim_positions(on.sim) + 3 * n,
+                                             drape_sim_positions(by.sim) + 3 * n));
+            ck_assert_msg(worst <= 1e-9, "%s, key %d: %g m apart", settings[i], k, worst);
+            double work = fabs(drape_sim_energy(on.sim).numerical - drape_sim_energy(by.sim).numerical);
+            ck_assert_double_le(work, 1e-8);
+        }
+        close_scene(&on, &memory[0]);
+        close_scene(&by, &memory[1]);
+    }
+}
+END_TEST
+
+/* A cubic through positions and velocities of x = a sin(w t) is off by at most (a w^4 h^4)/384 inside, and starts no
+ * integrator anew: ida, which does at every kink, takes fewer steps than with straight ways. */
+START_TEST(velocities_make_a_motion_smooth)
+{
+    const double a = 0.05, w = 9;
+    double steps[2], worst[2] = {0, 0};
+    for (int straight = 0; straight < 2; straight++) {
+        failing_allocator memory = {0};
+        host h = open_scene(&memory, SHEET, "", "{'edge': 'top'}", "'method': 'ida', 'rtol': 1e-4", "");
+        const int32_t node = 2;
+        const double *rest = drape_model_rest_positions(h.model) + 6;
+        for (int f = 1; f <= 32; f++) {
+            double t = f * FRAME, to[3] = {rest[0], rest[1], rest[2] + a * sin(w * t)},
+                   v[3] = {0, 0, a * w * cos(w * t)};
+            good(&h, drape_sim_move_pins(h.sim, 1, &node, FRAME, to, straight ? NULL : v));
+            for (int part = 1; part <= 4; part++) {
+                good(&h, drape_sim_advance(h.sim, t - FRAME + part * FRAME / 4));
+                double is = drape_sim_positions(h.sim)[8] - rest[2];
+                if (f > 1) /* the first frame starts at rest, the sine does not */
+                    worst[straight] = fmax(worst[straight], fabs(is - a * sin(w * drape_sim_time(h.sim))));
+            }
+        }
+        steps[straight] = (double)drape_sim_statistics(h.sim).steps_accepted;
+        close_scene(&h, &memory);
+    }
+    ck_assert_double_le(worst[0], a * pow(w * FRAME, 4) / 384 * (1 + 1e-6));
+    ck_assert_double_le(worst[1], a * pow(w * FRAME, 2) / 8 * (1 + 1e-6));
+    ck_assert_double_ge(worst[1], 10 * worst[0]);
+    ck_assert_msg(steps[0] < 0.7 * steps[1], "smooth %g steps, straight %g", steps[0], steps[1]);
+}
+END_TEST
+
+/* Where the host has put a pin, a state of the host's own may have it anywhere. */
+START_TEST(a_state_takes_moved_pins_along)
+{
+    failing_allocator memory = {0};
+    host h = open_scene(&memory, SHEET, "", "{'edge': 'top'}", "", "");
+    const int32_t node = 1;
+    double x[60], v[60] = {0}, to[3] = {0.125, 0.1, 0};
+    memcpy(x, drape_sim_positions(h.sim), sizeof x);
+    x[4] += 0.01;
+    ck_assert_int_eq(drape_sim_set_state(h.sim, 0, x, v), DRAPE_E_ARGUMENT);
+    good(&h, drape_sim_move_pins(h.sim, 1, &node, FRAME, to, NULL));
+    good(&h, drape_sim_advance(h.sim, FRAME));
+    good(&h, drape_sim_set_state(h.sim, 0, x, v));
+    ck_assert(memcmp(drape_sim_positions(h.sim), x, sizeof x) == 0);
+    good(&h, drape_sim_advance(h.sim, FRAME));
+    ck_assert(memcmp(drape_sim_positions(h.sim) + 3, x + 3, 3 * sizeof *x) == 0);
+    close_scene(&h, &memory);
+}
+END_TEST
+
+/* ---- Colliders ---- */
+
+#define BALL                                                                                                 \
+    "'colliders': [{'type': 'sphere', 'center': [0.25, -0.3, 0.16], 'radius': 0.1, 'friction': 0.3%s}], "
+
+/* As with pins: a ball that is sent from key to key is one on the track. */
+START_TEST(a_collider_goes_where_it_is_sent)
+{
+    static const char *const settings[] = {"'method': 'be', 'dt': 0.0078125, 'tolerance': 1e-9",
+                                           "'method': 'verlet', 'dt': 0.0078125"};
+    static const double keys[2][3] = {{0, 0, -0.1}, {0, 0.05, -0.12}};
+    for (int i = 0; i < 2; i++) {
+        char moving[256], still[256];
+        snprintf(moving, sizeof moving, BALL,
+                 ", 'track': [[0, [0,0,0]], [0.125, [0,0,-0.1]], [0.25, [0,0.05,-0.12]]]");
+        snprintf(still, sizeof still, BALL, "");
+        failing_allocator memory[2] = {{0}, {0}};
+        host on = open_scene(&memory[0], SHEET, "", "{'edge': 'top'}", settings[i], moving),
+             by = open_scene(&memory[1], SHEET, "", "{'edge': 'top'}", settings[i], still);
+        for (int k = 0; k < 2; k++) {
+            double worst = 0;
+            good(&by, drape_sim_move_collider(by.sim, 0, 0.125, keys[k], NULL));
+            good(&by, drape_sim_advance(by.sim, 0.125 * (k + 1)));
+            good(&on, drape_sim_advance(on.sim, 0.125 * (k + 1)));
+            for (int n = 0; n < 20; n++)
+                worst = fmax(worst, distance(drape_sim_positions(on.sim) + 3 * n,
+                                             drape_sim_positions(by.sim) + 3 * n));
+            ck_assert_msg(worst <= 1e-7, "%s, key %d: %g m apart", settings[i], k, worst);
+            drape_collider_motion at = drape_sim_collider(by.sim, 0);
+            ck_assert(memcmp(at.displacement, keys[k], sizeof at.displacement) == 0);
+            ck_assert_str_eq(at.type, "sphere");
+        }
+        ck_assert_double_gt(fabs(drape_sim_positions(by.sim)[3 * 17 + 2]), 0.01); /* it was met */
+        close_scene(&on, &memory[0]);
+        close_scene(&by, &memory[1]);
+    }
+}
+END_TEST
+
+/* ---- Forces ---- */
+
+/* Reactions carry what hangs from pins, and what is pushed: the sum over pins is the weight of all nodes less the push,
+ * but for the residuals of 16 free nodes at 1e-8 N. */
+START_TEST(reactions_carry_the_weight)
+{
+    failing_allocator memory = {0};
+    host h = open_scene(&memory, SHEET, "", "{'corner': 'top-left'}, {'corner': 'top-right'}",
+                        "'method': 'static', 'tolerance': 1e-8", "");
+    double push[60] = {0}, forces[60], mass = 0;
+    for (int n = 0; n < 20; n++)
+        mass += drape_model_masses(h.model)[n];
+    for (int pushed = 0; pushed < 2; pushed++) {
+        if (pushed)
+            push[3 * 12 + 2] = 0.07, push[3 * 4] = 0.02; /* a free node, and a pinned one */
+        good(&h, drape_sim_push(h.sim, push));
+        good(&h, drape_sim_advance(h.sim, 0.5 * (pushed + 1)));
+        good(&h, drape_sim_reactions(h.sim, forces));
+        double sum[3] = {0}, expected[3] = {-(pushed ? 0.02 : 0), 9.81 * mass, -(pushed ? 0.07 : 0)};
+        for (int n = 0; n < 20; n++)
+            for (int k = 0; k < 3; k++) {
+                sum[k] += forces[3 * n + k];
+                ck_assert(n == 0 || n == 4 || forces[3 * n + k] == 0);
+            }
+        for (int k = 0; k < 3; k++)
+            ck_assert_msg(fabs(sum[k] - expected[k]) <= 18e-8, "%d: %g for %g N", k, sum[k], expected[k]);
+        if (!pushed) /* the sheet's diagonals alternate, so that it is its own mirror image */
+            ck_assert_double_eq_tol(forces[1], forces[13], 1e-6);
+    }
+    close_scene(&h, &memory);
+}
+END_TEST
+
+/* A triangle without forces of its own, pushed by F on each node: backward Euler's v_n = n h F/m, x_n - x_0 = h^2 F/m
+ * n (n + 1)/2, so that F (x_n - x_0) - m v_n^2/2 = h^2 F^2/m n/2 is lost. Rounding: some 100 operations on 1 m, 1 J. */
+START_TEST(a_push_does_its_work)
+{
+    failing_allocator memory = {0};
+    host h = open_scene(
+        &memory,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 1, 'edge_length': 1}, 'material': "
+        "{'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}], 'gravity': "
+        "[0,0,0], 'integrator': {'method': 'be', 'dt': 0.015625, 'tolerance': 1e-12}, 'duration': 1}");
+    int nodes = drape_model_node_count(h.model), n = 16;
+    double push[12], before[12], dt = FRAME, a = 3, lost = 0;
+    const double *m = drape_model_masses(h.model);
+    ck_assert_int_eq(nodes, 4);
+    memcpy(before, drape_sim_positions(h.sim), sizeof before);
+    for (int i = 0; i < 12; i++)
+        push[i] = i % 3 == 1 ? a * m[i / 3] : 0;
+    good(&h, drape_sim_push(h.sim, push));
+    good(&h, drape_sim_advance(h.sim, n * dt));
+    for (int i = 0; i < nodes; i++) {
+        ck_assert_double_eq_tol(drape_sim_velocities(h.sim)[3 * i + 1], n * dt * a, 1e-9);
+        ck_assert_double_eq_tol(drape_sim_positions(h.sim)[3 * i + 1] - before[3 * i + 1],
+                                dt * dt * a * n * (n + 1) / 2, 1e-9);
+        lost += dt * dt * a * a * m[i] * n / 2;
+    }
+    ck_assert_double_eq_tol(drape_sim_energy(h.sim).numerical, lost, 1e-9);
+    good(&h, drape_sim_push(h.sim, NULL));
+    good(&h, drape_sim_advance(h.sim, 2 * n * dt));
+    ck_assert_double_eq_tol(drape_sim_velocities(h.sim)[1], n * dt * a, 1e-9);
+    close_scene(&h, &memory);
+}
+END_TEST
+
+/* Every integrator is pushed: what lies in 1 g and is pushed up by 1 g floats. */
+START_TEST(every_integrator_is_pushed)
+{
+    for (int i = 0; i < METHODS; i++) {
+        failing_allocator memory = {0};
+        host h = open_scene(&memory, SHEET, "", "", "", "");
+        drape_sim_def def;
+        drape_sim_def_init(&def, sizeof def);
+        def.integrator = methods[i];
+        def.dt = FRAME / 4;
+        drape_sim_destroy(&h.sim);
+        good(&h, drape_sim_create(h.ctx, h.model, &def, &h.sim));
+        double push[60];
+        for (int k = 0; k < 60; k++)
+            push[k] = k % 3 == 1 ? 9.81 * drape_model_masses(h.model)[k / 3] : 0;
+        good(&h, drape_sim_push(h.sim, push));
+        good(&h, drape_sim_advance(h.sim, 0.5));
+        for (int n = 0; n < 20; n++)
+            ck_assert_msg(distance(drape_sim_positions(h.sim) + 3 * n,
+                                   drape_model_rest_positions(h.model) + 3 * n) < 1e-6,
+                          "%s: node %d fell", methods[i], n);
+        good(&h, drape_sim_push(h.sim, NULL));
+        good(&h, drape_sim_advance(h.sim, 1));
+        ck_assert_msg(drape_sim_positions(h.sim)[1] < -0.5, "%s", methods[i]);
+        close_scene(&h, &memory);
+    }
+}
+END_TEST
+
+/* Springs alone are summed by verlet itself, past the system: pushes and pulls act there, too. */
+START_TEST(springs_of_verlet_are_pushed_and_pulled)
+{
+    failing_allocator memory = {0};
+    host h = open_scene(
+        &memory, "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 1, "
+                 "'height': 1}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, "
+                 "'terms': [{'type': 'spring.structural', 'stiffness': 10}]}], 'integrator': {'method': "
+                 "'verlet', 'dt': 0.005}, 'duration': 1}");
+    double push[243];
+    for (int k = 0; k < 243; k++)
+        push[k] = k % 3 == 1 ? 9.81 * drape_model_masses(h.model)[k / 3] : 0;
+    good(&h, drape_sim_push(h.sim, push));
+    good(&h, drape_sim_advance(h.sim, 0.1));
+    for (int n = 0; n < 81; n++)
+        ck_assert_double_eq_tol(drape_sim_positions(h.sim)[3 * n + 1],
+                                drape_model_rest_positions(h.model)[3 * n + 1], 1e-9);
+    good(&h, drape_sim_pull(h.sim, 40, 1, (const double[]){0.5, 0.5, -0.5}));
+    good(&h, drape_sim_advance(h.sim, 0.2));
+    ck_assert_double_gt(drape_sim_positions(h.sim)[3 * 40 + 1], 0.01);
+    close_scene(&h, &memory);
+}
+END_TEST
+
+/* What lies on a table is carried by it, within the residuals of 20 nodes at 1e-8 N; what pushes it along is friction. */
+START_TEST(contact_carries_the_weight)
+{
+    failing_allocator memory = {0};
+    host h = open_scene(
+        &memory, "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 4, 'width': "
+                 "0.5, 'height': 0.4, 'transform': {'translate': [0, 0.0005, 0]}}, 'material': "
+                 "{'young_modulus': 1e4, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge', "
+                 "'bend.hinge']}], 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': "
+                 "[0,1,0]}], 'integrator': {'method': 'static', 'tolerance': 1e-8}, 'duration': 1}");
+    double forces[60], on[3], sum[3] = {0}, mass = 0;
+    good(&h, drape_sim_contact_forces(h.sim, forces)); /* before any step, too */
+    good(&h, drape_sim_advance(h.sim, 1));
+    good(&h, drape_sim_contact_forces(h.sim, forces));
+    good(&h, drape_sim_collider_force(h.sim, 0, on));
+    for (int n = 0; n < 20; n++) {
+        mass += drape_model_masses(h.model)[n];
+        ck_assert_double_gt(forces[3 * n + 1], 0);
+        for (int k = 0; k < 3; k++)
+            sum[k] += forces[3 * n + k];
+    }
+    ck_assert_double_eq_tol(sum[1], 9.81 * mass, 20e-8);
+    for (int k = 0; k < 3; k++)
+        ck_assert_double_eq_tol(on[k], -sum[k], 1e-12 * 9.81 * mass);
+    good(&h, drape_sim_reactions(h.sim, forces));
+    for (int i = 0; i < 60; i++)
+        ck_assert(forces[i] == 0); /* no pins */
+    close_scene(&h, &memory);
+}
+END_TEST
+
+/* ---- Wind ---- */
+
+/* w = w0 + w1 t + G x */
+typedef struct field {
+    double w0[3], w1[3], g[9];
+    bool lagged; /* it does not tell its gradient */
+    long calls;
+} field;
+
+static void blow(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
+{
+    field *f = user;
+    f->calls++;
+    for (int32_t p = 0; p < count; p++)
+        for (int i = 0; i < 3; i++) {
+            wind[3 * p + i] = f->w0[i] + f->w1[i] * t;
+            for (int j = 0; j < 3; j++)
+                wind[3 * p + i] += f->g[3 * i + j] * x[3 * p + j];
+            for (int j = 0; gradient && !f->lagged && j < 3; j++)
+                gradient[9 * p + 3 * i + j] = f->g[3 * i + j];
+        }
+}
+
+#define DRAG                                                                                                 \
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 2, 'edge_length': 1}, 'material': "    \
+    "{'young_modulus': 1e2, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge', %s]}], "           \
+    "'gravity': [0,0,0], 'integrator': {'method': '%s', 'dt': 0.015625%s}, 'duration': 1}"
+
+/* A viscous medium that moves as a whole, ever faster: k = c/sigma, and every node has backward Euler's
+ *     v1 = (v0 + h k w(t1))/(1 + h k).
+ * Tolerance: a residual of 1e-12 N on at least 0.03 kg moves v by h r/m < 1e-12 m/s a step, 16 of them. */
+START_TEST(wind_takes_cloth_along)
+{
+    failing_allocator memory = {0};
+    host h = open_scene(&memory, DRAG, "{'type': 'drag.viscous', 'coefficient': 0.5}", "be",
+                        ", 'tolerance': 1e-12");
+    field f = {.w0 = {1, -2, 0.5}, .w1 = {3, 0, -1}};
+    double v[3] = {0}, k = 0.5 / 0.2;
+    good(&h, drape_sim_set_wind(h.sim, blow, &f));
+    for (int n = 1; n <= 16; n++) {
+        good(&h, drape_sim_advance(h.sim, n * FRAME));
+        for (int c = 0; c < 3; c++) {
+            v[c] = (v[c] + FRAME * k * (f.w0[c] + f.w1[c] * n * FRAME)) / (1 + FRAME * k);
+            for (int i = 0; i < drape_model_node_count(h.model); i++)
+                ck_assert_double_eq_tol(drape_sim_velocities(h.sim)[3 * i + c], v[c], 1e-10);
+        }
+    }
+    ck_assert_int_gt(f.calls, 16);
+    close_scene(&h, &memory);
+}
+END_TEST
+
+/* A host's steady wind is that of the row: the same equations, and the same states but for rounding; the inner
+ * solves of newton_k, which end at a share of what they began with, make some 1e-8 m of it. */
+START_TEST(a_steady_wind_is_that_of_the_row)
+{
+    for (int i = 0; i < METHODS; i++) {
+        failing_allocator memory[2] = {{0}, {0}};
+        host own = open_scene(&memory[0], DRAG, "{'type': 'drag.wind', 'wind': [1, 2, -1]}", methods[i], ""),
+             by = open_scene(&memory[1], DRAG, "{'type': 'drag.wind', 'wind': [0, 2, 0]}", methods[i], "");
+        field f = {.w0 = {1, 0, -1}};
+        good(&by, drape_sim_set_wind(by.sim, blow, &f));
+        good(&by, drape_sim_advance(by.sim, 0.25));
+        good(&own, drape_sim_advance(own.sim, 0.25));
+        double apart = 0;
+        for (int n = 0; n < drape_model_node_count(by.model); n++)
+            apart = fmax(apart,
+                         distance(drape_sim_positions(own.sim) + 3 * n, drape_sim_positions(by.sim) + 3 * n));
+        ck_assert_msg(apart < 1e-6, "%s: %g m apart", methods[i], apart);
+        ck_assert_double_gt(distance(drape_sim_positions(by.sim), drape_model_rest_positions(by.model)),
+                            0.01);
+        good(&by, drape_sim_set_wind(by.sim, NULL, NULL));
+        long calls = f.calls;
+        good(&by, drape_sim_advance(by.sim, 0.5));
+        ck_assert_int_eq(f.calls, calls);
+        close_scene(&own, &memory[0]);
+        close_scene(&by, &memory[1]);
+    }
+}
+END_TEST
+
+/* A field that tells its gradient is solved by Newton's method; one that does not comes to the same state, later. */
+START_TEST(a_field_without_gradient_takes_longer)
+{
+    double x[2][3];
+    int64_t iterations[2];
+    for (int lagged = 0; lagged < 2; lagged++) {
+        failing_allocator memory = {0};
+        host h = open_scene(&memory, DRAG, "{'type': 'drag.viscous', 'coefficient': 5}", "be",
+                            ", 'tolerance': 1e-9");
+        field f = {.w0 = {0, 1, 0}, .g = {0, -8, 0, 8, 0, 0, 0, 0, 4}, .lagged = lagged};
+        good(&h, drape_sim_set_wind(h.sim, blow, &f));
+        good(&h, drape_sim_advance(h.sim, 0.125));
+        memcpy(x[lagged], drape_sim_positions(h.sim), sizeof x[lagged]);
+        iterations[lagged] = drape_sim_statistics(h.sim).newton_iterations;
+        close_scene(&h, &memory);
+    }
+    ck_assert_double_le(distance(x[0], x[1]), 1e-8);
+    ck_assert_msg(iterations[0] < iterations[1], "%ld and %ld", (long)iterations[0], (long)iterations[1]);
+}
+END_TEST
+
+/* ---- Cancelling ---- */
+
+static const char pins[] = "{'corner': 'top-left'}, {'corner': 'top-right'}";
+
+/* Before an advance, it returns at once; and goes on the next time, to the same bits. */
+START_TEST(a_cancelled_advance_can_go_on)
+{
+    for (int i = 0; i < METHODS; i++) {
+        failing_allocator memory[2] = {{0}, {0}};
+        char method[64];
+        snprintf(method, sizeof method, "'method': '%s', 'dt': 0.0078125", methods[i]);
+        host whole = open_scene(&memory[0], SHEET, "", pins, method, ""),
+             cut = open_scene(&memory[1], SHEET, "", pins, method, "");
+        good(&whole, drape_sim_advance(whole.sim, 0.125));
+        good(&whole, drape_sim_advance(whole.sim, 0.25));
+        good(&cut, drape_sim_advance(cut.sim, 0.125));
+        uint64_t before = drape_sim_hash(cut.sim);
+        drape_sim_cancel(cut.sim);
+        says(&cut, drape_sim_advance(cut.sim, 0.25), DRAPE_E_STOPPED, "t=0.125: cancelled");
+        ck_assert_uint_eq(drape_sim_hash(cut.sim), before);
+        ck_assert_int_eq(drape_sim_statistics(cut.sim).steps_rejected,
+                         drape_sim_statistics(whole.sim).steps_rejected);
+        good(&cut, drape_sim_advance(cut.sim, 0.25));
+        ck_assert_msg(drape_sim_hash(cut.sim) == drape_sim_hash(whole.sim), "%s", methods[i]);
+        drape_sim_cancel(cut.sim);
+        drape_realtime report;
+        ck_assert_int_eq(drape_sim_advance_realtime(cut.sim, FRAME, 1, &report), DRAPE_E_STOPPED);
+        ck_assert_int_eq(report.attempts, 0);
+        good(&cut, drape_sim_advance_realtime(cut.sim, FRAME, 1, &report));
+        close_scene(&whole, &memory[0]);
+        close_scene(&cut, &memory[1]);
+    }
+    drape_sim_cancel(NULL);
+}
+END_TEST
+
+typedef struct trigger {
+    drape_sim *sim;
+    int at, calls;
+} trigger;
+
+/* Cancels in the middle of a step: when the wind is asked for the n-th time. */
+static void still_air(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
+{
+    trigger *now = user;
+    (void)t, (void)count, (void)x, (void)wind, (void)gradient;
+    if (++now->calls == now->at)
+        drape_sim_cancel(now->sim);
+}
+
+/* In a step it is forgotten: the state is the one before, and the same step is made again. */
+START_TEST(a_step_can_be_cancelled)
+{
+    for (int i = 0; i < METHODS; i++) {
+        failing_allocator memory = {0};
+        char method[64];
+        snprintf(method, sizeof method, "'method': '%s', 'dt': 0.0078125", methods[i]);
+        host h =
+            open_scene(&memory, SHEET, ", {'type': 'drag.viscous', 'coefficient': 0.1}", pins, method, "");
+        trigger t = {.sim = h.sim};
+        good(&h, drape_sim_set_wind(h.sim, still_air, &t));
+        good(&h, drape_sim_advance(h.sim, 0.125));
+        double time = drape_sim_time(h.sim);
+        uint64_t before = drape_sim_hash(h.sim);
+        int64_t count = 0, accepted = drape_sim_statistics(h.sim).steps_accepted;
+        t.at = t.calls + 1;
+        says(&h, drape_sim_advance(h.sim, 0.25), DRAPE_E_STOPPED, "cancelled");
+        if (drape_sim_statistics(h.sim).steps_accepted ==
+            accepted) { /* else it was done when it was noticed */
+            ck_assert_double_eq(drape_sim_time(h.sim), time);
+            ck_assert_uint_eq(drape_sim_hash(h.sim), before);
+            for (int k = 0; drape_sim_reason(h.sim, k, &count); k++)
+                if (strcmp(drape_sim_reason(h.sim, k, &count), "cancelled") == 0)
+                    break;
+            ck_assert_msg(count == 1, "%s", methods[i]);
+        }
+        good(&h, drape_sim_advance(h.sim, 0.25));
+        ck_assert_double_eq(drape_sim_time(h.sim), 0.25);
+        close_scene(&h, &memory);
+    }
+}
+END_TEST
+
+static drape_sim *volatile signalled;
+
+static void on_alarm(int number)
+{
+    (void)number;
+    drape_sim_cancel(signalled);
+}
+
+/* From a signal handler, and from another thread, while an advance runs that would take hours. */
+START_TEST(a_signal_and_a_thread_can_cancel)
+{
+    failing_allocator memory = {0};
+    host h = open_scene(&memory, SHEET, "", pins, "", "");
+    signalled = h.sim;
+    ck_assert(signal(SIGALRM, on_alarm) != SIG_ERR);
+    struct itimerval soon = {.it_value = {.tv_usec = 50000}};
+    ck_assert_int_eq(setitimer(ITIMER_REAL, &soon, NULL), 0);
+    says(&h, drape_sim_advance(h.sim, 1e8), DRAPE_E_STOPPED, "cancelled");
+    ck_assert_double_gt(drape_sim_time(h.sim), 0);
+    close_scene(&h, &memory);
+}
+END_TEST
+
+/* ---- Reading ---- */
+
+/* Of a sheet in the plane z = 0, rows downwards, they are its normal; of a bent one, unit vectors; of a point, none. */
+START_TEST(normals_are_of_length_one)
+{
+    failing_allocator memory = {0};
+    host h = open_scene(&memory, SHEET, "", pins, "", "");
+    double n[60], point[60] = {0}, first = 0;
+    drape_sim_normals(h.sim, n);
+    first = n[2];
+    ck_assert_double_eq_tol(fabs(first), 1, 4 * DBL_EPSILON);
+    for (int i = 0; i < 20; i++) {
+        ck_assert_double_eq_tol(n[3 * i], 0, 4 * DBL_EPSILON);
+        ck_assert_double_eq_tol(n[3 * i + 2], first, 4 * DBL_EPSILON);
+    }
+    /* as the first triangle turns: its corners counterclockwise as seen from where it points to */
+    const int32_t *t = drape_model_triangles(h.model);
+    const double *a = drape_model_rest_positions(h.model) + 3 * t[0],
+                 *b = drape_model_rest_positions(h.model) + 3 * t[1],
+                 *c = drape_model_rest_positions(h.model) + 3 * t[2];
+    ck_assert_double_gt(((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) * first, 0);
+    good(&h, drape_sim_advance(h.sim, 0.3));
+    drape_sim_normals(h.sim, n);
+    for (int i = 0; i < 20; i++)
+        ck_assert_double_eq_tol(hypot(hypot(n[3 * i], n[3 * i + 1]), n[3 * i + 2]), 1, 8 * DBL_EPSILON);
+    drape_model_normals(h.model, point, n);
+    for (int i = 0; i < 60; i++)
+        ck_assert(n[i] == 0);
+    drape_sim_normals(NULL, n);
+    drape_sim_normals(h.sim, NULL);
+    close_scene(&h, &memory);
+}
+END_TEST
+
+/* ---- All of it ---- */
+
+typedef struct job {
+    const drape_model *model;
+    int way;
+    uint64_t hash;
+} job;
+
+/* One sim with a host of its own. */
+static void *run_job(void *user)
+{
+    job *j = user;
+    drape_context *ctx = NULL;
+    drape_sim *sim = NULL;
+    field f = {.w0 = {j->way, 0, 1}};
+    double forces[60];
+    const int32_t node = 2;
+    bool bad = drape_context_create(NULL, &ctx) || drape_sim_create(ctx, j->model, NULL, &sim) ||
+               drape_sim_set_wind(sim, blow, &f);
+    for (int i = 1; !bad && i <= 16; i++) {
+        double to[3] = {0.25 + 0.01 * j->way * i, 0.01 * i, 0}, by[3] = {0, 0, -0.01 * i};
+        bad = drape_sim_move_pins(sim, 1, &node, FRAME, to, NULL) ||
+              drape_sim_move_collider(sim, 0, FRAME, by, NULL) || drape_sim_advance(sim, i * FRAME) ||
+              drape_sim_reactions(sim, forces) || drape_sim_contact_forces(sim, forces);
+    }
+    j->hash = bad ? 0 : drape_sim_hash(sim);
+    drape_sim_destroy(&sim);
+    drape_context_destroy(&ctx);
+    return NULL;
+}
+
+/* Hosts in threads over one model do not see each other: each comes to what it comes to alone. */
+START_TEST(hosts_in_threads_share_a_model)
+{
+    enum { THREADS = 4 };
+    char ball[256];
+    failing_allocator memory = {0};
+    snprintf(ball, sizeof ball, BALL, "");
+    host h = open_scene(&memory, SHEET, ", 'drag.wind'", "{'edge': 'top'}", "", ball);
+    pthread_t thread[THREADS];
+    job jobs[THREADS], alone[THREADS];
+    for (int i = 0; i < THREADS; i++) {
+        alone[i] = jobs[i] = (job){.model = h.model, .way = i};
+        run_job(&alone[i]);
+        ck_assert_uint_ne(alone[i].hash, 0);
+    }
+    ck_assert_uint_ne(alone[0].hash, alone[1].hash);
+    for (int i = 0; i < THREADS; i++)
+        ck_assert_int_eq(pthread_create(&thread[i], NULL, run_job, &jobs[i]), 0);
+    for (int i = 0; i < THREADS; i++) {
+        ck_assert_int_eq(pthread_join(thread[i], NULL), 0);
+        ck_assert_uint_eq(jobs[i].hash, alone[i].hash);
+    }
+    close_scene(&h, &memory);
+}
+END_TEST
+
+/* Nothing is allocated once a sim is made, but by the first field of wind, whose failures leave all as it was. */
+START_TEST(a_host_needs_no_memory)
+{
+    failing_allocator memory = {0};
+    host h = open_scene(&memory, SHEET, ", 'drag.wind'", "{'edge': 'top'}", "", "");
+    field f = {.w0 = {1, 0, 1}};
+    double forces[60] = {0}, to[3] = {0, 0.1, 0};
+    const int32_t node = 0;
+    for (long k = 1; k <= 2; k++) {
+        memory.fail_at = memory.calls + k;
+        says(&h, drape_sim_set_wind(h.sim, blow, &f), DRAPE_E_MEMORY, "out of memory");
+    }
+    memory.fail_at = 0;
+    good(&h, drape_sim_advance(h.sim, FRAME));
+    ck_assert_int_eq(f.calls, 0);
+    good(&h, drape_sim_set_wind(h.sim, blow, &f));
+    long calls = memory.calls;
+    good(&h, drape_sim_set_wind(h.sim, NULL, NULL));
+    good(&h, drape_sim_set_wind(h.sim, blow, &f));
+    good(&h, drape_sim_move_pins(h.sim, 1, &node, FRAME, to, NULL));
+    good(&h, drape_sim_push(h.sim, forces));
+    good(&h, drape_sim_advance(h.sim, 2 * FRAME));
+    good(&h, drape_sim_reactions(h.sim, forces));
+    good(&h, drape_sim_contact_forces(h.sim, forces));
+    drape_sim_normals(h.sim, forces);
+    drape_sim_cancel(h.sim);
+    ck_assert_int_eq(drape_sim_advance(h.sim, 3 * FRAME), DRAPE_E_STOPPED);
+    ck_assert_int_eq(memory.calls, calls);
+    close_scene(&h, &memory);
+}
+END_TEST
+
+/* Each refusal says what it wants, and changes nothing. */
+START_TEST(wrong_arguments_are_refused)
+{
+    failing_allocator memory = {0};
+    char ball[256];
+    snprintf(ball, sizeof ball, BALL, "");
+    host h = open_scene(&memory, SHEET, "", "{'corner': 'top-left'}", "", ball);
+    const double zero[60] = {0}, far[3] = {0, 2e9, 0}, none[3] = {0, 0, NAN};
+    const int32_t pin = 0, two[2] = {0, 7}, out = 20, under = -1;
+    const drape_status e = DRAPE_E_ARGUMENT;
+    double bad[60] = {0}, force[3];
+    bad[59] = INFINITY;
+    good(&h, drape_sim_advance(h.sim, FRAME));
+    uint64_t before = drape_sim_hash(h.sim);
+    says(&h, drape_sim_move_pins(h.sim, 1, &out, 1, zero, NULL), e, "node 20; there are 0 to 19");
+    says(&h, drape_sim_move_pins(h.sim, 1, &under, 1, zero, NULL), e, "node -1");
+    says(&h, drape_sim_move_pins(h.sim, 2, two, 1, zero, NULL), e, "node 7 is free");
+    says(&h, drape_sim_move_pins(h.sim, 1, &pin, 0, zero, NULL), e, "seconds = 0");
+    says(&h, drape_sim_move_pins(h.sim, 1, &pin, NAN, zero, NULL), e, "seconds = nan");
+    says(&h, drape_sim_move_pins(h.sim, 1, &pin, 1e-300, zero, NULL), e, "seconds = 1e-300");
+    says(&h, drape_sim_move_pins(h.sim, 1, &pin, 1, far, NULL), e, "within 1e+09");
+    says(&h, drape_sim_move_pins(h.sim, 1, &pin, 1, none, NULL), e, "node 0");
+    says(&h, drape_sim_move_pins(h.sim, 1, &pin, 1, zero, none), e, "node 0");
+    says(&h, drape_sim_move_pins(h.sim, -1, &pin, 1, zero, NULL), e, "-1 nodes");
+    says(&h, drape_sim_move_pins(h.sim, 1, NULL, 1, zero, NULL), e, "no list");
+    says(&h, drape_sim_move_pins(h.sim, 1, &pin, 1, NULL, NULL), e, "no list");
+    good(&h, drape_sim_move_pins(h.sim, 0, NULL, 1, NULL, NULL));
+    says(&h, drape_sim_move_collider(h.sim, 1, 1, zero, NULL), e, "collider 1; the model has 1");
+    says(&h, drape_sim_move_collider(h.sim, 0, -1, zero, NULL), e, "seconds = -1");
+    says(&h, drape_sim_move_collider(h.sim, 0, 1, none, NULL), e, "displacement");
+    says(&h, drape_sim_move_collider(h.sim, 0, 1, NULL, NULL), e, "displacement");
+    says(&h, drape_sim_push(h.sim, bad), e, "not finite");
+    says(&h, drape_sim_set_wind(h.sim, blow, NULL), e, "no term of the model is in a medium");
+    says(&h, drape_sim_reactions(h.sim, NULL), e, "no array");
+    says(&h, drape_sim_contact_forces(h.sim, NULL), e, "no array");
+    says(&h, drape_sim_collider_force(h.sim, 0, NULL), e, "no array");
+    says(&h, drape_sim_collider_force(h.sim, 3, force), e, "collider 3");
+    ck_assert_str_eq(drape_sim_collider(h.sim, 3).name, "");
+    ck_assert_uint_eq(drape_sim_hash(h.sim), before);
+    ck_assert_int_eq(drape_sim_move_pins(NULL, 0, NULL, 1, NULL, NULL), e);
+    ck_assert_int_eq(drape_sim_move_collider(NULL, 0, 1, zero, NULL), e);
+    ck_assert_int_eq(drape_sim_push(NULL, NULL), e);
+    ck_assert_int_eq(drape_sim_set_wind(NULL, NULL, NULL), e);
+    ck_assert_int_eq(drape_sim_reactions(NULL, bad), e);
+    ck_assert_int_eq(drape_sim_contact_forces(NULL, bad), e);
+    ck_assert_int_eq(drape_sim_collider_force(NULL, 0, force), e);
+    close_scene(&h, &memory);
+
+    h = open_scene(&memory, SHEET, "", "", "'method': 'verlet'", ball);
+    says(&h, drape_sim_contact_forces(h.sim, bad), e, "moves nodes out of what they meet");
+    says(&h, drape_sim_collider_force(h.sim, 0, force), e, "has no force");
+    close_scene(&h, &memory);
+}
+END_TEST
+
+SUITE("host", pins_go_where_they_are_sent, a_host_is_as_good_as_a_track, velocities_make_a_motion_smooth,
+      a_state_takes_moved_pins_along, a_collider_goes_where_it_is_sent, reactions_carry_the_weight,
+      a_push_does_its_work, every_integrator_is_pushed, springs_of_verlet_are_pushed_and_pulled,
+      contact_carries_the_weight, wind_takes_cloth_along, a_steady_wind_is_that_of_the_row,
+      a_field_without_gradient_takes_longer, a_cancelled_advance_can_go_on, a_step_can_be_cancelled,
+      a_signal_and_a_thread_can_cancel, normals_are_of_length_one, hosts_in_threads_share_a_model,
+      a_host_needs_no_memory, wrong_arguments_are_refused)

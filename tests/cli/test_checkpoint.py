@@ -1,0 +1,181 @@
+#!/usr/bin/env python3
+"""test_checkpoint.py: `drape run --checkpoint-every` and `--resume`: runs that were killed, interrupted, or had no room go on and end with
+the files of one that was left alone; what does not belong together is refused and not touched."""
+import hashlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+from program import LIMIT, PROGRAM, SOURCES, drape, equal, good, read_json, read_npy, refused, run_tests, write_scene
+
+ALL = "npy,obj,ply,vtp,pc2,glb"
+
+
+def contents(folder, but=("checkpoint.drape",)):
+    """{name: hash} of all files; of the summary without the wall clock."""
+    found = {}
+    for name in sorted(os.listdir(folder)):
+        with open(f"{folder}/{name}", "rb") as file:
+            data = file.read()
+        if name == "summary.json":
+            summary = json.loads(data)
+            summary.pop("wall_s")
+            data = json.dumps(summary).encode()
+        if name not in but:
+            found[name] = hashlib.sha256(data).hexdigest()
+    return found
+
+
+def same(one, other):
+    a, b = contents(one), contents(other)
+    different = sorted(name for name in a.keys() | b.keys() if a.get(name) != b.get(name))
+    assert not different, f"{one} and {other} differ in {different}"
+
+
+def stopped(kind, *args):
+    """A run that got a signal after its first checkpoint."""
+    with subprocess.Popen([PROGRAM, "run", "scene.json", "--checkpoint-every", "1", *args], stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, text=True) as process:
+        end = time.monotonic() + LIMIT
+        while not os.path.exists("out/checkpoint.drape") and time.monotonic() < end:
+            time.sleep(0.005)
+        process.send_signal(kind)
+        process.communicate(timeout=LIMIT)
+    return process.returncode
+
+
+def test_kills():
+    """runs of several rows and formats, killed at random times, end bit for bit as if they had not been"""
+    command = [sys.executable, SOURCES + "/tools/kills", PROGRAM, "--kills", "12", "--folder", "kills",
+               "--cases", "be,bdf2,midpoint,newton_k,ida,error"]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, check=False)
+    print("# " + result.stdout.strip().replace("\n", "\n# "))
+    equal(result.returncode, 0, result.stdout + result.stderr)
+
+
+def test_interrupted():
+    """Ctrl-C leaves a checkpoint of where it stopped; the last frame of the part is none of the whole"""
+    write_scene(duration=2, frame_rate=50, integrator={"dt": 0.0005})
+    good("run", "scene.json", "--out", "whole", "--format", ALL)
+    equal(stopped(signal.SIGINT, "--out", "out", "--format", ALL), 130)
+    part = read_json("out/summary.json")
+    assert part["status"] == "e_stopped" and part["time"] < 2, part
+    good("run", "scene.json", "--out", "out", "--format", ALL, "--resume", "--threads", "2")
+    same("whole", "out")
+
+
+def test_no_checkpoint_and_finished():
+    """--resume begins where there is none, and leaves a finished run as it is"""
+    write_scene()
+    good("run", "scene.json", "--out", "whole", "--format", ALL)
+    text = good("run", "scene.json", "--out", "out", "--format", ALL, "--resume", "--checkpoint-every", "2")
+    same("whole", "out")
+    with open("out/summary.json", "rb") as file:
+        summary = file.read()
+    before = {name: os.stat("out/" + name).st_mtime_ns for name in os.listdir("out") if name != "summary.json"}
+    for _ in range(2):
+        equal(good("run", "scene.json", "--out", "out", "--format", ALL, "--resume"), text, "results")
+        with open("out/summary.json", "rb") as file:
+            equal(file.read(), summary, "the summary")
+    equal({name: os.stat("out/" + name).st_mtime_ns for name in os.listdir("out") if name != "summary.json"}, before)
+    os.remove("out/summary.json")
+    good("run", "out/scene.json", "--out", "out", "--resume")
+    with open("out/summary.json", "rb") as file:
+        equal(file.read(), summary, "the summary that was lost")
+
+
+def test_without_output_formats():
+    """the tables alone, an equilibrium, and a new run that takes the checkpoint of the one before away"""
+    write_scene(integrator={"method": "static"})
+    for name in "whole", "out":
+        good("run", "scene.json", "--out", name, "--format", "", *(["--checkpoint-every", "1"] if name == "out" else []))
+    same("whole", "out")
+    good("run", "scene.json", "--out", "out", "--format", "", "--resume")
+    same("whole", "out")
+    good("run", "scene.json", "--out", "out", "--format", "npy")
+    assert not os.path.exists("out/checkpoint.drape")
+
+
+def test_refused():
+    """of another scene, damaged, or with other files beside it: exit 2, one line, and nothing is touched"""
+    write_scene(duration=1, integrator={"dt": 0.0005})
+    equal(stopped(signal.SIGKILL, "--out", "out", "--format", ALL), -signal.SIGKILL)
+    shutil.copytree("out", "kept")
+    run = ["run", "scene.json", "--out", "out", "--resume", "--format", ALL]
+
+    def broken(says, *args, change=lambda: None):
+        change()
+        before = contents("out", but=())
+        refused(*run, *args, says=says)
+        equal(contents("out", but=()), before, f"files after {says!r}")
+        shutil.rmtree("out")
+        shutil.copytree("kept", "out")
+
+    def edit(name, position, data=None):
+        with open("out/" + name, "r+b") as file:
+            if data is None:
+                file.truncate(position)
+            else:
+                file.seek(position)
+                file.write(data)
+
+    refused("run", "scene.json", "--resume", says="--out")
+    refused("run", "scene.json", "--checkpoint-every", "5", says="--out")
+    refused("run", "scene.json", "--checkpoint-every", "0", "--out", "x", says="1 to")
+    refused("run", "scene.json", "--resume", "--realtime", "--out", "x", says="--realtime")
+    broken("another model", "--set", "/gravity=[0,-9,0]")
+    broken("other settings", "--dt", "0.002")
+    broken("integrator", "--integrator", "bdf2")
+    broken("run of 1 s", "--duration", "2")
+    broken("formats", "--format", "npy")
+    broken("frames in", "--format", ALL.replace("npy,obj", "obj,npy"))
+    broken("z up", "--set", "/output/up=z")
+    broken("damaged", change=lambda: edit("checkpoint.drape", 1000, b"?"))
+    broken("damaged", change=lambda: edit("checkpoint.drape", 1000))
+    broken("no checkpoint", change=lambda: edit("checkpoint.drape", 0))
+    broken("no checkpoint", change=lambda: shutil.copy("scene.json", "out/checkpoint.drape"))
+    broken("positions.npy", change=lambda: edit("positions.npy", 200))
+    broken("steps.csv", change=lambda: edit("steps.csv", 20))
+    broken("energy.csv", change=lambda: os.remove("out/energy.csv"))
+    broken("positions.glb", change=lambda: os.remove("out/positions.glb"))
+    broken("frame_000000.obj", change=lambda: os.remove("out/frame_000000.obj"))
+    broken("positions.pc2", change=lambda: os.truncate("out/positions.pc2", 40))
+    broken("frames.pvd", change=lambda: os.remove("out/frames.pvd"))
+    good("run", "scene.json", "--out", "whole", "--format", ALL)
+    good(*run)
+    same("whole", "out")
+
+
+def test_full():
+    """a disk that is full ends the run; the checkpoint before is good, and from there it goes on"""
+    write_scene(duration=5)
+    good("run", "scene.json", "--out", "whole", "--format", "npy")
+    for blocks in 20, 30, 35:
+        script = f'ulimit -f {blocks}; exec "$0" run scene.json --out out --format npy --checkpoint-every 3'
+        result = subprocess.run(["/bin/sh", "-c", script, PROGRAM], capture_output=True, text=True, timeout=LIMIT, check=False)
+        equal(result.returncode, 1, result.stderr)
+        equal(read_json("out/summary.json")["status"], "e_file")
+        assert read_npy("out/positions.npy")[0][0] > 1
+        good("run", "scene.json", "--out", "out", "--format", "npy", "--resume")
+        same("whole", "out")
+        shutil.rmtree("out")
+
+
+def test_a_later_failure():
+    """a run that fails after a checkpoint fails in the same way when it goes on"""
+    write_scene(duration=1, integrator={"dt": 0.01, "max_iterations": 4}, controller={"type": "fixed"},
+                pins=[{"corner": "top-left"}, {"corner": "top-right", "track": [[0, [0, 0, 0]], [0.3, [0, 0, 0]], [0.31, [0, 5, 0]]]}])
+    found = [drape("run", "scene.json", "--out", "out", "--checkpoint-every", "2")]
+    first = contents("out")
+    found.append(drape("run", "scene.json", "--out", "out", "--resume"))
+    equal([result.returncode for result in found], [1, 1], found[0].stderr)
+    equal(found[0].stderr, found[1].stderr)
+    equal(contents("out"), first)
+
+
+if __name__ == "__main__":
+    sys.exit(run_tests(globals()))

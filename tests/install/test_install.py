@@ -1,0 +1,200 @@
+#!/usr/bin/env python3
+"""test_install.py: the installed tree, as a host meets it. `meson install` into a folder of its own; what is in it and what the libraries
+show; the hosts of examples/ built against it by pkg-config, by CMake, against the static library, and run by Python. Speaks TAP. What needs a
+program that is not here, or a library that this build does not make, is skipped."""
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+SOURCE, BUILD = os.environ["DRAPE_SOURCE"], os.environ["DRAPE_BUILD"]
+PREFIX, LIBDIR = sys.argv[1:3]
+EXAMPLES = os.path.join(SOURCE, "examples")
+FRAMES = "45"
+
+
+class Skip(Exception):
+    pass
+
+
+def run(*command, cwd=None, env=None):
+    done = subprocess.run(command, cwd=cwd, env=env, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=300)
+    assert done.returncode == 0, f"{' '.join(command)} ended with {done.returncode}:\n{done.stdout}"
+    return done.stdout
+
+
+def need(name):
+    path = shutil.which(name)
+    if not path:
+        raise Skip(f"no {name}")
+    return path
+
+
+class Tree:
+    """An installed tree below `top`; `install` fills it."""
+
+    def __init__(self, top):
+        self.top, self.prefix = top, top + PREFIX
+        self.lib, self.work = os.path.join(self.prefix, LIBDIR), top + ".work"
+        os.makedirs(self.work)
+        run(need("meson"), "install", "-C", BUILD, "--no-rebuild", "--quiet", "--destdir", top)
+        pkgconfig = os.path.join(self.lib, "pkgconfig")
+        self.env = {**os.environ, "PKG_CONFIG_SYSROOT_DIR": top, "PKG_CONFIG_LIBDIR": pkgconfig, "LD_LIBRARY_PATH": self.lib}
+
+    def shared(self):
+        path = os.path.join(self.lib, "libdrape.so")
+        if not os.path.exists(path):
+            raise Skip("this build has no shared library")
+        return path
+
+    def static(self):
+        path = os.path.join(self.lib, "libdrape.a")
+        if not os.path.exists(path):
+            raise Skip("this build has no static library")
+        return path
+
+    def flags(self, *options):
+        return run(need("pkg-config"), *options, "drape", env=self.env).split()
+
+
+def declared():
+    """The functions that the public headers of the library declare."""
+    names = set()
+    for header in ("drape.h", "extend.h"):
+        with open(os.path.join(SOURCE, "include", "drape", header)) as file:
+            text = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
+        names |= set(re.findall(r"^DRAPE_API [^;(]*?\b(drape_\w+)\(", text, flags=re.M))
+    return names
+
+
+def symbols(path, *options):
+    lines = run(need("nm"), *options, "--defined-only", path).splitlines()
+    return {parts[2].split("@")[0] for parts in map(str.split, lines) if len(parts) == 3 and parts[1] not in "A"}
+
+
+def what_is_installed(tree):
+    for name in ("include/drape/drape.h", "include/drape/extend.h", "include/drape/export.h", "bin/drape"):
+        assert os.path.isfile(os.path.join(tree.prefix, name)), name
+    for name in ("pkgconfig/drape.pc", "cmake/drape/drape-config.cmake", "cmake/drape/drape-config-version.cmake"):
+        assert os.path.isfile(os.path.join(tree.lib, name)), name
+    library = tree.shared()
+    assert os.readlink(library) == "libdrape.so.1" and "." in os.readlink(library + ".1")
+    assert "SONAME" in run("objdump", "-p", library) and "libdrape.so.1" in run("objdump", "-p", library)
+
+
+def what_the_shared_library_shows(tree):
+    shown = symbols(tree.shared(), "-D")
+    assert shown == declared(), f"shown and not declared: {sorted(shown - declared())}; declared and not shown: {sorted(declared() - shown)}"
+    assert all(name.startswith("drape_") for name in shown) and len(shown) > 70
+
+
+def what_the_static_library_defines(tree):
+    defined = symbols(tree.static(), "-g")
+    assert declared() <= defined
+    assert all(name.startswith("drape_") for name in defined), sorted(name for name in defined if not name.startswith("drape_"))
+
+
+def what_comes_along(tree):
+    needed = re.findall(r"NEEDED +(\S+)", run("objdump", "-p", tree.shared()))
+    for name in ("libgsl", "libsundials", "libpetsc", "libmpi", "libepoxy", "libGL"):
+        assert not any(library.startswith(name) for library in needed), needed
+    libraries = tree.flags("--libs")
+    assert "-ldrape" in libraries and not any("sundials" in flag or "klu" in flag for flag in libraries), libraries
+
+
+def check_host(output):
+    lines = output.splitlines()
+    assert len(lines) == int(FRAMES) // 30 and lines[0].startswith("t "), output
+
+
+def host_in_c(tree):
+    tree.shared()
+    source, program = os.path.join(EXAMPLES, "host_c", "host.c"), os.path.join(tree.work, "host_c")
+    with open(source) as file:
+        assert sum(1 for _ in file) < 60
+    run(need("cc"), "-Wall", "-Werror", source, *tree.flags("--cflags", "--libs"), "-lm", "-o", program)
+    assert "libdrape.so.1" in run("ldd", program, env=tree.env)
+    check_host(run(program, FRAMES, env=tree.env))
+
+
+def host_in_c_static(tree):
+    source, program = os.path.join(EXAMPLES, "host_c", "host.c"), os.path.join(tree.work, "host_c_static")
+    flags = [tree.static() if flag == "-ldrape" else flag for flag in tree.flags("--static", "--cflags", "--libs")]
+    run(need("cc"), source, *flags, "-lm", "-o", program)
+    assert "libdrape" not in run("ldd", program) and "sundials" not in run("ldd", program)
+    check_host(run(program, FRAMES))
+
+
+def host_in_cpp(tree):
+    build = os.path.join(tree.work, "host_cpp")
+    need("c++")
+    run(need("cmake"), "-S", os.path.join(EXAMPLES, "host_cpp"), "-B", build, "-DCMAKE_PREFIX_PATH=" + tree.prefix,
+        "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror")
+    run("cmake", "--build", build)
+    check_host(run(os.path.join(build, "host"), FRAMES, env=tree.env))
+
+
+def cmake_of_the_static_library(tree):
+    tree.static()
+    need("c++")
+    project = os.path.join(tree.work, "static")
+    shutil.copytree(os.path.join(EXAMPLES, "host_cpp"), project)
+    with open(os.path.join(project, "CMakeLists.txt")) as file:
+        text = file.read()
+    with open(os.path.join(project, "CMakeLists.txt"), "w") as file:
+        file.write(text.replace("drape::drape", "drape::static"))
+    run(need("cmake"), "-S", project, "-B", project + "/build", "-DCMAKE_PREFIX_PATH=" + tree.prefix)
+    run("cmake", "--build", project + "/build")
+    assert "libdrape" not in run("ldd", project + "/build/host")
+    check_host(run(project + "/build/host", FRAMES))
+
+
+def cmake_refuses_another_version(tree):
+    project = os.path.join(tree.work, "newer")
+    os.makedirs(project)
+    with open(os.path.join(project, "CMakeLists.txt"), "w") as file:
+        file.write("cmake_minimum_required(VERSION 3.16)\nproject(newer C)\nfind_package(drape 99 QUIET)\n"
+                   "if(drape_FOUND)\n  message(FATAL_ERROR \"taken\")\nendif()\nfind_package(drape 0.1 REQUIRED)\n")
+    run(need("cmake"), "-S", project, "-B", project + "/build", "-DCMAKE_PREFIX_PATH=" + tree.prefix)
+
+
+def host_in_python(tree):
+    tree.shared()
+    source = os.path.join(EXAMPLES, "host_python", "host.py")
+    with open(source) as file:
+        assert sum(1 for _ in file) < 30
+    if subprocess.run(["/usr/bin/python3", "-c", "import numpy"], stderr=subprocess.DEVNULL).returncode:
+        raise Skip("no numpy")
+    check_host(run("/usr/bin/python3", source, FRAMES, env=tree.env))
+
+
+def the_program_runs(tree):
+    output = run(os.path.join(tree.prefix, "bin", "drape"), "list", "terms")
+    assert "stretch.edge" in output
+
+
+TESTS = [what_is_installed, what_the_shared_library_shows, what_the_static_library_defines, what_comes_along, host_in_c, host_in_c_static,
+         host_in_cpp, cmake_of_the_static_library, cmake_refuses_another_version, host_in_python, the_program_runs]
+
+
+def main():
+    failed = 0
+    print(f"1..{len(TESTS)}")
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Tree(os.path.join(folder, "tree"))
+        for number, test in enumerate(TESTS, 1):
+            try:
+                test(tree)
+                print(f"ok {number} - {test.__name__}", flush=True)
+            except Skip as reason:
+                print(f"ok {number} - {test.__name__} # SKIP {reason}", flush=True)
+            except Exception as error:
+                failed += 1
+                print("".join(f"# {line}\n" for line in str(error).splitlines()) + f"not ok {number} - {test.__name__}", flush=True)
+    return failed > 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

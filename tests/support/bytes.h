@@ -1,0 +1,37 @@
+/* bytes.h: a sim saved in memory. */
+#ifndef DRAPE_TESTS_BYTES_H
+#define DRAPE_TESTS_BYTES_H
+
+#include <check.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drape/drape.h"
+
+typedef struct bytes {
+    unsigned char *data;
+    size_t size, room;
+} bytes;
+
+static inline drape_status bytes_keep(void *user, const void *data, size_t size)
+{
+    bytes *b = user;
+    if (b->size + size > b->room) {
+        b->room = 2 * (b->size + size);
+        b->data = realloc(b->data, b->room);
+        ck_assert_ptr_nonnull(b->data);
+    }
+    memcpy(b->data + b->size, data, size);
+    b->size += size;
+    return DRAPE_OK;
+}
+
+/* To be freed. */
+static inline bytes bytes_save(drape_sim *sim)
+{
+    bytes b = {0};
+    ck_assert_int_eq(drape_sim_save_to(sim, bytes_keep, &b), DRAPE_OK);
+    return b;
+}
+
+#endif
