@@ -290,13 +290,29 @@ static void archive_pull(drape_system *system, drape_archive *a)
                            (int)pull->node);
 }
 
+static void archive_push(drape_system *system, drape_archive *a)
+{
+    drape_archive_bool(a, &system->pushed);
+    if (system->pushed)
+        drape_archive_doubles(a, system->push, 3 * (size_t)system->model->node_count);
+}
+
+void drape_system_swap_winds(drape_system *system, drape_system *other)
+{
+    drape_wind wind = system->wind;
+    system->wind = other->wind;
+    other->wind = wind;
+}
+
 /* A wider pattern is made of what was near when the one before it was too narrow: that list is kept. */
 void drape_system_archive(drape_system *system, drape_archive *a)
 {
     bool contact = system->contact != NULL, wider = system->blocks != NULL;
     const int32_t *nodes = NULL;
     drape_archive_mark(a, "system");
+    drape_motion_archive(system->motion, a);
     archive_pull(system, a);
+    archive_push(system, a);
     drape_archive_same(a, "whether there is contact", contact);
     if (contact)
         drape_contact_archive(system->contact, a);

@@ -270,3 +270,48 @@ bool drape_motion_at_kink(const drape_motion *motion, double t)
         found = at_kink_of(&motion->model->colliders[c].track, &motion->collider_way[c], t);
     return found;
 }
+
+/* ---- In a checkpoint ---- */
+
+static void archive_way(drape_way *way, drape_archive *a)
+{
+    drape_archive_bool(a, &way->given);
+    drape_archive_bool(a, &way->smooth);
+    drape_archive_doubles(a, way->t, 2);
+    drape_archive_doubles(a, way->x[0], 6);
+    drape_archive_doubles(a, way->v[0], 6);
+}
+
+/* One that the host moved first, and the model did not. */
+static void archive_new_pin(drape_motion *motion, int32_t i, drape_archive *a)
+{
+    const drape_model *m = motion->model;
+    int32_t node = a->reading ? 0 : motion->moved_node[i];
+    drape_archive_int32(a, &node);
+    if (!drape_archive_is_reading(a))
+        return;
+    if (node < 0 || node >= m->node_count || !m->pinned[node] || motion->place[node] >= 0) {
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves node %d, which is no pin", (int)node);
+        return;
+    }
+    motion->moved_node[i] = node;
+    motion->moved_track[i] = -1;
+    motion->place[node] = i;
+    motion->moved_count = i + 1;
+}
+
+void drape_motion_archive(drape_motion *motion, drape_archive *a)
+{
+    const drape_model *m = motion->model;
+    int32_t count = motion->moved_count;
+    drape_archive_mark(a, "motion");
+    drape_archive_int32(a, &count);
+    if (drape_archive_good(a) && (count < m->moved_count || (size_t)count > pinned_count(m)))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves %d pins", (int)count);
+    for (int32_t i = m->moved_count; i < count && drape_archive_good(a); i++)
+        archive_new_pin(motion, i, a);
+    for (int32_t i = 0; i < count && drape_archive_good(a); i++)
+        archive_way(&motion->pin_way[i], a);
+    for (int32_t i = 0; i < m->collider_count && drape_archive_good(a); i++)
+        archive_way(&motion->collider_way[i], a);
+}

@@ -5,6 +5,7 @@
 #ifndef DRAPE_MODEL_MOTION_H
 #define DRAPE_MODEL_MOTION_H
 
+#include "base/archive.h"
 #include "model/model.h"
 
 /* A cubic from its first moment to its last, at rest before and after: x and v at both. x is a position of a pin, a
@@ -55,6 +56,9 @@ void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double 
                            const double *v);
 void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t, double span,
                                 const double x[3], const double *v);
+
+/* What a host sent where, into an archive or, where the motion was just made, out of it. */
+void drape_motion_archive(drape_motion *motion, drape_archive *a);
 
 /* Pins that a host moved rest from now on where these positions (node_count x 3) have them. */
 void drape_motion_hold_pins(drape_motion *motion, const double *x);

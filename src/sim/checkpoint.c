@@ -10,6 +10,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #define MOST_LEVELS 60
 #define LONGEST     1e9 /* [s] as the duration of a scene */
@@ -190,17 +191,17 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
 
 /* ---- For hosts ---- */
 
-/* The contents change places, but for those who look on. */
+/* The contents change places, but for what is the host's: who looks on, who may cancel, the wind. */
 static void take_place(drape_sim *sim, drape_sim *made)
 {
-    drape_sim old = *sim;
-    *sim = *made;
-    for (int i = 0; i < old.observer_count; i++) {
-        sim->observers[i] = old.observers[i];
-        sim->observer_users[i] = old.observer_users[i];
-    }
-    sim->observer_count = old.observer_count;
-    *made = old;
+    drape_sim old;
+    const size_t size = offsetof(drape_sim, cancel);
+    memcpy(&old, sim, size);
+    memcpy(sim, made, size);
+    memcpy(made, &old, size);
+    drape_system_watch(sim->system, &sim->cancel);
+    drape_system_watch(made->system, &made->cancel);
+    drape_system_swap_winds(sim->system, made->system);
 }
 
 drape_status drape_sim_read(drape_sim *sim, drape_archive *a)
