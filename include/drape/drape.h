@@ -446,6 +446,11 @@ DRAPE_API const drape_model *drape_sim_model(const drape_sim *sim);
  * else. */
 DRAPE_API uint64_t drape_sim_hash(const drape_sim *sim);
 
+/* How many triangles of the cloth reach into a collider of the scene, counted from 0, by more than 1e-9 m; by 28 points of
+ * each. With implicit rows and `ida` none does that did not in the beginning (docs/contact.md). *deepest, if not NULL:
+ * how deep [m]. -1: there is no such collider. */
+DRAPE_API int32_t drape_sim_inside(const drape_sim *sim, int32_t collider, double *deepest);
+
 /* Normals of the last accepted state (node_count x 3 [1]): the mean of the triangles around a node weighted by their
  * areas, of length 1, counterclockwise outside; 0 where those add up to nothing. drape_model_normals: at other
  * positions x (node_count x 3 [m]). */

@@ -524,6 +524,7 @@ static drape_status recall(drape_contact *c, double margin, double next_margin, 
     if (!status && known)
         status = search_at(c, c->to, c->listed_pose, margin);
     c->known = known;
+    c->aim = c->begun ? GOING_BACK : 0;
     c->listed = false;
     c->margin = margin;
     c->next_margin = next_margin;
