@@ -80,8 +80,10 @@ const drape_contact *drape_system_contact(const drape_system *system); /* NULL: 
  * that one. [s] */
 double drape_system_clock(const drape_system *system);
 
-/* What it knows besides the model, into an archive or, where it was just made, out of it. */
+/* What it knows besides the model, into an archive or, where it was just made, out of it: not the wind, which is a
+ * function of the host's. */
 void drape_system_archive(drape_system *system, drape_archive *a);
+void drape_system_swap_winds(drape_system *system, drape_system *other);
 
 /* A step begins at a state: contact is compared with it until the next. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
