@@ -355,6 +355,8 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
         if (!configure(s))
             status = drape_fail(ctx, DRAPE_E_MEMORY, "IDA cannot be set up for %lld unknowns",
                                 (long long)(2 * s->n));
+        else
+            drape_ida_clear(s->ida);
     }
     if (status)
         destroy(state);

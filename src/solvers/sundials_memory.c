@@ -46,12 +46,25 @@ bool drape_kinsol_archive(void *kinsol, drape_archive *a)
     return true;
 }
 
+/* The last of the vectors of differences that IDAInit took. */
+static int last_column(const struct IDAMemRec *s)
+{
+    return s->ida_maxord_alloc > 3 ? s->ida_maxord_alloc : 3;
+}
+
+void drape_ida_clear(void *ida)
+{
+    IDAMem s = ida;
+    for (int k = 0; k <= last_column(s); k++)
+        N_VConst(0, s->ida_phi[k]);
+    N_VConst(0, s->ida_ee);
+}
+
 /* The history itself: divided differences, and the steps that they are of. */
 static void archive_history(IDAMem s, drape_archive *a)
 {
-    int columns = s->ida_maxord_alloc > 3 ? s->ida_maxord_alloc : 3; /* as IDAInit takes them */
     drape_archive_same(a, "IDA's largest order", s->ida_maxord_alloc);
-    for (int k = 0; k <= columns; k++)
+    for (int k = 0; k <= last_column(s); k++)
         archive_vector(a, s->ida_phi[k]);
     archive_vector(a, s->ida_ee);
     double *const arrays[] = {s->ida_psi, s->ida_alpha, s->ida_beta, s->ida_sigma, s->ida_gamma};
@@ -118,6 +131,11 @@ bool drape_ida_archive(void *ida, drape_archive *a)
 {
     (void)ida, (void)a;
     return false;
+}
+
+void drape_ida_clear(void *ida)
+{
+    (void)ida;
 }
 
 #endif

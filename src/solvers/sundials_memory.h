@@ -13,4 +13,7 @@
 bool drape_kinsol_archive(void *kinsol, drape_archive *a);
 bool drape_ida_archive(void *ida, drape_archive *a);
 
+/* Once, after IDAInit: what IDA has not written yet is 0 then, and nothing of the heap's gets into a checkpoint. */
+void drape_ida_clear(void *ida);
+
 #endif

@@ -70,7 +70,7 @@ def test_interrupted():
 
 def test_no_checkpoint_and_finished():
     """--resume begins where there is none, and leaves a finished run as it is"""
-    write_scene()
+    write_scene(colliders=[{"type": "plane", "point": [0, -0.02, 0], "normal": [0, 1, 0]}])
     good("run", "scene.json", "--out", "whole", "--format", ALL)
     text = good("run", "scene.json", "--out", "out", "--format", ALL, "--resume", "--checkpoint-every", "2")
     same("whole", "out")

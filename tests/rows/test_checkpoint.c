@@ -324,6 +324,8 @@ START_TEST(what_a_host_did_goes_on)
         ck_assert_uint_eq(saved.size, again.size);
         ck_assert_mem_eq(saved.data, again.data, saved.size);
         ck_assert_int_eq(drape_sim_restore_from(other, saved.data, saved.size), DRAPE_OK);
+        const drape_statistics was = drape_sim_statistics(one), is = drape_sim_statistics(other);
+        ck_assert_mem_eq(&was, &is, offsetof(drape_statistics, stability_known)); /* seconds, too */
         double force[2][3];
         drape_sim_pull_force(one, force[0]);
         drape_sim_pull_force(other, force[1]);
