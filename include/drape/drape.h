@@ -360,7 +360,8 @@ DRAPE_API drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_d
 
 /* Puts the sim into a state of the host's own, from which the next advance starts: time [s], 0 to 1e9, before
  * or after the present one; positions [m] and velocities [m/s], node_count x 3, copied. Pinned nodes must lie
- * where their pins have them at t, to 1e-9 of the scene's size, and are put there exactly; the velocities of
+ * where their pins have them at t, to 1e-9 of the scene's size, and are put there exactly (those that drape_sim_move_pins
+ * has sent rest where x has them); the velocities of
  * fixed ones become 0, those of moved ones are taken until a step gives them the mean of their track. Internal
  * variables follow from the positions: a hinge's angle is taken on the branch nearest to its present one.
  *
