@@ -360,10 +360,10 @@ DRAPE_API drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_d
 
 /* Puts the sim into a state of the host's own, from which the next advance starts: time [s], 0 to 1e9, before
  * or after the present one; positions [m] and velocities [m/s], node_count x 3, copied. Pinned nodes must lie
- * where their pins have them at t, to 1e-9 of the scene's size, and are put there exactly (those that drape_sim_move_pins
- * has sent rest where x has them); the velocities of
- * fixed ones become 0, those of moved ones are taken until a step gives them the mean of their track. Internal
- * variables follow from the positions: a hinge's angle is taken on the branch nearest to its present one.
+ * where their pins have them at t, to 1e-9 of the scene's size, and are put there exactly; those that
+ * drape_sim_move_pins has sent rest where x has them. The velocities of fixed ones become 0, those of moved ones are
+ * taken until a step gives them the mean of their track. Internal variables follow from the positions: a hinge's angle
+ * is taken on the branch nearest to its present one.
  *
  * The integrator and the controller start anew, as after a kink; steps are counted from t, and the energies
  * dissipated and numerical from 0. Frames go on with the first at or after t; where t is the present time, with
@@ -404,6 +404,8 @@ DRAPE_API void drape_sim_cancel(drape_sim *sim);
  * so that calls from frame to frame make a smooth motion; NULL: straight, at one speed. A node that was sent once is
  * the host's for good: its track no longer counts. drape_sim_set_state leaves such nodes where the state has them, at
  * rest.
+ *
+ * Before drape_sim_advance_realtime, seconds is the frame and what is owed, frame_dt + drape_realtime.debt.
  *
  * The way is known to the integrator in full: any step inside it, and any frame, has pins where the way has them. A
  * jump of velocity is a kink, at which "ida" starts anew. Errors: DRAPE_E_ARGUMENT (no such node, one that is free, the
