@@ -449,6 +449,11 @@ DRAPE_API const drape_model *drape_sim_model(const drape_sim *sim);
  * else. */
 DRAPE_API uint64_t drape_sim_hash(const drape_sim *sim);
 
+/* How many triangles of the cloth reach into a collider of the scene, counted from 0, by more than 1e-9 m; by 28 points of
+ * each. With implicit rows and `ida` none does that did not in the beginning (docs/contact.md). *deepest, if not NULL:
+ * how deep [m]. -1: there is no such collider. */
+DRAPE_API int32_t drape_sim_inside(const drape_sim *sim, int32_t collider, double *deepest);
+
 /* Normals of the last accepted state (node_count x 3 [1]): the mean of the triangles around a node weighted by their
  * areas, of length 1, counterclockwise outside; 0 where those add up to nothing. drape_model_normals: at other
  * positions x (node_count x 3 [m]). */
@@ -518,7 +523,7 @@ typedef drape_status drape_write(void *user, const void *bytes, size_t size);
  *
  * drape_sim_save writes a file: under another name first, then to the disk, then under its own, so that at any moment, a
  * crash of the machine too, there is the file before or the new one whole. It takes a buffer of 64 KiB and gives it back;
- * drape_sim_save_to takes no memory. Sizes: some 100 bytes a node, for "ida" and modified Newton that of a matrix, too.
+ * drape_sim_save_to takes no memory. Sizes: 100 to 400 bytes a node; for "ida" and modified Newton a matrix beside.
  *
  * Errors: DRAPE_E_ARGUMENT (NULL), DRAPE_E_MEMORY, DRAPE_E_FILE; what `write` returned. The sim is as it was.
  * Thread-safety: as the sim. */

@@ -34,10 +34,12 @@ void cli_chosen_rows(const drape_sim *sim, cli_chosen_row rows[CLI_CHOSEN_ROWS])
                                drape_chosen_ignores_controller};
 }
 
-void cli_contact(const drape_model *model, cli_contact_rows *out)
+void cli_contact(const drape_sim *sim, cli_contact_rows *out)
 {
+    const drape_model *model = sim->model;
+    const bool forces = !sim->chosen.integrator->projects_contact; /* else only the distance of layers acts */
     out->count = 0;
-    if (model->collider_count > 0 || model->contact.self) {
+    if (forces && (model->collider_count > 0 || model->contact.self)) {
         drape_contact_values(&model->contact, out->values[0]);
         out->rows[out->count++] = (cli_chosen_row){.title = "contact",
                                                    .params = drape_contact_params,
@@ -47,11 +49,12 @@ void cli_contact(const drape_model *model, cli_contact_rows *out)
     }
     if (model->contact.self) {
         drape_self_contact_values(&model->contact, out->values[1]);
-        out->rows[out->count++] = (cli_chosen_row){.title = "self_contact",
-                                                   .params = drape_self_contact_params,
-                                                   .param_count = DRAPE_SELF_PARAM_COUNT,
-                                                   .values = out->values[1],
-                                                   .choice = &model->self_choice};
+        out->rows[out->count++] =
+            (cli_chosen_row){.title = "self_contact",
+                             .params = drape_self_contact_params,
+                             .param_count = forces ? DRAPE_SELF_PARAM_COUNT : DRAPE_SELF_THICKNESS + 1,
+                             .values = out->values[1],
+                             .choice = &model->self_choice};
     }
 }
 

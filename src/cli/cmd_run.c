@@ -219,6 +219,17 @@ static void print_wall(const run *r, const drape_statistics *s)
     fputc('\n', stdout);
 }
 
+/* Nothing where all is well: a scene without colliders has no such line, and one that comes out of them neither. */
+static void print_inside(const run *r)
+{
+    double deepest;
+    int32_t faces;
+    for (int32_t c = 0; (faces = drape_sim_inside(r->in.sim, c, &deepest)) >= 0; c++)
+        if (faces > 0)
+            printf("inside    %d triangle%s of the cloth reach%s into %s, up to %.3g m deep\n", (int)faces,
+                   faces == 1 ? "" : "s", faces == 1 ? "es" : "", r->in.model->colliders[c].name, deepest);
+}
+
 static void print_results(const run *r)
 {
     const drape_model *model = r->in.model;
@@ -234,6 +245,7 @@ static void print_results(const run *r)
         printf("equilibrium %s, %lld unstable modes\n", s.unstable_modes == 0 ? "stable" : "unstable",
                (long long)s.unstable_modes);
     print_energy(r);
+    print_inside(r);
     print_wall(r, &s);
     if (r->request->realtime)
         cli_realtime_print(&r->realtime);

@@ -43,7 +43,7 @@ static int open_run(const cli_command *command, cli_source *s)
     char *path = NULL;
     if (command->setting_count > 0)
         return cli_misuse(command->verb,
-                          "--%s: %s is a finished run, which it does not change; give the scene, which is "
+                          "--%s is of a simulation, and %s is a finished run; give its scene, which is "
                           "simulated again: %s/scene.json",
                           command->settings[0].option, s->operand, s->operand);
     drape_context *ctx = NULL;

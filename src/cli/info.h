@@ -50,7 +50,7 @@ typedef struct cli_contact_rows {
     cli_chosen_row rows[2];
     double values[2][DRAPE_MAX_PARAMS];
 } cli_contact_rows;
-void cli_contact(const drape_model *model, cli_contact_rows *out);
+void cli_contact(const drape_sim *sim, cli_contact_rows *out);
 
 /* Whether the scene gave the parameter. */
 bool cli_is_given(const drape_choice *choice, const char *name);

@@ -118,7 +118,7 @@ static json_t *with_contact(json_t *object, const cli_info *info)
     if (info->model->collider_count > 0)
         object = with(object, "colliders", json_incref(colliders));
     json_decref(colliders);
-    cli_contact(info->model, &contact);
+    cli_contact(info->sim, &contact);
     for (int i = 0; i < contact.count; i++) {
         const cli_chosen_row *row = &contact.rows[i];
         object = with(object, row->title, params_of(row->params, row->param_count, row->values, row->choice));

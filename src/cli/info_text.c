@@ -164,10 +164,10 @@ static void print_collider(const drape_collider *collider, const cli_collider_in
                info->inside == 1 ? "" : "s", info->inside == 1 ? "s" : "");
 }
 
-static void print_contact(const drape_model *model)
+static void print_contact(const drape_sim *sim)
 {
     cli_contact_rows contact;
-    cli_contact(model, &contact);
+    cli_contact(sim, &contact);
     for (int i = 0; i < contact.count; i++) {
         const cli_chosen_row *row = &contact.rows[i];
         printf("\n%s\n", row->title);
@@ -314,7 +314,7 @@ void cli_info_text(const cli_info *info)
         print_cloth(info, c);
     for (int32_t c = 0; c < info->model->collider_count; c++)
         print_collider(&info->model->colliders[c], &info->colliders[c]);
-    print_contact(info->model);
+    print_contact(info->sim);
     cli_chosen_rows(info->sim, rows);
     for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
         print_chosen(&rows[i], &info->sim->chosen);

@@ -498,6 +498,7 @@ static drape_status search_at(drape_contact *c, const double *x, const drape_col
     memcpy(c->x, x, 3 * (size_t)c->search.points * sizeof *x);
     memcpy(c->pose, pose, (size_t)c->model->collider_count * sizeof *pose);
     c->next_margin = margin;
+    c->aim = 0;
     return search(c);
 }
 
@@ -522,6 +523,7 @@ static drape_status recall(drape_contact *c, double margin, double next_margin, 
     if (!status && known)
         status = search_at(c, c->to, c->listed_pose, margin);
     c->known = known;
+    c->aim = c->begun ? GOING_BACK : 0;
     c->listed = false;
     c->margin = margin;
     c->next_margin = next_margin;

@@ -643,6 +643,9 @@ static void archive(void *state, drape_archive *a)
     ida_state *s = state;
     int64_t counted = s->counted;
     drape_archive_double(a, &s->reached);
+    drape_archive_double(a, &s->from);
+    drape_archive_double(a, &s->newton.left);
+    drape_archive_bool(a, &s->newton.strict);
     drape_archive_doubles(a, s->powers, 2);
     drape_archive_double(a, &s->second);
     drape_archive_int64(a, &s->steps);

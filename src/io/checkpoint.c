@@ -48,7 +48,7 @@ drape_status drape_checkpoint_read(drape_context *ctx, const char *path, bool *t
                                    size_t *size)
 {
     *bytes = NULL;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (there)
         *there = fd >= 0;
     if (fd < 0 && there && (errno == ENOENT || errno == ENOTDIR))

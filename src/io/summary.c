@@ -144,6 +144,28 @@ static json_t *realtime(const drape_summary_realtime *r)
     return with_reals(with_counts(json_object(), counts, LENGTH(counts)), times, LENGTH(times));
 }
 
+/* Of each collider, where there are any: how many triangles of the cloth reach into it, and how deep [m]. */
+static json_t *with_inside(json_t *object, const drape_sim *sim)
+{
+    json_t *list = json_array();
+    double deepest;
+    int32_t triangles;
+    for (int32_t c = 0; (triangles = drape_sim_inside(sim, c, &deepest)) >= 0; c++) {
+        json_t *one = with(json_object(), "triangles", json_integer(triangles));
+        one = with(one, "deepest", number(deepest));
+        if (json_array_append_new(list, one)) {
+            json_decref(list);
+            list = NULL; /* so is the object, then */
+            break;
+        }
+    }
+    if (list && json_array_size(list) == 0) {
+        json_decref(list);
+        return object;
+    }
+    return with(object, "inside", list);
+}
+
 static json_t *hash(const drape_sim *sim)
 {
     char digits[17];
@@ -171,6 +193,7 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
     object = with(object, "strain", strain(&s));
     if (s.stability_known)
         object = with(object, "equilibrium", stability(&s));
+    object = with_inside(object, sim);
     if (def->realtime)
         object = with(object, "realtime", realtime(def->realtime));
     return with(object, "hash", hash(sim));

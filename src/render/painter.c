@@ -69,6 +69,8 @@ static const char surface_main[] =
     "    s.piece = piece;\n"
     "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
     "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
+    "    if (relief > 0.0) facing = dot(s.n, light); // the slopes of a relief are those of its map, not of "
+    "its mesh\n"
     "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
     "    colour = vec4(encoded(shade(s)), 1.0);\n"
     "}\n";

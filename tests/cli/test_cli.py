@@ -511,6 +511,8 @@ def test_info_of_contact():
     equal((found["contact"]["distance"]["default"], found["contact"]["friction"]["value"]), (True, "implicit"))
     equal(found["self_contact"], {"thickness": {"value": 0.002, "unit": "m", "default": False},
                                   "friction": {"value": 0, "unit": "1", "default": True}})
+    found = json.loads(good("info", "scene.json", "--json", "--integrator", "verlet"))  # moves nodes, has no such forces
+    equal(("contact" in found, list(found["self_contact"])), (False, ["thickness"]))
 
 
 # ---- The schema

@@ -172,7 +172,7 @@ def test_shadings():
         cloth = image[60:140, 100:220]
         assert cloth.sum(axis=2).min() > 24, f"{shade}: black at {cloth.sum(axis=2).min()}"
         assert cloth.std() > 6, f"{shade}: all of one colour"
-        if shade in ("wireframe", "pbr", "strain"):
+        if shade in ("wireframe", "refraction", "pbr", "strain"):
             render(source, "--shade", shade, out="b.png")
             with open("a.png", "rb") as a, open("b.png", "rb") as b:
                 assert a.read() == b.read(), f"{shade}: two pictures differ"
@@ -377,8 +377,8 @@ def test_refused():
              (["ball.json", "--out", "x.PNG", "--every", "2"], "--every is for films"),
              (["ball.json", "--out", "x.png", "--out", "y.png"], "--out is given twice"),
              (["ball.json", "--out", "x.png", "--dt", "0.01", "--dt", "0.02"], "--dt is given twice"),
-             (["ball", "--out", "x.png", "--dt", "0.01"], "--dt: ball is a finished run"),
-             (["ball.json", "ball", "--compare", "--out", "x.png", "--set", "/duration=1"], "--set: ball is a finished run"),
+             (["ball", "--out", "x.png", "--dt", "0.01"], "--dt is of a simulation, and ball is a finished run"),
+             (["ball.json", "ball", "--compare", "--out", "x.png", "--set", "/duration=1"], "--set is of a simulation, and ball is a finished run"),
              (["empty", "--out", "x.png"], "scene.json"),
              (["none.json", "--out", "x.png"], "none.json")]
     for args, says in cases:

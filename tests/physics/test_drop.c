@@ -371,5 +371,27 @@ START_TEST(friction_holds_layers)
 }
 END_TEST
 
-SUITE("drop", nothing_is_ever_inside, nor_in_what_moves, what_begins_inside_comes_out, nothing_tunnels,
-      a_fold_never_crosses_itself, friction_holds_layers)
+/* Layers are no volumes: what starts below the plane's surface is told as it stands, in both signs of the depth. */
+START_TEST(what_is_inside_a_collider_is_told)
+{
+    static const double heights[] = {0.02, -0.01};
+    for (int i = 0; i < 2; i++) {
+        scene s = scene_open(
+            "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 3, 'width': 0.3, "
+            "'height': 0.2, "
+            "'transform': {'translate': [0, %g, 0]}}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, "
+            "'density': 200}, 'terms': ['stretch.edge']}], 'colliders': [{'type': 'plane'}], 'duration': 1}",
+            heights[i]);
+        double deepest = -1;
+        ck_assert_int_eq(drape_sim_inside(s.sim, 0, &deepest), i ? s.model->triangle_count : 0);
+        ck_assert_double_eq_tol(deepest, i ? 0.01 : 0, 1e-15);
+        ck_assert_int_eq(drape_sim_inside(s.sim, 1, NULL), -1);
+        ck_assert_int_eq(drape_sim_inside(s.sim, -1, NULL), -1);
+        scene_close(&s);
+    }
+    ck_assert_int_eq(drape_sim_inside(NULL, 0, NULL), -1);
+}
+END_TEST
+
+SUITE("drop", what_is_inside_a_collider_is_told, nothing_is_ever_inside, nor_in_what_moves,
+      what_begins_inside_comes_out, nothing_tunnels, a_fold_never_crosses_itself, friction_holds_layers)

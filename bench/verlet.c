@@ -1,0 +1,147 @@
+/*
+ * verlet: a frame of pinned2 in CS184's mode, 30 substeps with cloth on cloth and the strain limit, against the same
+ * frame by its own loops (cs184.h), in turns, so that both meet the same machine. CPU time of a frame, and their
+ * ratio; and how far the sheets are from each other, for both do the same: what differs is points nearer than
+ * 2 thicknesses on both sides of a box, which `own` leaves out as CS184 does.
+ *
+ *     verlet [--csv FILE] [--side N] [--thickness T] [--frames WARM COUNT] [SCENE]      default 64, the scene's, 30 60
+ */
+#include "bench.h"
+
+#include "cs184.h"
+#include "model/scene.h"
+
+#include <time.h>
+
+#define GRAVITY -9.8
+
+static int side = 64, warm = 30, frames = 60;
+static double thickness = 0.0095;
+
+static void set(drape_context *ctx, drape_scene *scene, const char *pointer, const char *value)
+{
+    if (drape_scene_set(scene, pointer, value))
+        bench_fail(ctx, "%s=%s", pointer, value);
+}
+
+static drape_model *load(drape_context *ctx, const char *path, const char *boxes)
+{
+    char count[32], last[64], thick[32];
+    drape_scene *scene = NULL;
+    drape_model *model = NULL;
+    snprintf(count, sizeof count, "%d", side);
+    snprintf(last, sizeof last, "[[0, 0], [%d, 0]]", side - 1);
+    snprintf(thick, sizeof thick, "%.17g", thickness);
+    if (drape_scene_load(ctx, path, &scene))
+        bench_fail(ctx, "%s", path);
+    set(ctx, scene, "/cloth/num_width_points", count);
+    set(ctx, scene, "/cloth/num_height_points", count);
+    set(ctx, scene, "/cloth/pinned", last);
+    set(ctx, scene, "/cloth/thickness", thick);
+    set(ctx, scene, "/integrator/self_boxes", boxes);
+    if (drape_scene_compile(scene, &model))
+        bench_fail(ctx, "%s", path);
+    drape_scene_destroy(&scene);
+    return model;
+}
+
+static void open_reference(cs184 *c, const drape_model *m, const drape_sim *sim)
+{
+    bool *pinned = malloc((size_t)m->node_count * sizeof *pinned);
+    if (!pinned)
+        exit(1);
+    for (int32_t i = 0; i < m->node_count; i++)
+        pinned[i] = m->free_of_node[i] < 0;
+    *c = (cs184){.side = side,
+                 .width = 1,
+                 .thickness = thickness,
+                 .ks = 5000,
+                 .damping = 0.2,
+                 .mass = m->mass[1],
+                 .substeps = 30,
+                 .frame_rate = 90,
+                 .enabled = {true, true, true}};
+    cs184_open(c, drape_sim_positions(sim), pinned);
+    free(pinned);
+}
+
+static double frame_of_drape(drape_context *ctx, drape_sim *sim, int frame)
+{
+    clock_t start = clock();
+    if (drape_sim_advance(sim, frame / 90.0))
+        bench_fail(ctx, "frame %d", frame);
+    return (double)(clock() - start) / CLOCKS_PER_SEC;
+}
+
+static double frame_of_reference(cs184 *c)
+{
+    clock_t start = clock();
+    cs184_frame(c, GRAVITY);
+    return (double)(clock() - start) / CLOCKS_PER_SEC;
+}
+
+/* RMS [m]. */
+static double distance(const cs184 *c, const double *x)
+{
+    double sum = 0, d[3];
+    for (int i = 0; i < side * side; i++) {
+        double length = cs184_between(c->points[i].position, x + 3 * (size_t)i, d);
+        sum += length * length;
+    }
+    return sqrt(sum / (side * side));
+}
+
+static void measure(drape_context *ctx, const char *path, const char *boxes, FILE *csv)
+{
+    cs184 reference;
+    drape_model *model = load(ctx, path, boxes);
+    drape_sim *sim = bench_sim(ctx, model, NULL, NULL, NULL, NULL);
+    double ours = 0, theirs = 0;
+    open_reference(&reference, model, sim);
+    for (int frame = 1; frame <= warm + frames; frame++) {
+        double a = frame_of_drape(ctx, sim, frame), b = frame_of_reference(&reference);
+        ours += frame > warm ? a : 0;
+        theirs += frame > warm ? b : 0;
+    }
+    const double apart = distance(&reference, drape_sim_positions(sim));
+    printf("%6d %10g %-8s %10.2f %10.2f %8.3f %10.3g\n", side * side, thickness, boxes, 1e3 * ours / frames,
+           1e3 * theirs / frames, ours / theirs, apart);
+    fflush(stdout);
+    if (csv) {
+        bench_csv_row(csv);
+        fprintf(csv, "%d,%g,%.*s,%d,%d,%.4g,%.4g,%.4g,%.4g\n", side * side, thickness, (int)strlen(boxes) - 2,
+                boxes + 1, warm, frames, 1e3 * ours / frames, 1e3 * theirs / frames, ours / theirs, apart);
+    }
+    cs184_close(&reference);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+}
+
+int main(int argc, char **argv)
+{
+    static const char usage[] =
+        "verlet [--csv FILE] [--side N] [--thickness T] [--frames WARM COUNT] [SCENE]\n";
+    const char *file = NULL, *path = "examples/scenes/cs184_pinned2.json";
+    for (int i = 1; i < argc; i++) {
+        if (strcmp(argv[i], "--csv") == 0 && i + 1 < argc)
+            file = argv[++i];
+        else if (strcmp(argv[i], "--side") == 0 && i + 1 < argc && atoi(argv[i + 1]) > 2)
+            side = atoi(argv[++i]);
+        else if (strcmp(argv[i], "--thickness") == 0 && i + 1 < argc && atof(argv[i + 1]) > 0)
+            thickness = atof(argv[++i]);
+        else if (strcmp(argv[i], "--frames") == 0 && i + 2 < argc && atoi(argv[i + 2]) > 0) {
+            warm = atoi(argv[++i]);
+            frames = atoi(argv[++i]);
+        } else if (argv[i][0] != '-')
+            path = argv[i];
+        else
+            return bench_usage(argv[i], usage);
+    }
+    FILE *csv = bench_csv(file, "nodes,thickness_m,boxes,warm_frames,frames,drape_ms,cs184_ms,ratio,apart_m");
+    drape_context *ctx = bench_context();
+    puts(" nodes  thickness boxes      drape ms   cs184 ms    ratio    apart m");
+    measure(ctx, path, "\"own\"", csv);
+    measure(ctx, path, "\"all\"", csv);
+    drape_context_destroy(&ctx);
+    return csv && fclose(csv) ? 1 : 0;
+}
