@@ -66,9 +66,9 @@ typedef struct drape_lab_outcome {
 
 DRAPE_API void drape_lab_outcome_free(drape_lab_outcome *outcome);
 
-/* Runs "tradeoff", "stability" or "converge" into the folder: cases.jsonl (cases-1-of-4.jsonl for a shard),
- * experiment.json, and, once all cases are done, results.csv, pictures and report.html. Lines from before of
- * the same experiment are taken as they are. Errors: DRAPE_E_ARGUMENT (no such experiment, a wrong def),
+/* Runs "tradeoff", "stability" or "converge" into the folder: cases.jsonl, experiment.json, results.csv, pictures and
+ * report.html; a shard, beside which others may write, experiment.json and cases-1-of-4.jsonl alone: the rest is the
+ * merge's. Lines from before of the same experiment are taken as they are. Errors: DRAPE_E_ARGUMENT (no such experiment, a wrong def),
  * those of loading the scene, DRAPE_E_FILE (also a folder that holds another experiment), DRAPE_E_MEMORY,
  * DRAPE_E_STOPPED (cancel said so). */
 DRAPE_API drape_status drape_lab_run(drape_context *ctx, const char *experiment, const drape_lab_def *def,

@@ -40,7 +40,7 @@ static int merge(const merge_request *request)
     drape_status status = drape_lab_merge(ctx, (const char *const *)request->command.operands,
                                           (size_t)request->command.operand_count, request->out, &outcome);
     bool whole = outcome.done == outcome.cases;
-    int code = cli_lab_conclude(ctx, status, &outcome, request->out);
+    int code = cli_lab_conclude(ctx, status, &outcome);
     drape_context_destroy(&ctx);
     return code == CLI_DONE && !whole ? CLI_FAILED : code;
 }

@@ -292,7 +292,7 @@ const drape_verb drape_verb_validate = {
                "closed form,\n"
                "series or differential equation that it is known by. Terms that converge to something else "
                "show that as\n"
-               "a documented model error. Exit code 0: none failed. All of them take some minutes.",
+               "a documented model error. Exit code 0: none failed. All of them take two minutes of CPU time.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .run = main_validate,

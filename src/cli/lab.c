@@ -125,15 +125,12 @@ static int exit_code(drape_status status)
     }
 }
 
-int cli_lab_conclude(drape_context *ctx, drape_status status, drape_lab_outcome *outcome, const char *out)
+int cli_lab_conclude(drape_context *ctx, drape_status status, drape_lab_outcome *outcome)
 {
-    if (status) {
+    if (status)
         fprintf(stderr, "%s\n", drape_context_message(ctx));
-    } else {
+    else
         fputs(outcome->text ? outcome->text : "", stdout);
-        if (outcome->done == outcome->cases)
-            printf("report    %s/report.html\n", out);
-    }
     drape_lab_outcome_free(outcome);
     return exit_code(status);
 }
@@ -155,7 +152,7 @@ static int run(const drape_verb *verb, const cli_lab_request *request, int defau
         cli_progress_begin(&progress, 0, 0);
         drape_status status = drape_lab_run(ctx, verb->name, &def, &outcome);
         cli_progress_clear(&progress);
-        code = cli_lab_conclude(ctx, status, &outcome, def.folder);
+        code = cli_lab_conclude(ctx, status, &outcome);
     }
     drape_context_destroy(&ctx);
     free_words(&w);

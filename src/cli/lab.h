@@ -42,7 +42,6 @@ typedef struct cli_lab_request {
 int cli_lab_main(const drape_verb *verb, int default_jobs, int argc, char **argv);
 
 struct drape_lab_outcome;
-int cli_lab_conclude(drape_context *ctx, drape_status status, struct drape_lab_outcome *outcome,
-                     const char *out);
+int cli_lab_conclude(drape_context *ctx, drape_status status, struct drape_lab_outcome *outcome);
 
 #endif

@@ -8,7 +8,9 @@
 #include "lab/sweep.h"
 #include "lab/text.h"
 
+#include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -164,6 +166,21 @@ static drape_status parse_about(drape_context *ctx, const char *folder, json_t *
     return status;
 }
 
+/* Shards that begin at once in one folder all write the same: each under a name of its own, which then becomes the
+ * file's at once, so that nobody reads half of it or misses it. */
+static drape_status write_about(lab *l)
+{
+    char own[64], from[4200], to[4200];
+    char *text = json_dumps(l->about, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
+    snprintf(own, sizeof own, "experiment-%d-of-%d.json", l->def->shard, l->def->shards);
+    snprintf(from, sizeof from, "%s/%s", l->folder, own);
+    snprintf(to, sizeof to, "%s/" ABOUT, l->folder);
+    drape_status status = text ? lab_write_text(l, own, text, strlen(text))
+                               : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for " ABOUT);
+    free(text);
+    return !status && rename(from, to) ? drape_file_fail(l->ctx, "write", to, errno) : status;
+}
+
 /* A folder goes on with the experiment that it has, or is given this one. */
 static drape_status claim_folder(lab *l)
 {
@@ -184,11 +201,7 @@ static drape_status claim_folder(lab *l)
         json_decref(there);
         return status;
     }
-    char *text = json_dumps(l->about, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
-    status = text ? lab_write_text(l, ABOUT, text, strlen(text))
-                  : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for " ABOUT);
-    free(text);
-    return status;
+    return write_about(l);
 }
 
 static drape_status make_results(lab *l)
@@ -212,6 +225,18 @@ static void count_results(const lab *l, drape_lab_outcome *outcome)
     }
 }
 
+static drape_status write_report(lab *l)
+{
+    char title[512];
+    drape_status status = l->experiment->report(l);
+    snprintf(title, sizeof title, "drape %s: %s", l->experiment->name, word_of(l->about, "scene"));
+    if (!status)
+        status = lab_write_page(l, title);
+    fprintf(l->words, "report    %s/report.html\n", l->folder);
+    return status;
+}
+
+/* Shards leave it to the merge: several at once in one folder would write the same files. */
 static drape_status report(lab *l, drape_lab_outcome *outcome)
 {
     lab_copy_same(l);
@@ -221,16 +246,11 @@ static drape_status report(lab *l, drape_lab_outcome *outcome)
         "%lld of %lld cases done; %lld of them did not come to the end; %lld steps were rejected in all\n",
         (long long)outcome->done, (long long)outcome->cases, (long long)outcome->failed,
         (long long)outcome->rejected);
-    drape_status status = lab_write_csv(l);
-    if (!status && outcome->done == outcome->cases)
-        status = l->experiment->report(l);
-    if (!status && outcome->done < outcome->cases)
-        fprintf(l->words, "the report is made when all cases are done: other shards, `drape merge`\n");
-    if (!status && outcome->done == outcome->cases) {
-        char title[512];
-        snprintf(title, sizeof title, "drape %s: %s", l->experiment->name, word_of(l->about, "scene"));
-        status = lab_write_page(l, title);
-    }
+    const bool shard = l->def->shards > 1;
+    drape_status status = shard ? DRAPE_OK : lab_write_csv(l);
+    if (!status && !shard && outcome->done == outcome->cases)
+        return write_report(l);
+    fprintf(l->words, "the report is made when all cases are done: other shards, `drape merge`\n");
     return status;
 }
 

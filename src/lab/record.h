@@ -21,8 +21,8 @@ lab_record *lab_records_make(drape_context *ctx, const drape_reference *only, si
 /* What is told of a case that is done; NULL: no memory. */
 json_t *lab_record_json(const lab_record *record);
 
-/* Takes the lines of folder/cases.jsonl that are of these cases: of the same scene, the same expected value and this
- * version of Drape. Others are left out. The file is then begun anew with what was taken, open for more; closed and
+/* Takes the lines of folder/cases.jsonl that are of these cases: of the same scene and this version of Drape; they are
+ * judged anew. Others are left out. The file is then begun anew with what was taken, open for more; closed and
  * destroyed by the caller. *found counts. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_records_open(drape_context *ctx, const char *folder, lab_record *records, size_t count,
                               drape_file *file, size_t *found);

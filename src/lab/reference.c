@@ -130,9 +130,13 @@ static void forget(const lab *l, const char *name)
 
 /* ---- Climbing ---- */
 
-static void name_ladder(const ladder *one, char *name, size_t size)
+/* Without a ladder that of what was chosen. Shards in one folder climb each by itself. */
+static void name_file(const lab *l, const ladder *one, char *name, size_t size)
 {
-    snprintf(name, size, FINAL "-%s", one->method);
+    char shard[32] = "";
+    if (l->def->shards > 1)
+        snprintf(shard, sizeof shard, "-%d-of-%d", l->def->shard, l->def->shards);
+    snprintf(name, size, FINAL "%s%s%s", one ? "-" : "", one ? one->method : "", shard);
 }
 
 /* One rung. *good: it ended; else the climb is where it was. */
@@ -161,7 +165,7 @@ static drape_status climb_ladder(lab *l, const drape_model *model, const ladder 
     bool good = true;
     drape_status status = DRAPE_OK;
     *c = (climb){.error = INFINITY};
-    name_ladder(one, name, sizeof name);
+    name_file(l, one, name, sizeof name);
     read_back(l, name, c);
     while (!status && good && c->rungs < RUNGS && c->error > BEST * model->length &&
            GROWTH * c->took < BUDGET * l->def->case_seconds - c->spent) {
@@ -195,6 +199,7 @@ static drape_status climb_all(lab *l, const drape_model *model, climb *best, int
 
 static drape_status choose(lab *l, const drape_model *model, climb *best)
 {
+    char name[64];
     int which;
     drape_status status = climb_all(l, model, best, &which);
     if (!status && which < 0)
@@ -202,11 +207,11 @@ static drape_status choose(lab *l, const drape_model *model, climb *best)
                           "no reference: neither ida nor trbdf2 ends twice within %g s; give more by "
                           "--case-seconds, or a shorter duration",
                           BUDGET * l->def->case_seconds);
+    name_file(l, NULL, name, sizeof name);
     if (!status)
-        status = keep(l, FINAL, &ladders[which], best);
+        status = keep(l, name, &ladders[which], best);
     for (size_t i = 0; !status && i < sizeof ladders / sizeof *ladders; i++) {
-        char name[64];
-        name_ladder(&ladders[i], name, sizeof name);
+        name_file(l, &ladders[i], name, sizeof name);
         forget(l, name);
     }
     return status;
@@ -217,7 +222,9 @@ drape_status lab_make_reference(lab *l)
     drape_model *model = NULL;
     climb best = {.error = INFINITY};
     drape_status status = DRAPE_OK;
-    if (!read_back(l, FINAL, &best)) {
+    char name[64];
+    name_file(l, NULL, name, sizeof name);
+    if (!read_back(l, name, &best)) {
         const lab_request request = {.def = l->def};
         if (l->def->progress)
             l->def->progress(l->def->user, 0, 0, NAN);

@@ -215,7 +215,7 @@ static void *work(void *user)
                                      .reference = &l->reference,
                                      .probe = &l->probe,
                                      .seconds = def->case_seconds,
-                                     .repeats = def->repeats,
+                                     .repeats = l->experiment->compares_costs ? def->repeats : 1,
                                      .given_up = &s->given_up};
         drape_status status = lab_run(ctx, &request, &result);
         settle(s, ctx, i, status, result);

@@ -383,6 +383,7 @@ static drape_status report(lab *l)
 const lab_experiment_ops lab_experiment_tradeoff = {
     .name = "tradeoff",
     .summary = "work against accuracy of every integrator over its settings",
+    .compares_costs = true,
     .plan = plan,
     .prepare = lab_make_reference,
     .report = report,

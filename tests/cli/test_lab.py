@@ -14,7 +14,7 @@ import json
 
 from program import PROGRAM, SOURCES, drape, equal, good, read_json, refused, run_tests, scene, write_scene
 
-CASES = 79  # of drape validate
+CASES = 81  # of drape validate
 AXES = ["--axis", "/integrator/dt=1e-3:1e-1:3log", "--axis", "/cloth/0/material/young_modulus=1e4:1e6:2log"]
 
 
@@ -125,6 +125,7 @@ def test_shards():
     for i in (1, 2, 3):
         out = good(*command, "--shard", f"{i}/3", "--out", f"part{i}")
     assert "when all cases are done" in out, out
+    equal(sorted(os.listdir("part1")), ["cases-1-of-3.jsonl", "experiment.json"], "what a shard writes: others may write beside it")
     missing = drape("merge", "part1", "part3", "--out", "some")
     equal(missing.returncode, 1, "exit code of a merge that lacks cases")
     assert "12 of 18" in missing.stdout, missing.stdout
