@@ -498,7 +498,7 @@ static drape_status search_at(drape_contact *c, const double *x, const drape_col
     memcpy(c->x, x, 3 * (size_t)c->search.points * sizeof *x);
     memcpy(c->pose, pose, (size_t)c->model->collider_count * sizeof *pose);
     c->next_margin = margin;
-    c->aim = 0;
+    c->aim = 0; /* they are aimed already */
     return search(c);
 }
 
@@ -519,6 +519,7 @@ static drape_status begin_again(drape_contact *c, double margin)
  * c->listed_pose. */
 static drape_status recall(drape_contact *c, double margin, double next_margin, bool known)
 {
+    const double next_aim = c->aim;
     drape_status status = c->begun ? begin_again(c, margin) : DRAPE_OK;
     if (!status && known)
         status = search_at(c, c->to, c->listed_pose, margin);
@@ -527,6 +528,7 @@ static drape_status recall(drape_contact *c, double margin, double next_margin, 
     c->listed = false;
     c->margin = margin;
     c->next_margin = next_margin;
+    c->aim = next_aim;
     return status;
 }
 
@@ -555,7 +557,7 @@ static void archive_couplings(drape_contact *c, drape_archive *a)
 static bool is_sound(const drape_contact *c, double margin, double next_margin)
 {
     size_t n = 3 * (size_t)c->search.points;
-    return drape_all_finite(c->to, n) && drape_all_finite(c->start, n) && margin >= 0 &&
+    return isfinite(c->aim) && drape_all_finite(c->to, n) && drape_all_finite(c->start, n) && margin >= 0 &&
            margin <= c->model->length && next_margin >= 0 && next_margin <= c->model->length;
 }
 
@@ -569,6 +571,7 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     drape_archive_bool(a, &c->begun);
     drape_archive_double(a, &margin);
     drape_archive_double(a, &next_margin);
+    drape_archive_double(a, &c->aim);
     drape_archive_doubles(a, a->reading ? c->to : c->searched, points);
     drape_archive_doubles(a, (a->reading ? c->listed_pose : c->searched_pose)->displacement, poses);
     drape_archive_doubles(a, c->start, points);

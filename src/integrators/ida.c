@@ -644,8 +644,7 @@ static void archive(void *state, drape_archive *a)
     int64_t counted = s->counted;
     drape_archive_double(a, &s->reached);
     drape_archive_double(a, &s->from);
-    drape_archive_double(a, &s->newton.left);
-    drape_archive_bool(a, &s->newton.strict);
+    drape_ida_newton_archive(&s->newton, a);
     drape_archive_doubles(a, s->powers, 2);
     drape_archive_double(a, &s->second);
     drape_archive_int64(a, &s->steps);
@@ -656,7 +655,7 @@ static void archive(void *state, drape_archive *a)
         return;
     archive_factors(s, a);
     if (!drape_ida_archive(s->ida, a) && a->reading)
-        s->reached = NAN;
+        restart(s, NULL);
 }
 
 static size_t bytes(const void *state)

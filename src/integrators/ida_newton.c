@@ -48,6 +48,13 @@ void drape_ida_newton_forget(drape_ida_newton *newton)
     newton->left = UNKNOWN;
 }
 
+void drape_ida_newton_archive(drape_ida_newton *newton, drape_archive *a)
+{
+    drape_archive_double(a, &newton->first);
+    drape_archive_double(a, &newton->left);
+    drape_archive_bool(a, &newton->strict);
+}
+
 void drape_ida_newton_free(drape_ida_newton *newton)
 {
     if (newton->solver)

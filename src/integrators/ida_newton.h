@@ -11,6 +11,8 @@
 #ifndef DRAPE_INTEGRATORS_IDA_NEWTON_H
 #define DRAPE_INTEGRATORS_IDA_NEWTON_H
 
+#include "base/archive.h"
+
 #include <sundials/sundials_nonlinearsolver.h>
 
 #include <stdbool.h>
@@ -27,6 +29,9 @@ bool drape_ida_newton_attach(drape_ida_newton *newton, void *ida, N_Vector like,
 
 /* After new factors. */
 void drape_ida_newton_forget(drape_ida_newton *newton);
+
+/* What it knows from step to step. */
+void drape_ida_newton_archive(drape_ida_newton *newton, drape_archive *a);
 
 /* After IDA has been freed; NULL solver: nothing. */
 void drape_ida_newton_free(drape_ida_newton *newton);

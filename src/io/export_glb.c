@@ -453,6 +453,7 @@ static void glb_archive(void *state, drape_archive *a)
     glb->frames = (uint32_t)frames;
     drape_export_archive_size(a, &glb->file.kept);
     drape_archive_bytes(a, glb->base, node_bytes(glb));
+    drape_archive_bytes(a, glb->upright, node_bytes(glb));
     drape_archive_bytes(a, glb->times, glb->frames * sizeof *glb->times);
 }
 
@@ -523,7 +524,7 @@ static drape_status glb_cut(drape_context *ctx, void *state, int64_t frames)
         return drape_export_begin(ctx, glb->def->folder, FILE_NAME, &glb->file);
     drape_status status = blank_rest(glb);
     if (!status)
-        status = write_lengths(glb, glb->frames * node_bytes(glb));
+        status = write_lengths(glb, glb->frames * frame_bytes(glb));
     if (!status)
         status = drape_file_trim(&glb->file);
     glb->live = !status;

@@ -105,12 +105,12 @@ def test_refused():
     write_scene(duration=1, integrator={"dt": 0.0005})
     equal(stopped(signal.SIGKILL, "--out", "out", "--format", ALL), -signal.SIGKILL)
     shutil.copytree("out", "kept")
-    run = ["run", "scene.json", "--out", "out", "--resume", "--format", ALL]
+    run = ["run", "scene.json", "--out", "out", "--resume"]
 
-    def broken(says, *args, change=lambda: None):
+    def broken(says, *args, formats=ALL, change=lambda: None):
         change()
         before = contents("out", but=())
-        refused(*run, *args, says=says)
+        refused(*run, "--format", formats, *args, says=says)
         equal(contents("out", but=()), before, f"files after {says!r}")
         shutil.rmtree("out")
         shutil.copytree("kept", "out")
@@ -131,8 +131,8 @@ def test_refused():
     broken("other settings", "--dt", "0.002")
     broken("integrator", "--integrator", "bdf2")
     broken("run of 1 s", "--duration", "2")
-    broken("formats", "--format", "npy")
-    broken("frames in", "--format", ALL.replace("npy,obj", "obj,npy"))
+    broken("formats", formats="npy")
+    broken("frames in", formats=ALL.replace("npy,obj", "obj,npy"))
     broken("z up", "--set", "/output/up=z")
     broken("damaged", change=lambda: edit("checkpoint.drape", 1000, b"?"))
     broken("damaged", change=lambda: edit("checkpoint.drape", 1000))
@@ -146,7 +146,7 @@ def test_refused():
     broken("positions.pc2", change=lambda: os.truncate("out/positions.pc2", 40))
     broken("frames.pvd", change=lambda: os.remove("out/frames.pvd"))
     good("run", "scene.json", "--out", "whole", "--format", ALL)
-    good(*run)
+    good(*run, "--format", ALL)
     same("whole", "out")
 
 
