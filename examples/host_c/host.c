@@ -42,7 +42,7 @@ int main(int argc, char **argv)
     status = status ? status : drape_sim_create(ctx, model, NULL, &sim);
     for (int k = 1; !status && k <= frames; k++) {
         const double t = k * frame, x[3] = {a * sin(w * t)}, v[3] = {a * w * cos(w * t)};
-        status = drape_sim_move_collider(sim, 0, frame, x, v);
+        status = drape_sim_move_collider(sim, 0, frame + report.debt, x, v);
         status = status ? status : drape_sim_advance_realtime(sim, frame, 0.8 * frame, &report);
         double low = INFINITY; /* here a game would draw the positions, with drape_sim_normals */
         for (int32_t i = 0; !status && i < drape_model_node_count(model); i++)

@@ -360,9 +360,10 @@ DRAPE_API drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_d
 
 /* Puts the sim into a state of the host's own, from which the next advance starts: time [s], 0 to 1e9, before
  * or after the present one; positions [m] and velocities [m/s], node_count x 3, copied. Pinned nodes must lie
- * where their pins have them at t, to 1e-9 of the scene's size, and are put there exactly; the velocities of
- * fixed ones become 0, those of moved ones are taken until a step gives them the mean of their track. Internal
- * variables follow from the positions: a hinge's angle is taken on the branch nearest to its present one.
+ * where their pins have them at t, to 1e-9 of the scene's size, and are put there exactly; those that
+ * drape_sim_move_pins has sent rest where x has them. The velocities of fixed ones become 0, those of moved ones are
+ * taken until a step gives them the mean of their track. Internal variables follow from the positions: a hinge's angle
+ * is taken on the branch nearest to its present one.
  *
  * The integrator and the controller start anew, as after a kink; steps are counted from t, and the energies
  * dissipated and numerical from 0. Frames go on with the first at or after t; where t is the present time, with
@@ -403,6 +404,8 @@ DRAPE_API void drape_sim_cancel(drape_sim *sim);
  * so that calls from frame to frame make a smooth motion; NULL: straight, at one speed. A node that was sent once is
  * the host's for good: its track no longer counts. drape_sim_set_state leaves such nodes where the state has them, at
  * rest.
+ *
+ * Before drape_sim_advance_realtime, seconds is the frame and what is owed, frame_dt + drape_realtime.debt.
  *
  * The way is known to the integrator in full: any step inside it, and any frame, has pins where the way has them. A
  * jump of velocity is a kink, at which "ida" starts anew. Errors: DRAPE_E_ARGUMENT (no such node, one that is free, the
@@ -514,9 +517,9 @@ typedef drape_status drape_write(void *user, const void *bytes, size_t size);
 
 /* Saves a sim between two calls that advance it, so that a sim of the same model goes on from there with the same bits:
  * states, what integrator, controller, contact and linear solver know of the past, the energies and statistics so far, the
- * number of the next frame, pulls, pushes and where the host has pins and colliders go. Not saved are observers, the field
- * of wind, and what a host's own terms or colliders keep. May also be called by
- * an observer of a frame: the frames that are left of the step are told after drape_sim_restore, by the next advance.
+ * number of the next frame; where a host sent pins and colliders, what it pushes and pulls. Not saved are observers, the
+ * field of drape_sim_set_wind, and what a host's own terms or colliders keep. May also be called by an observer of a
+ * frame: the frames that are left of the step are told after drape_sim_restore, by the next advance.
  *
  * drape_sim_save writes a file: under another name first, then to the disk, then under its own, so that at any moment, a
  * crash of the machine too, there is the file before or the new one whole. It takes a buffer of 64 KiB and gives it back;
@@ -529,8 +532,8 @@ DRAPE_API drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, voi
 
 /* Puts a sim, whatever it did before, where the saved one was; bytes (size) need only live during the call. The sim was
  * made with the model of the saved one, or one from the same scene, by the same build, with the same integrator,
- * controller, their settings and frame rate; threads may differ. Its observers and its wind stay; observers are told nothing. Arrays that
- * the sim gave out before are no longer valid. A sim is made beside the present one for it: for the time of the call there are
+ * controller, their settings and frame rate; threads may differ. Its observers and its wind stay, and it may be
+ * cancelled as before; observers are told nothing. Arrays that the sim gave out before are no longer valid. A sim is made beside the present one for it: for the time of the call there are
  * both. With a SUNDIALS without its private headers (docs/checkpoints.md) "ida" starts anew from the state.
  *
  * A file of `drape run --checkpoint-every` is such a one, too. Errors, and then the sim is as it was: DRAPE_E_ARGUMENT

@@ -126,11 +126,11 @@ drape_status drape_system_set_wind(drape_system *system, drape_wind_field *field
     return drape_wind_set(system->ctx, system->model, field, user, &system->wind);
 }
 
-void drape_system_swap_wind(drape_system *a, drape_system *b)
+void drape_system_swap_winds(drape_system *system, drape_system *other)
 {
-    const drape_wind wind = a->wind;
-    a->wind = b->wind;
-    b->wind = wind;
+    const drape_wind wind = system->wind;
+    system->wind = other->wind;
+    other->wind = wind;
 }
 
 void drape_system_add_loads(const drape_system *system, const double *x, double *g)
@@ -302,7 +302,7 @@ static void archive_push(drape_system *system, drape_archive *a)
 {
     const size_t n = 3 * (size_t)system->model->node_count;
     drape_archive_bool(a, &system->pushed);
-    if (system->pushed && drape_archive_good(a))
+    if (system->pushed)
         drape_archive_doubles(a, system->push, n);
     if (drape_archive_is_reading(a) && !drape_all_finite(system->push, n))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pushes with a force that is not finite");
@@ -314,9 +314,9 @@ void drape_system_archive(drape_system *system, drape_archive *a)
     bool contact = system->contact != NULL, wider = system->blocks != NULL;
     const int32_t *nodes = NULL;
     drape_archive_mark(a, "system");
+    drape_motion_archive(system->motion, a);
     archive_pull(system, a);
     archive_push(system, a);
-    drape_motion_archive(system->motion, a);
     drape_archive_same(a, "whether there is contact", contact);
     if (contact)
         drape_contact_archive(system->contact, a);

@@ -61,9 +61,6 @@ double drape_system_push_work(const drape_system *system, const double *x, const
 /* A medium that moves, from now on. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user);
 
-/* The winds of two systems of one model change places. */
-void drape_system_swap_wind(drape_system *a, drape_system *b);
-
 /* Adds what a host does to nodes at x, pull and push, to g (node_count x 3): a part of drape_system_force. */
 void drape_system_add_loads(const drape_system *system, const double *x, double *g);
 
@@ -83,6 +80,8 @@ double drape_system_clock(const drape_system *system);
 /* What it knows besides the model, into an archive or, where it was just made, out of it: not the wind, which is a
  * function of the host's. */
 void drape_system_archive(drape_system *system, drape_archive *a);
+
+/* The winds of two systems of one model change places. */
 void drape_system_swap_winds(drape_system *system, drape_system *other);
 
 /* A step begins at a state: contact is compared with it until the next. Errors: DRAPE_E_MEMORY. */

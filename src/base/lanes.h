@@ -21,7 +21,7 @@ typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
 
 /* The sanitizers' code is not ready when the program picks. */
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__) &&             \
-    !defined(__SANITIZE_ADDRESS__)
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define LANES_DISPATCH __attribute__((target_clones("avx2", "default")))
 #else
 #define LANES_DISPATCH

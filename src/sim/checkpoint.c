@@ -142,8 +142,8 @@ static void archive_statistics(drape_sim *sim, drape_archive *a)
     drape_statistics *s = &sim->statistics;
     int64_t *const counts[] = {&s->steps_accepted, &s->steps_rejected, &s->steps_unconverged, &sim->attempts,
                                &sim->next_frame};
-    double *const numbers[] = {&s->h_min,        &s->h_max,      &s->wall_setup, &s->wall_steps,
-                               &s->wall_contact, &s->strain_min, &s->strain_max};
+    double *const numbers[] = {&s->h_min,      &s->h_max,      &s->wall_setup,
+                               &s->wall_steps, &s->strain_min, &s->strain_max};
     drape_archive_mark(a, "statistics");
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
         drape_archive_int64(a, counts[i]);
@@ -192,28 +192,17 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
 
 /* ---- For hosts ---- */
 
-/* All of a sim but its flag, which another thread may raise at this moment. */
-static void copy_contents(drape_sim *to, const drape_sim *from)
-{
-    const size_t first = offsetof(drape_sim, ctx);
-    memcpy((char *)to + first, (const char *)from + first, sizeof *to - first);
-}
-
-/* The contents change places, but for those who look on and the wind. */
+/* The contents change places, but for what is the host's: who looks on, who may cancel, the wind. */
 static void take_place(drape_sim *sim, drape_sim *made)
 {
-    drape_sim old = {.cancel = false};
-    copy_contents(&old, sim);
-    copy_contents(sim, made);
-    for (int i = 0; i < old.observer_count; i++) {
-        sim->observers[i] = old.observers[i];
-        sim->observer_users[i] = old.observer_users[i];
-    }
-    sim->observer_count = old.observer_count;
-    copy_contents(made, &old);
+    drape_sim old;
+    const size_t size = offsetof(drape_sim, cancel);
+    memcpy(&old, sim, size);
+    memcpy(sim, made, size);
+    memcpy(made, &old, size);
     drape_system_watch(sim->system, &sim->cancel);
     drape_system_watch(made->system, &made->cancel);
-    drape_system_swap_wind(sim->system, made->system);
+    drape_system_swap_winds(sim->system, made->system);
 }
 
 drape_status drape_sim_read(drape_sim *sim, drape_archive *a)

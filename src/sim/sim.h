@@ -39,8 +39,6 @@ typedef struct drape_realtime_memory {
 } drape_realtime_memory;
 
 struct drape_sim {
-    atomic_bool
-        cancel; /* the advance that runs, or the next, is to stop; first, of the handle, whatever it holds */
     drape_context *ctx;
     drape_arena arena;
     const drape_model *model;
@@ -57,9 +55,6 @@ struct drape_sim {
     int64_t next_frame;
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
     double *read;                   /* (node_count x 3) scratch of what is read between steps */
-    drape_observer *observers[DRAPE_MAX_OBSERVERS];
-    void *observer_users[DRAPE_MAX_OBSERVERS];
-    int observer_count;
     int64_t attempts;
     drape_statistics statistics; /* what the driver counts; the integrator has the rest */
     drape_reason reasons[DRAPE_MAX_REASONS];
@@ -70,6 +65,11 @@ struct drape_sim {
     bool energy_known, made_known;     /* whether they are */
     uint64_t model_hash, choices_hash; /* of what a checkpoint is of; identity_known: they are */
     bool identity_known;
+    /* From here on it stays where a restored sim takes the place of the rest (checkpoint.c). */
+    atomic_bool cancel; /* the advance that runs, or the next, is to stop */
+    drape_observer *observers[DRAPE_MAX_OBSERVERS];
+    void *observer_users[DRAPE_MAX_OBSERVERS];
+    int observer_count;
 };
 
 /* Another one with the same choices, at the beginning. */
