@@ -180,12 +180,6 @@ typedef struct drape_term_ops {
     void (*lanes)(const drape_elements *el, const int32_t *element, const double *x, const double *internal,
                   double *q, double *dq, double *ddq);
 
-    /* Optional, beside measure: the ddq with which force ddq is its positive semidefinite part, given the force of
-     * each element, so (ddq)+ where it pulls and (ddq)- where it pushes; ddq (count x d x d, symmetric). Without it,
-     * and without convex, what is made positive loses force ddq, and with it the stiffness that tension gives. */
-    void (*positive)(const drape_elements *el, int32_t first, int32_t count, const double *x,
-                     const double *internal, const double *force, double *ddq);
-
     /* e [J] (count), g [N] (count x d), hess [N/m] (count x d x d, symmetric). */
     void (*energy)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                    const double *internal, double *e, double *g, double *hess);
@@ -219,6 +213,12 @@ typedef struct drape_term_ops {
 
     /* dissipation: it is in a medium. v is the velocity against it, less by the wind of drape_sim_set_wind. */
     bool in_medium;
+
+    /* Optional, beside measure: the ddq with which force ddq is its positive semidefinite part, given the force of
+     * each element, so (ddq)+ where it pulls and (ddq)- where it pushes; ddq (count x d x d, symmetric). Without it,
+     * and without convex, what is made positive loses force ddq, and with it the stiffness that tension gives. */
+    void (*positive)(const drape_elements *el, int32_t first, int32_t count, const double *x,
+                     const double *internal, const double *force, double *ddq);
 } drape_term_ops;
 
 /* Registers a term of the host's own: scenes compiled with this context may name it from then on. *ops is copied; what

@@ -288,11 +288,12 @@ const drape_verb drape_verb_validate = {
     .operand = "REFERENCE",
     .operand_optional = true,
     .summary = "the physics references: obtained against expected",
-    .details = "Runs the scene of every reference, or of one, and compares what is measured in it with the "
-               "closed form,\n"
-               "series or differential equation that it is known by. Terms that converge to something else "
-               "show that as\n"
-               "a documented model error. Exit code 0: none failed. All of them take two minutes of CPU time.",
+    .details =
+        "Runs the scene of every reference, or of one, and compares what is measured in it with the "
+        "closed form,\n"
+        "series or differential equation that it is known by. Terms that converge to something else "
+        "show that as\n"
+        "a documented model error. Exit code 0: none failed. All of them take two minutes of CPU time.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .run = main_validate,
