@@ -12,10 +12,12 @@
 
 #include <math.h>
 
-#define JUMP      4.0   /* a kinetic energy that grew by less is no explosion */
-#define SHARE     0.5   /* nor one of which less than this came from nowhere */
-#define UNNOTICED 1e-6  /* of the energies that are compared: less is below what adaptive rows resolve */
-#define QUIET     1e-16 /* of the scene's own energy: motion at 1e-8 of its speed is rounding */
+#define JUMP      4.0  /* a kinetic energy that grew by less is no explosion */
+#define SHARE     0.5  /* nor one of which less than this came from nowhere */
+#define UNNOTICED 1e-6 /* of the energies that are compared: less is below what adaptive rows resolve */
+#define ROUNDED                                                                                              \
+    1e-12 /* of the same: no gain at all. Small steps gain little each: a share of a step's size would let them */
+#define QUIET 1e-16 /* of the scene's own energy: motion at 1e-8 of its speed is rounding */
 
 /* Of the energy that a scene had to offer so far. Rows that conserve energy, or bound an error, let it swing by
  * some per cent. */
@@ -157,11 +159,13 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
            scale = offered(audit, &made, info, quiet), run = audit->best - made.numerical;
     sim->made = made;
     sim->made_known = true;
+    if (m->free_count == 0) /* all is prescribed: what is from nowhere is of the sums of pins' work */
+        return false;
     if (exploded(&e, &made, gain, quiet))
         info->worst = gain_at(m, out->v, "energy from nowhere / kinetic energy", gain / made.kinetic, SHARE);
     else if (gain > STEP_GAIN * scale)
         info->worst = gain_at(m, out->v, "energy from nowhere / energy of the run", gain / scale, STEP_GAIN);
-    else if (gain > UNNOTICED * scale && run > most * scale)
+    else if (gain > ROUNDED * scale && run > most * scale)
         info->worst =
             gain_at(m, out->v, "energy from nowhere since its least / energy of the run", run / scale, most);
     else

@@ -241,7 +241,7 @@ def test_failure():
     equal(summary["steps"]["reasons"], {"max_iterations": 1})
     equal(read_npy("out/positions.npy")[0][0], summary["frames"])
     assert re.search(r"^status +e_solver$", result.stdout, re.M), result.stdout
-    write_scene(duration=1, integrator={"dt": 0.01, "max_iterations": 1, "tolerance": 1e-12}, controller={"dt_min": 1e-3})
+    write_scene(duration=1, integrator={"dt": 0.01, "max_iterations": 1, "tolerance": 1e-12, "globalization": "none"}, controller={"dt_min": 1e-3})
     result = drape("run", "scene.json", "--out", "out")
     equal((result.returncode, read_json("out/summary.json")["status"]), (1, "e_step_too_small"))
     assert all(row["accepted"] == "0" for row in read_steps("out")), "the last attempt failed, and all before it"

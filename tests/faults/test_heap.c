@@ -189,7 +189,7 @@ END_TEST
 /* Rejected steps too: one iteration is not enough at 0.01 s. */
 START_TEST(no_heap_call_in_rejected_steps)
 {
-    scene s = open_scene("'max_iterations': 2", true);
+    scene s = open_scene("'max_iterations': 2, 'globalization': 'none'", true);
     long n = count_steps(&s);
     ck_assert_int_gt(drape_sim_statistics(s.sim).steps_rejected, 50);
     ck_assert_int_eq(n, 0);

@@ -127,7 +127,8 @@ END_TEST
 START_TEST(accept_takes_no_nan)
 {
     for (long n = 1; n <= EVALUATIONS; n++) {
-        host_sim s = host_open(", 'on_failure': 'accept', 'max_iterations': 2", "'type': 'fixed'", true);
+        host_sim s = host_open(", 'on_failure': 'accept', 'max_iterations': 2, 'globalization': 'none'",
+                               "'type': 'fixed'", true);
         host_watch(&s);
         host_break(HOST_NAN_FORCE, n, false);
         drape_status status = drape_sim_advance(s.sim, 0.3);

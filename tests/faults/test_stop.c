@@ -239,7 +239,7 @@ START_TEST(every_row_stops_at_a_time_and_goes_on)
             continue;
         if (drape_param_find(row->params, row->param_count, "max_iterations") >=
             0) /* so that steps are rejected */
-            check_time_stops(row->name, "halving", ", 'max_iterations': 3");
+            check_time_stops(row->name, "halving", ", 'max_iterations': 3, 'globalization': 'none'");
         check_time_stops(row->name, "error", "");
     }
 }

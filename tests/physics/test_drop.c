@@ -380,7 +380,8 @@ START_TEST(what_is_inside_a_collider_is_told)
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 4, 'rows': 3, 'width': 0.3, "
             "'height': 0.2, "
             "'transform': {'translate': [0, %g, 0]}}, 'material': {'young_modulus': 1e5, 'thickness': 1e-3, "
-            "'density': 200}, 'terms': ['stretch.edge']}], 'colliders': [{'type': 'plane'}], 'duration': 1}",
+            "'density': 200}, 'terms': ['stretch.edge']}], 'colliders': [{'type': 'plane', 'point': [0, 0, "
+            "0], 'normal': [0, 1, 0]}], 'duration': 1}",
             heights[i]);
         double deepest = -1;
         ck_assert_int_eq(drape_sim_inside(s.sim, 0, &deepest), i ? s.model->triangle_count : 0);
