@@ -310,7 +310,7 @@ START_TEST(what_a_host_did_goes_on)
         const char *name = drape_integrators[i]->name;
         if (drape_integrators[i]->timeless)
             continue;
-        scene s = scene_model(SHEET, 4, "", "", name, "", "halving");
+        scene s = scene_model(SHEET, 4, "", OBSTACLES, name, "", "halving");
         drape_sim *one = make_sim(&s, NULL), *other = make_sim(&s, NULL);
         const double target[3] = {0.1, 0.05, 0.1};
         ck_assert_int_eq(go(one, MIDDLE), DRAPE_OK);
