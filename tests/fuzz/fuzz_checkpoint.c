@@ -21,7 +21,7 @@ static const char sheet[] =
     "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"equilateral\", \"edges\": 2, \"edge_length\": 0.1},"
     "\"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200},"
     "\"terms\": [\"stretch.edge\", \"bend.hinge\", {\"type\": \"damp.kelvin_voigt\", \"beta\": 1e-3}],"
-    "\"pins\": [{\"corner\": \"top-left\", \"track\": [[0, [0, 0, 0]], [1, [0, 0.1, 0]]]}]}],"
+    "\"pins\": [{\"edge\": \"top\", \"track\": [[0, [0, 0, 0]], [1, [0, 0.1, 0]]]}]}],"
     "\"colliders\": [{\"type\": \"sphere\", \"center\": [0.1, -0.12, -0.1], \"radius\": 0.1,"
     "\"friction\": 0.2}], \"self_contact\": {\"thickness\": 0.01}, \"contact\": {\"friction\": \"lagged\"},"
     "\"integrator\": {\"method\": \"be\", \"dt\": 0.01}, \"controller\": {\"type\": \"halving\"},"

@@ -1,9 +1,10 @@
 /*
  * fuzz_model.c: a scene out of the bytes, in memory, and some steps of it. Meshes are small and may be all but
  * degenerate; materials go to the ends of their ranges; terms, colliders, contact, controllers and integrators are what
- * the tables have, with settings drawn out of their own ranges. A scene that is refused is refused with one line.
+ * the tables have, with settings drawn out of their own ranges. What a scene is refused for, with one line, is left out of it.
  */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "colliders/colliders.h"
@@ -21,7 +22,7 @@
 #define MOST_PINS      3
 #define MOST_TERMS     8
 #define MOST_COLLIDERS 3
-#define MOST_ROWS      24 /* with settings, in a scene */
+#define MOST_ROWS      32 /* with settings, in a scene */
 #define ATTEMPTS       6
 #define STEPS          3
 #define MOST_COUNT     40 /* of integers: iterations, substeps; what bounds the work of a step */
@@ -37,7 +38,8 @@ typedef struct drawn {
 /* Within the range, by magnitude where it spans some; at its ends now and then. */
 static double draw_number(fuzz_bytes *in, const drape_param *p)
 {
-    const double most = fmin(p->max, 1e12), least = fmax(p->min, -1e12);
+    const double most = fmin(p->open_max ? p->max * (1 - 1e-9) : p->max, 1e12),
+                 least = fmax(p->open_min ? p->min + 1e-9 : p->min, -1e12);
     const unsigned how = fuzz_below(in, 8);
     if (how == 0)
         return least;
@@ -48,7 +50,7 @@ static double draw_number(fuzz_bytes *in, const drape_param *p)
     return fuzz_magnitude(in, fmax(least, most * 1e-12), most);
 }
 
-static void draw_value(fuzz_bytes *in, const drape_param *p, drape_setting *s, double *vector)
+static void draw_value(fuzz_bytes *in, const drape_param *p, int most, drape_setting *s, double *vector)
 {
     unsigned choices = 0;
     while (p->choices && p->choices[choices])
@@ -58,21 +60,21 @@ static void draw_value(fuzz_bytes *in, const drape_param *p, drape_setting *s, d
     else if (p->kind == DRAPE_PARAM_BOOLEAN)
         s->number = fuzz_below(in, 2);
     else if (p->kind == DRAPE_PARAM_INTEGER)
-        s->number = floor(fuzz_between(in, p->min, fmin(p->max, p->min + MOST_COUNT)));
+        s->number = floor(fuzz_between(in, p->min, fmin(p->max, p->min + most)));
     else if (p->kind == DRAPE_PARAM_NUMBER)
         s->number = draw_number(in, p);
     else if (p->kind == DRAPE_PARAM_TEXT)
         s->text = "missing.obj";
     else {
         for (int k = 0; k < 3; k++)
-            vector[k] = fuzz_between(in, -1, 1);
+            vector[k] = fuzz_between(in, fmax(p->min + (p->open_min ? 1e-3 : 0), -1), fmin(p->max, 1));
         s->vector = vector;
         s->vector_count = 3;
     }
 }
 
-/* Those that are required, and each other one where a bit says so. */
-static void draw(fuzz_bytes *in, const drape_param *params, int count, drawn *d)
+/* Those that are required, and each other one where a bit says so. most: integers lie at most so far above their least. */
+static void draw(fuzz_bytes *in, const drape_param *params, int count, int most, drawn *d)
 {
     unsigned bits = 0;
     d->count = 0;
@@ -85,7 +87,7 @@ static void draw(fuzz_bytes *in, const drape_param *params, int count, drawn *d)
             continue;
         drape_setting *s = &d->setting[d->count];
         *s = (drape_setting){.name = p->name};
-        draw_value(in, p, s, d->vector[d->count++]);
+        draw_value(in, p, most, s, d->vector[d->count++]);
     }
 }
 
@@ -120,7 +122,7 @@ static drape_row_def row(scene *s, fuzz_bytes *in, const char *name, const drape
 {
     FUZZ_REQUIRE(s->row_count < MOST_ROWS, "row %s", name);
     drawn *d = &s->rows[s->row_count++];
-    draw(in, params, count, d);
+    draw(in, params, count, MOST_COUNT, d);
     return (drape_row_def){.type = name, .settings = d->setting, .setting_count = d->count};
 }
 
@@ -137,7 +139,7 @@ static void draw_triangles(mesh *m, int columns, int rows, unsigned flips)
 }
 
 /* A lattice of some size whose cells are as flat as `squeeze` says, each node out of its place by some of a cell. */
-static void draw_mesh(mesh *m, fuzz_bytes *in)
+static void draw_mesh(mesh *m, drape_mesh_def *def, fuzz_bytes *in)
 {
     const int columns = 1 + (int)fuzz_below(in, MOST_SIDE), rows = 1 + (int)fuzz_below(in, MOST_SIDE);
     const double size = fuzz_magnitude(in, 1e-5, 1e4);
@@ -151,6 +153,21 @@ static void draw_mesh(mesh *m, fuzz_bytes *in)
             m->x[3 * i + k] = size * (at[k] + (stir > 0 ? fuzz_between(in, -stir, stir) : 0));
     }
     draw_triangles(m, columns, rows, fuzz_byte(in));
+    def->positions = m->x;
+    def->node_count = (size_t)m->nodes;
+    def->triangles = m->triangle;
+    def->triangle_count = (size_t)m->triangles;
+}
+
+static void draw_grid(scene *s, drape_cloth_def *def, fuzz_bytes *in)
+{
+    unsigned count = 0;
+    while (drape_grids[count])
+        count++;
+    const drape_grid_ops *ops = drape_grids[fuzz_below(in, count)];
+    drawn *d = &s->rows[s->row_count++];
+    draw(in, ops->params, ops->param_count, MOST_SIDE, d);
+    def->mesh.grid = (drape_row_def){.type = ops->name, .settings = d->setting, .setting_count = d->count};
 }
 
 /* To where it goes, in a time that may be shorter than any step. */
@@ -170,7 +187,7 @@ static void draw_pins(cloth *c, drape_cloth_def *def, fuzz_bytes *in)
     for (size_t i = 0; i < def->pin_count; i++) {
         drape_pin_def *pin = &c->pins[i];
         drape_pin_def_init(pin, sizeof *pin);
-        c->pinned[i] = (int32_t)fuzz_below(in, (unsigned)c->mesh.nodes);
+        c->pinned[i] = (int32_t)fuzz_below(in, 4);
         pin->nodes = &c->pinned[i];
         pin->node_count = 1;
         pin->clamp = fuzz_below(in, 4) == 3;
@@ -199,8 +216,9 @@ static void draw_terms(scene *s, cloth *c, drape_cloth_def *def, fuzz_bytes *in)
         count++;
     def->terms = c->terms;
     def->term_count = fuzz_below(in, MOST_TERMS + 1);
+    const unsigned first = fuzz_below(in, count);
     for (size_t i = 0; i < def->term_count; i++) {
-        const drape_term_ops *ops = drape_terms[fuzz_below(in, count)];
+        const drape_term_ops *ops = drape_terms[(first + i * (i + 1) / 2) % count];
         c->terms[i] = row(s, in, ops->name, ops->params, ops->param_count);
     }
 }
@@ -213,11 +231,10 @@ static void draw_cloths(scene *s, fuzz_bytes *in)
         drape_cloth_def *def = &s->cloths[i];
         cloth *c = &s->parts[i];
         drape_cloth_def_init(def, sizeof *def);
-        draw_mesh(&c->mesh, in);
-        def->mesh.positions = c->mesh.x;
-        def->mesh.node_count = (size_t)c->mesh.nodes;
-        def->mesh.triangles = c->mesh.triangle;
-        def->mesh.triangle_count = (size_t)c->mesh.triangles;
+        if (fuzz_below(in, 3) == 2)
+            draw_grid(s, def, in);
+        else
+            draw_mesh(&c->mesh, &def->mesh, in);
         draw_material(c, def, in);
         draw_terms(s, c, def, in);
         draw_pins(c, def, in);
@@ -273,6 +290,47 @@ static void draw_scene(scene *s, fuzz_bytes *in)
         s->def.gravity[1] = fuzz_between(in, -1e4, 1e4);
 }
 
+/* ---- What was refused is left out ---- */
+
+static void drop(void *items, size_t size, size_t *count, unsigned index, const char *pointer)
+{
+    char *from = items;
+    FUZZ_REQUIRE(index < *count, "%s: there are %zu", pointer, *count);
+    memmove(from + index * size, from + (index + 1) * size, (*count - index - 1) * size);
+    --*count;
+}
+
+/* By the place that the message names; false: it is of what a scene cannot do without. */
+static bool leave_out(scene *s, const char *pointer)
+{
+    unsigned i, j;
+    if (sscanf(pointer, "/cloth/%u/terms/%u", &i, &j) == 2 && i < s->def.cloth_count)
+        drop(s->parts[i].terms, sizeof *s->parts[i].terms, &s->cloths[i].term_count, j, pointer);
+    else if (sscanf(pointer, "/cloth/%u/pins/%u", &i, &j) == 2 && i < s->def.cloth_count)
+        drop(s->parts[i].pins, sizeof *s->parts[i].pins, &s->cloths[i].pin_count, j, pointer);
+    else if (sscanf(pointer, "/colliders/%u", &j) == 1)
+        drop(s->colliders, sizeof *s->colliders, &s->def.collider_count, j, pointer);
+    else if (strncmp(pointer, "/contact", 8) == 0 && s->def.contact)
+        s->def.contact = NULL, s->def.contact_count = 0;
+    else if (strncmp(pointer, "/self_contact", 13) == 0 && s->def.self_contact)
+        s->def.self_contact = NULL, s->def.self_contact_count = 0;
+    else
+        return false;
+    return true;
+}
+
+static drape_model *make_model(drape_context *ctx, scene *s)
+{
+    drape_model *model = NULL;
+    drape_status status;
+    do {
+        status = drape_model_create(ctx, &s->def, &model);
+        fuzz_check(ctx, status, "drape_model_create");
+        FUZZ_REQUIRE(!status == !!model, "%s", drape_status_name(status));
+    } while ((status == DRAPE_E_ARGUMENT || status == DRAPE_E_FILE) && leave_out(s, ctx->pointer));
+    return model;
+}
+
 /* ---- Steps ---- */
 
 static void run(drape_context *ctx, const drape_model *model, const drape_integrator_ops *integrator,
@@ -286,8 +344,8 @@ static void run(drape_context *ctx, const drape_model *model, const drape_integr
         count++;
     const drape_controller_ops *controller = drape_controllers[fuzz_below(in, count)];
     drape_sim_def_init(&def, sizeof def);
-    draw(in, integrator->params, integrator->param_count, &settings[0]);
-    draw(in, controller->params, controller->param_count, &settings[1]);
+    draw(in, integrator->params, integrator->param_count, MOST_COUNT, &settings[0]);
+    draw(in, controller->params, controller->param_count, MOST_COUNT, &settings[1]);
     def.integrator = integrator->name;
     def.integrator_settings = settings[0].setting;
     def.integrator_setting_count = settings[0].count;
@@ -308,15 +366,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static scene s; /* large */
     fuzz_bytes in = {.at = data, .end = data + size};
     drape_context *ctx = fuzz_open(MOST_MEMORY);
-    drape_model *model = NULL;
     const unsigned chosen = fuzz_below(&in, 16); /* an integrator; past the last: all of them */
     unsigned count = 0;
     while (drape_integrators[count])
         count++;
     draw_scene(&s, &in);
-    const drape_status status = drape_model_create(ctx, &s.def, &model);
-    fuzz_check(ctx, status, "drape_model_create");
-    FUZZ_REQUIRE(!status == !!model, "%s", drape_status_name(status));
+    drape_model *model = make_model(ctx, &s);
     for (unsigned i = 0; model && i < count; i++) {
         fuzz_bytes own = in; /* each with the same bytes */
         if (chosen == i || chosen >= count)
