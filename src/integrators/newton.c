@@ -34,6 +34,7 @@ static const char *const predictor_choices[] = {"inertial", "rest", NULL};
     1e3 /* of the scene's size, a node: KINSOL's own limit depends on the guess and is 1 for d = 0 */
 #define WORK_SHARE        0.5 /* of the work along a correction: so much may be left on the far side */
 #define MOST_TRIALS       8   /* of the line search, by bisection */
+#define MOST_MIXED        8   /* corrections of a solve after which the forces are taken as they are */
 #define MOST_CHORDS       2   /* corrections more, with the factors of one */
 #define SHORT_STEP        0.5
 #define LEAST_SHARE       1e-3 /* of the positive part, that an indefinite matrix is given */
@@ -141,6 +142,7 @@ struct drape_newton {
     double *f;                   /* free DOFs: F there */
     double *chord, *minus_f;     /* free DOFs: of chords; NULL without trial */
     drape_mixed mixed;           /* with trial */
+    int corrections;             /* of this solve */
     bool searched;               /* there is trial: the line search ended on it */
     bool nonfinite;              /* a residual was */
     drape_status fitted;         /* of the last change of the pattern: < 0 ends the solve */
@@ -376,6 +378,18 @@ static drape_status add_chords(drape_newton *s, double *p, double first)
     return DRAPE_OK;
 }
 
+/* Where many corrections did not lead to an end, sheets buckle: there forces to first order in the last correction say
+ * little, and the iteration may go in circles. */
+static void correct_mixed(drape_newton *s, const double *p)
+{
+    double start = drape_system_clock(s->system);
+    if (++s->corrections <= MOST_MIXED)
+        drape_mixed_correct(&s->mixed, &s->point, p);
+    else
+        drape_mixed_forget(&s->mixed);
+    s->work.jacobian_seconds += drape_system_clock(s->system) - start;
+}
+
 /* After a short step the next matrix is the positive part, after a whole one the exact one again. */
 static drape_status globalize(drape_newton *s, N_Vector x, N_Vector b)
 {
@@ -388,7 +402,7 @@ static drape_status globalize(drape_newton *s, N_Vector x, N_Vector b)
     double start = s->trial ? -dot(N_VGetArrayPointer(b), p, s->n) : 0;
     if (start >= 0)
         return DRAPE_OK;
-    drape_mixed_correct(&s->mixed, &s->point, p);
+    correct_mixed(s, p);
     double a = search_along(s, p, start);
     scale(p, a, s->n);
     s->positive = a < SHORT_STEP;
@@ -594,8 +608,11 @@ static void begin(drape_newton *s, const drape_newton_problem *problem)
     s->fitted = DRAPE_OK;
     drape_point start = s->point;
     start.x = problem->x_start;
+    double clock = drape_system_clock(s->system);
+    s->corrections = 0;
     if (s->trial)
         drape_mixed_begin(&s->mixed, start.x ? &start : NULL);
+    s->work.jacobian_seconds += drape_system_clock(s->system) - clock;
 }
 
 /* KINSOL's counters start anew with each KINSol. */
