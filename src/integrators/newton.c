@@ -84,8 +84,8 @@ const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {
          .unit = "1",
          .default_value = METHOD_EXACT,
          .choices = method_choices,
-         .help = "exact: a Jacobian each iteration; modified: factors kept for up to 10 iterations and "
-                 "across steps"},
+         .help = "exact: a Jacobian each iteration, but for chords at the end under globalization work; "
+                 "modified: factors kept for up to 10 iterations and across steps"},
     [DRAPE_NEWTON_GLOBALIZATION] =
         {.name = "globalization",
          .kind = DRAPE_PARAM_CHOICE,
