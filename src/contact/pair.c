@@ -232,7 +232,8 @@ static double gap_at(const drape_pair *pair, double x[4][3], double p[4][3], dou
     return closest.distance - radius;
 }
 
-double drape_pair_way(const drape_pair *pair, const double *from, const double *to, double keep, bool core)
+double drape_pair_way(const drape_pair *pair, const double *from, const double *to, double keep, bool core,
+                      double most)
 {
     double x[4][3], y[4][3], p[4][3], radius = core ? 0 : pair->radius, t = 0;
     drape_pair_gather(pair, from, x);
@@ -241,11 +242,11 @@ double drape_pair_way(const drape_pair *pair, const double *from, const double *
         vec3_sub(y[a], x[a], p[a]);
     double speed = approach_speed(pair->kind, p), gap = gap_at(pair, x, p, 0, radius), least = keep * gap;
     if (!(speed > 0) || !(gap > (pair->collider >= 0 ? TOUCHING : 0)) || gap > speed)
-        return 1;
+        return most;
     for (int i = 0; i < MOST_ADVANCES; i++) {
         t += WAY_SHARE * (gap - least) / speed;
-        if (t >= 1)
-            return 1;
+        if (t >= most)
+            return most;
         gap = gap_at(pair, x, p, t, radius);
         if (gap < least + (1 - WAY_SHARE) * least)
             return t;

@@ -65,8 +65,9 @@ bool drape_pair_gap(const drape_pair *pair, const drape_placed *at, const double
 
 /* The largest fraction of the way from x to y, straight and for all points together, that a pair may go
  * without touching: additive continuous collision detection (Li et al. 2021, Codimensional IPC, algorithm
- * 1). It stops where keep of the gap at the start is left. 1 where the pair touches at the start (a collider: is within 1e-9 m of it). core: the
- * radius counts as 0. */
-double drape_pair_way(const drape_pair *pair, const double *x, const double *y, double keep, bool core);
+ * 1). It stops where keep of the gap at the start is left. At most `most`, which is looked no further than, and
+ * which is given where the pair touches at the start (a collider: is within 1e-9 m of it). core: the radius counts as 0. */
+double drape_pair_way(const drape_pair *pair, const double *x, const double *y, double keep, bool core,
+                      double most);
 
 #endif

@@ -25,10 +25,12 @@ typedef struct journey {
     drape_pair worst;
 } journey;
 
+/* No further than the way that another pair leaves: where forces throw nodes to the end of the world, each pair on its
+ * own would come near so slowly, against its speed, that all of them together never end. */
 static void follow(void *user, const drape_pair *pair)
 {
     journey *j = user;
-    double way = drape_pair_way(pair, j->x, j->y, j->keep, j->core);
+    double way = drape_pair_way(pair, j->x, j->y, j->keep, j->core, j->way);
     if (way < j->way) {
         j->way = way;
         j->worst = *pair;

@@ -247,7 +247,9 @@ START_TEST(test_way)
         double start = drape_pair_gap_value(&pair, &placed);
         if (!(start > 1e-3))
             continue;
-        double way = drape_pair_way(&pair, x, y, 0.1, false);
+        double way = drape_pair_way(&pair, x, y, 0.1, false, 1);
+        ck_assert_double_eq(drape_pair_way(&pair, x, y, 0.1, false, 0.5 * way), 0.5 * way);
+        ck_assert_double_eq(drape_pair_way(&pair, x, y, 0.1, false, 0.5 + 0.5 * way), way < 1 ? way : 1);
         for (int i = 0; i <= 200; i++) {
             for (int j = 0; j < D; j++)
                 at[j] = x[j] + way * i / 200 * (y[j] - x[j]);

@@ -1,0 +1,116 @@
+/*
+ * fuzz_checkpoint.c: a checkpoint of a small sim, changed in places, its length and checksum made right again: what a
+ * checksum cannot tell must be told by what is read. The first byte chooses the integrator; each 4 bytes after it are a
+ * change. What is refused leaves the sim as it is; what is taken goes on for some steps.
+ */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/hash.h"
+#include "fuzz/fuzz.h"
+#include "integrators/integrator.h"
+
+#define MOST_MEMORY ((size_t)64 << 20)
+#define TAIL        (2 * sizeof(uint64_t)) /* of an archive: its length and its checksum */
+#define CHANGES     16
+#define STEP        0.01 /* [s] */
+
+/* Every part that has something to keep: contact, friction, an internal variable, a moving pin, the past of the steps. */
+static const char sheet[] =
+    "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"equilateral\", \"edges\": 2, \"edge_length\": 0.1},"
+    "\"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200},"
+    "\"terms\": [\"stretch.edge\", \"bend.hinge\", {\"type\": \"damp.kelvin_voigt\", \"beta\": 1e-3}],"
+    "\"pins\": [{\"edge\": \"top\", \"track\": [[0, [0, 0, 0]], [1, [0, 0.1, 0]]]}]}],"
+    "\"colliders\": [{\"type\": \"sphere\", \"center\": [0.1, -0.12, -0.1], \"radius\": 0.1,"
+    "\"friction\": 0.2}], \"self_contact\": {\"thickness\": 0.01}, \"contact\": {\"friction\": \"lagged\"},"
+    "\"integrator\": {\"method\": \"be\", \"dt\": 0.01}, \"controller\": {\"type\": \"halving\"},"
+    "\"duration\": 1, \"frame_rate\": 60}";
+
+typedef struct bytes {
+    uint8_t *data;
+    size_t size;
+} bytes;
+
+static drape_status keep(void *user, const void *piece, size_t size)
+{
+    bytes *b = user;
+    b->data = realloc(b->data, b->size + size);
+    FUZZ_REQUIRE(b->data, "no memory for %zu bytes", b->size + size);
+    memcpy(b->data + b->size, piece, size);
+    b->size += size;
+    return DRAPE_OK;
+}
+
+static void change(bytes *b, fuzz_bytes *in)
+{
+    static const double odd[] = {NAN, INFINITY, -1, 0, 1e300, 1e-300, -1e9, 0.5};
+    static const int64_t whole[] = {-1, 0, 1, INT32_MAX, INT32_MIN, INT64_MAX, INT64_MIN, 64};
+    const unsigned kind = fuzz_byte(in), high = fuzz_byte(in);
+    const size_t body = b->size - TAIL, at = (256 * high + fuzz_byte(in)) % body;
+    const unsigned value = fuzz_byte(in);
+    const size_t room = body - at, eight = room < 8 ? room : 8, four = room < 4 ? room : 4;
+    if (kind % 6 == 0)
+        b->data[at] = (uint8_t)value;
+    else if (kind % 6 == 1)
+        b->data[at] ^= (uint8_t)(1u << value % 8);
+    else if (kind % 6 == 2)
+        memcpy(b->data + at, &odd[value % 8], eight);
+    else if (kind % 6 == 3)
+        memcpy(b->data + at, &whole[value % 8], eight);
+    else if (kind % 6 == 4)
+        memcpy(b->data + at, &whole[value % 8], four);
+    else if (at + TAIL > 0 && value % 8 == 0)
+        b->size = at + TAIL;
+}
+
+static void make_right(bytes *b)
+{
+    const uint64_t length = b->size - TAIL;
+    memcpy(b->data + b->size - TAIL, &length, sizeof length);
+    const uint64_t hash = drape_hash_bytes(DRAPE_HASH_START, b->data, b->size - sizeof hash);
+    memcpy(b->data + b->size - sizeof hash, &hash, sizeof hash);
+}
+
+static void restore(drape_context *ctx, drape_sim *sim, const bytes *b)
+{
+    const uint64_t before = drape_sim_hash(sim);
+    const drape_status status = drape_sim_restore_from(sim, b->data, b->size);
+    fuzz_check(ctx, status, "drape_sim_restore_from");
+    FUZZ_REQUIRE(!status || drape_sim_hash(sim) == before, "%s: the sim is another",
+                 drape_context_message(ctx));
+    fuzz_advance(ctx, sim, drape_sim_time(sim) + 2 * STEP, 20, 3);
+}
+
+static void try_one(drape_context *ctx, const drape_model *model, fuzz_bytes *in)
+{
+    unsigned count = 0;
+    while (drape_integrators[count])
+        count++;
+    drape_sim_def def;
+    drape_sim *sim = NULL;
+    bytes b = {0};
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator = drape_integrators[fuzz_below(in, count)]->name;
+    FUZZ_REQUIRE(drape_sim_create(ctx, model, &def, &sim) == DRAPE_OK, "%s", drape_context_message(ctx));
+    FUZZ_REQUIRE(drape_sim_advance(sim, 3 * STEP) == DRAPE_OK, "%s", drape_context_message(ctx));
+    FUZZ_REQUIRE(drape_sim_save_to(sim, keep, &b) == DRAPE_OK, "%s", drape_context_message(ctx));
+    for (int i = 0; i < CHANGES && in->at < in->end; i++)
+        change(&b, in);
+    make_right(&b);
+    restore(ctx, sim, &b);
+    drape_sim_destroy(&sim);
+    free(b.data);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    drape_context *ctx = fuzz_open(MOST_MEMORY);
+    fuzz_bytes in = {.at = data, .end = data + size};
+    drape_model *model = fuzz_scene(ctx, (const uint8_t *)sheet, sizeof sheet - 1);
+    FUZZ_REQUIRE(model, "%s", drape_context_message(ctx));
+    try_one(ctx, model, &in);
+    drape_model_destroy(&model);
+    fuzz_close(&ctx);
+    return 0;
+}
