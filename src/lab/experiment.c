@@ -5,6 +5,7 @@
 #include "base/param.h"
 #include "integrators/integrator.h"
 #include "io/file.h"
+#include "lab/run.h"
 #include "lab/sweep.h"
 #include "lab/text.h"
 
@@ -204,6 +205,33 @@ static drape_status claim_folder(lab *l)
     return write_about(l);
 }
 
+static drape_status try_case(lab *l, const json_t *settings)
+{
+    const lab_request request = {.def = l->def, .settings = settings};
+    drape_model *model = NULL;
+    drape_status status = lab_load(l->ctx, &request, &model);
+    drape_model_destroy(&model);
+    return status;
+}
+
+/* A scene that does not compile is told before there is a folder, which would then hold an experiment that nobody
+ * wants: the scene itself where it is prepared, and the first case of every series. Maps try their own corners. */
+static drape_status try_scene(lab *l)
+{
+    const char *before = "";
+    drape_status status = l->experiment->prepare ? try_case(l, NULL) : DRAPE_OK;
+    if (!status && l->experiment->check)
+        status = l->experiment->check(l);
+    for (size_t i = 0; !status && i < json_array_size(l->cases); i++) {
+        const json_t *one = json_array_get(l->cases, i);
+        const char *series = lab_tag_word(one, "series");
+        if (strcmp(series, before) != 0)
+            status = try_case(l, json_object_get(one, "settings"));
+        before = series;
+    }
+    return status;
+}
+
 static drape_status make_results(lab *l)
 {
     l->count = json_array_size(l->cases);
@@ -324,6 +352,8 @@ drape_status drape_lab_run(drape_context *ctx, const char *experiment, const dra
         status = drape_fail(ctx, DRAPE_E_ARGUMENT, "there is no experiment \"%.60s\"", experiment);
     if (!status)
         status = plan(&l);
+    if (!status)
+        status = try_scene(&l);
     if (!status)
         status = make_results(&l);
     if (!status)

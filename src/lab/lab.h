@@ -26,6 +26,8 @@ typedef struct lab_experiment_ops {
     /* Adds cases (lab_add_case) and what else distinguishes the experiment to l->arguments. Errors:
      * DRAPE_E_ARGUMENT, DRAPE_E_MEMORY and those of loading the scene. */
     drape_status (*plan)(lab *l);
+    /* Faults of what prepare will run, found before there is a folder. NULL: it runs nothing. */
+    drape_status (*check)(lab *l);
     /* Makes l->reference or l->probe. NULL: there is nothing to prepare. */
     drape_status (*prepare)(lab *l);
     /* All cases have results: writes the CSV, pictures, and words (l->words) and figures (lab_page_*). */

@@ -66,6 +66,20 @@ static const double *end_of(const lab_trace *trace)
     return trace->x + trace->size * (size_t)(trace->frames - 1);
 }
 
+drape_status lab_check_reference(lab *l)
+{
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < sizeof ladders / sizeof *ladders; i++) {
+        json_t *settings = settings_of(&ladders[i], ladders[i].first);
+        const lab_request request = {.def = l->def, .settings = settings};
+        drape_model *model = NULL;
+        status = lab_load(l->ctx, &request, &model);
+        drape_model_destroy(&model);
+        json_decref(settings);
+    }
+    return status;
+}
+
 /* ---- Keeping it ---- */
 
 static drape_status keep(lab *l, const char *name, const ladder *one, const climb *c)

@@ -13,4 +13,7 @@
  * DRAPE_E_SOLVER where no ladder has two rungs that end. */
 drape_status lab_make_reference(lab *l);
 
+/* Whether the scene compiles for every ladder, before anything is written. Errors: those of loading. */
+drape_status lab_check_reference(lab *l);
+
 #endif

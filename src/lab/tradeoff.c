@@ -385,6 +385,7 @@ const lab_experiment_ops lab_experiment_tradeoff = {
     .summary = "work against accuracy of every integrator over its settings",
     .compares_costs = true,
     .plan = plan,
+    .check = lab_check_reference,
     .prepare = lab_make_reference,
     .report = report,
 };

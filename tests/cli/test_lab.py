@@ -294,6 +294,11 @@ def test_wrong_words():
     refused("tradeoff", "scene.json", "--shard", "3/2", "--out", "s", says="--shard")
     refused("tradeoff", "scene.json", "--case-seconds", "0", "--out", "s", says="above 0")
     refused("tradeoff", "nowhere.json", "--out", "s", says="nowhere.json")
+    for what, says in (("/cloth/0/material/density=-1", "density"), ("/duration=0", "duration"), ("/nope=1", "nope"), ("/cloth/0/mesh/edges=0", "edges")):
+        for verb in ("tradeoff", "converge"):
+            refused(verb, "scene.json", "--integrators", "be", "--set", what, "--out", "s", says=says)
+    refused("tradeoff", "scene.json", "--controller", "error", "--out", "s", says="error")
+    refused("tradeoff", "scene.json", "--integrators", "be", "--controller", "error", "--out", "s", says="error")
     refused("converge", "scene.json", "--levels", "2", "--out", "s", says="levels")
     refused("merge", "nowhere", "--out", "s", says="nowhere")
     refused("merge", "--out", "s", says="DIR")
