@@ -62,18 +62,36 @@ static double axis_value(const axis *a, int k)
     return a->log ? a->from * pow(a->to / a->from, share) : a->from + share * (a->to - a->from);
 }
 
-/* What is an integer in the scene stays one: the resolution of a mesh. */
-static json_t *setting_value(const axis *a, int k)
+/* Whether it is an integer in the scene: the resolution of a mesh. */
+static bool is_integer_axis(const axis *a)
 {
     static const char *const integers[] = {"/columns",  "/rows",      "/edges",
                                            "/substeps", "/max_order", "/max_iterations"};
+    const char *name = strrchr(a->pointer, '/');
+    for (size_t i = 0; i < sizeof integers / sizeof *integers; i++)
+        if (strcmp(name, integers[i]) == 0)
+            return true;
+    return false;
+}
+
+/* What is run, and what is recorded of it. An integer stays one; powers are integers up to rounding. */
+static json_t *setting_value(const axis *a, int k)
+{
     double value = axis_value(a, k);
-    for (size_t i = 0; i < sizeof integers / sizeof *integers; i++) {
-        const char *found = strstr(a->pointer, integers[i]);
-        if (found && strlen(found) == strlen(integers[i]))
-            return json_integer((json_int_t)llround(value));
+    return is_integer_axis(a) ? json_integer((json_int_t)llround(value)) : json_real(value);
+}
+
+/* A map over values that were not run would be of something else. */
+static drape_status check_integers(lab *l, const axis *a)
+{
+    for (int k = 0; is_integer_axis(a) && k < a->count; k++) {
+        double value = axis_value(a, k);
+        if (!(fabs(value) < 1e15) || fabs(value - round(value)) > 1e-9 * fmax(1, fabs(value)))
+            return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
+                              "--axis \"%.100s\": its value %d would be %.6g, and it takes integers",
+                              a->pointer, k + 1, value);
     }
-    return json_real(value);
+    return DRAPE_OK;
 }
 
 /* ---- The cases ---- */
@@ -147,7 +165,7 @@ static drape_status add_cell(lab *l, const space *s, const drape_integrator_ops 
     places_of(s, cell, place);
     lay_bare(l, s, row, settings);
     for (int a = 0; a < s->count; a++) {
-        json_object_set_new(tags, s->axes[a].pointer, json_real(axis_value(&s->axes[a], place[a])));
+        json_object_set_new(tags, s->axes[a].pointer, setting_value(&s->axes[a], place[a]));
         json_object_set_new(settings, s->axes[a].pointer, setting_value(&s->axes[a], place[a]));
     }
     int64_t same = same_cell(s, row, place);
@@ -170,6 +188,8 @@ static drape_status read_space(lab *l, space *s)
     s->count = (int)def->axis_count;
     for (int a = 0; a < s->count; a++) {
         drape_status status = read_axis(l, def->axes[a], &s->axes[a]);
+        if (!status)
+            status = check_integers(l, &s->axes[a]);
         if (status)
             return status;
     }
