@@ -178,6 +178,7 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count)
     char *script = NULL;
     size_t size = 0;
     bool drawn = false, any = false;
+    drape_status status = DRAPE_OK;
     FILE *out = open_memstream(&script, &size);
     if (!out)
         return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for a picture");
@@ -201,9 +202,10 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count)
                     any ? "," : "plot", k, 4 + k % 10, sequences[k].series, sequences[k].line.slope);
             any = true;
         }
-    fprintf(out, any ? "\n" : "plot NAN notitle\n");
+    fprintf(out, "\n");
     fclose(out);
-    drape_status status = lab_plot(l, "converge", script, size, &drawn);
+    if (any) /* without a point there are no axes in logarithms */
+        status = lab_plot(l, "converge", script, size, &drawn);
     free(script);
     return status || !drawn
                ? status

@@ -214,12 +214,18 @@ static void say_reference(lab *l)
         unresolved += lab_is_good(r) && isnan(error);
         late += strcmp(lab_word(r, "status"), "over_budget") == 0;
     }
-    fprintf(
-        l->words,
-        "The reference's error is estimated as %.2g m; the smallest error plotted is %.2g m, %.3g times "
-        "that. %d cases closer than 100 times are listed and not plotted; %d took more than their CPU time "
-        "and were stopped.\n",
-        reference, smallest, smallest / reference, unresolved, late);
+    fprintf(l->words, "The reference's error is estimated as %.2g m; ", reference);
+    if (!isfinite(smallest))
+        fprintf(l->words, "no error is plotted. ");
+    else if (reference > 0)
+        fprintf(l->words, "the smallest error plotted is %.2g m, %.3g times that. ", smallest,
+                smallest / reference);
+    else
+        fprintf(l->words, "the smallest error plotted is %.2g m. ", smallest);
+    fprintf(l->words,
+            "%d cases closer than 100 times are listed and not plotted; %d took more than their CPU time "
+            "and were stopped.\n",
+            unresolved, late);
 }
 
 /* ---- Pictures ---- */
@@ -289,7 +295,8 @@ static look look_of(const lab *l, const size_t *first, size_t k)
     return one;
 }
 
-static void write_script(const lab *l, FILE *out, const chart *c)
+/* false: there is no point to draw, and on axes in logarithms not even the axes. */
+static bool write_script(const lab *l, FILE *out, const chart *c)
 {
     size_t first[128], count = list_series(l, first, 128);
     bool drawn[128], any = false;
@@ -310,7 +317,8 @@ static void write_script(const lab *l, FILE *out, const chart *c)
                 lab_tag_word(l->results[first[k]], "series"));
         any = true;
     }
-    fprintf(out, any ? "\n" : "plot NAN notitle\n");
+    fprintf(out, "\n");
+    return any;
 }
 
 static drape_status draw(lab *l, const chart *c)
@@ -318,12 +326,14 @@ static drape_status draw(lab *l, const chart *c)
     char *script = NULL, picture[64];
     size_t size = 0;
     bool drawn = false;
+    drape_status status = DRAPE_OK;
     FILE *out = open_memstream(&script, &size);
     if (!out)
         return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for a picture");
-    write_script(l, out, c);
+    bool any = write_script(l, out, c);
     fclose(out);
-    drape_status status = lab_plot(l, c->file, script, size, &drawn);
+    if (any)
+        status = lab_plot(l, c->file, script, size, &drawn);
     free(script);
     snprintf(picture, sizeof picture, "%s.svg", c->file);
     return status || !drawn ? status : lab_page_picture(l, picture, c->y_label);

@@ -64,6 +64,10 @@ def test_tradeoff():
     page_is_alone("t/report.html")
     for result in results.values():
         assert result["status"] == "ok" or result["tags"]["series"] in open("t/report.html", encoding="utf-8").read()
+    # An explicit row has no Jacobians: there is nothing to draw over them.
+    out = good("tradeoff", "scene.json", "--integrators", "verlet", "--out", "v", "--repeats", "1")
+    equal(sorted(glob.glob("v/error_jacobians*")), [], "pictures without a point")
+    assert "error_jacobians" not in out and "inf times" not in out, out
 
 
 def test_stability():
