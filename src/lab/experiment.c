@@ -5,6 +5,7 @@
 #include "base/param.h"
 #include "integrators/integrator.h"
 #include "io/file.h"
+#include "lab/grid.h"
 #include "lab/run.h"
 #include "lab/sweep.h"
 #include "lab/text.h"
@@ -110,6 +111,10 @@ drape_status lab_check_integrators(const lab *l)
             return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "there is no integrator \"%.60s\"%s%s%s", name,
                               meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
         }
+        if (lab_find_integrator(name)->timeless)
+            return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
+                              "\"%s\" has no steps in time: %s is of rows that have", name,
+                              l->experiment->name);
     }
     return DRAPE_OK;
 }

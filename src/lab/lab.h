@@ -71,7 +71,7 @@ bool lab_is_good(const json_t *result); /* it came to the end */
 /* Whether the rows asked for contain it; where none were asked for, fallback. */
 bool lab_wants_integrator(const lab *l, const char *name, bool fallback);
 
-/* Faults of the def: an integrator that there is not. */
+/* Faults of the def: an integrator that there is not, or that has no steps in time. */
 drape_status lab_check_integrators(const lab *l);
 
 #endif

@@ -99,9 +99,6 @@ static drape_status plan(lab *l)
         const drape_integrator_ops *row = drape_integrators[i];
         if (!lab_wants_integrator(l, row->name, !row->timeless))
             continue;
-        if (row->timeless)
-            return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
-                              "\"%s\" has no steps in time: there is nothing to trade", row->name);
         status = row->own_steps ? add_own_steps(l, row) : add_fixed(l, row);
     }
     if (!status && lab_wants_integrator(l, BASE_METHOD, true))

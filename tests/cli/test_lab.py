@@ -296,7 +296,8 @@ def test_wrong_words():
     refused("stability", "scene.json", *two, "--axis", "/integrator/tolerancee=1:2:2", "--out", "s", says="tolerancee")
     refused("stability", "scene.json", *two, "--axis", "/cloth/0/material/density=-1:2:2", "--out", "s", says="density")
     refused("tradeoff", "scene.json", "--integrators", "bee", "--out", "s", says="did you mean")
-    refused("tradeoff", "scene.json", "--integrators", "static", "--out", "s", says="no steps in time")
+    for verb in (["tradeoff"], ["converge"], ["stability", *AXES]):
+        refused(*verb, "scene.json", "--integrators", "be,static", "--out", "s", says="no steps in time")
     refused("tradeoff", "scene.json", "--shard", "3/2", "--out", "s", says="--shard")
     refused("tradeoff", "scene.json", "--case-seconds", "0", "--out", "s", says="above 0")
     refused("tradeoff", "nowhere.json", "--out", "s", says="nowhere.json")
