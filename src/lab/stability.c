@@ -180,6 +180,16 @@ static bool is_usual(const char *name)
     return false;
 }
 
+static drape_status check_twice(lab *l, const space *s)
+{
+    for (int a = 0; a < s->count; a++)
+        for (int b = 0; b < a; b++)
+            if (strcmp(s->axes[a].pointer, s->axes[b].pointer) == 0)
+                return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "--axis \"%.100s\" is given twice",
+                                  s->axes[a].pointer);
+    return DRAPE_OK;
+}
+
 static drape_status read_space(lab *l, space *s)
 {
     const drape_lab_def *def = l->def;
@@ -196,7 +206,7 @@ static drape_status read_space(lab *l, space *s)
     if (cells_of(s) > MOST_RUNS)
         return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "a map has at most %d points; the axes have %zu",
                           MOST_RUNS, cells_of(s));
-    return DRAPE_OK;
+    return check_twice(l, s);
 }
 
 /* The scene must compile at both ends of every axis, before hours are spent. */

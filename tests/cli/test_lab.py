@@ -291,6 +291,7 @@ def test_wrong_words():
     for axis, says in (("dt=1:2:3", "no pointer"), ("/integrator/dt=1:2", "three numbers"), ("/integrator/dt=1:2:3lin", "log, or nothing"),
                        ("/integrator/dt=0:2:3log", "positive"), ("/integrator/dt=1:1:3", "different"), ("/integrator/dt=1:2:1", "2 to 1024")):
         refused("stability", "scene.json", *two, "--axis", axis, "--out", "s", says=says)
+    refused("stability", "scene.json", *two, "--axis", "/integrator/dt=1e-4:1e-3:3", "--out", "s", says="/integrator/dt\" is given twice")
     refused("stability", "scene.json", *two, "--axis", "/cloth/0/mesh/edges=2.5:7.5:3", "--out", "s", says="edges\": its value 1 would be 2.5")
     refused("stability", "scene.json", *two, "--axis", "/integrator/max_order=1.5:4.5:3", "--out", "s", says="max_order\": its value 1 would be 1.5")
     refused("stability", "scene.json", *two, "--axis", "/integrator/tolerancee=1:2:2", "--out", "s", says="tolerancee")
