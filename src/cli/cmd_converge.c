@@ -3,8 +3,7 @@
 
 static const cli_option options[] = {
     CLI_LAB_OPTIONS,
-    {"levels", CLI_NUMBER, "N", "refinements, 3 to 12 (default 6)", offsetof(cli_lab_request, levels), 12,
-     NULL},
+    {"levels", CLI_TEXT, "N", "refinements, 3 to 12 (default 6)", offsetof(cli_lab_request, levels), 0, NULL},
     {"space", CLI_FLAG, NULL, "also refine the grids of all cloths", offsetof(cli_lab_request, space), 0,
      NULL},
 };

@@ -5,6 +5,7 @@
 #include "cli/signals.h"
 #include "drape/lab.h"
 
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -31,6 +32,20 @@ static int read_shard(const cli_lab_request *request, drape_lab_def *def)
         def->shard > def->shards)
         return cli_misuse(request->command.verb, "--shard \"%.60s\": it is I/N, with I from 1 to N, as 1/4",
                           text);
+    return CLI_GO_ON;
+}
+
+/* Its range is the experiment's, with the same words. */
+static int read_levels(const cli_lab_request *request, drape_lab_def *def)
+{
+    const char *text = request->levels;
+    char *end;
+    if (!text)
+        return CLI_GO_ON;
+    long number = strtol(text, &end, 10);
+    if (end == text || *end || number < INT_MIN || number > INT_MAX)
+        return cli_misuse(request->command.verb, "--levels \"%.60s\": it is an integer, 3 to 12", text);
+    def->levels = (int)number;
     return CLI_GO_ON;
 }
 
@@ -98,14 +113,14 @@ static int make_def(const cli_lab_request *request, int default_jobs, words *w, 
     def->axis_count = request->axes.count;
     def->space = request->space;
     def->jobs = request->jobs ? request->jobs : default_jobs;
-    def->levels = request->levels ? request->levels : def->levels;
     def->repeats = request->repeats ? request->repeats : def->repeats;
     def->case_seconds = request->case_seconds > 0 ? request->case_seconds : def->case_seconds;
     def->strain_limit = request->strain_limit > 0 ? request->strain_limit : def->strain_limit;
     def->progress = show;
     def->cancel = interrupted;
     def->user = progress;
-    return read_shard(request, def);
+    int code = read_levels(request, def);
+    return code == CLI_GO_ON ? read_shard(request, def) : code;
 }
 
 /* What is wrong with the input is found before anything is run. */

@@ -7,9 +7,9 @@
 /* The command line of an experiment; each verb has options for what it uses of it. */
 typedef struct cli_lab_request {
     cli_command command;
-    const char *out, *shard, *integrators;
+    const char *out, *shard, *integrators, *levels;
     cli_texts axes;
-    int levels, jobs, repeats; /* 0: not said */
+    int jobs, repeats; /* 0: not said */
     bool space;
     double case_seconds, strain_limit; /* 0: not said */
 } cli_lab_request;

@@ -19,7 +19,8 @@
 #define FIRST_RTOL 1e-2
 #define SPACE      "space"
 #define SPACE_ROW  "bdf2" /* whose error in time is small beside that of the mesh, at the scene's dt */
-#define MOST       16
+#define LEAST      3
+#define MOST       12
 #define ROUNDING   1e-12 /* m: distances below are not of the method */
 
 /* ---- The cases ---- */
@@ -89,8 +90,9 @@ static drape_status add_space(lab *l)
 
 static drape_status plan(lab *l)
 {
-    if (l->def->levels < 3 || l->def->levels > MOST)
-        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "levels = %d; it is 3 to %d", l->def->levels, MOST);
+    if (l->def->levels < LEAST || l->def->levels > MOST)
+        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "levels = %d; it is %d to %d", l->def->levels, LEAST,
+                          MOST);
     drape_status status = lab_check_integrators(l);
     for (int i = 0; !status && drape_integrators[i]; i++)
         if (lab_wants_integrator(l, drape_integrators[i]->name, true) && !drape_integrators[i]->timeless)

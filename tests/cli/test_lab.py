@@ -307,7 +307,8 @@ def test_wrong_words():
             refused(verb, "scene.json", "--integrators", "be", "--set", what, "--out", "s", says=says)
     refused("tradeoff", "scene.json", "--controller", "error", "--out", "s", says="error")
     refused("tradeoff", "scene.json", "--integrators", "be", "--controller", "error", "--out", "s", says="error")
-    refused("converge", "scene.json", "--levels", "2", "--out", "s", says="levels")
+    for levels in ("0", "2", "13", "x"):
+        refused("converge", "scene.json", "--levels", levels, "--out", "s", says="3 to 12")
     refused("merge", "nowhere", "--out", "s", says="nowhere")
     refused("merge", "--out", "s", says="DIR")
 
