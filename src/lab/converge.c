@@ -21,7 +21,8 @@
 #define SPACE_ROW  "bdf2" /* whose error in time is small beside that of the mesh, at the scene's dt */
 #define LEAST      3
 #define MOST       12
-#define ROUNDING   1e-12 /* m: distances below are not of the method */
+#define OWN        "dt, with own substeps" /* the knob of a row that dt does not refine */
+#define ROUNDING   1e-12                   /* m: distances below are not of the method */
 
 /* ---- The cases ---- */
 
@@ -31,13 +32,23 @@ static drape_status add(lab *l, const char *series, const char *knob, double val
     return lab_add_case(l, tags, settings, -1);
 }
 
-static drape_status add_time(lab *l, const drape_integrator_ops *row)
+/* A row whose limit says how many substeps it takes goes on at its limit, whatever dt is, unless the scene fixes them. */
+static bool has_own_substeps(const drape_integrator_ops *row, const drape_row_def *said)
+{
+    for (size_t i = 0; i < said->setting_count; i++)
+        if (strcmp(said->settings[i].name, "substeps") == 0 && said->settings[i].number > 0)
+            return false;
+    return row->stability && lab_has_param(row->params, row->param_count, "substeps");
+}
+
+static drape_status add_time(lab *l, const drape_integrator_ops *row, const drape_row_def *said)
 {
     drape_status status = DRAPE_OK;
+    const char *knob = row->own_steps ? "rtol" : has_own_substeps(row, said) ? OWN : "dt";
     const char *pointer = row->own_steps ? "/integrator/rtol" : "/integrator/dt";
     double value = row->own_steps ? FIRST_RTOL : FIRST_DT, ratio = row->own_steps ? 0.1 : 0.5;
     for (int k = 0; k < l->def->levels && !status; k++, value *= ratio)
-        status = add(l, row->name, row->own_steps ? "rtol" : "dt", value,
+        status = add(l, row->name, knob, value,
                      json_pack("{s:s, s:f}", "/integrator/method", row->name, pointer, value));
     return status;
 }
@@ -73,7 +84,18 @@ static drape_status add_level(lab *l, const drape_scene_def *def, int level)
     return add(l, SPACE, "edge", ldexp(1, -level), settings);
 }
 
-static drape_status add_space(lab *l)
+static drape_status add_all(lab *l, const drape_scene_def *def)
+{
+    drape_status status = DRAPE_OK;
+    for (int i = 0; !status && drape_integrators[i]; i++)
+        if (lab_wants_integrator(l, drape_integrators[i]->name, true) && !drape_integrators[i]->timeless)
+            status = add_time(l, drape_integrators[i], &def->integrator);
+    for (int k = 0; l->def->space && k < l->def->levels && !status; k++)
+        status = add_level(l, def, k);
+    return status;
+}
+
+static drape_status add_cases(lab *l)
 {
     const lab_request request = {.def = l->def};
     drape_scene *scene = NULL;
@@ -82,8 +104,8 @@ static drape_status add_space(lab *l)
     drape_scene_def_init(&def, sizeof def);
     if (!status)
         status = drape_scene_to_def(scene, &def);
-    for (int k = 0; k < l->def->levels && !status; k++)
-        status = add_level(l, &def, k);
+    if (!status)
+        status = add_all(l, &def);
     drape_scene_destroy(&scene);
     return status;
 }
@@ -94,11 +116,8 @@ static drape_status plan(lab *l)
         return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "levels = %d; it is %d to %d", l->def->levels, LEAST,
                           MOST);
     drape_status status = lab_check_integrators(l);
-    for (int i = 0; !status && drape_integrators[i]; i++)
-        if (lab_wants_integrator(l, drape_integrators[i]->name, true) && !drape_integrators[i]->timeless)
-            status = add_time(l, drape_integrators[i]);
-    if (!status && l->def->space)
-        status = add_space(l);
+    if (!status)
+        status = add_cases(l);
     json_object_set_new(l->arguments, "case_seconds", json_real(l->def->case_seconds));
     return status;
 }
@@ -123,6 +142,7 @@ typedef struct sequence {
     double value[MOST], moved[MOST]; /* of the coarser of two, [m] */
     size_t count;
     int failed;
+    bool unrefined; /* by its knob: there is no order */
     lab_line line;
 } sequence;
 
@@ -155,19 +175,32 @@ static void read_sequence(const lab *l, size_t first, sequence *s)
         }
         before = good ? r : NULL;
     }
+    s->unrefined = strcmp(s->knob, OWN) == 0;
     s->line = lab_fit_power(s->value, s->moved, s->count);
 }
 
-static void say(lab *l, const sequence *s)
+static void say_order(lab *l, const sequence *s)
 {
     double last = NAN;
     if (s->count >= 2)
         last = log(s->moved[s->count - 2] / s->moved[s->count - 1]) /
                log(s->value[s->count - 2] / s->value[s->count - 1]);
-    fprintf(l->words, "%s: order %.3g in %s", s->series, s->line.slope, s->knob);
+    fprintf(l->words, "order %.3g in %s", s->line.slope, s->knob);
     if (!isnan(s->line.low))
         fprintf(l->words, " (95 %% confidence %.3g to %.3g)", s->line.low, s->line.high);
     fprintf(l->words, ", %.3g at the last refinement", last);
+}
+
+static void say(lab *l, const sequence *s)
+{
+    fprintf(l->words, "%s: ", s->series);
+    if (s->unrefined)
+        fprintf(l->words, "no order, as it chooses its own substeps and dt does not refine them; "
+                          "--set /integrator/substeps=N fixes them");
+    else if (isnan(s->line.slope))
+        fprintf(l->words, "no order, as too few of its refinements moved the end");
+    else
+        say_order(l, s);
     if (s->failed)
         fprintf(l->words, "; %d of its runs did not come to the end", s->failed);
     fprintf(l->words, "\n");
@@ -199,7 +232,7 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count)
         fprintf(out, "EOD\n");
     }
     for (size_t k = 0; k < count; k++)
-        if (sequences[k].count > 0) {
+        if (sequences[k].count > 0 && !sequences[k].unrefined) {
             fprintf(out, "%s $s%zu with linespoints lw 1.6 pt %zu ps .6 title \"%s (%.3g)\"",
                     any ? "," : "plot", k, 4 + k % 10, sequences[k].series, sequences[k].line.slope);
             any = true;
@@ -221,7 +254,7 @@ static void write_table(lab *l, const sequence *s)
     fprintf(l->page, "<table><tr><th>%s</th><th>moved [m]</th><th>order</th></tr>\n", s->knob);
     for (size_t i = 0; i < s->count; i++) {
         fprintf(l->page, "<tr><td>%.6g</td><td>%.4g</td><td>", s->value[i], s->moved[i]);
-        if (i > 0)
+        if (i > 0 && !s->unrefined)
             fprintf(l->page, "%.3f", log(s->moved[i - 1] / s->moved[i]) / log(s->value[i - 1] / s->value[i]));
         fputs("</td></tr>\n", l->page);
     }

@@ -106,6 +106,11 @@ def test_converge():
     for row, order in (("be", 1), ("bdf2", 2), ("trbdf2", 2)):
         assert abs(float(orders[row]) - order) < 0.1, out
     page_is_alone("c/report.html")
+    # verlet takes as many substeps as its limit asks for, which dt does not refine, unless they are fixed.
+    out = good("converge", "scene.json", "--integrators", "verlet", "--levels", "4", "--out", "v")
+    assert "verlet: no order, as it chooses its own substeps" in out, out
+    out = good("converge", "scene.json", "--integrators", "verlet", "--levels", "4", "--set", "/integrator/substeps=64", "--out", "w")
+    assert re.search(r"^verlet: order (1\.9|2)", out, re.M), out
 
 
 def test_converge_in_space():
