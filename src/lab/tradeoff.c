@@ -157,6 +157,14 @@ static void knob_text(const json_t *result, char *text, size_t size)
         snprintf(text, size, "%s %.3g", knob, value);
 }
 
+static bool has_series(const lab *l, const char *series)
+{
+    for (size_t i = 0; i < l->count; i++)
+        if (strcmp(lab_tag_word(l->results[i], "series"), series) == 0)
+            return true;
+    return false;
+}
+
 /* "At 1 mm error the cheapest is ida, order 2, rtol 0.0003 (0.21 s of CPU); be needs 0.86 s, 4.1 times as much". */
 static void say_cheapest(lab *l, double error)
 {
@@ -169,7 +177,7 @@ static void say_cheapest(lab *l, double error)
     double cost = lab_number(best, "cpu_s");
     fprintf(l->words, "At %s error the cheapest is %s, %s (%.3g s of CPU)", length,
             lab_tag_word(best, "series"), knob, cost);
-    if (best == base)
+    if (best == base || !has_series(l, BASE_METHOD))
         fprintf(l->words, ".\n");
     else if (base)
         fprintf(l->words, ", %.2g times cheaper than " BASE_METHOD ".\n", lab_number(base, "cpu_s") / cost);

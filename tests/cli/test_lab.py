@@ -68,6 +68,7 @@ def test_tradeoff():
     out = good("tradeoff", "scene.json", "--integrators", "verlet", "--out", "v", "--repeats", "1")
     equal(sorted(glob.glob("v/error_jacobians*")), [], "pictures without a point")
     assert "error_jacobians" not in out and "inf times" not in out, out
+    assert "be does not come so close" not in out, "be was not run: " + out
 
 
 def test_stability():
