@@ -142,7 +142,8 @@ typedef struct sequence {
     double value[MOST], moved[MOST]; /* of the coarser of two, [m] */
     size_t count;
     int failed;
-    bool unrefined; /* by its knob: there is no order */
+    int64_t rejected; /* steps that the controller cut: there dt was not what the case says */
+    bool unrefined;   /* by its knob: there is no order */
     lab_line line;
 } sequence;
 
@@ -169,6 +170,7 @@ static void read_sequence(const lab *l, size_t first, sequence *s)
         bool good = lab_is_good(r);
         double moved = before && good ? distance(before, r) : NAN;
         s->failed += !good;
+        s->rejected += (int64_t)lab_number(r, "rejected");
         if (moved > ROUNDING && s->count < MOST) {
             s->value[s->count] = lab_tag_number(before, "value");
             s->moved[s->count++] = moved;
@@ -201,6 +203,9 @@ static void say(lab *l, const sequence *s)
         fprintf(l->words, "no order, as too few of its refinements moved the end");
     else
         say_order(l, s);
+    if (s->rejected && strcmp(s->knob, "dt") == 0)
+        fprintf(l->words, "; %lld of its steps were rejected and cut, so dt was not halved everywhere",
+                (long long)s->rejected);
     if (s->failed)
         fprintf(l->words, "; %d of its runs did not come to the end", s->failed);
     fprintf(l->words, "\n");

@@ -112,6 +112,8 @@ def test_converge():
     assert "verlet: no order, as it chooses its own substeps" in out, out
     out = good("converge", "scene.json", "--integrators", "verlet", "--levels", "4", "--set", "/integrator/substeps=64", "--out", "w")
     assert re.search(r"^verlet: order (1\.9|2)", out, re.M), out
+    out = good("converge", "scene.json", "--integrators", "verlet", "--levels", "4", "--set", "/integrator/substeps=1", "--out", "x")
+    assert "steps were rejected and cut, so dt was not halved everywhere" in out, out
 
 
 def test_converge_in_space():
