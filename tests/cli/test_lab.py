@@ -302,6 +302,7 @@ def test_wrong_words():
     refused("stability", "scene.json", *two, "--axis", "/integrator/dt=1e-4:1e-3:3", "--out", "s", says="/integrator/dt\" is given twice")
     refused("stability", "scene.json", *two, "--axis", "/cloth/0/mesh/edges=2.5:7.5:3", "--out", "s", says="edges\": its value 1 would be 2.5")
     refused("stability", "scene.json", *two, "--axis", "/integrator/max_order=1.5:4.5:3", "--out", "s", says="max_order\": its value 1 would be 1.5")
+    refused("stability", "scene.json", *two, "--integrators", "verlet", "--axis", "/integrator/max_substeps=1:4:3", "--out", "s", says="2.5 is not allowed")
     refused("stability", "scene.json", *two, "--axis", "/integrator/tolerancee=1:2:2", "--out", "s", says="tolerancee")
     refused("stability", "scene.json", *two, "--axis", "/cloth/0/material/density=-1:2:2", "--out", "s", says="density")
     refused("tradeoff", "scene.json", "--integrators", "bee", "--out", "s", says="did you mean")
