@@ -25,8 +25,8 @@
 #define MOST_ROWS      32 /* with settings, in a scene */
 #define ATTEMPTS       6
 #define STEPS          3
-#define ALONE          1.0 /* [s] of CPU for an integrator that is the only one, and for each of all */
-#define EACH           0.3
+#define ALONE          0.4 /* [s] of CPU for an integrator that is the only one, and for each of all */
+#define EACH           0.1
 #define MOST_COUNT     40 /* of integers: iterations, substeps; what bounds the work of a step */
 
 /* ---- Settings, drawn from the parameters of a row ---- */
