@@ -132,7 +132,7 @@ static uint64_t choices_hash(const drape_sim *sim)
 
 /* ---- The build ---- */
 
-static void describe_build(char *text, size_t size)
+void drape_sim_describe_build(char *text, size_t size)
 {
     size_t used = (size_t)snprintf(text, size, "Drape %s, compiler %s, SUNDIALS %s, KLU %d.%d.%d%s, solvers",
                                    drape_version(), __VERSION__, SUNDIALS_VERSION, KLU_MAIN_VERSION,
@@ -144,7 +144,7 @@ static void describe_build(char *text, size_t size)
 static void archive_build(drape_archive *a)
 {
     char here[BUILD_ROOM], there[BUILD_ROOM];
-    describe_build(here, sizeof here);
+    drape_sim_describe_build(here, sizeof here);
     memcpy(there, here, sizeof there);
     drape_archive_text(a, there, sizeof there);
     if (drape_archive_good(a) && strcmp(there, here) != 0)

@@ -82,6 +82,9 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a);
 /* What a checkpoint must be of: the model, the choices, the build. Reading fails where they are others. */
 void drape_sim_archive_identity(drape_sim *sim, drape_archive *a);
 
+/* The build, as far as bits depend on it: compiler, solvers and their versions. */
+void drape_sim_describe_build(char *text, size_t size);
+
 /* drape_sim_archive of a checkpoint in memory that begins with a sim, into *sim: made anew beside it, so that *sim is as
  * it was after a failure. What follows in the archive is the caller's. */
 drape_status drape_sim_read(drape_sim *sim, drape_archive *a);

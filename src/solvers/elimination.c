@@ -4,7 +4,9 @@
  * factorization); postorder; rows of the columns from those of their children. Then a front is merged with its last
  * child where the two take longer than the one, zeros included.
  */
+#define _XOPEN_SOURCE 700 /* initstate */
 #include "solvers/elimination.h"
+#include "solvers/alone.h"
 
 #include <amd.h>
 #include <stdlib.h>
@@ -28,6 +30,25 @@ typedef struct maker {
 /* ---- Order and tree ---- */
 
 #ifdef DRAPE_METIS
+#define RAND_STATE 128 /* [bytes] as much as rand() begins with, so that it gives the same numbers */
+
+/*
+ * METIS draws its cuts from rand(), which it seeds. That is one for the whole process: two at once would have each other's
+ * numbers and another order, so other bits, and a host's own sequence would begin anew. So one at a time does it, with a state of
+ * rand() that is its own. What is left is a host that calls rand() from another thread meanwhile.
+ */
+static int dissect_alone(idx_t *n, idx_t *start, idx_t *other, idx_t *options, maker *m)
+{
+    char own[RAND_STATE];
+    drape_alone_begin();
+    char *before = initstate(1, own, sizeof own);
+    const int code = METIS_NodeND(n, start, other, NULL, options, m->e->order, m->e->place);
+    if (before)
+        setstate(before);
+    drape_alone_end();
+    return code;
+}
+
 static bool dissect(maker *m)
 {
     const drape_pattern *p = m->pattern;
@@ -41,8 +62,7 @@ static bool dissect(maker *m)
         start[j + 1] = at;
     }
     METIS_SetDefaultOptions(options);
-    bool done =
-        start && other && METIS_NodeND(&n, start, other, NULL, options, m->e->order, m->e->place) == METIS_OK;
+    bool done = start && other && dissect_alone(&n, start, other, options, m) == METIS_OK;
     drape_free(m->ctx, start);
     drape_free(m->ctx, other);
     return done;
