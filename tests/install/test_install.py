@@ -79,6 +79,8 @@ def what_is_installed(tree):
         assert os.path.isfile(os.path.join(tree.prefix, name)), name
     for name in ("pkgconfig/drape.pc", "cmake/drape/drape-config.cmake", "cmake/drape/drape-config-version.cmake"):
         assert os.path.isfile(os.path.join(tree.lib, name)), name
+    pages = {name for _, _, names in os.walk(os.path.join(tree.prefix, "share", "man")) for name in names}
+    assert {"drape.1", "drape-run.1", "drape-scene.5", "drape.3"} <= pages, pages
     library = tree.shared()
     assert os.readlink(library) == "libdrape.so.1" and "." in os.readlink(library + ".1")
     assert "SONAME" in run("objdump", "-p", library) and "libdrape.so.1" in run("objdump", "-p", library)
