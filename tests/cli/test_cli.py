@@ -463,7 +463,7 @@ def test_check():
 def test_scene_of_springs():
     """the scene in docs/springs.md is checked, described and run, below its strain limit"""
     with open(os.path.join(SOURCES, "docs", "springs.md"), encoding="utf-8") as file:
-        block = re.search(r"\n\n((?:    .*\n)+)", file.read()).group(1)
+        block = re.search(r"^```json\n(.*?)^```", file.read(), re.S | re.M).group(1)
     with open("scene.json", "w", encoding="utf-8") as file:
         file.write(block)
     text = good("info", "scene.json")
