@@ -292,7 +292,7 @@ static int unknown_name(const char *name)
     }
     const char *meant = drape_did_you_mean(name, names, count);
     return cli_misuse("list", "there is no table and no row \"%.60s\"%s%s%s; `drape list` shows all", name,
-                      meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+                      DRAPE_MEANT(meant));
 }
 
 /* name: of a table, of a row or of an object of a scene; NULL: all tables, the keys of a scene first. */

@@ -336,4 +336,24 @@ def test_statuses():
     assert not missing, missing
 
 
+def test_summary():
+    """each key of a summary.json and each column of the tables of a run is explained in docs/output.md"""
+    page = read("docs/output.md")
+    with open(SOURCES + "/src/io/summary.c", encoding="utf-8") as file:
+        wanted = set(re.findall(r'(?:\{|with\(\w+(?:\(\))?, )"([a-z_]\w*)"', file.read()))
+    with open("scene.json", "w", encoding="utf-8") as file:
+        json.dump(scene(), file)
+    good("run", "scene.json", "--out", "out", "--realtime", "--integrator", "newton_k")
+    with open("out/summary.json", encoding="utf-8") as file:
+        summary = json.load(file)
+    for key, value in summary.items():
+        wanted |= {key, *(value if isinstance(value, dict) else [])}
+    for name in "steps.csv", "energy.csv":
+        with open("out/" + name, encoding="ascii") as file:
+            wanted |= set(file.readline().strip().split(","))
+    assert len(wanted) > 60, wanted
+    missing = sorted(key for key in wanted if f"`{key}`" not in page)
+    assert not missing, missing
+
+
 sys.exit(run_tests(globals()))
