@@ -297,7 +297,7 @@ typedef struct drape_collider_ops {
     size_t struct_size;        /* sizeof(drape_collider_ops) of the author */
     const char *name;          /* "sphere" */
     const char *summary;       /* one line for `drape list` */
-    const char *reference;     /* where its distance is from; NULL for none */
+    const char *reference;     /* where its distance is from */
     const drape_param *params; /* param_count of them, static; NULL for none */
     int param_count;           /* of params */
 
