@@ -99,6 +99,9 @@ START_TEST(every_fabric_gives_back_what_its_row_says)
             check(tests[t], i, DRAPE_OUTCOME_PASS);
         }
     }
+    const drape_reference *draped = find("cusick_measured");
+    for (int i = 0; i < draped->case_count; i++)
+        ck_assert(draped->expected(draped->parameters[i]) > 0 && draped->expected(draped->parameters[i]) < 1);
 }
 END_TEST
 
