@@ -62,6 +62,7 @@ typedef struct drape_lab_outcome {
     int64_t resumed;  /* of those, found from before */
     int64_t failed;   /* of those, that did not come to the end */
     int64_t rejected; /* steps that were rejected in all of them */
+    bool input;       /* of a failure: the fault is of what was given, not of what had to be written */
     char *text;       /* what the report says in words, lines; free with drape_lab_outcome_free */
 } drape_lab_outcome;
 
@@ -70,9 +71,9 @@ DRAPE_API void drape_lab_outcome_free(drape_lab_outcome *outcome);
 
 /* Runs "tradeoff", "stability" or "converge" into the folder: cases.jsonl, experiment.json, results.csv, pictures and
  * report.html; a shard, beside which others may write, experiment.json and cases-1-of-4.jsonl alone: the rest is the
- * merge's. Lines from before of the same experiment are taken as they are. Errors: DRAPE_E_ARGUMENT (no such experiment, a wrong def),
- * those of loading the scene, DRAPE_E_FILE (also a folder that holds another experiment), DRAPE_E_MEMORY,
- * DRAPE_E_STOPPED (cancel said so). */
+ * merge's. Lines from before of the same experiment are taken as they are. Errors: DRAPE_E_ARGUMENT (no such experiment, a wrong
+ * def, a setting that no case uses, a folder that holds another experiment), those of loading the scene, DRAPE_E_FILE,
+ * DRAPE_E_SOLVER (no reference: what was begun in the folder is taken away), DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancel said so). */
 DRAPE_API drape_status drape_lab_run(drape_context *ctx, const char *experiment, const drape_lab_def *def,
                                      drape_lab_outcome *outcome);
 

@@ -281,6 +281,14 @@ static drape_status unknown_name(drape_context *ctx, const char *pointer, const 
                          DRAPE_MEANT(meant));
 }
 
+drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param)
+{
+    char range[256];
+    drape_param_range_text(param, range, sizeof range);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%s\" is missing: %s, %s", param->name,
+                         param->help, range);
+}
+
 drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_param *params,
                                   int param_count, const drape_setting *settings, size_t setting_count,
                                   double *values)
@@ -301,11 +309,7 @@ drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const
         given[i] = true;
     }
     for (int i = 0; i < param_count; i++)
-        if (!given[i] && isnan(params[i].default_value) && !params[i].derived) {
-            char range[256];
-            drape_param_range_text(&params[i], range, sizeof range);
-            return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%s\" is missing: %s, %s", params[i].name,
-                                 params[i].help, range);
-        }
+        if (!given[i] && isnan(params[i].default_value) && !params[i].derived)
+            return drape_param_missing(ctx, pointer, &params[i]);
     return DRAPE_OK;
 }

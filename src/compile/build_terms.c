@@ -118,7 +118,9 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
                               .columns = m->columns,
                               .rectangular = m->rectangular,
                               .material = cloth->material,
-                              .gravity = {model->gravity[0], model->gravity[1], model->gravity[2]}};
+                              .gravity = {model->gravity[0], model->gravity[1], model->gravity[2]},
+                              .tension = cloth->tension.warp > 0 ? &cloth->tension : NULL,
+                              .bending = cloth->bending.warp > 0 ? &cloth->bending : NULL};
 }
 
 static drape_status check_elements(drape_term_builder *builder)

@@ -8,6 +8,9 @@
 
 #define MAX_GRID_NAMES 64
 
+const char *const drape_grid_orientations[] = {
+    [GRID_HORIZONTAL] = "horizontal", [GRID_VERTICAL] = "vertical", NULL};
+
 drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_t rows, int32_t columns,
                                  drape_mesh *mesh)
 {

@@ -613,6 +613,14 @@ def variants():
     yield False, scene(material={"young_modulus": 1e5, "thickness": 1e-3})
     yield False, scene(material={"young_modulus": 1e5, "thickness": 1e-3, "density": 1, "total_mass": 1})
     yield False, scene(material={"young_modulus": 1e5, "poisson_ratio": -1, "thickness": 1e-3, "density": 200})
+    fabric = {"fabric": "wang2011_denim"}
+    stiff = {"young_modulus": 1e5, "thickness": 1e-3}
+    for more in ({}, stiff, {"areal_density": 0.3}, {**stiff, "density": 200}, {"poisson_ratio": 0.1}, {"mass": "uniform"}):
+        yield True, scene(material={**fabric, **more})
+    for more in ({"young_modulus": 1e5}, {"thickness": 1e-3}, {"areal_density": 0.3, "total_mass": 1}, {"fabric": "denim"}, {"fabric": "none"}):
+        yield False, scene(material={**fabric, **more})
+    yield True, scene(material={**stiff, "fabric": "none", "density": 200})
+    yield False, scene(material={**stiff, "fabric": "none"})
     yield False, scene(pins=[{"nodes": [0], "row": 1}])
     yield False, scene(pins=[{"track": [[0, [0, 0, 0]]]}])
     yield False, scene(pins=[{"nodes": []}])
@@ -637,6 +645,30 @@ def test_schema_and_reader():
             json.dump(one, file)
         result = drape("info", "scene.json")
         equal(result.returncode, 0 if right else 2, json.dumps(one) + result.stderr)
+
+
+def test_fabric():
+    """a fabric alone is a material: woven terms take its own numbers, others those of the sheet that comes next to it"""
+    rows = good("list", "fabrics")
+    names = re.findall(r"^  (\w+) ", rows, re.M)
+    assert {"wang2011_denim", "feng2022_1", "matsudaira2015_wool"} <= set(names) and "none" not in names, names
+    equal(rows.count("["), len(names), "sources")
+    for name in names:
+        write_scene(material={"fabric": name}, terms=["stretch.cst", "bend.midedge"])
+        good("run", "scene.json")
+        write_scene(material={"fabric": name})
+        found = json.loads(good("info", "scene.json", "--json"))["cloths"][0]["material"]
+        equal(found["fabric"], name, "fabric")
+        # E h and E h^3/12 are the means of warp and weft, D = B/(1 - nu^2) with the nu of the lattice, 1/3.
+        assert abs(found["young_modulus"] * found["thickness"] / found["membrane_stiffness"] - 1) < 1e-9, found
+        assert 1e-5 < found["thickness"] < 2e-3, found
+    write_scene(material={"fabric": "wang2011_pants"})
+    found = json.loads(good("info", "scene.json", "--json"))["cloths"][0]["material"]
+    equal(found["tension"]["shear"], 104.759674, "what stretch.cst takes")
+    assert "104.759674 N/m, shear" in good("info", "scene.json")
+    assert abs(found["areal_density"] - 0.22) < 1e-12 and abs(found["flexural_rigidity"] / (125.409805e-6 / 4 * 9 / 8) - 1) < 1e-6, found
+    write_scene(material={"fabric": "wang2011_pants", "thickness": 1e-3})
+    refused("info", "scene.json", says="/cloth/0/material: \"young_modulus\" is missing")
 
 
 def test_cs184():
