@@ -63,10 +63,11 @@ typedef struct drape_material {
     double bending_warp, bending_weft, bending_twist; /* of a measured fabric [N m]; NaN: it is none */
 } drape_material;
 
-/* Stiffness of a woven sheet, in tension [N/m] or in bending [N m]: of strips along warp and weft with free sides, of
- * shear or twist; poisson: sqrt(nu12 nu21). */
+/* Stiffness of a woven sheet, in tension [N/m] or in bending [N m]. */
 typedef struct drape_woven {
-    double warp, weft, shear, poisson;
+    double warp, weft; /* of strips along them with free sides */
+    double shear;      /* of shear, or of twist */
+    double poisson;    /* sqrt(nu12 nu21) [1] */
 } drape_woven;
 
 /* One cloth at rest. Node numbers are local to the cloth. All arrays are const and live as long as the model
@@ -87,8 +88,8 @@ typedef struct drape_cloth_view {
     const double *node_mass;      /* (node_count) lumped [kg] */
     int32_t rows, columns;        /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
     bool rectangular;             /* a grid whose cells are rectangles before its transform */
-    drape_material material;              /* of the sheet */
-    double gravity[3];                    /* [m/s2] */
+    drape_material material;      /* of the sheet */
+    double gravity[3];            /* [m/s2] */
     const drape_woven *tension, *bending; /* of a measured fabric; NULL: the material says all */
 } drape_cloth_view;
 
