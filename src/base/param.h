@@ -39,4 +39,7 @@ void drape_param_value_text(const drape_param *param, const double *value, char 
 /* The candidate nearest to word by edit distance, NULL if none is near enough to be meant. */
 const char *drape_did_you_mean(const char *word, const char *const *candidates, size_t count);
 
+/* For three %s behind a fault: `; did you mean "x"?`, or nothing where meant is NULL. */
+#define DRAPE_MEANT(meant) (meant) ? "; did you mean \"" : "", (meant) ? (meant) : "", (meant) ? "\"?" : ""
+
 #endif

@@ -86,7 +86,7 @@ static int read_shade(render *r)
     const char *meant = drape_did_you_mean(name, drape_shadings_words, count);
     return cli_misuse("render",
                       "--shade \"%.60s\": there is no such shading%s%s%s; `drape list shadings` shows all",
-                      name, meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+                      name, DRAPE_MEANT(meant));
 }
 
 static int read_size(render *r)

@@ -48,7 +48,7 @@ static int unknown_verb(const char *name)
 {
     const char *meant = drape_did_you_mean(name, drape_verbs_words, verb_count());
     fprintf(stderr, "drape: there is no verb \"%.60s\"%s%s%s; `drape --help` shows all\n", name,
-            meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+            DRAPE_MEANT(meant));
     return CLI_BAD_INPUT;
 }
 

@@ -92,7 +92,7 @@ static drape_status find_row(drape_context *ctx, const char *pointer, const char
     const char *meant = drape_did_you_mean(name, names, count);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
                          "there is no term \"%.60s\"%s%s%s; `drape list` shows all", name,
-                         meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+                         DRAPE_MEANT(meant));
 }
 
 static drape_cloth_view view_of(const drape_model *model, const drape_cloth *cloth)

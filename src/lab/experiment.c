@@ -110,7 +110,7 @@ drape_status lab_check_integrators(const lab *l)
         if (k == count) {
             const char *meant = drape_did_you_mean(name, drape_integrators_words, count);
             return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "there is no integrator \"%.60s\"%s%s%s", name,
-                              meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+                              DRAPE_MEANT(meant));
         }
         if (lab_find_integrator(name)->timeless)
             return drape_fail(l->ctx, DRAPE_E_ARGUMENT,

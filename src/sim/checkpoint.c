@@ -77,7 +77,7 @@ static void archive_schedule(drape_schedule *s, drape_archive *a)
     drape_archive_int(a, &s->level);
     drape_archive_int64(a, &s->part);
     drape_archive_bool(a, &s->stepped);
-    drape_archive_bool(a, &s->cut);
+    drape_archive_bool(a, &s->anew);
     if (drape_archive_good(a) && !is_schedule(s))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step that could come next");
 }

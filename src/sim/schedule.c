@@ -29,18 +29,33 @@ static double interval_time(const drape_schedule *s, int64_t k)
     return s->start + (double)k * s->dt;
 }
 
-/* The interval after count: a whole one, one that the end cuts, or one that takes a tiny remainder along. */
+/* By what k dt and the caller's own sum to the time t may differ and count as one time. */
+static double rounding(double t)
+{
+    return 4 * DBL_EPSILON * fabs(t);
+}
+
+/* The remainder that joins, more than a frame can add to what counts as one time. */
+static double least_remainder(const drape_schedule *s)
+{
+    return fmax(JOIN * s->dt, 2 * rounding(s->end));
+}
+
+/*
+ * The interval after count: a whole one, one that the end cuts, or one that takes a tiny remainder along. After the latter
+ * two counting starts anew at the end: a host that adds up its frames leaves the counted times ever further behind,
+ * and would come to a remainder that is just too large to join, a step of 1e-9 dt.
+ */
 static void open_interval(drape_schedule *s)
 {
     double t0 = interval_time(s, s->count), t1 = interval_time(s, s->count + 1);
     double beyond = s->end - t1;
-    bool at_end = fabs(beyond) <= JOIN * s->dt;
-    bool same =
-        fabs(beyond) <= 4 * DBL_EPSILON * fabs(t1); /* rounding of k dt against the caller's own sum */
-    s->cut = beyond < 0 && !at_end;
+    bool same = fabs(beyond) <= rounding(t1), joined = !same && fabs(beyond) <= least_remainder(s),
+         cut = !same && !joined && beyond < 0;
+    s->anew = joined || cut;
     s->interval_start = t0;
-    s->interval_end = s->cut || at_end ? s->end : t1;
-    s->interval_size = s->cut ? s->end - t0 : at_end && !same ? s->dt + beyond : s->dt;
+    s->interval_end = same || s->anew ? s->end : t1;
+    s->interval_size = cut ? s->end - t0 : joined ? s->dt + beyond : s->dt;
 }
 
 static bool next_free(const drape_schedule *s, double *t1, double *h)
@@ -65,7 +80,7 @@ static bool next_counted(drape_schedule *s, double *t1, double *h)
     if (s->part == 0) {
         double left = s->end - interval_time(s, s->count);
         double least =
-            s->stepped ? JOIN * s->dt : ROUNDING * fabs(s->end); /* the first step has none to join */
+            s->stepped ? least_remainder(s) : ROUNDING * fabs(s->end); /* the first step has none to join */
         if (!(left > least))
             return false;
         open_interval(s);
@@ -102,7 +117,7 @@ static void close_interval(drape_schedule *s)
 {
     s->part = 0;
     s->count++;
-    if (s->cut) {
+    if (s->anew) {
         s->start = s->interval_end;
         s->count = 0;
     }

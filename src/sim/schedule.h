@@ -30,7 +30,7 @@ typedef struct drape_schedule {
     int64_t part;  /* parts of it done */
     double interval_start, interval_end, interval_size;
     bool stepped; /* a step was accepted: a remainder has a step to join */
-    bool cut;     /* the interval is shorter than dt: the next count starts at its end */
+    bool anew;    /* the interval ends at no counted time: the next count starts at its end */
 } drape_schedule;
 
 void drape_schedule_init(drape_schedule *schedule, drape_stepping stepping, double dt, double start);

@@ -14,7 +14,12 @@ import time
 
 from program import LIMIT, PROGRAM, SOURCES, Skip, drape, equal, good, read_json, read_npy, read_steps, refused, run_tests, scene, write_scene
 
-VERBS = ["run", "report", "info", "check", "list", "render", "view"]
+
+
+def verbs():
+    """Those that the program has."""
+    found = re.findall(r"^  (\w+) ", good("help"), re.M)
+    return [verb for verb in found if verb != "drape"]
 
 
 # ---- Help and usage
@@ -24,11 +29,16 @@ def test_help():
     """help of the program and of every verb is on stdout with exit 0"""
     overview = good("--help")
     equal(good("help"), overview)
-    for verb in VERBS:
-        assert re.search(rf"^  {verb} ", overview, re.M), verb
+    assert {"run", "report", "info", "check", "list", "render", "view"} <= set(verbs()), verbs()
+    for verb in verbs():
         text = good(verb, "--help")
         assert text.startswith(f"usage: drape {verb} "), text
         equal(good("help", verb), text)
+        equal(good(verb, "-h"), text)
+        options = re.findall(r"^  (--\S+)(?: [^ ]+)? +(.*)$", text, re.M)
+        assert len(options) >= 2 and all(len(words) > 8 for _, words in options), options
+        for option, _ in options:  # the parser knows what the help shows
+            assert "there is no option" not in drape(verb, "missing.json", option).stderr, option
     assert re.fullmatch(r"drape \d+\.\d+\.\d+\n", good("--version"))
 
 
@@ -453,7 +463,7 @@ def test_check():
 def test_scene_of_springs():
     """the scene in docs/springs.md is checked, described and run, below its strain limit"""
     with open(os.path.join(SOURCES, "docs", "springs.md"), encoding="utf-8") as file:
-        block = re.search(r"\n\n((?:    .*\n)+)", file.read()).group(1)
+        block = re.search(r"^```json\n(.*?)^```", file.read(), re.S | re.M).group(1)
     with open("scene.json", "w", encoding="utf-8") as file:
         file.write(block)
     text = good("info", "scene.json")
@@ -479,7 +489,29 @@ def test_list():
     rows = [line for line in good("list", "--markdown").splitlines() if line.startswith("|")]
     assert len(rows) > 40, rows
     for line in rows:
-        assert line.replace("\\|", "").count("|") in (4, 7), line
+        assert line.replace("\\|", "").count("|") in (4, 6, 7), line
+
+
+def test_list_of_keys():
+    """list shows the keys of a scene, object by object, with what each takes; every key of the schema is there"""
+    text = good("list", "scene")
+    for part in (r"\n  cloth +/cloth/N\n", r"\n  mesh +/cloth/N/mesh; exactly one of grid, file\n", r"\n    duration +the simulated time\n"
+                 r" +a number above 0 to 1e\+09; required \[s\]\n", r'"top-left", "top-right"', r"\n    row +a row of a grid, from 0\n +an integer from 0\n"):
+        assert re.search(part, text), (part, text)
+    equal(re.findall(r"^  (\S+)", good("list", "pin"), re.M), ["pin"])
+    assert text == good("list")[:len(text)]
+    refused("list", "clot", says='did you mean "cloth"?')
+    shown = set(re.findall(r"^\| `[^`]*` \| `([^`]*)`", good("list", "--markdown"), re.M))
+    wanted = set()
+
+    def collect(part):
+        for key, value in part.get("properties", {}).items():
+            wanted.add(key)
+            collect(value)
+        for value in [*filter(None, [part.get("items")]), *part.get("anyOf", [])]:
+            collect(value)
+    collect(json.loads(good("list", "--schema")))
+    assert len(wanted) > 100 and wanted <= shown, wanted - shown
 
 
 def test_info_of_contact():

@@ -49,8 +49,9 @@ double fuzz_magnitude(fuzz_bytes *bytes, double least, double most); /* the same
 /* ---- Sims ---- */
 
 /* Advances to t in at most `attempts` attempts, and cancels what takes more than `seconds` of CPU: the work of a single
- * attempt has bounds of its own, which may be high ("static" follows a thousand steps of pseudo time). A loop that does
- * not heed the cancellation hangs, which libFuzzer and the timeout of the tests tell. Along the way and after it: numbers
+ * attempt has bounds of its own, which may be high ("static" follows a thousand steps of pseudo time). What does not heed
+ * the cancellation soon, by CPU and not by the clock of a busy machine, breaks a promise; a loop that never does hangs,
+ * which libFuzzer and the timeout of the tests tell. Along the way and after it: numbers
  * are finite, a rejected attempt or a failure leaves the last accepted state to the bit. Once for each sim. */
 drape_status fuzz_advance(drape_context *ctx, drape_sim *sim, double t, int attempts, double seconds);
 

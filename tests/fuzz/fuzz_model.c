@@ -25,6 +25,8 @@
 #define MOST_ROWS      32 /* with settings, in a scene */
 #define ATTEMPTS       6
 #define STEPS          3
+#define ALONE          0.4 /* [s] of CPU for an integrator that is the only one, and for each of all */
+#define EACH           0.1
 #define MOST_COUNT     40 /* of integers: iterations, substeps; what bounds the work of a step */
 
 /* ---- Settings, drawn from the parameters of a row ---- */
@@ -334,7 +336,7 @@ static drape_model *make_model(drape_context *ctx, scene *s)
 /* ---- Steps ---- */
 
 static void run(drape_context *ctx, const drape_model *model, const drape_integrator_ops *integrator,
-                fuzz_bytes *in)
+                fuzz_bytes *in, double seconds)
 {
     static drawn settings[2]; /* large */
     drape_sim_def def;
@@ -357,7 +359,7 @@ static void run(drape_context *ctx, const drape_model *model, const drape_integr
     fuzz_check(ctx, status, "drape_sim_create");
     FUZZ_REQUIRE(!status == !!sim, "%s", drape_status_name(status));
     if (sim)
-        fuzz_advance(ctx, sim, STEPS * dt, ATTEMPTS, integrator->timeless ? 0.3 : 3);
+        fuzz_advance(ctx, sim, STEPS * dt, ATTEMPTS, seconds);
     drape_sim_destroy(&sim);
 }
 
@@ -375,7 +377,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     for (unsigned i = 0; model && i < count; i++) {
         fuzz_bytes own = in; /* each with the same bytes */
         if (chosen == i || chosen >= count)
-            run(ctx, model, drape_integrators[i], &own);
+            run(ctx, model, drape_integrators[i], &own, chosen == i ? ALONE : EACH);
     }
     drape_model_destroy(&model);
     fuzz_close(&ctx);
