@@ -63,10 +63,11 @@ typedef struct drape_material {
     double bending_warp, bending_weft, bending_twist; /* of a measured fabric [N m]; NaN: it is none */
 } drape_material;
 
-/* Stiffness of a woven sheet, in tension [N/m] or in bending [N m]: of strips along warp and weft with free sides, of
- * shear or twist; poisson: sqrt(nu12 nu21). */
+/* Stiffness of a woven sheet, in tension [N/m] or in bending [N m]. */
 typedef struct drape_woven {
-    double warp, weft, shear, poisson;
+    double warp, weft; /* of strips along them with free sides */
+    double shear;      /* of shear, or of twist */
+    double poisson;    /* sqrt(nu12 nu21) [1] */
 } drape_woven;
 
 /* One cloth at rest. Node numbers are local to the cloth. All arrays are const and live as long as the model

@@ -339,7 +339,7 @@ static int main_list(int argc, char **argv);
 
 const drape_verb drape_verb_list = {
     .name = "list",
-    .operand = "[TABLE|ROW]",
+    .operand = "TABLE|ROW",
     .operand_optional = true,
     .summary = "the keys of a scene, every row of every table: parameters, units, defaults, references",
     .details =

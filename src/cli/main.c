@@ -55,8 +55,11 @@ static int unknown_verb(const char *name)
 static void print_overview(void)
 {
     puts("drape: a cloth simulator\n\nusage: drape VERB [arguments]\n");
-    for (int i = 0; drape_verbs[i]; i++)
-        printf("  %-10s %-15s %s\n", drape_verbs[i]->name, drape_verbs[i]->operand, drape_verbs[i]->summary);
+    char operand[64];
+    for (int i = 0; drape_verbs[i]; i++) {
+        cli_operand_text(drape_verbs[i], operand, sizeof operand);
+        printf("  %-10s %-15s %s\n", drape_verbs[i]->name, operand, drape_verbs[i]->summary);
+    }
     puts("\n  drape VERB --help   what a verb takes\n"
          "  drape --version     the version\n\n"
          "Exit codes: 0 done, 1 the simulation, a check or the output failed, 2 bad input, 130 interrupted.");
