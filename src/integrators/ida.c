@@ -12,7 +12,7 @@
  *
  * That iteration needs no exact matrix either. What makes it not symmetric is friction, whose force follows the normal
  * force, and dashpots of strains that turn: small beside c_j^2 M and c_j D at the steps that both ask for. Half of it goes
- * to each side, so that Cholesky factors serve: a third of the time in most scenes of contact, for as many iterations.
+ * to each side, so that Cholesky factors serve: half of the time or less in most scenes of contact, for as many iterations.
  * Where much slides, those may fail: then some matrices are exact.
  *
  * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative
