@@ -87,8 +87,8 @@ typedef struct drape_cloth_view {
     const double *node_mass;      /* (node_count) lumped [kg] */
     int32_t rows, columns;        /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
     bool rectangular;             /* a grid whose cells are rectangles before its transform */
-    drape_material material;              /* of the sheet */
-    double gravity[3];                    /* [m/s2] */
+    drape_material material;      /* of the sheet */
+    double gravity[3];            /* [m/s2] */
     const drape_woven *tension, *bending; /* of a measured fabric; NULL: the material says all */
 } drape_cloth_view;
 
