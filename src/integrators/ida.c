@@ -658,7 +658,9 @@ static void restart(void *state, const drape_state *from)
     (void)from;
     ida_state *s = state;
     s->reached = s->from = NAN;
-    s->newton.strict = false;
+    s->newton.strict = s->part = false;
+    s->exact_left = 0;
+    s->exact_span = 1;
     drape_ida_newton_forget(&s->newton);
 }
 
