@@ -1,12 +1,15 @@
 /*
- * speed: what a converged backward Euler step costs, as one table of cases. Two scenes:
+ * speed: what a step costs on every rung, and what it is off by, as one table of cases: groups of sizes and rungs. Two
+ * scenes:
  *     dep     the DEP report's setting: equilateral lattice, four inner pins, its stiffness, dt 0.01 s
- *     sheet   a square sheet of 1 m let go level from two corners, E h 1 000 N/m, D 1e-4 N m, 0.2 kg/m2, dt 1/60 s:
- *             the workload that other programs were measured on
- * The first step is left out. Milliseconds are a step's: CPU time of the process, wall time, and of that the parts; the
- * rest is what the framework takes. Small cases are repeated: a run is the same each time, so each step's CPU time is the
- * least that it took, and the wall times are those of the fastest run. Work is counted beside time, because machines are noisy and counts are not. Equal
- * hashes are equal bits: of one thread and several.
+ *     sheet   a square sheet of 1 m let go level from two corners, E h = 1 000 N/m, D = 1e-4 N m, 0.2 kg/m2, dt 1/60 s: the
+ *             workload that other programs were measured on
+ * The first step, which takes what is taken once, is left out. Milliseconds are a step's: CPU time of the process (mean,
+ * median and worst), wall time, and of that the parts; the rest is what the framework takes. Small cases are repeated: a run
+ * is the same each time, so each step's CPU time is the least that it took, and the wall times are those of the fastest run.
+ * Work is counted beside time, because machines are noisy and counts are not. Equal hashes are equal bits: of one thread
+ * and several. Errors are against backward Euler at the same step, solved to 1e-6 N: positions after 0.5 s, rms and largest,
+ * and the rms strain of the edges beside that of the converged sheet; nan where there is nothing to compare with.
  */
 #include "bench.h"
 #include "sim/profile.h"
@@ -14,47 +17,94 @@
 
 #include <inttypes.h>
 
-#define MOST_STEPS 256
+#define MOST_STEPS    256
+#define MOST_SIDES    9
+#define MOST_RUNGS    7
+#define COMPARE_AT    30    /* steps of 1/60 s */
+#define MOST_COMPARED 11000 /* nodes: beyond, the converged run takes too long */
+#define GROWTH_FROM   2500  /* nodes */
+#define NAN_RESULT                                                                                           \
+    {                                                                                                        \
+        .rms_mm = NAN, .largest_mm = NAN, .strain_rms = NAN, .strain_converged = NAN                         \
+    }
 
-typedef struct bench_case {
-    const char *group;
-    bool dep;
-    int side; /* nodes */
-    const char *linear;
+/* ---- The table ---- */
+
+typedef enum scene_kind { DEP, SHEET } scene_kind;
+
+typedef struct rung {
+    const char *name, *integrator;
+    drape_setting settings[3];
     int threads;
-    double seconds; /* that are simulated */
-} bench_case;
+} rung;
 
-static const bench_case cases[] = {
-    {"dep", true, 5, "auto", 1, 0.6},           {"dep", true, 9, "auto", 1, 0.6},
-    {"dep", true, 13, "auto", 1, 0.6},          {"dep", true, 17, "auto", 1, 0.6},
-    {"dep", true, 23, "auto", 1, 0.6},          {"dep", true, 23, "klu", 1, 0.6},
-    {"dep", true, 23, "cholmod", 1, 0.6},       {"dep", true, 23, "dense", 1, 0.03},
-    {"dep", true, 41, "auto", 1, 0.6},          {"dep", true, 50, "auto", 1, 0.6},
-    {"fall", false, 23, "auto", 1, 2},          {"fall", false, 50, "auto", 1, 2},
-    {"fall", false, 100, "auto", 1, 2},         {"linear", false, 50, "auto", 1, 0.1},
-    {"linear", false, 50, "cholmod", 1, 0.1},   {"linear", false, 50, "klu", 1, 0.1},
-    {"growth", false, 5, "auto", 1, 0.1},       {"growth", false, 10, "auto", 1, 0.1},
-    {"growth", false, 25, "auto", 1, 0.1},      {"growth", false, 50, "auto", 1, 0.1},
-    {"growth", false, 100, "auto", 1, 0.1},     {"growth", false, 200, "auto", 1, 0.1},
-    {"growth", false, 320, "auto", 1, 0.1},     {"cholmod", false, 50, "cholmod", 1, 0.1},
-    {"cholmod", false, 100, "cholmod", 1, 0.1}, {"cholmod", false, 320, "cholmod", 1, 0.1},
-    {"threads", false, 100, "auto", 1, 0.25},   {"threads", false, 100, "auto", 2, 0.25},
+static const rung be = {"be", "be", {{NULL, 0, NULL}}, 1}, be_two = {"be", "be", {{NULL, 0, NULL}}, 2},
+                  be_klu = {"be klu", "be", {{"linear_solver", 0, "klu"}}, 1},
+                  be_cholmod = {"be cholmod", "be", {{"linear_solver", 0, "cholmod"}}, 1},
+                  be_dense = {"be dense", "be", {{"linear_solver", 0, "dense"}}, 1},
+                  be_pcg = {"be pcg",
+                            "be",
+                            {{"linear_solver", 0, "pcg"}, {"linear_tolerance", 0.01, NULL}},
+                            1},
+                  newton_1 = {"newton_k 1", "newton_k", {{NULL, 0, NULL}}, 1},
+                  newton_2 = {"newton_k 2", "newton_k", {{"iterations", 2, NULL}}, 1},
+                  newton_3 = {"newton_k 3", "newton_k", {{"iterations", 3, NULL}}, 1},
+                  projective = {"projective 10", "projective", {{NULL, 0, NULL}}, 1};
+
+typedef struct bench_group {
+    const char *name;
+    scene_kind scene;
+    double seconds; /* that are simulated */
+    int sides[MOST_SIDES];
+    const rung *rungs[MOST_RUNGS];
+    bool compared;
+} bench_group;
+
+static const bench_group groups[] = {
+    {"dep", DEP, 0.6, {5, 9, 13, 17, 23, 41, 50}, {&be}, false},
+    {"dep_linear", DEP, 0.6, {23}, {&be, &be_klu, &be_cholmod}, false},
+    {"dep_dense", DEP, 0.03, {23}, {&be, &be_dense}, false},
+    {"fall", SHEET, 2, {23, 50, 100}, {&be}, false},
+    {"linear", SHEET, 0.1, {50}, {&be, &be_cholmod, &be_klu}, false},
+    {"growth", SHEET, 0.1, {5, 10, 25, 50, 100, 200, 320}, {&be}, false},
+    {"cholmod", SHEET, 0.1, {50, 100, 320}, {&be_cholmod}, false},
+    {"threads", SHEET, 0.25, {100}, {&be, &be_two}, false},
+    {"rungs",
+     SHEET,
+     2,
+     {5, 12, 23, 50, 100},
+     {&projective, &newton_1, &newton_2, &newton_3, &be_pcg, &be},
+     true},
+    {"rungs_growth",
+     SHEET,
+     0.5,
+     {50, 100, 160, 226, 320},
+     {&projective, &newton_1, &newton_2, &newton_3},
+     false},
 };
 
-/* Of one case, a step; times in ms. */
+/* Of one size and rung, a step; times in ms. */
 typedef struct result {
     int nodes, steps;
     long long unknowns, nonzeros, rejected;
-    double cpu, wall, residual, jacobian, factor, solve, contact;
-    double newton, residuals, jacobians, factorizations, strain;
+    double cpu, median, worst, wall, residual, jacobian, factor, solve, contact;
+    double newton, residuals, jacobians, factorizations, iterations;
+    double residual_left; /* [N] the largest of an accepted step */
+    double rms_mm, largest_mm, strain_rms, strain_converged, strain_max;
     size_t bytes;
     uint64_t hash;
 } result;
 
-static drape_model *dep_scene(drape_context *ctx, const bench_case *c)
+/* ---- The scenes ---- */
+
+static double step_of(scene_kind scene)
 {
-    const int edges = c->side - 1, low = edges / 3, high = 2 * edges / 3;
+    return scene == DEP ? 0.01 : 1.0 / 60;
+}
+
+static drape_model *dep_scene(drape_context *ctx, int side)
+{
+    const int edges = side - 1, low = edges / 3, high = 2 * edges / 3;
     return bench_model(
         ctx,
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': %d, 'edge_length': 0.1},"
@@ -62,22 +112,97 @@ static drape_model *dep_scene(drape_context *ctx, const bench_case *c)
         "'mass': 'uniform'},"
         "'terms': [{'type': 'stretch.edge', 'stiffness': 'report'},"
         "{'type': 'bend.hinge', 'stiffness': 'report'}], 'pins': [{'nodes': [%d, %d, %d, %d]}]}],"
-        "'integrator': {'method': 'be', 'dt': 0.01, 'linear_solver': '%s'}, 'duration': 10}",
-        edges, low * c->side + low, low * c->side + high, high * c->side + low, high * c->side + high,
-        c->linear);
+        "'integrator': {'method': 'be', 'dt': 0.01}, 'duration': 10}",
+        edges, low * side + low, low * side + high, high * side + low, high * side + high);
 }
 
-static drape_model *sheet_scene(drape_context *ctx, const bench_case *c)
+static drape_model *sheet_scene(drape_context *ctx, int side)
 {
     return bench_model(
         ctx,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': %d, 'rows': %d, 'width': 1, "
-        "'height': 1},"
-        "'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'areal_density': 0.2},"
-        "'terms': ['stretch.edge', 'bend.hinge'],"
-        "'pins': [{'corner': 'top-left'}, {'corner': 'top-right'}]}],"
-        "'integrator': {'method': 'be', 'linear_solver': '%s'}, 'duration': 10}",
-        c->side, c->side, c->linear);
+        "{'drape':1,'cloth':[{'mesh':{'grid':'square','columns':%d,'rows':%d,'width':1,'height':1},"
+        "'material':{'young_modulus':968245.8365518542,'poisson_ratio':0.3333333333333333,"
+        "'thickness':1.0327955589886444e-3,'areal_density':0.2},"
+        "'terms':['stretch.edge','bend.hinge'],'pins':[{'corner':'top-left'},{'corner':'top-right'}]}],"
+        "'duration':10}",
+        side, side);
+}
+
+/* ---- Errors ---- */
+
+/* Root mean square of |e|/L - 1. */
+static double strain_of(const drape_model *m, const double *x)
+{
+    double sum = 0;
+    for (int32_t e = 0; e < m->edge_count; e++) {
+        const double *a = x + 3 * (size_t)m->edge[2 * (size_t)e],
+                     *b = x + 3 * (size_t)m->edge[2 * (size_t)e + 1];
+        double length = sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) +
+                             (b[2] - a[2]) * (b[2] - a[2]));
+        sum += (length / m->edge_length[e] - 1) * (length / m->edge_length[e] - 1);
+    }
+    return sqrt(sum / m->edge_count);
+}
+
+static void compare_states(const drape_model *m, const double *x, const double *converged, result *r)
+{
+    double sum = 0, most = 0;
+    for (size_t i = 0; i < (size_t)m->node_count; i++) {
+        double square = 0;
+        for (size_t k = 3 * i; k < 3 * i + 3; k++)
+            square += (x[k] - converged[k]) * (x[k] - converged[k]);
+        sum += square;
+        most = fmax(most, square);
+    }
+    r->rms_mm = 1e3 * sqrt(sum / m->node_count);
+    r->largest_mm = 1e3 * sqrt(most);
+    r->strain_rms = strain_of(m, x);
+    r->strain_converged = strain_of(m, converged);
+}
+
+/* Positions of the converged run at COMPARE_AT; NULL where nothing is compared. */
+static double *make_converged(const bench_group *g, int side)
+{
+    if (!g->compared || side * side > MOST_COMPARED)
+        return NULL;
+    drape_context *ctx = bench_context();
+    drape_model *m = sheet_scene(ctx, side);
+    drape_sim *sim = bench_sim(ctx, m, "be", NULL, NULL, NULL);
+    if (drape_sim_advance(sim, COMPARE_AT * step_of(SHEET)))
+        bench_fail(ctx, "the converged run");
+    const size_t bytes = 3 * (size_t)m->node_count * sizeof(double);
+    double *x = malloc(bytes);
+    if (!x)
+        exit(1);
+    memcpy(x, drape_sim_positions(sim), bytes);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&m);
+    drape_context_destroy(&ctx);
+    return x;
+}
+
+static drape_status keep_residual(void *user, const drape_event *event)
+{
+    double *left = user;
+    if (event->kind == DRAPE_EVENT_ATTEMPT && event->attempt->accepted)
+        *left = fmax(*left, event->attempt->residual);
+    return DRAPE_OK;
+}
+
+/* ---- One run ---- */
+
+static drape_sim *open_sim(drape_context *ctx, const drape_model *m, const rung *g)
+{
+    drape_sim *sim = NULL;
+    drape_sim_def def;
+    drape_sim_def_init(&def, sizeof def);
+    def.integrator = g->integrator;
+    def.integrator_settings = g->settings;
+    def.integrator_setting_count = bench_count(g->settings);
+    def.threads = g->threads;
+    if (drape_sim_create(ctx, m, &def, &sim))
+        bench_fail(ctx, "%s", g->name);
+    return sim;
 }
 
 static size_t bytes_of(drape_context *ctx, drape_sim *sim)
@@ -107,28 +232,30 @@ static void divide(result *r, const drape_statistics *a, const drape_statistics 
     r->residuals = (double)(b->residuals - a->residuals) / steps;
     r->jacobians = (double)(b->jacobians - a->jacobians) / steps;
     r->factorizations = (double)(b->factorizations - a->factorizations) / steps;
-    r->strain = b->strain_max;
+    r->iterations = (double)(b->linear_iterations - a->linear_iterations) / steps;
+    r->strain_max = b->strain_max;
 }
 
-/* One run; least (MOST_STEPS) [s] CPU of each step, the least so far. */
-static void run_once(const bench_case *c, double *least, result *r)
+/* least (MOST_STEPS) [s] CPU of each step, the least so far. */
+static void run_once(const bench_group *group, int side, const rung *g, const double *converged,
+                     double *least, result *r)
 {
-    const double dt = c->dep ? 0.01 : 1.0 / 60;
+    const double dt = step_of(group->scene);
     drape_context *ctx = bench_context();
-    drape_model *model = c->dep ? dep_scene(ctx, c) : sheet_scene(ctx, c);
-    drape_sim *sim = NULL;
-    drape_sim_def def;
-    result now = {0};
-    drape_sim_def_init(&def, sizeof def);
-    def.threads = c->threads;
-    if (drape_sim_create(ctx, model, &def, &sim) || drape_sim_advance(sim, dt))
-        bench_fail(ctx, "%s", c->group);
+    drape_model *model = (group->scene == DEP ? dep_scene : sheet_scene)(ctx, side);
+    drape_sim *sim = open_sim(ctx, model, g);
+    result now = NAN_RESULT;
+    drape_sim_observe(sim, keep_residual, &now.residual_left);
+    if (drape_sim_advance(sim, dt))
+        bench_fail(ctx, "%s, %s", group->name, g->name);
     const drape_statistics before = drape_sim_statistics(sim);
-    for (int k = 0; k < MOST_STEPS && (k + 1.5) * dt < c->seconds; k++) {
+    for (int k = 0; k < MOST_STEPS && (k + 1.5) * dt < group->seconds; k++) {
         const double cpu = drape_clock_cpu_seconds();
         if (drape_sim_advance(sim, (k + 2) * dt))
-            bench_fail(ctx, "%s", c->group);
+            bench_fail(ctx, "%s, %s", group->name, g->name);
         least[k] = fmin(least[k], drape_clock_cpu_seconds() - cpu);
+        if (k + 2 == COMPARE_AT && converged)
+            compare_states(model, drape_sim_positions(sim), converged, &now);
     }
     const drape_statistics after = drape_sim_statistics(sim);
     divide(&now, &before, &after);
@@ -144,118 +271,184 @@ static void run_once(const bench_case *c, double *least, result *r)
     drape_context_destroy(&ctx);
 }
 
-static int repeats_of(const bench_case *c)
+static int repeats_of(int side, const rung *g)
 {
-    return strcmp(c->linear, "dense") == 0 || c->side > 50 ? 1 : c->side > 25 ? 3 : 7;
+    return g == &be_dense || side > 50 ? 1 : side > 25 ? 3 : 7;
 }
 
-static result measure(const bench_case *c)
+static int compare_doubles(const void *a, const void *b)
 {
-    result r = {0};
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static result measure(const bench_group *group, int side, const rung *g, const double *converged)
+{
+    result r = NAN_RESULT;
     double least[MOST_STEPS];
+    int count = 0;
     for (int k = 0; k < MOST_STEPS; k++)
         least[k] = INFINITY;
-    for (int i = 0; i < repeats_of(c); i++)
-        run_once(c, least, &r);
-    for (int k = 0; k < MOST_STEPS && isfinite(least[k]); k++)
-        r.cpu += 1e3 * least[k] / r.steps;
+    for (int i = 0; i < repeats_of(side, g); i++)
+        run_once(group, side, g, converged, least, &r);
+    for (; count < MOST_STEPS && isfinite(least[count]); count++)
+        r.cpu += 1e3 * least[count] / r.steps;
+    qsort(least, (size_t)count, sizeof *least, compare_doubles);
+    r.median = 1e3 * least[count / 2];
+    r.worst = 1e3 * least[count - 1];
     return r;
 }
+
+/* ---- What is told ---- */
 
 static double rest_of(const result *r)
 {
     return r->wall - r->residual - r->jacobian - r->factor - r->solve - r->contact;
 }
 
-static void print(const bench_case *c, const result *r)
+static const char csv_columns[] =
+    "group,nodes,rung,threads,unknowns,nonzeros,steps,rejected,cpu_ms,median_cpu_ms,worst_cpu_ms,wall_ms,"
+    "residual_ms,"
+    "jacobian_ms,factor_ms,solve_ms,contact_ms,rest_ms,newton,residuals,jacobians,factorizations,linear_"
+    "iterations,"
+    "residual_n,rms_mm,largest_mm,strain_percent,converged_strain_percent,strain_max,bytes,hash";
+
+static void print_head(void)
 {
-    printf("%-8s %6d %-8s %2d %5d %4lld %9.2f %9.2f %9.3f %9.3f %9.3f %9.3f %5.1f %6.2f %6.2f %6.2f %7zu "
-           "%016" PRIx64 "\n",
-           c->group, r->nodes, c->linear, c->threads, r->steps, r->rejected, r->cpu, r->wall, r->residual,
-           r->jacobian, r->factor, r->solve, 100 * rest_of(r) / r->wall, r->newton, r->residuals,
-           r->factorizations, r->bytes / (size_t)r->nodes, r->hash);
+    printf("%-12s %6s %-13s %2s %5s %4s %9s %9s %9s %9s %9s %9s %9s %5s %6s %6s %6s %6s %7s %6s %7s %s\n",
+           "group", "nodes", "rung", "th", "steps", "rej", "cpu ms", "median", "wall ms", "residual",
+           "jacobian", "factor", "solve", "rest%", "newton", "resid.", "factor", "linear", "rms mm", "strain",
+           "B/node", "hash");
+}
+
+static void print(const char *group, const rung *g, const result *r)
+{
+    printf("%-12s %6d %-13s %2d %5d %4lld %9.3f %9.3f %9.3f %9.3f %9.3f %9.3f %9.3f %5.1f %6.2f %6.2f %6.2f "
+           "%6.1f "
+           "%7.3f %6.4f %7zu %016" PRIx64 "\n",
+           group, r->nodes, g->name, g->threads, r->steps, r->rejected, r->cpu, r->median, r->wall,
+           r->residual, r->jacobian, r->factor, r->solve, 100 * rest_of(r) / r->wall, r->newton, r->residuals,
+           r->factorizations, r->iterations, r->rms_mm, 100 * r->strain_rms, r->bytes / (size_t)r->nodes,
+           r->hash);
     fflush(stdout);
 }
 
-static void write_row(FILE *csv, const bench_case *c, const result *r)
+static void write_row(FILE *csv, const char *group, const rung *g, const result *r)
 {
     bench_csv_row(csv);
-    fprintf(csv,
-            "%s,%d,%s,%d,%lld,%lld,%d,%lld,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.3f,%.3f,%.3f,%.3f,%zu,%.5f,%"
-            "016" PRIx64 "\n",
-            c->group, r->nodes, c->linear, c->threads, r->unknowns, r->nonzeros, r->steps, r->rejected,
-            r->cpu, r->wall, r->residual, r->jacobian, r->factor, r->solve, rest_of(r), r->newton,
-            r->residuals, r->jacobians, r->factorizations, r->bytes, r->strain, r->hash);
+    fprintf(csv, "%s,%d,%s,%d,%lld,%lld,%d,%lld,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,", group,
+            r->nodes, g->name, g->threads, r->unknowns, r->nonzeros, r->steps, r->rejected, r->cpu, r->median,
+            r->worst, r->wall, r->residual, r->jacobian, r->factor, r->solve, r->contact, rest_of(r));
+    fprintf(csv, "%.3f,%.3f,%.3f,%.3f,%.2f,%.4g,%.4f,%.3f,%.5f,%.5f,%.5f,%zu,%016" PRIx64 "\n", r->newton,
+            r->residuals, r->jacobians, r->factorizations, r->iterations, r->residual_left, r->rms_mm,
+            r->largest_mm, 100 * r->strain_rms, 100 * r->strain_converged, r->strain_max, r->bytes, r->hash);
     fflush(csv);
 }
 
-/* What the goals are about: growth, threads, overhead. */
-static void conclude(const char *group, const result *first, const result *last, int count)
+/* Of a rung, over the sizes of a group. */
+typedef struct growth {
+    int first, last, count; /* nodes, from GROWTH_FROM on */
+    double x, y, xx, xy;    /* sums of logarithms */
+} growth;
+
+static void add_to_growth(growth *a, const result *r)
 {
-    if (count < 2)
+    if (r->nodes < GROWTH_FROM)
         return;
-    if (strcmp(group, "threads") == 0)
-        printf("threads: %.2f times faster, %s bits\n", first->wall / last->wall,
-               first->hash == last->hash ? "the same" : "OTHER");
-    if (strcmp(group, "growth") == 0 || strcmp(group, "cholmod") == 0)
-        printf("%s: from %d to %d nodes a Newton iteration grows with the exponent %.2f, a step with %.2f\n",
-               group, first->nodes, last->nodes,
-               log(last->cpu / last->newton * first->newton / first->cpu) /
-                   log((double)last->nodes / first->nodes),
-               log(last->cpu / first->cpu) / log((double)last->nodes / first->nodes));
+    const double x = log(r->nodes), y = log(r->median);
+    if (a->count++ == 0)
+        a->first = r->nodes;
+    a->last = r->nodes;
+    a->x += x;
+    a->y += y;
+    a->xx += x * x;
+    a->xy += x * y;
 }
 
-static bool is_row(const char *name)
+/* The slope by least squares. */
+static void print_growth(const rung *g, const growth *a)
 {
+    if (a->count > 1)
+        printf("%s: from %d to %d nodes the median step grows with their number to the power %.2f\n", g->name,
+               a->first, a->last, (a->count * a->xy - a->x * a->y) / (a->count * a->xx - a->x * a->x));
+}
+
+/* Two rungs that differ in their threads alone. */
+static void print_threads(const rung *const *g, const result *r)
+{
+    if (g[1] && g[1]->threads != g[0]->threads)
+        printf("%d threads: %.2f times faster, %s bits\n", g[1]->threads, r[0].wall / r[1].wall,
+               r[0].hash == r[1].hash ? "the same" : "OTHER");
+}
+
+/* ---- The groups ---- */
+
+static bool is_in_build(const rung *g)
+{
+    const drape_setting *linear = &g->settings[0];
+    if (!linear->name || strcmp(linear->name, "linear_solver") != 0)
+        return true;
     for (int i = 0; drape_linears_words[i]; i++)
-        if (strcmp(drape_linears_words[i], name) == 0)
+        if (strcmp(drape_linears_words[i], linear->text) == 0)
             return true;
     return false;
 }
 
-static void run_group(const char *group, int most, FILE *csv)
+static void run_side(const bench_group *group, int side, FILE *csv, growth *grown)
 {
-    result first = {0}, last = {0};
-    int count = 0;
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        const bench_case *c = &cases[i];
-        if (strcmp(c->group, group) != 0 || c->side * c->side > most || !is_row(c->linear))
+    double *converged = make_converged(group, side);
+    result r[MOST_RUNGS];
+    for (int k = 0; k < MOST_RUNGS && group->rungs[k]; k++) {
+        const rung *g = group->rungs[k];
+        if (!is_in_build(g))
             continue;
-        last = measure(c);
-        if (count == 0 || first.nodes < 2500) /* growth counts from there on */
-            first = last;
-        count++;
-        print(c, &last);
+        r[k] = measure(group, side, g, converged);
+        print(group->name, g, &r[k]);
+        add_to_growth(&grown[k], &r[k]);
         if (csv)
-            write_row(csv, c, &last);
+            write_row(csv, group->name, g, &r[k]);
     }
-    conclude(group, &first, &last, count);
+    print_threads(group->rungs, r);
+    free(converged);
 }
 
-static const char help[] = "speed [GROUP [CSV [NODES]]]: milliseconds of a converged backward Euler step, by "
-                           "size, linear solver and threads\n"
-                           "  GROUP  all, dep, fall, linear, growth, cholmod or threads; NODES: none larger; "
-                           "BENCH_COMMIT names the commit\n";
+static void run_group(const bench_group *group, int most, FILE *csv)
+{
+    growth grown[MOST_RUNGS] = {{0}};
+    for (int i = 0; i < MOST_SIDES && group->sides[i]; i++)
+        if (group->sides[i] * group->sides[i] <= most)
+            run_side(group, group->sides[i], csv, grown);
+    for (int k = 0; k < MOST_RUNGS && group->rungs[k]; k++)
+        print_growth(group->rungs[k], &grown[k]);
+}
+
+static int usage(const char *argument)
+{
+    char text[600];
+    int length =
+        snprintf(text, sizeof text,
+                 "speed [GROUP [CSV [NODES]]]: milliseconds of a step on each rung, its parts and its error\n"
+                 "  GROUP  all");
+    for (size_t i = 0; i < sizeof groups / sizeof *groups; i++)
+        length += snprintf(text + length, sizeof text - (size_t)length, ", %s", groups[i].name);
+    snprintf(text + length, sizeof text - (size_t)length,
+             "\n  NODES  none larger; BENCH_COMMIT in the environment names the commit\n");
+    return bench_usage(argument, text);
+}
 
 int main(int argc, char **argv)
 {
-    const char *only = argc >= 2 ? argv[1] : "all", *done = "";
-    if (argc > 4 || only[0] == '-')
-        return bench_usage(only, help);
+    const char *only = argc >= 2 ? argv[1] : "all";
+    bool known = strcmp(only, "all") == 0;
+    for (size_t i = 0; i < sizeof groups / sizeof *groups; i++)
+        known |= strcmp(only, groups[i].name) == 0;
+    if (argc > 4 || !known)
+        return usage(only);
     const int most = argc == 4 ? atoi(argv[3]) : INT32_MAX;
-    FILE *csv =
-        bench_csv(argc >= 3 && *argv[2] ? argv[2] : NULL,
-                  "group,nodes,linear,threads,unknowns,nonzeros,steps,rejected,cpu_ms,wall_ms,residual_ms,"
-                  "jacobian_ms,factor_ms,solve_ms,rest_ms,newton,residuals,jacobians,factorizations,bytes,"
-                  "strain_max,hash");
-    printf("%-8s %6s %-8s %2s %5s %4s %9s %9s %9s %9s %9s %9s %5s %6s %6s %6s %7s %s\n", "group", "nodes",
-           "linear", "th", "steps", "rej", "cpu ms", "wall ms", "residual", "jacobian", "factor", "solve",
-           "rest%", "newton", "resid.", "factor", "B/node", "hash");
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        const char *group = cases[i].group;
-        if (strcmp(group, done) != 0 && (strcmp(only, "all") == 0 || strcmp(only, group) == 0))
-            run_group(group, most, csv);
-        done = group;
-    }
+    FILE *csv = bench_csv(argc >= 3 && *argv[2] ? argv[2] : NULL, csv_columns);
+    print_head();
+    for (size_t i = 0; i < sizeof groups / sizeof *groups; i++)
+        if (strcmp(only, "all") == 0 || strcmp(only, groups[i].name) == 0)
+            run_group(&groups[i], most, csv);
     return csv && fclose(csv) != 0;
 }

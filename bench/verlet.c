@@ -1,8 +1,12 @@
 /*
  * verlet: a frame of pinned2 in CS184's mode, 30 substeps with cloth on cloth and the strain limit, against the same
- * frame by its own loops (cs184.h), in turns, so that both meet the same machine. CPU time of a frame, and their
- * ratio; and how far the sheets are from each other, for both do the same: what differs is points nearer than
- * 2 thicknesses on both sides of a box, which `own` leaves out as CS184 does.
+ * frame by its own code (cs184.cpp), in turns, so that both meet the same machine. CPU time of a frame, and their
+ * ratio; and how far the sheets are from each other, for both do the same. CS184 looks for near points in a point's
+ * own box alone and misses pairs across its faces, we look in all:
+ *
+ *   all own   what each does by itself
+ *   own own   both as CS184
+ *   all all   both without missing any: CS184's map asked for all boxes in reach
  *
  *     verlet [--csv FILE] [--side N] [--thickness T] [--frames WARM COUNT] [SCENE]      default 64, the scene's, 30 60
  */
@@ -13,8 +17,6 @@
 
 #include <time.h>
 
-#define GRAVITY -9.8
-
 static int side = 64, warm = 30, frames = 60;
 static double thickness = 0.0095;
 
@@ -24,7 +26,7 @@ static void set(drape_context *ctx, drape_scene *scene, const char *pointer, con
         bench_fail(ctx, "%s=%s", pointer, value);
 }
 
-static drape_model *load(drape_context *ctx, const char *path, const char *boxes)
+static drape_model *load(drape_context *ctx, const char *path, bool all_boxes)
 {
     char count[32], last[64], thick[32];
     drape_scene *scene = NULL;
@@ -38,31 +40,33 @@ static drape_model *load(drape_context *ctx, const char *path, const char *boxes
     set(ctx, scene, "/cloth/num_height_points", count);
     set(ctx, scene, "/cloth/pinned", last);
     set(ctx, scene, "/cloth/thickness", thick);
-    set(ctx, scene, "/integrator/self_boxes", boxes);
+    set(ctx, scene, "/integrator/self_boxes", all_boxes ? "\"all\"" : "\"own\"");
     if (drape_scene_compile(scene, &model))
         bench_fail(ctx, "%s", path);
     drape_scene_destroy(&scene);
     return model;
 }
 
-static void open_reference(cs184 *c, const drape_model *m, const drape_sim *sim)
+static cs184 *open_reference(const drape_model *m, const drape_sim *sim, bool all_boxes)
 {
+    const cs184_scene scene = {.side = side,
+                               .width = 1,
+                               .thickness = thickness,
+                               .mass = m->mass[1],
+                               .ks = 5000,
+                               .damping = 0.2,
+                               .gravity = -9.8,
+                               .frame_rate = 90,
+                               .substeps = 30,
+                               .all_boxes = all_boxes};
     bool *pinned = malloc((size_t)m->node_count * sizeof *pinned);
     if (!pinned)
         exit(1);
     for (int32_t i = 0; i < m->node_count; i++)
         pinned[i] = m->free_of_node[i] < 0;
-    *c = (cs184){.side = side,
-                 .width = 1,
-                 .thickness = thickness,
-                 .ks = 5000,
-                 .damping = 0.2,
-                 .mass = m->mass[1],
-                 .substeps = 30,
-                 .frame_rate = 90,
-                 .enabled = {true, true, true}};
-    cs184_open(c, drape_sim_positions(sim), pinned);
+    cs184 *c = cs184_open(&scene, drape_sim_positions(sim), pinned);
     free(pinned);
+    return c;
 }
 
 static double frame_of_drape(drape_context *ctx, drape_sim *sim, int frame)
@@ -76,7 +80,7 @@ static double frame_of_drape(drape_context *ctx, drape_sim *sim, int frame)
 static double frame_of_reference(cs184 *c)
 {
     clock_t start = clock();
-    cs184_frame(c, GRAVITY);
+    cs184_frame(c);
     return (double)(clock() - start) / CLOCKS_PER_SEC;
 }
 
@@ -85,34 +89,44 @@ static double distance(const cs184 *c, const double *x)
 {
     double sum = 0, d[3];
     for (int i = 0; i < side * side; i++) {
-        double length = cs184_between(c->points[i].position, x + 3 * (size_t)i, d);
-        sum += length * length;
+        cs184_position(c, i, d);
+        for (int k = 0; k < 3; k++)
+            sum += (d[k] - x[3 * i + k]) * (d[k] - x[3 * i + k]);
     }
     return sqrt(sum / (side * side));
 }
 
-static void measure(drape_context *ctx, const char *path, const char *boxes, FILE *csv)
+typedef struct boxes {
+    bool ours_all, theirs_all;
+} boxes;
+
+static const char *name_of(bool all)
 {
-    cs184 reference;
-    drape_model *model = load(ctx, path, boxes);
+    return all ? "all" : "own";
+}
+
+static void measure(drape_context *ctx, const char *path, boxes b, FILE *csv)
+{
+    drape_model *model = load(ctx, path, b.ours_all);
     drape_sim *sim = bench_sim(ctx, model, NULL, NULL, NULL, NULL);
+    cs184 *reference = open_reference(model, sim, b.theirs_all);
     double ours = 0, theirs = 0;
-    open_reference(&reference, model, sim);
     for (int frame = 1; frame <= warm + frames; frame++) {
-        double a = frame_of_drape(ctx, sim, frame), b = frame_of_reference(&reference);
-        ours += frame > warm ? a : 0;
-        theirs += frame > warm ? b : 0;
+        double drape = frame_of_drape(ctx, sim, frame), course = frame_of_reference(reference);
+        ours += frame > warm ? drape : 0;
+        theirs += frame > warm ? course : 0;
     }
-    const double apart = distance(&reference, drape_sim_positions(sim));
-    printf("%6d %10g %-8s %10.2f %10.2f %8.3f %10.3g\n", side * side, thickness, boxes, 1e3 * ours / frames,
-           1e3 * theirs / frames, ours / theirs, apart);
+    const double apart = distance(reference, drape_sim_positions(sim));
+    printf("%6d %10g %-6s %-6s %10.2f %10.2f %8.3f %10.3g\n", side * side, thickness, name_of(b.ours_all),
+           name_of(b.theirs_all), 1e3 * ours / frames, 1e3 * theirs / frames, ours / theirs, apart);
     fflush(stdout);
     if (csv) {
         bench_csv_row(csv);
-        fprintf(csv, "%d,%g,%.*s,%d,%d,%.4g,%.4g,%.4g,%.4g\n", side * side, thickness, (int)strlen(boxes) - 2,
-                boxes + 1, warm, frames, 1e3 * ours / frames, 1e3 * theirs / frames, ours / theirs, apart);
+        fprintf(csv, "%d,%g,%s,%s,%d,%d,%.4g,%.4g,%.4g,%.4g\n", side * side, thickness, name_of(b.ours_all),
+                name_of(b.theirs_all), warm, frames, 1e3 * ours / frames, 1e3 * theirs / frames,
+                ours / theirs, apart);
     }
-    cs184_close(&reference);
+    cs184_close(reference);
     drape_sim_destroy(&sim);
     drape_model_destroy(&model);
 }
@@ -137,11 +151,13 @@ int main(int argc, char **argv)
         else
             return bench_usage(argv[i], usage);
     }
-    FILE *csv = bench_csv(file, "nodes,thickness_m,boxes,warm_frames,frames,drape_ms,cs184_ms,ratio,apart_m");
+    FILE *csv = bench_csv(
+        file, "nodes,thickness_m,boxes,cs184_boxes,warm_frames,frames,drape_ms,cs184_ms,ratio,apart_m");
     drape_context *ctx = bench_context();
-    puts(" nodes  thickness boxes      drape ms   cs184 ms    ratio    apart m");
-    measure(ctx, path, "\"own\"", csv);
-    measure(ctx, path, "\"all\"", csv);
+    puts(" nodes  thickness boxes  cs184    drape ms   cs184 ms    ratio    apart m");
+    measure(ctx, path, (boxes){true, false}, csv);
+    measure(ctx, path, (boxes){false, false}, csv);
+    measure(ctx, path, (boxes){true, true}, csv);
     drape_context_destroy(&ctx);
     return csv && fclose(csv) ? 1 : 0;
 }

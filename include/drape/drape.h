@@ -55,6 +55,7 @@ DRAPE_API const char *drape_version(void);
 
 /* ---- Context ---- */
 
+/* Allocator, log, and the last message. */
 typedef struct drape_context drape_context;
 
 /* Severity of a log line. */
@@ -80,6 +81,8 @@ DRAPE_API void drape_context_def_init(drape_context_def *def, size_t struct_size
 /* Makes a context. def NULL: the defaults. Errors: DRAPE_E_ARGUMENT (def not initialised, out NULL),
  * DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_context_create(const drape_context_def *def, drape_context **out);
+
+/* Frees a context, after all that was made from it. */
 DRAPE_API void drape_context_destroy(drape_context **ctx);
 
 /* What the last failed call had to say, one line without newline; "" before any failure. Valid until the next
@@ -94,33 +97,33 @@ DRAPE_API const char *drape_context_message(const drape_context *ctx);
 /* One parameter by name. Numbers and integers go into number with text and vector NULL; choices and file
  * names into text; booleans as text "true" or "false", or as number 0 or 1; vectors into vector. */
 typedef struct drape_setting {
-    const char *name;
-    double number;
-    const char *text;
+    const char *name;     /* of the parameter */
+    double number;        /* of numbers, integers and booleans */
+    const char *text;     /* of choices, names of files, booleans; NULL: none */
     const double *vector; /* vector_count numbers: 3, or 4 for axis and angle [degrees] */
-    size_t vector_count;
+    size_t vector_count;  /* of vector */
 } drape_setting;
 
 /* A row of one of Drape's tables by name, with the parameters that differ from their defaults. `drape list`
  * shows all. */
 typedef struct drape_row_def {
-    const char *type;
+    const char *type;              /* the name of the row */
     const drape_setting *settings; /* setting_count of them; NULL for none */
-    size_t setting_count;
+    size_t setting_count;          /* of settings */
 } drape_row_def;
 
 /* A triangle mesh: one of three sources. Exactly one of grid.type, file, positions is set. It lies inside the def of a
  * cloth and grows into what is reserved. */
 typedef struct drape_mesh_def {
-    drape_row_def grid;       /* a row of the grids: "equilateral", "square" */
-    const char *file;         /* an OBJ or PLY file, by its ending */
-    const double *positions;  /* node_count x 3 [m], copied */
-    const int32_t *triangles; /* triangle_count x 3, 0-based, copied */
-    size_t node_count, triangle_count;
-    double scale[3];     /* default 1 1 1; applied first */
-    double rotate[4];    /* axis x y z and angle [degrees]; default none; applied second */
-    double translate[3]; /* [m]; default 0; applied last */
-    void *reserved[4];   /* NULL */
+    drape_row_def grid;                /* a row of the grids: "equilateral", "square" */
+    const char *file;                  /* an OBJ or PLY file, by its ending */
+    const double *positions;           /* node_count x 3 [m], copied */
+    const int32_t *triangles;          /* triangle_count x 3, 0-based, copied */
+    size_t node_count, triangle_count; /* of positions and triangles */
+    double scale[3];                   /* default 1 1 1; applied first */
+    double rotate[4];                  /* axis x y z and angle [degrees]; default none; applied second */
+    double translate[3];               /* [m]; default 0; applied last */
+    void *reserved[4];                 /* NULL */
 } drape_mesh_def;
 
 /* Displacement of pinned nodes from their rest positions, or of a collider from where its parameters put it,
@@ -133,66 +136,66 @@ typedef struct drape_track_key {
 /* Nodes of one cloth held fixed, or moved along a track. Exactly one of nodes, corner, edge, row (>= 0),
  * has_box selects them. corner, edge and row exist on grids only. */
 typedef struct drape_pin_def {
-    size_t struct_size;
+    size_t struct_size;   /* set by drape_pin_def_init */
     const int32_t *nodes; /* node_count node numbers of this cloth */
-    size_t node_count;
+    size_t node_count;    /* of nodes */
     const char
         *corner; /* "top-left", "top-right", "bottom-left", "bottom-right"; top is row 0, left is column 0 */
-    const char *edge; /* "top", "bottom", "left", "right" */
-    int32_t row;      /* -1: not selected by row */
-    bool has_box;
+    const char *edge;              /* "top", "bottom", "left", "right" */
+    int32_t row;                   /* -1: not selected by row */
+    bool has_box;                  /* box_min and box_max are set */
     double box_min[3], box_max[3]; /* [m], rest coordinates after the transform; boundary included */
     const drape_track_key *track;  /* key_count keys; NULL: fixed */
-    size_t key_count;
+    size_t key_count;              /* of track */
     bool clamp; /* edges between its nodes keep the direction of the sheet, for bending terms that see it */
 } drape_pin_def;
 
 /* One piece of cloth. */
 typedef struct drape_cloth_def {
-    size_t struct_size;
-    const char *name; /* NULL: "cloth0", "cloth1" ... */
-    drape_mesh_def mesh;
+    size_t struct_size;  /* set by drape_cloth_def_init */
+    const char *name;    /* NULL: "cloth0", "cloth1" ... */
+    drape_mesh_def mesh; /* its triangles at rest */
     const drape_setting
-        *material; /* young_modulus, poisson_ratio, thickness, density ...: `drape list` shows all */
-    size_t material_count;
+        *material;         /* young_modulus, poisson_ratio, thickness, density ...: `drape list` shows all */
+    size_t material_count; /* of material */
     const drape_row_def *terms; /* rows of the terms that are modelled */
-    size_t term_count;
-    const drape_pin_def *pins;
-    size_t pin_count;
-    double velocity[3]; /* [m/s] of every node at t = 0 */
+    size_t term_count;          /* of terms */
+    const drape_pin_def *pins;  /* nodes that are held or moved; NULL: none */
+    size_t pin_count;           /* of pins */
+    double velocity[3];         /* [m/s] of every node at t = 0 */
 } drape_cloth_def;
 
 /* A rigid obstacle: a row of the colliders with its parameters. Initialise with drape_collider_def_init. */
 typedef struct drape_collider_def {
-    size_t struct_size;
+    size_t struct_size;           /* set by drape_collider_def_init */
     drape_row_def row;            /* "plane", "sphere" ... */
     const char *name;             /* NULL: "collider0", "collider1" ... */
     double friction;              /* Coulomb's mu between it and cloth [1], [0, 1000]; default 0 */
     const drape_track_key *track; /* displacement from where the parameters put it; NULL: it rests */
-    size_t key_count;
+    size_t key_count;             /* of track */
 } drape_collider_def;
 
 /* A whole scene. Initialise with drape_scene_def_init; everything pointed to need only live until
  * drape_model_create returns. */
 typedef struct drape_scene_def {
-    size_t struct_size; /* set by drape_scene_def_init */
-    const drape_cloth_def *cloths;
-    size_t cloth_count;
-    double gravity[3];          /* [m/s2]; default 0 -9.81 0 */
+    size_t struct_size;            /* set by drape_scene_def_init */
+    const drape_cloth_def *cloths; /* at least one */
+    size_t cloth_count;            /* of cloths */
+    double gravity[3];             /* [m/s2]; default 0 -9.81 0 */
     drape_row_def integrator;   /* default "be"; keys of any integrator row are accepted, those of other rows
                                    are ignored */
     drape_row_def controller;   /* default "halving" */
     double duration;            /* [s], required > 0 when run from the command line; default 1 */
     double frame_rate;          /* [1/s] of frame events; default 60 */
     const char *const *formats; /* frame formats of `drape run`, rows of the exporters; default none */
-    size_t format_count;
-    const char *folder; /* folder that relative mesh files are in; NULL: the working directory */
+    size_t format_count;        /* of formats */
+    const char *folder;         /* folder that relative mesh files are in; NULL: the working directory */
     const drape_collider_def *colliders; /* at most 4096 */
-    size_t collider_count;
-    const drape_setting *self_contact; /* thickness, friction; NULL: cloth goes through cloth */
-    size_t self_contact_count;
-    const drape_setting *contact; /* distance, stiffness ...: `drape list contact` shows all */
-    size_t contact_count;
+    size_t collider_count;               /* of colliders */
+    const drape_setting *self_contact;   /* thickness, friction; NULL: cloth goes through cloth */
+    size_t self_contact_count;           /* of self_contact */
+    const drape_setting *contact;        /* distance, stiffness ...: `drape list contact` shows all */
+    size_t contact_count;                /* of contact */
     const char *up; /* axis that points up in frames of `drape run`: "y" or "z"; NULL: "y" */
 } drape_scene_def;
 
@@ -221,6 +224,8 @@ DRAPE_API drape_status drape_scene_parse(drape_context *ctx, const char *text, c
  * made. "-" appends to an array. Errors: DRAPE_E_ARGUMENT (not a pointer, a step into a number or past an
  * array), DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char *value);
+
+/* Frees a scene; models made from it stay. */
 DRAPE_API void drape_scene_destroy(drape_scene **scene);
 
 /* ---- Model
@@ -238,6 +243,8 @@ DRAPE_API drape_status drape_scene_compile(drape_scene *scene, drape_model **out
 DRAPE_API drape_status drape_model_create(drape_context *ctx, const drape_scene_def *def, drape_model **out);
 /* drape_scene_load and drape_scene_compile in one call. */
 DRAPE_API drape_status drape_model_load(drape_context *ctx, const char *scene_path, drape_model **out);
+
+/* Frees a model, after all its sims. */
 DRAPE_API void drape_model_destroy(drape_model **model);
 
 /* Sizes. A NULL model has none of anything. dofs: unknowns, 3 a free node; nonzeros: of the full dofs x dofs
@@ -257,20 +264,24 @@ DRAPE_API const uint8_t *drape_model_pinned(const drape_model *model);
 
 /* The pieces of cloth: each owns a contiguous range of nodes and of triangles, in scene order. */
 typedef struct drape_cloth_range {
-    const char *name;
-    int32_t first_node, node_count;
-    int32_t first_triangle, triangle_count;
+    const char *name;                       /* as in the scene, or "cloth0" ... */
+    int32_t first_node, node_count;         /* its nodes, in numbers of the model */
+    int32_t first_triangle, triangle_count; /* its triangles */
 } drape_cloth_range;
+
+/* How many pieces of cloth there are, and one of them; an index that none has gives a range of nothing. */
 DRAPE_API int32_t drape_model_cloth_count(const drape_model *model);
 DRAPE_API drape_cloth_range drape_model_cloth(const drape_model *model, int32_t index);
 
 /* The obstacles, in scene order, and where they are at time t [s]. */
 typedef struct drape_collider_motion {
-    const char *name;
+    const char *name;       /* as in the scene, or "collider0" ... */
     const char *type;       /* the row */
     double displacement[3]; /* [m] from where its parameters put it */
     double velocity[3];     /* [m/s]; at a key of the track, that of the piece after it */
 } drape_collider_motion;
+
+/* How many obstacles there are, and where one of them is by its track at time t [s]. */
 DRAPE_API int32_t drape_model_collider_count(const drape_model *model);
 DRAPE_API drape_collider_motion drape_model_collider(const drape_model *model, int32_t index, double t);
 
@@ -292,21 +303,22 @@ typedef struct drape_sim drape_sim;
 
 /* How to run. Initialise with drape_sim_def_init; what is left at its default is the scene's own. */
 typedef struct drape_sim_def {
-    size_t struct_size;
+    size_t struct_size;                       /* set by drape_sim_def_init */
     const char *integrator;                   /* a row of the integrators; NULL: the scene's */
     const drape_setting *integrator_settings; /* override the scene's settings */
-    size_t integrator_setting_count;
-    const char *controller; /* a row of the controllers; NULL: the scene's */
-    const drape_setting *controller_settings;
-    size_t controller_setting_count;
-    double dt;         /* [s]; 0: the scene's */
-    double dt_min;     /* [s]; 0: the scene's */
-    double frame_rate; /* [1/s] of frame events; 0: the scene's */
+    size_t integrator_setting_count;          /* of integrator_settings */
+    const char *controller;                   /* a row of the controllers; NULL: the scene's */
+    const drape_setting *controller_settings; /* override the scene's settings */
+    size_t controller_setting_count;          /* of controller_settings */
+    double dt;                                /* [s]; 0: the scene's */
+    double dt_min;                            /* [s]; 0: the scene's */
+    double frame_rate;                        /* [1/s] of frame events; 0: the scene's */
     int threads; /* threads that evaluate elements, 1 to 256; default 1; the result does not depend on it */
     double realtime_step; /* [s] longest step that drape_sim_advance_realtime takes to keep up, and the most
                              time that it owes; 0: four times dt */
 } drape_sim_def;
 
+/* Fills *def with the defaults. */
 DRAPE_API void drape_sim_def_init(drape_sim_def *def, size_t struct_size);
 
 /* Makes a sim at t = 0 in the model's rest positions and initial velocities. NULL def: the scene's integrator
@@ -315,6 +327,8 @@ DRAPE_API void drape_sim_def_init(drape_sim_def *def, size_t struct_size);
  * DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
 DRAPE_API drape_status drape_sim_create(drape_context *ctx, const drape_model *model,
                                         const drape_sim_def *def, drape_sim **out);
+
+/* Frees a sim. */
 DRAPE_API void drape_sim_destroy(drape_sim **sim);
 
 /* Advances to t_end [s]. Steps end at t0 + k dt; only the last one is cut to end at t_end, and a remainder
@@ -330,13 +344,13 @@ typedef struct drape_realtime {
     double time;    /* [s] simulated time that it came to */
     double debt;    /* [s] of the frame, and of those before, that is owed to the next call; 0: it kept up */
     double dropped; /* [s] given up in this call, because more was owed than may be */
-    double dropped_total; /* [s] since the sim was made */
-    double seconds;       /* [s] of wall clock that the call took, its observers included */
-    bool kept;            /* that was within the budget */
-    const char *rung;     /* "full"; "fewer iterations"; "larger steps": longer than dt, or time is owed */
-    int effort;           /* of the integrator: 0, as its parameters say, and up, cheaper */
-    int attempts, rejected;
-    double h;        /* [s] largest accepted step; 0: none was accepted */
+    double dropped_total;   /* [s] since the sim was made */
+    double seconds;         /* [s] of wall clock that the call took, its observers included */
+    bool kept;              /* that was within the budget */
+    const char *rung;       /* "full"; "fewer iterations"; "larger steps": longer than dt, or time is owed */
+    int effort;             /* of the integrator: 0, as its parameters say, and up, cheaper */
+    int attempts, rejected; /* steps of this call, and those of them that were forgotten */
+    double h;               /* [s] largest accepted step; 0: none was accepted */
     double residual; /* [N] largest of the accepted steps, in the norm of the integrator; NaN: it has none */
 } drape_realtime;
 
@@ -468,7 +482,8 @@ DRAPE_API void drape_model_normals(const drape_model *model, const double *x, do
  *
  * drape_sim_contact_forces: of contact and friction, with colliders and between layers, on every node;
  * drape_sim_collider_force: of cloth on one collider, as a whole. Colliders have the mean velocity of the last step, so
- * ask before moving them on. An integrator that moves nodes out of what they meet ("verlet") has no such forces, and
+ * ask before moving them on. Under "newton_k" and "projective", which do not bring the residual of a step to zero, all
+ * of these are far off (docs/choosing.md). An integrator that moves nodes out of what they meet ("verlet") has no such forces, and
  * says so. Errors: DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. Thread-safety: as the sim. Not for observers. */
 DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_contact_forces(drape_sim *sim, double *forces);
@@ -477,12 +492,19 @@ DRAPE_API drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider
 /* Where a collider is in the last accepted state, as drape_model_collider, with the host's moves. */
 DRAPE_API drape_collider_motion drape_sim_collider(const drape_sim *sim, int32_t collider);
 
-/* Energies of the last accepted state [J]. kinetic: of the free nodes, as the motion of pinned ones is prescribed. gravity: the potential, zero at the origin. dissipated: the work
- * that damping and drag terms took since t = 0 or drape_sim_set_state. numerical: what is missing otherwise, the integrator's own
- * dissipation (negative: gain), after the work of pins and colliders that move and of drape_sim_push. */
+/* Energies of the last accepted state [J]. */
 typedef struct drape_energy {
-    double kinetic, elastic, gravity, contact, dissipated, numerical;
+    double kinetic;    /* [J] of the free nodes, as the motion of pinned ones is prescribed */
+    double elastic;    /* [J] of all terms that have an energy, and of drape_sim_pull */
+    double gravity;    /* [J] the potential, zero at the origin */
+    double contact;    /* [J] of pairs that are nearer than their activation distance */
+    double dissipated; /* [J] the work that damping and drag terms took since t = 0 or drape_sim_set_state */
+    double
+        numerical; /* [J] what is missing otherwise, the integrator's own dissipation (negative: gain), after
+                          the work of pins and colliders that move and of drape_sim_push */
 } drape_energy;
+
+/* Adds up the energies of the last accepted state. */
 DRAPE_API drape_energy drape_sim_energy(drape_sim *sim);
 
 /* Where the elastic energy of the last accepted state is: density (node_count) [J/m2], that of each element in
@@ -492,17 +514,28 @@ DRAPE_API void drape_sim_energy_density(drape_sim *sim, double *density);
 
 /* Work done since the sim was made. Times in seconds of wall clock; newton times are parts of steps. */
 typedef struct drape_statistics {
-    int64_t steps_accepted, steps_rejected;
+    int64_t steps_accepted, steps_rejected; /* attempts by what became of them */
     int64_t steps_unconverged; /* of the accepted: taken although unconverged, by on_failure "accept" */
     double h_min, h_max;       /* [s] of accepted steps; 0 before the first */
-    int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
-    /* [s] of a clock on a wall. Those after wall_steps are parts of it, none of them a part of another: residual and
-     * Jacobian are without their contact. */
-    double wall_setup, wall_steps, wall_residual, wall_jacobian, wall_factor, wall_solve, wall_contact;
+    int64_t newton_iterations; /* of all attempts, as what follows */
+    int64_t jacobians;         /* evaluated */
+    int64_t factorizations;    /* of matrices, those that were refused too */
+    int64_t linear_iterations; /* of solvers that iterate */
+    int64_t residuals;         /* evaluated */
+    double wall_setup;         /* [s] of a clock on a wall, as what follows: making the sim */
+    double wall_steps;         /* [s] all steps, with the parts below */
+    /* [s] Parts of wall_steps, none of them a part of another: residual and Jacobian are without their contact. */
+    double wall_residual;
+    double wall_jacobian;
+    double wall_factor;
+    double wall_solve;
+    double wall_contact;
     double strain_min, strain_max; /* |e|/L - 1 over all edges and accepted steps */
     bool stability_known;   /* "static" found an equilibrium and the signs of its Hessian's eigenvalues */
     int64_t unstable_modes; /* how many are negative: 0 for a stable equilibrium */
 } drape_statistics;
+
+/* Copies what was counted so far. */
 DRAPE_API drape_statistics drape_sim_statistics(const drape_sim *sim);
 
 /* Reasons for which attempts were rejected, with their counts: "max_iterations", "line_search",
@@ -561,15 +594,16 @@ typedef struct drape_attempt {
     double t, h;         /* start and size [s] */
     drape_status status; /* > 0 with accepted: on_failure "accept" took an unconverged state */
     const char *reason;  /* "converged", "max_iterations", ...: a short token, static */
-    bool accepted;
-    int iterations;  /* Newton iterations */
-    double residual; /* of the free nodes at the end of the attempt, in the norm of the integrator [N] */
+    bool accepted;       /* the sim went on from its end; else it was forgotten */
+    int iterations;      /* Newton iterations */
+    double residual;     /* of the free nodes at the end of the attempt, in the norm of the integrator [N] */
     double
         tolerance; /* that it was to reach [N]; with the reason "rounding" what rounding alone leaves; NaN: the
                          row promises none */
-    drape_worst worst;
+    drape_worst worst; /* what the attempt has most to say about */
 } drape_attempt;
 
+/* What an observer is told about. */
 typedef enum drape_event_kind {
     DRAPE_EVENT_ATTEMPT, /* after each attempt was judged; the sim's state is the one kept */
     DRAPE_EVENT_FRAME    /* a frame time was reached: t = 0 at the first advance, then k / frame_rate */
@@ -577,8 +611,8 @@ typedef enum drape_event_kind {
 
 /* What an observer is told. Valid during the call. */
 typedef struct drape_event {
-    drape_event_kind kind;
-    drape_sim *sim;
+    drape_event_kind kind;        /* what happened */
+    drape_sim *sim;               /* to whom */
     const drape_attempt *attempt; /* ATTEMPT only */
     int64_t frame;                /* FRAME: its number from 0 */
     double time;                  /* FRAME [s] */

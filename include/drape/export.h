@@ -2,12 +2,15 @@
 #ifndef DRAPE_EXPORT_H
 #define DRAPE_EXPORT_H
 
+/* The version of this header; drape_version() is that of the library. */
 #define DRAPE_VERSION_MAJOR 0
 #define DRAPE_VERSION_MINOR 1
 #define DRAPE_VERSION_PATCH 0
 
 #if defined(__GNUC__)
-#define DRAPE_API                 __attribute__((visibility("default")))
+/* What the shared library shows. */
+#define DRAPE_API __attribute__((visibility("default")))
+/* Arguments that the compiler holds against a text as of printf; both count from 1. */
 #define DRAPE_PRINTF(text, first) __attribute__((format(printf, text, first)))
 #else
 #define DRAPE_API
@@ -15,6 +18,7 @@
 #endif
 
 #ifdef __cplusplus
+/* The brackets around declarations that C and C++ share. */
 #define DRAPE_C_BEGIN extern "C" {
 #define DRAPE_C_END   }
 #else

@@ -22,9 +22,10 @@ DRAPE_C_BEGIN
 
 /* ---- Parameters of a row ---- */
 
+/* What a parameter is. */
 typedef enum drape_param_kind {
-    DRAPE_PARAM_NUMBER,
-    DRAPE_PARAM_INTEGER,
+    DRAPE_PARAM_NUMBER,  /* any number of the range */
+    DRAPE_PARAM_INTEGER, /* a whole one */
     DRAPE_PARAM_BOOLEAN, /* 0 or 1 */
     DRAPE_PARAM_CHOICE,  /* the index of one of choices */
     DRAPE_PARAM_VECTOR,  /* three numbers, one after another in the values; the range holds for each */
@@ -36,10 +37,10 @@ typedef enum drape_param_kind {
 /* One parameter. All values travel as doubles: integers exact, booleans 0 or 1, choices by index; a vector
  * or a turn takes three of them, so that the values of the parameters after it stand two further on. */
 typedef struct drape_param {
-    const char *name;
-    drape_param_kind kind;
-    const char *unit;     /* "N/m", "s", "1" for none */
-    double default_value; /* NaN: there is none, see derived */
+    const char *name;      /* as in scenes */
+    drape_param_kind kind; /* what values it has */
+    const char *unit;      /* "N/m", "s", "1" for none */
+    double default_value;  /* NaN: there is none, see derived */
     const char
         *derived; /* with a NaN default: what is taken instead, in words; NULL: the parameter is required */
     double min, max;            /* closed range; ignored by booleans and choices */
@@ -62,14 +63,21 @@ typedef struct drape_material {
     double bending_warp, bending_weft, bending_twist; /* of a measured fabric [N m]; NaN: it is none */
 } drape_material;
 
+/* Stiffness of a woven sheet, in tension [N/m] or in bending [N m]. */
+typedef struct drape_woven {
+    double warp, weft; /* of strips along them with free sides */
+    double shear;      /* of shear, or of twist */
+    double poisson;    /* sqrt(nu12 nu21) [1] */
+} drape_woven;
+
 /* One cloth at rest. Node numbers are local to the cloth. All arrays are const and live as long as the model
  * is compiled. */
 typedef struct drape_cloth_view {
-    int32_t node_count, triangle_count, edge_count, hinge_count;
-    const double *rest;           /* (node_count x 3) rest positions [m] */
-    const int32_t *triangle;      /* (triangle_count x 3) */
-    const double *triangle_area;  /* (triangle_count) [m2] */
-    const int32_t *edge;          /* (edge_count x 2) */
+    int32_t node_count, triangle_count, edge_count, hinge_count; /* of the arrays below */
+    const double *rest;                                          /* (node_count x 3) rest positions [m] */
+    const int32_t *triangle;                                     /* (triangle_count x 3) */
+    const double *triangle_area;                                 /* (triangle_count) [m2] */
+    const int32_t *edge;                                         /* (edge_count x 2) */
     const int32_t *edge_triangle; /* (edge_count x 2) triangles beside the edge; second -1 on the boundary */
     const double *edge_length;    /* (edge_count) [m] */
     const int32_t *hinge; /* (hinge_count x 4) x0 x1 the shared edge, x2 x3 the apices of its two triangles */
@@ -80,8 +88,9 @@ typedef struct drape_cloth_view {
     const double *node_mass;      /* (node_count) lumped [kg] */
     int32_t rows, columns;        /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
     bool rectangular;             /* a grid whose cells are rectangles before its transform */
-    drape_material material;
-    double gravity[3]; /* [m/s2] */
+    drape_material material;      /* of the sheet */
+    double gravity[3];            /* [m/s2] */
+    const drape_woven *tension, *bending; /* of a measured fabric; NULL: the material says all */
 } drape_cloth_view;
 
 /* Receives the elements of a term while its cloth is compiled. Opaque. */
@@ -110,12 +119,14 @@ DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, cons
 DRAPE_API drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
     DRAPE_PRINTF(2, 3);
 
+/* The most nodes that an element has. */
 #define DRAPE_MAX_ELEMENT_NODES 12
-#define DRAPE_MAX_ELEMENT_DOFS  (3 * DRAPE_MAX_ELEMENT_NODES)
+/* Their coordinates. */
+#define DRAPE_MAX_ELEMENT_DOFS (3 * DRAPE_MAX_ELEMENT_NODES)
 
 /* The elements of one term on one cloth, const after compile. */
 typedef struct drape_elements {
-    int32_t count;
+    int32_t count;        /* elements */
     int nodes;            /* nodes an element */
     int rest_count;       /* numbers of rest data an element */
     const int32_t *node;  /* (count x nodes) node numbers of the whole model */
@@ -125,16 +136,18 @@ typedef struct drape_elements {
 
 /* What a check found, for the message of a rejected step. */
 typedef struct drape_fault {
-    const char *reason; /* short token: "edge_collapse"; static text */
-    const char *what;   /* "edge length / rest length"; static text */
-    int32_t element;
-    double value, limit;
+    const char *reason;  /* short token: "edge_collapse"; static text */
+    const char *what;    /* "edge length / rest length"; static text */
+    int32_t element;     /* the worst */
+    double value, limit; /* of what, there, and where it becomes a fault */
 } drape_fault;
 
 /* ---- The ops table of a term ---- */
 
+/* The most elements that pair is asked for at once. */
 #define DRAPE_PAIR_BLOCK 32
-#define DRAPE_LANES      4
+/* How many elements lanes takes at once. */
+#define DRAPE_LANES 4
 
 /*
  * A row. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first + count
@@ -144,12 +157,12 @@ typedef struct drape_fault {
  * not wanted.
  */
 typedef struct drape_term_ops {
-    size_t struct_size; /* sizeof(drape_term_ops) of the author */
-    const char *name;   /* "bend.hinge" */
-    const char *summary;
-    const char *reference; /* paper and equation of the formula */
-    const drape_param *params;
-    int param_count;
+    size_t struct_size;        /* sizeof(drape_term_ops) of the author */
+    const char *name;          /* "bend.hinge" */
+    const char *summary;       /* one line for `drape list` */
+    const char *reference;     /* paper and equation of the formula */
+    const drape_param *params; /* param_count of them, static; NULL for none */
+    int param_count;           /* of params */
     const char *element_name;  /* "edge", "hinge", "node": for messages */
     int nodes;                 /* nodes an element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
     bool linear;               /* energy: its Hessian is zero and takes no sparsity */
@@ -194,7 +207,7 @@ typedef struct drape_term_ops {
     void (*law)(const double *params, int32_t count, const double *k, const double *strain,
                 const double *rate, double *force, double *dforce_dstrain, double *dforce_drate,
                 double *energy);
-    bool dissipative;
+    bool dissipative; /* law: as said there */
 
     /* The internal variable of elements after a step was accepted: from those before and the new positions.
      */
@@ -253,9 +266,9 @@ DRAPE_API void drape_pair_distance(const drape_elements *el, int32_t first, int3
  * triangles (rows without a smooth distance) against its nodes. No segment has the length 0. A shape begins
  * as all zeros; arrays are taken by drape_shape_reserve. */
 typedef struct drape_collider_shape {
-    int32_t point_count, segment_count, triangle_count;
-    double *point;     /* (point_count x 3) [m] */
-    int32_t *segment;  /* (segment_count x 2) numbers of points */
+    int32_t point_count, segment_count, triangle_count; /* of the arrays below */
+    double *point;                                      /* (point_count x 3) [m] */
+    int32_t *segment;                                   /* (segment_count x 2) numbers of points */
     int32_t *triangle; /* (triangle_count x 3) numbers of points, counterclockwise from outside */
     double radius;     /* [m] */
     bool inscribed;    /* of a convex body: its points and segments stay inside of a curved surface */
@@ -289,10 +302,12 @@ DRAPE_API drape_status drape_shape_read_mesh(drape_collider_shape *shape, const 
  * once a collider while a model is compiled, may allocate.
  */
 typedef struct drape_collider_ops {
-    size_t struct_size;
-    const char *name, *summary, *reference;
-    const drape_param *params;
-    int param_count;
+    size_t struct_size;        /* sizeof(drape_collider_ops) of the author */
+    const char *name;          /* "sphere" */
+    const char *summary;       /* one line for `drape list` */
+    const char *reference;     /* where its distance is from */
+    const drape_param *params; /* param_count of them, static; NULL for none */
+    int param_count;           /* of params */
 
     /* Refuses values that do not go together, and fills the shape. tolerance [m]: how far a polygon may stay
      * inside a curved surface. */

@@ -18,7 +18,7 @@ DRAPE_C_BEGIN
 
 /* A value of the scene, as of drape_scene_set: a JSON pointer and a JSON text. */
 typedef struct drape_lab_setting {
-    const char *pointer, *value;
+    const char *pointer, *value; /* "/integrator/dt", "0.01" */
 } drape_lab_setting;
 
 /* How far a sweep is. done: cases that need no more work, of total in this shard; total 0: the reference is
@@ -31,18 +31,18 @@ typedef bool drape_lab_cancel(void *user);
 
 /* What to run. Initialise with drape_lab_def_init. Strings live during the call. */
 typedef struct drape_lab_def {
-    size_t struct_size;
+    size_t struct_size;                /* set by drape_lab_def_init */
     const char *scene;                 /* a scene file */
     const char *folder;                /* for results; made if it is not there */
     const drape_lab_setting *settings; /* of all cases */
-    size_t setting_count;
-    const char *const *integrators; /* rows; none: what the experiment takes by itself */
-    size_t integrator_count;
-    const char *const *axes; /* stability: 2 or 3 of "/pointer=from:to:n" or "...:nlog" */
-    size_t axis_count;
-    int levels;          /* converge: refinements, 3 to 12; default 6 */
-    bool space;          /* converge: also of the mesh */
-    double strain_limit; /* stability: an edge strained by more is unphysical; default 0.2 */
+    size_t setting_count;              /* of settings */
+    const char *const *integrators;    /* rows; none: what the experiment takes by itself */
+    size_t integrator_count;           /* of integrators */
+    const char *const *axes;           /* stability: 2 or 3 of "/pointer=from:to:n" or "...:nlog" */
+    size_t axis_count;                 /* of axes */
+    int levels;                        /* converge: refinements, 3 to 12; default 6 */
+    bool space;                        /* converge: also of the mesh */
+    double strain_limit;               /* stability: an edge strained by more is unphysical; default 0.2 */
     double case_seconds; /* CPU after which a case is stopped and counted as over budget; default 30 */
     int repeats;         /* tradeoff: of which the least CPU time counts; default 3 */
     int jobs;            /* threads, 1 to 256; default 1: cases that run side by side cost each other time */
@@ -52,6 +52,7 @@ typedef struct drape_lab_def {
     void *user;                   /* of both */
 } drape_lab_def;
 
+/* Fills *def with the defaults. */
 DRAPE_API void drape_lab_def_init(drape_lab_def *def, size_t struct_size);
 
 /* What came of it. */
@@ -61,16 +62,18 @@ typedef struct drape_lab_outcome {
     int64_t resumed;  /* of those, found from before */
     int64_t failed;   /* of those, that did not come to the end */
     int64_t rejected; /* steps that were rejected in all of them */
+    bool input;       /* of a failure: the fault is of what was given, not of what had to be written */
     char *text;       /* what the report says in words, lines; free with drape_lab_outcome_free */
 } drape_lab_outcome;
 
+/* Frees the text of an outcome; the struct is the caller's. */
 DRAPE_API void drape_lab_outcome_free(drape_lab_outcome *outcome);
 
 /* Runs "tradeoff", "stability" or "converge" into the folder: cases.jsonl, experiment.json, results.csv, pictures and
  * report.html; a shard, beside which others may write, experiment.json and cases-1-of-4.jsonl alone: the rest is the
- * merge's. Lines from before of the same experiment are taken as they are. Errors: DRAPE_E_ARGUMENT (no such experiment, a wrong def),
- * those of loading the scene, DRAPE_E_FILE (also a folder that holds another experiment), DRAPE_E_MEMORY,
- * DRAPE_E_STOPPED (cancel said so). */
+ * merge's. Lines from before of the same experiment are taken as they are. Errors: DRAPE_E_ARGUMENT (no such experiment, a wrong
+ * def, a setting that no case uses, a folder that holds another experiment), those of loading the scene, DRAPE_E_FILE,
+ * DRAPE_E_SOLVER (no reference: what was begun in the folder is taken away), DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancel said so). */
 DRAPE_API drape_status drape_lab_run(drape_context *ctx, const char *experiment, const drape_lab_def *def,
                                      drape_lab_outcome *outcome);
 

@@ -200,6 +200,12 @@ drape_status drape_system_begin(drape_system *system, const drape_state *in)
     return system->contact ? drape_contact_begin(system->contact, in->x, in->v, in->t) : DRAPE_OK;
 }
 
+void drape_system_rest(drape_system *system)
+{
+    if (system->contact)
+        drape_contact_rest(system->contact);
+}
+
 drape_status drape_system_status(const drape_system *system)
 {
     return system->status;

@@ -87,6 +87,9 @@ void drape_system_swap_winds(drape_system *system, drape_system *other);
 /* A step begins at a state: contact is compared with it until the next. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
 
+/* It has ended: what is asked between steps leaves no trace in the next one. */
+void drape_system_rest(drape_system *system);
+
 /* The sparsity of its matrices. Contact between cloths changes it: drape_system_fit makes it hold what acts
  * at a point; *changed: it is another one since, in the same place. Errors: DRAPE_E_MEMORY. */
 const drape_pattern *drape_system_pattern(const drape_system *system);

@@ -175,8 +175,7 @@ static drape_status choice_value(drape_context *ctx, const char *pointer, const 
     choices_text(param, range, sizeof range);
     const char *meant = drape_did_you_mean(word, param->choices, count);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%.60s\" is not allowed; %s is %s%s%s%s", word,
-                         param->name, range, meant ? "; did you mean \"" : "", meant ? meant : "",
-                         meant ? "\"?" : "");
+                         param->name, range, DRAPE_MEANT(meant));
 }
 
 static bool in_range(const drape_param *param, double number)
@@ -279,7 +278,15 @@ static drape_status unknown_name(drape_context *ctx, const char *pointer, const 
         names[i] = params[i].name;
     const char *meant = drape_did_you_mean(name, names, (size_t)param_count);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown key \"%.60s\"%s%s%s", name,
-                         meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+                         DRAPE_MEANT(meant));
+}
+
+drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param)
+{
+    char range[256];
+    drape_param_range_text(param, range, sizeof range);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%s\" is missing: %s, %s", param->name,
+                         param->help, range);
 }
 
 drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_param *params,
@@ -302,11 +309,7 @@ drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const
         given[i] = true;
     }
     for (int i = 0; i < param_count; i++)
-        if (!given[i] && isnan(params[i].default_value) && !params[i].derived) {
-            char range[256];
-            drape_param_range_text(&params[i], range, sizeof range);
-            return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%s\" is missing: %s, %s", params[i].name,
-                                 params[i].help, range);
-        }
+        if (!given[i] && isnan(params[i].default_value) && !params[i].derived)
+            return drape_param_missing(ctx, pointer, &params[i]);
     return DRAPE_OK;
 }

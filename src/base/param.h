@@ -11,6 +11,9 @@ int drape_param_place(const drape_param *params, int index);
 /* The default, once for each value. */
 void drape_param_default(const drape_param *param, double *values);
 
+/* Sets the message of a parameter that nothing gives, at the pointer. Returns DRAPE_E_ARGUMENT. */
+drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param);
+
 /* Values of params in their order: the default where no setting names it (NaN where the default is derived).
  * Faults are reported at "pointer/name". A setting of a name that the list does not have is a fault, with a
  * "did you mean". */
@@ -35,5 +38,8 @@ void drape_param_value_text(const drape_param *param, const double *value, char 
 
 /* The candidate nearest to word by edit distance, NULL if none is near enough to be meant. */
 const char *drape_did_you_mean(const char *word, const char *const *candidates, size_t count);
+
+/* For three %s behind a fault: `; did you mean "x"?`, or nothing where meant is NULL. */
+#define DRAPE_MEANT(meant) (meant) ? "; did you mean \"" : "", (meant) ? (meant) : "", (meant) ? "\"?" : ""
 
 #endif

@@ -85,6 +85,9 @@ extern const char *const drape_verbs_words[];
 
 void cli_print_help(const drape_verb *verb); /* on stdout */
 
+/* What a verb is given, as help shows it: in brackets where it may be left out. */
+void cli_operand_text(const drape_verb *verb, char *text, size_t size);
+
 /* Reads a command line into a request, all zeros before. CLI_GO_ON, or the exit code after help or a fault
  * was printed. cli_command_free in any case. */
 int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *request);

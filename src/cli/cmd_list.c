@@ -1,5 +1,7 @@
-/* cmd_list.c: `drape list`: the tables of the library, as text, as Markdown, and as the schema of a scene. */
+/* cmd_list.c: `drape list`: the keys of a scene and the tables of the library, as text, as Markdown, and as the
+ * schema of a scene. */
 #include "cli/cli.h"
+#include "cli/keys.h"
 #include "cli/schema.h"
 #include "cli/tables.h"
 
@@ -16,8 +18,14 @@ typedef struct list_request {
     bool markdown, schema;
 } list_request;
 
+#define SCENE_NAME  "scene" /* of what is no table: the keys */
+#define SCENE_TITLE "The scene file"
+
 /* How a table is printed. */
 typedef struct list_style {
+    void (*scene)(void);
+    void (*object)(const cli_object *object);
+    void (*key)(const cli_object *object, const drape_scene_key *key);
     void (*table)(const cli_table *table);
     void (*rows_begin)(void);
     void (*row)(const cli_row *row);
@@ -50,6 +58,28 @@ static void nothing(void) {}
 static void no_params(const cli_table *table)
 {
     (void)table;
+}
+
+static void text_scene(void)
+{
+    puts(SCENE_TITLE " (" SCENE_NAME "): its keys, object by object; N counts from 0");
+}
+
+static void text_object(const cli_object *object)
+{
+    char one_of[256];
+    cli_one_of_text(object->form, one_of, sizeof one_of);
+    printf("\n  %-20s %s%s%s\n", object->form->name, *object->pointer ? object->pointer : "at the top",
+           *one_of ? "; " : "", one_of);
+}
+
+static void text_key(const cli_object *object, const drape_scene_key *key)
+{
+    (void)object;
+    char text[256];
+    cli_key_text(key, text, sizeof text);
+    printf("    %-18s %s\n    %-18s %s%s%s%s\n", key->name, key->help, "", text, key->unit ? " [" : "",
+           key->unit ? key->unit : "", key->unit ? "]" : "");
 }
 
 static void text_table(const cli_table *table)
@@ -88,6 +118,42 @@ static void cell(const char *text)
     fputs(" |", stdout);
 }
 
+static void code_cell(const char *text)
+{
+    char code[160];
+    snprintf(code, sizeof code, "`%s`", text);
+    cell(code);
+}
+
+static void markdown_scene(void)
+{
+    puts("### " SCENE_TITLE "\n\n| in | key | unit | takes | what |\n|---|---|---|---|---|");
+}
+
+/* A key that stands for others says so: its row is read alone. */
+static void markdown_key(const cli_object *object, const drape_scene_key *key)
+{
+    char text[512];
+    cli_key_text(key, text, sizeof text);
+    const size_t length = strlen(text);
+    if (cli_is_one_of(object->form, key)) {
+        snprintf(text + length, sizeof text - length, "; ");
+        cli_one_of_text(object->form, text + length + 2, sizeof text - length - 2);
+    }
+    fputs("|", stdout);
+    code_cell(*object->pointer ? object->pointer : "/");
+    code_cell(key->name);
+    cell(key->unit ? key->unit : "");
+    cell(text);
+    cell(key->help);
+    fputc('\n', stdout);
+}
+
+static void markdown_object(const cli_object *object)
+{
+    (void)object;
+}
+
 static void markdown_table(const cli_table *table)
 {
     printf("### %s\n", table->title);
@@ -98,13 +164,6 @@ static void markdown_table(const cli_table *table)
 static void markdown_rows_begin(void)
 {
     puts("\n| name | what | reference |\n|---|---|---|");
-}
-
-static void code_cell(const char *text)
-{
-    char code[160];
-    snprintf(code, sizeof code, "`%s`", text);
-    cell(code);
 }
 
 static void markdown_row(const cli_row *row)
@@ -135,9 +194,23 @@ static void markdown_param(const cli_row *row, const drape_param *param)
     fputc('\n', stdout);
 }
 
-static const list_style text_style = {text_table, nothing, text_row, no_params, text_param, false};
-static const list_style markdown_style = {markdown_table,        markdown_rows_begin, markdown_row,
-                                          markdown_params_begin, markdown_param,      true};
+static const list_style text_style = {.scene = text_scene,
+                                      .object = text_object,
+                                      .key = text_key,
+                                      .table = text_table,
+                                      .rows_begin = nothing,
+                                      .row = text_row,
+                                      .params_begin = no_params,
+                                      .param = text_param};
+static const list_style markdown_style = {.scene = markdown_scene,
+                                          .object = markdown_object,
+                                          .key = markdown_key,
+                                          .table = markdown_table,
+                                          .rows_begin = markdown_rows_begin,
+                                          .row = markdown_row,
+                                          .params_begin = markdown_params_begin,
+                                          .param = markdown_param,
+                                          .params_apart = true};
 
 /* ---- What is printed ---- */
 
@@ -185,11 +258,33 @@ static bool has_row(const cli_table *table, const char *name)
     return false;
 }
 
+/* only: the name of one object; NULL: all. Returns how many were printed. */
+static int print_scene(const list_style *style, const char *only)
+{
+    cli_object objects[CLI_MAX_OBJECTS];
+    int count = cli_objects(objects), printed = 0;
+    for (int i = 0; i < count; i++) {
+        const drape_scene_object *form = objects[i].form;
+        if (only && strcmp(only, form->name) != 0)
+            continue;
+        if (printed++ == 0)
+            style->scene();
+        style->object(&objects[i]);
+        for (size_t k = 0; k < form->key_count; k++)
+            style->key(&objects[i], &form->keys[k]);
+    }
+    return printed;
+}
+
 static int unknown_name(const char *name)
 {
     const char *names[MAX_NAMES];
     size_t count = 0;
     cli_row row;
+    cli_object objects[CLI_MAX_OBJECTS];
+    const int object_count = cli_objects(objects);
+    for (int i = 0; i < object_count; i++)
+        names[count++] = objects[i].form->name;
     for (int t = 0; cli_tables[t] && count < MAX_NAMES; t++) {
         names[count++] = cli_tables[t]->name;
         for (int i = 0; cli_tables[t]->row(i, &row) && count < MAX_NAMES; i++)
@@ -197,13 +292,14 @@ static int unknown_name(const char *name)
     }
     const char *meant = drape_did_you_mean(name, names, count);
     return cli_misuse("list", "there is no table and no row \"%.60s\"%s%s%s; `drape list` shows all", name,
-                      meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+                      DRAPE_MEANT(meant));
 }
 
-/* name: of a table or of a row; NULL: all tables. */
+/* name: of a table, of a row or of an object of a scene; NULL: all tables, the keys of a scene first. */
 static int print_tables(const list_style *style, const char *name)
 {
-    int printed = 0;
+    const bool keys = name && strcmp(name, SCENE_NAME) == 0;
+    int printed = print_scene(style, keys ? NULL : name);
     for (int t = 0; cli_tables[t]; t++) {
         const cli_table *table = cli_tables[t];
         bool whole = !name || strcmp(name, table->name) == 0;
@@ -243,10 +339,12 @@ static int main_list(int argc, char **argv);
 
 const drape_verb drape_verb_list = {
     .name = "list",
-    .operand = "[TABLE|ROW]",
+    .operand = "TABLE|ROW",
     .operand_optional = true,
-    .summary = "every row of every table: parameters, units, defaults, references",
-    .details = "Prints all that a scene can choose from, or one table, or one row.",
+    .summary = "the keys of a scene, every row of every table: parameters, units, defaults, references",
+    .details =
+        "Prints the keys of a scene and all that it can choose from, or one table, or one row. The table\n"
+        "`scene` is the keys of all objects of a scene; one of its rows, as `pin`, is the keys of one.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .run = main_list,

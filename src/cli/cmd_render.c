@@ -21,6 +21,7 @@
 #define LEAST_SIDE     16
 #define LEAST_RANGE    1e-9 /* of a field whose values are all the same */
 #define PICTURE_DIGITS 5    /* in the name of a frame, at least */
+#define PICTURE_NAME   32   /* bytes of "/frame_000000.png", for any number */
 
 typedef struct render_request {
     cli_command command;
@@ -85,7 +86,7 @@ static int read_shade(render *r)
     const char *meant = drape_did_you_mean(name, drape_shadings_words, count);
     return cli_misuse("render",
                       "--shade \"%.60s\": there is no such shading%s%s%s; `drape list shadings` shows all",
-                      name, meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+                      name, DRAPE_MEANT(meant));
 }
 
 static int read_size(render *r)
@@ -333,29 +334,56 @@ static drape_status draw(render *r, size_t k)
                                    .high = r->high,
                                    .camera = r->view,
                                    .caption = r->picture ? NULL : caption};
-    drape_status status = drape_painter_draw(r->painter, &picture);
-    return status ? status : drape_canvas_read(r->ctx, drape_painter_canvas(r->painter), r->pixels);
+    return drape_painter_draw(r->painter, &picture);
+}
+
+static drape_status read_pixels(render *r)
+{
+    return drape_canvas_read(r->ctx, drape_painter_canvas(r->painter), r->pixels);
 }
 
 static drape_status make_picture(render *r)
 {
     drape_status status = draw(r, 0);
+    if (!status)
+        status = read_pixels(r);
     return status
                ? status
                : drape_png_write(r->ctx, r->request->out, r->pixels, r->width, r->height, r->request->small);
 }
 
+/* Takes frame k, which is in r->pixels. */
+typedef drape_status (*frame_taker)(render *r, size_t k, void *taker);
+
+/* The driver draws the next frame while the last one is taken. */
+static drape_status draw_frames(render *r, frame_taker take, void *taker)
+{
+    size_t count = r->sources[0].reel.count;
+    drape_status status = draw(r, 0);
+    for (size_t k = 0; k < count && !status && !cli_interrupted(); k++) {
+        status = read_pixels(r);
+        drape_status next = !status && k + 1 < count ? draw(r, k + 1) : DRAPE_OK;
+        if (!status)
+            status = take(r, k, taker);
+        status = status ? status : next;
+    }
+    return status;
+}
+
+static drape_status add_to_film(render *r, size_t k, void *film)
+{
+    (void)r;
+    (void)k;
+    return drape_film_add(film, r->pixels);
+}
+
 static drape_status make_film(render *r)
 {
     drape_film *film = NULL;
-    const drape_reel *reel = &r->sources[0].reel;
     double rate = drape_model_frame_rate(r->sources[0].in.model) / r->frames.every;
     drape_status status = drape_film_begin(r->ctx, r->request->out, r->width, r->height, rate, &film);
-    for (size_t k = 0; k < reel->count && !status && !cli_interrupted(); k++) {
-        status = draw(r, k);
-        if (!status)
-            status = drape_film_add(film, r->pixels);
-    }
+    if (!status)
+        status = draw_frames(r, add_to_film, film);
     if (!status && !cli_interrupted())
         return drape_film_end(&film);
     char message[DRAPE_MESSAGE_SIZE];
@@ -364,23 +392,29 @@ static drape_status make_film(render *r)
     return status ? drape_fail(r->ctx, status, "%s", message) : DRAPE_OK;
 }
 
+/* folder: its path, with room for the name of a picture. */
+static drape_status put_in_folder(render *r, size_t k, void *folder)
+{
+    char *path = folder, *end = path + strlen(path);
+    snprintf(end, PICTURE_NAME, "/frame_%0*zu.png", PICTURE_DIGITS, k);
+    drape_status status = drape_png_write(r->ctx, path, r->pixels, r->width, r->height, r->request->small);
+    *end = 0;
+    return status;
+}
+
 static drape_status make_folder(render *r)
 {
-    size_t size = strlen(r->request->out) + sizeof "/frame_0000000000.png";
-    char *path = drape_alloc(r->ctx, size, 1);
-    if (!path)
+    size_t size = strlen(r->request->out) + PICTURE_NAME;
+    char *folder = drape_alloc(r->ctx, size, 1);
+    if (!folder)
         return DRAPE_E_MEMORY;
-    snprintf(path, size, "%s", r->request->out);
-    drape_status status = drape_folder_make(r->ctx, path);
+    snprintf(folder, size, "%s", r->request->out);
+    drape_status status = drape_folder_make(r->ctx, folder);
     if (!status) /* frames of two runs must not lie side by side */
-        status = drape_frame_files_clean(r->ctx, r->request->out, PICTURE_DIGITS, "png");
-    for (size_t k = 0; k < r->sources[0].reel.count && !status && !cli_interrupted(); k++) {
-        snprintf(path, size, "%s/frame_%0*zu.png", r->request->out, PICTURE_DIGITS, k);
-        status = draw(r, k);
-        if (!status)
-            status = drape_png_write(r->ctx, path, r->pixels, r->width, r->height, r->request->small);
-    }
-    drape_free(r->ctx, path);
+        status = drape_frame_files_clean(r->ctx, folder, PICTURE_DIGITS, "png");
+    if (!status)
+        status = draw_frames(r, put_in_folder, folder);
+    drape_free(r->ctx, folder);
     return status;
 }
 

@@ -6,6 +6,7 @@
 
 #include "base/clock.h"
 #include "io/checkpoint.h"
+#include "io/record.h"
 #include "io/recorder.h"
 #include "io/scene_copy.h"
 #include "io/summary.h"
@@ -84,21 +85,12 @@ static drape_recorder_def recorder_def(const run *r)
                                 .start = r->start};
 }
 
-static char *path_in_folder(const run *r, const char *name)
-{
-    size_t size = strlen(r->request->out) + strlen(name) + 2;
-    char *path = drape_alloc(r->in.ctx, size, 1);
-    if (path)
-        snprintf(path, size, "%s/%s", r->request->out, name);
-    return path;
-}
-
 /* Of a run that goes on, the recorder is there already, and so is the scene. */
 static drape_status begin_output(run *r)
 {
     if (!r->request->out)
         return DRAPE_OK;
-    r->summary_path = path_in_folder(r, "summary.json");
+    r->summary_path = drape_record_path(r->in.ctx, r->request->out, "summary.json");
     if (!r->summary_path)
         return DRAPE_E_MEMORY;
     if (drape_recorder_is_finished(r->recorder))
@@ -120,7 +112,7 @@ static drape_status go_on(run *r)
 {
     bool there;
     size_t size;
-    char *path = path_in_folder(r, DRAPE_CHECKPOINT_NAME);
+    char *path = drape_record_path(r->in.ctx, r->request->out, DRAPE_CHECKPOINT_NAME);
     if (!path)
         return DRAPE_E_MEMORY;
     drape_status status = drape_checkpoint_read(r->in.ctx, path, &there, &r->checkpoint, &size);

@@ -144,8 +144,7 @@ static int find(const char *name, const drape_reference **only)
         }
     }
     const char *meant = drape_did_you_mean(name, names, count);
-    return cli_misuse("validate", "there is no reference \"%.60s\"%s%s%s", name,
-                      meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+    return cli_misuse("validate", "there is no reference \"%.60s\"%s%s%s", name, DRAPE_MEANT(meant));
 }
 
 static bool interrupted(void *user)

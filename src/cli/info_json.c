@@ -182,13 +182,23 @@ static json_t *mesh(const drape_cloth *cloth)
     return with(object, "transform", transform(cloth));
 }
 
+/* Of a measured fabric. */
+static json_t *woven(const drape_woven *w, const char *shear)
+{
+    json_t *object = with(with(json_object(), "warp", number(w->warp)), "weft", number(w->weft));
+    return with(with(object, shear, number(w->shear)), "poisson", number(w->poisson));
+}
+
 static json_t *material(const drape_cloth *cloth)
 {
     const drape_material *m = &cloth->material;
     json_t *object = values_of(drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, cloth->material_values);
     object = with(object, "areal_density", number(m->areal_density));
     object = with(object, "membrane_stiffness", number(m->membrane_stiffness));
-    return with(object, "flexural_rigidity", number(m->flexural_rigidity));
+    object = with(object, "flexural_rigidity", number(m->flexural_rigidity));
+    if (cloth->tension.warp > 0)
+        object = with(object, "tension", woven(&cloth->tension, "shear"));
+    return cloth->bending.warp > 0 ? with(object, "bending", woven(&cloth->bending, "twist")) : object;
 }
 
 static json_t *cloth(const cli_info *info, int32_t c)

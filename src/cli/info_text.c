@@ -80,6 +80,14 @@ static void print_source(const drape_cloth *cloth)
            cloth->rotate[2], cloth->rotate[3], cloth->translate[0], cloth->translate[1], cloth->translate[2]);
 }
 
+/* Of a measured fabric; nothing where it is none. */
+static void print_woven(const char *name, const char *unit, const char *shear, const drape_woven *w)
+{
+    if (w->warp > 0)
+        printf("    %-16s %.9g, %.9g %s along warp and weft, %.9g %s, %s, Poisson's ratio %.9g\n", name,
+               w->warp, w->weft, unit, w->shear, unit, shear, w->poisson);
+}
+
 static void print_material(const drape_cloth *cloth)
 {
     const drape_material *m = &cloth->material;
@@ -93,6 +101,8 @@ static void print_material(const drape_cloth *cloth)
     print_params("    ", drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, cloth->material_values);
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
         printf("    %-16s %.9g %s\n", lines[i].name, lines[i].value, lines[i].unit);
+    print_woven("tension", "N/m", "shear", &cloth->tension);
+    print_woven("bending", "N m", "twist", &cloth->bending);
 }
 
 static void print_cloth(const cli_info *info, int32_t c)

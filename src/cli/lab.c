@@ -123,21 +123,13 @@ static int make_def(const cli_lab_request *request, int default_jobs, words *w, 
     return code == CLI_GO_ON ? read_shard(request, def) : code;
 }
 
-/* What is wrong with the input is found before anything is run. */
-static int exit_code(drape_status status)
+static int exit_code(drape_status status, bool input)
 {
-    switch (status) {
-    case DRAPE_OK:
+    if (!status)
         return CLI_DONE;
-    case DRAPE_E_STOPPED:
+    if (status == DRAPE_E_STOPPED)
         return CLI_INTERRUPTED;
-    case DRAPE_E_ARGUMENT:
-    case DRAPE_E_PARSE:
-    case DRAPE_E_FILE:
-        return CLI_BAD_INPUT;
-    default:
-        return CLI_FAILED;
-    }
+    return input && status != DRAPE_E_MEMORY ? CLI_BAD_INPUT : CLI_FAILED;
 }
 
 int cli_lab_conclude(drape_context *ctx, drape_status status, drape_lab_outcome *outcome)
@@ -146,8 +138,9 @@ int cli_lab_conclude(drape_context *ctx, drape_status status, drape_lab_outcome 
         fprintf(stderr, "%s\n", drape_context_message(ctx));
     else
         fputs(outcome->text ? outcome->text : "", stdout);
+    const int code = exit_code(status, outcome->input);
     drape_lab_outcome_free(outcome);
-    return exit_code(status);
+    return code;
 }
 
 static int run(const drape_verb *verb, const cli_lab_request *request, int default_jobs)
@@ -162,6 +155,9 @@ static int run(const drape_verb *verb, const cli_lab_request *request, int defau
         return cli_misuse(verb->name, "out of memory");
     }
     int code = make_def(request, default_jobs, &w, &progress, &def);
+    if (code == CLI_GO_ON && request->command.threads)
+        code =
+            cli_misuse(verb->name, "--threads has no effect: a case takes one; --jobs runs cases at a time");
     if (code == CLI_GO_ON) {
         cli_catch_signals();
         cli_progress_begin(&progress, 0, 0);

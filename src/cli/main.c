@@ -48,15 +48,18 @@ static int unknown_verb(const char *name)
 {
     const char *meant = drape_did_you_mean(name, drape_verbs_words, verb_count());
     fprintf(stderr, "drape: there is no verb \"%.60s\"%s%s%s; `drape --help` shows all\n", name,
-            meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+            DRAPE_MEANT(meant));
     return CLI_BAD_INPUT;
 }
 
 static void print_overview(void)
 {
     puts("drape: a cloth simulator\n\nusage: drape VERB [arguments]\n");
-    for (int i = 0; drape_verbs[i]; i++)
-        printf("  %-10s %-15s %s\n", drape_verbs[i]->name, drape_verbs[i]->operand, drape_verbs[i]->summary);
+    char operand[64];
+    for (int i = 0; drape_verbs[i]; i++) {
+        cli_operand_text(drape_verbs[i], operand, sizeof operand);
+        printf("  %-10s %-15s %s\n", drape_verbs[i]->name, operand, drape_verbs[i]->summary);
+    }
     puts("\n  drape VERB --help   what a verb takes\n"
          "  drape --version     the version\n\n"
          "Exit codes: 0 done, 1 the simulation, a check or the output failed, 2 bad input, 130 interrupted.");

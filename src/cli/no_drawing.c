@@ -8,7 +8,7 @@ extern const drape_verb drape_verb_render, drape_verb_view;
 
 static int refuse(const drape_verb *verb, int argc, char **argv)
 {
-    if (argc > 1 && strcmp(argv[1], "--help") == 0) {
+    if (argc > 1 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
         cli_print_help(verb);
         return CLI_DONE;
     }

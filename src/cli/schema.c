@@ -77,14 +77,46 @@ static json_t *one_of_words(const char *const *words)
     return with(json_object(), "enum", array);
 }
 
-/* { "required": [name] } for each name: exactly one of them. */
-static json_t *exactly_one(json_t *object, const char *const *names)
+static json_t *words(const char *const *names)
+{
+    json_t *array = json_array();
+    for (int i = 0; names[i]; i++)
+        array = and_also(array, json_string(names[i]));
+    return array;
+}
+
+static json_t *that_requires(json_t *names)
+{
+    return with(json_object(), "required", names);
+}
+
+/* { "required": [name] } for each name. */
+static json_t *each_required(const char *const *names)
 {
     json_t *cases = json_array();
     for (int i = 0; names[i]; i++)
-        cases =
-            and_also(cases, with(json_object(), "required", and_also(json_array(), json_string(names[i]))));
-    return with(object, "oneOf", cases);
+        cases = and_also(cases, that_requires(and_also(json_array(), json_string(names[i]))));
+    return cases;
+}
+
+static json_t *exactly_one(json_t *object, const char *const *names)
+{
+    return with(object, "oneOf", each_required(names));
+}
+
+static json_t *at_most_one(json_t *object, const char *const *names)
+{
+    json_t *none = with(json_object(), "not", with(json_object(), "anyOf", each_required(names)));
+    return with(object, "oneOf", and_also(each_required(names), none));
+}
+
+/* Of several keys all or none. */
+static json_t *all_or_none(json_t *object, const char *const *names)
+{
+    json_t *dependents = json_object();
+    for (int i = 0; names[i]; i++)
+        dependents = with(dependents, names[i], words(names));
+    return with(object, "dependentRequired", dependents);
 }
 
 /* ---- Parameters of rows ---- */
@@ -224,17 +256,19 @@ static const struct opening {
     const char *object, *key; /* the key that names the row; NULL: there is but one */
     opening_kind kind;
     const cli_table *table;
-    const char *const *one_of;
+    const char *const *one_of, *const *all_of; /* but where `preset` says them: at most one, all or none */
+    const char *preset;
 } openings[] = {
-    {"term", "type", ROW_PARAMS, &cli_terms, NULL},
-    {"mesh", "grid", ROW_PARAMS, &cli_grids, NULL},
-    {"collider", "type", ROW_PARAMS, &cli_colliders, NULL},
-    {"self_contact", NULL, ROW_PARAMS, &cli_self_contacts, NULL},
-    {"contact", NULL, ROW_PARAMS, &cli_contacts, NULL},
-    {"integrator", "method", TABLE_PARAMS, &cli_integrators, NULL},
-    {"controller", "type", TABLE_PARAMS, &cli_controllers, NULL},
+    {"term", "type", ROW_PARAMS, &cli_terms, NULL, NULL, NULL},
+    {"mesh", "grid", ROW_PARAMS, &cli_grids, NULL, NULL, NULL},
+    {"collider", "type", ROW_PARAMS, &cli_colliders, NULL, NULL, NULL},
+    {"self_contact", NULL, ROW_PARAMS, &cli_self_contacts, NULL, NULL, NULL},
+    {"contact", NULL, ROW_PARAMS, &cli_contacts, NULL, NULL, NULL},
+    {"integrator", "method", TABLE_PARAMS, &cli_integrators, NULL, NULL, NULL},
+    {"controller", "type", TABLE_PARAMS, &cli_controllers, NULL, NULL, NULL},
     {"material", NULL, ROW_PARAMS, &cli_materials,
-     (const char *const[]){"density", "areal_density", "total_mass", NULL}},
+     (const char *const[]){"density", "areal_density", "total_mass", NULL},
+     (const char *const[]){"young_modulus", "thickness", NULL}, "fabric"},
 };
 
 static const struct opening *opening_of(const drape_scene_object *object)
@@ -319,7 +353,8 @@ static bool key_is_required(const drape_scene_key *key)
     cli_row row;
     if (key->optional)
         return false;
-    return key->required || (opening && !opening->key && opening->table->row(0, &row) && needs_params(&row));
+    return key->required || (opening && !opening->key && opening->table->row(0, &row) &&
+                             (needs_params(&row) || opening->all_of));
 }
 
 /* ---- Objects ---- */
@@ -413,6 +448,18 @@ static json_t *table_schema(const drape_scene_object *object, const struct openi
     return closed(properties, required);
 }
 
+/* Its first word is that there is none. */
+static json_t *with_preset(json_t *schema, const struct opening *opening)
+{
+    json_t *none = with(json_object(), "const", json_string("none"));
+    json_t *word = with(json_object(), opening->preset, with(json_object(), "not", none));
+    json_t *named =
+        with(that_requires(and_also(json_array(), json_string(opening->preset))), "properties", word);
+    schema = with(schema, "if", named);
+    schema = with(schema, "then", all_or_none(at_most_one(json_object(), opening->one_of), opening->all_of));
+    return with(schema, "else", exactly_one(that_requires(words(opening->all_of)), opening->one_of));
+}
+
 static json_t *object_schema(const drape_scene_object *object)
 {
     const struct opening *opening = object->open ? opening_of(object) : NULL;
@@ -421,6 +468,8 @@ static json_t *object_schema(const drape_scene_object *object)
     json_t *schema =
         opening ? table_schema(object, opening) : closed(properties_of(object, NULL), required_of(object));
     const char *const *one_of = opening && opening->one_of ? opening->one_of : object->one_of;
+    if (opening && opening->preset)
+        return with_preset(schema, opening);
     return one_of ? exactly_one(schema, one_of) : schema;
 }
 

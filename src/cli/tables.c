@@ -3,12 +3,16 @@
 
 #include "colliders/colliders.h"
 #include "compile/compile.h"
+#include "compile/fabrics.h"
 #include "control/control.h"
 #include "fields/fields.h"
 #include "io/export.h"
 #include "mesh/mesh.h"
 #include "solvers/linear.h"
 #include "terms/terms.h"
+
+#include <math.h>
+#include <stdio.h>
 
 static bool grid(int index, cli_row *row)
 {
@@ -38,6 +42,33 @@ static bool material(int index, cli_row *row)
                          .params = drape_material_params,
                          .param_count = DRAPE_MATERIAL_PARAM_COUNT};
     return index == 0;
+}
+
+/* Of what was published, as drape_fabric has it; the rest is derived. */
+static void describe(const drape_fabric *f, char *text, size_t size)
+{
+    drape_woven tension, bending;
+    drape_fabric_tension(f, &tension);
+    drape_fabric_bending(f, &bending);
+    int used = snprintf(text, size, "%s: %.4g kg/m2", f->what, f->areal_density);
+    used += snprintf(text + used, size - (size_t)used,
+                     isnan(f->tension.warp) ? "" : "; tension %.4g, %.4g N/m, shear %.3g N/m", tension.warp,
+                     tension.weft, tension.shear);
+    used += snprintf(text + used, size - (size_t)used, "; bending %.3g, %.3g, twist %.3g uN m",
+                     1e6 * bending.warp, 1e6 * bending.weft, 1e6 * bending.shear);
+    snprintf(text + used, size - (size_t)used, isnan(f->drape) ? "" : "; drape coefficient %.3g", f->drape);
+}
+
+/* All but none, which is no fabric. */
+static bool fabric(int index, cli_row *row)
+{
+    const drape_fabric *f = &drape_fabrics[index + 1];
+    if (f->name) {
+        *row = (cli_row){.name = f->name, .reference = f->source};
+        describe(f, row->text, sizeof row->text);
+        row->summary = row->text;
+    }
+    return f->name;
 }
 
 static bool term(int index, cli_row *row)
@@ -136,6 +167,7 @@ static bool exporter(int index, cli_row *row)
 const cli_table cli_grids = {"grids", "Grids", "\"grid\" of a mesh, its parameters beside it", grid};
 const cli_table cli_imports = {"imports", "Mesh files", "\"file\" of a mesh, by its ending", import};
 const cli_table cli_materials = {"materials", "Material", "\"material\" of a cloth", material};
+const cli_table cli_fabrics = {"fabrics", "Measured fabrics", "\"fabric\" of a material", fabric};
 const cli_table cli_terms = {"terms", "Terms", "\"terms\" of a cloth", term};
 const cli_table cli_colliders = {"colliders", "Colliders",
                                  "\"type\" of the colliders, parameters, friction, name and track beside it",
@@ -155,10 +187,7 @@ const cli_table cli_fields = {"fields", "Fields",
 const cli_table cli_shadings = {"shadings", "Shadings", "--shade of drape render and drape view",
                                 cli_shading_row};
 
-const cli_table *const cli_tables[] = {&cli_grids,       &cli_imports,
-                                       &cli_materials,   &cli_terms,
-                                       &cli_colliders,   &cli_self_contacts,
-                                       &cli_contacts,    &cli_integrators,
-                                       &cli_controllers, &cli_linears,
-                                       &cli_exporters,   &cli_fields,
-                                       &cli_shadings,    NULL};
+const cli_table *const cli_tables[] = {
+    &cli_grids,     &cli_imports,       &cli_materials, &cli_fabrics,     &cli_terms,
+    &cli_colliders, &cli_self_contacts, &cli_contacts,  &cli_integrators, &cli_controllers,
+    &cli_linears,   &cli_exporters,     &cli_fields,    &cli_shadings,    NULL};

@@ -1,9 +1,8 @@
 /*
  * tree.c: see tree.h.
  *
- * A node of the tree holds the box around its triangles; they are halved at the median of their centers along
- * the longest side of the box of these, so that the depth is the logarithm of their number. The nearest point
- * is sought depth first, the nearer child before the other (Ericson 2005, sections 5.1.5 and 6.3).
+ * The nearest point is sought depth first in a tree of boxes, the nearer child before the other (Ericson 2005, section
+ * 6.3; points of triangles: 5.1.5).
  *
  * The side: n . (x - c) > 0 for the angle-weighted pseudo-normal n of the face, edge or point that the nearest
  * point c is in (Baerentzen and Aanaes 2005, "Signed distance computation using the angle weighted
@@ -11,28 +10,13 @@
  */
 #include "colliders/tree.h"
 
+#include "colliders/bvh.h"
 #include "colliders/round.h"
 
 #include <string.h>
 
-#define LEAF_SIZE 2
-#define DEPTH     64 /* halving 2^31 triangles ends after 31 levels */
-
-typedef struct box {
-    double low[3], high[3];
-} box;
-
-/* Children of an inner node follow it: the first at its index + 1, the second at `second`. */
-typedef struct tree_node {
-    box bounds;
-    int32_t second;       /* inner nodes */
-    int32_t first, count; /* leaves: triangles order[first] ... ; count 0: an inner node */
-} tree_node;
-
 struct drape_tree {
-    int32_t node_count;
-    tree_node *node;
-    int32_t *order;       /* (triangle_count) */
+    drape_bvh boxes;      /* of the shape's triangles */
     int32_t *edge_of;     /* (triangle_count x 3) segment between corners k and k + 1 */
     double *face_normal;  /* (triangle_count x 3) of length 1 */
     double *edge_normal;  /* (segment_count x 3), their length does not matter */
@@ -96,91 +80,26 @@ static void fill_normals(const drape_collider_shape *s, drape_tree *tree)
     }
 }
 
-/* ---- Boxes ---- */
+/* ---- Making ---- */
 
-static box empty_box(void)
+/* The tree of boxes, in memory of the shape's. */
+static bool make_boxes(drape_collider_shape *s, drape_bvh *out)
 {
-    return (box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-}
-
-static void include(box *b, const double *x)
-{
-    for (int k = 0; k < 3; k++) {
-        b->low[k] = fmin(b->low[k], x[k]);
-        b->high[k] = fmax(b->high[k], x[k]);
+    drape_context *ctx = s->builder->ctx;
+    drape_bvh made;
+    if (drape_bvh_build(ctx, s->triangle_count, 3, s->triangle, s->point, &made))
+        return false;
+    drape_bvh_fit(&made, s->point, NULL);
+    *out = made;
+    out->order = drape_shape_take(s, (size_t)made.count, sizeof *made.order);
+    out->branches = drape_shape_take(s, (size_t)made.branch_count, sizeof *made.branches);
+    const bool taken = out->order && out->branches;
+    if (taken && made.count > 0) {
+        memcpy(out->order, made.order, (size_t)made.count * sizeof *made.order);
+        memcpy(out->branches, made.branches, (size_t)made.branch_count * sizeof *made.branches);
     }
-}
-
-static double center(const drape_collider_shape *s, int32_t t, int axis)
-{
-    return (corner(s, t, 0)[axis] + corner(s, t, 1)[axis] + corner(s, t, 2)[axis]) / 3;
-}
-
-/* The axis along which the centers are spread most. */
-static int longest_axis(const drape_collider_shape *s, const int32_t *order, int32_t count)
-{
-    box centers = empty_box();
-    for (int32_t i = 0; i < count; i++)
-        include(&centers,
-                (double[3]){center(s, order[i], 0), center(s, order[i], 1), center(s, order[i], 2)});
-    int axis = 0;
-    for (int k = 1; k < 3; k++)
-        if (centers.high[k] - centers.low[k] > centers.high[axis] - centers.low[axis])
-            axis = k;
-    return axis;
-}
-
-static void swap(int32_t *a, int32_t *b)
-{
-    int32_t kept = *a;
-    *a = *b;
-    *b = kept;
-}
-
-/* Quickselect (Hoare 1961): the `wanted` lowest centers come first. */
-static void select_lowest(const drape_collider_shape *s, int axis, int32_t *order, int32_t count,
-                          int32_t wanted)
-{
-    int32_t first = 0, last = count - 1;
-    while (first < last) {
-        double pivot = center(s, order[first + (last - first) / 2], axis);
-        int32_t i = first, j = last;
-        while (i <= j) {
-            while (center(s, order[i], axis) < pivot)
-                i++;
-            while (center(s, order[j], axis) > pivot)
-                j--;
-            if (i <= j)
-                swap(&order[i++], &order[j--]);
-        }
-        if (wanted <= j)
-            last = j;
-        else if (wanted >= i)
-            first = i;
-        else
-            return;
-    }
-}
-
-/* Makes the node of order[first] ... and those below it; its index. */
-static int32_t make_node(drape_tree *tree, const drape_collider_shape *s, int32_t first, int32_t count)
-{
-    int32_t index = tree->node_count++;
-    tree_node *node = &tree->node[index];
-    int32_t *order = tree->order + first;
-    node->bounds = empty_box();
-    for (int32_t i = 0; i < count; i++)
-        for (int k = 0; k < 3; k++)
-            include(&node->bounds, corner(s, order[i], k));
-    if (count <= LEAF_SIZE) {
-        node->first = first;
-        node->count = count;
-        return index;
-    }
-    select_lowest(s, longest_axis(s, order, count), order, count, count / 2);
-    make_node(tree, s, first, count / 2);
-    node->second = make_node(tree, s, first + count / 2, count - count / 2);
-    return index;
+    drape_bvh_free(ctx, &made);
+    return taken;
 }
 
 const drape_tree *drape_tree_make(drape_collider_shape *shape)
@@ -189,19 +108,14 @@ const drape_tree *drape_tree_make(drape_collider_shape *shape)
     drape_tree *tree = drape_shape_take(shape, 1, sizeof *tree);
     if (!tree)
         return NULL;
-    tree->node = drape_shape_take(shape, 2 * triangles, sizeof *tree->node);
-    tree->order = drape_shape_take(shape, triangles, sizeof *tree->order);
     tree->edge_of = drape_shape_take(shape, triangles, 3 * sizeof *tree->edge_of);
     tree->face_normal = drape_shape_take(shape, triangles, 3 * sizeof *tree->face_normal);
     tree->edge_normal = drape_shape_take(shape, (size_t)shape->segment_count, 3 * sizeof *tree->edge_normal);
     tree->point_normal = drape_shape_take(shape, (size_t)shape->point_count, 3 * sizeof *tree->point_normal);
-    if (!tree->node || !tree->order || !tree->edge_of || !tree->face_normal || !tree->edge_normal ||
-        !tree->point_normal)
+    if (!tree->edge_of || !tree->face_normal || !tree->edge_normal || !tree->point_normal ||
+        !make_boxes(shape, &tree->boxes))
         return NULL;
     fill_normals(shape, tree);
-    for (int32_t t = 0; t < shape->triangle_count; t++)
-        tree->order[t] = t;
-    make_node(tree, shape, 0, shape->triangle_count);
     return tree;
 }
 
@@ -271,7 +185,7 @@ static void offer_triangle(const drape_collider_shape *s, const drape_tree *tree
     }
 }
 
-static double squared_distance(const box *b, const double *x)
+static double squared_distance(const drape_box *b, const double *x)
 {
     double sum = 0;
     for (int k = 0; k < 3; k++) {
@@ -281,7 +195,7 @@ static double squared_distance(const box *b, const double *x)
     return sum;
 }
 
-/* A node that is still to be visited. */
+/* A branch that is still to be visited. */
 typedef struct pending {
     int32_t index;
     double squared; /* of the distance of its box */
@@ -289,24 +203,25 @@ typedef struct pending {
 
 static pending pending_at(const drape_tree *tree, int32_t index, const double *x)
 {
-    return (pending){index, squared_distance(&tree->node[index].bounds, x)};
+    return (pending){index, squared_distance(&tree->boxes.branches[index].box, x)};
 }
 
 static nearest find_nearest(const drape_tree *tree, const drape_collider_shape *s, const double *x)
 {
     nearest best = {.squared = INFINITY};
-    pending stack[DEPTH] = {{0, 0}};
+    pending stack[DRAPE_BVH_DEPTH] = {{0, 0}};
     int height = 1;
     while (height > 0) {
         const pending next = stack[--height];
-        const tree_node *node = &tree->node[next.index];
+        const drape_bvh_branch *branch = &tree->boxes.branches[next.index];
         if (next.squared >= best.squared)
             continue;
-        for (int32_t i = 0; i < node->count; i++)
-            offer_triangle(s, tree, tree->order[node->first + i], x, &best);
-        if (node->count > 0)
+        if (branch->second == 0) {
+            for (int32_t i = 0; i < branch->count; i++)
+                offer_triangle(s, tree, tree->boxes.order[branch->first + i], x, &best);
             continue;
-        const pending one = pending_at(tree, next.index + 1, x), other = pending_at(tree, node->second, x);
+        }
+        const pending one = pending_at(tree, next.index + 1, x), other = pending_at(tree, branch->second, x);
         bool one_is_near = one.squared <= other.squared;
         stack[height++] = one_is_near ? other : one;
         stack[height++] = one_is_near ? one : other;

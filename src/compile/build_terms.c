@@ -92,7 +92,7 @@ static drape_status find_row(drape_context *ctx, const char *pointer, const char
     const char *meant = drape_did_you_mean(name, names, count);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
                          "there is no term \"%.60s\"%s%s%s; `drape list` shows all", name,
-                         meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+                         DRAPE_MEANT(meant));
 }
 
 static drape_cloth_view view_of(const drape_model *model, const drape_cloth *cloth)
@@ -118,7 +118,9 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
                               .columns = m->columns,
                               .rectangular = m->rectangular,
                               .material = cloth->material,
-                              .gravity = {model->gravity[0], model->gravity[1], model->gravity[2]}};
+                              .gravity = {model->gravity[0], model->gravity[1], model->gravity[2]},
+                              .tension = cloth->tension.warp > 0 ? &cloth->tension : NULL,
+                              .bending = cloth->bending.warp > 0 ? &cloth->bending : NULL};
 }
 
 static drape_status check_elements(drape_term_builder *builder)

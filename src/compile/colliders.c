@@ -39,7 +39,7 @@ static drape_status find_row(drape_context *ctx, const char *pointer, const char
     snprintf(at, sizeof at, "%s/type", pointer);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at,
                          "there is no collider \"%.60s\"%s%s%s; `drape list` shows all", name,
-                         meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+                         DRAPE_MEANT(meant));
 }
 
 static drape_status name_collider(drape_model *model, const char *pointer, const char *given,

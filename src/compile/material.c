@@ -19,6 +19,7 @@ const drape_param drape_material_params[DRAPE_MATERIAL_PARAM_COUNT] = {
     [DRAPE_MATERIAL_YOUNG_MODULUS] = {.name = "young_modulus",
                                       .unit = "Pa",
                                       .default_value = NAN,
+                                      .derived = "required without a fabric",
                                       .min = 0,
                                       .max = 1e15,
                                       .open_min = true,
@@ -34,6 +35,7 @@ const drape_param drape_material_params[DRAPE_MATERIAL_PARAM_COUNT] = {
     [DRAPE_MATERIAL_THICKNESS] = {.name = "thickness",
                                   .unit = "m",
                                   .default_value = NAN,
+                                  .derived = "required without a fabric",
                                   .min = 0,
                                   .max = 10,
                                   .open_min = true,
@@ -75,8 +77,11 @@ const drape_param drape_material_params[DRAPE_MATERIAL_PARAM_COUNT] = {
          .unit = "1",
          .default_value = 0,
          .choices = drape_fabric_names,
-         .help = "a measured one: its areal density where none is given, and what bend.midedge takes "
-                 "for warp, weft and twist"},
+         .help =
+             "a measured one (`drape list fabrics`): its areal density where none is given; its bending is "
+             "that of bend.midedge, and without young_modulus and thickness its tension and shear are those "
+             "of "
+             "stretch.cst"},
 };
 
 static double total_area(const drape_mesh *mesh)
@@ -107,13 +112,59 @@ static drape_status total_mass(drape_context *ctx, const char *pointer, const do
     return DRAPE_OK;
 }
 
-static drape_material resolve(const double *values, double mass, double area)
+/* Without a fabric, and with half of it said, all is. */
+static drape_status check_stiffness(drape_context *ctx, const char *pointer, const double *values)
+{
+    static const int needed[] = {DRAPE_MATERIAL_YOUNG_MODULUS, DRAPE_MATERIAL_THICKNESS};
+    const bool none = isnan(values[needed[0]]) && isnan(values[needed[1]]);
+    if (none && values[DRAPE_MATERIAL_FABRIC] > 0)
+        return DRAPE_OK;
+    for (size_t i = 0; i < sizeof needed / sizeof *needed; i++)
+        if (isnan(values[needed[i]]))
+            return drape_param_missing(ctx, pointer, &drape_material_params[needed[i]]);
+    return DRAPE_OK;
+}
+
+/* Of the isotropic sheet whose strips have the mean tension K and bending B of the fabric: h = sqrt(12 B/K), E = K/h. So
+ * hinges and edges, which know no fabrics, come as near as they can. */
+static void fill_in(const drape_woven *tension, const drape_woven *bending, double *values)
+{
+    const double k = sqrt(tension->warp * tension->weft), b = sqrt(bending->warp * bending->weft);
+    values[DRAPE_MATERIAL_THICKNESS] = sqrt(12 * b / k);
+    values[DRAPE_MATERIAL_YOUNG_MODULUS] = k / values[DRAPE_MATERIAL_THICKNESS];
+}
+
+static bool is_given(const drape_cloth_def *def, const char *name)
+{
+    for (size_t i = 0; i < def->material_count; i++)
+        if (strcmp(def->material[i].name, name) == 0)
+            return true;
+    return false;
+}
+
+/* What the scene says of itself goes before what was measured. */
+static void take_fabric(const drape_cloth_def *def, double *values, drape_cloth *cloth)
 {
     const drape_fabric *fabric = &drape_fabrics[(int)values[DRAPE_MATERIAL_FABRIC]];
-    const bool measured = fabric->warp > 0;
-    drape_material m = {.bending_warp = measured ? fabric->warp : NAN,
-                        .bending_weft = measured ? fabric->weft : NAN,
-                        .bending_twist = measured ? drape_fabric_twist(fabric) : NAN,
+    drape_woven tension, *bending = &cloth->bending;
+    if (!(fabric->areal_density > 0))
+        return;
+    drape_fabric_tension(fabric, &tension);
+    drape_fabric_bending(fabric, bending);
+    if (is_given(def, drape_material_params[DRAPE_MATERIAL_POISSON_RATIO].name))
+        tension.poisson = bending->poisson = values[DRAPE_MATERIAL_POISSON_RATIO];
+    if (!isnan(values[DRAPE_MATERIAL_THICKNESS]))
+        return;
+    cloth->tension = tension;
+    fill_in(&tension, bending, values);
+}
+
+static drape_material resolve(const double *values, const drape_woven *bending, double mass, double area)
+{
+    const bool measured = bending->warp > 0;
+    drape_material m = {.bending_warp = measured ? bending->warp : NAN,
+                        .bending_weft = measured ? bending->weft : NAN,
+                        .bending_twist = measured ? bending->shear : NAN,
                         .young_modulus = values[DRAPE_MATERIAL_YOUNG_MODULUS],
                         .poisson_ratio = values[DRAPE_MATERIAL_POISSON_RATIO],
                         .thickness = values[DRAPE_MATERIAL_THICKNESS],
@@ -135,6 +186,8 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
                              def->material_count, values);
     double area = total_area(&cloth->mesh);
     if (!status)
+        status = check_stiffness(model->ctx, at, values);
+    if (!status)
         status = total_mass(model->ctx, at, values, area, &mass);
     if (status)
         return status;
@@ -142,8 +195,9 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
     cloth->node_mass = drape_arena_take(&model->arena, model->ctx, (size_t)count, sizeof *cloth->node_mass);
     if (!cloth->node_mass)
         return DRAPE_E_MEMORY;
+    take_fabric(def, values, cloth);
     memcpy(cloth->material_values, values, sizeof values);
-    cloth->material = resolve(values, mass, area);
+    cloth->material = resolve(values, &cloth->bending, mass, area);
     for (int32_t i = 0; i < count; i++)
         cloth->node_mass[i] = values[DRAPE_MATERIAL_MASS] == MASS_UNIFORM
                                   ? mass / count

@@ -93,8 +93,7 @@ static drape_status refuse_word(const pin_place *pin, const char *key, const cha
     char text[256];
     const char *meant = drape_did_you_mean(word, choices, count);
     snprintf(text, sizeof text, "\"%.60s\" is not allowed; one of: %s, %s, %s, %s%s%s%s", word, choices[0],
-             choices[1], choices[2], choices[3], meant ? "; did you mean \"" : "", meant ? meant : "",
-             meant ? "\"?" : "");
+             choices[1], choices[2], choices[3], DRAPE_MEANT(meant));
     return refuse(pin, key, text);
 }
 

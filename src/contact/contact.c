@@ -41,9 +41,12 @@ static bool take_arrays(drape_contact *c)
     c->searched_pose = drape_alloc(c->ctx, colliders, sizeof *c->searched_pose);
     c->start_pose = drape_alloc(c->ctx, colliders, sizeof *c->start_pose);
     c->listed_pose = drape_alloc(c->ctx, colliders, sizeof *c->listed_pose);
+    c->steps_pose = drape_alloc(c->ctx, colliders, sizeof *c->steps_pose);
+    c->steps_searched = drape_alloc(c->ctx, 3 * (size_t)c->search.points, sizeof *c->steps_searched);
     c->on_collider = drape_alloc(c->ctx, 3 * colliders, sizeof *c->on_collider);
     return c->x && c->v && c->from && c->to && c->searched && c->start && c->start_gaps && c->pose &&
-           c->searched_pose && c->start_pose && c->listed_pose && c->on_collider;
+           c->searched_pose && c->start_pose && c->listed_pose && c->on_collider && c->steps_pose &&
+           c->steps_searched;
 }
 
 drape_status drape_contact_create(drape_context *ctx, const drape_motion *motion, drape_contact **out)
@@ -73,10 +76,25 @@ void drape_contact_destroy(drape_contact **contact)
     drape_contact *c = *contact;
     if (!c)
         return;
-    void *arrays[] = {c->x,        c->v,           c->from,          c->to,         c->searched,
-                      c->start,    c->start_gaps,  c->pose,          c->pairs,      c->lagged,
-                      c->coupling, c->on_collider, c->searched_pose, c->start_pose, c->touches,
-                      c->slots,    c->listed_pose};
+    void *arrays[] = {c->x,
+                      c->v,
+                      c->from,
+                      c->to,
+                      c->searched,
+                      c->start,
+                      c->start_gaps,
+                      c->pose,
+                      c->pairs,
+                      c->lagged,
+                      c->coupling,
+                      c->on_collider,
+                      c->searched_pose,
+                      c->start_pose,
+                      c->touches,
+                      c->slots,
+                      c->listed_pose,
+                      c->steps_pose,
+                      c->steps_searched};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         drape_free(c->ctx, arrays[i]);
     drape_search_destroy(&c->search);
@@ -91,7 +109,7 @@ size_t drape_contact_bytes(const drape_contact *c)
     size_t points = (size_t)c->search.points, nodes = (size_t)c->model->node_count,
            colliders = (size_t)c->model->collider_count;
     return sizeof *c + drape_search_bytes(&c->search) +
-           (18 * points + nodes + 3 * colliders) * sizeof(double) + 4 * colliders * sizeof *c->pose +
+           (21 * points + nodes + 3 * colliders) * sizeof(double) + 5 * colliders * sizeof *c->pose +
            (size_t)c->room * sizeof *c->pairs +
            (size_t)c->touch_room * (sizeof *c->touches + DRAPE_SLOTS * sizeof *c->slots) +
            (size_t)c->lagged_room * sizeof *c->lagged + 4 * (size_t)c->coupling_room * sizeof *c->coupling;
@@ -257,9 +275,20 @@ static void aim(drape_contact *c)
         c->searched[i] += share * (c->x[i] - c->start[i]);
 }
 
+static void remember_search(drape_contact *c)
+{
+    c->strayed = true;
+    c->steps_known = c->known;
+    c->steps_margin = c->margin;
+    memcpy(c->steps_searched, c->searched, 3 * (size_t)c->search.points * sizeof *c->searched);
+    memcpy(c->steps_pose, c->searched_pose, (size_t)c->model->collider_count * sizeof *c->searched_pose);
+}
+
 static drape_status search(drape_contact *c)
 {
     double start = drape_clock_seconds();
+    if (c->resting && !c->strayed)
+        remember_search(c);
     c->count = 0;
     c->margin = c->next_margin;
     c->status = DRAPE_OK;
@@ -462,6 +491,34 @@ static void measure_start(drape_contact *c)
     }
 }
 
+/* Candidates as a search at these positions finds them. */
+static drape_status search_at(drape_contact *c, const double *x, const drape_collider_pose *pose,
+                              double margin)
+{
+    memcpy(c->x, x, 3 * (size_t)c->search.points * sizeof *x);
+    memcpy(c->pose, pose, (size_t)c->model->collider_count * sizeof *pose);
+    c->next_margin = margin;
+    c->aim = 0; /* they are aimed already */
+    return search(c);
+}
+
+/* Back to the search of the steps. */
+static drape_status return_search(drape_contact *c)
+{
+    const bool strayed = c->strayed;
+    c->resting = c->strayed = false;
+    if (!strayed)
+        return DRAPE_OK;
+    c->listed = false;
+    c->known = c->steps_known;
+    return c->known ? search_at(c, c->steps_searched, c->steps_pose, c->steps_margin) : DRAPE_OK;
+}
+
+void drape_contact_rest(drape_contact *c)
+{
+    c->resting = true;
+}
+
 /* A fast sheet is searched with a wider margin and ahead of itself, once in a step or two and not at every trial. x: the
  * nodes at the end of the last step, whose beginning is still known. */
 static void look_ahead(drape_contact *c, const double *x)
@@ -474,8 +531,10 @@ static void look_ahead(drape_contact *c, const double *x)
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
     double start = drape_clock_seconds();
+    drape_status status = return_search(c);
     look_ahead(c, x);
-    drape_status status = drape_contact_go(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}});
+    if (!status)
+        status = drape_contact_go(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}});
     c->aim = GOING_BACK;
     if (!status)
         status = lag(c);
@@ -490,17 +549,6 @@ drape_status drape_contact_begin(drape_contact *c, const double *x, const double
 }
 
 /* ---- In a checkpoint ---- */
-
-/* Candidates as a search at these positions finds them. */
-static drape_status search_at(drape_contact *c, const double *x, const drape_collider_pose *pose,
-                              double margin)
-{
-    memcpy(c->x, x, 3 * (size_t)c->search.points * sizeof *x);
-    memcpy(c->pose, pose, (size_t)c->model->collider_count * sizeof *pose);
-    c->next_margin = margin;
-    c->aim = 0; /* they are aimed already */
-    return search(c);
-}
 
 /* What acted where the step began follows from the positions alone: a search there finds it. */
 static drape_status begin_again(drape_contact *c, double margin)
@@ -529,6 +577,7 @@ static drape_status recall(drape_contact *c, double margin, double next_margin, 
     c->margin = margin;
     c->next_margin = next_margin;
     c->aim = next_aim;
+    c->resting = c->begun;
     return status;
 }
 
@@ -564,16 +613,19 @@ static bool is_sound(const drape_contact *c, double margin, double next_margin)
 void drape_contact_archive(drape_contact *c, drape_archive *a)
 {
     size_t points = 3 * (size_t)c->search.points, poses = 6 * (size_t)c->model->collider_count;
-    double margin = c->margin, next_margin = c->next_margin, seconds[2] = {c->seconds, c->search_seconds};
-    bool known = c->known;
+    double margin = c->strayed ? c->steps_margin : c->margin, next_margin = c->next_margin,
+           seconds[2] = {c->seconds, c->search_seconds};
+    bool known = c->strayed ? c->steps_known : c->known;
+    double *searched = c->strayed ? c->steps_searched : c->searched;
+    drape_collider_pose *pose = c->strayed ? c->steps_pose : c->searched_pose;
     drape_archive_mark(a, "contact");
     drape_archive_bool(a, &known);
     drape_archive_bool(a, &c->begun);
     drape_archive_double(a, &margin);
     drape_archive_double(a, &next_margin);
     drape_archive_double(a, &c->aim);
-    drape_archive_doubles(a, a->reading ? c->to : c->searched, points);
-    drape_archive_doubles(a, (a->reading ? c->listed_pose : c->searched_pose)->displacement, poses);
+    drape_archive_doubles(a, a->reading ? c->to : searched, points);
+    drape_archive_doubles(a, (a->reading ? c->listed_pose : pose)->displacement, poses);
     drape_archive_doubles(a, c->start, points);
     drape_archive_doubles(a, c->start_pose->displacement, poses);
     archive_couplings(c, a);

@@ -34,6 +34,10 @@ double drape_contact_search_seconds(const drape_contact *contact); /* of that, i
  * is compared with it. The arrays are copied. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_begin(drape_contact *contact, const double *x, const double *v, double t);
 
+/* The step has ended. Whatever is asked from now on, the next one finds the candidates as this one left them: its bits
+ * are the same, whoever looks on. */
+void drape_contact_rest(drape_contact *contact);
+
 /* Goes to a point; what follows is asked there. Errors: DRAPE_E_MEMORY (list of candidates). */
 drape_status drape_contact_place(drape_contact *contact, const drape_contact_at *at);
 

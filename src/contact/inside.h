@@ -34,7 +34,13 @@ struct drape_contact {
     double next_margin; /* of the next search */
     double aim;         /* of the way from `start`: so much further is the next search made */
     double moved;       /* how far one has, where it was last placed [m] */
-    drape_pair *pairs;  /* (count of room) candidates, surfaces too */
+    bool resting;       /* between steps: what is asked is a frame, an energy, a host's */
+    bool strayed;       /* it made a search: the last of the steps, which they go on with, was this: */
+    bool steps_known;
+    double steps_margin;
+    double *steps_searched; /* (points x 3) */
+    drape_collider_pose *steps_pose;
+    drape_pair *pairs; /* (count of room) candidates, surfaces too */
     int32_t count, room;
     bool listed; /* the touches are those of x, and of the colliders at listed_pose */
     drape_touch

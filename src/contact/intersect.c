@@ -7,7 +7,7 @@
 #include "contact/intersect.h"
 
 #include "base/vec3.h"
-#include "contact/bvh.h"
+#include "colliders/bvh.h"
 
 #include <float.h>
 #include <math.h>

@@ -6,7 +6,7 @@
 #ifndef DRAPE_CONTACT_SEARCH_H
 #define DRAPE_CONTACT_SEARCH_H
 
-#include "contact/bvh.h"
+#include "colliders/bvh.h"
 #include "contact/pair.h"
 
 typedef struct drape_search {

@@ -10,6 +10,11 @@
  * IDA keeps Jacobian and factors while c_j stays near theirs; that is most of its advantage over one
  * factorisation an iteration. When the iteration with old factors has converged is ida_newton.h's to say.
  *
+ * That iteration needs no exact matrix either. What makes it not symmetric is friction, whose force follows the normal
+ * force, and dashpots of strains that turn: small beside c_j^2 M and c_j D at the steps that both ask for. Half of it goes
+ * to each side, so that Cholesky factors serve: half of the time or less in most scenes of contact, for as many iterations.
+ * Where much slides, those may fail: then some matrices are exact.
+ *
  * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative
  * part would make the error depend on where the scene lies. The maximum order is 2 at loose tolerances,
  * because BDF 3 to 5 are not A-stable and feed energy into undamped waves; it is 5 when the tolerance
@@ -38,8 +43,10 @@ enum {
     PARAM_MAX_STEP,
     PARAM_MAX_STEPS,
     PARAM_LINEAR_SOLVER,
+    PARAM_MATRIX,
     PARAM_COUNT
 };
+enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
 
 #define TIGHT        1e-4 /* rtol below which order 5 pays */
 #define LOOSE_ORDER  2
@@ -47,12 +54,15 @@ enum {
 #define NEWTON_SHARE 0.33 /* of the error tolerance that is left to the Newton iteration */
 /* New factors past a change of c_j by (1 - d)/(1 + d). IDA's own 0.25 takes a quarter more residuals for
  * as many factors. */
-#define CJ_CHANGE 0.1
+#define CJ_CHANGE  0.1
+#define MOST_EXACT 64 /* matrices in a row, where the symmetric part keeps failing */
 /* Of the energy of a scene. At rtol 1e-3 a smooth fall swings by half a percent: more is of waves that are fed. */
 #define GAIN             0.02
 #define MAX_ERROR_FAILS  10 /* error test failures in one step */
 #define MAX_SOLVER_FAILS 10 /* convergence failures in one step */
 
+static const char *const matrix_choices[] = {
+    [MATRIX_AUTO] = "auto", [MATRIX_SYMMETRIC] = "symmetric", [MATRIX_EXACT] = "exact", NULL};
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_RTOL] = DRAPE_RTOL_PARAM,
     [PARAM_ATOL_X] = DRAPE_ATOL_X_PARAM,
@@ -87,6 +97,14 @@ static const drape_param params[PARAM_COUNT] = {
                              .default_value = 0,
                              .choices = drape_linears_words,
                              .help = "a row of the linear solvers"},
+    [PARAM_MATRIX] =
+        {.name = "matrix",
+         .kind = DRAPE_PARAM_CHOICE,
+         .unit = "1",
+         .default_value = MATRIX_AUTO,
+         .choices = matrix_choices,
+         .help = "of Newton's corrections; symmetric: the symmetric part of the exact one, which friction "
+                 "and dashpots make another; auto: that, and exact ones for a while where it fails"},
 };
 
 typedef struct ida_state {
@@ -101,16 +119,20 @@ typedef struct ida_state {
     N_Vector y, rate, weights, between; /* (x, v), (x', v'), absolute tolerances, dense output */
     drape_sun_linear *linear;
     drape_ida_newton newton;
-    double *x, *v, *g;        /* nodes: where the residual was evaluated last, and g there */
-    double *damping;          /* D (nonzeros); NULL where nothing dissipates */
-    double *reduced;          /* right-hand side of the reduced system (n) */
-    double *dissipated;       /* nodes; NULL where nothing dissipates */
-    double factored_cj;       /* c_j of the factors */
-    const double *internal;   /* of the last accepted state */
-    double span[2];           /* [s] no pin or collider has a kink inside */
-    double reached;           /* time of IDA's state; NaN: it must start anew */
-    double from;              /* time that the last good step began at; NaN: none */
-    double powers[2];         /* [W] taken by dissipation and put in by pins, at the time reached */
+    double *x, *v, *g;      /* nodes: where the residual was evaluated last, and g there */
+    double *damping;        /* D (nonzeros); NULL where nothing dissipates */
+    double *reduced;        /* right-hand side of the reduced system (n) */
+    double *dissipated;     /* nodes; NULL where nothing dissipates */
+    double factored_cj;     /* c_j of the factors */
+    bool part;              /* they are of the symmetric part */
+    int64_t exact_left;     /* so many matrices before it is tried again, */
+    int64_t exact_span;     /* of so many */
+    int64_t failures;       /* of the iteration with a new matrix, as IDA had counted them at the last one */
+    const double *internal; /* of the last accepted state */
+    double span[2];         /* [s] no pin or collider has a kink inside */
+    double reached;         /* time of IDA's state; NaN: it must start anew */
+    double from;            /* time that the last good step began at; NaN: none */
+    double powers[2];       /* [W] taken by dissipation and put in by pins, at the time reached */
     bool nonfinite, crossing; /* why the last residual was refused */
     drape_status fitted;      /* of the last change of the pattern: < 0 ends the run */
     double second;            /* [s] the second of simulated time that steps are counted in */
@@ -197,6 +219,25 @@ static double jacobian_clock(const ida_state *s)
     return drape_system_clock(s->system) - s->linear->factor_seconds;
 }
 
+/* Where the iteration failed with a new matrix that was the symmetric part, exact ones follow for a while: twice as many
+ * as the last time, half as many after each symmetric one that did. */
+static bool takes_part(ida_state *s)
+{
+    long failures = 0;
+    IDAGetNumNonlinSolvConvFails(s->ida, &failures);
+    const bool failed = s->part && failures > s->failures;
+    s->failures = failures;
+    if (s->values[PARAM_MATRIX] != MATRIX_AUTO)
+        return s->values[PARAM_MATRIX] == MATRIX_SYMMETRIC;
+    if (failed)
+        s->exact_left = s->exact_span = s->exact_span < MOST_EXACT ? 2 * s->exact_span : MOST_EXACT;
+    else if (s->exact_left > 0)
+        s->exact_left--;
+    else if (s->exact_span > 1)
+        s->exact_span /= 2;
+    return s->exact_left == 0;
+}
+
 static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_Vector r, SUNMatrix matrix,
                     void *user, N_Vector a, N_Vector b, N_Vector c)
 {
@@ -208,6 +249,9 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
     if (fit_pattern(s, &point))
         return -1;
     drape_system_jacobian(s->system, &point, cj * cj, false, s->linear->values);
+    s->part = takes_part(s);
+    if (s->part)
+        drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
     if (s->damping)
         drape_system_damping(s->system, &point, s->damping);
     s->factored_cj = cj;
@@ -336,6 +380,7 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
                      .system = system,
                      .model = drape_system_model(system),
                      .motion = drape_system_motion(system),
+                     .exact_span = 1,
                      .reached = NAN,
                      .from = NAN};
     s->n = 3 * (int64_t)s->model->free_count;
@@ -414,6 +459,7 @@ static drape_status start(ida_state *s, const drape_state *in, drape_step_info *
         rate[s->n + i] = -s->g[node_at(s, i)] / s->model->mass[s->model->node_of_free[i / 3]];
     }
     s->counted = 0;
+    s->failures = 0;
     info->reason = "nonfinite";
     if (!drape_all_finite(rate + s->n, (size_t)s->n)) /* IDA would cut its step ten times over it */
         return DRAPE_RETRY_NONFINITE;
@@ -612,7 +658,9 @@ static void restart(void *state, const drape_state *from)
     (void)from;
     ida_state *s = state;
     s->reached = s->from = NAN;
-    s->newton.strict = false;
+    s->newton.strict = s->part = false;
+    s->exact_left = 0;
+    s->exact_span = 1;
     drape_ida_newton_forget(&s->newton);
 }
 
@@ -635,6 +683,10 @@ static void archive_factors(ida_state *s, drape_archive *a)
     if (drape_archive_is_reading(a) && drape_system_pattern(s->system) != s->linear->pattern)
         drape_archive_note(a, adopt_pattern(s));
     drape_archive_double(a, &s->factored_cj);
+    drape_archive_bool(a, &s->part);
+    drape_archive_int64(a, &s->exact_left);
+    drape_archive_int64(a, &s->exact_span);
+    drape_archive_int64(a, &s->failures);
     if (s->damping && drape_archive_good(a))
         drape_archive_doubles(a, s->damping, (size_t)drape_system_pattern(s->system)->nonzeros);
     drape_sun_linear_archive(s->linear, a, s->factored_cj != 0);

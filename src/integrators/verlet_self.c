@@ -4,9 +4,9 @@
  *     share * mean over its near points j of (r - |x_i - x_j|) (x_i - x_j)/|x_i - x_j|
  * with the points as they are by then; share is one over the substeps of a step.
  *
- * Near points are found by boxes. CS184 looks into a point's own box alone, of 3 width/columns x 3 height/rows
- * x the larger of both, and misses pairs across its faces; with same_box so do we. Else all boxes that a ball
- * of the radius r around the point reaches are searched. Points are sorted by bucket, then by number, where
+ * Near points are found by boxes: all that a ball of the radius r around the point reaches are searched. CS184 looks
+ * into a point's own box alone, of 3 width/columns x 3 height/rows x the larger of both, as points stand before the
+ * first turn, and misses pairs across its faces; with same_box so do we. Points are sorted by bucket, then by number, where
  *     bucket = hash of a box's y and z + its number along x,
  * so that the boxes of a row along x lie one after another and are searched as one range.
  *
@@ -17,7 +17,8 @@
  * skin, kept as a list that is good until a node has moved by half of the skin (Verlet 1967), not counting what
  * all nodes move alike. Where lists become too long, in a heap of cloth, boxes are searched each time. The
  * points that push are the same, and are added in the order of their numbers, whichever way they were found: the
- * result depends on the positions alone, not on when a list was made.
+ * result depends on the positions alone, not on when a list was made. With same_box the points of a list that push are
+ * those of the same box of CS184, which is found for each point in every substep.
  */
 #include "base/lanes.h"
 #include "base/vec3.h"
@@ -35,7 +36,9 @@ struct drape_verlet_self {
     const drape_model *model;
     bool same_box;
     double reach;            /* r [m] */
-    double per_box[3];       /* boxes a metre */
+    double per_box[3];       /* boxes a metre, as nodes are sorted */
+    double per_own[3];       /* same_box: those of CS184 */
+    uint64_t *own;           /* same_box: (node_count) own_box of a node */
     int32_t buckets;         /* a power of 2 */
     int32_t *start;          /* (buckets + 1) */
     int32_t *bucket, *place; /* (node_count) of a node, and where it is in what follows */
@@ -74,11 +77,9 @@ static void box_of_cs184(const drape_model *m, double size[3])
  * rows then. */
 static void set_boxes(drape_verlet_self *s)
 {
-    double size[3] = {0.5 * s->reach, 2 * s->reach, 2 * s->reach};
-    if (s->same_box)
-        box_of_cs184(s->model, size);
+    const double size[3] = {0.5 * s->reach, 2 * s->reach, 2 * s->reach};
     for (int k = 0; k < 3; k++)
-        s->per_box[k] = 1 / size[k];
+        s->per_box[k] = s->same_box ? s->per_own[k] : 1 / size[k];
 }
 
 void drape_verlet_self_destroy(drape_verlet_self **self)
@@ -86,6 +87,7 @@ void drape_verlet_self_destroy(drape_verlet_self **self)
     drape_verlet_self *s = *self;
     if (!s)
         return;
+    drape_free(s->ctx, s->own);
     drape_free(s->ctx, s->start);
     drape_free(s->ctx, s->bucket);
     drape_free(s->ctx, s->place);
@@ -99,6 +101,18 @@ void drape_verlet_self_destroy(drape_verlet_self **self)
     drape_free(s->ctx, s->x_built);
     drape_free(s->ctx, s);
     *self = NULL;
+}
+
+static bool create_own(drape_verlet_self *s)
+{
+    double size[3];
+    if (!s->same_box)
+        return true;
+    box_of_cs184(s->model, size);
+    for (int k = 0; k < 3; k++)
+        s->per_own[k] = 1 / size[k];
+    s->own = drape_alloc(s->ctx, (size_t)s->model->node_count, sizeof *s->own);
+    return s->own;
 }
 
 drape_status drape_verlet_self_create(drape_context *ctx, const drape_model *m, bool same_box,
@@ -125,7 +139,7 @@ drape_status drape_verlet_self_create(drape_context *ctx, const drape_model *m, 
     s->pair = drape_alloc(ctx, n * A_NODE, sizeof *s->pair);
     s->x_built = drape_alloc(ctx, 3 * n, sizeof *s->x_built);
     if (s->start && s->bucket && s->place && s->node && s->row && s->x && s->first && s->cursor && s->near &&
-        s->pair && s->x_built)
+        s->pair && s->x_built && create_own(s))
         return DRAPE_OK;
     drape_verlet_self_destroy(out);
     return DRAPE_E_MEMORY;
@@ -135,7 +149,7 @@ size_t drape_verlet_self_bytes(const drape_verlet_self *s)
 {
     size_t n = (size_t)s->model->node_count;
     return sizeof *s + ((size_t)s->buckets + 1) * sizeof *s->start +
-           n * ((5 + 2 * A_NODE) * sizeof(int32_t) + 7 * sizeof(double));
+           n * ((5 + 2 * A_NODE) * sizeof(int32_t) + 7 * sizeof(double) + (s->own ? sizeof *s->own : 0));
 }
 
 /* ---- Boxes ---- */
@@ -377,13 +391,11 @@ static void build_lists(drape_verlet_self *s, double share, const double *x)
 {
     double reach = s->reach * (1 + 2 * share + SKIN);
     s->built = false;
-    if (!s->same_box) {
-        for (int k = 0; k < 3; k++)
-            s->per_box[k] = 1 / reach;
-        sort_nodes(s, x);
-        int32_t count = collect_pairs(s, reach);
-        s->built = count >= 0 && spread_pairs(s, count);
-    }
+    for (int k = 0; k < 3; k++)
+        s->per_box[k] = 1 / reach;
+    sort_nodes(s, x);
+    int32_t count = collect_pairs(s, reach);
+    s->built = count >= 0 && spread_pairs(s, count);
     if (s->built) {
         memcpy(s->x_built, x, 3 * (size_t)s->model->node_count * sizeof *x);
         s->built_share = share;
@@ -473,6 +485,33 @@ static void push_listed(drape_verlet_self *s, double share, double *x)
             push_node(s, i, s->near + s->first[i], s->first[i + 1] - s->first[i], share, x);
 }
 
+/* A box as 21 bits of each of its numbers: points that are near to each other are not 2^20 boxes apart. */
+static uint64_t own_box(const drape_verlet_self *s, const double *x)
+{
+    uint64_t box = 0;
+    for (int k = 0; k < 3; k++)
+        box = box << 21 | ((uint32_t)box_number(x[k], s->per_own[k]) & 0x1FFFFFu);
+    return box;
+}
+
+static void push_listed_own(drape_verlet_self *s, double share, double *x)
+{
+    const int32_t n = s->model->node_count;
+    for (int32_t i = 0; i < n; i++)
+        s->own[i] = own_box(s, x + 3 * (size_t)i);
+    for (int32_t i = 0; i < n; i++) {
+        int32_t near[MOST_NEAR + 1];
+        int count = 0;
+        if (s->model->pinned[i])
+            continue;
+        for (int32_t k = s->first[i]; k < s->first[i + 1]; k++) {
+            near[count] = s->near[k];
+            count += s->own[near[count]] == s->own[i];
+        }
+        push_node(s, i, near, count, share, x);
+    }
+}
+
 /* A point in a heap of more than MOST_NEAR others, of cloth much thicker than its mesh is fine, asks all; in its
  * own box it keeps to the first of them. */
 static void push_searched(drape_verlet_self *s, double share, double *x)
@@ -496,8 +535,10 @@ void drape_verlet_self_push(drape_verlet_self *s, double share, double *x)
 {
     if (!lists_are_good(s, share, x))
         build_lists(s, share, x);
-    if (s->built)
-        push_listed(s, share, x);
-    else
+    if (!s->built)
         push_searched(s, share, x);
+    else if (s->same_box)
+        push_listed_own(s, share, x);
+    else
+        push_listed(s, share, x);
 }

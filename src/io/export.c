@@ -28,8 +28,7 @@ static drape_status unknown_format(drape_context *ctx, const char *pointer, cons
     }
     const char *meant = drape_did_you_mean(name, names, count);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown format \"%.60s\"; formats are %s%s%s%s",
-                         name, list, meant ? "; did you mean \"" : "", meant ? meant : "",
-                         meant ? "\"?" : "");
+                         name, list, DRAPE_MEANT(meant));
 }
 
 drape_status drape_exporter_find(drape_context *ctx, const char *pointer, const char *name,

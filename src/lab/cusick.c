@@ -2,8 +2,22 @@
 #include "lab/cusick.h"
 
 #include <math.h>
+#include <stdio.h>
 
 #define PI 3.14159265358979323846
+
+int cusick_scene(const drape_fabric *fabric, int rows, int columns, char *text, size_t size)
+{
+    return snprintf(
+        text, size,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'annulus', 'rows': %d, 'columns': %d, 'inner_radius': %g, "
+        "'outer_radius': %g},\n 'material': {'fabric': '%s', 'young_modulus': %g, 'poisson_ratio': 0, "
+        "'thickness': 1e-3},\n 'terms': ['stretch.cst', 'bend.midedge', {'type': 'drag.viscous', "
+        "'coefficient': 1}], 'pins': [{'edge': 'top', 'clamp': true}]}],\n 'gravity': [0, -9.81, 0], "
+        "'integrator': {'method': 'be', 'dt': 0.02, 'tolerance': 1e-6, 'globalization': 'work'}, 'duration': "
+        "1}",
+        rows, columns, CUSICK_INNER, CUSICK_OUTER, fabric->name, CUSICK_TENSION / 1e-3);
+}
 
 /* The area inside the shadow of the outer rim, by its corners. Folds that hang under others would be counted with their
  * sign; specimens of 30 cm do not do that. */

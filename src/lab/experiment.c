@@ -16,6 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #define ABOUT "experiment.json"
 
@@ -109,7 +110,7 @@ drape_status lab_check_integrators(const lab *l)
         if (k == count) {
             const char *meant = drape_did_you_mean(name, drape_integrators_words, count);
             return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "there is no integrator \"%.60s\"%s%s%s", name,
-                              meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+                              DRAPE_MEANT(meant));
         }
         if (lab_find_integrator(name)->timeless)
             return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
@@ -192,22 +193,74 @@ static drape_status claim_folder(lab *l)
 {
     char path[4096];
     struct stat info;
+    l->writing = true;
     drape_status status = drape_folder_make(l->ctx, l->folder);
     if (status)
         return status;
     snprintf(path, sizeof path, "%s/" ABOUT, l->folder);
     if (stat(path, &info) == 0) {
         json_t *there = NULL;
+        l->writing = false;
         status = parse_about(l->ctx, l->folder, &there);
         if (!status && !json_equal(there, l->about))
-            status = drape_fail(l->ctx, DRAPE_E_FILE,
+            status = drape_fail(l->ctx, DRAPE_E_ARGUMENT,
                                 "\"%.400s\" holds another experiment, or this one of another scene or "
                                 "version; name another folder, or remove it",
                                 l->folder);
         json_decref(there);
+        l->writing = !status;
         return status;
     }
+    l->claimed = true;
     return write_about(l);
+}
+
+/* Without a reference there will be no case: a folder that has nothing else is not left to an experiment that the next
+ * attempt, with more time, is not. */
+static void give_back(const lab *l)
+{
+    char path[4200];
+    snprintf(path, sizeof path, "%s/" ABOUT, l->folder);
+    remove(path);
+    rmdir(l->folder); /* fails where there is anything in it */
+}
+
+/* The lines of before, and what cases are compared with. */
+static drape_status prepare(lab *l, int64_t *resumed)
+{
+    l->writing = false;
+    drape_status status = lab_read_lines(l, l->folder, resumed);
+    l->writing = !status;
+    if (!status && l->experiment->prepare)
+        status = l->experiment->prepare(l);
+    if (status && status != DRAPE_E_STOPPED && l->claimed)
+        give_back(l);
+    return status;
+}
+
+/* Whether a case is what it is without that value of the scene: it has one of its own there, or does not look. */
+static bool is_indifferent(const json_t *one, const char *pointer)
+{
+    const json_t *settings = json_object_get(one, "settings");
+    const char *method = json_string_value(json_object_get(settings, "/integrator/method"));
+    const drape_integrator_ops *row = method ? lab_find_integrator(method) : NULL;
+    return json_object_get(settings, pointer) || (row && lab_ignores(row, pointer));
+}
+
+/* Who sets dt for a tradeoff expects runs at that dt, and gets a grid of dt: told, not ignored. */
+static drape_status check_settings(lab *l)
+{
+    for (size_t i = 0; i < l->def->setting_count; i++) {
+        const char *pointer = l->def->settings[i].pointer;
+        bool idle = true;
+        for (size_t k = 0; idle && k < json_array_size(l->cases); k++)
+            idle = is_indifferent(json_array_get(l->cases, k), pointer);
+        if (idle || strncmp(pointer, "/output", strlen("/output")) == 0)
+            return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
+                              "%.100s = %.60s has no effect: no case of this %s takes it from the scene",
+                              pointer, l->def->settings[i].value, l->experiment->name);
+    }
+    return DRAPE_OK;
 }
 
 static drape_status try_case(lab *l, const json_t *settings)
@@ -307,6 +360,7 @@ static void end(lab *l, drape_lab_outcome *outcome)
         fclose(l->page);
     free(l->page_text);
     outcome->text = l->words_text;
+    outcome->input = !l->writing;
     for (size_t i = 0; l->results && i < l->count; i++)
         json_decref(l->results[i]);
     drape_free(l->ctx, l->results);
@@ -348,6 +402,7 @@ drape_status drape_lab_run(drape_context *ctx, const char *experiment, const dra
     lab l;
     *outcome = (drape_lab_outcome){0};
     drape_status status = check_def(ctx, def);
+    outcome->input = status;
     if (status)
         return status;
     locale_t old = drape_locale_enter();
@@ -360,13 +415,13 @@ drape_status drape_lab_run(drape_context *ctx, const char *experiment, const dra
     if (!status)
         status = try_scene(&l);
     if (!status)
+        status = check_settings(&l);
+    if (!status)
         status = make_results(&l);
     if (!status)
         status = claim_folder(&l);
     if (!status)
-        status = lab_read_lines(&l, l.folder, &outcome->resumed);
-    if (!status && l.experiment->prepare)
-        status = l.experiment->prepare(&l);
+        status = prepare(&l, &outcome->resumed);
     if (!status)
         status = lab_sweep(&l);
     if (!status)
@@ -406,7 +461,7 @@ drape_status drape_lab_merge(drape_context *ctx, const char *const *folders, siz
 {
     drape_lab_def def;
     lab l;
-    *outcome = (drape_lab_outcome){0};
+    *outcome = (drape_lab_outcome){.input = true};
     if (count < 1 || !folder || !*folder)
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
                           "a merge needs folders with results, and one for the report");

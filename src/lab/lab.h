@@ -41,6 +41,8 @@ struct lab {
     const drape_lab_def *def;
     const lab_experiment_ops *experiment;
     char *folder;
+    bool writing;              /* all that was given is read and good: a failure now is of the folder */
+    bool claimed;              /* it had no experiment before */
     json_t *about;             /* experiment.json; owns: */
     json_t *cases, *arguments; /* borrowed from it */
     json_t **results;          /* one a case, NULL: not there yet */

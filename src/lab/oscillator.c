@@ -4,7 +4,10 @@
 #include <math.h>
 #include <stdio.h>
 
-#define PHASE_STEPS 50
+#define AMPLITUDE_STEPS 20
+#define PHASE_STEPS     50
+
+const double oscillator_angles[OSCILLATOR_ANGLES] = {0.1, 0.5, 2};
 
 int oscillator_scene(const char *integrator, double angle, char *text, size_t size)
 {
@@ -30,14 +33,19 @@ double oscillator_energy(const drape_reference_run *run)
     return e.kinetic + e.elastic;
 }
 
-drape_status oscillator_amplitude(drape_reference_run *run, double angle, int from, int to, double *value)
+drape_status oscillator_amplitude_between(drape_reference_run *run, int from, int to, double *value)
 {
-    drape_status status = from ? oscillator_advance(run, angle, from) : DRAPE_OK;
+    drape_status status = from ? oscillator_advance(run, run->parameter, from) : DRAPE_OK;
     const double before = oscillator_energy(run);
     if (!status)
-        status = oscillator_advance(run, angle, to - from);
+        status = oscillator_advance(run, run->parameter, to - from);
     *value = pow(oscillator_energy(run) / before, 0.5 / (to - from));
     return status;
+}
+
+drape_status oscillator_amplitude(drape_reference_run *run, double *value)
+{
+    return oscillator_amplitude_between(run, 0, AMPLITUDE_STEPS, value);
 }
 
 /* How far a free node is from its rest. */
@@ -47,18 +55,18 @@ static double position(const drape_reference_run *run)
     return drape_sim_positions(run->sim)[at] - drape_model_rest_positions(run->model)[at];
 }
 
-drape_status oscillator_phase(drape_reference_run *run, double angle, double *value)
+drape_status oscillator_phase(drape_reference_run *run, double *value)
 {
     double x[3] = {0}, product = 0, square = 0;
     drape_status status = DRAPE_OK;
     for (int k = 0; !status && k < PHASE_STEPS; k++) {
-        status = oscillator_advance(run, angle, 1);
+        status = oscillator_advance(run, run->parameter, 1);
         x[0] = x[1], x[1] = x[2], x[2] = position(run);
         if (k < 2)
             continue;
         product += x[1] * (x[0] + x[2]);
         square += x[1] * x[1];
     }
-    *value = acos(product / (2 * square)) / angle;
+    *value = acos(product / (2 * square)) / run->parameter;
     return status;
 }

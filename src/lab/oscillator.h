@@ -18,11 +18,22 @@ drape_status oscillator_advance(drape_reference_run *run, double angle, int step
 /* Kinetic and elastic energy. */
 double oscillator_energy(const drape_reference_run *run);
 
-/* The share of the amplitude that a step leaves, from the energies after `from` and after `to` steps. */
-drape_status oscillator_amplitude(drape_reference_run *run, double angle, int from, int to, double *value);
+/* The share of the amplitude that a step leaves, from the energies after `from` and after `to` steps; of the first 20. */
+drape_status oscillator_amplitude_between(drape_reference_run *run, int from, int to, double *value);
+drape_status oscillator_amplitude(drape_reference_run *run, double *value);
 
 /* The angle of a step over omega h: every method that advances x and v by one matrix of determinant 1 has
  * x(n+1) + x(n-1) = 2 cos(angle) x(n). */
-drape_status oscillator_phase(drape_reference_run *run, double angle, double *value);
+drape_status oscillator_phase(drape_reference_run *run, double *value);
+
+/* What rows have in common: cases of omega h, 0.1, 0.5 and 2 unless they have others; those that measure an amplitude, and
+ * those that measure an angle. */
+#define OSCILLATOR_ANGLES 3
+extern const double oscillator_angles[OSCILLATOR_ANGLES];
+#define OSCILLATOR_CASES                                                                                     \
+    .unit = "1", .parameter = "omega h", .tolerance = 1e-4, .case_count = OSCILLATOR_ANGLES
+#define OSCILLATOR_AMPLITUDE .quantity = "share of the amplitude left by a step", OSCILLATOR_CASES
+#define OSCILLATOR_PHASE                                                                                     \
+    .quantity = "angle of a step over omega h", OSCILLATOR_CASES, .measure = oscillator_phase
 
 #endif

@@ -9,6 +9,8 @@
 #define PI      3.14159265358979323846
 #define STEPS   400
 
+const double pendulum_angles[PENDULUM_ANGLES] = {30, 90, 150};
+
 double pendulum_period(double degrees)
 {
     return 2 / PI * gsl_sf_ellint_Kcomp(sin(degrees * PI / 360), GSL_PREC_DOUBLE);

@@ -14,4 +14,12 @@ drape_status pendulum_measure(drape_reference_run *run, double *value);
 /* T/T0 = 2/pi K(sin(a/2)) */
 double pendulum_period(double degrees);
 
+/* What rows of it have in common: its period from 30, 90 and 150 degrees. */
+#define PENDULUM_ANGLES 3
+extern const double pendulum_angles[PENDULUM_ANGLES];
+#define PENDULUM_PERIOD                                                                                      \
+    .quantity = "period over that of small swings", .unit = "1", .parameter = "degrees",                     \
+    .source = "T/T0 = 2/pi K(sin(a/2))", .tolerance = 0.001, .parameters = pendulum_angles,                  \
+    .case_count = PENDULUM_ANGLES, .expected = pendulum_period, .measure = pendulum_measure
+
 #endif

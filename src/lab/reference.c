@@ -153,6 +153,15 @@ static void name_file(const lab *l, const ladder *one, char *name, size_t size)
     snprintf(name, size, FINAL "%s%s%s", one ? "-" : "", one ? one->method : "", shard);
 }
 
+static void forget_ladders(const lab *l)
+{
+    char name[64];
+    for (size_t i = 0; i < sizeof ladders / sizeof *ladders; i++) {
+        name_file(l, &ladders[i], name, sizeof name);
+        forget(l, name);
+    }
+}
+
 /* One rung. *good: it ended; else the climb is where it was. */
 static drape_status step_up(lab *l, const drape_model *model, const ladder *one, climb *c, bool *good)
 {
@@ -216,18 +225,18 @@ static drape_status choose(lab *l, const drape_model *model, climb *best)
     char name[64];
     int which;
     drape_status status = climb_all(l, model, best, &which);
-    if (!status && which < 0)
+    if (!status && which < 0) {
+        forget_ladders(l);
         return drape_fail(l->ctx, DRAPE_E_SOLVER,
                           "no reference: neither ida nor trbdf2 ends twice within %g s; give more by "
                           "--case-seconds, or a shorter duration",
                           BUDGET * l->def->case_seconds);
+    }
     name_file(l, NULL, name, sizeof name);
     if (!status)
         status = keep(l, name, &ladders[which], best);
-    for (size_t i = 0; !status && i < sizeof ladders / sizeof *ladders; i++) {
-        name_file(l, &ladders[i], name, sizeof name);
-        forget(l, name);
-    }
+    if (!status)
+        forget_ladders(l);
     return status;
 }
 

@@ -3,16 +3,13 @@
  * circles of 80, 112 and 144 nodes; squares of the mesh size are in the ratio of 2.9, the steps in that of 3.5, so that
  * what is beyond is 0.008 to 0.012. The fabric's tension is 100 N/m, a fiftieth of a woven one's: flat triangles bend
  * across their edges only as far as they stretch (docs/validate.md). */
-#include "compile/fabrics.h"
 #include "lab/cusick.h"
+#include "lab/fabric.h"
 #include "lab/strip.h"
 
-#include <stdio.h>
-
-#define ROWS    13
-#define SPOKES  112
-#define LIMIT   0.497
-#define TENSION 100.0 /* [N/m] */
+#define ROWS   13
+#define SPOKES 112
+#define LIMIT  0.497
 
 static const double fabrics[] = {3}; /* places in the table */
 
@@ -25,16 +22,7 @@ static double expected(double unused)
 static int scene(double place, double load, char *text, size_t size)
 {
     (void)load;
-    return snprintf(
-        text, size,
-        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'annulus', 'rows': %d, 'columns': %d, 'inner_radius': %g, "
-        "'outer_radius': %g},\n 'material': {'fabric': '%s', 'young_modulus': %g, 'poisson_ratio': 0, "
-        "'thickness': 1e-3},\n 'terms': ['stretch.cst', 'bend.midedge', {'type': 'drag.viscous', "
-        "'coefficient': "
-        "1}], 'pins': [{'edge': 'top', 'clamp': true}]}],\n 'gravity': [0, -9.81, 0], 'integrator': "
-        "{'method': "
-        "'be', 'dt': 0.02, 'tolerance': 1e-6, 'globalization': 'work'}, 'duration': 1}",
-        ROWS, SPOKES, CUSICK_INNER, CUSICK_OUTER, drape_fabrics[(int)place].name, TENSION / 1e-3);
+    return cusick_scene(fabric_at(place), ROWS, SPOKES, text, size);
 }
 
 static drape_status measure(drape_reference_run *run, double *value)

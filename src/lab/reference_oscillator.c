@@ -1,12 +1,6 @@
 /* oscillator: backward Euler leaves 1/(1 + (omega h)^2) of the energy of an oscillation in each step. */
 #include "lab/oscillator.h"
 
-#include <math.h>
-
-#define STEPS 20
-
-static const double angles[] = {0.1, 0.5, 2};
-
 static double expected(double angle)
 {
     return 1 / (1 + angle * angle);
@@ -20,7 +14,7 @@ static int scene(double angle, double load, char *text, size_t size)
 
 static drape_status measure(drape_reference_run *run, double *value)
 {
-    drape_status status = oscillator_amplitude(run, run->parameter, 0, STEPS, value);
+    drape_status status = oscillator_amplitude(run, value);
     *value *= *value;
     return status;
 }
@@ -28,13 +22,10 @@ static drape_status measure(drape_reference_run *run, double *value)
 const drape_reference drape_reference_oscillator = {
     .name = "oscillator",
     .quantity = "share of energy left by a step",
-    .unit = "1",
-    .parameter = "omega h",
+    OSCILLATOR_CASES,
     .model = "stretch.cst; square; be",
     .source = "|1/(1 - i omega h)|^2",
-    .tolerance = 1e-4,
-    .parameters = angles,
-    .case_count = sizeof angles / sizeof *angles,
+    .parameters = oscillator_angles,
     .expected = expected,
     .scene = scene,
     .measure = measure,

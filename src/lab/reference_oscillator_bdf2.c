@@ -9,8 +9,6 @@
 #define FIRST 15
 #define LAST  25
 
-static const double angles[] = {0.1, 0.5, 2};
-
 static double expected(double angle)
 {
     const double complex z = I * angle;
@@ -25,19 +23,15 @@ static int scene(double angle, double load, char *text, size_t size)
 
 static drape_status measure(drape_reference_run *run, double *value)
 {
-    return oscillator_amplitude(run, run->parameter, FIRST, LAST, value);
+    return oscillator_amplitude_between(run, FIRST, LAST, value);
 }
 
 const drape_reference drape_reference_oscillator_bdf2 = {
     .name = "oscillator_bdf2",
-    .quantity = "share of the amplitude left by a step",
-    .unit = "1",
-    .parameter = "omega h",
+    OSCILLATOR_AMPLITUDE,
     .model = "stretch.cst; square; bdf2",
     .source = "roots of (3/2 - i omega h) r^2 - 2 r + 1/2; .990401 at omega h = .5",
-    .tolerance = 1e-4,
-    .parameters = angles,
-    .case_count = sizeof angles / sizeof *angles,
+    .parameters = oscillator_angles,
     .expected = expected,
     .scene = scene,
     .measure = measure,

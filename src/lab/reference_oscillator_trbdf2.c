@@ -5,10 +5,6 @@
 #include <complex.h>
 #include <math.h>
 
-#define STEPS 20
-
-static const double angles[] = {0.1, 0.5, 2};
-
 static double expected(double angle)
 {
     const double gamma = 2 - sqrt(2), a1 = 1 / (gamma * (2 - gamma));
@@ -22,22 +18,13 @@ static int scene(double angle, double load, char *text, size_t size)
     return oscillator_scene("'method': 'trbdf2'", angle, text, size);
 }
 
-static drape_status measure(drape_reference_run *run, double *value)
-{
-    return oscillator_amplitude(run, run->parameter, 0, STEPS, value);
-}
-
 const drape_reference drape_reference_oscillator_trbdf2 = {
     .name = "oscillator_trbdf2",
-    .quantity = "share of the amplitude left by a step",
-    .unit = "1",
-    .parameter = "omega h",
+    OSCILLATOR_AMPLITUDE,
     .model = "stretch.cst; square; trbdf2",
     .source = "stability function; Bank et al. 1985, Hosea & Shampine 1996",
-    .tolerance = 1e-4,
-    .parameters = angles,
-    .case_count = sizeof angles / sizeof *angles,
+    .parameters = oscillator_angles,
     .expected = expected,
     .scene = scene,
-    .measure = measure,
+    .measure = oscillator_amplitude,
 };

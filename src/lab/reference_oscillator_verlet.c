@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-static const double angles[] = {0.1, 0.5, 1};
+static const double angles[OSCILLATOR_ANGLES] = {0.1, 0.5, 1};
 
 static double expected(double angle)
 {
@@ -16,22 +16,12 @@ static int scene(double angle, double load, char *text, size_t size)
     return oscillator_scene("'method': 'verlet', 'substeps': 1", angle, text, size);
 }
 
-static drape_status measure(drape_reference_run *run, double *value)
-{
-    return oscillator_phase(run, run->parameter, value);
-}
-
 const drape_reference drape_reference_oscillator_verlet = {
     .name = "oscillator_verlet",
-    .quantity = "angle of a step over omega h",
-    .unit = "1",
-    .parameter = "omega h",
+    OSCILLATOR_PHASE,
     .model = "stretch.cst; square; verlet",
     .source = "2 asin(omega h/2)",
-    .tolerance = 1e-4,
     .parameters = angles,
-    .case_count = sizeof angles / sizeof *angles,
     .expected = expected,
     .scene = scene,
-    .measure = measure,
 };

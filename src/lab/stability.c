@@ -6,6 +6,7 @@
 #include "lab/grid.h"
 #include "lab/run.h"
 #include "lab/text.h"
+#include "lab/units.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -270,7 +271,7 @@ static const struct {
     int colour;
 } verdicts[VERDICTS] = {
     [CLEAN] = {"clean", 0x1a7f5a},
-    [REJECTIONS] = {"with rejections", 0x8fc9a8},
+    [REJECTIONS] = {"with rejections", 0}, /* a scale */
     [STRAINED] = {"unphysical strain", 0xb07cc6},
     [STOPPED] = {"stopped", 0xf0a03c},
     [EXPLODED] = {"exploded", 0xc0392b},
@@ -294,14 +295,13 @@ static verdict judge(const lab *l, const json_t *result)
     return lab_number(result, "rejected") > 0 ? REJECTIONS : CLEAN;
 }
 
-/* Rejections shade from pale green to sand: by the logarithm of how many an accepted step. */
-static int colour_of(const lab *l, const json_t *result)
+/* From green to sand by the logarithm of how many steps are rejected for one that is accepted: the ends of the scale. */
+#define FEWEST 1e-3
+#define MOST   1.0
+
+static int colour_of_share(double share)
 {
-    verdict v = judge(l, result);
-    if (v != REJECTIONS)
-        return verdicts[v].colour;
-    double share = lab_number(result, "rejected") / fmax(1, lab_number(result, "accepted"));
-    double pale = fmin(1, fmax(0, (log10(share) + 3) / 3)); /* one in 1 000 to one a step */
+    const double pale = fmin(1, fmax(0, log(share / FEWEST) / log(MOST / FEWEST)));
     const int from[] = {0x4f, 0xa9, 0x7c}, to[] = {0xe4, 0xe0, 0xa8};
     int colour = 0;
     for (int k = 0; k < 3; k++)
@@ -309,11 +309,26 @@ static int colour_of(const lab *l, const json_t *result)
     return colour;
 }
 
+static int colour_of(const lab *l, const json_t *result)
+{
+    const verdict v = judge(l, result);
+    return v == REJECTIONS
+               ? colour_of_share(lab_number(result, "rejected") / fmax(1, lab_number(result, "accepted")))
+               : verdicts[v].colour;
+}
+
 /* ---- Pictures ---- */
 
 static const char *axis_name(const axis *a)
 {
     return strrchr(a->pointer, '/') + 1;
+}
+
+/* "young_modulus [Pa]" */
+static void axis_label(const axis *a, char *label, size_t size)
+{
+    const char *unit = lab_unit(a->pointer);
+    snprintf(label, size, *unit ? "%.100s [%s]" : "%.100s", axis_name(a), unit);
 }
 
 /* Half a step to either side, in the axis' own measure. */
@@ -374,14 +389,42 @@ static bool write_limit(const lab *l, const space *s, FILE *out, size_t first, i
 static void write_range(const axis *a, const char *name, FILE *out)
 {
     double ends[4];
+    char label[128];
+    axis_label(a, label, sizeof label);
     cell_bounds(a, 0, &ends[0], &ends[1]);
     cell_bounds(a, a->count - 1, &ends[2], &ends[3]);
     double low = fmin(fmin(ends[0], ends[1]), fmin(ends[2], ends[3])),
            high = fmax(fmax(ends[0], ends[1]), fmax(ends[2], ends[3]));
-    fprintf(out, "set %srange [%.9g:%.9g]\nset %slabel '%s' noenhanced\n", name, low, high, name,
-            axis_name(a));
+    fprintf(out, "set %srange [%.9g:%.9g]\nset %slabel '%s' noenhanced\n", name, low, high, name, label);
     if (a->log)
         fprintf(out, "set logscale %s\nset format %s '10^{%%T}'\n", name, name);
+}
+
+static void write_swatch(FILE *out, int colour, const char *title)
+{
+    fprintf(out, ", NaN with points pt 5 ps 1.5 lc rgb '#%06x' title '%s'", colour, title);
+}
+
+/* A swatch for each verdict; of rejections the scale, where the map has some. */
+static void write_legend(FILE *out, bool rejections)
+{
+    static const struct {
+        double share;
+        const char *title;
+    } scale[] = {{1e-3, "1 rejected in 1 000 steps"}, {1e-2, "1 in 100"}, {1e-1, "1 in 10"}, {1, "1 a step"}};
+    for (int v = 0; v < VERDICTS; v++)
+        if (v != REJECTIONS)
+            write_swatch(out, verdicts[v].colour, verdicts[v].name);
+    for (size_t i = 0; rejections && i < sizeof scale / sizeof *scale; i++)
+        write_swatch(out, colour_of_share(scale[i].share), scale[i].title);
+}
+
+static bool has_rejections(const lab *l, const space *s, size_t first)
+{
+    for (size_t cell = 0; cell < cells_of(s); cell++)
+        if (judge(l, l->results[first + cell]) == REJECTIONS)
+            return true;
+    return false;
 }
 
 static void write_script(const lab *l, const space *s, FILE *out, const char *name, const char *title,
@@ -397,9 +440,7 @@ static void write_script(const lab *l, const space *s, FILE *out, const char *na
     write_cells(l, s, out, first, third);
     bool limited = write_limit(l, s, out, first, third);
     fprintf(out, "plot $cells using 1:2:3:4:5:6:7 with boxxyerror lc rgb variable notitle");
-    for (int v = 0; v < VERDICTS; v++)
-        fprintf(out, ", NaN with points pt 5 ps 1.5 lc rgb '#%06x' title '%s'", verdicts[v].colour,
-                verdicts[v].name);
+    write_legend(out, has_rejections(l, s, first));
     if (limited)
         fprintf(out, ", $limit with lines lw 2.5 lc rgb '#000000' title 'explicit limit 2/omega'");
     fprintf(out, "\n");
@@ -416,8 +457,8 @@ static drape_status draw(lab *l, const space *s, size_t first, int third)
         return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for a picture");
     snprintf(name, sizeof name, s->count == AXES ? "map_%s_%d" : "map_%s", row, third);
     if (s->count == AXES)
-        snprintf(title, sizeof title, "%s, %.100s = %.4g", row, axis_name(&s->axes[2]),
-                 axis_value(&s->axes[2], third));
+        snprintf(title, sizeof title, "%s, %.100s = %.4g %s", row, axis_name(&s->axes[2]),
+                 axis_value(&s->axes[2], third), lab_unit(s->axes[2].pointer));
     else
         snprintf(title, sizeof title, "%s", row);
     write_script(l, s, out, name, title, first, third);

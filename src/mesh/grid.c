@@ -8,6 +8,9 @@
 
 #define MAX_GRID_NAMES 64
 
+const char *const drape_grid_orientations[] = {
+    [GRID_HORIZONTAL] = "horizontal", [GRID_VERTICAL] = "vertical", NULL};
+
 drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_t rows, int32_t columns,
                                  drape_mesh *mesh)
 {
@@ -73,7 +76,7 @@ static drape_status unknown_grid(drape_context *ctx, const char *pointer, const 
     const char *meant = drape_did_you_mean(type, names, count);
     snprintf(place, sizeof place, "%s/grid", pointer);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "unknown grid \"%.60s\"; known are %s%s%s%s", type,
-                         known, meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+                         known, DRAPE_MEANT(meant));
 }
 
 drape_status drape_mesh_from_grid(drape_context *ctx, const char *pointer, const drape_row_def *grid,

@@ -28,4 +28,31 @@ drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_
 int32_t *drape_grid_split(int32_t *triangle, int32_t a, int32_t columns, bool falling, bool flip);
 void drape_grid_triangulate(drape_mesh *mesh, const bool falling[2][2], bool flip);
 
+/* Parameters: a number of nodes, of which the grid has at most 2^28 / share; a length. */
+#define GRID_NODES(name_, least_, share_, help_)                                                             \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_INTEGER, .unit = "1", .default_value = NAN, .min = least_,        \
+        .max = DRAPE_MAX_NODES / (share_), .help = help_                                                     \
+    }
+#define GRID_LENGTH(name_, help_)                                                                            \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_NUMBER, .unit = "m", .default_value = NAN, .min = 0, .max = 1e9,  \
+        .open_min = true, .help = help_                                                                      \
+    }
+
+/* Those of rectangles: the first ones of such a grid, and in which plane it lies. */
+enum { GRID_COLUMNS, GRID_ROWS, GRID_WIDTH, GRID_HEIGHT, GRID_RECTANGLE_COUNT };
+enum { GRID_HORIZONTAL, GRID_VERTICAL };
+extern const char *const drape_grid_orientations[];
+#define GRID_RECTANGLE                                                                                       \
+    [GRID_COLUMNS] = GRID_NODES("columns", 2, 2, "nodes along the width; columns x rows is at most 2^28"),   \
+    [GRID_ROWS] = GRID_NODES("rows", 2, 2, "nodes along the height"),                                        \
+    [GRID_WIDTH] = GRID_LENGTH("width", "size along x"),                                                     \
+    [GRID_HEIGHT] = GRID_LENGTH("height", "size along -z, or along -y if vertical")
+#define GRID_ORIENTATION                                                                                     \
+    {                                                                                                        \
+        .name = "orientation", .kind = DRAPE_PARAM_CHOICE, .unit = "1", .default_value = GRID_HORIZONTAL,    \
+        .choices = drape_grid_orientations, .help = "the plane of the sheet: y = 0 or z = 0"                 \
+    }
+
 #endif

@@ -14,36 +14,11 @@
 enum { CIRCLES, SPOKES, INNER, OUTER, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
-    [CIRCLES] = {.name = "rows",
-                 .kind = DRAPE_PARAM_INTEGER,
-                 .unit = "1",
-                 .default_value = NAN,
-                 .min = 2,
-                 .max = DRAPE_MAX_NODES / 3,
-                 .help = "circles of nodes, the inner one first; columns x rows is at most 2^28"},
-    [SPOKES] = {.name = "columns",
-                .kind = DRAPE_PARAM_INTEGER,
-                .unit = "1",
-                .default_value = NAN,
-                .min = 3,
-                .max = DRAPE_MAX_NODES / 2,
-                .help = "nodes on each circle"},
-    [INNER] = {.name = "inner_radius",
-               .kind = DRAPE_PARAM_NUMBER,
-               .unit = "m",
-               .default_value = NAN,
-               .min = 0,
-               .max = 1e9,
-               .open_min = true,
-               .help = "radius of the hole"},
-    [OUTER] = {.name = "outer_radius",
-               .kind = DRAPE_PARAM_NUMBER,
-               .unit = "m",
-               .default_value = NAN,
-               .min = 0,
-               .max = 1e9,
-               .open_min = true,
-               .help = "radius of the rim; larger than inner_radius"},
+    [CIRCLES] =
+        GRID_NODES("rows", 2, 3, "circles of nodes, the inner one first; columns x rows is at most 2^28"),
+    [SPOKES] = GRID_NODES("columns", 3, 2, "nodes on each circle"),
+    [INNER] = GRID_LENGTH("inner_radius", "radius of the hole"),
+    [OUTER] = GRID_LENGTH("outer_radius", "radius of the rim; larger than inner_radius"),
 };
 
 static void place_nodes(const double *values, drape_mesh *mesh)

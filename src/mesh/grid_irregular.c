@@ -8,42 +8,10 @@
 
 #include "mesh/grid.h"
 
-enum { COLUMNS, ROWS, WIDTH, HEIGHT, JITTER, SEED, ORIENTATION, PARAM_COUNT };
-enum { HORIZONTAL, VERTICAL };
-
-static const char *const orientations[] = {[HORIZONTAL] = "horizontal", [VERTICAL] = "vertical", NULL};
+enum { JITTER = GRID_RECTANGLE_COUNT, SEED, ORIENTATION, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
-    [COLUMNS] = {.name = "columns",
-                 .kind = DRAPE_PARAM_INTEGER,
-                 .unit = "1",
-                 .default_value = NAN,
-                 .min = 2,
-                 .max = DRAPE_MAX_NODES / 2,
-                 .help = "nodes along the width; columns x rows is at most 2^28"},
-    [ROWS] = {.name = "rows",
-              .kind = DRAPE_PARAM_INTEGER,
-              .unit = "1",
-              .default_value = NAN,
-              .min = 2,
-              .max = DRAPE_MAX_NODES / 2,
-              .help = "nodes along the height"},
-    [WIDTH] = {.name = "width",
-               .kind = DRAPE_PARAM_NUMBER,
-               .unit = "m",
-               .default_value = NAN,
-               .min = 0,
-               .max = 1e9,
-               .open_min = true,
-               .help = "size along x"},
-    [HEIGHT] = {.name = "height",
-                .kind = DRAPE_PARAM_NUMBER,
-                .unit = "m",
-                .default_value = NAN,
-                .min = 0,
-                .max = 1e9,
-                .open_min = true,
-                .help = "size along -z, or along -y if vertical"},
+    GRID_RECTANGLE,
     [JITTER] = {.name = "jitter",
                 .kind = DRAPE_PARAM_NUMBER,
                 .unit = "1",
@@ -58,12 +26,7 @@ static const drape_param params[PARAM_COUNT] = {
               .min = 0,
               .max = 1e9,
               .help = "another mesh of the same kind"},
-    [ORIENTATION] = {.name = "orientation",
-                     .kind = DRAPE_PARAM_CHOICE,
-                     .unit = "1",
-                     .default_value = HORIZONTAL,
-                     .choices = orientations,
-                     .help = "the plane of the sheet: y = 0 or z = 0"},
+    [ORIENTATION] = GRID_ORIENTATION,
 };
 
 static void place_nodes(const double *values, bool vertical, drape_mesh *mesh)
@@ -77,8 +40,8 @@ static void place_nodes(const double *values, bool vertical, drape_mesh *mesh)
             const double along = jitter * drape_grid_random(&seed), down = jitter * drape_grid_random(&seed);
             const double u = c == 0 || c == last_column ? c : c + along,
                          w = r == 0 || r == last_row ? r : r + down;
-            x[0] = u * values[WIDTH] / last_column;
-            x[vertical ? 1 : 2] = -w * values[HEIGHT] / last_row;
+            x[0] = u * values[GRID_WIDTH] / last_column;
+            x[vertical ? 1 : 2] = -w * values[GRID_HEIGHT] / last_row;
         }
 }
 
@@ -102,8 +65,8 @@ static void split_cells(bool vertical, drape_mesh *mesh)
 
 static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
 {
-    const bool vertical = values[ORIENTATION] == VERTICAL;
-    const int32_t columns = (int32_t)values[COLUMNS], rows = (int32_t)values[ROWS];
+    const bool vertical = values[ORIENTATION] == GRID_VERTICAL;
+    const int32_t columns = (int32_t)values[GRID_COLUMNS], rows = (int32_t)values[GRID_ROWS];
     drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
     if (!status)
         status = drape_grid_allocate(ctx, pointer, rows, columns, mesh);

@@ -13,56 +13,20 @@
 
 #include "mesh/grid.h"
 
-enum { COLUMNS, ROWS, WIDTH, HEIGHT, DIAGONALS, ORIENTATION, NOISE, PARAM_COUNT };
+enum { DIAGONALS = GRID_RECTANGLE_COUNT, ORIENTATION, NOISE, PARAM_COUNT };
 enum { ALTERNATING, PARALLEL };
-enum { HORIZONTAL, VERTICAL };
 
 static const char *const diagonals[] = {[ALTERNATING] = "alternating", [PARALLEL] = "parallel", NULL};
-static const char *const orientations[] = {[HORIZONTAL] = "horizontal", [VERTICAL] = "vertical", NULL};
 
 static const drape_param params[PARAM_COUNT] = {
-    [COLUMNS] = {.name = "columns",
-                 .kind = DRAPE_PARAM_INTEGER,
-                 .unit = "1",
-                 .default_value = NAN,
-                 .min = 2,
-                 .max = DRAPE_MAX_NODES / 2,
-                 .help = "nodes along the width; columns x rows is at most 2^28"},
-    [ROWS] = {.name = "rows",
-              .kind = DRAPE_PARAM_INTEGER,
-              .unit = "1",
-              .default_value = NAN,
-              .min = 2,
-              .max = DRAPE_MAX_NODES / 2,
-              .help = "nodes along the height"},
-    [WIDTH] = {.name = "width",
-               .kind = DRAPE_PARAM_NUMBER,
-               .unit = "m",
-               .default_value = NAN,
-               .min = 0,
-               .max = 1e9,
-               .open_min = true,
-               .help = "size along x"},
-    [HEIGHT] = {.name = "height",
-                .kind = DRAPE_PARAM_NUMBER,
-                .unit = "m",
-                .default_value = NAN,
-                .min = 0,
-                .max = 1e9,
-                .open_min = true,
-                .help = "size along -z, or along -y if vertical"},
+    GRID_RECTANGLE,
     [DIAGONALS] = {.name = "diagonals",
                    .kind = DRAPE_PARAM_CHOICE,
                    .unit = "1",
                    .default_value = ALTERNATING,
                    .choices = diagonals,
                    .help = "how the cells are split into triangles"},
-    [ORIENTATION] = {.name = "orientation",
-                     .kind = DRAPE_PARAM_CHOICE,
-                     .unit = "1",
-                     .default_value = HORIZONTAL,
-                     .choices = orientations,
-                     .help = "the plane of the sheet: y = 0 or z = 0"},
+    [ORIENTATION] = GRID_ORIENTATION,
     [NOISE] = {.name = "noise",
                .kind = DRAPE_PARAM_NUMBER,
                .unit = "m",
@@ -96,8 +60,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 {
     static const bool falling[][2][2] = {
         [ALTERNATING] = {{true, false}, {false, true}}, [PARALLEL] = {{true, true}, {true, true}}};
-    const int32_t columns = (int32_t)values[COLUMNS], rows = (int32_t)values[ROWS];
-    const bool vertical = values[ORIENTATION] == VERTICAL;
+    const int32_t columns = (int32_t)values[GRID_COLUMNS], rows = (int32_t)values[GRID_ROWS];
+    const bool vertical = values[ORIENTATION] == GRID_VERTICAL;
 
     drape_status status = drape_grid_check_size(ctx, pointer, columns, rows);
     if (!status)
@@ -105,7 +69,7 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
     if (status)
         return status;
     mesh->rectangular = true;
-    place_nodes(mesh, values[WIDTH], values[HEIGHT], vertical);
+    place_nodes(mesh, values[GRID_WIDTH], values[GRID_HEIGHT], vertical);
     add_noise(mesh, values[NOISE], vertical);
     /* Rows of a vertical sheet go down where those of grid.h go up. */
     drape_grid_triangulate(mesh, falling[(int)values[DIAGONALS]], vertical);

@@ -57,9 +57,10 @@ typedef struct drape_cloth {
     double scale[3], rotate[4], translate[3];
     double material_values[8]; /* in the order of drape_material_params */
     drape_material material;
-    double *node_mass;     /* (mesh.node_count) [kg] */
-    uint8_t *edge_clamped; /* (mesh.edge_count) 1: both its nodes are held by pins that clamp */
-    double velocity[3];    /* [m/s] at t = 0 */
+    drape_woven tension, bending; /* of a measured fabric; warp 0: it is none */
+    double *node_mass;            /* (mesh.node_count) [kg] */
+    uint8_t *edge_clamped;        /* (mesh.edge_count) 1: both its nodes are held by pins that clamp */
+    double velocity[3];           /* [m/s] at t = 0 */
     int32_t first_node, first_triangle;
     const struct drape_term **laws; /* (law_count) */
     int law_count;

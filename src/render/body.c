@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#define CELLS      56   /* along the longest side of the box */
+#define CELLS      32   /* along the longest side of the box */
 #define FLAT_CELLS 12   /* of an endless body */
 #define FAR        1e4  /* reaches: from so far away the distance tells where a body ends */
 #define ENDLESS    2.0  /* reaches */

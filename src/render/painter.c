@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define SHADOW 2048 /* texels of a side */
+#define SHADOW 1024 /* texels of a side */
 #define SOFT   1.5f /* texels between the comparisons with it */
 #define LAMP_AZIMUTH                                                                                         \
     -16.0f /* [degrees], as a camera's: the lamp stands in the room, whoever looks from where */
@@ -607,6 +607,9 @@ static drape_status draw_panel(drape_painter *p, const drape_picture *picture, i
     set_lamp(stage, &v);
     drape_stage_set(stage, &panel->moment, shading->wires);
     draw_shadows(p, stage, shading, &v);
+    if (index == 0)
+        drape_canvas_begin(
+            &p->canvas); /* not before: cleared and left, it would be loaded and stored twice */
     glBindFramebuffer(GL_FRAMEBUFFER, p->canvas.many);
     glViewport(v.left, v.bottom, v.width, v.height);
     draw_scene(p, picture, stage, program, &v);
@@ -621,7 +624,6 @@ drape_status drape_painter_draw(drape_painter *painter, const drape_picture *pic
 {
     drape_status status = DRAPE_OK;
     glDisable(GL_SCISSOR_TEST);
-    drape_canvas_begin(&painter->canvas);
     for (int i = 0; i < picture->panel_count && !status; i++)
         status = draw_panel(painter, picture, i);
     if (status)
@@ -629,5 +631,6 @@ drape_status drape_painter_draw(drape_painter *painter, const drape_picture *pic
     glViewport(0, 0, painter->canvas.width, painter->canvas.height);
     drape_layout_put(&painter->overlay, picture);
     drape_overlay_draw(&painter->overlay);
+    glFlush();
     return drape_gl_check(painter->ctx, "draw a picture");
 }

@@ -47,8 +47,7 @@ static drape_status find_row(drape_context *ctx, const table *t, const char *nam
     const char *meant = drape_did_you_mean(name, t->names, (size_t)t->count);
     snprintf(at, sizeof at, "%s/%s", t->pointer, t->key);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "there is no %s \"%.60s\"%s%s%s; `drape list` shows all",
-                         t->pointer + 1, name, meant ? "; did you mean \"" : "", meant ? meant : "",
-                         meant ? "\"?" : "");
+                         t->pointer + 1, name, DRAPE_MEANT(meant));
 }
 
 static drape_status unknown_key(drape_context *ctx, const table *t, const char *at, const char *name)
@@ -59,8 +58,7 @@ static drape_status unknown_key(drape_context *ctx, const table *t, const char *
         for (int p = 0; p < t->param_counts[r] && count < MAX_KEYS; p++)
             keys[count++] = t->params[r][p].name;
     const char *meant = drape_did_you_mean(name, keys, count);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "unknown key \"%.60s\"%s%s%s", name,
-                         meant ? "; did you mean \"" : "", meant ? meant : "", meant ? "\"?" : "");
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "unknown key \"%.60s\"%s%s%s", name, DRAPE_MEANT(meant));
 }
 
 /* Checks a setting against every row that has a parameter of its name; keeps the value for the chosen row. */

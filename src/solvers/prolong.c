@@ -9,7 +9,7 @@
 #define SMOOTH (2.0 / 3) /* share of a node's value that comes from its neighbours, in each averaging */
 #define DROP                                                                                                 \
     0.08 /* of the largest at a node: smaller values are left out, the others scaled to add up to 1 */
-#define WIDENING 1.1 /* of the spacing: measured best at 2 500 and 10 000 nodes (bench/realtime) */
+#define WIDENING 1.1 /* of the spacing: measured best at 2 500 and 10 000 nodes (bench/speed rungs) */
 
 int drape_prolong_spacing(int32_t nodes)
 {

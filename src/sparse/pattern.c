@@ -199,3 +199,25 @@ void drape_pattern_place(const drape_pattern *pattern, const int32_t *block_of_n
                 *block++ = drape_pattern_find(pattern, block_of_node[node[a]], block_of_node[node[b]]);
     }
 }
+
+/* A block and its mirror, which may be itself. */
+static void symmetrize_block(double *a, int64_t stride, double *b, int64_t mirror_stride)
+{
+    for (int c = 0; c < 3; c++)
+        for (int r = 0; r < 3; r++) {
+            double *one = a + c * stride + r, *other = b + r * mirror_stride + c;
+            *one = *other = 0.5 * (*one + *other);
+        }
+}
+
+void drape_pattern_symmetrize(const drape_pattern *p, double *values)
+{
+    for (int32_t j = 0; j < p->block_count; j++)
+        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
+            int64_t stride, mirror_stride;
+            const int32_t i = p->block_row[k];
+            double *block = drape_pattern_at(p, values, j, k, &stride);
+            double *mirror = drape_pattern_at(p, values, i, drape_pattern_find(p, j, i), &mirror_stride);
+            symmetrize_block(block, stride, mirror, mirror_stride);
+        }
+}

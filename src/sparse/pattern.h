@@ -44,6 +44,9 @@ bool drape_pattern_has(const drape_pattern *pattern, int32_t row, int32_t column
 void drape_pattern_place(const drape_pattern *pattern, const int32_t *block_of_node,
                          const drape_coupling *coupling, int32_t *block);
 
+/* A becomes (A + A')/2; a symmetric one keeps its bits. */
+void drape_pattern_symmetrize(const drape_pattern *pattern, double *values);
+
 /* The first value of a block and the distance to its next column. */
 static inline double *drape_pattern_at(const drape_pattern *pattern, double *values, int32_t column,
                                        int32_t block, int64_t *stride)

@@ -8,21 +8,24 @@
 
 #define STEEP 1e-6 /* share of the warp that must lie in the plane of a triangle */
 
-void drape_orthotropic_law(const double *values, double strip, double poisson, double c[9])
+void drape_orthotropic_law(const double *values, const drape_woven *measured, double strip, double poisson,
+                           double c[9])
 {
-    const double given_warp = values[DRAPE_ORTHOTROPIC_WARP], given_weft = values[DRAPE_ORTHOTROPIC_WEFT];
-    const double given_shear = values[DRAPE_ORTHOTROPIC_SHEAR], given_nu = values[DRAPE_ORTHOTROPIC_POISSON];
-    const double warp = isnan(given_warp) ? strip : given_warp, weft = isnan(given_weft) ? strip : given_weft;
-    const double nu = isnan(given_nu) ? poisson : given_nu, mean = sqrt(warp * weft);
-    const double law[9] = {warp / (1 - nu * nu),
-                           nu * mean / (1 - nu * nu),
-                           0,
-                           nu * mean / (1 - nu * nu),
-                           weft / (1 - nu * nu),
-                           0,
-                           0,
-                           0,
-                           isnan(given_shear) ? mean / (2 * (1 + nu)) : given_shear};
+    const drape_woven isotropic = {strip, strip, NAN, poisson}, *of = measured ? measured : &isotropic;
+    const double given[] = {values[DRAPE_ORTHOTROPIC_WARP], values[DRAPE_ORTHOTROPIC_WEFT],
+                            values[DRAPE_ORTHOTROPIC_SHEAR], values[DRAPE_ORTHOTROPIC_POISSON]};
+    const double warp = isnan(given[0]) ? of->warp : given[0], weft = isnan(given[1]) ? of->weft : given[1];
+    const double shear = isnan(given[2]) ? of->shear : given[2],
+                 nu = isnan(given[3]) ? of->poisson : given[3];
+    const double mean = sqrt(warp * weft), law[9] = {warp / (1 - nu * nu),
+                                                     nu * mean / (1 - nu * nu),
+                                                     0,
+                                                     nu * mean / (1 - nu * nu),
+                                                     weft / (1 - nu * nu),
+                                                     0,
+                                                     0,
+                                                     0,
+                                                     isnan(shear) ? mean / (2 * (1 + nu)) : shear};
     memcpy(c, law, sizeof law);
 }
 

@@ -21,9 +21,10 @@ enum {
     DRAPE_ORTHOTROPIC_COUNT = DRAPE_ORTHOTROPIC_DIRECTION + 3
 };
 
-/* C (3 x 3) from values, of which those that are NaN are taken from an isotropic strip: its stiffness and
- * nu. */
-void drape_orthotropic_law(const double *values, double strip, double poisson, double c[9]);
+/* C (3 x 3) from values, of which those that are NaN are taken from what was measured; without that, NULL, from an
+ * isotropic strip: its stiffness and nu. */
+void drape_orthotropic_law(const double *values, const drape_woven *measured, double strip, double poisson,
+                           double c[9]);
 
 /* Two orthonormal axes (3 each) in the plane of a triangle at rest, the first along the warp, or along any
  * direction where the law has none; and its corners in them (3 x 2), the first at 0. Returns false where the
@@ -62,7 +63,8 @@ void drape_orthotropic_release(double c[9], const double *f, int count);
                                  .kind = DRAPE_PARAM_NUMBER,                                                 \
                                  .unit = unit_,                                                              \
                                  .default_value = NAN,                                                       \
-                                 .derived = "sqrt(warp weft)/(2 (1 + poisson)), as if isotropic",            \
+                                 .derived =                                                                  \
+                                     "of the fabric, or sqrt(warp weft)/(2 (1 + poisson)), as if isotropic", \
                                  .min = 0,                                                                   \
                                  .max = 1e15,                                                                \
                                  .open_min = true,                                                           \
@@ -71,7 +73,7 @@ void drape_orthotropic_release(double c[9], const double *f, int count);
                                    .kind = DRAPE_PARAM_NUMBER,                                               \
                                    .unit = "1",                                                              \
                                    .default_value = NAN,                                                     \
-                                   .derived = "the material's poisson_ratio",                                \
+                                   .derived = "of the fabric, or poisson_ratio",                             \
                                    .min = -1,                                                                \
                                    .max = 1,                                                                 \
                                    .open_min = true,                                                         \

@@ -263,24 +263,14 @@ static double rest_measure(const drape_cloth_view *cloth, const int32_t *node, c
     return q;
 }
 
-/* What the scene leaves to the material: of a measured fabric, or of an isotropic sheet. */
-static void law_of(const drape_material *m, const double *given, double law[9])
-{
-    double values[DRAPE_ORTHOTROPIC_COUNT];
-    const double measured[3] = {m->bending_warp, m->bending_weft, m->bending_twist};
-    memcpy(values, given, sizeof values);
-    for (int k = 0; k < 3; k++)
-        if (isnan(values[k]))
-            values[k] = measured[k];
-    drape_orthotropic_law(values, m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio),
-                          m->poisson_ratio, law);
-}
-
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     const double *bend = values + PARAM_CURVATURE;
     double law[9];
-    law_of(&cloth->material, values, law);
+    const drape_material *m = &cloth->material;
+    drape_orthotropic_law(values, cloth->bending,
+                          m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio), m->poisson_ratio,
+                          law);
     drape_status status = announce(cloth, values, law, builder);
     int32_t element = 0;
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {

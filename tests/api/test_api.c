@@ -1792,6 +1792,44 @@ START_TEST(nothing_leaks)
 }
 END_TEST
 
+static void count_line(void *user, drape_log_level level, const char *text)
+{
+    ck_assert_int_eq(level, DRAPE_LOG_INFO);
+    ck_assert_ptr_nonnull(strstr(text, "step rejected, max_iterations"));
+    ++*(int *)user;
+}
+
+/* One iteration does not bring the fall of a hung sheet to a millionth of its tolerance, at any step that is allowed. */
+START_TEST(the_log_of_a_host_is_told_of_rejections)
+{
+    int lines = 0;
+    drape_context_def def;
+    drape_context *ctx = NULL;
+    drape_model *model = NULL;
+    drape_context_def_init(&def, sizeof def);
+    def.log = count_line;
+    def.log_user = &lines;
+    ck_assert_int_eq(drape_context_create(&def, &ctx), DRAPE_OK);
+    drape_status status = compile_text(
+        ctx,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 3, 'edge_length': 0.1}, "
+        "'material': "
+        "{'young_modulus': 1e6, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge'], 'pins': "
+        "[{'nodes': [0]}], 'velocity': [0, 0, 3]}], 'integrator': {'dt': 0.1, 'max_iterations': 1, "
+        "'tolerance': "
+        "1e-12}, 'controller': {'type': 'halving', 'dt_min': 0.02}, 'duration': 1}",
+        &model);
+    ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
+    drape_sim *sim = make_sim(ctx, model);
+    ck_assert_int_eq(drape_sim_advance(sim, 1), DRAPE_E_STEP_TOO_SMALL);
+    ck_assert_int_gt(lines, 1);
+    ck_assert_int_eq(lines, (int)drape_sim_statistics(sim).steps_rejected);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 SUITE("api", destroying_nothing_is_fine, destroy_writes_null, null_arguments_are_told, no_model_has_nothing,
       defs_that_were_not_initialised_are_refused, shorter_defs_of_older_callers_are_read,
       every_older_def_is_read, defs_in_arrays_are_checked, half_an_allocator_is_refused, sim_defs_are_checked,
@@ -1806,4 +1844,4 @@ SUITE("api", destroying_nothing_is_fine, destroy_writes_null, null_arguments_are
       states_of_the_host_are_checked, frames_follow_the_time_of_a_state, a_push_repeats_no_frame,
       more_reasons_than_there_is_room_for_are_other, a_failure_names_what_is_distorted,
       a_sim_has_at_most_8_observers, threads_share_a_model, element_threads_change_no_bit,
-      statuses_have_names, messages_are_one_line, nothing_leaks)
+      statuses_have_names, messages_are_one_line, nothing_leaks, the_log_of_a_host_is_told_of_rejections)

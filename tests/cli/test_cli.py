@@ -14,7 +14,12 @@ import time
 
 from program import LIMIT, PROGRAM, SOURCES, Skip, drape, equal, good, read_json, read_npy, read_steps, refused, run_tests, scene, write_scene
 
-VERBS = ["run", "report", "info", "check", "list", "render", "view"]
+
+
+def verbs():
+    """Those that the program has."""
+    found = re.findall(r"^  (\w+) ", good("help"), re.M)
+    return [verb for verb in found if verb != "drape"]
 
 
 # ---- Help and usage
@@ -24,11 +29,16 @@ def test_help():
     """help of the program and of every verb is on stdout with exit 0"""
     overview = good("--help")
     equal(good("help"), overview)
-    for verb in VERBS:
-        assert re.search(rf"^  {verb} ", overview, re.M), verb
+    assert {"run", "report", "info", "check", "list", "render", "view"} <= set(verbs()), verbs()
+    for verb in verbs():
         text = good(verb, "--help")
         assert text.startswith(f"usage: drape {verb} "), text
         equal(good("help", verb), text)
+        equal(good(verb, "-h"), text)
+        options = re.findall(r"^  (--\S+)(?: [^ ]+)? +(.*)$", text, re.M)
+        assert all(len(words) > 8 for _, words in options) and "--help" in [option for option, _ in options], options
+        for option, _ in options:  # the parser knows what the help shows
+            assert "there is no option" not in drape(verb, "missing.json", option).stderr, option
     assert re.fullmatch(r"drape \d+\.\d+\.\d+\n", good("--version"))
 
 
@@ -453,7 +463,7 @@ def test_check():
 def test_scene_of_springs():
     """the scene in docs/springs.md is checked, described and run, below its strain limit"""
     with open(os.path.join(SOURCES, "docs", "springs.md"), encoding="utf-8") as file:
-        block = re.search(r"\n\n((?:    .*\n)+)", file.read()).group(1)
+        block = re.search(r"^```json\n(.*?)^```", file.read(), re.S | re.M).group(1)
     with open("scene.json", "w", encoding="utf-8") as file:
         file.write(block)
     text = good("info", "scene.json")
@@ -479,7 +489,29 @@ def test_list():
     rows = [line for line in good("list", "--markdown").splitlines() if line.startswith("|")]
     assert len(rows) > 40, rows
     for line in rows:
-        assert line.replace("\\|", "").count("|") in (4, 7), line
+        assert line.replace("\\|", "").count("|") in (4, 6, 7), line
+
+
+def test_list_of_keys():
+    """list shows the keys of a scene, object by object, with what each takes; every key of the schema is there"""
+    text = good("list", "scene")
+    for part in (r"\n  cloth +/cloth/N\n", r"\n  mesh +/cloth/N/mesh; exactly one of grid, file\n", r"\n    duration +the simulated time\n"
+                 r" +a number above 0 to 1e\+09; required \[s\]\n", r'"top-left", "top-right"', r"\n    row +a row of a grid, from 0\n +an integer from 0\n"):
+        assert re.search(part, text), (part, text)
+    equal(re.findall(r"^  (\S+)", good("list", "pin"), re.M), ["pin"])
+    assert text == good("list")[:len(text)]
+    refused("list", "clot", says='did you mean "cloth"?')
+    shown = set(re.findall(r"^\| `[^`]*` \| `([^`]*)`", good("list", "--markdown"), re.M))
+    wanted = set()
+
+    def collect(part):
+        for key, value in part.get("properties", {}).items():
+            wanted.add(key)
+            collect(value)
+        for value in [*filter(None, [part.get("items")]), *part.get("anyOf", [])]:
+            collect(value)
+    collect(json.loads(good("list", "--schema")))
+    assert len(wanted) > 100 and wanted <= shown, wanted - shown
 
 
 def test_info_of_contact():
@@ -581,6 +613,14 @@ def variants():
     yield False, scene(material={"young_modulus": 1e5, "thickness": 1e-3})
     yield False, scene(material={"young_modulus": 1e5, "thickness": 1e-3, "density": 1, "total_mass": 1})
     yield False, scene(material={"young_modulus": 1e5, "poisson_ratio": -1, "thickness": 1e-3, "density": 200})
+    fabric = {"fabric": "wang2011_denim"}
+    stiff = {"young_modulus": 1e5, "thickness": 1e-3}
+    for more in ({}, stiff, {"areal_density": 0.3}, {**stiff, "density": 200}, {"poisson_ratio": 0.1}, {"mass": "uniform"}):
+        yield True, scene(material={**fabric, **more})
+    for more in ({"young_modulus": 1e5}, {"thickness": 1e-3}, {"areal_density": 0.3, "total_mass": 1}, {"fabric": "denim"}, {"fabric": "none"}):
+        yield False, scene(material={**fabric, **more})
+    yield True, scene(material={**stiff, "fabric": "none", "density": 200})
+    yield False, scene(material={**stiff, "fabric": "none"})
     yield False, scene(pins=[{"nodes": [0], "row": 1}])
     yield False, scene(pins=[{"track": [[0, [0, 0, 0]]]}])
     yield False, scene(pins=[{"nodes": []}])
@@ -605,6 +645,30 @@ def test_schema_and_reader():
             json.dump(one, file)
         result = drape("info", "scene.json")
         equal(result.returncode, 0 if right else 2, json.dumps(one) + result.stderr)
+
+
+def test_fabric():
+    """a fabric alone is a material: woven terms take its own numbers, others those of the sheet that comes next to it"""
+    rows = good("list", "fabrics")
+    names = re.findall(r"^  (\w+) ", rows, re.M)
+    assert {"wang2011_denim", "feng2022_1", "matsudaira2015_wool"} <= set(names) and "none" not in names, names
+    equal(rows.count("["), len(names), "sources")
+    for name in names:
+        write_scene(material={"fabric": name}, terms=["stretch.cst", "bend.midedge"])
+        good("run", "scene.json")
+        write_scene(material={"fabric": name})
+        found = json.loads(good("info", "scene.json", "--json"))["cloths"][0]["material"]
+        equal(found["fabric"], name, "fabric")
+        # E h and E h^3/12 are the means of warp and weft, D = B/(1 - nu^2) with the nu of the lattice, 1/3.
+        assert abs(found["young_modulus"] * found["thickness"] / found["membrane_stiffness"] - 1) < 1e-9, found
+        assert 1e-5 < found["thickness"] < 2e-3, found
+    write_scene(material={"fabric": "wang2011_pants"})
+    found = json.loads(good("info", "scene.json", "--json"))["cloths"][0]["material"]
+    equal(found["tension"]["shear"], 104.759674, "what stretch.cst takes")
+    assert "104.759674 N/m, shear" in good("info", "scene.json")
+    assert abs(found["areal_density"] - 0.22) < 1e-12 and abs(found["flexural_rigidity"] / (125.409805e-6 / 4 * 9 / 8) - 1) < 1e-6, found
+    write_scene(material={"fabric": "wang2011_pants", "thickness": 1e-3})
+    refused("info", "scene.json", says="/cloth/0/material: \"young_modulus\" is missing")
 
 
 def test_cs184():

@@ -14,7 +14,6 @@ import json
 
 from program import PROGRAM, SOURCES, drape, equal, good, read_json, refused, run_tests, scene, write_scene
 
-CASES = 81  # of drape validate
 AXES = ["--axis", "/integrator/dt=1e-3:1e-1:3log", "--axis", "/cloth/0/material/young_modulus=1e4:1e6:2log"]
 
 
@@ -183,6 +182,8 @@ def test_recipes():
 
 def test_validate_goes_on():
     """validate --out keeps its cases and goes on after Ctrl-C"""
+    good("validate", "--scenes", "scenes")
+    cases = len(os.listdir("scenes"))
     with subprocess.Popen([PROGRAM, "validate", "--out", "v"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as child:
         for _ in range(6000):
             time.sleep(0.02)
@@ -192,7 +193,7 @@ def test_validate_goes_on():
         table, message = (text.decode() for text in child.communicate())
     equal(child.returncode, 130, "exit code")
     kept = [json.loads(line) for line in lines_there("v")]
-    equal(message, f"interrupted: {len(kept)} of {CASES} cases are done; the same command goes on\n", "message")
+    equal(message, f"interrupted: {len(kept)} of {cases} cases are done; the same command goes on\n", "message")
     assert table.count("pass") == len(kept) + 1, table  # and "passed" in the last line
     # The lines are of these cases: what is changed in them shows in the table, a case of another name is left out.
     kept[0]["obtained"] = 2 * kept[0]["expected"]
@@ -320,6 +321,75 @@ def test_wrong_words():
         refused("converge", "scene.json", "--levels", levels, "--out", "s", says="3 to 12")
     refused("merge", "nowhere", "--out", "s", says="nowhere")
     refused("merge", "--out", "s", says="DIR")
+
+
+def test_settings_without_effect():
+    """what no case takes from the command line is refused, not ignored; what some take acts"""
+    write_scene()
+    for verb, option in ((["tradeoff"], ["--dt", "0.01"]), (["tradeoff"], ["--integrator", "ida"]), (["tradeoff"], ["--format", "obj"]),
+                         (["tradeoff"], ["--set", "/integrator/rtol=1e-3"]), (["converge"], ["--dt", "0.01"]),
+                         (["stability", *AXES], ["--dt", "0.01"]), (["stability", *AXES], ["--integrator", "be"]),
+                         (["stability", *AXES], ["--set", "/cloth/0/material/young_modulus=1e5"]),
+                         (["stability", *AXES, "--integrators", "ida"], ["--tolerance", "1e-3"])):
+        refused(*verb, "scene.json", *option, "--out", "s", says="has no effect")
+        assert not os.path.exists("s"), (verb, option)
+    refused("tradeoff", "scene.json", "--threads", "2", "--out", "s", says="--jobs")
+    out = good("converge", "scene.json", "--integrators", "be", "--levels", "3", "--tolerance", "1e-3", "--out", "t")
+    assert "be: order" in out, out
+
+
+def test_folder_that_cannot_be_made():
+    """an --out that cannot be made is one line and exit code 1 in every verb; the input is good"""
+    write_scene()
+    good("run", "scene.json", "--out", "run")
+    with open("file", "w", encoding="utf-8") as file:
+        file.write("in the way\n")
+    verbs = [["run", "scene.json"], ["report", "run"], ["tradeoff", "scene.json"], ["stability", "scene.json", *AXES],
+             ["converge", "scene.json"], ["validate", "free_fall"]]
+    for verb in verbs:
+        result = drape(*verb, "--out", "file/x")
+        equal(result.returncode, 1, " ".join(verb))
+        assert re.fullmatch(r"[^\n]*file/x[^\n]*Not a directory\n", result.stderr), (verb, result.stderr)
+    equal(drape("validate", "free_fall", "--scenes", "file/x").returncode, 1, "validate --scenes")
+    equal(drape("run", "scene.json", "--summary", "file/x").returncode, 1, "run --summary")
+    good("stability", "scene.json", *AXES, "--integrators", "be", "--out", "s")
+    equal(drape("merge", "s", "--out", "file/x").returncode, 1, "merge")
+
+
+def test_no_reference():
+    """a tradeoff whose reference does not come to its end leaves no folder to an experiment that has no case"""
+    write_scene()
+    command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
+    result = drape(*command, "--case-seconds", "1e-9")
+    equal(result.returncode, 1, "exit code")
+    assert "give more by --case-seconds" in result.stderr, result.stderr
+    assert not os.path.exists("t"), os.listdir("t")
+    os.mkdir("t")
+    with open("t/mine", "w", encoding="utf-8") as file:
+        file.write("kept\n")
+    equal(drape(*command, "--case-seconds", "1e-9").returncode, 1, "exit code")
+    equal(os.listdir("t"), ["mine"], "what was there before")
+    good(*command)
+
+
+def test_map_is_labelled():
+    """axes of a map have units, and rejections a scale where there are some"""
+    write_scene()
+    good("stability", "scene.json", *AXES, "--integrators", "be,verlet", "--out", "s")
+    with open("s/map_verlet.gp", encoding="utf-8") as file:
+        script = file.read()
+    assert "set xlabel 'dt [s]'" in script and "set ylabel 'young_modulus [Pa]'" in script, script
+    assert "1 in 100" not in script, "a scale of rejections on a map without any"
+    # The lines say that cases were rejected: the report is made of them alone.
+    with open("s/cases.jsonl", encoding="utf-8") as file:
+        text = file.read()
+    with open("s/cases.jsonl", "w", encoding="utf-8") as file:
+        file.write(text.replace('"rejected":0', '"rejected":3'))
+    good("stability", "scene.json", *AXES, "--integrators", "be,verlet", "--out", "s")
+    with open("s/map_be.gp", encoding="utf-8") as file:
+        script = file.read()
+    for title in ("1 rejected in 1 000 steps", "1 in 100", "1 in 10", "1 a step"):
+        assert f"title '{title}'" in script, title
 
 
 def test_over_budget():

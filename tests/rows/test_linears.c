@@ -625,9 +625,31 @@ START_TEST(auto_picks_by_size_and_says_so)
 }
 END_TEST
 
+/* A + B with B' = -B has A as its symmetric part, to the rounding of the sum; A alone keeps its bits. */
+START_TEST(the_symmetric_part_is_that)
+{
+    sheet q = open_sheet(8);
+    fill_sheet(&q, 1, 7);
+    double *symmetric = take((size_t)q.p.nonzeros, sizeof *symmetric);
+    memcpy(symmetric, q.values, (size_t)q.p.nonzeros * sizeof *symmetric);
+    drape_pattern_symmetrize(&q.p, q.values);
+    ck_assert(memcmp(symmetric, q.values, (size_t)q.p.nonzeros * sizeof *symmetric) == 0);
+    for (int64_t c = 0; c < q.p.n; c++)
+        for (int64_t k = q.p.column[c]; k < q.p.column[c + 1]; k++) {
+            const int64_t r = q.p.row[k];
+            q.values[k] += sin((double)(r * r - c * c)); /* odd in (r, c) */
+        }
+    drape_pattern_symmetrize(&q.p, q.values);
+    for (int64_t k = 0; k < q.p.nonzeros; k++)
+        ck_assert_double_eq_tol(q.values[k], symmetric[k], 2 * DBL_EPSILON * (fabs(symmetric[k]) + 1));
+    free(symmetric);
+    close_sheet(&q);
+}
+END_TEST
+
 SUITE("linears", rows_are_well_formed, random_systems_are_solved,
       several_right_hand_sides_of_one_factorisation, broken_matrices_are_told_and_good_ones_work_again,
       a_right_hand_side_that_is_not_finite_is_told, kept_pivots_that_become_zero_are_chosen_again,
       a_small_part_that_is_not_symmetric_is_not_lost, fallbacks_are_counted, a_sheet_of_many_supernodes,
       threads_give_the_same_bits, no_memory_for_the_fallback, made_again_on_other_patterns,
-      auto_picks_by_size_and_says_so)
+      auto_picks_by_size_and_says_so, the_symmetric_part_is_that)

@@ -3,8 +3,8 @@
  * both kinds of pairs: energy and force, force and Hessian, friction by velocity and by position, the
  * mollifier where edges are nearly parallel. Ways that are called free are.
  */
+#include "colliders/bvh.h"
 #include "contact/barrier.h"
-#include "contact/bvh.h"
 #include "contact/pair.h"
 #include "support/suite.h"
 

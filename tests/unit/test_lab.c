@@ -1,9 +1,11 @@
 /* test_lab.c: what experiments measure with: lines through powers, material points on other meshes, distances. */
 #include "lab/statistics.h"
 #include "lab/trace.h"
+#include "lab/units.h"
 #include "support/suite.h"
 
 #include <math.h>
+#include <string.h>
 
 static drape_context *new_context(void)
 {
@@ -116,5 +118,30 @@ START_TEST(a_distance_is_of_the_free_nodes)
 }
 END_TEST
 
+START_TEST(a_value_of_a_scene_has_its_unit)
+{
+    static const struct {
+        const char *pointer, *unit;
+    } known[] = {{"/integrator/dt", "s"},
+                 {"/integrator/rtol", ""}, /* a number */
+                 {"/integrator/max_order", ""},
+                 {"/cloth/0/material/young_modulus", "Pa"},
+                 {"/cloth/3/material/density", "kg/m3"},
+                 {"/cloth/0/mesh/edge_length", "m"},
+                 {"/cloth/0/mesh/columns", ""},
+                 {"/cloth/0/terms/2/beta", "s"},
+                 {"/cloth/0/terms/2/warp", ""}, /* N/m of stretch.cst, N m of bend.midedge */
+                 {"/colliders/0/radius", "m"},
+                 {"/contact/distance", "m"},
+                 {"/self_contact/thickness", "m"},
+                 {"/gravity/1", "m/s2"},
+                 {"/controller/dt_min", "s"},
+                 {"/nowhere/dt", ""}};
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+        ck_assert_msg(strcmp(lab_unit(known[i].pointer), known[i].unit) == 0, "%s: \"%s\", not \"%s\"",
+                      known[i].pointer, lab_unit(known[i].pointer), known[i].unit);
+}
+END_TEST
+
 SUITE("lab", a_power_is_found_exactly, confidence_is_students, a_linear_field_is_taken_exactly,
-      a_distance_is_of_the_free_nodes)
+      a_distance_is_of_the_free_nodes, a_value_of_a_scene_has_its_unit)

@@ -1,12 +1,14 @@
 /*
- * bvh.h: a tree of boxes over edges or triangles. Its shape is made once, from the rest positions, so that a
- * branch is a patch of cloth; the boxes are fitted to any positions. Queries visit in an order that does not
+ * bvh.h: a tree of boxes over edges or triangles, of cloth or of a collider. Its shape is made once, from the rest
+ * positions, so that a branch is a patch of cloth; the boxes are fitted to any positions. Queries visit in an order that does not
  * depend on the positions: sums over what they find have the same bits however it was found.
  */
-#ifndef DRAPE_CONTACT_BVH_H
-#define DRAPE_CONTACT_BVH_H
+#ifndef DRAPE_COLLIDERS_BVH_H
+#define DRAPE_COLLIDERS_BVH_H
 
 #include "base/context.h"
+
+#define DRAPE_BVH_DEPTH 64 /* of a stack for a walk: halving 2^31 elements takes 31 */
 
 typedef struct drape_box {
     double low[3], high[3];

@@ -1,12 +1,11 @@
 /* bvh.c: see bvh.h. */
-#include "contact/bvh.h"
+#include "colliders/bvh.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define LEAF  1  /* elements of a leaf: its box is theirs */
-#define DEPTH 64 /* halving 2^31 elements takes 31 */
+#define LEAF 1 /* elements of a leaf: its box is theirs */
 
 /* ---- Building ---- */
 
@@ -169,7 +168,7 @@ static bool meet(const drape_box *a, const drape_box *b)
 
 void drape_bvh_query(const drape_bvh *bvh, const drape_box *box, drape_bvh_visit *visit, void *user)
 {
-    int32_t waiting[DEPTH];
+    int32_t waiting[DRAPE_BVH_DEPTH];
     int count = 0;
     if (bvh->branch_count > 0)
         waiting[count++] = 0;

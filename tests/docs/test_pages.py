@@ -1,0 +1,360 @@
+#!/usr/bin/env python3
+"""test_pages.py: what the pages say, done: README.md, CONTRIBUTING.md, docs/*.md. Every block of code is run, and every link leads somewhere. See
+tests/cli/program.py.
+
+A block is fenced and names its language. `sh` runs in a folder with a scene (SCENE, scene.json), a finished run of it (RUN), the examples, and the
+program on its path; what one block of a page leaves, the next one finds. `json` is a scene, or members of one. `c` is a program, or functions and
+statements of one with a context ctx, a model and a sim. `python` runs. `text` is what a command prints. What stands before a block may say more:
+
+    <!-- not run: WHY -->           it cannot be
+    <!-- printed by: COMMAND -->    a text is what that prints, to the letter
+    <!-- from: FILE -->             it stands in that file
+"""
+import glob
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "cli"))
+from program import PROGRAM, SOURCES, Skip, drape, equal, good, run_tests, scene  # noqa: E402  pylint: disable=wrong-import-position
+
+BUILD = os.path.dirname(PROGRAM)
+PAGES = ["README.md", "CONTRIBUTING.md"] + sorted("docs/" + os.path.basename(path) for path in glob.glob(SOURCES + "/docs/*.md"))
+LANGUAGES = ("sh", "json", "c", "python", "text")
+FENCE = re.compile(r"^(?: *<!-- (?P<kind>[a-z ]+): (?P<said>.*?) -->\n)?(?P<indent> *)```(?P<language>\w*)\n(?P<text>.*?)^ *```$", re.S | re.M)
+HEADS = {"scene": ("cloth",), "cloth": ("mesh", "material", "terms", "pins", "velocity")}
+
+# What a page's C programs print: that they did what it says.
+PRINTS = {"README.md": ["node 0 is at"], "docs/embedding.md": ["my scene:1:", "node 0 at"]}
+
+# Around fragments: a sheet of 30 nodes in the wind, hung by two corners over a ball.
+FRAME_SCENE = """{"drape": 1, "cloth": [{"mesh": {"grid": "square", "columns": 6, "rows": 5, "width": 0.5, "height": 0.4},
+  "material": {"young_modulus": 1e4, "thickness": 1e-3, "density": 200}, "terms": ["stretch.edge", "bend.hinge", "drag.wind"],
+  "pins": [{"corner": "top-left"}, {"corner": "top-right"}]}],
+  "colliders": [{"type": "sphere", "center": [0.25, -0.5, -0.2], "radius": 0.2}], "duration": 1}"""
+FRAME = """#include <drape/extend.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#define CHECK(call) do { if (call) { puts(drape_context_message(ctx)); return 1; } } while (0)
+%s
+int main(void)
+{
+    drape_context *ctx = NULL;
+    drape_model *model = NULL;
+    drape_sim *sim = NULL;
+    if (drape_context_create(NULL, &ctx)) return 1;
+    CHECK(drape_model_load(ctx, "scene.json", &model));
+    CHECK(drape_sim_create(ctx, model, NULL, &sim));
+    %s
+    drape_sim_destroy(&sim), drape_model_destroy(&model), drape_context_destroy(&ctx);
+    return 0;
+}
+"""
+
+
+def read(page):
+    with open(os.path.join(SOURCES, page), encoding="utf-8") as file:
+        return file.read()
+
+
+class Block:
+    def __init__(self, page, match):
+        self.place = f"{page}:{read(page).count(chr(10), 0, match.end('indent')) + 1}"
+        self.language, self.kind, self.said = match["language"], match["kind"], match["said"]
+        self.text = re.sub(rf"^{match['indent']}", "", match["text"], flags=re.M)
+
+
+def blocks(page):
+    return [Block(page, match) for match in FENCE.finditer(read(page))]
+
+
+# ---- Doing what they say
+
+
+def done(command, place, **options):
+    result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=300, check=False, **options)
+    assert result.returncode == 0, f"{place}: exit {result.returncode}:\n{result.stdout}"
+    return result.stdout
+
+
+def need_programs(text):
+    """What a build or a machine may lack."""
+    verbs = good("help")
+    for verb in re.findall(r"^drape (\w+)", text, re.M):
+        if not re.search(rf"^  {verb} ", verbs, re.M):
+            raise Skip(f"no {verb} in this build")
+    if re.search(r"\.(mp4|webm|gif)\b", text) and not shutil.which("ffmpeg"):
+        raise Skip("no ffmpeg")
+    if "drape render" in text:
+        tried = drape("render", "SCENE", "--size", "16x16", "--out", "tried.png")
+        if tried.returncode == 2:
+            raise Skip(tried.stderr.strip())
+        os.remove("tried.png")
+
+
+def run_sh(block):
+    need_programs(block.text)
+    done(["bash", "-euo", "pipefail", "-c", block.text], block.place)
+
+
+def run_json(block):
+    text = block.text
+    try:
+        whole = json.loads(text)
+    except ValueError:
+        whole = {**scene(), **json.loads("{" + text + "}")}
+        cloth = whole["cloth"][0]
+        for key in HEADS["cloth"]:
+            if key in whole:
+                cloth[key] = whole.pop(key)
+    with open("block.json", "w", encoding="utf-8") as file:
+        json.dump(whole, file)
+    done([PROGRAM, "check", "block.json"], block.place)
+
+
+def compiled(text, place):
+    library = os.path.join(BUILD, "src", "libdrape.so")
+    if not os.path.exists(library):
+        raise Skip("no shared library in this build")
+    with open("block.c", "w", encoding="utf-8") as file:
+        file.write(text)
+    done(["cc", "-Wall", "-Werror", "-I", SOURCES + "/include", "block.c", library, "-Wl,-rpath," + os.path.dirname(library), "-lm", "-o", "block"], place)
+    return done(["./block"], place)
+
+
+def run_c(page, found):
+    """Programs as they are; of fragments, the functions before main and the statements inside, in the order of the page, each in a scope."""
+    output = "".join(compiled(block.text, block.place) for block in found if "int main(" in block.text)
+    rest = [block for block in found if "int main(" not in block.text]
+    if rest:
+        functions = [block.text for block in rest if block.text.startswith("static ")]
+        inside = ["{\n" + block.text + "}\n" for block in rest if not block.text.startswith("static ")]
+        with open("scene.json", "w", encoding="utf-8") as file:
+            file.write(FRAME_SCENE)
+        output += compiled(FRAME % ("".join(functions), "".join(inside)), page)
+    for words in PRINTS.get(page, []):
+        assert words in output, f"{page}: its programs do not print {words!r}:\n{output}"
+
+
+def run_text(block):
+    assert block.kind == "printed by", f"{block.place}: a text says what it is: <!-- printed by: COMMAND --> or <!-- not run: WHY -->"
+    command = block.said.split()
+    assert command[0] == "drape", block.place
+    found = good(*command[1:])
+    if found != block.text and "tradeoff" not in good("help"):
+        raise Skip("this build has fewer verbs")
+    equal(block.text, found, block.place + ": " + block.said)
+
+
+def run_python(block):
+    done([sys.executable, "-c", block.text], block.place, env={**os.environ, "LD_LIBRARY_PATH": BUILD + "/src"})
+
+
+def stands_in(block):
+    def lean(text):
+        return " ".join(text.split())
+    assert lean(block.text) in lean(read(block.said)), f"{block.place}: does not stand in {block.said}"
+
+
+RUN = {"sh": run_sh, "json": run_json, "text": run_text, "python": run_python}
+
+
+def prepare():
+    """The folder that a page is tried in."""
+    for name in "SCENE", "scene.json":
+        with open(name, "w", encoding="utf-8") as file:
+            json.dump(scene(), file)
+    good("run", "SCENE", "--out", "RUN")
+    shutil.copytree(SOURCES + "/examples", "examples", ignore=shutil.ignore_patterns("__pycache__"))
+
+
+def run_page(page):
+    """Returns how many blocks were run, marked, and skipped, and why those were."""
+    counts, reasons, programs = {"run": 0, "marked": 0, "skipped": 0}, [], []
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        prepare()
+        for block in blocks(page):
+            assert block.language in LANGUAGES, f"{block.place}: a block says its language, one of {LANGUAGES}"
+            if block.kind == "not run":
+                counts["marked"] += 1
+                reasons.append(f"{block.place}: not run: {block.said}")
+            elif block.kind == "from":
+                stands_in(block)
+                counts["run"] += 1
+            elif block.language == "c":
+                programs.append(block)
+            else:
+                counts["run"] += 1
+                try:
+                    RUN[block.language](block)
+                except Skip as reason:
+                    counts["run"] -= 1
+                    counts["skipped"] += 1
+                    reasons.append(f"{block.place}: skipped: {reason}")
+        prepare_again = {"scene.json": "SCENE"}
+        for name, source in prepare_again.items():
+            shutil.copy(source, name)
+        try:
+            run_c(page, programs)
+            counts["run"] += len(programs)
+        except Skip as reason:
+            counts["skipped"] += len(programs)
+            reasons.append(f"{page}: programs skipped: {reason}")
+        os.chdir("/")
+    return counts, reasons
+
+
+def test_the_net():
+    """what a page could do wrong is seen"""
+    def tried(text):
+        matches = [Block("README.md", match) for match in FENCE.finditer(text)]
+        return [(block.language, block.kind, block.text) for block in matches]
+    equal(tried("```sh\nfalse\n```\n"), [("sh", None, "false\n")])
+    equal(tried("<!-- not run: a -->\n   ```text\n   x\n   ```\n"), [("text", "not run", "x\n")])
+    block = next(Block("README.md", match) for match in FENCE.finditer("```sh\nfalse\ntrue\n```\n"))
+    for wrong in (lambda: run_sh(block), lambda: compiled("int main(void) { return 1; }\n", "x"), lambda: compiled("int main(void) { oops }\n", "x")):
+        try:
+            wrong()
+        except (AssertionError, Skip):
+            continue
+        raise AssertionError("was taken")
+
+
+def test_blocks():
+    """every block of code is run, or says why it is not"""
+    os.environ["PATH"] = BUILD + os.pathsep + os.environ["PATH"]
+    total, failed = {"run": 0, "marked": 0, "skipped": 0}, []
+    for page in PAGES:
+        try:
+            counts, reasons = run_page(page)
+        except (AssertionError, ValueError, subprocess.TimeoutExpired) as error:
+            os.chdir("/")
+            failed.append(f"{page}: {error}")
+            continue
+        for line in reasons:
+            print("#", line)
+        print(f"# {page}: {counts['run']} run, {counts['marked']} marked, {counts['skipped']} skipped", flush=True)
+        total = {key: total[key] + counts[key] for key in total}
+    print(f"# all pages: {total['run']} blocks run, {total['marked']} marked, {total['skipped']} skipped")
+    assert not failed, "\n".join(failed)
+
+
+def test_no_other_blocks():
+    """no block is indented: it would be overlooked"""
+    for page in PAGES:
+        text = re.sub(FENCE, lambda match: "\n" * match[0].count("\n"), read(page))
+        for number, line in enumerate(text.split("\n"), 1):
+            before = text.split("\n")[number - 2] if number > 1 else ""
+            assert not (line.startswith("    ") and not before.strip()), f"{page}:{number}: an indented block: {line}"
+            assert "```" not in line, f"{page}:{number}: a fence without its other end"
+
+
+# ---- Links
+
+
+def slug(heading):
+    """As GitHub makes them."""
+    return re.sub(r" ", "-", re.sub(r"[^\w\- ]", "", re.sub(r"[`*]", "", heading).strip().lower()))
+
+
+def anchors(path):
+    with open(path, encoding="utf-8") as file:
+        return {slug(heading) for heading in re.findall(r"^#+ (.*)$", file.read(), re.M)}
+
+
+def dead_links(page, text):
+    for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(FENCE, "", text)):
+        if re.match(r"https?:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        whole = os.path.normpath(os.path.join(SOURCES, os.path.dirname(page), path)) if path else os.path.join(SOURCES, page)
+        if not os.path.exists(whole):
+            yield f"{page}: {target}: there is no such file"
+        elif anchor and anchor not in anchors(whole):
+            yield f"{page}: {target}: there is no such heading"
+
+
+def test_links():
+    """no link leads nowhere, from README, CONTRIBUTING, docs, CHANGELOG, the map of the source"""
+    pages = PAGES + ["CHANGELOG.md", "src/README.md"]
+    dead = [line for page in pages for line in dead_links(page, read(page))]
+    assert not dead, "\n".join(dead)
+    assert list(dead_links("README.md", "[x](docs/no.md) [y](docs/lab.md#no)")) != []
+    count = sum(len(re.findall(r"\]\((?!http)", read(page))) for page in pages)
+    assert count > 60, count
+
+
+def test_paths():
+    """files that the pages name in the tree are there"""
+    named = re.compile(r"`((?:src|tests|tools|examples|bench|docs|include)/[\w./*-]+)`")
+    for page in PAGES + ["src/README.md"]:
+        for path in named.findall(read(page)):
+            if not re.fullmatch(r"docs/\w+", path):  # that is a test
+                assert glob.glob(os.path.join(SOURCES, path)), f"{page}: `{path}` is not there"
+
+
+def test_pages_are_found():
+    """every page is linked from README or from the index"""
+    text = read("README.md") + read("docs/index.md")
+    for page in PAGES[2:]:
+        name = os.path.basename(page)
+        assert name == "index.md" or re.search(rf"\((docs/)?{re.escape(name)}[)#]", text), f"{page} is linked from nowhere"
+
+
+def test_scene_page():
+    """the tables of docs/scene.md are those of the program: tools/tables writes them anew"""
+    marker = "<!-- drape list --markdown -->\n"
+    head, found = read("docs/scene.md").split(marker)
+    assert len(head) > 500
+    printed = good("list", "--markdown")
+    if "| `cholmod` |" in printed and "| `wireframe` |" in printed:
+        equal(found, printed, "docs/scene.md; tools/tables writes it")
+    choices = re.compile(r"^\| `\w+` \| `linear_solver` |^\| `auto` ")  # they name the solvers of a build
+    missing = [line for line in printed.splitlines() if line not in found.splitlines() and not choices.match(line)]
+    assert not missing, missing
+
+
+def test_statuses():
+    """each status and each reason why a step was rejected is explained in docs/output.md"""
+    page = read("docs/output.md")
+    header = read("include/drape/drape.h")
+    names = [name.lower() for name in re.findall(r"^    DRAPE_((?:OK|RETRY_\w+|E_\w+)) = ", header, re.M)]
+    reasons = set()
+    for path in glob.glob(SOURCES + "/src/*/*.c"):
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
+        for said in re.findall(r"\breason = ([^;]*);|drape_rung_fail\(([^;]*);|\bkeep_worst\(([^;]*);|drape_fault \w+ = \{([^;]*);", text):
+            reasons |= set(re.findall(r'^[^"]*?"([a-z_]+)"|: "([a-z_]+)"', "".join(said)))
+    reasons = {a or b for a, b in reasons}
+    assert len(names) > 10 and len(reasons) > 15, (names, reasons)
+    missing = [name for name in names + sorted(reasons) if f"`{name}`" not in page]
+    assert not missing, missing
+
+
+def test_summary():
+    """each key of a summary.json and each column of the tables of a run is explained in docs/output.md"""
+    page = read("docs/output.md")
+    with open(SOURCES + "/src/io/summary.c", encoding="utf-8") as file:
+        wanted = set(re.findall(r'(?:\{|with\(\w+(?:\(\))?, )"([a-z_]\w*)"', file.read()))
+    with open("scene.json", "w", encoding="utf-8") as file:
+        json.dump(scene(), file)
+    good("run", "scene.json", "--out", "out", "--realtime", "--integrator", "newton_k")
+    with open("out/summary.json", encoding="utf-8") as file:
+        summary = json.load(file)
+    for key, value in summary.items():
+        wanted |= {key, *(value if isinstance(value, dict) else [])}
+    for name in "steps.csv", "energy.csv":
+        with open("out/" + name, encoding="ascii") as file:
+            wanted |= set(file.readline().strip().split(","))
+    assert len(wanted) > 60, wanted
+    missing = sorted(key for key in wanted if f"`{key}`" not in page)
+    assert not missing, missing
+
+
+sys.exit(run_tests(globals()))
