@@ -1,5 +1,4 @@
 /* test_import.c: OBJ and PLY: what is read, what each fault says, truncated and hostile data, files. */
-#include <locale.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -8,6 +7,7 @@
 #include <unistd.h>
 
 #include "mesh/mesh.h"
+#include "support/comma.h"
 #include "support/failing_allocator.h"
 #include "support/suite.h"
 
@@ -688,9 +688,7 @@ START_TEST(numbers_do_not_depend_on_the_locale)
 {
     const folder f = new_folder();
     const char *obj = "v 0.5 0 0\nv 1.25 0 0\nv 0 1.5 0\nf 1 2 3\n";
-    static const char *const commas[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "de_DE"};
-    for (size_t i = 0; i < COUNT(commas) && !setlocale(LC_ALL, commas[i]); i++) {
-    } /* where none is installed this is the C locale again */
+    comma_begin();
     drape_context *ctx = new_context();
     drape_mesh mesh;
     write_file(&f, "a.obj", obj, strlen(obj));
@@ -698,7 +696,7 @@ START_TEST(numbers_do_not_depend_on_the_locale)
     ck_assert_double_eq(mesh.x[3], 1.25);
     drape_mesh_free(ctx, &mesh);
     drape_context_destroy(&ctx);
-    setlocale(LC_ALL, "C");
+    comma_end();
     remove_file(&f, "a.obj");
     rmdir(f.path);
 }

@@ -1,6 +1,5 @@
 /* test_scene.c: the text of a scene becomes the right defs, or one line that says what is wrong and where. */
 #include <jansson.h>
-#include <locale.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -9,6 +8,7 @@
 
 #include "model/scene.h"
 #include "model/scene_text.h"
+#include "support/comma.h"
 #include "support/failing_allocator.h"
 #include "support/suite.h"
 
@@ -1055,21 +1055,17 @@ START_TEST(test_many_nodes)
 }
 END_TEST
 
-/* A host's decimal comma must not reach the numbers. Where no such locale is installed there is nothing to
- * see. */
+/* A host's decimal comma must not reach the numbers. */
 START_TEST(test_locale)
 {
-    const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "C"};
-    size_t i = 0;
-    while (!setlocale(LC_ALL, names[i]))
-        i++;
+    comma_begin();
     open_context();
     ck_assert_int_eq(read_quoted(ROOT("'gravity': [0, -1.5, 0]")), DRAPE_OK);
     ck_assert_double_eq(def.gravity[1], -1.5);
     ck_assert_int_eq(drape_scene_set(scene, "/duration", "-0.5"), DRAPE_OK);
     ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
     ck_assert_ptr_nonnull(strstr(message(), "/duration: -0.5 is not allowed"));
-    setlocale(LC_ALL, "C");
+    comma_end();
     close_context();
 }
 END_TEST
