@@ -1,0 +1,92 @@
+/*
+ * test_clock.c: the clock jumps, forwards and back, as that of a machine which sleeps or is moved, though CLOCK_MONOTONIC should
+ * not: steps have the same bits, a budget ends a call and no call hangs, and what is told of time is finite. clock_gettime
+ * is taken from under the library.
+ */
+#define _GNU_SOURCE
+#include "support/scene.h"
+
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
+
+#define FRAME (1.0 / 60)
+
+static const char hung[] =
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 1, 'height': 1},"
+    "'material': {'young_modulus': 968246, 'thickness': 1.0328e-3, 'areal_density': 0.2},"
+    "'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'corner': 'top-left'}, {'corner': 'top-right'}]}],"
+    "'integrator': {'method': '%s'}, 'duration': 4}";
+
+static const char *const rows[] = {"newton_k", "projective", "be", "ida", "verlet"};
+#define ROWS (sizeof rows / sizeof *rows)
+
+static long jump_each, reads; /* jump_each: calls between two jumps; 0: the clock is good */
+static double away;           /* [s] that it is off */
+
+int clock_gettime(clockid_t id, struct timespec *t)
+{
+    static const double jumps[] = {3600, -7200, 1e-3, -1e-3, 1e9, -1e9};
+    int result = (int)syscall(SYS_clock_gettime, id, t);
+    if (jump_each && ++reads % jump_each == 0)
+        away += jumps[reads / jump_each % (long)(sizeof jumps / sizeof *jumps)];
+    if (jump_each)
+        t->tv_sec += (time_t)away;
+    return result;
+}
+
+static void jump(long each)
+{
+    jump_each = each;
+    reads = 0;
+    away = 0;
+}
+
+START_TEST(steps_do_not_depend_on_the_clock)
+{
+    for (size_t i = 0; i < ROWS; i++) {
+        scene good = scene_open(hung, rows[i]);
+        scene_advance(&good, 20 * FRAME);
+        jump(3);
+        scene bad = scene_open(hung, rows[i]);
+        scene_advance(&bad, 20 * FRAME);
+        ck_assert_int_gt(reads, 0); /* it was asked */
+        jump(0);
+        ck_assert_uint_eq(drape_sim_hash(good.sim), drape_sim_hash(bad.sim));
+        const drape_statistics s = drape_sim_statistics(bad.sim);
+        ck_assert(isfinite(s.wall_steps) && isfinite(s.wall_residual) && isfinite(s.wall_factor));
+        scene_close(&good);
+        scene_close(&bad);
+    }
+}
+END_TEST
+
+/* Whatever it believes of the time that is left, a call makes no more steps than the frame and the debt ask for at the
+ * row's own step, and the state is good. */
+START_TEST(a_budget_on_a_jumping_clock_ends)
+{
+    for (size_t i = 0; i < ROWS; i++)
+        for (long each = 1; each < 8; each++) {
+            scene s = scene_open(hung, rows[i]);
+            double before = 0;
+            jump(each);
+            for (int k = 0; k < 20; k++) {
+                drape_realtime report;
+                drape_status status = drape_sim_advance_realtime(s.sim, FRAME, 1e-3, &report);
+                ck_assert_msg(status == DRAPE_OK, "%s: %s", rows[i], drape_context_message(s.ctx));
+                ck_assert(report.time >= before && report.time <= (k + 1) * FRAME * (1 + 1e-9));
+                ck_assert(isfinite(report.debt) && report.debt >= 0 && isfinite(report.seconds));
+                ck_assert(isfinite(report.dropped_total) && report.dropped_total >= 0);
+                before = report.time;
+            }
+            jump(0);
+            ck_assert_int_eq(drape_sim_advance(s.sim, before + FRAME), DRAPE_OK);
+            const double *x = drape_sim_positions(s.sim);
+            for (size_t n = 0; n < 3 * (size_t)s.model->node_count; n++)
+                ck_assert(isfinite(x[n]));
+            scene_close(&s);
+        }
+}
+END_TEST
+
+SUITE("clock", steps_do_not_depend_on_the_clock, a_budget_on_a_jumping_clock_ends)
