@@ -143,8 +143,12 @@ static int find(const char *name, const drape_reference **only)
             return CLI_GO_ON;
         }
     }
+    char all[2048] = "";
+    for (size_t i = 0; i < count; i++)
+        snprintf(all + strlen(all), sizeof all - strlen(all), "%s%s", i ? ", " : "", names[i]);
     const char *meant = drape_did_you_mean(name, names, count);
-    return cli_misuse("validate", "there is no reference \"%.60s\"%s%s%s", name, DRAPE_MEANT(meant));
+    return cli_misuse("validate", "there is no reference \"%.60s\"%s%s%s; there are %s", name,
+                      DRAPE_MEANT(meant), all);
 }
 
 static bool interrupted(void *user)
@@ -292,7 +296,7 @@ const drape_verb drape_verb_validate = {
         "closed form,\n"
         "series or differential equation that it is known by. Terms that converge to something else "
         "show that as\n"
-        "a documented model error. Exit code 0: none failed. All of them take two minutes of CPU time.",
+        "a documented model error. Exit code 0: none failed. All of them take four minutes of CPU time.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .run = main_validate,

@@ -34,7 +34,8 @@ static const drape_param params[PARAM_COUNT] = {
                      .min = 0,
                      .max = 100,
                      .open_min = true,
-                     .help = "strain |e|/L - 1 that no accepted state exceeds"},
+                     .help = "strain |e|/L - 1 that no accepted state of an implicit row exceeds; verlet "
+                             "leaves it out, and has strain_limit"},
     [PARAM_ONSET] = {.name = "onset",
                      .kind = DRAPE_PARAM_NUMBER,
                      .unit = "1",
