@@ -1,13 +1,21 @@
 /* cusick.c: see cusick.h. */
 #include "lab/cusick.h"
 
+#include "lab/fabric.h"
+#include "lab/strip.h"
+
 #include <math.h>
 #include <stdio.h>
 
-#define PI 3.14159265358979323846
+#define PI     3.14159265358979323846
+#define ROWS   13
+#define SPOKES 112
+#define TENSION                                                                                              \
+    100.0 /* [N/m], a fiftieth of a woven one's: flat triangles bend across their edges only as far as they stretch */
 
-int cusick_scene(const drape_fabric *fabric, int rows, int columns, char *text, size_t size)
+int cusick_scene(double place, double load, char *text, size_t size)
 {
+    (void)load;
     return snprintf(
         text, size,
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'annulus', 'rows': %d, 'columns': %d, 'inner_radius': %g, "
@@ -16,19 +24,21 @@ int cusick_scene(const drape_fabric *fabric, int rows, int columns, char *text, 
         "'coefficient': 1}], 'pins': [{'edge': 'top', 'clamp': true}]}],\n 'gravity': [0, -9.81, 0], "
         "'integrator': {'method': 'be', 'dt': 0.02, 'tolerance': 1e-6, 'globalization': 'work'}, 'duration': "
         "1}",
-        rows, columns, CUSICK_INNER, CUSICK_OUTER, fabric->name, CUSICK_TENSION / 1e-3);
+        ROWS, SPOKES, CUSICK_INNER, CUSICK_OUTER, fabric_at(place)->name, TENSION / 1e-3);
 }
 
 /* The area inside the shadow of the outer rim, by its corners. Folds that hang under others would be counted with their
  * sign; specimens of 30 cm do not do that. */
-double cusick_coefficient(const drape_reference_run *run, int32_t spokes)
+drape_status cusick_measure(drape_reference_run *run, double *value)
 {
+    drape_status status = lab_advance(run);
     const int32_t nodes = drape_model_node_count(run->model);
-    const double *rim = drape_sim_positions(run->sim) + 3 * (size_t)(nodes - spokes);
+    const double *rim = drape_sim_positions(run->sim) + 3 * (size_t)(nodes - SPOKES);
     double twice = 0, inner = PI * CUSICK_INNER * CUSICK_INNER, outer = PI * CUSICK_OUTER * CUSICK_OUTER;
-    for (int32_t i = 0; i < spokes; i++) {
-        const double *a = rim + 3 * (size_t)i, *b = rim + 3 * (size_t)((i + 1) % spokes);
+    for (int32_t i = 0; i < SPOKES; i++) {
+        const double *a = rim + 3 * (size_t)i, *b = rim + 3 * (size_t)((i + 1) % SPOKES);
         twice += a[2] * b[0] - a[0] * b[2];
     }
-    return (twice / 2 - inner) / (outer - inner);
+    *value = (twice / 2 - inner) / (outer - inner);
+    return status;
 }

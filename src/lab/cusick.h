@@ -3,18 +3,20 @@
 #ifndef DRAPE_LAB_CUSICK_H
 #define DRAPE_LAB_CUSICK_H
 
-#include "compile/fabrics.h"
 #include "lab/validate.h"
 
 #define CUSICK_INNER 0.09 /* [m] */
 #define CUSICK_OUTER 0.15
 
-/* The overhang of a measured fabric, let go level, that falls for 1 s and folds; rows circles of so many columns. Its tension
- * is CUSICK_TENSION, a fiftieth of a woven one's: flat triangles bend across their edges only as far as they stretch. */
-#define CUSICK_TENSION 100.0 /* [N/m] */
-int cusick_scene(const drape_fabric *fabric, int rows, int columns, char *text, size_t size);
+/* The overhang of the measured fabric at a place of the table, let go level, that falls for 1 s and folds; and the share of its
+ * area that its shadow has then. */
+int cusick_scene(double place, double load, char *text, size_t size);
+drape_status cusick_measure(drape_reference_run *run, double *value);
 
-/* The share of the overhang's area that its shadow has. Needs nodes of the grid "annulus". spokes: columns of it. */
-double cusick_coefficient(const drape_reference_run *run, int32_t spokes);
+/* What rows have in common whose cases are places in the table. Folds that begin otherwise end otherwise: the tolerance covers
+ * what another order of the sums, or another processor, makes of it. */
+#define CUSICK_CASES                                                                                         \
+    .unit = "1", .parameter = "fabric, by its place", .model = "stretch.cst, bend.midedge; annulus; be",     \
+    .tolerance = 0.05, .scene = cusick_scene, .measure = cusick_measure
 
 #endif

@@ -263,28 +263,19 @@ static drape_status check_settings(lab *l)
     return DRAPE_OK;
 }
 
-static drape_status try_case(lab *l, const json_t *settings)
-{
-    const lab_request request = {.def = l->def, .settings = settings};
-    drape_model *model = NULL;
-    drape_status status = lab_load(l->ctx, &request, &model);
-    drape_model_destroy(&model);
-    return status;
-}
-
 /* A scene that does not compile is told before there is a folder, which would then hold an experiment that nobody
  * wants: the scene itself where it is prepared, and the first case of every series. Maps try their own corners. */
 static drape_status try_scene(lab *l)
 {
     const char *before = "";
-    drape_status status = l->experiment->prepare ? try_case(l, NULL) : DRAPE_OK;
+    drape_status status = l->experiment->prepare ? lab_try(l->ctx, l->def, NULL) : DRAPE_OK;
     if (!status && l->experiment->check)
         status = l->experiment->check(l);
     for (size_t i = 0; !status && i < json_array_size(l->cases); i++) {
         const json_t *one = json_array_get(l->cases, i);
         const char *series = lab_tag_word(one, "series");
         if (strcmp(series, before) != 0)
-            status = try_case(l, json_object_get(one, "settings"));
+            status = lab_try(l->ctx, l->def, json_object_get(one, "settings"));
         before = series;
     }
     return status;

@@ -34,4 +34,10 @@ double fabric_strain(double stiffness, double force);
 #define FABRIC_CASES                                                                                         \
     .parameter = "fabric, by its place", .parameters = fabric_places, .case_count = DRAPE_FABRIC_COUNT
 
+/* The same of the two cantilevers. */
+#define FABRIC_CANTILEVER                                                                                    \
+    .unit = "degree", FABRIC_CASES, .model = "stretch.cst, bend.midedge; irregular",                         \
+    .source = "ASTM D1388; the fabric's own", .tolerance = 0.005, .expected = fabric_chord,                  \
+    .measure = fabric_measure_chord
+
 #endif

@@ -71,10 +71,7 @@ drape_status lab_check_reference(lab *l)
     drape_status status = DRAPE_OK;
     for (size_t i = 0; !status && i < sizeof ladders / sizeof *ladders; i++) {
         json_t *settings = settings_of(&ladders[i], ladders[i].first);
-        const lab_request request = {.def = l->def, .settings = settings};
-        drape_model *model = NULL;
-        status = lab_load(l->ctx, &request, &model);
-        drape_model_destroy(&model);
+        status = lab_try(l->ctx, l->def, settings);
         json_decref(settings);
     }
     return status;

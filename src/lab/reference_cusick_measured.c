@@ -3,10 +3,6 @@
  * lacks, and what of theirs is not known here. */
 #include "lab/cusick.h"
 #include "lab/fabric.h"
-#include "lab/strip.h"
-
-#define ROWS   13
-#define SPOKES 112
 
 /* Places in the table, and what the model gives instead: of runs of 1 s, 13 circles of 112 nodes, in which it does not move any
  * more (0.7666, 0.7664 and 0.7664 after 1, 1.25 and 1.5 s). */
@@ -23,32 +19,13 @@ static double documented(double place)
     return elastic[(int)(place - fabrics[0])];
 }
 
-static int scene(double place, double load, char *text, size_t size)
-{
-    (void)load;
-    return cusick_scene(fabric_at(place), ROWS, SPOKES, text, size);
-}
-
-static drape_status measure(drape_reference_run *run, double *value)
-{
-    drape_status status = lab_advance(run);
-    *value = cusick_coefficient(run, SPOKES);
-    return status;
-}
-
-/* Folds that begin otherwise end otherwise: 0.05 covers what another order of the sums, or another processor, makes of it. */
 const drape_reference drape_reference_cusick_measured = {
     .name = "cusick_measured",
     .quantity = "drape coefficient of a measured fabric",
-    .unit = "1",
-    .parameter = "fabric, by its place",
-    .model = "stretch.cst, bend.midedge; annulus; be",
+    CUSICK_CASES,
     .source = "Matsudaira, Masuda, Wada & Yokura 2015",
-    .tolerance = 0.05,
     .parameters = fabrics,
     .case_count = sizeof fabrics / sizeof *fabrics,
     .expected = expected,
     .documented = documented,
-    .scene = scene,
-    .measure = measure,
 };

@@ -73,6 +73,15 @@ drape_status lab_load(drape_context *ctx, const lab_request *request, drape_mode
     return status;
 }
 
+drape_status lab_try(drape_context *ctx, const drape_lab_def *def, const json_t *settings)
+{
+    const lab_request request = {.def = def, .settings = settings};
+    drape_model *model = NULL;
+    drape_status status = lab_load(ctx, &request, &model);
+    drape_model_destroy(&model);
+    return status;
+}
+
 static void compare(watcher *w, const double *x, int64_t frame)
 {
     const lab_trace *reference = w->request->reference;

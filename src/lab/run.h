@@ -25,6 +25,9 @@ typedef struct lab_request {
 drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drape_scene **scene);
 drape_status lab_load(drape_context *ctx, const lab_request *request, drape_model **model);
 
+/* Whether it compiles: loads it and lets it go. settings: of a case; NULL: the scene itself. */
+drape_status lab_try(drape_context *ctx, const drape_lab_def *def, const json_t *settings);
+
 /* Runs it. *result: what was measured, to be freed by the caller; a simulation that stops is a result.
  * Errors: those of loading, DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
 drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **result);

@@ -227,13 +227,8 @@ static drape_status try_ends(lab *l, size_t first, const space *s)
 {
     const size_t ends[] = {first, first + second_of(s), first + cells_of(s) - 1};
     drape_status status = DRAPE_OK;
-    for (size_t i = 0; i < sizeof ends / sizeof *ends && !status; i++) {
-        const lab_request request = {
-            .def = l->def, .settings = json_object_get(json_array_get(l->cases, ends[i]), "settings")};
-        drape_model *model = NULL;
-        status = lab_load(l->ctx, &request, &model);
-        drape_model_destroy(&model);
-    }
+    for (size_t i = 0; i < sizeof ends / sizeof *ends && !status; i++)
+        status = lab_try(l->ctx, l->def, json_object_get(json_array_get(l->cases, ends[i]), "settings"));
     return status;
 }
 

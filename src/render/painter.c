@@ -607,9 +607,8 @@ static drape_status draw_panel(drape_painter *p, const drape_picture *picture, i
     set_lamp(stage, &v);
     drape_stage_set(stage, &panel->moment, shading->wires);
     draw_shadows(p, stage, shading, &v);
-    if (index == 0)
-        drape_canvas_begin(
-            &p->canvas); /* not before: cleared and left, it would be loaded and stored twice */
+    if (index == 0) /* not before the map: a canvas that is cleared and left is stored and loaded again */
+        drape_canvas_begin(&p->canvas);
     glBindFramebuffer(GL_FRAMEBUFFER, p->canvas.many);
     glViewport(v.left, v.bottom, v.width, v.height);
     draw_scene(p, picture, stage, program, &v);
@@ -631,6 +630,6 @@ drape_status drape_painter_draw(drape_painter *painter, const drape_picture *pic
     glViewport(0, 0, painter->canvas.width, painter->canvas.height);
     drape_layout_put(&painter->overlay, picture);
     drape_overlay_draw(&painter->overlay);
-    glFlush();
+    glFlush(); /* the driver draws while the caller does something else */
     return drape_gl_check(painter->ctx, "draw a picture");
 }
