@@ -1,8 +1,6 @@
 /* sum.c: see sum.h. */
 #include "assemble/sum.h"
 
-#include "base/parallel.h"
-
 #include <string.h>
 
 /* The lowest and the highest node of a block of elements. */
@@ -18,6 +16,7 @@ typedef struct share {
 struct drape_summer {
     drape_context *ctx;
     const drape_model *model;
+    drape_crew *crew; /* of the system; NULL: none */
     int threads;
     bool unconstrained;
     drape_block *blocks; /* (threads) */
@@ -49,11 +48,6 @@ static reach reach_of(const drape_term *term, int32_t block)
     return r;
 }
 
-int drape_summer_threads(const drape_summer *s)
-{
-    return s->threads;
-}
-
 static drape_status create_reaches(drape_summer *s)
 {
     s->reaches = drape_alloc(s->ctx, (size_t)s->model->term_count, sizeof *s->reaches);
@@ -70,19 +64,14 @@ static drape_status create_reaches(drape_summer *s)
     return DRAPE_OK;
 }
 
-drape_status drape_summer_create(drape_context *ctx, const drape_model *model, int threads,
+drape_status drape_summer_create(drape_context *ctx, const drape_model *model, drape_crew *crew,
                                  drape_summer **out)
 {
     drape_summer *s = drape_alloc(ctx, 1, sizeof *s);
     *out = s;
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (drape_summer){.ctx = ctx, .model = model, .threads = 1};
-#ifdef _OPENMP
-    s->threads = threads;
-#else
-    (void)threads;
-#endif
+    *s = (drape_summer){.ctx = ctx, .model = model, .crew = crew, .threads = drape_crew_threads(crew)};
     s->blocks = drape_alloc(ctx, (size_t)s->threads, sizeof *s->blocks);
     drape_status status = s->blocks ? DRAPE_OK : DRAPE_E_MEMORY;
     if (!status && s->threads > 1)
@@ -338,7 +327,7 @@ static void add_round(void *user, int64_t thread)
 /* There may be fewer threads than shares: they are dealt out, not assumed. */
 void drape_summer_add(drape_summer *s, const drape_request *want, const drape_sums *to)
 {
-    drape_parallel(s->threads, s->threads, add_round, &(order){s, want, to});
+    drape_parallel(s->crew, s->threads, add_round, &(order){s, want, to});
 }
 
 static void stress_round(void *user, int64_t thread)
@@ -349,7 +338,7 @@ static void stress_round(void *user, int64_t thread)
 
 void drape_summer_stress(drape_summer *s, const drape_request *want)
 {
-    drape_parallel(s->threads, s->threads, stress_round, &(order){.summer = s, .want = want});
+    drape_parallel(s->crew, s->threads, stress_round, &(order){.summer = s, .want = want});
 }
 
 void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_request *want,

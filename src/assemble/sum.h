@@ -8,6 +8,7 @@
 #define DRAPE_ASSEMBLE_SUM_H
 
 #include "assemble/block.h"
+#include "base/crew.h"
 
 typedef struct drape_summer drape_summer;
 
@@ -21,12 +22,10 @@ typedef struct drape_sums {
         *blocks; /* (term_count) each as drape_term.block, for this pattern; NULL: those of the terms */
 } drape_sums;
 
-/* threads >= 1; without OpenMP there is one. Errors: DRAPE_E_MEMORY. */
-drape_status drape_summer_create(drape_context *ctx, const drape_model *model, int threads,
+/* crew outlives it; NULL: one thread. Errors: DRAPE_E_MEMORY. */
+drape_status drape_summer_create(drape_context *ctx, const drape_model *model, drape_crew *crew,
                                  drape_summer **out);
 void drape_summer_destroy(drape_summer **summer);
-
-int drape_summer_threads(const drape_summer *summer);
 
 /* From here on terms that are a constraint are left out. */
 void drape_summer_leave_constraints(drape_summer *summer);

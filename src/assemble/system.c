@@ -12,6 +12,7 @@
 struct drape_system {
     drape_context *ctx;
     const drape_model *model;
+    drape_crew *crew;             /* NULL: one thread */
     drape_summer *summer;         /* over the elements of terms */
     drape_contact *contact;       /* NULL: none */
     const drape_pattern *pattern; /* the model's, or wider */
@@ -44,7 +45,9 @@ drape_status drape_system_create(drape_context *ctx, const drape_model *model, i
     if (!system)
         return DRAPE_E_MEMORY;
     *system = (drape_system){.ctx = ctx, .model = model, .pattern = &model->pattern};
-    drape_status status = drape_summer_create(ctx, model, threads, &system->summer);
+    drape_status status = drape_crew_create(ctx, threads, &system->crew);
+    if (!status)
+        status = drape_summer_create(ctx, model, system->crew, &system->summer);
     if (!status)
         status = drape_motion_create(ctx, model, &system->motion);
     system->push = drape_alloc(ctx, 3 * (size_t)model->node_count, sizeof *system->push);
@@ -63,6 +66,7 @@ void drape_system_destroy(drape_system **system)
     drape_contact_destroy(&(*system)->contact);
     forget_wider(*system);
     drape_summer_destroy(&(*system)->summer);
+    drape_crew_destroy(&(*system)->crew);
     drape_motion_destroy(&(*system)->motion);
     drape_wind_free(ctx, &(*system)->wind);
     drape_free(ctx, (*system)->push);
@@ -80,9 +84,9 @@ const drape_model *drape_system_model(const drape_system *system)
     return system->model;
 }
 
-int drape_system_threads(const drape_system *system)
+drape_crew *drape_system_crew(const drape_system *system)
 {
-    return drape_summer_threads(system->summer);
+    return system->crew;
 }
 
 void drape_system_set_pull(drape_system *system, const drape_pull *pull)
@@ -171,8 +175,8 @@ static size_t wider_bytes(const drape_system *system)
 
 size_t drape_system_bytes(const drape_system *system)
 {
-    return sizeof *system + drape_summer_bytes(system->summer) + drape_contact_bytes(system->contact) +
-           wider_bytes(system) + drape_motion_bytes(system->motion) +
+    return sizeof *system + drape_crew_bytes(system->crew) + drape_summer_bytes(system->summer) +
+           drape_contact_bytes(system->contact) + wider_bytes(system) + drape_motion_bytes(system->motion) +
            drape_wind_bytes(&system->wind, system->model) +
            3 * (size_t)system->model->node_count * sizeof *system->push;
 }

@@ -16,6 +16,7 @@
 #include "assemble/pull.h"
 #include "assemble/state.h"
 #include "assemble/wind.h"
+#include "base/crew.h"
 #include "contact/contact.h"
 
 typedef struct drape_system drape_system;
@@ -42,7 +43,8 @@ void drape_system_destroy(drape_system **system);
 void drape_system_leave_constraints(drape_system *system);
 
 const drape_model *drape_system_model(const drape_system *system);
-int drape_system_threads(const drape_system *system);
+/* The threads that it has, for whoever works on what it assembles; NULL: one. */
+drape_crew *drape_system_crew(const drape_system *system);
 
 /* A spring that belongs to the system from now on, its energy to the elastic one; of stiffness 0: none. Its node is
  * free. */

@@ -489,9 +489,9 @@ drape_status drape_newton_create(drape_context *ctx, drape_system *system, const
     if (!status)
         status = create_vectors(s);
     if (!status && s->n > 0)
-        status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
-                                         drape_system_pattern(system), drape_system_threads(s->system),
-                                         &s->linear);
+        status =
+            drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
+                                    drape_system_pattern(system), drape_system_crew(s->system), &s->linear);
     if (!status && s->n > 0)
         s->linear->tolerance = values[DRAPE_NEWTON_LINEAR_TOLERANCE];
     if (!status && s->n > 0 && (s->ahead || s->trial)) {

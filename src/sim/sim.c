@@ -108,7 +108,7 @@ drape_status drape_sim_create_like(const drape_sim *like, drape_sim **out)
         return DRAPE_E_MEMORY;
     *sim = empty_sim(like->ctx, like->model, like->frame_rate, like->realtime.longest_asked);
     sim->chosen = like->chosen;
-    drape_status status = start_sim(sim, drape_system_threads(like->system));
+    drape_status status = start_sim(sim, drape_crew_threads(drape_system_crew(like->system)));
     if (status)
         drape_sim_destroy(out);
     return status;

@@ -8,6 +8,7 @@
 #define DRAPE_SOLVERS_LINEAR_H
 
 #include "base/archive.h"
+#include "base/crew.h"
 #include "sparse/pattern.h"
 
 typedef struct drape_linear_ops drape_linear_ops;
@@ -32,8 +33,8 @@ struct drape_linear_ops {
     bool borrows_heap;
     /* Makes the solver's state. pattern outlives it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
     drape_status (*create)(drape_context *ctx, const drape_pattern *pattern, void **state);
-    /* How many threads it may use from now on; the result does not depend on it. NULL: it uses one. */
-    void (*use_threads)(void *state, int threads);
+    /* The threads that it may use from now on, which outlive it; the result does not depend on them. NULL: it uses one. */
+    void (*use_threads)(void *state, drape_crew *crew);
     /* Takes the values (pattern->nonzeros). DRAPE_OK, or DRAPE_RETRY_LINEAR: singular to working precision,
      * or not finite. Where it borrows heap also DRAPE_E_MEMORY, and it may be called again. */
     drape_status (*factor)(void *state, const double *values);

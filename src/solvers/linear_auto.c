@@ -47,11 +47,11 @@ static drape_status create(drape_context *ctx, const drape_pattern *pattern, voi
     return status;
 }
 
-static void use_threads(void *state, int threads)
+static void use_threads(void *state, drape_crew *crew)
 {
     auto_state *s = state;
     if (s->row->use_threads)
-        s->row->use_threads(s->solver, threads);
+        s->row->use_threads(s->solver, crew);
 }
 
 static drape_status factor(void *state, const double *values)

@@ -13,7 +13,6 @@
 
 #include "base/finite.h"
 #include "base/lanes.h"
-#include "base/parallel.h"
 #include "solvers/elimination.h"
 #include "solvers/tiles.h"
 
@@ -60,9 +59,9 @@ typedef struct multifrontal {
     int64_t panel_size, update_size;
     int32_t widest, tallest; /* scalars, of all fronts, in whole strips */
     double *diagonal;        /* (n) in the pattern's order */
-    int threads;
-    const double *values; /* while it factors */
-    bool *failed;         /* (e.count) */
+    drape_crew *crew;        /* NULL: one thread */
+    const double *values;    /* while it factors */
+    bool *failed;            /* (e.count) */
     const drape_linear_ops *general_row;
     void *general; /* its state; NULL before the first matrix that it gets */
     bool by_general, factored;
@@ -313,7 +312,7 @@ static drape_status create(drape_context *ctx, const drape_pattern *pattern, voi
     *state = s;
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (multifrontal){.ctx = ctx, .pattern = pattern, .threads = 1};
+    *s = (multifrontal){.ctx = ctx, .pattern = pattern};
     s->general_row = drape_linear_general(pattern->n);
     drape_status status = analyse(s);
     if (status)
@@ -321,9 +320,9 @@ static drape_status create(drape_context *ctx, const drape_pattern *pattern, voi
     return status;
 }
 
-static void use_threads(void *state, int threads)
+static void use_threads(void *state, drape_crew *crew)
 {
-    ((multifrontal *)state)->threads = threads;
+    ((multifrontal *)state)->crew = crew;
 }
 
 /* ---- One front ---- */
@@ -362,7 +361,7 @@ typedef struct job {
     double *panel, *update;
     int32_t first, width; /* of the columns that are factored now; the first that is added of a child */
     int32_t child;
-    int threads;
+    drape_crew *crew; /* NULL: this thread alone, in a branch */
 } job;
 
 /* A column of blocks of what a child left, into its front. */
@@ -403,7 +402,7 @@ static void add_children(job *w, bool on_rows)
     for (w->child = w->f->first_child; w->child >= 0; w->child = w->s->fronts[w->child].sibling) {
         const int32_t middle = first_row_left(w->s, w->child), all = w->s->fronts[w->child].rows / 3;
         w->first = on_rows ? middle : 0;
-        drape_parallel(w->threads, on_rows ? all - middle : middle, add_child_column, w);
+        drape_parallel(w->crew, on_rows ? all - middle : middle, add_child_column, w);
     }
 }
 
@@ -447,7 +446,7 @@ static bool factor_columns(job *w)
         drape_tile_multiply(strip_of(w, diagonal), strip_of(w, diagonal), w->first, w->width, false, tile);
         if (!drape_tile_factor(w->width, tile, w->s->inverse + 3 * w->s->e.first[w->index] + w->first))
             return false;
-        drape_parallel(w->threads, f->column_strips + f->row_strips - diagonal - 1, finish_strip, w);
+        drape_parallel(w->crew, f->column_strips + f->row_strips - diagonal - 1, finish_strip, w);
     }
     return true;
 }
@@ -467,7 +466,7 @@ static void leave_column(void *user, int64_t round)
     }
 }
 
-static void make_front(multifrontal *s, int32_t i, int threads)
+static void make_front(multifrontal *s, int32_t i, drape_crew *crew)
 {
     const front *f = &s->fronts[i];
     job w = {.s = s,
@@ -475,12 +474,12 @@ static void make_front(multifrontal *s, int32_t i, int threads)
              .f = f,
              .panel = s->panels + f->panel,
              .update = s->updates + f->update,
-             .threads = threads};
+             .crew = crew};
     assemble(&w);
     s->failed[i] = !factor_columns(&w);
     if (s->failed[i])
         return;
-    drape_parallel(threads, f->row_strips, leave_column, &w);
+    drape_parallel(crew, f->row_strips, leave_column, &w);
     add_children(&w, true);
 }
 
@@ -490,7 +489,7 @@ static void make_branch(void *user, int64_t round)
 {
     multifrontal *s = user;
     for (int32_t i = s->branch[2 * round]; i <= s->branch[2 * round + 1]; i++) {
-        make_front(s, i, 1);
+        make_front(s, i, NULL);
         if (s->failed[i])
             return;
     }
@@ -565,12 +564,12 @@ static bool is_well_conditioned(const multifrontal *s)
 static bool factor_cholesky(multifrontal *s)
 {
     memset(s->failed, 0, (size_t)s->e.count * sizeof *s->failed);
-    drape_parallel(s->threads, s->branch_count, make_branch, s);
+    drape_parallel(s->crew, s->branch_count, make_branch, s);
     for (int32_t i = 0; i < s->e.count; i++)
         if (s->failed[i])
             return false;
     for (int32_t k = 0; k < s->top_count; k++) {
-        make_front(s, s->top[k], s->threads);
+        make_front(s, s->top[k], s->crew);
         if (s->failed[s->top[k]])
             return false;
     }

@@ -76,12 +76,12 @@ static drape_status create_state(drape_sun_linear *linear, const drape_pattern *
 {
     drape_status status = linear->ops->create(linear->ctx, pattern, &linear->state);
     if (!status && linear->ops->use_threads)
-        linear->ops->use_threads(linear->state, linear->threads);
+        linear->ops->use_threads(linear->state, linear->crew);
     return status;
 }
 
 drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const drape_linear_ops *ops,
-                                     const drape_pattern *pattern, int threads, drape_sun_linear **out)
+                                     const drape_pattern *pattern, drape_crew *crew, drape_sun_linear **out)
 {
     drape_sun_linear *linear = drape_alloc(ctx, 1, sizeof *linear);
     *out = linear;
@@ -89,7 +89,7 @@ drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const d
         return DRAPE_E_MEMORY;
     linear->ctx = ctx;
     linear->ops = ops;
-    linear->threads = threads;
+    linear->crew = crew;
     linear->pattern = pattern;
     linear->nonzeros = pattern->nonzeros;
     linear->values = drape_alloc(ctx, (size_t)pattern->nonzeros, sizeof *linear->values);

@@ -25,7 +25,7 @@ typedef struct drape_sun_linear {
     SUNLinearSolver solver;
     SUNMatrix matrix;
     bool definite; /* the next factorisations refuse what is not positive definite, where the row can tell */
-    int threads;
+    drape_crew *crew;                   /* NULL: one thread */
     double tolerance;                   /* share of the residual that iterative rows may leave; 0: none */
     int64_t factorizations, iterations; /* of iterative rows; of direct ones, solves */
     double factor_seconds, solve_seconds;
@@ -33,7 +33,7 @@ typedef struct drape_sun_linear {
 } drape_sun_linear;
 
 drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const drape_linear_ops *ops,
-                                     const drape_pattern *pattern, int threads, drape_sun_linear **out);
+                                     const drape_pattern *pattern, drape_crew *crew, drape_sun_linear **out);
 
 /* Another pattern from now on: the values are cleared, the solver is analysed anew. Errors: as of create; then
  * it can only be destroyed, or adopt again. */

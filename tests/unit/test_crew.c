@@ -1,0 +1,174 @@
+/*
+ * test_crew.c: loops dealt out to threads. Every round is done once, by the function of its own loop, before the loop returns,
+ * whatever the number of rounds and threads; helpers that slept come again; a caller whose helpers do not come does all.
+ */
+#include "base/crew.h"
+
+#include <pthread.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <string.h>
+#include <time.h>
+
+#include "support/suite.h"
+
+#define MOST 257
+
+/* A loop that writes a number of its own, and who wrote it. */
+typedef struct ledger {
+    int64_t sign;
+    int64_t entry[MOST]; /* sign + round */
+    pthread_t by[MOST];
+    int times[MOST];
+} ledger;
+
+static void enter(void *user, int64_t round)
+{
+    ledger *l = user;
+    l->entry[round] = l->sign + round;
+    l->by[round] = pthread_self();
+    l->times[round]++;
+}
+
+/* Another one, so that a round of one loop by the function of the other shows. */
+static void enter_twice(void *user, int64_t round)
+{
+    enter(user, round);
+    enter(user, round);
+}
+
+static drape_context *open_context(void)
+{
+    drape_context *ctx = NULL;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    return ctx;
+}
+
+static void check_loop(drape_crew *crew, ledger *l, int64_t sign, int rounds)
+{
+    const bool twice = sign % 2;
+    memset(l, 0, sizeof *l);
+    l->sign = sign;
+    drape_parallel(crew, rounds, twice ? enter_twice : enter, l);
+    for (int k = 0; k < MOST; k++) {
+        ck_assert_int_eq(l->times[k], k < rounds ? 1 + twice : 0);
+        ck_assert_int_eq(l->entry[k], k < rounds ? sign + k : 0);
+    }
+}
+
+START_TEST(every_round_is_done_once)
+{
+    static ledger l;
+    drape_context *ctx = open_context();
+    for (int threads = 1; threads <= 5; threads++) {
+        drape_crew *crew = NULL;
+        ck_assert_int_eq(drape_crew_create(ctx, threads, &crew), DRAPE_OK);
+        ck_assert_int_eq(drape_crew_threads(crew), threads);
+        ck_assert_int_eq(crew != NULL, threads > 1);
+        for (int k = 0; k < 400; k++)
+            check_loop(crew, &l, 1000 * k + k, k % MOST + k % 2);
+        drape_crew_destroy(&crew);
+        ck_assert_ptr_null(crew);
+    }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* Between two loops helpers fall asleep; the next one wakes them. A round here lasts until another thread takes
+ * the other one, so that the loop would not end if none came. */
+static atomic_int here;
+
+static void meet(void *user, int64_t round)
+{
+    (void)user, (void)round;
+    atomic_fetch_add(&here, 1);
+    while (atomic_load(&here) < 2)
+        sched_yield();
+}
+
+START_TEST(helpers_that_sleep_are_woken)
+{
+    drape_context *ctx = open_context();
+    drape_crew *crew = NULL;
+    ck_assert_int_eq(drape_crew_create(ctx, 2, &crew), DRAPE_OK);
+    for (int k = 0; k < 20; k++) {
+        nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
+        atomic_store(&here, 0);
+        drape_parallel(crew, 2, meet, NULL);
+        ck_assert_int_eq(atomic_load(&here), 2);
+    }
+    drape_crew_destroy(&crew);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* Helpers in the middle of a round of theirs: the caller does all others meanwhile. The first round that a helper takes waits
+ * for all others to be done; a team whose rounds were dealt out beforehand would never end. */
+typedef struct held {
+    pthread_t caller;
+    atomic_int done, held;
+} held;
+
+static void hold(void *user, int64_t round)
+{
+    held *h = user;
+    (void)round;
+    if (!pthread_equal(pthread_self(), h->caller) && !atomic_exchange(&h->held, 1))
+        while (atomic_load(&h->done) < MOST - 1)
+            sched_yield();
+    atomic_fetch_add(&h->done, 1);
+}
+
+START_TEST(the_caller_does_what_no_helper_takes)
+{
+    drape_context *ctx = open_context();
+    drape_crew *crew = NULL;
+    ck_assert_int_eq(drape_crew_create(ctx, 2, &crew), DRAPE_OK);
+    for (int k = 0; k < 200; k++) {
+        held h = {.caller = pthread_self()};
+        drape_parallel(crew, MOST, hold, &h);
+        ck_assert_int_eq(h.done, MOST);
+    }
+    drape_crew_destroy(&crew);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* Two crews do not see each other, and a crew works for whatever thread calls. */
+static void *loop_often(void *crew)
+{
+    ledger l;
+    for (int k = 0; k < 400; k++) {
+        memset(&l, 0, sizeof l);
+        drape_parallel(crew, 7, enter, &l);
+        for (int r = 0; r < 7; r++)
+            if (l.times[r] != 1)
+                return crew;
+    }
+    return NULL;
+}
+
+START_TEST(crews_work_beside_each_other)
+{
+    drape_context *ctx = open_context();
+    drape_crew *crews[2];
+    for (int repeat = 0; repeat < 3; repeat++) {
+        pthread_t callers[2];
+        for (int i = 0; i < 2; i++) {
+            ck_assert_int_eq(drape_crew_create(ctx, 3, &crews[i]), DRAPE_OK);
+            ck_assert_int_eq(pthread_create(&callers[i], NULL, loop_often, crews[i]), 0);
+        }
+        for (int i = 0; i < 2; i++) {
+            void *wrong = NULL;
+            ck_assert_int_eq(pthread_join(callers[i], &wrong), 0);
+            ck_assert_ptr_null(wrong);
+            ck_assert_ptr_null(loop_often(crews[i]));
+            drape_crew_destroy(&crews[i]);
+        }
+    }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+SUITE("crew", every_round_is_done_once, helpers_that_sleep_are_woken, the_caller_does_what_no_helper_takes,
+      crews_work_beside_each_other)
