@@ -40,7 +40,7 @@ typedef enum drape_status {
     DRAPE_E_MEMORY = -2,         /* an allocation failed */
     DRAPE_E_FILE = -3,           /* a file cannot be opened, read or written */
     DRAPE_E_PARSE = -4,          /* the text of a scene or mesh is not of its format */
-    DRAPE_E_STEP_TOO_SMALL = -5, /* below dt_min, or max_steps of them; the last accepted state stays */
+    DRAPE_E_STEP_TOO_SMALL = -5, /* below dt_min, or too many of them; the last accepted state stays */
     DRAPE_E_SOLVER = -6,  /* a step failed and no smaller step may be tried, or the solver cannot be set up */
     DRAPE_E_VERSION = -7, /* a struct or a file of another version of Drape */
     DRAPE_E_STOPPED = -8  /* an observer or drape_sim_cancel asked to stop */
@@ -334,7 +334,7 @@ DRAPE_API void drape_sim_destroy(drape_sim **sim);
 /* Advances to t_end [s]. Steps end at t0 + k dt; only the last one is cut to end at t_end, and a remainder
  * below 1e-9 dt joins the step before. A t_end not after the present time, but for rounding, does nothing. On
  * failure the state is that of the last accepted step. Errors: DRAPE_E_STEP_TOO_SMALL (halving gave up; "ida"
- * took max_steps), DRAPE_E_SOLVER (a step failed under the controller "fixed"), DRAPE_E_STOPPED (an observer
+ * took max_steps; max_attempts in one dt), DRAPE_E_SOLVER (a step failed under the controller "fixed"), DRAPE_E_STOPPED (an observer
  * asked, or drape_sim_cancel), DRAPE_E_ARGUMENT (t_end not finite); the message names time, step, reason and worst
  * element. */
 DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);

@@ -5,9 +5,12 @@
  */
 #include "control/halve.h"
 
-enum { PARAM_DT_MIN, PARAM_COUNT };
+enum { PARAM_DT_MIN, PARAM_MAX_ATTEMPTS, PARAM_COUNT };
 
-static const drape_param params[PARAM_COUNT] = {[PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM};
+static const drape_param params[PARAM_COUNT] = {
+    [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
+    [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(10000),
+};
 
 static drape_verdict judge(const double *values, drape_trial *trial)
 {

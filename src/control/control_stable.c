@@ -10,13 +10,14 @@
 
 #include <math.h>
 
-enum { PARAM_DT_MIN, PARAM_SAFETY, PARAM_EVERY, PARAM_COUNT };
+enum { PARAM_DT_MIN, PARAM_MAX_ATTEMPTS, PARAM_SAFETY, PARAM_EVERY, PARAM_COUNT };
 enum { SCRATCH_LIMIT, SCRATCH_LEFT };
 
 #define SLACK 1e-6 /* a limit of which a step was made is found again to this */
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
+    [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(1000000),
     [PARAM_SAFETY] = {.name = "safety",
                       .unit = "1",
                       .default_value = 0.9,

@@ -8,10 +8,11 @@
 
 #include <math.h>
 
-enum { PARAM_DT_MIN, PARAM_MAX_STRETCH, PARAM_MAX_MOVE, PARAM_COUNT };
+enum { PARAM_DT_MIN, PARAM_MAX_ATTEMPTS, PARAM_MAX_STRETCH, PARAM_MAX_MOVE, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
+    [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(10000),
     [PARAM_MAX_STRETCH] = {.name = "max_stretch",
                            .unit = "1",
                            .default_value = 0.1,

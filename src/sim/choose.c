@@ -148,6 +148,12 @@ double drape_chosen_integrator_value(const drape_chosen *chosen, const char *nam
     return p < 0 ? fallback : chosen->integrator_values[p];
 }
 
+double drape_chosen_controller_value(const drape_chosen *chosen, const char *name, double fallback)
+{
+    int p = drape_param_find(chosen->controller->params, chosen->controller->param_count, name);
+    return p < 0 ? fallback : chosen->controller_values[p];
+}
+
 bool drape_chosen_ignores_integrator(const drape_chosen *chosen, const char *name)
 {
     return drape_param_find(chosen->integrator->params, chosen->integrator->param_count, name) < 0;

@@ -19,6 +19,7 @@ drape_status drape_choose(drape_context *ctx, const drape_model *model, const dr
 
 /* The value of the parameter of that name; fallback if the row has none. */
 double drape_chosen_integrator_value(const drape_chosen *chosen, const char *name, double fallback);
+double drape_chosen_controller_value(const drape_chosen *chosen, const char *name, double fallback);
 
 /* Whether the chosen integrator or controller ignores a setting that the scene gave. */
 bool drape_chosen_ignores_integrator(const drape_chosen *chosen, const char *name);

@@ -119,12 +119,14 @@ static drape_status take_steps(drape_sim *sim, double deadline, drape_realtime *
 {
     drape_status status = drape_sim_emit_frames(sim);
     double t1, h;
+    drape_attempt attempt = {.reason = ""};
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {
-        drape_attempt attempt;
         double start = drape_clock_seconds();
         if (report->h > 0 && start + expected(sim, sim->realtime.effort) > deadline)
             break;
-        status = drape_sim_heed(sim);
+        status = drape_sim_bound(sim, &attempt);
+        if (!status)
+            status = drape_sim_heed(sim);
         if (status)
             break;
         status = drape_sim_step(sim, t1, h, &attempt);

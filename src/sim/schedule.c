@@ -22,6 +22,8 @@ void drape_schedule_aim(drape_schedule *s, double end)
         s->part = 0;
     }
     s->end = end;
+    s->tries = 0;
+    s->tries_from = s->now;
 }
 
 static double interval_time(const drape_schedule *s, int64_t k)
@@ -139,6 +141,11 @@ static void accept_part(drape_schedule *s)
 void drape_schedule_accept(drape_schedule *s, double t1, double h_next)
 {
     s->now = t1;
+    s->tries++;
+    if (t1 - s->tries_from >= (1 - JOIN) * s->dt) {
+        s->tries = 0;
+        s->tries_from = t1;
+    }
     s->stepped = true;
     s->limit = s->stepping == DRAPE_STEPS_PROPOSED ? h_next : INFINITY;
     if (s->stepping == DRAPE_STEPS_COUNTED)
@@ -148,6 +155,7 @@ void drape_schedule_accept(drape_schedule *s, double t1, double h_next)
 bool drape_schedule_retry(drape_schedule *s, double h_next)
 {
     s->limit = h_next;
+    s->tries++;
     if (s->stepping != DRAPE_STEPS_COUNTED)
         return h_next > 0 && h_next < s->tried;
     if (s->level == MOST_LEVELS)

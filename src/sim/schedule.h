@@ -31,6 +31,9 @@ typedef struct drape_schedule {
     double interval_start, interval_end, interval_size;
     bool stepped; /* a step was accepted: a remainder has a step to join */
     bool anew;    /* the interval ends at no counted time: the next count starts at its end */
+    /* Steps tried within one dt; of an advance, so that it begins anew in the next one, and is in no checkpoint. */
+    int64_t tries;
+    double tries_from; /* [s] */
 } drape_schedule;
 
 void drape_schedule_init(drape_schedule *schedule, drape_stepping stepping, double dt, double start);

@@ -97,6 +97,7 @@ static drape_status start_sim(drape_sim *sim, int threads)
         return status;
     drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
                         drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
+    sim->most_attempts = drape_chosen_controller_value(&sim->chosen, "max_attempts", INFINITY);
     drape_sim_reset_energy(sim);
     return DRAPE_OK;
 }

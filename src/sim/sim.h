@@ -47,10 +47,11 @@ struct drape_sim {
     void *integrator;      /* state of chosen.integrator */
     drape_state states[4]; /* as many as are needed: 2, and those before that the controller asks for */
     int now, next;         /* states[now] is the last accepted one, states[next] is being made */
-    int before;  /* the one that the last step began with, until the next attempt; -1 before the first */
-    int past[2]; /* the ones before; -1: there is none */
+    int before; /* the one that the last step began with; -1 before the first, and where a later attempt was made over it */
+    int past[2];       /* the ones before; -1: there is none */
     double scratch[2]; /* the controller's memory */
     drape_schedule schedule;
+    double most_attempts; /* the controller's max_attempts; INFINITY: it has none */
     double frame_rate;
     int64_t next_frame;
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
@@ -112,6 +113,10 @@ void drape_sim_describe_distortion(const drape_sim *sim, char *text, size_t size
 
 /* One attempt at the step that the schedule handed out, judged and told, with its frames. *attempt: what it was. */
 drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *attempt);
+
+/* DRAPE_E_STEP_TOO_SMALL, with its message, where one more attempt within one dt is too many. last: the one
+ * before, if there was one in this advance. */
+drape_status drape_sim_bound(drape_sim *sim, const drape_attempt *last);
 
 /* Ends the advance if somebody has cancelled it, and takes the cancelling back: DRAPE_E_STOPPED, with its message. */
 drape_status drape_sim_heed(drape_sim *sim);

@@ -7,6 +7,7 @@
 #include "base/finite.h"
 #include "sim/sim.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -128,8 +129,12 @@ static void count_reason(drape_sim *sim, const char *reason)
     sim->reasons[i].count++;
 }
 
+/* Where the attempt was made over the state that the last step began with, that one is gone: the sim is as at a start. A row
+ * without time tells no frames after its first step, and needs to know that there was one. */
 static void reject(drape_sim *sim, const drape_step_info *info)
 {
+    if (sim->before == sim->next && !sim->chosen.integrator->timeless)
+        sim->before = -1;
     sim->statistics.steps_rejected++;
     count_reason(sim, info->reason);
 }
@@ -211,6 +216,21 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
                       residual, worst, distortion);
 }
 
+/* A row that chooses its own steps has no dt, and a bound of its own. */
+drape_status drape_sim_bound(drape_sim *sim, const drape_attempt *last)
+{
+    char worst[400];
+    const drape_schedule *s = &sim->schedule;
+    if (!(s->dt > 0) || (double)s->tries < sim->most_attempts)
+        return DRAPE_OK;
+    describe_worst(sim->model, &last->worst, worst, sizeof worst);
+    return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
+                      "t=%.9g: %" PRId64 " attempts since t=%.9g did not come as far as one dt, %.4g s, and "
+                      "the controller's max_attempts is %.15g; the last, h=%.4g: %s (%s)%s",
+                      drape_sim_state(sim)->t, s->tries, s->tries_from, s->dt, sim->most_attempts, last->h,
+                      last->reason, drape_status_name(last->status), worst);
+}
+
 static drape_status tell_attempt(drape_sim *sim, const drape_attempt *attempt)
 {
     drape_event event = {.kind = DRAPE_EVENT_ATTEMPT, .sim = sim, .attempt = attempt};
@@ -281,7 +301,7 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
 drape_status drape_sim_advance(drape_sim *sim, double t_end)
 {
     double t1, h;
-    drape_attempt attempt;
+    drape_attempt attempt = {.reason = ""};
     if (!sim)
         return DRAPE_E_ARGUMENT;
     sim->ctx->message[0] = 0; /* what it says after a failure is of this advance */
@@ -292,7 +312,9 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
     drape_sim_leave_realtime(sim);
     drape_schedule_aim(&sim->schedule, t_end);
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {
-        status = drape_sim_heed(sim);
+        status = drape_sim_bound(sim, &attempt);
+        if (!status)
+            status = drape_sim_heed(sim);
         if (!status)
             status = drape_sim_step(sim, t1, h, &attempt);
     }

@@ -211,6 +211,106 @@ START_TEST(a_step_that_gets_too_small_names_time_reason_and_element)
 }
 END_TEST
 
+/* ---- A bound on attempts ---- */
+
+#define MOST_ATTEMPTS 2 /* within one dt */
+
+/* Checks what is said; the sim stands where the last accepted attempt left it. */
+static void check_bound(const scene *s, const record *r, drape_status status)
+{
+    double t, since;
+    char expected[100];
+    const drape_attempt *last = &r->attempt[r->count - 1];
+    const char *message = drape_context_message(s->ctx);
+    ck_assert_msg(status == DRAPE_E_STEP_TOO_SMALL, "%s", message);
+    ck_assert_int_eq(sscanf(message, "t=%lf: 2 attempts since t=%lf did not", &t, &since), 2);
+    snprintf(expected, sizeof expected, "the last, h=%.4g: %s (%s)", last->h, last->reason,
+             drape_status_name(last->status));
+    ck_assert_msg(strstr(message, expected) && !strchr(message, '\n'), "%s, not %s", message, expected);
+    ck_assert_double_le(since, t);
+    ck_assert_double_lt(t - since, STEP);
+    ck_assert_double_le(fabs(t - drape_sim_time(s->sim)), 1e-8);
+    ck_assert(drape_sim_hash(s->sim) == r->before);
+}
+
+typedef struct memory {
+    char bytes[1 << 18];
+    size_t size;
+} memory;
+
+static drape_status remember(void *user, const void *bytes, size_t size)
+{
+    memory *m = user;
+    ck_assert(m->size + size <= sizeof m->bytes);
+    memcpy(m->bytes + m->size, bytes, size);
+    m->size += size;
+    return DRAPE_OK;
+}
+
+/* Advances to `end`, stopped as often as it may be. Half of the stops, another sim goes on from a checkpoint of this one. */
+static int advance_bounded(scene *s, scene *other, double end)
+{
+    static memory m;
+    record *r = watch(s);
+    int stops = 0;
+    for (drape_status status = drape_sim_advance(s->sim, end); status;
+         status = drape_sim_advance(s->sim, end)) {
+        const int count = r->count;
+        check_bound(s, r, status);
+        m.size = 0;
+        ck_assert_int_eq(drape_sim_save_to(s->sim, remember, &m), DRAPE_OK);
+        ck_assert_msg(!drape_sim_restore_from(other->sim, m.bytes, m.size), "%s",
+                      drape_context_message(other->ctx));
+        if (++stops % 2)
+            ck_assert_msg(!drape_sim_restore_from(s->sim, m.bytes, m.size), "%s",
+                          drape_context_message(s->ctx));
+        ck_assert_msg(count > 0 && stops < 1000, "%s", drape_context_message(s->ctx));
+    }
+    for (int left = stops + 1000; drape_sim_advance(other->sim, end); left--)
+        ck_assert_int_gt(left, 0);
+    return stops;
+}
+
+/* Each advance tries max_attempts steps within one dt and no more; who advances again and again, or goes on from a checkpoint,
+ * comes to the bits of a run without a bound. */
+START_TEST(a_bound_on_attempts_ends_the_advance_and_changes_no_bit)
+{
+    static const char *const controllers[] = {"'type': 'halving'", "'type': 'strain', 'max_stretch': 0.05",
+                                              "'type': 'error', 'rtol': 1e-4"};
+    for (size_t k = 0; k < sizeof controllers / sizeof *controllers; k++) {
+        char bounded[100];
+        snprintf(bounded, sizeof bounded, "%s, 'max_attempts': %d", controllers[k], MOST_ATTEMPTS);
+        scene plain = swinging("be", controllers[k]), s = swinging("be", bounded),
+              other = swinging("be", bounded);
+        scene_advance(&plain, 1);
+        const int stops = advance_bounded(&s, &other, 1);
+        printf("# %s: %d stops\n", controllers[k], stops);
+        ck_assert_int_gt(stops, 0);
+        ck_assert(drape_sim_hash(s.sim) == drape_sim_hash(plain.sim));
+        ck_assert(drape_sim_hash(other.sim) == drape_sim_hash(plain.sim));
+        scene_close(&plain);
+        scene_close(&s);
+        scene_close(&other);
+    }
+}
+END_TEST
+
+/* A bound of one is that of steps which are never tried again, and a run of those does not meet it. */
+START_TEST(a_run_without_rejections_never_meets_the_bound)
+{
+    scene s = scene_open(
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 3, 'width': 1, 'height': "
+        "1},"
+        "'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}],"
+        "'integrator': {'method': 'be', 'dt': 0.01}, 'controller': {'max_attempts': 1}, 'duration': 1}");
+    scene_advance(&s, 0.5);
+    scene_advance(&s, 0.503); /* a host may cut steps as it likes */
+    scene_advance(&s, 1);
+    ck_assert_int_eq(drape_sim_statistics(s.sim).steps_rejected, 0);
+    scene_close(&s);
+}
+END_TEST
+
 /*
  * Flight at 1 m/s, and a last step of 0.17 us at a tolerance of 1e-13 N: the inertia M v/h of a node, some 1e4 N, is
  * rounded to 1e-12. What is left of it is no failure, and half the step would double it.
@@ -840,8 +940,9 @@ SUITE("rejection", a_residual_that_is_no_number_is_not_told,
       the_message_of_an_earlier_failure_is_not_told_again, ida_without_free_nodes_stops_at_kinks,
       the_error_controller_starts_at_tight_tolerances, a_run_with_rejections_is_the_run_of_its_accepted_steps,
       parts_fill_their_interval_exactly, nominal_times_are_met_to_the_bit, sizes_are_halved_and_grow_back,
-      a_step_that_gets_too_small_names_time_reason_and_element, a_residual_of_rounding_is_converged,
-      strain_names_the_edge_or_the_node_that_went_too_far,
+      a_step_that_gets_too_small_names_time_reason_and_element,
+      a_bound_on_attempts_ends_the_advance_and_changes_no_bit, a_run_without_rejections_never_meets_the_bound,
+      a_residual_of_rounding_is_converged, strain_names_the_edge_or_the_node_that_went_too_far,
       the_error_controller_never_tries_a_refused_size_again,
       an_estimate_that_is_not_a_number_is_refused_until_it_ends, kinetic_energy_from_nowhere_is_refused,
       a_slow_gain_is_no_runaway, a_slow_gain_ends_the_run_when_it_is_large,
