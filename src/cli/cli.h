@@ -47,13 +47,16 @@ typedef struct cli_option {
     size_t offset;       /* FLAG, TEXT, TEXTS, NUMBER, REAL: in the verb's request */
     int max;             /* NUMBER */
     const char *pointer; /* VALUE, LIST */
+    bool
+        must_act; /* VALUE of the integrator: drape run refuses it where the chosen row has no such parameter */
 } cli_option;
 
 /* A scene value of the command line. */
 typedef struct cli_setting {
     const char *option; /* its name on the command line */
     const char *pointer, *value;
-    char *memory; /* of either; NULL: none was needed */
+    char *memory;  /* of either; NULL: none was needed */
+    bool must_act; /* the option's */
 } cli_setting;
 
 /* What every command line has. A verb's request begins with it. */

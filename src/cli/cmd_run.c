@@ -341,6 +341,24 @@ static int check_checkpoints(const run_request *request)
     return CLI_GO_ON;
 }
 
+/* What was asked for and would be left out without a word. */
+static int check_integrator(const run *r)
+{
+    const cli_command *command = &r->request->command;
+    const drape_chosen *chosen = &r->in.sim->chosen;
+    if (r->request->realtime && chosen->integrator->timeless)
+        return cli_misuse(command->verb, "--realtime: the integrator \"%s\" has no time to keep",
+                          chosen->integrator->name);
+    for (size_t i = 0; i < command->setting_count; i++) {
+        const cli_setting *s = &command->settings[i];
+        if (s->must_act && drape_chosen_ignores_integrator(chosen, strrchr(s->pointer, '/') + 1))
+            return cli_misuse(command->verb,
+                              "--%s \"%.60s\": the integrator \"%s\" has none to choose; leave it out",
+                              s->option, s->value, chosen->integrator->name);
+    }
+    return CLI_GO_ON;
+}
+
 static int load_and_run(const run_request *request)
 {
     run r = {.request = request, .start = drape_clock_seconds()};
@@ -348,6 +366,8 @@ static int load_and_run(const run_request *request)
     if (code != CLI_GO_ON)
         return code;
     code = cli_scene_load(&request->command, &r.in);
+    if (code == CLI_GO_ON)
+        code = check_integrator(&r);
     if (code == CLI_GO_ON)
         code = check_folder(request);
     if (code == CLI_GO_ON)

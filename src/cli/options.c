@@ -25,7 +25,7 @@ static const cli_option scene_options[] = {
     {"integrator", CLI_VALUE, "ROW", "time integrator", 0, 0, "/integrator/method"},
     {"dt", CLI_VALUE, "SECONDS", "nominal step", 0, 0, "/integrator/dt"},
     {"tolerance", CLI_VALUE, "NEWTONS", "bound on the residual of a step", 0, 0, "/integrator/tolerance"},
-    {"linear-solver", CLI_VALUE, "ROW", "linear solver", 0, 0, "/integrator/linear_solver"},
+    {"linear-solver", CLI_VALUE, "ROW", "linear solver", 0, 0, "/integrator/linear_solver", true},
     {"controller", CLI_VALUE, "ROW", "step controller", 0, 0, "/controller/type"},
     {"threads", CLI_NUMBER, "N", "threads that evaluate elements; the result does not depend on it",
      offsetof(cli_command, threads), 256, NULL},
@@ -108,8 +108,11 @@ static int no_memory(const cli_command *command)
 static int add_setting(cli_command *command, const cli_option *option, const char *pointer, const char *value,
                        char *memory)
 {
-    command->settings[command->setting_count++] =
-        (cli_setting){.option = option->name, .pointer = pointer, .value = value, .memory = memory};
+    command->settings[command->setting_count++] = (cli_setting){.option = option->name,
+                                                                .pointer = pointer,
+                                                                .value = value,
+                                                                .memory = memory,
+                                                                .must_act = option->must_act};
     return CLI_GO_ON;
 }
 

@@ -165,6 +165,19 @@ def test_realtime():
         shape, _ = read_npy("out/positions.npy")
         assert shape[0] >= 2, shape
     assert "realtime" not in read_summary_without_budget()
+    refused("run", "scene.json", "--realtime", "--integrator", "static", "--out", "none",
+            says='--realtime: the integrator "static" has no time to keep')
+
+
+def test_linear_solver_acts():
+    """a linear solver that the integrator would leave out is refused; others run, and a scene may have the key for other rows"""
+    write_scene()
+    for row in "newton_k", "projective", "verlet":
+        refused("run", "scene.json", "--integrator", row, "--linear-solver", "klu", "--out", "none",
+                says=f'--linear-solver "klu": the integrator "{row}" has none to choose')
+        good("run", "scene.json", "--integrator", row, "--set", "/integrator/linear_solver=klu", "--duration", "0.02")
+    for row in "be", "ida", "static":
+        good("run", "scene.json", "--integrator", row, "--linear-solver", "klu", "--duration", "0.02")
 
 
 def read_summary_without_budget():
