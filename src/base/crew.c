@@ -35,7 +35,7 @@ struct drape_crew {
     char apart[APART];
     atomic_uint_fast64_t open;
     char apart_too[APART];
-    atomic_int_fast64_t unfinished; /* rounds */
+    atomic_int_fast64_t unfinished; /* rounds, less those that were told */
     atomic_int asleep;              /* helpers */
     atomic_bool waiting, ended;     /* waiting: the caller sleeps */
 };
@@ -63,14 +63,22 @@ static bool do_round(drape_crew *c)
         if (!atomic_compare_exchange_weak(&c->open, &open, open - 1))
             continue;
         one(user, round);
-        if (atomic_fetch_sub(&c->unfinished, 1) == 1 && atomic_load(&c->waiting)) {
-            pthread_mutex_lock(&c->lock);
-            pthread_cond_signal(&c->done);
-            pthread_mutex_unlock(&c->lock);
-        }
         return true;
     }
     return false;
+}
+
+/* As many as there are; all are of one loop, which does not end before they are told. */
+static void do_rounds(drape_crew *c)
+{
+    int64_t done = 0;
+    while (do_round(c))
+        done++;
+    if (done > 0 && atomic_fetch_sub(&c->unfinished, done) == done && atomic_load(&c->waiting)) {
+        pthread_mutex_lock(&c->lock);
+        pthread_cond_signal(&c->done);
+        pthread_mutex_unlock(&c->lock);
+    }
 }
 
 /* ---- Helpers ---- */
@@ -100,8 +108,7 @@ static void *help(void *crew)
     drape_crew *c = crew;
     while (!atomic_load(&c->ended)) {
         await_call(c);
-        while (do_round(c))
-            ;
+        do_rounds(c);
     }
     return NULL;
 }
@@ -204,7 +211,6 @@ void drape_parallel(drape_crew *crew, int64_t rounds, drape_round *one, void *us
     }
     assert(rounds <= INT32_MAX);
     call_helpers(crew, rounds, one, user);
-    while (do_round(crew))
-        ;
+    do_rounds(crew);
     await_helpers(crew);
 }
