@@ -225,10 +225,10 @@ drape_status drape_sim_bound(drape_sim *sim, const drape_attempt *last)
         return DRAPE_OK;
     describe_worst(sim->model, &last->worst, worst, sizeof worst);
     return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
-                      "t=%.9g: %" PRId64 " attempts since t=%.9g did not come as far as one dt, %.4g s, and "
-                      "the controller's max_attempts is %.15g; the last, h=%.4g: %s (%s)%s",
-                      drape_sim_state(sim)->t, s->tries, s->tries_from, s->dt, sim->most_attempts, last->h,
-                      last->reason, drape_status_name(last->status), worst);
+                      "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64 " attempts since t=%.9g did not "
+                      "come as far as one dt, %.4g s, and the controller's max_attempts is %.15g%s",
+                      drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status),
+                      last->iterations, s->tries, s->tries_from, s->dt, sim->most_attempts, worst);
 }
 
 static drape_status tell_attempt(drape_sim *sim, const drape_attempt *attempt)
