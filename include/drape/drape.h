@@ -224,10 +224,10 @@ DRAPE_API drape_status drape_scene_load(drape_context *ctx, const char *path, dr
 DRAPE_API drape_status drape_scene_parse(drape_context *ctx, const char *text, const char *name,
                                          drape_scene **out);
 
-/* Sets the value at a JSON pointer ("/integrator/dt") to a JSON text ("0.001", "\"ida\"", "[0,0,0]"; a text
- * that is not JSON is taken as a string, so ida may stand without quotes). Missing objects on the way are
- * made. "-" appends to an array. Errors: DRAPE_E_ARGUMENT (not a pointer, a step into a number or past an
- * array), DRAPE_E_MEMORY. */
+/* Sets the value at a JSON pointer ("/integrator/dt") to a JSON text ("0.001", "\"ida\"", "[0,0,0]"; numbers
+ * may be .5, +5 or 5. as well; a text that is not JSON is taken as a string, so ida may stand without quotes). Missing
+ * objects on the way are made. "-" appends to an array. Errors: DRAPE_E_ARGUMENT (not a pointer, a step into a number or
+ * past an array), DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char *value);
 
 /* Frees a scene; models made from it stay. */

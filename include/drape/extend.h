@@ -48,6 +48,7 @@ typedef struct drape_param {
     const char *const *choices; /* NULL-ended list of words */
     const char *help;           /* what it is and what it does, one line */
     bool uniform;               /* VECTOR: one number may stand for three equal ones */
+    const char *numbers;        /* VECTOR: what the three are, "[k11, k22, k12]"; NULL: [x, y, z] */
 } drape_param;
 
 #define DRAPE_MAX_PARAMS 24 /* values of the parameters of a row */

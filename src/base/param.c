@@ -80,18 +80,20 @@ static void choices_text(const drape_param *param, char *text, size_t size)
 }
 
 /* What stands before the range of each number of several. */
-static const char *several_text(const drape_param *param)
+static void several_text(const drape_param *param, char *text, size_t size)
 {
+    const char *numbers = param->numbers ? param->numbers : "[x, y, z]";
+    *text = 0;
     if (param->kind == DRAPE_PARAM_TURN)
-        return "[x, y, z, angle], or [x, y, z] as long as the angle, which is in ";
+        snprintf(text, size, "[x, y, z, angle], or %s as long as the angle, which is in ", numbers);
     if (param->kind == DRAPE_PARAM_VECTOR)
-        return param->uniform ? "a number or [x, y, z], each in " : "[x, y, z], each in ";
-    return "";
+        snprintf(text, size, "%s%s, each in ", param->uniform ? "a number or " : "", numbers);
 }
 
 void drape_param_range_text(const drape_param *param, char *text, size_t size)
 {
     const char *unit = strcmp(param->unit, "1") == 0 ? "" : param->unit;
+    char several[96];
     switch (param->kind) {
     case DRAPE_PARAM_BOOLEAN:
         snprintf(text, size, "true or false");
@@ -106,8 +108,9 @@ void drape_param_range_text(const drape_param *param, char *text, size_t size)
     case DRAPE_PARAM_INTEGER:
     case DRAPE_PARAM_VECTOR:
     case DRAPE_PARAM_TURN:
-        snprintf(text, size, "%s%c%.10g, %.10g%c%s%s", several_text(param), param->open_min ? '(' : '[',
-                 param->min, param->max, param->open_max ? ')' : ']', *unit ? " " : "", unit);
+        several_text(param, several, sizeof several);
+        snprintf(text, size, "%s%c%.10g, %.10g%c%s%s", several, param->open_min ? '(' : '[', param->min,
+                 param->max, param->open_max ? ')' : ']', *unit ? " " : "", unit);
     }
 }
 

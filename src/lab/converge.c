@@ -191,6 +191,11 @@ static void say_order(lab *l, const sequence *s)
     if (!isnan(s->line.low))
         fprintf(l->words, " (95 %% confidence %.3g to %.3g)", s->line.low, s->line.high);
     fprintf(l->words, ", %.3g at the last refinement", last);
+    if (s->line.low <= 0)
+        fprintf(l->words,
+                ": that is not all above 0, so these do not tell the order; more --levels may, or a "
+                "shorter --duration, "
+                "before small differences grow");
 }
 
 static void say(lab *l, const sequence *s)

@@ -5,7 +5,8 @@
 #include <math.h>
 #include <stdio.h>
 
-static const double moments[] = {0.3, 1, 2};
+static const double moments[] = {0.3, 1, 2, 3.1415926535897932,
+                                 4.7123889803846899}; /* to three quarters of a circle */
 
 static double expected(double moment)
 {

@@ -1,6 +1,7 @@
 /* scene.c: the scene object: a text, its JSON tree, and what was set in the tree since. */
 #include "model/scene.h"
 
+#include <ctype.h>
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -345,6 +346,29 @@ static drape_status check_pointer(drape_scene *scene, const char *pointer)
     return DRAPE_OK;
 }
 
+/* A number as people write it and JSON does not: ".5", "-.5", "+5", "5." and these with an exponent. NULL: it is none. */
+static json_t *loose_number(const char *text)
+{
+    char number[LONGEST_SET + 3];
+    const size_t digits = strspn(text, "+-"), length = strlen(text);
+    if (length > LONGEST_SET || digits > 1 || strspn(text + digits, "0123456789.eE+-") + digits != length)
+        return NULL;
+    const char *point = strchr(text, '.');
+    size_t n = 0;
+    for (const char *c = text + (*text == '+'); *c; c++) {
+        if (c == point && c == text + digits)
+            number[n++] = '0';
+        number[n++] = *c;
+        if (c == point && !isdigit((unsigned char)c[1])) {
+            if (c == text + digits)
+                return NULL;
+            number[n++] = '0';
+        }
+    }
+    number[n] = 0;
+    return json_loads(number, LOAD_FLAGS | JSON_DECODE_ANY, NULL);
+}
+
 /* The JSON value that a text says, else the text as a string. */
 static drape_status parse_value(drape_scene *scene, const char *text, json_t **value)
 {
@@ -356,7 +380,10 @@ static drape_status parse_value(drape_scene *scene, const char *text, json_t **v
     if (utf8 == 0)
         return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "a value is UTF-8, this one is not");
     bool no_memory = !*error.text || json_error_code(&error) == json_error_out_of_memory;
-    *value = no_memory ? NULL : json_string(text);
+    if (!no_memory)
+        *value = loose_number(text);
+    if (!no_memory && !*value)
+        *value = json_string(text);
     return *value ? DRAPE_OK : drape_fail_memory(scene->ctx, strlen(text));
 }
 

@@ -65,6 +65,7 @@ static const drape_param params[LIST_COUNT] = {
          .default_value = 0,
          .min = -1e9,
          .max = 1e9,
+         .numbers = "[k11, k22, k12]",
          .help = "added to the rest curvature: along the warp, along the weft, twist; positive towards "
                  "the side from which triangles turn counterclockwise"},
     [LIST_MIN_ALTITUDE] = {.name = "min_altitude",

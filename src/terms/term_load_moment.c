@@ -1,9 +1,14 @@
 /*
- * load.moment: a moment per length on edges of the boundary, about each edge: E = M L theta, theta the angle
- * from the triangle to the direction r in space that it had at rest, as of a hinge whose second apex is (x0 +
- * x1)/2 + r, and L the length at rest. It bends a strip to the curvature M/D, however far: M follows the
- * edge, and since it has a potential its Hessian is symmetric. Where the edge turns in its own plane the
- * moment is about where it is.
+ * load.moment: a moment per length on edges of the boundary, about each edge as it was at rest: E = M L psi, L the
+ * length at rest and psi the twist of the edge's triangle about that direction e0: with q the unit quaternion of the
+ * triangle's rotation psi = 2 atan2(q . e0, q_w). By the triangle's unit vectors t, in its plane from the edge to the
+ * apex, and n, its normal, and by those at rest,
+ *     S = n0.t - t0.n = 4 q_w (q . e0),  C = t0.t + n0.n = 2 (q_w^2 - (q . e0)^2),  psi = atan2(S, C).
+ * It bends a strip to the curvature M/D, however far. Where the edge is tilted besides by a small angle, the moment
+ * turns by half of it: a semitangential moment (Argyris, Dunne & Scharpf 1978, On large displacement - small strain
+ * analysis of structures with rotational degrees of freedom), whose potential does not change with the tilt at second
+ * order. The work on the angle about the edge where it is does, by M sin(2 psi) w^2/4, and tips a strip over that it
+ * winds up by more than 3.7. psi has no value where the triangle has turned by pi about a direction across e0.
  *
  * The internal variable is the angle of the last accepted state: the next is on the branch nearest to it.
  */
@@ -17,7 +22,7 @@
 
 enum { LIST_MOMENT = DRAPE_LOAD_LIST_COUNT, LIST_COUNT };
 enum { PARAM_MOMENT = DRAPE_LOAD_COUNT };
-enum { REST_MOMENT, REST_X, REST_Y, REST_Z, REST_COUNT }; /* M L [N m], r [m] */
+enum { REST_MOMENT, REST_TANGENT, REST_NORMAL = 4, REST_COUNT = 7 }; /* M L [N m], t0, n0 */
 
 static const drape_param params[LIST_COUNT] = {
     DRAPE_LOAD_PARAMS,
@@ -42,6 +47,222 @@ static void corners(const drape_cloth_view *cloth, int32_t e, int32_t node[3])
                 node[i] = cloth->triangle[3 * (size_t)t + (size_t)((k + i) % 3)];
 }
 
+static double rest_of(const drape_elements *el, int item, int32_t element)
+{
+    return el->rest[(size_t)item * (size_t)el->count + (size_t)element];
+}
+
+/* ---- Unit vectors of a triangle as functions of d = x1 - x0 and g = x2 - x0 ---- */
+
+/* A vector a(d, g), its norm, and its derivatives by d and by g. */
+typedef struct direction {
+    double unit[3], norm, by[3][6];
+} direction;
+
+static void measure(direction *v, const double a[3])
+{
+    v->norm = vec3_norm(a);
+    for (int i = 0; i < 3; i++)
+        v->unit[i] = a[i] / v->norm;
+}
+
+/* Along d x g. */
+static void measure_normal(const double d[3], const double g[3], direction *n)
+{
+    double a[3];
+    vec3_cross(d, g, a);
+    measure(n, a);
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3; /* a_i = d_j g_k - d_k g_j */
+        n->by[i][i] = n->by[i][3 + i] = 0;
+        n->by[i][j] = g[k];
+        n->by[i][k] = -g[j];
+        n->by[i][3 + j] = -d[k];
+        n->by[i][3 + k] = d[j];
+    }
+}
+
+/* Along (d x g) x d = g d.d - d d.g. */
+static void measure_tangent(const double d[3], const double g[3], direction *t)
+{
+    const double dd = vec3_dot(d, d), dg = vec3_dot(d, g);
+    double a[3];
+    for (int i = 0; i < 3; i++)
+        a[i] = g[i] * dd - d[i] * dg;
+    measure(t, a);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            t->by[i][j] = 2 * g[i] * d[j] - d[i] * g[j] - (i == j) * dg;
+            t->by[i][3 + j] = (i == j) * dd - d[i] * d[j];
+        }
+}
+
+/* v . the second derivatives of d x g, and those of g d.d - d d.g, into h, of (d, g). */
+static void add_normal_second(const double v[3], double h[6][6])
+{
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        h[j][3 + k] += v[i];
+        h[k][3 + j] -= v[i];
+        h[3 + k][j] += v[i];
+        h[3 + j][k] -= v[i];
+    }
+}
+
+static void add_tangent_second(const double d[3], const double g[3], const double v[3], double h[6][6])
+{
+    const double vd = vec3_dot(v, d), vg = vec3_dot(v, g);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const double mixed = 2 * d[i] * v[j] - v[i] * d[j] - (i == j) * vd;
+            h[i][j] += 2 * (i == j) * vg - v[i] * g[j] - g[i] * v[j];
+            h[i][3 + j] += mixed;
+            h[3 + j][i] += mixed;
+        }
+}
+
+/* c less its part along the unit vector, over the norm: by it c . unit changes with a. */
+static void across(const direction *v, const double c[3], double out[3])
+{
+    const double along = vec3_dot(c, v->unit);
+    for (int i = 0; i < 3; i++)
+        out[i] = (c[i] - along * v->unit[i]) / v->norm;
+}
+
+/* g += the derivatives of c . unit. */
+static void add_first(const direction *v, const double c[3], double g[6])
+{
+    double b[3];
+    across(v, c, b);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 6; j++)
+            g[j] += b[i] * v->by[i][j];
+}
+
+/* h += the second derivatives of c . unit but for b . those of a, with b as across() has it: by a they are -(u b' + b u' +
+ * (c.u) (I - u u')/|a|)/|a|. */
+static void add_second(const direction *v, const double c[3], double h[6][6])
+{
+    double b[3], curvature[3][3];
+    const double along = vec3_dot(c, v->unit) / v->norm;
+    across(v, c, b);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            curvature[i][j] =
+                -(v->unit[i] * b[j] + b[i] * v->unit[j] + along * ((i == j) - v->unit[i] * v->unit[j])) /
+                v->norm;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 6; k++) {
+            double turned = 0;
+            for (int j = 0; j < 3; j++)
+                turned += curvature[i][j] * v->by[j][k];
+            for (int l = 0; l < 6; l++)
+                h[l][k] += v->by[i][l] * turned;
+        }
+}
+
+/* ---- The angle ---- */
+
+/* What psi is made of, of one element. */
+typedef struct twist {
+    double d[3], g[3], t0[3], n0[3];
+    direction t, n;
+    double sine, cosine, square; /* S, C, S^2 + C^2 */
+} twist;
+
+static double measure_twist(const drape_elements *el, int32_t element, const double *x, twist *w)
+{
+    const int32_t *node = el->node + 3 * (size_t)element;
+    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], w->d);
+    vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], w->g);
+    for (int i = 0; i < 3; i++) {
+        w->t0[i] = rest_of(el, REST_TANGENT + i, element);
+        w->n0[i] = rest_of(el, REST_NORMAL + i, element);
+    }
+    measure_normal(w->d, w->g, &w->n);
+    measure_tangent(w->d, w->g, &w->t);
+    w->sine = vec3_dot(w->n0, w->t.unit) - vec3_dot(w->t0, w->n.unit);
+    w->cosine = vec3_dot(w->t0, w->t.unit) + vec3_dot(w->n0, w->n.unit);
+    w->square = w->sine * w->sine + w->cosine * w->cosine;
+    return atan2(w->sine, w->cosine);
+}
+
+/* p . t + q . n has the derivatives C S' - S C', p and q held. */
+static void hold(const twist *w, double p[3], double q[3])
+{
+    for (int i = 0; i < 3; i++) {
+        p[i] = w->cosine * w->n0[i] - w->sine * w->t0[i];
+        q[i] = -w->cosine * w->t0[i] - w->sine * w->n0[i];
+    }
+}
+
+/* Of nodes x0 x1 x2, from those by (d, g): scale times it. */
+static void to_nodes(double scale, const double by[6], double g[9])
+{
+    for (int i = 0; i < 3; i++) {
+        g[i] = -scale * (by[i] + by[3 + i]);
+        g[3 + i] = scale * by[i];
+        g[6 + i] = scale * by[3 + i];
+    }
+}
+
+static void put_gradient(const twist *w, double scale, double *g)
+{
+    double p[3], q[3], by[6] = {0};
+    hold(w, p, q);
+    add_first(&w->t, p, by);
+    add_first(&w->n, q, by);
+    to_nodes(scale / w->square, by, g);
+}
+
+/* C S'' - S C'', into h, of (d, g). */
+static void add_curvature(const twist *w, double h[6][6])
+{
+    double p[3], q[3], b[3];
+    hold(w, p, q);
+    add_second(&w->t, p, h);
+    across(&w->t, p, b);
+    add_tangent_second(w->d, w->g, b, h);
+    add_second(&w->n, q, h);
+    across(&w->n, q, b);
+    add_normal_second(b, h);
+}
+
+/* (2 S C (C' C'^T - S' S'^T) + (S^2 - C^2) (S' C'^T + C' S'^T))/(S^2 + C^2), into h, of (d, g). */
+static void add_products(const twist *w, double h[6][6])
+{
+    const double same = 2 * w->sine * w->cosine / w->square,
+                 mixed = (w->sine * w->sine - w->cosine * w->cosine) / w->square,
+                 back[3] = {-w->t0[0], -w->t0[1], -w->t0[2]};
+    double by_sine[6] = {0}, by_cosine[6] = {0};
+    add_first(&w->t, w->n0, by_sine);
+    add_first(&w->n, back, by_sine);
+    add_first(&w->t, w->t0, by_cosine);
+    add_first(&w->n, w->n0, by_cosine);
+    for (int k = 0; k < 6; k++)
+        for (int l = 0; l < 6; l++)
+            h[k][l] += same * (by_cosine[k] * by_cosine[l] - by_sine[k] * by_sine[l]) +
+                       mixed * (by_sine[k] * by_cosine[l] + by_cosine[k] * by_sine[l]);
+}
+
+static void put_hessian(const twist *w, double scale, double *hess)
+{
+    double h[6][6] = {{0}}, rows[6][9], column[6], full[9];
+    add_curvature(w, h);
+    add_products(w, h);
+    for (int k = 0; k < 6; k++)
+        to_nodes(scale / w->square, h[k], rows[k]);
+    for (int l = 0; l < 9; l++) {
+        for (int k = 0; k < 6; k++)
+            column[k] = rows[k][l];
+        to_nodes(1, column, full);
+        for (int k = 0; k < 9; k++)
+            hess[9 * k + l] = full[k];
+    }
+}
+
+/* ---- The row ---- */
+
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
     int32_t count, next = 0;
@@ -50,35 +271,20 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         status = drape_term_reserve(builder, count, REST_COUNT);
     for (int32_t e = 0; !status && e < cloth->edge_count; e++) {
         int32_t node[3];
-        double rest[REST_COUNT] = {values[PARAM_MOMENT] * cloth->edge_length[e]};
+        double rest[REST_COUNT] = {values[PARAM_MOMENT] * cloth->edge_length[e]}, d[3], g[3];
+        direction t, n;
         if (!drape_load_takes(cloth, values, e))
             continue;
         corners(cloth, e, node);
-        const double *a = cloth->rest + 3 * (size_t)node[0], *b = cloth->rest + 3 * (size_t)node[1];
-        for (int k = 0; k < 3; k++)
-            rest[REST_X + k] = (a[k] + b[k]) / 2 - cloth->rest[3 * (size_t)node[2] + (size_t)k];
+        vec3_sub(cloth->rest + 3 * (size_t)node[1], cloth->rest + 3 * (size_t)node[0], d);
+        vec3_sub(cloth->rest + 3 * (size_t)node[2], cloth->rest + 3 * (size_t)node[0], g);
+        measure_tangent(d, g, &t);
+        measure_normal(d, g, &n);
+        memcpy(rest + REST_TANGENT, t.unit, sizeof t.unit);
+        memcpy(rest + REST_NORMAL, n.unit, sizeof n.unit);
         drape_term_set(builder, next++, node, rest);
     }
     return status;
-}
-
-static double rest_of(const drape_elements *el, int item, int32_t element)
-{
-    return el->rest[(size_t)item * (size_t)el->count + (size_t)element];
-}
-
-/* theta, with derivatives by the three nodes: those by the second apex go to x0 and x1, by halves. */
-static double angle(const drape_elements *el, int32_t element, const double *x, double g[12], double h[144])
-{
-    const int32_t *node = el->node + 3 * (size_t)element;
-    double at[12], theta;
-    for (int a = 0; a < 3; a++)
-        memcpy(at + 3 * a, x + 3 * (size_t)node[a], 3 * sizeof *at);
-    for (int i = 0; i < 3; i++)
-        at[9 + i] = (at[i] + at[3 + i]) / 2 + rest_of(el, REST_X + i, element);
-    drape_dihedrals(1, at, &theta, g, h);
-    drape_dihedral_tie(g, h);
-    return theta;
 }
 
 static void energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
@@ -86,35 +292,38 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
 {
     for (int32_t i = 0; i < count; i++) {
         const double moment = rest_of(el, REST_MOMENT, first + i);
-        double dq[12], ddq[144];
-        const double theta = angle(el, first + i, x, g ? dq : NULL, hess ? ddq : NULL);
+        twist w;
+        const double psi = measure_twist(el, first + i, x, &w);
         if (e)
-            e[i] = moment * drape_nearest_branch(theta, internal[first + i]);
-        for (int k = 0; g && k < 9; k++)
-            g[9 * (size_t)i + (size_t)k] = moment * dq[k];
-        for (int k = 0; hess && k < 81; k++)
-            hess[81 * (size_t)i + (size_t)k] = moment * ddq[12 * (k / 9) + k % 9];
+            e[i] = moment * drape_nearest_branch(psi, internal[first + i]);
+        if (g)
+            put_gradient(&w, moment, g + 9 * (size_t)i);
+        if (hess)
+            put_hessian(&w, moment, hess + 81 * (size_t)i);
     }
 }
 
 static void initial(const drape_elements *el, int32_t first, int32_t count, const double *x, double *after)
 {
+    twist w;
     for (int32_t i = first; i < first + count; i++)
-        after[i] = angle(el, i, x, NULL, NULL);
+        after[i] = measure_twist(el, i, x, &w);
 }
 
 static void commit(const drape_elements *el, int32_t first, int32_t count, const double *x,
                    const double *before, double *after)
 {
+    twist w;
     for (int32_t i = first; i < first + count; i++)
-        after[i] = drape_nearest_branch(angle(el, i, x, NULL, NULL), before[i]);
+        after[i] = drape_nearest_branch(measure_twist(el, i, x, &w), before[i]);
 }
 
 const drape_term_ops drape_term_load_moment = {
     .struct_size = sizeof(drape_term_ops),
     .name = "load.moment",
-    .summary = "a moment per length on edges of the boundary, about each edge: bends a strip to M/D",
-    .reference = "work of a couple on the angle of the triangle at the edge",
+    .summary = "a moment per length on edges of the boundary, about each edge at rest: bends a strip to M/D",
+    .reference =
+        "Argyris, Dunne & Scharpf 1978, semitangential moment: work on the twist of the triangle at the edge",
     .params = params,
     .param_count = LIST_COUNT,
     .element_name = "edge",

@@ -113,6 +113,12 @@ def test_converge():
     assert re.search(r"^verlet: order (1\.9|2)", out, re.M), out
     out = good("converge", "scene.json", "--integrators", "verlet", "--levels", "4", "--set", "/integrator/substeps=1", "--out", "x")
     assert "steps were rejected and cut, so dt was not halved everywhere" in out, out
+    # In a second folds grow: refinements do not fall, and the words say so, and only then.
+    for duration, told in ((0.3, False), (1, True)):
+        write_scene(duration=duration)
+        out = good("converge", "scene.json", "--integrators", "midpoint", "--levels", "4", "--out", f"i{duration}")
+        low = re.search(r"^midpoint: order .*confidence (\S+) to", out, re.M).group(1)
+        equal((float(low) <= 0, "so these do not tell the order" in out), (told, told), out)
 
 
 def test_converge_in_space():

@@ -805,6 +805,12 @@ static const struct {
      "--set /duration=: /duration: \"\" is not allowed; duration is a number in (0, 1000000000] s"},
     {"/duration", "1e999",
      "--set /duration=1e999: /duration: \"1e999\" is not allowed; duration is a number in (0, 1000000000] s"},
+    {"/duration", "-.5",
+     "--set /duration=-.5: /duration: -0.5 is not allowed; duration is a number in (0, 1000000000] s"},
+    {"/duration", "-.",
+     "--set /duration=-.: /duration: \"-.\" is not allowed; duration is a number in (0, 1000000000] s"},
+    {"/duration", "+-1",
+     "--set /duration=+-1: /duration: \"+-1\" is not allowed; duration is a number in (0, 1000000000] s"},
     {"/gravity", "[0, 0]",
      "--set /gravity=[0, 0]: /gravity: an array of 2 is not allowed; gravity is three "
      "numbers, [x, y, z], in m/s2"},
@@ -864,6 +870,24 @@ START_TEST(test_sets)
         }
         ck_assert_int_eq(status, DRAPE_E_ARGUMENT);
         ck_assert_str_eq(message(), sets[i].message);
+    }
+    close_context();
+}
+END_TEST
+
+/* Numbers that people write and JSON does not have. */
+START_TEST(test_set_loose_numbers)
+{
+    static const struct {
+        const char *text;
+        double value;
+    } numbers[] = {{".02", 0.02}, {"+.5", 0.5}, {"+2", 2}, {"5.", 5}, {"1.e-2", 0.01}, {"1.5E+1", 15}};
+    open_context();
+    ck_assert_int_eq(read_quoted(example), DRAPE_OK);
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        ck_assert_int_eq(drape_scene_set(scene, "/duration", numbers[i].text), DRAPE_OK);
+        ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_OK);
+        ck_assert_double_eq(def.duration, numbers[i].value);
     }
     close_context();
 }
@@ -1173,5 +1197,5 @@ END_TEST
 SUITE("scene", test_example_scene, test_example_cloth, test_example_pins, test_transforms, test_defaults,
       test_numbers, test_def_sizes, test_comments, test_places, test_mend_end, test_colliders_and_contact,
       test_wrong_scenes, test_long_texts, test_deep_nesting, test_truncations, test_mutations, test_sets,
-      test_set_values, test_set_order, test_locate_fault, test_files, test_pipe, test_arguments,
-      test_many_nodes, test_locale, test_no_memory, test_no_memory_for_json, test_form)
+      test_set_values, test_set_loose_numbers, test_set_order, test_locate_fault, test_files, test_pipe,
+      test_arguments, test_many_nodes, test_locale, test_no_memory, test_no_memory_for_json, test_form)
