@@ -43,7 +43,7 @@ typedef enum drape_status {
     DRAPE_E_STEP_TOO_SMALL = -5, /* below dt_min, or too many of them; the last accepted state stays */
     DRAPE_E_SOLVER = -6,  /* a step failed and no smaller step may be tried, or the solver cannot be set up */
     DRAPE_E_VERSION = -7, /* a struct or a file of another version of Drape */
-    DRAPE_E_STOPPED = -8  /* an observer or drape_sim_cancel asked to stop */
+    DRAPE_E_STOPPED = -8  /* an observer, drape_sim_cancel, or the context's cancel asked to stop */
 } drape_status;
 
 /* The status' name in lower case without the prefix: "ok", "retry_nonlinear", "e_step_too_small"; "unknown"
@@ -73,6 +73,11 @@ typedef struct drape_context_def {
     /* Receives log lines without a newline. Default NULL: nothing is logged. */
     void (*log)(void *user, drape_log_level level, const char *text);
     void *log_user;
+    /* Asked between the stages of reading and compiling a scene, of making a sim and of restoring one, in the thread of
+     * the call: whether to end it with DRAPE_E_STOPPED, as if it had not been made. It may be asked thousands of times
+     * and must only look. Default NULL: never. A sim that is there is ended by drape_sim_cancel. */
+    bool (*cancel)(void *user);
+    void *cancel_user;
 } drape_context_def;
 
 /* Fills *def with the defaults. struct_size is sizeof(drape_context_def) of the caller. */

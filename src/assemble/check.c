@@ -555,9 +555,10 @@ static bool allocate(checker *c, drape_context *ctx, drape_arena *arena)
     return c->internal && c->history;
 }
 
-static void check_terms(checker *c)
+static drape_status check_terms(drape_context *ctx, checker *c)
 {
-    for (int32_t t = 0; t < c->model->term_count; t++) {
+    drape_status status = DRAPE_OK;
+    for (int32_t t = 0; t < c->model->term_count && !(status = drape_heed(ctx)); t++) {
         const drape_term *term = &c->model->terms[t];
         if (term->ops->law)
             check_law(c, term);
@@ -566,6 +567,7 @@ static void check_terms(checker *c)
         if (term->ops->measure)
             check_invariance(c, t);
     }
+    return status;
 }
 
 drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, unsigned seed,
@@ -582,11 +584,14 @@ drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, u
         status = DRAPE_E_MEMORY;
     if (!status) {
         make_state(&c, &rest);
-        check_terms(&c);
-        status = check_jacobian(&c, "Jacobian in a step", 60, c.history);
+        status = check_terms(ctx, &c);
     }
     if (!status)
+        status = check_jacobian(&c, "Jacobian in a step", 60, c.history);
+    if (!status)
         status = check_jacobian(&c, "Jacobian in continuous time", 60, NULL);
+    if (!status)
+        status = drape_heed(ctx);
     if (!status)
         status = check_contact(&c, &rest);
     *row_count = c.row_count;

@@ -15,8 +15,8 @@ typedef struct drape_check_row {
 #define DRAPE_MAX_CHECK_ROWS 1024
 
 /* Fills rows (DRAPE_MAX_CHECK_ROWS) for the terms of the system's model, and for its contact. seed: of the
- * deformation. The system's pattern may be another one since: no sim goes on with it. Errors: DRAPE_E_MEMORY; a
- * failed comparison is no error, its row says so. */
+ * deformation. The system's pattern may be another one since: no sim goes on with it. Errors: DRAPE_E_MEMORY,
+ * DRAPE_E_STOPPED (the context's cancel); a failed comparison is no error, its row says so. */
 drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, unsigned seed,
                                      drape_check_row *rows, int *row_count);
 

@@ -140,6 +140,13 @@ drape_status drape_fail_memory(drape_context *ctx, size_t bytes)
     return drape_fail(ctx, DRAPE_E_MEMORY, "out of memory: an allocation of %zu bytes failed", bytes);
 }
 
+drape_status drape_heed(drape_context *ctx)
+{
+    if (!ctx->def.cancel || !ctx->def.cancel(ctx->def.cancel_user))
+        return DRAPE_OK;
+    return drape_fail(ctx, DRAPE_E_STOPPED, "cancelled");
+}
+
 void drape_context_set_message(drape_context *ctx, const char *format, ...)
 {
     va_list args;

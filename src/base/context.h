@@ -36,6 +36,10 @@ drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *
                            ...) DRAPE_PRINTF(4, 5);
 drape_status drape_fail_memory(drape_context *ctx, size_t bytes);
 
+/* For what takes long before a sim runs, between its stages: DRAPE_E_STOPPED with its message where the host wants no
+ * more of it. */
+drape_status drape_heed(drape_context *ctx);
+
 void drape_log(drape_context *ctx, drape_log_level level, const char *format, ...) DRAPE_PRINTF(3, 4);
 
 /* The C locale for all reading and writing of numbers, whatever the host's is: old = drape_locale_enter();

@@ -102,6 +102,9 @@ int cli_misuse(const char *verb, const char *format, ...) DRAPE_PRINTF(2, 3);
 /* ---- Scenes
  * ------------------------------------------------------------------------------------------------ */
 
+/* A context whose scenes, models and sims are given up where the program was interrupted (cli/signals.h). */
+drape_status cli_context_create(drape_context **out);
+
 /* A scene that is ready to run. All NULL: nothing. */
 typedef struct cli_scene {
     drape_context *ctx;
@@ -111,7 +114,7 @@ typedef struct cli_scene {
 } cli_scene;
 
 /* Loads the operand, applies the settings, compiles, checks the formats of the output, makes a sim. Writes no
- * file. CLI_GO_ON, or CLI_BAD_INPUT after the fault was printed. cli_scene_free in any case. */
+ * file. CLI_GO_ON, CLI_BAD_INPUT or CLI_INTERRUPTED after a line was printed. cli_scene_free in any case. */
 int cli_scene_load(const cli_command *command, cli_scene *out);
 void cli_scene_free(cli_scene *scene);
 

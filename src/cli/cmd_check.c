@@ -1,5 +1,6 @@
 /* cmd_check.c: `drape check`: every analytic derivative of a scene against differences. */
 #include "cli/cli.h"
+#include "cli/signals.h"
 
 #include "assemble/check.h"
 #include "contact/intersect.h"
@@ -59,7 +60,9 @@ static int check(const check_request *request, const cli_scene *in)
         rows && !drape_check_derivatives(in->ctx, in->sim->system, (unsigned)request->seed, rows, &count);
     if (done)
         code = print_rows(rows, count);
-    if (!done || print_intersections(in)) {
+    if (cli_interrupted()) {
+        code = cli_tell_interrupted(request->command.verb);
+    } else if (!done || print_intersections(in)) {
         code = CLI_FAILED;
         fprintf(stderr, "%s\n", drape_context_message(in->ctx));
     }

@@ -1,5 +1,6 @@
 /* cmd_info.c: `drape info`: what a scene models and what it costs. */
 #include "cli/info.h"
+#include "cli/signals.h"
 
 #include "colliders/colliders.h"
 
@@ -167,7 +168,10 @@ static int print_info(const info_request *request, const cli_scene *in)
 {
     cli_info info = {.path = request->command.operand};
     int code = CLI_DONE;
-    if (gather(in, &info)) {
+    drape_status status = gather(in, &info);
+    if (status == DRAPE_E_STOPPED) {
+        code = cli_tell_interrupted(request->command.verb);
+    } else if (status) {
         fprintf(stderr, "%s\n", drape_context_message(in->ctx));
         code = CLI_FAILED;
     } else if (request->json) {

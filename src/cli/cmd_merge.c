@@ -35,7 +35,7 @@ static int merge(const merge_request *request)
     drape_lab_outcome outcome;
     if (!request->out)
         return cli_misuse("merge", "--out is missing: the folder for the report");
-    if (drape_context_create(NULL, &ctx))
+    if (cli_context_create(&ctx))
         return cli_misuse("merge", "out of memory");
     drape_status status = drape_lab_merge(ctx, (const char *const *)request->command.operands,
                                           (size_t)request->command.operand_count, request->out, &outcome);

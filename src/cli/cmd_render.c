@@ -424,8 +424,8 @@ static int make(render *r)
     drape_status status = r->film ? make_film(r) : r->picture ? make_picture(r) : make_folder(r);
     if (status)
         return report(r, CLI_FAILED);
-    if (cli_interrupted())
-        return CLI_INTERRUPTED;
+    if (cli_interrupted() && !r->picture) /* a picture is there */
+        return cli_tell_interrupted("render");
     for (int i = 0; i < r->source_count; i++)
         incomplete |= r->sources[i].incomplete;
     printf("%s: %zu frame%s, %d x %d, %s\n", r->request->out, r->sources[0].reel.count,
@@ -439,6 +439,8 @@ static int run(render *r)
     int code = CLI_GO_ON;
     for (size_t i = 0; i < sizeof stages / sizeof *stages && code == CLI_GO_ON; i++)
         code = stages[i](r);
+    if (code == CLI_GO_ON && cli_interrupted())
+        code = cli_tell_interrupted("render");
     if (code != CLI_GO_ON)
         return code;
     set_range(r);
@@ -503,10 +505,9 @@ static int main_render(int argc, char **argv)
     render_request request = {.out = NULL};
     render r = {.request = &request};
     int code = cli_parse(&drape_verb_render, argc, argv, &request.command);
-    if (code == CLI_GO_ON && drape_context_create(NULL, &r.ctx))
+    if (code == CLI_GO_ON && cli_context_create(&r.ctx))
         code = cli_misuse("render", "out of memory");
     if (code == CLI_GO_ON) {
-        cli_catch_signals();
         code = run(&r);
         release(&r);
     }

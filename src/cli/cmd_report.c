@@ -1,5 +1,6 @@
 /* cmd_report.c: `drape report`: a finished run as one HTML file that moves. */
 #include "cli/cli.h"
+#include "cli/signals.h"
 
 #include "report/report.h"
 
@@ -46,15 +47,19 @@ static int write_report(const report_request *request)
         .run = request->command.operand,
         .out = request->out,
         .most_bytes = (size_t)(request->megabytes ? request->megabytes : DEFAULT_MEGABYTES) * 1000000};
-    if (drape_context_create(NULL, &ctx))
+    if (cli_context_create(&ctx))
         return cli_misuse(request->command.verb, "out of memory");
     drape_status status = drape_report_write(ctx, &def, &result, &input);
-    if (status)
+    if (status == DRAPE_E_STOPPED)
+        cli_tell_interrupted(request->command.verb);
+    else if (status)
         fprintf(stderr, "%s\n", drape_context_message(ctx));
     else
         printf("report    %s, %.3g MB, %lld of %lld frames\n", result.path, (double)result.bytes / 1e6,
                (long long)result.kept, (long long)result.frames);
     drape_context_destroy(&ctx);
+    if (status == DRAPE_E_STOPPED)
+        return CLI_INTERRUPTED;
     return !status ? CLI_DONE : input ? CLI_BAD_INPUT : CLI_FAILED;
 }
 

@@ -134,6 +134,8 @@ static int resume(run *r)
     drape_status status = r->request->resume ? go_on(r) : DRAPE_OK;
     if (!status)
         return CLI_GO_ON;
+    if (status == DRAPE_E_STOPPED)
+        return cli_tell_interrupted(r->request->command.verb);
     fprintf(stderr, "%s\n", drape_context_message(r->in.ctx));
     return CLI_BAD_INPUT;
 }
@@ -291,7 +293,6 @@ static void finish(run *r)
 static void simulate(run *r)
 {
     const bool done = drape_recorder_is_finished(r->recorder);
-    cli_catch_signals();
     note(r, begin_output(r));
     if (!r->status && !done)
         advance(r);
@@ -408,7 +409,8 @@ const drape_verb drape_verb_run = {
     .takes_scene = true,
     .summary = "simulate a scene; frames, step log and summary into a folder",
     .details = "Simulates a scene. Without --out nothing is written but the results on the standard output.\n"
-               "Ctrl-C ends the run after the step in progress and keeps what was written.\n"
+               "Ctrl-C ends the run after the step in progress and keeps what was written; before the first "
+               "step, nothing is.\n"
                "A run with --checkpoint-every that was killed goes on with --resume, and ends as if it had "
                "not been.",
     .options = options,

@@ -238,7 +238,6 @@ static int run_references(drape_context *ctx, const validate_request *request, c
     if (!status && request->out)
         status = lab_records_open(ctx, request->out, r.records, r.count, &r.file, &r.found);
     if (!status) {
-        cli_catch_signals();
         style->begin();
         cli_progress_begin(&r.progress, 0, 0);
         status = run_cases(&r, style, counts);
@@ -307,7 +306,7 @@ static int main_validate(int argc, char **argv)
     validate_request request = {.scenes = NULL};
     drape_context *ctx = NULL;
     int code = cli_parse(&drape_verb_validate, argc, argv, &request.command);
-    if (code == CLI_GO_ON && drape_context_create(NULL, &ctx))
+    if (code == CLI_GO_ON && cli_context_create(&ctx))
         code = cli_misuse("validate", "out of memory");
     if (code == CLI_GO_ON)
         code = validate(&request, ctx);

@@ -1,4 +1,5 @@
 /* cmd_view.c: `drape view`: a window on a scene that runs. */
+#include "cli/signals.h"
 #include "cli/view.h"
 
 #include "base/clock.h"
@@ -541,7 +542,7 @@ static drape_status follow_size(window_view *w)
 static drape_status loop(window_view *w)
 {
     drape_status status = DRAPE_OK;
-    while (!status && !w->quit && !drape_window_closed(w->window)) {
+    while (!status && !w->quit && !drape_window_closed(w->window) && !cli_interrupted()) {
         double start = drape_clock_seconds();
         bool idle = w->v.paused && !w->changed;
         drape_window_poll(w->window, idle ? IDLE : 0);
@@ -620,7 +621,7 @@ static int run(window_view *w)
     if (loop(w))
         return report(w, CLI_FAILED);
     print_end(w);
-    return CLI_DONE;
+    return cli_interrupted() ? cli_tell_interrupted("view") : CLI_DONE;
 }
 
 static const cli_option options[] = {
@@ -651,7 +652,7 @@ static int main_view(int argc, char **argv)
     view_request request = {.shade = NULL};
     window_view w = {.request = &request};
     int code = cli_parse(&drape_verb_view, argc, argv, &request.command);
-    if (code == CLI_GO_ON && drape_context_create(NULL, &w.ctx))
+    if (code == CLI_GO_ON && cli_context_create(&w.ctx))
         code = cli_misuse("view", "out of memory");
     if (code == CLI_GO_ON) {
         code = run(&w);

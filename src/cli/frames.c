@@ -47,7 +47,7 @@ static int open_run(const cli_command *command, cli_source *s)
                           "simulated again: %s/scene.json",
                           command->settings[0].option, s->operand, s->operand);
     drape_context *ctx = NULL;
-    if (drape_context_create(NULL, &ctx))
+    if (cli_context_create(&ctx))
         return cli_misuse(command->verb, "out of memory");
     int code = drape_record_scene(ctx, s->operand, &path) == DRAPE_OK
                    ? cli_scene_load_from(command, path, &s->in)
@@ -130,9 +130,9 @@ static int read_frames(const cli_frames_def *def, cli_source *s)
     for (int64_t i = 0; def->one == -1 && i <= last && !status && !cli_interrupted(); i += def->every)
         status = read_frame(def, s, i, room);
     drape_free(s->in.ctx, room);
-    if (status)
-        return report(s, CLI_FAILED);
-    return cli_interrupted() ? CLI_INTERRUPTED : CLI_GO_ON;
+    if (cli_interrupted())
+        return cli_tell_interrupted("render");
+    return status ? report(s, CLI_FAILED) : CLI_GO_ON;
 }
 
 /* ---- From a simulation ---- */
@@ -192,10 +192,10 @@ static int simulate(const cli_frames_def *def, cli_source *s)
     if (w.enough)
         return CLI_GO_ON;
     s->incomplete = status != DRAPE_OK;
+    if (cli_interrupted())
+        return status == DRAPE_E_STOPPED ? report(s, CLI_INTERRUPTED) : cli_tell_interrupted("render");
     if (status)
         report(s, CLI_FAILED);
-    if (cli_interrupted())
-        return CLI_INTERRUPTED;
     if (status == DRAPE_E_ARGUMENT || status == DRAPE_E_MEMORY)
         return CLI_FAILED;
     if (keep_end(&w))

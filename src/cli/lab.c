@@ -135,7 +135,7 @@ static int exit_code(drape_status status, bool input)
 int cli_lab_conclude(drape_context *ctx, drape_status status, drape_lab_outcome *outcome)
 {
     if (status)
-        fprintf(stderr, "%s\n", drape_context_message(ctx));
+        fprintf(stderr, "%s\n", status == DRAPE_E_STOPPED ? "interrupted" : drape_context_message(ctx));
     else
         fputs(outcome->text ? outcome->text : "", stdout);
     const int code = exit_code(status, outcome->input);
@@ -150,7 +150,7 @@ static int run(const drape_verb *verb, const cli_lab_request *request, int defau
     drape_context *ctx = NULL;
     cli_progress progress;
     words w = {.settings = NULL};
-    if (!make_words(request, &w) || drape_context_create(NULL, &ctx)) {
+    if (!make_words(request, &w) || cli_context_create(&ctx)) {
         free_words(&w);
         return cli_misuse(verb->name, "out of memory");
     }
@@ -159,7 +159,6 @@ static int run(const drape_verb *verb, const cli_lab_request *request, int defau
         code =
             cli_misuse(verb->name, "--threads has no effect: a case takes one; --jobs runs cases at a time");
     if (code == CLI_GO_ON) {
-        cli_catch_signals();
         cli_progress_begin(&progress, 0, 0);
         drape_status status = drape_lab_run(ctx, verb->name, &def, &outcome);
         cli_progress_clear(&progress);

@@ -1,6 +1,7 @@
 /* main.c: the program `drape`: finds the verb, hands it the command line, and sees that its output arrived.
  */
 #include "cli/cli.h"
+#include "cli/signals.h"
 
 #include "base/param.h"
 
@@ -120,5 +121,6 @@ int main(int argc, char **argv)
 {
     fill_descriptors();
     ignore_write_signals();
+    cli_catch_signals();
     return finish_output(run(argc, argv));
 }

@@ -1,6 +1,7 @@
 /* scene.c: from a command line to a sim. All that can be wrong with the input is found here, before any verb
  * writes a file. */
 #include "cli/cli.h"
+#include "cli/signals.h"
 
 #include "io/recorder.h"
 #include "model/scene.h"
@@ -45,12 +46,31 @@ static drape_status load(const cli_command *command, const char *path, cli_scene
     return status ? status : check_formats(s);
 }
 
+static bool interrupted(void *user)
+{
+    (void)user;
+    return cli_interrupted();
+}
+
+drape_status cli_context_create(drape_context **out)
+{
+    drape_context_def def;
+    drape_context_def_init(&def, sizeof def);
+    def.cancel = interrupted;
+    return drape_context_create(&def, out);
+}
+
 int cli_scene_load_from(const cli_command *command, const char *path, cli_scene *out)
 {
     *out = (cli_scene){.ctx = NULL};
-    if (drape_context_create(NULL, &out->ctx))
+    if (cli_context_create(&out->ctx))
         return cli_misuse(command->verb, "out of memory");
-    if (!load(command, path, out))
+    cli_signals_end_waits(true);
+    drape_status status = load(command, path, out);
+    cli_signals_end_waits(false);
+    if (cli_interrupted()) /* whatever that made of the scene */
+        return cli_tell_interrupted(command->verb);
+    if (!status)
         return CLI_GO_ON;
     fprintf(stderr, "%s\n", drape_context_message(out->ctx));
     return CLI_BAD_INPUT;

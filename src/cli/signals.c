@@ -1,10 +1,13 @@
 /* signals.c: see signals.h. */
 #include "cli/signals.h"
 
+#include "cli/cli.h"
+
 #include <signal.h>
-#include <stddef.h>
+#include <stdio.h>
 
 static volatile sig_atomic_t interrupted; /* a handler has no other place to leave a word */
+static const int caught[] = {SIGINT, SIGTERM, SIGHUP};
 
 static void remember(int signal)
 {
@@ -17,12 +20,30 @@ static void remember(int signal)
 void cli_catch_signals(void)
 {
     const struct sigaction action = {.sa_handler = remember, .sa_flags = (int)SA_RESETHAND | SA_RESTART};
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    sigaction(SIGHUP, &action, NULL);
+    for (size_t i = 0; i < sizeof caught / sizeof *caught; i++)
+        sigaction(caught[i], &action, NULL);
+}
+
+/* What was reset by a first signal stays so. */
+void cli_signals_end_waits(bool end)
+{
+    struct sigaction action;
+    for (size_t i = 0; i < sizeof caught / sizeof *caught; i++) {
+        if (sigaction(caught[i], NULL, &action) || action.sa_handler != remember)
+            continue;
+        action.sa_flags = end ? action.sa_flags & ~SA_RESTART : action.sa_flags | SA_RESTART;
+        sigaction(caught[i], &action, NULL);
+    }
 }
 
 bool cli_interrupted(void)
 {
     return interrupted != 0;
+}
+
+int cli_tell_interrupted(const char *verb)
+{
+    fflush(stdout);
+    fprintf(stderr, "drape %s: interrupted\n", verb);
+    return CLI_INTERRUPTED;
 }

@@ -1,4 +1,4 @@
-/* signals.h: Ctrl-C and SIGTERM as a wish to stop, which the step in progress outlives. */
+/* signals.h: Ctrl-C, SIGTERM and SIGHUP as a wish to stop, which all stages of a verb look at. */
 #ifndef DRAPE_CLI_SIGNALS_H
 #define DRAPE_CLI_SIGNALS_H
 
@@ -8,5 +8,11 @@
 void cli_catch_signals(void);
 
 bool cli_interrupted(void);
+
+/* Whether a signal ends a read or an open that waits, of a scene from a pipe; writes must not be cut by it. */
+void cli_signals_end_waits(bool end);
+
+/* One line "drape run: interrupted" on stderr, for what has nothing more to tell. Returns CLI_INTERRUPTED. */
+int cli_tell_interrupted(const char *verb);
 
 #endif

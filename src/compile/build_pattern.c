@@ -25,8 +25,10 @@ drape_status drape_compile_pattern(drape_model *model)
     drape_status status = drape_pattern_build(model->ctx, model->free_count, model->free_of_node, couplings,
                                               count, &model->pattern);
     drape_free(model->ctx, couplings);
-    for (int32_t i = 0; !status && i < model->term_count; i++)
-        if (drape_term_couples(&model->terms[i]))
+    for (int32_t i = 0; !status && i < model->term_count; i++) {
+        status = drape_heed(model->ctx);
+        if (!status && drape_term_couples(&model->terms[i]))
             status = place_term(model, &model->terms[i]);
+    }
     return status;
 }

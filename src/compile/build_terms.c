@@ -144,7 +144,9 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
 {
     drape_term *term = &model->terms[model->term_count];
     drape_cloth *cloth = &model->cloths[c];
-    drape_status status = find_row(model->ctx, pointer, def->type, &term->ops);
+    drape_status status = drape_heed(model->ctx);
+    if (!status)
+        status = find_row(model->ctx, pointer, def->type, &term->ops);
     for (int32_t i = 0; !status && i < model->term_count; i++)
         if (model->terms[i].cloth == c && model->terms[i].ops == term->ops)
             status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "the term \"%s\" is named twice",

@@ -234,7 +234,9 @@ static drape_status compile_cloths(drape_model *model, const drape_scene_def *de
         return DRAPE_E_MEMORY;
     drape_status status = DRAPE_OK;
     for (size_t c = 0; !status && c < def->cloth_count; c++) {
-        status = compile_cloth(model, (int32_t)c, def);
+        status = drape_heed(model->ctx);
+        if (!status)
+            status = compile_cloth(model, (int32_t)c, def);
         model->cloth_count = (int32_t)c + 1; /* an unfinished one is freed too */
     }
     if (!status)
@@ -252,24 +254,23 @@ static void stop_pinned(drape_model *model)
 
 drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape_model **out)
 {
+    static drape_status (*const stages[])(drape_model *, const drape_scene_def *) = {copy_scene,
+                                                                                     compile_cloths,
+                                                                                     drape_compile_pins,
+                                                                                     drape_compile_contact,
+                                                                                     drape_compile_colliders,
+                                                                                     drape_compile_terms};
     *out = NULL;
     drape_model *model = drape_alloc(ctx, 1, sizeof *model);
     if (!model)
         return DRAPE_E_MEMORY;
     model->ctx = ctx;
     drape_status status = drape_compile_check_def(ctx, def);
-    if (!status)
-        status = copy_scene(model, def);
-    if (!status)
-        status = compile_cloths(model, def);
-    if (!status)
-        status = drape_compile_pins(model, def);
-    if (!status)
-        status = drape_compile_contact(model, def);
-    if (!status)
-        status = drape_compile_colliders(model, def);
-    if (!status)
-        status = drape_compile_terms(model, def);
+    for (size_t i = 0; !status && i < sizeof stages / sizeof *stages; i++) {
+        status = drape_heed(ctx);
+        if (!status)
+            status = stages[i](model, def);
+    }
     if (!status)
         status = drape_compile_pattern(model);
     for (int32_t c = 0; c < model->cloth_count; c++) /* a scene without bending keeps no hinges */

@@ -99,7 +99,11 @@ static drape_status complete(drape_context *ctx, const drape_mesh_source *source
 {
     drape_status status = drape_mesh_validate_triangles(ctx, source, mesh);
     if (!status)
+        status = drape_heed(ctx);
+    if (!status)
         status = drape_mesh_connect(ctx, source, mesh);
+    if (!status)
+        status = drape_heed(ctx);
     if (!status)
         status = drape_mesh_validate_nodes(ctx, source, mesh);
     if (!status)
@@ -120,6 +124,8 @@ drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drap
         status = drape_mesh_check_transform(ctx, pointer, def->scale, def->rotate, def->translate);
     if (!status)
         status = take_from_source(ctx, pointer, def, folder, mesh);
+    if (!status)
+        status = drape_heed(ctx);
     if (!status)
         status = place_nodes(ctx, pointer, &source, def, mesh);
     if (!status)

@@ -148,6 +148,8 @@ static drape_status read_all(drape_scene *scene, FILE *file, size_t room, size_t
             status = cannot_read(scene, strerror(errno));
         else if (*size > LARGEST_FILE)
             status = cannot_read(scene, "it is larger than 1 GiB");
+        else
+            status = drape_heed(scene->ctx);
     }
     if (!status)
         scene->text[*size] = 0;

@@ -53,7 +53,9 @@ static const double *values_of(const drape_report_data *d, int field)
 
 static drape_status load(const drape_report_data *d, int64_t frame)
 {
-    drape_status status = drape_record_read(&d->run->record, frame, d->x);
+    drape_status status = drape_heed(d->run->ctx);
+    if (!status)
+        status = drape_record_read(&d->run->record, frame, d->x);
     if (status)
         return status;
     find_strain(d);

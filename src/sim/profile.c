@@ -190,6 +190,9 @@ static drape_status measure_terms(bench *s, bool implicit, drape_profile_term *t
     if (!seen)
         return DRAPE_E_MEMORY;
     for (s->term = 0; s->term < model->term_count; s->term++) {
+        drape_status status = drape_heed(s->ctx);
+        if (status)
+            return status;
         const drape_term *term = &model->terms[s->term];
         drape_profile_term *p = &terms[s->term];
         *p = (drape_profile_term){.nonzeros = count_nonzeros(term, seen, blocks), .bytes = term_bytes(term)};
@@ -275,6 +278,9 @@ static drape_status measure(bench *s, drape_profile *out)
     if (!out->implicit)
         return DRAPE_OK;
     out->jacobian_seconds = shortest(s, whole_jacobian);
+    status = drape_heed(s->ctx);
+    if (status)
+        return status;
     return s->sim->model->free_count > 0 ? measure_solver(s, out) : DRAPE_OK;
 }
 

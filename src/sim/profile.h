@@ -30,7 +30,7 @@ typedef struct drape_profile {
     size_t model_bytes, mesh_bytes, pattern_bytes, system_bytes, integrator_bytes, state_bytes;
 } drape_profile;
 
-/* terms: room for the terms of the model. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
+/* terms: room for the terms of the model. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED. */
 drape_status drape_profile_measure(drape_context *ctx, const drape_sim *sim, drape_profile_term *terms,
                                    drape_profile *out);
 

@@ -56,6 +56,8 @@ static drape_status create_parts(drape_sim *sim, int threads)
 {
     drape_status status = create_states(sim);
     if (!status)
+        status = drape_heed(sim->ctx);
+    if (!status)
         status = drape_system_create(sim->ctx, sim->model, threads, &sim->system);
     if (!status)
         drape_system_watch(sim->system, &sim->cancel);
@@ -64,6 +66,8 @@ static drape_status create_parts(drape_sim *sim, int threads)
         drape_system_leave_constraints(sim->system);
     if (!status && !projects)
         status = drape_system_add_contact(sim->system);
+    if (!status)
+        status = drape_heed(sim->ctx);
     if (!status)
         status = sim->chosen.integrator->create(sim->ctx, sim->system, sim->chosen.integrator_values,
                                                 &sim->integrator);
@@ -93,6 +97,8 @@ static drape_sim empty_sim(drape_context *ctx, const drape_model *model, double 
 static drape_status start_sim(drape_sim *sim, int threads)
 {
     drape_status status = create_parts(sim, threads);
+    if (!status)
+        status = drape_heed(sim->ctx);
     if (status)
         return status;
     drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),

@@ -139,6 +139,10 @@ def write_png(path, pixels):
 def need_pictures():
     if numpy is None:
         raise Skip("no numpy here")
+    need_driver()
+
+
+def need_driver():
     probe = drape("render", write_scene("probe.json", duration=0.01), "--out", "probe.png", "--size", "64x64")
     if probe.returncode == 2 and ("without drawing" in probe.stderr or "draw without a display" in probe.stderr):
         raise Skip(probe.stderr.strip())
@@ -531,6 +535,35 @@ def test_view():
     for part in ("bdf2", "dt = 0.00666667 s", "shade blinn_phong", "stiffness x 0.6667", "gravity x 0.6667"):
         assert part in out, f"{part!r} is not in {out!r}"
     assert not out.startswith("t = 0 s"), out
+
+
+def test_view_interrupted():
+    """a window ends by Ctrl-C at any moment with one line, paused or not, before it is open or after"""
+    need_driver()
+    write_scene(duration=5, frame_rate=60)
+    with Screen() as screen:
+        for k, delay in enumerate((0.02, 0.1, 0.5, 1.5)):
+            view = subprocess.Popen([PROGRAM, "view", "ball.json", "--size", "320x240"] + ["--running"] * (k % 2), env=screen.env,
+                                    text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            try:
+                end = time.monotonic() + LIMIT
+                while time.monotonic() < end and not catches_signals(view.pid):
+                    time.sleep(0.001)
+                time.sleep(delay)
+                view.send_signal(signal.SIGINT)
+                _, err = view.communicate(timeout=LIMIT)
+            finally:
+                if view.poll() is None:
+                    view.kill()
+                    view.wait()
+            equal((view.returncode, err), (130, "drape view: interrupted\n"), f"view after {delay} s")
+
+
+def catches_signals(pid):
+    """SIGHUP, the last that the program asks for."""
+    with open(f"/proc/{pid}/status", encoding="ascii") as file:
+        caught = next(line for line in file if line.startswith("SigCgt:"))
+    return int(caught.split()[1], 16) >> (signal.SIGHUP - 1) & 1
 
 
 def test_no_display():

@@ -7,6 +7,7 @@
 #include "io/recorder.h"
 #include "io/summary.h"
 #include "solvers/linear.h"
+#include "support/bytes.h"
 #include "support/failing_allocator.h"
 #include "support/suite.h"
 
@@ -66,9 +67,51 @@ static void remove_files(void)
     ck_assert_int_eq(system(command), 0);
 }
 
+static void breeze(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
+{
+    (void)user, (void)t, (void)x, (void)gradient;
+    for (int32_t i = 0; i < count; i++)
+        wind[3 * i] = 1;
+}
+
+/* What a host does between two frames, up to the first failure. */
+static drape_status steer(drape_sim *sim, const drape_model *model)
+{
+    static double forces[3 * 64];
+    static const double still[3 * 64];
+    const int32_t node = 3; /* on a track */
+    const double *x = drape_model_rest_positions(model), up[3] = {0, 0.01, 0};
+    ck_assert_int_le(drape_model_node_count(model), 64);
+    drape_status status = drape_sim_move_pins(sim, 1, &node, 0.01, x + 3 * node, NULL);
+    if (!status)
+        status = drape_sim_move_collider(sim, 1, 0.01, up, NULL);
+    if (!status)
+        status = drape_sim_push(sim, still);
+    if (!status)
+        status = drape_sim_set_wind(sim, breeze, NULL);
+    if (!status)
+        status = drape_sim_pull(sim, 1, 1, up);
+    if (!status)
+        status = drape_sim_reactions(sim, forces);
+    if (!status)
+        status = drape_sim_contact_forces(sim, forces);
+    if (!status)
+        status = drape_sim_collider_force(sim, 1, forces);
+    if (!status)
+        status = drape_sim_set_state(sim, 0, x, still);
+    if (status)
+        return status;
+    const uint64_t hash = drape_sim_hash(sim);
+    bytes saved = bytes_save(sim);
+    status = drape_sim_restore_from(sim, saved.data, saved.size);
+    free(saved.data);
+    ck_assert(drape_sim_hash(sim) == hash);
+    return status;
+}
+
 static drape_status run(drape_context *ctx, const drape_model *model, const char *linear_solver)
 {
-    static const char *const formats[] = {"npy", "obj", "ply"};
+    static const char *const formats[] = {"npy", "obj", "ply", "vtp", "pc2", "glb"};
     const drape_setting setting = {"linear_solver", 0, linear_solver};
     drape_sim *sim = (drape_sim *)(uintptr_t)1;
     drape_recorder *recorder = (drape_recorder *)(uintptr_t)1;
@@ -78,10 +121,14 @@ static drape_status run(drape_context *ctx, const drape_model *model, const char
     def.integrator_setting_count = 1;
     drape_status status = drape_sim_create(ctx, model, &def, &sim);
     ck_assert_int_eq(status != DRAPE_OK, sim == NULL);
-    if (status)
+    if (!status)
+        status = steer(sim, model);
+    if (status) {
+        drape_sim_destroy(&sim);
         return status;
+    }
     status = drape_recorder_create(
-        ctx, sim, &(drape_recorder_def){.folder = out_path, .formats = formats, .format_count = 3},
+        ctx, sim, &(drape_recorder_def){.folder = out_path, .formats = formats, .format_count = 6},
         &recorder);
     ck_assert_int_eq(status != DRAPE_OK, recorder == NULL);
     if (!status)

@@ -1,0 +1,114 @@
+#!/usr/bin/env python3
+"""test_faults.py: verbs that write, on a disk that is full after any number of bytes, and where a folder cannot be: exit code 1 and one
+line that names the file, or the work of a verb that had room; whole files or none. `drape run` is in test_cli.py. TAP on stdout.
+"""
+import os
+import re
+import resource
+import shutil
+
+from program import Skip, drape, equal, good, read_json, run_tests, write_scene
+
+SIZES = 0, 1, 100, 700, 3000, 9000  # [bytes] that a file may have: none, a part of the first, of later ones
+
+
+def on_full_disk(size, *args):
+    """The program ignores SIGXFSZ, so that a write is cut short and the next one fails, as on a disk that is full."""
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+    return drape(*args, preexec_fn=limit)
+
+
+def files_below(folder):
+    return {os.path.join(path, name): os.path.getsize(os.path.join(path, name))
+            for path, _, names in os.walk(folder) for name in names}
+
+
+def fill(args, out, whole_of, sizes=SIZES):
+    """whole_of: name -> whether that file is whole, for those that are there."""
+    failed = 0
+    for size in sizes:
+        for path in (out,) if isinstance(out, str) else out:
+            shutil.rmtree(path, ignore_errors=True)
+            if os.path.exists(path):
+                os.remove(path)
+        result = on_full_disk(size, *args)
+        what = f"{' '.join(args)}, {size} bytes: {result.returncode}, {result.stderr!r}"
+        if result.returncode:
+            failed += 1
+            equal(result.returncode, 1, what)
+            assert re.fullmatch(r"[^\n]*\"[^\n]+\": File too large\n", result.stderr), what
+        for name in files_below("."):
+            assert not name.endswith((".part", ".tmp")), f"{what}: {name} is left"
+            whole_of(name, what)
+    assert failed >= 2, f"{' '.join(args)}: {failed} failures"
+
+
+def is_whole(name, what):
+    with open(name, "rb") as file:
+        data = file.read()
+    if name.endswith(".png"):
+        equal(data[-8:-4], b"IEND", f"{what}: {name}")
+    elif name.endswith(".html"):
+        assert data.rstrip().endswith(b"</html>"), f"{what}: {name}"
+    elif name.endswith(".json"):
+        read_json(name)
+    elif name.endswith(".jsonl"):
+        assert data == b"" or data.endswith(b"\n"), f"{what}: {name} ends within a line"
+
+
+def test_report():
+    """report"""
+    write_scene()
+    good("run", "scene.json", "--out", "run", "--format", "npy")
+    fill(["report", "run", "--out", "page.html"], "page.html", is_whole)
+
+
+def test_experiments():
+    """tradeoff, stability, converge: the lines that are kept are whole, and the same command goes on when there is room"""
+    if not re.search(r"^ +tradeoff ", good("--help"), re.M):
+        raise Skip("this build has no experiments")
+    write_scene()
+    for command in (["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1"],
+                    ["converge", "scene.json", "--integrators", "be", "--levels", "3"],
+                    ["stability", "scene.json", "--integrators", "be", "--axis", "/integrator/dt=1e-3:1e-2:3log", "--axis",
+                     "/cloth/0/material/young_modulus=1e4:1e6:3log"]):
+        fill([*command, "--out", "lab"], "lab", is_whole)
+        good(*command, "--out", "lab")
+
+
+def test_validate():
+    """validate --out"""
+    if not re.search(r"^ +validate ", good("--help"), re.M):
+        raise Skip("this build has no experiments")
+    fill(["validate", "free_fall", "--out", "lab"], "lab", is_whole, (0, 1, 100))
+    good("validate", "free_fall", "--out", "lab")
+
+
+def test_render():
+    """render: a picture, a folder of them"""
+    write_scene()
+    if drape("render", "scene.json", "--out", "x.png", "--size", "64x48").returncode:
+        raise Skip("there is no driver")
+    fill(["render", "scene.json", "--out", "x.png", "--size", "320x200"], "x.png", is_whole, (0, 1, 100, 700))
+    fill(["render", "scene.json", "--out", "frames", "--size", "320x200"], "frames", is_whole, (0, 1, 100, 700))
+
+
+def test_no_folder():
+    """a file is where a folder should be"""
+    write_scene()
+    good("run", "scene.json", "--out", "run", "--format", "npy")
+    with open("file", "w", encoding="ascii") as file:
+        file.write("x")
+    commands = [["run", "scene.json", "--out", "file/x"], ["report", "run", "--out", "file/x/page.html"]]
+    if drape("render", "run", "--out", "x.png", "--size", "64x48").returncode == 0:
+        commands += [["render", "run", "--out", "file/x.png"], ["render", "run", "--out", "file/x"]]
+    for command in commands:
+        result = drape(*command)
+        assert re.fullmatch(r"[^\n]*file/x[^\n]*Not a directory\n", result.stderr), (command, result.stderr)
+        equal(result.returncode, 1, " ".join(command))
+        with open("file", encoding="ascii") as file:
+            equal(file.read(), "x")
+
+
+raise SystemExit(run_tests(globals()))

@@ -1,0 +1,180 @@
+/* test_cancel.c: a context's cancel says yes at each of its calls in turn, while a scene is read and compiled, a sim is made and
+ * restored: each time a clean DRAPE_E_STOPPED, NULL, no leak; what was there before goes on with the same bits. */
+#include <stdio.h>
+#include <unistd.h>
+
+#include "assemble/check.h"
+#include "sim/profile.h"
+#include "sim/sim.h"
+#include "support/bytes.h"
+#include "support/failing_allocator.h"
+#include "support/suite.h"
+
+#define MOST 1000 /* calls; a life takes some dozens */
+
+static const char scene_text[] =
+    "{\"drape\": 1, \"cloth\": [\n"
+    " {\"mesh\": {\"grid\": \"square\", \"columns\": 4, \"rows\": 4, \"width\": 0.3, \"height\": 0.3},\n"
+    "  \"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200},\n"
+    "  \"terms\": [\"stretch.edge\", {\"type\": \"bend.hinge\", \"rest\": \"flat\"}],\n"
+    "  \"pins\": [{\"corner\": \"top-left\"}]},\n"
+    " {\"mesh\": {\"grid\": \"equilateral\", \"edges\": 2, \"edge_length\": 0.1, \"transform\": "
+    "{\"translate\": [0, 1, 0]}},\n"
+    "  \"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200}, \"terms\": "
+    "[\"stretch.edge\"]}],\n"
+    " \"colliders\": [{\"type\": \"plane\", \"point\": [0, -9, 0], \"normal\": [0, 1, 0]}],\n"
+    " \"integrator\": {\"dt\": 0.01}, \"duration\": 1}\n";
+
+/* Says yes at call number `at`, and, if it is to, ever after. */
+typedef struct asked {
+    failing_allocator memory;
+    long calls, at;
+    bool stays;
+} asked;
+
+static bool cancel(void *user)
+{
+    asked *a = user;
+    a->calls++;
+    return a->at > 0 && (a->calls == a->at || (a->stays && a->calls > a->at));
+}
+
+static drape_context *context(asked *a)
+{
+    drape_context_def def;
+    drape_context *ctx = NULL;
+    drape_context_def_init(&def, sizeof def);
+    def.allocate = failing_allocate;
+    def.release = failing_release;
+    def.allocator_user = &a->memory;
+    def.cancel = cancel;
+    def.cancel_user = a;
+    ck_assert_int_eq(drape_context_create(&def, &ctx), DRAPE_OK);
+    return ctx;
+}
+
+/* Reads, compiles, makes, checks, measures and restores. */
+static drape_status live(drape_context *ctx, const char *path)
+{
+    drape_scene *scene = NULL;
+    drape_model *model = NULL;
+    drape_sim *sim = NULL;
+    int rows;
+    drape_status status = drape_scene_load(ctx, path, &scene);
+    ck_assert_int_eq(status != DRAPE_OK, scene == NULL);
+    if (!status) {
+        status = drape_scene_compile(scene, &model);
+        ck_assert_int_eq(status != DRAPE_OK, model == NULL);
+    }
+    if (!status) {
+        status = drape_sim_create(ctx, model, NULL, &sim);
+        ck_assert_int_eq(status != DRAPE_OK, sim == NULL);
+    }
+    if (!status) {
+        static drape_check_row row[DRAPE_MAX_CHECK_ROWS];
+        status = drape_check_derivatives(ctx, sim->system, 1, row, &rows);
+    }
+    if (!status) {
+        drape_profile_term terms[16];
+        drape_profile profile;
+        status = drape_profile_measure(ctx, sim, terms, &profile);
+    }
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_scene_destroy(&scene);
+    return status;
+}
+
+/* How many times a whole life asks. */
+static long calls_of_a_life(const char *path)
+{
+    asked a = {.at = 0};
+    drape_context *ctx = context(&a);
+    ck_assert_int_eq(live(ctx, path), DRAPE_OK);
+    drape_context_destroy(&ctx);
+    return a.calls;
+}
+
+START_TEST(it_may_be_at_any_stage)
+{
+    char path[] = "/tmp/drape-cancel-XXXXXX";
+    const int fd = mkstemp(path);
+    ck_assert_int_eq(write(fd, scene_text, sizeof scene_text - 1), sizeof scene_text - 1);
+    close(fd);
+    const long calls = calls_of_a_life(path);
+    ck_assert_int_ge(calls,
+                     30); /* reading, each cloth, mesh, collider and term, the parts of a sim, measurements */
+    for (long n = 1; n <= 2 * calls; n++) {
+        asked a = {.at = (n + 1) / 2, .stays = n % 2 == 0};
+        drape_context *ctx = context(&a);
+        ck_assert_msg(live(ctx, path) == DRAPE_E_STOPPED, "call %ld: %s", a.at, drape_context_message(ctx));
+        ck_assert_ptr_nonnull(strstr(drape_context_message(ctx), "cancelled"));
+        ck_assert_int_eq(a.calls, a.at); /* whoever was told to end does not ask again */
+        drape_context_destroy(&ctx);
+        ck_assert_msg(a.memory.live == 0, "call %ld: %ld leaks", a.at, a.memory.live);
+    }
+    unlink(path);
+}
+END_TEST
+
+/* The restored sim is made beside the present one. */
+START_TEST(a_cancelled_restore_leaves_the_sim)
+{
+    asked a = {.at = 0};
+    drape_context *ctx = context(&a);
+    drape_scene *scene = NULL;
+    drape_model *model = NULL;
+    drape_sim *sim = NULL;
+    ck_assert_int_eq(drape_scene_parse(ctx, scene_text, "scene", &scene), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_compile(scene, &model), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_create(ctx, model, NULL, &sim), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.02), DRAPE_OK);
+    bytes there = bytes_save(sim);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.04), DRAPE_OK);
+    const uint64_t hash = drape_sim_hash(sim);
+    drape_status status = DRAPE_E_STOPPED;
+    long n = 0;
+    while (status) {
+        a.calls = 0;
+        a.at = ++n;
+        ck_assert_int_lt(n, MOST);
+        status = drape_sim_restore_from(sim, there.data, there.size);
+        ck_assert(status == DRAPE_OK || status == DRAPE_E_STOPPED);
+        ck_assert_int_eq(status == DRAPE_OK, drape_sim_hash(sim) != hash);
+    }
+    ck_assert_int_gt(n, 2);
+    ck_assert_double_eq(drape_sim_time(sim), 0.02);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.04), DRAPE_OK);
+    ck_assert(drape_sim_hash(sim) == hash);
+    free(there.data);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_scene_destroy(&scene);
+    drape_context_destroy(&ctx);
+    ck_assert_int_eq(a.memory.live, 0);
+}
+END_TEST
+
+/* A context of a host that knew no cancel asks nobody. */
+START_TEST(an_older_host_has_none)
+{
+    drape_context_def def;
+    drape_context *ctx = NULL;
+    drape_model *model = NULL;
+    drape_scene *scene = NULL;
+    asked a = {.at = 1, .stays = true};
+    drape_context_def_init(&def, sizeof def);
+    def.cancel = cancel;
+    def.cancel_user = &a;
+    def.struct_size = offsetof(drape_context_def, cancel);
+    ck_assert_int_eq(drape_context_create(&def, &ctx), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_parse(ctx, scene_text, "scene", &scene), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_compile(scene, &model), DRAPE_OK);
+    ck_assert_int_eq(a.calls, 0);
+    drape_model_destroy(&model);
+    drape_scene_destroy(&scene);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+SUITE("cancel", it_may_be_at_any_stage, a_cancelled_restore_leaves_the_sim, an_older_host_has_none)
