@@ -14,11 +14,11 @@
 #include <signal.h>
 #include <stdatomic.h>
 
-/* Looks before one sleeps, each of which lets others have the core, a third of a microsecond where there are none. A helper
- * looks for as long as the caller takes between two loops of one factorisation; the caller, whose core may be what the helper
- * needs, sleeps soon. */
-#define HELPER_LOOKS 200
-#define CALLER_LOOKS 20
+/* Looks before one sleeps, each of which lets others have the core, a third of a microsecond where there are none: a millisecond or
+ * two, longer than the caller takes between two loops of one step. To wake a core that has gone to sleep takes up to a tenth of that, each
+ * time; where a core is taken, longer looks cost nothing that was measured. */
+#define HELPER_LOOKS 5000
+#define CALLER_LOOKS 3000
 #define LEFT         0xffffffffu /* of `open`: rounds not taken; above it, the number of the loop */
 #define APART        64 /* bytes: in one line of the cache, what one thread writes is taken from all others */
 

@@ -54,8 +54,8 @@ typedef struct multifrontal {
     int32_t *target_start;    /* (e.n + 1) of each column */
     int32_t *in_panel,
         *in_update; /* (rows of all fronts) where a row lies in its front's parent; see place_rows */
-    double *panels, *updates, *inverse, *work, *scratch;
-    void *memory[2]; /* of panels and updates, before alignment */
+    double *panels, *updates, *inverse, *work, *scratch, *left; /* left: (rows of all fronts, 3) see part */
+    void *memory[2];                                            /* of panels and updates, before alignment */
     int64_t panel_size, update_size;
     int32_t widest, tallest; /* scalars, of all fronts, in whole strips */
     double *diagonal;        /* (n) in the pattern's order */
@@ -76,9 +76,9 @@ static void destroy(void **state)
     if (s->general)
         s->general_row->destroy(&s->general);
     drape_elimination_free(s->ctx, &s->e);
-    void *all[] = {s->fronts,       s->branch,    s->top,       s->source,  s->mirror, s->target,
-                   s->target_start, s->in_panel,  s->in_update, s->inverse, s->work,   s->scratch,
-                   s->memory[0],    s->memory[1], s->diagonal,  s->failed};
+    void *all[] = {s->fronts,       s->branch,    s->top,       s->source,   s->mirror, s->target,
+                   s->target_start, s->in_panel,  s->in_update, s->inverse,  s->work,   s->scratch,
+                   s->left,         s->memory[0], s->memory[1], s->diagonal, s->failed};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         drape_free(s->ctx, all[i]);
     drape_free(s->ctx, s);
@@ -265,6 +265,12 @@ static double *take_aligned(multifrontal *s, int which, int64_t count)
     return at ? (double *)((at + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT) : NULL;
 }
 
+/* Doubles of scratch of one branch, or the top. */
+static int64_t scratch_size(const multifrontal *s)
+{
+    return 5 * (int64_t)s->widest + s->tallest;
+}
+
 static bool allocate(multifrontal *s)
 {
     const drape_pattern *p = s->pattern;
@@ -277,13 +283,15 @@ static bool allocate(multifrontal *s)
     s->inverse = drape_alloc(s->ctx, n, sizeof *s->inverse);
     s->work = drape_alloc(s->ctx, n, sizeof *s->work);
     s->failed = drape_alloc(s->ctx, (size_t)s->e.count, sizeof *s->failed);
-    s->scratch = drape_alloc(s->ctx, (size_t)(5 * s->widest + s->tallest), sizeof *s->scratch);
+    s->scratch =
+        drape_alloc(s->ctx, (size_t)(s->branch_count + 1), (size_t)scratch_size(s) * sizeof *s->scratch);
+    s->left = drape_alloc(s->ctx, (size_t)s->e.row_start[s->e.count], 3 * sizeof *s->left);
     s->in_panel = drape_alloc(s->ctx, (size_t)s->e.row_start[s->e.count], sizeof *s->in_panel);
     s->in_update = drape_alloc(s->ctx, (size_t)s->e.row_start[s->e.count], sizeof *s->in_update);
     s->panels = take_aligned(s, 0, s->panel_size);
     s->updates = take_aligned(s, 1, s->update_size);
     return s->source && s->mirror && s->target && s->target_start && s->diagonal && s->inverse && s->work &&
-           s->failed && s->scratch && s->in_panel && s->in_update && s->panels && s->updates;
+           s->failed && s->scratch && s->left && s->in_panel && s->in_update && s->panels && s->updates;
 }
 
 static drape_status analyse(multifrontal *s)
@@ -618,19 +626,24 @@ typedef struct part {
     const front *f;
     const double *panel, *inverse;
     const int32_t *row;   /* (f->rows / 3) */
+    double *left;         /* (f->rows) what it leaves to its parent */
     double *x, *y, *sums; /* of its columns, of its rows, four sums a column */
 } part;
 
+/* Scratch is a branch's own, or the top's. */
 static part part_of(multifrontal *s, int32_t i)
 {
     const front *f = &s->fronts[i];
-    double *x = s->scratch, *y = x + s->widest, *sums = y + s->tallest;
+    const int32_t place = f->branch < 0 ? s->branch_count : f->branch;
+    double *x = s->scratch + (int64_t)place * scratch_size(s), *y = x + s->widest, *sums = y + s->tallest;
     memset(x, 0, (size_t)S * (size_t)f->column_strips * sizeof *x);
     memcpy(x, s->work + 3 * s->e.first[i], (size_t)f->columns * sizeof *x);
+    memset(y, 0, (size_t)S * (size_t)f->row_strips * sizeof *y);
     return (part){.f = f,
                   .panel = s->panels + f->panel,
                   .inverse = s->inverse + 3 * s->e.first[i],
                   .row = s->e.row + s->e.row_start[i],
+                  .left = s->left + 3 * s->e.row_start[i],
                   .x = x,
                   .y = y,
                   .sums = sums};
@@ -642,10 +655,24 @@ static const double *strip_from(const part *w, int64_t strip, int32_t p)
     return w->panel + (strip * w->f->columns + p) * S;
 }
 
+/* What children left, on columns and rows. */
+static void take_from_children(const multifrontal *s, const part *w)
+{
+    const int32_t columns = w->f->columns / 3;
+    for (int32_t child = w->f->first_child; child >= 0; child = s->fronts[child].sibling)
+        for (int64_t k = s->e.row_start[child]; k < s->e.row_start[child + 1]; k++) {
+            const int32_t at = s->e.in_parent[k];
+            double *to = at < columns ? w->x + 3 * at : w->y + 3 * (at - columns);
+            for (int c = 0; c < 3; c++)
+                to[c] += s->left[3 * k + c];
+        }
+}
+
 static void solve_forward(multifrontal *s, int32_t i)
 {
     const part w = part_of(s, i);
     const front *f = w.f;
+    take_from_children(s, &w);
     for (int32_t d = 0; d < f->column_strips; d++) {
         const int32_t first = S * d, width = f->columns - first < S ? f->columns - first : S;
         const double *tile = strip_from(&w, d, first);
@@ -659,18 +686,15 @@ static void solve_forward(multifrontal *s, int32_t i)
             drape_strip_times(width, strip_from(&w, t, first), x, w.x + S * t);
     }
     memcpy(s->work + 3 * s->e.first[i], w.x, (size_t)f->columns * sizeof *w.x);
-    memset(w.y, 0, (size_t)S * (size_t)f->row_strips * sizeof *w.y);
     for (int32_t t = 0; t < f->row_strips; t++)
         drape_strip_times(f->columns, strip_from(&w, f->column_strips + t, 0), w.x, w.y + S * t);
-    for (int32_t k = 0; k < f->rows; k++)
-        s->work[3 * w.row[k / 3] + k % 3] += w.y[k];
+    memcpy(w.left, w.y, (size_t)f->rows * sizeof *w.y);
 }
 
 static void solve_backward(multifrontal *s, int32_t i)
 {
     const part w = part_of(s, i);
     const front *f = w.f;
-    memset(w.y, 0, (size_t)S * (size_t)f->row_strips * sizeof *w.y);
     for (int32_t k = 0; k < f->rows; k++)
         w.y[k] = s->work[3 * w.row[k / 3] + k % 3];
     memset(w.sums, 0, (size_t)LANES * (size_t)f->columns * sizeof *w.sums);
@@ -694,6 +718,20 @@ static void solve_backward(multifrontal *s, int32_t i)
     memcpy(s->work + 3 * s->e.first[i], w.x, (size_t)f->columns * sizeof *w.x);
 }
 
+static void forward_branch(void *user, int64_t round)
+{
+    multifrontal *s = user;
+    for (int32_t i = s->branch[2 * round]; i <= s->branch[2 * round + 1]; i++)
+        solve_forward(s, i);
+}
+
+static void backward_branch(void *user, int64_t round)
+{
+    multifrontal *s = user;
+    for (int32_t i = s->branch[2 * round + 1]; i >= s->branch[2 * round]; i--)
+        solve_backward(s, i);
+}
+
 static drape_status solve(void *state, const double *b, double *x)
 {
     multifrontal *s = state;
@@ -704,10 +742,12 @@ static drape_status solve(void *state, const double *b, double *x)
         return s->general_row->solve(s->general, b, x);
     for (int32_t k = 0; k < s->e.n; k++)
         memcpy(s->work + 3 * (size_t)k, b + 3 * (size_t)s->e.order[k], 3 * sizeof *b);
-    for (int32_t i = 0; i < s->e.count; i++)
-        solve_forward(s, i);
-    for (int32_t i = s->e.count - 1; i >= 0; i--)
-        solve_backward(s, i);
+    drape_parallel(s->crew, s->branch_count, forward_branch, s);
+    for (int32_t k = 0; k < s->top_count; k++)
+        solve_forward(s, s->top[k]);
+    for (int32_t k = s->top_count - 1; k >= 0; k--)
+        solve_backward(s, s->top[k]);
+    drape_parallel(s->crew, s->branch_count, backward_branch, s);
     for (int32_t k = 0; k < s->e.n; k++)
         memcpy(x + 3 * (size_t)s->e.order[k], s->work + 3 * (size_t)k, 3 * sizeof *x);
     return drape_all_finite(x, n) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
@@ -732,8 +772,8 @@ static size_t bytes(const void *state)
     const size_t n = (size_t)s->pattern->n, blocks = n / 3,
                  lower = ((size_t)s->pattern->nonzeros / 9 + blocks) / 2;
     const size_t rows = (size_t)s->e.row_start[s->e.count];
-    size_t doubles =
-        (size_t)s->panel_size + (size_t)s->update_size + 3 * n + (size_t)(5 * s->widest + s->tallest);
+    size_t doubles = (size_t)s->panel_size + (size_t)s->update_size + 3 * n + 3 * rows +
+                     (size_t)((s->branch_count + 1) * scratch_size(s));
     return sizeof *s + doubles * sizeof(double) + (size_t)s->e.count * (sizeof(front) + 40) +
            (3 * lower + 4 * blocks + 4 * rows) * sizeof(int32_t) +
            (s->general ? s->general_row->bytes(s->general) : 0);
