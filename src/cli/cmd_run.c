@@ -37,6 +37,7 @@ typedef struct run {
     cli_realtime realtime; /* of --realtime */
     double start;          /* [s] of the clock, less what the run took before a checkpoint */
     double wall;           /* [s] that it took */
+    bool begun;            /* there is a place for what comes out */
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
 } run;
@@ -294,7 +295,8 @@ static void simulate(run *r)
 {
     const bool done = drape_recorder_is_finished(r->recorder);
     note(r, begin_output(r));
-    if (!r->status && !done)
+    r->begun = !r->status;
+    if (r->begun && !done)
         advance(r);
     if (done)
         r->wall = drape_recorder_wall(r->recorder);
@@ -307,7 +309,8 @@ static void simulate(run *r)
 /* A signal that came after the last step has nothing left to stop. */
 static int conclude(const run *r)
 {
-    print_results(r);
+    if (r->begun)
+        print_results(r);
     if (!r->status)
         return CLI_DONE;
     fflush(stdout);

@@ -24,7 +24,7 @@ const drape_reference drape_reference_oscillator = {
     .quantity = "share of energy left by a step",
     OSCILLATOR_CASES,
     .model = "stretch.cst; square; be",
-    .source = "|1/(1 - i omega h)|^2",
+    .source = "1/(1 + omega^2 h^2), of 1/(1 - i omega h)",
     .parameters = oscillator_angles,
     .expected = expected,
     .scene = scene,
