@@ -106,13 +106,33 @@ static inline FILE *bench_csv(const char *name, const char *columns)
     return csv;
 }
 
+/* As Linux names it, without commas; "unknown" elsewhere. */
+static inline void bench_processor(char *name, size_t size)
+{
+    char line[256];
+    FILE *info = fopen("/proc/cpuinfo", "r");
+    snprintf(name, size, "unknown");
+    while (info && fgets(line, sizeof line, info))
+        if (strncmp(line, "model name", 10) == 0 && strchr(line, ':')) {
+            snprintf(name, size, "%.60s", strchr(line, ':') + 2);
+            name[strcspn(name, "\n")] = 0;
+            break;
+        }
+    if (info)
+        fclose(info);
+    for (char *c = name; (c = strchr(c, ','));)
+        *c = ' ';
+}
+
 static inline void bench_csv_row(FILE *csv)
 {
     struct utsname machine;
+    char processor[64];
     const char *commit = getenv("BENCH_COMMIT");
     uname(&machine);
-    fprintf(csv, "%s %s,%s,%s,%s,", machine.sysname, machine.machine, commit ? commit : "unknown",
-            BENCH_COMPILER, BENCH_OPTIONS);
+    bench_processor(processor, sizeof processor);
+    fprintf(csv, "%s %s %s,%s,%s,%s,", processor, machine.sysname, machine.machine,
+            commit ? commit : "unknown", BENCH_COMPILER, BENCH_OPTIONS);
 }
 
 #endif

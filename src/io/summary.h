@@ -7,6 +7,7 @@
 /* Frames with a budget: how long they took, and on which rung they ended. */
 typedef struct drape_summary_realtime {
     int64_t frames, missed, full, fewer, larger;
+    int64_t still; /* frames without a new state: they took no time, and show the one before */
     double budget, p50, p95, p99, worst; /* [s] wall clock a frame */
     double debt, dropped; /* [s] simulated time owed at the end of the last frame, dropped in all */
 } drape_summary_realtime;

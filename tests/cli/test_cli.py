@@ -160,6 +160,8 @@ def test_realtime():
         equal(realtime["full"] + realtime["fewer"] + realtime["larger"], realtime["frames"])
         assert abs(summary["time"] - (0.1 if rate < 1e6 else 2e-5)) < 1e-12, summary
         assert realtime["worst"] >= realtime["p50"] > 0 and realtime["dropped"] >= 0
+        equal(realtime["still"], int(re.search(r"; (\d+) without a new state; ", text).group(1)))
+        equal(realtime["still"] > 0, rate == 1e6)
         if rate == 1e6:  # a microsecond a frame is kept by no machine: frames that make a step miss, the others wait
             assert realtime["missed"] > 0 and realtime["larger"] > 0, realtime
         shape, _ = read_npy("out/positions.npy")
