@@ -19,10 +19,11 @@ call("scene_parse", ctx, SCENE, b"scene", c.byref(scene))
 call("scene_compile", scene, c.byref(model))
 call("sim_create", ctx, model, None, c.byref(sim))
 frame, a, w, start = 1 / 60, 0.1, 3, time.perf_counter()
+report = (c.c_double * 20)()  # room for a drape_realtime, which begins with the time and what is owed
 for k in range(1, int(sys.argv[1]) + 1 if len(sys.argv) > 1 else 301):
     t, vector = k * frame, c.c_double * 3
-    call("sim_move_collider", sim, 0, c.c_double(frame), vector(a * math.sin(w * t)), vector(a * w * math.cos(w * t)))
-    call("sim_advance_realtime", sim, c.c_double(frame), c.c_double(0.8 * frame), None)
+    call("sim_move_collider", sim, 0, c.c_double(frame + report[1]), vector(a * math.sin(w * t)), vector(a * w * math.cos(w * t)))
+    call("sim_advance_realtime", sim, c.c_double(frame), c.c_double(0.8 * frame), report)
     x = np.ctypeslib.as_array(lib.drape_sim_positions(sim), (lib.drape_model_node_count(model), 3))  # a view, no copy
     if k % 30 == 0: print(f"t {t:.2f} s: {x[:, 1].min():.3f} m to {x[:, 1].max():.3f} m high")
     time.sleep(max(0, start + t - time.perf_counter()))

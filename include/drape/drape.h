@@ -283,7 +283,8 @@ typedef struct drape_collider_motion {
     const char *name;       /* as in the scene, or "collider0" ... */
     const char *type;       /* the row */
     double displacement[3]; /* [m] from where its parameters put it */
-    double velocity[3];     /* [m/s]; at a key of the track, that of the piece after it */
+    double velocity
+        [3]; /* [m/s]; at a key of the track, or the end of a host's way, that of the piece after it: 0 of a way */
 } drape_collider_motion;
 
 /* How many obstacles there are, and where one of them is by its track at time t [s]. */

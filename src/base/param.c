@@ -6,6 +6,7 @@
 #include <string.h>
 
 #define LONGEST_WORD 63
+#define RANGE_SIZE   1024 /* bytes of a range in words: lists of choices are long */
 
 int drape_param_find(const drape_param *params, int param_count, const char *name)
 {
@@ -26,6 +27,18 @@ int drape_param_place(const drape_param *params, int index)
     for (int i = 0; i < index; i++)
         place += drape_param_width(&params[i]);
     return place;
+}
+
+bool drape_params_are_well_formed(const drape_param *params, int param_count)
+{
+    if (param_count < 0 || param_count > DRAPE_MAX_PARAMS || (param_count > 0 && !params))
+        return false;
+    for (int i = 0; i < param_count; i++)
+        if (!params[i].name || !params[i].unit || params[i].kind < DRAPE_PARAM_NUMBER ||
+            params[i].kind > DRAPE_PARAM_TEXT ||
+            (params[i].kind == DRAPE_PARAM_CHOICE && (!params[i].choices || !params[i].choices[0])))
+            return false;
+    return drape_param_place(params, param_count) <= DRAPE_MAX_PARAMS;
 }
 
 void drape_param_default(const drape_param *param, double *values)
@@ -146,7 +159,7 @@ static drape_status refuse(drape_context *ctx, const char *pointer, const drape_
     const char *kind = param->kind == DRAPE_PARAM_INTEGER  ? "an integer in "
                        : param->kind == DRAPE_PARAM_NUMBER ? "in "
                                                            : "";
-    char range[256];
+    char range[RANGE_SIZE];
     drape_param_range_text(param, range, sizeof range);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%.100s is not allowed; %s is %s%s", given,
                          param->name, kind, range);
@@ -174,7 +187,7 @@ static drape_status choice_value(drape_context *ctx, const char *pointer, const 
             *value = (double)count;
             return DRAPE_OK;
         }
-    char range[256];
+    char range[RANGE_SIZE];
     choices_text(param, range, sizeof range);
     const char *meant = drape_did_you_mean(word, param->choices, count);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%.60s\" is not allowed; %s is %s%s%s%s", word,
@@ -286,7 +299,7 @@ static drape_status unknown_name(drape_context *ctx, const char *pointer, const 
 
 drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param)
 {
-    char range[256];
+    char range[RANGE_SIZE];
     drape_param_range_text(param, range, sizeof range);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%s\" is missing: %s, %s", param->name,
                          param->help, range);

@@ -27,6 +27,9 @@ drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const
 drape_status drape_param_value(drape_context *ctx, const char *pointer, const drape_param *param,
                                const drape_setting *setting, double *value);
 
+/* Whether a host's list can be read: no more than DRAPE_MAX_PARAMS values, each parameter with a name and a unit, a choice with choices. */
+bool drape_params_are_well_formed(const drape_param *params, int param_count);
+
 /* The index of a name; -1 if it is not in the list. */
 int drape_param_find(const drape_param *params, int param_count, const char *name);
 

@@ -35,7 +35,7 @@ typedef struct list_style {
 } list_style;
 
 typedef struct param_text {
-    char range[256], value[128], unit[64];
+    char range[1024], value[256], unit[64];
 } param_text;
 
 static param_text text_of(const drape_param *param)

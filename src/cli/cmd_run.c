@@ -273,8 +273,14 @@ static void advance(run *r)
     if (r->status)
         return;
     cli_progress_begin(&r->progress, drape_sim_time(r->in.sim), end);
-    note(r,
-         r->request->realtime ? cli_realtime_run(&r->realtime, &r->in) : drape_sim_advance(r->in.sim, end));
+    if (r->in.sim->chosen.integrator->timeless) /* its one step may take minutes */
+        cli_signals_cancel(r->in.sim);
+    drape_status status =
+        r->request->realtime ? cli_realtime_run(&r->realtime, &r->in) : drape_sim_advance(r->in.sim, end);
+    cli_signals_cancel(NULL);
+    if (status == DRAPE_E_STOPPED && cli_interrupted())
+        drape_context_set_message(r->in.ctx, "t=%.9g: interrupted", drape_sim_time(r->in.sim));
+    note(r, status);
     cli_progress_clear(&r->progress);
 }
 
@@ -412,8 +418,9 @@ const drape_verb drape_verb_run = {
     .takes_scene = true,
     .summary = "simulate a scene; frames, step log and summary into a folder",
     .details = "Simulates a scene. Without --out nothing is written but the results on the standard output.\n"
-               "Ctrl-C ends the run after the step in progress and keeps what was written; before the first "
-               "step, nothing is.\n"
+               "Ctrl-C ends the run after the step in progress, or in it where it is the only one (static), "
+               "and keeps "
+               "what was written; before the first step, nothing is.\n"
                "A run with --checkpoint-every that was killed goes on with --resume, and ends as if it had "
                "not been.",
     .options = options,

@@ -4,15 +4,27 @@
 #include "cli/cli.h"
 
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 
 static volatile sig_atomic_t interrupted; /* a handler has no other place to leave a word */
 static const int caught[] = {SIGINT, SIGTERM, SIGHUP};
 
+static _Atomic(drape_sim *) cancelled;
+_Static_assert(ATOMIC_POINTER_LOCK_FREE == 2, "a handler reads it");
+
 static void remember(int signal)
 {
     (void)signal;
     interrupted = 1;
+    drape_sim_cancel(atomic_load(&cancelled));
+}
+
+void cli_signals_cancel(drape_sim *sim)
+{
+    atomic_store(&cancelled, sim);
+    if (interrupted)
+        drape_sim_cancel(sim);
 }
 
 /* Also where they were ignored: a shell starts the background jobs of a script so, and a signal that is

@@ -269,7 +269,7 @@ static bool well_formed(const drape_term_ops *ops)
     bool internal = !ops->has_internal || (ops->commit && ops->initial);
     return ops->name && ops->summary && ops->reference && ops->element_name && kinds == 1 && sized &&
            internal && (!ops->damped || ops->measure) && (!ops->in_medium || ops->dissipation) &&
-           ops->param_count >= 0 && ops->param_count <= DRAPE_MAX_PARAMS;
+           drape_params_are_well_formed(ops->params, ops->param_count);
 }
 
 /* The first version's ops ended here. */
@@ -278,8 +278,10 @@ static bool well_formed(const drape_term_ops *ops)
 drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *given)
 {
     drape_term_ops own = {0}, *ops = &own;
-    if (!ctx || !given)
+    if (!ctx)
         return DRAPE_E_ARGUMENT;
+    if (!given)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_context_add_term: there are no ops");
     if (given->struct_size < LEAST_SIZE || given->struct_size > sizeof own)
         return drape_fail(
             ctx, DRAPE_E_VERSION,
@@ -292,8 +294,9 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *gi
             "the ops of term \"%s\" are not well formed: name, summary, reference, "
             "element_name, exactly one of measure, "
             "energy, dissipation, law; nodes 1 to %d and build but for a law; commit and "
-            "initial with has_internal; damped with a measure alone, in_medium with a dissipation",
-            ops->name ? ops->name : "?", DRAPE_MAX_ELEMENT_NODES);
+            "initial with has_internal; damped with a measure alone, in_medium with a dissipation; "
+            "at most %d values of parameters, each with name and unit, a choice with choices",
+            ops->name ? ops->name : "?", DRAPE_MAX_ELEMENT_NODES, DRAPE_MAX_PARAMS);
     const drape_term_ops *other = NULL;
     for (int i = 0; (other = row(ctx, i)) != NULL; i++)
         if (strcmp(other->name, ops->name) == 0)

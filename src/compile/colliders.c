@@ -113,9 +113,7 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
 static bool well_formed(const drape_collider_ops *ops)
 {
     bool named = ops->name && ops->summary && ops->reference && ops->shape && ops->distance;
-    bool sized =
-        ops->param_count >= 0 && ops->param_count <= DRAPE_MAX_PARAMS && (ops->params || !ops->param_count);
-    return named && sized && drape_param_place(ops->params, ops->param_count) <= DRAPE_MAX_PARAMS;
+    return named && drape_params_are_well_formed(ops->params, ops->param_count);
 }
 
 /* The first version's ops ended here: `smooth` may be missing, and a collider without it is met by its triangles. */
@@ -125,8 +123,10 @@ drape_status drape_context_add_collider(drape_context *ctx, const drape_collider
 {
     drape_collider_ops own = {0}, *ops = &own;
     const drape_collider_ops *other = NULL;
-    if (!ctx || !given)
+    if (!ctx)
         return DRAPE_E_ARGUMENT;
+    if (!given)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_context_add_collider: there are no ops");
     if (given->struct_size < LEAST_SIZE || given->struct_size > sizeof own)
         return drape_fail(
             ctx, DRAPE_E_VERSION,
@@ -134,10 +134,11 @@ drape_status drape_context_add_collider(drape_context *ctx, const drape_collider
             given->struct_size, sizeof own, LEAST_SIZE);
     memcpy(&own, given, given->struct_size);
     if (!well_formed(ops))
-        return drape_fail(ctx, DRAPE_E_ARGUMENT,
-                          "the ops of collider \"%s\" are not well formed: name, summary, reference, shape, "
-                          "distance; at most %d values of parameters",
-                          ops->name ? ops->name : "?", DRAPE_MAX_PARAMS);
+        return drape_fail(
+            ctx, DRAPE_E_ARGUMENT,
+            "the ops of collider \"%s\" are not well formed: name, summary, reference, shape, "
+            "distance; at most %d values of parameters, each with name and unit, a choice with choices",
+            ops->name ? ops->name : "?", DRAPE_MAX_PARAMS);
     for (int i = 0; (other = row(ctx, i)) != NULL; i++)
         if (strcmp(other->name, ops->name) == 0)
             return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a collider \"%s\" already", ops->name);

@@ -4,6 +4,7 @@
  */
 #include "compile/stages.h"
 
+#include <stddef.h>
 #include <string.h>
 
 /* One kind of def: its size here, one that is all defaults, who makes those, and how many there may be. */
@@ -84,7 +85,7 @@ static drape_status read_colliders(drape_context *ctx, drape_arena *arena, drape
 drape_status drape_compile_read_def(drape_context *ctx, drape_arena *arena, const drape_scene_def *given,
                                     drape_scene_def *out)
 {
-    if (!given || given->struct_size == 0 || given->struct_size > sizeof *out)
+    if (!given || given->struct_size < offsetof(drape_scene_def, cloths) || given->struct_size > sizeof *out)
         return drape_fail(ctx, DRAPE_E_VERSION,
                           "the scene def was not initialised by drape_scene_def_init of this version");
     drape_scene_def_init(out, sizeof *out);

@@ -113,8 +113,9 @@ drape_status drape_sim_restore(drape_sim *sim, const char *path)
     drape_archive a;
     void *bytes;
     size_t size;
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status guarded = drape_sim_guard(sim, "drape_sim_restore");
+    if (guarded)
+        return guarded;
     if (!path || !*path)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_restore: there is no name of a file");
     drape_status status = drape_checkpoint_read(sim->ctx, path, NULL, &bytes, &size);

@@ -236,8 +236,9 @@ drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, void *user)
 drape_status drape_sim_restore_from(drape_sim *sim, const void *bytes, size_t size)
 {
     drape_archive a;
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status guarded = drape_sim_guard(sim, "drape_sim_restore_from");
+    if (guarded)
+        return guarded;
     if (!bytes)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_restore_from: there are no bytes");
     if (!drape_archive_read_from(&a, sim->ctx, MEMORY_NAME, bytes, size))

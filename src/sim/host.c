@@ -45,8 +45,9 @@ static drape_status check_pin(const drape_sim *sim, int32_t node, const double *
 drape_status drape_sim_move_pins(drape_sim *sim, int32_t count, const int32_t *nodes, double seconds,
                                  const double *positions, const double *velocities)
 {
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status guarded = drape_sim_guard(sim, "drape_sim_move_pins");
+    if (guarded)
+        return guarded;
     if (count < 0 || (count > 0 && (!nodes || !positions)))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_move_pins: %d nodes, but no list of them or of positions", (int)count);
@@ -73,8 +74,9 @@ static drape_status check_collider(const drape_sim *sim, const char *function, i
 drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double seconds,
                                      const double displacement[3], const double *velocity)
 {
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status guarded = drape_sim_guard(sim, "drape_sim_move_collider");
+    if (guarded)
+        return guarded;
     drape_status status = check_collider(sim, "drape_sim_move_collider", collider);
     if (!status)
         status = check_seconds(sim, "drape_sim_move_collider", seconds);
@@ -111,8 +113,9 @@ static void forces_jump(drape_sim *sim)
 
 drape_status drape_sim_push(drape_sim *sim, const double *forces)
 {
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status guarded = drape_sim_guard(sim, "drape_sim_push");
+    if (guarded)
+        return guarded;
     if (forces && !drape_all_finite(forces, 3 * (size_t)sim->model->node_count))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_push: a force is not finite");
     drape_system_set_push(sim->system, forces);
@@ -122,8 +125,9 @@ drape_status drape_sim_push(drape_sim *sim, const double *forces)
 
 drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *field, void *user)
 {
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status guarded = drape_sim_guard(sim, "drape_sim_set_wind");
+    if (guarded)
+        return guarded;
     if (field && !drape_wind_is_felt(sim->model))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_set_wind: no term of the model is in a medium, as drag.wind is");

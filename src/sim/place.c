@@ -107,8 +107,9 @@ static void start_anew(drape_sim *sim, double t_before)
 
 drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, const double *v)
 {
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status guarded = drape_sim_guard(sim, "drape_sim_set_state");
+    if (guarded)
+        return guarded;
     drape_status status = check_given(sim, t, x, v);
     if (status)
         return status;

@@ -24,8 +24,9 @@ static drape_status check(const drape_sim *sim, int32_t node, double stiffness, 
 
 drape_status drape_sim_pull(drape_sim *sim, int32_t node, double stiffness, const double target[3])
 {
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status guarded = drape_sim_guard(sim, "drape_sim_pull");
+    if (guarded)
+        return guarded;
     drape_status status = check(sim, node, stiffness, target);
     if (status)
         return status;

@@ -200,8 +200,9 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
 {
     drape_realtime report = {.rung = "full"};
     double start = drape_clock_seconds();
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status guarded = drape_sim_guard(sim, "drape_sim_advance_realtime");
+    if (guarded)
+        return guarded;
     sim->ctx->message[0] = 0;
     drape_status status = check_arguments(sim, frame_dt, budget);
     if (!status) {

@@ -126,8 +126,10 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
 {
     drape_sim_def def;
     double start = drape_clock_seconds();
-    if (!out || !ctx)
+    if (!ctx)
         return DRAPE_E_ARGUMENT;
+    if (!out)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_sim_create: there is no place for the sim");
     *out = NULL;
     if (!model)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_sim_create: there is no model");
@@ -238,8 +240,10 @@ const char *drape_sim_reason(const drape_sim *sim, int index, int64_t *count)
 
 drape_status drape_sim_observe(drape_sim *sim, drape_observer *observer, void *user)
 {
-    if (!sim || !observer)
+    if (!sim)
         return DRAPE_E_ARGUMENT;
+    if (!observer)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_observe: there is no function");
     if (sim->observer_count == DRAPE_MAX_OBSERVERS)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "a sim has at most %d observers", DRAPE_MAX_OBSERVERS);
     sim->observers[sim->observer_count] = observer;
@@ -247,10 +251,22 @@ drape_status drape_sim_observe(drape_sim *sim, drape_observer *observer, void *u
     return DRAPE_OK;
 }
 
+drape_status drape_sim_guard(drape_sim *sim, const char *function)
+{
+    if (!sim)
+        return DRAPE_E_ARGUMENT;
+    if (sim->telling)
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: not from an observer, while the sim advances",
+                          function);
+    return DRAPE_OK;
+}
+
 drape_status drape_sim_tell(drape_sim *sim, const drape_event *event)
 {
     for (int i = 0; i < sim->observer_count; i++) {
+        sim->telling = true;
         drape_status status = sim->observers[i](sim->observer_users[i], event);
+        sim->telling = false;
         if (status > 0)
             return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: an observer asked to stop",
                               drape_sim_state(sim)->t);

@@ -71,7 +71,11 @@ struct drape_sim {
     drape_observer *observers[DRAPE_MAX_OBSERVERS];
     void *observer_users[DRAPE_MAX_OBSERVERS];
     int observer_count;
+    bool telling; /* an observer is running */
 };
+
+/* Whether a host may change the sim now. Errors: DRAPE_E_ARGUMENT (no sim; from an observer of it). */
+drape_status drape_sim_guard(drape_sim *sim, const char *function);
 
 /* Another one with the same choices, at the beginning. */
 drape_status drape_sim_create_like(const drape_sim *like, drape_sim **out);

@@ -302,8 +302,9 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
 {
     double t1, h;
     drape_attempt attempt = {.reason = ""};
-    if (!sim)
-        return DRAPE_E_ARGUMENT;
+    drape_status guarded = drape_sim_guard(sim, "drape_sim_advance");
+    if (guarded)
+        return guarded;
     sim->ctx->message[0] = 0; /* what it says after a failure is of this advance */
     if (!isfinite(t_end))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_advance: t_end is not finite");

@@ -55,5 +55,7 @@ void drape_dihedral_tie(double *g, double *h)
 double drape_nearest_branch(double angle, double reference)
 {
     static const double two_pi = 6.28318530717958647693;
+    if (!isfinite(reference)) /* of a collapsed state that a host gave */
+        return angle;
     return angle + two_pi * round((reference - angle) / two_pi);
 }

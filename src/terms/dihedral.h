@@ -30,7 +30,7 @@ void drape_dihedrals(int count, const double *x, double *theta, double *g, doubl
  * x 9 of 12 x 12) are right then. */
 void drape_dihedral_tie(double *g, double *h);
 
-/* The branch of an angle, known up to 2 pi, that is nearest to reference. */
+/* The branch of an angle, known up to 2 pi, that is nearest to reference; the angle itself where that is not finite. */
 double drape_nearest_branch(double angle, double reference);
 
 /* ---- In lanes ---- */

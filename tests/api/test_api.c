@@ -1053,6 +1053,53 @@ static void some_law(const double *params, int32_t count, const double *k, const
     (void)force, (void)dforce_dstrain, (void)dforce_drate, (void)energy;
 }
 
+/* Lists that would be read past their end, or by a pointer to nothing. */
+START_TEST(malformed_parameters_are_refused)
+{
+    static const char *const none[] = {NULL};
+    static drape_param wide[9];
+    for (int i = 0; i < 9; i++)
+        wide[i] =
+            (drape_param){.name = "wide", .kind = DRAPE_PARAM_VECTOR, .unit = "m", .max = 1, .help = "three"};
+    drape_context *ctx = make_context();
+    for (int i = 0; i < 12; i++) {
+        drape_param one = {.name = "one", .kind = DRAPE_PARAM_NUMBER, .unit = "m", .max = 1, .help = "one"};
+        const drape_param *params = &one;
+        int count = 1;
+        switch (i / 2) {
+        case 0:
+            params = NULL;
+            break;
+        case 1:
+            params = wide;
+            count = 9;
+            break;
+        case 2:
+            one.name = NULL;
+            break;
+        case 3:
+            one.unit = NULL;
+            break;
+        case 4:
+            one.kind = DRAPE_PARAM_CHOICE;
+            break;
+        default:
+            one.kind = DRAPE_PARAM_CHOICE;
+            one.choices = none;
+        }
+        drape_term_ops term = attract;
+        drape_collider_ops collider = blob;
+        term.params = collider.params = params;
+        term.param_count = collider.param_count = count;
+        ck_assert_int_eq(i % 2 ? drape_context_add_term(ctx, &term)
+                               : drape_context_add_collider(ctx, &collider),
+                         DRAPE_E_ARGUMENT);
+        check_message(ctx, "at most 24 values of parameters, each with name and unit, a choice with choices");
+    }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 START_TEST(malformed_ops_are_refused)
 {
     drape_context *ctx = make_context();
@@ -1327,6 +1374,77 @@ static drape_sim *make_sim_of(drape_context *ctx, const drape_model *model, cons
 
 /* Backward Euler without forces but gravity: n steps of h from v0 move by n h v0 + g h^2 n (n + 1)/2, and h and
  * the sums are exact in binary but for rounding of g. */
+typedef struct meddler {
+    drape_context *ctx;
+    drape_sim *sim;
+} meddler;
+
+/* What an observer tries that is not for it; the sim is where it was, and the advance goes on. */
+static drape_status meddle(void *user, const drape_event *event)
+{
+    const meddler *m = user;
+    drape_sim *sim = m->sim;
+    const double x[3 * MAX_NODES] = {0};
+    if (event->kind != DRAPE_EVENT_FRAME)
+        return DRAPE_OK;
+    const drape_status all[] = {drape_sim_advance(sim, 1),
+                                drape_sim_advance_realtime(sim, 0.1, 1, NULL),
+                                drape_sim_set_state(sim, 0, x, x),
+                                drape_sim_restore(sim, "nowhere"),
+                                drape_sim_restore_from(sim, x, sizeof x),
+                                drape_sim_pull(sim, 3, 1, x),
+                                drape_sim_push(sim, x),
+                                drape_sim_set_wind(sim, NULL, NULL),
+                                drape_sim_move_pins(sim, 0, NULL, 1, NULL, NULL),
+                                drape_sim_move_collider(sim, 0, 1, x, NULL)};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
+        ck_assert_int_eq(all[i], DRAPE_E_ARGUMENT);
+    check_message(m->ctx, "drape_sim_move_collider: not from an observer, while the sim advances");
+    return DRAPE_OK;
+}
+
+START_TEST(observers_cannot_change_the_sim)
+{
+    drape_context *ctx = make_context();
+    drape_model *model = make_sheet(ctx);
+    drape_sim *sim = make_sim(ctx, model), *alone = make_sim(ctx, model);
+    ck_assert_int_eq(drape_sim_observe(sim, meddle, &(meddler){ctx, sim}), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(alone, 0.1), DRAPE_OK);
+    ck_assert_uint_eq(drape_sim_hash(sim), drape_sim_hash(alone));
+    drape_sim_destroy(&alone);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* All nodes in one point have no angles; the next state that has some counts alone. */
+START_TEST(a_collapsed_state_leaves_nothing_behind)
+{
+    const double zero[3 * MAX_NODES] = {0};
+    drape_context *ctx = make_context();
+    host_scene h;
+    drape_model *model;
+    fill_scene(&h);
+    h.cloth.pin_count = 0;
+    ck_assert_int_eq(drape_model_create(ctx, &h.scene, &model), DRAPE_OK);
+    drape_sim *sim = make_sim(ctx, model), *alone = make_sim(ctx, model);
+    state s = state_of(alone);
+    ck_assert_int_eq(drape_sim_set_state(sim, 0, zero, zero), DRAPE_OK);
+    ck_assert_int_eq(set_state(sim, &s), DRAPE_OK);
+    ck_assert_int_eq(set_state(alone, &s), DRAPE_OK);
+    ck_assert_double_eq(drape_sim_energy(sim).elastic, drape_sim_energy(alone).elastic);
+    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(alone, 0.1), DRAPE_OK);
+    ck_assert_uint_eq(drape_sim_hash(sim), drape_sim_hash(alone));
+    drape_sim_destroy(&alone);
+    drape_sim_destroy(&sim);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
 START_TEST(a_state_of_the_host_is_where_a_run_starts)
 {
     drape_context *ctx = make_context();
@@ -1836,10 +1954,12 @@ SUITE("api", destroying_nothing_is_fine, destroy_writes_null, null_arguments_are
       an_end_that_is_no_time_is_refused, zeroed_parts_of_a_scene_are_refused,
       a_scene_in_memory_is_the_same_as_in_a_file, the_hash_sees_all_of_the_state, a_model_can_be_read,
       an_override_is_a_value_of_the_scene, a_term_of_the_host_works, ops_are_copied_and_may_be_older,
-      faults_of_a_term_of_the_host_are_told_at_its_place, malformed_ops_are_refused, a_context_holds_32_terms,
-      colliders_of_a_scene_can_be_asked, a_collider_in_memory_is_the_same_as_in_a_file,
-      a_collider_of_the_host_works, malformed_colliders_are_refused, frames_come_in_time,
-      advances_may_be_cut_up, statistics_agree_with_what_was_told, a_state_of_the_host_is_where_a_run_starts,
+      faults_of_a_term_of_the_host_are_told_at_its_place, malformed_parameters_are_refused,
+      malformed_ops_are_refused, a_context_holds_32_terms, colliders_of_a_scene_can_be_asked,
+      a_collider_in_memory_is_the_same_as_in_a_file, a_collider_of_the_host_works,
+      malformed_colliders_are_refused, frames_come_in_time, advances_may_be_cut_up,
+      statistics_agree_with_what_was_told, observers_cannot_change_the_sim,
+      a_collapsed_state_leaves_nothing_behind, a_state_of_the_host_is_where_a_run_starts,
       a_state_of_another_sim_is_taken_to_the_bit, the_past_does_not_count_after_a_state_was_set,
       states_of_the_host_are_checked, frames_follow_the_time_of_a_state, a_push_repeats_no_frame,
       more_reasons_than_there_is_room_for_are_other, a_failure_names_what_is_distorted,

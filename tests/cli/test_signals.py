@@ -123,6 +123,24 @@ def test_run():
     equal(read_steps("out"), read_steps("whole"), "steps")
 
 
+def test_static():
+    """static has one step, which may take minutes: a signal ends it there"""
+    write_scene(
+        mesh={"grid": "irregular", "columns": 81, "rows": 4, "width": 1, "height": 0.02, "orientation": "horizontal"},
+        material={"young_modulus": 1200, "poisson_ratio": 0, "thickness": 0.01, "areal_density": 0.1},
+        terms=["stretch.cst", "bend.midedge", {"type": "load.moment", "edge": "right", "moment": 6.283e-4}],
+        pins=[{"edge": "left", "clamp": True}], gravity=[0, 0, 0], integrator={"method": "static", "tolerance": 1e-11}, duration=1)
+    begun = time.monotonic()
+    good("run", "scene.json", "--summary", "whole.json")
+    whole = time.monotonic() - begun
+    begun = time.monotonic()
+    code, _, err = struck(0.3, signal.SIGINT, "run", "scene.json", "--out", "out")
+    equal((code, err), (130, "t=0: interrupted\n"))
+    assert time.monotonic() - begun < whole, (time.monotonic() - begun, whole)
+    summary = read_json("out/summary.json")
+    equal((summary["status"], summary["steps"]["accepted"]), ("e_stopped", 0))
+
+
 def test_resume():
     """a run that is being resumed, interrupted again and again, ends with the same bits"""
     large(duration=0.2)
