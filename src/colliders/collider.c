@@ -36,7 +36,10 @@ drape_status drape_collider_build(drape_context *ctx, drape_arena *arena, const 
     if (status)
         return status;
     collider->shape = (drape_collider_shape){.builder = &builder};
+    ctx->message[0] = 0;
     status = ops->shape(collider->values, tolerance, &collider->shape);
     collider->shape.builder = NULL;
-    return status;
+    return status && !ctx->message[0] ? drape_fail_at(ctx, status, pointer, "shape() of \"%s\" returned %s",
+                                                      ops->name, drape_status_name(status))
+                                      : status;
 }

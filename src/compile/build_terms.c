@@ -14,8 +14,9 @@ struct drape_term_builder {
     drape_term *term;
     const char *pointer;
     int32_t first_node, node_count;
-    int32_t *node; /* the elements' arrays while they are filled */
+    int32_t *node; /* the elements' arrays while they are filled; node -1: not yet */
     double *rest;
+    bool beyond; /* an element was set that was not announced */
 };
 
 drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count)
@@ -40,6 +41,8 @@ drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t eleme
         arena, builder->model->ctx, (size_t)element_count * (size_t)el->nodes, sizeof *builder->node);
     el->rest = builder->rest = drape_arena_take(
         arena, builder->model->ctx, (size_t)element_count * (size_t)rest_count, sizeof *builder->rest);
+    for (size_t i = 0; builder->node && i < (size_t)element_count * (size_t)el->nodes; i++)
+        builder->node[i] = -1;
     return builder->node && builder->rest ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
@@ -51,6 +54,10 @@ void drape_term_anchor(drape_term_builder *builder)
 void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes, const double *rest)
 {
     const drape_elements *el = &builder->term->elements;
+    if (!builder->node || !builder->rest || element < 0 || element >= el->count) {
+        builder->beyond = true;
+        return;
+    }
     for (int a = 0; a < el->nodes; a++)
         builder->node[(size_t)element * (size_t)el->nodes + (size_t)a] = builder->first_node + nodes[a];
     for (int k = 0; k < el->rest_count; k++)
@@ -132,6 +139,13 @@ static drape_status check_elements(drape_term_builder *builder)
         return drape_term_refuse(builder, "%s has %d numbers of rest data an element; its kind needs %d",
                                  ops->name, el->rest_count, needed);
     int32_t first = builder->first_node, last = first + builder->node_count - 1;
+    if (builder->beyond)
+        return drape_term_refuse(builder, "%s set an element beyond the %d that it announced", ops->name,
+                                 (int)el->count);
+    for (size_t i = 0; i < (size_t)el->count; i++)
+        if (el->node[i * (size_t)el->nodes] == -1)
+            return drape_term_refuse(builder, "%s announced %d elements and did not set element %zu",
+                                     ops->name, (int)el->count, i);
     for (size_t i = 0; i < (size_t)el->count * (size_t)el->nodes; i++)
         if (el->node[i] < first || el->node[i] > last)
             return drape_term_refuse(builder, "element %zu of %s has node %d; the cloth's are 0 to %d",
@@ -170,7 +184,11 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
                                   .first_node = cloth->first_node,
                                   .node_count = cloth->mesh.node_count};
     drape_cloth_view view = view_of(model, cloth);
+    model->ctx->message[0] = 0;
     status = term->ops->build(&view, term->params, &builder);
+    if (status && !model->ctx->message[0])
+        return drape_fail_at(model->ctx, status, pointer, "build() of \"%s\" returned %s", term->ops->name,
+                             drape_status_name(status));
     return status ? status : check_elements(&builder);
 }
 

@@ -226,10 +226,15 @@ drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, void *user)
         return DRAPE_E_ARGUMENT;
     if (!write)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_save_to: there is no function to write");
+    sim->ctx->message[0] = 0;
     drape_archive_write_to(&a, sim->ctx, MEMORY_NAME, write, user);
     drape_sim_archive_identity(sim, &a);
     drape_sim_archive(sim, &a);
-    return drape_archive_end(&a);
+    const drape_status status = drape_archive_end(&a);
+    return status && !sim->ctx->message[0]
+               ? drape_fail(sim->ctx, status, "drape_sim_save_to: the function to write returned %s",
+                            drape_status_name(status))
+               : status;
 }
 
 /* What a run adds for its files is none of the sim's. */

@@ -823,6 +823,67 @@ START_TEST(faults_of_a_term_of_the_host_are_told_at_its_place)
 }
 END_TEST
 
+static const int32_t a_node[] = {0};
+
+static drape_status forgets(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder)
+{
+    (void)cloth, (void)params;
+    drape_status status = drape_term_reserve(builder, 2, 0);
+    if (!status)
+        drape_term_set(builder, 0, a_node, NULL);
+    return status;
+}
+
+static drape_status strays(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder)
+{
+    (void)cloth, (void)params;
+    drape_status status = drape_term_reserve(builder, 1, 0);
+    for (int32_t i = 0; !status && i < 2; i++)
+        drape_term_set(builder, i, a_node, NULL);
+    return status;
+}
+
+static drape_status announces_nothing(const drape_cloth_view *cloth, const double *params,
+                                      drape_term_builder *builder)
+{
+    (void)cloth, (void)params;
+    drape_term_set(builder, 0, a_node, NULL);
+    return DRAPE_OK;
+}
+
+static drape_status says_nothing(const drape_cloth_view *cloth, const double *params,
+                                 drape_term_builder *builder)
+{
+    (void)cloth, (void)params, (void)builder;
+    return DRAPE_E_FILE;
+}
+
+START_TEST(elements_of_a_term_of_the_host_are_checked)
+{
+    static const struct {
+        drape_status (*build)(const drape_cloth_view *, const double *, drape_term_builder *);
+        drape_status status;
+        const char *says;
+    } cases[] = {
+        {forgets, DRAPE_E_ARGUMENT, "host.attract announced 2 elements and did not set element 1"},
+        {strays, DRAPE_E_ARGUMENT, "host.attract set an element beyond the 1 that it announced"},
+        {announces_nothing, DRAPE_E_ARGUMENT, "host.attract set an element beyond the 0 that it announced"},
+        {says_nothing, DRAPE_E_FILE, "/cloth/0/terms/0: build() of \"host.attract\" returned e_file"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        drape_context *ctx = make_context();
+        drape_model *model;
+        drape_term_ops ops = attract;
+        ops.build = cases[i].build;
+        ck_assert_int_eq(drape_context_add_term(ctx, &ops), DRAPE_OK);
+        ck_assert_int_eq(compile_text(ctx, ATTRACTED("{'type': 'host.attract', 'stiffness': 1}"), &model),
+                         cases[i].status);
+        check_message(ctx, cases[i].says);
+        drape_context_destroy(&ctx);
+    }
+}
+END_TEST
+
 /* ---- Colliders: of scenes, of hosts ---- */
 
 #define WITH_COLLIDERS(text)                                                                                 \
@@ -1954,11 +2015,11 @@ SUITE("api", destroying_nothing_is_fine, destroy_writes_null, null_arguments_are
       an_end_that_is_no_time_is_refused, zeroed_parts_of_a_scene_are_refused,
       a_scene_in_memory_is_the_same_as_in_a_file, the_hash_sees_all_of_the_state, a_model_can_be_read,
       an_override_is_a_value_of_the_scene, a_term_of_the_host_works, ops_are_copied_and_may_be_older,
-      faults_of_a_term_of_the_host_are_told_at_its_place, malformed_parameters_are_refused,
-      malformed_ops_are_refused, a_context_holds_32_terms, colliders_of_a_scene_can_be_asked,
-      a_collider_in_memory_is_the_same_as_in_a_file, a_collider_of_the_host_works,
-      malformed_colliders_are_refused, frames_come_in_time, advances_may_be_cut_up,
-      statistics_agree_with_what_was_told, observers_cannot_change_the_sim,
+      faults_of_a_term_of_the_host_are_told_at_its_place, elements_of_a_term_of_the_host_are_checked,
+      malformed_parameters_are_refused, malformed_ops_are_refused, a_context_holds_32_terms,
+      colliders_of_a_scene_can_be_asked, a_collider_in_memory_is_the_same_as_in_a_file,
+      a_collider_of_the_host_works, malformed_colliders_are_refused, frames_come_in_time,
+      advances_may_be_cut_up, statistics_agree_with_what_was_told, observers_cannot_change_the_sim,
       a_collapsed_state_leaves_nothing_behind, a_state_of_the_host_is_where_a_run_starts,
       a_state_of_another_sim_is_taken_to_the_bit, the_past_does_not_count_after_a_state_was_set,
       states_of_the_host_are_checked, frames_follow_the_time_of_a_state, a_push_repeats_no_frame,
