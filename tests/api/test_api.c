@@ -1469,7 +1469,8 @@ START_TEST(observers_cannot_change_the_sim)
     drape_context *ctx = make_context();
     drape_model *model = make_sheet(ctx);
     drape_sim *sim = make_sim(ctx, model), *alone = make_sim(ctx, model);
-    ck_assert_int_eq(drape_sim_observe(sim, meddle, &(meddler){ctx, sim}), DRAPE_OK);
+    meddler m = {ctx, sim};
+    ck_assert_int_eq(drape_sim_observe(sim, meddle, &m), DRAPE_OK);
     ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
     ck_assert_int_eq(drape_sim_advance(alone, 0.1), DRAPE_OK);
     ck_assert_uint_eq(drape_sim_hash(sim), drape_sim_hash(alone));
