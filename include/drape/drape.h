@@ -284,7 +284,7 @@ typedef struct drape_collider_motion {
     const char *type;       /* the row */
     double displacement[3]; /* [m] from where its parameters put it */
     double velocity
-        [3]; /* [m/s]; at a key of the track, or the end of a host's way, that of the piece after it: 0 of a way */
+        [3]; /* [m/s]; at a key of the track that of the piece after it, at the end of a host's way 0 */
 } drape_collider_motion;
 
 /* How many obstacles there are, and where one of them is by its track at time t [s]. */
@@ -340,9 +340,9 @@ DRAPE_API void drape_sim_destroy(drape_sim **sim);
 /* Advances to t_end [s]. Steps end at t0 + k dt; only the last one is cut to end at t_end, and a remainder
  * below 1e-9 dt joins the step before. A t_end not after the present time, but for rounding, does nothing. On
  * failure the state is that of the last accepted step. Errors: DRAPE_E_STEP_TOO_SMALL (halving gave up; "ida"
- * took max_steps; max_attempts in one dt), DRAPE_E_SOLVER (a step failed under the controller "fixed"), DRAPE_E_STOPPED (an observer
- * asked, or drape_sim_cancel), DRAPE_E_ARGUMENT (t_end not finite); the message names time, step, reason and worst
- * element. */
+ * took max_steps; max_attempts in one dt), DRAPE_E_SOLVER (a step failed under the controller "fixed"),
+ * DRAPE_E_STOPPED (an observer asked, or drape_sim_cancel), DRAPE_E_ARGUMENT (t_end not finite); the message names
+ * time, step, reason and worst element. */
 DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);
 
 /* What a call of drape_sim_advance_realtime did. */

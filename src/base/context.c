@@ -135,6 +135,18 @@ drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *
     return status;
 }
 
+drape_status drape_fail_unsaid(drape_context *ctx, drape_status status, const char *pointer,
+                               const char *format, ...)
+{
+    va_list args;
+    if (!status || ctx->message[0])
+        return status;
+    va_start(args, format);
+    fail(ctx, status, pointer, format, args);
+    va_end(args);
+    return status;
+}
+
 drape_status drape_fail_memory(drape_context *ctx, size_t bytes)
 {
     return drape_fail(ctx, DRAPE_E_MEMORY, "out of memory: an allocation of %zu bytes failed", bytes);

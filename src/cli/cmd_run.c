@@ -260,10 +260,7 @@ static drape_status watch(void *user, const drape_event *event)
     if (r->progress.on)
         cli_progress_show(&r->progress, drape_sim_time(event->sim),
                           drape_sim_statistics(event->sim).steps_rejected);
-    if (!cli_interrupted())
-        return DRAPE_OK;
-    drape_context_set_message(r->in.ctx, "t=%.9g: interrupted", drape_sim_time(event->sim));
-    return DRAPE_E_STOPPED;
+    return cli_interrupted() ? DRAPE_E_STOPPED : DRAPE_OK;
 }
 
 static void advance(run *r)
@@ -417,12 +414,12 @@ const drape_verb drape_verb_run = {
     .operand = "SCENE",
     .takes_scene = true,
     .summary = "simulate a scene; frames, step log and summary into a folder",
-    .details = "Simulates a scene. Without --out nothing is written but the results on the standard output.\n"
-               "Ctrl-C ends the run after the step in progress, or in it where it is the only one (static), "
-               "and keeps "
-               "what was written; before the first step, nothing is.\n"
-               "A run with --checkpoint-every that was killed goes on with --resume, and ends as if it had "
-               "not been.",
+    .details =
+        "Simulates a scene. Without --out nothing is written but the results on the standard output.\n"
+        "Ctrl-C ends the run after the step in progress, or in it where it is the only one (static), and\n"
+        "keeps what was written; before the first step, nothing is.\n"
+        "A run with --checkpoint-every that was killed goes on with --resume, and ends as if it had "
+        "not been.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .run = main_run,

@@ -81,9 +81,8 @@ void cli_realtime_print(const cli_realtime *r)
     printf("realtime  %lld frames of %.4g ms: p50 %.4g, p95 %.4g, p99 %.4g, worst %.4g ms; %lld missed\n",
            (long long)s->frames, 1e3 * s->budget, 1e3 * s->p50, 1e3 * s->p95, 1e3 * s->p99, 1e3 * s->worst,
            (long long)s->missed);
-    printf("rungs     full %lld, fewer iterations %lld, larger steps %lld; %lld without a new state; %.4g s "
-           "owed "
-           "after the last frame, then made up, %.4g s dropped\n",
+    printf("rungs     full %lld, fewer iterations %lld, larger steps %lld; %lld without a new state; "
+           "%.4g s owed after the last frame, then made up, %.4g s dropped\n",
            (long long)s->full, (long long)s->fewer, (long long)s->larger, (long long)s->still, s->debt,
            s->dropped);
 }

@@ -39,7 +39,6 @@ drape_status drape_collider_build(drape_context *ctx, drape_arena *arena, const 
     ctx->message[0] = 0;
     status = ops->shape(collider->values, tolerance, &collider->shape);
     collider->shape.builder = NULL;
-    return status && !ctx->message[0] ? drape_fail_at(ctx, status, pointer, "shape() of \"%s\" returned %s",
-                                                      ops->name, drape_status_name(status))
-                                      : status;
+    return drape_fail_unsaid(ctx, status, pointer, "shape() of \"%s\" returned %s", ops->name,
+                             drape_status_name(status));
 }

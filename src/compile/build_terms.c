@@ -186,9 +186,8 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
     drape_cloth_view view = view_of(model, cloth);
     model->ctx->message[0] = 0;
     status = term->ops->build(&view, term->params, &builder);
-    if (status && !model->ctx->message[0])
-        return drape_fail_at(model->ctx, status, pointer, "build() of \"%s\" returned %s", term->ops->name,
-                             drape_status_name(status));
+    status = drape_fail_unsaid(model->ctx, status, pointer, "build() of \"%s\" returned %s", term->ops->name,
+                               drape_status_name(status));
     return status ? status : check_elements(&builder);
 }
 

@@ -231,10 +231,8 @@ drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, void *user)
     drape_sim_archive_identity(sim, &a);
     drape_sim_archive(sim, &a);
     const drape_status status = drape_archive_end(&a);
-    return status && !sim->ctx->message[0]
-               ? drape_fail(sim->ctx, status, "drape_sim_save_to: the function to write returned %s",
-                            drape_status_name(status))
-               : status;
+    return drape_fail_unsaid(sim->ctx, status, "", "drape_sim_save_to: the function to write returned %s",
+                             drape_status_name(status));
 }
 
 /* What a run adds for its files is none of the sim's. */

@@ -270,11 +270,9 @@ drape_status drape_sim_tell(drape_sim *sim, const drape_event *event)
         if (status > 0)
             return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: an observer asked to stop",
                               drape_sim_state(sim)->t);
-        if (status < 0 && !*drape_context_message(sim->ctx)) /* it told none of its own */
-            return drape_fail(sim->ctx, status, "t=%.9g: an observer stopped the run with %s",
-                              drape_sim_state(sim)->t, drape_status_name(status));
         if (status < 0)
-            return status;
+            return drape_fail_unsaid(sim->ctx, status, "", "t=%.9g: an observer stopped the run with %s",
+                                     drape_sim_state(sim)->t, drape_status_name(status));
     }
     return DRAPE_OK;
 }

@@ -1464,6 +1464,16 @@ static drape_status meddle(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
+/* Both go on to the same bits. */
+static void end_alike(drape_sim *sim, drape_sim *alone, double t)
+{
+    ck_assert_int_eq(drape_sim_advance(sim, t), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(alone, t), DRAPE_OK);
+    ck_assert_uint_eq(drape_sim_hash(sim), drape_sim_hash(alone));
+    drape_sim_destroy(&alone);
+    drape_sim_destroy(&sim);
+}
+
 START_TEST(observers_cannot_change_the_sim)
 {
     drape_context *ctx = make_context();
@@ -1471,11 +1481,7 @@ START_TEST(observers_cannot_change_the_sim)
     drape_sim *sim = make_sim(ctx, model), *alone = make_sim(ctx, model);
     meddler m = {ctx, sim};
     ck_assert_int_eq(drape_sim_observe(sim, meddle, &m), DRAPE_OK);
-    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
-    ck_assert_int_eq(drape_sim_advance(alone, 0.1), DRAPE_OK);
-    ck_assert_uint_eq(drape_sim_hash(sim), drape_sim_hash(alone));
-    drape_sim_destroy(&alone);
-    drape_sim_destroy(&sim);
+    end_alike(sim, alone, 0.1);
     drape_model_destroy(&model);
     drape_context_destroy(&ctx);
 }
@@ -1497,11 +1503,7 @@ START_TEST(a_collapsed_state_leaves_nothing_behind)
     ck_assert_int_eq(set_state(sim, &s), DRAPE_OK);
     ck_assert_int_eq(set_state(alone, &s), DRAPE_OK);
     ck_assert_double_eq(drape_sim_energy(sim).elastic, drape_sim_energy(alone).elastic);
-    ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_OK);
-    ck_assert_int_eq(drape_sim_advance(alone, 0.1), DRAPE_OK);
-    ck_assert_uint_eq(drape_sim_hash(sim), drape_sim_hash(alone));
-    drape_sim_destroy(&alone);
-    drape_sim_destroy(&sim);
+    end_alike(sim, alone, 0.1);
     drape_model_destroy(&model);
     drape_context_destroy(&ctx);
 }

@@ -10,6 +10,7 @@
 #include <sys/time.h>
 
 #include "drape/extend.h"
+#include "support/bytes.h"
 #include "support/failing_allocator.h"
 #include "support/suite.h"
 
@@ -667,21 +668,6 @@ END_TEST
 
 /* ---- Checkpoints ---- */
 
-typedef struct bytes {
-    char data[1 << 20];
-    size_t size;
-} bytes;
-
-static drape_status keep(void *user, const void *data, size_t size)
-{
-    bytes *b = user;
-    if (size > sizeof b->data - b->size)
-        return DRAPE_E_MEMORY;
-    memcpy(b->data + b->size, data, size);
-    b->size += size;
-    return DRAPE_OK;
-}
-
 /* Ways that begin in one frame and end in another. */
 static void send_all(host *h, field *f, double sign)
 {
@@ -701,7 +687,6 @@ static void send_all(host *h, field *f, double sign)
  * end, under its own wind; and the restored one is cancelled by its own flag, raised before or after. */
 START_TEST(a_checkpoint_keeps_what_the_host_moves)
 {
-    static bytes saved;
     for (int i = 0; i < METHODS; i++) {
         failing_allocator memory[2] = {{0}, {0}};
         char method[64], ball[256];
@@ -710,10 +695,9 @@ START_TEST(a_checkpoint_keeps_what_the_host_moves)
         host one = open_scene(&memory[0], SHEET, ", 'drag.wind'", "{'edge': 'top'}", method, ball),
              two = open_scene(&memory[1], SHEET, ", 'drag.wind'", "{'edge': 'top'}", method, ball);
         field f = {.w0 = {1, 0, -1}, .w1 = {0, 2, 0}};
-        saved.size = 0;
         send_all(&one, &f, 1);
         good(&one, drape_sim_advance(one.sim, FRAME));
-        good(&one, drape_sim_save_to(one.sim, keep, &saved));
+        bytes saved = bytes_save(one.sim);
         good(&one, drape_sim_advance(one.sim, 4 * FRAME));
         send_all(&two, &f, -1);
         good(&two, drape_sim_advance(two.sim, 2 * FRAME));
@@ -724,6 +708,7 @@ START_TEST(a_checkpoint_keeps_what_the_host_moves)
         ck_assert_msg(drape_sim_hash(one.sim) == drape_sim_hash(two.sim), "%s", methods[i]);
         drape_sim_cancel(two.sim);
         says(&two, drape_sim_advance(two.sim, 5 * FRAME), DRAPE_E_STOPPED, "cancelled");
+        free(saved.data);
         close_scene(&one, &memory[0]);
         close_scene(&two, &memory[1]);
     }

@@ -11,6 +11,7 @@
 #include "drape/extend.h"
 #include "io/recorder.h"
 #include "io/summary.h"
+#include "support/bytes.h"
 #include "support/scene.h"
 
 #define MOST_STEPS 4000
@@ -235,37 +236,22 @@ static void check_bound(const scene *s, const record *r, drape_status status)
     ck_assert(drape_sim_hash(s->sim) == r->before);
 }
 
-typedef struct memory {
-    char bytes[1 << 18];
-    size_t size;
-} memory;
-
-static drape_status remember(void *user, const void *bytes, size_t size)
-{
-    memory *m = user;
-    ck_assert(m->size + size <= sizeof m->bytes);
-    memcpy(m->bytes + m->size, bytes, size);
-    m->size += size;
-    return DRAPE_OK;
-}
-
 /* Advances to `end`, stopped as often as it may be. Half of the stops, another sim goes on from a checkpoint of this one. */
 static int advance_bounded(scene *s, scene *other, double end)
 {
-    static memory m;
     record *r = watch(s);
     int stops = 0;
     for (drape_status status = drape_sim_advance(s->sim, end); status;
          status = drape_sim_advance(s->sim, end)) {
         const int count = r->count;
         check_bound(s, r, status);
-        m.size = 0;
-        ck_assert_int_eq(drape_sim_save_to(s->sim, remember, &m), DRAPE_OK);
-        ck_assert_msg(!drape_sim_restore_from(other->sim, m.bytes, m.size), "%s",
+        bytes saved = bytes_save(s->sim);
+        ck_assert_msg(!drape_sim_restore_from(other->sim, saved.data, saved.size), "%s",
                       drape_context_message(other->ctx));
         if (++stops % 2)
-            ck_assert_msg(!drape_sim_restore_from(s->sim, m.bytes, m.size), "%s",
+            ck_assert_msg(!drape_sim_restore_from(s->sim, saved.data, saved.size), "%s",
                           drape_context_message(s->ctx));
+        free(saved.data);
         ck_assert_msg(count > 0 && stops < 1000, "%s", drape_context_message(s->ctx));
     }
     for (int left = stops + 1000; drape_sim_advance(other->sim, end); left--)
