@@ -52,9 +52,9 @@ static void fill(problem *q, matrix_kind kind)
 {
     const drape_model *m = q->model;
     drape_system *system = NULL;
-    drape_arena arena = {0};
+    drape_arena arena = drape_arena_of(q->ctx);
     drape_state state = {0};
-    if (drape_system_create(q->ctx, m, 1, &system) || drape_state_create(q->ctx, &arena, m, &state))
+    if (drape_system_create(q->ctx, m, 1, &system) || drape_state_create(&arena, m, &state))
         bench_fail(q->ctx, "the state");
     const double edge = m->edge_length[0];
     for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
@@ -67,7 +67,7 @@ static void fill(problem *q, matrix_kind kind)
         add_friction(&m->pattern, q->values);
     for (int64_t i = 0; i < m->pattern.n; i++)
         q->b[i] = cos((double)i);
-    drape_arena_free(&arena, q->ctx);
+    drape_arena_free(&arena);
     drape_system_destroy(&system);
 }
 

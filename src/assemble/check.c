@@ -350,7 +350,7 @@ static drape_status fit(checker *c, const drape_point *point)
     size_t nonzeros = (size_t)drape_system_pattern(c->system)->nonzeros;
     if (status || (c->values && nonzeros <= c->room))
         return status;
-    c->values = drape_arena_take(c->arena, c->ctx, nonzeros, sizeof(double));
+    c->values = drape_arena_take(c->arena, nonzeros, sizeof(double));
     c->room = nonzeros;
     return c->values ? DRAPE_OK : DRAPE_E_MEMORY;
 }
@@ -546,10 +546,10 @@ static bool allocate(checker *c, drape_context *ctx, drape_arena *arena)
     size_t n = 3 * (size_t)c->model->node_count, measures = (size_t)c->model->measure_count;
     double **arrays[] = {&c->x, &c->v, &c->x2, &c->v2, &c->g1, &c->g2, &c->direction};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        if (!(*arrays[i] = drape_arena_take(arena, ctx, n, sizeof(double))))
+        if (!(*arrays[i] = drape_arena_take(arena, n, sizeof(double))))
             return false;
-    c->internal = drape_arena_take(arena, ctx, (size_t)c->model->internal_count, sizeof(double));
-    c->history = drape_arena_take(arena, ctx, measures, sizeof(double));
+    c->internal = drape_arena_take(arena, (size_t)c->model->internal_count, sizeof(double));
+    c->history = drape_arena_take(arena, measures, sizeof(double));
     c->ctx = ctx;
     c->arena = arena;
     return c->internal && c->history;
@@ -574,12 +574,12 @@ drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, u
                                      drape_check_row *rows, int *row_count)
 {
     const drape_model *model = drape_system_model(system);
-    drape_arena arena = {0};
+    drape_arena arena = drape_arena_of(ctx);
     drape_state rest;
     checker c = {.system = system, .model = model, .random = seed, .size = mean_edge(model), .rows = rows};
     c.step = DIFFERENCE_STEP * c.size;
     *row_count = 0;
-    drape_status status = drape_state_create(ctx, &arena, model, &rest);
+    drape_status status = drape_state_create(&arena, model, &rest);
     if (!status && !allocate(&c, ctx, &arena))
         status = DRAPE_E_MEMORY;
     if (!status) {
@@ -595,6 +595,6 @@ drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, u
     if (!status)
         status = check_contact(&c, &rest);
     *row_count = c.row_count;
-    drape_arena_free(&arena, ctx);
+    drape_arena_free(&arena);
     return status;
 }

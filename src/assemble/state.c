@@ -5,14 +5,13 @@
 
 #include <string.h>
 
-drape_status drape_state_create(drape_context *ctx, drape_arena *arena, const drape_model *model,
-                                drape_state *state)
+drape_status drape_state_create(drape_arena *arena, const drape_model *model, drape_state *state)
 {
     size_t n = 3 * (size_t)model->node_count;
     state->t = 0;
-    state->x = drape_arena_take(arena, ctx, n, sizeof *state->x);
-    state->v = drape_arena_take(arena, ctx, n, sizeof *state->v);
-    state->internal = drape_arena_take(arena, ctx, (size_t)model->internal_count, sizeof *state->internal);
+    state->x = drape_arena_take(arena, n, sizeof *state->x);
+    state->v = drape_arena_take(arena, n, sizeof *state->v);
+    state->internal = drape_arena_take(arena, (size_t)model->internal_count, sizeof *state->internal);
     if (!state->x || !state->v || !state->internal)
         return DRAPE_E_MEMORY;
     memcpy(state->x, model->rest, n * sizeof *state->x);

@@ -11,8 +11,7 @@ typedef struct drape_state {
 } drape_state;
 
 /* A state in the rest positions and initial velocities at t = 0, with pins where their tracks begin. */
-drape_status drape_state_create(drape_context *ctx, drape_arena *arena, const drape_model *model,
-                                drape_state *state);
+drape_status drape_state_create(drape_arena *arena, const drape_model *model, drape_state *state);
 
 /* after.internal from before.internal and after.x: what the terms remember of an accepted step. */
 void drape_state_commit(const drape_model *model, const drape_state *before, drape_state *after);

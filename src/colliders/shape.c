@@ -19,7 +19,7 @@ drape_status drape_shape_refuse(drape_collider_shape *shape, const char *paramet
 
 void *drape_shape_take(drape_collider_shape *shape, size_t count, size_t size)
 {
-    return drape_arena_take(shape->builder->arena, shape->builder->ctx, count, size);
+    return drape_arena_take(shape->builder->arena, count, size);
 }
 
 drape_status drape_shape_reserve(drape_collider_shape *shape, int32_t points, int32_t segments,

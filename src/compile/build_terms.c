@@ -37,10 +37,10 @@ drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t eleme
     el->nodes = nodes;
     el->rest_count = rest_count;
     el->params = builder->term->params;
-    el->node = builder->node = drape_arena_take(
-        arena, builder->model->ctx, (size_t)element_count * (size_t)el->nodes, sizeof *builder->node);
-    el->rest = builder->rest = drape_arena_take(
-        arena, builder->model->ctx, (size_t)element_count * (size_t)rest_count, sizeof *builder->rest);
+    el->node = builder->node =
+        drape_arena_take(arena, (size_t)element_count * (size_t)el->nodes, sizeof *builder->node);
+    el->rest = builder->rest =
+        drape_arena_take(arena, (size_t)element_count * (size_t)rest_count, sizeof *builder->rest);
     for (size_t i = 0; builder->node && i < (size_t)element_count * (size_t)el->nodes; i++)
         builder->node[i] = -1;
     return builder->node && builder->rest ? DRAPE_OK : DRAPE_E_MEMORY;
@@ -197,8 +197,7 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
     const double *g = model->gravity;
     drape_status status = DRAPE_OK;
     char pointer[128];
-    model->cloths[c].laws =
-        drape_arena_take(&model->arena, model->ctx, def->term_count, sizeof *model->cloths[c].laws);
+    model->cloths[c].laws = drape_arena_take(&model->arena, def->term_count, sizeof *model->cloths[c].laws);
     if (!model->cloths[c].laws)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; !status && i < def->term_count; i++) {
@@ -266,7 +265,7 @@ drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def)
     drape_status status = DRAPE_OK;
     for (size_t c = 0; c < def->cloth_count; c++)
         count += def->cloths[c].term_count + 1; /* + 1: gravity */
-    model->terms = drape_arena_take(&model->arena, model->ctx, count, sizeof *model->terms);
+    model->terms = drape_arena_take(&model->arena, count, sizeof *model->terms);
     if (!model->terms)
         return DRAPE_E_MEMORY;
     for (int32_t c = 0; !status && c < model->cloth_count; c++) {

@@ -54,7 +54,7 @@ static drape_status name_collider(drape_model *model, const char *pointer, const
         if (strcmp(model->colliders[i].name, wanted) == 0)
             return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "two colliders have the name \"%.60s\"",
                                  wanted);
-    to->name = drape_arena_text(&model->arena, model->ctx, wanted);
+    to->name = drape_arena_text(&model->arena, wanted);
     return to->name ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
@@ -95,8 +95,7 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
     drape_status status = DRAPE_OK;
     if (def->collider_count == 0)
         return DRAPE_OK;
-    model->colliders =
-        drape_arena_take(&model->arena, model->ctx, def->collider_count, sizeof *model->colliders);
+    model->colliders = drape_arena_take(&model->arena, def->collider_count, sizeof *model->colliders);
     if (!model->colliders)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; !status && i < def->collider_count; i++) {

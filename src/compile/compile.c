@@ -11,13 +11,13 @@
 static drape_status copy_setting(drape_model *model, const drape_setting *from, drape_setting *to)
 {
     to->number = from->number;
-    to->name = drape_arena_text(&model->arena, model->ctx, from->name);
-    to->text = from->text ? drape_arena_text(&model->arena, model->ctx, from->text) : NULL;
+    to->name = drape_arena_text(&model->arena, from->name);
+    to->text = from->text ? drape_arena_text(&model->arena, from->text) : NULL;
     if (!to->name || (from->text && !to->text))
         return DRAPE_E_MEMORY;
     if (!from->vector)
         return DRAPE_OK;
-    double *vector = drape_arena_take(&model->arena, model->ctx, from->vector_count, sizeof *vector);
+    double *vector = drape_arena_take(&model->arena, from->vector_count, sizeof *vector);
     if (!vector)
         return DRAPE_E_MEMORY;
     memcpy(vector, from->vector, from->vector_count * sizeof *vector);
@@ -29,9 +29,8 @@ static drape_status copy_setting(drape_model *model, const drape_setting *from, 
 drape_status drape_compile_choice(drape_model *model, const drape_row_def *def, const char *fallback,
                                   drape_choice *choice)
 {
-    choice->type = drape_arena_text(&model->arena, model->ctx, def->type ? def->type : fallback);
-    choice->settings =
-        drape_arena_take(&model->arena, model->ctx, def->setting_count, sizeof *choice->settings);
+    choice->type = drape_arena_text(&model->arena, def->type ? def->type : fallback);
+    choice->settings = drape_arena_take(&model->arena, def->setting_count, sizeof *choice->settings);
     if (!choice->type || !choice->settings)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < def->setting_count; i++) {
@@ -45,11 +44,11 @@ drape_status drape_compile_choice(drape_model *model, const drape_row_def *def, 
 
 static drape_status copy_formats(drape_model *model, const drape_scene_def *def)
 {
-    model->formats = drape_arena_take(&model->arena, model->ctx, def->format_count, sizeof *model->formats);
+    model->formats = drape_arena_take(&model->arena, def->format_count, sizeof *model->formats);
     if (!model->formats)
         return DRAPE_E_MEMORY;
     for (; model->format_count < def->format_count; model->format_count++) {
-        char *copy = drape_arena_text(&model->arena, model->ctx, def->formats[model->format_count]);
+        char *copy = drape_arena_text(&model->arena, def->formats[model->format_count]);
         if (!copy)
             return DRAPE_E_MEMORY;
         model->formats[model->format_count] = copy;
@@ -114,7 +113,7 @@ static drape_status name_cloth(drape_model *model, int32_t c, const drape_cloth_
         if (strcmp(model->cloths[i].name, wanted) == 0)
             return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "two cloths have the name \"%.60s\"",
                                  wanted);
-    model->cloths[c].name = drape_arena_text(&model->arena, model->ctx, wanted);
+    model->cloths[c].name = drape_arena_text(&model->arena, wanted);
     return model->cloths[c].name ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
@@ -124,7 +123,7 @@ static drape_status copy_source(drape_model *model, const drape_mesh_def *def, d
     memcpy(cloth->scale, def->scale, sizeof cloth->scale);
     memcpy(cloth->rotate, def->rotate, sizeof cloth->rotate);
     memcpy(cloth->translate, def->translate, sizeof cloth->translate);
-    if (def->file && !(cloth->file = drape_arena_text(&model->arena, model->ctx, def->file)))
+    if (def->file && !(cloth->file = drape_arena_text(&model->arena, def->file)))
         return DRAPE_E_MEMORY;
     return drape_compile_choice(model, &def->grid, "", &cloth->grid);
 }
@@ -206,13 +205,12 @@ static drape_status gather(drape_model *model)
 {
     drape_arena *arena = &model->arena;
     size_t nodes = (size_t)model->node_count, edges = (size_t)model->edge_count, first_edge = 0;
-    model->rest = drape_arena_take(arena, model->ctx, 3 * nodes, sizeof *model->rest);
-    model->velocity = drape_arena_take(arena, model->ctx, 3 * nodes, sizeof *model->velocity);
-    model->mass = drape_arena_take(arena, model->ctx, nodes, sizeof *model->mass);
-    model->triangle =
-        drape_arena_take(arena, model->ctx, 3 * (size_t)model->triangle_count, sizeof *model->triangle);
-    model->edge = drape_arena_take(arena, model->ctx, 2 * edges, sizeof *model->edge);
-    model->edge_length = drape_arena_take(arena, model->ctx, edges, sizeof *model->edge_length);
+    model->rest = drape_arena_take(arena, 3 * nodes, sizeof *model->rest);
+    model->velocity = drape_arena_take(arena, 3 * nodes, sizeof *model->velocity);
+    model->mass = drape_arena_take(arena, nodes, sizeof *model->mass);
+    model->triangle = drape_arena_take(arena, 3 * (size_t)model->triangle_count, sizeof *model->triangle);
+    model->edge = drape_arena_take(arena, 2 * edges, sizeof *model->edge);
+    model->edge_length = drape_arena_take(arena, edges, sizeof *model->edge_length);
     if (!model->rest || !model->velocity || !model->mass || !model->triangle || !model->edge ||
         !model->edge_length)
         return DRAPE_E_MEMORY;
@@ -229,7 +227,7 @@ static drape_status compile_cloths(drape_model *model, const drape_scene_def *de
     if (def->cloth_count == 0 || def->cloth_count > DRAPE_MOST_CLOTHS)
         return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, "/cloth",
                              "the scene has %zu cloths; it has 1 to %d", def->cloth_count, DRAPE_MOST_CLOTHS);
-    model->cloths = drape_arena_take(&model->arena, model->ctx, def->cloth_count, sizeof *model->cloths);
+    model->cloths = drape_arena_take(&model->arena, def->cloth_count, sizeof *model->cloths);
     if (!model->cloths)
         return DRAPE_E_MEMORY;
     drape_status status = DRAPE_OK;
@@ -264,6 +262,7 @@ drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape
     drape_model *model = drape_alloc(ctx, 1, sizeof *model);
     if (!model)
         return DRAPE_E_MEMORY;
+    model->arena = drape_arena_of(ctx);
     model->ctx = ctx;
     drape_status status = drape_compile_check_def(ctx, def);
     for (size_t i = 0; !status && i < sizeof stages / sizeof *stages; i++) {

@@ -192,7 +192,7 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
     if (status)
         return status;
     int32_t count = cloth->mesh.node_count;
-    cloth->node_mass = drape_arena_take(&model->arena, model->ctx, (size_t)count, sizeof *cloth->node_mass);
+    cloth->node_mass = drape_arena_take(&model->arena, (size_t)count, sizeof *cloth->node_mass);
     if (!cloth->node_mass)
         return DRAPE_E_MEMORY;
     take_fabric(def, values, cloth);

@@ -212,8 +212,8 @@ static drape_status clamp_edges(drape_model *model, const uint8_t *clamped)
     for (int32_t c = 0; c < model->cloth_count; c++) {
         drape_cloth *cloth = &model->cloths[c];
         const uint8_t *of_node = clamped + cloth->first_node;
-        cloth->edge_clamped = drape_arena_take(&model->arena, model->ctx, (size_t)cloth->mesh.edge_count,
-                                               sizeof *cloth->edge_clamped);
+        cloth->edge_clamped =
+            drape_arena_take(&model->arena, (size_t)cloth->mesh.edge_count, sizeof *cloth->edge_clamped);
         if (!cloth->edge_clamped)
             return DRAPE_E_MEMORY;
         for (int32_t e = 0; e < cloth->mesh.edge_count; e++) {
@@ -232,11 +232,11 @@ static drape_status number_nodes(drape_model *model, const int32_t *track_of_nod
         model->moved_count += track_of_node[i] >= 0;
     }
     model->node_of_free =
-        drape_arena_take(&model->arena, model->ctx, (size_t)model->free_count, sizeof *model->node_of_free);
+        drape_arena_take(&model->arena, (size_t)model->free_count, sizeof *model->node_of_free);
     model->moved_node =
-        drape_arena_take(&model->arena, model->ctx, (size_t)model->moved_count, sizeof *model->moved_node);
+        drape_arena_take(&model->arena, (size_t)model->moved_count, sizeof *model->moved_node);
     model->moved_track =
-        drape_arena_take(&model->arena, model->ctx, (size_t)model->moved_count, sizeof *model->moved_track);
+        drape_arena_take(&model->arena, (size_t)model->moved_count, sizeof *model->moved_track);
     if (!model->node_of_free || !model->moved_node || !model->moved_track)
         return DRAPE_E_MEMORY;
     int32_t moved = 0;
@@ -256,9 +256,9 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
     size_t pin_count = 0, nodes = (size_t)model->node_count;
     for (size_t c = 0; c < def->cloth_count; c++)
         pin_count += def->cloths[c].pin_count;
-    model->tracks = drape_arena_take(&model->arena, model->ctx, pin_count, sizeof *model->tracks);
-    model->pinned = drape_arena_take(&model->arena, model->ctx, nodes, sizeof *model->pinned);
-    model->free_of_node = drape_arena_take(&model->arena, model->ctx, nodes, sizeof *model->free_of_node);
+    model->tracks = drape_arena_take(&model->arena, pin_count, sizeof *model->tracks);
+    model->pinned = drape_arena_take(&model->arena, nodes, sizeof *model->pinned);
+    model->free_of_node = drape_arena_take(&model->arena, nodes, sizeof *model->free_of_node);
     int32_t *track_of_node = drape_alloc(model->ctx, nodes, sizeof *track_of_node);
     uint8_t *clamped = drape_alloc(model->ctx, nodes, sizeof *clamped);
     drape_status status = DRAPE_E_MEMORY;

@@ -36,7 +36,7 @@ static drape_status widen(drape_context *ctx, drape_arena *arena, const kind *k,
             stride = 0;
     if (stride < sizeof(size_t) || stride > k->size)
         return drape_fail(ctx, DRAPE_E_VERSION, "a def was not initialised by %s of this version", k->init);
-    char *to = drape_arena_take(arena, ctx, count, k->size);
+    char *to = drape_arena_take(arena, count, k->size);
     *out = to;
     for (size_t i = 0; to && i < count; i++) {
         memcpy(to + i * k->size, k->defaults, k->size);

@@ -27,7 +27,7 @@ drape_status drape_compile_track(drape_model *model, const char *pointer, const 
         if (fault)
             return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%s", fault);
     }
-    track->keys = drape_arena_take(&model->arena, model->ctx, key_count, sizeof *track->keys);
+    track->keys = drape_arena_take(&model->arena, key_count, sizeof *track->keys);
     if (!track->keys)
         return DRAPE_E_MEMORY;
     memcpy(track->keys, keys, key_count * sizeof *track->keys);

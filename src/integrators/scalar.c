@@ -60,14 +60,14 @@ drape_status drape_scalar_build(drape_context *ctx, drape_system *system, bool p
 {
     const drape_model *m = drape_system_model(system);
     size_t n = (size_t)m->pattern.nonzeros;
-    drape_arena arena = {0};
+    drape_arena arena = drape_arena_of(ctx);
     drape_state rest;
     *out = (drape_scalar){.model = m, .n = m->free_count};
     double *values[2] = {drape_alloc(ctx, n, sizeof(double)),
                          m->has_dissipation ? drape_alloc(ctx, n, sizeof(double)) : NULL};
     drape_status status = values[0] && (values[1] || !m->has_dissipation) ? DRAPE_OK : DRAPE_E_MEMORY;
     if (!status)
-        status = drape_state_create(ctx, &arena, m, &rest);
+        status = drape_state_create(&arena, m, &rest);
     if (!status) {
         memset(rest.v, 0, 3 * (size_t)m->node_count * sizeof *rest.v);
         for (int w = 0; w < 2; w++)
@@ -75,7 +75,7 @@ drape_status drape_scalar_build(drape_context *ctx, drape_system *system, bool p
                 add_rest_hessians(system, pairs, rest.internal, rest.v, w, values[w]);
         status = pack(ctx, values[0], values[1], out);
     }
-    drape_arena_free(&arena, ctx);
+    drape_arena_free(&arena);
     drape_free(ctx, values[0]);
     drape_free(ctx, values[1]);
     return status;

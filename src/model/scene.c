@@ -50,8 +50,8 @@ void drape_scene_destroy(drape_scene **scene)
     drape_scene *s = *scene;
     json_decref(s->root);
     json_decref(s->ours);
-    drape_arena_free(&s->defs, s->ctx);
-    drape_arena_free(&s->kept, s->ctx);
+    drape_arena_free(&s->defs);
+    drape_arena_free(&s->kept);
     drape_free(s->ctx, s->text);
     drape_free(s->ctx, s);
     *scene = NULL;
@@ -75,7 +75,7 @@ static char *shown_name(drape_scene *scene, const char *name)
     for (char *p = text; *p; p++)
         if ((unsigned char)*p < ' ' || *p == 127)
             *p = '?';
-    return drape_arena_text(&scene->kept, scene->ctx, text);
+    return drape_arena_text(&scene->kept, text);
 }
 
 /* "a/b.json" -> "a", "/b.json" -> "/", "b.json" -> NULL. */
@@ -84,7 +84,7 @@ static drape_status keep_folder(drape_scene *scene, const char *path)
     const char *slash = strrchr(path, '/');
     if (!slash)
         return DRAPE_OK;
-    scene->folder = drape_arena_text(&scene->kept, scene->ctx, path);
+    scene->folder = drape_arena_text(&scene->kept, path);
     if (!scene->folder)
         return DRAPE_E_MEMORY;
     scene->folder[slash == path ? 1 : slash - path] = 0;
@@ -97,6 +97,7 @@ static drape_status new_scene(drape_context *ctx, const char *name, drape_scene 
     if (!scene)
         return DRAPE_E_MEMORY;
     scene->ctx = ctx;
+    scene->kept = scene->defs = drape_arena_of(ctx);
     scene->name = shown_name(scene, name);
     if (!scene->name)
         drape_scene_destroy(&scene);
@@ -484,9 +485,9 @@ static drape_status new_override(drape_scene *scene, const char *path, const cha
     for (char *p = shown; *p; p++)
         if ((unsigned char)*p < ' ' || *p == 127)
             *p = ' ';
-    override *o = drape_arena_take(&scene->kept, scene->ctx, 1, sizeof *o);
-    if (!o || !(o->pointer = drape_arena_text(&scene->kept, scene->ctx, path)) ||
-        !(o->shown = drape_arena_text(&scene->kept, scene->ctx, shown)))
+    override *o = drape_arena_take(&scene->kept, 1, sizeof *o);
+    if (!o || !(o->pointer = drape_arena_text(&scene->kept, path)) ||
+        !(o->shown = drape_arena_text(&scene->kept, shown)))
         return DRAPE_E_MEMORY;
     o->before = scene->last;
     *out = o;
@@ -545,7 +546,7 @@ drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char
     if (!pointer || !value)
         return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "drape_scene_set: pointer and value are needed");
     locale_t old = drape_locale_enter();
-    drape_arena_free(&scene->defs, scene->ctx); /* the defs of before point into values that may go */
+    drape_arena_free(&scene->defs); /* the defs of before point into values that may go */
     drape_status status = set_value(scene, pointer, value);
     drape_locale_leave(old);
     return status;
@@ -567,7 +568,7 @@ static drape_status read_tree(drape_scene *scene, drape_scene_def *def)
 drape_status drape_scene_to_def(drape_scene *scene, drape_scene_def *def)
 {
     locale_t old = drape_locale_enter();
-    drape_arena_free(&scene->defs, scene->ctx);
+    drape_arena_free(&scene->defs);
     drape_status status = read_tree(scene, def);
     def->folder = scene->folder;
     drape_locale_leave(old);

@@ -330,7 +330,7 @@ static drape_status take_array(reader *r, const drape_scene_key *key, json_t *va
     size_t count = json_array_size(value);
     if (!json_is_array(value) || count < key->at_least)
         return refuse(r, key, value);
-    void *memory = count ? drape_arena_take(r->arena, r->ctx, count, size) : NULL;
+    void *memory = count ? drape_arena_take(r->arena, count, size) : NULL;
     if (count && !memory)
         return DRAPE_E_MEMORY;
     memcpy(def + key->offset, &memory, sizeof memory);
@@ -437,7 +437,7 @@ static bool has_key(const drape_scene_object *object, const char *name)
 
 static drape_status read_vector_setting(reader *r, json_t *value, drape_setting *out)
 {
-    double *numbers = drape_arena_take(r->arena, r->ctx, json_array_size(value), sizeof *numbers);
+    double *numbers = drape_arena_take(r->arena, json_array_size(value), sizeof *numbers);
     if (!numbers)
         return DRAPE_E_MEMORY;
     out->vector = numbers;
@@ -475,7 +475,7 @@ static drape_status read_others(reader *r, const drape_scene_object *object, jso
     size_t count = 0;
     bool open = object->open && (!object->open_with || json_object_get(value, object->open_with));
     if (open) {
-        settings = drape_arena_take(r->arena, r->ctx, json_object_size(value), sizeof *settings);
+        settings = drape_arena_take(r->arena, json_object_size(value), sizeof *settings);
         if (!settings)
             return DRAPE_E_MEMORY;
     }

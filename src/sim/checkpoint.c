@@ -111,7 +111,7 @@ static void archive_reason(drape_sim *sim, drape_reason *reason, drape_archive *
     drape_archive_int64(a, &reason->count);
     if (!a->reading)
         return;
-    reason->reason = drape_arena_text(&sim->arena, sim->ctx, text);
+    reason->reason = drape_arena_text(&sim->arena, text);
     if (!reason->reason)
         drape_archive_note(a, DRAPE_E_MEMORY);
 }

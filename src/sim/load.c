@@ -17,7 +17,7 @@ static drape_status compile(drape_context *ctx, const drape_scene_def *def, drap
 drape_status drape_model_create(drape_context *ctx, const drape_scene_def *given, drape_model **out)
 {
     drape_scene_def def;
-    drape_arena arena = {NULL, 0};
+    drape_arena arena = drape_arena_of(ctx);
     if (!ctx)
         return DRAPE_E_ARGUMENT;
     if (!out)
@@ -26,7 +26,7 @@ drape_status drape_model_create(drape_context *ctx, const drape_scene_def *given
     drape_status status = drape_compile_read_def(ctx, &arena, given, &def);
     if (!status)
         status = compile(ctx, &def, out);
-    drape_arena_free(&arena, ctx);
+    drape_arena_free(&arena);
     return status;
 }
 

@@ -82,18 +82,18 @@ static drape_status create(bench *s, bool implicit)
 {
     const drape_model *model = s->sim->model;
     size_t nodes = 3 * (size_t)model->node_count, dofs = 3 * (size_t)model->free_count;
-    s->x = drape_arena_take(&s->arena, s->ctx, nodes, sizeof *s->x);
-    s->v = drape_arena_take(&s->arena, s->ctx, nodes, sizeof *s->v);
-    s->g = drape_arena_take(&s->arena, s->ctx, nodes, sizeof *s->g);
-    s->b = drape_arena_take(&s->arena, s->ctx, dofs, sizeof *s->b);
-    s->d = drape_arena_take(&s->arena, s->ctx, dofs, sizeof *s->d);
+    s->x = drape_arena_take(&s->arena, nodes, sizeof *s->x);
+    s->v = drape_arena_take(&s->arena, nodes, sizeof *s->v);
+    s->g = drape_arena_take(&s->arena, nodes, sizeof *s->g);
+    s->b = drape_arena_take(&s->arena, dofs, sizeof *s->b);
+    s->d = drape_arena_take(&s->arena, dofs, sizeof *s->d);
     if (!s->x || !s->v || !s->g || !s->b || !s->d)
         return DRAPE_E_MEMORY;
     if (model->has_laws &&
-        !(s->history = drape_arena_take(&s->arena, s->ctx, (size_t)model->measure_count, sizeof(double))))
+        !(s->history = drape_arena_take(&s->arena, (size_t)model->measure_count, sizeof(double))))
         return DRAPE_E_MEMORY;
-    if (implicit && !(s->values = drape_arena_take(&s->arena, s->ctx, (size_t)model->pattern.nonzeros,
-                                                   sizeof *s->values)))
+    if (implicit &&
+        !(s->values = drape_arena_take(&s->arena, (size_t)model->pattern.nonzeros, sizeof *s->values)))
         return DRAPE_E_MEMORY;
     return DRAPE_OK;
 }
@@ -186,7 +186,7 @@ static drape_status measure_terms(bench *s, bool implicit, drape_profile_term *t
 {
     const drape_model *model = s->sim->model;
     size_t blocks = (size_t)model->pattern.block_start[model->pattern.block_count];
-    unsigned char *seen = drape_arena_take(&s->arena, s->ctx, blocks, 1);
+    unsigned char *seen = drape_arena_take(&s->arena, blocks, 1);
     if (!seen)
         return DRAPE_E_MEMORY;
     for (s->term = 0; s->term < model->term_count; s->term++) {
@@ -287,7 +287,7 @@ static drape_status measure(bench *s, drape_profile *out)
 drape_status drape_profile_measure(drape_context *ctx, const drape_sim *sim, drape_profile_term *terms,
                                    drape_profile *out)
 {
-    bench s = {.ctx = ctx, .sim = sim, .linear = linear_of(&sim->chosen)};
+    bench s = {.ctx = ctx, .arena = drape_arena_of(ctx), .sim = sim, .linear = linear_of(&sim->chosen)};
     *out = (drape_profile){.terms = terms,
                            .implicit = s.linear != NULL,
                            .linear_solver = s.linear ? s.linear->name : "",
@@ -296,7 +296,7 @@ drape_status drape_profile_measure(drape_context *ctx, const drape_sim *sim, dra
                            .dt = drape_chosen_integrator_value(&sim->chosen, "dt", 1.0 / 60)};
     count_bytes(sim, out);
     drape_status status = measure(&s, out);
-    drape_arena_free(&s.arena, ctx);
+    drape_arena_free(&s.arena);
     return status;
 }
 

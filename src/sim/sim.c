@@ -44,11 +44,11 @@ static drape_status create_states(drape_sim *sim)
 {
     drape_status status = DRAPE_OK;
     for (int i = 0; !status && i < 2 + sim->chosen.controller->pasts; i++)
-        status = drape_state_create(sim->ctx, &sim->arena, sim->model, &sim->states[i]);
+        status = drape_state_create(&sim->arena, sim->model, &sim->states[i]);
     size_t n = 3 * (size_t)sim->model->node_count;
-    sim->frame = drape_arena_take(&sim->arena, sim->ctx, n, sizeof *sim->frame);
-    sim->frame_velocity = drape_arena_take(&sim->arena, sim->ctx, n, sizeof *sim->frame_velocity);
-    sim->read = drape_arena_take(&sim->arena, sim->ctx, n, sizeof *sim->read);
+    sim->frame = drape_arena_take(&sim->arena, n, sizeof *sim->frame);
+    sim->frame_velocity = drape_arena_take(&sim->arena, n, sizeof *sim->frame_velocity);
+    sim->read = drape_arena_take(&sim->arena, n, sizeof *sim->read);
     return status ? status : sim->frame && sim->frame_velocity && sim->read ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
@@ -88,6 +88,7 @@ static drape_sim empty_sim(drape_context *ctx, const drape_model *model, double 
                        .before = -1,
                        .past = {-1, -1},
                        .ctx = ctx,
+                       .arena = drape_arena_of(ctx),
                        .model = model,
                        .realtime = {.longest_asked = longest_asked},
                        .frame_rate = frame_rate};
@@ -160,7 +161,7 @@ void drape_sim_destroy(drape_sim **out)
     if (sim->integrator)
         sim->chosen.integrator->destroy(&sim->integrator);
     drape_system_destroy(&sim->system);
-    drape_arena_free(&sim->arena, sim->ctx);
+    drape_arena_free(&sim->arena);
     drape_free(sim->ctx, sim);
     *out = NULL;
 }

@@ -37,7 +37,7 @@ typedef struct probe {
 
 static double *take(probe *t, size_t n)
 {
-    double *out = drape_arena_take(&t->arena, t->s.ctx, n, sizeof *out);
+    double *out = drape_arena_take(&t->arena, n, sizeof *out);
     ck_assert_ptr_nonnull(out);
     return out;
 }
@@ -50,7 +50,8 @@ static probe open_probe(scene s, double lift, uint64_t seed)
     const int32_t high = s.model->cloths[s.model->cloth_count - 1].first_node;
     ck_assert_int_eq(drape_system_create(s.ctx, s.model, 1, &t.system), DRAPE_OK);
     ck_assert_int_eq(drape_system_add_contact(t.system), DRAPE_OK);
-    ck_assert_int_eq(drape_state_create(s.ctx, &t.arena, s.model, &t.at), DRAPE_OK);
+    t.arena = drape_arena_of(s.ctx);
+    ck_assert_int_eq(drape_state_create(&t.arena, s.model, &t.at), DRAPE_OK);
     double **arrays[] = {&t.p, &t.x, &t.v, &t.g[0], &t.g[1], &t.jp};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         *arrays[i] = take(&t, n);
@@ -66,7 +67,7 @@ static probe open_probe(scene s, double lift, uint64_t seed)
 static void close_probe(probe *t)
 {
     drape_system_destroy(&t->system);
-    drape_arena_free(&t->arena, t->s.ctx);
+    drape_arena_free(&t->arena);
     scene_close(&t->s);
 }
 
@@ -331,10 +332,10 @@ START_TEST(bytes_are_all_of_them)
         0.0, 0.1);
     const drape_context_def def = s.ctx->def;
     drape_system *system = NULL;
-    drape_arena arena = {0};
+    drape_arena arena = drape_arena_of(s.ctx);
     drape_state at;
     bool changed;
-    ck_assert_int_eq(drape_state_create(s.ctx, &arena, s.model, &at), DRAPE_OK);
+    ck_assert_int_eq(drape_state_create(&arena, s.model, &at), DRAPE_OK);
     for (int32_t i = s.model->cloths[1].first_node; i < s.model->node_count; i++)
         at.x[3 * (size_t)i + 1] = 2e-3;
     s.ctx->def.allocate = hold;
@@ -352,7 +353,7 @@ START_TEST(bytes_are_all_of_them)
     drape_system_destroy(&system);
     ck_assert_uint_eq(held, 0);
     s.ctx->def = def;
-    drape_arena_free(&arena, s.ctx);
+    drape_arena_free(&arena);
     scene_close(&s);
 }
 END_TEST

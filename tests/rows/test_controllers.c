@@ -19,11 +19,11 @@ static drape_verdict judge(const drape_controller_ops *ops, const double *values
     const drape_row_def term = {.type = "stretch.edge"};
     drape_context *ctx = make_context();
     drape_model *model = make_model(ctx, &(model_def){.mesh = MESH_SQUARE, .terms = &term, .term_count = 1});
-    drape_arena arena = {0};
+    drape_arena arena = drape_arena_of(ctx);
     drape_state in, out;
     double scratch[2] = {0, 0};
-    ck_assert_int_eq(drape_state_create(ctx, &arena, model, &in), DRAPE_OK);
-    ck_assert_int_eq(drape_state_create(ctx, &arena, model, &out), DRAPE_OK);
+    ck_assert_int_eq(drape_state_create(&arena, model, &in), DRAPE_OK);
+    ck_assert_int_eq(drape_state_create(&arena, model, &out), DRAPE_OK);
     in.t = t;
     out.t = t + h;
     drape_trial trial = {.model = model,
@@ -41,7 +41,7 @@ static drape_verdict judge(const drape_controller_ops *ops, const double *values
         ck_assert(trial.h_next > 0 && trial.h_next < h && t + trial.h_next > t);
     if (verdict == DRAPE_ACCEPT && ops->own_steps)
         ck_assert(trial.h_next > 0);
-    drape_arena_free(&arena, ctx);
+    drape_arena_free(&arena);
     drape_model_destroy(&model);
     drape_context_destroy(&ctx);
     return verdict;

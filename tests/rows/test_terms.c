@@ -150,11 +150,12 @@ typedef struct state {
 static state make_state(drape_context *ctx, const drape_model *model, uint64_t seed, double deformation)
 {
     state s = {.n = 3 * (size_t)model->node_count};
-    ck_assert_int_eq(drape_state_create(ctx, &s.arena, model, &s.rest), DRAPE_OK);
-    s.x = drape_arena_take(&s.arena, ctx, s.n, sizeof(double));
-    s.v = drape_arena_take(&s.arena, ctx, s.n, sizeof(double));
-    s.g = drape_arena_take(&s.arena, ctx, s.n, sizeof(double));
-    s.history = drape_arena_take(&s.arena, ctx, (size_t)model->measure_count, sizeof(double));
+    s.arena = drape_arena_of(ctx);
+    ck_assert_int_eq(drape_state_create(&s.arena, model, &s.rest), DRAPE_OK);
+    s.x = drape_arena_take(&s.arena, s.n, sizeof(double));
+    s.v = drape_arena_take(&s.arena, s.n, sizeof(double));
+    s.g = drape_arena_take(&s.arena, s.n, sizeof(double));
+    s.history = drape_arena_take(&s.arena, (size_t)model->measure_count, sizeof(double));
     for (size_t i = 0; i < s.n; i++) {
         s.x[i] = s.rest.x[i] + deformation * random_number(&seed);
         s.v[i] = random_number(&seed);
@@ -355,7 +356,7 @@ static void check_invariance(drape_context *ctx, const variant *v, const drape_m
         ck_assert_msg(fabs(after - before) <= 1e-11 * fabs(before), "%s: %.17g, turned %.17g", name_of(v),
                       before, after);
         ck_assert(v->ops->dissipation || before > 0);
-        drape_arena_free(&s.arena, ctx);
+        drape_arena_free(&s.arena);
     }
     drape_system_destroy(&system);
 }
@@ -401,7 +402,7 @@ static void check_rest(drape_context *ctx, const variant *v, const drape_model *
     ck_assert_msg(largest(s.g, s.n) <= rounding_force(model, &s.point), "%s: %g N at rest", name_of(v),
                   largest(s.g, s.n));
     ck_assert_double_le(fabs(elastic), 1e-20);
-    drape_arena_free(&s.arena, ctx);
+    drape_arena_free(&s.arena);
     drape_system_destroy(&system);
 }
 
@@ -435,7 +436,7 @@ static void check_power(drape_context *ctx, const variant *v, const drape_model 
         if (!v->ops->dissipation)
             ck_assert_msg(largest(s.g, s.n) <= 1e-13 * scale, "%s: %g N of %g", name_of(v), largest(s.g, s.n),
                           scale);
-        drape_arena_free(&s.arena, ctx);
+        drape_arena_free(&s.arena);
     }
     drape_system_destroy(&system);
 }
@@ -457,12 +458,11 @@ static void check_stress(drape_context *ctx, const variant *v, const drape_model
         return;
     state s = make_state(ctx, model, 13, 0.01);
     drape_system *system = make_system(ctx, model, 1);
-    double *p = drape_arena_take(&s.arena, ctx, s.n, sizeof *p),
-           *x = drape_arena_take(&s.arena, ctx, s.n, sizeof *x);
-    double *here = drape_arena_take(&s.arena, ctx, n, sizeof *here),
-           *ahead = drape_arena_take(&s.arena, ctx, n, sizeof *ahead);
-    double *sum = drape_arena_take(&s.arena, ctx, n, sizeof *sum),
-           *moved = drape_arena_take(&s.arena, ctx, n, sizeof *moved);
+    double *p = drape_arena_take(&s.arena, s.n, sizeof *p), *x = drape_arena_take(&s.arena, s.n, sizeof *x);
+    double *here = drape_arena_take(&s.arena, n, sizeof *here),
+           *ahead = drape_arena_take(&s.arena, n, sizeof *ahead);
+    double *sum = drape_arena_take(&s.arena, n, sizeof *sum),
+           *moved = drape_arena_take(&s.arena, n, sizeof *moved);
     drape_system_stress(system, &s.point, p, here); /* p is 0 yet */
     uint64_t seed = 17;
     for (size_t i = 0; i < s.n; i++)
@@ -484,7 +484,7 @@ static void check_stress(drape_context *ctx, const variant *v, const drape_model
     const double size = fmax(largest(here, n), largest(ahead, n)), error = largest(sum, n);
     ck_assert_msg(error <= 1e-7 * size, "%s: %g of %g", name_of(v), error, size);
     drape_system_destroy(&system);
-    drape_arena_free(&s.arena, ctx);
+    drape_arena_free(&s.arena);
 }
 
 START_TEST(forces_ahead_agree_with_differences)
@@ -540,7 +540,7 @@ static void check_ranges(drape_context *ctx, const variant *v, const drape_model
                                        : memcmp(e1, e2, m * sizeof *e1) == 0,
                       "%s: without derivatives", name_of(v));
     }
-    drape_arena_free(&s.arena, ctx);
+    drape_arena_free(&s.arena);
 }
 
 START_TEST(elements_do_not_depend_on_the_range)
@@ -554,12 +554,12 @@ static void check_threads(drape_context *ctx, const variant *v, const drape_mode
 {
     state s = make_state(ctx, model, 9, 0.01);
     size_t values = (size_t)model->pattern.nonzeros;
-    double *g = drape_arena_take(&s.arena, ctx, s.n, sizeof *g);
-    double *j1 = drape_arena_take(&s.arena, ctx, values, sizeof *j1);
-    double *j2 = drape_arena_take(&s.arena, ctx, values, sizeof *j2);
+    double *g = drape_arena_take(&s.arena, s.n, sizeof *g);
+    double *j1 = drape_arena_take(&s.arena, values, sizeof *j1);
+    double *j2 = drape_arena_take(&s.arena, values, sizeof *j2);
     const size_t measures = (size_t)model->measure_count;
-    double *f1 = drape_arena_take(&s.arena, ctx, measures + 1, sizeof *f1);
-    double *f2 = drape_arena_take(&s.arena, ctx, measures + 1, sizeof *f2);
+    double *f1 = drape_arena_take(&s.arena, measures + 1, sizeof *f1);
+    double *f2 = drape_arena_take(&s.arena, measures + 1, sizeof *f2);
     for (int threads = 1; threads <= 3; threads++) {
         drape_system *system = make_system(ctx, model, threads);
         drape_system_force(system, &s.point, threads == 1 ? s.g : g);
@@ -570,7 +570,7 @@ static void check_threads(drape_context *ctx, const variant *v, const drape_mode
         ck_assert_msg(threads == 1 || memcmp(f1, f2, measures * sizeof *f1) == 0, "%s: stress", name_of(v));
         drape_system_destroy(&system);
     }
-    drape_arena_free(&s.arena, ctx);
+    drape_arena_free(&s.arena);
 }
 
 START_TEST(threads_give_the_same_bits)
@@ -585,8 +585,8 @@ static void check_projection(drape_context *ctx, const variant *v, const drape_m
 {
     state s = make_state(ctx, model, 11, 0.04);
     const drape_pattern *p = &model->pattern;
-    double *j = drape_arena_take(&s.arena, ctx, (size_t)p->nonzeros, sizeof *j);
-    double *b = drape_arena_take(&s.arena, ctx, (size_t)p->n, sizeof *b);
+    double *j = drape_arena_take(&s.arena, (size_t)p->nonzeros, sizeof *j);
+    double *b = drape_arena_take(&s.arena, (size_t)p->n, sizeof *b);
     drape_system *system = make_system(ctx, model, 1);
     drape_system_jacobian(system, &s.point, 0, true, j);
     for (uint64_t trial = 1; trial <= 50; trial++) {
@@ -602,7 +602,7 @@ static void check_projection(drape_context *ctx, const variant *v, const drape_m
         ck_assert_msg(sum >= -1e-13 * size, "%s: %g of %g", name_of(v), sum, size);
     }
     drape_system_destroy(&system);
-    drape_arena_free(&s.arena, ctx);
+    drape_arena_free(&s.arena);
 }
 
 START_TEST(projected_jacobians_are_positive)

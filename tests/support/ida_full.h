@@ -146,7 +146,7 @@ static inline void ida_full_close(ida_full *f)
     drape_free(f->ctx, f->g);
     drape_free(f->ctx, f->k);
     drape_free(f->ctx, f->d);
-    drape_arena_free(&f->arena, f->ctx);
+    drape_arena_free(&f->arena);
     drape_system_destroy(&f->system);
     *f = (ida_full){0};
 }
@@ -154,12 +154,13 @@ static inline void ida_full_close(ida_full *f)
 static inline bool ida_full_arrays(ida_full *f)
 {
     const size_t nonzeros = (size_t)f->model->pattern.nonzeros;
+    f->arena = drape_arena_of(f->ctx);
     f->g = drape_alloc(f->ctx, 3 * (size_t)f->model->node_count, sizeof(double));
     f->k = drape_alloc(f->ctx, nonzeros, sizeof(double));
     f->d = drape_alloc(f->ctx, nonzeros, sizeof(double));
     return f->g && f->k && f->d && !drape_system_create(f->ctx, f->model, 1, &f->system) &&
-           !drape_state_create(f->ctx, &f->arena, f->model, &f->now) &&
-           !drape_state_create(f->ctx, &f->arena, f->model, &f->next);
+           !drape_state_create(&f->arena, f->model, &f->now) &&
+           !drape_state_create(&f->arena, f->model, &f->next);
 }
 
 /* x' = v, v' = -M^-1 g at the start; the tolerances. */

@@ -201,7 +201,8 @@ static state open_state(int side, const char *terms)
     const drape_model *m = q.s.model;
     q.n = 3 * (size_t)m->free_count;
     ck_assert_int_eq(drape_system_create(q.s.ctx, m, 1, &q.system), DRAPE_OK);
-    ck_assert_int_eq(drape_state_create(q.s.ctx, &q.arena, m, &q.at), DRAPE_OK);
+    q.arena = drape_arena_of(q.s.ctx);
+    ck_assert_int_eq(drape_state_create(&q.arena, m, &q.at), DRAPE_OK);
     ck_assert_int_eq(drape_quasi_create(q.s.ctx, q.system, 0, &q.quasi), DRAPE_OK);
     q.point = (drape_point){.x = q.at.x, .v = q.at.v, .internal = q.at.internal, .weight = 60};
     q.x = calloc(q.n, sizeof *q.x);
@@ -215,7 +216,7 @@ static void close_state(state *q)
     drape_quasi_destroy(&q->quasi);
     drape_quasi_destroy(&q->quasi);
     drape_system_destroy(&q->system);
-    drape_arena_free(&q->arena, q->s.ctx);
+    drape_arena_free(&q->arena);
     free(q->x);
     free(q->y);
     free(q->values);
