@@ -123,6 +123,34 @@ def library_is_silent(files):
     return complaints
 
 
+def private_words(files):
+    """The words that the table under "Words" in CONTRIBUTING.md keeps out: what stands in backticks in its first column."""
+    section = files.get("CONTRIBUTING.md", "").partition("\n### Words\n")[2].partition("\n#")[0]
+    cells = [line.split("|")[1] for line in section.split("\n") if line.startswith("|")]
+    return [word for cell in cells for word in re.findall("`([^`]+)`", cell)]
+
+
+def words_are_standard(files):
+    """An identifier counts as the words that underscores join."""
+    words = private_words(files)
+    if not words:
+        return ["CONTRIBUTING.md: there is no table under Words"]
+    pattern = re.compile("(?<![a-z])(" + "|".join(re.escape(word) for word in words) + ")(?:e?s)?(?![a-z])", re.I)
+    complaints = []
+    for path, text in files.items():
+        if path == "CONTRIBUTING.md" or path.startswith("tests/fuzz/corpus/") or path.endswith((".abi", ".csv", ".obj", ".ply", ".svg")):
+            continue
+        for match in pattern.finditer(text.replace("_", " ")):
+            complaints.append(f'{path}:{line_of(text, match.start())}: "{match.group(1)}": CONTRIBUTING.md has the standard word')
+    return complaints
+
+
+def lines_are_short(files):
+    """clang-format breaks code and comments at 110 columns, but not long strings and what it is told to leave alone."""
+    return [f"{path}:{number}: {len(line)} columns; at most 110" for path, text in sources(files, "src", "include", "tests", "bench", "examples").items()
+            for number, line in enumerate(text.split("\n"), 1) if len(line) > 110]
+
+
 def one_place_for_cpp(files):
     complaints = []
     for path, text in sources(files, "src", "include").items():
@@ -162,10 +190,15 @@ BROKEN = {
         {"tests/unit/test_a.c": "", "tests/meson.build": "'b'\n"}],
     library_is_silent: [{"src/io/a.c": 'printf("x");\n'}, {"src/io/a.c": "fputs(x, stderr);\n"}, {"src/io/a.c": "abort ();\n"}],
     one_place_for_cpp: [{"src/io/a.h": "#ifdef __cplusplus\n"}, {"include/drape/drape.h": "visibility\n"}],
+    words_are_standard: [
+        {"CONTRIBUTING.md": "\n### Words\n| `rung` | level |\n", "src/a.h": "the\nRungs of it"},
+        {"CONTRIBUTING.md": "\n### Words\n| `rung` | level |\n", "src/a.c": "drape_rung_init();"},
+        {"CONTRIBUTING.md": "\n### Words\n"}],
+    lines_are_short: [{"src/io/a.c": "x" * 111 + "\n"}],
     no_stray_blanks: [{"a.c": "\tx\n"}, {"a.md": "x \n"}, {"tools/a": "x"}],
 }
 SOUND = {
-    **MAP, "src/sim/b.c": '#include "base/a.h"\n#include "sim/a.h"\n#include "drape/drape.h"\n/* printf(x) */ snprintf(x, "exit(1)");\n',
+    **MAP, "CONTRIBUTING.md": "\n### Words\n| `rung` | level |\n", "docs/a.md": "wrung by a level\n", "src/sim/b.c": '#include "base/a.h"\n#include "sim/a.h"\n#include "drape/drape.h"\n/* printf(x) */ snprintf(x, "exit(1)");\n',
     "src/sim/meson.build": "sources = ['b.c']\nrows += {'r': ['halving']}\n", "src/sim/control_halving.c": "", "src/cli/main.c": "exit(1);\n",
     "src/cli/meson.build": "'main.c'\n", "src/README.md": "cli -> sim\nsim -> mesh\nmesh -> base\n", "include/drape/drape.h": '#include "export.h"\n',
     "include/drape/export.h": "__cplusplus visibility\n", "tests/unit/test_a.c": "", "tests/meson.build": "'a'\n"}
