@@ -114,22 +114,22 @@ static times measure(problem *q, const drape_linear_ops *ops)
             ops->destroy(&solver);
         double start = drape_clock_cpu_seconds();
         if (ops->create(q->ctx, &q->model->pattern, &solver))
-            bench_fail(q->ctx, "%s", ops->name);
+            bench_fail(q->ctx, "%s", ops->entry.name);
         keep_least(&t.create, start);
         start = drape_clock_cpu_seconds();
         if (ops->factor(solver, q->values))
-            bench_fail(q->ctx, "%s cannot factor", ops->name);
+            bench_fail(q->ctx, "%s cannot factor", ops->entry.name);
         keep_least(&t.first, start);
     } while (drape_clock_cpu_seconds() - begin < BUDGET);
     begin = drape_clock_cpu_seconds();
     do {
         double start = drape_clock_cpu_seconds();
         if (ops->factor(solver, q->values))
-            bench_fail(q->ctx, "%s cannot factor", ops->name);
+            bench_fail(q->ctx, "%s cannot factor", ops->entry.name);
         keep_least(&t.factor, start);
         start = drape_clock_cpu_seconds();
         if (ops->solve(solver, q->b, q->x))
-            bench_fail(q->ctx, "%s cannot solve", ops->name);
+            bench_fail(q->ctx, "%s cannot solve", ops->entry.name);
         keep_least(&t.solve, start);
     } while (drape_clock_cpu_seconds() - begin < BUDGET);
     t.bytes = ops->bytes(solver);
@@ -155,7 +155,7 @@ static void report(FILE *csv, int nodes, const problem *q, matrix_kind kind, con
 /* n^3: beyond, minutes. */
 static bool affordable(const drape_linear_ops *ops, int side)
 {
-    return side <= 16 || strcmp(ops->name, "dense") != 0;
+    return side <= 16 || strcmp(ops->entry.name, "dense") != 0;
 }
 
 static void measure_all(FILE *csv, int side, matrix_kind kind)
@@ -164,7 +164,7 @@ static void measure_all(FILE *csv, int side, matrix_kind kind)
     for (int k = 0; drape_linears[k]; k++)
         if (affordable(drape_linears[k], side)) {
             times t = measure(&q, drape_linears[k]);
-            report(csv, side * side, &q, kind, drape_linears[k]->name, &t);
+            report(csv, side * side, &q, kind, drape_linears[k]->entry.name, &t);
         }
     close_problem(&q);
 }

@@ -66,14 +66,15 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
     drape_energy_range(el, first, count, x, e, g, hess, one);
 }
 
-static const drape_term_ops harmonic = {.struct_size = sizeof(drape_term_ops),
-                                        .name = "bench.harmonic",
-                                        .summary = "a spring that holds every node to its rest position",
-                                        .reference = "-",
-                                        .element_name = "node",
-                                        .nodes = 1,
-                                        .build = build,
-                                        .energy = energy};
+static const drape_term_ops harmonic = {
+    .struct_size = sizeof(drape_term_ops),
+    .entry = {.name = "bench.harmonic",
+              .summary = "a spring that holds every node to its rest position",
+              .reference = "-"},
+    .element_name = "node",
+    .nodes = 1,
+    .build = build,
+    .energy = energy};
 
 /* E/E0 - 1 after 100 periods; NaN where the run did not come to its end. */
 static double drift(drape_context *ctx, const drape_model *model, const char *integrator,
@@ -122,8 +123,8 @@ static void over_steps(drape_context *ctx, const drape_model *model, const drape
     for (size_t k = 0; k < sizeof phases / sizeof *phases; k++) {
         const drape_setting settings[] = {{"dt", phases[k] / OMEGA, NULL}, {"tolerance", 1e-13, NULL}, {0}};
         drape_statistics work;
-        double change = drift(ctx, model, row->name, settings, &work);
-        print(csv, row->name, row->order, "w h", phases[k], change, &work);
+        double change = drift(ctx, model, row->entry.name, settings, &work);
+        print(csv, row->entry.name, row->order, "w h", phases[k], change, &work);
     }
 }
 

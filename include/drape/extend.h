@@ -20,7 +20,7 @@
 
 DRAPE_C_BEGIN
 
-/* ---- Parameters of a row ---- */
+/* ---- Parameters ---- */
 
 /* What a parameter is. */
 typedef enum drape_param_kind {
@@ -51,7 +51,22 @@ typedef struct drape_param {
     const char *numbers;        /* VECTOR: what the three are, "[k11, k22, k12]"; NULL: [x, y, z] */
 } drape_param;
 
-#define DRAPE_MAX_PARAMS 24 /* values of the parameters of a row */
+#define DRAPE_MAX_PARAMS 24 /* values of all parameters of an entry */
+
+/* ---- Entries ---- */
+
+/* What every implementation that is chosen by name says of itself: a term, a collider, and all that `drape list` shows. The
+ * struct of its functions begins with it, behind its size where it has one. Texts and parameters are static. */
+typedef struct drape_entry {
+    const char *name;          /* as in scenes: "bend.hinge" */
+    const char *summary;       /* one line for `drape list` */
+    const char *reference;     /* where the method is from: paper and equation; NULL: nowhere else */
+    const drape_param *params; /* param_count of them; NULL: none */
+    int param_count;           /* of params */
+} drape_entry;
+
+/* Initialises params and param_count of an entry from an array. */
+#define DRAPE_PARAMS(array) .params = (array), .param_count = (int)(sizeof(array) / sizeof *(array))
 
 /* ---- What a term is built from ---- */
 
@@ -159,11 +174,7 @@ typedef struct drape_fault {
  */
 typedef struct drape_term_ops {
     size_t struct_size;        /* sizeof(drape_term_ops) of the author */
-    const char *name;          /* "bend.hinge" */
-    const char *summary;       /* one line for `drape list` */
-    const char *reference;     /* paper and equation of the formula */
-    const drape_param *params; /* param_count of them, static; NULL for none */
-    int param_count;           /* of params */
+    drape_entry entry;         /* with a reference: paper and equation of the formula */
     const char *element_name;  /* "edge", "hinge", "node": for messages */
     int nodes;                 /* nodes an element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
     bool linear;               /* energy: its Hessian is zero and takes no sparsity */
@@ -303,12 +314,8 @@ DRAPE_API drape_status drape_shape_read_mesh(drape_collider_shape *shape, const 
  * once a collider while a model is compiled, may allocate.
  */
 typedef struct drape_collider_ops {
-    size_t struct_size;        /* sizeof(drape_collider_ops) of the author */
-    const char *name;          /* "sphere" */
-    const char *summary;       /* one line for `drape list` */
-    const char *reference;     /* where its distance is from */
-    const drape_param *params; /* param_count of them, static; NULL for none */
-    int param_count;           /* of params */
+    size_t struct_size; /* sizeof(drape_collider_ops) of the author */
+    drape_entry entry;  /* with a reference: where its distance is from */
 
     /* Refuses values that do not go together, and fills the shape. tolerance [m]: how far a polygon may stay
      * inside a curved surface. */

@@ -277,15 +277,15 @@ static void check_elements(checker *c, const drape_term *term)
     for (int32_t e = 0; e < term->elements.count; e += stride)
         worst = largest_of(worst, compare_element(c, term, e, least));
     if (term->ops->dissipation) {
-        report(c, term->ops->name, "force by position", worst.hessian, HESSIAN_LIMIT);
-        report(c, term->ops->name, "force by velocity", worst.velocity, HESSIAN_LIMIT);
+        report(c, term->ops->entry.name, "force by position", worst.hessian, HESSIAN_LIMIT);
+        report(c, term->ops->entry.name, "force by velocity", worst.velocity, HESSIAN_LIMIT);
         return;
     }
-    report(c, term->ops->name, term->ops->measure ? "gradient of measure" : "gradient", worst.gradient,
+    report(c, term->ops->entry.name, term->ops->measure ? "gradient of measure" : "gradient", worst.gradient,
            GRADIENT_LIMIT);
-    report(c, term->ops->name, term->ops->measure ? "Hessian of measure" : "Hessian", worst.hessian,
+    report(c, term->ops->entry.name, term->ops->measure ? "Hessian of measure" : "Hessian", worst.hessian,
            HESSIAN_LIMIT);
-    report(c, term->ops->name, "symmetry", worst.symmetry, INVARIANCE_LIMIT);
+    report(c, term->ops->entry.name, "symmetry", worst.symmetry, INVARIANCE_LIMIT);
 }
 
 /* Net force and net torque of a measure's term, over the sum of magnitudes: internal forces have neither. */
@@ -307,9 +307,10 @@ static void check_invariance(checker *c, int32_t t)
             size = fmax(size, fabs(x[k]));
         }
     }
-    report(c, term->ops->name, "net force", ratio(largest(net, 3), scale), INVARIANCE_LIMIT);
+    report(c, term->ops->entry.name, "net force", ratio(largest(net, 3), scale), INVARIANCE_LIMIT);
     if (!term->anchored)
-        report(c, term->ops->name, "net torque", ratio(largest(net + 3, 3), scale * size), INVARIANCE_LIMIT);
+        report(c, term->ops->entry.name, "net torque", ratio(largest(net + 3, 3), scale * size),
+               INVARIANCE_LIMIT);
 }
 
 /* At one state and at two steps along each of its arguments. */
@@ -322,10 +323,10 @@ static void check_law(checker *c, const drape_term *law)
     law->ops->law(law->params, 5, stiffness, strain, rate, f, fs, fr, e);
     double by_strain = (f[1] - f[2]) / (2 * h), by_rate = (f[3] - f[4]) / (2 * h);
     double scale = fmax(fmax(fabs(fs[0]), fabs(fr[0])), fabs(f[0]));
-    report(c, law->ops->name, "force by strain", ratio(fabs(by_strain - fs[0]), scale), HESSIAN_LIMIT);
-    report(c, law->ops->name, "force by rate", ratio(fabs(by_rate - fr[0]), scale), HESSIAN_LIMIT);
+    report(c, law->ops->entry.name, "force by strain", ratio(fabs(by_strain - fs[0]), scale), HESSIAN_LIMIT);
+    report(c, law->ops->entry.name, "force by rate", ratio(fabs(by_rate - fr[0]), scale), HESSIAN_LIMIT);
     if (!law->ops->dissipative)
-        report(c, law->ops->name, "force of energy", ratio(fabs((e[1] - e[2]) / (2 * h) - f[0]), scale),
+        report(c, law->ops->entry.name, "force of energy", ratio(fabs((e[1] - e[2]) / (2 * h) - f[0]), scale),
                GRADIENT_LIMIT);
 }
 

@@ -564,7 +564,7 @@ static drape_worst worst_element(const drape_term *term, const drape_fault *faul
 {
     const drape_elements *el = &term->elements;
     drape_worst worst = {.what = fault->what,
-                         .term = term->ops->name,
+                         .term = term->ops->entry.name,
                          .element = fault->element,
                          .node = {-1, -1, -1, -1},
                          .cloth = term->cloth,

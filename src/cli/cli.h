@@ -71,12 +71,11 @@ typedef struct cli_command {
 } cli_command;
 
 typedef struct drape_verb {
-    const char *name;
+    drape_entry entry;   /* summary: a line in the list of verbs */
     const char *operand; /* "SCENE" in the help */
     bool operand_optional;
     int operands_most;   /* 0: one */
     bool takes_scene;    /* the options that change a scene */
-    const char *summary; /* a line in the list of verbs */
     const char *details; /* lines of its help */
     const cli_option *options;
     size_t option_count;

@@ -78,10 +78,10 @@ static const cli_option options[] = {
 static int main_check(int argc, char **argv);
 
 const drape_verb drape_verb_check = {
-    .name = "check",
+    .entry = {.name = "check",
+              .summary = "differences against every analytic derivative of a scene; edge-face intersections"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "differences against every analytic derivative of a scene; edge-face intersections",
     .details =
         "Compares every analytic derivative of a scene with central differences at a deformed, rotated,\n"
         "moving state, and counts the edges that pass through triangles at the start. Exit code 0: all\n"

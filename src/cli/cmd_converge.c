@@ -11,10 +11,9 @@ static const cli_option options[] = {
 static int main_converge(int argc, char **argv);
 
 const drape_verb drape_verb_converge = {
-    .name = "converge",
+    .entry = {.name = "converge", .summary = "orders of convergence in time, and in space"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "orders of convergence in time, and in space",
     .details =
         "Halves the step of every integrator again and again (ida: cuts rtol to a tenth), and the edges of "
         "the\n"

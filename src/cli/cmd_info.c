@@ -18,18 +18,18 @@ void cli_chosen_rows(const drape_sim *sim, cli_chosen_row rows[CLI_CHOSEN_ROWS])
     const drape_integrator_ops *integrator = sim->chosen.integrator;
     const drape_controller_ops *controller = sim->chosen.controller;
     rows[0] = (cli_chosen_row){"integrator",
-                               integrator->name,
-                               integrator->summary,
-                               integrator->params,
-                               integrator->param_count,
+                               integrator->entry.name,
+                               integrator->entry.summary,
+                               integrator->entry.params,
+                               integrator->entry.param_count,
                                sim->chosen.integrator_values,
                                &sim->model->integrator,
                                drape_chosen_ignores_integrator};
     rows[1] = (cli_chosen_row){"controller",
-                               controller->name,
-                               controller->summary,
-                               controller->params,
-                               controller->param_count,
+                               controller->entry.name,
+                               controller->entry.summary,
+                               controller->entry.params,
+                               controller->entry.param_count,
                                sim->chosen.controller_values,
                                &sim->model->controller,
                                drape_chosen_ignores_controller};
@@ -195,9 +195,9 @@ const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values)
     for (int g = 0; drape_grids[g]; g++) {
         const drape_grid_ops *grid = drape_grids[g];
         drape_context *ctx = NULL;
-        if (strcmp(grid->name, cloth->grid.type) != 0 || drape_context_create(NULL, &ctx))
+        if (strcmp(grid->entry.name, cloth->grid.type) != 0 || drape_context_create(NULL, &ctx))
             continue;
-        drape_status status = drape_params_resolve(ctx, "", grid->params, grid->param_count,
+        drape_status status = drape_params_resolve(ctx, "", grid->entry.params, grid->entry.param_count,
                                                    cloth->grid.settings, cloth->grid.setting_count, values);
         drape_context_destroy(&ctx);
         return status ? NULL : grid;
@@ -208,10 +208,9 @@ const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values)
 static int main_info(int argc, char **argv);
 
 const drape_verb drape_verb_info = {
-    .name = "info",
+    .entry = {.name = "info", .summary = "what a scene models and what it costs"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "what a scene models and what it costs",
     .details =
         "Shows what a scene models, every parameter with its value, and what each part costs: elements,\n"
         "nonzeros, bytes, and its share of one Newton iteration, measured at a slightly deformed state.",

@@ -338,10 +338,11 @@ static const cli_option options[] = {
 static int main_list(int argc, char **argv);
 
 const drape_verb drape_verb_list = {
-    .name = "list",
+    .entry = {.name = "list",
+              .summary =
+                  "the keys of a scene, every row of every table: parameters, units, defaults, references"},
     .operand = "TABLE|ROW",
     .operand_optional = true,
-    .summary = "the keys of a scene, every row of every table: parameters, units, defaults, references",
     .details =
         "Prints the keys of a scene and all that it can choose from, or one table, or one row. The table\n"
         "`scene` is the keys of all objects of a scene; one of its rows, as `pin`, is the keys of one.",

@@ -17,10 +17,9 @@ static const cli_option options[] = {
 static int main_merge(int argc, char **argv);
 
 const drape_verb drape_verb_merge = {
-    .name = "merge",
+    .entry = {.name = "merge", .summary = "the shards of a sweep into one, with its report"},
     .operand = "DIR...",
     .operands_most = 100000,
-    .summary = "the shards of a sweep into one, with its report",
     .details =
         "Takes the lines of the folders of an experiment that ran in parts (--shard I/N), and makes the\n"
         "report once all cases are there. Says how many are missing where some are.",

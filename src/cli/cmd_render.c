@@ -52,7 +52,9 @@ bool cli_shading_row(int index, cli_row *row)
 {
     const drape_shading *shading = drape_shadings[index];
     if (shading)
-        *row = (cli_row){.name = shading->name, .summary = shading->summary, .reference = shading->reference};
+        *row = (cli_row){.name = shading->entry.name,
+                         .summary = shading->entry.summary,
+                         .reference = shading->entry.reference};
     return shading;
 }
 
@@ -121,7 +123,7 @@ static int read_range(render *r)
 {
     double v[2] = {NAN, NAN};
     if (r->request->range && !r->shading->field)
-        return cli_misuse("render", "--range: the shading \"%s\" shows no field", r->shading->name);
+        return cli_misuse("render", "--range: the shading \"%s\" shows no field", r->shading->entry.name);
     if (r->request->range && (!read_numbers(r->request->range, v, 2, 2) || v[0] >= v[1]))
         return cli_misuse("render", "--range \"%.60s\": it is low,high, in %s", r->request->range,
                           r->shading->field->shown_unit);
@@ -149,9 +151,9 @@ static int read_images(render *r)
         for (int k = 0; drape_shadings[k] && used < sizeof names; k++)
             if (drape_shadings[k]->reads & images[i].reads)
                 used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : "",
-                                         drape_shadings[k]->name);
+                                         drape_shadings[k]->entry.name);
         return cli_misuse("render", "--%s: the shading \"%s\" does not show it; --shade may be %s",
-                          images[i].option, r->shading->name, names);
+                          images[i].option, r->shading->entry.name, names);
     }
     return CLI_GO_ON;
 }
@@ -429,7 +431,7 @@ static int make(render *r)
     for (int i = 0; i < r->source_count; i++)
         incomplete |= r->sources[i].incomplete;
     printf("%s: %zu frame%s, %d x %d, %s\n", r->request->out, r->sources[0].reel.count,
-           r->sources[0].reel.count == 1 ? "" : "s", r->width, r->height, r->shading->name);
+           r->sources[0].reel.count == 1 ? "" : "s", r->width, r->height, r->shading->entry.name);
     return incomplete ? CLI_FAILED : CLI_DONE;
 }
 
@@ -487,11 +489,10 @@ static const cli_option options[] = {
 static int main_render(int argc, char **argv);
 
 const drape_verb drape_verb_render = {
-    .name = "render",
+    .entry = {.name = "render", .summary = "pictures and films of a scene or a finished run"},
     .operand = "SCENE|RUN",
     .operands_most = DRAPE_MAX_PANELS,
     .takes_scene = true,
-    .summary = "pictures and films of a scene or a finished run",
     .details =
         "Draws a scene, which is simulated, or a folder that drape run --out wrote. It needs no display.\n"
         "With --compare several are put side by side in one picture or film.",

@@ -26,9 +26,8 @@ static const cli_option options[] = {
 static int main_report(int argc, char **argv);
 
 const drape_verb drape_verb_report = {
-    .name = "report",
+    .entry = {.name = "report", .summary = "a finished run as one HTML file that moves"},
     .operand = "RUN",
-    .summary = "a finished run as one HTML file that moves",
     .details = "Writes one HTML file of a run, the folder that `drape run SCENE --out RUN` wrote: the cloth "
                "in motion, plots of\n"
                "energies and steps under the same time, the summary and the scene. A browser shows it "

@@ -355,13 +355,13 @@ static int check_integrator(const run *r)
     const drape_chosen *chosen = &r->in.sim->chosen;
     if (r->request->realtime && chosen->integrator->timeless)
         return cli_misuse(command->verb, "--realtime: the integrator \"%s\" has no time to keep",
-                          chosen->integrator->name);
+                          chosen->integrator->entry.name);
     for (size_t i = 0; i < command->setting_count; i++) {
         const cli_setting *s = &command->settings[i];
         if (s->must_act && drape_chosen_ignores_integrator(chosen, strrchr(s->pointer, '/') + 1))
             return cli_misuse(command->verb,
                               "--%s \"%.60s\": the integrator \"%s\" has none to choose; leave it out",
-                              s->option, s->value, chosen->integrator->name);
+                              s->option, s->value, chosen->integrator->entry.name);
     }
     return CLI_GO_ON;
 }
@@ -410,10 +410,9 @@ static const cli_option options[] = {
 static int main_run(int argc, char **argv);
 
 const drape_verb drape_verb_run = {
-    .name = "run",
+    .entry = {.name = "run", .summary = "simulate a scene; frames, step log and summary into a folder"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "simulate a scene; frames, step log and summary into a folder",
     .details =
         "Simulates a scene. Without --out nothing is written but the results on the standard output.\n"
         "Ctrl-C ends the run after the step in progress, or in it where it is the only one (static), and\n"

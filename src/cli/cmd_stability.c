@@ -14,10 +14,11 @@ static const cli_option options[] = {
 static int main_stability(int argc, char **argv);
 
 const drape_verb drape_verb_stability = {
-    .name = "stability",
+    .entry = {.name = "stability",
+              .summary =
+                  "maps over dt, stiffness, mass, resolution: what completes, rejects, stops or explodes"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "maps over dt, stiffness, mass, resolution: what completes, rejects, stops or explodes",
     .details = "Runs a scene at every point of a grid of its values with several integrators (be, bdf2, ida, "
                "verlet\n"
                "unless --integrators says which), as\n"

@@ -10,10 +10,10 @@ static const cli_option options[] = {
 static int main_tradeoff(int argc, char **argv);
 
 const drape_verb drape_verb_tradeoff = {
-    .name = "tradeoff",
+    .entry = {.name = "tradeoff",
+              .summary = "work against accuracy of every integrator, against a tight reference"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "work against accuracy of every integrator, against a tight reference",
     .details = "Runs a scene with every integrator over its dt or rtol, and compares with a reference whose "
                "own error\n"
                "is estimated. Stopped by Ctrl-C, the same command goes on where it was. Cases run one at a "

@@ -286,10 +286,9 @@ static const cli_option options[] = {
 static int main_validate(int argc, char **argv);
 
 const drape_verb drape_verb_validate = {
-    .name = "validate",
+    .entry = {.name = "validate", .summary = "the physics references: obtained against expected"},
     .operand = "REFERENCE",
     .operand_optional = true,
-    .summary = "the physics references: obtained against expected",
     .details =
         "Runs the scene of every reference, or of one, and compares what is measured in it with the "
         "closed form,\n"

@@ -181,7 +181,7 @@ static void put_lines(const window_view *w, char lines[LINES][LINE])
     snprintf(lines[n++], LINE, "stiffness\tx %.3g", v->stiffness);
     snprintf(lines[n++], LINE, "damping\tx %.3g", v->damping);
     snprintf(lines[n++], LINE, "gravity\tx %.3g", v->gravity);
-    snprintf(lines[n++], LINE, "shading\t%s", shading_of(w)->name);
+    snprintf(lines[n++], LINE, "shading\t%s", shading_of(w)->entry.name);
     if (v->movable_count > 0)
         snprintf(lines[n++], LINE, "arrows\tmove %s", v->movables[v->moved].name);
     if (v->pulled >= 0)
@@ -585,7 +585,7 @@ static int read_shade(window_view *w)
 {
     const char *name = w->request->shade ? w->request->shade : "diffuse";
     for (w->shading = 0; drape_shadings[w->shading]; w->shading++)
-        if (strcmp(drape_shadings[w->shading]->name, name) == 0)
+        if (strcmp(drape_shadings[w->shading]->entry.name, name) == 0)
             return CLI_GO_ON;
     return cli_misuse("view", "--shade \"%.60s\": there is no such shading; `drape list shadings` shows all",
                       name);
@@ -598,7 +598,7 @@ static void print_end(const window_view *w)
     printf("t = %.6g s, %s, dt = %.6g s, %lld steps, %lld rejected, shade %s, stiffness x %.4g, gravity x "
            "%.4g\n",
            drape_sim_time(w->v.in.sim), view_integrator(&w->v), view_dt(&w->v), (long long)s.steps_accepted,
-           (long long)s.steps_rejected, shading_of(w)->name, w->v.stiffness, w->v.gravity);
+           (long long)s.steps_rejected, shading_of(w)->entry.name, w->v.stiffness, w->v.gravity);
 }
 
 static int run(window_view *w)
@@ -635,10 +635,9 @@ static const cli_option options[] = {
 static int main_view(int argc, char **argv);
 
 const drape_verb drape_verb_view = {
-    .name = "view",
+    .entry = {.name = "view", .summary = "a window on a scene that runs: turn it, pull at it, change it"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "a window on a scene that runs: turn it, pull at it, change it",
     .details = "Opens a window, paused. Space runs and pauses, N makes one step, R starts again, Esc quits, "
                "H shows all\n"
                "keys. Drag a node with the left button; drag beside the cloth turns the camera.",

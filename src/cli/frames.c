@@ -68,7 +68,7 @@ static int check_def(const cli_command *command, const cli_frames_def *def, cons
         return cli_misuse(command->verb,
                           "--shade %s: a run's frames do not have it; give the scene, which is "
                           "simulated again: %s/scene.json",
-                          def->field->name, s->operand);
+                          def->field->entry.name, s->operand);
     return CLI_GO_ON;
 }
 

@@ -97,9 +97,10 @@ static json_t *track(const drape_track *track)
 static json_t *collider(const drape_collider *from, const cli_collider_info *info)
 {
     json_t *object = with(json_object(), "name", text(from->name));
-    object = with(object, "type", json_string(from->ops->name));
-    object = with(object, "parameters",
-                  params_of(from->ops->params, from->ops->param_count, from->values, &from->choice));
+    object = with(object, "type", json_string(from->ops->entry.name));
+    object =
+        with(object, "parameters",
+             params_of(from->ops->entry.params, from->ops->entry.param_count, from->values, &from->choice));
     object = with(object, "friction", number(from->friction));
     if (from->track.key_count > 0)
         object = with(object, "track", track(&from->track));
@@ -174,9 +175,9 @@ static json_t *mesh(const drape_cloth *cloth)
 {
     double values[DRAPE_MAX_PARAMS];
     const drape_grid_ops *grid = cli_grid_of(cloth, values);
-    json_t *object = grid ? values_of(grid->params, grid->param_count, values) : json_object();
+    json_t *object = grid ? values_of(grid->entry.params, grid->entry.param_count, values) : json_object();
     if (grid)
-        object = with(object, "grid", text(grid->name));
+        object = with(object, "grid", text(grid->entry.name));
     if (cloth->file)
         object = with(object, "file", text(cloth->file));
     return with(object, "transform", transform(cloth));
@@ -221,7 +222,7 @@ static json_t *term(const cli_info *info, int32_t i)
 {
     const drape_term *from = &info->model->terms[i];
     const drape_profile_term *cost = &info->profile.terms[i];
-    json_t *object = with(json_object(), "name", json_string(from->ops->name));
+    json_t *object = with(json_object(), "name", json_string(from->ops->entry.name));
     object = with(object, "cloth", text(info->model->cloths[from->cloth].name));
     if (from->ops->law)
         object = with(object, "acts_on", count(cost->acts_on));
@@ -234,7 +235,7 @@ static json_t *term(const cli_info *info, int32_t i)
     object = with(object, "jacobian_s", number(cost->jacobian_seconds));
     object = with(object, "share", number(cli_share(info, cost->residual_seconds + cost->jacobian_seconds)));
     return with(object, "parameters",
-                params_of(from->ops->params, from->ops->param_count, from->params, NULL));
+                params_of(from->ops->entry.params, from->ops->entry.param_count, from->params, NULL));
 }
 
 /* ---- Costs ---- */

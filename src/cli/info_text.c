@@ -71,8 +71,8 @@ static void print_source(const drape_cloth *cloth)
     if (cloth->file)
         printf("  file      %s\n", cloth->file);
     if (grid) {
-        printf("  grid      %s\n", grid->name);
-        print_params("    ", grid->params, grid->param_count, values);
+        printf("  grid      %s\n", grid->entry.name);
+        print_params("    ", grid->entry.params, grid->entry.param_count, values);
     }
     printf("  transform scale %.9g %.9g %.9g, turn about %.9g %.9g %.9g by %.9g degrees, shift %.9g %.9g "
            "%.9g m\n",
@@ -161,8 +161,10 @@ static void print_chosen(const cli_chosen_row *row, const drape_chosen *chosen)
 static void print_collider(const drape_collider *collider, const cli_collider_info *info)
 {
     const drape_collider_shape *shape = &collider->shape;
-    printf("\ncollider %s: %s, %s\n", collider->name, collider->ops->name, collider->ops->summary);
-    print_given(collider->ops->params, collider->ops->param_count, collider->values, &collider->choice);
+    printf("\ncollider %s: %s, %s\n", collider->name, collider->ops->entry.name,
+           collider->ops->entry.summary);
+    print_given(collider->ops->entry.params, collider->ops->entry.param_count, collider->values,
+                &collider->choice);
     printf("  %-16s %.9g\n", "friction", collider->friction);
     if (collider->track.key_count > 0)
         printf("  %-16s %zu keys, %.9g s to %.9g s\n", "track", collider->track.key_count,
@@ -191,17 +193,17 @@ static void print_term(const cli_info *info, int32_t i)
 {
     const drape_term *term = &info->model->terms[i];
     const drape_profile_term *cost = &info->profile.terms[i];
-    printf("  %-20s of %s: ", term->ops->name, info->model->cloths[term->cloth].name);
+    printf("  %-20s of %s: ", term->ops->entry.name, info->model->cloths[term->cloth].name);
     if (term->ops->law)
         printf("acts on %lld strain measures, its time is in theirs", (long long)cost->acts_on);
     else
         printf("%d %s elements of %d node%s", (int)term->elements.count, term->ops->element_name,
                term->elements.nodes, term->elements.nodes == 1 ? "" : "s");
-    for (int p = 0; p < term->ops->param_count; p++) {
-        printf("; %s ", term->ops->params[p].name);
-        const double *value = term->params + drape_param_place(term->ops->params, p);
-        print_value(&term->ops->params[p], value);
-        fputs(is_default(&term->ops->params[p], value) ? " (default)" : "", stdout);
+    for (int p = 0; p < term->ops->entry.param_count; p++) {
+        printf("; %s ", term->ops->entry.params[p].name);
+        const double *value = term->params + drape_param_place(term->ops->entry.params, p);
+        print_value(&term->ops->entry.params[p], value);
+        fputs(is_default(&term->ops->entry.params[p], value) ? " (default)" : "", stdout);
     }
     fputc('\n', stdout);
 }
@@ -272,7 +274,7 @@ static void print_costs(const cli_info *info)
     for (int32_t i = 0; i < info->model->term_count; i++) {
         const drape_term *term = &info->model->terms[i];
         const drape_profile_term *cost = &p->terms[i];
-        print_cost(info, term->ops->name, info->model->cloths[term->cloth].name, cost->nonzeros,
+        print_cost(info, term->ops->entry.name, info->model->cloths[term->cloth].name, cost->nonzeros,
                    (long long)cost->bytes, cost->residual_seconds, cost->jacobian_seconds);
     }
     print_cost(info, "masses, clearing", "", p->implicit ? info->model->pattern.n : 0,

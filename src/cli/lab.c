@@ -152,15 +152,15 @@ static int run(const drape_verb *verb, const cli_lab_request *request, int defau
     words w = {.settings = NULL};
     if (!make_words(request, &w) || cli_context_create(&ctx)) {
         free_words(&w);
-        return cli_misuse(verb->name, "out of memory");
+        return cli_misuse(verb->entry.name, "out of memory");
     }
     int code = make_def(request, default_jobs, &w, &progress, &def);
     if (code == CLI_GO_ON && request->command.threads)
-        code =
-            cli_misuse(verb->name, "--threads has no effect: a case takes one; --jobs runs cases at a time");
+        code = cli_misuse(verb->entry.name,
+                          "--threads has no effect: a case takes one; --jobs runs cases at a time");
     if (code == CLI_GO_ON) {
         cli_progress_begin(&progress, 0, 0);
-        drape_status status = drape_lab_run(ctx, verb->name, &def, &outcome);
+        drape_status status = drape_lab_run(ctx, verb->entry.name, &def, &outcome);
         cli_progress_clear(&progress);
         code = cli_lab_conclude(ctx, status, &outcome);
     }

@@ -32,7 +32,7 @@ static void ignore_write_signals(void)
 static const drape_verb *find_verb(const char *name)
 {
     for (int i = 0; drape_verbs[i]; i++)
-        if (strcmp(drape_verbs[i]->name, name) == 0)
+        if (strcmp(drape_verbs[i]->entry.name, name) == 0)
             return drape_verbs[i];
     return NULL;
 }
@@ -59,7 +59,7 @@ static void print_overview(void)
     char operand[64];
     for (int i = 0; drape_verbs[i]; i++) {
         cli_operand_text(drape_verbs[i], operand, sizeof operand);
-        printf("  %-10s %-15s %s\n", drape_verbs[i]->name, operand, drape_verbs[i]->summary);
+        printf("  %-10s %-15s %s\n", drape_verbs[i]->entry.name, operand, drape_verbs[i]->entry.summary);
     }
     puts("\n  drape VERB --help   what a verb takes\n"
          "  drape --version     the version\n\n"

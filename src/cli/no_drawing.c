@@ -33,14 +33,13 @@ static int main_view(int argc, char **argv)
     return refuse(&drape_verb_view, argc, argv);
 }
 
-const drape_verb drape_verb_render = {.name = "render",
-                                      .operand = "SCENE|RUN",
-                                      .summary = "pictures and films: not in this build",
-                                      .details = "This drape was built without drawing.",
-                                      .run = main_render};
+const drape_verb drape_verb_render = {
+    .entry = {.name = "render", .summary = "pictures and films: not in this build"},
+    .operand = "SCENE|RUN",
+    .details = "This drape was built without drawing.",
+    .run = main_render};
 
-const drape_verb drape_verb_view = {.name = "view",
+const drape_verb drape_verb_view = {.entry = {.name = "view", .summary = "a window: not in this build"},
                                     .operand = "SCENE",
-                                    .summary = "a window: not in this build",
                                     .details = "This drape was built without drawing.",
                                     .run = main_view};

@@ -67,7 +67,7 @@ void cli_print_help(const drape_verb *verb)
     const option_list list = list_options(verb);
     char operand[64];
     cli_operand_text(verb, operand, sizeof operand);
-    printf("usage: drape %s %s [options]\n\n%s\n\n", verb->name, operand, verb->details);
+    printf("usage: drape %s %s [options]\n\n%s\n\n", verb->entry.name, operand, verb->details);
     for (size_t i = 0; i < list.count; i++)
         print_option(list.options[i]->name, list.options[i]->argument, list.options[i]->help);
     print_option("help", NULL, "this text");
@@ -94,8 +94,9 @@ static int unknown_option(const drape_verb *verb, const option_list *list, const
     snprintf(word, sizeof word, "%.*s", (int)strcspn(given + strspn(given, "-"), "="),
              given + strspn(given, "-"));
     const char *meant = drape_did_you_mean(word, names, list->count + 1);
-    return cli_misuse(verb->name, "there is no option \"%.60s\"%s%s%s; `drape %s --help` shows all", given,
-                      meant ? "; did you mean \"--" : "", meant ? meant : "", meant ? "\"?" : "", verb->name);
+    return cli_misuse(verb->entry.name, "there is no option \"%.60s\"%s%s%s; `drape %s --help` shows all",
+                      given, meant ? "; did you mean \"--" : "", meant ? meant : "", meant ? "\"?" : "",
+                      verb->entry.name);
 }
 
 /* ---- Values ---- */
@@ -244,10 +245,10 @@ static int handle(const drape_verb *verb, option_list *list, int code, char **ar
     if (code >= FIRST_VALUE)
         return take_once(request, list, (size_t)(code - FIRST_VALUE), optarg);
     if (code == ':')
-        return cli_misuse(verb->name, "%s needs an argument; `drape %s --help` shows all", argv[optind - 1],
-                          verb->name);
+        return cli_misuse(verb->entry.name, "%s needs an argument; `drape %s --help` shows all",
+                          argv[optind - 1], verb->entry.name);
     if (optopt >= FIRST_VALUE || optopt == HELP_VALUE)
-        return cli_misuse(verb->name, "\"%.60s\": this option takes no argument", argv[optind - 1]);
+        return cli_misuse(verb->entry.name, "\"%.60s\": this option takes no argument", argv[optind - 1]);
     if (optopt) {
         const char letter[] = {'-', (char)optopt, 0};
         return unknown_option(verb, list, letter);
@@ -259,13 +260,13 @@ static int take_operand(const drape_verb *verb, int argc, char **argv, cli_comma
 {
     int count = argc - optind, most = verb->operands_most ? verb->operands_most : 1;
     if (count > most && most > 1)
-        return cli_misuse(verb->name, "at most %d operands are taken, %d are given", most, count);
+        return cli_misuse(verb->entry.name, "at most %d operands are taken, %d are given", most, count);
     if (count > most)
-        return cli_misuse(verb->name, "one %s is taken, %d are given: \"%.60s\", \"%.60s\"%s", verb->operand,
-                          count, argv[optind], argv[optind + 1], count > 2 ? " ..." : "");
+        return cli_misuse(verb->entry.name, "one %s is taken, %d are given: \"%.60s\", \"%.60s\"%s",
+                          verb->operand, count, argv[optind], argv[optind + 1], count > 2 ? " ..." : "");
     if (count < 1 && !verb->operand_optional)
-        return cli_misuse(verb->name, "%s is missing; `drape %s --help` shows all", verb->operand,
-                          verb->name);
+        return cli_misuse(verb->entry.name, "%s is missing; `drape %s --help` shows all", verb->operand,
+                          verb->entry.name);
     request->operand = count ? argv[optind] : NULL;
     request->operands = argv + optind;
     request->operand_count = count;
@@ -277,7 +278,7 @@ int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *reques
     struct option table[MAX_OPTIONS + 2] = {{0}};
     option_list list = list_options(verb);
     int code, result = CLI_GO_ON;
-    request->verb = verb->name;
+    request->verb = verb->entry.name;
     request->settings = calloc((size_t)argc, sizeof *request->settings);
     if (!request->settings)
         return no_memory(request);

@@ -18,10 +18,10 @@ static bool grid(int index, cli_row *row)
 {
     const drape_grid_ops *ops = drape_grids[index];
     if (ops)
-        *row = (cli_row){.name = ops->name,
-                         .summary = ops->summary,
-                         .params = ops->params,
-                         .param_count = ops->param_count};
+        *row = (cli_row){.name = ops->entry.name,
+                         .summary = ops->entry.summary,
+                         .params = ops->entry.params,
+                         .param_count = ops->entry.param_count};
     return ops;
 }
 
@@ -29,7 +29,7 @@ static bool import(int index, cli_row *row)
 {
     const drape_import_ops *ops = drape_imports[index];
     if (ops)
-        *row = (cli_row){.name = ops->name, .summary = ops->summary};
+        *row = (cli_row){.name = ops->entry.name, .summary = ops->entry.summary};
     return ops;
 }
 
@@ -75,11 +75,11 @@ static bool term(int index, cli_row *row)
 {
     const drape_term_ops *ops = drape_terms[index];
     if (ops)
-        *row = (cli_row){.name = ops->name,
-                         .summary = ops->summary,
-                         .reference = ops->reference,
-                         .params = ops->params,
-                         .param_count = ops->param_count,
+        *row = (cli_row){.name = ops->entry.name,
+                         .summary = ops->entry.summary,
+                         .reference = ops->entry.reference,
+                         .params = ops->entry.params,
+                         .param_count = ops->entry.param_count,
                          .implied = ops->potential_of_gravity};
     return ops;
 }
@@ -88,11 +88,11 @@ static bool collider(int index, cli_row *row)
 {
     const drape_collider_ops *ops = drape_colliders[index];
     if (ops)
-        *row = (cli_row){.name = ops->name,
-                         .summary = ops->summary,
-                         .reference = ops->reference,
-                         .params = ops->params,
-                         .param_count = ops->param_count};
+        *row = (cli_row){.name = ops->entry.name,
+                         .summary = ops->entry.summary,
+                         .reference = ops->entry.reference,
+                         .params = ops->entry.params,
+                         .param_count = ops->entry.param_count};
     return ops;
 }
 
@@ -120,11 +120,11 @@ static bool integrator(int index, cli_row *row)
 {
     const drape_integrator_ops *ops = drape_integrators[index];
     if (ops)
-        *row = (cli_row){.name = ops->name,
-                         .summary = ops->summary,
-                         .reference = ops->reference,
-                         .params = ops->params,
-                         .param_count = ops->param_count};
+        *row = (cli_row){.name = ops->entry.name,
+                         .summary = ops->entry.summary,
+                         .reference = ops->entry.reference,
+                         .params = ops->entry.params,
+                         .param_count = ops->entry.param_count};
     return ops;
 }
 
@@ -132,11 +132,11 @@ static bool controller(int index, cli_row *row)
 {
     const drape_controller_ops *ops = drape_controllers[index];
     if (ops)
-        *row = (cli_row){.name = ops->name,
-                         .summary = ops->summary,
-                         .reference = ops->reference,
-                         .params = ops->params,
-                         .param_count = ops->param_count};
+        *row = (cli_row){.name = ops->entry.name,
+                         .summary = ops->entry.summary,
+                         .reference = ops->entry.reference,
+                         .params = ops->entry.params,
+                         .param_count = ops->entry.param_count};
     return ops;
 }
 
@@ -144,7 +144,8 @@ static bool linear(int index, cli_row *row)
 {
     const drape_linear_ops *ops = drape_linears[index];
     if (ops)
-        *row = (cli_row){.name = ops->name, .summary = ops->summary, .reference = ops->reference};
+        *row = (cli_row){
+            .name = ops->entry.name, .summary = ops->entry.summary, .reference = ops->entry.reference};
     return ops;
 }
 
@@ -152,7 +153,7 @@ static bool field(int index, cli_row *row)
 {
     const drape_field_ops *ops = drape_fields[index];
     if (ops)
-        *row = (cli_row){.name = ops->name, .summary = ops->summary};
+        *row = (cli_row){.name = ops->entry.name, .summary = ops->entry.summary};
     return ops;
 }
 
@@ -160,7 +161,8 @@ static bool exporter(int index, cli_row *row)
 {
     const drape_exporter_ops *ops = drape_exporters[index];
     if (ops)
-        *row = (cli_row){.name = ops->name, .summary = ops->summary, .reference = ops->reference};
+        *row = (cli_row){
+            .name = ops->entry.name, .summary = ops->entry.summary, .reference = ops->entry.reference};
     return ops;
 }
 

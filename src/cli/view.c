@@ -154,10 +154,10 @@ static drape_status scale_terms(cli_view *v, const char *name, double factor, in
     for (int32_t i = 0; i < m->term_count && !status; i++) {
         const drape_term *term = &m->terms[i];
         place = i > 0 && m->terms[i - 1].cloth == term->cloth ? place + 1 : 0;
-        for (int p = 0; p < term->ops->param_count && !status; p++) {
+        for (int p = 0; p < term->ops->entry.param_count && !status; p++) {
             char pointer[120];
-            if (strcmp(term->ops->params[p].name, name) != 0 ||
-                term->ops->params[p].kind != DRAPE_PARAM_NUMBER || isnan(term->params[p]))
+            if (strcmp(term->ops->entry.params[p].name, name) != 0 ||
+                term->ops->entry.params[p].kind != DRAPE_PARAM_NUMBER || isnan(term->params[p]))
                 continue;
             snprintf(pointer, sizeof pointer, "/cloth/%d/terms/%d/%s", (int)term->cloth, place, name);
             status = set_number(v, pointer, factor * term->params[p]);
@@ -253,7 +253,7 @@ double view_dt(const cli_view *v)
 
 const char *view_integrator(const cli_view *v)
 {
-    return v->in.sim->chosen.integrator->name;
+    return v->in.sim->chosen.integrator->entry.name;
 }
 
 bool view_scale_dt(cli_view *v, double factor)
@@ -271,15 +271,16 @@ bool view_next_integrator(cli_view *v, int step)
     const char *now = view_integrator(v);
     int count = 0, at = 0;
     for (; drape_integrators[count]; count++)
-        if (strcmp(drape_integrators[count]->name, now) == 0)
+        if (strcmp(drape_integrators[count]->entry.name, now) == 0)
             at = count;
     do
         at = (at + step + count) % count;
     while (drape_integrators[at]->timeless);
     char before[64];
     snprintf(before, sizeof before, "%s", now);
-    bool good = commit(v, drape_scene_set(v->in.scene, "/integrator/method", drape_integrators[at]->name), 1,
-                       "integrator");
+    bool good =
+        commit(v, drape_scene_set(v->in.scene, "/integrator/method", drape_integrators[at]->entry.name), 1,
+               "integrator");
     if (!good)
         drape_scene_set(v->in.scene, "/integrator/method", before);
     return good;

@@ -165,12 +165,12 @@ static double distance(const double *values, const drape_collider_shape *shape, 
 
 const drape_collider_ops drape_collider_cylinder = {
     .struct_size = sizeof(drape_collider_ops),
-    .name = "cylinder",
-    .summary = "a cylinder with flat ends, its rims rounded where wanted",
-    .reference =
-        "d = |max(q, 0)| + min(max q, 0) - rounding, q = (rho, |z|) - (radius, length / 2) + rounding",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry =
+        {.name = "cylinder",
+         .summary = "a cylinder with flat ends, its rims rounded where wanted",
+         .reference =
+             "d = |max(q, 0)| + min(max q, 0) - rounding, q = (rho, |z|) - (radius, length / 2) + rounding",
+         DRAPE_PARAMS(params)},
     .shape = make_shape,
     .distance = distance,
     .smooth = true,

@@ -58,11 +58,10 @@ static double distance(const double *values, const drape_collider_shape *shape, 
 
 const drape_collider_ops drape_collider_mesh = {
     .struct_size = sizeof(drape_collider_ops),
-    .name = "mesh",
-    .summary = "the solid inside of a closed triangle mesh",
-    .reference = "Baerentzen and Aanaes 2005: signed distance by angle-weighted pseudo-normals",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "mesh",
+              .summary = "the solid inside of a closed triangle mesh",
+              .reference = "Baerentzen and Aanaes 2005: signed distance by angle-weighted pseudo-normals",
+              DRAPE_PARAMS(params)},
     .shape = make_shape,
     .distance = distance,
 };

@@ -46,11 +46,7 @@ static double distance(const double *values, const drape_collider_shape *shape, 
 
 const drape_collider_ops drape_collider_sphere = {
     .struct_size = sizeof(drape_collider_ops),
-    .name = "sphere",
-    .summary = "a ball",
-    .reference = "d = |x - c| - r",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "sphere", .summary = "a ball", .reference = "d = |x - c| - r", DRAPE_PARAMS(params)},
     .shape = make_shape,
     .distance = distance,
     .smooth = true,

@@ -91,10 +91,10 @@ static drape_status find_row(drape_context *ctx, const char *pointer, const char
     const char *names[MAX_NAMES];
     size_t count = 0;
     for (int i = 0; (*out = row(ctx, i)) != NULL; i++) {
-        if (strcmp((*out)->name, name) == 0)
+        if (strcmp((*out)->entry.name, name) == 0)
             return DRAPE_OK;
         if (count < MAX_NAMES)
-            names[count++] = (*out)->name;
+            names[count++] = (*out)->entry.name;
     }
     const char *meant = drape_did_you_mean(name, names, count);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
@@ -137,19 +137,19 @@ static drape_status check_elements(drape_term_builder *builder)
     const int needed = ops->measure ? 2 + ops->damped : 0;
     if (el->rest_count < needed)
         return drape_term_refuse(builder, "%s has %d numbers of rest data an element; its kind needs %d",
-                                 ops->name, el->rest_count, needed);
+                                 ops->entry.name, el->rest_count, needed);
     int32_t first = builder->first_node, last = first + builder->node_count - 1;
     if (builder->beyond)
-        return drape_term_refuse(builder, "%s set an element beyond the %d that it announced", ops->name,
-                                 (int)el->count);
+        return drape_term_refuse(builder, "%s set an element beyond the %d that it announced",
+                                 ops->entry.name, (int)el->count);
     for (size_t i = 0; i < (size_t)el->count; i++)
         if (el->node[i * (size_t)el->nodes] == -1)
             return drape_term_refuse(builder, "%s announced %d elements and did not set element %zu",
-                                     ops->name, (int)el->count, i);
+                                     ops->entry.name, (int)el->count, i);
     for (size_t i = 0; i < (size_t)el->count * (size_t)el->nodes; i++)
         if (el->node[i] < first || el->node[i] > last)
             return drape_term_refuse(builder, "element %zu of %s has node %d; the cloth's are 0 to %d",
-                                     i / (size_t)el->nodes, builder->term->ops->name,
+                                     i / (size_t)el->nodes, builder->term->ops->entry.name,
                                      (int)(el->node[i] - first), (int)(last - first));
     return DRAPE_OK;
 }
@@ -166,8 +166,9 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
             status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "the term \"%s\" is named twice",
                                    def->type);
     if (!status)
-        status = drape_params_resolve(model->ctx, pointer, term->ops->params, term->ops->param_count,
-                                      def->settings, def->setting_count, term->params);
+        status =
+            drape_params_resolve(model->ctx, pointer, term->ops->entry.params, term->ops->entry.param_count,
+                                 def->settings, def->setting_count, term->params);
     if (status)
         return status;
     term->cloth = c;
@@ -186,8 +187,8 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
     drape_cloth_view view = view_of(model, cloth);
     model->ctx->message[0] = 0;
     status = term->ops->build(&view, term->params, &builder);
-    status = drape_fail_unsaid(model->ctx, status, pointer, "build() of \"%s\" returned %s", term->ops->name,
-                               drape_status_name(status));
+    status = drape_fail_unsaid(model->ctx, status, pointer, "build() of \"%s\" returned %s",
+                               term->ops->entry.name, drape_status_name(status));
     return status ? status : check_elements(&builder);
 }
 
@@ -255,7 +256,7 @@ static drape_status tie(drape_model *model, int32_t c)
     if (cloth->law_count > 0 && !measured)
         return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
                              "\"%s\" has nothing to act on: no other term here has a strain measure",
-                             cloth->laws[0]->ops->name);
+                             cloth->laws[0]->ops->entry.name);
     return DRAPE_OK;
 }
 
@@ -283,9 +284,9 @@ static bool well_formed(const drape_term_ops *ops)
     bool sized =
         ops->law ? ops->nodes == 0 : ops->nodes >= 1 && ops->nodes <= DRAPE_MAX_ELEMENT_NODES && ops->build;
     bool internal = !ops->has_internal || (ops->commit && ops->initial);
-    return ops->name && ops->summary && ops->reference && ops->element_name && kinds == 1 && sized &&
-           internal && (!ops->damped || ops->measure) && (!ops->in_medium || ops->dissipation) &&
-           drape_params_are_well_formed(ops->params, ops->param_count);
+    return ops->entry.name && ops->entry.summary && ops->entry.reference && ops->element_name && kinds == 1 &&
+           sized && internal && (!ops->damped || ops->measure) && (!ops->in_medium || ops->dissipation) &&
+           drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
 }
 
 /* The first version's ops ended here. */
@@ -312,14 +313,14 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *gi
             "energy, dissipation, law; nodes 1 to %d and build but for a law; commit and "
             "initial with has_internal; damped with a measure alone, in_medium with a dissipation; "
             "at most %d values of parameters, each with name and unit, a choice with choices",
-            ops->name ? ops->name : "?", DRAPE_MAX_ELEMENT_NODES, DRAPE_MAX_PARAMS);
+            ops->entry.name ? ops->entry.name : "?", DRAPE_MAX_ELEMENT_NODES, DRAPE_MAX_PARAMS);
     const drape_term_ops *other = NULL;
     for (int i = 0; (other = row(ctx, i)) != NULL; i++)
-        if (strcmp(other->name, ops->name) == 0)
-            return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a term \"%s\" already", ops->name);
+        if (strcmp(other->entry.name, ops->entry.name) == 0)
+            return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a term \"%s\" already", ops->entry.name);
     if (ctx->host_term_count == DRAPE_MAX_HOST_TERMS)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "term \"%s\": a context holds at most %d terms of the host",
-                          ops->name, DRAPE_MAX_HOST_TERMS);
+                          ops->entry.name, DRAPE_MAX_HOST_TERMS);
     ctx->host_terms[ctx->host_term_count++] = own;
     return DRAPE_OK;
 }

@@ -30,10 +30,10 @@ static drape_status find_row(drape_context *ctx, const char *pointer, const char
     char at[96];
     size_t count = 0;
     for (int i = 0; (*out = row(ctx, i)) != NULL; i++) {
-        if (strcmp((*out)->name, name) == 0)
+        if (strcmp((*out)->entry.name, name) == 0)
             return DRAPE_OK;
         if (count < MAX_NAMES)
-            names[count++] = (*out)->name;
+            names[count++] = (*out)->entry.name;
     }
     const char *meant = drape_did_you_mean(name, names, count);
     snprintf(at, sizeof at, "%s/type", pointer);
@@ -111,8 +111,8 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
 
 static bool well_formed(const drape_collider_ops *ops)
 {
-    bool named = ops->name && ops->summary && ops->reference && ops->shape && ops->distance;
-    return named && drape_params_are_well_formed(ops->params, ops->param_count);
+    bool named = ops->entry.name && ops->entry.summary && ops->entry.reference && ops->shape && ops->distance;
+    return named && drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
 }
 
 /* The first version's ops ended here: `smooth` may be missing, and a collider without it is met by its triangles. */
@@ -137,14 +137,14 @@ drape_status drape_context_add_collider(drape_context *ctx, const drape_collider
             ctx, DRAPE_E_ARGUMENT,
             "the ops of collider \"%s\" are not well formed: name, summary, reference, shape, "
             "distance; at most %d values of parameters, each with name and unit, a choice with choices",
-            ops->name ? ops->name : "?", DRAPE_MAX_PARAMS);
+            ops->entry.name ? ops->entry.name : "?", DRAPE_MAX_PARAMS);
     for (int i = 0; (other = row(ctx, i)) != NULL; i++)
-        if (strcmp(other->name, ops->name) == 0)
-            return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a collider \"%s\" already", ops->name);
+        if (strcmp(other->entry.name, ops->entry.name) == 0)
+            return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a collider \"%s\" already", ops->entry.name);
     if (ctx->host_collider_count == DRAPE_MAX_HOST_COLLIDERS)
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
-                          "collider \"%s\": a context holds at most %d colliders of the host", ops->name,
-                          DRAPE_MAX_HOST_COLLIDERS);
+                          "collider \"%s\": a context holds at most %d colliders of the host",
+                          ops->entry.name, DRAPE_MAX_HOST_COLLIDERS);
     ctx->host_colliders[ctx->host_collider_count++] = own;
     return DRAPE_OK;
 }

@@ -31,9 +31,7 @@ typedef struct drape_trial {
 } drape_trial;
 
 typedef struct drape_controller_ops {
-    const char *name, *summary, *reference;
-    const drape_param *params;
-    int param_count;
+    drape_entry entry;
     bool own_steps; /* steps follow h_next, not the counted grid of dt */
     int pasts;      /* how many states before in it wants, at most 2 */
     drape_verdict (*judge)(const double *values, drape_trial *trial);

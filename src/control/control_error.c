@@ -171,11 +171,10 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 }
 
 const drape_controller_ops drape_controller_error = {
-    .name = "error",
-    .summary = "step size by the local error: predictor against solution, PI rule",
-    .reference = "Gustafsson 1991; Hairer & Wanner 1996, IV.2",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "error",
+              .summary = "step size by the local error: predictor against solution, PI rule",
+              .reference = "Gustafsson 1991; Hairer & Wanner 1996, IV.2",
+              DRAPE_PARAMS(params)},
     .own_steps = true,
     .pasts = 2,
     .judge = judge,

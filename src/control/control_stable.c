@@ -88,11 +88,10 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 }
 
 const drape_controller_ops drape_controller_stable = {
-    .name = "stable",
-    .summary = "nominal steps, smaller where an explicit integrator's stability limit asks for it",
-    .reference = "2/omega: Courant, Friedrichs & Lewy 1928; Hairer, Lubich & Wanner 2003",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "stable",
+              .summary = "nominal steps, smaller where an explicit integrator's stability limit asks for it",
+              .reference = "2/omega: Courant, Friedrichs & Lewy 1928; Hairer, Lubich & Wanner 2003",
+              DRAPE_PARAMS(params)},
     .own_steps = true,
     .judge = judge,
 };

@@ -91,10 +91,9 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 }
 
 const drape_controller_ops drape_controller_strain = {
-    .name = "strain",
-    .summary = "halving that also rejects steps in which an edge or a node moves too far",
-    .reference = "-",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "strain",
+              .summary = "halving that also rejects steps in which an edge or a node moves too far",
+              .reference = "-",
+              DRAPE_PARAMS(params)},
     .judge = judge,
 };

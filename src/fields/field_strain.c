@@ -27,9 +27,8 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
 }
 
 const drape_field_ops drape_field_strain = {
-    .name = "strain",
+    .entry = {.name = "strain", .summary = "largest principal strain of the sheet"},
     .unit = "1",
-    .summary = "largest principal strain of the sheet",
     .shown = 100,
     .shown_unit = "%",
     .measure = measure,

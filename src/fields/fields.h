@@ -8,7 +8,8 @@
 #include "sim/sim.h"
 
 typedef struct drape_field_ops {
-    const char *name, *unit, *summary;
+    drape_entry entry;
+    const char *unit;
     double shown; /* a factor for people, with shown_unit: 100 and "%" */
     const char *shown_unit;
     bool of_steps; /* it is of the last step that the sim made: a state that was put there has none */

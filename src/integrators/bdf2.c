@@ -183,13 +183,14 @@ static size_t bytes(const void *state)
 }
 
 const drape_integrator_ops drape_integrator_bdf2 = {
-    .name = "bdf2",
-    .summary = "two-step backward differentiation by Newton: fixed step, second order, damps what h does not "
-               "resolve",
-    .reference = "Hairer, Norsett & Wanner 1993, Solving Ordinary Differential Equations I, III.5",
+    .entry =
+        {.name = "bdf2",
+         .summary =
+             "two-step backward differentiation by Newton: fixed step, second order, damps what h does not "
+             "resolve",
+         .reference = "Hairer, Norsett & Wanner 1993, Solving Ordinary Differential Equations I, III.5",
+         DRAPE_PARAMS(drape_newton_params)},
     .order = 2,
-    .params = drape_newton_params,
-    .param_count = DRAPE_NEWTON_PARAM_COUNT,
     .create = create,
     .step = step,
     .restart = restart,

@@ -43,12 +43,11 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
 }
 
 const drape_integrator_ops drape_integrator_be = {
-    .name = "be",
-    .summary = "backward Euler by Newton: fixed step, first order, L-stable",
-    .reference = "Baraff & Witkin 1998, solved to a tolerance",
+    .entry = {.name = "be",
+              .summary = "backward Euler by Newton: fixed step, first order, L-stable",
+              .reference = "Baraff & Witkin 1998, solved to a tolerance",
+              DRAPE_PARAMS(drape_newton_params)},
     .order = 1,
-    .params = drape_newton_params,
-    .param_count = DRAPE_NEWTON_PARAM_COUNT,
     .create = drape_implicit_create,
     .step = step,
     .restart = drape_implicit_restart,

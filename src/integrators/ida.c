@@ -724,12 +724,11 @@ static size_t bytes(const void *state)
 }
 
 const drape_integrator_ops drape_integrator_ida = {
-    .name = "ida",
-    .summary = "variable order and step with local error control by IDA",
-    .reference = "Hindmarsh et al. 2005, SUNDIALS; Brenan, Campbell & Petzold 1996",
+    .entry = {.name = "ida",
+              .summary = "variable order and step with local error control by IDA",
+              .reference = "Hindmarsh et al. 2005, SUNDIALS; Brenan, Campbell & Petzold 1996",
+              DRAPE_PARAMS(params)},
     .order = 5,
-    .params = params,
-    .param_count = PARAM_COUNT,
     .create = create,
     .own_steps = true,
     .gain = GAIN,

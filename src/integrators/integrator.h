@@ -46,10 +46,8 @@ typedef struct drape_work {
 void drape_work_archive(drape_work *work, drape_archive *a);
 
 typedef struct drape_integrator_ops {
-    const char *name, *summary, *reference;
-    int order;                 /* of convergence in h */
-    const drape_param *params; /* one of them is dt */
-    int param_count;
+    drape_entry entry; /* one of its parameters is dt */
+    int order;         /* of convergence in h */
     /* values in the order of params. Takes all memory that stepping needs. */
     drape_status (*create)(drape_context *ctx, drape_system *system, const double *values, void **state);
     /* The row chooses its own steps: h is the way to the end of the advance or, after a rejection, an

@@ -44,12 +44,11 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
 }
 
 const drape_integrator_ops drape_integrator_midpoint = {
-    .name = "midpoint",
-    .summary = "implicit midpoint by Newton: fixed step, second order, no damping of its own",
-    .reference = "Hairer, Lubich & Wanner 2006, Geometric Numerical Integration, II.1.3",
+    .entry = {.name = "midpoint",
+              .summary = "implicit midpoint by Newton: fixed step, second order, no damping of its own",
+              .reference = "Hairer, Lubich & Wanner 2006, Geometric Numerical Integration, II.1.3",
+              DRAPE_PARAMS(drape_newton_params)},
     .order = 2,
-    .params = drape_newton_params,
-    .param_count = DRAPE_NEWTON_PARAM_COUNT,
     .create = drape_implicit_create,
     .step = step,
     .restart = drape_implicit_restart,

@@ -253,12 +253,12 @@ static size_t bytes(const void *state)
 }
 
 const drape_integrator_ops drape_integrator_newton_k = {
-    .name = "newton_k",
-    .summary = "backward Euler by k inexact Newton iterations: for real time, checked, not to a tolerance",
-    .reference = "Dembo, Eisenstat & Steihaug 1982; Baraff & Witkin 1998 for k = 1",
+    .entry = {.name = "newton_k",
+              .summary =
+                  "backward Euler by k inexact Newton iterations: for real time, checked, not to a tolerance",
+              .reference = "Dembo, Eisenstat & Steihaug 1982; Baraff & Witkin 1998 for k = 1",
+              DRAPE_PARAMS(params)},
     .order = 1,
-    .params = params,
-    .param_count = PARAM_COUNT,
     .create = create,
     .step = step,
     .restart = drape_rung_restart,

@@ -320,13 +320,12 @@ static size_t bytes(const void *state)
 }
 
 const drape_integrator_ops drape_integrator_projective = {
-    .name = "projective",
-    .summary =
-        "backward Euler by a fixed point with a constant matrix and Anderson acceleration: bounded steps",
-    .reference = "Liu, Bouaziz & Kavan 2017; Anderson 1965; Peng et al. 2018",
+    .entry = {.name = "projective",
+              .summary = "backward Euler by a fixed point with a constant matrix and Anderson acceleration: "
+                         "bounded steps",
+              .reference = "Liu, Bouaziz & Kavan 2017; Anderson 1965; Peng et al. 2018",
+              DRAPE_PARAMS(params)},
     .order = 1,
-    .params = params,
-    .param_count = PARAM_COUNT,
     .create = create,
     .step = step,
     .restart = drape_rung_restart,

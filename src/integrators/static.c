@@ -198,12 +198,12 @@ static size_t bytes(const void *state)
 }
 
 const drape_integrator_ops drape_integrator_static = {
-    .name = "static",
-    .summary = "equilibrium by Newton with pseudo-transient continuation; says whether it is stable",
-    .reference = "Kelley & Keyes 1998, Convergence analysis of pseudo-transient continuation",
+    .entry = {.name = "static",
+              .summary =
+                  "equilibrium by Newton with pseudo-transient continuation; says whether it is stable",
+              .reference = "Kelley & Keyes 1998, Convergence analysis of pseudo-transient continuation",
+              DRAPE_PARAMS(drape_newton_params)},
     .order = 0,
-    .params = drape_newton_params,
-    .param_count = DRAPE_NEWTON_PARAM_COUNT,
     .create = create,
     .own_steps = true,
     .timeless = true,

@@ -200,13 +200,12 @@ static size_t bytes(const void *state)
 }
 
 const drape_integrator_ops drape_integrator_trbdf2 = {
-    .name = "trbdf2",
-    .summary =
-        "trapezoid, then backward differentiation, in one step by Newton: fixed step, second order, L-stable",
-    .reference = "Bank et al. 1985; Hosea & Shampine 1996",
+    .entry = {.name = "trbdf2",
+              .summary = "trapezoid, then backward differentiation, in one step by Newton: fixed step, "
+                         "second order, L-stable",
+              .reference = "Bank et al. 1985; Hosea & Shampine 1996",
+              DRAPE_PARAMS(drape_newton_params)},
     .order = 2,
-    .params = drape_newton_params,
-    .param_count = DRAPE_NEWTON_PARAM_COUNT,
     .create = create,
     .step = step,
     .restart = drape_implicit_restart,

@@ -581,13 +581,14 @@ static size_t bytes(const void *state)
 }
 
 const drape_integrator_ops drape_integrator_verlet = {
-    .name = "verlet",
-    .summary = "explicit Verlet steps in substeps, with the contact rules and the strain limit of CS184 and "
-               "Boson; stable below 2/omega",
-    .reference = "Verlet 1967; Provot 1995; CS184 clothsim; Hairer, Lubich & Wanner 2003",
+    .entry =
+        {.name = "verlet",
+         .summary =
+             "explicit Verlet steps in substeps, with the contact rules and the strain limit of CS184 and "
+             "Boson; stable below 2/omega",
+         .reference = "Verlet 1967; Provot 1995; CS184 clothsim; Hairer, Lubich & Wanner 2003",
+         DRAPE_PARAMS(params)},
     .order = 2,
-    .params = params,
-    .param_count = PARAM_COUNT,
     .create = create,
     .projects_contact = true,
     .step = step,

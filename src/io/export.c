@@ -23,7 +23,7 @@ static drape_status unknown_format(drape_context *ctx, const char *pointer, cons
     char list[512] = "";
     size_t count = 0, used = 0;
     for (; count < MAX_NAMES && drape_exporters[count] && used < sizeof list; count++) {
-        names[count] = drape_exporters[count]->name;
+        names[count] = drape_exporters[count]->entry.name;
         used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", count ? ", " : "", names[count]);
     }
     const char *meant = drape_did_you_mean(name, names, count);
@@ -36,7 +36,7 @@ drape_status drape_exporter_find(drape_context *ctx, const char *pointer, const 
 {
     *out = NULL;
     for (int i = 0; drape_exporters[i]; i++)
-        if (strcmp(drape_exporters[i]->name, name) == 0) {
+        if (strcmp(drape_exporters[i]->entry.name, name) == 0) {
             *out = drape_exporters[i];
             return DRAPE_OK;
         }

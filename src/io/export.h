@@ -31,9 +31,7 @@ typedef struct drape_frame {
  * the frames before it are whole and readable.
  */
 typedef struct drape_exporter_ops {
-    const char *name;      /* "npy" */
-    const char *summary;   /* what it writes where */
-    const char *reference; /* the format's definition */
+    drape_entry entry; /* summary: what it writes where; reference: the format's definition */
     size_t state_size;
     bool wants_fields;
     bool y_up; /* always: its frames are never turned */

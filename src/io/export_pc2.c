@@ -143,11 +143,13 @@ static drape_status pc2_close(drape_context *ctx, void *state)
 }
 
 const drape_exporter_ops drape_exporter_pc2 = {
-    .name = "pc2",
-    .summary = "positions.pc2 and positions.obj: a point cache, float32, and its mesh, for Blender's Mesh "
-               "Cache; valid "
-               "after every frame",
-    .reference = "PC2 format version 1, Autodesk 3ds Max SDK, Point Cache; Blender, MOD_meshcache_pc2.c",
+    .entry = {.name = "pc2",
+              .summary =
+                  "positions.pc2 and positions.obj: a point cache, float32, and its mesh, for Blender's Mesh "
+                  "Cache; valid "
+                  "after every frame",
+              .reference =
+                  "PC2 format version 1, Autodesk 3ds Max SDK, Point Cache; Blender, MOD_meshcache_pc2.c"},
     .state_size = sizeof(pc2_state),
     .open = pc2_open,
     .clean = pc2_clean,

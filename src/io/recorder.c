@@ -147,12 +147,12 @@ static void archive_formats(drape_recorder *r, drape_archive *a)
     drape_archive_same(a, "the number of formats", (int64_t)r->output_count);
     for (size_t i = 0; i < r->output_count && drape_archive_good(a); i++) {
         char there[32];
-        snprintf(there, sizeof there, "%s", r->outputs[i].ops->name);
+        snprintf(there, sizeof there, "%s", r->outputs[i].ops->entry.name);
         drape_archive_text(a, there, sizeof there);
-        if (drape_archive_good(a) && strcmp(there, r->outputs[i].ops->name) != 0)
+        if (drape_archive_good(a) && strcmp(there, r->outputs[i].ops->entry.name) != 0)
             drape_archive_fail(a, DRAPE_E_ARGUMENT,
                                "the checkpoint has frames in \"%s\"; here they are in \"%s\"", there,
-                               r->outputs[i].ops->name);
+                               r->outputs[i].ops->entry.name);
     }
 }
 

@@ -38,7 +38,7 @@ static bool has_own_substeps(const drape_integrator_ops *row, const drape_row_de
     for (size_t i = 0; i < said->setting_count; i++)
         if (strcmp(said->settings[i].name, "substeps") == 0 && said->settings[i].number > 0)
             return false;
-    return row->stability && lab_has_param(row->params, row->param_count, "substeps");
+    return row->stability && lab_has_param(row->entry.params, row->entry.param_count, "substeps");
 }
 
 static drape_status add_time(lab *l, const drape_integrator_ops *row, const drape_row_def *said)
@@ -48,8 +48,8 @@ static drape_status add_time(lab *l, const drape_integrator_ops *row, const drap
     const char *pointer = row->own_steps ? "/integrator/rtol" : "/integrator/dt";
     double value = row->own_steps ? FIRST_RTOL : FIRST_DT, ratio = row->own_steps ? 0.1 : 0.5;
     for (int k = 0; k < l->def->levels && !status; k++, value *= ratio)
-        status = add(l, row->name, knob, value,
-                     json_pack("{s:s, s:f}", "/integrator/method", row->name, pointer, value));
+        status = add(l, row->entry.name, knob, value,
+                     json_pack("{s:s, s:f}", "/integrator/method", row->entry.name, pointer, value));
     return status;
 }
 
@@ -88,7 +88,8 @@ static drape_status add_all(lab *l, const drape_scene_def *def)
 {
     drape_status status = DRAPE_OK;
     for (int i = 0; !status && drape_integrators[i]; i++)
-        if (lab_wants_integrator(l, drape_integrators[i]->name, true) && !drape_integrators[i]->timeless)
+        if (lab_wants_integrator(l, drape_integrators[i]->entry.name, true) &&
+            !drape_integrators[i]->timeless)
             status = add_time(l, drape_integrators[i], &def->integrator);
     for (int k = 0; l->def->space && k < l->def->levels && !status; k++)
         status = add_level(l, def, k);
@@ -291,8 +292,7 @@ static drape_status report(lab *l)
 }
 
 const lab_experiment_ops lab_experiment_converge = {
-    .name = "converge",
-    .summary = "orders of convergence in time, and in space",
+    .entry = {.name = "converge", .summary = "orders of convergence in time, and in space"},
     .plan = plan,
     .prepare = prepare,
     .report = report,

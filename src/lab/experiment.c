@@ -115,7 +115,7 @@ drape_status lab_check_integrators(const lab *l)
         if (lab_find_integrator(name)->timeless)
             return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
                               "\"%s\" has no steps in time: %s is of rows that have", name,
-                              l->experiment->name);
+                              l->experiment->entry.name);
     }
     return DRAPE_OK;
 }
@@ -147,8 +147,8 @@ static drape_status plan(lab *l)
     drape_status status = hash_scene(l, digits, sizeof digits);
     if (status)
         return status;
-    l->about = json_pack("{s:s, s:s, s:s, s:s, s:o, s:{}, s:[]}", "experiment", l->experiment->name, "drape",
-                         drape_version(), "scene", l->def->scene, "scene_hash", digits, "settings",
+    l->about = json_pack("{s:s, s:s, s:s, s:s, s:o, s:{}, s:[]}", "experiment", l->experiment->entry.name,
+                         "drape", drape_version(), "scene", l->def->scene, "scene_hash", digits, "settings",
                          settings_of(l->def), "arguments", "cases");
     l->cases = json_object_get(l->about, "cases");
     l->arguments = json_object_get(l->about, "arguments");
@@ -258,7 +258,7 @@ static drape_status check_settings(lab *l)
         if (idle || strncmp(pointer, "/output", strlen("/output")) == 0)
             return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
                               "%.100s = %.60s has no effect: no case of this %s takes it from the scene",
-                              pointer, l->def->settings[i].value, l->experiment->name);
+                              pointer, l->def->settings[i].value, l->experiment->entry.name);
     }
     return DRAPE_OK;
 }
@@ -306,7 +306,7 @@ static drape_status write_report(lab *l)
 {
     char title[512];
     drape_status status = l->experiment->report(l);
-    snprintf(title, sizeof title, "drape %s: %s", l->experiment->name, word_of(l->about, "scene"));
+    snprintf(title, sizeof title, "drape %s: %s", l->experiment->entry.name, word_of(l->about, "scene"));
     if (!status)
         status = lab_write_page(l, title);
     fprintf(l->words, "report    %s/report.html\n", l->folder);
@@ -364,7 +364,7 @@ static void end(lab *l, drape_lab_outcome *outcome)
 static const lab_experiment_ops *find(const char *name)
 {
     for (int i = 0; lab_experiments[i]; i++)
-        if (strcmp(lab_experiments[i]->name, name) == 0)
+        if (strcmp(lab_experiments[i]->entry.name, name) == 0)
             return lab_experiments[i];
     return NULL;
 }

@@ -14,7 +14,7 @@ bool lab_has_param(const drape_param *params, int count, const char *name)
 const drape_integrator_ops *lab_find_integrator(const char *name)
 {
     for (int i = 0; drape_integrators[i]; i++)
-        if (strcmp(drape_integrators[i]->name, name) == 0)
+        if (strcmp(drape_integrators[i]->entry.name, name) == 0)
             return drape_integrators[i];
     return NULL;
 }
@@ -24,5 +24,5 @@ bool lab_ignores(const drape_integrator_ops *row, const char *pointer)
     const char *prefix = "/integrator/";
     size_t length = strlen(prefix);
     return strncmp(pointer, prefix, length) == 0 && strcmp(pointer + length, "method") != 0 &&
-           !lab_has_param(row->params, row->param_count, pointer + length);
+           !lab_has_param(row->entry.params, row->entry.param_count, pointer + length);
 }

@@ -21,7 +21,7 @@
 typedef struct lab lab;
 
 typedef struct lab_experiment_ops {
-    const char *name, *summary;
+    drape_entry entry;
     bool compares_costs; /* short cases are run several times, of which the cheapest counts */
     /* Adds cases (lab_add_case) and what else distinguishes the experiment to l->arguments. Errors:
      * DRAPE_E_ARGUMENT, DRAPE_E_MEMORY and those of loading the scene. */

@@ -151,7 +151,8 @@ static void lay_bare(const lab *l, const space *s, const drape_integrator_ops *r
 {
     if (!row->stability)
         return;
-    if (lab_has_param(row->params, row->param_count, "substeps") && !is_said(l, s, "/integrator/substeps"))
+    if (lab_has_param(row->entry.params, row->entry.param_count, "substeps") &&
+        !is_said(l, s, "/integrator/substeps"))
         json_object_set_new(settings, "/integrator/substeps", json_integer(1));
     if (!is_said(l, s, "/controller/type"))
         json_object_set_new(settings, "/controller/type", json_string("fixed"));
@@ -161,8 +162,8 @@ static drape_status add_cell(lab *l, const space *s, const drape_integrator_ops 
                              int64_t first)
 {
     int place[AXES];
-    json_t *tags = json_pack("{s:s}", "integrator", row->name),
-           *settings = json_pack("{s:s}", "/integrator/method", row->name);
+    json_t *tags = json_pack("{s:s}", "integrator", row->entry.name),
+           *settings = json_pack("{s:s}", "/integrator/method", row->entry.name);
     places_of(s, cell, place);
     lay_bare(l, s, row, settings);
     for (int a = 0; a < s->count; a++) {
@@ -247,7 +248,7 @@ static drape_status plan(lab *l)
     for (int i = 0; !status && drape_integrators[i]; i++) {
         const drape_integrator_ops *row = drape_integrators[i];
         size_t first = json_array_size(l->cases);
-        if (!lab_wants_integrator(l, row->name, is_usual(row->name)))
+        if (!lab_wants_integrator(l, row->entry.name, is_usual(row->entry.name)))
             continue;
         for (size_t cell = 0; cell < cells_of(&s) && !status; cell++)
             status = add_cell(l, &s, row, cell, (int64_t)first);
@@ -507,8 +508,7 @@ static drape_status report(lab *l)
 }
 
 const lab_experiment_ops lab_experiment_stability = {
-    .name = "stability",
-    .summary = "maps of what happens over two or three values of the scene",
+    .entry = {.name = "stability", .summary = "maps of what happens over two or three values of the scene"},
     .plan = plan,
     .report = report,
 };

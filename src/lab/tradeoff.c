@@ -40,15 +40,15 @@ static drape_status add(lab *l, const char *series, const char *method, const ch
 static drape_status add_own_steps(lab *l, const drape_integrator_ops *row)
 {
     drape_status status = DRAPE_OK;
-    bool ordered = lab_has_param(row->params, row->param_count, "max_order");
+    bool ordered = lab_has_param(row->entry.params, row->entry.param_count, "max_order");
     for (size_t k = 0; k < (ordered ? sizeof orders / sizeof *orders : 1); k++) {
         char series[96];
         if (ordered)
-            snprintf(series, sizeof series, "%s, order %d", row->name, orders[k]);
+            snprintf(series, sizeof series, "%s, order %d", row->entry.name, orders[k]);
         else
-            snprintf(series, sizeof series, "%s", row->name);
+            snprintf(series, sizeof series, "%s", row->entry.name);
         for (size_t i = 0; !status && i < sizeof rtols / sizeof *rtols; i++)
-            status = add(l, series, row->name, "integrator/rtol", rtols[i],
+            status = add(l, series, row->entry.name, "integrator/rtol", rtols[i],
                          ordered ? json_pack("{s:i}", "/integrator/max_order", orders[k]) : json_object());
     }
     return status;
@@ -60,13 +60,13 @@ static drape_status add_controlled(lab *l, const drape_integrator_ops *row)
     for (int c = 0; drape_controllers[c]; c++) {
         const drape_controller_ops *controller = drape_controllers[c];
         char series[96];
-        if (!lab_has_param(controller->params, controller->param_count, "rtol"))
+        if (!lab_has_param(controller->entry.params, controller->entry.param_count, "rtol"))
             continue;
-        snprintf(series, sizeof series, "%s, %s control", row->name, controller->name);
+        snprintf(series, sizeof series, "%s, %s control", row->entry.name, controller->entry.name);
         for (size_t i = 0; !status && i < sizeof controlled / sizeof *controlled; i++)
-            status = add(
-                l, series, row->name, "controller/rtol", controlled[i],
-                json_pack("{s:s, s:f}", "/controller/type", controller->name, "/integrator/dt", 1.0 / 480));
+            status = add(l, series, row->entry.name, "controller/rtol", controlled[i],
+                         json_pack("{s:s, s:f}", "/controller/type", controller->entry.name, "/integrator/dt",
+                                   1.0 / 480));
     }
     return status;
 }
@@ -75,7 +75,7 @@ static drape_status add_fixed(lab *l, const drape_integrator_ops *row)
 {
     drape_status status = DRAPE_OK;
     for (size_t i = 0; !status && i < sizeof rates / sizeof *rates; i++)
-        status = add(l, row->name, row->name, "integrator/dt", 1 / rates[i], json_object());
+        status = add(l, row->entry.name, row->entry.name, "integrator/dt", 1 / rates[i], json_object());
     return status ? status : add_controlled(l, row);
 }
 
@@ -85,9 +85,9 @@ static drape_status add_linear_solvers(lab *l)
     drape_status status = DRAPE_OK;
     for (int i = 0; !status && drape_linears[i]; i++) {
         char series[96];
-        snprintf(series, sizeof series, BASE_METHOD ", linear solver %s", drape_linears[i]->name);
+        snprintf(series, sizeof series, BASE_METHOD ", linear solver %s", drape_linears[i]->entry.name);
         status = add(l, series, BASE_METHOD, "integrator/dt", BASE_DT,
-                     json_pack("{s:s}", "/integrator/linear_solver", drape_linears[i]->name));
+                     json_pack("{s:s}", "/integrator/linear_solver", drape_linears[i]->entry.name));
     }
     return status;
 }
@@ -97,7 +97,7 @@ static drape_status plan(lab *l)
     drape_status status = lab_check_integrators(l);
     for (int i = 0; !status && drape_integrators[i]; i++) {
         const drape_integrator_ops *row = drape_integrators[i];
-        if (!lab_wants_integrator(l, row->name, !row->timeless))
+        if (!lab_wants_integrator(l, row->entry.name, !row->timeless))
             continue;
         status = row->own_steps ? add_own_steps(l, row) : add_fixed(l, row);
     }
@@ -396,8 +396,7 @@ static drape_status report(lab *l)
 }
 
 const lab_experiment_ops lab_experiment_tradeoff = {
-    .name = "tradeoff",
-    .summary = "work against accuracy of every integrator over its settings",
+    .entry = {.name = "tradeoff", .summary = "work against accuracy of every integrator over its settings"},
     .compares_costs = true,
     .plan = plan,
     .check = lab_check_reference,

@@ -22,8 +22,8 @@ typedef const drape_param *params_of(int row, int *count);
         static const drape_param none;                                                                       \
         if (!(table)[row])                                                                                   \
             return NULL;                                                                                     \
-        *count = (table)[row]->param_count;                                                                  \
-        return (table)[row]->params ? (table)[row]->params : &none;                                          \
+        *count = (table)[row]->entry.param_count;                                                            \
+        return (table)[row]->entry.params ? (table)[row]->entry.params : &none;                              \
     }
 
 PARAMS_OF(grids, drape_grids)

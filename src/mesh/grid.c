@@ -68,7 +68,7 @@ static drape_status unknown_grid(drape_context *ctx, const char *pointer, const 
     char place[sizeof ctx->pointer], known[256];
     size_t count = 0, used = 0;
     for (; drape_grids[count] && count < MAX_GRID_NAMES; count++) {
-        names[count] = drape_grids[count]->name;
+        names[count] = drape_grids[count]->entry.name;
         if (used < sizeof known)
             used +=
                 (size_t)snprintf(known + used, sizeof known - used, "%s%s", count ? ", " : "", names[count]);
@@ -83,13 +83,14 @@ drape_status drape_mesh_from_grid(drape_context *ctx, const char *pointer, const
                                   drape_mesh *mesh)
 {
     const drape_grid_ops *const *row = drape_grids;
-    while (*row && strcmp((*row)->name, grid->type) != 0)
+    while (*row && strcmp((*row)->entry.name, grid->type) != 0)
         row++;
     if (!*row)
         return unknown_grid(ctx, pointer, grid->type);
 
     double values[DRAPE_MAX_PARAMS];
-    const drape_status status = drape_params_resolve(ctx, pointer, (*row)->params, (*row)->param_count,
-                                                     grid->settings, grid->setting_count, values);
+    const drape_status status =
+        drape_params_resolve(ctx, pointer, (*row)->entry.params, (*row)->entry.param_count, grid->settings,
+                             grid->setting_count, values);
     return status ? status : (*row)->generate(ctx, pointer, values, mesh);
 }

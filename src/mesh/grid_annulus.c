@@ -84,9 +84,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 }
 
 const drape_grid_ops drape_grid_annulus = {
-    .name = "annulus",
-    .summary = "a ring between two circles: what overhangs the disc of a drape tester",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "annulus",
+              .summary = "a ring between two circles: what overhangs the disc of a drape tester",
+              DRAPE_PARAMS(params)},
     .generate = generate,
 };

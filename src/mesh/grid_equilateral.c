@@ -56,9 +56,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 }
 
 const drape_grid_ops drape_grid_equilateral = {
-    .name = "equilateral",
-    .summary = "equilateral triangles in rows, every second row shifted by half an edge",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "equilateral",
+              .summary = "equilateral triangles in rows, every second row shifted by half an edge",
+              DRAPE_PARAMS(params)},
     .generate = generate,
 };

@@ -78,9 +78,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 }
 
 const drape_grid_ops drape_grid_irregular = {
-    .name = "irregular",
-    .summary = "a rectangle of columns x rows nodes out of line, to show what depends on the mesh",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "irregular",
+              .summary = "a rectangle of columns x rows nodes out of line, to show what depends on the mesh",
+              DRAPE_PARAMS(params)},
     .generate = generate,
 };

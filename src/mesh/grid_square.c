@@ -77,9 +77,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 }
 
 const drape_grid_ops drape_grid_square = {
-    .name = "square",
-    .summary = "a rectangle of columns x rows nodes, horizontal or vertical",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "square",
+              .summary = "a rectangle of columns x rows nodes, horizontal or vertical",
+              DRAPE_PARAMS(params)},
     .generate = generate,
 };

@@ -43,9 +43,7 @@ drape_status drape_mesh_fail(drape_context *ctx, const drape_mesh_source *source
 /* A grid: a mesh from parameters alone. Checks counts against DRAPE_MAX_NODES before anything is allocated.
  */
 typedef struct drape_grid_ops {
-    const char *name, *summary;
-    const drape_param *params;
-    int param_count;
+    drape_entry entry;
     /* Fills x, triangle, their counts, rows, columns and rectangular. Faults are reported at pointer or below it. */
     drape_status (*generate)(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh);
 } drape_grid_ops;
@@ -53,7 +51,8 @@ extern const drape_grid_ops *const drape_grids[]; /* NULL-ended */
 
 /* A file format. */
 typedef struct drape_import_ops {
-    const char *name, *ending, *summary; /* ending with its dot: ".obj", any case */
+    drape_entry entry;
+    const char *ending; /* with its dot: ".obj", any case */
     /* Parses size bytes of data (followed by a 0 byte) into x, triangle and their counts; indices are
      * checked. Polygons become fans. The caller has entered the C locale. */
     drape_status (*read)(drape_context *ctx, const drape_mesh_source *source, const char *data, size_t size,

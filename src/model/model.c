@@ -84,7 +84,7 @@ drape_collider_motion drape_model_collider(const drape_model *model, int32_t ind
     if (!model || index < 0 || index >= model->collider_count)
         return (drape_collider_motion){.name = "", .type = ""};
     const drape_collider *collider = &model->colliders[index];
-    drape_collider_motion motion = {.name = collider->name, .type = collider->ops->name};
+    drape_collider_motion motion = {.name = collider->name, .type = collider->ops->entry.name};
     if (collider->track.key_count > 0) {
         drape_track_displacement(collider->track.keys, collider->track.key_count, t, motion.displacement);
         drape_track_velocity(collider->track.keys, collider->track.key_count, t, motion.velocity);

@@ -17,7 +17,7 @@ static const float veil[4] = {1, 1, 1, 0.62f};
 
 static void legend_title(const drape_shading *shading, char *title, size_t size)
 {
-    snprintf(title, size, "%s [%s]", shading->field->name, shading->field->shown_unit);
+    snprintf(title, size, "%s [%s]", shading->field->entry.name, shading->field->shown_unit);
 }
 
 /* Pixels at the right that belong to the legend. */

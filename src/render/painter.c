@@ -336,7 +336,7 @@ static GLuint shading_program(drape_painter *p, const drape_shading *shading)
     while (i + 1 < MAX_SHADINGS && drape_shadings[i] && drape_shadings[i] != shading)
         i++;
     if (!p->shadings[i])
-        p->shadings[i] = surface_program(p->ctx, shading->name,
+        p->shadings[i] = surface_program(p->ctx, shading->entry.name,
                                          (const char *const[]){shading->source, surface_main, NULL});
     return p->shadings[i];
 }

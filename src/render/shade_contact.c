@@ -4,8 +4,7 @@
 extern const drape_field_ops drape_field_contact;
 
 const drape_shading drape_shading_contact = {
-    .name = "contact",
-    .summary = "in colours with a legend: force of contact",
+    .entry = {.name = "contact", .summary = "in colours with a legend: force of contact"},
     .source = drape_shading_field_source,
     .field = &drape_field_contact,
 };

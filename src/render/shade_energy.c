@@ -4,8 +4,7 @@
 extern const drape_field_ops drape_field_energy;
 
 const drape_shading drape_shading_energy = {
-    .name = "energy",
-    .summary = "in colours with a legend: elastic energy stored in the sheet",
+    .entry = {.name = "energy", .summary = "in colours with a legend: elastic energy stored in the sheet"},
     .source = drape_shading_field_source,
     .field = &drape_field_energy,
 };

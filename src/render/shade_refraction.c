@@ -2,9 +2,10 @@
 #include "render/shading.h"
 
 const drape_shading drape_shading_refraction = {
-    .name = "refraction",
-    .summary = "glass: what is behind it, bent at the surface, and the world around mirrored at its rim",
-    .reference = "Wyman 2005, with one surface",
+    .entry = {.name = "refraction",
+              .summary =
+                  "glass: what is behind it, bent at the surface, and the world around mirrored at its rim",
+              .reference = "Wyman 2005, with one surface"},
     .reads = DRAPE_READS_ENVIRONMENT | DRAPE_READS_BEHIND,
     .source = "// A ray goes on as it is bent, for a part of the scene's size, and there sees what is "
               "behind; red, green and\n"

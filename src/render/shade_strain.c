@@ -4,8 +4,7 @@
 extern const drape_field_ops drape_field_strain;
 
 const drape_shading drape_shading_strain = {
-    .name = "strain",
-    .summary = "in colours with a legend: how far the sheet is stretched",
+    .entry = {.name = "strain", .summary = "in colours with a legend: how far the sheet is stretched"},
     .source = drape_shading_field_source,
     .field = &drape_field_strain,
 };

@@ -4,8 +4,7 @@
 extern const drape_field_ops drape_field_velocity;
 
 const drape_shading drape_shading_velocity = {
-    .name = "velocity",
-    .summary = "in colours with a legend: speed",
+    .entry = {.name = "velocity", .summary = "in colours with a legend: speed"},
     .source = drape_shading_field_source,
     .field = &drape_field_velocity,
 };

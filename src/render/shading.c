@@ -121,7 +121,7 @@ const char drape_shading_field_source[] =
 const drape_shading *drape_shading_find(const char *name)
 {
     for (int i = 0; drape_shadings[i]; i++)
-        if (strcmp(drape_shadings[i]->name, name) == 0)
+        if (strcmp(drape_shadings[i]->entry.name, name) == 0)
             return drape_shadings[i];
     return NULL;
 }

@@ -17,8 +17,7 @@ enum {
 };
 
 typedef struct drape_shading {
-    const char *name, *summary;
-    const char *reference;        /* NULL: none */
+    drape_entry entry;
     const char *source;           /* GLSL */
     const drape_field_ops *field; /* what is shown in colours; NULL: none */
     int reads;                    /* sum of DRAPE_READS_* */

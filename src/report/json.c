@@ -124,9 +124,9 @@ static drape_status read_energies(const drape_report_source *run, json_t **out)
 static json_t *parameters(const drape_collider *collider)
 {
     json_t *object = json_object();
-    for (int i = 0; i < collider->ops->param_count; i++) {
-        const drape_param *param = &collider->ops->params[i];
-        const double *value = collider->values + drape_param_place(collider->ops->params, i);
+    for (int i = 0; i < collider->ops->entry.param_count; i++) {
+        const drape_param *param = &collider->ops->entry.params[i];
+        const double *value = collider->values + drape_param_place(collider->ops->entry.params, i);
         object = with(object, param->name,
                       drape_param_width(param) > 1 ? numbers(value, (size_t)drape_param_width(param))
                                                    : number(*value));
@@ -146,7 +146,7 @@ static json_t *shape(const drape_collider_shape *shape)
 
 static json_t *collider(const drape_report_data *data, const drape_collider *c)
 {
-    json_t *object = with(json_object(), "type", text(c->ops->name));
+    json_t *object = with(json_object(), "type", text(c->ops->entry.name));
     object = with(object, "name", text(c->name));
     object = with(object, "parameters", parameters(c));
     if (c->shape.triangle_count > 0)

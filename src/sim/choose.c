@@ -20,9 +20,9 @@ static table integrator_table(void)
 {
     table t = {.pointer = "/integrator", .key = "method"};
     for (; drape_integrators[t.count]; t.count++) {
-        t.names[t.count] = drape_integrators[t.count]->name;
-        t.params[t.count] = drape_integrators[t.count]->params;
-        t.param_counts[t.count] = drape_integrators[t.count]->param_count;
+        t.names[t.count] = drape_integrators[t.count]->entry.name;
+        t.params[t.count] = drape_integrators[t.count]->entry.params;
+        t.param_counts[t.count] = drape_integrators[t.count]->entry.param_count;
     }
     return t;
 }
@@ -31,9 +31,9 @@ static table controller_table(void)
 {
     table t = {.pointer = "/controller", .key = "type"};
     for (; drape_controllers[t.count]; t.count++) {
-        t.names[t.count] = drape_controllers[t.count]->name;
-        t.params[t.count] = drape_controllers[t.count]->params;
-        t.param_counts[t.count] = drape_controllers[t.count]->param_count;
+        t.names[t.count] = drape_controllers[t.count]->entry.name;
+        t.params[t.count] = drape_controllers[t.count]->entry.params;
+        t.param_counts[t.count] = drape_controllers[t.count]->entry.param_count;
     }
     return t;
 }
@@ -138,28 +138,30 @@ drape_status drape_choose(drape_context *ctx, const drape_model *model, const dr
     if (!status && chosen->integrator->own_steps && chosen->controller->own_steps)
         status = drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/controller/type",
                                "\"%s\" chooses steps, and so does the integrator \"%s\"; take \"halving\"",
-                               chosen->controller->name, chosen->integrator->name);
+                               chosen->controller->entry.name, chosen->integrator->entry.name);
     return status;
 }
 
 double drape_chosen_integrator_value(const drape_chosen *chosen, const char *name, double fallback)
 {
-    int p = drape_param_find(chosen->integrator->params, chosen->integrator->param_count, name);
+    int p = drape_param_find(chosen->integrator->entry.params, chosen->integrator->entry.param_count, name);
     return p < 0 ? fallback : chosen->integrator_values[p];
 }
 
 double drape_chosen_controller_value(const drape_chosen *chosen, const char *name, double fallback)
 {
-    int p = drape_param_find(chosen->controller->params, chosen->controller->param_count, name);
+    int p = drape_param_find(chosen->controller->entry.params, chosen->controller->entry.param_count, name);
     return p < 0 ? fallback : chosen->controller_values[p];
 }
 
 bool drape_chosen_ignores_integrator(const drape_chosen *chosen, const char *name)
 {
-    return drape_param_find(chosen->integrator->params, chosen->integrator->param_count, name) < 0;
+    return drape_param_find(chosen->integrator->entry.params, chosen->integrator->entry.param_count, name) <
+           0;
 }
 
 bool drape_chosen_ignores_controller(const drape_chosen *chosen, const char *name)
 {
-    return drape_param_find(chosen->controller->params, chosen->controller->param_count, name) < 0;
+    return drape_param_find(chosen->controller->entry.params, chosen->controller->entry.param_count, name) <
+           0;
 }

@@ -180,7 +180,7 @@ static drape_status check_has_contact(const drape_sim *sim, const char *function
         return DRAPE_OK;
     return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                       "%s: the integrator \"%s\" moves nodes out of what they meet and has no force",
-                      function, sim->chosen.integrator->name);
+                      function, sim->chosen.integrator->entry.name);
 }
 
 drape_status drape_sim_contact_forces(drape_sim *sim, double *forces)

@@ -58,7 +58,7 @@ static uint64_t add_term(uint64_t hash, const drape_term *term)
     const drape_elements *el = &term->elements;
     const int64_t sizes[] = {term->cloth, el->count, el->nodes, el->rest_count, term->law_count};
     size_t count = (size_t)el->count;
-    hash = add_text(hash, term->ops->name);
+    hash = add_text(hash, term->ops->entry.name);
     hash = add(hash, sizes, sizeof sizes);
     hash = add_doubles(hash, term->params, DRAPE_MAX_PARAMS);
     hash = add(hash, el->node, count * (size_t)el->nodes * sizeof *el->node);
@@ -70,7 +70,7 @@ static uint64_t add_collider(uint64_t hash, const drape_collider *collider)
 {
     const drape_collider_shape *s = &collider->shape;
     const int64_t sizes[] = {s->point_count, s->segment_count, s->triangle_count, s->inscribed};
-    hash = add_text(hash, collider->ops->name);
+    hash = add_text(hash, collider->ops->entry.name);
     hash = add_doubles(hash, collider->values, DRAPE_MAX_PARAMS);
     hash = add(hash, sizes, sizeof sizes);
     hash = add_doubles(hash, s->point, 3 * (size_t)s->point_count);
@@ -122,12 +122,13 @@ static uint64_t model_hash(const drape_model *m)
 static uint64_t choices_hash(const drape_sim *sim)
 {
     const drape_chosen *c = &sim->chosen;
-    const drape_param *of_integrator = c->integrator->params, *of_controller = c->controller->params;
+    const drape_param *of_integrator = c->integrator->entry.params,
+                      *of_controller = c->controller->entry.params;
     uint64_t hash = add_doubles(DRAPE_HASH_START, &sim->frame_rate, 1);
     hash = add_doubles(hash, c->integrator_values,
-                       (size_t)drape_param_place(of_integrator, c->integrator->param_count));
+                       (size_t)drape_param_place(of_integrator, c->integrator->entry.param_count));
     return add_doubles(hash, c->controller_values,
-                       (size_t)drape_param_place(of_controller, c->controller->param_count));
+                       (size_t)drape_param_place(of_controller, c->controller->entry.param_count));
 }
 
 /* ---- The build ---- */
@@ -182,8 +183,8 @@ void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
     }
     drape_archive_mark(a, "identity");
     archive_build(a);
-    archive_row(a, "integrator", sim->chosen.integrator->name);
-    archive_row(a, "controller", sim->chosen.controller->name);
+    archive_row(a, "integrator", sim->chosen.integrator->entry.name);
+    archive_row(a, "controller", sim->chosen.controller->entry.name);
     drape_archive_same(a, "the number of nodes", m->node_count);
     drape_archive_same(a, "the number of free nodes", m->free_count);
     archive_hash(a, "another model", sim->model_hash);

@@ -235,8 +235,8 @@ static void tell_solver(const bench *s, drape_profile *out)
     drape_linear_report report = {.row = s->linear};
     if (s->linear->report)
         s->linear->report(s->solver, &report);
-    out->linear_picked = report.row->name;
-    out->linear_fallback = report.fallback ? report.fallback->name : "";
+    out->linear_picked = report.row->entry.name;
+    out->linear_fallback = report.fallback ? report.fallback->entry.name : "";
     memcpy(out->linear_why, report.why, sizeof out->linear_why);
 }
 
@@ -290,8 +290,8 @@ drape_status drape_profile_measure(drape_context *ctx, const drape_sim *sim, dra
     bench s = {.ctx = ctx, .arena = drape_arena_of(ctx), .sim = sim, .linear = linear_of(&sim->chosen)};
     *out = (drape_profile){.terms = terms,
                            .implicit = s.linear != NULL,
-                           .linear_solver = s.linear ? s.linear->name : "",
-                           .linear_picked = s.linear ? s.linear->name : "",
+                           .linear_solver = s.linear ? s.linear->entry.name : "",
+                           .linear_picked = s.linear ? s.linear->entry.name : "",
                            .linear_fallback = "",
                            .dt = drape_chosen_integrator_value(&sim->chosen, "dt", 1.0 / 60)};
     count_bytes(sim, out);

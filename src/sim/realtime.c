@@ -181,7 +181,7 @@ static drape_status check_arguments(drape_sim *sim, double frame_dt, double budg
     if (sim->chosen.integrator->timeless)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_advance_realtime: the integrator \"%s\" has no time",
-                          sim->chosen.integrator->name);
+                          sim->chosen.integrator->entry.name);
     return DRAPE_OK;
 }
 

@@ -22,7 +22,7 @@ typedef struct drape_linear_report {
 } drape_linear_report;
 
 struct drape_linear_ops {
-    const char *name, *summary, *reference;
+    drape_entry entry;
     /* Unknowns from which on it is measured to be the fastest for a positive definite matrix: what `auto` goes
      * by. 0: at no size. */
     int64_t best_from;

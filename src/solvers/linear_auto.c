@@ -91,7 +91,7 @@ static void report(const void *state, drape_linear_report *out)
     *out = (drape_linear_report){.row = s->row};
     if (s->row->report)
         s->row->report(s->solver, out);
-    const char *name = next ? next->name : s->row->name;
+    const char *name = next ? next->entry.name : s->row->entry.name;
     int64_t from = next ? next->best_from : s->row->best_from;
     if (from > 1)
         snprintf(out->why, sizeof out->why, "%" PRId64 " unknowns; %s from %" PRId64 " on", s->n, name, from);
@@ -100,9 +100,10 @@ static void report(const void *state, drape_linear_report *out)
 }
 
 const drape_linear_ops drape_linear_auto = {
-    .name = "auto",
-    .summary = "the fastest direct solver of this build for the number of unknowns; drape info says which",
-    .reference = "bench/linears",
+    .entry = {.name = "auto",
+              .summary =
+                  "the fastest direct solver of this build for the number of unknowns; drape info says which",
+              .reference = "bench/linears"},
     .create = create,
     .use_threads = use_threads,
     .factor = factor,

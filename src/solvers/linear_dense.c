@@ -81,9 +81,9 @@ static size_t bytes(const void *state)
 }
 
 const drape_linear_ops drape_linear_dense = {
-    .name = "dense",
-    .summary = "full LU with partial pivoting: the baseline, for small scenes",
-    .reference = "SUNDIALS dense solver",
+    .entry = {.name = "dense",
+              .summary = "full LU with partial pivoting: the baseline, for small scenes",
+              .reference = "SUNDIALS dense solver"},
     .create = create,
     .factor = factor,
     .solve = solve,

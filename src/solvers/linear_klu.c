@@ -145,9 +145,9 @@ static size_t bytes(const void *state)
 }
 
 const drape_linear_ops drape_linear_klu = {
-    .name = "klu",
-    .summary = "sparse LU with AMD ordering; pivots are kept from step to step",
-    .reference = "Davis & Palamadai Natarajan 2010, Algorithm 907: KLU",
+    .entry = {.name = "klu",
+              .summary = "sparse LU with AMD ordering; pivots are kept from step to step",
+              .reference = "Davis & Palamadai Natarajan 2010, Algorithm 907: KLU"},
     .best_from = 1,
     .general_from = 1,
     .create = create,

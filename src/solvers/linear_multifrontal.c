@@ -788,11 +788,11 @@ static void report(const void *state, drape_linear_report *out)
 }
 
 const drape_linear_ops drape_linear_multifrontal = {
-    .name = "multifrontal",
-    .summary =
-        "multifrontal Cholesky of our own, the same bits with any number of threads; what is not symmetric "
-        "positive definite goes to umfpack or klu, by size",
-    .reference = "Duff & Reid 1983; Liu 1992, The multifrontal method for sparse matrix solution",
+    .entry = {.name = "multifrontal",
+              .summary = "multifrontal Cholesky of our own, the same bits with any number of threads; what "
+                         "is not symmetric "
+                         "positive definite goes to umfpack or klu, by size",
+              .reference = "Duff & Reid 1983; Liu 1992, The multifrontal method for sparse matrix solution"},
     .best_from = 100,     /* a third of klu's time at 400 unknowns */
     .borrows_heap = true, /* that of the general row, at the first matrix for it */
     .create = create,

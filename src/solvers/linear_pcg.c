@@ -373,11 +373,12 @@ static void report(const void *state, drape_linear_report *out)
 }
 
 const drape_linear_ops drape_linear_pcg = {
-    .name = "pcg",
-    .summary =
-        "conjugate gradients with diagonal blocks and a coarse space, no factors of the matrix; what is "
-        "not symmetric positive definite goes to umfpack or klu, by size",
-    .reference = "Hestenes & Stiefel 1952; Vanek, Mandel & Brezina 1996",
+    .entry =
+        {.name = "pcg",
+         .summary =
+             "conjugate gradients with diagonal blocks and a coarse space, no factors of the matrix; what is "
+             "not symmetric positive definite goes to umfpack or klu, by size",
+         .reference = "Hestenes & Stiefel 1952; Vanek, Mandel & Brezina 1996"},
     .borrows_heap = true, /* of the rows that it has for the coarse space and for general matrices */
     .create = create,
     .factor = factor,

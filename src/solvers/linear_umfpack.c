@@ -123,9 +123,9 @@ static size_t bytes(const void *state)
 }
 
 const drape_linear_ops drape_linear_umfpack = {
-    .name = "umfpack",
-    .summary = "multifrontal LU with AMD ordering; pivots are chosen at each factorisation",
-    .reference = "Davis 2004, Algorithm 832: UMFPACK V4.3",
+    .entry = {.name = "umfpack",
+              .summary = "multifrontal LU with AMD ordering; pivots are chosen at each factorisation",
+              .reference = "Davis 2004, Algorithm 832: UMFPACK V4.3"},
     .general_from = 1000, /* with OpenBLAS 0.8 of klu's time at 1 200, half at 2 300, a quarter at 7 500 */
     .borrows_heap = true, /* fronts, and the factors anew */
     .create = create,

@@ -42,7 +42,7 @@ void drape_linear_archive(const drape_linear_ops *row, void *state, drape_archiv
         row->archive(state, a, values);
     else if (drape_archive_is_reading(a) && values && row->factor(state, values))
         drape_archive_fail(a, DRAPE_E_SOLVER, "a matrix of the checkpoint has no factors by \"%s\" here",
-                           row->name);
+                           row->entry.name);
 }
 
 void drape_linear_archive_general(const drape_linear_ops *row, drape_context *ctx,

@@ -141,7 +141,7 @@ drape_status drape_sun_linear_adopt_other(drape_sun_linear *linear, const drape_
 void drape_sun_linear_archive(drape_sun_linear *linear, drape_archive *a, bool factors)
 {
     bool there = linear->state && !linear->stale;
-    drape_archive_mark(a, linear->ops->name);
+    drape_archive_mark(a, linear->ops->entry.name);
     drape_archive_int64(a, &linear->factorizations);
     drape_archive_int64(a, &linear->iterations);
     drape_archive_double(a, &linear->factor_seconds);

@@ -212,11 +212,10 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
 
 const drape_term_ops drape_term_bend_hinge = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "bend.hinge",
-    .summary = "bending of every inner edge: E = 1/2 k (theta - theta0)^2",
-    .reference = "Grinspun et al. 2003; Tamstorf & Grinspun 2013",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "bend.hinge",
+              .summary = "bending of every inner edge: E = 1/2 k (theta - theta0)^2",
+              .reference = "Grinspun et al. 2003; Tamstorf & Grinspun 2013",
+              DRAPE_PARAMS(params)},
     .element_name = "hinge",
     .nodes = 4,
     .has_internal = true,

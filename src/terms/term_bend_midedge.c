@@ -373,13 +373,14 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
 
 const drape_term_ops drape_term_bend_midedge = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "bend.midedge",
-    .summary = "bending of every triangle, a plate with the true Poisson ratio on any mesh: E = A/2 (K - "
-               "K0)'C(K - K0)",
-    .reference =
-        "Grinspun, Gingold, Reisman & Zorin 2006, section 4, the turns of the normals from the nodes",
-    .params = params,
-    .param_count = LIST_COUNT,
+    .entry =
+        {.name = "bend.midedge",
+         .summary =
+             "bending of every triangle, a plate with the true Poisson ratio on any mesh: E = A/2 (K - "
+             "K0)'C(K - K0)",
+         .reference =
+             "Grinspun, Gingold, Reisman & Zorin 2006, section 4, the turns of the normals from the nodes",
+         DRAPE_PARAMS(params)},
     .element_name = "square",
     .nodes = MIDEDGE_NODES,
     .has_internal = true,

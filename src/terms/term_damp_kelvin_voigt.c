@@ -34,12 +34,12 @@ static void law(const double *values, int32_t count, const double *k, const doub
 
 const drape_term_ops drape_term_damp_kelvin_voigt = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "damp.kelvin_voigt",
-    .summary =
-        "internal damping: force beta k q' grad q on every strain measure q of the cloth's other terms",
-    .reference = "Kelvin-Voigt solid: spring and dashpot side by side",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry =
+        {.name = "damp.kelvin_voigt",
+         .summary =
+             "internal damping: force beta k q' grad q on every strain measure q of the cloth's other terms",
+         .reference = "Kelvin-Voigt solid: spring and dashpot side by side",
+         DRAPE_PARAMS(params)},
     .element_name = "measure",
     .law = law,
     .dissipative = true,

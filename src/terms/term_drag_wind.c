@@ -143,11 +143,12 @@ static void dissipation(const drape_elements *el, int32_t first, int32_t count, 
 
 const drape_term_ops drape_term_drag_wind = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "drag.wind",
-    .summary = "pressure of wind across every triangle: 1/2 rho C A |u.n| (u.n) n, u the wind relative to it",
-    .reference = "Provot 1995, section 3.2; Hoerner 1965, Fluid-Dynamic Drag, chapter 3",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry =
+        {.name = "drag.wind",
+         .summary =
+             "pressure of wind across every triangle: 1/2 rho C A |u.n| (u.n) n, u the wind relative to it",
+         .reference = "Provot 1995, section 3.2; Hoerner 1965, Fluid-Dynamic Drag, chapter 3",
+         DRAPE_PARAMS(params)},
     .element_name = "triangle",
     .nodes = 3,
     .build = build,

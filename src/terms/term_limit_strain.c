@@ -220,13 +220,13 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
 
 const drape_term_ops drape_term_limit_strain = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "limit.strain",
-    .summary = "keeps edges or springs from stretching beyond a limit, by a barrier that is zero below an "
-               "onset",
-    .reference =
-        "barrier of Li et al. 2020, Incremental Potential Contact, eq. 6; CS184 clothsim's limit of 10 %",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "limit.strain",
+              .summary =
+                  "keeps edges or springs from stretching beyond a limit, by a barrier that is zero below an "
+                  "onset",
+              .reference = "barrier of Li et al. 2020, Incremental Potential Contact, eq. 6; CS184 "
+                           "clothsim's limit of 10 %",
+              DRAPE_PARAMS(params)},
     .element_name = "edge",
     .nodes = 2,
     .constraint = true,

@@ -320,12 +320,13 @@ static void commit(const drape_elements *el, int32_t first, int32_t count, const
 
 const drape_term_ops drape_term_load_moment = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "load.moment",
-    .summary = "a moment per length on edges of the boundary, about each edge at rest: bends a strip to M/D",
-    .reference =
-        "Argyris, Dunne & Scharpf 1978, semitangential moment: work on the twist of the triangle at the edge",
-    .params = params,
-    .param_count = LIST_COUNT,
+    .entry =
+        {.name = "load.moment",
+         .summary =
+             "a moment per length on edges of the boundary, about each edge at rest: bends a strip to M/D",
+         .reference = "Argyris, Dunne & Scharpf 1978, semitangential moment: work on the twist of the "
+                      "triangle at the edge",
+         DRAPE_PARAMS(params)},
     .element_name = "edge",
     .nodes = 3,
     .has_internal = true,

@@ -192,11 +192,12 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
 
 const drape_term_ops drape_term_stretch_cst = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "stretch.cst",
-    .summary = "stretching and shear of every triangle, isotropic or woven: E = A/2 e'C e of Green's strain",
-    .reference = "Bonet & Wood 2008, 6.3; Volino, Magnenat-Thalmann & Faure 2009",
-    .params = params,
-    .param_count = LIST_COUNT,
+    .entry =
+        {.name = "stretch.cst",
+         .summary =
+             "stretching and shear of every triangle, isotropic or woven: E = A/2 e'C e of Green's strain",
+         .reference = "Bonet & Wood 2008, 6.3; Volino, Magnenat-Thalmann & Faure 2009",
+         DRAPE_PARAMS(params)},
     .element_name = "square",
     .nodes = 3,
     .build = build,

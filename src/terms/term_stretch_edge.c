@@ -139,11 +139,10 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
 
 const drape_term_ops drape_term_stretch_edge = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "stretch.edge",
-    .summary = "stretching of every edge: E = 1/2 k (|e|/L - 1)^2",
-    .reference = "Van Gelder 1998; DEP report (Grinspun et al. 2003, Discrete Shells)",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "stretch.edge",
+              .summary = "stretching of every edge: E = 1/2 k (|e|/L - 1)^2",
+              .reference = "Van Gelder 1998; DEP report (Grinspun et al. 2003, Discrete Shells)",
+              DRAPE_PARAMS(params)},
     .element_name = "edge",
     .nodes = 2,
     .build = build,

@@ -754,11 +754,11 @@ static void attract_energy(const drape_elements *el, int32_t first, int32_t coun
 }
 
 static const drape_term_ops attract = {.struct_size = sizeof(drape_term_ops),
-                                       .name = "host.attract",
-                                       .summary = "draws every node to a point",
-                                       .reference = "Hooke 1678",
-                                       .params = attract_params,
-                                       .param_count = 3,
+                                       .entry = {.name = "host.attract",
+                                                 .summary = "draws every node to a point",
+                                                 .reference = "Hooke 1678",
+                                                 .params = attract_params,
+                                                 .param_count = 3},
                                        .element_name = "node",
                                        .nodes = 1,
                                        .build = attract_build,
@@ -932,11 +932,11 @@ static double blob_distance(const double *values, const drape_collider_shape *sh
 }
 
 static const drape_collider_ops blob = {.struct_size = sizeof(drape_collider_ops),
-                                        .name = "host.blob",
-                                        .summary = "a ball of the host",
-                                        .reference = "none",
-                                        .params = blob_params,
-                                        .param_count = 3,
+                                        .entry = {.name = "host.blob",
+                                                  .summary = "a ball of the host",
+                                                  .reference = "none",
+                                                  .params = blob_params,
+                                                  .param_count = 3},
                                         .shape = blob_shape,
                                         .distance = blob_distance};
 
@@ -1075,19 +1075,19 @@ START_TEST(malformed_colliders_are_refused)
         if (i == 0)
             ops.struct_size = 0;
         else if (i == 1)
-            ops.name = NULL;
+            ops.entry.name = NULL;
         else if (i == 2)
-            ops.summary = NULL;
+            ops.entry.summary = NULL;
         else if (i == 3)
-            ops.reference = NULL;
+            ops.entry.reference = NULL;
         else if (i == 4)
             ops.shape = NULL;
         else if (i == 5)
             ops.distance = NULL;
         else if (i == 6)
-            ops.params = wide, ops.param_count = 9; /* 27 values */
+            ops.entry.params = wide, ops.entry.param_count = 9; /* 27 values */
         else
-            ops.name = "sphere", says = "there is a collider \"sphere\" already";
+            ops.entry.name = "sphere", says = "there is a collider \"sphere\" already";
         ck_assert_int_eq(drape_context_add_collider(ctx, &ops), i == 0 ? DRAPE_E_VERSION : DRAPE_E_ARGUMENT);
         check_message(ctx, says);
     }
@@ -1096,7 +1096,7 @@ START_TEST(malformed_colliders_are_refused)
     for (int i = 0; i < 33; i++) {
         snprintf(names[i], sizeof names[i], "host.n%d", i);
         many[i] = blob;
-        many[i].name = names[i];
+        many[i].entry.name = names[i];
         ck_assert_int_eq(drape_context_add_collider(ctx, &many[i]), i < 32 ? DRAPE_OK : DRAPE_E_ARGUMENT);
     }
     check_message(ctx, "at most 32");
@@ -1150,8 +1150,8 @@ START_TEST(malformed_parameters_are_refused)
         }
         drape_term_ops term = attract;
         drape_collider_ops collider = blob;
-        term.params = collider.params = params;
-        term.param_count = collider.param_count = count;
+        term.entry.params = collider.entry.params = params;
+        term.entry.param_count = collider.entry.param_count = count;
         ck_assert_int_eq(i % 2 ? drape_context_add_term(ctx, &term)
                                : drape_context_add_collider(ctx, &collider),
                          DRAPE_E_ARGUMENT);
@@ -1180,10 +1180,10 @@ START_TEST(malformed_ops_are_refused)
             says = "bytes";
             break;
         case 2:
-            ops.name = NULL;
+            ops.entry.name = NULL;
             break;
         case 3:
-            ops.summary = NULL;
+            ops.entry.summary = NULL;
             break;
         case 4:
             ops.element_name = NULL;
@@ -1207,10 +1207,10 @@ START_TEST(malformed_ops_are_refused)
             ops.has_internal = true;
             break;
         case 11:
-            ops.param_count = DRAPE_MAX_PARAMS + 1;
+            ops.entry.param_count = DRAPE_MAX_PARAMS + 1;
             break;
         case 12:
-            ops.name = "stretch.edge";
+            ops.entry.name = "stretch.edge";
             says = "there is a term \"stretch.edge\" already";
             break;
         case 13:
@@ -1243,7 +1243,7 @@ START_TEST(a_context_holds_32_terms)
     for (int i = 0; i < 33; i++) {
         snprintf(names[i], sizeof names[i], "host.n%d", i);
         ops[i] = attract;
-        ops[i].name = names[i];
+        ops[i].entry.name = names[i];
         ck_assert_int_eq(drape_context_add_term(ctx, &ops[i]), i < 32 ? DRAPE_OK : DRAPE_E_ARGUMENT);
     }
     check_message(ctx, "at most 32");

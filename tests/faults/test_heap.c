@@ -140,8 +140,8 @@ static void check_heap(const drape_linear_ops *linear, int i)
     char integrator[160];
     bool damped = i & 4, project = i & 8;
     snprintf(integrator, sizeof integrator,
-             "'linear_solver': '%s', 'newton': '%s', 'globalization': '%s', 'project': %s", linear->name,
-             newtons[i & 1], globals[(i >> 1) & 1], project ? "true" : "false");
+             "'linear_solver': '%s', 'newton': '%s', 'globalization': '%s', 'project': %s",
+             linear->entry.name, newtons[i & 1], globals[(i >> 1) & 1], project ? "true" : "false");
     scene s = open_scene(integrator, damped);
     long n = count_steps(&s);
     ck_assert_msg(live <= (linear->borrows_heap ? FALLBACK_PIECES : 0), "%s: %ld pieces kept in 49 steps",
@@ -149,7 +149,7 @@ static void check_heap(const drape_linear_ops *linear, int i)
     ck_assert_msg(n == 0 || linear->borrows_heap, "%s%s: %ld heap calls in 49 steps", integrator,
                   damped ? ", damped" : "", n);
     if (n > 0 && i == 0)
-        printf("# %s: %ld heap calls in %lld factorisations\n", linear->name, n,
+        printf("# %s: %ld heap calls in %lld factorisations\n", linear->entry.name, n,
                (long long)drape_sim_statistics(s.sim).factorizations);
     scene_close(&s);
 }

@@ -269,7 +269,7 @@ drape_model *fuzz_scene(drape_context *ctx, const uint8_t *data, size_t size)
 static const drape_import_ops *find_import(const char *name)
 {
     for (int i = 0; drape_imports[i]; i++)
-        if (strcmp(drape_imports[i]->name, name) == 0)
+        if (strcmp(drape_imports[i]->entry.name, name) == 0)
             return drape_imports[i];
     fuzz_die(__FILE__, __LINE__, "a row of the imports", "%s", name);
 }

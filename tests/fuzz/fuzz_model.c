@@ -168,8 +168,9 @@ static void draw_grid(scene *s, drape_cloth_def *def, fuzz_bytes *in)
         count++;
     const drape_grid_ops *ops = drape_grids[fuzz_below(in, count)];
     drawn *d = &s->rows[s->row_count++];
-    draw(in, ops->params, ops->param_count, MOST_SIDE, d);
-    def->mesh.grid = (drape_row_def){.type = ops->name, .settings = d->setting, .setting_count = d->count};
+    draw(in, ops->entry.params, ops->entry.param_count, MOST_SIDE, d);
+    def->mesh.grid =
+        (drape_row_def){.type = ops->entry.name, .settings = d->setting, .setting_count = d->count};
 }
 
 /* To where it goes, in a time that may be shorter than any step. */
@@ -221,7 +222,7 @@ static void draw_terms(scene *s, cloth *c, drape_cloth_def *def, fuzz_bytes *in)
     const unsigned first = fuzz_below(in, count);
     for (size_t i = 0; i < def->term_count; i++) {
         const drape_term_ops *ops = drape_terms[(first + i * (i + 1) / 2) % count];
-        c->terms[i] = row(s, in, ops->name, ops->params, ops->param_count);
+        c->terms[i] = row(s, in, ops->entry.name, ops->entry.params, ops->entry.param_count);
     }
 }
 
@@ -256,7 +257,7 @@ static void draw_colliders(scene *s, fuzz_bytes *in)
         const drape_collider_ops *ops = drape_colliders[fuzz_below(in, count)];
         drape_collider_def *def = &s->colliders[i];
         drape_collider_def_init(def, sizeof *def);
-        def->row = row(s, in, ops->name, ops->params, ops->param_count);
+        def->row = row(s, in, ops->entry.name, ops->entry.params, ops->entry.param_count);
         def->friction = fuzz_below(in, 2) ? fuzz_magnitude(in, 1e-3, 1e3) : 0;
         if (fuzz_below(in, 2)) {
             draw_track(in, s->collider_keys[i]);
@@ -346,12 +347,12 @@ static void run(drape_context *ctx, const drape_model *model, const drape_integr
         count++;
     const drape_controller_ops *controller = drape_controllers[fuzz_below(in, count)];
     drape_sim_def_init(&def, sizeof def);
-    draw(in, integrator->params, integrator->param_count, MOST_COUNT, &settings[0]);
-    draw(in, controller->params, controller->param_count, MOST_COUNT, &settings[1]);
-    def.integrator = integrator->name;
+    draw(in, integrator->entry.params, integrator->entry.param_count, MOST_COUNT, &settings[0]);
+    draw(in, controller->entry.params, controller->entry.param_count, MOST_COUNT, &settings[1]);
+    def.integrator = integrator->entry.name;
     def.integrator_settings = settings[0].setting;
     def.integrator_setting_count = settings[0].count;
-    def.controller = controller->name;
+    def.controller = controller->entry.name;
     def.controller_settings = settings[1].setting;
     def.controller_setting_count = settings[1].count;
     const double dt = fuzz_magnitude(in, 1e-6, 1);

@@ -195,7 +195,7 @@ START_TEST(springs_join_the_right_nodes)
     int32_t total = 0;
     for (int t = 0; t < 3; t++) {
         const drape_elements *el = &s.model->terms[t].elements;
-        ck_assert_str_eq(s.model->terms[t].ops->name, kinds[t]);
+        ck_assert_str_eq(s.model->terms[t].ops->entry.name, kinds[t]);
         for (int32_t e = 0; e < el->count; e++) {
             const double length = el->rest[el->count + e];
             ck_assert(fabs(length - lengths[t][0]) < 1e-12 || fabs(length - lengths[t][1]) < 1e-12);

@@ -232,7 +232,7 @@ static void check_sheet(int edges, const char *terms, const char *more, const ch
 START_TEST(every_integrator_goes_on)
 {
     for (int i = 0; drape_integrators[i]; i++) {
-        const char *name = drape_integrators[i]->name;
+        const char *name = drape_integrators[i]->entry.name;
         if (drape_integrators[i]->timeless)
             continue;
         check_sheet(4, "", "", name, "", "halving", "sheet");
@@ -268,7 +268,7 @@ START_TEST(every_linear_solver_goes_on)
             for (size_t j = 0; j < (k == 0 ? 2 : 1); j++) {
                 char settings[100];
                 snprintf(settings, sizeof settings, ", 'linear_solver': '%s', 'newton': '%s'",
-                         drape_linears[i]->name, newtons[j]);
+                         drape_linears[i]->entry.name, newtons[j]);
                 check_sheet(7, "", OBSTACLES, rows[k], settings, "halving", "solver");
                 check_sheet(3, "", "", rows[k], settings, "halving", "solver");
             }
@@ -282,7 +282,8 @@ START_TEST(every_controller_goes_on)
             if (drape_integrators[k]->timeless ||
                 (drape_integrators[k]->own_steps && drape_controllers[i]->own_steps))
                 continue;
-            check_sheet(3, "", "", drape_integrators[k]->name, "", drape_controllers[i]->name, "controller");
+            check_sheet(3, "", "", drape_integrators[k]->entry.name, "", drape_controllers[i]->entry.name,
+                        "controller");
         }
 }
 END_TEST
@@ -290,7 +291,7 @@ END_TEST
 START_TEST(cloth_on_cloth_goes_on)
 {
     for (int i = 0; drape_integrators[i]; i++) {
-        const char *name = drape_integrators[i]->name;
+        const char *name = drape_integrators[i]->entry.name;
         static const char *const settings[] = {"", ", 'newton': 'modified'", ", 'linear_solver': 'klu'"};
         for (size_t k = 0; !drape_integrators[i]->timeless && k < 3; k++) {
             char what[100];
@@ -307,7 +308,7 @@ END_TEST
 START_TEST(what_a_host_did_goes_on)
 {
     for (int i = 0; drape_integrators[i]; i++) {
-        const char *name = drape_integrators[i]->name;
+        const char *name = drape_integrators[i]->entry.name;
         if (drape_integrators[i]->timeless)
             continue;
         scene s = scene_model(SHEET, 4, "", OBSTACLES, name, "", "halving");
@@ -372,8 +373,8 @@ START_TEST(a_sheet_that_buckles_goes_on)
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
         for (int k = 0; drape_linears[k]; k++) {
             char what[100];
-            snprintf(what, sizeof what, "buckling, %s, %s", rows[i], drape_linears[k]->name);
-            scene s = scene_model(BUCKLING, rows[i], drape_linears[k]->name);
+            snprintf(what, sizeof what, "buckling, %s, %s", rows[i], drape_linears[k]->entry.name);
+            scene s = scene_model(BUCKLING, rows[i], drape_linears[k]->entry.name);
             check(&s, what);
             scene_close(&s);
         }
@@ -393,7 +394,7 @@ static void blow(void *user, double t, int32_t count, const double *x, double *w
 START_TEST(what_a_host_moves_goes_on)
 {
     for (int i = 0; drape_integrators[i]; i++) {
-        const char *name = drape_integrators[i]->name;
+        const char *name = drape_integrators[i]->entry.name;
         if (drape_integrators[i]->timeless)
             continue;
         scene s = scene_model(SHEET, 4, "", OBSTACLES, name, "", "halving");

@@ -260,7 +260,7 @@ static void each_variant(visit *one)
     enter_folder();
     for (size_t i = 0; i < VARIANTS; i++) {
         scene s = with_collider(variants[i].text);
-        ck_assert_str_eq(s.model->colliders[0].ops->name, variants[i].row);
+        ck_assert_str_eq(s.model->colliders[0].ops->entry.name, variants[i].row);
         one(&s.model->colliders[0], &variants[i]);
         scene_close(&s);
     }
@@ -278,14 +278,14 @@ START_TEST(rows_are_well_formed)
         const drape_collider_ops *ops = drape_colliders[i];
         bool tried = false;
         ck_assert_uint_eq(ops->struct_size, sizeof *ops);
-        check_row(ops->name, ops->summary, ops->reference, false);
-        check_params(ops->params, ops->param_count);
+        check_row(ops->entry.name, ops->entry.summary, ops->entry.reference, false);
+        check_params(ops->entry.params, ops->entry.param_count);
         ck_assert(ops->shape && ops->distance);
         for (int other = 0; other < i; other++)
-            ck_assert_str_ne(ops->name, drape_colliders[other]->name);
+            ck_assert_str_ne(ops->entry.name, drape_colliders[other]->entry.name);
         for (size_t v = 0; v < VARIANTS; v++)
-            tried = tried || strcmp(variants[v].row, ops->name) == 0;
-        ck_assert_msg(tried, "no variant of %s is tested", ops->name);
+            tried = tried || strcmp(variants[v].row, ops->entry.name) == 0;
+        ck_assert_msg(tried, "no variant of %s is tested", ops->entry.name);
     }
 }
 END_TEST

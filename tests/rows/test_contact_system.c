@@ -161,8 +161,8 @@ START_TEST(colliders_of_every_row)
     for (int i = 0; drape_colliders[i]; i++) {
         bool tried = false;
         for (size_t k = 0; k < SETTINGS; k++)
-            tried = tried || strcmp(settings[k].row, drape_colliders[i]->name) == 0;
-        ck_assert_msg(tried, "no setting of %s is tested", drape_colliders[i]->name);
+            tried = tried || strcmp(settings[k].row, drape_colliders[i]->entry.name) == 0;
+        ck_assert_msg(tried, "no setting of %s is tested", drape_colliders[i]->entry.name);
     }
     for (size_t i = 0; i < SETTINGS; i++)
         for (int k = 0; k < 4; k++) {

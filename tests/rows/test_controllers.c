@@ -7,8 +7,8 @@
 
 static void defaults(const drape_controller_ops *ops, double *values)
 {
-    for (int i = 0; i < ops->param_count; i++)
-        values[i] = generic_value(&ops->params[i]);
+    for (int i = 0; i < ops->entry.param_count; i++)
+        values[i] = generic_value(&ops->entry.params[i]);
 }
 
 /* The interface of a judge, here once: an attempt of size h from time t that ended with *status, of a
@@ -52,12 +52,12 @@ START_TEST(rows_are_well_formed)
     int count = 0;
     for (; drape_controllers[count]; count++) {
         const drape_controller_ops *ops = drape_controllers[count];
-        check_row(ops->name, ops->summary, ops->reference, false);
-        check_params(ops->params, ops->param_count);
-        ck_assert_str_eq(ops->name, drape_controllers_words[count]);
+        check_row(ops->entry.name, ops->entry.summary, ops->entry.reference, false);
+        check_params(ops->entry.params, ops->entry.param_count);
+        ck_assert_str_eq(ops->entry.name, drape_controllers_words[count]);
         ck_assert(ops->judge != NULL);
         for (int i = 0; i < count; i++)
-            ck_assert_str_ne(ops->name, drape_controllers[i]->name);
+            ck_assert_str_ne(ops->entry.name, drape_controllers[i]->entry.name);
     }
     ck_assert_ptr_null(drape_controllers_words[count]);
     ck_assert_int_ge(count, 2);
@@ -125,7 +125,7 @@ END_TEST
 static const drape_controller_ops *row(const char *name)
 {
     int i = 0;
-    while (strcmp(drape_controllers[i]->name, name) != 0)
+    while (strcmp(drape_controllers[i]->entry.name, name) != 0)
         i++;
     return drape_controllers[i];
 }

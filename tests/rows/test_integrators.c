@@ -9,7 +9,7 @@
 
 static int param_of(const drape_integrator_ops *ops, const char *name)
 {
-    return drape_param_find(ops->params, ops->param_count, name);
+    return drape_param_find(ops->entry.params, ops->entry.param_count, name);
 }
 
 START_TEST(rows_are_well_formed)
@@ -17,15 +17,15 @@ START_TEST(rows_are_well_formed)
     int count = 0;
     for (; drape_integrators[count]; count++) {
         const drape_integrator_ops *ops = drape_integrators[count];
-        check_row(ops->name, ops->summary, ops->reference, false);
-        check_params(ops->params, ops->param_count);
-        ck_assert_str_eq(ops->name, drape_integrators_words[count]);
+        check_row(ops->entry.name, ops->entry.summary, ops->entry.reference, false);
+        check_params(ops->entry.params, ops->entry.param_count);
+        ck_assert_str_eq(ops->entry.name, drape_integrators_words[count]);
         ck_assert_int_ge(ops->order, ops->timeless ? 0 : 1);
         ck_assert(ops->create && ops->step && ops->restart && ops->work && ops->bytes && ops->destroy);
         int dt = param_of(ops, "dt");
-        ck_assert(dt >= 0 ? strcmp(ops->params[dt].unit, "s") == 0 : ops->own_steps);
+        ck_assert(dt >= 0 ? strcmp(ops->entry.params[dt].unit, "s") == 0 : ops->own_steps);
         for (int i = 0; i < count; i++)
-            ck_assert_str_ne(ops->name, drape_integrators[i]->name);
+            ck_assert_str_ne(ops->entry.name, drape_integrators[i]->entry.name);
     }
     ck_assert_ptr_null(drape_integrators_words[count]);
     ck_assert_int_ge(count, 1);
@@ -37,13 +37,13 @@ START_TEST(shared_names_mean_the_same)
 {
     for (int i = 0; drape_integrators[i]; i++)
         for (int j = 0; j < i; j++)
-            for (int p = 0; p < drape_integrators[i]->param_count; p++) {
-                const drape_param *one = &drape_integrators[i]->params[p];
+            for (int p = 0; p < drape_integrators[i]->entry.param_count; p++) {
+                const drape_param *one = &drape_integrators[i]->entry.params[p];
                 int q = param_of(drape_integrators[j], one->name);
                 if (q < 0)
                     continue;
-                ck_assert_int_eq(one->kind, drape_integrators[j]->params[q].kind);
-                ck_assert_str_eq(one->unit, drape_integrators[j]->params[q].unit);
+                ck_assert_int_eq(one->kind, drape_integrators[j]->entry.params[q].kind);
+                ck_assert_str_eq(one->unit, drape_integrators[j]->entry.params[q].unit);
             }
 }
 END_TEST
@@ -118,8 +118,8 @@ static drape_status take_step(stepper *s, double h, drape_step_info *info)
 
 static void defaults(const drape_integrator_ops *ops, double *values)
 {
-    for (int i = 0; i < ops->param_count; i++)
-        values[i] = generic_value(&ops->params[i]);
+    for (int i = 0; i < ops->entry.param_count; i++)
+        values[i] = generic_value(&ops->entry.params[i]);
 }
 
 /* Calls use for every row with each of its choices in turn, alone, the others at their defaults. */
@@ -133,8 +133,8 @@ static void for_all_choices(void (*use)(const drape_integrator_ops *ops, const d
             continue;
         defaults(ops, values);
         use(ops, values, "defaults");
-        for (int p = 0; p < ops->param_count; p++) {
-            const drape_param *param = &ops->params[p];
+        for (int p = 0; p < ops->entry.param_count; p++) {
+            const drape_param *param = &ops->entry.params[p];
             bool choice = param->kind == DRAPE_PARAM_CHOICE;
             if (!choice && param->kind != DRAPE_PARAM_BOOLEAN)
                 continue;
@@ -168,18 +168,19 @@ static void check_steps(const drape_integrator_ops *ops, const double *values, c
         copy_state(&s, &s.in, &s.kept);
         s.ops->restart(s.state, &s.in);
         drape_status status = take_step(&s, h, &info);
-        ck_assert_msg(same_bits(&s, &s.in, &s.kept), "%s, %s: step %d wrote its input", ops->name, what, k);
+        ck_assert_msg(same_bits(&s, &s.in, &s.kept), "%s, %s: step %d wrote its input", ops->entry.name, what,
+                      k);
         check_line(info.reason, "a reason");
         if (hopeless)
             continue;
-        ck_assert_msg(status == DRAPE_OK, "%s, %s: step %d: %s", ops->name, what, k, info.reason);
+        ck_assert_msg(status == DRAPE_OK, "%s, %s: step %d: %s", ops->entry.name, what, k, info.reason);
         copy_state(&s, &s.out, &first);
         memset(s.out.x, 0xff, s.n * sizeof *s.out.x);
         memset(s.out.v, 0xff, s.n * sizeof *s.out.v);
         s.ops->restart(s.state, &s.in);
         ck_assert_int_eq(take_step(&s, h, &info), DRAPE_OK);
-        ck_assert_msg(modified || same_bits(&s, &s.out, &first), "%s, %s: step %d has other bits", ops->name,
-                      what, k);
+        ck_assert_msg(modified || same_bits(&s, &s.out, &first), "%s, %s: step %d has other bits",
+                      ops->entry.name, what, k);
         drape_state_commit(s.model, &s.in, &s.out);
         copy_state(&s, &s.out, &s.in);
     }
@@ -200,7 +201,7 @@ static void check_twins(const drape_integrator_ops *ops, const double *values, c
         drape_step_info one, other;
         ck_assert_int_eq(take_step(&a, 0.01, &one), DRAPE_OK);
         ck_assert_int_eq(take_step(&b, 0.01, &other), DRAPE_OK);
-        ck_assert_msg(same_bits(&a, &a.out, &b.out), "%s, %s: step %d", ops->name, what, k);
+        ck_assert_msg(same_bits(&a, &a.out, &b.out), "%s, %s: step %d", ops->entry.name, what, k);
         ck_assert_int_eq(one.iterations, other.iterations);
         ck_assert(one.residual == other.residual || (isnan(one.residual) && isnan(other.residual)));
         drape_state_commit(a.model, &a.in, &a.out);
@@ -241,7 +242,7 @@ static double residual_of(stepper *s, double h, double *history, double *g)
  * 1e3 N/m and 0.01 kg/h^2. */
 static void check_residual(const drape_integrator_ops *ops, const double *values, const char *what)
 {
-    if (strcmp(ops->name, "be") != 0)
+    if (strcmp(ops->entry.name, "be") != 0)
         return;
     stepper s = open_stepper(ops, values);
     double *history = drape_arena_take(&s.arena, (size_t)s.model->measure_count, sizeof *history);
@@ -253,7 +254,7 @@ static void check_residual(const drape_integrator_ops *ops, const double *values
         if (status) { /* without a controller to halve it a step may fail, but not in silence */
             ck_assert_str_ne(info.reason, "converged");
             ck_assert(!(info.residual <= info.tolerance));
-            ck_assert_msg(k > 2, "%s, %s: step %d: %s", ops->name, what, k, info.reason);
+            ck_assert_msg(k > 2, "%s, %s: step %d: %s", ops->entry.name, what, k, info.reason);
             break;
         }
         double actual = residual_of(&s, h, history, g);
@@ -261,7 +262,7 @@ static void check_residual(const drape_integrator_ops *ops, const double *values
         ck_assert_double_eq(info.tolerance, values[param_of(ops, "tolerance")]);
         ck_assert_double_le(info.residual, info.tolerance);
         ck_assert_msg(actual <= info.residual + 1e-11, "%s, %s: step %d has a residual of %g, not %g",
-                      ops->name, what, k, actual, info.residual);
+                      ops->entry.name, what, k, actual, info.residual);
         drape_state_commit(s.model, &s.in, &s.out);
         copy_state(&s, &s.out, &s.in);
     }
@@ -348,7 +349,7 @@ START_TEST(a_triangle_falls_freely)
         drape_sim_def def;
         ck_assert_msg(drape_model_create(ctx, &scene, &model) == DRAPE_OK, "%s", drape_context_message(ctx));
         drape_sim_def_init(&def, sizeof def);
-        def.integrator = drape_integrators[i]->name;
+        def.integrator = drape_integrators[i]->entry.name;
         def.dt = drape_integrators[i]->own_steps ? 0 : h;
         ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
         ck_assert_int_eq(drape_sim_advance(sim, t), DRAPE_OK);
@@ -393,17 +394,18 @@ START_TEST(a_damped_sheet_swings)
         drape_sim_def def;
         int accepted = 0;
         drape_sim_def_init(&def, sizeof def);
-        def.integrator = drape_integrators[i]->name;
+        def.integrator = drape_integrators[i]->entry.name;
         ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
         ck_assert_int_eq(drape_sim_observe(sim, all_converged, &accepted), DRAPE_OK);
         drape_energy start = drape_sim_energy(sim);
         drape_status status = drape_sim_advance(sim, 1);
-        ck_assert_msg(status == DRAPE_OK, "%s: %s", drape_integrators[i]->name, drape_context_message(ctx));
+        ck_assert_msg(status == DRAPE_OK, "%s: %s", drape_integrators[i]->entry.name,
+                      drape_context_message(ctx));
         drape_energy end = drape_sim_energy(sim);
         drape_statistics s = drape_sim_statistics(sim);
         ck_assert_double_eq(drape_sim_time(sim), 1);
         ck_assert_int_eq(s.steps_accepted, accepted);
-        ck_assert_msg(accepted > 10, "%s: %d steps", drape_integrators[i]->name, accepted);
+        ck_assert_msg(accepted > 10, "%s: %d steps", drape_integrators[i]->entry.name, accepted);
         ck_assert_double_gt(end.dissipated, 0);
         ck_assert_double_lt(end.kinetic + end.elastic + end.gravity, start.elastic + start.gravity);
         ck_assert_double_lt(end.gravity, start.gravity);

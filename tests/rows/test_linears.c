@@ -123,16 +123,16 @@ static void solve_dense(problem *q)
 static void check_solution(problem *q, const drape_linear_ops *ops, void *solver, const char *what)
 {
     double size = 0, error = 0;
-    ck_assert_msg(ops->factor(solver, q->values) == DRAPE_OK, "%s: %s", ops->name, what);
+    ck_assert_msg(ops->factor(solver, q->values) == DRAPE_OK, "%s: %s", ops->entry.name, what);
     memcpy(q->kept, q->b, q->n * sizeof *q->b);
-    ck_assert_msg(ops->solve(solver, q->b, q->x) == DRAPE_OK, "%s: %s", ops->name, what);
+    ck_assert_msg(ops->solve(solver, q->b, q->x) == DRAPE_OK, "%s: %s", ops->entry.name, what);
     ck_assert_mem_eq(q->kept, q->b, q->n * sizeof *q->b);
     solve_dense(q);
     for (size_t i = 0; i < q->n; i++) {
         size = fmax(size, fabs(q->expected[i]));
         error = fmax(error, fabs(q->x[i] - q->expected[i]));
     }
-    ck_assert_msg(error <= 1e-10 * size, "%s: %s is off by %g of %g", ops->name, what, error, size);
+    ck_assert_msg(error <= 1e-10 * size, "%s: %s is off by %g of %g", ops->entry.name, what, error, size);
 }
 
 static void *open_solver(problem *q, const drape_linear_ops *ops)
@@ -159,11 +159,11 @@ START_TEST(rows_are_well_formed)
     int count = 0;
     for (; drape_linears[count]; count++) {
         const drape_linear_ops *ops = drape_linears[count];
-        check_row(ops->name, ops->summary, ops->reference, false);
-        ck_assert_str_eq(ops->name, drape_linears_words[count]);
+        check_row(ops->entry.name, ops->entry.summary, ops->entry.reference, false);
+        ck_assert_str_eq(ops->entry.name, drape_linears_words[count]);
         ck_assert(ops->create && ops->factor && ops->solve && ops->destroy && ops->bytes);
         for (int i = 0; i < count; i++)
-            ck_assert_str_ne(ops->name, drape_linears[i]->name);
+            ck_assert_str_ne(ops->entry.name, drape_linears[i]->entry.name);
     }
     ck_assert_ptr_null(drape_linears_words[count]);
     ck_assert_int_ge(count, 2);
@@ -271,7 +271,8 @@ START_TEST(broken_matrices_are_told_and_good_ones_work_again)
                     ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_RETRY_LINEAR);
                 break_matrix(&q, how);
                 ck_assert_msg(ops->factor(solver, q.values) == DRAPE_RETRY_LINEAR,
-                              "%s takes the broken matrix %d, %s", ops->name, how, later ? "later" : "first");
+                              "%s takes the broken matrix %d, %s", ops->entry.name, how,
+                              later ? "later" : "first");
                 ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_RETRY_LINEAR);
                 for (uint64_t seed = 1; seed <= 3; seed++) {
                     fill(&q, (matrix_kind)(seed % 2), seed);
@@ -348,7 +349,7 @@ static bool falls_back(const drape_linear_ops *ops)
 {
     static const char *const rows[] = {"cholmod", "multifrontal", "pcg"};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
-        if (strcmp(ops->name, rows[i]) == 0)
+        if (strcmp(ops->entry.name, rows[i]) == 0)
             return true;
     return false;
 }
@@ -490,7 +491,7 @@ START_TEST(a_sheet_of_many_supernodes)
             fill_sheet(&q, shifts[k], 7);
             ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
             ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
-            check_residual(&q, shifts[k] > 1, ops->name);
+            check_residual(&q, shifts[k] > 1, ops->entry.name);
             ck_assert_int_eq(ops->factor(other, q.values), DRAPE_OK);
             ck_assert_int_eq(ops->solve(other, q.b, q.again), DRAPE_OK);
             ck_assert_mem_eq(q.again, q.x, (size_t)q.p.n * sizeof *q.x);
@@ -527,7 +528,7 @@ START_TEST(threads_give_the_same_bits)
                 ops->use_threads(solver, NULL);
                 drape_crew_destroy(&crew);
             }
-            check_residual(&q, true, ops->name);
+            check_residual(&q, true, ops->entry.name);
             ops->destroy(&solver);
             close_sheet(&q);
         }
@@ -565,7 +566,7 @@ START_TEST(no_memory_for_the_fallback)
             }
             ck_assert_int_eq(status, DRAPE_OK);
             ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
-            check_residual(&q, false, ops->name);
+            check_residual(&q, false, ops->entry.name);
             bool falls = report_of(ops, solver).fallback;
             ck_assert_int_eq(failed > 0, falls);
             if (falls)
@@ -592,7 +593,7 @@ START_TEST(made_again_on_other_patterns)
                 fill_sheet(&q, k % 2 ? 0.2 : 1.01, 9);
                 ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
                 ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
-                check_residual(&q, k % 2 == 0, ops->name);
+                check_residual(&q, k % 2 == 0, ops->entry.name);
             }
             ops->destroy(&solver);
             close_sheet(&q);
@@ -606,7 +607,7 @@ START_TEST(auto_picks_by_size_and_says_so)
 {
     static const int32_t sides[] = {3, 30};
     const drape_linear_ops *chooser = drape_linears[0];
-    ck_assert_str_eq(chooser->name, "auto");
+    ck_assert_str_eq(chooser->entry.name, "auto");
     ck_assert_int_eq(chooser->best_from, 0);
     for (size_t k = 0; k < sizeof sides / sizeof *sides; k++) {
         sheet q = open_sheet(sides[k]);
@@ -622,7 +623,7 @@ START_TEST(auto_picks_by_size_and_says_so)
         ck_assert_ptr_nonnull(report.row);
         ck_assert_str_ne(report.why, "");
         if (k == 0)
-            ck_assert_str_eq(report.row->name, "klu");
+            ck_assert_str_eq(report.row->entry.name, "klu");
         chooser->destroy(&solver);
         close_sheet(&q);
     }

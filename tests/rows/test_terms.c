@@ -34,9 +34,9 @@ static bool is_dashpot(const drape_term_ops *ops, const drape_param *p)
 
 static size_t settings_of(const variant *v, const drape_term_ops *ops, drape_setting *settings)
 {
-    size_t count = required_settings(ops->params, ops->param_count, settings);
+    size_t count = required_settings(ops->entry.params, ops->entry.param_count, settings);
     if (ops == v->ops && v->param >= 0) {
-        const drape_param *p = &ops->params[v->param];
+        const drape_param *p = &ops->entry.params[v->param];
         settings[count++] = is_word(p) ? (drape_setting){p->name, 0, p->choices[v->choice]}
                                        : (drape_setting){p->name, 2.385, NULL};
     }
@@ -46,7 +46,7 @@ static size_t settings_of(const variant *v, const drape_term_ops *ops, drape_set
 /* The one that the scene's vector models, not its terms. */
 static bool is_gravity(const drape_term_ops *ops)
 {
-    return strcmp(ops->name, "gravity") == 0;
+    return strcmp(ops->entry.name, "gravity") == 0;
 }
 
 /* Forces from outside: rest is no equilibrium of them, and they know directions in space. */
@@ -59,11 +59,11 @@ static bool is_external(const drape_term_ops *ops)
 static drape_model *try_alone(drape_context *ctx, const variant *v)
 {
     drape_setting settings[DRAPE_MAX_PARAMS + 1];
-    const drape_row_def term = {v->ops->name, settings, settings_of(v, v->ops, settings)};
+    const drape_row_def term = {v->ops->entry.name, settings, settings_of(v, v->ops, settings)};
     drape_model *model = NULL;
     const model_def def = {.mesh = v->mesh, .terms = &term, .term_count = 1, .pinned = v->pinned};
     if (try_model(ctx, &def, &model)) {
-        ck_assert_msg(v->mesh != MESH_SQUARE, "%s: %s", v->ops->name, drape_context_message(ctx));
+        ck_assert_msg(v->mesh != MESH_SQUARE, "%s: %s", v->ops->entry.name, drape_context_message(ctx));
         ck_assert_ptr_nonnull(strstr(drape_context_message(ctx), "mesh"));
     }
     return model;
@@ -90,7 +90,8 @@ static drape_model *model_of(drape_context *ctx, const variant *v)
         if (is_gravity(ops) || !(ops == v->ops || (v->ops->law && ops->measure && takes(ctx, ops, v->mesh))))
             continue;
         ck_assert_uint_lt(count, MAX_TERMS);
-        terms[count] = (drape_row_def){ops->name, settings[count], settings_of(v, ops, settings[count])};
+        terms[count] =
+            (drape_row_def){ops->entry.name, settings[count], settings_of(v, ops, settings[count])};
         count++;
     }
     return make_model(ctx, &(model_def){.mesh = v->mesh,
@@ -115,8 +116,8 @@ static void for_all_variants(void (*use)(drape_context *ctx, const variant *v, c
     drape_context *ctx = make_context();
     for (int i = 0; drape_terms[i]; i++)
         for (int mesh = 0; mesh < MESH_COUNT; mesh++)
-            for (int p = -1; p < drape_terms[i]->param_count; p++) {
-                const drape_param *param = &drape_terms[i]->params[p < 0 ? 0 : p];
+            for (int p = -1; p < drape_terms[i]->entry.param_count; p++) {
+                const drape_param *param = &drape_terms[i]->entry.params[p < 0 ? 0 : p];
                 bool words = p >= 0 && is_word(param);
                 if (p >= 0 && !words && !is_dashpot(drape_terms[i], param))
                     continue;
@@ -131,10 +132,11 @@ static void for_all_variants(void (*use)(drape_context *ctx, const variant *v, c
 static const char *name_of(const variant *v)
 {
     static char text[128];
-    snprintf(text, sizeof text, "%s on %s%s%s", v->ops->name, mesh_names[v->mesh], v->param >= 0 ? ", " : "",
-             v->param < 0                         ? ""
-             : is_word(&v->ops->params[v->param]) ? v->ops->params[v->param].choices[v->choice]
-                                                  : v->ops->params[v->param].name);
+    snprintf(text, sizeof text, "%s on %s%s%s", v->ops->entry.name, mesh_names[v->mesh],
+             v->param >= 0 ? ", " : "",
+             v->param < 0                               ? ""
+             : is_word(&v->ops->entry.params[v->param]) ? v->ops->entry.params[v->param].choices[v->choice]
+                                                        : v->ops->entry.params[v->param].name);
     return text;
 }
 
@@ -184,9 +186,9 @@ START_TEST(rows_are_well_formed)
     int count = 0;
     for (; drape_terms[count]; count++) {
         const drape_term_ops *ops = drape_terms[count];
-        check_row(ops->name, ops->summary, ops->reference, true);
+        check_row(ops->entry.name, ops->entry.summary, ops->entry.reference, true);
         check_word(ops->element_name, false);
-        check_params(ops->params, ops->param_count);
+        check_params(ops->entry.params, ops->entry.param_count);
         ck_assert_uint_eq(ops->struct_size, sizeof *ops);
         ck_assert_int_eq(!!ops->measure + !!ops->energy + !!ops->dissipation + !!ops->law, 1);
         ck_assert(ops->law ? ops->nodes == 0 && !ops->build : ops->build != NULL);
@@ -196,7 +198,7 @@ START_TEST(rows_are_well_formed)
         ck_assert(!ops->linear || ops->energy);
         ck_assert(!ops->damped || ops->measure);
         for (int i = 0; i < count; i++)
-            ck_assert_str_ne(ops->name, drape_terms[i]->name);
+            ck_assert_str_ne(ops->entry.name, drape_terms[i]->entry.name);
     }
     ck_assert_int_ge(count, 5);
 }
@@ -223,7 +225,7 @@ static void check_variant(drape_context *ctx, const variant *v, const drape_mode
                           rows[i].term, rows[i].error);
             ck_assert(rows[i].error <= rows[i].limit);
             check_limits(&rows[i]);
-            own += strcmp(rows[i].term, v->ops->name) == 0;
+            own += strcmp(rows[i].term, v->ops->entry.name) == 0;
         }
         ck_assert_msg(own >= 2, "%s: %d comparisons", name_of(v), own);
     }
@@ -275,14 +277,13 @@ static void wrong_measure(const drape_elements *el, int32_t first, int32_t count
     }
 }
 
-static const drape_term_ops wrong_term = {.struct_size = sizeof(drape_term_ops),
-                                          .name = "host.wrong",
-                                          .summary = "a measure with a mistake",
-                                          .reference = "-",
-                                          .element_name = "edge",
-                                          .nodes = 2,
-                                          .build = wrong_build,
-                                          .measure = wrong_measure};
+static const drape_term_ops wrong_term = {
+    .struct_size = sizeof(drape_term_ops),
+    .entry = {.name = "host.wrong", .summary = "a measure with a mistake", .reference = "-"},
+    .element_name = "edge",
+    .nodes = 2,
+    .build = wrong_build,
+    .measure = wrong_measure};
 
 START_TEST(mistakes_are_found)
 {
@@ -388,8 +389,8 @@ static double rounding_force(const drape_model *model, const drape_point *point)
  * no energy. A law at rest has no rate. */
 static void check_rest(drape_context *ctx, const variant *v, const drape_model *model)
 {
-    bool flat = v->param >= 0 && is_word(&v->ops->params[v->param]) &&
-                strcmp(v->ops->params[v->param].choices[v->choice], "flat") == 0;
+    bool flat = v->param >= 0 && is_word(&v->ops->entry.params[v->param]) &&
+                strcmp(v->ops->entry.params[v->param].choices[v->choice], "flat") == 0;
     if (is_external(v->ops) || (flat && v->mesh == MESH_CURVED))
         return;
     drape_system *system = make_system(ctx, model, 1);

@@ -63,14 +63,13 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
     drape_energy_range(el, first, count, x, e, g, h, one);
 }
 
-static const drape_term_ops newton = {.struct_size = sizeof(drape_term_ops),
-                                      .name = "test.newton",
-                                      .summary = "stars that attract each other",
-                                      .reference = "Newton 1687",
-                                      .element_name = "pair",
-                                      .nodes = 2,
-                                      .build = build,
-                                      .energy = energy};
+static const drape_term_ops newton = {
+    .struct_size = sizeof(drape_term_ops),
+    .entry = {.name = "test.newton", .summary = "stars that attract each other", .reference = "Newton 1687"},
+    .element_name = "pair",
+    .nodes = 2,
+    .build = build,
+    .energy = energy};
 
 /* A fan of triangles around the fifth star, which nothing but the mesh needs. */
 static scene stars(const char *integrator, const drape_setting *settings, size_t count)

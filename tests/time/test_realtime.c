@@ -213,7 +213,7 @@ START_TEST(every_row_with_a_time_takes_frames)
         scene s = scene_model(HUNG, "", "be", ", 'tolerance': 1e-4");
         drape_sim_def def;
         drape_sim_def_init(&def, sizeof def);
-        def.integrator = drape_integrators[i]->name;
+        def.integrator = drape_integrators[i]->entry.name;
         scene_start(&s, &def);
         drape_status status = drape_sim_advance_realtime(s.sim, 0.02, PLENTY, &r);
         if (drape_integrators[i]->timeless) {

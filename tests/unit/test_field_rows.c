@@ -20,7 +20,7 @@ static double values[NODES];
 static drape_status measure(scene *h, const char *name, const double *x)
 {
     for (int i = 0; drape_fields[i]; i++)
-        if (strcmp(drape_fields[i]->name, name) == 0)
+        if (strcmp(drape_fields[i]->entry.name, name) == 0)
             return drape_fields[i]->measure(h->sim, x, values);
     ck_abort_msg("there is no field %s", name);
     return DRAPE_OK;

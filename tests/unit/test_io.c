@@ -417,8 +417,8 @@ START_TEST(every_row_writes_the_same_frames)
     drape_recorder *recorder;
     set_up(&w);
     for (; drape_exporters[count]; count++) {
-        ck_assert(*drape_exporters[count]->summary && *drape_exporters[count]->reference);
-        formats[count] = drape_exporters[count]->name;
+        ck_assert(*drape_exporters[count]->entry.summary && *drape_exporters[count]->entry.reference);
+        formats[count] = drape_exporters[count]->entry.name;
     }
     formats[count] = formats[0]; /* twice counts once */
     const drape_recorder_def def = {w.out, formats, count + 1};
@@ -1068,7 +1068,7 @@ START_TEST(each_allocation_may_fail)
     const char *formats[32];
     size_t count = 0;
     for (; drape_exporters[count]; count++)
-        formats[count] = drape_exporters[count]->name;
+        formats[count] = drape_exporters[count]->entry.name;
     const drape_recorder_def def = {w.out, formats, count};
     drape_status status = DRAPE_E_MEMORY;
     for (int n = 0; status; n++) {

@@ -105,7 +105,7 @@ END_TEST
 START_TEST(every_integrator_follows)
 {
     for (int i = 0; drape_integrators[i]; i++) {
-        scene h = scene_open(sheet, "", drape_integrators[i]->name);
+        scene h = scene_open(sheet, "", drape_integrators[i]->entry.name);
         const double *x;
         double before = 0, after = 0;
         if (!drape_integrators[i]->timeless) {
@@ -113,12 +113,12 @@ START_TEST(every_integrator_follows)
             for (int k = 0; k < 3; k++)
                 before += pow(x[3 * 5 + k] - target[k], 2);
             ck_assert_int_eq(drape_sim_pull(h.sim, 5, 1, target), DRAPE_OK);
-            ck_assert_msg(drape_sim_advance(h.sim, 0.05) == DRAPE_OK, "%s: %s", drape_integrators[i]->name,
-                          drape_context_message(h.ctx));
+            ck_assert_msg(drape_sim_advance(h.sim, 0.05) == DRAPE_OK, "%s: %s",
+                          drape_integrators[i]->entry.name, drape_context_message(h.ctx));
             x = drape_sim_positions(h.sim);
             for (int k = 0; k < 3; k++)
                 after += pow(x[3 * 5 + k] - target[k], 2);
-            ck_assert_msg(after < before, "%s", drape_integrators[i]->name);
+            ck_assert_msg(after < before, "%s", drape_integrators[i]->entry.name);
         }
         scene_close(&h);
     }

@@ -37,7 +37,7 @@ START_TEST(bodies_lie_on_their_surface)
         drape_body body;
         double off = 0;
         ck_assert_int_eq(drape_body_create(h.ctx, collider, (const double[3]){0}, 4, &body), DRAPE_OK);
-        ck_assert_int_eq(body.endless, strcmp(collider->ops->name, "plane") == 0);
+        ck_assert_int_eq(body.endless, strcmp(collider->ops->entry.name, "plane") == 0);
         ck_assert(body.vertex_count > 100 && body.vertex_count % 3 == 0);
         for (size_t i = 0; i < body.vertex_count; i++) {
             const float *v = body.vertex + 6 * i;
@@ -237,8 +237,9 @@ END_TEST
 START_TEST(shadings_are_found_by_name)
 {
     for (int i = 0; drape_shadings[i]; i++) {
-        ck_assert_ptr_eq(drape_shading_find(drape_shadings[i]->name), drape_shadings[i]);
-        ck_assert(drape_shadings[i]->summary && strstr(drape_shadings[i]->source, "vec3 shade(Surface s)"));
+        ck_assert_ptr_eq(drape_shading_find(drape_shadings[i]->entry.name), drape_shadings[i]);
+        ck_assert(drape_shadings[i]->entry.summary &&
+                  strstr(drape_shadings[i]->source, "vec3 shade(Surface s)"));
     }
     ck_assert_ptr_null(drape_shading_find("lambert"));
 }
