@@ -390,12 +390,8 @@ static bool is_for(const rung *g, int side)
     if (g->most > 0 && side * side > g->most)
         return false;
     const drape_setting *linear = &g->settings[0];
-    if (!linear->name || strcmp(linear->name, "linear_solver") != 0)
-        return true;
-    for (int i = 0; drape_linears_words[i]; i++)
-        if (strcmp(drape_linears_words[i], linear->text) == 0)
-            return true;
-    return false;
+    return !linear->name || strcmp(linear->name, "linear_solver") != 0 ||
+           drape_registry_find(&drape_linear_registry, NULL, linear->text) >= 0;
 }
 
 static void run_side(const bench_group *group, int side, FILE *csv, growth *grown)

@@ -125,6 +125,16 @@ drape_status drape_fail(drape_context *ctx, drape_status status, const char *for
     return status;
 }
 
+const drape_entry *drape_context_term(const drape_context *ctx, int index)
+{
+    return index < ctx->host_term_count ? &ctx->host_terms[index].entry : NULL;
+}
+
+const drape_entry *drape_context_collider(const drape_context *ctx, int index)
+{
+    return index < ctx->host_collider_count ? &ctx->host_colliders[index].entry : NULL;
+}
+
 drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *pointer, const char *format,
                            ...)
 {

@@ -1,4 +1,4 @@
-/* context.h: allocator, last message, log, rows of the host. Every function that can fail reports through
+/* context.h: allocator, last message, log, user-defined terms and colliders. Every function that can fail reports through
  * its context. */
 #ifndef DRAPE_BASE_CONTEXT_H
 #define DRAPE_BASE_CONTEXT_H
@@ -22,6 +22,10 @@ struct drape_context {
     drape_collider_ops host_colliders[DRAPE_MAX_HOST_COLLIDERS];
     int host_collider_count;
 };
+
+/* User-defined entry `index` of the context; NULL past the last. */
+const drape_entry *drape_context_term(const drape_context *ctx, int index);
+const drape_entry *drape_context_collider(const drape_context *ctx, int index);
 
 /* count x size bytes, zeroed, aligned for any type; NULL with a message on failure or overflow. 0 bytes give
  * a valid pointer. */

@@ -1,10 +1,11 @@
 /* cli.h: what the verbs of the program share: the table of verbs, command lines, scenes, exit codes, output.
  *
- * A verb is one file, cmd_<verb>.c, and one word in meson.build. Results go to stdout; messages and progress
+ * A verb is one file, cmd_<verb>.c, and one name in meson.build. Results go to stdout; messages and progress
  * go to stderr. The library never prints. */
 #ifndef DRAPE_CLI_CLI_H
 #define DRAPE_CLI_CLI_H
 
+#include "base/registry.h"
 #include "sim/sim.h"
 
 /* ---- Exit codes
@@ -48,7 +49,7 @@ typedef struct cli_option {
     int max;             /* NUMBER */
     const char *pointer; /* VALUE, LIST */
     bool
-        must_act; /* VALUE of the integrator: drape run refuses it where the chosen row has no such parameter */
+        must_act; /* VALUE of the integrator: drape run refuses it where the chosen integrator has no such parameter */
 } cli_option;
 
 /* A scene value of the command line. */
@@ -83,7 +84,7 @@ typedef struct drape_verb {
 } drape_verb;
 
 extern const drape_verb *const drape_verbs[]; /* NULL-ended */
-extern const char *const drape_verbs_words[];
+extern const drape_registry drape_verb_registry;
 
 void cli_print_help(const drape_verb *verb); /* on stdout */
 

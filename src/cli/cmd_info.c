@@ -192,17 +192,15 @@ static const cli_option options[] = {
 /* The settings were good when the model was compiled, so they are now. */
 const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values)
 {
-    for (int g = 0; drape_grids[g]; g++) {
-        const drape_grid_ops *grid = drape_grids[g];
-        drape_context *ctx = NULL;
-        if (strcmp(grid->entry.name, cloth->grid.type) != 0 || drape_context_create(NULL, &ctx))
-            continue;
-        drape_status status = drape_params_resolve(ctx, "", grid->entry.params, grid->entry.param_count,
-                                                   cloth->grid.settings, cloth->grid.setting_count, values);
-        drape_context_destroy(&ctx);
-        return status ? NULL : grid;
-    }
-    return NULL;
+    const int i = drape_registry_find(&drape_grid_registry, NULL, cloth->grid.type);
+    drape_context *ctx = NULL;
+    if (i < 0 || drape_context_create(NULL, &ctx))
+        return NULL;
+    const drape_grid_ops *grid = drape_grids[i];
+    drape_status status = drape_params_resolve(ctx, "", grid->entry.params, grid->entry.param_count,
+                                               cloth->grid.settings, cloth->grid.setting_count, values);
+    drape_context_destroy(&ctx);
+    return status ? NULL : grid;
 }
 
 static int main_info(int argc, char **argv);

@@ -26,12 +26,12 @@ typedef struct list_style {
     void (*scene)(void);
     void (*object)(const cli_object *object);
     void (*key)(const cli_object *object, const drape_scene_key *key);
-    void (*table)(const cli_table *table);
-    void (*rows_begin)(void);
-    void (*row)(const cli_row *row);
-    void (*params_begin)(const cli_table *table);
-    void (*param)(const cli_row *row, const drape_param *param);
-    bool params_apart; /* in a table of their own, after all rows */
+    void (*table)(const drape_registry *table);
+    void (*entries_begin)(void);
+    void (*entry)(const drape_entry *entry);
+    void (*params_begin)(const drape_registry *table);
+    void (*param)(const drape_entry *entry, const drape_param *param);
+    bool params_apart; /* in a table of their own, after all entries */
 } list_style;
 
 typedef struct param_text {
@@ -55,7 +55,7 @@ static param_text text_of(const drape_param *param)
 
 static void nothing(void) {}
 
-static void no_params(const cli_table *table)
+static void no_params(const drape_registry *table)
 {
     (void)table;
 }
@@ -82,22 +82,21 @@ static void text_key(const cli_object *object, const drape_scene_key *key)
            key->unit ? key->unit : "", key->unit ? "]" : "");
 }
 
-static void text_table(const cli_table *table)
+static void text_table(const drape_registry *table)
 {
-    printf("%s (%s)%s%s\n", table->title, table->name, table->place ? ": " : "",
-           table->place ? table->place : "");
+    printf("%s (%s)%s%s\n", table->title, table->key, *table->place ? ": " : "", table->place);
 }
 
-static void text_row(const cli_row *row)
+static void text_entry(const drape_entry *entry)
 {
-    printf("\n  %-20s %s\n", row->name, row->summary);
-    if (row->reference && strcmp(row->reference, "-") != 0)
-        printf("  %-20s [%s]\n", "", row->reference);
+    printf("\n  %-20s %s\n", entry->name, entry->summary);
+    if (entry->reference && strcmp(entry->reference, "-") != 0)
+        printf("  %-20s [%s]\n", "", entry->reference);
 }
 
-static void text_param(const cli_row *row, const drape_param *param)
+static void text_param(const drape_entry *entry, const drape_param *param)
 {
-    (void)row;
+    (void)entry;
     const param_text text = text_of(param);
     printf("    %-18s %s\n", param->name, param->help);
     printf("    %-18s %s%s%s; %s%s\n", "", text.range, *text.unit ? " " : "", text.unit,
@@ -130,7 +129,7 @@ static void markdown_scene(void)
     puts("### " SCENE_TITLE "\n\n| in | key | unit | takes | what |\n|---|---|---|---|---|");
 }
 
-/* A key that stands for others says so: its row is read alone. */
+/* A key that stands for others says so: its line is read alone. */
 static void markdown_key(const cli_object *object, const drape_scene_key *key)
 {
     char text[512];
@@ -154,38 +153,38 @@ static void markdown_object(const cli_object *object)
     (void)object;
 }
 
-static void markdown_table(const cli_table *table)
+static void markdown_table(const drape_registry *table)
 {
     printf("### %s\n", table->title);
-    if (table->place)
+    if (*table->place)
         printf("\nIn a scene: %s.\n", table->place);
 }
 
-static void markdown_rows_begin(void)
+static void markdown_entries_begin(void)
 {
     puts("\n| name | what | reference |\n|---|---|---|");
 }
 
-static void markdown_row(const cli_row *row)
+static void markdown_entry(const drape_entry *entry)
 {
     fputs("|", stdout);
-    code_cell(row->name);
-    cell(row->summary);
-    cell(row->reference && strcmp(row->reference, "-") != 0 ? row->reference : "");
+    code_cell(entry->name);
+    cell(entry->summary);
+    cell(entry->reference && strcmp(entry->reference, "-") != 0 ? entry->reference : "");
     fputc('\n', stdout);
 }
 
-static void markdown_params_begin(const cli_table *table)
+static void markdown_params_begin(const drape_registry *table)
 {
     (void)table;
     puts("\n| of | parameter | unit | default | range | what |\n|---|---|---|---|---|---|");
 }
 
-static void markdown_param(const cli_row *row, const drape_param *param)
+static void markdown_param(const drape_entry *entry, const drape_param *param)
 {
     const param_text text = text_of(param);
     fputs("|", stdout);
-    code_cell(row->name);
+    code_cell(entry->name);
     code_cell(param->name);
     cell(text.unit);
     cell(text.value);
@@ -198,64 +197,53 @@ static const list_style text_style = {.scene = text_scene,
                                       .object = text_object,
                                       .key = text_key,
                                       .table = text_table,
-                                      .rows_begin = nothing,
-                                      .row = text_row,
+                                      .entries_begin = nothing,
+                                      .entry = text_entry,
                                       .params_begin = no_params,
                                       .param = text_param};
 static const list_style markdown_style = {.scene = markdown_scene,
                                           .object = markdown_object,
                                           .key = markdown_key,
                                           .table = markdown_table,
-                                          .rows_begin = markdown_rows_begin,
-                                          .row = markdown_row,
+                                          .entries_begin = markdown_entries_begin,
+                                          .entry = markdown_entry,
                                           .params_begin = markdown_params_begin,
                                           .param = markdown_param,
                                           .params_apart = true};
 
 /* ---- What is printed ---- */
 
-static bool has_params(const cli_table *table, const char *only)
+static bool is_shown(const drape_entry *entry, const char *only)
 {
-    cli_row row;
-    for (int i = 0; table->row(i, &row); i++)
-        if (row.param_count > 0 && (!only || strcmp(only, row.name) == 0))
-            return true;
-    return false;
+    return !only || strcmp(only, entry->name) == 0;
 }
 
-static void print_params(const list_style *style, const cli_row *row)
+static void print_params(const list_style *style, const drape_entry *entry)
 {
-    for (int p = 0; p < row->param_count; p++)
-        style->param(row, &row->params[p]);
+    for (int p = 0; p < entry->param_count; p++)
+        style->param(entry, &entry->params[p]);
 }
 
-/* only: the name of one row; NULL: all. */
-static void print_table(const list_style *style, const cli_table *table, const char *only)
+/* only: the name of one entry; NULL: all. */
+static void print_table(const list_style *style, const drape_registry *table, const char *only)
 {
-    cli_row row;
+    const drape_entry *entry;
+    bool params = false;
     style->table(table);
-    style->rows_begin();
-    for (int i = 0; table->row(i, &row); i++)
-        if (!only || strcmp(only, row.name) == 0) {
-            style->row(&row);
+    style->entries_begin();
+    for (int i = 0; (entry = table->entries[i]) != NULL; i++)
+        if (is_shown(entry, only)) {
+            style->entry(entry);
             if (!style->params_apart)
-                print_params(style, &row);
+                print_params(style, entry);
+            params = params || entry->param_count > 0;
         }
-    if (style->params_apart && has_params(table, only)) {
+    if (style->params_apart && params) {
         style->params_begin(table);
-        for (int i = 0; table->row(i, &row); i++)
-            if (!only || strcmp(only, row.name) == 0)
-                print_params(style, &row);
+        for (int i = 0; (entry = table->entries[i]) != NULL; i++)
+            if (is_shown(entry, only))
+                print_params(style, entry);
     }
-}
-
-static bool has_row(const cli_table *table, const char *name)
-{
-    cli_row row;
-    for (int i = 0; table->row(i, &row); i++)
-        if (strcmp(row.name, name) == 0)
-            return true;
-    return false;
 }
 
 /* only: the name of one object; NULL: all. Returns how many were printed. */
@@ -280,30 +268,30 @@ static int unknown_name(const char *name)
 {
     const char *names[MAX_NAMES];
     size_t count = 0;
-    cli_row row;
+    const drape_registry *const *tables = cli_tables();
     cli_object objects[CLI_MAX_OBJECTS];
     const int object_count = cli_objects(objects);
     for (int i = 0; i < object_count; i++)
         names[count++] = objects[i].form->name;
-    for (int t = 0; cli_tables[t] && count < MAX_NAMES; t++) {
-        names[count++] = cli_tables[t]->name;
-        for (int i = 0; cli_tables[t]->row(i, &row) && count < MAX_NAMES; i++)
-            names[count++] = row.name;
+    for (int t = 0; tables[t] && count < MAX_NAMES; t++) {
+        names[count++] = tables[t]->key;
+        for (int i = 0; tables[t]->entries[i] && count < MAX_NAMES; i++)
+            names[count++] = tables[t]->entries[i]->name;
     }
     const char *meant = drape_did_you_mean(name, names, count);
-    return cli_misuse("list", "there is no table and no row \"%.60s\"%s%s%s; `drape list` shows all", name,
+    return cli_misuse("list", "there is no table and no entry \"%.60s\"%s%s%s; `drape list` shows all", name,
                       DRAPE_MEANT(meant));
 }
 
-/* name: of a table, of a row or of an object of a scene; NULL: all tables, the keys of a scene first. */
+/* name: of a table, of an entry or of an object of a scene; NULL: all tables, the keys of a scene first. */
 static int print_tables(const list_style *style, const char *name)
 {
     const bool keys = name && strcmp(name, SCENE_NAME) == 0;
     int printed = print_scene(style, keys ? NULL : name);
-    for (int t = 0; cli_tables[t]; t++) {
-        const cli_table *table = cli_tables[t];
-        bool whole = !name || strcmp(name, table->name) == 0;
-        if (!whole && !has_row(table, name))
+    for (const drape_registry *const *t = cli_tables(); *t; t++) {
+        const drape_registry *table = *t;
+        bool whole = !name || strcmp(name, table->key) == 0;
+        if (!whole && drape_registry_find(table, NULL, name) < 0)
             continue;
         if (printed++)
             fputc('\n', stdout);
@@ -340,12 +328,12 @@ static int main_list(int argc, char **argv);
 const drape_verb drape_verb_list = {
     .entry = {.name = "list",
               .summary =
-                  "the keys of a scene, every row of every table: parameters, units, defaults, references"},
-    .operand = "TABLE|ROW",
+                  "the keys of a scene, every entry of every table: parameters, units, defaults, references"},
+    .operand = "TABLE|ENTRY",
     .operand_optional = true,
     .details =
-        "Prints the keys of a scene and all that it can choose from, or one table, or one row. The table\n"
-        "`scene` is the keys of all objects of a scene; one of its rows, as `pin`, is the keys of one.",
+        "Prints the keys of a scene and all that it can choose from, or one table, or one entry. The table\n"
+        "`scene` is the keys of all objects of a scene; one of its objects, as `pin`, is the keys of one.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .run = main_list,

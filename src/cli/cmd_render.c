@@ -1,9 +1,7 @@
 /* cmd_render.c: `drape render`: scenes and finished runs to pictures and films. */
 #include "cli/frames.h"
 #include "cli/signals.h"
-#include "cli/tables.h"
 
-#include "base/param.h"
 #include "io/export.h"
 #include "render/film.h"
 #include "render/images.h"
@@ -48,16 +46,6 @@ typedef struct render {
     uint8_t *pixels;
 } render;
 
-bool cli_shading_row(int index, cli_row *row)
-{
-    const drape_shading *shading = drape_shadings[index];
-    if (shading)
-        *row = (cli_row){.name = shading->entry.name,
-                         .summary = shading->entry.summary,
-                         .reference = shading->entry.reference};
-    return shading;
-}
-
 /* ---- The command line ---- */
 
 /* count numbers between commas, nothing after them. */
@@ -79,16 +67,14 @@ static bool read_numbers(const char *text, double *values, int least, int most)
 static int read_shade(render *r)
 {
     const char *name = r->request->shade ? r->request->shade : "diffuse";
-    size_t count = 0;
-    while (drape_shadings_words[count])
-        count++;
-    r->shading = drape_shading_find(name);
-    if (r->shading)
-        return CLI_GO_ON;
-    const char *meant = drape_did_you_mean(name, drape_shadings_words, count);
-    return cli_misuse("render",
-                      "--shade \"%.60s\": there is no such shading%s%s%s; `drape list shadings` shows all",
-                      name, DRAPE_MEANT(meant));
+    const int i = drape_registry_find(&drape_shading_registry, NULL, name);
+    if (i < 0) {
+        char text[DRAPE_UNKNOWN_SIZE];
+        drape_registry_unknown(&drape_shading_registry, NULL, name, text);
+        return cli_misuse("render", "--shade: %s", text);
+    }
+    r->shading = drape_shadings[i];
+    return CLI_GO_ON;
 }
 
 static int read_size(render *r)
@@ -470,7 +456,7 @@ static const cli_option options[] = {
      AT(out), 0, NULL},
     {"frame", CLI_TEXT, "N", "the frame of a picture, from 0; the last without it", AT(frame), 0, NULL},
     {"every", CLI_NUMBER, "N", "each Nth frame of a film or folder", AT(every), 1000000, NULL},
-    {"shade", CLI_TEXT, "ROW", "how cloth is coloured, diffuse without it; `drape list shadings` shows all",
+    {"shade", CLI_TEXT, "NAME", "how cloth is coloured, diffuse without it; `drape list shadings` shows all",
      AT(shade), 0, NULL},
     {"size", CLI_TEXT, "WxH", "pixels, 1280x720 without it", AT(size), 0, NULL},
     {"camera", CLI_TEXT, "A,E[,Z]",

@@ -6,7 +6,6 @@
 #include "lab/record.h"
 
 #include "base/clock.h"
-#include "base/param.h"
 
 #include <errno.h>
 #include <jansson.h>
@@ -14,8 +13,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
-
-#define MOST_NAMES 64
 
 typedef struct validate_request {
     cli_command command;
@@ -45,7 +42,7 @@ static void text_row(const lab_record *record)
     char parameter[24] = "";
     if (reference->parameter)
         snprintf(parameter, sizeof parameter, "%.6g", v->parameter);
-    printf("%-18s %12s %14.8g %14.8g %9.4f%% %8.3g%%  %s", reference->name, parameter, v->expected,
+    printf("%-18s %12s %14.8g %14.8g %9.4f%% %8.3g%%  %s", reference->entry.name, parameter, v->expected,
            v->obtained, 100 * (v->obtained / v->expected - 1), 100 * reference->tolerance,
            drape_outcome_name(v->verdict));
     if (reference->documented)
@@ -75,10 +72,10 @@ static void markdown_row(const lab_record *record)
     char parameter[200] = "";
     if (reference->parameter)
         snprintf(parameter, sizeof parameter, "%s = %.6g", reference->parameter, v->parameter);
-    printf("| %s | %s [%s] | %s | %s | %.8g | %.8g | %.4f %% | %.3g %% | %s | %s |\n", reference->name,
-           reference->quantity, reference->unit, parameter, reference->model, v->expected, v->obtained,
+    printf("| %s | %s [%s] | %s | %s | %.8g | %.8g | %.4f %% | %.3g %% | %s | %s |\n", reference->entry.name,
+           reference->entry.summary, reference->unit, parameter, reference->model, v->expected, v->obtained,
            100 * (v->obtained / v->expected - 1), 100 * reference->tolerance, drape_outcome_name(v->verdict),
-           reference->source);
+           reference->entry.reference);
 }
 
 static void markdown_end(const int counts[4])
@@ -122,7 +119,7 @@ static int write_scenes(const drape_reference *reference, const char *folder)
         reference->scene(p, reference->high > 0 ? reference->expected(p) : 0, text, sizeof text);
         for (char *c = text; *c; c++)
             *c = *c == '\'' ? '"' : *c;
-        snprintf(path, sizeof path, "%s/%s_%d.json", folder, reference->name, i);
+        snprintf(path, sizeof path, "%s/%s_%d.json", folder, reference->entry.name, i);
         FILE *file = fopen(path, "w");
         if (!file || fprintf(file, "%s\n", text) < 0 || fclose(file)) {
             fprintf(stderr, "drape validate: %s: %s\n", path, strerror(errno));
@@ -134,21 +131,14 @@ static int write_scenes(const drape_reference *reference, const char *folder)
 
 static int find(const char *name, const drape_reference **only)
 {
-    const char *names[MOST_NAMES];
-    size_t count = 0;
-    for (int i = 0; drape_references[i] && count < MOST_NAMES; i++) {
-        names[count++] = drape_references[i]->name;
-        if (strcmp(drape_references[i]->name, name) == 0) {
-            *only = drape_references[i];
-            return CLI_GO_ON;
-        }
+    const int i = drape_registry_find(&drape_reference_registry, NULL, name);
+    if (i < 0) {
+        char text[DRAPE_UNKNOWN_SIZE];
+        drape_registry_unknown(&drape_reference_registry, NULL, name, text);
+        return cli_misuse("validate", "%s", text);
     }
-    char all[2048] = "";
-    for (size_t i = 0; i < count; i++)
-        snprintf(all + strlen(all), sizeof all - strlen(all), "%s%s", i ? ", " : "", names[i]);
-    const char *meant = drape_did_you_mean(name, names, count);
-    return cli_misuse("validate", "there is no reference \"%.60s\"%s%s%s; there are %s", name,
-                      DRAPE_MEANT(meant), all);
+    *only = drape_references[i];
+    return CLI_GO_ON;
 }
 
 static bool interrupted(void *user)

@@ -3,7 +3,6 @@
 #include "cli/view.h"
 
 #include "base/clock.h"
-#include "base/param.h"
 #include "render/painter.h"
 #include "render/reel.h"
 #include "render/window.h"
@@ -44,7 +43,7 @@ typedef struct window_view {
     drape_stage stage;
     drape_reel reel;
     drape_camera camera, home;
-    int shading;      /* index of its row */
+    int shading;      /* index in the table */
     double low, high; /* of its field, as far as it was seen */
     drag drag;
     double x, y; /* of the pointer */
@@ -285,9 +284,7 @@ static void new_model(window_view *w, bool changed)
 
 static void choose_shading(window_view *w, int step)
 {
-    int count = 0;
-    while (drape_shadings[count])
-        count++;
+    const int count = drape_registry_count(&drape_shading_registry);
     w->shading = (w->shading + step + count) % count;
     forget_range(w);
 }
@@ -584,11 +581,12 @@ static drape_status set_up(window_view *w, int width, int height)
 static int read_shade(window_view *w)
 {
     const char *name = w->request->shade ? w->request->shade : "diffuse";
-    for (w->shading = 0; drape_shadings[w->shading]; w->shading++)
-        if (strcmp(drape_shadings[w->shading]->entry.name, name) == 0)
-            return CLI_GO_ON;
-    return cli_misuse("view", "--shade \"%.60s\": there is no such shading; `drape list shadings` shows all",
-                      name);
+    char text[DRAPE_UNKNOWN_SIZE];
+    w->shading = drape_registry_find(&drape_shading_registry, NULL, name);
+    if (w->shading >= 0)
+        return CLI_GO_ON;
+    drape_registry_unknown(&drape_shading_registry, NULL, name, text);
+    return cli_misuse("view", "--shade: %s", text);
 }
 
 /* What it came to, for whoever closed the window. */
@@ -625,7 +623,7 @@ static int run(window_view *w)
 }
 
 static const cli_option options[] = {
-    {"shade", CLI_TEXT, "ROW", "how cloth is coloured; `drape list shadings` shows all",
+    {"shade", CLI_TEXT, "NAME", "how cloth is coloured; `drape list shadings` shows all",
      offsetof(view_request, shade), 0, NULL},
     {"size", CLI_TEXT, "WxH", "pixels of the window, 1280x720 without it", offsetof(view_request, size), 0,
      NULL},

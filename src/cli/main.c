@@ -3,8 +3,6 @@
 #include "cli/cli.h"
 #include "cli/signals.h"
 
-#include "base/param.h"
-
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -31,25 +29,15 @@ static void ignore_write_signals(void)
 
 static const drape_verb *find_verb(const char *name)
 {
-    for (int i = 0; drape_verbs[i]; i++)
-        if (strcmp(drape_verbs[i]->entry.name, name) == 0)
-            return drape_verbs[i];
-    return NULL;
-}
-
-static size_t verb_count(void)
-{
-    size_t count = 0;
-    while (drape_verbs[count])
-        count++;
-    return count;
+    const int i = drape_registry_find(&drape_verb_registry, NULL, name);
+    return i < 0 ? NULL : drape_verbs[i];
 }
 
 static int unknown_verb(const char *name)
 {
-    const char *meant = drape_did_you_mean(name, drape_verbs_words, verb_count());
-    fprintf(stderr, "drape: there is no verb \"%.60s\"%s%s%s; `drape --help` shows all\n", name,
-            DRAPE_MEANT(meant));
+    char text[DRAPE_UNKNOWN_SIZE];
+    drape_registry_unknown(&drape_verb_registry, NULL, name, text);
+    fprintf(stderr, "drape: %s\n", text);
     return CLI_BAD_INPUT;
 }
 

@@ -1,6 +1,5 @@
 /* no_drawing.c: stands for the verbs that draw in a program that was built without what they need. */
 #include "cli/cli.h"
-#include "cli/tables.h"
 
 #include <string.h>
 
@@ -12,15 +11,9 @@ static int refuse(const drape_verb *verb, int argc, char **argv)
         cli_print_help(verb);
         return CLI_DONE;
     }
-    return cli_misuse(verb->name,
+    return cli_misuse(verb->entry.name,
                       "this drape was built without drawing: install Debian's libepoxy-dev, libpng-dev and "
                       "libglfw3-dev, and build anew with -Drender=enabled");
-}
-
-bool cli_shading_row(int index, cli_row *row)
-{
-    (void)index, (void)row;
-    return false;
 }
 
 static int main_render(int argc, char **argv)

@@ -8,9 +8,12 @@
  */
 #include "cli/schema.h"
 
-#include "cli/tables.h"
+#include "colliders/colliders.h"
 #include "compile/compile.h"
+#include "control/control.h"
+#include "io/export.h"
 #include "model/scene.h"
+#include "terms/terms.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -119,7 +122,7 @@ static json_t *all_or_none(json_t *object, const char *const *names)
     return with(object, "dependentRequired", dependents);
 }
 
-/* ---- Parameters of rows ---- */
+/* ---- Parameters of entries ---- */
 
 static bool is_required(const drape_param *p)
 {
@@ -196,7 +199,7 @@ static json_t *param(const drape_param *p)
     return isnan(p->default_value) ? value : with(value, "default", default_of(p));
 }
 
-/* A parameter of several rows with different bounds must be right for each of them, as the reader has it. */
+/* A parameter of several entries with different bounds must be right for each of them, as the reader has it. */
 static json_t *with_param(json_t *properties, const drape_param *p)
 {
     json_t *schema = param(p), *before = json_object_get(properties, p->name);
@@ -210,63 +213,69 @@ static json_t *with_param(json_t *properties, const drape_param *p)
     return with(properties, p->name, with(json_object(), "allOf", both));
 }
 
-static json_t *with_params(json_t *properties, const cli_row *row)
+static json_t *with_params(json_t *properties, const drape_entry *entry)
 {
-    for (int i = 0; i < row->param_count; i++)
-        properties = with_param(properties, &row->params[i]);
+    for (int i = 0; i < entry->param_count; i++)
+        properties = with_param(properties, &entry->params[i]);
     return properties;
 }
 
-static bool needs_params(const cli_row *row)
+static bool needs_params(const drape_entry *entry)
 {
-    for (int i = 0; i < row->param_count; i++)
-        if (is_required(&row->params[i]))
+    for (int i = 0; i < entry->param_count; i++)
+        if (is_required(&entry->params[i]))
             return true;
     return false;
 }
 
-static json_t *with_required(json_t *required, const cli_row *row)
+static json_t *with_required(json_t *required, const drape_entry *entry)
 {
-    for (int i = 0; i < row->param_count; i++)
-        if (is_required(&row->params[i]))
-            required = and_also(required, json_string(row->params[i].name));
+    for (int i = 0; i < entry->param_count; i++)
+        if (is_required(&entry->params[i]))
+            required = and_also(required, json_string(entry->params[i].name));
     return required;
 }
 
-/* Rows that a scene may name: those that need no parameters where only a name is given. */
-static json_t *row_names(const cli_table *table, bool alone)
+/* Gravity is a term where the scene's gravity is not zero: scenes do not name it. */
+static bool is_implied(const drape_registry *table, int index)
+{
+    return table == &drape_term_registry && drape_terms[index]->potential_of_gravity;
+}
+
+/* Entries that a scene may name: those that need no parameters where only a name is given. */
+static json_t *entry_names(const drape_registry *table, bool alone)
 {
     json_t *names = json_array();
-    cli_row row;
-    for (int i = 0; table->row(i, &row); i++)
-        if (!row.implied && !(alone && needs_params(&row)))
-            names = and_also(names, json_string(row.name));
+    const drape_entry *entry;
+    for (int i = 0; (entry = table->entries[i]) != NULL; i++)
+        if (!is_implied(table, i) && !(alone && needs_params(entry)))
+            names = and_also(names, json_string(entry->name));
     return with(json_object(), "enum", names);
 }
 
 /* ---- Which tables stand where in a scene ---- */
 
 typedef enum opening_kind {
-    ROW_PARAMS,  /* the parameters of the named row, and no others */
-    TABLE_PARAMS /* parameters of any row of the table, whichever is named */
+    ENTRY_PARAMS, /* the parameters of the named entry, and no others */
+    TABLE_PARAMS  /* parameters of any entry of the table, whichever is named */
 } opening_kind;
 
 /* The open objects of scene_keys.c. */
 static const struct opening {
-    const char *object, *key; /* the key that names the row; NULL: there is but one */
+    const char *object, *key; /* the key that names the entry; NULL: there is but one */
     opening_kind kind;
-    const cli_table *table;
+    const drape_registry *table;
     const char *const *one_of, *const *all_of; /* but where `preset` says them: at most one, all or none */
     const char *preset;
 } openings[] = {
-    {"term", "type", ROW_PARAMS, &cli_terms, NULL, NULL, NULL},
-    {"mesh", "grid", ROW_PARAMS, &cli_grids, NULL, NULL, NULL},
-    {"collider", "type", ROW_PARAMS, &cli_colliders, NULL, NULL, NULL},
-    {"self_contact", NULL, ROW_PARAMS, &cli_self_contacts, NULL, NULL, NULL},
-    {"contact", NULL, ROW_PARAMS, &cli_contacts, NULL, NULL, NULL},
-    {"integrator", "method", TABLE_PARAMS, &cli_integrators, NULL, NULL, NULL},
-    {"controller", "type", TABLE_PARAMS, &cli_controllers, NULL, NULL, NULL},
-    {"material", NULL, ROW_PARAMS, &cli_materials,
+    {"term", "type", ENTRY_PARAMS, &drape_term_registry, NULL, NULL, NULL},
+    {"mesh", "grid", ENTRY_PARAMS, &drape_grid_registry, NULL, NULL, NULL},
+    {"collider", "type", ENTRY_PARAMS, &drape_collider_registry, NULL, NULL, NULL},
+    {"self_contact", NULL, ENTRY_PARAMS, &drape_self_contact_registry, NULL, NULL, NULL},
+    {"contact", NULL, ENTRY_PARAMS, &drape_contact_registry, NULL, NULL, NULL},
+    {"integrator", "method", TABLE_PARAMS, &drape_integrator_registry, NULL, NULL, NULL},
+    {"controller", "type", TABLE_PARAMS, &drape_controller_registry, NULL, NULL, NULL},
+    {"material", NULL, ENTRY_PARAMS, &drape_material_registry,
      (const char *const[]){"density", "areal_density", "total_mass", NULL},
      (const char *const[]){"young_modulus", "thickness", NULL}, "fabric"},
 };
@@ -279,14 +288,14 @@ static const struct opening *opening_of(const drape_scene_object *object)
     return NULL;
 }
 
-/* Words that name rows. */
+/* Names of entries. */
 static json_t *words_of(const drape_scene_object *object, const drape_scene_key *key)
 {
     const struct opening *opening = object->open ? opening_of(object) : NULL;
     if (opening && opening->key && strcmp(opening->key, key->name) == 0)
-        return row_names(opening->table, false);
+        return entry_names(opening->table, false);
     if (strcmp(object->name, "output") == 0 && strcmp(key->name, "formats") == 0)
-        return row_names(&cli_exporters, false);
+        return entry_names(&drape_exporter_registry, false);
     return key->words ? one_of_words(key->words) : word();
 }
 
@@ -299,9 +308,9 @@ static json_t *ranged(const drape_scene_key *key, const char *type, const char *
     return with(with(typed(type), least, number(key->min)), "maximum", number(key->max));
 }
 
-static json_t *row_or_name(const drape_scene_key *key)
+static json_t *entry_or_name(const drape_scene_key *key)
 {
-    return any_of(row_names(opening_of(key->child)->table, true), object_schema(key->child));
+    return any_of(entry_names(opening_of(key->child)->table, true), object_schema(key->child));
 }
 
 static json_t *key_value(const drape_scene_object *object, const drape_scene_key *key)
@@ -341,7 +350,7 @@ static json_t *key_value(const drape_scene_object *object, const drape_scene_key
     case DRAPE_SCENE_OBJECTS:
         return array_of(object_schema(key->child), key->at_least, 0);
     case DRAPE_SCENE_ROWS:
-        return array_of(row_or_name(key), key->at_least, 0);
+        return array_of(entry_or_name(key), key->at_least, 0);
     }
     return NULL;
 }
@@ -350,11 +359,10 @@ static json_t *key_value(const drape_scene_object *object, const drape_scene_key
 static bool key_is_required(const drape_scene_key *key)
 {
     const struct opening *opening = key->kind == DRAPE_SCENE_OBJECT ? opening_of(key->child) : NULL;
-    cli_row row;
     if (key->optional)
         return false;
-    return key->required || (opening && !opening->key && opening->table->row(0, &row) &&
-                             (needs_params(&row) || opening->all_of));
+    return key->required ||
+           (opening && !opening->key && (needs_params(opening->table->entries[0]) || opening->all_of));
 }
 
 /* ---- Objects ---- */
@@ -398,11 +406,11 @@ static json_t *closed(json_t *properties, json_t *required)
     return with(object, "additionalProperties", json_false());
 }
 
-/* An object in which `key` names the row. */
-static json_t *row_schema(const drape_scene_object *object, const char *key, const cli_row *row)
+/* An object in which `key` names the entry. */
+static json_t *entry_schema(const drape_scene_object *object, const char *key, const drape_entry *entry)
 {
-    json_t *name =
-        with(with(json_object(), "const", json_string(row->name)), "description", json_string(row->summary));
+    json_t *name = with(with(json_object(), "const", json_string(entry->name)), "description",
+                        json_string(entry->summary));
     json_t *properties = with(properties_of(object, key), key, name);
     json_t *required = required_of(object);
     bool named = false;
@@ -410,7 +418,7 @@ static json_t *row_schema(const drape_scene_object *object, const char *key, con
         named = named || strcmp(json_string_value(json_array_get(required, i)), key) == 0;
     if (!named)
         required = and_also(required, json_string(key));
-    return closed(with_params(properties, row), with_required(required, row));
+    return closed(with_params(properties, entry), with_required(required, entry));
 }
 
 /* Without the key that opens the object: one of its alternatives. */
@@ -425,25 +433,25 @@ static json_t *with_closed_forms(json_t *forms, const drape_scene_object *object
     return forms;
 }
 
-static json_t *rows_schema(const drape_scene_object *object, const struct opening *opening)
+static json_t *entries_schema(const drape_scene_object *object, const struct opening *opening)
 {
     json_t *forms = json_array();
-    cli_row row;
-    for (int i = 0; opening->table->row(i, &row); i++)
-        if (!row.implied)
-            forms = and_also(forms, row_schema(object, opening->key, &row));
+    const drape_entry *entry;
+    for (int i = 0; (entry = opening->table->entries[i]) != NULL; i++)
+        if (!is_implied(opening->table, i))
+            forms = and_also(forms, entry_schema(object, opening->key, entry));
     return with(json_object(), "anyOf", with_closed_forms(forms, object));
 }
 
-/* Parameters of all rows of the table; for a table of one row that has no name, they are its own. */
+/* Parameters of all entries of the table; for a table of one entry that has no name, they are its own. */
 static json_t *table_schema(const drape_scene_object *object, const struct opening *opening)
 {
     json_t *properties = properties_of(object, NULL), *required = required_of(object);
-    cli_row row;
-    for (int i = 0; opening->table->row(i, &row); i++) {
-        properties = with_params(properties, &row);
-        if (opening->kind == ROW_PARAMS)
-            required = with_required(required, &row);
+    const drape_entry *entry;
+    for (int i = 0; (entry = opening->table->entries[i]) != NULL; i++) {
+        properties = with_params(properties, entry);
+        if (opening->kind == ENTRY_PARAMS)
+            required = with_required(required, entry);
     }
     return closed(properties, required);
 }
@@ -463,8 +471,8 @@ static json_t *with_preset(json_t *schema, const struct opening *opening)
 static json_t *object_schema(const drape_scene_object *object)
 {
     const struct opening *opening = object->open ? opening_of(object) : NULL;
-    if (opening && opening->kind == ROW_PARAMS && opening->key)
-        return rows_schema(object, opening);
+    if (opening && opening->kind == ENTRY_PARAMS && opening->key)
+        return entries_schema(object, opening);
     json_t *schema =
         opening ? table_schema(object, opening) : closed(properties_of(object, NULL), required_of(object));
     const char *const *one_of = opening && opening->one_of ? opening->one_of : object->one_of;

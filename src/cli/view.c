@@ -265,14 +265,12 @@ bool view_scale_dt(cli_view *v, double factor)
     return good;
 }
 
-/* Rows without motion in time have nothing to show. */
+/* Integrators without motion in time have nothing to show. */
 bool view_next_integrator(cli_view *v, int step)
 {
     const char *now = view_integrator(v);
-    int count = 0, at = 0;
-    for (; drape_integrators[count]; count++)
-        if (strcmp(drape_integrators[count]->entry.name, now) == 0)
-            at = count;
+    const int count = drape_registry_count(&drape_integrator_registry);
+    int at = drape_registry_find(&drape_integrator_registry, NULL, now);
     do
         at = (at + step + count) % count;
     while (drape_integrators[at]->timeless);

@@ -1,12 +1,13 @@
 /* colliders.h: the table of colliders, and what their users need: where one is, how far a point is from it.
  *
- * A row is the constant drape_collider_<word> of collider_<word>.c; its interface is drape/extend.h. */
+ * A collider is the constant drape_collider_<name> of collider_<name>.c; its interface is drape/extend.h. */
 #ifndef DRAPE_COLLIDERS_COLLIDERS_H
 #define DRAPE_COLLIDERS_COLLIDERS_H
 
 #include "model/model.h"
 
 extern const drape_collider_ops *const drape_colliders[]; /* NULL-ended */
+extern const drape_registry drape_collider_registry;
 
 /* ---- For those who meet colliders ---- */
 

@@ -1,4 +1,4 @@
-/* build_terms.c: rows by name, their parameters, their elements; laws are tied to the measures of their
+/* build_terms.c: terms by name, their parameters, their elements; laws are tied to the measures of their
  * cloth. */
 #include "compile/stages.h"
 #include "terms/terms.h"
@@ -6,8 +6,6 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-
-#define MAX_NAMES 128
 
 struct drape_term_builder {
     drape_model *model;
@@ -74,32 +72,15 @@ drape_status drape_term_refuse(drape_term_builder *builder, const char *format, 
     return drape_fail_at(builder->model->ctx, DRAPE_E_ARGUMENT, builder->pointer, "%s", text);
 }
 
-/* Row i of the built-in rows followed by the host's; NULL past the last. */
-static const drape_term_ops *row(const drape_context *ctx, int i)
+static drape_status find_term(drape_context *ctx, const char *pointer, const char *name,
+                              const drape_term_ops **out)
 {
-    int built_in = 0;
-    while (drape_terms[built_in])
-        built_in++;
-    if (i < built_in)
-        return drape_terms[i];
-    return i - built_in < ctx->host_term_count ? &ctx->host_terms[i - built_in] : NULL;
-}
-
-static drape_status find_row(drape_context *ctx, const char *pointer, const char *name,
-                             const drape_term_ops **out)
-{
-    const char *names[MAX_NAMES];
-    size_t count = 0;
-    for (int i = 0; (*out = row(ctx, i)) != NULL; i++) {
-        if (strcmp((*out)->entry.name, name) == 0)
-            return DRAPE_OK;
-        if (count < MAX_NAMES)
-            names[count++] = (*out)->entry.name;
-    }
-    const char *meant = drape_did_you_mean(name, names, count);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
-                         "there is no term \"%.60s\"%s%s%s; `drape list` shows all", name,
-                         DRAPE_MEANT(meant));
+    const int built_in = drape_registry_count(&drape_term_registry);
+    int i;
+    drape_status status = drape_registry_choose(ctx, &drape_term_registry, pointer, name, &i);
+    if (!status)
+        *out = i < built_in ? drape_terms[i] : &ctx->host_terms[i - built_in];
+    return status;
 }
 
 static drape_cloth_view view_of(const drape_model *model, const drape_cloth *cloth)
@@ -160,7 +141,7 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
     drape_cloth *cloth = &model->cloths[c];
     drape_status status = drape_heed(model->ctx);
     if (!status)
-        status = find_row(model->ctx, pointer, def->type, &term->ops);
+        status = find_term(model->ctx, pointer, def->type, &term->ops);
     for (int32_t i = 0; !status && i < model->term_count; i++)
         if (model->terms[i].cloth == c && model->terms[i].ops == term->ops)
             status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "the term \"%s\" is named twice",
@@ -314,10 +295,8 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *gi
             "initial with has_internal; damped with a measure alone, in_medium with a dissipation; "
             "at most %d values of parameters, each with name and unit, a choice with choices",
             ops->entry.name ? ops->entry.name : "?", DRAPE_MAX_ELEMENT_NODES, DRAPE_MAX_PARAMS);
-    const drape_term_ops *other = NULL;
-    for (int i = 0; (other = row(ctx, i)) != NULL; i++)
-        if (strcmp(other->entry.name, ops->entry.name) == 0)
-            return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a term \"%s\" already", ops->entry.name);
+    if (drape_registry_find(&drape_term_registry, ctx, ops->entry.name) >= 0)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a term \"%s\" already", ops->entry.name);
     if (ctx->host_term_count == DRAPE_MAX_HOST_TERMS)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "term \"%s\": a context holds at most %d terms of the host",
                           ops->entry.name, DRAPE_MAX_HOST_TERMS);

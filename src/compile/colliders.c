@@ -1,45 +1,27 @@
-/* colliders.c: rows by name, their parameters, shapes and tracks. */
+/* colliders.c: colliders by name, their parameters, shapes and tracks. */
 #include "colliders/colliders.h"
 #include "compile/stages.h"
 
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_NAMES     128
 #define MOST_FRICTION 1e3
 
 /* How far a polygon may stay inside a curved surface, of the activation distance: an edge of the cloth that
  * rests on a polygon then is pushed off nearly as if it were the surface. */
 #define SHARE_OF_DISTANCE 0.1
 
-/* Row i of the built-in rows followed by the host's; NULL past the last. */
-static const drape_collider_ops *row(const drape_context *ctx, int i)
+static drape_status find_collider(drape_context *ctx, const char *pointer, const char *name,
+                                  const drape_collider_ops **out)
 {
-    int built_in = 0;
-    while (drape_colliders[built_in])
-        built_in++;
-    if (i < built_in)
-        return drape_colliders[i];
-    return i - built_in < ctx->host_collider_count ? &ctx->host_colliders[i - built_in] : NULL;
-}
-
-static drape_status find_row(drape_context *ctx, const char *pointer, const char *name,
-                             const drape_collider_ops **out)
-{
-    const char *names[MAX_NAMES];
+    const int built_in = drape_registry_count(&drape_collider_registry);
     char at[96];
-    size_t count = 0;
-    for (int i = 0; (*out = row(ctx, i)) != NULL; i++) {
-        if (strcmp((*out)->entry.name, name) == 0)
-            return DRAPE_OK;
-        if (count < MAX_NAMES)
-            names[count++] = (*out)->entry.name;
-    }
-    const char *meant = drape_did_you_mean(name, names, count);
+    int i;
     snprintf(at, sizeof at, "%s/type", pointer);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at,
-                         "there is no collider \"%.60s\"%s%s%s; `drape list` shows all", name,
-                         DRAPE_MEANT(meant));
+    drape_status status = drape_registry_choose(ctx, &drape_collider_registry, at, name, &i);
+    if (!status)
+        *out = i < built_in ? drape_colliders[i] : &ctx->host_colliders[i - built_in];
+    return status;
 }
 
 static drape_status name_collider(drape_model *model, const char *pointer, const char *given,
@@ -78,7 +60,7 @@ static drape_status compile_collider(drape_model *model, size_t i, const drape_s
     snprintf(pointer, sizeof pointer, "/colliders/%zu", i);
     drape_status status = name_collider(model, pointer, def->name, to);
     if (!status)
-        status = find_row(model->ctx, pointer, def->row.type, &to->ops);
+        status = find_collider(model->ctx, pointer, def->row.type, &to->ops);
     if (!status)
         status = take_friction(model, pointer, def->friction, to);
     if (!status)
@@ -121,7 +103,6 @@ static bool well_formed(const drape_collider_ops *ops)
 drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *given)
 {
     drape_collider_ops own = {0}, *ops = &own;
-    const drape_collider_ops *other = NULL;
     if (!ctx)
         return DRAPE_E_ARGUMENT;
     if (!given)
@@ -138,9 +119,8 @@ drape_status drape_context_add_collider(drape_context *ctx, const drape_collider
             "the ops of collider \"%s\" are not well formed: name, summary, reference, shape, "
             "distance; at most %d values of parameters, each with name and unit, a choice with choices",
             ops->entry.name ? ops->entry.name : "?", DRAPE_MAX_PARAMS);
-    for (int i = 0; (other = row(ctx, i)) != NULL; i++)
-        if (strcmp(other->entry.name, ops->entry.name) == 0)
-            return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a collider \"%s\" already", ops->entry.name);
+    if (drape_registry_find(&drape_collider_registry, ctx, ops->entry.name) >= 0)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a collider \"%s\" already", ops->entry.name);
     if (ctx->host_collider_count == DRAPE_MAX_HOST_COLLIDERS)
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
                           "collider \"%s\": a context holds at most %d colliders of the host",

@@ -1,7 +1,8 @@
-/* compile.h: scene + rows -> model. The only place that looks rows up while a model is built. */
+/* compile.h: scene -> model. The only place that looks up names while a model is built. */
 #ifndef DRAPE_COMPILE_COMPILE_H
 #define DRAPE_COMPILE_COMPILE_H
 
+#include "base/registry.h"
 #include "model/model.h"
 
 /* The parameters of a material, in this order. */
@@ -29,6 +30,10 @@ enum {
 enum { DRAPE_SELF_THICKNESS, DRAPE_SELF_FRICTION, DRAPE_SELF_PARAM_COUNT };
 extern const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT];
 extern const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT];
+
+/* What has parameters and no kinds: a table of one entry each. */
+extern const drape_registry drape_material_registry, drape_contact_registry, drape_self_contact_registry;
+
 void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_CONTACT_PARAM_COUNT]);
 void drape_self_contact_values(const drape_contact_def *contact, double values[DRAPE_SELF_PARAM_COUNT]);
 

@@ -38,6 +38,6 @@ typedef struct drape_controller_ops {
 } drape_controller_ops;
 
 extern const drape_controller_ops *const drape_controllers[]; /* NULL-ended */
-extern const char *const drape_controllers_words[];
+extern const drape_registry drape_controller_registry;
 
 #endif

@@ -1,6 +1,6 @@
 /*
- * fields.h: what can be told of a moment at each node, for pictures and for files that have fields. A row is the
- * constant drape_field_<word> of field_<word>.c.
+ * fields.h: what can be told of a moment at each node, for pictures and for files that have fields. A field is the
+ * constant drape_field_<name> of field_<name>.c.
  */
 #ifndef DRAPE_FIELDS_FIELDS_H
 #define DRAPE_FIELDS_FIELDS_H
@@ -20,5 +20,6 @@ typedef struct drape_field_ops {
 } drape_field_ops;
 
 extern const drape_field_ops *const drape_fields[]; /* NULL-ended */
+extern const drape_registry drape_field_registry;
 
 #endif

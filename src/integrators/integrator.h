@@ -1,6 +1,6 @@
 /*
- * integrator.h: time integrators as rows of one table. A row is the constant drape_integrator_<word> of
- * <word>.c. step(in, out) never writes in: rejecting a step is forgetting out.
+ * integrator.h: time integrators, the entries of one table. An integrator is the constant drape_integrator_<name> of
+ * <name>.c. step(in, out) never writes in: rejecting a step is forgetting out.
  */
 #ifndef DRAPE_INTEGRATORS_INTEGRATOR_H
 #define DRAPE_INTEGRATORS_INTEGRATOR_H
@@ -8,6 +8,7 @@
 #include "assemble/system.h"
 #include "base/archive.h"
 #include "base/param.h"
+#include "base/registry.h"
 
 /* What a step has to say of itself. */
 typedef struct drape_step_info {
@@ -92,6 +93,6 @@ typedef struct drape_integrator_ops {
 } drape_integrator_ops;
 
 extern const drape_integrator_ops *const drape_integrators[]; /* NULL-ended */
-extern const char *const drape_integrators_words[];
+extern const drape_registry drape_integrator_registry;
 
 #endif

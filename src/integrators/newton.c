@@ -111,7 +111,7 @@ const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {
                                     .kind = DRAPE_PARAM_CHOICE,
                                     .unit = "1",
                                     .default_value = 0,
-                                    .choices = drape_linears_words,
+                                    .choices = drape_linears_names,
                                     .help = "a row of the linear solvers"},
     [DRAPE_NEWTON_LINEAR_TOLERANCE] = {.name = "linear_tolerance",
                                        .unit = "1",

@@ -3,6 +3,7 @@
 #define DRAPE_IO_EXPORT_H
 
 #include "base/archive.h"
+#include "base/registry.h"
 #include "io/file.h"
 
 /* What is written where, known before the first frame. All of it lives until close. */
@@ -63,11 +64,7 @@ typedef struct drape_exporter_ops {
     drape_status (*close)(drape_context *ctx, void *state);
 } drape_exporter_ops;
 extern const drape_exporter_ops *const drape_exporters[]; /* NULL-ended */
-
-/* The row of a name. Errors: DRAPE_E_ARGUMENT at pointer ("/output/formats/0", or "" for none), with the
- * names that there are. */
-drape_status drape_exporter_find(drape_context *ctx, const char *pointer, const char *name,
-                                 const drape_exporter_ops **out);
+extern const drape_registry drape_exporter_registry;
 
 /* ---- For formats with one file, folder/NAME ---- */
 

@@ -274,10 +274,10 @@ static drape_export_def def_of(const drape_sim *sim, const char *folder)
 drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, const char *pointer,
                                   const char *format)
 {
-    const drape_exporter_ops *ops;
     const drape_export_def def = def_of(sim, NULL);
-    drape_status status = drape_exporter_find(ctx, pointer, format, &ops);
-    return status || !ops->check ? status : ops->check(ctx, pointer, &def);
+    int i;
+    drape_status status = drape_registry_choose(ctx, &drape_exporter_registry, pointer, format, &i);
+    return status || !drape_exporters[i]->check ? status : drape_exporters[i]->check(ctx, pointer, &def);
 }
 
 static bool is_chosen(const drape_recorder *r, const drape_exporter_ops *ops)
@@ -294,12 +294,11 @@ static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *
     if (!r->outputs)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < def->format_count; i++) {
-        const drape_exporter_ops *ops;
         drape_status status = drape_recorder_check(r->ctx, r->sim, "", def->formats[i]);
-        if (!status)
-            status = drape_exporter_find(r->ctx, "", def->formats[i], &ops);
         if (status)
             return status;
+        const drape_exporter_ops *ops =
+            drape_exporters[drape_registry_find(&drape_exporter_registry, NULL, def->formats[i])];
         if (is_chosen(r, ops))
             continue;
         output *o = &r->outputs[r->output_count++];

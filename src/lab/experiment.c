@@ -2,7 +2,6 @@
 #include "drape/lab.h"
 
 #include "base/hash.h"
-#include "base/param.h"
 #include "integrators/integrator.h"
 #include "io/file.h"
 #include "lab/grid.h"
@@ -99,22 +98,15 @@ bool lab_wants_integrator(const lab *l, const char *name, bool fallback)
 
 drape_status lab_check_integrators(const lab *l)
 {
-    size_t count = 0;
-    while (drape_integrators_words[count])
-        count++;
     for (size_t i = 0; i < l->def->integrator_count; i++) {
         const char *name = l->def->integrators[i];
-        size_t k = 0;
-        while (k < count && strcmp(drape_integrators_words[k], name) != 0)
-            k++;
-        if (k == count) {
-            const char *meant = drape_did_you_mean(name, drape_integrators_words, count);
-            return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "there is no integrator \"%.60s\"%s%s%s", name,
-                              DRAPE_MEANT(meant));
-        }
-        if (lab_find_integrator(name)->timeless)
+        int k;
+        drape_status status = drape_registry_choose(l->ctx, &drape_integrator_registry, "", name, &k);
+        if (status)
+            return status;
+        if (drape_integrators[k]->timeless)
             return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
-                              "\"%s\" has no steps in time: %s is of rows that have", name,
+                              "\"%s\" has no steps in time: %s needs integrators that have them", name,
                               l->experiment->entry.name);
     }
     return DRAPE_OK;
@@ -361,12 +353,13 @@ static void end(lab *l, drape_lab_outcome *outcome)
     lab_probe_free(&l->probe);
 }
 
-static const lab_experiment_ops *find(const char *name)
+static drape_status find(lab *l, const char *name)
 {
-    for (int i = 0; lab_experiments[i]; i++)
-        if (strcmp(lab_experiments[i]->entry.name, name) == 0)
-            return lab_experiments[i];
-    return NULL;
+    int i;
+    drape_status status = drape_registry_choose(l->ctx, &lab_experiment_registry, "", name, &i);
+    if (!status)
+        l->experiment = lab_experiments[i];
+    return status;
 }
 
 static drape_status check_def(drape_context *ctx, const drape_lab_def *def)
@@ -398,9 +391,8 @@ drape_status drape_lab_run(drape_context *ctx, const char *experiment, const dra
         return status;
     locale_t old = drape_locale_enter();
     status = begin(ctx, def, def->folder, &l);
-    l.experiment = find(experiment);
-    if (!status && !l.experiment)
-        status = drape_fail(ctx, DRAPE_E_ARGUMENT, "there is no experiment \"%.60s\"", experiment);
+    if (!status)
+        status = find(&l, experiment);
     if (!status)
         status = plan(&l);
     if (!status)
@@ -429,8 +421,7 @@ static drape_status read_folders(lab *l, const char *const *folders, size_t coun
         return status;
     l->cases = json_object_get(l->about, "cases");
     l->arguments = json_object_get(l->about, "arguments");
-    l->experiment = find(word_of(l->about, "experiment"));
-    if (!l->experiment || !json_is_array(l->cases))
+    if (find(l, word_of(l->about, "experiment")) || !json_is_array(l->cases))
         return drape_fail(l->ctx, DRAPE_E_PARSE, "%.400s/" ABOUT ": it is no experiment", folders[0]);
     status = make_results(l);
     for (size_t i = 0; !status && i < count; i++) {

@@ -13,10 +13,8 @@ bool lab_has_param(const drape_param *params, int count, const char *name)
 
 const drape_integrator_ops *lab_find_integrator(const char *name)
 {
-    for (int i = 0; drape_integrators[i]; i++)
-        if (strcmp(drape_integrators[i]->entry.name, name) == 0)
-            return drape_integrators[i];
-    return NULL;
+    const int i = drape_registry_find(&drape_integrator_registry, NULL, name);
+    return i < 0 ? NULL : drape_integrators[i];
 }
 
 bool lab_ignores(const drape_integrator_ops *row, const char *pointer)

@@ -1,17 +1,17 @@
 /*
- * lab.h: what the experiments share. An experiment is a row: it plans cases, prepares what all of them are
+ * lab.h: what the experiments share. An experiment plans cases, prepares what all of them are
  * compared with, and reports. Cases and results are JSON from the start, as they are in the files: a report
  * is a function of experiment.json and of the lines, so what was run elsewhere or before needs no exception.
  *
  *     experiment.json   {"experiment", "drape", "scene", "scene_hash", "settings", "arguments", "cases": [case...]}
  *     case              {"tags": {what it is called}, "settings": {pointer: value}}, and "same_as": N where a
- *                       row ignores what distinguishes it from case N
+ *                       method ignores what distinguishes it from case N
  *     cases.jsonl       a result a line: {"case": N, "tags": {...}, "status": ..., what was measured}
  */
 #ifndef DRAPE_LAB_LAB_H
 #define DRAPE_LAB_LAB_H
 
-#include "base/context.h"
+#include "base/registry.h"
 #include "drape/lab.h"
 #include "lab/trace.h"
 
@@ -35,6 +35,7 @@ typedef struct lab_experiment_ops {
 } lab_experiment_ops;
 
 extern const lab_experiment_ops *const lab_experiments[]; /* NULL-ended */
+extern const drape_registry lab_experiment_registry;
 
 struct lab {
     drape_context *ctx;

@@ -45,11 +45,12 @@ json_t *lab_record_json(const lab_record *record)
     const drape_reference *r = record->reference;
     const drape_validation *v = &record->v;
     return json_pack("{s:s, s:s, s:s, s:s*, s:s, s:s, s:f, s:o, s:o, s:o, s:o, s:f, s:s, s:s, s:f}", "name",
-                     r->name, "quantity", r->quantity, "unit", r->unit, "parameter", r->parameter, "model",
-                     r->model, "source", r->source, "value", v->parameter, "expected", number(v->expected),
-                     "documented", number(v->documented), "obtained", number(v->obtained), "error",
-                     number(v->obtained / v->expected - 1), "tolerance", r->tolerance, "verdict",
-                     verdicts[v->verdict], "message", v->message, "cpu_s", v->seconds);
+                     r->entry.name, "quantity", r->entry.summary, "unit", r->unit, "parameter", r->parameter,
+                     "model", r->model, "source", r->entry.reference, "value", v->parameter, "expected",
+                     number(v->expected), "documented", number(v->documented), "obtained",
+                     number(v->obtained), "error", number(v->obtained / v->expected - 1), "tolerance",
+                     r->tolerance, "verdict", verdicts[v->verdict], "message", v->message, "cpu_s",
+                     v->seconds);
 }
 
 static void put_line(drape_file *file, const lab_record *record)
@@ -82,7 +83,7 @@ static bool is_of(const json_t *line, const lab_record *record)
 {
     char digits[17];
     const drape_reference *r = record->reference;
-    if (!says(line, "name", r->name) || value_of(line, "value") != r->parameters[record->index] ||
+    if (!says(line, "name", r->entry.name) || value_of(line, "value") != r->parameters[record->index] ||
         !says(line, "drape", drape_version()))
         return false;
     hash_of(record, digits);

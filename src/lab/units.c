@@ -1,6 +1,6 @@
 /*
  * units.c: see units.h. A pointer says in which table a name is to be looked for, "/cloth/0/terms/2/stiffness" in that of
- * terms, not in which row: that is in the scene. Where rows that have the name give it different units, there is none.
+ * terms, not in which term: that is in the scene. Where entries that have the name give it different units, there is none.
  */
 #include "lab/units.h"
 
@@ -13,72 +13,34 @@
 
 #include <string.h>
 
-/* The parameters of one row of a table; NULL: there are no more rows. */
-typedef const drape_param *params_of(int row, int *count);
-
-#define PARAMS_OF(name, table)                                                                               \
-    static const drape_param *name(int row, int *count)                                                      \
-    {                                                                                                        \
-        static const drape_param none;                                                                       \
-        if (!(table)[row])                                                                                   \
-            return NULL;                                                                                     \
-        *count = (table)[row]->entry.param_count;                                                            \
-        return (table)[row]->entry.params ? (table)[row]->entry.params : &none;                              \
-    }
-
-PARAMS_OF(grids, drape_grids)
-PARAMS_OF(terms, drape_terms)
-PARAMS_OF(colliders, drape_colliders)
-PARAMS_OF(integrators, drape_integrators)
-PARAMS_OF(controllers, drape_controllers)
-
-static const drape_param *materials(int row, int *count)
-{
-    *count = DRAPE_MATERIAL_PARAM_COUNT;
-    return row == 0 ? drape_material_params : NULL;
-}
-
-static const drape_param *contacts(int row, int *count)
-{
-    *count = DRAPE_CONTACT_PARAM_COUNT;
-    return row == 0 ? drape_contact_params : NULL;
-}
-
-static const drape_param *self_contacts(int row, int *count)
-{
-    *count = DRAPE_SELF_PARAM_COUNT;
-    return row == 0 ? drape_self_contact_params : NULL;
-}
-
 static const struct {
     const char *part; /* of the pointer */
-    params_of *params;
-} tables[] = {{"/mesh/", grids},
-              {"/material/", materials},
-              {"/terms/", terms},
-              {"/colliders/", colliders},
-              {"/contact/", contacts},
-              {"/self_contact/", self_contacts},
-              {"/integrator/", integrators},
-              {"/controller/", controllers}};
+    const drape_registry *registry;
+} tables[] = {{"/mesh/", &drape_grid_registry},
+              {"/material/", &drape_material_registry},
+              {"/terms/", &drape_term_registry},
+              {"/colliders/", &drape_collider_registry},
+              {"/contact/", &drape_contact_registry},
+              {"/self_contact/", &drape_self_contact_registry},
+              {"/integrator/", &drape_integrator_registry},
+              {"/controller/", &drape_controller_registry}};
 
-/* Values of the scene that are no row's, by how their pointers begin. */
+/* Values of the scene that are not in a table, by how their pointers begin. */
 static const struct {
     const char *start, *unit;
 } plain[] = {{"/gravity", "m/s2"}, {"/duration", "s"}, {"/frame_rate", "1/s"}};
 
-static const char *unit_in(params_of *params, const char *name)
+static const char *unit_in(const drape_registry *registry, const char *name)
 {
     const char *unit = NULL;
-    const drape_param *list;
-    int count;
-    for (int row = 0; (list = params(row, &count)); row++)
-        for (int p = 0; p < count; p++) {
-            if (strcmp(list[p].name, name) != 0)
+    const drape_entry *entry;
+    for (int i = 0; (entry = registry->entries[i]) != NULL; i++)
+        for (int p = 0; p < entry->param_count; p++) {
+            if (strcmp(entry->params[p].name, name) != 0)
                 continue;
-            if (unit && strcmp(unit, list[p].unit) != 0)
+            if (unit && strcmp(unit, entry->params[p].unit) != 0)
                 return "";
-            unit = list[p].unit;
+            unit = entry->params[p].unit;
         }
     return unit && strcmp(unit, "1") != 0 ? unit : "";
 }
@@ -90,6 +52,6 @@ const char *lab_unit(const char *pointer)
             return plain[i].unit;
     for (size_t i = 0; i < sizeof tables / sizeof *tables; i++)
         if (strstr(pointer, tables[i].part))
-            return unit_in(tables[i].params, strrchr(pointer, '/') + 1);
+            return unit_in(tables[i].registry, strrchr(pointer, '/') + 1);
     return "";
 }

@@ -2,6 +2,7 @@
 #ifndef DRAPE_LAB_VALIDATE_H
 #define DRAPE_LAB_VALIDATE_H
 
+#include "base/registry.h"
 #include "sim/sim.h"
 
 /* Whether to stop. Called after every step: it must only look. */
@@ -30,12 +31,12 @@ typedef enum drape_outcome {
     DRAPE_OUTCOME_STOPPED     /* the simulation did */
 } drape_outcome;
 
-/* One reference: a row. Its cases differ in one parameter. */
+/* A reference. Its cases differ in one parameter. */
 typedef struct drape_reference {
-    const char *name, *quantity, *unit;
-    const char *parameter; /* what the cases differ in; NULL: nothing */
-    const char *model;     /* the terms and the mesh */
-    const char *source;
+    drape_entry entry;        /* summary: the quantity; reference: the source of what is expected */
+    const char *unit;         /* of the quantity */
+    const char *parameter;    /* what the cases differ in; NULL: nothing */
+    const char *model;        /* the terms and the mesh */
     double tolerance;         /* relative; of the documented value where there is one */
     const double *parameters; /* (case_count) */
     int case_count;
@@ -51,6 +52,7 @@ typedef struct drape_reference {
     double low, high;
 } drape_reference;
 extern const drape_reference *const drape_references[]; /* NULL-ended */
+extern const drape_registry drape_reference_registry;
 
 typedef struct drape_validation {
     double parameter, expected, documented, obtained, error; /* error: relative, of the one it is held to */

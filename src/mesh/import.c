@@ -1,4 +1,4 @@
-/* import.c: reads a mesh file whole into memory and hands it to the row of the imports that its ending names.
+/* import.c: reads a mesh file whole into memory and hands it to the format that its ending names.
  */
 #include <errno.h>
 #include <fcntl.h>

@@ -1,9 +1,9 @@
 /* mesh.h: a triangle mesh at rest: nodes, triangles, unique edges, hinges, areas; where meshes come from is a
- * table of rows. */
+ * table of grids and one of file formats. */
 #ifndef DRAPE_MESH_MESH_H
 #define DRAPE_MESH_MESH_H
 
-#include "base/context.h"
+#include "base/registry.h"
 
 /* One mesh. Arrays are owned; all numbers are 0-based and local to the mesh. */
 typedef struct drape_mesh {
@@ -48,6 +48,7 @@ typedef struct drape_grid_ops {
     drape_status (*generate)(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh);
 } drape_grid_ops;
 extern const drape_grid_ops *const drape_grids[]; /* NULL-ended */
+extern const drape_registry drape_grid_registry;
 
 /* A file format. */
 typedef struct drape_import_ops {
@@ -59,6 +60,7 @@ typedef struct drape_import_ops {
                          drape_mesh *mesh);
 } drape_import_ops;
 extern const drape_import_ops *const drape_imports[]; /* NULL-ended */
+extern const drape_registry drape_import_registry;
 
 /* The stages of making a mesh, each usable alone on a mesh that began as all zeros. On failure they leave it
  * to be freed by drape_mesh_free. The first three are the sources; pointer names the mesh, and faults are

@@ -117,11 +117,3 @@ const char drape_shading_field_source[] =
     "    float form = 0.70 + 0.22 * max(0.0, dot(s.n, s.v)) + 0.16 * s.sun * max(0.0, dot(s.n, light));\n"
     "    return c * min(form, 1.06);\n"
     "}\n";
-
-const drape_shading *drape_shading_find(const char *name)
-{
-    for (int i = 0; drape_shadings[i]; i++)
-        if (strcmp(drape_shadings[i]->entry.name, name) == 0)
-            return drape_shadings[i];
-    return NULL;
-}

@@ -1,6 +1,6 @@
 /*
- * shading.h: the ways to colour cloth, rows of one table. A row is the constant drape_shading_<word> of
- * shade_<word>.c: a function `vec3 shade(Surface s)` in GLSL, in linear RGB, over what shading.c gives to all.
+ * shading.h: how cloth is coloured: the entries of one table. A shading is the constant drape_shading_<name> of
+ * shade_<name>.c: a function `vec3 shade(Surface s)` in GLSL, in linear RGB, over what shading.c gives to all.
  */
 #ifndef DRAPE_RENDER_SHADING_H
 #define DRAPE_RENDER_SHADING_H
@@ -27,10 +27,7 @@ typedef struct drape_shading {
 } drape_shading;
 
 extern const drape_shading *const drape_shadings[]; /* NULL-ended */
-extern const char *const drape_shadings_words[];
-
-/* NULL: there is none of that name. */
-const drape_shading *drape_shading_find(const char *name);
+extern const drape_registry drape_shading_registry;
 
 /* GLSL that all surfaces share: what is known of a point, light, shadow, the world around. NULL-ended. */
 extern const char *const drape_shading_prelude[];

@@ -138,8 +138,8 @@ void drape_sim_describe_build(char *text, size_t size)
     size_t used = (size_t)snprintf(text, size, "Drape %s, compiler %s, SUNDIALS %s, KLU %d.%d.%d%s, solvers",
                                    drape_version(), __VERSION__, SUNDIALS_VERSION, KLU_MAIN_VERSION,
                                    KLU_SUB_VERSION, KLU_SUBSUB_VERSION, METIS);
-    for (int i = 0; drape_linears_words[i] && used < size; i++)
-        used += (size_t)snprintf(text + used, size - used, " %s", drape_linears_words[i]);
+    for (int i = 0; drape_linears_names[i] && used < size; i++)
+        used += (size_t)snprintf(text + used, size - used, " %s", drape_linears_names[i]);
 }
 
 static void archive_build(drape_archive *a)

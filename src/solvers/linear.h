@@ -1,6 +1,6 @@
 /*
- * linear.h: direct and iterative solvers of A x = b for a matrix of a fixed pattern, as rows of one table. A
- * row is the constant drape_linear_<word> of linear_<word>.c. Analysis happens once, in create; factor may be
+ * linear.h: direct and iterative solvers of A x = b for a matrix of a fixed pattern, the entries of one table. A
+ * solver is the constant drape_linear_<name> of linear_<name>.c. Analysis happens once, in create; factor may be
  * called with new values any number of times. Where the sparsity changes, the solver is destroyed and made
  * again. The pattern is symmetric; whether the values are is for the row to see: no caller says it.
  */
@@ -9,6 +9,7 @@
 
 #include "base/archive.h"
 #include "base/crew.h"
+#include "base/registry.h"
 #include "sparse/pattern.h"
 
 typedef struct drape_linear_ops drape_linear_ops;
@@ -60,7 +61,8 @@ struct drape_linear_ops {
 };
 
 extern const drape_linear_ops *const drape_linears[]; /* NULL-ended */
-extern const char *const drape_linears_words[];       /* their names, NULL-ended */
+extern const char *const drape_linears_names[];       /* choices of a parameter, NULL-ended */
+extern const drape_registry drape_linear_registry;
 
 /* Archives a solver; values as in its row, NULL where its last factor failed, too. */
 void drape_linear_archive(const drape_linear_ops *row, void *state, drape_archive *a, const double *values);

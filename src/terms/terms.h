@@ -1,11 +1,12 @@
-/* terms.h: the table of terms. A row is the constant drape_term_<word> of term_<word>.c; its interface is
+/* terms.h: the table of terms. A term is the constant drape_term_<name> of term_<name>.c; its interface is
  * drape/extend.h. */
 #ifndef DRAPE_TERMS_TERMS_H
 #define DRAPE_TERMS_TERMS_H
 
-#include "drape/extend.h"
+#include "base/registry.h"
 
 extern const drape_term_ops *const drape_terms[]; /* NULL-ended */
+extern const drape_registry drape_term_registry;
 
 /* DRAPE_LANES elements from `first` on; beyond the last of count it is repeated. */
 static inline void drape_lanes_elements(int32_t first, int32_t count, int32_t element[DRAPE_LANES])

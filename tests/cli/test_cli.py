@@ -92,7 +92,7 @@ def test_wrong_formats():
     """a wrong format is found before anything is made, by every verb"""
     write_scene(output={"formats": ["npy", "nyp"]})
     for verb in "run", "info", "check":
-        line = refused(verb, "scene.json", says='/output/formats/1: unknown format "nyp"')
+        line = refused(verb, "scene.json", says='/output/formats/1: there is no format "nyp"')
         assert re.match(r"scene\.json:\d+:\d+: ", line), line
     refused("run", "scene.json", "--out", "out", "--format", "npy,objj", says='did you mean "obj"?')
     refused("run", "scene.json", "--out", "out", "--format", "glb", "--frame-rate", "1e6", says="/output/formats/0: glb: 100003 frames of 16 nodes")

@@ -489,10 +489,7 @@ END_TEST
 
 static const drape_controller_ops *row(const char *name)
 {
-    int i = 0;
-    while (strcmp(drape_controllers[i]->entry.name, name) != 0)
-        i++;
-    return drape_controllers[i];
+    return drape_controllers[drape_registry_find(&drape_controller_registry, NULL, name)];
 }
 
 /*

@@ -32,7 +32,7 @@ def sources(files, *tops):
 
 
 def folder_of(path):
-    """src/mesh/rest.c -> mesh; include/drape/drape.h -> drape; src/rows.c.in -> src"""
+    """src/mesh/rest.c -> mesh; include/drape/drape.h -> drape; src/entries.c.in -> src"""
     return path.split("/")[-2]
 
 
@@ -166,7 +166,7 @@ BROKEN = {
 }
 SOUND = {
     **MAP, "src/sim/b.c": '#include "base/a.h"\n#include "sim/a.h"\n#include "drape/drape.h"\n/* printf(x) */ snprintf(x, "exit(1)");\n',
-    "src/sim/meson.build": "sources = ['b.c']\nrows += {'r': ['halving']}\n", "src/sim/control_halving.c": "", "src/cli/main.c": "exit(1);\n",
+    "src/sim/meson.build": "sources = ['b.c']\nentries += {'r': ['halving']}\n", "src/sim/control_halving.c": "", "src/cli/main.c": "exit(1);\n",
     "src/cli/meson.build": "'main.c'\n", "src/README.md": "cli -> sim\nsim -> mesh\nmesh -> base\n", "include/drape/drape.h": '#include "export.h"\n',
     "include/drape/export.h": "__cplusplus visibility\n", "tests/unit/test_a.c": "", "tests/meson.build": "'a'\n"}
 

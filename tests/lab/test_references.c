@@ -11,11 +11,9 @@
 
 static const drape_reference *find(const char *name)
 {
-    for (int i = 0; drape_references[i]; i++)
-        if (strcmp(drape_references[i]->name, name) == 0)
-            return drape_references[i];
-    ck_abort_msg("there is no reference %s", name);
-    return NULL;
+    const int i = drape_registry_find(&drape_reference_registry, NULL, name);
+    ck_assert_msg(i >= 0, "there is no reference %s", name);
+    return drape_references[i];
 }
 
 static drape_validation run(const drape_reference *reference, int index)
@@ -191,8 +189,8 @@ START_TEST(rows_are_whole)
     for (; drape_references[count]; count++) {
         const drape_reference *r = drape_references[count];
         char text[DRAPE_LAB_TEXT];
-        ck_assert(r->name && r->quantity && r->unit && r->model && r->source && r->measure &&
-                  r->tolerance > 0);
+        ck_assert(r->entry.name && r->entry.summary && r->unit && r->model && r->entry.reference &&
+                  r->measure && r->tolerance > 0);
         ck_assert(r->case_count > 0 && (r->case_count == 1 || r->parameter));
         for (int i = 0; i < r->case_count; i++) {
             ck_assert(isfinite(r->expected(r->parameters[i])));

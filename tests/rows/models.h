@@ -224,13 +224,6 @@ static inline void check_params(const drape_param *params, int count)
     }
 }
 
-static inline void check_row(const char *name, const char *summary, const char *reference, bool dots)
-{
-    check_word(name, dots);
-    check_line(summary, "a summary");
-    check_line(reference, "a reference");
-}
-
 /* A generic value of a parameter: its default, or inside of its range where it has none. */
 static inline double generic_value(const drape_param *p)
 {

@@ -186,9 +186,8 @@ START_TEST(rows_are_well_formed)
     int count = 0;
     for (; drape_terms[count]; count++) {
         const drape_term_ops *ops = drape_terms[count];
-        check_row(ops->entry.name, ops->entry.summary, ops->entry.reference, true);
+        ck_assert_ptr_eq(drape_term_registry.entries[count], &ops->entry);
         check_word(ops->element_name, false);
-        check_params(ops->entry.params, ops->entry.param_count);
         ck_assert_uint_eq(ops->struct_size, sizeof *ops);
         ck_assert_int_eq(!!ops->measure + !!ops->energy + !!ops->dissipation + !!ops->law, 1);
         ck_assert(ops->law ? ops->nodes == 0 && !ops->build : ops->build != NULL);
@@ -197,10 +196,8 @@ START_TEST(rows_are_well_formed)
         ck_assert(!ops->dissipation || ops->dissipative);
         ck_assert(!ops->linear || ops->energy);
         ck_assert(!ops->damped || ops->measure);
-        for (int i = 0; i < count; i++)
-            ck_assert_str_ne(ops->entry.name, drape_terms[i]->entry.name);
     }
-    ck_assert_int_ge(count, 5);
+    ck_assert_int_eq(drape_registry_count(&drape_term_registry), count);
 }
 END_TEST
 

@@ -310,9 +310,8 @@ static double estimate(const scene *s, bool velocity, double h, const double pas
         v[k][at] = given[k][1];
         state[k] = (drape_state){.t = (k - 1) * h, .x = x[k], .v = v[k]};
     }
-    const drape_controller_ops *error = drape_controllers[0];
-    for (int i = 0; strcmp(error->entry.name, "error") != 0; i++)
-        error = drape_controllers[i];
+    const drape_controller_ops *error =
+        drape_controllers[drape_registry_find(&drape_controller_registry, NULL, "error")];
     for (int p = 0; p < error->entry.param_count; p++)
         values[p] = error->entry.params[p].default_value;
     values[drape_param_find(error->entry.params, error->entry.param_count, "dt_min")] = 1e-300;

@@ -345,12 +345,13 @@ START_TEST(grid_faults)
     def = equilateral(s, 3, 5e8);
     assert_refused(&def, "/m: node 3 is at (1.5e+09, 0, 0) m; coordinates must be finite and within 1e+09 m");
     def.grid.type = "equilaterale";
-    assert_refused(&def, "/m/grid: unknown grid \"equilaterale\"; known are equilateral, square, irregular, "
-                         "annulus; did you mean "
-                         "\"equilateral\"?");
-    def.grid.type = "hexagons";
     assert_refused(&def,
-                   "/m/grid: unknown grid \"hexagons\"; known are equilateral, square, irregular, annulus");
+                   "/m/grid: there is no grid \"equilaterale\"; there are equilateral, square, irregular, "
+                   "annulus; did you mean "
+                   "\"equilateral\"?");
+    def.grid.type = "hexagons";
+    assert_refused(
+        &def, "/m/grid: there is no grid \"hexagons\"; there are equilateral, square, irregular, annulus");
     def = square(s, 1, 2, "parallel", "vertical");
     assert_refused(&def, "/m/columns: 1 is not allowed; columns is an integer in [2, 134217728]");
     def = square(s, 20000, 20000, "parallel", "vertical");

@@ -237,11 +237,12 @@ END_TEST
 START_TEST(shadings_are_found_by_name)
 {
     for (int i = 0; drape_shadings[i]; i++) {
-        ck_assert_ptr_eq(drape_shading_find(drape_shadings[i]->entry.name), drape_shadings[i]);
+        ck_assert_int_eq(drape_registry_find(&drape_shading_registry, NULL, drape_shadings[i]->entry.name),
+                         i);
         ck_assert(drape_shadings[i]->entry.summary &&
                   strstr(drape_shadings[i]->source, "vec3 shade(Surface s)"));
     }
-    ck_assert_ptr_null(drape_shading_find("lambert"));
+    ck_assert_int_eq(drape_registry_find(&drape_shading_registry, NULL, "lambert"), -1);
 }
 END_TEST
 
