@@ -9,7 +9,7 @@
  * of the other terms of its cloth, such as a damping. The library owns the loops, the sparsity, the scatter,
  * the projection, boundary conditions and threads.
  *
- * Thread-safety: every function of a row may be called from several threads at once on different ranges; it
+ * Thread-safety: every function of a term may be called from several threads at once on different ranges; it
  * must not allocate and must read nothing but its arguments. The exception is build, called once per cloth
  * while a model is compiled.
  */
@@ -45,7 +45,7 @@ typedef struct drape_param {
         *derived; /* with a NaN default: what is taken instead, in words; NULL: the parameter is required */
     double min, max;            /* closed range; ignored by booleans and choices */
     bool open_min, open_max;    /* the bound itself is excluded */
-    const char *const *choices; /* NULL-ended list of words */
+    const char *const *choices; /* NULL-ended list of names */
     const char *help;           /* what it is and what it does, one line */
     bool uniform;               /* VECTOR: one number may stand for three equal ones */
     const char *numbers;        /* VECTOR: what the three are, "[k11, k22, k12]"; NULL: [x, y, z] */
@@ -117,7 +117,7 @@ typedef struct drape_term_builder drape_term_builder;
  * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count);
 
-/* The same for elements of fewer nodes than the row's, on this cloth. A node may stand in several places of an
+/* The same for elements of fewer nodes than the term's, on this cloth. A node may stand in several places of an
  * element, as its first does in places that are left over: its derivatives are the sum of theirs. */
 DRAPE_API drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t element_count, int nodes,
                                                 int rest_count);
@@ -126,7 +126,7 @@ DRAPE_API drape_status drape_term_reserve_nodes(drape_term_builder *builder, int
 DRAPE_API void drape_term_anchor(drape_term_builder *builder);
 
 /* Sets element `element`: its nodes (local to the cloth) and its rest data. Measures keep k [J/q2] in rest[0]
- * and q0 in rest[1]; rows that are damped keep c >= 0 [J s/q2] in rest[2]. */
+ * and q0 in rest[1]; terms that are damped keep c >= 0 [J s/q2] in rest[2]. */
 DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes,
                               const double *rest);
 
@@ -147,7 +147,7 @@ typedef struct drape_elements {
     int rest_count;       /* numbers of rest data an element */
     const int32_t *node;  /* (count x nodes) node numbers of the whole model */
     const double *rest;   /* (rest_count x count): item k of element e is rest[k * count + e] */
-    const double *params; /* values in the order of the row's parameter list */
+    const double *params; /* values in the order of the term's parameters */
 } drape_elements;
 
 /* What a check found, for the message of a rejected step. */
@@ -166,10 +166,10 @@ typedef struct drape_fault {
 #define DRAPE_LANES 4
 
 /*
- * A row. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first + count
+ * A term. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first + count
  * - 1; outputs are element-major: item i belongs to element first + i. d = 3 * nodes. Gradients have the sign
  * of dE/dx, so a force is minus that. x, v: (nodes of the model x 3). internal: (element_count) internal
- * variables of the last accepted state, of rows that have them, else NULL. An output pointer that is NULL is
+ * variables of the last accepted state, of terms that have them, else NULL. An output pointer that is NULL is
  * not wanted.
  */
 typedef struct drape_term_ops {
@@ -246,7 +246,7 @@ typedef struct drape_term_ops {
                      const double *internal, const double *force, double *ddq);
 } drape_term_ops;
 
-/* Registers a term of the host's own: scenes compiled with this context may name it from then on. *ops is copied; what
+/* Registers a user-defined term: scenes compiled with this context may name it from then on. *ops is copied; what
  * it points to must outlive the context and every model compiled with it. Ops of an older, shorter version are read. Errors: DRAPE_E_ARGUMENT (not well formed, name
  * taken, more than 32), DRAPE_E_VERSION (struct_size). */
 DRAPE_API drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *ops);
@@ -260,14 +260,14 @@ typedef void drape_element_energy(const drape_elements *el, int32_t element, con
 DRAPE_API void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                   double *e, double *g, double *hess, drape_element_energy *one);
 
-/* Makes the function measure of a row out of its lanes, for a range of any count. */
+/* Makes the function measure of a term out of its lanes, for a range of any count. */
 typedef void drape_measure_lanes(const drape_elements *el, const int32_t *element, const double *x,
                                  const double *internal, double *q, double *dq, double *ddq);
 DRAPE_API void drape_measure_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                    const double *internal, double *q, double *dq, double *ddq,
                                    drape_measure_lanes *lanes);
 
-/* For rows with pair: d (3 x count) and the distance l (count) of the two nodes of each element. */
+/* For terms with pair: d (3 x count) and the distance l (count) of the two nodes of each element. */
 DRAPE_API void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                    double *l, double *d);
 
@@ -275,7 +275,7 @@ DRAPE_API void drape_pair_distance(const drape_elements *el, int32_t first, int3
 
 /* What of a collider cloth can touch besides its smooth surface, in the collider's own coordinates, with the
  * surface `radius` outside of it: points against the faces of a cloth, segments against its edges, and
- * triangles (rows without a smooth distance) against its nodes. No segment has the length 0. A shape begins
+ * triangles (colliders without a smooth distance) against its nodes. No segment has the length 0. A shape begins
  * as all zeros; arrays are taken by drape_shape_reserve. */
 typedef struct drape_collider_shape {
     int32_t point_count, segment_count, triangle_count; /* of the arrays below */
@@ -284,16 +284,16 @@ typedef struct drape_collider_shape {
     int32_t *triangle; /* (triangle_count x 3) numbers of points, counterclockwise from outside */
     double radius;     /* [m] */
     bool inscribed;    /* of a convex body: its points and segments stay inside of a curved surface */
-    const void *kept;  /* what the row keeps for its distance, of drape_shape_take; NULL for nothing */
+    const void *kept;  /* what the collider keeps for its distance, of drape_shape_take; NULL for nothing */
     struct drape_shape_builder
-        *builder; /* of the functions below; NULL outside of the row's function shape */
+        *builder; /* of the functions below; NULL outside of the collider's function shape */
 } drape_collider_shape;
 
 /* Takes the arrays of a shape; they live as long as the model. Called once. Errors: DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_shape_reserve(drape_collider_shape *shape, int32_t points, int32_t segments,
                                            int32_t triangles);
 
-/* Memory that lives as long as the model, zeroed, for what the row keeps; NULL: return DRAPE_E_MEMORY. */
+/* Memory that lives as long as the model, zeroed, for what the collider keeps; NULL: return DRAPE_E_MEMORY. */
 DRAPE_API void *drape_shape_take(drape_collider_shape *shape, size_t count, size_t size);
 
 /* Refuses a value: the reason is reported at the parameter in the scene. Returns DRAPE_E_ARGUMENT. */
@@ -309,7 +309,7 @@ DRAPE_API drape_status drape_shape_read_mesh(drape_collider_shape *shape, const 
                                              const double translate[3]);
 
 /*
- * A row of the colliders: a rigid, closed obstacle. values: in the order of params; a vector takes three.
+ * A collider: a rigid, closed obstacle. values: in the order of params; a vector takes three.
  * Coordinates are the collider's own: a track moves it as a whole. Thread-safety: as for terms; shape, called
  * once a collider while a model is compiled, may allocate.
  */
@@ -332,7 +332,7 @@ typedef struct drape_collider_ops {
     bool smooth;
 } drape_collider_ops;
 
-/* Registers a collider of the host's own, as drape_context_add_term does a term. Errors: DRAPE_E_ARGUMENT
+/* Registers a user-defined collider, as drape_context_add_term does a term. Errors: DRAPE_E_ARGUMENT
  * (not well formed, name taken, more than 32), DRAPE_E_VERSION (struct_size). */
 DRAPE_API drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *ops);
 

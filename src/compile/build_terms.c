@@ -196,7 +196,7 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
     return status;
 }
 
-/* A row that can damp need not: where all its dashpots are 0 nothing asks for their rates. */
+/* A term that can damp need not: where all its dashpots are 0 nothing asks for their rates. */
 static const double *own_damping(const drape_term *term)
 {
     const drape_elements *el = &term->elements;
@@ -298,7 +298,7 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *gi
     if (drape_registry_find(&drape_term_registry, ctx, ops->entry.name) >= 0)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a term \"%s\" already", ops->entry.name);
     if (ctx->host_term_count == DRAPE_MAX_HOST_TERMS)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "term \"%s\": a context holds at most %d terms of the host",
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "term \"%s\": a context holds at most %d user-defined terms",
                           ops->entry.name, DRAPE_MAX_HOST_TERMS);
     ctx->host_terms[ctx->host_term_count++] = own;
     return DRAPE_OK;

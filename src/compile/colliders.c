@@ -123,7 +123,7 @@ drape_status drape_context_add_collider(drape_context *ctx, const drape_collider
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a collider \"%s\" already", ops->entry.name);
     if (ctx->host_collider_count == DRAPE_MAX_HOST_COLLIDERS)
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
-                          "collider \"%s\": a context holds at most %d colliders of the host",
+                          "collider \"%s\": a context holds at most %d user-defined colliders",
                           ops->entry.name, DRAPE_MAX_HOST_COLLIDERS);
     ctx->host_colliders[ctx->host_collider_count++] = own;
     return DRAPE_OK;

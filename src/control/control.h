@@ -1,6 +1,6 @@
 /*
- * control.h: what to do with an attempted step, as rows of one table. A row is the constant
- * drape_controller_<word> of control_<word>.c.
+ * control.h: what to do with an attempted step. A controller is the constant drape_controller_<name> of
+ * control_<name>.c.
  */
 #ifndef DRAPE_CONTROL_CONTROL_H
 #define DRAPE_CONTROL_CONTROL_H
@@ -16,8 +16,8 @@ typedef enum drape_verdict {
 /* An attempt to be judged, and what the judge has to say. */
 typedef struct drape_trial {
     const drape_model *model;
-    const drape_state
-        *past[2]; /* the states before in, latest first; NULL where there is none, or the row did not ask */
+    const drape_state *past
+        [2]; /* the states before in, latest first; NULL where there is none, or the controller did not ask */
     const drape_state *in, *out;            /* out is of worth only with status 0, or with info->usable */
     int order;                              /* of the integrator */
     double *scratch;                        /* [2] a controller's memory between steps; 0 at first */
@@ -27,7 +27,7 @@ typedef struct drape_trial {
     void *integrator_state;
     drape_step_info *info; /* a controller that rejects sets reason and worst */
     drape_status status;   /* of the attempt; on DRAPE_STOP the negative one to return */
-    double h_next;         /* [s] set on DRAPE_RETRY, and by rows with own_steps on DRAPE_ACCEPT */
+    double h_next;         /* [s] set on DRAPE_RETRY, and by controllers with own_steps on DRAPE_ACCEPT */
 } drape_trial;
 
 typedef struct drape_controller_ops {

@@ -11,7 +11,7 @@
 
 #include "drape/extend.h"
 
-/* What the four parameters of a row, in this order, say of it. */
+/* The parameters of a term that describe such a sheet, in this order. */
 enum {
     DRAPE_ORTHOTROPIC_WARP,
     DRAPE_ORTHOTROPIC_WEFT,

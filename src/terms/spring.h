@@ -1,8 +1,8 @@
 /*
- * spring.h: what the rows of springs share: which pairs of nodes they join, and the spring itself. With
+ * spring.h: what the terms of springs share: which pairs of nodes they join, and the spring itself. With
  * l = |x1 - x0| and n = (x1 - x0)/l
  *     q = l,  E = 1/2 k (l - L)^2,  dashpot c l' = c (v1 - v0).n along n
- * A row is a choice of pairs; the parameters are the same.
+ * A term is a choice of pairs; the parameters are the same.
  */
 #ifndef DRAPE_TERMS_SPRING_H
 #define DRAPE_TERMS_SPRING_H
@@ -51,7 +51,7 @@ drape_status drape_spring_build(const drape_spring_set *set, const double *value
 drape_status drape_spring_build_kind(const drape_cloth_view *cloth, int kind, const double *values,
                                      drape_term_builder *builder);
 
-/* Of the row: see drape_term_ops. */
+/* Functions of the terms: see drape_term_ops. */
 void drape_spring_measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
                           const double *internal, double *q, double *dq, double *ddq);
 void drape_spring_pairs(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,

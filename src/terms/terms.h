@@ -22,7 +22,7 @@ static inline bool drape_fell(double ratio, double before)
     return ratio < before - 1e-12;
 }
 
-/* For check of a row: finds the lowest ratio of all elements, or of every so manyth, that a step is to blame for.
+/* For check of a term: finds the lowest ratio of all elements, or of every so manyth, that a step is to blame for.
  * fault has reason, what and limit on entry. before may be NULL: none is excused. */
 typedef double drape_ratio(const drape_elements *el, int32_t element, const double *x);
 drape_status drape_check_ratios(const drape_elements *el, const double *x, const double *before,
