@@ -99,7 +99,7 @@ def all_is_built(files):
     complaints = []
     for path in files:
         folder, name = os.path.split(path)
-        if not name.endswith(".c") or not re.match(r"src/\w+/|tests/(unit|rows|physics|faults|api)/test_", path):
+        if not name.endswith(".c") or not re.match(r"src/\w+/|tests/(unit|entries|physics|faults|api)/test_", path):
             continue
         list_file = "tests/meson.build" if path.startswith("tests/") else f"{folder}/meson.build"
         if folder == "src/cli" and list_file not in files:

@@ -183,7 +183,7 @@ START_TEST(a_case_can_be_cancelled)
 }
 END_TEST
 
-START_TEST(rows_are_whole)
+START_TEST(entries_are_whole)
 {
     int count = 0;
     for (; drape_references[count]; count++) {
@@ -204,4 +204,4 @@ END_TEST
 
 SUITE("references", expected_values_are_those_of_other_sources, quick_references_pass,
       every_fabric_gives_back_what_its_row_says, a_fabric_has_what_was_published,
-      hinges_show_their_model_error, references_can_fail, a_case_can_be_cancelled, rows_are_whole)
+      hinges_show_their_model_error, references_can_fail, a_case_can_be_cancelled, entries_are_whole)

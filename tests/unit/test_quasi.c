@@ -1,6 +1,6 @@
 /* test_quasi.c: the coarse space, conjugate gradients, and the matrix that stands for a Jacobian. */
+#include "entries/models.h"
 #include "integrators/quasi.h"
-#include "rows/models.h"
 #include "solvers/pcg.h"
 #include "solvers/prolong.h"
 #include "support/scene.h"

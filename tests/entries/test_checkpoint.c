@@ -433,6 +433,6 @@ START_TEST(what_a_host_moves_goes_on)
 }
 END_TEST
 
-SUITE("rows/checkpoint", what_a_host_moves_goes_on, a_sheet_that_buckles_goes_on, what_a_host_did_goes_on,
+SUITE("entries/checkpoint", what_a_host_moves_goes_on, a_sheet_that_buckles_goes_on, what_a_host_did_goes_on,
       an_equilibrium_goes_on, every_integrator_goes_on, every_way_of_newton_goes_on,
       every_linear_solver_goes_on, every_controller_goes_on, cloth_on_cloth_goes_on)

@@ -181,7 +181,7 @@ static double largest(const double *a, size_t n)
  * ---------------------------------------------------------------------------------------------------------
  */
 
-START_TEST(rows_are_well_formed)
+START_TEST(entries_are_well_formed)
 {
     int count = 0;
     for (; drape_terms[count]; count++) {
@@ -609,7 +609,7 @@ START_TEST(projected_jacobians_are_positive)
 }
 END_TEST
 
-SUITE("terms", rows_are_well_formed, derivatives_agree_with_differences, mistakes_are_found,
+SUITE("terms", entries_are_well_formed, derivatives_agree_with_differences, mistakes_are_found,
       dashpots_need_their_number, energy_does_not_change_with_rigid_motion, no_force_at_rest,
       dissipation_takes_power, forces_ahead_agree_with_differences, elements_do_not_depend_on_the_range,
       threads_give_the_same_bits, projected_jacobians_are_positive)

@@ -3,7 +3,7 @@
  * for every row of the colliders, resting and moving, with implicit and lagged friction, and for cloth on cloth.
  */
 #include "assemble/check.h"
-#include "rows/models.h"
+#include "entries/models.h"
 #include "support/scene.h"
 
 #include <unistd.h>

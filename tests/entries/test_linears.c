@@ -154,7 +154,7 @@ static drape_linear_report report_of(const drape_linear_ops *ops, const void *so
 
 /* ---- Tests ---- */
 
-START_TEST(rows_are_well_formed)
+START_TEST(entries_are_well_formed)
 {
     int count = 0;
     for (; drape_linears[count]; count++) {
@@ -650,7 +650,7 @@ START_TEST(the_symmetric_part_is_that)
 }
 END_TEST
 
-SUITE("linears", rows_are_well_formed, random_systems_are_solved,
+SUITE("linears", entries_are_well_formed, random_systems_are_solved,
       several_right_hand_sides_of_one_factorisation, broken_matrices_are_told_and_good_ones_work_again,
       a_right_hand_side_that_is_not_finite_is_told, kept_pivots_that_become_zero_are_chosen_again,
       a_small_part_that_is_not_symmetric_is_not_lost, fallbacks_are_counted, a_sheet_of_many_supernodes,

@@ -12,7 +12,7 @@ static int param_of(const drape_integrator_ops *ops, const char *name)
     return drape_param_find(ops->entry.params, ops->entry.param_count, name);
 }
 
-START_TEST(rows_are_well_formed)
+START_TEST(entries_are_well_formed)
 {
     int count = 0;
     for (; drape_integrators[count]; count++) {
@@ -412,6 +412,6 @@ START_TEST(a_damped_sheet_swings)
 }
 END_TEST
 
-SUITE("integrators", rows_are_well_formed, shared_names_mean_the_same,
+SUITE("integrators", entries_are_well_formed, shared_names_mean_the_same,
       steps_do_not_write_their_input_and_repeat, equal_runs_have_equal_bits, a_converged_step_is_converged,
       a_step_that_is_not_converged_says_so, a_triangle_falls_freely, a_damped_sheet_swings)

@@ -6,7 +6,7 @@
 
 #include "base/clock.h"
 #include "base/vec3.h"
-#include "rows/models.h"
+#include "entries/models.h"
 #include "support/scene.h"
 
 #include <unistd.h>
@@ -272,7 +272,7 @@ static double distance_of(const drape_collider *c, const double *x, double *norm
     return c->ops->distance(c->values, &c->shape, x, normal, curvature);
 }
 
-START_TEST(rows_are_well_formed)
+START_TEST(entries_are_well_formed)
 {
     for (int i = 0; drape_colliders[i]; i++) {
         const drape_collider_ops *ops = drape_colliders[i];
@@ -678,7 +678,7 @@ START_TEST(queries_of_large_meshes_are_fast)
 }
 END_TEST
 
-SUITE("colliders", rows_are_well_formed, distances_are_exact, a_mesh_is_what_its_box_is,
+SUITE("colliders", entries_are_well_formed, distances_are_exact, a_mesh_is_what_its_box_is,
       derivatives_are_exact, normals_are_continuous_outside, the_distance_is_defined_everywhere,
       shapes_lie_on_the_surface, shapes_have_the_right_features, meshes_that_are_no_solid_are_refused,
       poses_follow_the_track, queries_of_large_meshes_are_fast)

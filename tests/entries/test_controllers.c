@@ -47,7 +47,7 @@ static drape_verdict judge(const drape_controller_ops *ops, const double *values
     return verdict;
 }
 
-START_TEST(rows_are_well_formed)
+START_TEST(entries_are_well_formed)
 {
     int count = 0;
     for (; drape_controllers[count]; count++) {
@@ -152,6 +152,6 @@ START_TEST(halving_stops_where_the_time_stands_still)
 }
 END_TEST
 
-SUITE("controllers", rows_are_well_formed, good_steps_are_accepted,
+SUITE("controllers", entries_are_well_formed, good_steps_are_accepted,
       what_no_smaller_step_helps_stops_with_its_own_status, failing_for_ever_ends, fixed_never_halves,
       halving_stops_at_dt_min, halving_stops_where_the_time_stands_still)
