@@ -37,7 +37,7 @@ double fabric_strain(double stiffness, double force);
 /* The same of the two cantilevers. */
 #define FABRIC_CANTILEVER                                                                                    \
     .unit = "degree", FABRIC_CASES, .model = "stretch.cst, bend.midedge; irregular",                         \
-    .source = "ASTM D1388; the fabric's own", .tolerance = 0.005, .expected = fabric_chord,                  \
+    .entry.reference = "ASTM D1388; the fabric's own", .tolerance = 0.005, .expected = fabric_chord,         \
     .measure = fabric_measure_chord
 
 #endif

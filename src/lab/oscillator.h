@@ -32,8 +32,8 @@ drape_status oscillator_phase(drape_reference_run *run, double *value);
 extern const double oscillator_angles[OSCILLATOR_ANGLES];
 #define OSCILLATOR_CASES                                                                                     \
     .unit = "1", .parameter = "omega h", .tolerance = 1e-4, .case_count = OSCILLATOR_ANGLES
-#define OSCILLATOR_AMPLITUDE .quantity = "share of the amplitude left by a step", OSCILLATOR_CASES
+#define OSCILLATOR_AMPLITUDE .entry.summary = "share of the amplitude left by a step", OSCILLATOR_CASES
 #define OSCILLATOR_PHASE                                                                                     \
-    .quantity = "angle of a step over omega h", OSCILLATOR_CASES, .measure = oscillator_phase
+    .entry.summary = "angle of a step over omega h", OSCILLATOR_CASES, .measure = oscillator_phase
 
 #endif

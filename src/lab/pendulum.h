@@ -18,8 +18,8 @@ double pendulum_period(double degrees);
 #define PENDULUM_ANGLES 3
 extern const double pendulum_angles[PENDULUM_ANGLES];
 #define PENDULUM_PERIOD                                                                                      \
-    .quantity = "period over that of small swings", .unit = "1", .parameter = "degrees",                     \
-    .source = "T/T0 = 2/pi K(sin(a/2))", .tolerance = 0.001, .parameters = pendulum_angles,                  \
+    .entry.summary = "period over that of small swings", .unit = "1", .parameter = "degrees",                \
+    .entry.reference = "T/T0 = 2/pi K(sin(a/2))", .tolerance = 0.001, .parameters = pendulum_angles,         \
     .case_count = PENDULUM_ANGLES, .expected = pendulum_period, .measure = pendulum_measure
 
 #endif

@@ -39,12 +39,12 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_bending_length = {
-    .name = "bending_length",
-    .quantity = "angle of the chord to the end",
+    .entry.name = "bending_length",
+    .entry.summary = "angle of the chord to the end",
     .unit = "degree",
     .parameter = "G = rho g L^3/B",
     .model = "stretch.cst, bend.midedge; irregular",
-    .source = "ASTM D1388; Peirce 1930, The handle of cloth as a measurable quantity",
+    .entry.reference = "ASTM D1388; Peirce 1930, The handle of cloth as a measurable quantity",
     .tolerance = 0.005,
     .parameters = weights,
     .case_count = 1,

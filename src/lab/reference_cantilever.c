@@ -36,12 +36,12 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_cantilever = {
-    .name = "cantilever",
-    .quantity = "drop over reach of the end",
+    .entry.name = "cantilever",
+    .entry.summary = "drop over reach of the end",
     .unit = "1",
     .parameter = "G = rho g L^3/B",
     .model = "stretch.cst, bend.midedge; irregular",
-    .source = "theta'' + G (1 - s) cos theta = 0; Romero et al. 2021, the cantilever test",
+    .entry.reference = "theta'' + G (1 - s) cos theta = 0; Romero et al. 2021, the cantilever test",
     .tolerance = 0.01,
     .parameters = weights,
     .case_count = sizeof weights / sizeof *weights,

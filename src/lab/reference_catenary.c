@@ -56,11 +56,11 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_catenary = {
-    .name = "catenary",
-    .quantity = "sag of 1.2 m over a span of 1 m",
+    .entry.name = "catenary",
+    .entry.summary = "sag of 1.2 m over a span of 1 m",
     .unit = "m",
     .model = "stretch.cst, bend.midedge; irregular",
-    .source = "2 a sinh(s/(2 a)) = L, sag a (cosh(s/(2 a)) - 1)",
+    .entry.reference = "2 a sinh(s/(2 a)) = L, sag a (cosh(s/(2 a)) - 1)",
     .tolerance = 0.001,
     .parameters = nothing,
     .case_count = 1,

@@ -82,12 +82,12 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_chain = {
-    .name = "chain",
-    .quantity = "frequency of a hanging chain",
+    .entry.name = "chain",
+    .entry.summary = "frequency of a hanging chain",
     .unit = "rad/s",
     .parameter = "mode",
     .model = "stretch.cst; irregular; midpoint",
-    .source = "omega_n = j_0n/2 sqrt(g/L); D. Bernoulli 1733",
+    .entry.reference = "omega_n = j_0n/2 sqrt(g/L); D. Bernoulli 1733",
     .tolerance = 0.005,
     .parameters = modes,
     .case_count = sizeof modes / sizeof *modes,

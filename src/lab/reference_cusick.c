@@ -16,10 +16,10 @@ static double expected(double unused)
 }
 
 const drape_reference drape_reference_cusick = {
-    .name = "cusick",
-    .quantity = "drape coefficient",
+    .entry.name = "cusick",
+    .entry.summary = "drape coefficient",
     CUSICK_CASES,
-    .source = "Cusick 1965, ISO 9073-9, on a fabric of Feng et al. 2022; finer meshes",
+    .entry.reference = "Cusick 1965, ISO 9073-9, on a fabric of Feng et al. 2022; finer meshes",
     .parameters = fabrics,
     .case_count = 1,
     .expected = expected,

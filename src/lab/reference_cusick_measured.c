@@ -20,10 +20,10 @@ static double documented(double place)
 }
 
 const drape_reference drape_reference_cusick_measured = {
-    .name = "cusick_measured",
-    .quantity = "drape coefficient of a measured fabric",
+    .entry.name = "cusick_measured",
+    .entry.summary = "drape coefficient of a measured fabric",
     CUSICK_CASES,
-    .source = "Matsudaira, Masuda, Wada & Yokura 2015",
+    .entry.reference = "Matsudaira, Masuda, Wada & Yokura 2015",
     .parameters = fabrics,
     .case_count = sizeof fabrics / sizeof *fabrics,
     .expected = expected,

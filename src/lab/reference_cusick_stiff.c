@@ -86,12 +86,12 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_cusick_stiff = {
-    .name = "cusick_stiff",
-    .quantity = "sinking of the rim of a drape tester's overhang w D/(q a^4)",
+    .entry.name = "cusick_stiff",
+    .entry.summary = "sinking of the rim of a drape tester's overhang w D/(q a^4)",
     .unit = "1",
     .parameter = "nu",
     .model = "stretch.cst, bend.midedge; annulus",
-    .source = "plate between two circles; Timoshenko & Woinowsky-Krieger 1959, 3",
+    .entry.reference = "plate between two circles; Timoshenko & Woinowsky-Krieger 1959, 3",
     .tolerance = 0.005,
     .parameters = ratios,
     .case_count = sizeof ratios / sizeof *ratios,

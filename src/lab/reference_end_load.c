@@ -34,12 +34,13 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_end_load = {
-    .name = "end_load",
-    .quantity = "sinking of the end w/L",
+    .entry.name = "end_load",
+    .entry.summary = "sinking of the end w/L",
     .unit = "1",
     .parameter = "P L^2/B",
     .model = "stretch.cst, bend.midedge, load.line; irregular",
-    .source = "theta'' + P cos theta = 0; Bisshopp & Drucker 1945, Large deflection of cantilever beams",
+    .entry.reference =
+        "theta'' + P cos theta = 0; Bisshopp & Drucker 1945, Large deflection of cantilever beams",
     .tolerance = 0.005,
     .parameters = forces,
     .case_count = sizeof forces / sizeof *forces,

@@ -34,12 +34,12 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_end_moment = {
-    .name = "end_moment",
-    .quantity = "rise of the end w/L",
+    .entry.name = "end_moment",
+    .entry.summary = "rise of the end w/L",
     .unit = "1",
     .parameter = "M L/B",
     .model = "stretch.cst, bend.midedge, load.moment; irregular",
-    .source = "an arc of curvature M/B",
+    .entry.reference = "an arc of curvature M/B",
     .tolerance = 0.005,
     .parameters = moments,
     .case_count = sizeof moments / sizeof *moments,

@@ -9,8 +9,8 @@ static int scene(double place, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_fabric = {
-    .name = "fabric",
-    .quantity = "angle of the chord of a strip along the warp",
+    .entry.name = "fabric",
+    .entry.summary = "angle of the chord of a strip along the warp",
     FABRIC_CANTILEVER,
     .scene = scene,
 };

@@ -35,12 +35,12 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_fabric_shear = {
-    .name = "fabric_shear",
-    .quantity = "shear stiffness of a square",
+    .entry.name = "fabric_shear",
+    .entry.summary = "shear stiffness of a square",
     .unit = "N/m",
     FABRIC_CASES,
     .model = "stretch.cst; square",
-    .source = "A shear gamma^2/2; the fabric's own",
+    .entry.reference = "A shear gamma^2/2; the fabric's own",
     .tolerance = 0.001,
     .expected = expected,
     .scene = scene,

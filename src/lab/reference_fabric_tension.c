@@ -19,12 +19,12 @@ static int scene(double place, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_fabric_tension = {
-    .name = "fabric_tension",
-    .quantity = "lengthening of a strip of 1 m, pulled along the weft",
+    .entry.name = "fabric_tension",
+    .entry.summary = "lengthening of a strip of 1 m, pulled along the weft",
     .unit = "m",
     FABRIC_CASES,
     .model = "stretch.cst, bend.midedge; irregular",
-    .source = "K l (l^2 - 1)/2; the fabric's own",
+    .entry.reference = "K l (l^2 - 1)/2; the fabric's own",
     .tolerance = 0.01,
     .expected = expected,
     .scene = scene,

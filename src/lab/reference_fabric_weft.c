@@ -9,8 +9,8 @@ static int scene(double place, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_fabric_weft = {
-    .name = "fabric_weft",
-    .quantity = "angle of the chord of a strip along the weft",
+    .entry.name = "fabric_weft",
+    .entry.summary = "angle of the chord of a strip along the weft",
     FABRIC_CANTILEVER,
     .scene = scene,
 };

@@ -38,12 +38,12 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_free_fall = {
-    .name = "free_fall",
-    .quantity = "way fallen in 0.5 s",
+    .entry.name = "free_fall",
+    .entry.summary = "way fallen in 0.5 s",
     .unit = "m",
     .parameter = "steps",
     .model = "stretch.cst, bend.midedge; irregular; be",
-    .source = "sum of backward Euler's steps",
+    .entry.reference = "sum of backward Euler's steps",
     .tolerance = 1e-9,
     .parameters = steps,
     .case_count = 2,

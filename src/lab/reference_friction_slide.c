@@ -69,12 +69,12 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_friction_slide = {
-    .name = "friction_slide",
-    .quantity = "way of a pushed sheet until it stands",
+    .entry.name = "friction_slide",
+    .entry.summary = "way of a pushed sheet until it stands",
     .unit = "m",
     .parameter = "mu",
     .model = "stretch.cst, bend.midedge; irregular; plane; trbdf2",
-    .source = "v0^2/(2 mu g)",
+    .entry.reference = "v0^2/(2 mu g)",
     .tolerance = 0.005,
     .parameters = coefficients,
     .case_count = sizeof coefficients / sizeof *coefficients,

@@ -45,12 +45,12 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_friction_slope = {
-    .name = "friction_slope",
-    .quantity = "friction above which a sheet stays on a slope",
+    .entry.name = "friction_slope",
+    .entry.summary = "friction above which a sheet stays on a slope",
     .unit = "1",
     .parameter = "degrees",
     .model = "stretch.cst, bend.midedge; irregular; plane; be",
-    .source = "mu = tan a; Coulomb 1785",
+    .entry.reference = "mu = tan a; Coulomb 1785",
     .tolerance = 0.005,
     .parameters = slopes,
     .case_count = sizeof slopes / sizeof *slopes,

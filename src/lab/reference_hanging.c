@@ -37,12 +37,12 @@ static int scene(double place, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_hanging = {
-    .name = "hanging",
-    .quantity = "lengthening of a strip of 1 m, hung along the warp",
+    .entry.name = "hanging",
+    .entry.summary = "lengthening of a strip of 1 m, hung along the warp",
     .unit = "m",
     FABRIC_CASES,
     .model = "stretch.cst, bend.midedge; irregular",
-    .source = "K l (l^2 - 1)/2 = rho g s; the fabric's own",
+    .entry.reference = "K l (l^2 - 1)/2 = rho g s; the fabric's own",
     .tolerance = 0.01,
     .expected = expected,
     .scene = scene,

@@ -29,12 +29,12 @@ static int scene(double nu, double weight, char *text, size_t size)
 }
 
 const drape_reference drape_reference_lateral_buckling = {
-    .name = "lateral_buckling",
-    .quantity = "rho g L^3/B at which a strip on edge turns aside",
+    .entry.name = "lateral_buckling",
+    .entry.summary = "rho g L^3/B at which a strip on edge turns aside",
     .unit = "1",
     .parameter = "nu",
     .model = "stretch.cst, bend.midedge; irregular",
-    .source = "q L^3 = 12.8538 sqrt(E I G J); Prandtl 1899, Michell 1899; Romero et al. 2021",
+    .entry.reference = "q L^3 = 12.8538 sqrt(E I G J); Prandtl 1899, Michell 1899; Romero et al. 2021",
     .tolerance = 0.05,
     .parameters = ratios,
     .case_count = sizeof ratios / sizeof *ratios,

@@ -64,11 +64,11 @@ static int scene(double unused, double weight, char *text, size_t size)
 }
 
 const drape_reference drape_reference_lateral_buckling_hinges = {
-    .name = "lateral_buckling_hinges",
-    .quantity = "rho g L^3/D at which a strip on edge turns aside",
+    .entry.name = "lateral_buckling_hinges",
+    .entry.summary = "rho g L^3/D at which a strip on edge turns aside",
     .unit = "1",
     .model = "stretch.edge, bend.hinge; equilateral",
-    .source = "q L^3 = 12.8538 sqrt(E I G J); the hinges' limit: docs/validate.md",
+    .entry.reference = "q L^3 = 12.8538 sqrt(E I G J); the hinges' limit: docs/validate.md",
     .tolerance = 0.05,
     .parameters = nothing,
     .case_count = 1,

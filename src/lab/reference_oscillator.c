@@ -20,11 +20,11 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_oscillator = {
-    .name = "oscillator",
-    .quantity = "share of energy left by a step",
+    .entry.name = "oscillator",
+    .entry.summary = "share of energy left by a step",
     OSCILLATOR_CASES,
     .model = "stretch.cst; square; be",
-    .source = "1/(1 + omega^2 h^2), of 1/(1 - i omega h)",
+    .entry.reference = "1/(1 + omega^2 h^2), of 1/(1 - i omega h)",
     .parameters = oscillator_angles,
     .expected = expected,
     .scene = scene,

@@ -27,10 +27,10 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_oscillator_bdf2 = {
-    .name = "oscillator_bdf2",
+    .entry.name = "oscillator_bdf2",
     OSCILLATOR_AMPLITUDE,
     .model = "stretch.cst; square; bdf2",
-    .source = "roots of (3/2 - i omega h) r^2 - 2 r + 1/2; .990401 at omega h = .5",
+    .entry.reference = "roots of (3/2 - i omega h) r^2 - 2 r + 1/2; .990401 at omega h = .5",
     .parameters = oscillator_angles,
     .expected = expected,
     .scene = scene,

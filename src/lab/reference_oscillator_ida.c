@@ -28,12 +28,12 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_oscillator_ida = {
-    .name = "oscillator_ida",
-    .quantity = "velocity over that at the start",
+    .entry.name = "oscillator_ida",
+    .entry.summary = "velocity over that at the start",
     .unit = "1",
     .parameter = "turns",
     .model = "stretch.cst; square; ida, order 5",
-    .source = "cos(2 pi turns)",
+    .entry.reference = "cos(2 pi turns)",
     .tolerance = 1e-3,
     .parameters = turns,
     .case_count = sizeof turns / sizeof *turns,

@@ -16,10 +16,10 @@ static int scene(double angle, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_oscillator_midpoint = {
-    .name = "oscillator_midpoint",
+    .entry.name = "oscillator_midpoint",
     OSCILLATOR_PHASE,
     .model = "stretch.cst; square; midpoint",
-    .source = "2 atan(omega h/2)",
+    .entry.reference = "2 atan(omega h/2)",
     .parameters = oscillator_angles,
     .expected = expected,
     .scene = scene,

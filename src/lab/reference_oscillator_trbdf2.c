@@ -19,10 +19,10 @@ static int scene(double angle, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_oscillator_trbdf2 = {
-    .name = "oscillator_trbdf2",
+    .entry.name = "oscillator_trbdf2",
     OSCILLATOR_AMPLITUDE,
     .model = "stretch.cst; square; trbdf2",
-    .source = "stability function; Bank et al. 1985, Hosea & Shampine 1996",
+    .entry.reference = "stability function; Bank et al. 1985, Hosea & Shampine 1996",
     .parameters = oscillator_angles,
     .expected = expected,
     .scene = scene,

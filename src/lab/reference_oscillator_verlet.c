@@ -17,10 +17,10 @@ static int scene(double angle, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_oscillator_verlet = {
-    .name = "oscillator_verlet",
+    .entry.name = "oscillator_verlet",
     OSCILLATOR_PHASE,
     .model = "stretch.cst; square; verlet",
-    .source = "2 asin(omega h/2)",
+    .entry.reference = "2 asin(omega h/2)",
     .parameters = angles,
     .expected = expected,
     .scene = scene,

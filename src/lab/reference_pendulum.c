@@ -8,7 +8,7 @@ static int scene(double degrees, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_pendulum = {
-    .name = "pendulum",
+    .entry.name = "pendulum",
     PENDULUM_PERIOD,
     .model = "stretch.cst, bend.midedge; square; midpoint",
     .scene = scene,

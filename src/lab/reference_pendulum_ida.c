@@ -8,7 +8,7 @@ static int scene(double degrees, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_pendulum_ida = {
-    .name = "pendulum_ida",
+    .entry.name = "pendulum_ida",
     PENDULUM_PERIOD,
     .model = "stretch.cst, bend.midedge; square; ida, order 5",
     .scene = scene,

@@ -8,7 +8,7 @@ static int scene(double degrees, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_pendulum_trbdf2 = {
-    .name = "pendulum_trbdf2",
+    .entry.name = "pendulum_trbdf2",
     PENDULUM_PERIOD,
     .model = "stretch.cst, bend.midedge; square; trbdf2",
     .scene = scene,

@@ -18,12 +18,12 @@ static int scene(double nu, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_plate_clamped = {
-    .name = "plate_clamped",
-    .quantity = "w D/(q a^4) in the middle",
+    .entry.name = "plate_clamped",
+    .entry.summary = "w D/(q a^4) in the middle",
     .unit = "1",
     .parameter = "nu",
     .model = "stretch.cst, bend.midedge; irregular",
-    .source = "Taylor & Govindjee 2004, Solution of clamped rectangular plate problems",
+    .entry.reference = "Taylor & Govindjee 2004, Solution of clamped rectangular plate problems",
     .tolerance = 0.005,
     .parameters = ratios,
     .case_count = 1,

@@ -26,12 +26,12 @@ static int scene(double is_parallel, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_plate_hinges = {
-    .name = "plate_hinges",
-    .quantity = "w D/(q a^4) in the middle",
+    .entry.name = "plate_hinges",
+    .entry.summary = "w D/(q a^4) in the middle",
     .unit = "1",
     .parameter = "diagonals: 0 alternating, 1 parallel",
     .model = "stretch.edge, bend.hinge; square",
-    .source = "Navier's series; the hinges' limit: docs/validate.md",
+    .entry.reference = "Navier's series; the hinges' limit: docs/validate.md",
     .tolerance = 0.02,
     .parameters = parallel,
     .case_count = 2,

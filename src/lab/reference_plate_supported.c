@@ -17,12 +17,12 @@ static int scene(double nu, double load, char *text, size_t size)
 }
 
 const drape_reference drape_reference_plate_supported = {
-    .name = "plate_supported",
-    .quantity = "w D/(q a^4) in the middle",
+    .entry.name = "plate_supported",
+    .entry.summary = "w D/(q a^4) in the middle",
     .unit = "1",
     .parameter = "nu",
     .model = "stretch.cst, bend.midedge; irregular",
-    .source = "Navier's series; Timoshenko & Woinowsky-Krieger 1959, 30",
+    .entry.reference = "Navier's series; Timoshenko & Woinowsky-Krieger 1959, 30",
     .tolerance = 0.005,
     .parameters = ratios,
     .case_count = sizeof ratios / sizeof *ratios,

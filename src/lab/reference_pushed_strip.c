@@ -131,12 +131,12 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_pushed_strip = {
-    .name = "pushed_strip",
-    .quantity = "friction above which the end of a pushed strip stays",
+    .entry.name = "pushed_strip",
+    .entry.summary = "friction above which the end of a pushed strip stays",
     .unit = "1",
     .parameter = "push over length",
     .model = "stretch.cst, bend.midedge; irregular; plane; be",
-    .source = "theta'' + N sin theta + f cos theta = 0, mu = f/N; Sano, Yamaguchi & Wada 2017",
+    .entry.reference = "theta'' + N sin theta + f cos theta = 0, mu = f/N; Sano, Yamaguchi & Wada 2017",
     .tolerance = 0.03,
     .parameters = shares,
     .case_count = sizeof shares / sizeof *shares,

@@ -32,12 +32,12 @@ static drape_status measure(drape_reference_run *run, double *value)
 }
 
 const drape_reference drape_reference_rest_curvature = {
-    .name = "rest_curvature",
-    .quantity = "rise of the end w/L",
+    .entry.name = "rest_curvature",
+    .entry.summary = "rise of the end w/L",
     .unit = "1",
     .parameter = "curvature L",
     .model = "stretch.cst, bend.midedge; irregular",
-    .source = "an arc",
+    .entry.reference = "an arc",
     .tolerance = 0.005,
     .parameters = curvatures,
     .case_count = sizeof curvatures / sizeof *curvatures,

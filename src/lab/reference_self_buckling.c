@@ -26,11 +26,11 @@ static int scene(double unused, double weight, char *text, size_t size)
 }
 
 const drape_reference drape_reference_self_buckling = {
-    .name = "self_buckling",
-    .quantity = "G = rho g L^3/B at which an upright strip buckles",
+    .entry.name = "self_buckling",
+    .entry.summary = "G = rho g L^3/B at which an upright strip buckles",
     .unit = "1",
     .model = "stretch.cst, bend.midedge; irregular",
-    .source = "theta'' + G t theta = 0; Greenhill 1881",
+    .entry.reference = "theta'' + G t theta = 0; Greenhill 1881",
     .tolerance = 0.02,
     .parameters = nothing,
     .case_count = 1,
