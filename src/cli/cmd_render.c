@@ -286,10 +286,10 @@ static int set_stages(render *r)
         if (drape_stage_create(r->ctx, r->sources[i].in.model, stage))
             return report(r, CLI_FAILED);
         for (size_t k = 0; k < reel->count; k++) {
-            drape_stage_see(stage, drape_reel_positions(reel, k));
+            drape_stage_add(stage, drape_reel_positions(reel, k));
             drape_stage_frame(stage, &framing, reel->times[k], drape_reel_positions(reel, k));
         }
-        drape_stage_settle(stage);
+        drape_stage_finish(stage);
     }
     r->view = drape_framing_end(&framing, (float)r->azimuth, (float)r->elevation, (float)r->zoom);
     return CLI_GO_ON;

@@ -135,7 +135,7 @@ static void set_camera(window_view *w)
     drape_framing framing = drape_framing_begin(DRAPE_CAMERA_AZIMUTH, DRAPE_CAMERA_ELEVATION, aspect);
     const float *x = drape_reel_positions(&w->reel, 0);
     drape_stage_frame(&w->stage, &framing, 0, x);
-    drape_stage_see(&w->stage, x);
+    drape_stage_add(&w->stage, x);
     if (!w->stage.has_ground) {
         float low[3] = {0};
         size_t lowest = 0;
@@ -148,7 +148,7 @@ static void set_camera(window_view *w)
         for (int k = 0; k < 3; k++)
             w->stage.low[k] = fminf(w->stage.low[k], low[k]);
     }
-    drape_stage_settle(&w->stage);
+    drape_stage_finish(&w->stage);
     w->home = w->camera = drape_framing_end(&framing, DRAPE_CAMERA_AZIMUTH, DRAPE_CAMERA_ELEVATION, 1);
 }
 
