@@ -1,5 +1,5 @@
-/* progress.c: see progress.h. Carriage returns and blanks only: no colours, no control sequences, so that
- * NO_COLOR and dumb terminals need no exception. */
+/* progress.c: see progress.h. It only uses carriage returns and blanks, no colours or control sequences, so NO_COLOR and
+ * dumb terminals need no special case. */
 #include "cli/progress.h"
 
 #include "base/clock.h"
@@ -10,7 +10,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#define PERIOD        0.1 /* [s] between two drawings */
+#define PERIOD        0.1 /* least time between two updates [s] */
 #define DEFAULT_WIDTH 80
 #define MAX_WIDTH     120
 #define BAR           24 /* cells */
@@ -20,7 +20,7 @@ static int terminal_width(void)
     struct winsize size;
     int columns =
         ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : DEFAULT_WIDTH;
-    return columns > MAX_WIDTH ? MAX_WIDTH : columns - 1; /* in the last column a terminal may wrap */
+    return columns > MAX_WIDTH ? MAX_WIDTH : columns - 1; /* a terminal may wrap after its last column */
 }
 
 /* 59 -> "0:59", 3725 -> "1:02:05" */
@@ -63,7 +63,7 @@ static void fill_bar(double share, char bar[BAR + 1])
     bar[BAR] = 0;
 }
 
-/* At most ten times a second. */
+/* Whether PERIOD has passed since the last update. */
 static bool is_due(cli_progress *p, double *now)
 {
     *now = p->on ? drape_clock_seconds() : 0;

@@ -1,5 +1,4 @@
-/* scene.c: from a command line to a sim. All that can be wrong with the input is found here, before any verb
- * writes a file. */
+/* scene.c: from a command line to a sim. All errors of the input are found here, before any verb writes a file. */
 #include "cli/cli.h"
 #include "cli/signals.h"
 
@@ -16,7 +15,7 @@ static drape_status apply_settings(const cli_command *command, drape_scene *scen
     return status;
 }
 
-/* The library leaves the formats of a model to whoever writes frames. */
+/* Compiling a scene does not check the formats: only writers of frames know them. */
 static drape_status check_formats(const cli_scene *s)
 {
     for (size_t i = 0; i < s->model->format_count; i++) {
@@ -60,25 +59,15 @@ drape_status cli_context_create(drape_context **out)
     return drape_context_create(&def, out);
 }
 
-int cli_scene_load_from(const cli_command *command, const char *path, cli_scene *out)
+int cli_scene_load(const cli_command *command, const char *path, cli_scene *out)
 {
-    *out = (cli_scene){.ctx = NULL};
-    if (cli_context_create(&out->ctx))
-        return cli_misuse(command->verb, "out of memory");
+    *out = (cli_scene){.ctx = command->ctx};
     cli_signals_end_waits(true);
     drape_status status = load(command, path, out);
     cli_signals_end_waits(false);
-    if (cli_interrupted()) /* whatever that made of the scene */
-        return cli_tell_interrupted(command->verb);
-    if (!status)
-        return CLI_GO_ON;
-    fprintf(stderr, "%s\n", drape_context_message(out->ctx));
-    return CLI_BAD_INPUT;
-}
-
-int cli_scene_load(const cli_command *command, cli_scene *out)
-{
-    return cli_scene_load_from(command, command->operand, out);
+    if (cli_interrupted()) /* whether or not loading noticed */
+        return cli_report_interrupted(command->verb);
+    return status ? cli_report(command->ctx, CLI_BAD_INPUT) : CLI_GO_ON;
 }
 
 void cli_scene_free(cli_scene *scene)
@@ -86,5 +75,4 @@ void cli_scene_free(cli_scene *scene)
     drape_sim_destroy(&scene->sim);
     drape_model_destroy(&scene->model);
     drape_scene_destroy(&scene->scene);
-    drape_context_destroy(&scene->ctx);
 }
