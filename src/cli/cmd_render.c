@@ -462,7 +462,7 @@ static const cli_option options[] = {
      NULL},
     {"frame", CLI_TEXT, "N", "the frame of a picture, from 0 (default: the last)", AT(frame), 0, NULL},
     {"every", CLI_NUMBER, "N", "every Nth frame in a film or folder", AT(every), 1000000, NULL},
-    {"shade", CLI_TEXT, "ROW", "how cloth is coloured (default diffuse); `drape list shadings` shows all",
+    {"shade", CLI_TEXT, "NAME", "how cloth is coloured (default diffuse); `drape list shadings` shows all",
      AT(shade), 0, NULL},
     {"size", CLI_TEXT, "WxH", "pixels (default 1280x720)", AT(size), 0, NULL},
     {"camera", CLI_TEXT, "A,E[,Z]",

@@ -569,7 +569,7 @@ static int run(const void *command)
 }
 
 static const cli_option options[] = {
-    {"shade", CLI_TEXT, "ROW", "how cloth is coloured (default diffuse); `drape list shadings` shows all",
+    {"shade", CLI_TEXT, "NAME", "how cloth is coloured (default diffuse); `drape list shadings` shows all",
      offsetof(view_request, shade), 0, NULL},
     {"size", CLI_TEXT, "WxH", "pixels of the window (default 1280x720)", offsetof(view_request, size), 0,
      NULL},

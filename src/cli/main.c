@@ -37,17 +37,12 @@ static const drape_verb *find_verb(const char *name)
     return NULL;
 }
 
-static size_t verb_count(void)
+static int unknown_verb(const char *name)
 {
     size_t count = 0;
     while (drape_verbs[count])
         count++;
-    return count;
-}
-
-static int unknown_verb(const char *name)
-{
-    const char *meant = drape_did_you_mean(name, drape_verbs_words, verb_count());
+    const char *meant = drape_did_you_mean(name, drape_verbs_words, count);
     fprintf(stderr, "drape: there is no verb \"%.60s\"%s%s%s; `drape --help` shows all\n", name,
             DRAPE_MEANT(meant));
     return CLI_BAD_INPUT;

@@ -15,14 +15,6 @@
 #define MAX_WIDTH     120
 #define BAR           24 /* cells */
 
-static int terminal_width(void)
-{
-    struct winsize size;
-    int columns =
-        ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : DEFAULT_WIDTH;
-    return columns > MAX_WIDTH ? MAX_WIDTH : columns - 1; /* a terminal may wrap after its last column */
-}
-
 /* 59 -> "0:59", 3725 -> "1:02:05" */
 static void time_text(double seconds, char *text, size_t size)
 {
@@ -49,8 +41,11 @@ void cli_progress_begin(cli_progress *p, double from, double end)
     *p = (cli_progress){.on = isatty(STDERR_FILENO), .from = from, .end = end, .shown = -INFINITY};
     if (!p->on)
         return;
+    struct winsize size;
+    int columns =
+        ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : DEFAULT_WIDTH;
+    p->width = columns > MAX_WIDTH ? MAX_WIDTH : columns - 1; /* a terminal may wrap after its last column */
     p->start = drape_clock_seconds();
-    p->width = terminal_width();
     if (end > 0)
         cli_progress_show(p, from, 0);
 }

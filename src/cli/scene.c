@@ -7,14 +7,6 @@
 
 #include <stdio.h>
 
-static drape_status apply_settings(const cli_command *command, drape_scene *scene)
-{
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < command->setting_count; i++)
-        status = drape_scene_set(scene, command->settings[i].pointer, command->settings[i].value);
-    return status;
-}
-
 /* Compiling a scene does not check the formats: only writers of frames know them. */
 static drape_status check_formats(const cli_scene *s)
 {
@@ -36,8 +28,8 @@ static drape_status load(const cli_command *command, const char *path, cli_scene
     drape_sim_def_init(&def, sizeof def);
     def.threads = command->threads ? command->threads : 1;
     drape_status status = drape_scene_load(s->ctx, path, &s->scene);
-    if (!status)
-        status = apply_settings(command, s->scene);
+    for (size_t i = 0; !status && i < command->setting_count; i++)
+        status = drape_scene_set(s->scene, command->settings[i].pointer, command->settings[i].value);
     if (!status)
         status = drape_scene_compile(s->scene, &s->model);
     if (!status)

@@ -187,17 +187,6 @@ static drape_status set_stiffness(cli_view *v, double factor, int *changed)
     return status;
 }
 
-bool view_scale_stiffness(cli_view *v, double factor)
-{
-    int changed = 0;
-    drape_status set = set_stiffness(v, factor, &changed);
-    bool good = commit(v, set, changed, "stiffness");
-    if (!good)
-        set_stiffness(v, 1, &changed);
-    v->stiffness *= good ? factor : 1;
-    return good;
-}
-
 static drape_status set_damping(cli_view *v, double factor, int *changed)
 {
     static const char *const names[] = {"beta", "damping", "coefficient"};
@@ -207,34 +196,41 @@ static drape_status set_damping(cli_view *v, double factor, int *changed)
     return status;
 }
 
-bool view_scale_damping(cli_view *v, double factor)
-{
-    int changed = 0;
-    drape_status set = set_damping(v, factor, &changed);
-    bool good = commit(v, set, changed, "damping");
-    if (!good)
-        set_damping(v, 1, &changed);
-    v->damping *= good ? factor : 1;
-    return good;
-}
-
-static drape_status set_gravity(cli_view *v, double factor)
+static drape_status set_gravity(cli_view *v, double factor, int *changed)
 {
     const double *g = v->in.model->gravity;
     char text[120];
+    *changed += g[0] != 0 || g[1] != 0 || g[2] != 0;
     snprintf(text, sizeof text, "[%.17g, %.17g, %.17g]", factor * g[0], factor * g[1], factor * g[2]);
     return drape_scene_set(v->in.scene, "/gravity", text);
 }
 
+/* Multiplies values of the present model by a factor; product is that of all factors so far. */
+static bool scale(cli_view *v, drape_status (*set)(cli_view *v, double factor, int *changed), double factor,
+                  const char *what, double *product)
+{
+    int changed = 0;
+    drape_status status = set(v, factor, &changed);
+    bool good = commit(v, status, changed, what);
+    if (!good)
+        set(v, 1, &changed);
+    *product *= good ? factor : 1;
+    return good;
+}
+
+bool view_scale_stiffness(cli_view *v, double factor)
+{
+    return scale(v, set_stiffness, factor, "stiffness", &v->stiffness);
+}
+
+bool view_scale_damping(cli_view *v, double factor)
+{
+    return scale(v, set_damping, factor, "damping", &v->damping);
+}
+
 bool view_scale_gravity(cli_view *v, double factor)
 {
-    const double *g = v->in.model->gravity;
-    bool any = g[0] != 0 || g[1] != 0 || g[2] != 0;
-    bool good = commit(v, set_gravity(v, factor), any, "gravity");
-    if (!good)
-        set_gravity(v, 1);
-    v->gravity *= good ? factor : 1;
-    return good;
+    return scale(v, set_gravity, factor, "gravity", &v->gravity);
 }
 
 double view_dt(const cli_view *v)

@@ -6,16 +6,14 @@
 #include <math.h>
 #include <string.h>
 
-#define CELLS      32  /* along the longest side of the box */
-#define FLAT_CELLS 12  /* the same for an endless body */
-#define FAR        1e4 /* distance in reaches from which the extent along an axis is measured */
-#define ENDLESS    2.0 /* half the side of the box of an endless body, in reaches */
-#define NORMAL_SHIFT                                                                                         \
-    0.15             /* share of the way from a corner to its face's middle at which the normal is taken */
-#define CUT_STEPS 24 /* bisections that find where the surface cuts an edge of the grid */
-#define MEAN_WEIGHT                                                                                          \
-    1e-2 /* weight of the mean in the least squares, for directions that the planes leave free */
-#define NEWTON_STEPS 4 /* that move a point onto the surface */
+#define CELLS        32   /* along the longest side of the box */
+#define FLAT_CELLS   12   /* the same for an endless body */
+#define FAR          1e4  /* distance in reaches from which the extent along an axis is measured */
+#define ENDLESS      2.0  /* half the side of the box of an endless body, in reaches */
+#define NORMAL_SHIFT 0.15 /* shift of a corner to the middle of its face, for the normal */
+#define CUT_STEPS    24   /* bisections that find where the surface cuts an edge of the grid */
+#define MEAN_WEIGHT  1e-2 /* of the mean, for directions that the planes leave free */
+#define NEWTON_STEPS 4    /* that move a point onto the surface */
 
 typedef struct grid {
     const drape_collider *collider;

@@ -113,16 +113,6 @@ static drape_status spawn(drape_film *film, char **args, int reading)
     return drape_fail(film->ctx, DRAPE_E_FILE, "cannot start " PROGRAM ": %s", strerror(error));
 }
 
-/* A file without a name, for the output of ffmpeg. */
-static int open_errors(void)
-{
-    FILE *file = tmpfile();
-    int fd = file ? fcntl(fileno(file), F_DUPFD_CLOEXEC, 3) : -1;
-    if (file)
-        fclose(file);
-    return fd;
-}
-
 static drape_status start(drape_film *film, int width, int height, double rate)
 {
     char input[200], output[600], *args[MAX_ARGS] = {PROGRAM};
@@ -133,7 +123,10 @@ static drape_status start(drape_film *film, int width, int height, double rate)
         width, height, rate);
     snprintf(output, sizeof output, "%s", kind_of(film->path)->args);
     args[add_args(output, args, add_args(input, args, 1))] = film->part;
-    film->errors = open_errors();
+    FILE *file = tmpfile();
+    film->errors = file ? fcntl(fileno(file), F_DUPFD_CLOEXEC, 3) : -1;
+    if (file)
+        fclose(file);
     if (film->errors < 0 || pipe(ends) != 0)
         return drape_fail(film->ctx, DRAPE_E_FILE, "cannot make a pipe to " PROGRAM ": %s", strerror(errno));
     film->pipe = fcntl(ends[1], F_DUPFD_CLOEXEC, 3);

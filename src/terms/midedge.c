@@ -26,9 +26,8 @@
 #include <math.h>
 #include <string.h>
 
-#define MIN_EIGENVALUE                                                                                       \
-    1e-4 /* over the largest; below, the hinges hardly depend on this curvature, and phi ignores it */
-#define MIN_C 1e-9 /* smaller coefficients c are rounding errors */
+#define MIN_EIGENVALUE 1e-4 /* over the largest; phi ignores curvatures below */
+#define MIN_C          1e-9 /* smaller coefficients c are rounding errors */
 
 const int drape_midedge_hinge[MIDEDGE_HINGES][4] = {{0, 1, 2, 3}, {1, 2, 0, 4},  {2, 0, 1, 5},
                                                     {0, 3, 1, 6}, {3, 1, 0, 7},  {1, 4, 2, 8},

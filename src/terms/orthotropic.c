@@ -6,8 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#define STEEP                                                                                                \
-    1e-6 /* least length of the projection of the warp into the plane of a triangle, over its length */
+#define STEEP 1e-6 /* least projection of the warp into a triangle, over its length */
 
 void drape_orthotropic_law(const double *values, const drape_woven *measured, double strip, double poisson,
                            double c[9])
