@@ -56,7 +56,7 @@ typedef struct cli_setting {
     bool must_act; /* the option's */
 } cli_setting;
 
-/* What every command line has. The request of a verb begins with it. */
+/* The part of a command line that all verbs have. The request of a verb begins with it. */
 typedef struct cli_command {
     drape_arena
         *arena; /* memory until the verb returns; its context stops where the program is interrupted */
@@ -93,7 +93,7 @@ void cli_print_help(const drape_verb *verb); /* on stdout */
 /* The operand as help shows it: in brackets if it is optional. */
 void cli_operand_text(const drape_verb *verb, char *text, size_t size);
 
-/* Reads a command line into a request, which is zero but for arena and ctx. CLI_GO_ON, or the exit code after help or an
+/* Reads a command line into a request, in which all but arena and ctx is zero. CLI_GO_ON, or the exit code after help or an
  * error was printed. */
 int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *request);
 

@@ -88,7 +88,7 @@ static drape_status make_grid(const drape_body *body, grid *g)
 
 /* ---- A point in each cell that the surface passes through ---- */
 
-/* Where the surface cuts the segment from a to b, by bisection. */
+/* Finds the point where the surface cuts the segment from a to b, by bisection. */
 static void cut(const drape_collider *c, const double *a, const double *b, double *x)
 {
     double low = 0, high = 1, at_a = distance(c, a, NULL);

@@ -338,7 +338,7 @@ drape_view drape_painter_view(const drape_painter *painter, const drape_picture 
     return view;
 }
 
-/* What is common to everything drawn in a panel. */
+/* The quantities common to everything drawn in a panel. */
 typedef struct panel_view {
     drape_view view;
     drape_matrix lamp;               /* from space to the shadow map */

@@ -20,7 +20,7 @@ enum {
 };
 extern const drape_param drape_spring_params[DRAPE_SPRING_PARAM_COUNT];
 
-/* From one node of a spring to the other, in rows (>= 0) and columns of a grid. */
+/* The offset from one node of a spring to the other, in rows (>= 0) and columns of a grid. */
 typedef struct drape_spring_offset {
     int32_t rows, columns;
 } drape_spring_offset;

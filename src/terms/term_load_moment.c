@@ -158,7 +158,7 @@ static void add_second(const direction *v, const double c[3], double h[6][6])
 
 /* ---- The angle ---- */
 
-/* What psi of an element is computed from. */
+/* The quantities that psi of an element is computed from. */
 typedef struct twist {
     double d[3], g[3], t0[3], n0[3];
     direction t, n;
