@@ -8,7 +8,10 @@ static const cli_option options[] = {
      NULL},
 };
 
-static int main_converge(int argc, char **argv);
+static int run(const void *request)
+{
+    return cli_lab_run(request, 1);
+}
 
 const drape_verb drape_verb_converge = {
     .entry = {.name = "converge", .summary = "orders of convergence in time, and in space"},
@@ -20,10 +23,6 @@ const drape_verb drape_verb_converge = {
         "grids with --space; the distances between successive ends give the order, with its confidence.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_converge,
+    .request_size = sizeof(cli_lab_request),
+    .run = run,
 };
-
-static int main_converge(int argc, char **argv)
-{
-    return cli_lab_main(&drape_verb_converge, 1, argc, argv);
-}

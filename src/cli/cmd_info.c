@@ -38,7 +38,7 @@ void cli_chosen_rows(const drape_sim *sim, cli_chosen_row rows[CLI_CHOSEN_ROWS])
 void cli_contact(const drape_sim *sim, cli_contact_rows *out)
 {
     const drape_model *model = sim->model;
-    const bool forces = !sim->chosen.integrator->projects_contact; /* else only the distance of layers acts */
+    const bool forces = !sim->chosen.integrator->projects_contact; /* else only the thickness acts */
     out->count = 0;
     if (forces && (model->collider_count > 0 || model->contact.self)) {
         drape_contact_values(&model->contact, out->values[0]);
@@ -81,7 +81,7 @@ double cli_share(const cli_info *info, double seconds)
     return whole > 0 ? seconds / whole : 0;
 }
 
-/* Single measurements may add up to more than the whole did. */
+/* The rest of the whole; not negative, as the parts are measured separately and may add up to more. */
 double cli_other_residual_seconds(const cli_info *info)
 {
     double other = info->profile.residual_seconds;
@@ -123,21 +123,21 @@ static cli_collider_info collider_info(const drape_sim *sim, const drape_collide
     return info;
 }
 
-/* The frames at k / rate up to the end, and one at the end where none of them is there. */
+/* Frames at k / rate up to the end, and one at the end if none of them is there. */
 static int64_t count_frames(const drape_model *model)
 {
     double intervals = model->duration * model->frame_rate, whole = floor(intervals + 1e-9);
     return (int64_t)whole + (intervals - whole > 1e-9 ? 2 : 1);
 }
 
-static drape_status gather(const cli_scene *in, cli_info *info)
+static drape_status gather(drape_arena *arena, const cli_scene *in, cli_info *info)
 {
     const drape_model *model = in->model;
-    drape_profile_term *terms = drape_alloc(in->ctx, (size_t)model->term_count, sizeof *terms);
+    drape_profile_term *terms = drape_arena_take(arena, (size_t)model->term_count, sizeof *terms);
     info->profile.terms = terms;
-    info->cloths = drape_alloc(in->ctx, (size_t)model->cloth_count, sizeof *info->cloths);
-    info->colliders = drape_alloc(in->ctx, (size_t)model->collider_count, sizeof *info->colliders);
-    if (!terms || !info->cloths || !info->colliders)
+    info->cloths = drape_arena_take(arena, (size_t)model->cloth_count, sizeof *info->cloths);
+    info->colliders = drape_arena_take(arena, (size_t)model->collider_count, sizeof *info->colliders);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     info->model = model;
     info->sim = in->sim;
@@ -164,24 +164,22 @@ static int print_json(const cli_info *info)
     return failed && !ferror(stdout) ? CLI_FAILED : CLI_DONE;
 }
 
-static int print_info(const info_request *request, const cli_scene *in)
+static int run(const void *command)
 {
+    const info_request *request = command;
     cli_info info = {.path = request->command.operand};
-    int code = CLI_DONE;
-    drape_status status = gather(in, &info);
-    if (status == DRAPE_E_STOPPED) {
-        code = cli_tell_interrupted(request->command.verb);
-    } else if (status) {
-        fprintf(stderr, "%s\n", drape_context_message(in->ctx));
-        code = CLI_FAILED;
-    } else if (request->json) {
-        code = print_json(&info);
-    } else {
-        cli_info_text(&info);
+    cli_scene in;
+    int code = cli_scene_load(&request->command, request->command.operand, &in);
+    if (code == CLI_GO_ON) {
+        drape_status status = gather(request->command.arena, &in, &info);
+        code = status == DRAPE_E_STOPPED ? cli_report_interrupted(request->command.verb)
+               : status                  ? cli_report(in.ctx, CLI_FAILED)
+               : request->json           ? print_json(&info)
+                                         : CLI_DONE;
+        if (!status && !request->json)
+            cli_info_text(&info);
     }
-    drape_free(in->ctx, info.profile.terms);
-    drape_free(in->ctx, info.cloths);
-    drape_free(in->ctx, info.colliders);
+    cli_scene_free(&in);
     return code;
 }
 
@@ -189,7 +187,7 @@ static const cli_option options[] = {
     {"json", CLI_FLAG, NULL, "the same as JSON", offsetof(info_request, json), 0, NULL},
 };
 
-/* The settings were good when the model was compiled, so they are now. */
+/* The settings were valid when the model was compiled, so they are valid now. */
 const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values)
 {
     const int i = drape_registry_find(&drape_grid_registry, NULL, cloth->grid.type);
@@ -203,8 +201,6 @@ const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values)
     return status ? NULL : grid;
 }
 
-static int main_info(int argc, char **argv);
-
 const drape_verb drape_verb_info = {
     .entry = {.name = "info", .summary = "what a scene models and what it costs"},
     .operand = "SCENE",
@@ -214,19 +210,6 @@ const drape_verb drape_verb_info = {
         "nonzeros, bytes, and its share of one Newton iteration, measured at a slightly deformed state.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_info,
+    .request_size = sizeof(info_request),
+    .run = run,
 };
-
-static int main_info(int argc, char **argv)
-{
-    info_request request = {.json = false};
-    cli_scene in = {.ctx = NULL};
-    int code = cli_parse(&drape_verb_info, argc, argv, &request.command);
-    if (code == CLI_GO_ON)
-        code = cli_scene_load(&request.command, &in);
-    if (code == CLI_GO_ON)
-        code = print_info(&request, &in);
-    cli_scene_free(&in);
-    cli_command_free(&request.command);
-    return code;
-}

@@ -309,8 +309,9 @@ static int print_schema(void)
     return failed && !ferror(stdout) ? cli_misuse("list", "out of memory for the schema") : CLI_DONE;
 }
 
-static int print_request(const list_request *request)
+static int run(const void *command)
 {
+    const list_request *request = command;
     if (request->schema && (request->command.operand || request->markdown))
         return cli_misuse("list", "--schema stands alone: it is the form of a whole scene");
     if (request->schema)
@@ -323,8 +324,6 @@ static const cli_option options[] = {
     {"schema", CLI_FLAG, NULL, "the JSON Schema of a scene", offsetof(list_request, schema), 0, NULL},
 };
 
-static int main_list(int argc, char **argv);
-
 const drape_verb drape_verb_list = {
     .entry = {.name = "list",
               .summary =
@@ -336,15 +335,6 @@ const drape_verb drape_verb_list = {
         "`scene` is the keys of all objects of a scene; one of its objects, as `pin`, is the keys of one.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_list,
+    .request_size = sizeof(list_request),
+    .run = run,
 };
-
-static int main_list(int argc, char **argv)
-{
-    list_request request = {.markdown = false};
-    int code = cli_parse(&drape_verb_list, argc, argv, &request.command);
-    if (code == CLI_GO_ON)
-        code = print_request(&request);
-    cli_command_free(&request.command);
-    return code;
-}

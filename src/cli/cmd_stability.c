@@ -11,7 +11,11 @@ static const cli_option options[] = {
      offsetof(cli_lab_request, strain_limit), 0, NULL},
 };
 
-static int main_stability(int argc, char **argv);
+static int run(const void *request)
+{
+    long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    return cli_lab_run(request, cores < 1 ? 1 : cores > 256 ? 256 : (int)cores);
+}
 
 const drape_verb drape_verb_stability = {
     .entry = {.name = "stability",
@@ -28,11 +32,6 @@ const drape_verb drape_verb_stability = {
                "where it was.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_stability,
+    .request_size = sizeof(cli_lab_request),
+    .run = run,
 };
-
-static int main_stability(int argc, char **argv)
-{
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    return cli_lab_main(&drape_verb_stability, cores < 1 ? 1 : cores > 256 ? 256 : (int)cores, argc, argv);
-}

@@ -7,7 +7,10 @@ static const cli_option options[] = {
      offsetof(cli_lab_request, repeats), 100, NULL},
 };
 
-static int main_tradeoff(int argc, char **argv);
+static int run(const void *request)
+{
+    return cli_lab_run(request, 1);
+}
 
 const drape_verb drape_verb_tradeoff = {
     .entry = {.name = "tradeoff",
@@ -21,10 +24,6 @@ const drape_verb drape_verb_tradeoff = {
                "that their CPU times can be compared; --jobs runs several.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_tradeoff,
+    .request_size = sizeof(cli_lab_request),
+    .run = run,
 };
-
-static int main_tradeoff(int argc, char **argv)
-{
-    return cli_lab_main(&drape_verb_tradeoff, 1, argc, argv);
-}

@@ -273,7 +273,11 @@ static const cli_option options[] = {
      offsetof(validate_request, scenes), 0, NULL},
 };
 
-static int main_validate(int argc, char **argv);
+static int main_validate(const void *command)
+{
+    const validate_request *request = command;
+    return validate(request, request->command.ctx);
+}
 
 const drape_verb drape_verb_validate = {
     .entry = {.name = "validate", .summary = "the physics references: obtained against expected"},
@@ -287,19 +291,6 @@ const drape_verb drape_verb_validate = {
         "a documented model error. Exit code 0: none failed. All of them take four minutes of CPU time.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
+    .request_size = sizeof(validate_request),
     .run = main_validate,
 };
-
-static int main_validate(int argc, char **argv)
-{
-    validate_request request = {.scenes = NULL};
-    drape_context *ctx = NULL;
-    int code = cli_parse(&drape_verb_validate, argc, argv, &request.command);
-    if (code == CLI_GO_ON && cli_context_create(&ctx))
-        code = cli_misuse("validate", "out of memory");
-    if (code == CLI_GO_ON)
-        code = validate(&request, ctx);
-    drape_context_destroy(&ctx);
-    cli_command_free(&request.command);
-    return code;
-}

@@ -143,8 +143,9 @@ int cli_lab_conclude(drape_context *ctx, drape_status status, drape_lab_outcome 
     return code;
 }
 
-static int run(const drape_verb *verb, const cli_lab_request *request, int default_jobs)
+int cli_lab_run(const cli_lab_request *request, int default_jobs)
 {
+    const char *verb = request->command.verb;
     drape_lab_def def;
     drape_lab_outcome outcome;
     drape_context *ctx = NULL;
@@ -152,29 +153,18 @@ static int run(const drape_verb *verb, const cli_lab_request *request, int defau
     words w = {.settings = NULL};
     if (!make_words(request, &w) || cli_context_create(&ctx)) {
         free_words(&w);
-        return cli_misuse(verb->entry.name, "out of memory");
+        return cli_misuse(verb, "out of memory");
     }
     int code = make_def(request, default_jobs, &w, &progress, &def);
     if (code == CLI_GO_ON && request->command.threads)
-        code = cli_misuse(verb->entry.name,
-                          "--threads has no effect: a case takes one; --jobs runs cases at a time");
+        code = cli_misuse(verb, "--threads has no effect: a case takes one; --jobs runs cases at a time");
     if (code == CLI_GO_ON) {
         cli_progress_begin(&progress, 0, 0);
-        drape_status status = drape_lab_run(ctx, verb->entry.name, &def, &outcome);
+        drape_status status = drape_lab_run(ctx, verb, &def, &outcome);
         cli_progress_clear(&progress);
         code = cli_lab_conclude(ctx, status, &outcome);
     }
     drape_context_destroy(&ctx);
     free_words(&w);
-    return code;
-}
-
-int cli_lab_main(const drape_verb *verb, int default_jobs, int argc, char **argv)
-{
-    cli_lab_request request = {.out = NULL};
-    int code = cli_parse(verb, argc, argv, &request.command);
-    if (code == CLI_GO_ON)
-        code = run(verb, &request, default_jobs);
-    cli_command_free(&request.command);
     return code;
 }

@@ -38,8 +38,8 @@ typedef struct cli_lab_request {
             offsetof(cli_lab_request, shard), 0, NULL                                                         \
     }
 
-/* Runs the experiment of that name as the command line says. Returns the exit code. */
-int cli_lab_main(const drape_verb *verb, int default_jobs, int argc, char **argv);
+/* Runs the experiment of the request's verb. Returns the exit code. */
+int cli_lab_run(const cli_lab_request *request, int default_jobs);
 
 struct drape_lab_outcome;
 int cli_lab_conclude(drape_context *ctx, drape_status status, struct drape_lab_outcome *outcome);

@@ -1,5 +1,5 @@
-/* main.c: the program `drape`: finds the verb, hands it the command line, and sees that its output arrived.
- */
+/* main.c: the program `drape`: finds the verb, reads its command line, runs it, and checks that its output was
+ * written. */
 #include "cli/cli.h"
 #include "cli/signals.h"
 
@@ -9,8 +9,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* A file that is opened later must not become the standard output: with a descriptor closed, it would. The
- * stand-ins refuse what the real ones are for, so that it is still seen to fail. */
+/* If the program is started with a standard descriptor closed, a file that is opened later would become the standard
+ * output. The substitutes refuse what the descriptor is for, so that writing to it still fails. */
 static void fill_descriptors(void)
 {
     static const int modes[] = {O_WRONLY, O_RDONLY, O_RDONLY};
@@ -19,7 +19,7 @@ static void fill_descriptors(void)
             return;
 }
 
-/* A closed pipe and a full quota are errors of a write, which is checked, and no reason to die. */
+/* A closed pipe or a full quota must not end the program: writes are checked. */
 static void ignore_write_signals(void)
 {
     const struct sigaction ignore = {.sa_handler = SIG_IGN};
@@ -74,6 +74,27 @@ static int version(int argc, char **argv)
     return CLI_DONE;
 }
 
+static int run_verb(const drape_verb *verb, int argc, char **argv)
+{
+    drape_context *ctx = NULL;
+    drape_status status = cli_context_create(&ctx);
+    drape_arena arena = drape_arena_of(ctx);
+    cli_command *request = status ? NULL : drape_arena_take(&arena, 1, verb->request_size);
+    int code = CLI_BAD_INPUT;
+    if (request) {
+        request->arena = &arena;
+        request->ctx = ctx;
+        code = cli_parse(verb, argc, argv, request);
+        if (code == CLI_GO_ON)
+            code = verb->run(request);
+        drape_arena_free(&arena);
+    } else {
+        cli_misuse(verb->entry.name, "out of memory");
+    }
+    drape_context_destroy(&ctx);
+    return code;
+}
+
 static int run(int argc, char **argv)
 {
     static const struct {
@@ -89,10 +110,10 @@ static int run(int argc, char **argv)
         if (strcmp(argv[1], words[i].word) == 0)
             return words[i].run(argc, argv);
     const drape_verb *verb = find_verb(argv[1]);
-    return verb ? verb->run(argc - 1, argv + 1) : unknown_verb(argv[1]);
+    return verb ? run_verb(verb, argc - 1, argv + 1) : unknown_verb(argv[1]);
 }
 
-/* Results that did not arrive are a failure, whatever the verb thought. */
+/* Results that could not be written are a failure, whatever the verb returned. */
 static int finish_output(int code)
 {
     bool lost = ferror(stdout);

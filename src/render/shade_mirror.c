@@ -1,4 +1,4 @@
-/* shade_mirror.c: a mirror of the world around. */
+/* shade_mirror.c: a mirror of the surroundings. */
 #include "render/shading.h"
 
 const drape_shading drape_shading_mirror = {

@@ -1,4 +1,4 @@
-/* load.h: which edges of the boundary a load is on. */
+/* load.h: the boundary edges that a load acts on. */
 #ifndef DRAPE_TERMS_LOAD_H
 #define DRAPE_TERMS_LOAD_H
 
@@ -16,8 +16,7 @@ enum {
 
 extern const char *const drape_load_edges[];
 
-/* How many edges; the status of a refusal where the mesh has none such, or is no grid and a side is asked
- * for. */
+/* The number of edges. Refuses a mesh that has none, and one that is not a grid if a side of the grid is given. */
 drape_status drape_load_count(const drape_cloth_view *cloth, const double *values,
                               drape_term_builder *builder, int32_t *count);
 

@@ -66,9 +66,9 @@ const drape_param drape_spring_params[DRAPE_SPRING_PARAM_COUNT] = {
          .help = "a step that leaves a spring shorter than this share of its rest length is rejected"},
 };
 
-/* ---- Which nodes ---- */
+/* ---- Pairs of nodes ---- */
 
-/* Springs of one offset: one for each node whose partner is on the grid. */
+/* The number of nodes in a row whose partner is on the grid. */
 static int32_t columns_of(const drape_cloth_view *cloth, const drape_spring_offset *offset)
 {
     int32_t columns = cloth->columns - abs(offset->columns);
@@ -113,8 +113,8 @@ double drape_spring_rest_length(const drape_cloth_view *cloth, const int32_t pai
 
 /* ---- Building ---- */
 
-/* The mean over both ends, so that a spring is the same seen from either: with the row of the neighbour, as
- * Boson has it, the two forces differ and the net force of a sheet is not zero. */
+/* The mean of both ends, so that the forces at both are equal: with the row of the neighbour, as in Boson, they differ,
+ * and the net force of a sheet is not zero. */
 static double gradient_factor(const drape_cloth_view *cloth, const int32_t pair[2], double gradient)
 {
     if (gradient == 0)
@@ -158,15 +158,6 @@ drape_status drape_spring_build_kind(const drape_cloth_view *cloth, int kind, co
 
 /* ---- The spring ---- */
 
-/* dq = (-n, n) */
-static void gradient(const double n[3], double *dq)
-{
-    for (int i = 0; i < 3; i++) {
-        dq[3 + i] = n[i];
-        dq[i] = -n[i];
-    }
-}
-
 /* ddq = [P -P; -P P] with P = (I - n n')/l */
 static void hessian(const double n[3], double length, double *ddq)
 {
@@ -189,8 +180,10 @@ void drape_spring_measure(const drape_elements *el, int32_t first, int32_t count
         q[i] = vec3_norm(n);
         for (int k = 0; k < 3; k++)
             n[k] /= q[i];
-        if (dq)
-            gradient(n, dq + 6 * (size_t)i);
+        for (int k = 0; dq && k < 3; k++) {
+            dq[6 * i + 3 + k] = n[k];
+            dq[6 * i + k] = -n[k];
+        }
         if (ddq)
             hessian(n, q[i], ddq + 36 * (size_t)i);
     }
@@ -207,9 +200,7 @@ void drape_spring_pairs(const drape_elements *el, int32_t first, int32_t count, 
 
 static double ratio_of(const drape_elements *el, int32_t e, const double *x)
 {
-    double d[3];
-    vec3_sub(x + 3 * (size_t)el->node[2 * (size_t)e + 1], x + 3 * (size_t)el->node[2 * (size_t)e], d);
-    return vec3_norm(d) / el->rest[(size_t)REST_LENGTH * (size_t)el->count + (size_t)e];
+    return drape_pair_length(el, e, x) / drape_rest_of(el, REST_LENGTH, e);
 }
 
 drape_status drape_spring_check(const drape_elements *el, const double *x, const double *before,

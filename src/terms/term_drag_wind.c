@@ -1,13 +1,14 @@
 /*
  * drag.wind: the pressure of a steady wind on every triangle. With m = (x1 - x0) x (x2 - x0), twice the
- * area along the normal n, and u = w - (v0 + v1 + v2)/3 the wind as the triangle meets it,
+ * area times the normal n, and u = w - (v0 + v1 + v2)/3, the wind relative to the triangle,
  *     F = 1/2 rho C A |u.n| (u.n) n = rho C/4 |q| q m / |m|^2,   q = u . m,
- * a third of it on each node. So the wind acts along the normal alone (Provot 1995, section 3.2, there linear in
- * u.n) and as the square of its speed, as on a flat plate (Hoerner 1965, Fluid-Dynamic Drag, 3: C = 1.17 for a
- * square one across the wind). No friction along the sheet, no lee: a layer behind another feels the wind too.
+ * a third of it on each node. So the wind acts along the normal only (Provot 1995, section 3.2, there linear in
+ * u.n) and with the square of its speed, as on a flat plate (Hoerner 1965, Fluid-Dynamic Drag, 3: C = 1.17 for a
+ * square plate across the wind). There is no friction along the sheet and no lee: the wind also acts on a layer behind
+ * another.
  *
  *     dF = rho C/4 [2 |q| m dq + |q| q dm - |q| q m d(|m|^2)/|m|^2] / |m|^2,  dq = u . dm + m . du
- * F is C1 in x and v; a triangle without area has no force. In air at rest it takes power: -F . v = |q|^3 ... >= 0.
+ * F is C1 in x and v; a triangle without area has no force. In air at rest F dissipates: -F . v = |q|^3 ... >= 0.
  */
 #include "base/vec3.h"
 #include "terms/terms.h"
@@ -79,8 +80,8 @@ static flow flow_of(const drape_elements *el, int32_t element, const double *x, 
     return f;
 }
 
-/* dm for a unit change of coordinate k of node i: x0 enters by both edges. */
-static void turn_of(const flow *f, int i, int k, double *dm)
+/* The derivative of m by coordinate k of node i; x0 enters through both edges. */
+static void normal_derivative(const flow *f, int i, int k, double *dm)
 {
     double unit[3] = {0}, edge[3];
     unit[k] = 1;
@@ -94,7 +95,7 @@ static void turn_of(const flow *f, int i, int k, double *dm)
         vec3_cross(edge, unit, dm);
 }
 
-/* Every node has the same third: a column of the 9 x 9 matrix is three times the same three numbers, less dF/3. */
+/* Every node has a third of the force: a column of the 9 x 9 matrix is three times -dF/3. */
 static void set_column(double *matrix, int column, const double *dforce)
 {
     for (int row = 0; row < D; row++)
@@ -106,7 +107,7 @@ static void derive(const flow *f, double factor, double *dg_dx, double *dg_dv)
     double scale = factor * fabs(f->q) / f->area2;
     for (int column = 0; column < D; column++) {
         double dm[3], dforce[3];
-        turn_of(f, column / 3, column % 3, dm);
+        normal_derivative(f, column / 3, column % 3, dm);
         double dq = vec3_dot(f->u, dm), darea2 = 2 * vec3_dot(f->m, dm);
         for (int k = 0; k < 3; k++)
             dforce[k] = scale * (2 * f->m[k] * dq + f->q * (dm[k] - f->m[k] * darea2 / f->area2));
@@ -126,11 +127,11 @@ static void dissipation(const drape_elements *el, int32_t first, int32_t count, 
         const flow f = flow_of(el, first + i, x, v);
         double factor = el->rest[first + i], *hx = dg_dx ? dg_dx + (size_t)(D * D) * (size_t)i : NULL,
                *hv = dg_dv ? dg_dv + (size_t)(D * D) * (size_t)i : NULL;
-        bool flat = f.area2 > 0;
-        double pressure = flat ? factor * fabs(f.q) * f.q / f.area2 : 0;
+        bool has_area = f.area2 > 0;
+        double pressure = has_area ? factor * fabs(f.q) * f.q / f.area2 : 0;
         for (int k = 0; k < D; k++)
             g[D * (size_t)i + (size_t)k] = -pressure * f.m[k % 3] / 3;
-        if (flat && (hx || hv)) {
+        if (has_area && (hx || hv)) {
             derive(&f, factor, hx, hv);
             continue;
         }

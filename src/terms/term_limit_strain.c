@@ -1,19 +1,19 @@
 /*
- * limit.strain: keeps edges, or springs, from stretching beyond a limit. With s = l/L - 1 and the window
- * y = (s - onset)/w, w = limit - onset, each has the energy
+ * limit.strain: keeps edges, or springs, from stretching beyond a limit. With s = l/L - 1,
+ * y = (s - onset)/w and w = limit - onset, each has the energy
  *     E = K (L w)^2 b(y),  b = 0 for y <= 0,  -y^2 ln(1 - y) for 0 < y <= 1 - cap
  *     dE/dl = K L w b',    b' = -2 y ln(1 - y) + y^2/(1 - y)
  *     d2E/dl2 = K b'',     b'' = -2 ln(1 - y) + 4 y/(1 - y) + y^2/(1 - y)^2
- * which is the barrier of Li et al. 2020 (Incremental Potential Contact, eq. 6), its gap limit - s: zero
- * below the onset, C2 there since b ~ y^3, and it has no end below the limit. b'' >= 0 and b' >= 0, so the
- * Hessian b'' grad l grad l' + b' hess l is positive semidefinite.
+ * which is the barrier of Li et al. 2020 (Incremental Potential Contact, eq. 6) with the gap limit - s: zero below the
+ * onset, C2 there since b ~ y^3, and unbounded towards the limit. b'' >= 0 and b' >= 0, so the Hessian
+ * b'' grad l grad l' + b' hess l is positive semidefinite.
  *
- * A barrier that is infinite beyond the limit would leave Newton nowhere to come from: fast nodes' first
- * guess lies beyond it, and so does any sheet whose pins were moved. So b goes on above y = 1 - cap as the
- * parabola that is C2 there. Iterates may be beyond the limit; states may not: the check rejects them.
- * The forces at the limit are some 2/cap K L w; a load beyond it needs a larger stiffness, or smaller cap.
+ * If the barrier were infinite beyond the limit, Newton could not start there, but the first guess of fast nodes is
+ * beyond it, and so is a sheet whose pins were moved. Therefore b continues above y = 1 - cap as the parabola that is C2
+ * there. Iterates may be beyond the limit; states may not: the check rejects them. The forces at the limit are about
+ * 2/cap K L w; a larger load needs a larger stiffness or a smaller cap.
  *
- * Pressed together springs are not limited, nor does CS184's pass limit them.
+ * Compressed springs are not limited, as in CS184.
  */
 #include "base/vec3.h"
 #include "terms/spring.h"
@@ -91,7 +91,7 @@ static double mean_length(const drape_spring_set *set, int32_t count)
     return sum / count;
 }
 
-/* One edge alone can carry the sheet's weight, with b' = 1, at y = 0.46. */
+/* Such that a single edge can carry the weight of the sheet at y = 0.46, where b' = 1. */
 static double stiffness_of(const drape_spring_set *set, int32_t count, const double *values)
 {
     const drape_cloth_view *cloth = set->cloth;
@@ -149,7 +149,7 @@ static barrier barrier_at(double y, double cap)
     if (y <= 1 - cap)
         return barrier_below_cap(y);
     barrier b = barrier_below_cap(1 - cap);
-    double beyond = y - (1 - cap); /* NaN, too, comes here and stays one */
+    double beyond = y - (1 - cap); /* NaN gets here too and stays NaN */
     b.value += beyond * (b.slope + 0.5 * b.curve * beyond);
     b.slope += b.curve * beyond;
     return b;
@@ -167,7 +167,7 @@ static void one(const drape_elements *el, int32_t element, const double *x, doub
     barrier b = barrier_at((length / rest_length - 1 - onset) / width, el->params[PARAM_CAP]);
     double force = k * scale * b.slope, across = b.slope > 0 ? force / length : 0;
     for (int i = 0; i < 3; i++)
-        n[i] = b.slope > 0 ? n[i] / length : 0; /* a collapsed edge is not stretched */
+        n[i] = b.slope > 0 ? n[i] / length : 0; /* a collapsed edge has no direction, and is not stretched */
     if (e)
         *e = k * scale * scale * b.value;
     for (int i = 0; g && i < 3; i++) {
@@ -191,12 +191,10 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
 
 static double strain_of(const drape_elements *el, int32_t e, const double *x)
 {
-    double d[3];
-    vec3_sub(x + 3 * (size_t)el->node[2 * (size_t)e + 1], x + 3 * (size_t)el->node[2 * (size_t)e], d);
-    return vec3_norm(d) / el->rest[(size_t)REST_LENGTH * (size_t)el->count + (size_t)e] - 1;
+    return drape_pair_length(el, e, x) / drape_rest_of(el, REST_LENGTH, e) - 1;
 }
 
-/* Beyond the limit a step may only lead back. */
+/* A step that starts beyond the limit may only reduce the strain. */
 static drape_status check(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault)
 {

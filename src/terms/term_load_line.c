@@ -1,11 +1,11 @@
-/* load.line: a dead force per length on edges of the boundary: E = -f . (x0 + x1) L/2, L the length at rest.
- * Linear: no Hessian. */
+/* load.line: a dead force per length on boundary edges: E = -f . (x0 + x1) L/2 with the rest length L. Linear: it has
+ * no Hessian. */
 #include "terms/load.h"
 #include "terms/terms.h"
 
 enum { LIST_FORCE = DRAPE_LOAD_LIST_COUNT, LIST_COUNT };
 enum { PARAM_FORCE = DRAPE_LOAD_COUNT };
-enum { REST_HALF_X, REST_HALF_Y, REST_HALF_Z, REST_COUNT }; /* of the force on an edge [N] */
+enum { REST_HALF_X, REST_HALF_Y, REST_HALF_Z, REST_COUNT }; /* half the force on an edge [N] */
 
 static const drape_param params[LIST_COUNT] = {
     DRAPE_LOAD_PARAMS,

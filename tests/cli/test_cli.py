@@ -144,7 +144,7 @@ def test_run_files():
 
 
 def test_realtime():
-    """frames with a budget: times, misses and rungs are told, late frames are no failure, files as usual"""
+    """frames with a budget: times, misses and levels are reported, late frames are not failures, files as usual"""
     write_scene()
     for rate, row in (30, "newton_k"), (1e6, "newton_k"), (30, "be"):
         text = good("run", "scene.json", "--realtime", "--integrator", row, "--frame-rate", str(rate), "--duration",
