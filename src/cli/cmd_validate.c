@@ -119,9 +119,9 @@ static int write_scenes(const drape_reference *reference, const char *folder)
     for (int i = 0; i < reference->case_count; i++) {
         char path[1024], text[DRAPE_LAB_TEXT];
         const double p = reference->parameters[i];
-        reference->scene(p, reference->high > 0 ? reference->expected(p) : 0, text, sizeof text);
-        for (char *c = text; *c; c++)
-            *c = *c == '\'' ? '"' : *c;
+        const drape_reference_case one = {reference, p, reference->high > 0 ? reference->expected(p) : 0};
+        reference->scene(&one, text);
+        drape_reference_quote(text);
         snprintf(path, sizeof path, "%s/%s_%d.json", folder, reference->name, i);
         FILE *file = fopen(path, "w");
         if (!file || fprintf(file, "%s\n", text) < 0 || fclose(file)) {

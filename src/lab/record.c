@@ -29,7 +29,7 @@ static void hash_of(const lab_record *record, char digits[17])
 {
     char text[DRAPE_LAB_TEXT];
     const double parameter = record->reference->parameters[record->index];
-    record->reference->scene(parameter, 1, text, sizeof text);
+    record->reference->scene(&(drape_reference_case){record->reference, parameter, 1}, text);
     snprintf(digits, 17, "%016llx",
              (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, text, strlen(text)));
 }

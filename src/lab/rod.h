@@ -1,8 +1,10 @@
-/* rod.h: heavy and loaded inextensible rods in a plane, by GSL. */
+/* rod.h: differential equations and roots by GSL: heavy and loaded inextensible rods in a plane. */
 #ifndef DRAPE_LAB_ROD_H
 #define DRAPE_LAB_ROD_H
 
-/* The tip of a rod of length 1, clamped level, under its weight G = q L^3/B and a force P = F L^2/B at its
+#include <stddef.h>
+
+/* The tip of a rod of length 1, clamped horizontally, under its weight G = q L^3/B and a force P = F L^2/B at its
  * end, both downwards: how far it hangs down and reaches. */
 void drape_rod_tip(double weight, double force, double *drop, double *reach);
 
@@ -12,5 +14,9 @@ double drape_rod_threshold(double power, double low, double high);
 
 /* The root of f between low and high, where its signs differ. */
 double drape_root(double (*f)(double x, void *context), void *context, double low, double high);
+
+/* y (n) from t = 0 to 1, with a first step and an absolute tolerance. Returns GSL's status; y[0] is NaN if it failed. */
+int drape_ode(int (*rate)(double t, const double y[], double dy[], void *context), void *context, size_t n,
+              double step, double tolerance, double *y);
 
 #endif
