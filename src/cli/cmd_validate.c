@@ -161,8 +161,8 @@ static bool interrupted(void *user)
 typedef struct run {
     drape_context *ctx;
     lab_record *records;
-    size_t count, found; /* found: done before */
-    drape_file file;     /* of their lines; not there without --out */
+    size_t count;
+    drape_file file; /* of their lines; not there without --out */
     cli_progress progress;
     double start; /* [s] of the clock */
 } run;
@@ -236,7 +236,7 @@ static int run_references(drape_context *ctx, const validate_request *request, c
     r.records = lab_records_make(ctx, only, &r.count);
     drape_status status = r.records ? DRAPE_OK : DRAPE_E_MEMORY;
     if (!status && request->out)
-        status = lab_records_open(ctx, request->out, r.records, r.count, &r.file, &r.found);
+        status = lab_records_open(ctx, request->out, r.records, r.count, &r.file);
     if (!status) {
         style->begin();
         cli_progress_begin(&r.progress, 0, 0);
