@@ -22,8 +22,8 @@ const drape_verb drape_verb_merge = {
     .operands_most = 100000,
     .summary = "the shards of a sweep into one, with its report",
     .details =
-        "Takes the lines of the folders of an experiment that ran in parts (--shard I/N), and makes the\n"
-        "report once all cases are there. Says how many are missing where some are.",
+        "Takes the results of the folders of an experiment that ran in parts (--shard I/N), and makes the\n"
+        "report once all cases are done. Says how many are missing otherwise.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .run = main_merge,

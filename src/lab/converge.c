@@ -200,7 +200,7 @@ static void report_order(const sequence *s, FILE *out)
         fprintf(out, "; %lld of its steps were rejected and cut, so dt was not halved everywhere",
                 (long long)s->rejected);
     if (s->failed)
-        fprintf(out, "; %d of its runs did not come to the end", s->failed);
+        fprintf(out, "; %d of its runs did not complete", s->failed);
     fprintf(out, "\n");
 }
 
@@ -216,7 +216,7 @@ static drape_status draw(lab *l, const sequence *sequences, size_t count)
     fprintf(plot.script, "set logscale xy\nset format '10^{%%T}'\n"
                          "set grid lc rgb '#dddddd'\nset key outside right top noenhanced\n"
                          "set xlabel 'dt [s], rtol, or edge over that of the coarsest mesh'\n"
-                         "set ylabel 'way of the end to the next refinement, RMS [m]'\n");
+                         "set ylabel 'distance of the end from that of the next refinement, RMS [m]'\n");
     for (size_t k = 0; k < count; k++) {
         fprintf(plot.script, "$s%zu << EOD\n", k);
         for (size_t i = 0; i < sequences[k].count; i++)

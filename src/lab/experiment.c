@@ -265,19 +265,25 @@ static drape_status report(lab *l, drape_lab_outcome *outcome)
 {
     char title[512];
     const bool shard = l->def->shards > 1;
-    lab_copy_same(l);
     outcome->cases = (int64_t)l->count;
-    for (size_t i = 0; i < l->count; i++)
+    for (size_t i = 0; i < l->count; i++) {
+        json_t *one = json_array_get(l->cases, i), *same = json_object_get(one, "same_as");
+        json_t *source = same ? l->results[json_integer_value(same)] : NULL;
+        if (source && !l->results[i]) {
+            l->results[i] = json_copy(source);
+            json_object_set_new(l->results[i], "case", json_integer((json_int_t)i));
+            json_object_set(l->results[i], "tags", json_object_get(one, "tags"));
+        }
         if (l->results[i]) {
             outcome->done++;
             outcome->failed += !lab_is_good(l->results[i]);
             outcome->rejected += (int64_t)lab_number(l->results[i], "rejected");
         }
-    fprintf(
-        l->summary,
-        "%lld of %lld cases done; %lld of them did not come to the end; %lld steps were rejected in all\n",
-        (long long)outcome->done, (long long)outcome->cases, (long long)outcome->failed,
-        (long long)outcome->rejected);
+    }
+    fprintf(l->summary,
+            "%lld of %lld cases done; %lld of them did not complete; %lld steps were rejected in all\n",
+            (long long)outcome->done, (long long)outcome->cases, (long long)outcome->failed,
+            (long long)outcome->rejected);
     drape_status status = shard ? DRAPE_OK : lab_write_csv(l);
     if (status || shard || outcome->done < outcome->cases) {
         fprintf(l->summary, "the report is made when all cases are done: other shards, `drape merge`\n");

@@ -40,7 +40,7 @@ extern const lab_experiment_ops *const lab_experiments[]; /* NULL-ended */
 
 struct lab {
     drape_context *ctx;
-    drape_arena arena; /* of what is borrowed below, unless it says otherwise */
+    drape_arena arena; /* of folder, the array of results, reference, probe */
     const drape_lab_def *def;
     const lab_experiment_ops *experiment;
     char *folder;
@@ -82,7 +82,7 @@ bool lab_wants_integrator(const lab *l, const char *name, bool fallback);
 /* Faults of the def: an integrator that does not exist, or that has no steps in time. */
 drape_status lab_check_integrators(const lab *l);
 
-/* Whether an integrator ignores the value at a pointer: "/integrator/..." that is none of its parameters. */
+/* Whether an integrator ignores the value at a pointer: "/integrator/..." that is not one of its parameters. */
 bool lab_ignores(const drape_integrator_ops *integrator, const char *pointer);
 
 #endif

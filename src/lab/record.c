@@ -24,7 +24,7 @@ lab_record *lab_records_make(drape_context *ctx, const drape_reference *only, si
     return records;
 }
 
-/* Of the scene at load 1: the line says everything else about the case. */
+/* The hash of the scene at load 1: the line has everything else about the case. */
 static void hash_of(const lab_record *record, char digits[17])
 {
     char text[DRAPE_LAB_TEXT];

@@ -6,8 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 
-#define DEGREES (180 / 3.14159265358979323846)
-#define BEAM    .model = "stretch.cst, bend.midedge; irregular"
+#define BEAM .model = "stretch.cst, bend.midedge; irregular"
 
 /* ---- Under its own weight: a case is G = rho g L^3/B ---- */
 
@@ -43,31 +42,16 @@ DRAPE_REFERENCE(cantilever, .quantity = "drop over reach of the end", .unit = "1
 
 /* ASTM D1388 pushes a strip over an edge until the chord to its end falls to 41.5 degrees, and takes the bending length
  * as half of the overhang: there G = 8, within 0.04 %. The rod's own angle at G = 8 is 41.487 degrees. */
-static double chord(double weight)
-{
-    double drop, reach;
-    drape_rod_tip(weight, 0, &drop, &reach);
-    return atan2(drop, reach) * DEGREES;
-}
-
 static int chord_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     return STRIP_SCENE(text, .columns = 81, .rows = 4, .width = 0.02, .thickness = 0.004,
                        .gravity = {0, -strip_gravity(c->parameter), 0}, .tolerance = 1e-12);
 }
 
-static drape_status measure_chord(drape_reference_run *run, double *value)
-{
-    double tip[3];
-    drape_status status = lab_tip(run, tip);
-    *value = atan2(-tip[1], tip[0]) * DEGREES;
-    return status;
-}
-
 DRAPE_REFERENCE(bending_length, .quantity = "angle of the chord to the end", .unit = "degree",
                 .parameter = "G = rho g L^3/B", DRAPE_CASES(8), BEAM,
                 .source = "ASTM D1388; Peirce 1930, The handle of cloth as a measurable quantity",
-                .tolerance = 0.005, .expected = chord, .scene = chord_scene, .measure = measure_chord);
+                .tolerance = 0.005, .expected = drape_rod_chord, .scene = chord_scene, .measure = lab_chord);
 
 /* ---- A force at the end that stays vertical ---- */
 

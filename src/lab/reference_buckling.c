@@ -77,10 +77,10 @@ static double lateral_hinges(double unused)
 static int hinges_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     enum { EDGES = 8, STRIPS = 240 }; /* across and along the strip */
-    const double edge = 0.035 / EDGES, thickness = 1e-3, poisson = 1.0 / 3, gravity = 9.81,
-                 length =
-                     (STRIPS - 0.5) * sqrt(3) / 2 * edge, /* pins of the first two rows clamp in between */
-        modulus = 12 * (1 - poisson * poisson) * STRIP_RIGIDITY / (thickness * thickness * thickness);
+    const double edge = 0.035 / EDGES, thickness = 1e-3, poisson = 1.0 / 3, gravity = 9.81;
+    const double length = (STRIPS - 0.5) * sqrt(3) / 2 * edge; /* pins of two rows clamp in between */
+    const double modulus =
+        12 * (1 - poisson * poisson) * STRIP_RIGIDITY / (thickness * thickness * thickness);
     return snprintf(
         text, DRAPE_LAB_TEXT,
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': %d, 'strips': %d, "
@@ -141,7 +141,7 @@ static int miss(const gsl_vector *u, void *share, gsl_vector *out)
 
 /* The mode in which a clamped and pinned column buckles, of that size: theta is -f (1 - cos k s)/k^2 + f sin(k s)/k, and
  * the mean of theta^2/2 is the share. */
-static void guess(double share, gsl_vector *u)
+static void guess(double share, double u[3])
 {
     double mean = 0;
     for (int i = 0; i < 1000; i++) {
@@ -149,9 +149,8 @@ static void guess(double share, gsl_vector *u)
         mean += theta * theta / 1000;
     }
     const double f = sqrt(2 * share / mean);
-    gsl_vector_set(u, 0, f);
-    gsl_vector_set(u, 1, EULER * EULER);
-    gsl_vector_set(u, 2, f);
+    u[0] = u[2] = f;
+    u[1] = EULER * EULER;
 }
 
 /* f/N: the share grows in steps from a small one, where the guess is good. */
@@ -159,26 +158,25 @@ static double slip_friction(double share)
 {
     enum { STEPS = 10 };
     gsl_multiroot_fsolver *solver = gsl_multiroot_fsolver_alloc(gsl_multiroot_fsolver_hybrids, 3);
-    gsl_vector *u = gsl_vector_alloc(3);
-    int status = solver && u ? GSL_SUCCESS : GSL_ENOMEM;
-    if (!status)
-        guess(share / STEPS, u);
+    double u[3]; /* theta'(0), N, f */
+    gsl_vector_view start = gsl_vector_view_array(u, 3);
+    int status = solver ? GSL_SUCCESS : GSL_ENOMEM;
+    guess(share / STEPS, u);
     for (int k = 1; k <= STEPS && !status; k++) {
         double pushed = share * k / STEPS;
         gsl_multiroot_function function = {miss, 3, &pushed};
-        status = gsl_multiroot_fsolver_set(solver, &function, u);
+        status = gsl_multiroot_fsolver_set(solver, &function, &start.vector);
         for (int i = 0; i < 100 && !status; i++) {
             status = gsl_multiroot_fsolver_iterate(solver);
             if (gsl_multiroot_test_residual(solver->f, 1e-9) == GSL_SUCCESS)
                 break;
         }
-        gsl_vector_memcpy(u, solver->x);
+        gsl_vector_memcpy(&start.vector, solver->x);
         status = gsl_multiroot_test_residual(solver->f, 1e-9);
     }
-    const double value = status ? NAN : fabs(gsl_vector_get(u, 2)) / gsl_vector_get(u, 1);
-    gsl_multiroot_fsolver_free(solver);
-    gsl_vector_free(u);
-    return value;
+    if (solver)
+        gsl_multiroot_fsolver_free(solver);
+    return status ? NAN : fabs(u[2]) / u[1];
 }
 
 /* The strip is in contact with the table from the start, so that the push is that of the track. */

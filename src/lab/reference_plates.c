@@ -5,6 +5,7 @@
 #include <gsl/gsl_multifit.h>
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #define THICKNESS 0.1
 #define PRESSURE  0.01 /* [Pa] */
@@ -82,28 +83,22 @@ static double deflection(const drape_reference_run *run, double x, double z)
     for (size_t i = 0; i < nodes && count < MAX_NODES; i++)
         if (hypot(rest[3 * i] - x, rest[3 * i + 2] - z) < near)
             found[count++] = i;
-    if (count < TERMS)
-        return NAN;
-    double value = NAN, squares;
-    gsl_matrix *powers = gsl_matrix_alloc(count, TERMS), *covariance = gsl_matrix_alloc(TERMS, TERMS);
-    gsl_vector *y = gsl_vector_alloc(count), *fit = gsl_vector_alloc(TERMS);
-    gsl_multifit_linear_workspace *work = gsl_multifit_linear_alloc(count, TERMS);
-    const bool there = powers && covariance && y && fit && work;
-    for (size_t i = 0; there && i < count; i++) {
+    double powers[MAX_NODES * TERMS], y[MAX_NODES], fit[TERMS], covariance[TERMS * TERMS], squares;
+    for (size_t i = 0; i < count; i++) {
         const double u = rest[3 * found[i]] - x, w = rest[3 * found[i] + 2] - z;
-        const double row[TERMS] = {1, u, w, u * u, u * w, w * w};
-        for (size_t k = 0; k < TERMS; k++)
-            gsl_matrix_set(powers, i, k, row[k]);
-        gsl_vector_set(y, i, -at[3 * found[i] + 1]);
+        memcpy(powers + i * TERMS, (const double[TERMS]){1, u, w, u * u, u * w, w * w},
+               TERMS * sizeof *powers);
+        y[i] = -at[3 * found[i] + 1];
     }
-    if (there && gsl_multifit_linear(powers, y, fit, covariance, &squares, work) == 0)
-        value = gsl_vector_get(fit, 0);
+    gsl_multifit_linear_workspace *work = count < TERMS ? NULL : gsl_multifit_linear_alloc(count, TERMS);
+    if (!work)
+        return NAN;
+    gsl_matrix_view p = gsl_matrix_view_array(powers, count, TERMS),
+                    c = gsl_matrix_view_array(covariance, TERMS, TERMS);
+    gsl_vector_view v = gsl_vector_view_array(y, count), f = gsl_vector_view_array(fit, TERMS);
+    const int failed = gsl_multifit_linear(&p.matrix, &v.vector, &f.vector, &c.matrix, &squares, work);
     gsl_multifit_linear_free(work);
-    gsl_vector_free(fit);
-    gsl_vector_free(y);
-    gsl_matrix_free(covariance);
-    gsl_matrix_free(powers);
-    return value;
+    return failed ? NAN : fit[0];
 }
 
 static drape_status measure(drape_reference_run *run, double *value)

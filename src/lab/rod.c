@@ -13,6 +13,7 @@
 
 #define TOLERANCE 1e-12 /* relative */
 #define STEP      1e-4  /* the first */
+#define DEGREES   (180 / 3.14159265358979323846)
 #define HALF_PI   1.57079632679489661923
 
 double drape_root(double (*f)(double x, void *context), void *context, double low, double high)
@@ -80,6 +81,13 @@ void drape_rod_tip(double weight, double force, double *drop, double *reach)
     drape_ode(rod_rate, &r, 4, STEP, TOLERANCE * 1e-12, y);
     *drop = y[2];
     *reach = y[3];
+}
+
+double drape_rod_chord(double weight)
+{
+    double drop, reach;
+    drape_rod_tip(weight, 0, &drop, &reach);
+    return atan2(drop, reach) * DEGREES;
 }
 
 typedef struct string {

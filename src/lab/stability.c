@@ -94,7 +94,7 @@ static json_t *setting_value(const axis *a, int k)
     return is_integer_axis(a) ? json_integer((json_int_t)llround(value)) : json_real(value);
 }
 
-/* Refuses an axis of integers with values that are none: they would be rounded, and the map would show others. */
+/* Refuses an axis of integers with other values: they would be rounded, and the map would show the wrong ones. */
 static drape_status check_integers(lab *l, const axis *a)
 {
     for (int k = 0; is_integer_axis(a) && k < a->count; k++) {

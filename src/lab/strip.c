@@ -60,6 +60,14 @@ drape_status lab_sinking(drape_reference_run *run, double *value)
     return status;
 }
 
+drape_status lab_chord(drape_reference_run *run, double *value)
+{
+    double tip[3];
+    drape_status status = lab_tip(run, tip);
+    *value = atan2(-tip[1], tip[0]) * (180 / 3.14159265358979323846);
+    return status;
+}
+
 drape_status lab_settle(drape_reference_run *run, const double *v)
 {
     drape_sim_def def;

@@ -219,16 +219,3 @@ drape_status lab_sweep(lab *l)
     pthread_mutex_destroy(&s.lock);
     return s.status ? s.status : closed;
 }
-
-void lab_copy_same(lab *l)
-{
-    for (size_t i = 0; i < l->count; i++) {
-        json_t *one = json_array_get(l->cases, i), *same = json_object_get(one, "same_as");
-        json_t *source = same ? l->results[json_integer_value(same)] : NULL;
-        if (!source || l->results[i])
-            continue;
-        l->results[i] = json_copy(source);
-        json_object_set_new(l->results[i], "case", json_integer((json_int_t)i));
-        json_object_set(l->results[i], "tags", json_object_get(one, "tags"));
-    }
-}

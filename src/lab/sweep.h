@@ -23,7 +23,4 @@ drape_status lab_begin_lines(lab *l, const char *name, int shard, int shards, dr
  * lab_run, DRAPE_E_FILE, DRAPE_E_STOPPED. */
 drape_status lab_sweep(lab *l);
 
-/* Every case that is the same as another gets its result. */
-void lab_copy_same(lab *l);
-
 #endif

@@ -169,7 +169,7 @@ static const char style[] =
     "body{font:16px/1.5 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#1b1e23;"
     "background:#fff}h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}"
     "figure{margin:1rem 0}figure img{max-width:100%;height:auto}figcaption{font-size:.85rem;color:#555}"
-    ".words p{margin:.3rem 0}table{border-collapse:collapse;font-size:.8rem;display:block;overflow-x:auto}"
+    ".summary p{margin:.3rem 0}table{border-collapse:collapse;font-size:.8rem;display:block;overflow-x:auto}"
     "td,th{padding:.15rem .6rem;text-align:right;border-bottom:1px solid #e3e5e8;white-space:nowrap}"
     "td:first-child,th:first-child{text-align:left}code,pre{font-size:.8rem}"
     "pre{background:#f5f6f7;padding:.7rem;overflow-x:auto}";
@@ -189,7 +189,7 @@ drape_status lab_write_page(lab *l, const char *title)
     put_escaped(out, title);
     fprintf(out, "</title><style>%s</style></head>\n<body>\n<h1>", style);
     put_escaped(out, title);
-    fputs("</h1>\n<div class=\"words\">", out);
+    fputs("</h1>\n<div class=\"summary\">", out);
     for (const char *at = l->summary_text; *at;) { /* each line is a paragraph */
         const size_t length = strcspn(at, "\n");
         char *line = strndup(at, length);

@@ -1,9 +1,10 @@
 /*
  * units.c: see units.h. A pointer says in which table a name is to be looked for, "/cloth/0/terms/2/stiffness" in that of
- * terms, not in which row: that is in the scene. Where rows that have the name give it different units, there is none.
+ * the terms, but not in which entry: that is in the scene. Where entries give the name different units, there is none.
  */
 #include "lab/units.h"
 
+#include "base/param.h"
 #include "colliders/colliders.h"
 #include "compile/compile.h"
 #include "control/control.h"
@@ -13,83 +14,41 @@
 
 #include <string.h>
 
-/* The parameters of one row of a table; NULL: there are no more rows. */
-typedef const drape_param *params_of(int row, int *count);
-
-#define PARAMS_OF(name, table)                                                                               \
-    static const drape_param *name(int row, int *count)                                                      \
-    {                                                                                                        \
-        static const drape_param none;                                                                       \
-        if (!(table)[row])                                                                                   \
-            return NULL;                                                                                     \
-        *count = (table)[row]->param_count;                                                                  \
-        return (table)[row]->params ? (table)[row]->params : &none;                                          \
-    }
-
-PARAMS_OF(grids, drape_grids)
-PARAMS_OF(terms, drape_terms)
-PARAMS_OF(colliders, drape_colliders)
-PARAMS_OF(integrators, drape_integrators)
-PARAMS_OF(controllers, drape_controllers)
-
-static const drape_param *materials(int row, int *count)
+/* The unit so far (NULL: the name was not found), and that of another list of parameters. */
+static const char *common_unit(const char *unit, const drape_param *params, int count, const char *name)
 {
-    *count = DRAPE_MATERIAL_PARAM_COUNT;
-    return row == 0 ? drape_material_params : NULL;
+    const int i = drape_param_find(params, count, name);
+    return i < 0 ? unit : !unit || strcmp(unit, params[i].unit) == 0 ? params[i].unit : "";
 }
 
-static const drape_param *contacts(int row, int *count)
-{
-    *count = DRAPE_CONTACT_PARAM_COUNT;
-    return row == 0 ? drape_contact_params : NULL;
-}
-
-static const drape_param *self_contacts(int row, int *count)
-{
-    *count = DRAPE_SELF_PARAM_COUNT;
-    return row == 0 ? drape_self_contact_params : NULL;
-}
-
-static const struct {
-    const char *part; /* of the pointer */
-    params_of *params;
-} tables[] = {{"/mesh/", grids},
-              {"/material/", materials},
-              {"/terms/", terms},
-              {"/colliders/", colliders},
-              {"/contact/", contacts},
-              {"/self_contact/", self_contacts},
-              {"/integrator/", integrators},
-              {"/controller/", controllers}};
-
-/* Values of the scene that are no row's, by how their pointers begin. */
-static const struct {
-    const char *start, *unit;
-} plain[] = {{"/gravity", "m/s2"}, {"/duration", "s"}, {"/frame_rate", "1/s"}};
-
-static const char *unit_in(params_of *params, const char *name)
-{
-    const char *unit = NULL;
-    const drape_param *list;
-    int count;
-    for (int row = 0; (list = params(row, &count)); row++)
-        for (int p = 0; p < count; p++) {
-            if (strcmp(list[p].name, name) != 0)
-                continue;
-            if (unit && strcmp(unit, list[p].unit) != 0)
-                return "";
-            unit = list[p].unit;
-        }
-    return unit && strcmp(unit, "1") != 0 ? unit : "";
-}
+#define LOOK_IN(table)                                                                                       \
+    for (int i = 0; (table)[i]; i++)                                                                         \
+    unit = common_unit(unit, (table)[i]->params, (table)[i]->param_count, name)
 
 const char *lab_unit(const char *pointer)
 {
-    for (size_t i = 0; i < sizeof plain / sizeof *plain; i++)
-        if (strncmp(pointer, plain[i].start, strlen(plain[i].start)) == 0)
-            return plain[i].unit;
-    for (size_t i = 0; i < sizeof tables / sizeof *tables; i++)
-        if (strstr(pointer, tables[i].part))
-            return unit_in(tables[i].params, strrchr(pointer, '/') + 1);
-    return "";
+    const char *name = strrchr(pointer, '/') + 1, *unit = NULL;
+    if (strncmp(pointer, "/gravity", strlen("/gravity")) == 0)
+        return "m/s2";
+    if (strcmp(pointer, "/duration") == 0)
+        return "s";
+    if (strcmp(pointer, "/frame_rate") == 0)
+        return "1/s";
+    if (strstr(pointer, "/mesh/"))
+        LOOK_IN(drape_grids);
+    else if (strstr(pointer, "/material/"))
+        unit = common_unit(NULL, drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, name);
+    else if (strstr(pointer, "/terms/"))
+        LOOK_IN(drape_terms);
+    else if (strstr(pointer, "/colliders/"))
+        LOOK_IN(drape_colliders);
+    else if (strstr(pointer, "/contact/"))
+        unit = common_unit(NULL, drape_contact_params, DRAPE_CONTACT_PARAM_COUNT, name);
+    else if (strstr(pointer, "/self_contact/"))
+        unit = common_unit(NULL, drape_self_contact_params, DRAPE_SELF_PARAM_COUNT, name);
+    else if (strstr(pointer, "/integrator/"))
+        LOOK_IN(drape_integrators);
+    else if (strstr(pointer, "/controller/"))
+        LOOK_IN(drape_controllers);
+    return unit && strcmp(unit, "1") != 0 ? unit : "";
 }

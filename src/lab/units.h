@@ -2,7 +2,7 @@
 #ifndef DRAPE_LAB_UNITS_H
 #define DRAPE_LAB_UNITS_H
 
-/* Of a value at a JSON pointer, as "Pa"; "" where it has none, or where rows disagree about it. */
+/* The unit at a JSON pointer, as "Pa"; "" where it has none, or where it depends on what else the scene says. */
 const char *lab_unit(const char *pointer);
 
 #endif

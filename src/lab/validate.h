@@ -58,6 +58,7 @@ typedef struct drape_reference {
 } drape_reference;
 
 extern const drape_reference *const drape_references[]; /* NULL-ended */
+extern const char *const drape_references_words[];      /* their names */
 
 /* The parameters of the cases, in an initialiser of drape_reference. */
 #define DRAPE_CASES(...)                                                                                     \
