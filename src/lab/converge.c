@@ -8,11 +8,9 @@
 #include "lab/run.h"
 #include "lab/statistics.h"
 #include "lab/text.h"
-
 #include "model/scene.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define FIRST_DT     (1.0 / 60)

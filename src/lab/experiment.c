@@ -242,10 +242,10 @@ static drape_status claim_folder(lab *l)
 }
 
 /* Reads earlier results, and makes what cases are compared with. */
-static drape_status prepare(lab *l, int64_t *resumed)
+static drape_status prepare(lab *l)
 {
     l->input_is_good = false;
-    drape_status status = lab_read_lines(l, l->folder, resumed);
+    drape_status status = lab_read_lines(l, l->folder, &l->outcome->resumed);
     l->input_is_good = !status;
     if (!status && l->experiment->prepare)
         status = l->experiment->prepare(l);
@@ -261,8 +261,9 @@ static drape_status prepare(lab *l, int64_t *resumed)
 /* ---- Reporting ---- */
 
 /* Shards leave the report to the merge: several at once in one folder would write the same files. */
-static drape_status report(lab *l, drape_lab_outcome *outcome)
+static drape_status report(lab *l)
 {
+    drape_lab_outcome *outcome = l->outcome;
     char title[512];
     const bool shard = l->def->shards > 1;
     outcome->cases = (int64_t)l->count;
@@ -299,9 +300,10 @@ static drape_status report(lab *l, drape_lab_outcome *outcome)
 
 /* ---- From end to end ---- */
 
-static drape_status begin(drape_context *ctx, const drape_lab_def *def, const char *folder, lab *l)
+static drape_status begin(drape_context *ctx, const drape_lab_def *def, const char *folder,
+                          drape_lab_outcome *outcome, lab *l)
 {
-    *l = (lab){.ctx = ctx, .def = def, .arena = drape_arena_of(ctx)};
+    *l = (lab){.ctx = ctx, .def = def, .outcome = outcome, .arena = drape_arena_of(ctx)};
     l->folder = drape_arena_text(&l->arena, folder);
     l->summary = open_memstream(&l->summary_text, &l->summary_size);
     l->page = open_memstream(&l->page_text, &l->page_size);
@@ -309,15 +311,15 @@ static drape_status begin(drape_context *ctx, const drape_lab_def *def, const ch
 }
 
 /* The summary becomes the outcome's. */
-static void end(lab *l, drape_lab_outcome *outcome)
+static void end(lab *l)
 {
     if (l->summary)
         fclose(l->summary);
     if (l->page)
         fclose(l->page);
     free(l->page_text);
-    outcome->text = l->summary_text;
-    outcome->input = !l->input_is_good;
+    l->outcome->text = l->summary_text;
+    l->outcome->input = !l->input_is_good;
     for (size_t i = 0; l->results && i < l->count; i++)
         json_decref(l->results[i]);
     json_decref(l->about);
@@ -353,6 +355,8 @@ static drape_status check_def(drape_context *ctx, const drape_lab_def *def)
 drape_status drape_lab_run(drape_context *ctx, const char *experiment, const drape_lab_def *def,
                            drape_lab_outcome *outcome)
 {
+    static drape_status (*const stages[])(lab *) = {plan,         try_scene, check_settings, make_results,
+                                                    claim_folder, prepare,   lab_sweep,      report};
     lab l;
     *outcome = (drape_lab_outcome){0};
     drape_status status = check_def(ctx, def);
@@ -360,32 +364,18 @@ drape_status drape_lab_run(drape_context *ctx, const char *experiment, const dra
     if (status)
         return status;
     locale_t old = drape_locale_enter();
-    status = begin(ctx, def, def->folder, &l);
+    status = begin(ctx, def, def->folder, outcome, &l);
     l.experiment = find(experiment);
     if (!status && !l.experiment)
         status = drape_fail(ctx, DRAPE_E_ARGUMENT, "there is no experiment \"%.60s\"", experiment);
-    if (!status)
-        status = plan(&l);
-    if (!status)
-        status = try_scene(&l);
-    if (!status)
-        status = check_settings(&l);
-    if (!status)
-        status = make_results(&l);
-    if (!status)
-        status = claim_folder(&l);
-    if (!status)
-        status = prepare(&l, &outcome->resumed);
-    if (!status)
-        status = lab_sweep(&l);
-    if (!status)
-        status = report(&l, outcome);
-    end(&l, outcome);
+    for (size_t i = 0; !status && i < sizeof stages / sizeof *stages; i++)
+        status = stages[i](&l);
+    end(&l);
     drape_locale_leave(old);
     return status;
 }
 
-static drape_status read_folders(lab *l, const char *const *folders, size_t count, drape_lab_outcome *outcome)
+static drape_status read_folders(lab *l, const char *const *folders, size_t count)
 {
     drape_status status = parse_about(l, folders[0], &l->about);
     if (status)
@@ -405,7 +395,7 @@ static drape_status read_folders(lab *l, const char *const *folders, size_t coun
                            folders[0], folders[i]);
         json_decref(about);
         if (!status)
-            status = lab_read_lines(l, folders[i], &outcome->resumed);
+            status = lab_read_lines(l, folders[i], &l->outcome->resumed);
     }
     return status;
 }
@@ -422,9 +412,9 @@ drape_status drape_lab_merge(drape_context *ctx, const char *const *folders, siz
                           "a merge needs folders with results, and one for the report");
     drape_lab_def_init(&def, sizeof def);
     locale_t old = drape_locale_enter();
-    drape_status status = begin(ctx, &def, folder, &l);
+    drape_status status = begin(ctx, &def, folder, outcome, &l);
     if (!status)
-        status = read_folders(&l, folders, count, outcome);
+        status = read_folders(&l, folders, count);
     if (!status)
         status = claim_folder(&l);
     if (!status)
@@ -432,9 +422,9 @@ drape_status drape_lab_merge(drape_context *ctx, const char *const *folders, siz
     if (!status)
         status = drape_file_finish(&file);
     if (!status)
-        status = report(&l, outcome);
+        status = report(&l);
     drape_file_destroy(&file);
-    end(&l, outcome);
+    end(&l);
     drape_locale_leave(old);
     return status;
 }

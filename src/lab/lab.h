@@ -42,6 +42,7 @@ struct lab {
     drape_context *ctx;
     drape_arena arena; /* of folder, the array of results, reference, probe */
     const drape_lab_def *def;
+    drape_lab_outcome *outcome; /* the caller's */
     const lab_experiment_ops *experiment;
     char *folder;
     bool input_is_good; /* all input has been read and checked: a failure now is of the output folder */

@@ -2,7 +2,6 @@
 #include "lab/reference.h"
 
 #include "base/clock.h"
-#include "io/file.h"
 #include "lab/run.h"
 #include "lab/text.h"
 #include "model/model.h"

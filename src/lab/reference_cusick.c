@@ -29,21 +29,17 @@
 static double rim_sinking(double nu)
 {
     const double b = INNER / OUTER, l = log(b);
-    const double conditions[4][5] = {/* what 1, ln r, r^2, r^2 ln r and r^4/64 give in each */
-                                     {1, l, b * b, b * b * l, pow(b, 4) / 64},
-                                     {0, 1 / b, 2 * b, b * (2 * l + 1), pow(b, 3) / 16},
-                                     {0, nu - 1, 2 * (1 + nu), 3 + nu, (3 + nu) / 16},
-                                     {0, 0, 0, 4, 1.0 / 2}};
-    double matrix[16], right[4], unknown[4];
+    /* What 1, ln r, r^2, r^2 ln r and -r^4/64 give in each. */
+    double conditions[4][5] = {{1, l, b * b, b * b * l, -pow(b, 4) / 64},
+                               {0, 1 / b, 2 * b, b * (2 * l + 1), -pow(b, 3) / 16},
+                               {0, nu - 1, 2 * (1 + nu), 3 + nu, -(3 + nu) / 16},
+                               {0, 0, 0, 4, -1.0 / 2}};
+    double unknown[4];
     int sign;
     size_t order[4];
-    for (int i = 0; i < 4; i++) {
-        right[i] = -conditions[i][4];
-        for (int k = 0; k < 4; k++)
-            matrix[4 * i + k] = conditions[i][k];
-    }
-    gsl_matrix_view m = gsl_matrix_view_array(matrix, 4, 4);
-    gsl_vector_view r = gsl_vector_view_array(right, 4), c = gsl_vector_view_array(unknown, 4);
+    gsl_matrix_view m = gsl_matrix_view_array_with_tda(conditions[0], 4, 4, 5);
+    gsl_vector_view r = gsl_vector_view_array_with_stride(&conditions[0][4], 5, 4),
+                    c = gsl_vector_view_array(unknown, 4);
     gsl_permutation p = {4, order};
     if (gsl_linalg_LU_decomp(&m.matrix, &p, &sign) ||
         gsl_linalg_LU_solve(&m.matrix, &p, &r.vector, &c.vector))

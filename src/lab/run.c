@@ -116,18 +116,6 @@ static drape_status run_once(drape_context *ctx, drape_sim *sim, run *r)
 
 /* ---- The result ---- */
 
-static json_t *positions(const lab_probe *probe, const drape_model *model, const double *x)
-{
-    json_t *array = json_array();
-    double *points = malloc(3 * probe->count * sizeof *points);
-    if (points)
-        lab_probe_take(probe, model, x, points);
-    for (size_t i = 0; points && i < 3 * probe->count; i++)
-        json_array_append_new(array, lab_real(points[i]));
-    free(points);
-    return array;
-}
-
 static json_t *describe(const run *r, drape_sim *sim)
 {
     const lab_request *request = r->request;
@@ -177,8 +165,15 @@ static json_t *describe(const run *r, drape_sim *sim)
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
         json_object_set_new(result, counts[i].key, json_integer(counts[i].value));
     json_object_set_new(result, "reasons", reasons);
-    if (request->probe && request->probe->count)
-        json_object_set_new(result, "positions", positions(request->probe, r->model, x));
+    json_t *positions = request->probe && request->probe->count ? json_array() : NULL;
+    for (size_t i = 0; positions && i < request->probe->count; i++) {
+        double point[3];
+        lab_probe_take(request->probe, i, r->model, x, point);
+        for (int k = 0; k < 3; k++)
+            json_array_append_new(positions, lab_real(point[k]));
+    }
+    if (positions)
+        json_object_set_new(result, "positions", positions);
     return result;
 }
 

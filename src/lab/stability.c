@@ -6,10 +6,8 @@
 #include "base/param.h"
 #include "lab/run.h"
 #include "lab/text.h"
-#include "lab/units.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define MAX_AXES 3

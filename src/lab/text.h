@@ -31,6 +31,10 @@ drape_status lab_plot_begin(lab *l, lab_plot *plot, const char *name, int width,
  * caption to the page. Where gnuplot is missing or fails, only the summary says so. */
 drape_status lab_plot_end(lab *l, lab_plot *plot, bool draws, const char *caption);
 
+/* The unit of a scene's value at a JSON pointer, as "Pa"; "" where it has none, or where it depends on what else the scene
+ * says (units.c). */
+const char *lab_unit(const char *pointer);
+
 void lab_page_heading(lab *l, const char *text);
 void lab_page_text(lab *l, const char *text); /* escaped */
 

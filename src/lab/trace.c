@@ -71,25 +71,22 @@ static double place_in(const double *rest, const int32_t *triangle, const double
     return vec3_dot(off, off) + outside * outside * (uu + vv);
 }
 
-void lab_probe_take(const lab_probe *probe, const drape_model *model, const double *x, double *out)
+void lab_probe_take(const lab_probe *probe, size_t i, const drape_model *model, const double *x,
+                    double out[3])
 {
     const double *rest = drape_model_rest_positions(model);
-    const int32_t *triangles = drape_model_triangles(model);
-    int32_t count = drape_model_triangle_count(model);
-    for (size_t i = 0; i < probe->count; i++) {
-        double best = INFINITY, weights[3], chosen[3] = {0};
-        const int32_t *home = triangles;
-        for (int32_t t = 0; t < count && best > 0; t++) {
-            double miss = place_in(rest, triangles + 3 * (size_t)t, probe->rest + 3 * i, weights);
-            if (!(miss < best))
-                continue;
-            best = miss;
-            home = triangles + 3 * (size_t)t;
-            memcpy(chosen, weights, sizeof chosen);
-        }
-        for (int k = 0; k < 3; k++)
-            out[3 * i + (size_t)k] = chosen[0] * x[3 * (size_t)home[0] + (size_t)k] +
-                                     chosen[1] * x[3 * (size_t)home[1] + (size_t)k] +
-                                     chosen[2] * x[3 * (size_t)home[2] + (size_t)k];
+    const int32_t *triangles = drape_model_triangles(model), *home = triangles;
+    double best = INFINITY, weights[3], chosen[3] = {0};
+    for (int32_t t = 0; t < drape_model_triangle_count(model) && best > 0; t++) {
+        const int32_t *triangle = triangles + 3 * (size_t)t;
+        const double miss = place_in(rest, triangle, probe->rest + 3 * i, weights);
+        if (!(miss < best))
+            continue;
+        best = miss;
+        home = triangle;
+        memcpy(chosen, weights, sizeof chosen);
     }
+    for (size_t k = 0; k < 3; k++)
+        out[k] = chosen[0] * x[3 * (size_t)home[0] + k] + chosen[1] * x[3 * (size_t)home[1] + k] +
+                 chosen[2] * x[3 * (size_t)home[2] + k];
 }

@@ -27,8 +27,8 @@ typedef struct lab_probe {
 /* At the nodes of a model. Errors: DRAPE_E_MEMORY. */
 drape_status lab_probe_create(drape_arena *arena, const drape_model *model, lab_probe *probe);
 
-/* Positions at the points (count x 3): linear in the triangle that the point lies in, or is nearest to, at
- * rest. */
-void lab_probe_take(const lab_probe *probe, const drape_model *model, const double *x, double *out);
+/* The position of point i: linear in the triangle that it lies in, or is nearest to, at rest. */
+void lab_probe_take(const lab_probe *probe, size_t i, const drape_model *model, const double *x,
+                    double out[3]);
 
 #endif

@@ -10,7 +10,6 @@
 #include "solvers/linear.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define RESOLVED    100.0 /* times the reference's error: smaller errors cannot be distinguished from it */

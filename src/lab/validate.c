@@ -1,11 +1,12 @@
 /* validate.c: runs the cases of a reference. */
 #include "lab/validate.h"
 
+#include "base/clock.h"
+
 #include <gsl/gsl_errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 #define BISECTIONS 9 /* of a threshold: 1/512 of the interval that it is sought in */
 
@@ -69,13 +70,6 @@ int drape_validate_runs(const drape_reference *reference)
     return reference->high > 0 ? BISECTIONS : 1;
 }
 
-static double cpu_seconds(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 void drape_validate_judge(const drape_reference *reference, drape_validation *v)
 {
     gsl_set_error_handler_off(); /* the default handler ends the process */
@@ -91,12 +85,9 @@ void drape_validate_judge(const drape_reference *reference, drape_validation *v)
 drape_status drape_validate(drape_context *ctx, const drape_reference *reference, int index,
                             drape_validate_cancel *cancel, void *user, drape_validation *out)
 {
-    const double start = cpu_seconds();
-    drape_reference_run run = {.ctx = ctx,
-                               .arena = drape_arena_of(ctx),
-                               .parameter = reference->parameters[index],
-                               .cancel = cancel,
-                               .user = user};
+    const double start = drape_clock_cpu_seconds();
+    drape_reference_run run = {ctx, drape_arena_of(ctx), NULL, NULL, reference->parameters[index], cancel,
+                               user};
     drape_status status;
     *out = (drape_validation){.parameter = run.parameter, .obtained = NAN};
     drape_validate_judge(reference, out);
@@ -105,7 +96,7 @@ drape_status drape_validate(drape_context *ctx, const drape_reference *reference
             search(&run, reference, reference->documented ? out->documented : out->expected, &out->obtained);
     else
         status = measure_at(&run, reference, 0, &out->obtained);
-    out->seconds = cpu_seconds() - start;
+    out->seconds = drape_clock_cpu_seconds() - start;
     if (status && cancel && cancel(user))
         return drape_fail(ctx, DRAPE_E_STOPPED, "interrupted");
     if (status) {
