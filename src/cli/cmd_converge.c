@@ -3,9 +3,8 @@
 
 static const cli_option options[] = {
     CLI_LAB_OPTIONS,
-    {"levels", CLI_TEXT, "N", "refinements, 3 to 12 (default 6)", offsetof(cli_lab_request, levels), 0, NULL},
-    {"space", CLI_FLAG, NULL, "also refine the grids of all cloths", offsetof(cli_lab_request, space), 0,
-     NULL},
+    CLI_LAB_OPTION("levels", CLI_TEXT, "N", "refinements, 3 to 12 (default 6)", levels, 0),
+    CLI_LAB_OPTION("space", CLI_FLAG, NULL, "also refine the grids of all cloths", space, 0),
 };
 
 static int run(const void *request)
@@ -18,7 +17,7 @@ const drape_verb drape_verb_converge = {
     .operand = "SCENE",
     .takes_scene = true,
     .details =
-        "Halves the step of every integrator again and again (ida: cuts rtol to a tenth), and the edges of "
+        "Halves the step of every integrator again and again (ida: divides rtol by 10), and the edges of "
         "the\n"
         "grids with --space; the distances between successive ends give the order, with its confidence.",
     .options = options,

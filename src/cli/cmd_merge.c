@@ -33,8 +33,8 @@ const drape_verb drape_verb_merge = {
     .operand = "DIR...",
     .max_operands = 100000,
     .details =
-        "Takes the lines of the folders of an experiment that ran in parts (--shard I/N), and makes the\n"
-        "report once all cases are there. Says how many are missing where some are.",
+        "Takes the results of the folders of an experiment that ran in parts (--shard I/N), and makes the\n"
+        "report once all cases are done. Says how many are missing otherwise.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(merge_request),

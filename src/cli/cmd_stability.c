@@ -4,11 +4,11 @@
 #include <unistd.h>
 
 static const cli_option options[] = {
-    {"axis", CLI_TEXTS, "/POINTER=FROM:TO:N[log]", "2 or 3 values of the scene, and where",
-     offsetof(cli_lab_request, axes), 0, NULL},
+    CLI_LAB_OPTION("axis", CLI_TEXTS, "/POINTER=FROM:TO:N[log]", "2 or 3 values of the scene, and where",
+                   axes, 0),
     CLI_LAB_OPTIONS,
-    {"strain-limit", CLI_REAL, "E", "strain of an edge that no cloth has (default 0.2)",
-     offsetof(cli_lab_request, strain_limit), 0, NULL},
+    CLI_LAB_OPTION("strain-limit", CLI_REAL, "E", "strain of an edge that no cloth has (default 0.2)",
+                   strain_limit, 0),
 };
 
 static int run(const void *request)
@@ -28,8 +28,8 @@ const drape_verb drape_verb_stability = {
                "unless --integrators says which), as\n"
                "  drape stability scene.json --axis /integrator/dt=1e-4:1e-1:32log \\\n"
                "      --axis /cloth/0/material/young_modulus=1e4:1e8:32log --out maps\n"
-               "Uses all cores unless --jobs says how many. Stopped by Ctrl-C, the same command goes on "
-               "where it was.",
+               "Uses all cores unless --jobs says how many. After Ctrl-C, the same command resumes where it "
+               "stopped.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(cli_lab_request),

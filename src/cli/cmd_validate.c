@@ -1,5 +1,4 @@
-/* cmd_validate.c: `drape validate`: what scenes give against what is known, as a table, as Markdown, as
- * JSON. */
+/* cmd_validate.c: `drape validate`: measured against expected values, as a table, as Markdown, as JSON. */
 #include "cli/cli.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
@@ -22,24 +21,17 @@ typedef struct validate_request {
 
 /* How results are printed. */
 typedef struct validate_style {
-    void (*begin)(void);
-    void (*row)(const lab_record *record);
+    const char *begin;
+    void (*record)(const lab_record *record, bool first);
     void (*end)(const int counts[4]);
 } validate_style;
 
-/* ---- As text, as Markdown ---- */
-
-static void text_begin(void)
-{
-    printf("%-18s %12s %14s %14s %10s %9s  %s\n", "reference", "case", "expected", "obtained", "error",
-           "limit", "verdict");
-}
-
-static void text_row(const lab_record *record)
+static void text_record(const lab_record *record, bool first)
 {
     const drape_reference *reference = record->reference;
     const drape_validation *v = &record->v;
     char parameter[24] = "";
+    (void)first;
     if (reference->parameter)
         snprintf(parameter, sizeof parameter, "%.6g", v->parameter);
     printf("%-18s %12s %14.8g %14.8g %9.4f%% %8.3g%%  %s", reference->entry.name, parameter, v->expected,
@@ -58,18 +50,12 @@ static void text_end(const int counts[4])
            counts[DRAPE_OUTCOME_DOCUMENTED], counts[DRAPE_OUTCOME_FAIL] + counts[DRAPE_OUTCOME_STOPPED]);
 }
 
-static void markdown_begin(void)
-{
-    printf(
-        "| reference | quantity | case | model | expected | obtained | error | limit | verdict | source |\n"
-        "|---|---|---|---|---|---|---|---|---|---|\n");
-}
-
-static void markdown_row(const lab_record *record)
+static void markdown_record(const lab_record *record, bool first)
 {
     const drape_reference *reference = record->reference;
     const drape_validation *v = &record->v;
     char parameter[200] = "";
+    (void)first;
     if (reference->parameter)
         snprintf(parameter, sizeof parameter, "%s = %.6g", reference->parameter, v->parameter);
     printf("| %s | %s [%s] | %s | %s | %.8g | %.8g | %.4f %% | %.3g %% | %s | %s |\n", reference->entry.name,
@@ -84,23 +70,13 @@ static void markdown_end(const int counts[4])
     text_end(counts);
 }
 
-/* ---- As JSON: one array, an object a case ---- */
-
-static int json_rows;
-
-static void json_begin(void)
+static void json_record(const lab_record *record, bool first)
 {
-    json_rows = 0;
-    printf("[");
-}
-
-static void json_row(const lab_record *record)
-{
-    json_t *row = lab_record_json(record);
-    char *text = row ? json_dumps(row, JSON_REAL_PRECISION(17)) : NULL;
-    printf("%s\n%s", json_rows++ ? "," : "", text ? text : "{}");
+    json_t *object = lab_record_json(record);
+    char *text = object ? json_dumps(object, JSON_REAL_PRECISION(17)) : NULL;
+    printf("%s\n%s", first ? "" : ",", text ? text : "{}");
     free(text);
-    json_decref(row);
+    json_decref(object);
 }
 
 static void json_end(const int counts[4])
@@ -109,6 +85,16 @@ static void json_end(const int counts[4])
     printf("\n]\n");
 }
 
+static const validate_style
+    text_style =
+        {"reference                  case       expected       obtained      error     limit  verdict\n",
+         text_record, text_end},
+    markdown_style =
+        {"| reference | quantity | case | model | expected | obtained | error | limit | verdict | source |\n"
+         "|---|---|---|---|---|---|---|---|---|---|\n",
+         markdown_record, markdown_end},
+    json_style = {"[", json_record, json_end};
+
 /* ---- Running ---- */
 
 static int write_scenes(const drape_reference *reference, const char *folder)
@@ -116,9 +102,9 @@ static int write_scenes(const drape_reference *reference, const char *folder)
     for (int i = 0; i < reference->case_count; i++) {
         char path[1024], text[DRAPE_LAB_TEXT];
         const double p = reference->parameters[i];
-        reference->scene(p, reference->high > 0 ? reference->expected(p) : 0, text, sizeof text);
-        for (char *c = text; *c; c++)
-            *c = *c == '\'' ? '"' : *c;
+        const drape_reference_case one = {reference, p, reference->high > 0 ? reference->expected(p) : 0};
+        reference->scene(&one, text);
+        drape_reference_quote(text);
         snprintf(path, sizeof path, "%s/%s_%d.json", folder, reference->entry.name, i);
         FILE *file = fopen(path, "w");
         if (!file || fprintf(file, "%s\n", text) < 0 || fclose(file)) {
@@ -151,13 +137,13 @@ static bool interrupted(void *user)
 typedef struct run {
     drape_context *ctx;
     lab_record *records;
-    size_t count, found; /* found: done before */
-    drape_file file;     /* of their lines; not there without --out */
+    size_t count;
+    drape_file file; /* of their lines; closed without --out */
     cli_progress progress;
     double start; /* [s] of the clock */
 } run;
 
-/* By simulations: a search is several of them. */
+/* By the number of simulations: a search takes several. */
 static void show_progress(run *r, size_t next)
 {
     double done = 0, left = 0;
@@ -172,27 +158,23 @@ static void show_progress(run *r, size_t next)
     cli_progress_count(&r->progress, (int64_t)next, (int64_t)r->count, done > 0 ? wall / done * left : NAN);
 }
 
-static drape_status run_case(run *r, lab_record *record)
-{
-    drape_status status =
-        drape_validate(r->ctx, record->reference, record->index, interrupted, NULL, &record->v);
-    record->done = !status;
-    return status || !r->file.open ? status : lab_record_keep(&r->file, record);
-}
-
 static drape_status run_cases(run *r, const validate_style *style, int counts[4])
 {
     drape_status status = DRAPE_OK;
     for (size_t i = 0; !status && i < r->count; i++) {
         lab_record *record = &r->records[i];
         show_progress(r, i);
-        if (!record->done)
-            status = run_case(r, record);
+        if (!record->done) {
+            status = drape_validate(r->ctx, record->reference, record->index, interrupted, NULL, &record->v);
+            record->done = !status;
+            if (!status && r->file.open)
+                status = lab_record_keep(&r->file, record);
+        }
         if (status)
             break;
         counts[record->v.verdict]++;
         cli_progress_hide(&r->progress);
-        style->row(record);
+        style->record(record, i == 0);
         fflush(stdout);
     }
     cli_progress_clear(&r->progress);
@@ -217,18 +199,17 @@ static int conclude(const run *r, const validate_request *request, drape_status 
 
 static int run_references(drape_context *ctx, const validate_request *request, const drape_reference *only)
 {
-    static const validate_style text = {text_begin, text_row, text_end},
-                                markdown = {markdown_begin, markdown_row, markdown_end},
-                                json = {json_begin, json_row, json_end};
-    const validate_style *style = request->json ? &json : request->markdown ? &markdown : &text;
+    const validate_style *style = request->json       ? &json_style
+                                  : request->markdown ? &markdown_style
+                                                      : &text_style;
     run r = {.ctx = ctx, .start = drape_clock_seconds()};
     int counts[4] = {0};
     r.records = lab_records_make(ctx, only, &r.count);
     drape_status status = r.records ? DRAPE_OK : DRAPE_E_MEMORY;
     if (!status && request->out)
-        status = lab_records_open(ctx, request->out, r.records, r.count, &r.file, &r.found);
+        status = lab_records_open(ctx, request->out, r.records, r.count, &r.file);
     if (!status) {
-        style->begin();
+        fputs(style->begin, stdout);
         cli_progress_begin(&r.progress, 0, 0);
         status = run_cases(&r, style, counts);
         style->end(counts);
@@ -267,7 +248,7 @@ static int validate(const validate_request *request, drape_context *ctx)
 static const cli_option options[] = {
     {"json", CLI_FLAG, NULL, "one array of objects, one a case", offsetof(validate_request, json), 0, NULL},
     {"markdown", CLI_FLAG, NULL, "a table for a page", offsetof(validate_request, markdown), 0, NULL},
-    {"out", CLI_TEXT, "DIR", "keep a line of JSON a case; the same command goes on where it was stopped",
+    {"out", CLI_TEXT, "DIR", "save a line of JSON a case; the same command resumes where it stopped",
      offsetof(validate_request, out), 0, NULL},
     {"scenes", CLI_TEXT, "DIR", "run nothing: write the scene of every case into DIR",
      offsetof(validate_request, scenes), 0, NULL},
@@ -284,10 +265,10 @@ const drape_verb drape_verb_validate = {
     .operand = "REFERENCE",
     .operand_optional = true,
     .details =
-        "Runs the scene of every reference, or of one, and compares what is measured in it with the "
-        "closed form,\n"
-        "series or differential equation that it is known by. Terms that converge to something else "
-        "show that as\n"
+        "Runs the scene of every reference, or of one, and compares a measured quantity with its closed "
+        "form,\n"
+        "series or differential equation. Terms that are known to converge to something else are reported "
+        "as\n"
         "a documented model error. Exit code 0: none failed. All of them take four minutes of CPU time.",
     .options = options,
     .option_count = sizeof options / sizeof *options,

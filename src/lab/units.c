@@ -1,9 +1,10 @@
 /*
- * units.c: see units.h. A pointer says in which table a name is to be looked for, "/cloth/0/terms/2/stiffness" in that of
- * terms, not in which term: that is in the scene. Where entries that have the name give it different units, there is none.
+ * units.c: lab_unit of text.h. A pointer says in which table a name is to be looked for, "/cloth/0/terms/2/stiffness" in that of
+ * the terms, but not in which entry: that is in the scene. Where entries give the name different units, there is none.
  */
-#include "lab/units.h"
+#include "lab/text.h"
 
+#include "base/param.h"
 #include "colliders/colliders.h"
 #include "compile/compile.h"
 #include "control/control.h"
@@ -13,45 +14,41 @@
 
 #include <string.h>
 
-static const struct {
-    const char *part; /* of the pointer */
-    const drape_registry *registry;
-} tables[] = {{"/mesh/", &drape_grid_registry},
-              {"/material/", &drape_material_registry},
-              {"/terms/", &drape_term_registry},
-              {"/colliders/", &drape_collider_registry},
-              {"/contact/", &drape_contact_registry},
-              {"/self_contact/", &drape_self_contact_registry},
-              {"/integrator/", &drape_integrator_registry},
-              {"/controller/", &drape_controller_registry}};
-
-/* Values of the scene that are not in a table, by how their pointers begin. */
-static const struct {
-    const char *start, *unit;
-} plain[] = {{"/gravity", "m/s2"}, {"/duration", "s"}, {"/frame_rate", "1/s"}};
-
-static const char *unit_in(const drape_registry *registry, const char *name)
+/* The unit so far (NULL: the name was not found), and that of another list of parameters. */
+static const char *common_unit(const char *unit, const drape_param *params, int count, const char *name)
 {
-    const char *unit = NULL;
-    const drape_entry *entry;
-    for (int i = 0; (entry = registry->entries[i]) != NULL; i++)
-        for (int p = 0; p < entry->param_count; p++) {
-            if (strcmp(entry->params[p].name, name) != 0)
-                continue;
-            if (unit && strcmp(unit, entry->params[p].unit) != 0)
-                return "";
-            unit = entry->params[p].unit;
-        }
-    return unit && strcmp(unit, "1") != 0 ? unit : "";
+    const int i = drape_param_find(params, count, name);
+    return i < 0 ? unit : !unit || strcmp(unit, params[i].unit) == 0 ? params[i].unit : "";
 }
+
+#define LOOK_IN(table)                                                                                       \
+    for (int i = 0; (table)[i]; i++)                                                                         \
+    unit = common_unit(unit, (table)[i]->entry.params, (table)[i]->entry.param_count, name)
 
 const char *lab_unit(const char *pointer)
 {
-    for (size_t i = 0; i < sizeof plain / sizeof *plain; i++)
-        if (strncmp(pointer, plain[i].start, strlen(plain[i].start)) == 0)
-            return plain[i].unit;
-    for (size_t i = 0; i < sizeof tables / sizeof *tables; i++)
-        if (strstr(pointer, tables[i].part))
-            return unit_in(tables[i].registry, strrchr(pointer, '/') + 1);
-    return "";
+    const char *name = strrchr(pointer, '/') + 1, *unit = NULL;
+    if (strncmp(pointer, "/gravity", strlen("/gravity")) == 0)
+        return "m/s2";
+    if (strcmp(pointer, "/duration") == 0)
+        return "s";
+    if (strcmp(pointer, "/frame_rate") == 0)
+        return "1/s";
+    if (strstr(pointer, "/mesh/"))
+        LOOK_IN(drape_grids);
+    else if (strstr(pointer, "/material/"))
+        unit = common_unit(NULL, drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, name);
+    else if (strstr(pointer, "/terms/"))
+        LOOK_IN(drape_terms);
+    else if (strstr(pointer, "/colliders/"))
+        LOOK_IN(drape_colliders);
+    else if (strstr(pointer, "/contact/"))
+        unit = common_unit(NULL, drape_contact_params, DRAPE_CONTACT_PARAM_COUNT, name);
+    else if (strstr(pointer, "/self_contact/"))
+        unit = common_unit(NULL, drape_self_contact_params, DRAPE_SELF_PARAM_COUNT, name);
+    else if (strstr(pointer, "/integrator/"))
+        LOOK_IN(drape_integrators);
+    else if (strstr(pointer, "/controller/"))
+        LOOK_IN(drape_controllers);
+    return unit && strcmp(unit, "1") != 0 ? unit : "";
 }
