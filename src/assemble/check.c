@@ -14,6 +14,8 @@
  */
 #include "assemble/check.h"
 
+#include "colliders/colliders.h"
+
 #include <math.h>
 #include <string.h>
 

@@ -11,6 +11,7 @@
 
 struct drape_system {
     drape_context *ctx;
+    drape_arena arena; /* of contact */
     const drape_model *model;
     drape_crew *crew;             /* NULL: one thread */
     drape_summer *summer;         /* over the elements of terms */
@@ -44,7 +45,8 @@ drape_status drape_system_create(drape_context *ctx, const drape_model *model, i
     *out = system;
     if (!system)
         return DRAPE_E_MEMORY;
-    *system = (drape_system){.ctx = ctx, .model = model, .pattern = &model->pattern};
+    *system =
+        (drape_system){.ctx = ctx, .arena = drape_arena_of(ctx), .model = model, .pattern = &model->pattern};
     drape_status status = drape_crew_create(ctx, threads, &system->crew);
     if (!status)
         status = drape_summer_create(ctx, model, system->crew, &system->summer);
@@ -63,7 +65,7 @@ void drape_system_destroy(drape_system **system)
     if (!*system)
         return;
     drape_context *ctx = (*system)->ctx;
-    drape_contact_destroy(&(*system)->contact);
+    drape_arena_free(&(*system)->arena);
     forget_wider(*system);
     drape_summer_destroy(&(*system)->summer);
     drape_crew_destroy(&(*system)->crew);
@@ -176,7 +178,7 @@ static size_t wider_bytes(const drape_system *system)
 size_t drape_system_bytes(const drape_system *system)
 {
     return sizeof *system + drape_crew_bytes(system->crew) + drape_summer_bytes(system->summer) +
-           drape_contact_bytes(system->contact) + wider_bytes(system) + drape_motion_bytes(system->motion) +
+           system->arena.bytes + wider_bytes(system) + drape_motion_bytes(system->motion) +
            drape_wind_bytes(&system->wind, system->model) +
            3 * (size_t)system->model->node_count * sizeof *system->push;
 }
@@ -185,7 +187,7 @@ size_t drape_system_bytes(const drape_system *system)
 
 drape_status drape_system_add_contact(drape_system *system)
 {
-    return drape_contact_create(system->ctx, system->motion, &system->contact);
+    return drape_contact_create(&system->arena, system->motion, &system->contact);
 }
 
 const drape_contact *drape_system_contact(const drape_system *system)
@@ -207,7 +209,7 @@ drape_status drape_system_begin(drape_system *system, const drape_state *in)
 void drape_system_rest(drape_system *system)
 {
     if (system->contact)
-        drape_contact_rest(system->contact);
+        drape_contact_end(system->contact);
 }
 
 drape_status drape_system_status(const drape_system *system)
@@ -344,7 +346,7 @@ const double *drape_system_on_colliders(const drape_system *system)
 
 double drape_system_way(drape_system *system, const double *x, const double *y, double t)
 {
-    return system->contact ? drape_contact_way(system->contact, x, y, t) : 1;
+    return system->contact ? drape_contact_step_fraction(system->contact, x, y, t) : 1;
 }
 
 bool drape_system_crosses(drape_system *system, const double *y, double t)

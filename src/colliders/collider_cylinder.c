@@ -4,7 +4,7 @@
  * f_rr e e + f_rz (e u + u e) + f_zz u u + f_r / rho (I - e e - u u), u along the axis, e away from it. */
 #include "colliders/colliders.h"
 
-#include "colliders/round.h"
+#include "geometry/round.h"
 
 enum { A = 0, B = 3, RADIUS = 6, ROUNDING = 7, PARAM_COUNT = 4 }; /* places of the values */
 

@@ -3,6 +3,8 @@
  * for every row of the colliders, resting and moving, with implicit and lagged friction, and for cloth on cloth.
  */
 #include "assemble/check.h"
+#include "contact/broad_phase.h"
+#include "contact/force.h"
 #include "rows/models.h"
 #include "support/scene.h"
 
@@ -128,7 +130,7 @@ static void check(probe *t, const char *what, double time)
     double gap;
     const double steps = error_of(t, 100, time), still = error_of(t, 0, time);
     const drape_contact *contact = drape_system_contact(t->system);
-    const int32_t active = drape_contact_active((drape_contact *)(uintptr_t)contact, &gap);
+    const int32_t active = drape_contact_active(contact, &gap);
     printf("# %.60s: %d active, least gap %.2g m; errors %.2g with w = 100, %.2g with w = 0\n", what,
            (int)active, gap, steps, still);
     ck_assert_msg(active >= 2, "%s: %d active", what, (int)active);
@@ -217,8 +219,7 @@ START_TEST(nan_is_forgotten)
     drape_point point = {.x = t.at.x, .v = t.at.v, .internal = t.at.internal, .t = 0.01, .span = {0, 0.01}};
     double gap;
     drape_system_force(t.system, &point, t.g[0]);
-    ck_assert_int_gt(drape_contact_active((drape_contact *)(uintptr_t)drape_system_contact(t.system), &gap),
-                     0);
+    ck_assert_int_gt(drape_contact_active(drape_system_contact(t.system), &gap), 0);
     for (size_t broken = 0; broken < n; broken += 7) {
         const char *reason = "";
         drape_worst worst;
@@ -361,7 +362,7 @@ END_TEST
 /* Energy pair by pair, none left out and none merged. */
 typedef struct pairwise {
     const drape_model *model;
-    const drape_search *search;
+    const drape_broad_phase *broad;
     const double *x;
     double energy;
     int acting;
@@ -372,9 +373,10 @@ static void add_energy(void *user, const drape_pair *found)
     pairwise *w = user;
     drape_pair pair = *found;
     drape_gap gap;
-    const drape_placed rest = {.model = w->model, .x = w->search->rest}, now = {.model = w->model, .x = w->x};
+    const drape_configuration rest = {.model = w->model, .x = w->broad->rest},
+                              now = {.model = w->model, .x = w->x};
     pair.distance = fmin(pair.distance, 0.5 * drape_pair_gap_value(&pair, &rest));
-    if (!drape_pair_gap(&pair, &now, w->search->rest, false, &gap))
+    if (!drape_pair_gap(&pair, &now, w->broad->rest, &gap))
         return;
     const drape_contact_law law = {.distance = pair.distance,
                                    .stiffness = w->model->contact.stiffness * pair.area *
@@ -385,26 +387,27 @@ static void add_energy(void *user, const drape_pair *found)
 
 /* What pairs share is counted once with all its area: the sum is that of all pairs, to the rounding of some hundred
  * numbers of one sign, and they are fewer. */
-START_TEST(touches_are_all_pairs)
+START_TEST(active_contacts_are_all_pairs)
 {
     scene s = scene_model("{'drape': 1, 'cloth': [" LAYER ", " LAYER "], 'self_contact': {'thickness': 2e-2},"
                           " 'contact': {'distance': 4e-3}, 'duration': 1}",
                           0.0, 0.1);
     probe t = open_probe(s, -0.08, 5);
     const drape_point point = {.x = t.at.x, .v = t.at.v, .internal = t.at.internal};
-    drape_search search;
+    drape_broad_phase broad;
+    drape_arena arena = drape_arena_of(s.ctx);
     double gap;
-    ck_assert_int_eq(drape_search_create(s.ctx, s.model, &search), DRAPE_OK);
-    pairwise w = {.model = s.model, .search = &search, .x = t.at.x};
-    drape_search_pairs(&search, t.at.x, NULL, 0, add_energy, &w);
+    ck_assert_int_eq(drape_broad_phase_create(&arena, s.model, &broad), DRAPE_OK);
+    pairwise w = {.model = s.model, .broad = &broad, .x = t.at.x};
+    drape_broad_phase_pairs(&broad, t.at.x, NULL, 0, add_energy, &w);
     const double merged = drape_system_contact_energy(t.system, &point);
-    const int32_t touches =
-        drape_contact_active((drape_contact *)(uintptr_t)drape_system_contact(t.system), &gap);
-    printf("# %d pairs are %d touches: %.17g J, %.17g J\n", w.acting, (int)touches, w.energy, merged);
-    ck_assert_int_gt(2 * w.acting, 3 * touches);
+    const int32_t contacts = drape_contact_active(drape_system_contact(t.system), &gap);
+    printf("# %d pairs are %d active contacts: %.17g J, %.17g J\n", w.acting, (int)contacts, w.energy,
+           merged);
+    ck_assert_int_gt(2 * w.acting, 3 * contacts);
     ck_assert_double_gt(merged, 0);
     assert_below(fabs(merged / w.energy - 1), 1e-13);
-    drape_search_destroy(&search);
+    drape_arena_free(&arena);
     close_probe(&t);
 }
 END_TEST
@@ -451,4 +454,5 @@ START_TEST(who_looks_on_changes_nothing)
 END_TEST
 
 SUITE("contact_system", colliders_of_every_row, cloth_on_cloth, nan_is_forgotten, contact_has_rows_of_its_own,
-      who_has_none_pays_nothing, bytes_are_all_of_them, touches_are_all_pairs, who_looks_on_changes_nothing)
+      who_has_none_pays_nothing, bytes_are_all_of_them, active_contacts_are_all_pairs,
+      who_looks_on_changes_nothing)

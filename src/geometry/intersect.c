@@ -1,21 +1,21 @@
 /*
- * intersect.c: see intersect.h. An edge is tried against the triangles whose boxes its box meets. An edge p q
+ * intersect.c: see intersect.h. An edge is tested against the triangles whose boxes meet its box. An edge p q
  * crosses triangle a b c where p and q lie on different sides of its plane and the line through them
- * leaves a b, b c and c a on the same side: five signs of tetrahedron volumes (Moeller & Trumbore 1997
- * compute the same).
+ * has a b, b c and c a on the same side: five signs of tetrahedron volumes (equivalent to Moeller & Trumbore
+ * 1997).
  */
-#include "contact/intersect.h"
+#include "geometry/intersect.h"
 
 #include "base/vec3.h"
-#include "colliders/bvh.h"
+#include "geometry/bvh.h"
 
 #include <float.h>
 #include <math.h>
 
-#define ROUNDINGS 8 /* of coordinates, differences, products, sums */
+#define ROUNDINGS 8 /* rounding errors of a volume: of its coordinates, differences, products and sums */
 
-/* Six times the volume of the tetrahedron a b c d; 0 where it is no more than the rounding of its coordinates: what
- * lies in a plane crosses nothing in it. */
+/* Six times the volume of the tetrahedron a b c d; 0 if it is within rounding of 0: an edge that lies in the plane of a
+ * triangle does not cross it. */
 static double volume(const double *a, const double *b, const double *c, const double *d)
 {
     double u[3], v[3], w[3], n[3], largest = 0;
@@ -45,7 +45,7 @@ static bool crosses(const double *x, const int32_t *edge, const int32_t *triangl
     return ab == (volume(p, q, b, c) > 0) && ab == (volume(p, q, c, a) > 0);
 }
 
-/* One edge against the triangles. */
+/* One edge that is tested against triangles. */
 typedef struct search {
     const drape_model *model;
     const double *x;
@@ -68,18 +68,18 @@ static void try_triangle(void *user, int32_t element)
 drape_status drape_find_intersections(drape_context *ctx, const drape_model *m, const double *x,
                                       drape_intersections *found)
 {
+    drape_arena arena = drape_arena_of(ctx);
     drape_bvh faces;
     search s = {.model = m, .x = x, .found = found};
     *found = (drape_intersections){.edge = {-1, -1}, .triangle = {-1, -1, -1}};
-    drape_status status = drape_bvh_build(ctx, m->triangle_count, 3, m->triangle, m->rest, &faces);
-    if (status)
-        return status;
-    drape_bvh_fit(&faces, x, NULL);
-    for (int32_t e = 0; e < m->edge_count; e++) {
+    drape_status status = drape_bvh_build(&arena, m->triangle_count, 3, m->triangle, m->rest, &faces);
+    if (!status)
+        drape_bvh_fit(&faces, x, NULL);
+    for (int32_t e = 0; !status && e < m->edge_count; e++) {
         s.edge = m->edge + 2 * (size_t)e;
         drape_box box = drape_box_of(s.edge, 2, x, NULL, 0);
         drape_bvh_query(&faces, &box, try_triangle, &s);
     }
-    drape_bvh_free(ctx, &faces);
-    return DRAPE_OK;
+    drape_arena_free(&arena);
+    return status;
 }

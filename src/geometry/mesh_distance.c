@@ -1,26 +1,26 @@
 /*
- * tree.c: see tree.h.
+ * mesh_distance.c: see mesh_distance.h.
  *
- * The nearest point is sought depth first in a tree of boxes, the nearer child before the other (Ericson 2005, section
+ * The nearest point is searched depth first in a tree of boxes, the nearer child before the other (Ericson 2005, section
  * 6.3; points of triangles: 5.1.5).
  *
- * The side: n . (x - c) > 0 for the angle-weighted pseudo-normal n of the face, edge or point that the nearest
- * point c is in (Baerentzen and Aanaes 2005, "Signed distance computation using the angle weighted
- * pseudonormal", theorem 1); right for every closed mesh without self-intersections.
+ * x is outside if n . (x - c) > 0 for the angle-weighted pseudo-normal n of the face, edge or point that contains the
+ * nearest point c (Baerentzen and Aanaes 2005, "Signed distance computation using the angle weighted pseudonormal",
+ * theorem 1). This holds for every closed mesh without self-intersections.
  */
-#include "colliders/tree.h"
+#include "geometry/mesh_distance.h"
 
-#include "colliders/bvh.h"
-#include "colliders/round.h"
+#include "geometry/bvh.h"
+#include "geometry/round.h"
 
 #include <string.h>
 
-struct drape_tree {
+struct drape_mesh_distance {
     drape_bvh boxes;      /* of the shape's triangles */
     int32_t *edge_of;     /* (triangle_count x 3) segment between corners k and k + 1 */
     double *face_normal;  /* (triangle_count x 3) of length 1 */
-    double *edge_normal;  /* (segment_count x 3), their length does not matter */
-    double *point_normal; /* (point_count x 3), likewise */
+    double *edge_normal;  /* (segment_count x 3) of any length */
+    double *point_normal; /* (point_count x 3) of any length */
 };
 
 /* ---- Normals ---- */
@@ -37,9 +37,9 @@ static double angle_between(const double *a, const double *b)
     return atan2(vec3_norm(cross), vec3_dot(a, b));
 }
 
-static void add_normals(const drape_collider_shape *s, int32_t t, drape_tree *tree)
+static void add_normals(const drape_collider_shape *s, int32_t t, drape_mesh_distance *mesh)
 {
-    double *n = tree->face_normal + 3 * (size_t)t, to_next[3], to_last[3];
+    double *n = mesh->face_normal + 3 * (size_t)t, to_next[3], to_last[3];
     vec3_sub(corner(s, t, 1), corner(s, t, 0), to_next);
     vec3_sub(corner(s, t, 2), corner(s, t, 0), to_last);
     vec3_cross(to_next, to_last, n);
@@ -50,12 +50,12 @@ static void add_normals(const drape_collider_shape *s, int32_t t, drape_tree *tr
         size_t at = 3 * (size_t)t + (size_t)k;
         vec3_sub(corner(s, t, k + 1), corner(s, t, k), to_next);
         vec3_sub(corner(s, t, k + 2), corner(s, t, k), to_last);
-        vec3_add_scaled(angle_between(to_next, to_last), n, tree->point_normal + 3 * (size_t)s->triangle[at]);
-        vec3_add_scaled(1, n, tree->edge_normal + 3 * (size_t)tree->edge_of[at]);
+        vec3_add_scaled(angle_between(to_next, to_last), n, mesh->point_normal + 3 * (size_t)s->triangle[at]);
+        vec3_add_scaled(1, n, mesh->edge_normal + 3 * (size_t)mesh->edge_of[at]);
     }
 }
 
-/* The segment a b; they are ordered by (lower, higher), the lower first. */
+/* The number of segment a b. */
 static int32_t find_segment(const drape_collider_shape *s, int32_t a, int32_t b)
 {
     int32_t low = 0, high = s->segment_count - 1, least = a < b ? a : b, most = a < b ? b : a;
@@ -70,53 +70,32 @@ static int32_t find_segment(const drape_collider_shape *s, int32_t a, int32_t b)
     return low;
 }
 
-static void fill_normals(const drape_collider_shape *s, drape_tree *tree)
+static void fill_normals(const drape_collider_shape *s, drape_mesh_distance *mesh)
 {
     for (int32_t t = 0; t < s->triangle_count; t++) {
         const int32_t *n = s->triangle + 3 * (size_t)t;
         for (int k = 0; k < 3; k++)
-            tree->edge_of[3 * (size_t)t + (size_t)k] = find_segment(s, n[k], n[(k + 1) % 3]);
-        add_normals(s, t, tree);
+            mesh->edge_of[3 * (size_t)t + (size_t)k] = find_segment(s, n[k], n[(k + 1) % 3]);
+        add_normals(s, t, mesh);
     }
 }
 
-/* ---- Making ---- */
-
-/* The tree of boxes, in memory of the shape's. */
-static bool make_boxes(drape_collider_shape *s, drape_bvh *out)
+const drape_mesh_distance *drape_mesh_distance_create(drape_arena *arena, const drape_collider_shape *shape)
 {
-    drape_context *ctx = s->builder->ctx;
-    drape_bvh made;
-    if (drape_bvh_build(ctx, s->triangle_count, 3, s->triangle, s->point, &made))
-        return false;
-    drape_bvh_fit(&made, s->point, NULL);
-    *out = made;
-    out->order = drape_shape_take(s, (size_t)made.count, sizeof *made.order);
-    out->branches = drape_shape_take(s, (size_t)made.branch_count, sizeof *made.branches);
-    const bool taken = out->order && out->branches;
-    if (taken && made.count > 0) {
-        memcpy(out->order, made.order, (size_t)made.count * sizeof *made.order);
-        memcpy(out->branches, made.branches, (size_t)made.branch_count * sizeof *made.branches);
-    }
-    drape_bvh_free(ctx, &made);
-    return taken;
-}
-
-const drape_tree *drape_tree_make(drape_collider_shape *shape)
-{
-    size_t triangles = (size_t)shape->triangle_count;
-    drape_tree *tree = drape_shape_take(shape, 1, sizeof *tree);
-    if (!tree)
+    const size_t triangles = (size_t)shape->triangle_count;
+    drape_mesh_distance *mesh = drape_arena_take(arena, 1, sizeof *mesh);
+    if (!mesh ||
+        drape_bvh_build(arena, shape->triangle_count, 3, shape->triangle, shape->point, &mesh->boxes))
         return NULL;
-    tree->edge_of = drape_shape_take(shape, triangles, 3 * sizeof *tree->edge_of);
-    tree->face_normal = drape_shape_take(shape, triangles, 3 * sizeof *tree->face_normal);
-    tree->edge_normal = drape_shape_take(shape, (size_t)shape->segment_count, 3 * sizeof *tree->edge_normal);
-    tree->point_normal = drape_shape_take(shape, (size_t)shape->point_count, 3 * sizeof *tree->point_normal);
-    if (!tree->edge_of || !tree->face_normal || !tree->edge_normal || !tree->point_normal ||
-        !make_boxes(shape, &tree->boxes))
+    mesh->edge_of = drape_arena_take(arena, triangles, 3 * sizeof *mesh->edge_of);
+    mesh->face_normal = drape_arena_take(arena, triangles, 3 * sizeof *mesh->face_normal);
+    mesh->edge_normal = drape_arena_take(arena, (size_t)shape->segment_count, 3 * sizeof *mesh->edge_normal);
+    mesh->point_normal = drape_arena_take(arena, (size_t)shape->point_count, 3 * sizeof *mesh->point_normal);
+    if (drape_arena_status(arena))
         return NULL;
-    fill_normals(shape, tree);
-    return tree;
+    drape_bvh_fit(&mesh->boxes, shape->point, NULL);
+    fill_normals(shape, mesh);
+    return mesh;
 }
 
 /* ---- The nearest point ---- */
@@ -128,7 +107,7 @@ typedef struct nearest {
     double at[3];
     int32_t triangle;
     feature_kind kind;
-    int which; /* EDGE: from corner `which` to the next; POINT: that corner */
+    int which; /* EDGE: it runs from this corner to the next; POINT: this corner */
 } nearest;
 
 static void offer(nearest *best, const double *x, const double *at, int32_t t, feature_kind kind, int which)
@@ -142,7 +121,7 @@ static void offer(nearest *best, const double *x, const double *at, int32_t t, f
     }
 }
 
-/* On the edge from corner k, which point x is beside of or beyond. */
+/* Offers the point of the edge from corner k that is nearest to x. */
 static void offer_edge(const drape_collider_shape *s, int32_t t, int k, const double *x, nearest *best)
 {
     double along[3], from[3], at[3];
@@ -161,12 +140,12 @@ static void offer_edge(const drape_collider_shape *s, int32_t t, int k, const do
     }
 }
 
-/* Inside of all three edges the nearest point is the foot of the perpendicular; else it is on an edge that x
- * is outside of. */
-static void offer_triangle(const drape_collider_shape *s, const drape_tree *tree, int32_t t, const double *x,
-                           nearest *best)
+/* If x lies inside of all three edges, the nearest point is the foot of its perpendicular; otherwise it is on an edge
+ * that x lies outside of. */
+static void offer_triangle(const drape_collider_shape *s, const drape_mesh_distance *mesh, int32_t t,
+                           const double *x, nearest *best)
 {
-    const double *n = tree->face_normal + 3 * (size_t)t;
+    const double *n = mesh->face_normal + 3 * (size_t)t;
     double along[3], from[3], outward[3], at[3];
     bool inside = true;
     for (int k = 0; k < 3; k++) {
@@ -195,33 +174,33 @@ static double squared_distance(const drape_box *b, const double *x)
     return sum;
 }
 
-/* A branch that is still to be visited. */
+/* A branch that has not been visited yet. */
 typedef struct pending {
     int32_t index;
     double squared; /* of the distance of its box */
 } pending;
 
-static pending pending_at(const drape_tree *tree, int32_t index, const double *x)
+static pending pending_at(const drape_mesh_distance *mesh, int32_t index, const double *x)
 {
-    return (pending){index, squared_distance(&tree->boxes.branches[index].box, x)};
+    return (pending){index, squared_distance(&mesh->boxes.branches[index].box, x)};
 }
 
-static nearest find_nearest(const drape_tree *tree, const drape_collider_shape *s, const double *x)
+static nearest find_nearest(const drape_mesh_distance *mesh, const drape_collider_shape *s, const double *x)
 {
     nearest best = {.squared = INFINITY};
     pending stack[DRAPE_BVH_DEPTH] = {{0, 0}};
     int height = 1;
     while (height > 0) {
         const pending next = stack[--height];
-        const drape_bvh_branch *branch = &tree->boxes.branches[next.index];
+        const drape_bvh_branch *branch = &mesh->boxes.branches[next.index];
         if (next.squared >= best.squared)
             continue;
         if (branch->second == 0) {
             for (int32_t i = 0; i < branch->count; i++)
-                offer_triangle(s, tree, tree->boxes.order[branch->first + i], x, &best);
+                offer_triangle(s, mesh, mesh->boxes.order[branch->first + i], x, &best);
             continue;
         }
-        const pending one = pending_at(tree, next.index + 1, x), other = pending_at(tree, branch->second, x);
+        const pending one = pending_at(mesh, next.index + 1, x), other = pending_at(mesh, branch->second, x);
         bool one_is_near = one.squared <= other.squared;
         stack[height++] = one_is_near ? other : one;
         stack[height++] = one_is_near ? one : other;
@@ -240,7 +219,7 @@ static double face_distance(const double *n, const double *from, double *normal,
     return vec3_dot(from, n);
 }
 
-/* About an edge with the direction u, or a point. On it, the pseudo-normal is the normal. */
+/* The distance from an edge with the direction u, or from a point (u NULL). On it the normal is the pseudo-normal. */
 static double round_signed(const double *pseudo, const double *u, const double *from, double *normal,
                            double *curvature)
 {
@@ -253,23 +232,23 @@ static double round_signed(const double *pseudo, const double *u, const double *
     return sign * length;
 }
 
-double drape_tree_distance(const drape_tree *tree, const drape_collider_shape *shape, const double *x,
-                           double *normal, double *curvature)
+double drape_mesh_distance_at(const drape_mesh_distance *mesh, const drape_collider_shape *shape,
+                              const double *x, double *normal, double *curvature)
 {
-    const nearest found = find_nearest(tree, shape, x);
+    const nearest found = find_nearest(mesh, shape, x);
     size_t place = 3 * (size_t)found.triangle + (size_t)found.which;
     double from[3], u[3];
     if (found.kind == FACE) {
         vec3_sub(x, corner(shape, found.triangle, 0), from);
-        return face_distance(tree->face_normal + 3 * (size_t)found.triangle, from, normal, curvature);
+        return face_distance(mesh->face_normal + 3 * (size_t)found.triangle, from, normal, curvature);
     }
     vec3_sub(x, found.at, from);
     if (found.kind == POINT)
-        return round_signed(tree->point_normal + 3 * (size_t)shape->triangle[place], NULL, from, normal,
+        return round_signed(mesh->point_normal + 3 * (size_t)shape->triangle[place], NULL, from, normal,
                             curvature);
     vec3_sub(corner(shape, found.triangle, found.which + 1), corner(shape, found.triangle, found.which), u);
     double length = vec3_norm(u);
     for (int k = 0; k < 3; k++)
         u[k] /= length;
-    return round_signed(tree->edge_normal + 3 * (size_t)tree->edge_of[place], u, from, normal, curvature);
+    return round_signed(mesh->edge_normal + 3 * (size_t)mesh->edge_of[place], u, from, normal, curvature);
 }

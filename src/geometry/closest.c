@@ -1,21 +1,20 @@
 /* closest.c: see closest.h. */
-#include "contact/closest.h"
+#include "geometry/closest.h"
 
 #include "base/vec3.h"
 
 #include <stdbool.h>
 #include <string.h>
 
-/* sin^2 of the angle below which two segments count as parallel: their closest points are then those at an
- * end, which are as close to within rounding. */
-#define PARALLEL 1e-12
+#define PARALLEL                                                                                             \
+    1e-12 /* sin^2 of the angle below which segments count as parallel: closest points at an end are as good */
 
 static double clamp01(double t)
 {
     return t < 0 ? 0 : t > 1 ? 1 : t;
 }
 
-/* p = sum c x, from differences of points: their coordinates may be large. */
+/* p = sum c x, from differences of points because coordinates may be large. */
 static void measure(double x[4][3], drape_closest *at)
 {
     double p[3] = {0};
@@ -93,7 +92,7 @@ void drape_closest_point_triangle(double x[4][3], drape_closest *at)
 
 /* ---- Two segments ---- */
 
-/* s and t may move unless they are at an end. */
+/* Parameters s and t are free unless they are at an end. */
 static void between(double s, double t, bool s_moves, bool t_moves, drape_closest *at)
 {
     const double c[4] = {1 - s, s, -(1 - t), -t};
@@ -108,7 +107,7 @@ static void between(double s, double t, bool s_moves, bool t_moves, drape_closes
     }
 }
 
-/* The point of segment 0 1 next to a point at parameter t of 2 3, and the other way about. */
+/* The parameter of the point of a segment that is nearest to a given point. */
 static double nearest(double along, double length2)
 {
     return length2 > 0 ? clamp01(along / length2) : 0;
@@ -151,7 +150,7 @@ void drape_closest_reduce(drape_closest *at, int which[4])
 
 /* ---- Derivatives ---- */
 
-/* inverse of G = T . T */
+/* The inverse of G = T . T. */
 static void invert(double t[2][3], int params, double inverse[2][2])
 {
     double a = vec3_dot(t[0], t[0]), b = vec3_dot(t[0], t[1]), c = vec3_dot(t[1], t[1]);
@@ -165,7 +164,7 @@ static void invert(double t[2][3], int params, double inverse[2][2])
     inverse[0][1] = inverse[1][0] = -b / det;
 }
 
-/* dt/dx */
+/* Adds dt/dx. */
 static void derive_params(double t[2][3], const drape_closest *at, double shift[2][12])
 {
     double inverse[2][2];

@@ -1,16 +1,16 @@
 /* bvh.c: see bvh.h. */
-#include "colliders/bvh.h"
+#include "geometry/bvh.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define LEAF 1 /* elements of a leaf: its box is theirs */
+#define LEAF 1 /* elements of a leaf */
 
 /* ---- Building ---- */
 
 typedef struct entry {
-    double middle[3];
+    double middle[3]; /* the sum of the element's nodes */
     int32_t element;
 } entry;
 
@@ -56,7 +56,7 @@ static int longest_axis(const entry *entries, int32_t count)
     return axis;
 }
 
-/* Branches in the order of a walk: the first child of branch i is i + 1. */
+/* Branches are stored in depth-first order: the first child of branch i is i + 1. */
 static void split(builder *b, int32_t first, int32_t count)
 {
     static int (*const by_axis[])(const void *, const void *) = {compare_x, compare_y, compare_z};
@@ -73,38 +73,31 @@ static void split(builder *b, int32_t first, int32_t count)
     split(b, first + count / 2, count - count / 2);
 }
 
-drape_status drape_bvh_build(drape_context *ctx, int32_t count, int nodes, const int32_t *node,
+drape_status drape_bvh_build(drape_arena *arena, int32_t count, int nodes, const int32_t *node,
                              const double *x, drape_bvh *bvh)
 {
     *bvh = (drape_bvh){.count = count, .nodes = nodes, .node = node};
     if (count == 0)
         return DRAPE_OK;
-    builder b = {.bvh = bvh, .entries = drape_alloc(ctx, (size_t)count, sizeof *b.entries)};
-    bvh->order = drape_alloc(ctx, (size_t)count, sizeof *bvh->order);
-    bvh->branches = drape_alloc(ctx, 2 * (size_t)count, sizeof *bvh->branches);
-    bool good = b.entries && bvh->order && bvh->branches;
-    for (int32_t e = 0; good && e < count; e++) {
+    bvh->order = drape_arena_take(arena, (size_t)count, sizeof *bvh->order);
+    bvh->branches = drape_arena_take(arena, 2 * (size_t)count, sizeof *bvh->branches);
+    builder b = {.bvh = bvh, .entries = drape_alloc(arena->ctx, (size_t)count, sizeof *b.entries)};
+    if (!b.entries || !bvh->order || !bvh->branches) {
+        drape_free(arena->ctx, b.entries);
+        return DRAPE_E_MEMORY;
+    }
+    for (int32_t e = 0; e < count; e++) {
         b.entries[e].element = e;
         for (int a = 0; a < nodes; a++)
             for (int k = 0; k < 3; k++)
                 b.entries[e].middle[k] +=
                     x[3 * (size_t)node[(size_t)e * (size_t)nodes + (size_t)a] + (size_t)k];
     }
-    if (good)
-        split(&b, 0, count);
-    for (int32_t e = 0; good && e < count; e++)
+    split(&b, 0, count);
+    for (int32_t e = 0; e < count; e++)
         bvh->order[e] = b.entries[e].element;
-    drape_free(ctx, b.entries);
-    if (!good)
-        drape_bvh_free(ctx, bvh);
-    return good ? DRAPE_OK : DRAPE_E_MEMORY;
-}
-
-void drape_bvh_free(drape_context *ctx, drape_bvh *bvh)
-{
-    drape_free(ctx, bvh->order);
-    drape_free(ctx, bvh->branches);
-    memset(bvh, 0, sizeof *bvh);
+    drape_free(arena->ctx, b.entries);
+    return DRAPE_OK;
 }
 
 /* ---- Fitting ---- */
@@ -126,11 +119,11 @@ static void cover(drape_box *box, const int32_t *node, int nodes, const double *
     }
 }
 
-static const drape_box nothing = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+static const drape_box empty_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 
 drape_box drape_box_of(const int32_t *node, int nodes, const double *x, const double *y, double reach)
 {
-    drape_box box = nothing;
+    drape_box box = empty_box;
     cover(&box, node, nodes, x, y);
     for (int k = 0; k < 3; k++) {
         box.low[k] -= reach;
@@ -139,12 +132,12 @@ drape_box drape_box_of(const int32_t *node, int nodes, const double *x, const do
     return box;
 }
 
-/* Children come after their parent: backwards, they are fitted first. */
+/* Children are stored after their parent: going backwards fits them first. */
 void drape_bvh_fit(drape_bvh *bvh, const double *x, const double *y)
 {
     for (int32_t i = bvh->branch_count - 1; i >= 0; i--) {
         drape_bvh_branch *branch = &bvh->branches[i];
-        branch->box = nothing;
+        branch->box = empty_box;
         if (branch->second > 0) {
             const drape_box *children[] = {&bvh->branches[i + 1].box, &bvh->branches[branch->second].box};
             for (int c = 0; c < 2; c++) {
@@ -158,7 +151,7 @@ void drape_bvh_fit(drape_bvh *bvh, const double *x, const double *y)
     }
 }
 
-/* ---- Asking ---- */
+/* ---- Queries ---- */
 
 static bool meet(const drape_box *a, const drape_box *b)
 {
