@@ -17,35 +17,12 @@
 
 #include <string.h>
 
-#define MEAN_NEIGHBOURS 24  /* room in the lists, for each point on average */
-#define SKIN            0.5 /* of the reach */
-#define FARTHEST        1e9 /* boxes are numbered in 32 bits: all points beyond share a box */
+#define SKIN     0.5 /* of the reach */
+#define FARTHEST 1e9 /* boxes are numbered in 32 bits: all points beyond share a box */
 
-struct drape_neighbours {
-    int32_t points;
-    double reach;            /* [m] */
-    double per_box;          /* boxes per metre */
-    int32_t buckets;         /* a power of 2 */
-    int32_t *start;          /* (buckets + 1) */
-    int32_t *bucket, *place; /* (points) of a point, and its index in the sorted arrays */
-    int32_t *point;          /* sorted: (points) */
-    uint64_t *row;           /* sorted: (points) row_of its box */
-    double *x;               /* sorted: (points x 3) */
-    double share;            /* of the last update */
-    bool listed;             /* the lists are valid near x_listed, for shares up to listed_share */
-    double listed_share;
-    int32_t *first, *cursor; /* (points + 1), (points): of a point in near */
-    int32_t *near;           /* (points x MEAN_NEIGHBOURS) */
-    int32_t *pair;           /* (points x MEAN_NEIGHBOURS / 2 x 2) */
-    double *x_listed;        /* (points x 3) */
-};
-
-drape_status drape_neighbours_create(drape_arena *arena, int32_t points, double reach, drape_neighbours **out)
+drape_status drape_neighbours_create(drape_arena *arena, int32_t points, double reach, drape_neighbours *s)
 {
     const size_t n = (size_t)points;
-    drape_neighbours *s = *out = drape_arena_take(arena, 1, sizeof *s);
-    if (!s)
-        return DRAPE_E_MEMORY;
     *s = (drape_neighbours){.points = points, .reach = reach, .buckets = 64};
     while (s->buckets < 2 * points && s->buckets < 1 << 28)
         s->buckets *= 2;
@@ -57,8 +34,8 @@ drape_status drape_neighbours_create(drape_arena *arena, int32_t points, double 
     s->x = drape_arena_take(arena, 3 * n, sizeof *s->x);
     s->first = drape_arena_take(arena, n + 1, sizeof *s->first);
     s->cursor = drape_arena_take(arena, n, sizeof *s->cursor);
-    s->near = drape_arena_take(arena, n * MEAN_NEIGHBOURS, sizeof *s->near);
-    s->pair = drape_arena_take(arena, n * MEAN_NEIGHBOURS, sizeof *s->pair);
+    s->near = drape_arena_take(arena, n * DRAPE_MEAN_NEIGHBOURS, sizeof *s->near);
+    s->pair = drape_arena_take(arena, n * DRAPE_MEAN_NEIGHBOURS, sizeof *s->pair);
     s->x_listed = drape_arena_take(arena, 3 * n, sizeof *s->x_listed);
     return drape_arena_status(arena);
 }
@@ -169,7 +146,7 @@ static void sort_numbers(int32_t *number, int count)
     }
 }
 
-static int search_boxes(const drape_neighbours *s, int32_t point, const double *x, int32_t *found)
+int drape_neighbours_search(const drape_neighbours *s, int32_t point, const double *x, int32_t *found)
 {
     const double ball = s->reach * (1 + s->share);
     search q = {.point = point, .x = x, .square_of_reach = s->reach * s->reach, .found = found};
@@ -251,7 +228,7 @@ static inline int32_t pair_with(const drape_neighbours *s, int32_t at, uint64_t 
 /* All pairs of points nearer than reach, which is the size of the boxes. -1: there is no room for all. */
 static int32_t collect_pairs(drape_neighbours *s, double reach)
 {
-    const int32_t room = s->points * (MEAN_NEIGHBOURS / 2);
+    const int32_t room = s->points * (DRAPE_MEAN_NEIGHBOURS / 2);
     int32_t count = 0;
     surroundings a = {.bucket = -1};
     for (int32_t at = 0; at < s->points; at++) {
@@ -358,17 +335,4 @@ void drape_neighbours_update(drape_neighbours *s, double share, const double *x)
     s->listed = pairs >= 0 && spread_pairs(s, pairs);
     s->listed_share = share;
     memcpy(s->x_listed, x, 3 * (size_t)s->points * sizeof *x);
-}
-
-void drape_neighbours_moved(drape_neighbours *s, int32_t point, const double *x)
-{
-    if (!s->listed)
-        memcpy(s->x + 3 * (size_t)s->place[point], x, 3 * sizeof *x);
-}
-
-int drape_neighbours_of(const drape_neighbours *s, int32_t point, const double *x,
-                        int32_t room[DRAPE_MAX_NEIGHBOURS + 1], const int32_t **near)
-{
-    *near = s->listed ? s->near + s->first[point] : room;
-    return s->listed ? s->first[point + 1] - s->first[point] : search_boxes(s, point, x, room);
 }

@@ -58,10 +58,10 @@ void drape_verlet_rub(const drape_verlet_contact *contact, double t, const doubl
 
 typedef struct drape_verlet_self {
     const drape_model *model;
-    double reach;                 /* [m] nodes nearer than this are pushed apart; 0: none are */
-    drape_neighbours *neighbours; /* the broad phase */
-    uint64_t *box;                /* (node_count) the box of a node; NULL: all near nodes push */
-    double per_box[3];            /* boxes per metre */
+    double reach;                /* [m] nodes nearer than this are pushed apart; 0: none are */
+    drape_neighbours neighbours; /* the broad phase */
+    uint64_t *box;               /* (node_count) the box of a node; NULL: all near nodes push */
+    double per_box[3];           /* boxes per metre */
 } drape_verlet_self;
 
 /* same_box: only nodes in the same box push, as in CS184. */

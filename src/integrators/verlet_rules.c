@@ -207,18 +207,15 @@ static uint64_t box_of(const drape_verlet_self *s, const double *x)
     return box;
 }
 
-/* near NULL: all points, which are count. Of a heap of points in one box only the first push. */
+/* near NULL: all points, which are count. */
 static void push_node(const drape_verlet_self *s, int32_t i, const int32_t *near, int count, double share,
                       double *x)
 {
     double *own = x + 3 * (size_t)i, sum[3] = {0}, square_of_reach = s->reach * s->reach;
     int pushing = 0;
-    for (int k = 0; k < count && !(s->box && pushing == DRAPE_MAX_NEIGHBOURS); k++) {
-        const int32_t j = near ? near[k] : k;
+    for (int k = 0; k < count; k++) {
         double d[3];
-        if (s->box && s->box[j] != s->box[i])
-            continue;
-        vec3_sub(own, x + 3 * (size_t)j, d);
+        vec3_sub(own, x + 3 * (size_t)(near ? near[k] : k), d);
         double square = vec3_dot(d, d);
         if (!(square < square_of_reach) || square == 0) /* too far, or no direction to push in */
             continue;
@@ -230,10 +227,25 @@ static void push_node(const drape_verlet_self *s, int32_t i, const int32_t *near
         vec3_add_scaled(share / pushing, sum, own);
 }
 
+/* Keeps the near points in the box of a point, in `kept`, which may be near; of all points (near NULL) the first. */
+static int keep_box(const drape_verlet_self *s, int32_t i, const int32_t *near, int count, const double *x,
+                    int32_t kept[DRAPE_MAX_NEIGHBOURS + 1])
+{
+    int number = 0;
+    for (int k = 0; k < count && number < DRAPE_MAX_NEIGHBOURS; k++) {
+        const int32_t j = near ? near[k] : k;
+        double d[3];
+        vec3_sub(x + 3 * (size_t)i, x + 3 * (size_t)j, d);
+        kept[number] = j;
+        number += (s->box[j] == s->box[i]) & (j != i) & (near || vec3_dot(d, d) < s->reach * s->reach);
+    }
+    return number;
+}
+
 /* A point with more near points than a list holds, in a heap of cloth much thicker than its mesh is fine, asks all. */
 void drape_verlet_self_push(drape_verlet_self *s, double share, double *x)
 {
-    drape_neighbours_update(s->neighbours, share, x);
+    drape_neighbours_update(&s->neighbours, share, x);
     for (int32_t i = 0; s->box && i < s->model->node_count; i++)
         s->box[i] = box_of(s, x + 3 * (size_t)i);
     for (int32_t i = 0; i < s->model->node_count; i++) {
@@ -241,8 +253,16 @@ void drape_verlet_self_push(drape_verlet_self *s, double share, double *x)
         const int32_t *near;
         if (s->model->pinned[i])
             continue;
-        const int count = drape_neighbours_of(s->neighbours, i, x + 3 * (size_t)i, room, &near);
-        push_node(s, i, count < 0 ? NULL : near, count < 0 ? s->model->node_count : count, share, x);
-        drape_neighbours_moved(s->neighbours, i, x + 3 * (size_t)i);
+        int count = drape_neighbours_of(&s->neighbours, i, x + 3 * (size_t)i, room, &near);
+        if (count < 0) {
+            near = NULL;
+            count = s->model->node_count;
+        }
+        if (s->box) {
+            count = keep_box(s, i, near, count, x, room);
+            near = room;
+        }
+        push_node(s, i, near, count, share, x);
+        drape_neighbours_moved(&s->neighbours, i, x + 3 * (size_t)i);
     }
 }
