@@ -20,8 +20,8 @@ static void reduce(drape_active_contact *contact)
         contact->pair.node[a] = -1;
 }
 
-/* Whether several pairs can be this contact: two points, or a point and an edge. A contact of four nodes is only that of
- * its own pair, and so is one that depends on more than its nodes. */
+/* Whether several pairs can be this contact: two points, or a point and an edge. A contact of four nodes is
+ * only that of its own pair, and so is one that depends on more than its nodes. */
 static bool is_shared(const drape_active_contact *contact)
 {
     const int points = contact->gap.closest.points;

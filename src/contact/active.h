@@ -1,7 +1,7 @@
 /*
- * active.h: the active set: the candidates whose gap is below the activation distance, each with its geometry. Pairs of
- * large pieces are often contacts of smaller ones (an edge that is closest at its end is that point): these are listed
- * once, with the sum of their areas.
+ * active.h: the active set: the candidates whose gap is below the activation distance, each with its
+ * geometry. Pairs of large pieces are often contacts of smaller ones (an edge that is closest at its end is
+ * that point): these are listed once, with the sum of their areas.
  */
 #ifndef DRAPE_CONTACT_ACTIVE_H
 #define DRAPE_CONTACT_ACTIVE_H
@@ -20,8 +20,8 @@ typedef struct drape_active_set {
     int32_t *slots; /* (several x room) hash table by nodes: 1 + a contact, 0: free */
 } drape_active_set;
 
-/* Lists what acts at a configuration in which no point has moved farther than `moved` from the search of the candidates.
- * Errors: DRAPE_E_MEMORY. */
+/* Lists the active contacts of a configuration in which no point has moved farther than `moved` from the
+ * search of the candidates. Errors: DRAPE_E_MEMORY. */
 drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates, double moved,
                                    const drape_configuration *at);
 

@@ -1,7 +1,7 @@
 /*
- * broad_phase.h: which pairs of pieces may come near each other, at some positions or on the way to others. Pieces are the
- * nodes, edges and faces of the cloths and the features of the colliders' shapes, whose points are numbered after the
- * nodes.
+ * broad_phase.h: which pairs of pieces may come near each other, at some positions or on the path to others.
+ * Pieces are the nodes, edges and faces of the cloths and the features of the colliders' shapes, whose points
+ * are numbered after the nodes.
  */
 #ifndef DRAPE_CONTACT_BROAD_PHASE_H
 #define DRAPE_CONTACT_BROAD_PHASE_H
@@ -28,10 +28,11 @@ typedef struct drape_broad_phase {
 
 drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *model, drape_broad_phase *out);
 
-/* Calls visit for every pair whose pieces may be within its activation distance plus reach, at x or anywhere on the
- * straight path from there to y (NULL: only at x), in an order that does not depend on the positions. A negative reach
- * shrinks the distance to 0 at least, so that pairs that meet are found. Pairs whose nodes are all pinned are left out, and
- * so are surfaces: every free node is paired with them. x, y: (points x 3). */
+/* Calls visit for every pair whose pieces may be within its activation distance plus reach, at x or anywhere
+ * on the straight path from there to y (NULL: only at x), in an order that does not depend on the positions.
+ * A negative reach shrinks the distance to 0 at least, so that pairs that meet are found. Pairs whose nodes
+ * are all pinned are left out, and so are surfaces: every free node is paired with them. x, y: (points x
+ * 3). */
 typedef void drape_broad_phase_visit(void *user, const drape_pair *pair);
 void drape_broad_phase_pairs(drape_broad_phase *broad, const double *x, const double *y, double reach,
                              drape_broad_phase_visit *visit, void *user);

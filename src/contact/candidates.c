@@ -14,14 +14,15 @@ drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broa
     return out->x && out->pose ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-/* A search that is under way. */
+/* A search in progress. */
 typedef struct search {
     drape_candidates *candidates;
     drape_configuration at, rest;
     drape_status status;
 } search;
 
-/* Layers of one sheet that are near to each other at rest are not in contact there: they have half of that distance. */
+/* Layers of one sheet that are near to each other at rest are not in contact there: they have half of that
+ * distance. */
 static double activation_distance(const search *s, const drape_pair *pair)
 {
     if (pair->collider >= 0 || drape_pair_is_apart(pair, &s->rest, 2 * pair->distance))

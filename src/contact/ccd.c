@@ -1,4 +1,5 @@
-/* ccd.c: continuous collision detection: the step fraction of a straight displacement without collisions. See contact.h. */
+/* ccd.c: continuous collision detection: the step fraction of a straight displacement without collisions. See
+ * contact.h. */
 #include "contact/parts.h"
 
 #include "base/clock.h"
@@ -18,8 +19,8 @@ typedef struct path {
     drape_pair limiting;
 } path;
 
-/* Not searched beyond the fraction that another pair leaves: if forces throw nodes very far, a pair approaches so slowly
- * relative to its speed that searching each to its own end would take for ever. */
+/* Not searched beyond the fraction that another pair leaves: if forces throw nodes very far, a pair
+ * approaches so slowly relative to its speed that searching each to its own end would take for ever. */
 static void follow(void *user, const drape_pair *pair)
 {
     path *p = user;
@@ -40,8 +41,8 @@ static double longest_move(const drape_contact *c, const path *p)
     return sqrt(largest);
 }
 
-/* Paths are straight: if both ends are near the last search, all between them is. Two points approach each other by no more
- * than the sum of their moves. */
+/* Paths are straight: if both ends are near the last search, all between them is. Two points approach each
+ * other by no more than the sum of their moves. */
 double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
                                    const drape_collider_pose *pose, double keep, bool core,
                                    drape_pair *limiting)
@@ -66,8 +67,8 @@ double drape_contact_free_fraction(drape_contact *c, const double *x, const doub
     return p.fraction;
 }
 
-/* The same for a node and a surface: marching by the distance, which no path can outrun, until keep of the gap is
- * left. 1 from inside. */
+/* The same for a node and a surface: marching by the distance, which no path can outrun, until keep of the
+ * gap is left. 1 from inside. */
 static double march(const drape_collider *collider, const drape_collider_pose *pose, const double *x,
                     const double *y, double keep)
 {

@@ -1,4 +1,4 @@
-/* check.c: what is wrong with the end of a step. See contact.h. */
+/* check.c: whether the end of a step is allowed: penetration and collisions. See contact.h. */
 #include "contact/parts.h"
 
 #include "base/clock.h"
@@ -28,7 +28,8 @@ static drape_worst diagnostic_of(const drape_contact *c, const drape_pair *pair,
     return found;
 }
 
-/* Finds the active contact that is farthest below what it may be: a node that was too deep before may be as deep. */
+/* Finds the active contact with the largest penetration beyond its limit: it may be as deep as before the
+ * step. */
 static drape_status check_depth(drape_contact *c, const char **reason, drape_worst *worst)
 {
     double excess = 0;
@@ -48,8 +49,8 @@ static drape_status check_depth(drape_contact *c, const char **reason, drape_wor
     return excess > 0 ? DRAPE_RETRY_REJECTED : DRAPE_OK;
 }
 
-/* Whether a node on its straight path passes through the surface although both ends are outside: marching by the
- * distance, which no path can outrun. x, y: in the collider's own coordinates. */
+/* Whether a node on its straight path passes through the surface although both ends are outside: marching by
+ * the distance, which no path can outrun. x, y: in the collider's own coordinates. */
 static bool dips(const drape_collider *collider, const double *x, const double *y)
 {
     double p[3], at[3], t = 0,
@@ -99,8 +100,8 @@ static double depth_of(const drape_collider *collider, const drape_collider_pose
                       : drape_depth_face(collider, pose, corner, enough);
 }
 
-/* Edges or faces of cloth against the curved surfaces of shapes that are inside of them (inscribed). A piece may be as deep
- * as it was before. */
+/* Edges or faces of cloth against the curved surfaces of shapes that are inside of them (inscribed). A piece
+ * may be as deep as it was before. */
 static drape_status check_inscribed(drape_contact *c, const int32_t *node, int nodes, int32_t count,
                                     const char **reason, drape_worst *worst)
 {

@@ -47,7 +47,8 @@ static drape_status restore_start(drape_contact *c)
     return status;
 }
 
-/* Which candidates the steps have, and so what a pattern is made for, follows from where their last search was. */
+/* Which candidates the steps have, and so what a pattern is made for, follows from where their last search
+ * was. */
 static drape_status restore(drape_contact *c)
 {
     const drape_configuration at = {.model = c->model, .x = c->steps.x, .pose = c->steps.pose};

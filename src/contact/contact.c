@@ -9,7 +9,8 @@
  *     friction.c     its friction, with the normal force of now or of the beginning of the step (lagged)
  *     jacobian.c     dg/dx + w dg/dv of the active set, block by block into the pattern
  *
- * This file has the states between which that happens: the beginning of a step, and where contact is evaluated.
+ * This file has the states between which that happens: the beginning of a step, and where contact is
+ * evaluated.
  */
 #include "contact/parts.h"
 
@@ -150,7 +151,8 @@ const drape_candidates *drape_contact_covering(const drape_contact *c, const dra
     return *moved <= c->queries.margin ? &c->queries : NULL;
 }
 
-/* The largest displacement of a node since the beginning of the step; before the first step, from the origin. */
+/* The largest displacement of a node since the beginning of the step; before the first step, from the
+ * origin. */
 static double displacement(const drape_contact *c, const double *x)
 {
     double largest = 0, d[3];
@@ -161,7 +163,7 @@ static double displacement(const drape_contact *c, const double *x)
     return sqrt(largest);
 }
 
-/* Not where points are, but where they will be, or may return to: what is found holds for as far before as after. */
+/* Searches where points are expected, ahead or half back: the candidates then hold before and after that. */
 static drape_status search(drape_contact *c, drape_candidates *candidates, double lead)
 {
     const double start = drape_clock_seconds(), limit = MAX_LEAD * c->next_margin;

@@ -1,8 +1,8 @@
 /*
  * force.h: energy and normal force of one contact of up to four points, with exact derivatives. A gap s has
  *     E = m K d b(s / d)                  [J],  lambda = -m K b'(s / d)      [N]
- * with d the activation distance, K the stiffness times an area [N], b the barrier (barrier.h) and m the mollifier of nearly
- * parallel edges (gap.h).
+ * with d the activation distance, K the stiffness times an area [N], b the barrier (barrier.h) and m the
+ * mollifier of nearly parallel edges (gap.h).
  */
 #ifndef DRAPE_CONTACT_FORCE_H
 #define DRAPE_CONTACT_FORCE_H

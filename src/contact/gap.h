@@ -1,6 +1,6 @@
 /*
- * gap.h: the geometry of an active contact of up to four points, evaluated once where the contact is found and read by
- * forces, energy, friction and Jacobian.
+ * gap.h: the geometry of an active contact of up to four points, evaluated once where the contact is found
+ * and read by forces, energy, friction and Jacobian.
  */
 #ifndef DRAPE_CONTACT_GAP_H
 #define DRAPE_CONTACT_GAP_H
@@ -24,8 +24,8 @@ typedef struct drape_gap_slopes {
     double ddm[12][12];           /* of the mollifier, where there is one */
 } drape_gap_slopes;
 
-/* The mollifier of edges 0 1 and 2 3 (Li et al. 2020, eq. 24), a function of q = |e1 x e2|^2: m = q/w (2 - q/w) below w,
- * 1 above. Sets mollified, m and dm. */
+/* The mollifier of edges 0 1 and 2 3 (Li et al. 2020, eq. 24), a function of q = |e1 x e2|^2: m = q/w (2 -
+ * q/w) below w, 1 above. Sets mollified, m and dm. */
 void drape_mollify(double x[4][3], double w, drape_gap *gap);
 
 /* Its second derivative, below w. */

@@ -1,4 +1,5 @@
-/* jacobian.c: derivatives of the forces of the active set, and the blocks of a pattern that they need. See contact.h. */
+/* jacobian.c: derivatives of the forces of the active set, and the blocks of a pattern that they need. See
+ * contact.h. */
 #include "contact/parts.h"
 
 #include "base/clock.h"

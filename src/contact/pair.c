@@ -56,8 +56,8 @@ static double mollifier_width(const drape_pair *pair, const double *rest)
     return PARALLEL_WIDTH * vec3_dot(u, u) * vec3_dot(w, w);
 }
 
-/* A sharp feature that touches has no direction from its closest points. Its normal is the one across both pieces, out of
- * the collider, and fixed. */
+/* A sharp feature that touches has no direction from its closest points. Its normal is the one across both
+ * pieces, out of the collider, and fixed. */
 static void touching_normal(const drape_pair *pair, const drape_configuration *at, double x[4][3],
                             double normal[3])
 {
@@ -79,7 +79,8 @@ static void touching_normal(const drape_pair *pair, const drape_configuration *a
         normal[k] = sign * n[k] / length;
 }
 
-/* Whether the boxes around both pieces are farther apart than reach; false for numbers that are not finite. */
+/* Whether the boxes around both pieces are farther apart than reach; false for numbers that are not
+ * finite. */
 static bool are_apart(drape_pair_kind kind, double x[4][3], double reach)
 {
     double sum = 0;
@@ -159,7 +160,8 @@ void drape_pair_slopes(const drape_pair *pair, const drape_gap *gap, const drape
 
 /* ---- Continuous collision detection ---- */
 
-/* The largest rate at which both pieces can approach each other, per step fraction; their common motion does not count. */
+/* The largest rate at which both pieces can approach each other, per step fraction; their common motion does
+ * not count. */
 static double approach_speed(drape_pair_kind kind, double p[4][3])
 {
     double mean[3] = {0}, first = 0, second = 0;

@@ -1,6 +1,7 @@
 /*
- * pair.h: two pieces that may come into contact, and the narrow phase: a node and the smooth surface of a collider, a point
- * and a triangle, or two segments. Points are nodes of the cloth and, from node_count on, points of colliders.
+ * pair.h: two pieces that may come into contact, and the narrow phase: a node and the smooth surface of a
+ * collider, a point and a triangle, or two segments. Points are nodes of the cloth and, from node_count on,
+ * points of colliders.
  */
 #ifndef DRAPE_CONTACT_PAIR_H
 #define DRAPE_CONTACT_PAIR_H
@@ -37,8 +38,9 @@ double drape_pair_gap_value(const drape_pair *pair, const drape_configuration *a
 /* Whether boxes around the pieces already show that the gap is larger than `gap`, as for most candidates. */
 bool drape_pair_is_apart(const drape_pair *pair, const drape_configuration *at, double gap);
 
-/* The geometry of the pair, with all four points. False if it is not below the activation distance: then only the value of
- * the gap is set, INFINITY if the pieces are apart. rest: (points x 3), for the width of the mollifier. */
+/* The geometry of the pair, with all four points. False if it is not below the activation distance: then only
+ * the value of the gap is set, INFINITY if the pieces are apart. rest: (points x 3), for the width of the
+ * mollifier. */
 bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const double *rest,
                     drape_gap *gap);
 
@@ -46,10 +48,11 @@ bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const
 void drape_pair_slopes(const drape_pair *pair, const drape_gap *gap, const drape_configuration *at,
                        const double *rest, drape_gap_slopes *slopes);
 
-/* Continuous collision detection: the largest step fraction from x to y, straight and for all points together, without
- * contact of the pair (additive continuous collision detection, Li et al. 2021, Codimensional IPC, algorithm 1). It stops
- * where `keep` of the gap at the start is left. At most `limit`, beyond which it does not search, and which it returns for
- * a pair in contact at the start (with a collider: within 1e-9 m of it). core: the radius counts as 0. */
+/* Continuous collision detection: the largest step fraction from x to y, straight and for all points
+ * together, without contact of the pair (additive continuous collision detection, Li et al. 2021,
+ * Codimensional IPC, algorithm 1). It stops where `keep` of the gap at the start is left. At most `limit`,
+ * beyond which it does not search, and which it returns for a pair in contact at the start (with a collider:
+ * within 1e-9 m of it). core: the radius counts as 0. */
 double drape_pair_step_fraction(const drape_pair *pair, const double *x, const double *y, double keep,
                                 bool core, double limit);
 

@@ -1,7 +1,7 @@
 /*
- * parts.h: the struct behind contact.h and what its files share. contact.c: the configuration and its active set;
- * forces.c: forces and energy; jacobian.c: derivatives and their blocks in a pattern; ccd.c: continuous collision detection;
- * check.c: the end of a step; checkpoint.c.
+ * parts.h: the struct behind contact.h and what its files share. contact.c: the configuration and its active
+ * set; forces.c: forces and energy; jacobian.c: derivatives and their blocks in a pattern; ccd.c: continuous
+ * collision detection; check.c: the end of a step; checkpoint.c.
  */
 #ifndef DRAPE_CONTACT_PARTS_H
 #define DRAPE_CONTACT_PARTS_H
@@ -28,7 +28,7 @@ struct drape_contact {
     drape_candidates steps;   /* of the steps, which depend on nothing else */
     drape_candidates queries; /* between steps, where those of the steps do not reach */
     double next_margin;       /* of the next search [m] */
-    bool between_steps;       /* no step is under way: it is asked for frames, energies, by the user */
+    bool between_steps;       /* evaluated for frames, energies or the user, not for a step */
 
     double *x, *v;                  /* (points x 3) where contact is evaluated */
     drape_collider_pose *pose;      /* (collider_count) */
@@ -70,8 +70,8 @@ double drape_contact_lead(const drape_contact *c);
 drape_status drape_contact_lag(drape_contact *c);
 void drape_contact_measure_start(drape_contact *c);
 
-/* The candidates that hold at a configuration, and how far points have moved since their search; NULL: a search is
- * needed. */
+/* The candidates that hold at a configuration, and how far points have moved since their search; NULL: a
+ * search is needed. */
 const drape_candidates *drape_contact_covering(const drape_contact *c, const drape_configuration *at,
                                                double *moved);
 
@@ -81,8 +81,8 @@ drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_pair 
 /* Velocities of the points of an active contact, relative to the collider if it is a surface. */
 void drape_contact_velocities(const drape_contact *c, const drape_active_contact *contact, double v[4][3]);
 
-/* The largest step fraction from x to y (points x 3) on which pairs keep `keep` of their gap, and the pair that limits it.
- * Colliders at pose; core: without radius. */
+/* The largest step fraction from x to y (points x 3) on which pairs keep `keep` of their gap, and the pair
+ * that limits it. Colliders at pose; core: without radius. */
 double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
                                    const drape_collider_pose *pose, double keep, bool core,
                                    drape_pair *limiting);

@@ -1,8 +1,8 @@
 /*
- * bvh.h: a bounding volume hierarchy: a binary tree of axis-aligned boxes over edges or triangles, of cloth or of a
- * collider. Its shape is made once, from rest positions, so that a branch is a patch of cloth; the boxes are refitted to any
- * positions. Queries visit elements in an order that does not depend on the positions, so that sums over what they find
- * have the same bits however it was found.
+ * bvh.h: a bounding volume hierarchy: a binary tree of axis-aligned boxes over edges or triangles, of cloth
+ * or of a collider. Its shape is made once, from rest positions, so that a branch is a patch of cloth; the
+ * boxes are refitted to any positions. Queries visit elements in an order that does not depend on the
+ * positions, so that sums over what they find have the same bits however it was found.
  */
 #ifndef DRAPE_GEOMETRY_BVH_H
 #define DRAPE_GEOMETRY_BVH_H

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #define PARALLEL                                                                                             \
-    1e-12 /* sin^2 of the angle below which segments count as parallel: closest points at an end are as good */
+    1e-12 /* sin^2 of the angle below which segments count as parallel: ends are then as near as any points */
 
 static double clamp01(double t)
 {

@@ -1,6 +1,6 @@
 /*
- * closest.h: the closest points of two pieces of four points in all (point and triangle, or two segments), and how
- * they move with the points.
+ * closest.h: the closest points of two pieces of four points in all (point and triangle, or two segments),
+ * and how they move with the points.
  *     p = sum c_i x_i,  gap = |p| - radius,  n = p / |p|
  * with c the barycentric weights of the closest points of both pieces, negative on the second. Where the
  * closest points lie inside a face or an edge, c depends on parameters t with p . dp/dt = 0, so
@@ -31,8 +31,8 @@ void drape_closest_point_triangle(double x[4][3], drape_closest *at);
 /* Segments 0 1 and 2 3 (Ericson 2005, 5.1.9). */
 void drape_closest_segments(double x[4][3], drape_closest *at);
 
-/* Removes the points without weight, as the far end of an edge that is closest at its other end. which: the former
- * number of each point that stays. */
+/* Removes the points without weight, as the far end of an edge that is closest at its other end. which: the
+ * former number of each point that stays. */
 void drape_closest_reduce(drape_closest *at, int which[4]);
 
 void drape_closest_derive(double x[4][3], const drape_closest *at, drape_closest_slopes *slopes);

@@ -14,8 +14,8 @@
 
 #define ROUNDINGS 8 /* rounding errors of a volume: of its coordinates, differences, products and sums */
 
-/* Six times the volume of the tetrahedron a b c d; 0 if it is within rounding of 0: an edge that lies in the plane of a
- * triangle does not cross it. */
+/* Six times the volume of the tetrahedron a b c d; 0 if it is within rounding of 0: an edge that lies in the
+ * plane of a triangle does not cross it. */
 static double volume(const double *a, const double *b, const double *c, const double *d)
 {
     double u[3], v[3], w[3], n[3], largest = 0;

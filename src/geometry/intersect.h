@@ -9,8 +9,8 @@ typedef struct drape_intersections {
     int32_t edge[2], triangle[3]; /* nodes of the first one; -1 if there is none */
 } drape_intersections;
 
-/* x (node_count x 3) [m], finite. An edge that only touches a triangle does not count: it has to change sides. Errors:
- * DRAPE_E_MEMORY. */
+/* x (node_count x 3) [m], finite. An edge that only touches a triangle does not count: it has to change
+ * sides. Errors: DRAPE_E_MEMORY. */
 drape_status drape_find_intersections(drape_context *ctx, const drape_model *model, const double *x,
                                       drape_intersections *found);
 

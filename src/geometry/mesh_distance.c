@@ -1,12 +1,12 @@
 /*
  * mesh_distance.c: see mesh_distance.h.
  *
- * The nearest point is searched depth first in a tree of boxes, the nearer child before the other (Ericson 2005, section
- * 6.3; points of triangles: 5.1.5).
+ * The nearest point is searched depth first in a tree of boxes, the nearer child before the other (Ericson
+ * 2005, section 6.3; points of triangles: 5.1.5).
  *
- * x is outside if n . (x - c) > 0 for the angle-weighted pseudo-normal n of the face, edge or point that contains the
- * nearest point c (Baerentzen and Aanaes 2005, "Signed distance computation using the angle weighted pseudonormal",
- * theorem 1). This holds for every closed mesh without self-intersections.
+ * x is outside if n . (x - c) > 0 for the angle-weighted pseudo-normal n of the face, edge or point that
+ * contains the nearest point c (Baerentzen and Aanaes 2005, "Signed distance computation using the angle
+ * weighted pseudonormal", theorem 1). This holds for every closed mesh without self-intersections.
  */
 #include "geometry/mesh_distance.h"
 
@@ -140,8 +140,8 @@ static void offer_edge(const drape_collider_shape *s, int32_t t, int k, const do
     }
 }
 
-/* If x lies inside of all three edges, the nearest point is the foot of its perpendicular; otherwise it is on an edge
- * that x lies outside of. */
+/* If x lies inside of all three edges, the nearest point is the foot of its perpendicular; otherwise it is on
+ * an edge that x lies outside of. */
 static void offer_triangle(const drape_collider_shape *s, const drape_mesh_distance *mesh, int32_t t,
                            const double *x, nearest *best)
 {
@@ -219,7 +219,8 @@ static double face_distance(const double *n, const double *from, double *normal,
     return vec3_dot(from, n);
 }
 
-/* The distance from an edge with the direction u, or from a point (u NULL). On it the normal is the pseudo-normal. */
+/* The distance from an edge with the direction u, or from a point (u NULL). On it the normal is the
+ * pseudo-normal. */
 static double round_signed(const double *pseudo, const double *u, const double *from, double *normal,
                            double *curvature)
 {

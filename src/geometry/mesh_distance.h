@@ -7,8 +7,8 @@
 
 typedef struct drape_mesh_distance drape_mesh_distance;
 
-/* For the points, segments and triangles of a shape; segments are the edges of its triangles, sorted by (lower, higher)
- * point, the lower first. NULL: out of memory. */
+/* For the points, segments and triangles of a shape; segments are the edges of its triangles, sorted by
+ * (lower, higher) point, the lower first. NULL: out of memory. */
 const drape_mesh_distance *drape_mesh_distance_create(drape_arena *arena, const drape_collider_shape *shape);
 
 /* As the function distance of drape_collider_ops. */

@@ -5,10 +5,11 @@
  *     bucket = hash of a box's y and z + its number along x,
  * so that the boxes of a row along x lie one after another and are searched as one range.
  *
- * The lists hold the points that are nearer than the reach, the moves of two points and a skin. They are valid until a
- * point has moved by half of the skin, not counting the mean motion of all points. If lists become too long, in a heap of
- * points, the boxes are searched at each question: a point that has not moved since the update is where it was sorted;
- * another one has moved by share times the reach at most, and a ball that much larger finds it in its old box.
+ * The lists hold the points that are nearer than the reach, the moves of two points and a skin. They are
+ * valid until a point has moved by half of the skin, not counting the mean motion of all points. If lists
+ * become too long, in a heap of points, the boxes are searched at each question: a point that has not moved
+ * since the update is where it was sorted; another one has moved by share times the reach at most, and a ball
+ * that much larger finds it in its old box.
  */
 #include "geometry/neighbours.h"
 
@@ -107,8 +108,8 @@ typedef struct search {
     int count; /* more than DRAPE_MAX_NEIGHBOURS: not all are in found */
 } search;
 
-/* Points from first to last that are of the row and not of another one with the same hash. A point is always written and
- * counted only if it belongs: a branch here would be mispredicted half of the time. */
+/* Points from first to last that are of the row and not of another one with the same hash. A point is always
+ * written and counted only if it belongs: a branch here would be mispredicted half of the time. */
 static inline void search_range(const drape_neighbours *s, search *q, uint64_t row, int32_t first,
                                 int32_t last)
 {
@@ -146,7 +147,8 @@ static void sort_numbers(int32_t *number, int count)
     }
 }
 
-int drape_neighbours_search(const drape_neighbours *s, int32_t point, const double *x, int32_t *found)
+int drape_neighbours_search(const drape_neighbours *s, int32_t point, const double *x,
+                            int32_t found[DRAPE_MAX_NEIGHBOURS + 1])
 {
     const double ball = s->reach * (1 + s->share);
     search q = {.point = point, .x = x, .square_of_reach = s->reach * s->reach, .found = found};
@@ -165,13 +167,13 @@ int drape_neighbours_search(const drape_neighbours *s, int32_t point, const doub
 
 /* ---- Lists ---- */
 
-/* The rows of boxes around one in which the second point of a pair is searched; the rows on the other side search for
- * it. */
+/* The rows of boxes around one in which the second point of a pair is searched; the rows on the other side
+ * search for it. */
 #define ROWS 4
 static const int32_t rows_ahead[ROWS][2] = {{0, 1}, {1, -1}, {1, 0}, {1, 1}};
 
-/* The sorted points that may be near to those of one box: of the next box of its row, and of three boxes of each of the
- * rows ahead. A range that wraps around the table is two. */
+/* The sorted points that may be near to those of one box: of the next box of its row, and of three boxes of
+ * each of the rows ahead. A range that wraps around the table is two. */
 typedef struct surroundings {
     int32_t bucket;
     uint64_t row;
@@ -247,8 +249,8 @@ static int32_t collect_pairs(drape_neighbours *s, double reach)
     return count;
 }
 
-/* From pairs to the list of every point, in ascending order: first unordered lists, in near; then each point in turn is
- * appended to the lists of the points in its own list. False: some list is too long. */
+/* From pairs to the list of every point, in ascending order: first unordered lists, in near; then each point
+ * in turn is appended to the lists of the points in its own list. False: some list is too long. */
 static bool spread_pairs(drape_neighbours *s, int32_t count)
 {
     int32_t total = 0, *sorted = s->pair;
@@ -299,8 +301,8 @@ static inline double square_of_move(const double *x, const double *x0, const dou
     return a * a + b * b + c * c;
 }
 
-/* The largest distance that a point has moved from x0 to x, relative to the mean of all; infinite if a number is not
- * finite. */
+/* The largest distance that a point has moved from x0 to x, relative to the mean of all; infinite if a number
+ * is not finite. */
 LANES_DISPATCH static double farthest_moved(size_t n, const double *restrict x, const double *restrict x0)
 {
     double mean[3], lane[LANES] = {0}, square;

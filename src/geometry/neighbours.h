@@ -1,7 +1,8 @@
 /*
- * neighbours.h: which points are nearer to each other than a reach, asked again and again while the points move a little:
- * a grid of boxes in a hash table, and lists of near points that are kept for many updates (Verlet 1967). The broad phase
- * of the explicit integrator, for nodes against nodes; that of contact is contact/broad_phase.h, for faces and edges.
+ * neighbours.h: which points are nearer to each other than a reach, asked again and again while the points
+ * move a little: a grid of boxes in a hash table, and lists of near points that are kept for many updates
+ * (Verlet 1967). The broad phase of the explicit integrator, for nodes against nodes; that of contact is
+ * contact/broad_phase.h, for faces and edges.
  */
 #ifndef DRAPE_GEOMETRY_NEIGHBOURS_H
 #define DRAPE_GEOMETRY_NEIGHBOURS_H
@@ -34,8 +35,8 @@ typedef struct drape_neighbours {
 
 drape_status drape_neighbours_create(drape_arena *arena, int32_t points, double reach, drape_neighbours *out);
 
-/* The points are at x (points x 3). They are then asked for one by one and may be moved in between, each by at most
- * share times the reach; drape_neighbours_moved reports it. */
+/* The points are at x (points x 3). They are then asked for one by one and may be moved in between, each by
+ * at most share times the reach; drape_neighbours_moved reports it. */
 void drape_neighbours_update(drape_neighbours *neighbours, double share, const double *x);
 
 static inline void drape_neighbours_moved(drape_neighbours *s, int32_t point, const double *x)
@@ -48,8 +49,9 @@ static inline void drape_neighbours_moved(drape_neighbours *s, int32_t point, co
 int drape_neighbours_search(const drape_neighbours *neighbours, int32_t point, const double *x,
                             int32_t found[DRAPE_MAX_NEIGHBOURS + 1]);
 
-/* The numbers, ascending, of all points that are nearer to a point at x than the reach, and of some others: an array of the
- * neighbours, valid until the next update, or `room`. Returns how many, -1 if they are more than DRAPE_MAX_NEIGHBOURS. */
+/* The numbers, ascending, of all points that are nearer to a point at x than the reach, and of some others:
+ * an array of the neighbours, valid until the next update, or `room`. Returns how many, -1 if they are more
+ * than DRAPE_MAX_NEIGHBOURS. */
 static inline int drape_neighbours_of(const drape_neighbours *s, int32_t point, const double *x,
                                       int32_t room[DRAPE_MAX_NEIGHBOURS + 1], const int32_t **near)
 {

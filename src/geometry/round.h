@@ -1,4 +1,5 @@
-/* round.h: the distance from a point or a line, shared by spheres, capsules, cylinders and the edges of meshes. */
+/* round.h: the distance from a point or a line, shared by spheres, capsules, cylinders and the edges of
+ * meshes. */
 #ifndef DRAPE_GEOMETRY_ROUND_H
 #define DRAPE_GEOMETRY_ROUND_H
 
@@ -17,8 +18,8 @@ static inline void round_across(const double *u, double *out)
 }
 
 /* The distance |r| from the nearest point, and its derivatives: normal n = r / |r| and curvature
- * (I - n n^T - u u^T) / |r|, where u is the direction of the line that r starts from, NULL for a point. On the
- * point or line itself the normal is arbitrary and the curvature 0. */
+ * (I - n n^T - u u^T) / |r|, where u is the direction of the line that r starts from, NULL for a point. On
+ * the point or line itself the normal is arbitrary and the curvature 0. */
 static inline double round_distance(const double *r, const double *u, double *normal, double *curvature)
 {
     double n[3] = {0, 1, 0}, length = vec3_norm(r);

@@ -1,22 +1,25 @@
 /*
- * verlet.h: the parts of the explicit integrator, and the rules of the two explicit cloth systems that it reproduces:
+ * verlet.h: the parts of the explicit integrator, and the rules of the two explicit cloth systems that it
+ * reproduces:
  *     CS184  the cloth simulator "clothsim" of CS184, UC Berkeley: point masses, springs, Verlet steps
  *     Boson  a sheet of 100 x 100 springs, of which examples/scenes/verlet_100.json has all constants
  * A substep applies them in this order, that of CS184 (verlet.c):
  *
  *     forces      springs, weight and drag; Boson: friction changes the force of nodes near a
- *                 surface                                                     verlet_force.c, drape_verlet_rub
+ *                 surface                                                     verlet_force.c,
+ *                 drape_verlet_rub
  *     step        x' = x + c (x - x_before) + h^2 a, c = 1 - damping/100      verlet.c, form "position"
  *     self        CS184: points nearer than 2 thickness are pushed apart      drape_verlet_self_push
  *     colliders   CS184, Boson: nodes inside of one are put on its surface    drape_verlet_project
  *     strain      CS184, Provot 1995: springs longer than (1 + limit) times
  *                 their rest length are shortened                             verlet_limit.c
  *
- * The rules are stated where they are applied: those of contact and friction in verlet_rules.c, the limit of strains in
- * verlet_limit.c. docs/seed_systems.md compares both systems with this one, model/scene_cs184.c reads scenes of CS184.
+ * The rules are stated where they are applied: those of contact and friction in verlet_rules.c, the limit of
+ * strains in verlet_limit.c. docs/seed_systems.md compares both systems with this one, model/scene_cs184.c
+ * reads scenes of CS184.
  *
- * Each stage after the forces moves nodes: x is where the substep has put them so far, x0 where they were when it began.
- * No stage moves pinned nodes.
+ * Each stage after the forces moves nodes: x is where the substep has put them so far, x0 where they were
+ * when it began. No stage moves pinned nodes.
  */
 #ifndef DRAPE_INTEGRATORS_VERLET_H
 #define DRAPE_INTEGRATORS_VERLET_H

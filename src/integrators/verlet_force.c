@@ -1,9 +1,9 @@
 /*
- * verlet_force.c: the forces of a substep. Springs without dashpots and laws are summed here, in runs: consecutive
- * elements that join consecutive nodes, as along the rows of a grid,
+ * verlet_force.c: the forces of a substep. Springs without dashpots and laws are summed here, in runs:
+ * consecutive elements that join consecutive nodes, as along the rows of a grid,
  *     g(b + i) += p, g(a + i) -= p with p = k (1 - L/l) (x(b + i) - x(a + i)), l = |x(b + i) - x(a + i)|
- * so that a run is a loop over arrays without indices, which compilers vectorise. The forces of linear terms do not depend
- * on x and are computed once. The system sums all other terms.
+ * so that a run is a loop over arrays without indices, which compilers vectorise. The forces of linear terms
+ * do not depend on x and are computed once. The system sums all other terms.
  */
 #include "base/lanes.h"
 #include "integrators/planes.h"

@@ -1,15 +1,17 @@
 /*
- * verlet_limit.c: the limit of strains of CS184 and Provot (1995): one spring after the other, a spring that is too long
- * is shortened to its longest length, by half at each end, or all of it at the end that is free. A pass moves springs that
- * it has already shortened, so that the limit is not met after one pass: CS184 makes only one. Passes are repeated until no
- * spring is longer than the slack allows, or their number is reached.
+ * verlet_limit.c: the limit of strains of CS184 and Provot (1995): one spring after the other, a spring that
+ * is too long is shortened to its longest length, by half at each end, or all of it at the end that is free.
+ * A pass moves springs that it has already shortened, so that the limit is not met after one pass: CS184
+ * makes only one. Passes are repeated until no spring is longer than the slack allows, or their number is
+ * reached.
  *
  * All springs take part, of any stiffness, in the order in which CS184 makes them: by their later node.
  *
- * Most springs are not too long. They are checked in patches: consecutive nodes whose springs lead to the same
- * differences of node numbers, as inside of a grid, so that the springs of one difference are a loop over arrays without
- * indices. A node without a spring that is too long is done unless one of its springs' nodes moves before its turn, as it
- * would be in the sequence of springs. The springs of other nodes, and those in no patch, are taken one after the other.
+ * Most springs are not too long. They are checked in patches: consecutive nodes whose springs lead to the
+ * same differences of node numbers, as inside of a grid, so that the springs of one difference are a loop
+ * over arrays without indices. A node without a spring that is too long is done unless one of its springs'
+ * nodes moves before its turn, as it would be in the sequence of springs. The springs of other nodes, and
+ * those in no patch, are taken one after the other.
  */
 #include "base/lanes.h"
 #include "base/vec3.h"
@@ -23,8 +25,8 @@
 #define MIN_PATCH_NODES 4  /* smaller patches are not worth it */
 #define MAX_STEPS       8  /* springs of a node */
 
-/* Springs first ... first + steps x nodes - 1, as many of each node: spring s of node `from` + i joins it with
- * from + i - back[s]. steps 0: any springs, `nodes` of them. */
+/* Springs first ... first + steps x nodes - 1, as many of each node: spring s of node `from` + i joins it
+ * with from + i - back[s]. steps 0: any springs, `nodes` of them. */
 struct drape_verlet_patch {
     int32_t first, nodes, steps, from;
     int32_t back[MAX_STEPS];
@@ -101,8 +103,8 @@ static bool has_same_steps(const drape_verlet_limit *l, const drape_verlet_patch
     return true;
 }
 
-/* The springs of node i of a patch have the nodes i and i - back[s]: to share one with those of an earlier node j, i - j
- * has to be a step or the difference of two. */
+/* The springs of node i of a patch have the nodes i and i - back[s]: to share one with those of an earlier
+ * node j, i - j has to be a step or the difference of two. */
 static int32_t reach_of(const drape_verlet_patch *p)
 {
     int32_t reach = 0;
@@ -131,7 +133,8 @@ static drape_verlet_patch patch_at(const drape_verlet_limit *l, int32_t first)
     return p;
 }
 
-/* Squares of a patch are in the order of steps, not of nodes: those that are compared in one loop are neighbours. */
+/* Squares of a patch are in the order of steps, not of nodes: those that are compared in one loop are
+ * neighbours. */
 static void place_squares(drape_verlet_limit *l, const drape_verlet_patch *p)
 {
     for (int32_t s = 0; s < p->steps; s++)
@@ -141,7 +144,8 @@ static void place_squares(drape_verlet_limit *l, const drape_verlet_patch *p)
         }
 }
 
-/* Returns the number of patches; writes them if out is not NULL. Adjacent ones without steps are one patch. */
+/* Returns the number of patches; writes them if out is not NULL. Adjacent ones without steps are one
+ * patch. */
 static int32_t find_patches(drape_verlet_limit *l, drape_verlet_patch *out)
 {
     int32_t count = 0;
@@ -205,8 +209,8 @@ static void shorten(const drape_verlet_limit *l, const int32_t *node, double by,
     }
 }
 
-/* One spring after the other. worst: the largest square of length/longest so far; returns the new one. *moved is set if a
- * spring was too long. */
+/* One spring after the other. worst: the largest square of length/longest so far; returns the new one. *moved
+ * is set if a spring was too long. */
 static double limit_each(const drape_verlet_limit *l, int32_t first, int32_t count, double worst, bool *moved)
 {
     const double *x = l->x, *y = x + l->node_count, *z = y + l->node_count;
@@ -223,8 +227,8 @@ static double limit_each(const drape_verlet_limit *l, int32_t first, int32_t cou
     return worst;
 }
 
-/* excess: for each node, by how much the square of the length of a spring is above its limit at most; 0 if none is.
- * Returns whether some excess is positive. */
+/* excess: for each node, by how much the square of the length of a spring is above its limit at most; 0 if
+ * none is. Returns whether some excess is positive. */
 LANES_DISPATCH static bool find_excess(const drape_verlet_limit *l, const drape_verlet_patch *p,
                                        double excess[MAX_PATCH_NODES])
 {

@@ -1,8 +1,8 @@
 /*
- * verlet_rules.c: the rules of contact and friction of CS184 and of Boson (verlet.h), for any surface with a signed
- * distance phi and a normal n. y0 is where the node was, carried along with the collider: it stands for the previous
- * position in their rules. A surface without curvature at a node is flat and follows the rule of their planes, any other
- * that of their spheres.
+ * verlet_rules.c: the rules of contact and friction of CS184 and of Boson (verlet.h), for any surface with a
+ * signed distance phi and a normal n. y0 is where the node was, carried along with the collider: it stands
+ * for the previous position in their rules. A surface without curvature at a node is flat and follows the
+ * rule of their planes, any other that of their spheres.
  *
  * CS184, where phi <= 0: x = y0 + (1 - friction)(t - y0) with the surface point
  *     t = x - phi n                                                              on a sphere
@@ -12,17 +12,17 @@
  * Boson, where phi <= 0: x = x - phi n on a sphere, x = y0 on a floor. And nearer than friction_range to a
  * surface, with F the sum of all forces on the node and F_n = -F.n > 0 the part that presses it on:
  *     F <- max(|F_t| - friction F_n, 0) F_t/|F_t| - friction_drag v
- * Its code reads the height of a node before it is set, so that in its first frame all nodes have friction with the floor,
- * and divides by |F_t| = 0; neither is reproduced. The range of friction of its spheres is a little larger, by
- * sqrt(r^2 + (d/2)^2) - r with the spacing d: 5 mm for its radius of 100 m.
+ * Its code reads the height of a node before it is set, so that in its first frame all nodes have friction
+ * with the floor, and divides by |F_t| = 0; neither is reproduced. The range of friction of its spheres is a
+ * little larger, by sqrt(r^2 + (d/2)^2) - r with the spacing d: 5 mm for its radius of 100 m.
  *
- * CS184, cloth against cloth: points nearer to each other than r = 2 thickness are pushed apart. One node after the other,
- * x_i moves by
+ * CS184, cloth against cloth: points nearer to each other than r = 2 thickness are pushed apart. One node
+ * after the other, x_i moves by
  *     share * mean over its near points j of (r - |x_i - x_j|) (x_i - x_j)/|x_i - x_j|
- * with the points where they are by then; share is one over the substeps of a step. CS184 searches only the box of the
- * point, of 3 width/columns x 3 height/rows x the larger of both, as points are before the first is moved, and misses
- * pairs across its faces; so does same_box. Near points are added in ascending order: the result depends on the positions
- * alone, not on how they were found.
+ * with the points where they are by then; share is one over the substeps of a step. CS184 searches only the
+ * box of the point, of 3 width/columns x 3 height/rows x the larger of both, as points are before the first
+ * is moved, and misses pairs across its faces; so does same_box. Near points are added in ascending order:
+ * the result depends on the positions alone, not on how they were found.
  */
 #include "base/vec3.h"
 #include "colliders/colliders.h"
@@ -227,7 +227,8 @@ static void push_node(const drape_verlet_self *s, int32_t i, const int32_t *near
         vec3_add_scaled(share / pushing, sum, own);
 }
 
-/* Keeps the near points in the box of a point, in `kept`, which may be near; of all points (near NULL) the first. */
+/* Keeps the near points in the box of a point, in `kept`, which may be near; of all points (near NULL) the
+ * first. */
 static int keep_box(const drape_verlet_self *s, int32_t i, const int32_t *near, int count, const double *x,
                     int32_t kept[DRAPE_MAX_NEIGHBOURS + 1])
 {
@@ -242,7 +243,8 @@ static int keep_box(const drape_verlet_self *s, int32_t i, const int32_t *near, 
     return number;
 }
 
-/* A point with more near points than a list holds, in a heap of cloth much thicker than its mesh is fine, asks all. */
+/* A point with more near points than a list holds, in a heap of cloth much thicker than its mesh is fine,
+ * asks all. */
 void drape_verlet_self_push(drape_verlet_self *s, double share, double *x)
 {
     drape_neighbours_update(&s->neighbours, share, x);
