@@ -33,10 +33,11 @@ typedef struct drape_point {
     double span[2];         /* [s] over which their velocity is taken; equal: they rest */
 } drape_point;
 
-/* Workspace for a model; threads >= 1. */
-drape_status drape_system_create(drape_context *ctx, const drape_model *model, int threads,
+/* Workspace for a model, all of it of the arena but the threads; threads >= 1. Errors: DRAPE_E_MEMORY; then *out is
+ * NULL. */
+drape_status drape_system_create(drape_arena *arena, const drape_model *model, int threads,
                                  drape_system **out);
-void drape_system_destroy(drape_system **system);
+void drape_system_destroy(drape_system **system); /* ends the threads; before the arena is freed */
 
 /* From here on what stands for a constraint has no part in forces, energies and checks: for integrators that keep
  * constraints by moving nodes. */
@@ -60,8 +61,9 @@ drape_motion *drape_system_steer(drape_system *system);
 void drape_system_set_push(drape_system *system, const double *force);
 double drape_system_push_work(const drape_system *system, const double *x, const double *y);
 
-/* A medium that moves, from now on. Errors: DRAPE_E_MEMORY. */
-drape_status drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user);
+/* A medium that moves, from now on, where the model has a term that feels it; NULL: it rests. */
+void drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user);
+void drape_system_copy_wind(drape_system *system, const drape_system *from);
 
 /* Adds what a host does to nodes at x, pull and push, to g (node_count x 3): a part of drape_system_force. */
 void drape_system_add_loads(const drape_system *system, const double *x, double *g);
@@ -82,9 +84,6 @@ double drape_system_clock(const drape_system *system);
 /* What it knows besides the model, into an archive or, where it was just made, out of it: not the wind, which is a
  * function of the host's. */
 void drape_system_archive(drape_system *system, drape_archive *a);
-
-/* The winds of two systems of one model change places. */
-void drape_system_swap_winds(drape_system *system, drape_system *other);
 
 /* A step begins at a state: contact is compared with it until the next. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
@@ -182,7 +181,5 @@ drape_status drape_system_check_contact(drape_system *system, const double *x, d
  * magnitude, or the first that is not finite. */
 drape_worst drape_system_worst_dof(const drape_system *system, const double *free_vector, const char *what,
                                    double limit);
-
-size_t drape_system_bytes(const drape_system *system);
 
 #endif

@@ -468,9 +468,10 @@ static bool configure(drape_newton *s)
            !KINSetNoResMon(s->kin, exact) && !KINSetMaxBetaFails(s->kin, MAX_BETA_FAILURES);
 }
 
-drape_status drape_newton_create(drape_context *ctx, drape_system *system, const double *values,
+drape_status drape_newton_create(drape_arena *arena, drape_system *system, const double *values,
                                  drape_newton **out)
 {
+    drape_context *ctx = arena->ctx;
     drape_newton *s = drape_alloc(ctx, 1, sizeof *s);
     *out = s;
     if (!s)
@@ -490,7 +491,7 @@ drape_status drape_newton_create(drape_context *ctx, drape_system *system, const
         status = create_vectors(s);
     if (!status && s->n > 0)
         status =
-            drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
+            drape_sun_linear_create(arena, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
                                     drape_system_pattern(system), drape_system_crew(s->system), &s->linear);
     if (!status && s->n > 0)
         s->linear->tolerance = values[DRAPE_NEWTON_LINEAR_TOLERANCE];
@@ -784,10 +785,9 @@ drape_work drape_newton_work(const drape_newton *newton)
 size_t drape_newton_bytes(const drape_newton *newton)
 {
     size_t nodes = 3 * (size_t)newton->model->node_count, n = (size_t)newton->n;
-    size_t values = (size_t)drape_system_pattern(newton->system)->nonzeros;
-    size_t factors = newton->linear ? newton->linear->ops->bytes(newton->linear->state) : 0;
+    size_t factors = newton->linear ? drape_sun_linear_bytes(newton->linear) : 0;
     size_t searches = (newton->ahead ? nodes : 0) + (newton->trial ? 3 * n : 0);
     if (newton->trial)
         factors += drape_mixed_bytes(&newton->mixed);
-    return (3 * nodes + 8 * n + searches + values) * sizeof(double) + factors; /* KINSOL keeps 6 vectors */
+    return (3 * nodes + 8 * n + searches) * sizeof(double) + factors; /* KINSOL keeps 6 vectors */
 }

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-/* ---- Making and freeing ---- */
+/* ---- Making ---- */
 
 static size_t pinned_count(const drape_model *m)
 {
@@ -27,48 +27,23 @@ static void take_tracks(drape_motion *motion)
     }
 }
 
-drape_status drape_motion_create(drape_context *ctx, const drape_model *model, drape_motion **out)
+drape_status drape_motion_create(drape_arena *arena, const drape_model *model, drape_motion **out)
 {
-    drape_motion *motion = drape_alloc(ctx, 1, sizeof *motion);
-    *out = motion;
+    const size_t pins = pinned_count(model);
+    drape_motion *motion = *out = drape_arena_take(arena, 1, sizeof *motion);
     if (!motion)
         return DRAPE_E_MEMORY;
-    *motion = (drape_motion){.ctx = ctx, .model = model};
-    motion->moved_node = drape_alloc(ctx, pinned_count(model), sizeof *motion->moved_node);
-    motion->moved_track = drape_alloc(ctx, pinned_count(model), sizeof *motion->moved_track);
-    motion->place = drape_alloc(ctx, (size_t)model->node_count, sizeof *motion->place);
-    motion->pin_way = drape_alloc(ctx, pinned_count(model), sizeof *motion->pin_way);
-    motion->collider_way = drape_alloc(ctx, (size_t)model->collider_count, sizeof *motion->collider_way);
-    if (!motion->moved_node || !motion->moved_track || !motion->place || !motion->pin_way ||
-        !motion->collider_way) {
-        drape_motion_destroy(out);
+    motion->model = model;
+    motion->moved_node = drape_arena_take(arena, pins, sizeof *motion->moved_node);
+    motion->moved_track = drape_arena_take(arena, pins, sizeof *motion->moved_track);
+    motion->place = drape_arena_take(arena, (size_t)model->node_count, sizeof *motion->place);
+    motion->pin_way = drape_arena_take(arena, pins, sizeof *motion->pin_way);
+    motion->collider_way =
+        drape_arena_take(arena, (size_t)model->collider_count, sizeof *motion->collider_way);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    }
     take_tracks(motion);
     return DRAPE_OK;
-}
-
-void drape_motion_destroy(drape_motion **motion)
-{
-    drape_motion *m = *motion;
-    if (!m)
-        return;
-    drape_free(m->ctx, m->moved_node);
-    drape_free(m->ctx, m->moved_track);
-    drape_free(m->ctx, m->place);
-    drape_free(m->ctx, m->pin_way);
-    drape_free(m->ctx, m->collider_way);
-    drape_free(m->ctx, m);
-    *motion = NULL;
-}
-
-size_t drape_motion_bytes(const drape_motion *motion)
-{
-    const drape_model *m = motion->model;
-    return sizeof *motion + (size_t)m->node_count * sizeof *motion->place +
-           pinned_count(m) *
-               (sizeof *motion->moved_node + sizeof *motion->moved_track + sizeof *motion->pin_way) +
-           (size_t)m->collider_count * sizeof *motion->collider_way;
 }
 
 /* ---- A way ---- */

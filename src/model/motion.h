@@ -19,7 +19,6 @@ typedef struct drape_way {
 } drape_way;
 
 typedef struct drape_motion {
-    drape_context *ctx;
     const drape_model *model;
     int32_t moved_count;     /* pinned nodes with a track or a way */
     int32_t *moved_node;     /* (as many as are pinned) */
@@ -29,9 +28,7 @@ typedef struct drape_motion {
     drape_way *collider_way; /* (collider_count) */
 } drape_motion;
 
-drape_status drape_motion_create(drape_context *ctx, const drape_model *model, drape_motion **out);
-void drape_motion_destroy(drape_motion **motion);
-size_t drape_motion_bytes(const drape_motion *motion);
+drape_status drape_motion_create(drape_arena *arena, const drape_model *model, drape_motion **out);
 
 /* The ways of the host, and which pins have one. */
 void drape_motion_archive(drape_motion *motion, drape_archive *archive);
