@@ -247,7 +247,7 @@ static drape_status extend(drape_system *system, int32_t pairs, const int32_t *n
     return status;
 }
 
-drape_status drape_system_fit(drape_system *system, const drape_point *point, bool *changed)
+drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed)
 {
     *changed = false;
     if (!place_contact(system, point))

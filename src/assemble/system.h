@@ -91,10 +91,10 @@ drape_status drape_system_begin(drape_system *system, const drape_state *in);
 /* It has ended: what is asked between steps leaves no trace in the next one. */
 void drape_system_rest(drape_system *system);
 
-/* The sparsity of its matrices. Contact between cloths changes it: drape_system_fit makes it hold what acts
+/* The sparsity of its matrices. Contact between cloths changes it: drape_system_extend_pattern makes it hold what acts
  * at a point; *changed: it is another one since, in the same place. Errors: DRAPE_E_MEMORY. */
 const drape_pattern *drape_system_pattern(const drape_system *system);
-drape_status drape_system_fit(drape_system *system, const drape_point *point, bool *changed);
+drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed);
 
 /* The first failure since drape_system_begin of what has no status of its own: memory for contacts, cancelling. */
 drape_status drape_system_status(const drape_system *system);
@@ -139,7 +139,7 @@ double drape_system_contact_energy(drape_system *system, const drape_point *poin
 void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy);
 
 /* Contact alone, for checks: g (node_count x 3), of the energy or with friction too, and its J in values
- * (pattern.nonzeros, of drape_system_fit at this point), are overwritten; either may be NULL. */
+ * (pattern.nonzeros, of drape_system_extend_pattern at this point), are overwritten; either may be NULL. */
 void drape_system_contact_part(drape_system *system, const drape_point *point, bool friction, double *g,
                                double *values);
 

@@ -199,14 +199,14 @@ static drape_status adopt_pattern(ida_state *s)
         if (!s->damping)
             return DRAPE_E_MEMORY;
     }
-    return drape_sun_linear_adopt(s->linear, pattern);
+    return drape_sun_linear_extend_pattern(s->linear, pattern);
 }
 
 /* Contact may couple what it did not before. */
 static drape_status fit_pattern(ida_state *s, const drape_point *point)
 {
     bool changed;
-    s->fitted = drape_system_fit(s->system, point, &changed);
+    s->fitted = drape_system_extend_pattern(s->system, point, &changed);
     s->linear->stale |= changed;
     if (!s->fitted && s->linear->stale)
         s->fitted = adopt_pattern(s);

@@ -202,10 +202,10 @@ static int residual(N_Vector d, N_Vector f, void *user)
 static drape_status fit_pattern(drape_newton *s)
 {
     bool changed;
-    s->fitted = drape_system_fit(s->system, &s->point, &changed);
+    s->fitted = drape_system_extend_pattern(s->system, &s->point, &changed);
     s->linear->stale |= changed;
     if (!s->fitted && s->linear->stale)
-        s->fitted = drape_sun_linear_adopt(s->linear, drape_system_pattern(s->system));
+        s->fitted = drape_sun_linear_extend_pattern(s->linear, drape_system_pattern(s->system));
     return s->fitted;
 }
 
@@ -764,7 +764,7 @@ void drape_newton_archive(drape_newton *s, drape_archive *a)
     if (s->n == 0)
         return;
     if (drape_archive_is_reading(a))
-        drape_archive_note(a, drape_sun_linear_adopt_other(s->linear, drape_system_pattern(s->system)));
+        drape_archive_note(a, drape_sun_linear_ensure_pattern(s->linear, drape_system_pattern(s->system)));
     drape_sun_linear_archive(s->linear, a, modified && s->factored_mass_weight != 0);
     if (modified && !drape_kinsol_archive(s->kin, a) && a->reading)
         drape_newton_forget_factors(s);

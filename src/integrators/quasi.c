@@ -161,7 +161,7 @@ static drape_status evaluate_remainder(drape_quasi *s, const drape_point *point)
     bool changed;
     if (!s->remainder.values)
         return DRAPE_OK;
-    drape_status status = drape_system_fit(s->system, point, &changed);
+    drape_status status = drape_system_extend_pattern(s->system, point, &changed);
     if (!status && changed)
         status = drape_quasi_make_room(s);
     if (status)

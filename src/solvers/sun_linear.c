@@ -115,7 +115,7 @@ drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const d
     return DRAPE_OK;
 }
 
-drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_pattern *pattern)
+drape_status drape_sun_linear_extend_pattern(drape_sun_linear *linear, const drape_pattern *pattern)
 {
     double start = drape_clock_seconds();
     linear->stale = true;
@@ -127,9 +127,9 @@ drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_patter
     return status;
 }
 
-drape_status drape_sun_linear_adopt_other(drape_sun_linear *linear, const drape_pattern *pattern)
+drape_status drape_sun_linear_ensure_pattern(drape_sun_linear *linear, const drape_pattern *pattern)
 {
-    return linear->pattern == pattern ? DRAPE_OK : drape_sun_linear_adopt(linear, pattern);
+    return linear->pattern == pattern ? DRAPE_OK : drape_sun_linear_extend_pattern(linear, pattern);
 }
 
 void drape_sun_linear_archive(drape_sun_linear *linear, drape_archive *a, bool factors)

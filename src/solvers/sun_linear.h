@@ -37,9 +37,9 @@ drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const d
 
 /* Another pattern from now on: the values are cleared, the solver is analysed anew. Errors: as of create; then
  * it can only be destroyed, or adopt again. */
-drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_pattern *pattern);
+drape_status drape_sun_linear_extend_pattern(drape_sun_linear *linear, const drape_pattern *pattern);
 /* The same, unless it is the pattern that it has. */
-drape_status drape_sun_linear_adopt_other(drape_sun_linear *linear, const drape_pattern *pattern);
+drape_status drape_sun_linear_ensure_pattern(drape_sun_linear *linear, const drape_pattern *pattern);
 void drape_sun_linear_destroy(drape_sun_linear **linear); /* before the arena is freed */
 
 /* Bytes that libraries took beside the arena. */

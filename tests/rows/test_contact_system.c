@@ -104,7 +104,7 @@ static double error_of(probe *t, double weight, double time)
                                .span = {time - 0.01, time}};
     bool changed;
     double best = INFINITY;
-    ck_assert_int_eq(drape_system_fit(t->system, &point, &changed), DRAPE_OK);
+    ck_assert_int_eq(drape_system_extend_pattern(t->system, &point, &changed), DRAPE_OK);
     const drape_pattern *pattern = drape_system_pattern(t->system);
     t->values = take(t, (size_t)pattern->nonzeros);
     drape_system_jacobian(t->system, &point, 0, false, t->values);
@@ -346,7 +346,7 @@ START_TEST(bytes_are_all_of_them)
     const size_t before = held;
     const drape_point point = {.x = at.x, .v = at.v, .internal = at.internal};
     ck_assert_int_eq(drape_system_begin(system, &at), DRAPE_OK);
-    ck_assert_int_eq(drape_system_fit(system, &point, &changed), DRAPE_OK);
+    ck_assert_int_eq(drape_system_extend_pattern(system, &point, &changed), DRAPE_OK);
     ck_assert(changed);
     ck_assert_uint_gt(held, before);
     ck_assert_uint_eq(own.bytes + drape_contact_bytes(drape_system_contact(system)), held);
