@@ -307,7 +307,7 @@ const double *drape_system_on_colliders(const drape_system *system)
     return system->contact ? drape_contact_on_colliders(system->contact) : NULL;
 }
 
-double drape_system_way(drape_system *system, const double *x, const double *y, double t)
+double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t)
 {
     return system->contact ? drape_contact_way(system->contact, x, y, t) : 1;
 }

@@ -145,7 +145,7 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
 
 /* The largest fraction of the way from nodes x to y on which no two pieces pass through each other, colliders
  * resting where they are at time t. */
-double drape_system_way(drape_system *system, const double *x, const double *y, double t);
+double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t);
 
 /* q of all measures (measure_count). */
 void drape_system_measures(drape_system *system, const drape_point *point, double *q);

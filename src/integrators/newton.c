@@ -245,7 +245,7 @@ static double free_share(drape_newton *s, const double *x, const double *step)
     memcpy(s->ahead, x, 3 * (size_t)s->model->node_count * sizeof *x);
     for (int64_t i = 0; i < s->n; i++)
         s->ahead[3 * (int64_t)s->model->node_of_free[i / 3] + i % 3] += step[i];
-    return drape_system_way(s->system, x, s->ahead, s->problem->t);
+    return drape_system_step_fraction(s->system, x, s->ahead, s->problem->t);
 }
 
 static void scale(double *p, double share, int64_t n)
