@@ -40,7 +40,7 @@ static bool is_place(int index, int least, int count)
 /* The present one, and those before it that are still asked for; what the next attempt writes to is left out. */
 static void archive_states(drape_sim *sim, drape_archive *a)
 {
-    const int count = 2 + sim->chosen.controller->pasts;
+    const int count = 2 + sim->chosen.controller->history_depth;
     int *const places[] = {&sim->now, &sim->next, &sim->before, &sim->past[0], &sim->past[1]};
     drape_archive_mark(a, "states");
     for (int i = 0; i < 5; i++) {

@@ -43,7 +43,7 @@ static drape_status read_def(drape_context *ctx, const drape_sim_def *given, dra
 static drape_status create_states(drape_sim *sim)
 {
     drape_status status = DRAPE_OK;
-    for (int i = 0; !status && i < 2 + sim->chosen.controller->pasts; i++)
+    for (int i = 0; !status && i < 2 + sim->chosen.controller->history_depth; i++)
         status = drape_state_create(sim->arena, sim->model, &sim->states[i]);
     size_t n = 3 * (size_t)sim->model->node_count;
     sim->frame = drape_arena_take(sim->arena, n, sizeof *sim->frame);
