@@ -21,7 +21,7 @@ struct drape_system {
     int32_t **blocks; /* (term_count) as in the terms, for the extended pattern; NULL while there is none */
     drape_status status; /* of placing contact */
     drape_motion *motion;
-    drape_pull pull;
+    drape_drag_spring pull;
     double *push; /* (node_count x 3) */
     bool pushed;
     drape_wind wind;
@@ -81,12 +81,12 @@ drape_crew *drape_system_crew(const drape_system *system)
     return system->crew;
 }
 
-void drape_system_set_pull(drape_system *system, const drape_pull *pull)
+void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *pull)
 {
     system->pull = *pull;
 }
 
-const drape_pull *drape_system_pull(const drape_system *system)
+const drape_drag_spring *drape_system_drag_spring(const drape_system *system)
 {
     return &system->pull;
 }
@@ -130,7 +130,7 @@ void drape_system_copy_wind(drape_system *system, const drape_system *from)
 
 void drape_system_add_loads(const drape_system *system, const double *x, double *g)
 {
-    drape_pull_add_gradient(&system->pull, x, g);
+    drape_drag_spring_add_gradient(&system->pull, x, g);
     for (size_t i = 0; system->pushed && i < 3 * (size_t)system->model->node_count; i++)
         g[i] -= system->push[i];
 }
@@ -263,7 +263,7 @@ drape_status drape_system_extend_pattern(drape_system *system, const drape_point
 static void archive_pull(drape_system *system, drape_archive *a)
 {
     const drape_model *m = system->model;
-    drape_pull *pull = &system->pull;
+    drape_drag_spring *pull = &system->pull;
     drape_archive_int32(a, &pull->node);
     drape_archive_double(a, &pull->stiffness);
     drape_archive_doubles(a, pull->target, 3);
@@ -391,7 +391,7 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
     if (place_contact(system, point))
         drape_contact_add_jacobian(system->contact, point->weight, false, project > 0, system->pattern,
                                    values);
-    drape_pull_add_hessian(&system->pull, system->model, system->pattern, values);
+    drape_drag_spring_add_hessian(&system->pull, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
 }
 
@@ -474,7 +474,7 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
             drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
         *(term->ops->potential_of_gravity ? gravity : elastic) += energy;
     }
-    *elastic += drape_pull_energy(&system->pull, point->x);
+    *elastic += drape_drag_spring_energy(&system->pull, point->x);
 }
 
 void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy)

@@ -13,7 +13,7 @@
 
 #include <stdatomic.h>
 
-#include "assemble/pull.h"
+#include "assemble/drag_spring.h"
 #include "assemble/state.h"
 #include "assemble/wind.h"
 #include "base/crew.h"
@@ -49,8 +49,8 @@ drape_crew *drape_system_crew(const drape_system *system);
 
 /* A spring that belongs to the system from now on, its energy to the elastic one; of stiffness 0: none. Its node is
  * free. */
-void drape_system_set_pull(drape_system *system, const drape_pull *pull);
-const drape_pull *drape_system_pull(const drape_system *system);
+void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *pull);
+const drape_drag_spring *drape_system_drag_spring(const drape_system *system);
 
 /* Where pins and colliders are, on the tracks of the model and on the ways of a host. */
 const drape_motion *drape_system_motion(const drape_system *system);
