@@ -6,7 +6,7 @@
  */
 #define _XOPEN_SOURCE 700 /* initstate */
 #include "solvers/elimination.h"
-#include "solvers/alone.h"
+#include "solvers/library_lock.h"
 
 #include <amd.h>
 #include <stdlib.h>
@@ -40,12 +40,12 @@ typedef struct maker {
 static int dissect_alone(idx_t *n, idx_t *start, idx_t *other, idx_t *options, maker *m)
 {
     char own[RAND_STATE];
-    drape_alone_begin();
+    drape_library_lock();
     char *before = initstate(1, own, sizeof own);
     const int code = METIS_NodeND(n, start, other, NULL, options, m->e->order, m->e->place);
     if (before)
         setstate(before);
-    drape_alone_end();
+    drape_library_unlock();
     return code;
 }
 

@@ -9,8 +9,8 @@
  * positive definite, or singular to working precision goes to the fallback (fallback.h); no matrix is made symmetric that
  * is not.
  */
-#include "solvers/alone.h"
 #include "solvers/fallback.h"
+#include "solvers/library_lock.h"
 
 #include "base/finite.h"
 
@@ -341,9 +341,9 @@ static bool factor_lower(cholmod_state *s)
     double shift[2] = {0, 0};
     int levels = omp_get_max_active_levels();
     omp_set_max_active_levels(0);
-    drape_alone_begin();
+    drape_library_lock();
     bool done = cholmod_l_super_numeric(&lower, NULL, shift, s->factor, &s->common);
-    drape_alone_end();
+    drape_library_unlock();
     omp_set_max_active_levels(levels);
     return done && s->common.status == CHOLMOD_OK && s->factor->minor == s->factor->n &&
            cholmod_l_rcond(s->factor, &s->common) > MIN_RCOND;
@@ -401,10 +401,10 @@ static drape_status solve(void *state, const double *b, double *x)
     for (size_t j = 0; j < n; j++)
         s->solution[j] = b[3 * s->order[j / 3] + (index_t)(j % 3)];
     cholmod_dense solution = as_vector(s->solution, n), scratch = as_vector(s->scratch, s->factor->maxesize);
-    drape_alone_begin();
+    drape_library_lock();
     bool done = cholmod_l_super_lsolve(s->factor, &solution, &scratch, &s->common) &&
                 cholmod_l_super_ltsolve(s->factor, &solution, &scratch, &s->common);
-    drape_alone_end();
+    drape_library_unlock();
     if (!done)
         return DRAPE_RETRY_LINEAR;
     for (size_t j = 0; j < n; j++)

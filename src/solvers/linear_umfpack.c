@@ -4,7 +4,7 @@
  * thousandth of what is below. Ordering and analysis are done once, in create; each factorisation chooses its
  * pivots afresh and takes its factors from the heap anew.
  */
-#include "solvers/alone.h"
+#include "solvers/library_lock.h"
 #include "solvers/linear.h"
 
 #include "base/finite.h"
@@ -79,10 +79,10 @@ static drape_status factor(void *state, const double *values)
     umfpack_dl_free_numeric(&s->numeric);
     if (!drape_all_finite(values, (size_t)p->nonzeros))
         return DRAPE_RETRY_LINEAR;
-    drape_alone_begin();
+    drape_library_lock();
     index_t code = umfpack_dl_numeric(indices(p->column), indices(p->row), values, s->symbolic, &s->numeric,
                                       s->control, s->info);
-    drape_alone_end();
+    drape_library_unlock();
     if (code == UMFPACK_OK && s->info[UMFPACK_RCOND] > MIN_RCOND)
         return DRAPE_OK;
     umfpack_dl_free_numeric(&s->numeric);
@@ -95,10 +95,10 @@ static drape_status solve(void *state, const double *b, double *x)
     const drape_pattern *p = s->pattern;
     if (!s->numeric)
         return DRAPE_RETRY_LINEAR;
-    drape_alone_begin();
+    drape_library_lock();
     index_t code = umfpack_dl_wsolve(UMFPACK_A, indices(p->column), indices(p->row), NULL, x, b, s->numeric,
                                      s->control, NULL, s->index, s->work);
-    drape_alone_end();
+    drape_library_unlock();
     if (code != UMFPACK_OK)
         return DRAPE_RETRY_LINEAR;
     return drape_all_finite(x, (size_t)p->n) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
