@@ -9,8 +9,8 @@
  * counts: a wrong derivative is wrong at all of them. Where a barrier begins its gradient is as small as one
  * likes, so an element's error is relative to no less than a millionth of the term's largest entry.
  *
- * Contact is looked at where there is some: the sheet is moved until its deepest node lies half of the activation
- * distance off a collider, or folded onto itself; steps are relative to that distance.
+ * Contact is looked at where there is some: the sheet is moved until its deepest node lies half of the
+ * activation distance off a collider, or folded onto itself; steps are relative to that distance.
  */
 #include "assemble/check.h"
 
@@ -537,9 +537,7 @@ static drape_status check_contact(checker *c, const drape_state *rest)
     return status;
 }
 
-/* ---- All of it
- * ------------------------------------------------------------------------------------------------------------
- */
+/* ---- All of it ---- */
 
 static bool allocate(checker *c, drape_context *ctx, drape_arena *arena)
 {

@@ -1,8 +1,9 @@
 /*
- * sum.h: sums over the elements of terms, by several threads. Each thread owns a range of nodes: it adds to their
- * forces and to their columns of matrices, and to no others, and evaluates all blocks of elements that touch
- * one of them; those that touch nodes of two threads are evaluated by both. So no two threads write to one place,
- * and every place is added to in the order of elements: the bits are the same for any number of threads.
+ * sum.h: sums over the elements of terms, by several threads. Each thread owns a range of nodes: it adds to
+ * their forces and to their columns of matrices, and to no others, and evaluates all blocks of elements that
+ * touch one of them; those that touch nodes of two threads are evaluated by both. So no two threads write to
+ * one place, and every place is added to in the order of elements: the bits are the same for any number of
+ * threads.
  */
 #ifndef DRAPE_ASSEMBLE_SUM_H
 #define DRAPE_ASSEMBLE_SUM_H
@@ -40,7 +41,8 @@ void drape_summer_add_term(drape_summer *summer, const drape_term *term, const d
 /* The forces on the measures of all terms, into want->stress. */
 void drape_summer_stress(drape_summer *summer, const drape_request *want);
 
-/* Of a term of pairs: the block of each element, xx xy xz yy yz zz, as (element count x 6). want->hessian is set. */
+/* Of a term of pairs: the block of each element, xx xy xz yy yz zz, as (element count x 6). want->hessian is
+ * set. */
 void drape_summer_pairs(drape_summer *summer, const drape_term *term, const drape_request *want, double *h);
 
 #endif

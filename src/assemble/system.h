@@ -33,22 +33,22 @@ typedef struct drape_point {
     double span[2];         /* [s] over which their velocity is taken; equal: they rest */
 } drape_point;
 
-/* Workspace for a model, all of it of the arena but the threads; threads >= 1. Errors: DRAPE_E_MEMORY; then *out is
- * NULL. */
+/* Workspace for a model, all of it of the arena but the threads; threads >= 1. Errors: DRAPE_E_MEMORY; then
+ * *out is NULL. */
 drape_status drape_system_create(drape_arena *arena, const drape_model *model, int threads,
                                  drape_system **out);
 void drape_system_destroy(drape_system **system); /* ends the threads; before the arena is freed */
 
-/* From here on what stands for a constraint has no part in forces, energies and checks: for integrators that keep
- * constraints by moving nodes. */
+/* From here on what stands for a constraint has no part in forces, energies and checks: for integrators that
+ * keep constraints by moving nodes. */
 void drape_system_leave_constraints(drape_system *system);
 
 const drape_model *drape_system_model(const drape_system *system);
 /* The threads that it has, for whoever works on what it assembles; NULL: one. */
 drape_crew *drape_system_crew(const drape_system *system);
 
-/* A spring that belongs to the system from now on, its energy to the elastic one; of stiffness 0: none. Its node is
- * free. */
+/* A spring that belongs to the system from now on, its energy to the elastic one; of stiffness 0: none. Its
+ * node is free. */
 void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *pull);
 const drape_drag_spring *drape_system_drag_spring(const drape_system *system);
 
@@ -56,8 +56,8 @@ const drape_drag_spring *drape_system_drag_spring(const drape_system *system);
 const drape_motion *drape_system_motion(const drape_system *system);
 drape_motion *drape_system_steer(drape_system *system);
 
-/* Forces of a host on nodes (node_count x 3) [N], copied; NULL: none. They are the same at any x and belong to the
- * system from now on, without an energy: their work from x to y [J]. */
+/* Forces of a host on nodes (node_count x 3) [N], copied; NULL: none. They are the same at any x and belong
+ * to the system from now on, without an energy: their work from x to y [J]. */
 void drape_system_set_push(drape_system *system, const double *force);
 double drape_system_push_work(const drape_system *system, const double *x, const double *y);
 
@@ -68,8 +68,8 @@ void drape_system_copy_wind(drape_system *system, const drape_system *from);
 /* Adds what a host does to nodes at x, pull and push, to g (node_count x 3): a part of drape_system_force. */
 void drape_system_add_loads(const drape_system *system, const double *x, double *g);
 
-/* A flag that may be raised at any time: from the next force on drape_system_status is DRAPE_E_STOPPED, until a step
- * begins without it. drape_system_cancelled looks at it at once. */
+/* A flag that may be raised at any time: from the next force on drape_system_status is DRAPE_E_STOPPED, until
+ * a step begins without it. drape_system_cancelled looks at it at once. */
 void drape_system_watch(drape_system *system, const atomic_bool *cancel);
 bool drape_system_cancelled(drape_system *system);
 
@@ -77,12 +77,12 @@ bool drape_system_cancelled(drape_system *system);
 drape_status drape_system_add_contact(drape_system *system);
 const drape_contact *drape_system_contact(const drape_system *system); /* NULL: there is none */
 
-/* A clock that stands while contact is at work, which has one of its own: parts of a step timed by it are parts beside
- * that one. [s] */
+/* A clock that stands while contact is at work, which has one of its own: parts of a step timed by it are
+ * parts beside that one. [s] */
 double drape_system_clock(const drape_system *system);
 
-/* What it knows besides the model, into an archive or, where it was just made, out of it: not the wind, which is a
- * function of the host's. */
+/* What it knows besides the model, into an archive or, where it was just made, out of it: not the wind, which
+ * is a function of the host's. */
 void drape_system_archive(drape_system *system, drape_archive *a);
 
 /* A step begins at a state: contact is compared with it until the next. Errors: DRAPE_E_MEMORY. */
@@ -91,12 +91,13 @@ drape_status drape_system_begin(drape_system *system, const drape_state *in);
 /* It has ended: what is asked between steps leaves no trace in the next one. */
 void drape_system_rest(drape_system *system);
 
-/* The sparsity of its matrices. Contact between cloths changes it: drape_system_extend_pattern makes it hold what acts
- * at a point; *changed: it is another one since, in the same place. Errors: DRAPE_E_MEMORY. */
+/* The sparsity of its matrices. Contact between cloths changes it: drape_system_extend_pattern makes it hold
+ * what acts at a point; *changed: it is another one since, in the same place. Errors: DRAPE_E_MEMORY. */
 const drape_pattern *drape_system_pattern(const drape_system *system);
 drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed);
 
-/* The first failure since drape_system_begin of what has no status of its own: memory for contacts, cancelling. */
+/* The first failure since drape_system_begin of what has no status of its own: memory for contacts,
+ * cancelling. */
 drape_status drape_system_status(const drape_system *system);
 
 /* g (node_count x 3) of all nodes, pinned ones too. */
@@ -106,15 +107,16 @@ void drape_system_force(drape_system *system, const drape_point *point, double *
 void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
                                 double *g);
 
-/* values (pattern.nonzeros) = mass_weight M + J over the free nodes. project: the share, 0 to 1, by which element
- * Hessians become positive semidefinite: H + project (H+ - H); those of contact do altogether, if it is not 0. */
+/* values (pattern.nonzeros) = mass_weight M + J over the free nodes. project: the share, 0 to 1, by which
+ * element Hessians become positive semidefinite: H + project (H+ - H); those of contact do altogether, if it
+ * is not 0. */
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, double project,
                            double *values);
 
 /* What a matrix that is cheaper than J is made of (integrators/quasi.h), term by term.
  *
- * drape_system_pairs, of a term with pairs: the symmetric 3 x 3 block H of each element, xx xy xz yy yz zz, as
- * (6 x element count), such that [H -H; -H H] is the positive semidefinite part of its Hessian.
+ * drape_system_pairs, of a term with pairs: the symmetric 3 x 3 block H of each element, xx xy xz yy yz zz,
+ * as (6 x element count), such that [H -H; -H H] is the positive semidefinite part of its Hessian.
  * drape_system_remainder: values (pattern.nonzeros) = the part of J, energies with their positive part, that
  * belongs to no strain measure, and contact; drape_system_has_remainder: whether there is any. */
 void drape_system_pairs(const drape_system *system, int32_t term, const drape_point *point, double *h);
@@ -150,8 +152,8 @@ double drape_system_step_fraction(drape_system *system, const double *x, const d
 /* q of all measures (measure_count). */
 void drape_system_measures(drape_system *system, const drape_point *point, double *q);
 
-/* The forces f on all measures, dE/dq and laws (measure_count), to first order where the nodes go on by `along`
- * (node_count x 3); NULL: here, and without what is dissipative. */
+/* The forces f on all measures, dE/dq and laws (measure_count), to first order where the nodes go on by
+ * `along` (node_count x 3); NULL: here, and without what is dissipative. */
 void drape_system_stress(drape_system *system, const drape_point *point, const double *along, double *stress);
 
 /* One term alone, for checks and profiles: adds its g to g, its J to values; *energy gets its energy. Any of
@@ -160,8 +162,8 @@ void drape_system_term(drape_system *system, int32_t term, const drape_point *po
                        double *g, double *values);
 
 /* Looks in all terms for an element that a step made degenerate: DRAPE_OK or DRAPE_RETRY_DEGENERATE, with the
- * worst filled in. x is the new state; before and internal are of the one before. before NULL: also those that
- * were degenerate already. */
+ * worst filled in. x is the new state; before and internal are of the one before. before NULL: also those
+ * that were degenerate already. */
 drape_status drape_system_check(const drape_system *system, const double *x, const double *before,
                                 const double *internal, const char **reason, drape_worst *worst);
 
@@ -172,8 +174,8 @@ bool drape_system_breaks_limit(const drape_system *system, const double *x, cons
 /* Whether on the straight way from the beginning of the step to y something passes through something. */
 bool drape_system_crosses(drape_system *system, const double *y, double t);
 
-/* Looks for a piece that a step brought into a collider or through something: x is the new state at time t, the
- * one before that of drape_system_begin. DRAPE_OK, or DRAPE_RETRY_REJECTED with reason and worst. */
+/* Looks for a piece that a step brought into a collider or through something: x is the new state at time t,
+ * the one before that of drape_system_begin. DRAPE_OK, or DRAPE_RETRY_REJECTED with reason and worst. */
 drape_status drape_system_check_contact(drape_system *system, const double *x, double t, const char **reason,
                                         drape_worst *worst);
 

@@ -1,6 +1,6 @@
 /*
- * wind.h: the medium that a host moves. Terms in a medium (drag) are given the velocity against it, v - w(t, x), and
- * their derivatives become, W = dw/dx of each node,
+ * wind.h: the medium that a host moves. Terms in a medium (drag) are given the velocity against it, v - w(t,
+ * x), and their derivatives become, W = dw/dx of each node,
  *     dg/dx = g_x - g_v W,   dg/dv = g_v
  */
 #ifndef DRAPE_ASSEMBLE_WIND_H

@@ -115,7 +115,8 @@ static bool well_formed(const drape_collider_ops *ops)
     return named && drape_params_are_well_formed(ops->params, ops->param_count);
 }
 
-/* The first version's ops ended here: `smooth` may be missing, and a collider without it is met by its triangles. */
+/* The first version's ops ended here: `smooth` may be missing, and a collider without it is met by its
+ * triangles. */
 #define LEAST_SIZE offsetof(drape_collider_ops, smooth)
 
 drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *given)

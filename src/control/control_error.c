@@ -88,10 +88,10 @@ static double difference(const prediction *p, double solution, double y0, double
     return p->factor * (solution - (p->weight[0] * y0 + p->weight[1] * y1 + p->weight[2] * y2));
 }
 
-/* The first step has no past, so that its velocities have no estimate: what they change by, g h, is none, and at
- * tight tolerances would allow no step at all. Positions have one, h^2 a/2 beyond flight. So the step may also be a
- * share 1/FIRST_SHARE of that at which the whole of it is atol_x, as in Hairer, Norsett & Wanner 1993, II.4: its
- * square is as small as the tolerance is, and with it the error h^2 v''/2 of velocities. */
+/* The first step has no past, so that its velocities have no estimate: what they change by, g h, is none, and
+ * at tight tolerances would allow no step at all. Positions have one, h^2 a/2 beyond flight. So the step may
+ * also be a share 1/FIRST_SHARE of that at which the whole of it is atol_x, as in Hairer, Norsett & Wanner
+ * 1993, II.4: its square is as small as the tolerance is, and with it the error h^2 v''/2 of velocities. */
 static double first_error(double by_both, double by_positions)
 {
     return by_both <= 1 ? by_both : fmin(by_both, FIRST_SHARE * sqrt(by_positions));

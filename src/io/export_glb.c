@@ -1,16 +1,17 @@
 /*
- * export_glb.c: folder/positions.glb: binary glTF 2.0. The mesh, all cloths in one, is the first frame; each later
- * one is a morph target, its displacements in float32, with normals, and an animation of the targets' weights plays them: at the
- * time of frame k weight k - 1 is 1 and the others are 0, and between two times they mix linearly, as positions do.
+ * export_glb.c: folder/positions.glb: binary glTF 2.0. The mesh, all cloths in one, is the first frame; each
+ * later one is a morph target, its displacements in float32, with normals, and an animation of the targets'
+ * weights plays them: at the time of frame k weight k - 1 is 1 and the others are 0, and between two times
+ * they mix linearly, as positions do.
  *
  *     header                  12 bytes
  *     JSON chunk              8 bytes and JSON of a fixed length, with blanks for what is not there yet
- *     binary chunk            8 bytes, triangles, positions and normals of the first frame, what the others differ by
- *                             from them, and at the end, when all frames are known, times and weights
+ *     binary chunk            8 bytes, triangles, positions and normals of the first frame, the differences
+ *                             of the others, and at the end, when all frames are known, times and weights
  *
- * After each frame its displacements are complete in the file before its few numbers are written into their blanks:
- * a run that is killed leaves a valid file with all frames as morph targets, without the animation. That comes
- * last because the weights are a matrix, frames x targets.
+ * After each frame its displacements are complete in the file before its few numbers are written into their
+ * blanks: a run that is killed leaves a valid file with all frames as morph targets, without the animation.
+ * That comes last because the weights are a matrix, frames x targets.
  *
  * glTF has y up and metres, as Drape has. Specification: Khronos, glTF 2.0, 3.6.2 (accessors), 3.7.2.2 (morph
  * targets), 3.11 (animations), 4.4 (GLB).

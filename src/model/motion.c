@@ -121,8 +121,8 @@ static bool at_kink_of(const drape_track *track, const drape_path *way, double t
     return false;
 }
 
-/* The velocity that leads to where it is at t, and whether it is known: not at the key of a track, nor where the host
- * has changed its mind about the same moment. */
+/* The velocity that leads to where it is at t, and whether it is known: not at the key of a track, nor where
+ * the host has changed its mind about the same moment. */
 static bool leading_velocity(const drape_track *track, const drape_path *way, double t, double v[3])
 {
     if (way->given && (t == way->t[0] || t == way->t[1])) {

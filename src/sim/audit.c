@@ -16,11 +16,12 @@
 #define SHARE     0.5  /* nor one of which less than this came from nowhere */
 #define UNNOTICED 1e-6 /* of the energies that are compared: less is below what adaptive rows resolve */
 #define ROUNDED                                                                                              \
-    1e-12 /* of the same: no gain at all. Small steps gain little each: a share of a step's size would let them */
+    1e-12 /* of the same: no gain at all. Small steps gain little each: a share of a step's size would let
+             them */
 #define QUIET 1e-16 /* of the scene's own energy: motion at 1e-8 of its speed is rounding */
 
-/* Of the energy that a scene had to offer so far. Rows that conserve energy, or bound an error, let it swing by
- * some per cent. */
+/* Of the energy that a scene had to offer so far. Rows that conserve energy, or bound an error, let it swing
+ * by some per cent. */
 #define STEP_GAIN 0.25 /* gained in one step */
 #define RUN_GAIN  0.1  /* gained since numerical dissipation was at its largest, if the row does not say */
 
@@ -138,8 +139,8 @@ static bool exploded(const drape_energy *e, const drape_energy *made, double gai
 }
 
 /* All that the run could live on so far: what it started with, the largest fall in gravity, the work of pins
- * and damping (whose sums have errors of their own), and the energy of the scene's mass at the scene's speed, for
- * starts at rest. */
+ * and damping (whose sums have errors of their own), and the energy of the scene's mass at the scene's speed,
+ * for starts at rest. */
 static double offered(const drape_audit *audit, const drape_energy *made, const drape_step_info *info,
                       double quiet)
 {

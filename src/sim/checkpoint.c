@@ -1,9 +1,10 @@
 /*
- * checkpoint.c: a sim as bytes, from which another sim of the same model goes on with the same bits. What is archived is
- * what the next steps depend on; all else follows from it, or from the model.
+ * checkpoint.c: a sim as bytes, from which another sim of the same model goes on with the same bits. What is
+ * archived is what the next steps depend on; all else follows from it, or from the model.
  *
- * A sim that is restored is made anew beside the present one and takes its place when all went well: nothing of what the
- * present one kept can have a part in it, and a failure at any moment leaves the present one as it is.
+ * A sim that is restored is made anew beside the present one and takes its place when all went well: nothing
+ * of what the present one kept can have a part in it, and a failure at any moment leaves the present one as
+ * it is.
  */
 #include "base/finite.h"
 #include "sim/sim.h"
@@ -37,7 +38,8 @@ static bool is_place(int index, int least, int count)
     return index >= least && index < count;
 }
 
-/* The present one, and those before it that are still asked for; what the next attempt writes to is left out. */
+/* The present one, and those before it that are still asked for; what the next attempt writes to is left
+ * out. */
 static void archive_states(drape_sim *sim, drape_archive *a)
 {
     const int count = 2 + sim->chosen.controller->history_depth;

@@ -33,8 +33,8 @@ static drape_status check_given(const drape_sim *sim, double t, const double *x,
     return DRAPE_OK;
 }
 
-/* Pinned nodes where their pins have them at the time of the state; those that a host has moved where it has them
- * now. */
+/* Pinned nodes where their pins have them at the time of the state; those that a host has moved where it has
+ * them now. */
 static void place_pinned(const drape_sim *sim, const double *given, drape_state *state)
 {
     const drape_model *m = sim->model;
@@ -50,8 +50,8 @@ static void place_pinned(const drape_sim *sim, const double *given, drape_state 
     }
 }
 
-/* Fixed nodes have no velocity, nor have those that rest where the host put them; others that move keep what was
- * given, until a step gives them the mean of their way. */
+/* Fixed nodes have no velocity, nor have those that rest where the host put them; others that move keep what
+ * was given, until a step gives them the mean of their way. */
 static void stop_fixed(const drape_sim *sim, const double *given, drape_state *state)
 {
     const drape_model *m = sim->model;

@@ -9,8 +9,9 @@
 
 #define BUDGET       0.02 /* [s] for the repeats of one measurement */
 #define MOST_REPEATS 200
-/* Displacement of the nodes, as a share of the scene's mean edge. Edges that are 1e-3 shorter than at rest make
- * the matrix of a common scene indefinite, which a step seldom meets and for which solvers take other ways. */
+/* Displacement of the nodes, as a share of the scene's mean edge. Edges that are 1e-3 shorter than at rest
+ * make the matrix of a common scene indefinite, which a step seldom meets and for which solvers take other
+ * ways. */
 #define DEFORMATION 1e-5
 
 /* Where everything is evaluated, and room for the results. */

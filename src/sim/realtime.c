@@ -1,12 +1,13 @@
 /*
- * realtime.c: an advance with a budget. What is owed, the frame and what earlier frames left over, is made in equal
- * steps no longer than dt, so that at any frame rate a step is the same equations at its own h. Where that does not
- * fit into the budget, by what steps cost lately, the integrator tries less hard (efforts), then steps are longer
- * than dt, then time is left over. Left-over time above one longest step is dropped: late frames must not
- * make later ones later.
+ * realtime.c: an advance with a budget. What is owed, the frame and what earlier frames left over, is made in
+ * equal steps no longer than dt, so that at any frame rate a step is the same equations at its own h. Where
+ * that does not fit into the budget, by what steps cost lately, the integrator tries less hard (efforts),
+ * then steps are longer than dt, then time is left over. Left-over time above one longest step is dropped:
+ * late frames must not make later ones later.
  *
- * The work of a call is bounded: after its first accepted step it begins no other that it does not expect to end in
- * time. A step that takes longer than a frame is made once in several frames: those between show the state before.
+ * The work of a call is bounded: after its first accepted step it begins no other that it does not expect to
+ * end in time. A step that takes longer than a frame is made once in several frames: those between show the
+ * state before.
  */
 #include "base/clock.h"
 #include "sim/sim.h"
@@ -84,8 +85,8 @@ static bool plan_effort(const drape_sim *sim, double owed, double budget, plan *
     return false;
 }
 
-/* Steps at the least effort, longer than dt: as many as fit; where not even one does, one for so many frames that it
- * costs no more than their budgets, and none before that many are owed. */
+/* Steps at the least effort, longer than dt: as many as fit; where not even one does, one for so many frames
+ * that it costs no more than their budgets, and none before that many are owed. */
 static plan plan_stretched(const drape_sim *sim, double owed, double frame, double budget)
 {
     int effort = effort_count(sim) - 1;
@@ -106,7 +107,8 @@ static plan make_plan(const drape_sim *sim, double owed, double frame, double bu
 
 /* ---- A call ---- */
 
-/* Steps of h from now on where the sim counts them; rows and controllers that choose their own do that here, too. */
+/* Steps of h from now on where the sim counts them; rows and controllers that choose their own do that here,
+ * too. */
 static void aim(drape_sim *sim, const plan *p, double end)
 {
     drape_schedule *s = &sim->schedule;

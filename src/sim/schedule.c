@@ -44,9 +44,9 @@ static double least_remainder(const drape_schedule *s)
 }
 
 /*
- * The interval after count: a whole one, one that the end cuts, or one that takes a tiny remainder along. After the latter
- * two counting starts anew at the end: a host that adds up its frames leaves the counted times ever further behind,
- * and would come to a remainder that is just too large to join, a step of 1e-9 dt.
+ * The interval after count: a whole one, one that the end cuts, or one that takes a tiny remainder along.
+ * After the latter two counting starts anew at the end: a host that adds up its frames leaves the counted
+ * times ever further behind, and would come to a remainder that is just too large to join, a step of 1e-9 dt.
  */
 static void open_interval(drape_schedule *s)
 {

@@ -31,15 +31,16 @@ typedef struct drape_schedule {
     double interval_start, interval_end, interval_size;
     bool stepped; /* a step was accepted: a remainder has a step to join */
     bool anew;    /* the interval ends at no counted time: the next count starts at its end */
-    /* Steps tried within one dt; of an advance, so that it begins anew in the next one, and is in no checkpoint. */
+    /* Steps tried within one dt; of an advance, so that it begins anew in the next one, and is in no
+     * checkpoint. */
     int64_t tries;
     double tries_from; /* [s] */
 } drape_schedule;
 
 void drape_schedule_init(drape_schedule *schedule, drape_stepping stepping, double dt, double start);
 
-/* Sets the end of an advance. An interval that was left half done goes on where the end is the same, else it is
- * given up: counting starts where it came. */
+/* Sets the end of an advance. An interval that was left half done goes on where the end is the same, else it
+ * is given up: counting starts where it came. */
 void drape_schedule_aim(drape_schedule *schedule, double end);
 
 /* The next step: its end and its size. False when the end is reached. */

@@ -48,8 +48,9 @@ struct drape_sim {
     void *integrator;      /* state of chosen.integrator */
     drape_state states[4]; /* as many as are needed: 2, and those before that the controller asks for */
     int now, next;         /* states[now] is the last accepted one, states[next] is being made */
-    int before; /* the one that the last step began with; -1 before the first, and where a later attempt was made over it */
-    int past[2];       /* the ones before; -1: there is none */
+    int before;  /* the one that the last step began with; -1 before the first, and where a later attempt was
+                    made over it */
+    int past[2]; /* the ones before; -1: there is none */
     double scratch[2]; /* the controller's memory */
     drape_schedule schedule;
     double most_attempts; /* the controller's max_attempts; INFINITY: it has none */
@@ -81,8 +82,8 @@ drape_status drape_sim_guard(drape_sim *sim, const char *function);
 /* Another one with the same choices, at the beginning. */
 drape_status drape_sim_create_like(const drape_sim *like, drape_sim **out);
 
-/* All that the next steps, frames and statistics depend on besides the model and the choices: into an archive or, where
- * the sim was just made, out of it. */
+/* All that the next steps, frames and statistics depend on besides the model and the choices: into an archive
+ * or, where the sim was just made, out of it. */
 void drape_sim_archive(drape_sim *sim, drape_archive *a);
 
 /* What a checkpoint must be of: the model, the choices, the build. Reading fails where they are others. */
@@ -91,8 +92,8 @@ void drape_sim_archive_identity(drape_sim *sim, drape_archive *a);
 /* The build, as far as bits depend on it: compiler, solvers and their versions. */
 void drape_sim_describe_build(char *text, size_t size);
 
-/* drape_sim_archive of a checkpoint in memory that begins with a sim, into *sim: made anew beside it, so that *sim is as
- * it was after a failure. What follows in the archive is the caller's. */
+/* drape_sim_archive of a checkpoint in memory that begins with a sim, into *sim: made anew beside it, so that
+ * *sim is as it was after a failure. What follows in the archive is the caller's. */
 drape_status drape_sim_read(drape_sim *sim, drape_archive *a);
 
 static inline const drape_state *drape_sim_state(const drape_sim *sim)
@@ -104,7 +105,8 @@ static inline const drape_state *drape_sim_state(const drape_sim *sim)
  * info->worst says how much. */
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info *info);
 
-/* drape_sim_energy_density at other positions (node_count x 3), internal variables those of the present state. */
+/* drape_sim_energy_density at other positions (node_count x 3), internal variables those of the present
+ * state. */
 void drape_sim_energy_density_at(drape_sim *sim, const double *x, double *density);
 
 /* The step is accepted: its work counts. */
@@ -113,17 +115,20 @@ void drape_sim_book(drape_sim *sim, const drape_step_info *info);
 /* The energy of the present state is the one that the audit starts from. */
 void drape_sim_reset_energy(drape_sim *sim);
 
-/* Of a badly distorted present state: the clause of a message that names its worst edge or triangle; else "". */
+/* Of a badly distorted present state: the clause of a message that names its worst edge or triangle; else
+ * "". */
 void drape_sim_describe_distortion(const drape_sim *sim, char *text, size_t size);
 
-/* One attempt at the step that the schedule handed out, judged and told, with its frames. *attempt: what it was. */
+/* One attempt at the step that the schedule handed out, judged and told, with its frames. *attempt: what it
+ * was. */
 drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *attempt);
 
 /* DRAPE_E_STEP_TOO_SMALL, with its message, where one more attempt within one dt is too many. last: the one
  * before, if there was one in this advance. */
 drape_status drape_sim_bound(drape_sim *sim, const drape_attempt *last);
 
-/* Ends the advance if somebody has cancelled it, and takes the cancelling back: DRAPE_E_STOPPED, with its message. */
+/* Ends the advance if somebody has cancelled it, and takes the cancelling back: DRAPE_E_STOPPED, with its
+ * message. */
 drape_status drape_sim_heed(drape_sim *sim);
 
 /* Back to the scene's own steps and all efforts, and no time is owed. */

@@ -129,8 +129,8 @@ static void count_reason(drape_sim *sim, const char *reason)
     sim->reasons[i].count++;
 }
 
-/* Where the attempt was made over the state that the last step began with, that one is gone: the sim is as at a start. A row
- * without time tells no frames after its first step, and needs to know that there was one. */
+/* Where the attempt was made over the state that the last step began with, that one is gone: the sim is as at
+ * a start. A row without time tells no frames after its first step, and needs to know that there was one. */
 static void reject(drape_sim *sim, const drape_step_info *info)
 {
     if (sim->before == sim->next && !sim->chosen.integrator->timeless)

@@ -1,8 +1,8 @@
 /*
- * elimination.c: see elimination.h. Order by minimum degree (AMD) or, for larger ones where METIS is there, nested
- * dissection; elimination tree with path compression (Liu 1990, The role of elimination trees in sparse
- * factorization); postorder; rows of the columns from those of their children. Then a front is merged with its last
- * child where the two take longer than the one, zeros included.
+ * elimination.c: see elimination.h. Order by minimum degree (AMD) or, for larger ones where METIS is there,
+ * nested dissection; elimination tree with path compression (Liu 1990, The role of elimination trees in
+ * sparse factorization); postorder; rows of the columns from those of their children. Then a front is merged
+ * with its last child where the two take longer than the one, zeros included.
  */
 #define _XOPEN_SOURCE 700 /* initstate */
 #include "solvers/elimination.h"
@@ -33,9 +33,10 @@ typedef struct maker {
 #define RAND_STATE 128 /* [bytes] as much as rand() begins with, so that it gives the same numbers */
 
 /*
- * METIS draws its cuts from rand(), which it seeds. That is one for the whole process: two at once would have each other's
- * numbers and another order, so other bits, and a host's own sequence would begin anew. So one at a time does it, with a state of
- * rand() that is its own. What is left is a host that calls rand() from another thread meanwhile.
+ * METIS draws its cuts from rand(), which it seeds. That is one for the whole process: two at once would have
+ * each other's numbers and another order, so other bits, and a host's own sequence would begin anew. So one
+ * at a time does it, with a state of rand() that is its own. What is left is a host that calls rand() from
+ * another thread meanwhile.
  */
 static int dissect_alone(idx_t *n, idx_t *start, idx_t *other, idx_t *options, maker *m)
 {
@@ -148,7 +149,8 @@ static void reorder(maker *m)
 
 /* ---- Fronts ---- */
 
-/* Time of a front in arbitrary units: its arithmetic in tiles of 4 x 4 blocks, its memory, its administration. */
+/* Time of a front in arbitrary units: its arithmetic in tiles of 4 x 4 blocks, its memory, its
+ * administration. */
 static double cost_of(int32_t columns, int32_t rows)
 {
     const double w = 3.0 * columns, r = 12.0 * ((rows + 3) / 4), d = 12.0 * ((columns + 3) / 4);
@@ -185,7 +187,8 @@ static int32_t gather_rows(maker *m, int32_t j)
     return count;
 }
 
-/* Front f ends: its rows are those of its first column that lie beyond its last; it waits for its parent's. */
+/* Front f ends: its rows are those of its first column that lie beyond its last; it waits for its
+ * parent's. */
 static void close_front(maker *m, int32_t f)
 {
     drape_elimination *e = m->e;
@@ -255,8 +258,8 @@ static bool is_better_merged(const maker *m, int32_t first, int32_t middle, int3
            cost_of(middle - first, m->length[g]) + cost_of(last - middle, m->length[f]);
 }
 
-/* Fronts are pushed on a stack that is written over the list of them; the last child of the one on top lies below
- * it. */
+/* Fronts are pushed on a stack that is written over the list of them; the last child of the one on top lies
+ * below it. */
 static void merge_fronts(maker *m)
 {
     drape_elimination *e = m->e;

@@ -24,18 +24,19 @@ typedef struct drape_linear_report {
 
 struct drape_linear_ops {
     const char *name, *summary, *reference;
-    /* Unknowns from which on it is measured to be the fastest for a positive definite matrix: what `auto` goes
-     * by. 0: at no size. */
+    /* Unknowns from which on it is measured to be the fastest for a positive definite matrix: what `auto`
+     * goes by. 0: at no size. */
     int64_t best_from;
     /* The same for a matrix that has no Cholesky factors: what rows that need them fall back to. */
     int64_t general_from;
     /* The library behind it takes heap for the time of a factorisation and gives it back, or it takes what it
      * keeps at the first matrix that needs it. Else nothing is taken from the second factorisation on. */
     bool borrows_heap;
-    /* Makes the solver's state in an arena that keeps its address. pattern outlives it. Errors: DRAPE_E_MEMORY,
-     * DRAPE_E_SOLVER; then *state is not set, and what was taken stays in the arena. */
+    /* Makes the solver's state in an arena that keeps its address. pattern outlives it. Errors:
+     * DRAPE_E_MEMORY, DRAPE_E_SOLVER; then *state is not set, and what was taken stays in the arena. */
     drape_status (*create)(drape_arena *arena, const drape_pattern *pattern, void **state);
-    /* The threads that it may use from now on, which outlive it; the result does not depend on them. NULL: it uses one. */
+    /* The threads that it may use from now on, which outlive it; the result does not depend on them. NULL: it
+     * uses one. */
     void (*use_threads)(void *state, drape_crew *crew);
     /* Takes the values (pattern->nonzeros). DRAPE_OK, or DRAPE_RETRY_LINEAR: singular to working precision,
      * or not finite. Where it borrows heap also DRAPE_E_MEMORY, and it may be called again. */
@@ -45,16 +46,17 @@ struct drape_linear_ops {
     drape_status (*factor_definite)(void *state, const double *values);
     /* x = A^-1 b, b untouched. */
     drape_status (*solve)(void *state, const double *b, double *x);
-    /* The same with the residual only reduced to a share `tolerance`, in a norm of the row's own; *iterations: how
-     * many it took. NULL: it is direct. */
+    /* The same with the residual only reduced to a share `tolerance`, in a norm of the row's own;
+     * *iterations: how many it took. NULL: it is direct. */
     drape_status (*solve_inexact)(void *state, const double *b, double *x, double tolerance,
                                   int64_t *iterations);
-    /* What has a part in later factors besides their values, such as pivots that are kept, into an archive or, where
-     * the state was just made for the same pattern, out of it. values: those of the last factor, if its factors are
-     * to stand again after a reading; NULL: factor comes before any solve. NULL: factors follow from values alone.
-     * Callers use drape_linear_archive. */
+    /* What has a part in later factors besides their values, such as pivots that are kept, into an archive
+     * or, where the state was just made for the same pattern, out of it. values: those of the last factor, if
+     * its factors are to stand again after a reading; NULL: factor comes before any solve. NULL: factors
+     * follow from values alone. Callers use drape_linear_archive. */
     void (*archive)(void *state, drape_archive *a, const double *values);
-    /* Gives back what is not of the arena, and comes before the arena's end: see drape_linear_destroy. NULL: all of it is. */
+    /* Gives back what is not of the arena, and comes before the arena's end: see drape_linear_destroy. NULL:
+     * all of it is. */
     void (*destroy)(void **state);
     /* Bytes that libraries took beside the arena, factors included. NULL: none. */
     size_t (*bytes)(const void *state);

@@ -1,5 +1,5 @@
-/* pick.c: which row is the fastest of this build for a number of unknowns, by what each row says of itself; and what all
- * rows archive in the same way. */
+/* pick.c: which row is the fastest of this build for a number of unknowns, by what each row says of itself;
+ * and what all rows archive in the same way. */
 #include "solvers/linear.h"
 
 static int64_t best_from(const drape_linear_ops *row)
