@@ -20,7 +20,7 @@ typedef struct drape_path {
 
 typedef struct drape_motion {
     const drape_model *model;
-    int32_t moved_count;       /* pinned nodes with a track or a way */
+    int32_t moved_count;       /* pinned nodes with a track or a path */
     int32_t *moved_node;       /* (as many as are pinned) */
     int32_t *moved_track;      /* the same; -1: none */
     int32_t *place;            /* (node_count) number among the moved ones, -1: none */
@@ -30,17 +30,17 @@ typedef struct drape_motion {
 
 drape_status drape_motion_create(drape_arena *arena, const drape_model *model, drape_motion **out);
 
-/* The ways of the host, and which pins have one. */
+/* The paths that a host gave, and which pins have one. */
 void drape_motion_archive(drape_motion *motion, drape_archive *archive);
 
 /* Writes the positions of moved pins at time t; other entries of x (node_count x 3) stay. */
 void drape_motion_place_pins(const drape_motion *motion, double t, double *x);
 
-/* The velocity at time t of moved pin i, of the piece of its track or way that the time `within` lies in: at
+/* The velocity at time t of moved pin i, of the piece of its track or path that the time `within` lies in: at
  * a kink there are two, and the later one is that at the kink. */
 void drape_motion_pin_velocity(const drape_motion *motion, int32_t i, double t, double within, double v[3]);
 
-/* Of a collider: whether it moves at all, its displacement, and its velocity as above. */
+/* Whether a collider moves at all, its displacement, and its velocity as above. */
 bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider);
 void drape_motion_collider(const drape_motion *motion, int32_t collider, double t, double displacement[3]);
 void drape_motion_collider_velocity(const drape_motion *motion, int32_t collider, double t, double within,
