@@ -1,4 +1,5 @@
-/* drag_spring.h: a spring from a node to a point of space, by which a host drags cloth: E = k/2 |x - target|^2. */
+/* drag_spring.h: a spring from a node to a point of space, by which a host drags cloth: E = k/2 |x -
+ * target|^2. */
 #ifndef DRAPE_ASSEMBLE_DRAG_SPRING_H
 #define DRAPE_ASSEMBLE_DRAG_SPRING_H
 

@@ -336,8 +336,8 @@ static void evaluate_wind(drape_system *system, drape_request *want)
     const drape_point *point = want->point;
     if (!system->wind.field)
         return;
-    drape_wind_feel(&system->wind, system->model->node_count, point->t, point->x, point->v,
-                    want->hessian && !want->velocity);
+    drape_wind_evaluate(&system->wind, system->model->node_count, point->t, point->x, point->v,
+                        want->hessian && !want->velocity);
     want->against = system->wind.against;
     want->wind_gradient = system->wind.gradient;
 }

@@ -39,16 +39,16 @@ drape_status drape_system_create(drape_arena *arena, const drape_model *model, i
                                  drape_system **out);
 void drape_system_destroy(drape_system **system); /* ends the threads; before the arena is freed */
 
-/* From here on terms that are constraints are left out of forces, energies and checks: for integrators that keep
- * constraints by moving nodes. */
+/* From here on terms that are constraints are left out of forces, energies and checks: for integrators that
+ * keep constraints by moving nodes. */
 void drape_system_leave_constraints(drape_system *system);
 
 const drape_model *drape_system_model(const drape_system *system);
 /* Its threads, for those who work on what it assembles; NULL: one thread. */
 drape_crew *drape_system_crew(const drape_system *system);
 
-/* A spring that belongs to the system from now on, and its energy to the elastic energy; stiffness 0: no spring. Its
- * node is free. */
+/* A spring that belongs to the system from now on, and its energy to the elastic energy; stiffness 0: no
+ * spring. Its node is free. */
 void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *spring);
 const drape_drag_spring *drape_system_drag_spring(const drape_system *system);
 
@@ -56,8 +56,8 @@ const drape_drag_spring *drape_system_drag_spring(const drape_system *system);
 const drape_motion *drape_system_motion(const drape_system *system);
 drape_motion *drape_system_steer(drape_system *system);
 
-/* User-defined forces on nodes (node_count x 3) [N], copied; NULL: none. They do not depend on x and belong to the
- * system from now on. They have no energy; drape_system_push_work is their work from x to y [J]. */
+/* User-defined forces on nodes (node_count x 3) [N], copied; NULL: none. They do not depend on x and belong
+ * to the system from now on. They have no energy; drape_system_push_work is their work from x to y [J]. */
 void drape_system_set_push(drape_system *system, const double *force);
 double drape_system_push_work(const drape_system *system, const double *x, const double *y);
 
@@ -69,8 +69,8 @@ void drape_system_copy_wind(drape_system *system, const drape_system *from);
  * drape_system_force. */
 void drape_system_add_loads(const drape_system *system, const double *x, double *g);
 
-/* A flag that may be raised at any time: from the next force on drape_system_status is DRAPE_E_STOPPED, until a step
- * begins without it. drape_system_cancelled reads it at once. */
+/* A flag that may be raised at any time: from the next force on drape_system_status is DRAPE_E_STOPPED, until
+ * a step begins without it. drape_system_cancelled reads it at once. */
 void drape_system_watch(drape_system *system, const atomic_bool *cancel);
 bool drape_system_cancelled(drape_system *system);
 
@@ -82,8 +82,8 @@ const drape_contact *drape_system_contact(const drape_system *system); /* NULL: 
  * contact. */
 double drape_system_clock(const drape_system *system);
 
-/* Writes all that it keeps besides the model into an archive or, where it was just made, reads it. The wind is left
- * out: it is a function of the host. */
+/* Writes all that it keeps besides the model into an archive or, where it was just made, reads it. The wind
+ * is left out: it is a function of the host. */
 void drape_system_archive(drape_system *system, drape_archive *a);
 
 /* A step begins at a state: contact is compared with it until the next. Errors: DRAPE_E_MEMORY. */
@@ -97,7 +97,8 @@ void drape_system_rest(drape_system *system);
 const drape_pattern *drape_system_pattern(const drape_system *system);
 drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed);
 
-/* The first failure since drape_system_begin in functions that return no status: memory for contacts, cancelling. */
+/* The first failure since drape_system_begin in functions that return no status: memory for contacts,
+ * cancelling. */
 drape_status drape_system_status(const drape_system *system);
 
 /* g (node_count x 3) of all nodes, pinned ones too. */
@@ -108,8 +109,8 @@ void drape_system_force_without(drape_system *system, const drape_point *point, 
                                 double *g);
 
 /* values (pattern.nonzeros) = mass_weight M + J over the free nodes. project: the share, 0 to 1, by which
- * element Hessians become positive semidefinite: H + project (H+ - H); Hessians of contact do entirely if it is not
- * 0. */
+ * element Hessians become positive semidefinite: H + project (H+ - H); Hessians of contact do entirely if it
+ * is not 0. */
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, double project,
                            double *values);
 
@@ -140,13 +141,13 @@ double drape_system_contact_energy(drape_system *system, const drape_point *poin
 /* The elastic energy by node (node_count) [J]: that of each element in equal parts on its nodes. */
 void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy);
 
-/* Contact alone, for checks: overwrites g (node_count x 3), with friction or without, and values (pattern.nonzeros,
- * after drape_system_extend_pattern at this point) with its J; either may be NULL. */
+/* Contact alone, for checks: overwrites g (node_count x 3), with friction or without, and values
+ * (pattern.nonzeros, after drape_system_extend_pattern at this point) with its J; either may be NULL. */
 void drape_system_contact_part(drape_system *system, const drape_point *point, bool friction, double *g,
                                double *values);
 
-/* The largest fraction of the step from nodes x to y on which no two pieces pass through each other, while colliders
- * rest where they are at time t. */
+/* The largest fraction of the step from nodes x to y on which no two pieces pass through each other, while
+ * colliders rest where they are at time t. */
 double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t);
 
 /* q of all measures (measure_count). */
@@ -156,31 +157,33 @@ void drape_system_measures(drape_system *system, const drape_point *point, doubl
  * `along` (node_count x 3); NULL: at the point itself, without dissipative forces. */
 void drape_system_stress(drape_system *system, const drape_point *point, const double *along, double *stress);
 
-/* One term alone, for checks and profiles: adds to g and to J in values, and sets *energy. Any of the three may be
- * NULL. */
+/* One term alone, for checks and profiles: adds to g and to J in values, and sets *energy. Any of the three
+ * may be NULL. */
 void drape_system_term(drape_system *system, int32_t term, const drape_point *point, double *energy,
                        double *g, double *values);
 
-/* Searches all terms for an element that a step made degenerate: DRAPE_OK or DRAPE_RETRY_DEGENERATE, with *worst
- * filled in. x is the new state; before and internal are of the one before. before NULL: also those
+/* Searches all terms for an element that a step made degenerate: DRAPE_OK or DRAPE_RETRY_DEGENERATE, with
+ * *worst filled in. x is the new state; before and internal are of the one before. before NULL: also those
  * that were degenerate already. */
 drape_status drape_system_check(const drape_system *system, const double *x, const double *before,
                                 const double *internal, const char **reason, drape_worst *worst);
 
-/* Whether x is beyond a limit that a term with `constraint` keeps: drape_system_check of these terms alone. */
+/* Whether x is beyond a limit that a term with `constraint` keeps: drape_system_check of these terms
+ * alone. */
 bool drape_system_breaks_limit(const drape_system *system, const double *x, const double *before,
                                const double *internal);
 
 /* Whether anything passes through anything on the straight path from the beginning of the step to y. */
 bool drape_system_crosses(drape_system *system, const double *y, double t);
 
-/* Searches for a piece that a step brought into a collider or through another piece: x is the new state at time t,
- * the one before that of drape_system_begin. DRAPE_OK, or DRAPE_RETRY_REJECTED with reason and worst. */
+/* Searches for a piece that a step brought into a collider or through another piece: x is the new state at
+ * time t, the one before that of drape_system_begin. DRAPE_OK, or DRAPE_RETRY_REJECTED with reason and
+ * worst. */
 drape_status drape_system_check_contact(drape_system *system, const double *x, double t, const char **reason,
                                         drape_worst *worst);
 
-/* For a message about a vector over free DOFs: the node, and its cloth, of the entry of largest magnitude or the first
- * that is not finite. */
+/* For a message about a vector over free DOFs: the node, and its cloth, of the entry of largest magnitude or
+ * the first that is not finite. */
 drape_worst drape_system_worst_dof(const drape_system *system, const double *free_vector, const char *what,
                                    double limit);
 

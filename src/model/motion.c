@@ -89,7 +89,8 @@ static void displacement_of(const drape_track *track, const drape_path *path, do
         memset(x, 0, 3 * sizeof *x);
 }
 
-static void velocity_of(const drape_track *track, const drape_path *path, double t, double within, double v[3])
+static void velocity_of(const drape_track *track, const drape_path *path, double t, double within,
+                        double v[3])
 {
     if (path->given)
         path_velocity(path, t, within, v);
@@ -154,7 +155,8 @@ static const drape_track *pin_track(const drape_motion *motion, int32_t i)
     return motion->moved_track[i] >= 0 ? &motion->model->tracks[motion->moved_track[i]] : NULL;
 }
 
-/* Paths of pins are positions, not displacements, so that a pin reaches exactly the position that the host gave. */
+/* Paths of pins are positions, not displacements, so that a pin reaches exactly the position that the host
+ * gave. */
 static void place_pin(const drape_motion *motion, int32_t i, double t, double x[3])
 {
     const double *rest = motion->model->rest + 3 * (size_t)motion->moved_node[i];

@@ -1,5 +1,5 @@
 /*
- * motion.h: where pinned nodes and colliders are at a time: on the tracks of the model, or on a way that a
+ * motion.h: where pinned nodes and colliders are at a time: on the tracks of the model, or on a path that a
  * host gives them while a sim runs. The model does not change; a motion belongs to one sim.
  */
 #ifndef DRAPE_MODEL_MOTION_H
@@ -50,7 +50,7 @@ void drape_motion_collider_velocity(const drape_motion *motion, int32_t collider
 double drape_motion_next_kink(const drape_motion *motion, double t, double end);
 bool drape_motion_at_kink(const drape_motion *motion, double t);
 
-/* From now on a pinned node goes on a way of the host's: from where it is at time t, by a cubic, to the
+/* From now on a pinned node moves on a user-defined path: from where it is at time t, on a cubic, to the
  * position x and the velocity v at t + span [s]; v NULL: straight, at one speed. A collider: to the
  * displacement x. */
 void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double span, const double x[3],

@@ -49,7 +49,7 @@ void drape_sim_pull_force(const drape_sim *sim, double force[3])
     const drape_drag_spring *spring = sim ? drape_system_drag_spring(sim->system) : NULL;
     for (int k = 0; k < 3; k++)
         force[k] = spring && spring->stiffness > 0
-                       ? spring->stiffness *
-                             (spring->target[k] - drape_sim_state(sim)->x[3 * (size_t)spring->node + (size_t)k])
+                       ? spring->stiffness * (spring->target[k] -
+                                              drape_sim_state(sim)->x[3 * (size_t)spring->node + (size_t)k])
                        : 0;
 }
