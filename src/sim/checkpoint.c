@@ -14,8 +14,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MOST_LEVELS 60
-#define LONGEST     1e9 /* [s] as the duration of a scene */
+#define MAX_LEVELS  60
+#define MAX_SECONDS 1e9 /* [s] as the duration of a scene */
 #define REASON_ROOM 64
 #define MEMORY_NAME "checkpoint in memory"
 
@@ -63,7 +63,7 @@ static void archive_states(drape_sim *sim, drape_archive *a)
 /* Of what ends a loop over steps or frames. */
 static bool is_schedule(const drape_schedule *s)
 {
-    return s->level >= 0 && s->level <= MOST_LEVELS && s->part >= 0 && s->part < (int64_t)1 << s->level &&
+    return s->level >= 0 && s->level <= MAX_LEVELS && s->part >= 0 && s->part < (int64_t)1 << s->level &&
            s->count >= 0 && !(s->dt < 0) && !isnan(s->dt);
 }
 
@@ -171,7 +171,7 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
     if (drape_archive_good(a) && !is_place(m->effort, 0, efforts))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an effort %d of %d", m->effort, efforts);
     if (drape_archive_good(a) && m->active &&
-        !(m->dt > 0 && m->longest >= m->dt && m->longest <= LONGEST && m->debt >= 0 &&
+        !(m->dt > 0 && m->longest >= m->dt && m->longest <= MAX_SECONDS && m->debt >= 0 &&
           m->debt <= m->longest && m->cap > 0))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step for a budget");
     if (drape_archive_is_reading(a) && sim->chosen.integrator->set_effort)
