@@ -54,13 +54,14 @@ static bool create_past(const drape_implicit *common, past *p)
     return p->dx && p->dv && (p->dq || !common->history);
 }
 
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
+    drape_context *ctx = arena->ctx;
     bdf2_state *s = drape_alloc(ctx, 1, sizeof *s);
     *state = s;
     if (!s)
         return DRAPE_E_MEMORY;
-    drape_status status = drape_implicit_init(ctx, system, values, &s->common);
+    drape_status status = drape_implicit_init(arena, system, values, &s->common);
     if (!status && s->common.history)
         s->q0 = drape_alloc(ctx, (size_t)s->common.model->measure_count, sizeof(double));
     if (!status && (!create_past(&s->common, &s->past) || !create_past(&s->common, &s->made) ||

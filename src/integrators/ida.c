@@ -199,14 +199,14 @@ static drape_status adopt_pattern(ida_state *s)
         if (!s->damping)
             return DRAPE_E_MEMORY;
     }
-    return drape_sun_linear_adopt(s->linear, pattern);
+    return drape_sun_linear_extend_pattern(s->linear, pattern);
 }
 
 /* Contact may couple what it did not before. */
 static drape_status fit_pattern(ida_state *s, const drape_point *point)
 {
     bool changed;
-    s->fitted = drape_system_fit(s->system, point, &changed);
+    s->fitted = drape_system_extend_pattern(s->system, point, &changed);
     s->linear->stale |= changed;
     if (!s->fitted && s->linear->stale)
         s->fitted = adopt_pattern(s);
@@ -370,8 +370,9 @@ static bool configure(ida_state *s)
     return good;
 }
 
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
+    drape_context *ctx = arena->ctx;
     ida_state *s = drape_alloc(ctx, 1, sizeof *s);
     *state = s;
     if (!s)
@@ -391,7 +392,7 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
     if (!status && s->n > 0)
         status = create_vectors(s);
     if (!status && s->n > 0)
-        status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
+        status = drape_sun_linear_create(arena, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
                                          drape_system_pattern(s->system), drape_system_crew(s->system),
                                          &s->linear);
     if (!status && s->n > 0) {
@@ -719,8 +720,8 @@ static size_t bytes(const void *state)
            values = (size_t)s->model->pattern.nonzeros;
     size_t order = isnan(s->values[PARAM_MAX_ORDER]) ? TIGHT_ORDER : (size_t)s->values[PARAM_MAX_ORDER];
     size_t vectors = 4 + order + 1 + 6; /* ours, the history of IDA, its scratch */
-    size_t doubles = (s->dissipated ? 4 : 3) * nodes + n + 2 * n * vectors + (s->damping ? 2 : 1) * values;
-    return doubles * sizeof(double) + (s->linear ? s->linear->ops->bytes(s->linear->state) : 0);
+    size_t doubles = (s->dissipated ? 4 : 3) * nodes + n + 2 * n * vectors + (s->damping ? values : 0);
+    return doubles * sizeof(double) + (s->linear ? drape_sun_linear_bytes(s->linear) : 0);
 }
 
 const drape_integrator_ops drape_integrator_ida = {

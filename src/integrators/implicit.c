@@ -27,12 +27,13 @@ drape_status drape_implicit_init_arrays(drape_context *ctx, drape_system *system
     return create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-drape_status drape_implicit_init(drape_context *ctx, drape_system *system, const double *values,
+drape_status drape_implicit_init(drape_arena *arena, drape_system *system, const double *values,
                                  drape_implicit *s)
 {
+    drape_context *ctx = arena->ctx;
     drape_status status = drape_implicit_init_arrays(ctx, system, s);
     s->inertial_guess = values[DRAPE_NEWTON_PREDICTOR] == 0;
-    return status ? status : drape_newton_create(ctx, system, values, &s->newton);
+    return status ? status : drape_newton_create(arena, system, values, &s->newton);
 }
 
 void drape_implicit_free(drape_implicit *s)
@@ -145,13 +146,14 @@ void drape_implicit_destroy(void **state)
     *state = NULL;
 }
 
-drape_status drape_implicit_create(drape_context *ctx, drape_system *system, const double *values,
+drape_status drape_implicit_create(drape_arena *arena, drape_system *system, const double *values,
                                    void **state)
 {
+    drape_context *ctx = arena->ctx;
     *state = drape_alloc(ctx, 1, sizeof(drape_implicit));
     if (!*state)
         return DRAPE_E_MEMORY;
-    drape_status status = drape_implicit_init(ctx, system, values, *state);
+    drape_status status = drape_implicit_init(arena, system, values, *state);
     if (status)
         drape_implicit_destroy(state);
     return status;

@@ -25,12 +25,12 @@ typedef struct drape_implicit {
 /* For rows that embed it, with a Newton solver or without one: on failure what was taken is freed by
  * drape_implicit_free. */
 drape_status drape_implicit_init_arrays(drape_context *ctx, drape_system *system, drape_implicit *implicit);
-drape_status drape_implicit_init(drape_context *ctx, drape_system *system, const double *values,
+drape_status drape_implicit_init(drape_arena *arena, drape_system *system, const double *values,
                                  drape_implicit *implicit);
 void drape_implicit_free(drape_implicit *implicit);
 
 /* For rows that need no state of their own, and work and bytes for those that have it first in theirs. */
-drape_status drape_implicit_create(drape_context *ctx, drape_system *system, const double *values,
+drape_status drape_implicit_create(drape_arena *arena, drape_system *system, const double *values,
                                    void **state);
 void drape_implicit_destroy(void **state);
 void drape_implicit_restart(void *state, const drape_state *from);

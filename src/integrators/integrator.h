@@ -51,7 +51,7 @@ typedef struct drape_integrator_ops {
     const drape_param *params; /* one of them is dt */
     int param_count;
     /* values in the order of params. Takes all memory that stepping needs. */
-    drape_status (*create)(drape_context *ctx, drape_system *system, const double *values, void **state);
+    drape_status (*create)(drape_arena *arena, drape_system *system, const double *values, void **state);
     /* The row chooses its own steps: h is the way to the end of the advance or, after a rejection, an
      * upper bound, out->t the end of the advance, which a step may reach and not pass; the row sets out->t
      * to where it came. */

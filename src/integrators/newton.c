@@ -202,10 +202,10 @@ static int residual(N_Vector d, N_Vector f, void *user)
 static drape_status fit_pattern(drape_newton *s)
 {
     bool changed;
-    s->fitted = drape_system_fit(s->system, &s->point, &changed);
+    s->fitted = drape_system_extend_pattern(s->system, &s->point, &changed);
     s->linear->stale |= changed;
     if (!s->fitted && s->linear->stale)
-        s->fitted = drape_sun_linear_adopt(s->linear, drape_system_pattern(s->system));
+        s->fitted = drape_sun_linear_extend_pattern(s->linear, drape_system_pattern(s->system));
     return s->fitted;
 }
 
@@ -245,7 +245,7 @@ static double free_share(drape_newton *s, const double *x, const double *step)
     memcpy(s->ahead, x, 3 * (size_t)s->model->node_count * sizeof *x);
     for (int64_t i = 0; i < s->n; i++)
         s->ahead[3 * (int64_t)s->model->node_of_free[i / 3] + i % 3] += step[i];
-    return drape_system_way(s->system, x, s->ahead, s->problem->t);
+    return drape_system_step_fraction(s->system, x, s->ahead, s->problem->t);
 }
 
 static void scale(double *p, double share, int64_t n)
@@ -468,9 +468,10 @@ static bool configure(drape_newton *s)
            !KINSetNoResMon(s->kin, exact) && !KINSetMaxBetaFails(s->kin, MAX_BETA_FAILURES);
 }
 
-drape_status drape_newton_create(drape_context *ctx, drape_system *system, const double *values,
+drape_status drape_newton_create(drape_arena *arena, drape_system *system, const double *values,
                                  drape_newton **out)
 {
+    drape_context *ctx = arena->ctx;
     drape_newton *s = drape_alloc(ctx, 1, sizeof *s);
     *out = s;
     if (!s)
@@ -490,7 +491,7 @@ drape_status drape_newton_create(drape_context *ctx, drape_system *system, const
         status = create_vectors(s);
     if (!status && s->n > 0)
         status =
-            drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
+            drape_sun_linear_create(arena, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
                                     drape_system_pattern(system), drape_system_crew(s->system), &s->linear);
     if (!status && s->n > 0)
         s->linear->tolerance = values[DRAPE_NEWTON_LINEAR_TOLERANCE];
@@ -763,7 +764,7 @@ void drape_newton_archive(drape_newton *s, drape_archive *a)
     if (s->n == 0)
         return;
     if (drape_archive_is_reading(a))
-        drape_archive_note(a, drape_sun_linear_adopt_other(s->linear, drape_system_pattern(s->system)));
+        drape_archive_note(a, drape_sun_linear_ensure_pattern(s->linear, drape_system_pattern(s->system)));
     drape_sun_linear_archive(s->linear, a, modified && s->factored_mass_weight != 0);
     if (modified && !drape_kinsol_archive(s->kin, a) && a->reading)
         drape_newton_forget_factors(s);
@@ -784,10 +785,9 @@ drape_work drape_newton_work(const drape_newton *newton)
 size_t drape_newton_bytes(const drape_newton *newton)
 {
     size_t nodes = 3 * (size_t)newton->model->node_count, n = (size_t)newton->n;
-    size_t values = (size_t)drape_system_pattern(newton->system)->nonzeros;
-    size_t factors = newton->linear ? newton->linear->ops->bytes(newton->linear->state) : 0;
+    size_t factors = newton->linear ? drape_sun_linear_bytes(newton->linear) : 0;
     size_t searches = (newton->ahead ? nodes : 0) + (newton->trial ? 3 * n : 0);
     if (newton->trial)
         factors += drape_mixed_bytes(&newton->mixed);
-    return (3 * nodes + 8 * n + searches + values) * sizeof(double) + factors; /* KINSOL keeps 6 vectors */
+    return (3 * nodes + 8 * n + searches) * sizeof(double) + factors; /* KINSOL keeps 6 vectors */
 }

@@ -44,7 +44,7 @@ typedef struct drape_newton_problem {
     double t, span[2];     /* [s] where colliders stand, and the step, see drape_point */
 } drape_newton_problem;
 
-drape_status drape_newton_create(drape_context *ctx, drape_system *system, const double *values,
+drape_status drape_newton_create(drape_arena *arena, drape_system *system, const double *values,
                                  drape_newton **out);
 void drape_newton_destroy(drape_newton **newton);
 

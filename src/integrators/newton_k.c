@@ -123,8 +123,9 @@ static void destroy(void **state)
     *state = NULL;
 }
 
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
+    drape_context *ctx = arena->ctx;
     newton_k *s = drape_alloc(ctx, 1, sizeof *s);
     *state = s;
     if (!s)
@@ -134,7 +135,7 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
     if (!status && !(s->p = drape_alloc(ctx, s->rung.dofs, sizeof *s->p)))
         status = DRAPE_E_MEMORY;
     if (!status && s->rung.dofs > 0)
-        status = drape_quasi_create(ctx, system, (int)values[PARAM_COARSE_SPACING], &s->quasi);
+        status = drape_quasi_create(arena, system, (int)values[PARAM_COARSE_SPACING], &s->quasi);
     if (status)
         destroy(state);
     return status;

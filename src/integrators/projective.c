@@ -208,8 +208,9 @@ static drape_status open_kinsol(projective *s)
     return DRAPE_OK;
 }
 
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
+    drape_context *ctx = arena->ctx;
     projective *s = drape_alloc(ctx, 1, sizeof *s);
     *state = s;
     if (!s)

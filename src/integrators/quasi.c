@@ -161,7 +161,7 @@ static drape_status evaluate_remainder(drape_quasi *s, const drape_point *point)
     bool changed;
     if (!s->remainder.values)
         return DRAPE_OK;
-    drape_status status = drape_system_fit(s->system, point, &changed);
+    drape_status status = drape_system_extend_pattern(s->system, point, &changed);
     if (!status && changed)
         status = drape_quasi_make_room(s);
     if (status)
@@ -305,13 +305,15 @@ static drape_status create_workspace(drape_quasi *s)
     return s->inverse && s->pcg.r && s->pcg.z && s->pcg.p && s->pcg.q ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-drape_status drape_quasi_create(drape_context *ctx, drape_system *system, int spacing, drape_quasi **out)
+drape_status drape_quasi_create(drape_arena *arena, drape_system *system, int spacing, drape_quasi **out)
 {
+    drape_context *ctx = arena->ctx;
     drape_quasi *s = drape_alloc(ctx, 1, sizeof *s);
     *out = s;
     if (!s)
         return DRAPE_E_MEMORY;
     s->ctx = ctx;
+    s->arena = arena;
     s->system = system;
     s->model = drape_system_model(system);
     s->nodes = s->model->free_count;
@@ -330,9 +332,7 @@ void drape_quasi_destroy(drape_quasi **out)
         return;
     drape_quasi_coarse *c = &s->coarse;
     if (c->solver)
-        c->row->destroy(&c->solver);
-    drape_prolong_free(s->ctx, &c->prolong);
-    drape_pattern_free(s->ctx, &c->pattern);
+        drape_linear_destroy(c->row, &c->solver);
     drape_quasi_free_room(s);
     drape_scalar_free(s->ctx, &s->scalar);
     void *all[] = {s->pair,       s->h,     s->inverse, c->elastic, c->damping, c->mass,
@@ -373,15 +373,14 @@ double drape_quasi_factor_seconds(const drape_quasi *s)
 size_t drape_quasi_bytes(const drape_quasi *s)
 {
     const drape_quasi_coarse *c = &s->coarse;
-    const drape_prolong *p = &c->prolong;
     const drape_pattern *fine = drape_system_pattern(s->system);
     size_t pairs = (size_t)s->pairs, nodes = (size_t)s->nodes, added = (size_t)c->pair_start[pairs];
     size_t slots = (size_t)c->pattern.block_start[c->pattern.block_count];
-    size_t doubles = 6 * pairs + 6 * nodes + 12 * nodes + (size_t)p->start[nodes] + added + 9 * slots +
+    size_t doubles = 6 * pairs + 6 * nodes + 12 * nodes + added + 9 * slots +
                      2 * (size_t)c->pattern.nonzeros + 2 * (size_t)c->pattern.n;
-    size_t indices = 2 * pairs + nodes + (size_t)p->start[nodes] + added + 2 * slots + 2 * pairs;
+    size_t indices = 2 * pairs + added + 2 * slots + 2 * pairs;
     size_t lower = s->remainder.values ? ((size_t)fine->block_start[nodes] + nodes) / 2 : 0;
     doubles += s->remainder.values ? (size_t)fine->nonzeros + 9 * lower : 0;
     return sizeof *s + drape_scalar_bytes(&s->scalar) + doubles * sizeof(double) +
-           (indices + 2 * lower) * sizeof(int32_t) + c->row->bytes(c->solver);
+           (indices + 2 * lower) * sizeof(int32_t) + drape_linear_bytes(c->row, c->solver);
 }

@@ -21,7 +21,7 @@ typedef struct drape_quasi drape_quasi;
 
 /* For a system with at least one free node. spacing: edges between the centres of the coarse functions; 0: by the
  * number of nodes. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
-drape_status drape_quasi_create(drape_context *ctx, drape_system *system, int spacing, drape_quasi **out);
+drape_status drape_quasi_create(drape_arena *arena, drape_system *system, int spacing, drape_quasi **out);
 void drape_quasi_destroy(drape_quasi **quasi);
 
 /* The matrix at a point. > 0: it has no factors on the coarse space. Errors: DRAPE_E_MEMORY, where contact couples

@@ -63,7 +63,7 @@ static drape_status build_prolong(drape_quasi *s, int spacing)
     drape_status status = list_edges(s, &start, &neighbor);
     const drape_graph graph = {.count = s->nodes, .start = start, .neighbor = neighbor};
     if (!status)
-        status = drape_prolong_build(s->ctx, &graph, spacing ? spacing : drape_prolong_spacing(s->nodes),
+        status = drape_prolong_build(s->arena, &graph, spacing ? spacing : drape_prolong_spacing(s->nodes),
                                      &s->coarse.prolong);
     drape_free(s->ctx, start);
     drape_free(s->ctx, neighbor);
@@ -77,7 +77,8 @@ static drape_status build_coarse_pattern(drape_quasi *s)
     const drape_pattern *p = &s->model->pattern;
     const drape_graph fine = {.count = p->block_count, .start = p->block_start, .neighbor = p->block_row};
     int32_t *start = NULL, *neighbor = NULL, *pairs = NULL, *own = NULL, count = 0;
-    drape_status status = drape_prolong_meet(s->ctx, &c->prolong, &fine, &start, &neighbor);
+    drape_arena scratch = drape_arena_of(s->ctx);
+    drape_status status = drape_prolong_meet(&scratch, &c->prolong, &fine, &start, &neighbor);
     if (!status) {
         pairs = drape_alloc(s->ctx, 2 * (size_t)start[c->prolong.coarse], sizeof *pairs);
         own = drape_alloc(s->ctx, (size_t)c->prolong.coarse, sizeof *own);
@@ -93,9 +94,8 @@ static drape_status build_coarse_pattern(drape_quasi *s)
     }
     const drape_coupling coupling = {.count = count, .nodes = 2, .node = pairs};
     if (!status)
-        status = drape_pattern_build(s->ctx, c->prolong.coarse, own, &coupling, 1, &c->pattern);
-    drape_free(s->ctx, start);
-    drape_free(s->ctx, neighbor);
+        status = drape_pattern_build(s->arena, c->prolong.coarse, own, &coupling, 1, &c->pattern);
+    drape_arena_free(&scratch);
     drape_free(s->ctx, pairs);
     drape_free(s->ctx, own);
     return status;
@@ -208,7 +208,7 @@ static drape_status build_coarse(drape_quasi *s, int spacing)
     c->b = drape_alloc(s->ctx, n, sizeof *c->b);
     c->x = drape_alloc(s->ctx, n, sizeof *c->x);
     c->row = drape_linear_best(c->pattern.n);
-    return c->sum && c->values && c->b && c->x ? c->row->create(s->ctx, &c->pattern, &c->solver)
+    return c->sum && c->values && c->b && c->x ? c->row->create(s->arena, &c->pattern, &c->solver)
                                                : DRAPE_E_MEMORY;
 }
 

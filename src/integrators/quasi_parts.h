@@ -33,6 +33,7 @@ typedef struct drape_quasi_remainder {
 
 struct drape_quasi {
     drape_context *ctx;
+    drape_arena *arena;
     drape_system *system;
     const drape_model *model;
     int32_t nodes, pairs; /* free nodes; pairs of all terms that have some */

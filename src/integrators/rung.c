@@ -167,7 +167,7 @@ void drape_rung_stay_free(drape_rung *s, const double *x, double *way)
     memcpy(s->ahead, x, s->nodes * sizeof *x);
     for (size_t i = 0; i < s->dofs; i++)
         s->ahead[drape_implicit_at(b, i)] += way[i];
-    double share = drape_system_way(b->system, x, s->ahead, s->point.t);
+    double share = drape_system_step_fraction(b->system, x, s->ahead, s->point.t);
     for (size_t i = 0; share < 1 && i < s->dofs; i++)
         way[i] *= share;
 }

@@ -40,13 +40,14 @@ static void destroy(void **state)
     *state = NULL;
 }
 
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
+    drape_context *ctx = arena->ctx;
     static_state *s = drape_alloc(ctx, 1, sizeof *s);
     *state = s;
     if (!s)
         return DRAPE_E_MEMORY;
-    drape_status status = drape_implicit_init(ctx, system, values, &s->common);
+    drape_status status = drape_implicit_init(arena, system, values, &s->common);
     const drape_model *m = drape_system_model(system);
     if (!status) {
         s->internal = drape_alloc(ctx, (size_t)m->internal_count, sizeof *s->internal);

@@ -35,13 +35,14 @@ static void destroy(void **state)
     *state = NULL;
 }
 
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
+    drape_context *ctx = arena->ctx;
     trbdf2_state *s = drape_alloc(ctx, 1, sizeof *s);
     *state = s;
     if (!s)
         return DRAPE_E_MEMORY;
-    drape_status status = drape_implicit_init(ctx, system, values, &s->common);
+    drape_status status = drape_implicit_init(arena, system, values, &s->common);
     size_t nodes = 3 * (size_t)s->common.model->node_count;
     s->g0 = drape_alloc(ctx, nodes, sizeof(double));
     s->xg = drape_alloc(ctx, nodes, sizeof(double));

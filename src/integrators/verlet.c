@@ -172,7 +172,6 @@ static const drape_param params[PARAM_COUNT] = {
 #define STABILITY_ITERATIONS 30 /* finds omega of a sheet to 1 % */
 
 typedef struct verlet_state {
-    drape_arena arena;
     drape_system *system;
     const drape_model *model;
     const drape_motion *motion;
@@ -209,8 +208,6 @@ static void destroy(void **state)
     if (!s)
         return;
     drape_spectrum_destroy(&s->spectrum);
-    drape_arena arena = s->arena;
-    drape_arena_free(&arena);
     *state = NULL;
 }
 
@@ -248,10 +245,9 @@ static drape_status create_parts(drape_arena *arena, verlet_state *s)
     return status;
 }
 
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
-    drape_arena arena = drape_arena_of(ctx);
-    verlet_state *s = *state = drape_arena_take(&arena, 1, sizeof *s);
+    verlet_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
     *s = (verlet_state){.system = system,
@@ -265,8 +261,7 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
                                         .offset = values[PARAM_SURFACE_OFFSET],
                                         .friction_range = values[PARAM_FRICTION_RANGE],
                                         .friction_drag = values[PARAM_FRICTION_DRAG]};
-    const drape_status status = create_parts(&arena, s);
-    s->arena = arena;
+    const drape_status status = create_parts(arena, s);
     if (status)
         destroy(state);
     return status;
@@ -569,8 +564,7 @@ static void archive(void *state, drape_archive *a)
 
 static size_t bytes(const void *state)
 {
-    const verlet_state *s = state;
-    return s->arena.bytes + drape_spectrum_bytes(s->spectrum);
+    return drape_spectrum_bytes(((const verlet_state *)state)->spectrum);
 }
 
 const drape_integrator_ops drape_integrator_verlet = {

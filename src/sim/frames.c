@@ -1,8 +1,8 @@
 /*
  * frames.c: frame times are k / frame_rate. No step is shortened for a frame: between the states of a step,
  * positions are the cubic Hermite interpolant of both positions and velocities, of fourth order in h for
- * smooth motion. Where that leads through a collider or through cloth, the straight way is taken, and where that
- * does, too, the nearer of the two states.
+ * smooth motion. Where that leads through a collider or through cloth, the straight way is taken, and where
+ * that does, too, the nearer of the two states.
  */
 #include "sim/sim.h"
 
