@@ -5,7 +5,7 @@
  * H: 3 x 3, of measures that depend on the distance of two nodes, positive part, at each update.
  * C: of all other measures, bending above all: one scalar a pair of nodes, constant (scalar.h). Liu, Bouaziz & Kavan
  *    2017 take such a matrix for all terms; on stretching it holds the sheet back across itself, by thousands of
- *    times its inertia, and ten iterations do not undo that (projective.c).
+ *    times its inertia, and ten iterations do not undo that.
  * R: energies and dissipation that are of no measure, and contact, as they are.
  *
  * It is solved by conjugate gradients with two parts added: the inverse of the diagonal blocks, and the
