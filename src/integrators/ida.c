@@ -108,7 +108,7 @@ static const drape_param params[PARAM_COUNT] = {
 };
 
 typedef struct ida_state {
-    drape_context *ctx;
+    drape_arena *arena;
     drape_system *system;
     const drape_model *model;
     const drape_motion *motion;
@@ -194,8 +194,8 @@ static drape_status adopt_pattern(ida_state *s)
 {
     const drape_pattern *pattern = drape_system_pattern(s->system);
     if (s->dissipated) {
-        drape_free(s->ctx, s->damping);
-        s->damping = drape_alloc(s->ctx, (size_t)pattern->nonzeros, sizeof *s->damping);
+        drape_arena_release(s->arena, s->damping);
+        s->damping = drape_arena_take(s->arena, (size_t)pattern->nonzeros, sizeof *s->damping);
         if (!s->damping)
             return DRAPE_E_MEMORY;
     }
@@ -248,7 +248,7 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
     point.weight = cj;
     if (fit_pattern(s, &point))
         return -1;
-    drape_system_jacobian(s->system, &point, cj * cj, false, s->linear->values);
+    drape_system_jacobian(s->system, &point, cj * cj, 0, s->linear->values);
     s->part = takes_part(s);
     if (s->part)
         drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
@@ -304,26 +304,21 @@ static void destroy(void **state)
             N_VDestroy(vectors[i]);
     if (s->sun)
         SUNContext_Free(&s->sun);
-    double *arrays[] = {s->x, s->v, s->g, s->damping, s->reduced, s->dissipated};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        drape_free(s->ctx, arrays[i]);
-    drape_free(s->ctx, s);
     *state = NULL;
 }
 
-static bool create_arrays(ida_state *s)
+static void create_arrays(ida_state *s)
 {
     size_t nodes = 3 * (size_t)s->model->node_count;
-    bool dissipates = s->model->has_dissipation;
-    s->x = drape_alloc(s->ctx, nodes, sizeof(double));
-    s->v = drape_alloc(s->ctx, nodes, sizeof(double));
-    s->g = drape_alloc(s->ctx, nodes, sizeof(double));
-    s->reduced = drape_alloc(s->ctx, (size_t)s->n, sizeof(double));
-    if (dissipates) {
-        s->damping = drape_alloc(s->ctx, (size_t)drape_system_pattern(s->system)->nonzeros, sizeof(double));
-        s->dissipated = drape_alloc(s->ctx, nodes, sizeof(double));
-    }
-    return s->x && s->v && s->g && s->reduced && (!dissipates || (s->damping && s->dissipated));
+    s->x = drape_arena_take(s->arena, nodes, sizeof *s->x);
+    s->v = drape_arena_take(s->arena, nodes, sizeof *s->v);
+    s->g = drape_arena_take(s->arena, nodes, sizeof *s->g);
+    s->reduced = drape_arena_take(s->arena, (size_t)s->n, sizeof *s->reduced);
+    if (!s->model->has_dissipation)
+        return;
+    s->damping =
+        drape_arena_take(s->arena, (size_t)drape_system_pattern(s->system)->nonzeros, sizeof *s->damping);
+    s->dissipated = drape_arena_take(s->arena, nodes, sizeof *s->dissipated);
 }
 
 /* Derived defaults, and the weights that follow. */
@@ -347,7 +342,7 @@ static drape_status create_vectors(ida_state *s)
     s->weights = N_VNew_Serial(2 * s->n, s->sun);
     s->between = N_VNew_Serial(2 * s->n, s->sun);
     if (!s->y || !s->rate || !s->weights || !s->between)
-        return drape_fail_memory(s->ctx, 2 * (size_t)s->n * sizeof(double));
+        return drape_fail_memory(s->arena->ctx, 2 * (size_t)s->n * sizeof(double));
     N_VConst(0, s->y);
     N_VConst(0, s->rate);
     set_tolerances(s);
@@ -370,13 +365,13 @@ static bool configure(ida_state *s)
     return good;
 }
 
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
-    ida_state *s = drape_alloc(ctx, 1, sizeof *s);
-    *state = s;
+    drape_context *ctx = arena->ctx;
+    ida_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (ida_state){.ctx = ctx,
+    *s = (ida_state){.arena = arena,
                      .system = system,
                      .model = drape_system_model(system),
                      .motion = drape_system_motion(system),
@@ -385,7 +380,8 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
                      .from = NAN};
     s->n = 3 * (int64_t)s->model->free_count;
     memcpy(s->values, values, sizeof s->values);
-    drape_status status = create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
+    create_arrays(s);
+    drape_status status = drape_arena_status(arena);
     if (!status && (drape_sundials_context(&s->sun) || !(s->ida = IDACreate(s->sun))))
         status = drape_fail_memory(ctx, sizeof(void *));
     if (!status && s->n > 0)
@@ -403,8 +399,6 @@ static drape_status create(drape_context *ctx, drape_system *system, const doubl
         else
             drape_ida_clear(s->ida);
     }
-    if (status)
-        destroy(state);
     return status;
 }
 
@@ -715,12 +709,11 @@ static void archive(void *state, drape_archive *a)
 static size_t bytes(const void *state)
 {
     const ida_state *s = state;
-    size_t nodes = 3 * (size_t)s->model->node_count, n = (size_t)s->n,
-           values = (size_t)s->model->pattern.nonzeros;
+    size_t n = (size_t)s->n, values = (size_t)s->model->pattern.nonzeros;
     size_t order = isnan(s->values[PARAM_MAX_ORDER]) ? TIGHT_ORDER : (size_t)s->values[PARAM_MAX_ORDER];
     size_t vectors = 4 + order + 1 + 6; /* ours, the history of IDA, its scratch */
-    size_t doubles = (s->dissipated ? 4 : 3) * nodes + n + 2 * n * vectors + (s->damping ? 2 : 1) * values;
-    return doubles * sizeof(double) + (s->linear ? s->linear->ops->bytes(s->linear->state) : 0);
+    return (2 * n * vectors + values) * sizeof(double) +
+           (s->linear ? s->linear->ops->bytes(s->linear->state) : 0);
 }
 
 const drape_integrator_ops drape_integrator_ida = {

@@ -252,8 +252,9 @@ static drape_status create_parts(verlet_state *s)
     return status;
 }
 
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
+    drape_context *ctx = arena->ctx;
     verlet_state *s = drape_alloc(ctx, 1, sizeof *s);
     *state = s;
     if (!s)

@@ -68,9 +68,12 @@ static drape_status create_parts(drape_sim *sim, int threads)
         status = drape_system_add_contact(sim->system);
     if (!status)
         status = drape_heed(sim->ctx);
-    if (!status)
-        status = sim->chosen.integrator->create(sim->ctx, sim->system, sim->chosen.integrator_values,
-                                                &sim->integrator);
+    if (status)
+        return status;
+    const size_t before = sim->arena.bytes;
+    status = sim->chosen.integrator->create(&sim->arena, sim->system, sim->chosen.integrator_values,
+                                            &sim->integrator);
+    sim->integrator_bytes = sim->arena.bytes - before;
     return status;
 }
 
@@ -158,7 +161,7 @@ void drape_sim_destroy(drape_sim **out)
     if (!out || !*out)
         return;
     drape_sim *sim = *out;
-    if (sim->integrator)
+    if (sim->integrator && sim->chosen.integrator->destroy)
         sim->chosen.integrator->destroy(&sim->integrator);
     drape_system_destroy(&sim->system);
     drape_arena_free(&sim->arena);

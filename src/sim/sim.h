@@ -41,6 +41,7 @@ typedef struct drape_realtime_memory {
 struct drape_sim {
     drape_context *ctx;
     drape_arena arena;
+    size_t integrator_bytes; /* of the arena's, after create */
     const drape_model *model;
     drape_chosen chosen;
     drape_system *system;

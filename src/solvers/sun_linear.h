@@ -24,7 +24,6 @@ typedef struct drape_sun_linear {
     int64_t nonzeros;
     SUNLinearSolver solver;
     SUNMatrix matrix;
-    bool definite; /* the next factorisations refuse what is not positive definite, where the row can tell */
     drape_crew *crew;                   /* NULL: one thread */
     double tolerance;                   /* share of the residual that iterative rows may leave; 0: none */
     int64_t factorizations, iterations; /* of iterative rows; of direct ones, solves */
@@ -46,8 +45,9 @@ void drape_sun_linear_destroy(drape_sun_linear **linear);
  * was made for the pattern that it had. */
 void drape_sun_linear_archive(drape_sun_linear *linear, drape_archive *a, bool factors);
 
-/* Factors the values, time and work counted: what the SUNLinearSolver does. */
-drape_status drape_sun_linear_factor(drape_sun_linear *linear);
+/* Factors the values, time and work counted: what the SUNLinearSolver does. definite: refuses a matrix that is not
+ * positive definite with DRAPE_RETRY_LINEAR, if the solver can tell. */
+drape_status drape_sun_linear_factor(drape_sun_linear *linear, bool definite);
 
 /* x = A^-1 b with the factors there are, time and work counted: what the SUNLinearSolver does. */
 drape_status drape_sun_linear_solve(drape_sun_linear *linear, const double *b, double *x);

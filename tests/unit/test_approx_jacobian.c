@@ -1,5 +1,5 @@
-/* test_quasi.c: the coarse space, conjugate gradients, and the matrix that stands for a Jacobian. */
-#include "integrators/quasi.h"
+/* test_approx_jacobian.c: the coarse space, conjugate gradients, and the matrix that stands for a Jacobian. */
+#include "nonlinear/approx_jacobian.h"
 #include "rows/models.h"
 #include "solvers/pcg.h"
 #include "solvers/prolong.h"
@@ -187,8 +187,9 @@ END_TEST
 typedef struct state {
     scene s;
     drape_system *system;
-    drape_quasi *quasi;
-    drape_arena arena;
+    drape_approx_jacobian *jacobian;
+    drape_arena *arena;
+    drape_work work;
     drape_state at;
     drape_point point;
     size_t n;
@@ -201,9 +202,10 @@ static state open_state(int side, const char *terms)
     const drape_model *m = q.s.model;
     q.n = 3 * (size_t)m->free_count;
     ck_assert_int_eq(drape_system_create(q.s.ctx, m, 1, &q.system), DRAPE_OK);
-    q.arena = drape_arena_of(q.s.ctx);
-    ck_assert_int_eq(drape_state_create(&q.arena, m, &q.at), DRAPE_OK);
-    ck_assert_int_eq(drape_quasi_create(q.s.ctx, q.system, 0, &q.quasi), DRAPE_OK);
+    q.arena = drape_alloc(q.s.ctx, 1, sizeof *q.arena);
+    *q.arena = drape_arena_of(q.s.ctx);
+    ck_assert_int_eq(drape_state_create(q.arena, m, &q.at), DRAPE_OK);
+    ck_assert_int_eq(drape_approx_jacobian_create(q.arena, q.system, 0, &q.jacobian), DRAPE_OK);
     q.point = (drape_point){.x = q.at.x, .v = q.at.v, .internal = q.at.internal, .weight = 60};
     q.x = calloc(q.n, sizeof *q.x);
     q.y = calloc(q.n, sizeof *q.y);
@@ -213,10 +215,11 @@ static state open_state(int side, const char *terms)
 
 static void close_state(state *q)
 {
-    drape_quasi_destroy(&q->quasi);
-    drape_quasi_destroy(&q->quasi);
+    drape_approx_jacobian_destroy(&q->jacobian);
+    drape_approx_jacobian_destroy(&q->jacobian);
     drape_system_destroy(&q->system);
-    drape_arena_free(&q->arena);
+    drape_arena_free(q->arena);
+    drape_free(q->s.ctx, q->arena);
     free(q->x);
     free(q->y);
     free(q->values);
@@ -231,11 +234,11 @@ static double mismatch(state *q, double mass_weight, const double *direction)
     double error = 0, size = 0;
     for (size_t i = 0; i < q->n; i++)
         q->x[i] = random_number(&seed) * (direction ? direction[i % 3] : 1);
-    ck_assert_int_eq(drape_quasi_update(q->quasi, &q->point, mass_weight), DRAPE_OK);
-    drape_quasi_multiply(q->quasi, q->x, q->y);
+    ck_assert_int_eq(drape_approx_jacobian_update(q->jacobian, &q->point, mass_weight, &q->work), DRAPE_OK);
+    drape_approx_jacobian_multiply(q->jacobian, q->x, q->y);
     for (size_t i = 0; i < q->n; i++)
         size = fmax(size, fabs(q->y[i]));
-    drape_system_jacobian(q->system, &q->point, mass_weight, true, q->values);
+    drape_system_jacobian(q->system, &q->point, mass_weight, 1, q->values);
     for (int64_t c = 0; c < m->pattern.n; c++)
         for (int64_t k = m->pattern.column[c]; k < m->pattern.column[c + 1]; k++)
             q->y[m->pattern.row[k]] -= q->values[k] * q->x[c];
@@ -285,12 +288,12 @@ START_TEST(it_is_solved_in_few_iterations_at_any_size)
         uint64_t seed = 8;
         for (size_t i = 0; i < 3 * (size_t)q.s.model->node_count; i++)
             q.at.x[i] *= 1.01;
-        ck_assert_int_eq(drape_quasi_update(q.quasi, &q.point, 3600), DRAPE_OK);
+        ck_assert_int_eq(drape_approx_jacobian_update(q.jacobian, &q.point, 3600, &q.work), DRAPE_OK);
         for (size_t i = 0; i < q.n; i++)
             b[i] = random_number(&seed);
-        int iterations = drape_quasi_solve(q.quasi, b, q.x, 1e-6, 500);
+        int iterations = drape_approx_jacobian_solve(q.jacobian, b, q.x, 1e-6, 500);
         ck_assert_msg(iterations <= 60, "%d nodes a side: %d iterations", side, iterations);
-        drape_quasi_multiply(q.quasi, q.x, q.y);
+        drape_approx_jacobian_multiply(q.jacobian, q.x, q.y);
         for (size_t i = 0; i < q.n; i++) {
             xax += q.x[i] * q.y[i];
             yax += b[i] * q.y[i];
@@ -300,7 +303,7 @@ START_TEST(it_is_solved_in_few_iterations_at_any_size)
         ck_assert_double_gt(xax, 0);
         ck_assert_double_lt(left, 1e-6 * all); /* in the plain norm: the condition of P is below 1e6 */
         double *ab = calloc(q.n, sizeof *ab);
-        drape_quasi_multiply(q.quasi, b, ab);
+        drape_approx_jacobian_multiply(q.jacobian, b, ab);
         for (size_t i = 0; i < q.n; i++)
             xay += q.x[i] * ab[i];
         ck_assert_double_eq_tol(xay, yax, 1e-10 * fabs(yax) + 1e-10);
@@ -311,7 +314,7 @@ START_TEST(it_is_solved_in_few_iterations_at_any_size)
 }
 END_TEST
 
-SUITE("quasi", coarse_functions_are_a_partition_of_unity, restriction_is_the_transpose,
+SUITE("approx_jacobian", coarse_functions_are_a_partition_of_unity, restriction_is_the_transpose,
       nodes_without_neighbours_are_alone, conjugate_gradients_end_with_the_eigenvalues,
       negative_curvature_is_told, without_bending_it_is_the_positive_jacobian,
       across_a_flat_sheet_bending_is_exact, it_is_solved_in_few_iterations_at_any_size)
