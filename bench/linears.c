@@ -54,7 +54,7 @@ static void fill(problem *q, matrix_kind kind)
     drape_system *system = NULL;
     drape_arena arena = drape_arena_of(q->ctx);
     drape_state state = {0};
-    if (drape_system_create(q->ctx, m, 1, &system) || drape_state_create(&arena, m, &state))
+    if (drape_system_create(&arena, m, 1, &system) || drape_state_create(&arena, m, &state))
         bench_fail(q->ctx, "the state");
     const double edge = m->edge_length[0];
     for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
@@ -67,8 +67,8 @@ static void fill(problem *q, matrix_kind kind)
         add_friction(&m->pattern, q->values);
     for (int64_t i = 0; i < m->pattern.n; i++)
         q->b[i] = cos((double)i);
-    drape_arena_free(&arena);
     drape_system_destroy(&system);
+    drape_arena_free(&arena);
 }
 
 static problem open_problem(int side, matrix_kind kind)
@@ -108,12 +108,13 @@ static times measure(problem *q, const drape_linear_ops *ops)
 {
     times t = {INFINITY, INFINITY, INFINITY, INFINITY, 0};
     void *solver = NULL;
+    drape_arena arena = drape_arena_of(q->ctx);
     double begin = drape_clock_cpu_seconds();
     do {
-        if (solver)
-            ops->destroy(&solver);
+        drape_linear_destroy(ops, &solver);
+        drape_arena_free(&arena);
         double start = drape_clock_cpu_seconds();
-        if (ops->create(q->ctx, &q->model->pattern, &solver))
+        if (ops->create(&arena, &q->model->pattern, &solver))
             bench_fail(q->ctx, "%s", ops->name);
         keep_least(&t.create, start);
         start = drape_clock_cpu_seconds();
@@ -132,8 +133,9 @@ static times measure(problem *q, const drape_linear_ops *ops)
             bench_fail(q->ctx, "%s cannot solve", ops->name);
         keep_least(&t.solve, start);
     } while (drape_clock_cpu_seconds() - begin < BUDGET);
-    t.bytes = ops->bytes(solver);
-    ops->destroy(&solver);
+    t.bytes = arena.bytes + drape_linear_bytes(ops, solver);
+    drape_linear_destroy(ops, &solver);
+    drape_arena_free(&arena);
     return t;
 }
 

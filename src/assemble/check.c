@@ -346,7 +346,7 @@ static void move(checker *c, double s, double weight)
 static drape_status fit(checker *c, const drape_point *point)
 {
     bool changed;
-    drape_status status = drape_system_fit(c->system, point, &changed);
+    drape_status status = drape_system_extend_pattern(c->system, point, &changed);
     size_t nonzeros = (size_t)drape_system_pattern(c->system)->nonzeros;
     if (status || (c->values && nonzeros <= c->room))
         return status;

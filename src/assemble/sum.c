@@ -14,7 +14,6 @@ typedef struct share {
 } share;
 
 struct drape_summer {
-    drape_context *ctx;
     const drape_model *model;
     drape_crew *crew; /* of the system; NULL: none */
     int threads;
@@ -34,7 +33,7 @@ static int32_t elements_in(const drape_term *term, int32_t block)
     return left < DRAPE_BLOCK ? left : DRAPE_BLOCK;
 }
 
-/* ---- Making and freeing ---- */
+/* ---- Making ---- */
 
 static reach reach_of(const drape_term *term, int32_t block)
 {
@@ -48,50 +47,28 @@ static reach reach_of(const drape_term *term, int32_t block)
     return r;
 }
 
-static drape_status create_reaches(drape_summer *s)
+static void find_reaches(drape_arena *arena, drape_summer *s)
 {
-    s->reaches = drape_alloc(s->ctx, (size_t)s->model->term_count, sizeof *s->reaches);
-    if (!s->reaches)
-        return DRAPE_E_MEMORY;
-    for (int32_t i = 0; i < s->model->term_count; i++) {
+    s->reaches = drape_arena_take(arena, (size_t)s->model->term_count, sizeof *s->reaches);
+    for (int32_t i = 0; s->reaches && i < s->model->term_count; i++) {
         const drape_term *term = &s->model->terms[i];
-        s->reaches[i] = drape_alloc(s->ctx, (size_t)block_count(term), sizeof **s->reaches);
-        if (!s->reaches[i])
-            return DRAPE_E_MEMORY;
-        for (int32_t k = 0; k < block_count(term); k++)
+        s->reaches[i] = drape_arena_take(arena, (size_t)block_count(term), sizeof **s->reaches);
+        for (int32_t k = 0; s->reaches[i] && k < block_count(term); k++)
             s->reaches[i][k] = reach_of(term, k);
     }
-    return DRAPE_OK;
 }
 
-drape_status drape_summer_create(drape_context *ctx, const drape_model *model, drape_crew *crew,
+drape_status drape_summer_create(drape_arena *arena, const drape_model *model, drape_crew *crew,
                                  drape_summer **out)
 {
-    drape_summer *s = drape_alloc(ctx, 1, sizeof *s);
-    *out = s;
+    drape_summer *s = *out = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (drape_summer){.ctx = ctx, .model = model, .crew = crew, .threads = drape_crew_threads(crew)};
-    s->blocks = drape_alloc(ctx, (size_t)s->threads, sizeof *s->blocks);
-    drape_status status = s->blocks ? DRAPE_OK : DRAPE_E_MEMORY;
-    if (!status && s->threads > 1)
-        status = create_reaches(s);
-    if (status)
-        drape_summer_destroy(out);
-    return status;
-}
-
-void drape_summer_destroy(drape_summer **summer)
-{
-    drape_summer *s = *summer;
-    if (!s)
-        return;
-    for (int32_t i = 0; s->reaches && i < s->model->term_count; i++)
-        drape_free(s->ctx, s->reaches[i]);
-    drape_free(s->ctx, s->reaches);
-    drape_free(s->ctx, s->blocks);
-    drape_free(s->ctx, s);
-    *summer = NULL;
+    *s = (drape_summer){.model = model, .crew = crew, .threads = drape_crew_threads(crew)};
+    s->blocks = drape_arena_take(arena, (size_t)s->threads, sizeof *s->blocks);
+    if (s->threads > 1)
+        find_reaches(arena, s);
+    return drape_arena_status(arena);
 }
 
 void drape_summer_leave_constraints(drape_summer *s)
@@ -102,14 +79,6 @@ void drape_summer_leave_constraints(drape_summer *s)
 bool drape_summer_leaves(const drape_summer *s, const drape_term *term)
 {
     return s->unconstrained && term->ops->constraint;
-}
-
-size_t drape_summer_bytes(const drape_summer *s)
-{
-    size_t bytes = sizeof *s + (size_t)s->threads * sizeof *s->blocks;
-    for (int32_t i = 0; s->reaches && i < s->model->term_count; i++)
-        bytes += sizeof *s->reaches + (size_t)block_count(&s->model->terms[i]) * sizeof **s->reaches;
-    return bytes;
 }
 
 /* ---- Adding a block ---- */

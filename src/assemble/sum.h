@@ -23,9 +23,8 @@ typedef struct drape_sums {
 } drape_sums;
 
 /* crew outlives it; NULL: one thread. Errors: DRAPE_E_MEMORY. */
-drape_status drape_summer_create(drape_context *ctx, const drape_model *model, drape_crew *crew,
+drape_status drape_summer_create(drape_arena *arena, const drape_model *model, drape_crew *crew,
                                  drape_summer **out);
-void drape_summer_destroy(drape_summer **summer);
 
 /* From here on terms that are a constraint are left out. */
 void drape_summer_leave_constraints(drape_summer *summer);
@@ -43,7 +42,5 @@ void drape_summer_stress(drape_summer *summer, const drape_request *want);
 
 /* Of a term of pairs: the block of each element, xx xy xz yy yz zz, as (element count x 6). want->hessian is set. */
 void drape_summer_pairs(drape_summer *summer, const drape_term *term, const drape_request *want, double *h);
-
-size_t drape_summer_bytes(const drape_summer *summer);
 
 #endif

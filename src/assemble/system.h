@@ -13,7 +13,7 @@
 
 #include <stdatomic.h>
 
-#include "assemble/pull.h"
+#include "assemble/drag_spring.h"
 #include "assemble/state.h"
 #include "assemble/wind.h"
 #include "base/crew.h"
@@ -33,10 +33,11 @@ typedef struct drape_point {
     double span[2];         /* [s] over which their velocity is taken; equal: they rest */
 } drape_point;
 
-/* Workspace for a model; threads >= 1. */
-drape_status drape_system_create(drape_context *ctx, const drape_model *model, int threads,
+/* Workspace for a model, all of it of the arena but the threads; threads >= 1. Errors: DRAPE_E_MEMORY; then *out is
+ * NULL. */
+drape_status drape_system_create(drape_arena *arena, const drape_model *model, int threads,
                                  drape_system **out);
-void drape_system_destroy(drape_system **system);
+void drape_system_destroy(drape_system **system); /* ends the threads; before the arena is freed */
 
 /* From here on what stands for a constraint has no part in forces, energies and checks: for integrators that keep
  * constraints by moving nodes. */
@@ -48,8 +49,8 @@ drape_crew *drape_system_crew(const drape_system *system);
 
 /* A spring that belongs to the system from now on, its energy to the elastic one; of stiffness 0: none. Its node is
  * free. */
-void drape_system_set_pull(drape_system *system, const drape_pull *pull);
-const drape_pull *drape_system_pull(const drape_system *system);
+void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *pull);
+const drape_drag_spring *drape_system_drag_spring(const drape_system *system);
 
 /* Where pins and colliders are, on the tracks of the model and on the ways of a host. */
 const drape_motion *drape_system_motion(const drape_system *system);
@@ -60,8 +61,9 @@ drape_motion *drape_system_steer(drape_system *system);
 void drape_system_set_push(drape_system *system, const double *force);
 double drape_system_push_work(const drape_system *system, const double *x, const double *y);
 
-/* A medium that moves, from now on. Errors: DRAPE_E_MEMORY. */
-drape_status drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user);
+/* A medium that moves, from now on, where the model has a term that feels it; NULL: it rests. */
+void drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user);
+void drape_system_copy_wind(drape_system *system, const drape_system *from);
 
 /* Adds what a host does to nodes at x, pull and push, to g (node_count x 3): a part of drape_system_force. */
 void drape_system_add_loads(const drape_system *system, const double *x, double *g);
@@ -83,19 +85,16 @@ double drape_system_clock(const drape_system *system);
  * function of the host's. */
 void drape_system_archive(drape_system *system, drape_archive *a);
 
-/* The winds of two systems of one model change places. */
-void drape_system_swap_winds(drape_system *system, drape_system *other);
-
 /* A step begins at a state: contact is compared with it until the next. Errors: DRAPE_E_MEMORY. */
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
 
 /* It has ended: what is asked between steps leaves no trace in the next one. */
 void drape_system_rest(drape_system *system);
 
-/* The sparsity of its matrices. Contact between cloths changes it: drape_system_fit makes it hold what acts
+/* The sparsity of its matrices. Contact between cloths changes it: drape_system_extend_pattern makes it hold what acts
  * at a point; *changed: it is another one since, in the same place. Errors: DRAPE_E_MEMORY. */
 const drape_pattern *drape_system_pattern(const drape_system *system);
-drape_status drape_system_fit(drape_system *system, const drape_point *point, bool *changed);
+drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed);
 
 /* The first failure since drape_system_begin of what has no status of its own: memory for contacts, cancelling. */
 drape_status drape_system_status(const drape_system *system);
@@ -141,13 +140,13 @@ double drape_system_contact_energy(drape_system *system, const drape_point *poin
 void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy);
 
 /* Contact alone, for checks: g (node_count x 3), of the energy or with friction too, and its J in values
- * (pattern.nonzeros, of drape_system_fit at this point), are overwritten; either may be NULL. */
+ * (pattern.nonzeros, of drape_system_extend_pattern at this point), are overwritten; either may be NULL. */
 void drape_system_contact_part(drape_system *system, const drape_point *point, bool friction, double *g,
                                double *values);
 
 /* The largest fraction of the way from nodes x to y on which no two pieces pass through each other, colliders
  * resting where they are at time t. */
-double drape_system_way(drape_system *system, const double *x, const double *y, double t);
+double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t);
 
 /* q of all measures (measure_count). */
 void drape_system_measures(drape_system *system, const drape_point *point, double *q);
@@ -183,7 +182,5 @@ drape_status drape_system_check_contact(drape_system *system, const double *x, d
  * magnitude, or the first that is not finite. */
 drape_worst drape_system_worst_dof(const drape_system *system, const double *free_vector, const char *what,
                                    double limit);
-
-size_t drape_system_bytes(const drape_system *system);
 
 #endif

@@ -6,8 +6,6 @@
  */
 #include "base/crew.h"
 
-#include "base/context.h"
-
 #include <assert.h>
 #include <pthread.h>
 #include <sched.h>
@@ -23,7 +21,6 @@
 #define APART        64 /* bytes: in one line of the cache, what one thread writes is taken from all others */
 
 struct drape_crew {
-    drape_context *ctx;
     int threads, helpers;
     pthread_t *helper;    /* (threads - 1), of which helpers run */
     pthread_mutex_t lock; /* of who goes to sleep */
@@ -43,11 +40,6 @@ struct drape_crew {
 int drape_crew_threads(const drape_crew *crew)
 {
     return crew ? crew->threads : 1;
-}
-
-size_t drape_crew_bytes(const drape_crew *crew)
-{
-    return crew ? sizeof *crew + (size_t)(crew->threads - 1) * sizeof *crew->helper : 0;
 }
 
 /* ---- Rounds ---- */
@@ -124,19 +116,15 @@ static void start_helpers(drape_crew *c)
     pthread_sigmask(SIG_SETMASK, &before, NULL);
 }
 
-drape_status drape_crew_create(drape_context *ctx, int threads, drape_crew **out)
+drape_status drape_crew_create(drape_arena *arena, int threads, drape_crew **out)
 {
     *out = NULL;
     if (threads <= 1)
         return DRAPE_OK;
-    drape_crew *c = drape_alloc(ctx, 1, sizeof *c);
-    pthread_t *helper = drape_alloc(ctx, (size_t)threads - 1, sizeof *helper);
-    if (!c || !helper) {
-        drape_free(ctx, helper);
-        drape_free(ctx, c);
+    drape_crew *c = drape_arena_take(arena, 1, sizeof *c);
+    pthread_t *helper = drape_arena_take(arena, (size_t)threads - 1, sizeof *helper);
+    if (!c || !helper)
         return DRAPE_E_MEMORY;
-    }
-    c->ctx = ctx;
     c->threads = threads;
     c->helper = helper;
     pthread_mutex_init(&c->lock, NULL);
@@ -166,8 +154,6 @@ void drape_crew_destroy(drape_crew **crew)
     pthread_cond_destroy(&c->work);
     pthread_cond_destroy(&c->done);
     pthread_mutex_destroy(&c->lock);
-    drape_free(c->ctx, c->helper);
-    drape_free(c->ctx, c);
     *crew = NULL;
 }
 

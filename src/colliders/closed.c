@@ -108,6 +108,6 @@ drape_status drape_shape_read_mesh(drape_collider_shape *shape, const char *para
         status = check_mesh(builder->ctx, &source, &mesh);
     if (!status)
         status = copy_mesh(&mesh, shape);
-    drape_mesh_free(builder->ctx, &mesh);
+    drape_mesh_free(&mesh);
     return status;
 }

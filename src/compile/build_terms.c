@@ -43,7 +43,7 @@ drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t eleme
         drape_arena_take(arena, (size_t)element_count * (size_t)rest_count, sizeof *builder->rest);
     for (size_t i = 0; builder->node && i < (size_t)element_count * (size_t)el->nodes; i++)
         builder->node[i] = -1;
-    return builder->node && builder->rest ? DRAPE_OK : DRAPE_E_MEMORY;
+    return drape_arena_status(arena);
 }
 
 void drape_term_anchor(drape_term_builder *builder)

@@ -55,7 +55,7 @@ static drape_status name_collider(drape_model *model, const char *pointer, const
             return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "two colliders have the name \"%.60s\"",
                                  wanted);
     to->name = drape_arena_text(&model->arena, wanted);
-    return to->name ? DRAPE_OK : DRAPE_E_MEMORY;
+    return drape_arena_status(&model->arena);
 }
 
 static drape_status take_friction(drape_model *model, const char *pointer, double friction,

@@ -49,8 +49,9 @@ static bool take_arrays(drape_contact *c)
            c->steps_searched;
 }
 
-drape_status drape_contact_create(drape_context *ctx, const drape_motion *motion, drape_contact **out)
+drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion, drape_contact **out)
 {
+    drape_context *ctx = arena->ctx;
     const drape_model *model = motion->model;
     *out = NULL;
     if (model->collider_count == 0 && !model->contact.self)

@@ -24,7 +24,7 @@ typedef struct drape_contact_at {
 } drape_contact_at;
 
 /* *out is NULL for a model without colliders and without self-contact. Errors: DRAPE_E_MEMORY. */
-drape_status drape_contact_create(drape_context *ctx, const drape_motion *motion, drape_contact **out);
+drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion, drape_contact **out);
 void drape_contact_destroy(drape_contact **contact);
 size_t drape_contact_bytes(const drape_contact *contact);
 double drape_contact_seconds(const drape_contact *contact);        /* spent in all functions here */

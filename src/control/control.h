@@ -34,8 +34,8 @@ typedef struct drape_controller_ops {
     const char *name, *summary, *reference;
     const drape_param *params;
     int param_count;
-    bool own_steps; /* steps follow h_next, not the counted grid of dt */
-    int pasts;      /* how many states before in it wants, at most 2 */
+    bool own_steps;    /* steps follow h_next, not the counted grid of dt */
+    int history_depth; /* how many states before in it wants, at most 2 */
     drape_verdict (*judge)(const double *values, drape_trial *trial);
 } drape_controller_ops;
 

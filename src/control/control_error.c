@@ -177,6 +177,6 @@ const drape_controller_ops drape_controller_error = {
     .params = params,
     .param_count = PARAM_COUNT,
     .own_steps = true,
-    .pasts = 2,
+    .history_depth = 2,
     .judge = judge,
 };

@@ -199,14 +199,14 @@ static drape_status adopt_pattern(ida_state *s)
         if (!s->damping)
             return DRAPE_E_MEMORY;
     }
-    return drape_sun_linear_adopt(s->linear, pattern);
+    return drape_sun_linear_extend_pattern(s->linear, pattern);
 }
 
 /* Contact may couple what it did not before. */
 static drape_status fit_pattern(ida_state *s, const drape_point *point)
 {
     bool changed;
-    s->fitted = drape_system_fit(s->system, point, &changed);
+    s->fitted = drape_system_extend_pattern(s->system, point, &changed);
     s->linear->stale |= changed;
     if (!s->fitted && s->linear->stale)
         s->fitted = adopt_pattern(s);
@@ -387,7 +387,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     if (!status && s->n > 0)
         status = create_vectors(s);
     if (!status && s->n > 0)
-        status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
+        status = drape_sun_linear_create(arena, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
                                          drape_system_pattern(s->system), drape_system_crew(s->system),
                                          &s->linear);
     if (!status && s->n > 0) {
@@ -709,11 +709,10 @@ static void archive(void *state, drape_archive *a)
 static size_t bytes(const void *state)
 {
     const ida_state *s = state;
-    size_t n = (size_t)s->n, values = (size_t)s->model->pattern.nonzeros;
+    size_t n = (size_t)s->n;
     size_t order = isnan(s->values[PARAM_MAX_ORDER]) ? TIGHT_ORDER : (size_t)s->values[PARAM_MAX_ORDER];
     size_t vectors = 4 + order + 1 + 6; /* ours, the history of IDA, its scratch */
-    return (2 * n * vectors + values) * sizeof(double) +
-           (s->linear ? s->linear->ops->bytes(s->linear->state) : 0);
+    return 2 * n * vectors * sizeof(double) + (s->linear ? drape_sun_linear_bytes(s->linear) : 0);
 }
 
 const drape_integrator_ops drape_integrator_ida = {

@@ -3,10 +3,12 @@
 #define DRAPE_IO_EXPORT_H
 
 #include "base/archive.h"
+#include "base/arena.h"
 #include "io/file.h"
 
 /* What is written where, known before the first frame. All of it lives until close. */
 typedef struct drape_export_def {
+    drape_arena *arena; /* for the memory that open takes */
     const drape_model *model;
     const char *folder;  /* without a slash at its end */
     double frame_rate;   /* [1/s] */

@@ -254,18 +254,19 @@ static drape_status glb_check(drape_context *ctx, const char *pointer, const dra
         frames, nodes, bytes, MOST_FRAMES);
 }
 
-static drape_status take_rooms(drape_context *ctx, const drape_export_def *def, glb_state *glb)
+static drape_status take_rooms(const drape_export_def *def, glb_state *glb)
 {
+    drape_arena *arena = def->arena;
     glb->def = def;
     glb->room = (uint32_t)def->most_frames;
     glb->json_size = FIXED_ROOM + (size_t)glb->room * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
-    glb->json = drape_alloc(ctx, glb->json_size, 1);
+    glb->json = drape_arena_take(arena, glb->json_size, 1);
     size_t count = 3 * (size_t)drape_model_node_count(def->model);
-    glb->base = drape_alloc(ctx, count, sizeof *glb->base);
-    glb->upright = drape_alloc(ctx, count, sizeof *glb->upright);
-    glb->normal = drape_alloc(ctx, count, sizeof *glb->normal);
-    glb->times = drape_alloc(ctx, glb->room, sizeof *glb->times);
-    if (!glb->json || !glb->base || !glb->upright || !glb->normal || !glb->times)
+    glb->base = drape_arena_take(arena, count, sizeof *glb->base);
+    glb->upright = drape_arena_take(arena, count, sizeof *glb->upright);
+    glb->normal = drape_arena_take(arena, count, sizeof *glb->normal);
+    glb->times = drape_arena_take(arena, glb->room, sizeof *glb->times);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     make_json(glb);
     return DRAPE_OK;
@@ -273,7 +274,7 @@ static drape_status take_rooms(drape_context *ctx, const drape_export_def *def, 
 
 static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
-    drape_status status = take_rooms(ctx, def, state);
+    drape_status status = take_rooms(def, state);
     return status ? status : drape_export_begin(ctx, def->folder, FILE_NAME, &((glb_state *)state)->file);
 }
 
@@ -506,7 +507,7 @@ static drape_status glb_resume(drape_context *ctx, const drape_export_def *def, 
 {
     glb_state *glb = state;
     (void)frames;
-    drape_status status = take_rooms(ctx, def, glb);
+    drape_status status = take_rooms(def, glb);
     if (status)
         return status;
     glb_archive(glb, a);
@@ -540,14 +541,10 @@ static drape_status glb_sync(void *state)
 static drape_status glb_close(drape_context *ctx, void *state)
 {
     glb_state *glb = state;
+    (void)ctx;
     drape_status status = glb->frames > 1 && glb->live ? write_animation(glb) : DRAPE_OK;
     drape_status closing = drape_file_close(&glb->file);
     drape_file_destroy(&glb->file);
-    drape_free(ctx, glb->json);
-    drape_free(ctx, glb->base);
-    drape_free(ctx, glb->upright);
-    drape_free(ctx, glb->normal);
-    drape_free(ctx, glb->times);
     return status ? status : closing;
 }
 

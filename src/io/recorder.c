@@ -25,6 +25,7 @@ typedef struct output {
 
 struct drape_recorder {
     drape_context *ctx;
+    drape_arena arena;
     drape_sim *sim;
     char *folder;         /* without a slash at its end */
     drape_export_def def; /* of the formats */
@@ -263,19 +264,17 @@ static int64_t most_frames(const drape_sim *sim)
     return counted < MOST_FRAMES ? (int64_t)counted + 3 : MOST_FRAMES;
 }
 
-static drape_export_def def_of(const drape_sim *sim, const char *folder)
+static drape_export_def def_of(const drape_sim *sim)
 {
-    return (drape_export_def){.model = sim->model,
-                              .folder = folder,
-                              .frame_rate = sim->frame_rate,
-                              .most_frames = most_frames(sim)};
+    return (drape_export_def){
+        .model = sim->model, .frame_rate = sim->frame_rate, .most_frames = most_frames(sim)};
 }
 
 drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, const char *pointer,
                                   const char *format)
 {
     const drape_exporter_ops *ops;
-    const drape_export_def def = def_of(sim, NULL);
+    const drape_export_def def = def_of(sim);
     drape_status status = drape_exporter_find(ctx, pointer, format, &ops);
     return status || !ops->check ? status : ops->check(ctx, pointer, &def);
 }
@@ -290,7 +289,7 @@ static bool is_chosen(const drape_recorder *r, const drape_exporter_ops *ops)
 
 static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *def)
 {
-    r->outputs = drape_alloc(r->ctx, def->format_count, sizeof *r->outputs);
+    r->outputs = drape_arena_take(&r->arena, def->format_count, sizeof *r->outputs);
     if (!r->outputs)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < def->format_count; i++) {
@@ -304,7 +303,7 @@ static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *
             continue;
         output *o = &r->outputs[r->output_count++];
         o->ops = ops;
-        o->state = drape_alloc(r->ctx, 1, ops->state_size);
+        o->state = drape_arena_take(&r->arena, 1, ops->state_size);
         if (!o->state)
             return DRAPE_E_MEMORY;
     }
@@ -320,16 +319,16 @@ static drape_status take_rooms(drape_recorder *r)
         fields = fields || r->outputs[i].ops->wants_fields;
         turns = turns || (model->z_up && !r->outputs[i].ops->y_up);
     }
-    if (fields && !(r->fields = drape_alloc(r->ctx, nodes + 2 * triangles, sizeof *r->fields)))
-        return DRAPE_E_MEMORY;
-    if (turns && !(r->turned = drape_alloc(r->ctx, 6 * nodes, sizeof *r->turned)))
-        return DRAPE_E_MEMORY;
-    return DRAPE_OK;
+    if (fields)
+        r->fields = drape_arena_take(&r->arena, nodes + 2 * triangles, sizeof *r->fields);
+    if (turns)
+        r->turned = drape_arena_take(&r->arena, 6 * nodes, sizeof *r->turned);
+    return drape_arena_status(&r->arena);
 }
 
 static drape_status make_folder(drape_recorder *r, const char *folder)
 {
-    r->folder = drape_copy_text(r->ctx, folder);
+    r->folder = drape_arena_text(&r->arena, folder);
     if (!r->folder)
         return DRAPE_E_MEMORY;
     for (size_t n = strlen(r->folder); n > 1 && r->folder[n - 1] == '/'; n--)
@@ -401,7 +400,9 @@ static drape_status prepare_checkpoints(drape_recorder *r, const drape_recorder_
 {
     r->every = def->checkpoint_every;
     r->start = def->start;
-    r->def = def_of(r->sim, r->folder);
+    r->def = def_of(r->sim);
+    r->def.arena = &r->arena;
+    r->def.folder = r->folder;
     r->def.durable = def->checkpoints;
     if (!def->checkpoints)
         return DRAPE_OK;
@@ -455,6 +456,7 @@ static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recor
     if (!r)
         return DRAPE_E_MEMORY;
     r->ctx = ctx;
+    r->arena = drape_arena_of(ctx);
     r->sim = sim;
     scope s = scope_enter();
     note(r, set_up(r, def, a));
@@ -529,15 +531,10 @@ void drape_recorder_destroy(drape_recorder **recorder)
         return;
     drape_recorder *r = *recorder;
     close_files(r);
-    for (size_t i = 0; i < r->output_count; i++)
-        drape_free(r->ctx, r->outputs[i].state);
-    drape_free(r->ctx, r->outputs);
-    drape_free(r->ctx, r->fields);
-    drape_free(r->ctx, r->turned);
     drape_file_destroy(&r->steps);
     drape_file_destroy(&r->energies);
     drape_file_destroy(&r->checkpoint);
-    drape_free(r->ctx, r->folder);
+    drape_arena_free(&r->arena);
     drape_free(r->ctx, r);
     *recorder = NULL;
 }

@@ -3,10 +3,11 @@
 #ifndef DRAPE_MESH_MESH_H
 #define DRAPE_MESH_MESH_H
 
-#include "base/context.h"
+#include "base/arena.h"
 
-/* One mesh. Arrays are owned; all numbers are 0-based and local to the mesh. */
+/* One mesh. All numbers are 0-based and local to the mesh. */
 typedef struct drape_mesh {
+    drape_arena arena; /* holds the arrays */
     int32_t node_count, triangle_count, edge_count, hinge_count;
     int32_t rows, columns;  /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
     bool rectangular;       /* a grid whose cells are rectangles before the transform */
@@ -104,7 +105,7 @@ drape_status drape_mesh_validate_nodes(drape_context *ctx, const drape_mesh_sour
                                        const drape_mesh *mesh);
 
 /* Areas, lengths, lumped node areas. */
-drape_status drape_mesh_measure(drape_context *ctx, drape_mesh *mesh);
+drape_status drape_mesh_measure(drape_mesh *mesh);
 
 /* All of it: source, transform, validate, connect, measure. pointer names the mesh: "/cloth/0/mesh"; folder
  * is the one that a relative file is in, NULL for the working directory. *mesh is overwritten; it is empty on
@@ -112,8 +113,8 @@ drape_status drape_mesh_measure(drape_context *ctx, drape_mesh *mesh);
 drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
                              const char *folder, drape_mesh *mesh);
 /* Frees what only the building of terms needs: edge_triangle, triangle_edge and the hinges. Their pointers become NULL. */
-void drape_mesh_drop_topology(drape_context *ctx, drape_mesh *mesh);
+void drape_mesh_drop_topology(drape_mesh *mesh);
 
-void drape_mesh_free(drape_context *ctx, drape_mesh *mesh); /* leaves it empty; an empty one is fine */
+void drape_mesh_free(drape_mesh *mesh); /* leaves it empty; an empty one is fine */
 
 #endif

@@ -10,28 +10,25 @@
 
 /* A cubic from its first moment to its last, at rest before and after: x and v at both. x is a position of a pin, a
  * displacement of a collider. */
-typedef struct drape_way {
+typedef struct drape_path {
     bool given;     /* else the track counts */
     bool smooth;    /* its first velocity is that which led there: no kink */
     double t[2];    /* [s] increasing, or equal: at rest at x[1] for good */
     double x[2][3]; /* [m] */
     double v[2][3]; /* [m/s] */
-} drape_way;
+} drape_path;
 
 typedef struct drape_motion {
-    drape_context *ctx;
     const drape_model *model;
-    int32_t moved_count;     /* pinned nodes with a track or a way */
-    int32_t *moved_node;     /* (as many as are pinned) */
-    int32_t *moved_track;    /* the same; -1: none */
-    int32_t *place;          /* (node_count) number among the moved ones, -1: none */
-    drape_way *pin_way;      /* (as many as are pinned) */
-    drape_way *collider_way; /* (collider_count) */
+    int32_t moved_count;       /* pinned nodes with a track or a way */
+    int32_t *moved_node;       /* (as many as are pinned) */
+    int32_t *moved_track;      /* the same; -1: none */
+    int32_t *place;            /* (node_count) number among the moved ones, -1: none */
+    drape_path *pin_path;      /* (as many as are pinned) */
+    drape_path *collider_path; /* (collider_count) */
 } drape_motion;
 
-drape_status drape_motion_create(drape_context *ctx, const drape_model *model, drape_motion **out);
-void drape_motion_destroy(drape_motion **motion);
-size_t drape_motion_bytes(const drape_motion *motion);
+drape_status drape_motion_create(drape_arena *arena, const drape_model *model, drape_motion **out);
 
 /* The ways of the host, and which pins have one. */
 void drape_motion_archive(drape_motion *motion, drape_archive *archive);

@@ -161,7 +161,7 @@ static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_poi
     bool changed;
     if (!s->remainder.values)
         return DRAPE_OK;
-    drape_status status = drape_system_fit(s->system, point, &changed);
+    drape_status status = drape_system_extend_pattern(s->system, point, &changed);
     if (!status && changed)
         status = drape_approx_jacobian_extend(s);
     if (status)
@@ -310,6 +310,7 @@ drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *syst
     if (!s)
         return DRAPE_E_MEMORY;
     s->arena = arena;
+    s->remainder.arena = drape_arena_within(arena);
     s->system = system;
     s->model = drape_system_model(system);
     s->nodes = s->model->free_count;
@@ -332,10 +333,8 @@ void drape_approx_jacobian_destroy(drape_approx_jacobian **out)
     drape_approx_jacobian *s = *out;
     if (!s)
         return;
-    if (s->coarse.solver)
-        s->coarse.linear->destroy(&s->coarse.solver);
-    drape_prolong_free(s->arena->ctx, &s->coarse.prolong);
-    drape_pattern_free(s->arena->ctx, &s->coarse.pattern);
+    drape_linear_destroy(s->coarse.linear, &s->coarse.solver);
+    drape_arena_free(&s->remainder.arena);
     *out = NULL;
 }
 
@@ -355,9 +354,5 @@ int32_t drape_approx_jacobian_coarse_nodes(const drape_approx_jacobian *s)
 
 size_t drape_approx_jacobian_bytes(const drape_approx_jacobian *s)
 {
-    const coarse_matrix *c = &s->coarse;
-    const drape_prolong *p = &c->prolong;
-    size_t functions = (size_t)p->start[p->fine]; /* entries of the prolongation */
-    return c->linear->bytes(c->solver) + drape_pattern_bytes(&c->pattern) +
-           functions * (sizeof *p->column + sizeof *p->weight) + ((size_t)p->fine + 1) * sizeof *p->start;
+    return drape_linear_bytes(s->coarse.linear, s->coarse.solver);
 }

@@ -58,8 +58,8 @@ static drape_status build_prolong(drape_approx_jacobian *s, int spacing)
             start[i + 1] += start[i];
         pass_edges(m, start, neighbor);
         const drape_graph graph = {.count = s->nodes, .start = start, .neighbor = neighbor};
-        status = drape_prolong_build(s->arena->ctx, &graph,
-                                     spacing ? spacing : drape_prolong_spacing(s->nodes), &s->coarse.prolong);
+        status = drape_prolong_build(s->arena, &graph, spacing ? spacing : drape_prolong_spacing(s->nodes),
+                                     &s->coarse.prolong);
     }
     drape_arena_free(&scratch);
     return status;
@@ -69,12 +69,11 @@ static drape_status build_prolong(drape_approx_jacobian *s, int spacing)
 static drape_status build_coarse_pattern(drape_approx_jacobian *s)
 {
     coarse_matrix *c = &s->coarse;
-    drape_context *ctx = s->arena->ctx;
     const drape_pattern *p = &s->model->pattern;
     const drape_graph fine = {.count = p->block_count, .start = p->block_start, .neighbor = p->block_row};
     int32_t *start = NULL, *neighbor = NULL, *pairs = NULL, *own = NULL, count = 0;
-    drape_status status = drape_prolong_meet(ctx, &c->prolong, &fine, &start, &neighbor);
-    drape_arena scratch = drape_arena_of(ctx);
+    drape_arena scratch = drape_arena_of(s->arena->ctx);
+    drape_status status = drape_prolong_meet(&scratch, &c->prolong, &fine, &start, &neighbor);
     if (!status) {
         pairs = drape_arena_take(&scratch, 2 * (size_t)start[c->prolong.coarse], sizeof *pairs);
         own = drape_arena_take(&scratch, (size_t)c->prolong.coarse, sizeof *own);
@@ -90,9 +89,7 @@ static drape_status build_coarse_pattern(drape_approx_jacobian *s)
     }
     const drape_coupling coupling = {.count = count, .nodes = 2, .node = pairs};
     if (!status)
-        status = drape_pattern_build(ctx, c->prolong.coarse, own, &coupling, 1, &c->pattern);
-    drape_free(ctx, start);
-    drape_free(ctx, neighbor);
+        status = drape_pattern_build(s->arena, c->prolong.coarse, own, &coupling, 1, &c->pattern);
     drape_arena_free(&scratch);
     return status;
 }
@@ -205,7 +202,7 @@ static drape_status build_coarse(drape_approx_jacobian *s, int spacing)
     c->x = drape_arena_take(s->arena, n, sizeof *c->x);
     c->linear = drape_linear_best(c->pattern.n);
     status = drape_arena_status(s->arena);
-    return status ? status : c->linear->create(s->arena->ctx, &c->pattern, &c->solver);
+    return status ? status : c->linear->create(s->arena, &c->pattern, &c->solver);
 }
 
 /* ---- The remainder ---- */
@@ -214,18 +211,17 @@ drape_status drape_approx_jacobian_extend(drape_approx_jacobian *s)
 {
     const drape_pattern *p = drape_system_pattern(s->system);
     remainder_matrix *r = &s->remainder;
-    void *const before[] = {r->values, r->row, r->column, r->block};
-    for (size_t i = 0; i < sizeof before / sizeof *before; i++)
-        drape_arena_release(s->arena, before[i]);
-    *r = (remainder_matrix){0};
+    drape_arena_free(&r->arena);
+    r->values = NULL;
+    r->count = 0;
     if (!drape_system_has_remainder(s->system))
         return DRAPE_OK;
     size_t lower = ((size_t)p->block_start[p->block_count] + (size_t)p->block_count) / 2;
-    r->values = drape_arena_take(s->arena, (size_t)p->nonzeros, sizeof *r->values);
-    r->row = drape_arena_take(s->arena, lower, sizeof *r->row);
-    r->column = drape_arena_take(s->arena, lower, sizeof *r->column);
-    r->block = drape_arena_take(s->arena, 9 * lower, sizeof *r->block);
-    return r->values && r->row && r->column && r->block ? DRAPE_OK : DRAPE_E_MEMORY;
+    r->values = drape_arena_take(&r->arena, (size_t)p->nonzeros, sizeof *r->values);
+    r->row = drape_arena_take(&r->arena, lower, sizeof *r->row);
+    r->column = drape_arena_take(&r->arena, lower, sizeof *r->column);
+    r->block = drape_arena_take(&r->arena, 9 * lower, sizeof *r->block);
+    return drape_arena_status(&r->arena);
 }
 
 drape_status drape_approx_jacobian_build(drape_approx_jacobian *s, int spacing)

@@ -26,7 +26,8 @@ typedef struct coarse_matrix {
 
 /* The blocks of R that are not zero, at or below the diagonal. */
 typedef struct remainder_matrix {
-    double *values; /* of the system's pattern; NULL: there is no R */
+    drape_arena arena; /* holds the arrays */
+    double *values;    /* of the system's pattern; NULL: there is no R */
     int32_t count;
     int32_t *row, *column; /* (lower blocks of the pattern) */
     double *block;         /* (9 x lower blocks) row by row; diagonal ones symmetric */

@@ -141,10 +141,10 @@ static int residual(N_Vector d_vector, N_Vector f, void *user)
 static drape_status extend_pattern(drape_newton *s, const drape_point *point)
 {
     bool changed;
-    drape_status status = drape_system_fit(s->equation->system, point, &changed);
+    drape_status status = drape_system_extend_pattern(s->equation->system, point, &changed);
     s->linear->stale |= changed;
     if (!status && s->linear->stale)
-        status = drape_sun_linear_adopt(s->linear, drape_system_pattern(s->equation->system));
+        status = drape_sun_linear_extend_pattern(s->linear, drape_system_pattern(s->equation->system));
     return status;
 }
 
@@ -466,8 +466,9 @@ static drape_status create_search(drape_arena *arena, drape_newton *s)
     return status ? status : drape_arena_status(arena);
 }
 
-static drape_status create_solver(drape_context *ctx, drape_newton *s)
+static drape_status create_solver(drape_arena *arena, drape_newton *s)
 {
+    drape_context *ctx = arena->ctx;
     drape_system *system = s->equation->system;
     const int64_t n = (int64_t)s->equation->dofs;
     if (drape_sundials_context(&s->sun) || !(s->kin = KINCreate(s->sun)) ||
@@ -477,7 +478,7 @@ static drape_status create_solver(drape_context *ctx, drape_newton *s)
     if (n == 0)
         return DRAPE_OK;
     drape_status status =
-        drape_sun_linear_create(ctx, s->sun, drape_linears[(int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]],
+        drape_sun_linear_create(arena, s->sun, drape_linears[(int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]],
                                 drape_system_pattern(system), drape_system_crew(system), &s->linear);
     if (status)
         return status;
@@ -503,7 +504,7 @@ drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equati
         s->values[DRAPE_NEWTON_GLOBALIZATION] = DRAPE_NEWTON_GLOBAL_WORK;
     s->searches = s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_WORK;
     drape_status status = s->searches ? create_search(arena, s) : DRAPE_OK;
-    return status ? status : create_solver(arena->ctx, s);
+    return status ? status : create_solver(arena, s);
 }
 
 void drape_newton_destroy(drape_newton **newton)
@@ -561,7 +562,7 @@ void drape_newton_archive(drape_newton *s, drape_archive *a)
     if (e->dofs == 0)
         return;
     if (drape_archive_is_reading(a))
-        drape_archive_note(a, drape_sun_linear_adopt_other(s->linear, drape_system_pattern(e->system)));
+        drape_archive_note(a, drape_sun_linear_ensure_pattern(s->linear, drape_system_pattern(e->system)));
     drape_sun_linear_archive(s->linear, a, modified && s->factored_mass_weight != 0);
     if (modified && !drape_kinsol_archive(s->kin, a) && a->reading)
         drape_newton_forget_factors(s);
@@ -583,7 +584,6 @@ drape_work drape_newton_work(const drape_newton *s)
 
 size_t drape_newton_bytes(const drape_newton *s)
 {
-    const drape_sun_linear *linear = s->linear;
     return KINSOL_VECTORS * s->equation->dofs * sizeof(double) +
-           (linear ? linear->ops->bytes(linear->state) + (size_t)linear->nonzeros * sizeof(double) : 0);
+           (s->linear ? drape_sun_linear_bytes(s->linear) : 0);
 }

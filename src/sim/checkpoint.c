@@ -40,7 +40,7 @@ static bool is_place(int index, int least, int count)
 /* The present one, and those before it that are still asked for; what the next attempt writes to is left out. */
 static void archive_states(drape_sim *sim, drape_archive *a)
 {
-    const int count = 2 + sim->chosen.controller->pasts;
+    const int count = 2 + sim->chosen.controller->history_depth;
     int *const places[] = {&sim->now, &sim->next, &sim->before, &sim->past[0], &sim->past[1]};
     drape_archive_mark(a, "states");
     for (int i = 0; i < 5; i++) {
@@ -111,7 +111,7 @@ static void archive_reason(drape_sim *sim, drape_reason *reason, drape_archive *
     drape_archive_int64(a, &reason->count);
     if (!a->reading)
         return;
-    reason->reason = drape_arena_text(&sim->arena, text);
+    reason->reason = drape_arena_text(sim->arena, text);
     if (!reason->reason)
         drape_archive_note(a, DRAPE_E_MEMORY);
 }
@@ -202,7 +202,7 @@ static void take_place(drape_sim *sim, drape_sim *made)
     memcpy(made, &old, size);
     drape_system_watch(sim->system, &sim->cancel);
     drape_system_watch(made->system, &made->cancel);
-    drape_system_swap_winds(sim->system, made->system);
+    drape_system_copy_wind(sim->system, made->system);
 }
 
 drape_status drape_sim_read(drape_sim *sim, drape_archive *a)

@@ -131,10 +131,9 @@ drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *field, void *u
     if (field && !drape_wind_is_felt(sim->model))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_set_wind: no term of the model is in a medium, as drag.wind is");
-    drape_status status = drape_system_set_wind(sim->system, field, user);
-    if (!status)
-        forces_jump(sim);
-    return status;
+    drape_system_set_wind(sim->system, field, user);
+    forces_jump(sim);
+    return DRAPE_OK;
 }
 
 /* ---- Reading forces ---- */

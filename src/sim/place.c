@@ -45,7 +45,7 @@ static void place_pinned(const drape_sim *sim, const double *given, drape_state 
     drape_motion_place_pins(motion, state->t, state->x);
     for (int32_t i = 0; i < motion->moved_count; i++) {
         size_t at = 3 * (size_t)motion->moved_node[i];
-        if (motion->pin_way[i].given)
+        if (motion->pin_path[i].given)
             memcpy(state->x + at, given + at, 3 * sizeof *state->x);
     }
 }
@@ -61,7 +61,7 @@ static void stop_fixed(const drape_sim *sim, const double *given, drape_state *s
             memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
     for (int32_t i = 0; i < motion->moved_count; i++) {
         size_t at = 3 * (size_t)motion->moved_node[i];
-        if (!motion->pin_way[i].given)
+        if (!motion->pin_path[i].given)
             memcpy(state->v + at, given + at, 3 * sizeof *state->v);
     }
 }

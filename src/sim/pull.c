@@ -31,11 +31,12 @@ drape_status drape_sim_pull(drape_sim *sim, int32_t node, double stiffness, cons
     if (status)
         return status;
     const double *x = drape_sim_state(sim)->x;
-    drape_pull pull = {.node = node, .stiffness = stiffness};
+    drape_drag_spring pull = {.node = node, .stiffness = stiffness};
     for (int k = 0; stiffness > 0 && k < 3; k++)
         pull.target[k] = target[k];
-    double work = drape_pull_energy(&pull, x) - drape_pull_energy(drape_system_pull(sim->system), x);
-    drape_system_set_pull(sim->system, &pull);
+    double work = drape_drag_spring_energy(&pull, x) -
+                  drape_drag_spring_energy(drape_system_drag_spring(sim->system), x);
+    drape_system_set_drag_spring(sim->system, &pull);
     sim->audit.pin_work += work;
     sim->audit.offered += fabs(work);
     sim->energy_known = sim->made_known = false;
@@ -45,7 +46,7 @@ drape_status drape_sim_pull(drape_sim *sim, int32_t node, double stiffness, cons
 
 void drape_sim_pull_force(const drape_sim *sim, double force[3])
 {
-    const drape_pull *pull = sim ? drape_system_pull(sim->system) : NULL;
+    const drape_drag_spring *pull = sim ? drape_system_drag_spring(sim->system) : NULL;
     for (int k = 0; k < 3; k++)
         force[k] = pull && pull->stiffness > 0
                        ? pull->stiffness *

@@ -40,8 +40,8 @@ typedef struct drape_realtime_memory {
 
 struct drape_sim {
     drape_context *ctx;
-    drape_arena arena;
-    size_t integrator_bytes; /* of the arena's, after create */
+    drape_arena *arena; /* holds all the sim's memory, at an address that stays: see drape_sim_read */
+    size_t state_bytes, integrator_bytes; /* of the arena's, after create */
     const drape_model *model;
     drape_chosen chosen;
     drape_system *system;

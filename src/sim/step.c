@@ -87,8 +87,8 @@ static void measure_strain(drape_sim *sim, const double *x)
  * written over next. */
 static void turn_states(drape_sim *sim)
 {
-    int pasts = sim->chosen.controller->pasts, spare = sim->now;
-    for (int k = 0; k < pasts; k++) {
+    int history_depth = sim->chosen.controller->history_depth, spare = sim->now;
+    for (int k = 0; k < history_depth; k++) {
         int older = sim->past[k];
         sim->past[k] = spare;
         spare = older;

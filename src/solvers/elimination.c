@@ -6,7 +6,7 @@
  */
 #define _XOPEN_SOURCE 700 /* initstate */
 #include "solvers/elimination.h"
-#include "solvers/alone.h"
+#include "solvers/library_lock.h"
 
 #include <amd.h>
 #include <stdlib.h>
@@ -19,7 +19,7 @@
 
 /* What only the making needs. */
 typedef struct maker {
-    drape_context *ctx;
+    drape_arena *arena, scratch;
     const drape_pattern *pattern;
     drape_elimination *e;
     int32_t *parent, *post, *head, *next, *mark, *stack; /* (n) of columns; head, next: lists of children */
@@ -40,12 +40,12 @@ typedef struct maker {
 static int dissect_alone(idx_t *n, idx_t *start, idx_t *other, idx_t *options, maker *m)
 {
     char own[RAND_STATE];
-    drape_alone_begin();
+    drape_library_lock();
     char *before = initstate(1, own, sizeof own);
     const int code = METIS_NodeND(n, start, other, NULL, options, m->e->order, m->e->place);
     if (before)
         setstate(before);
-    drape_alone_end();
+    drape_library_unlock();
     return code;
 }
 
@@ -53,19 +53,18 @@ static bool dissect(maker *m)
 {
     const drape_pattern *p = m->pattern;
     idx_t n = p->block_count, at = 0, options[METIS_NOPTIONS];
-    idx_t *start = drape_alloc(m->ctx, (size_t)n + 1, sizeof *start);
-    idx_t *other = drape_alloc(m->ctx, (size_t)p->block_start[n] + 1, sizeof *other);
-    for (idx_t j = 0; start && other && j < n; j++) {
+    idx_t *start = drape_arena_take(&m->scratch, (size_t)n + 1, sizeof *start);
+    idx_t *other = drape_arena_take(&m->scratch, (size_t)p->block_start[n] + 1, sizeof *other);
+    if (drape_arena_status(&m->scratch))
+        return false;
+    for (idx_t j = 0; j < n; j++) {
         for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++)
             if (p->block_row[k] != j)
                 other[at++] = p->block_row[k];
         start[j + 1] = at;
     }
     METIS_SetDefaultOptions(options);
-    bool done = start && other && dissect_alone(&n, start, other, options, m) == METIS_OK;
-    drape_free(m->ctx, start);
-    drape_free(m->ctx, other);
-    return done;
+    return dissect_alone(&n, start, other, options, m) == METIS_OK;
 }
 _Static_assert(sizeof(idx_t) == sizeof(int32_t), "METIS orders with the pattern's integers");
 #endif
@@ -232,7 +231,7 @@ static bool find_fronts(maker *m)
         if (linked)
             close_front(m, f);
         e->first[++f] = j;
-        m->rows[f] = drape_alloc(m->ctx, (size_t)count, sizeof **m->rows);
+        m->rows[f] = drape_arena_take(&m->scratch, (size_t)count, sizeof **m->rows);
         if (!m->rows[f])
             return false;
         qsort(m->stack, (size_t)count, sizeof *m->stack, compare);
@@ -267,15 +266,11 @@ static void merge_fronts(maker *m)
         int32_t first = e->first[f];
         while (top >= 0 && m->length[top] > 0 && m->rows[top][0] < last &&
                is_better_merged(m, e->first[top], first, last, top, f)) {
-            first = e->first[top];
-            drape_free(m->ctx, m->rows[top]);
-            m->rows[top--] = NULL;
+            first = e->first[top--];
         }
         top++;
-        int32_t *rows = m->rows[f], length = m->length[f];
-        m->rows[f] = NULL;
-        m->rows[top] = rows;
-        m->length[top] = length;
+        m->rows[top] = m->rows[f];
+        m->length[top] = m->length[f];
         e->first[top] = first;
     }
     e->count = top + 1;
@@ -304,19 +299,19 @@ static drape_status keep(maker *m)
 {
     drape_elimination *e = m->e;
     int32_t *front_of = m->mark;
-    e->parent = drape_alloc(m->ctx, (size_t)e->count, sizeof *e->parent);
-    e->work = drape_alloc(m->ctx, (size_t)e->count, sizeof *e->work);
-    e->row_start = drape_alloc(m->ctx, (size_t)e->count + 1, sizeof *e->row_start);
-    if (!e->parent || !e->work || !e->row_start)
+    e->parent = drape_arena_take(m->arena, (size_t)e->count, sizeof *e->parent);
+    e->work = drape_arena_take(m->arena, (size_t)e->count, sizeof *e->work);
+    e->row_start = drape_arena_take(m->arena, (size_t)e->count + 1, sizeof *e->row_start);
+    if (drape_arena_status(m->arena))
         return DRAPE_E_MEMORY;
     for (int32_t f = 0; f < e->count; f++) {
         e->row_start[f + 1] = e->row_start[f] + m->length[f];
         for (int32_t j = e->first[f]; j < e->first[f + 1]; j++)
             front_of[j] = f;
     }
-    e->row = drape_alloc(m->ctx, (size_t)e->row_start[e->count], sizeof *e->row);
-    e->in_parent = drape_alloc(m->ctx, (size_t)e->row_start[e->count], sizeof *e->in_parent);
-    if (!e->row || !e->in_parent)
+    e->row = drape_arena_take(m->arena, (size_t)e->row_start[e->count], sizeof *e->row);
+    e->in_parent = drape_arena_take(m->arena, (size_t)e->row_start[e->count], sizeof *e->in_parent);
+    if (drape_arena_status(m->arena))
         return DRAPE_E_MEMORY;
     for (int32_t f = 0; f < e->count; f++) {
         memcpy(e->row + e->row_start[f], m->rows[f], (size_t)m->length[f] * sizeof *e->row);
@@ -331,48 +326,37 @@ static drape_status keep(maker *m)
 
 static bool allocate(maker *m)
 {
-    const size_t n = (size_t)m->e->n;
-    int32_t **arrays[] = {&m->e->order, &m->e->place, &m->parent, &m->post,  &m->head,
-                          &m->next,     &m->mark,     &m->stack,  &m->length};
+    drape_elimination *e = m->e;
+    const size_t n = (size_t)e->n;
+    int32_t **arrays[] = {&m->parent, &m->post, &m->head, &m->next, &m->mark, &m->stack, &m->length};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        if (!(*arrays[i] = drape_alloc(m->ctx, n, sizeof(int32_t))))
-            return false;
-    m->e->first = drape_alloc(m->ctx, n + 1, sizeof *m->e->first);
-    m->rows = drape_alloc(m->ctx, n, sizeof *m->rows);
-    return m->e->first && m->rows;
+        *arrays[i] = drape_arena_take(&m->scratch, n, sizeof(int32_t));
+    m->rows = drape_arena_take(&m->scratch, n, sizeof *m->rows);
+    e->order = drape_arena_take(m->arena, n, sizeof *e->order);
+    e->place = drape_arena_take(m->arena, n, sizeof *e->place);
+    e->first = drape_arena_take(m->arena, n + 1, sizeof *e->first);
+    return !drape_arena_status(&m->scratch) && !drape_arena_status(m->arena);
 }
 
-drape_status drape_elimination_create(drape_context *ctx, const drape_pattern *pattern, drape_elimination *e)
+static drape_status make(maker *m)
 {
-    maker m = {.ctx = ctx, .pattern = pattern, .e = e};
+    if (!allocate(m) || !order(m))
+        return DRAPE_E_MEMORY;
+    invert(m);
+    find_parents(m);
+    find_postorder(m);
+    reorder(m);
+    if (!find_fronts(m))
+        return DRAPE_E_MEMORY;
+    merge_fronts(m);
+    return keep(m);
+}
+
+drape_status drape_elimination_create(drape_arena *arena, const drape_pattern *pattern, drape_elimination *e)
+{
+    maker m = {.arena = arena, .scratch = drape_arena_of(arena->ctx), .pattern = pattern, .e = e};
     *e = (drape_elimination){.n = pattern->block_count};
-    bool good = allocate(&m) && order(&m);
-    if (good) {
-        invert(&m);
-        find_parents(&m);
-        find_postorder(&m);
-        reorder(&m);
-        good = find_fronts(&m);
-    }
-    drape_status status = good ? DRAPE_OK : DRAPE_E_MEMORY;
-    if (good) {
-        merge_fronts(&m);
-        status = keep(&m);
-    }
-    for (int32_t f = 0; m.rows && f < e->n; f++)
-        drape_free(ctx, m.rows[f]);
-    void *all[] = {m.parent, m.post, m.head, m.next, m.mark, m.stack, m.length, m.rows};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        drape_free(ctx, all[i]);
-    if (status)
-        drape_elimination_free(ctx, e);
+    drape_status status = make(&m);
+    drape_arena_free(&m.scratch);
     return status;
-}
-
-void drape_elimination_free(drape_context *ctx, drape_elimination *e)
-{
-    void *all[] = {e->order, e->place, e->first, e->parent, e->row_start, e->row, e->in_parent, e->work};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        drape_free(ctx, all[i]);
-    memset(e, 0, sizeof *e);
 }

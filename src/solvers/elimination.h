@@ -22,8 +22,7 @@ typedef struct drape_elimination {
 } drape_elimination;
 
 /* Errors: DRAPE_E_MEMORY. */
-drape_status drape_elimination_create(drape_context *ctx, const drape_pattern *pattern, drape_elimination *e);
-void drape_elimination_free(drape_context *ctx, drape_elimination *e);
+drape_status drape_elimination_create(drape_arena *arena, const drape_pattern *pattern, drape_elimination *e);
 
 static inline int32_t drape_front_columns(const drape_elimination *e, int32_t front)
 {

@@ -8,6 +8,7 @@
 #define DRAPE_SOLVERS_LINEAR_H
 
 #include "base/archive.h"
+#include "base/arena.h"
 #include "base/crew.h"
 #include "sparse/pattern.h"
 
@@ -31,8 +32,9 @@ struct drape_linear_ops {
     /* The library behind it takes heap for the time of a factorisation and gives it back, or it takes what it
      * keeps at the first matrix that needs it. Else nothing is taken from the second factorisation on. */
     bool borrows_heap;
-    /* Makes the solver's state. pattern outlives it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
-    drape_status (*create)(drape_context *ctx, const drape_pattern *pattern, void **state);
+    /* Makes the solver's state in an arena that keeps its address. pattern outlives it. Errors: DRAPE_E_MEMORY,
+     * DRAPE_E_SOLVER; then *state is not set, and what was taken stays in the arena. */
+    drape_status (*create)(drape_arena *arena, const drape_pattern *pattern, void **state);
     /* The threads that it may use from now on, which outlive it; the result does not depend on them. NULL: it uses one. */
     void (*use_threads)(void *state, drape_crew *crew);
     /* Takes the values (pattern->nonzeros). DRAPE_OK, or DRAPE_RETRY_LINEAR: singular to working precision,
@@ -52,8 +54,9 @@ struct drape_linear_ops {
      * to stand again after a reading; NULL: factor comes before any solve. NULL: factors follow from values alone.
      * Callers use drape_linear_archive. */
     void (*archive)(void *state, drape_archive *a, const double *values);
+    /* Gives back what is not of the arena, and comes before the arena's end: see drape_linear_destroy. NULL: all of it is. */
     void (*destroy)(void **state);
-    /* Bytes that it takes, factors included. */
+    /* Bytes that libraries took beside the arena, factors included. NULL: none. */
     size_t (*bytes)(const void *state);
     /* NULL: it is what its name says. */
     void (*report)(const void *state, drape_linear_report *report);
@@ -65,10 +68,9 @@ extern const char *const drape_linears_words[];       /* their names, NULL-ended
 /* Archives a solver; values as in its row, NULL where its last factor failed, too. */
 void drape_linear_archive(const drape_linear_ops *row, void *state, drape_archive *a, const double *values);
 
-/* The same for a row's own solver of general matrices, which is made for the first of them: *solver NULL before. */
-void drape_linear_archive_general(const drape_linear_ops *row, drape_context *ctx,
-                                  const drape_pattern *pattern, void **solver, drape_archive *a,
-                                  const double *values);
+/* *state becomes NULL; it may be NULL. */
+void drape_linear_destroy(const drape_linear_ops *ops, void **state);
+size_t drape_linear_bytes(const drape_linear_ops *ops, const void *state);
 
 /* The row with the largest best_from, or general_from, that is not above n unknowns. */
 const drape_linear_ops *drape_linear_best(int64_t n);

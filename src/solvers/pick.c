@@ -45,14 +45,14 @@ void drape_linear_archive(const drape_linear_ops *row, void *state, drape_archiv
                            row->name);
 }
 
-void drape_linear_archive_general(const drape_linear_ops *row, drape_context *ctx,
-                                  const drape_pattern *pattern, void **solver, drape_archive *a,
-                                  const double *values)
+void drape_linear_destroy(const drape_linear_ops *ops, void **state)
 {
-    bool there = *solver != NULL;
-    drape_archive_bool(a, &there);
-    if (drape_archive_is_reading(a) && there && !*solver)
-        drape_archive_note(a, row->create(ctx, pattern, solver));
-    if (drape_archive_good(a) && there)
-        drape_linear_archive(row, *solver, a, values);
+    if (*state && ops->destroy)
+        ops->destroy(state);
+    *state = NULL;
+}
+
+size_t drape_linear_bytes(const drape_linear_ops *ops, const void *state)
+{
+    return ops->bytes ? ops->bytes(state) : 0;
 }

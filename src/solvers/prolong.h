@@ -8,7 +8,7 @@
 #ifndef DRAPE_SOLVERS_PROLONG_H
 #define DRAPE_SOLVERS_PROLONG_H
 
-#include "base/context.h"
+#include "base/arena.h"
 
 /* Neighbours of each node, in both directions: neighbor[start[i]] ... neighbor[start[i + 1] - 1]. */
 typedef struct drape_graph {
@@ -27,18 +27,18 @@ typedef struct drape_prolong {
  * more than the fine one. */
 int drape_prolong_spacing(int32_t nodes);
 
-/* Errors: DRAPE_E_MEMORY; then there is nothing to free. */
-drape_status drape_prolong_build(drape_context *ctx, const drape_graph *graph, int spacing,
+/* Errors: DRAPE_E_MEMORY. */
+drape_status drape_prolong_build(drape_arena *arena, const drape_graph *graph, int spacing,
                                  drape_prolong *out);
-void drape_prolong_free(drape_context *ctx, drape_prolong *prolong);
 
 /* coarse (coarse x 3) = P' fine; fine (fine x 3) += P coarse. */
 void drape_prolong_restrict(const drape_prolong *prolong, const double *fine, double *coarse);
 void drape_prolong_add(const drape_prolong *prolong, const double *coarse, double *fine);
 
 /* Which coarse functions meet through a symmetric graph of the nodes, as one that has them on its diagonal:
- * start (coarse + 1) and neighbor, rows not sorted, are taken by drape_alloc. Errors: DRAPE_E_MEMORY. */
-drape_status drape_prolong_meet(drape_context *ctx, const drape_prolong *prolong, const drape_graph *graph,
+ * start (coarse + 1) and neighbor, rows not sorted. Workspace is taken from the arena, too: let it be one for the moment.
+ * Errors: DRAPE_E_MEMORY. */
+drape_status drape_prolong_meet(drape_arena *arena, const drape_prolong *prolong, const drape_graph *graph,
                                 int32_t **start, int32_t **neighbor);
 
 #endif

@@ -14,7 +14,7 @@
 #include <sundials/sundials_matrix.h>
 
 typedef struct drape_sun_linear {
-    drape_context *ctx;
+    drape_arena arena; /* holds values and state */
     const drape_linear_ops *ops;
     void *state;
     bool stale;     /* the system's pattern has changed since: it must adopt it before it is used again */
@@ -31,15 +31,18 @@ typedef struct drape_sun_linear {
     drape_status status; /* of the last factor or solve */
 } drape_sun_linear;
 
-drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const drape_linear_ops *ops,
+drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const drape_linear_ops *ops,
                                      const drape_pattern *pattern, drape_crew *crew, drape_sun_linear **out);
 
 /* Another pattern from now on: the values are cleared, the solver is analysed anew. Errors: as of create; then
  * it can only be destroyed, or adopt again. */
-drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_pattern *pattern);
+drape_status drape_sun_linear_extend_pattern(drape_sun_linear *linear, const drape_pattern *pattern);
 /* The same, unless it is the pattern that it has. */
-drape_status drape_sun_linear_adopt_other(drape_sun_linear *linear, const drape_pattern *pattern);
-void drape_sun_linear_destroy(drape_sun_linear **linear);
+drape_status drape_sun_linear_ensure_pattern(drape_sun_linear *linear, const drape_pattern *pattern);
+void drape_sun_linear_destroy(drape_sun_linear **linear); /* before the arena is freed */
+
+/* Bytes that libraries took beside the arena. */
+size_t drape_sun_linear_bytes(const drape_sun_linear *linear);
 
 /* Work done, and what the solver archives; factors: those there are will be used again. Where it is read, the solver
  * was made for the pattern that it had. */

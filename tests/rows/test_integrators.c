@@ -73,9 +73,8 @@ static stepper open_stepper(const drape_integrator_ops *ops, const double *value
     s.model = make_model(
         s.ctx,
         &(model_def){.mesh = MESH_CURVED, .terms = terms, .term_count = 4, .gravity = true, .pinned = true});
-    s.system = make_system(s.ctx, s.model, 1);
-    s.arena = drape_alloc(s.ctx, 1, sizeof *s.arena);
-    *s.arena = drape_arena_of(s.ctx);
+    s.arena = drape_arena_create(s.ctx);
+    s.system = make_system(s.arena, s.model, 1);
     ck_assert_msg(ops->create(s.arena, s.system, values, &s.state) == DRAPE_OK, "%s",
                   drape_context_message(s.ctx));
     s.n = 3 * (size_t)s.model->node_count;
@@ -90,8 +89,7 @@ static void close_stepper(stepper *s)
     if (s->ops->destroy)
         s->ops->destroy(&s->state);
     drape_system_destroy(&s->system);
-    drape_arena_free(s->arena);
-    drape_free(s->ctx, s->arena);
+    drape_arena_destroy(&s->arena);
     drape_model_destroy(&s->model);
     drape_context_destroy(&s->ctx);
 }

@@ -282,8 +282,9 @@ END_TEST
 START_TEST(friction_on_forces_as_in_boson)
 {
     scene s = flyers("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], 'friction': 0.25}");
+    drape_arena memory = drape_arena_of(s.ctx);
     drape_motion *motion = NULL;
-    ck_assert_int_eq(drape_motion_create(s.ctx, s.model, &motion), DRAPE_OK);
+    ck_assert_int_eq(drape_motion_create(&memory, s.model, &motion), DRAPE_OK);
     const drape_verlet_contact rule = {.model = s.model,
                                        .motion = motion,
                                        .rule = DRAPE_VERLET_BOSON,
@@ -296,7 +297,7 @@ START_TEST(friction_on_forces_as_in_boson)
     drape_verlet_rub(&rule, 0, x, v, g);
     for (int i = 0; i < 12; i++)
         ck_assert_double_eq_tol(g[i], expected[i], 1e-15);
-    drape_motion_destroy(&motion);
+    drape_arena_free(&memory);
     scene_close(&s);
 }
 END_TEST

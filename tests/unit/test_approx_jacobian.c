@@ -49,8 +49,9 @@ START_TEST(coarse_functions_are_a_partition_of_unity)
     scene s = scene_empty();
     for (int spacing = 2; spacing <= 8; spacing++) {
         lattice l = open_lattice(31);
+        drape_arena memory = drape_arena_of(s.ctx);
         drape_prolong p;
-        ck_assert_int_eq(drape_prolong_build(s.ctx, &l.graph, spacing, &p), DRAPE_OK);
+        ck_assert_int_eq(drape_prolong_build(&memory, &l.graph, spacing, &p), DRAPE_OK);
         ck_assert_int_eq(p.fine, l.graph.count);
         int r = (spacing - 1) / 2;
         ck_assert_int_ge(p.coarse, 4);
@@ -63,7 +64,7 @@ START_TEST(coarse_functions_are_a_partition_of_unity)
             }
             ck_assert_double_eq_tol(sum, 1, 64 * DBL_EPSILON);
         }
-        drape_prolong_free(s.ctx, &p);
+        drape_arena_free(&memory);
         close_lattice(&l);
     }
     scene_close(&s);
@@ -75,8 +76,9 @@ START_TEST(restriction_is_the_transpose)
 {
     scene s = scene_empty();
     lattice l = open_lattice(12);
+    drape_arena memory = drape_arena_of(s.ctx);
     drape_prolong p;
-    ck_assert_int_eq(drape_prolong_build(s.ctx, &l.graph, 4, &p), DRAPE_OK);
+    ck_assert_int_eq(drape_prolong_build(&memory, &l.graph, 4, &p), DRAPE_OK);
     size_t n = 3 * (size_t)p.fine, m = 3 * (size_t)p.coarse;
     double *x = calloc(n, sizeof *x), *py = calloc(n, sizeof *py), *y = calloc(m, sizeof *y),
            *px = calloc(m, sizeof *px), a = 0, b = 0;
@@ -96,7 +98,7 @@ START_TEST(restriction_is_the_transpose)
     free(y);
     free(px);
     free(py);
-    drape_prolong_free(s.ctx, &p);
+    drape_arena_free(&memory);
     close_lattice(&l);
     scene_close(&s);
 }
@@ -108,12 +110,13 @@ START_TEST(nodes_without_neighbours_are_alone)
     scene s = scene_empty();
     int32_t start[4] = {0, 0, 0, 0}, none;
     const drape_graph graph = {.count = 3, .start = start, .neighbor = &none};
+    drape_arena memory = drape_arena_of(s.ctx);
     drape_prolong p;
-    ck_assert_int_eq(drape_prolong_build(s.ctx, &graph, 4, &p), DRAPE_OK);
+    ck_assert_int_eq(drape_prolong_build(&memory, &graph, 4, &p), DRAPE_OK);
     ck_assert_int_eq(p.coarse, 3);
     for (int i = 0; i < 3; i++)
         ck_assert(p.weight[i] == 1 && p.column[i] == i);
-    drape_prolong_free(s.ctx, &p);
+    drape_arena_free(&memory);
     scene_close(&s);
 }
 END_TEST
@@ -201,9 +204,8 @@ static state open_state(int side, const char *terms)
     state q = {.s = scene_model(SHEET, side, side, terms)};
     const drape_model *m = q.s.model;
     q.n = 3 * (size_t)m->free_count;
-    ck_assert_int_eq(drape_system_create(q.s.ctx, m, 1, &q.system), DRAPE_OK);
-    q.arena = drape_alloc(q.s.ctx, 1, sizeof *q.arena);
-    *q.arena = drape_arena_of(q.s.ctx);
+    q.arena = drape_arena_create(q.s.ctx);
+    ck_assert_int_eq(drape_system_create(q.arena, m, 1, &q.system), DRAPE_OK);
     ck_assert_int_eq(drape_state_create(q.arena, m, &q.at), DRAPE_OK);
     ck_assert_int_eq(drape_approx_jacobian_create(q.arena, q.system, 0, &q.jacobian), DRAPE_OK);
     q.point = (drape_point){.x = q.at.x, .v = q.at.v, .internal = q.at.internal, .weight = 60};
@@ -218,8 +220,7 @@ static void close_state(state *q)
     drape_approx_jacobian_destroy(&q->jacobian);
     drape_approx_jacobian_destroy(&q->jacobian);
     drape_system_destroy(&q->system);
-    drape_arena_free(q->arena);
-    drape_free(q->s.ctx, q->arena);
+    drape_arena_destroy(&q->arena);
     free(q->x);
     free(q->y);
     free(q->values);

@@ -1,16 +1,16 @@
 /* pull.h: a spring from a node to a point of space, by which a host drags cloth: E = k/2 |x - target|^2. */
-#ifndef DRAPE_ASSEMBLE_PULL_H
-#define DRAPE_ASSEMBLE_PULL_H
+#ifndef DRAPE_ASSEMBLE_DRAG_SPRING_H
+#define DRAPE_ASSEMBLE_DRAG_SPRING_H
 
 #include "model/model.h"
 
-typedef struct drape_pull {
+typedef struct drape_drag_spring {
     int32_t node;
     double stiffness; /* k [N/m]; 0: there is none */
     double target[3]; /* [m] */
-} drape_pull;
+} drape_drag_spring;
 
-static inline double drape_pull_energy(const drape_pull *pull, const double *x)
+static inline double drape_drag_spring_energy(const drape_drag_spring *pull, const double *x)
 {
     double sum = 0;
     for (int k = 0; pull->stiffness > 0 && k < 3; k++) {
@@ -21,7 +21,7 @@ static inline double drape_pull_energy(const drape_pull *pull, const double *x)
 }
 
 /* Adds its gradient to g (node_count x 3). */
-static inline void drape_pull_add_gradient(const drape_pull *pull, const double *x, double *g)
+static inline void drape_drag_spring_add_gradient(const drape_drag_spring *pull, const double *x, double *g)
 {
     for (size_t k = 0; pull->stiffness > 0 && k < 3; k++) {
         size_t at = 3 * (size_t)pull->node + k;
@@ -30,8 +30,8 @@ static inline void drape_pull_add_gradient(const drape_pull *pull, const double 
 }
 
 /* Adds its Hessian to values in the pattern; the node is free. */
-static inline void drape_pull_add_hessian(const drape_pull *pull, const drape_model *model,
-                                          const drape_pattern *pattern, double *values)
+static inline void drape_drag_spring_add_hessian(const drape_drag_spring *pull, const drape_model *model,
+                                                 const drape_pattern *pattern, double *values)
 {
     if (!(pull->stiffness > 0))
         return;
