@@ -213,7 +213,6 @@ static void destroy(void **state)
     drape_verlet_force_destroy(&s->force);
     drape_verlet_limit_free(s->ctx, &s->limit);
     drape_verlet_self_destroy(&s->self);
-    drape_spectrum_destroy(&s->spectrum);
     drape_free(s->ctx, s);
     *state = NULL;
 }
@@ -235,7 +234,7 @@ static bool create_arrays(verlet_state *s)
     return s->v_ahead && s->dissipated;
 }
 
-static drape_status create_parts(verlet_state *s)
+static drape_status create_parts(drape_arena *arena, verlet_state *s)
 {
     const double *values = s->values;
     drape_status status = create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
@@ -248,7 +247,7 @@ static drape_status create_parts(verlet_state *s)
     if (!status && s->model->contact.self)
         status = drape_verlet_self_create(s->ctx, s->model, values[PARAM_SELF_BOXES] == BOXES_OWN, &s->self);
     if (!status)
-        status = drape_spectrum_create(s->ctx, s->system, STABILITY_ITERATIONS, &s->spectrum);
+        status = drape_spectrum_create(arena, s->system, STABILITY_ITERATIONS, &s->spectrum);
     return status;
 }
 
@@ -271,7 +270,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
                                         .offset = values[PARAM_SURFACE_OFFSET],
                                         .friction_range = values[PARAM_FRICTION_RANGE],
                                         .friction_drag = values[PARAM_FRICTION_DRAG]};
-    drape_status status = create_parts(s);
+    drape_status status = create_parts(arena, s);
     if (status)
         destroy(state);
     return status;
@@ -578,7 +577,7 @@ static size_t bytes(const void *state)
     size_t nodes = 3 * (size_t)s->model->node_count;
     return sizeof *s + (s->dissipated ? 7 : 5) * nodes * sizeof(double) +
            drape_verlet_limit_bytes(&s->limit) + drape_verlet_force_bytes(s->force) +
-           (s->self ? drape_verlet_self_bytes(s->self) : 0) + drape_spectrum_bytes(s->spectrum);
+           (s->self ? drape_verlet_self_bytes(s->self) : 0);
 }
 
 const drape_integrator_ops drape_integrator_verlet = {

@@ -295,9 +295,7 @@ drape_status drape_approx_jacobian_update(drape_approx_jacobian *s, const drape_
 int drape_approx_jacobian_solve(drape_approx_jacobian *s, const double *b, double *x, double tolerance,
                                 int max_iterations)
 {
-    s->pcg.tolerance = tolerance;
-    s->pcg.max_iterations = max_iterations;
-    drape_pcg_solve(&s->pcg, b, x);
+    drape_pcg_solve(&s->pcg, b, x, tolerance, max_iterations);
     return s->pcg.iterations;
 }
 
