@@ -232,9 +232,8 @@ static void add_coarse_block(drape_approx_jacobian *s, int32_t row, int32_t colu
 {
     coarse_matrix *c = &s->coarse;
     int64_t stride;
-    if (!drape_pattern_has(&c->pattern, row,
-                           column)) /* contact of distant cloth: a preconditioner can omit it */
-        return;
+    if (!drape_pattern_has(&c->pattern, row, column))
+        return; /* contact of distant cloth: a preconditioner can omit it */
     int32_t slot = drape_pattern_find(&c->pattern, row, column);
     double *to = drape_pattern_at(&c->pattern, c->values, column, slot, &stride);
     for (int r = 0; r < 3; r++)

@@ -17,9 +17,9 @@
  * `newton: modified` it also decides when factors are too old, and with `globalization: line_search` it shortens p
  * itself, by the sum of squares of F.
  *
- * The globalization that is the default, `work`, is ours and is inside `correct`: KINSOL sees a linear solver whose
- * solution happens to be the step that is to be taken. Its own line search knows neither contact nor a second matrix,
- * and measures progress by |F|^2, which stiff stretching dominates: a step that lets a sheet move on raises it.
+ * Contact and the default globalization, `work`, are ours, and are inside `correct`: KINSOL is given a linear solver whose
+ * solution is the step to be taken. Its own line search can neither stop at contact nor ask for another matrix, and
+ * measures progress by the sum of squares of F, in which stiff stretching outweighs all other forces.
  */
 #include "nonlinear/newton.h"
 
@@ -37,9 +37,8 @@
 #define SETUPS_EXACT    1     /* iterations between Jacobians: exact Newton */
 #define SETUPS_MODIFIED 10    /* and modified Newton */
 #define STEP_TOLERANCE  1e-15 /* of the scene's size: a shorter correction moves nothing */
-#define MAX_NEWTON_STEP                                                                                      \
-    1e3 /* of the scene's size, a node: KINSOL's own depends on the guess, and is 1 for d = 0 */
-#define MAX_BETA_FAILURES 1000 /* its line search may fail its curvature condition as often as it likes */
+#define MAX_NEWTON_STEP 1e3   /* of the scene's size, a node: KINSOL's own limit is 1 for the guess d = 0 */
+#define MAX_BETA_FAIL   1000  /* failures of its line search's curvature condition: as many as it likes */
 
 #define WORK_FRACTION  0.5  /* of the work along a correction may be left when the line search ends */
 #define MAX_TRIALS     8    /* of the line search */
@@ -58,7 +57,8 @@ struct drape_newton {
     N_Vector unknown, ones; /* unknown wraps the caller's d during a solve */
     drape_sun_linear *linear;
     drape_stress_predictor predictor; /* if it searches */
-    double *trial, *chord, *minus_f;  /* free DOFs; NULL unless it searches */
+    double *trial;                    /* free DOFs: where the line search was last; NULL unless it searches */
+    double *chord, *chord_minus_f;    /* free DOFs: a chord step and its right-hand side; the same */
 
     /* From solve to solve. */
     double repair_share;         /* the share that made the last indefinite matrix definite */
@@ -66,7 +66,7 @@ struct drape_newton {
 
     /* From iteration to iteration of one solve. */
     int corrections;
-    double positive_share; /* of the positive parts, in the matrix: 0 Newton's own, 1 positive semidefinite */
+    double positive_share; /* of the positive parts in the matrix, or in the next one after a line search */
     bool trial_evaluated;  /* the last evaluation was at `trial`, and F is finite there */
     drape_status failure;  /* < 0: why a callback ended the solve, of which KINSOL keeps only the sign */
 };
@@ -276,8 +276,8 @@ static drape_status add_chords(drape_newton *s, const double *d, double *p, cons
            rate = before / largest(minus_f, e->dofs);
     for (int left = MAX_CHORDS; left > 0 && before > bound && before * pow(rate, left) <= bound; left--) {
         for (size_t i = 0; i < e->dofs; i++)
-            s->minus_f[i] = -e->f[i];
-        drape_status status = drape_sun_linear_solve(s->linear, s->minus_f, s->chord);
+            s->chord_minus_f[i] = -e->f[i];
+        drape_status status = drape_sun_linear_solve(s->linear, s->chord_minus_f, s->chord);
         if (status)
             return status;
         for (size_t i = 0; i < e->dofs; i++)
@@ -453,7 +453,7 @@ static bool configure(drape_newton *s)
            !KINSetMaxNewtonStep(s->kin, MAX_NEWTON_STEP * length * sqrt(n)) &&
            !KINSetNumMaxIters(s->kin, (long)s->values[DRAPE_NEWTON_MAX_ITERATIONS]) &&
            !KINSetMaxSetupCalls(s->kin, exact ? SETUPS_EXACT : SETUPS_MODIFIED) &&
-           !KINSetNoResMon(s->kin, exact) && !KINSetMaxBetaFails(s->kin, MAX_BETA_FAILURES);
+           !KINSetNoResMon(s->kin, exact) && !KINSetMaxBetaFails(s->kin, MAX_BETA_FAIL);
 }
 
 static drape_status create_search(drape_arena *arena, drape_newton *s)
@@ -461,7 +461,7 @@ static drape_status create_search(drape_arena *arena, drape_newton *s)
     const size_t n = s->equation->dofs;
     s->trial = drape_arena_take(arena, n, sizeof *s->trial);
     s->chord = drape_arena_take(arena, n, sizeof *s->chord);
-    s->minus_f = drape_arena_take(arena, n, sizeof *s->minus_f);
+    s->chord_minus_f = drape_arena_take(arena, n, sizeof *s->chord_minus_f);
     drape_status status = drape_stress_predictor_init(arena, s->equation->system, &s->predictor);
     return status ? status : drape_arena_status(arena);
 }
