@@ -106,9 +106,9 @@ void drape_system_force(drape_system *system, const drape_point *point, double *
 void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
                                 double *g);
 
-/* values (pattern.nonzeros) = mass_weight M + J over the free nodes. positive_share, 0 to 1: each element's Hessian H is
- * H + positive_share (H+ - H), with its positive semidefinite part H+: 0 exact, 1 positive semidefinite. Of contact it is
- * H+ for any share above 0. */
+/* values (pattern.nonzeros) = mass_weight M + J over the free nodes. positive_share, 0 to 1: each element's
+ * Hessian H is H + positive_share (H+ - H), with its positive semidefinite part H+: 0 exact, 1 positive
+ * semidefinite. Of contact it is H+ for any share above 0. */
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight,
                            double positive_share, double *values);
 

@@ -7,7 +7,7 @@
  *     M w^2 (d - p) + g(x0 + d, w (d - c)) = 0,  p = c + (v0 + a (v0 - v_))/w
  * A- and L-stable at constant steps, zero-stable for r < 1 + sqrt(2), which halving and doubling keep.
  * Hairer, Norsett & Wanner 1993, III.5. The first step and the one after a discontinuity are backward
- * Euler: r = 0 makes it of the same formulas.
+ * Euler, which the same formulas give for r = 0.
  */
 #include "integrators/implicit.h"
 

@@ -10,21 +10,22 @@
  * IDA keeps Jacobian and factors while c_j stays near theirs; that is most of its advantage over one
  * factorisation an iteration. ida_newton.h decides when the iteration with old factors has converged.
  *
- * That iteration needs no exact matrix either. What makes it nonsymmetric is friction, whose force follows the normal
- * force, and dashpots of strains that rotate: small beside c_j^2 M and c_j D at the steps that both ask for. With half of it
- * on each side Cholesky factors serve: half of the time or less in most scenes of contact, for as many iterations. Where
- * much slides, the iteration may fail with them: then some matrices are exact.
+ * That iteration needs no exact matrix either. What makes it nonsymmetric is friction, whose force follows
+ * the normal force, and dashpots of strains that rotate: small beside c_j^2 M and c_j D at the steps that
+ * both ask for. With half of it on each side Cholesky factors serve: half of the time or less in most scenes
+ * of contact, for as many iterations. Where much slides, the iteration may fail with them: then some matrices
+ * are exact.
  *
  * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative
  * part would make the error depend on where the scene lies. The maximum order is 2 at loose tolerances,
  * because BDF 3 to 5 are not A-stable and feed energy into undamped waves; it is 5 when the tolerance
  * resolves them.
  *
- * Pins that move have kinks at the keys of their tracks, and where a host sends them elsewhere: IDA stops there and
- * starts anew.
+ * Pins that move have kinks at the keys of their tracks, and where a host sends them elsewhere: IDA stops
+ * there and starts anew.
  *
- * IDA chooses order and step, predicts, tests errors and iterates. Its callbacks are below in the order in which it calls
- * them, then the stages of our step around IDASolve.
+ * IDA chooses order and step, predicts, tests errors and iterates. Its callbacks are below in the order in
+ * which it calls them, then the stages of our step around IDASolve.
  */
 #include "base/finite.h"
 #include "integrators/ida_newton.h"
@@ -59,8 +60,8 @@ enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
 /* New factors past a change of c_j by (1 - d)/(1 + d). IDA's own 0.25 takes a quarter more residuals for
  * as many factors. */
 #define CJ_CHANGE 0.1
-/* Of the energy of a scene. At rtol 1e-3 a smooth fall swings by half a percent: a larger gain comes from waves that are
- * amplified. */
+/* Of the energy of a scene. At rtol 1e-3 a smooth fall swings by half a percent: a larger gain comes from
+ * waves that are amplified. */
 #define GAIN             0.02
 #define MAX_ERROR_FAILS  10 /* error test failures in one step */
 #define MAX_SOLVER_FAILS 10 /* convergence failures in one step */
@@ -234,8 +235,9 @@ static double jacobian_clock(const ida_state *s)
     return drape_system_clock(s->system) - s->linear->factor_seconds;
 }
 
-/* Whether the next matrix is to be the symmetric part. Where the iteration failed with a new one that was, exact ones
- * follow for a while: twice as many as the last time, and half as many after each symmetric one that converged. */
+/* Whether the next matrix is to be the symmetric part. Where the iteration failed with a new one that was,
+ * exact ones follow for a while: twice as many as the last time, and half as many after each symmetric one
+ * that converged. */
 static bool choose_symmetric(ida_state *s)
 {
     long failures = 0;
@@ -314,7 +316,9 @@ static int solve_reduced(SUNLinearSolver solver, SUNMatrix matrix, N_Vector out,
 static double collider_power(const ida_state *s, double t, const double *force)
 {
     double power = 0;
-    for (int32_t c = 0; force && c < s->model->collider_count; c++) {
+    if (!force)
+        return 0;
+    for (int32_t c = 0; c < s->model->collider_count; c++) {
         double v[3];
         drape_motion_collider_velocity(s->motion, c, t, (s->span[0] + s->span[1]) / 2, v);
         for (int k = 0; k < 3; k++)
@@ -360,8 +364,8 @@ static void audit(ida_state *s, const drape_state *in, const drape_state *out, d
 
 /* ---- A step ---- */
 
-/* After a failure: the degenerate element or the node whose force is not finite, else the node of the largest weighted
- * error. */
+/* After a failure: the degenerate element or the node whose force is not finite, else the node of the largest
+ * weighted error. */
 static void diagnose(ida_state *s, drape_step_info *info)
 {
     if (s->n == 0)
@@ -382,8 +386,9 @@ static void diagnose(ida_state *s, drape_step_info *info)
 }
 
 /* Work is bounded: an undamped sheet that has degenerated may be followed for ever with steps that all
- * succeed. The bound is a rate, so that it is the same however a host divides its advances; steps that end one
- * are the host's choice and not counted. A host that continues after the failure is given as many steps again. */
+ * succeed. The bound is a rate, so that it is the same however a host divides its advances; steps that end
+ * one are the host's choice and not counted. A host that continues after the failure is given as many steps
+ * again. */
 static bool exhausted(ida_state *s, const drape_state *in, drape_step_info *info)
 {
     if (floor(in->t) != s->second)
@@ -420,9 +425,10 @@ static drape_status start(ida_state *s, const drape_state *in, drape_step_info *
     return IDAReInit(s->ida, in->t, s->y, s->rate) ? DRAPE_E_SOLVER : DRAPE_OK;
 }
 
-/* Continues from `in` if IDA's state is there, else starts anew, with a first step of at most h where an attempt before was
- * rejected. *t: the next kink or the end, whichever comes first: that is how far a scene without free nodes goes. Pinned
- * nodes that do not move keep their positions, and no velocity, in s->x and s->v for the whole step. */
+/* Continues from `in` if IDA's state is there, else starts anew, with a first step of at most h where an
+ * attempt before was rejected. *t: the next kink or the end, whichever comes first: that is how far a scene
+ * without free nodes goes. Pinned nodes that do not move keep their positions, and no velocity, in s->x and
+ * s->v for the whole step. */
 static drape_status prepare(ida_state *s, const drape_state *in, double end, double h, double *t,
                             drape_step_info *info)
 {

@@ -1,10 +1,11 @@
 /*
  * ida_newton.h: when the Newton iteration of a step of IDA has converged.
  *
- * IDA takes the rate at which old factors contract from the last step that iterated twice. While c_j stays, that
- * may be thousands of steps ago, and each step since has ended after one correction, however wrong the matrix had
- * become. The residual that such a step leaves is below the tolerance, but it acts alike in all of them, and turns
- * waves with w h about 1, which BDF 2 damps, into growing ones: a sheet of 1470 J came to 2345 J.
+ * IDA takes the rate at which old factors contract from the last step that iterated twice. While c_j stays,
+ * that may be thousands of steps ago, and each step since has ended after one correction, however wrong the
+ * matrix had become. The residual that such a step leaves is below the tolerance, but it acts alike in all of
+ * them, and turns waves with w h about 1, which BDF 2 damps, into growing ones: a sheet of 1470 J came to
+ * 2345 J.
  *
  * Here a rate is doubled with every step that does not measure it, and it is unknown after new factors.
  */

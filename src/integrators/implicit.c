@@ -124,7 +124,9 @@ double drape_implicit_collider_work(const drape_implicit *s, double t0, double t
 {
     const double *force = drape_system_on_colliders(s->equation.system);
     double work = 0;
-    for (int32_t c = 0; force && c < s->equation.model->collider_count; c++) {
+    if (!force)
+        return 0;
+    for (int32_t c = 0; c < s->equation.model->collider_count; c++) {
         double before[3], after[3];
         if (!drape_motion_moves_collider(s->motion, c))
             continue;

@@ -1,7 +1,7 @@
 /*
- * implicit.h: shared by the implicit integrators of fixed steps. Each of them is a choice of the step equation
- * (nonlinear/step_equation.h), of its base, weights, inertia and history, and of the solver; arrays, pins and the audit of
- * work are the same.
+ * implicit.h: shared by the implicit integrators of fixed steps. Each of them is a choice of the step
+ * equation (nonlinear/step_equation.h), of its base, weights, inertia and history, and of the solver; arrays,
+ * pins and the audit of work are the same.
  */
 #ifndef DRAPE_INTEGRATORS_IMPLICIT_H
 #define DRAPE_INTEGRATORS_IMPLICIT_H
@@ -34,23 +34,24 @@ void drape_implicit_archive(void *state, drape_archive *a);
 size_t drape_implicit_bytes(const void *state);
 void drape_implicit_destroy(void **state);
 
-/* Nodes for a step or stage that begins at in: free ones where they are there, at rest; pinned ones where their tracks have
- * them at time t, with their mean velocity over span, since in. */
+/* Nodes for a step or stage that begins at in: free ones where they are there, at rest; pinned ones where
+ * their tracks have them at time t, with their mean velocity over span, since in. */
 void drape_implicit_place(const drape_implicit *implicit, const drape_state *in, double t, double span,
                           double *x, double *v);
 
-/* The same as the base of the equation, with colliders at time t. Rates of measures are q' = grad q . v until a history is
- * set. */
+/* The same as the base of the equation, with colliders at time t. Rates of measures are q' = grad q . v until
+ * a history is set. */
 void drape_implicit_base(drape_implicit *implicit, const drape_state *in, double t, double span);
 
-/* The base and the rest of the equation of backward Euler, v1 = (x1 - x0)/h, q' = (q1 - q0)/h. */
+/* The equation of backward Euler: base, v1 = (x1 - x0)/h, q' = (q1 - q0)/h. mass_weight: 1/h^2. */
 void drape_implicit_backward_euler(drape_implicit *implicit, const drape_state *in, double t, double h,
                                    double mass_weight);
 
 /* q at the positions of a state, into q (measures); nothing where no law wants rates. */
 void drape_implicit_measure(drape_implicit *implicit, const drape_state *state, double *q);
 
-/* Solves for d by Newton: from the guess that the parameters ask for, or from d as it is. Iterations add up in info. */
+/* Solves for d by Newton: from the guess that the parameters ask for, or from d as it is. Iterations add up
+ * in info. */
 drape_status drape_implicit_solve(drape_implicit *implicit, drape_step_info *info);
 drape_status drape_implicit_solve_from(drape_implicit *implicit, drape_step_info *info);
 
@@ -60,8 +61,8 @@ void drape_implicit_report(const drape_solve_report *report, drape_step_info *in
 /* Work from t0 to t1 of the forces that the system last put on moving colliders; 0 without contact. */
 double drape_implicit_collider_work(const drape_implicit *implicit, double t0, double t1);
 
-/* Work over a step: of dissipative forces on all nodes, and of moved pins against g, where the equation was evaluated last.
- * What speeds up the pinned nodes' own mass is no work on the cloth. */
+/* Work over a step: of dissipative forces on all nodes, and of moved pins against g, where the equation was
+ * evaluated last. What speeds up the pinned nodes' own mass is no work on the cloth. */
 void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out,
                           drape_step_info *info);
 

@@ -1,7 +1,8 @@
 /*
- * newton_k: backward Euler by k inexact Newton iterations a step, for real time. be solves the same equation (be.c) to a
- * tolerance; here the solver is nonlinear/inexact_newton.h, and no step is accepted unchecked: the residual of its end is
- * reported, and where it has not fallen below that of the guess the step is refused, so that the controller halves it.
+ * newton_k: backward Euler by k inexact Newton iterations a step, for real time. be solves the same equation
+ * (be.c) to a tolerance; here the solver is nonlinear/inexact_newton.h, and no step is accepted unchecked:
+ * the residual of its end is reported, and where it has not fallen below that of the guess the step is
+ * refused, so that the controller halves it.
  *
  * The guess: the nodes fly on, and a share s of the last change of velocity acts again,
  *     d = h v0 + s h^2 (v0 - v-1)/h0
@@ -163,9 +164,9 @@ static void guess(newton_k *s, const drape_state *in, double h)
     }
 }
 
-/* The share of the residual that is left. A displacement e that is missing from a step is a velocity e/h, of which a
- * second has 1/h: for these to vanish with h as the method's own error does, e must be of order h^3. The guess is off by
- * h^2, so the share is of order h. */
+/* The share of the residual that is left. A displacement e that is missing from a step is a velocity e/h, of
+ * which a second has 1/h: for these to vanish with h as the method's own error does, e must be of order h^3.
+ * The guess is off by h^2, so the share is of order h. */
 static double linear_tolerance(const newton_k *s)
 {
     double share = s->values[PARAM_LINEAR_TOLERANCE] * NOMINAL_RATE / s->common.equation.point.weight;

@@ -1,8 +1,8 @@
 /*
  * stability.c: the largest eigenvalue of A = M^-1/2 K M^-1/2 by the power iteration u, A u, A^2 u ... in the
- * form that keeps all earlier powers: Lanczos' recurrence, whose tridiagonal matrix T has the largest Ritz value of the
- * whole sequence as its own (Parlett 1998, 13). Power iteration alone needs hundreds of products where a sheet's fastest
- * waves lie close together.
+ * form that keeps all earlier powers: Lanczos' recurrence, whose tridiagonal matrix T has the largest Ritz
+ * value of the whole sequence as its own (Parlett 1998, 13). Power iteration alone needs hundreds of products
+ * where a sheet's fastest waves lie close together.
  *     b_j u_j+1 = A u_j - a_j u_j - b_j-1 u_j-1,  a_j = u_j . A u_j
  * Orthogonality is lost in time; that repeats eigenvalues of T and moves none out of the spectrum.
  *
@@ -70,13 +70,15 @@ static double normalise(double *u, size_t n)
     for (size_t i = 0; i < n; i++)
         sum += u[i] * u[i];
     double norm = sqrt(sum);
-    for (size_t i = 0; norm > 0 && i < n; i++)
+    if (!(norm > 0))
+        return norm;
+    for (size_t i = 0; i < n; i++)
         u[i] /= norm;
     return norm;
 }
 
-/* u_0: numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX). Every wave has a part in them, and they are
- * the same everywhere. */
+/* u_0: numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX). Every wave has a part in them,
+ * and they are the same everywhere. */
 static void start(drape_spectrum *s)
 {
     uint64_t seed = 1;
@@ -88,8 +90,8 @@ static void start(drape_spectrum *s)
     normalise(s->u, s->dofs);
 }
 
-/* next = M^-1/2 (g(y + e M^-1/2 u) - g(y))/e, where y is s->x or s->v; its free entries are those of `from` (NULL: 0) before
- * and after. */
+/* next = M^-1/2 (g(y + e M^-1/2 u) - g(y))/e, where y is s->x or s->v; its free entries are those of `from`
+ * (NULL: 0) before and after. */
 static void product(drape_spectrum *s, const drape_state *at, double *y, const double *from)
 {
     const drape_model *m = s->model;
@@ -158,9 +160,8 @@ static double largest(drape_spectrum *s, const drape_state *at, double *y, const
         s->next = spare;
         s->b[n] = normalise(s->u, dofs);
         n++;
-        if (!(s->b[n - 1] >
-              EXHAUSTED * fabs(a))) /* all that u can reach is known, or numbers are not finite */
-            break;
+        if (!(s->b[n - 1] > EXHAUSTED * fabs(a)))
+            break; /* all that u can reach is known, or numbers are not finite */
     }
     return largest_of(s->a, s->b, n);
 }

@@ -1,6 +1,6 @@
 /*
- * stability.h: the fastest waves at a state, for integrators that do not resolve what is faster than their step.
- * Matrix-free: a product with K or D is a difference of two forces.
+ * stability.h: the fastest waves at a state, for integrators that do not resolve what is faster than their
+ * step. Matrix-free: a product with K or D is a difference of two forces.
  */
 #ifndef DRAPE_INTEGRATORS_STABILITY_H
 #define DRAPE_INTEGRATORS_STABILITY_H

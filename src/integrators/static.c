@@ -1,13 +1,14 @@
 /*
- * static: equilibrium, grad E(x) = 0 with the pins where they are at the end. Newton's method on that stalls far from the
- * solution, so pseudo-transient continuation leads there (Kelley & Keyes 1998): implicit Euler steps of the gradient flow
- * M x' = -grad E in a pseudo time,
+ * static: equilibrium, grad E(x) = 0 with the pins where they are at the end. Newton's method on that stalls
+ * far from the solution, so pseudo-transient continuation leads there (Kelley & Keyes 1998): implicit Euler
+ * steps of the gradient flow M x' = -grad E in a pseudo time,
  *     m M d + grad E(x + d) = 0,   x <- x + d,
- * each a Newton solve, with a weight m that falls with the residual and by half at least, so that the last steps are
- * Newton's own. A step that fails, or ends in a degenerate element, is forgotten and tried with a larger m. Damping and
- * velocities have no part.
+ * each a Newton solve, with a weight m that falls with the residual and by half at least, so that the last
+ * steps are Newton's own. A step that fails, or ends in a degenerate element, is forgotten and tried with a
+ * larger m. Damping and velocities have no part.
  *
- * Whether the equilibrium is stable is seen from the signs of D in K = L D L': it is stable if none is negative.
+ * Whether the equilibrium is stable is seen from the signs of D in K = L D L': it is stable if none is
+ * negative.
  */
 #include "integrators/implicit.h"
 #include "solvers/inertia.h"
@@ -15,11 +16,11 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_STEPS 1000 /* of pseudo time */
-#define MAX_FAILS 40   /* in a row */
-#define MAX_FALL  0.02 /* m falls to no less than this share in one step */
-#define MIN_FALL  0.5 /* and at least to this: where the residual does not fall yet, the flow has far to go */
-#define FAIL_RISE 10.0 /* m rises by this factor after a failure */
+#define MAX_STEPS   1000 /* of pseudo time */
+#define MAX_FAILS   40   /* in a row */
+#define MIN_FACTOR  0.02 /* of m from one step to the next */
+#define MAX_FACTOR  0.5 /* the same, also where the residual does not fall yet: then the flow has far to go */
+#define FAIL_FACTOR 10.0 /* of m after a failure */
 
 typedef struct static_state {
     drape_implicit common; /* first */
@@ -41,8 +42,8 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     return status ? status : drape_arena_status(arena);
 }
 
-/* The equation of a step of pseudo time from x. Colliders rest, and its corrections are too large for forces to first
- * order in them. */
+/* The equation of a step of pseudo time from x. Colliders rest, and its corrections are too large for forces
+ * to first order in them. */
 static void set_equation(static_state *s, const double *x, double mass_weight)
 {
     drape_step_equation *e = &s->common.equation;
@@ -76,7 +77,8 @@ static drape_status pseudo_step(static_state *s, double mass_weight, drape_state
     return drape_system_begin(e->system, &(drape_state){.t = e->point.t, .x = out->x, .v = e->v_base});
 }
 
-/* The residual of statics where the equation was evaluated last: the largest component of grad E on the free nodes. */
+/* The residual of statics where the equation was evaluated last: the largest component of grad E on the free
+ * nodes. */
 static double static_residual(const static_state *s)
 {
     const drape_step_equation *e = &s->common.equation;
@@ -109,7 +111,7 @@ static drape_status follow(static_state *s, double mass_weight, double tolerance
         if (status < 0)
             return status;
         if (status) {
-            mass_weight *= FAIL_RISE;
+            mass_weight *= FAIL_FACTOR;
             fails++;
             continue;
         }
@@ -118,7 +120,7 @@ static drape_status follow(static_state *s, double mass_weight, double tolerance
         if (info->residual <= tolerance)
             return DRAPE_OK;
         if (!isnan(last))
-            mass_weight *= fmin(MIN_FALL, fmax(MAX_FALL, info->residual / last));
+            mass_weight *= fmin(MAX_FACTOR, fmax(MIN_FACTOR, info->residual / last));
         last = info->residual;
     }
     if (fails == 0)

@@ -1,7 +1,7 @@
 /*
  * trbdf2: a trapezoidal step to t0 + gamma h, then the backward differentiation formula of order 2 through
  * both its ends to t0 + h. gamma = 2 - sqrt(2) gives both stages the same matrix. Second order, A- and
- * L-stable, one step: it knows nothing of the past that a kink or a change of h could spoil. Bank et al.
+ * L-stable, one step: it has no history that a kink or a change of h could spoil. Bank et al.
  * 1985; Hosea & Shampine 1996. With w = 2/(gamma h), a1 = 1/(gamma (2 - gamma)), a0 = a1 - 1:
  *     xg = x0 + (v0 + vg)/w,         M w (vg - v0) + g0 + gg = 0
  *     x1 = a1 xg - a0 x0 + v1/w,     M w (v1 - a1 vg + a0 v0) + g1 = 0
@@ -49,8 +49,9 @@ static drape_status solve_stage(trbdf2_state *s, double w, double *x, double *v,
 }
 
 /* Adds the work over a stage, by the midpoint rule with the mean velocity: of dissipative forces, and of the
- * forces that hold moved pins and colliders on their way. Powers at the ends would count what a stiff dashpot has at the
- * jump of a pin's velocity for a good part of the step. Bases and g0 serve as scratch. */
+ * forces that move pins and colliders along their paths. With powers at the ends, the force of a stiff
+ * dashpot at a jump of a pin's velocity would count for a good part of the step. The base and g0 serve as
+ * scratch. */
 static void add_work(trbdf2_state *s, const double *from, const double *to, double t, double span,
                      drape_step_info *info)
 {

@@ -53,10 +53,12 @@ static void add_pairs(const drape_approx_jacobian *s, const double *x, double *y
         const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
         double f[3];
         multiply_block(s->h + 6 * (size_t)p, d, f);
-        for (int r = 0; i >= 0 && r < 3; r++)
-            y[3 * (size_t)i + (size_t)r] += f[r];
-        for (int r = 0; j >= 0 && r < 3; r++)
-            y[3 * (size_t)j + (size_t)r] -= f[r];
+        for (size_t r = 0; r < 3; r++) {
+            if (i >= 0)
+                y[3 * (size_t)i + r] += f[r];
+            if (j >= 0)
+                y[3 * (size_t)j + r] -= f[r];
+        }
     }
 }
 
@@ -87,8 +89,8 @@ static void multiply(const void *owner, const double *x, double *y)
     drape_approx_jacobian_multiply(owner, x, y);
 }
 
-/* z = D^-1 r + P A_c^-1 P' r. The coarse solver has factors: its solve fails only if numbers are not finite, and then
- * its part is left out. */
+/* z = D^-1 r + P A_c^-1 P' r. The coarse solver has factors: its solve fails only if numbers are not finite,
+ * and then its part is left out. */
 static void precondition(const void *owner, const double *r, double *z)
 {
     const drape_approx_jacobian *s = owner;
@@ -171,6 +173,12 @@ static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_poi
     return DRAPE_OK;
 }
 
+static void add_upper(drape_approx_jacobian *s, int32_t node, const double upper[6])
+{
+    for (size_t c = 0; c < 6; c++)
+        s->inverse[6 * (size_t)node + c] += upper[c];
+}
+
 /* The diagonal blocks, inverted. */
 static void invert_diagonal(drape_approx_jacobian *s)
 {
@@ -180,12 +188,12 @@ static void invert_diagonal(drape_approx_jacobian *s)
         memcpy(s->inverse + 6 * (size_t)i, (double[6]){scalar, 0, 0, scalar, 0, scalar}, 6 * sizeof(double));
     }
     for (int32_t p = 0; p < 2 * s->pairs; p++)
-        for (int c = 0; s->pair[p] >= 0 && c < 6; c++)
-            s->inverse[6 * (size_t)s->pair[p] + (size_t)c] += s->h[6 * (size_t)(p / 2) + (size_t)c];
+        if (s->pair[p] >= 0)
+            add_upper(s, s->pair[p], s->h + 6 * (size_t)(p / 2));
     for (int32_t k = 0; k < m->count; k++) {
-        const double *b = m->block + 9 * (size_t)k, upper[6] = {b[0], b[1], b[2], b[4], b[5], b[8]};
-        for (int c = 0; m->row[k] == m->column[k] && c < 6; c++)
-            s->inverse[6 * (size_t)m->row[k] + (size_t)c] += upper[c];
+        const double *b = m->block + 9 * (size_t)k;
+        if (m->row[k] == m->column[k])
+            add_upper(s, m->row[k], (double[6]){b[0], b[1], b[2], b[4], b[5], b[8]});
     }
     for (int32_t i = 0; i < s->nodes; i++)
         invert_block(s->inverse + 6 * (size_t)i);

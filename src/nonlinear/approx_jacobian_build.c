@@ -1,5 +1,5 @@
-/* approx_jacobian_build.c: the parts of the approximate Jacobian that do not change with the state: pairs, scalar
- * stiffness, the coarse space, and what each pair adds to the matrix there. */
+/* approx_jacobian_build.c: the parts of the approximate Jacobian that do not change with the state: pairs,
+ * scalar stiffness, the coarse space, and what each pair adds to the matrix there. */
 #include "nonlinear/approx_jacobian_parts.h"
 
 #include <string.h>
@@ -27,8 +27,8 @@ static drape_status list_pairs(drape_approx_jacobian *s)
 
 /* ---- The coarse space ---- */
 
-/* Both passes over the edges of the mesh between free nodes: counts the neighbours of each node in start[node + 2], or
- * lists them from start[node + 1] on, which then is where the list of the next node begins. */
+/* Both passes over the edges of the mesh between free nodes: counts the neighbours of each node in start[node
+ * + 2], or lists them from start[node + 1] on, which then is where the list of the next node begins. */
 static void pass_edges(const drape_model *m, int32_t *start, int32_t *neighbor)
 {
     for (int32_t e = 0; e < m->edge_count; e++) {
@@ -45,41 +45,37 @@ static void pass_edges(const drape_model *m, int32_t *start, int32_t *neighbor)
     }
 }
 
-static drape_status build_prolong(drape_approx_jacobian *s, int spacing)
+static drape_status build_prolong(drape_approx_jacobian *s, int spacing, drape_arena *scratch)
 {
     const drape_model *m = s->model;
-    drape_arena scratch = drape_arena_of(s->arena->ctx);
-    int32_t *start = drape_arena_take(&scratch, (size_t)s->nodes + 2, sizeof *start);
-    int32_t *neighbor = drape_arena_take(&scratch, 2 * (size_t)m->edge_count, sizeof *neighbor);
-    drape_status status = drape_arena_status(&scratch);
-    if (!status) {
-        pass_edges(m, start, NULL);
-        for (int32_t i = 1; i < s->nodes; i++)
-            start[i + 1] += start[i];
-        pass_edges(m, start, neighbor);
-        const drape_graph graph = {.count = s->nodes, .start = start, .neighbor = neighbor};
-        status = drape_prolong_build(s->arena, &graph, spacing ? spacing : drape_prolong_spacing(s->nodes),
-                                     &s->coarse.prolong);
-    }
-    drape_arena_free(&scratch);
-    return status;
+    int32_t *start = drape_arena_take(scratch, (size_t)s->nodes + 2, sizeof *start);
+    int32_t *neighbor = drape_arena_take(scratch, 2 * (size_t)m->edge_count, sizeof *neighbor);
+    if (drape_arena_status(scratch))
+        return DRAPE_E_MEMORY;
+    pass_edges(m, start, NULL);
+    for (int32_t i = 1; i < s->nodes; i++)
+        start[i + 1] += start[i];
+    pass_edges(m, start, neighbor);
+    const drape_graph graph = {.count = s->nodes, .start = start, .neighbor = neighbor};
+    return drape_prolong_build(s->arena, &graph, spacing ? spacing : drape_prolong_spacing(s->nodes),
+                               &s->coarse.prolong);
 }
 
 /* Couples the coarse functions that overlap on the model's pattern, in pairs. */
-static drape_status build_coarse_pattern(drape_approx_jacobian *s)
+static drape_status build_coarse_pattern(drape_approx_jacobian *s, drape_arena *scratch)
 {
     coarse_matrix *c = &s->coarse;
     const drape_pattern *p = &s->model->pattern;
     const drape_graph fine = {.count = p->block_count, .start = p->block_start, .neighbor = p->block_row};
-    int32_t *start = NULL, *neighbor = NULL, *pairs = NULL, *own = NULL, count = 0;
-    drape_arena scratch = drape_arena_of(s->arena->ctx);
-    drape_status status = drape_prolong_meet(&scratch, &c->prolong, &fine, &start, &neighbor);
-    if (!status) {
-        pairs = drape_arena_take(&scratch, 2 * (size_t)start[c->prolong.coarse], sizeof *pairs);
-        own = drape_arena_take(&scratch, (size_t)c->prolong.coarse, sizeof *own);
-        status = drape_arena_status(&scratch);
-    }
-    for (int32_t a = 0; !status && a < c->prolong.coarse; a++) {
+    int32_t *start, *neighbor, count = 0;
+    drape_status status = drape_prolong_meet(scratch, &c->prolong, &fine, &start, &neighbor);
+    if (status)
+        return status;
+    int32_t *pairs = drape_arena_take(scratch, 2 * (size_t)start[c->prolong.coarse], sizeof *pairs);
+    int32_t *own = drape_arena_take(scratch, (size_t)c->prolong.coarse, sizeof *own);
+    if (drape_arena_status(scratch))
+        return DRAPE_E_MEMORY;
+    for (int32_t a = 0; a < c->prolong.coarse; a++) {
         own[a] = a;
         for (int32_t k = start[a]; k < start[a + 1]; k++)
             if (neighbor[k] < a) {
@@ -88,10 +84,7 @@ static drape_status build_coarse_pattern(drape_approx_jacobian *s)
             }
     }
     const drape_coupling coupling = {.count = count, .nodes = 2, .node = pairs};
-    if (!status)
-        status = drape_pattern_build(s->arena, c->prolong.coarse, own, &coupling, 1, &c->pattern);
-    drape_arena_free(&scratch);
-    return status;
+    return drape_pattern_build(s->arena, c->prolong.coarse, own, &coupling, 1, &c->pattern);
 }
 
 /* The scalar stiffness on the coarse space: P' C P. */
@@ -130,7 +123,9 @@ static int differences(const drape_approx_jacobian *s, int32_t pair, int32_t col
     int count = 0;
     for (int end = 0; end < 2; end++) {
         int32_t node = s->pair[2 * (size_t)pair + (size_t)end];
-        for (int32_t k = node < 0 ? 0 : p->start[node]; node >= 0 && k < p->start[node + 1]; k++) {
+        if (node < 0)
+            continue;
+        for (int32_t k = p->start[node]; k < p->start[node + 1]; k++) {
             int i = 0;
             while (i < count && column[i] != p->column[k])
                 i++;
@@ -144,7 +139,8 @@ static int differences(const drape_approx_jacobian *s, int32_t pair, int32_t col
     return count;
 }
 
-/* What one pair adds to the coarse matrix, from entry `at` of the list on; returns the next. Without store, only counts. */
+/* What one pair adds to the coarse matrix, from entry `at` of the list on; returns the next. Without store,
+ * only counts. */
 static int64_t add_pair(drape_approx_jacobian *s, int32_t pair, int64_t at, bool store)
 {
     coarse_matrix *c = &s->coarse;
@@ -186,9 +182,11 @@ static drape_status build_coarse_pairs(drape_approx_jacobian *s)
 static drape_status build_coarse(drape_approx_jacobian *s, int spacing)
 {
     coarse_matrix *c = &s->coarse;
-    drape_status status = build_prolong(s, spacing);
+    drape_arena scratch = drape_arena_of(s->arena->ctx);
+    drape_status status = build_prolong(s, spacing, &scratch);
     if (!status)
-        status = build_coarse_pattern(s);
+        status = build_coarse_pattern(s, &scratch);
+    drape_arena_free(&scratch);
     if (!status)
         status = build_coarse_scalars(s);
     if (!status)

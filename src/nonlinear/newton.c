@@ -1,25 +1,26 @@
 /*
- * newton.c: see newton.h. A solve runs through these stages, which stand below in this order. KINSOL calls those that it
- * is named at, once an iteration:
+ * newton.c: see newton.h. A solve runs through these stages, which stand below in this order:
  *
  *   guess      the caller's d, shortened to its feasible fraction; d = 0 where it breaks a limit
- *   residual   F(d)                                                             KINSOL's system function
- *   jacobian   J(d), in the pattern that contact has there                      KINSOL's Jacobian function
- *   factor     factors of J; an indefinite J is repaired by a share of the      setup of KINSOL's linear solver
- *              positive parts of its elements
- *   correct    p = -J^-1 F, made a descent direction, shortened to its          solve of KINSOL's linear solver
- *              feasible fraction, predicted stress for the next J, shortened
- *              or lengthened by line search, completed by chord steps
+ *   residual   F(d)
+ *   jacobian   J(d), in the pattern that contact has there
+ *   factor     factors of J; an indefinite J is repaired by a share of the positive parts of its elements
+ *   correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress predicted for
+ *              the next J; p shortened or lengthened by line search, completed by chord steps
  *   conclude   what KINSOL's return code means, and F at the d where it ended, in the norm that was asked for
  *
- * KINSOL does the rest: it adds p to d, counts iterations, and ends the loop where the largest component of F is within
- * its bound, where p moves nothing, where p is at its size limit five times in a row, or after max_iterations. With
- * `newton: modified` it also decides when factors are too old, and with `globalization: line_search` it shortens p
- * itself, by the sum of squares of F.
+ * KINSOL calls those between guess and conclude in each iteration: residual as its system function, jacobian
+ * as its Jacobian function, factor and correct as setup and solve of its linear solver.
  *
- * Contact and the default globalization, `work`, are ours, and are inside `correct`: KINSOL is given a linear solver whose
- * solution is the step to be taken. Its own line search can neither stop at contact nor ask for another matrix, and
- * measures progress by the sum of squares of F, in which stiff stretching outweighs all other forces.
+ * KINSOL does the rest: it adds p to d, counts iterations, and ends the loop where the largest component of F
+ * is within its bound, where p moves nothing, where p is at its size limit five times in a row, or after
+ * max_iterations. With `newton: modified` it also decides when factors are too old, and with `globalization:
+ * line_search` it shortens p itself, by the sum of squares of F.
+ *
+ * Contact and the default globalization, `work`, are ours, and are inside `correct`: KINSOL is given a linear
+ * solver whose solution is the step to be taken. Its own line search can neither stop at contact nor ask for
+ * another matrix, and measures progress by the sum of squares of F, in which stiff stretching outweighs all
+ * other forces.
  */
 #include "nonlinear/newton.h"
 
@@ -79,7 +80,8 @@ static int return_status(drape_newton *s, drape_status status)
     return status;
 }
 
-/* KINSOL compares the largest component of F with this, which implies the tolerance in the norm that was asked for. */
+/* KINSOL compares the largest component of F with this, which implies the tolerance in the norm that was
+ * asked for. */
 static double max_norm_bound(const drape_newton *s)
 {
     double tolerance = s->values[DRAPE_NEWTON_TOLERANCE], n = (double)s->equation->dofs;
@@ -107,7 +109,8 @@ static void begin(drape_newton *s)
     e->work.jacobian_seconds += drape_system_clock(e->system) - clock;
 }
 
-/* A guess beyond a limit is worse than none: springs that are too long pull with forces far above any that act. */
+/* A guess beyond a limit is worse than none: springs that are too long pull with forces far above any that
+ * act. */
 static void improve_guess(drape_newton *s, double *d)
 {
     drape_step_equation *e = s->equation;
@@ -119,8 +122,8 @@ static void improve_guess(drape_newton *s, double *d)
 
 /* ---- Residual ---- */
 
-/* KINSOL must not be shown a NaN: its norms ignore it, and it would pass for convergence. Where the line search ended,
- * F is known already. */
+/* KINSOL must not be shown a NaN: its norms ignore it, and it would pass for convergence. Where the line
+ * search ended, F is known already. */
 static int residual(N_Vector d_vector, N_Vector f, void *user)
 {
     drape_newton *s = user;
@@ -183,17 +186,17 @@ static int jacobian(N_Vector d, N_Vector f, SUNMatrix matrix, void *user, N_Vect
 
 /* ---- Factor ---- */
 
-/* Assembles and factors J at the present iterate with a share of the positive parts: with 1 in any case, with less only
- * if that is positive definite, else DRAPE_RETRY_LINEAR. */
+/* Assembles and factors J at the present iterate with a share of the positive parts: with 1 in any case, with
+ * less only if that is positive definite, else DRAPE_RETRY_LINEAR. */
 static drape_status factor_with_share(drape_newton *s, double share)
 {
     drape_status status = assemble(s, N_VGetArrayPointer(s->unknown), share);
     return status ? status : drape_sun_linear_factor(s->linear, share < 1);
 }
 
-/* An indefinite matrix gives directions that lead nowhere good. With the whole positive parts they lead down, but
- * slowly: the smaller the share that makes the matrix definite, the nearer its direction is to Newton's. The share that
- * was needed last is tried first, halved. */
+/* An indefinite matrix gives directions that lead nowhere good. With the whole positive parts they lead down,
+ * but slowly: the smaller the share that makes the matrix definite, the nearer its direction is to Newton's.
+ * The share that was needed last is tried first, halved. */
 static int factor(SUNLinearSolver solver, SUNMatrix matrix)
 {
     (void)matrix;
@@ -211,8 +214,8 @@ static int factor(SUNLinearSolver solver, SUNMatrix matrix)
 
 /* ---- Correct ---- */
 
-/* A p that climbs is of an indefinite matrix, which the linear solver could not tell: the positive semidefinite one gives
- * one that descends. */
+/* A p that climbs is of an indefinite matrix, which the linear solver could not tell: the positive
+ * semidefinite one gives one that descends. */
 static drape_status ensure_descent(drape_newton *s, const double *minus_f, double *p)
 {
     if (drape_step_equation_dot(s->equation, minus_f, p) > 0 || s->positive_share == 1)
@@ -221,8 +224,8 @@ static drape_status ensure_descent(drape_newton *s, const double *minus_f, doubl
     return status ? status : drape_sun_linear_solve(s->linear, minus_f, p);
 }
 
-/* Where many corrections did not lead to an end, sheets buckle: there forces to first order in the last correction say
- * little, and the iteration may go in circles. */
+/* Where many corrections did not lead to an end, sheets buckle: there forces to first order in the last
+ * correction say little, and the iteration may go in circles. */
 static void predict_stress(drape_newton *s, const double *p)
 {
     drape_step_equation *e = s->equation;
@@ -234,11 +237,12 @@ static void predict_stress(drape_newton *s, const double *p)
     e->work.jacobian_seconds += drape_system_clock(e->system) - start;
 }
 
-/* The a at which p is taken: the work of the residual along it, F(d + a p) . p, is to be at most a fraction of `start`,
- * what it was at a = 0, of either sign; a positive one has passed the minimum. Found by doubling and bisection. This is the
- * line search of Matthies & Strang 1979: it needs no energy, so it holds for friction and damping too. A matrix with
- * positive parts is too stiff by far along what is unstable: its corrections are lengthened until the work is small
- * enough, else a sheet that buckles takes a hundred of them. Others are taken whole if they stop short of the minimum. */
+/* The a at which p is taken: the work of the residual along it, F(d + a p) . p, is to be at most a fraction
+ * of `start`, what it was at a = 0, of either sign; a positive one has passed the minimum. Found by doubling
+ * and bisection. This is the line search of Matthies & Strang 1979: it needs no energy, so it holds for
+ * friction and damping too. A matrix with positive parts is too stiff by far along what is unstable: its
+ * corrections are lengthened until the work is small enough, else a sheet that buckles takes a hundred of
+ * them. Others are taken whole if they stop short of the minimum. */
 static double search_along(drape_newton *s, const double *d, const double *p, double start)
 {
     drape_step_equation *e = s->equation;
@@ -266,9 +270,9 @@ static double largest(const double *f, size_t n)
     return max;
 }
 
-/* Chord steps: where p brought the residual so far down that the same fall once or twice more ends the solve, the rest is
- * corrected with the factors of p, at a tenth of the cost of an iteration. F is known at d + p; minus_f is what it was at d.
- * A chord step that does not lower the residual is undone. */
+/* Chord steps: where p brought the residual so far down that the same fall once or twice more ends the solve,
+ * the rest is corrected with the factors of p, at a tenth of the cost of an iteration. F is known at d + p;
+ * minus_f is what it was at d. A chord step that does not lower the residual is undone. */
 static drape_status add_chords(drape_newton *s, const double *d, double *p, const double *minus_f)
 {
     drape_step_equation *e = s->equation;
@@ -296,7 +300,8 @@ static drape_status add_chords(drape_newton *s, const double *d, double *p, cons
     return DRAPE_OK;
 }
 
-/* The step that is taken from the present iterate d. A p that is not finite is left for KINSOL to evaluate, and fail. */
+/* The step that is taken from the present iterate d. A p that is not finite is left for KINSOL to evaluate,
+ * and fail. */
 static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
 {
     drape_step_equation *e = s->equation;
@@ -370,7 +375,8 @@ static drape_status status_of(int code, const char **reason)
     }
 }
 
-/* Whether F at d is small enough. KINSOL's last evaluation was at d if it converged; else it may have been a trial. */
+/* Whether F at d is small enough. KINSOL's last evaluation was at d if it converged; else it may have been a
+ * trial. */
 static drape_status judge(drape_newton *s, drape_status status, const double *d, drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;

@@ -1,6 +1,6 @@
 /*
- * newton.h: solves a step equation to a tolerance by Newton's method, with KINSOL. newton.c says at its top how an
- * iteration runs, and which parts of it are KINSOL's.
+ * newton.h: solves a step equation to a tolerance by Newton's method, with KINSOL. newton.c says at its top
+ * how an iteration runs, and which parts of it are KINSOL's.
  */
 #ifndef DRAPE_NONLINEAR_NEWTON_H
 #define DRAPE_NONLINEAR_NEWTON_H
@@ -38,19 +38,19 @@ enum { DRAPE_NEWTON_PREDICTOR_INERTIAL, DRAPE_NEWTON_PREDICTOR_REST };
 
 typedef struct drape_newton drape_newton;
 
-/* values: of the parameters. Both equation and arena outlive it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER; then, too,
- * drape_newton_destroy frees what SUNDIALS and the linear solver took. */
+/* values: of the parameters. Both equation and arena outlive it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER;
+ * then, too, drape_newton_destroy frees what SUNDIALS and the linear solver took. */
 drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equation, const double *values,
                                  drape_newton **out);
 void drape_newton_destroy(drape_newton **newton);
 
-/* Solves the equation for d (free DOFs; on entry the guess). DRAPE_OK: the residual at d is within the tolerance, in the
- * norm that was asked for. > 0: it is not, and the report says why; report->usable if the settings ask to continue all
- * the same. With either, the equation was evaluated last at d. */
+/* Solves the equation for d (free DOFs; on entry the guess). DRAPE_OK: the residual at d is within the
+ * tolerance, in the norm that was asked for. > 0: it is not, and the report says why; report->usable if the
+ * settings ask to continue all the same. With either, the equation was evaluated last at d. */
 drape_status drape_newton_solve(drape_newton *newton, double *d, drape_solve_report *report);
 
-/* J at a point with a weight of its own, in the pattern that the system has there; valid until the next solve. The
- * factors are forgotten. Errors: DRAPE_E_MEMORY. */
+/* J at a point with a weight of its own, in the pattern that the system has there; valid until the next
+ * solve. The factors are forgotten. Errors: DRAPE_E_MEMORY. */
 drape_status drape_newton_matrix(drape_newton *newton, const drape_point *point, double mass_weight,
                                  const drape_pattern **pattern, const double **values);
 

@@ -10,10 +10,10 @@ typedef struct drape_solve_report {
     const char *reason; /* "converged", or why not; static text */
     int iterations;
     double residual, tolerance; /* [N] */
-    bool
-        lenient; /* settings on_failure accept: states are only guarded against numbers that are not finite and against
-                   * passing through something */
-    bool usable; /* with a status > 0: lenient settings ask to continue with what there is */
+    /* lenient: settings on_failure accept: states are only guarded against numbers that are not finite and
+     * against passing through something. usable: with a status > 0, they ask to continue with what there
+     * is. */
+    bool lenient, usable;
     drape_worst worst;
 } drape_solve_report;
 

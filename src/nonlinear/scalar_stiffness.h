@@ -1,9 +1,9 @@
 /*
- * scalar_stiffness.h: a matrix of one scalar a pair of nodes that stands for the Hessian of strain measures, for all three
- * coordinates alike: the trace of each 3 x 3 block of the measures' Hessian at rest, k dq dq', constant from there on. For a
- * hinge it is the stencil on the flat sheet. Since (tr B)^2 <= 3 |B|^2 it bounds the Hessian of one measure up to a factor
- * of 3, and exactly where all gradients of the measure are parallel, as those of a hinge are. Measures that depend on the
- * distance of two nodes are left out.
+ * scalar_stiffness.h: a matrix of one scalar a pair of nodes that stands for the Hessian of strain measures,
+ * for all three coordinates alike: the trace of each 3 x 3 block of the measures' Hessian at rest, k dq dq',
+ * constant from there on. For a hinge it is the stencil on the flat sheet. Since (tr B)^2 <= 3 |B|^2 it
+ * bounds the Hessian of one measure up to a factor of 3, and exactly where all gradients of the measure are
+ * parallel, as those of a hinge are. Measures that depend on the distance of two nodes are left out.
  */
 #ifndef DRAPE_NONLINEAR_SCALAR_STIFFNESS_H
 #define DRAPE_NONLINEAR_SCALAR_STIFFNESS_H

@@ -85,7 +85,9 @@ void drape_step_equation_make_feasible(drape_step_equation *s, double *p)
     for (size_t i = 0; i < s->dofs; i++)
         s->x_ahead[drape_step_equation_at(s, i)] += p[i];
     double fraction = drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t);
-    for (size_t i = 0; fraction != 1 && i < s->dofs; i++)
+    if (fraction == 1)
+        return;
+    for (size_t i = 0; i < s->dofs; i++)
         p[i] *= fraction;
 }
 
@@ -113,8 +115,8 @@ double drape_step_equation_norm(const drape_step_equation *s, drape_norm norm)
     return choose(&sum, norm);
 }
 
-/* Terms are rounded to some DBL_EPSILON of themselves. At small h the inertia of a node in flight, M |v|/h, is more than
- * 1e16 times a tight tolerance, and halving h doubles it. */
+/* Terms are rounded to some DBL_EPSILON of themselves. At small h the inertia of a node in flight, M |v|/h,
+ * is more than 1e16 times a tight tolerance, and halving h doubles it. */
 double drape_step_equation_rounding(const drape_step_equation *s, const double *d, drape_norm norm)
 {
     norms sum = {0};

@@ -1,16 +1,16 @@
 /*
- * step_equation.h: the nonlinear equation of one implicit step, or of one stage of it. With the displacement d of the
- * free nodes from a base configuration,
+ * step_equation.h: the nonlinear equation of one implicit step, or of one stage of it. With the displacement
+ * d of the free nodes from a base configuration,
  *     x = x_base + d,  v = v_base + w d
  *     F(d) = m_w M (d - p) + g(x, v) = 0       [N]
  *     J(d) = m_w M + dg/dx + w dg/dv           [N/m]
- * An integrator is a choice of the base, the weights m_w and w, the inertial displacement p and the history of strain
- * rates. Backward Euler: m_w = 1/h^2, w = 1/h, p = h v0. The unknowns are displacements and not positions, so that
- * M (d - p) keeps its digits at small h, wherever the scene lies.
+ * An integrator is a choice of the base, the weights m_w and w, the inertial displacement p and the history
+ * of strain rates. Backward Euler: m_w = 1/h^2, w = 1/h, p = h v0. The unknowns are displacements and not
+ * positions, so that M (d - p) keeps its digits at small h, wherever the scene lies.
  *
- * Friction and damping have no energy that could be minimised. The merit of a step a p from d is the work of the residual
- * along it, F(d + a p) . p: it is negative while p still leads down, and zero where the energy along p, if there is one,
- * is least. A step is feasible where no two pieces pass through each other on it.
+ * Friction and damping have no energy that could be minimised. The merit of a step a p from d is the work of
+ * the residual along it, F(d + a p) . p: it is negative while p still leads down, and zero where the energy
+ * along p, if there is one, is least. A step is feasible where no two pieces pass through each other on it.
  *
  * The solvers are newton.h (to a tolerance) and inexact_newton.h (a fixed number of iterations).
  */
@@ -66,8 +66,8 @@ bool drape_step_equation_evaluate(drape_step_equation *equation, const double *d
 bool drape_step_equation_try(drape_step_equation *equation, const double *d, double a, const double *p,
                              double *trial, double *work);
 
-/* J at the last point into values. stress: see drape_point; NULL: the forces there. positive_share, 0 to 1: how much of
- * the difference from the Hessian of each element to its positive semidefinite part is added. */
+/* J at the last point into values. stress: see drape_point; NULL: the forces there. positive_share, 0 to 1:
+ * how much of the difference from the Hessian of each element to its positive semidefinite part is added. */
 void drape_step_equation_jacobian(drape_step_equation *equation, const double *stress, double positive_share,
                                   double *values);
 
@@ -82,8 +82,8 @@ double drape_step_equation_rounding(const drape_step_equation *equation, const d
 void drape_step_equation_diagnose(const drape_step_equation *equation, double tolerance,
                                   drape_solve_report *report);
 
-/* For numbers that are not finite: DRAPE_RETRY_DEGENERATE with the element that collapsed, if there is one, else
- * status. */
+/* For numbers that are not finite: DRAPE_RETRY_DEGENERATE with the element that collapsed, if there is one,
+ * else status. */
 drape_status drape_step_equation_find_cause(const drape_step_equation *equation, drape_status status,
                                             drape_solve_report *report);
 

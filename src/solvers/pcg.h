@@ -1,7 +1,7 @@
 /*
  * pcg.h: preconditioned conjugate gradients (Hestenes & Stiefel 1952) for A x = b, A symmetric positive
- * definite, both it and the preconditioner given as functions. Where a direction of no positive curvature turns
- * up, A was not: the iteration ends there, with what it has.
+ * definite, both it and the preconditioner given as functions. Where a direction of no positive curvature
+ * turns up, A was not: the iteration ends there, with what it has.
  */
 #ifndef DRAPE_SOLVERS_PCG_H
 #define DRAPE_SOLVERS_PCG_H
@@ -19,8 +19,8 @@ typedef struct drape_pcg {
     bool converged; /* the tolerance was reached */
 } drape_pcg;
 
-/* x from b, until the residual falls to a share `tolerance` in the norm of P^-1. The iteration starts at 0, and every
- * iterate is a direction of descent of x'Ax/2 - b'x. */
+/* x from b, until the residual falls to a share `tolerance` in the norm of P^-1. The iteration starts at 0,
+ * and every iterate is a direction of descent of x'Ax/2 - b'x. */
 void drape_pcg_solve(drape_pcg *pcg, const double *b, double *x, double tolerance, int max_iterations);
 
 #endif

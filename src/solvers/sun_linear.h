@@ -34,8 +34,8 @@ typedef struct drape_sun_linear {
 drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const drape_linear_ops *ops,
                                      const drape_pattern *pattern, drape_crew *crew, drape_sun_linear **out);
 
-/* Another pattern from now on: the values are cleared, the solver is analysed anew. Errors: as of create; then
- * it can only be destroyed, or adopt again. */
+/* Another pattern from now on: the values are cleared, the solver is analysed anew. Errors: as of create;
+ * then it can only be destroyed, or adopt again. */
 drape_status drape_sun_linear_extend_pattern(drape_sun_linear *linear, const drape_pattern *pattern);
 /* The same, unless it is the pattern that it has. */
 drape_status drape_sun_linear_ensure_pattern(drape_sun_linear *linear, const drape_pattern *pattern);
@@ -44,12 +44,12 @@ void drape_sun_linear_destroy(drape_sun_linear **linear); /* before the arena is
 /* Bytes that libraries took beside the arena. */
 size_t drape_sun_linear_bytes(const drape_sun_linear *linear);
 
-/* Work done, and what the solver archives; factors: those there are will be used again. Where it is read, the solver
- * was made for the pattern that it had. */
+/* Work done, and what the solver archives; factors: those there are will be used again. Where it is read, the
+ * solver was made for the pattern that it had. */
 void drape_sun_linear_archive(drape_sun_linear *linear, drape_archive *a, bool factors);
 
-/* Factors the values, time and work counted: what the SUNLinearSolver does. definite: refuses a matrix that is not
- * positive definite with DRAPE_RETRY_LINEAR, if the solver can tell. */
+/* Factors the values, time and work counted: what the SUNLinearSolver does. definite: refuses a matrix that
+ * is not positive definite with DRAPE_RETRY_LINEAR, if the solver can tell. */
 drape_status drape_sun_linear_factor(drape_sun_linear *linear, bool definite);
 
 /* x = A^-1 b with the factors there are, time and work counted: what the SUNLinearSolver does. */
