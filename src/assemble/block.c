@@ -59,9 +59,9 @@ static void write_stress(const drape_term *term, const drape_request *want, cons
         to[i] = b->force[i] + (b->by_strain[i] + want->point->weight * b->by_rate[i]) * ahead[i];
 }
 
-/* The weights of ddq and dq dq' in the Hessian. With a share of the positive semidefinite part that is known
- * without eigenvalues: f ddq where the measure is convex and pulls, and the Gauss-Newton part (Teran et al. 2005;
- * Tamstorf & Grinspun 2013, 5). A row that splits ddq by itself (`positive`) keeps the weight. */
+/* The weights of ddq and dq dq' in the Hessian. With a share of the positive semidefinite part that is
+ * known without eigenvalues: f ddq where the measure is convex and pulls, and the Gauss-Newton part (Teran et
+ * al. 2005; Tamstorf & Grinspun 2013, 5). A row that splits ddq by itself (`positive`) keeps the weight. */
 static void weigh(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const bool convex = term->ops->convex, split = term->ops->positive;

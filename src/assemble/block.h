@@ -1,6 +1,6 @@
 /*
- * block.h: a block of elements of one term, evaluated: their forces and Hessians, not yet added anywhere. What
- * is known of strain measures becomes forces here:
+ * block.h: a block of elements of one term, evaluated: their forces and Hessians, not yet added anywhere.
+ * What is known of strain measures becomes forces here:
  *     g = f dq,  f summed over elasticity, the elements' own dashpots and laws
  *     H = f ddq + (df/dq + w df/dq') dq dq'                       step methods: q' = w q + history
  *     H = f ddq + df/dq dq dq' + df/dq' dq (ddq v + w dq)'        continuous time: q' = dq . v
@@ -29,9 +29,10 @@ typedef struct drape_request {
 } drape_request;
 
 /*
- * With `pairs` the results are the force and the block of a pair: g = (-pull, pull), H = (block -block; -block
- * block), component k of element i at [k DRAPE_BLOCK + i]. Else number k of element i lies at [start(i) + stride k], and
- * `mirrored` says that of a Hessian the blocks above the diagonal are those below it, transposed, and not written.
+ * With `pairs` the results are the force and the block of a pair: g = (-pull, pull), H = (block -block;
+ * -block block), component k of element i at [k DRAPE_BLOCK + i]. Else number k of element i lies at
+ * [start(i) + stride k], and `mirrored` says that of a Hessian the blocks above the diagonal are those below
+ * it, transposed, and not written.
  */
 typedef struct drape_block {
     int32_t first, count;

@@ -19,7 +19,7 @@ struct drape_summer {
     int threads;
     bool unconstrained;
     drape_block *blocks; /* (threads) */
-    reach **reaches;     /* (term_count) of each of its blocks; NULL: one thread needs none */
+    reach **reaches;     /* (term_count) for each block of each term; NULL: one thread needs none */
 };
 
 static int32_t block_count(const drape_term *term)
@@ -125,7 +125,7 @@ static void share_energies(const drape_term *term, const drape_block *b, double 
     }
 }
 
-/* to (r, c) += sign from (r, c), whose rows are `row` apart and whose columns `column`. */
+/* to (r, c) += sign from (r, c); rows of from are `row` apart, its columns `column`. */
 static inline void add_block(const double *from, int row, int column, double sign, double *to, int64_t stride)
 {
     for (int c = 0; c < 3; c++)
@@ -248,7 +248,7 @@ static void clear(const drape_summer *s, const share *own, const drape_sums *to)
         }
 }
 
-/* The nodes of one share. */
+/* Sums for the nodes of one share. */
 static void add_share(drape_summer *s, const drape_request *want, const drape_sums *to, int thread)
 {
     const int64_t nodes = s->model->node_count;
@@ -269,7 +269,7 @@ static void add_share(drape_summer *s, const drape_request *want, const drape_su
     }
 }
 
-/* Of each term a share of its blocks. */
+/* Stresses of a share of the blocks of each term. */
 static void stress_of_share(drape_summer *s, const drape_request *want, int thread)
 {
     for (int32_t i = 0; i < s->model->term_count; i++) {
@@ -280,26 +280,26 @@ static void stress_of_share(drape_summer *s, const drape_request *want, int thre
     }
 }
 
-/* What all threads are to do. */
+/* The job that is dealt out to threads. */
 typedef struct order {
     drape_summer *summer;
     const drape_request *want;
     const drape_sums *to;
 } order;
 
-static void add_round(void *user, int64_t thread)
+static void add_task(void *user, int64_t thread)
 {
     const order *o = user;
     add_share(o->summer, o->want, o->to, (int)thread);
 }
 
-/* There may be fewer threads than shares: they are dealt out, not assumed. */
+/* There may be fewer threads than shares: shares are tasks, not threads. */
 void drape_summer_add(drape_summer *s, const drape_request *want, const drape_sums *to)
 {
-    drape_parallel(s->crew, s->threads, add_round, &(order){s, want, to});
+    drape_parallel(s->crew, s->threads, add_task, &(order){s, want, to});
 }
 
-static void stress_round(void *user, int64_t thread)
+static void stress_task(void *user, int64_t thread)
 {
     const order *o = user;
     stress_of_share(o->summer, o->want, (int)thread);
@@ -307,7 +307,7 @@ static void stress_round(void *user, int64_t thread)
 
 void drape_summer_stress(drape_summer *s, const drape_request *want)
 {
-    drape_parallel(s->crew, s->threads, stress_round, &(order){.summer = s, .want = want});
+    drape_parallel(s->crew, s->threads, stress_task, &(order){.summer = s, .want = want});
 }
 
 void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_request *want,

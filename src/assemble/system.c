@@ -21,11 +21,11 @@ struct drape_system {
     int32_t **blocks; /* (term_count) as in the terms, for the extended pattern; NULL while there is none */
     drape_status status; /* of placing contact */
     drape_motion *motion;
-    drape_drag_spring pull;
+    drape_drag_spring drag;
     double *push; /* (node_count x 3) */
     bool pushed;
     drape_wind wind;
-    const atomic_bool *cancel; /* NULL: nobody does */
+    const atomic_bool *cancel; /* NULL: nobody cancels */
 };
 
 drape_status drape_system_create(drape_arena *arena, const drape_model *model, int threads,
@@ -81,14 +81,14 @@ drape_crew *drape_system_crew(const drape_system *system)
     return system->crew;
 }
 
-void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *pull)
+void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *spring)
 {
-    system->pull = *pull;
+    system->drag = *spring;
 }
 
 const drape_drag_spring *drape_system_drag_spring(const drape_system *system)
 {
-    return &system->pull;
+    return &system->drag;
 }
 
 const drape_motion *drape_system_motion(const drape_system *system)
@@ -130,7 +130,7 @@ void drape_system_copy_wind(drape_system *system, const drape_system *from)
 
 void drape_system_add_loads(const drape_system *system, const double *x, double *g)
 {
-    drape_drag_spring_add_gradient(&system->pull, x, g);
+    drape_drag_spring_add_gradient(&system->drag, x, g);
     for (size_t i = 0; system->pushed && i < 3 * (size_t)system->model->node_count; i++)
         g[i] -= system->push[i];
 }
@@ -260,17 +260,17 @@ drape_status drape_system_extend_pattern(drape_system *system, const drape_point
     return extend(system, pairs, nodes);
 }
 
-static void archive_pull(drape_system *system, drape_archive *a)
+static void archive_drag_spring(drape_system *system, drape_archive *a)
 {
     const drape_model *m = system->model;
-    drape_drag_spring *pull = &system->pull;
-    drape_archive_int32(a, &pull->node);
-    drape_archive_double(a, &pull->stiffness);
-    drape_archive_doubles(a, pull->target, 3);
-    if (drape_archive_is_reading(a) && pull->stiffness > 0 &&
-        (pull->node < 0 || pull->node >= m->node_count || m->pinned[pull->node]))
+    drape_drag_spring *spring = &system->drag;
+    drape_archive_int32(a, &spring->node);
+    drape_archive_double(a, &spring->stiffness);
+    drape_archive_doubles(a, spring->target, 3);
+    if (drape_archive_is_reading(a) && spring->stiffness > 0 &&
+        (spring->node < 0 || spring->node >= m->node_count || m->pinned[spring->node]))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pulls node %d, which is not free",
-                           (int)pull->node);
+                           (int)spring->node);
 }
 
 static void archive_push(drape_system *system, drape_archive *a)
@@ -290,7 +290,7 @@ void drape_system_archive(drape_system *system, drape_archive *a)
     const int32_t *nodes = NULL;
     drape_archive_mark(a, "system");
     drape_motion_archive(system->motion, a);
-    archive_pull(system, a);
+    archive_drag_spring(system, a);
     archive_push(system, a);
     drape_archive_same(a, "whether there is contact", contact);
     if (contact)
@@ -330,14 +330,14 @@ static drape_sums into_values(const drape_system *system, double *values)
     return (drape_sums){.values = values, .pattern = system->pattern, .blocks = system->blocks};
 }
 
-/* Terms in a medium are told how fast it is at the point. */
-static void feel_wind(drape_system *system, drape_request *want)
+/* Gives terms in a medium its velocity at the point. */
+static void evaluate_wind(drape_system *system, drape_request *want)
 {
     const drape_point *point = want->point;
     if (!system->wind.field)
         return;
-    drape_wind_feel(&system->wind, system->model->node_count, point->t, point->x, point->v,
-                    want->hessian && !want->velocity);
+    drape_wind_evaluate(&system->wind, system->model->node_count, point->t, point->x, point->v,
+                        want->hessian && !want->velocity);
     want->against = system->wind.against;
     want->wind_gradient = system->wind.gradient;
 }
@@ -352,7 +352,7 @@ void drape_system_force_without(drape_system *system, const drape_point *point, 
 {
     drape_request want = {.point = point, .conservative = true, .dissipative = true, .without = without};
     drape_system_cancelled(system);
-    feel_wind(system, &want);
+    evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
     drape_system_add_loads(system, point->x, g);
     if (place_contact(system, point))
@@ -362,7 +362,7 @@ void drape_system_force_without(drape_system *system, const drape_point *point, 
 void drape_system_dissipation(drape_system *system, const drape_point *point, double *g)
 {
     drape_request want = {.point = point, .dissipative = true};
-    feel_wind(system, &want);
+    evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
     if (place_contact(system, point))
         drape_contact_add_forces(system->contact, false, true, g);
@@ -389,12 +389,12 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
                           .dissipative = true,
                           .positive_share = positive_share};
     const drape_sums to = into_values(system, values);
-    feel_wind(system, &want);
+    evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
         drape_contact_add_jacobian(system->contact, point->weight, false, positive_share > 0, system->pattern,
                                    values);
-    drape_drag_spring_add_hessian(&system->pull, system->model, system->pattern, values);
+    drape_drag_spring_add_hessian(&system->drag, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
 }
 
@@ -414,7 +414,7 @@ void drape_system_remainder(drape_system *system, const drape_point *point, doub
                           .positive_share = 1,
                           .remainder = true};
     const drape_sums to = into_values(system, values);
-    feel_wind(system, &want);
+    evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
         drape_contact_add_jacobian(system->contact, point->weight, false, true, system->pattern, values);
@@ -435,7 +435,7 @@ void drape_system_damping(drape_system *system, const drape_point *point, double
 {
     drape_request want = {.point = point, .hessian = true, .velocity = true, .dissipative = true};
     const drape_sums to = into_values(system, values);
-    feel_wind(system, &want);
+    evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
         drape_contact_add_jacobian(system->contact, 0, true, false, system->pattern, values);
@@ -477,7 +477,7 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
             drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
         *(term->ops->potential_of_gravity ? gravity : elastic) += energy;
     }
-    *elastic += drape_drag_spring_energy(&system->pull, point->x);
+    *elastic += drape_drag_spring_energy(&system->drag, point->x);
 }
 
 void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy)
@@ -499,7 +499,7 @@ void drape_system_term(drape_system *system, int32_t term, const drape_point *po
     drape_request want = {
         .point = point, .energy = energy, .hessian = values, .conservative = true, .dissipative = true};
     drape_sums to = into_values(system, t->block ? values : NULL);
-    feel_wind(system, &want);
+    evaluate_wind(system, &want);
     to.g = g;
     if (energy)
         *energy = 0;
@@ -526,9 +526,9 @@ void drape_system_stress(drape_system *system, const drape_point *point, const d
     drape_summer_stress(system->summer, &want);
 }
 
-/* ---- Finding what is wrong ---- */
+/* ---- Checks ---- */
 
-static drape_worst worst_element(const drape_term *term, const drape_fault *fault)
+static drape_worst diagnose_element(const drape_term *term, const drape_fault *fault)
 {
     const drape_elements *el = &term->elements;
     drape_worst worst = {.what = fault->what,
@@ -555,7 +555,7 @@ drape_status drape_system_check(const drape_system *system, const double *x, con
         drape_status status = term->ops->check(&term->elements, x, before, own, &fault);
         if (status) {
             *reason = fault.reason;
-            *worst = worst_element(term, &fault);
+            *worst = diagnose_element(term, &fault);
             return status;
         }
     }

@@ -20,8 +20,8 @@ drape_status drape_wind_create(drape_arena *arena, const drape_model *model, dra
     return drape_arena_status(arena);
 }
 
-void drape_wind_feel(drape_wind *wind, int32_t node_count, double t, const double *x, const double *v,
-                     bool gradient)
+void drape_wind_evaluate(drape_wind *wind, int32_t node_count, double t, const double *x, const double *v,
+                         bool gradient)
 {
     memset(wind->against, 0, 3 * (size_t)node_count * sizeof *wind->against);
     if (gradient)

@@ -1,5 +1,6 @@
-/* arena.h: memory that lives as long as its owner and is freed with it: a model, a sim, a scene. An object made in an
- * arena needs no destructor of its own, unless it holds what is not memory, and no function that counts its bytes. */
+/* arena.h: memory that lives as long as its owner and is freed with it: a model, a sim, a scene. An object
+ * made in an arena needs no destructor of its own, unless it holds what is not memory, and no function that
+ * counts its bytes. */
 #ifndef DRAPE_BASE_ARENA_H
 #define DRAPE_BASE_ARENA_H
 
@@ -20,16 +21,17 @@ drape_arena drape_arena_of(drape_context *ctx);
 drape_arena *drape_arena_create(drape_context *ctx);
 void drape_arena_destroy(drape_arena **arena); /* frees all; NULL is fine, and it becomes NULL */
 
-/* An empty arena for a part of an owner that is made again while the owner lives: it is freed on its own, before the
- * owner, who counts its bytes. owner keeps its address. */
+/* An empty arena for a part of an owner that is made again while the owner lives: it is freed on its own,
+ * before the owner, who counts its bytes. owner keeps its address. */
 drape_arena drape_arena_within(drape_arena *owner);
 
-/* As drape_alloc: count x size bytes, zeroed, until drape_arena_free. NULL with a message where there is no memory. */
+/* As drape_alloc: count x size bytes, zeroed, until drape_arena_free. NULL with a message where there is no
+ * memory. */
 void *drape_arena_take(drape_arena *arena, size_t count, size_t size);
 char *drape_arena_text(drape_arena *arena, const char *text); /* a copy */
 
-/* memory (of this arena, or NULL) at count x size bytes: its contents are kept as far as they fit, bytes beyond its former
- * size are zero. NULL with a message where there is no memory; then memory is as it was. */
+/* memory (of this arena, or NULL) at count x size bytes: its contents are kept as far as they fit, bytes
+ * beyond its former size are zero. NULL with a message where there is no memory; then memory is as it was. */
 void *drape_arena_resize(drape_arena *arena, void *memory, size_t count, size_t size);
 
 /* Gives memory of this arena back before the others; NULL is fine. */

@@ -1,8 +1,8 @@
 /*
- * crew.c: see crew.h. The rounds of a loop that no one has taken are a number, and a round is taken by making it one less, if nothing has
- * changed since it was read. The number of the loop is in the same word: whoever read of a loop that is over takes nothing of
- * the next one, whose round it would call with the other's function. Who takes a round is for chance; what it
- * writes is not.
+ * crew.c: see crew.h. The rounds of a loop that no one has taken are a number, and a round is taken by making
+ * it one less, if nothing has changed since it was read. The number of the loop is in the same word: whoever
+ * read of a loop that is over takes nothing of the next one, whose round it would call with the other's
+ * function. Who takes a round is for chance; what it writes is not.
  */
 #include "base/crew.h"
 
@@ -12,9 +12,10 @@
 #include <signal.h>
 #include <stdatomic.h>
 
-/* Looks before one sleeps, each of which lets others have the core, a third of a microsecond where there are none: a millisecond or
- * two, longer than the caller takes between two loops of one step. To wake a core that has gone to sleep takes up to a tenth of that, each
- * time; where a core is taken, longer looks cost nothing that was measured. */
+/* Looks before one sleeps, each of which lets others have the core, a third of a microsecond where there are
+ * none: a millisecond or two, longer than the caller takes between two loops of one step. To wake a core that
+ * has gone to sleep takes up to a tenth of that, each time; where a core is taken, longer looks cost nothing
+ * that was measured. */
 #define HELPER_LOOKS 5000
 #define CALLER_LOOKS 3000
 #define LEFT         0xffffffffu /* of `open`: rounds not taken; above it, the number of the loop */
@@ -25,7 +26,8 @@ struct drape_crew {
     pthread_t *helper;    /* (threads - 1), of which helpers run */
     pthread_mutex_t lock; /* of who goes to sleep */
     pthread_cond_t work, done;
-    /* The loop: written while no round of it is open, and read, of a loop that may be over, by whoever is late. */
+    /* The loop: written while no round of it is open, and read, of a loop that may be over, by whoever is
+     * late. */
     _Atomic(drape_round *) one;
     _Atomic(void *) user;
     atomic_int_fast64_t rounds;
@@ -159,8 +161,8 @@ void drape_crew_destroy(drape_crew **crew)
 
 /* ---- The caller ---- */
 
-/* All is said before the rounds are open; the fence between `open` and `asleep` is that both are sequentially consistent: a helper
- * that goes to sleep has counted itself before it looks for the last time. */
+/* All is said before the rounds are open; the fence between `open` and `asleep` is that both are sequentially
+ * consistent: a helper that goes to sleep has counted itself before it looks for the last time. */
 static void call_helpers(drape_crew *c, int64_t rounds, drape_round *one, void *user)
 {
     const uint_fast64_t loop = (atomic_load_explicit(&c->open, memory_order_relaxed) >> 32) + 1;

@@ -20,8 +20,8 @@ typedef struct drape_fabric {
 extern const drape_fabric drape_fabrics[]; /* the first is none, the last has no name */
 extern const char *const drape_fabric_names[];
 
-/* What terms take, with what was not published derived: tension 1e4 N/m, shear 34.4 N/m, no coupling; a twist as that
- * of an isotropic sheet. */
+/* What terms take, with what was not published derived: tension 1e4 N/m, shear 34.4 N/m, no coupling; a twist
+ * as that of an isotropic sheet. */
 void drape_fabric_tension(const drape_fabric *fabric, drape_woven *tension);
 void drape_fabric_bending(const drape_fabric *fabric, drape_woven *bending);
 

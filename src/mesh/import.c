@@ -10,7 +10,7 @@
 
 #include "mesh/mesh.h"
 
-#define LARGEST_FILE INT32_MAX /* [bytes] */
+#define MAX_FILE_SIZE INT32_MAX /* [bytes] */
 
 typedef struct contents {
     char *data; /* size bytes and a 0 byte */
@@ -86,9 +86,9 @@ static drape_status read_open_file(drape_arena *arena, const char *pointer, cons
         return fail_file(ctx, pointer, path, strerror(EISDIR));
     if (!S_ISREG(about.st_mode))
         return fail_file(ctx, pointer, path, "Not a regular file");
-    if (about.st_size > LARGEST_FILE)
+    if (about.st_size > MAX_FILE_SIZE)
         return drape_fail_at(ctx, DRAPE_E_FILE, pointer, "%s: has %lld bytes; at most %lld can be read", path,
-                             (long long)about.st_size, (long long)LARGEST_FILE);
+                             (long long)about.st_size, (long long)MAX_FILE_SIZE);
     file->size = (size_t)about.st_size;
     file->data = drape_arena_take(arena, file->size + 1, 1);
     return file->data ? read_descriptor(ctx, pointer, path, descriptor, file) : DRAPE_E_MEMORY;

@@ -17,12 +17,12 @@ typedef struct drape_mesh {
     int32_t *edge_triangle; /* (edge_count x 2) triangles beside the edge, lower first; second -1 on the
                                boundary */
     int32_t *triangle_edge; /* (triangle_count x 3) the edge from corner k to corner k + 1 */
-    int32_t
-        *hinge; /* (hinge_count x 4): x0 x1 the edge, x2 the apex of its first triangle, x3 of its second */
-    int32_t *hinge_edge;   /* (hinge_count) in the order of edges */
-    double *triangle_area; /* (triangle_count) [m2] */
-    double *edge_length;   /* (edge_count) [m] */
-    double *node_area;     /* (node_count) a third of the area of each triangle around it [m2] */
+    int32_t *hinge;         /* (hinge_count x 4): x0 x1 the edge, x2 the apex of its first triangle, x3 of its
+                               second */
+    int32_t *hinge_edge;    /* (hinge_count) in the order of edges */
+    double *triangle_area;  /* (triangle_count) [m2] */
+    double *edge_length;    /* (edge_count) [m] */
+    double *node_area;      /* (node_count) a third of the area of each triangle around it [m2] */
 } drape_mesh;
 
 /* With these no count and no number of a corner (3 a triangle) leaves an int32_t. Offsets into arrays are
@@ -47,7 +47,8 @@ typedef struct drape_grid_ops {
     const char *name, *summary;
     const drape_param *params;
     int param_count;
-    /* Fills x, triangle, their counts, rows, columns and rectangular. Faults are reported at pointer or below it. */
+    /* Fills x, triangle, their counts, rows, columns and rectangular. Faults are reported at pointer or below
+     * it. */
     drape_status (*generate)(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh);
 } drape_grid_ops;
 extern const drape_grid_ops *const drape_grids[]; /* NULL-ended */
@@ -112,7 +113,8 @@ drape_status drape_mesh_measure(drape_mesh *mesh);
  * failure. */
 drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drape_mesh_def *def,
                              const char *folder, drape_mesh *mesh);
-/* Frees what only the building of terms needs: edge_triangle, triangle_edge and the hinges. Their pointers become NULL. */
+/* Frees what only the building of terms needs: edge_triangle, triangle_edge and the hinges. Their pointers
+ * become NULL. */
 void drape_mesh_drop_topology(drape_mesh *mesh);
 
 void drape_mesh_free(drape_mesh *mesh); /* leaves it empty; an empty one is fine */

@@ -6,18 +6,18 @@
 #include "mesh/mesh.h"
 #include "mesh/order.h"
 
-#define FARTHEST          1e9   /* [m]: beyond, neighbouring doubles lie more than 1e-7 m apart */
-#define THINNEST_TRIANGLE 1e-12 /* altitude / longest edge: rounding of positions is 1e-16 of it */
+#define MAX_COORDINATE 1e9   /* [m]: beyond, neighbouring doubles lie more than 1e-7 m apart */
+#define MIN_THINNESS   1e-12 /* altitude / longest edge: rounding of positions is 1e-16 of it */
 
 drape_status drape_mesh_validate_positions(drape_context *ctx, const drape_mesh_source *source,
                                            const drape_mesh *mesh)
 {
     for (int32_t node = 0; node < mesh->node_count; node++) {
         const double *x = mesh->x + 3 * (size_t)node;
-        if (!(fabs(x[0]) <= FARTHEST && fabs(x[1]) <= FARTHEST && fabs(x[2]) <= FARTHEST))
+        if (!(fabs(x[0]) <= MAX_COORDINATE && fabs(x[1]) <= MAX_COORDINATE && fabs(x[2]) <= MAX_COORDINATE))
             return drape_mesh_fail(ctx, source, 0,
                                    "node %d is at (%g, %g, %g) m; coordinates must be finite and within %g m",
-                                   node, x[0], x[1], x[2], FARTHEST);
+                                   node, x[0], x[1], x[2], MAX_COORDINATE);
     }
     return DRAPE_OK;
 }
@@ -55,11 +55,11 @@ static drape_status check_shapes(drape_context *ctx, const drape_mesh_source *so
     for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
         const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
         const double ratio = thinness(mesh, n);
-        if (!(ratio >= THINNEST_TRIANGLE))
+        if (!(ratio >= MIN_THINNESS))
             return drape_mesh_fail(ctx, source, 0,
                                    "triangle %d (nodes %d %d %d) is degenerate: altitude / longest "
                                    "edge is %g, at least %g is needed",
-                                   triangle, n[0], n[1], n[2], ratio, THINNEST_TRIANGLE);
+                                   triangle, n[0], n[1], n[2], ratio, MIN_THINNESS);
     }
     return DRAPE_OK;
 }

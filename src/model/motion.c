@@ -46,10 +46,10 @@ drape_status drape_motion_create(drape_arena *arena, const drape_model *model, d
     return DRAPE_OK;
 }
 
-/* ---- A way ---- */
+/* ---- A path ---- */
 
-/* Hermite's cubic, at s = (t - t0)/(t1 - t0) of the way. */
-static void way_displacement(const drape_path *w, double t, double x[3])
+/* Hermite's cubic, at s = (t - t0)/(t1 - t0) of the path. */
+static void path_displacement(const drape_path *w, double t, double x[3])
 {
     if (t <= w->t[0] || t >= w->t[1]) {
         memcpy(x, w->x[t >= w->t[1]], 3 * sizeof *x);
@@ -61,7 +61,7 @@ static void way_displacement(const drape_path *w, double t, double x[3])
         x[k] = w->x[0][k] + rise * (w->x[1][k] - w->x[0][k]) + h * (leave * w->v[0][k] + arrive * w->v[1][k]);
 }
 
-static void way_velocity(const drape_path *w, double t, double within, double v[3])
+static void path_velocity(const drape_path *w, double t, double within, double v[3])
 {
     memset(v, 0, 3 * sizeof *v);
     if (within < w->t[0] || within >= w->t[1])
@@ -77,22 +77,23 @@ static bool rests(const double v[3])
     return v[0] == 0 && v[1] == 0 && v[2] == 0;
 }
 
-/* ---- A track or a way ---- */
+/* ---- A track or a path ---- */
 
-static void displacement_of(const drape_track *track, const drape_path *way, double t, double x[3])
+static void displacement_of(const drape_track *track, const drape_path *path, double t, double x[3])
 {
-    if (way->given)
-        way_displacement(way, t, x);
+    if (path->given)
+        path_displacement(path, t, x);
     else if (track && track->key_count > 0)
         drape_track_displacement(track->keys, track->key_count, t, x);
     else
         memset(x, 0, 3 * sizeof *x);
 }
 
-static void velocity_of(const drape_track *track, const drape_path *way, double t, double within, double v[3])
+static void velocity_of(const drape_track *track, const drape_path *path, double t, double within,
+                        double v[3])
 {
-    if (way->given)
-        way_velocity(way, t, within, v);
+    if (path->given)
+        path_velocity(path, t, within, v);
     else if (track && track->key_count > 0)
         drape_track_velocity(track->keys, track->key_count, within, v);
     else
@@ -100,51 +101,51 @@ static void velocity_of(const drape_track *track, const drape_path *way, double 
 }
 
 /* Its end is one unless it comes to rest there; its beginning unless it goes on as before. */
-static double next_kink_of(const drape_track *track, const drape_path *way, double t, double end)
+static double next_kink_of(const drape_track *track, const drape_path *path, double t, double end)
 {
-    for (int i = 0; way->given && i < 2; i++)
-        if (way->t[i] > t && way->t[i] < end && !(i == 0 ? way->smooth : rests(way->v[1])))
-            end = way->t[i];
-    for (size_t i = 0; !way->given && track && i < track->key_count; i++)
+    for (int i = 0; path->given && i < 2; i++)
+        if (path->t[i] > t && path->t[i] < end && !(i == 0 ? path->smooth : rests(path->v[1])))
+            end = path->t[i];
+    for (size_t i = 0; !path->given && track && i < track->key_count; i++)
         if (track->keys[i].time > t && track->keys[i].time < end)
             end = track->keys[i].time;
     return end;
 }
 
-static bool at_kink_of(const drape_track *track, const drape_path *way, double t)
+static bool at_kink_of(const drape_track *track, const drape_path *path, double t)
 {
-    if (way->given)
-        return (t == way->t[0] && !way->smooth) || (t == way->t[1] && !rests(way->v[1]));
+    if (path->given)
+        return (t == path->t[0] && !path->smooth) || (t == path->t[1] && !rests(path->v[1]));
     for (size_t i = 0; track && i < track->key_count; i++)
         if (track->keys[i].time == t)
             return true;
     return false;
 }
 
-/* The velocity that leads to where it is at t, and whether it is known: not at the key of a track, nor where the host
- * has changed its mind about the same moment. */
-static bool leading_velocity(const drape_track *track, const drape_path *way, double t, double v[3])
+/* The velocity that leads to where it is at t, and whether it is known: not at the key of a track, nor where
+ * the host has changed its mind about the same moment. */
+static bool leading_velocity(const drape_track *track, const drape_path *path, double t, double v[3])
 {
-    if (way->given && (t == way->t[0] || t == way->t[1])) {
-        memcpy(v, way->v[t == way->t[1]], 3 * sizeof *v);
-        return t == way->t[1] || way->smooth;
+    if (path->given && (t == path->t[0] || t == path->t[1])) {
+        memcpy(v, path->v[t == path->t[1]], 3 * sizeof *v);
+        return t == path->t[1] || path->smooth;
     }
-    velocity_of(track, way, t, t, v);
-    return way->given || !track || track->key_count == 0;
+    velocity_of(track, path, t, t, v);
+    return path->given || !track || track->key_count == 0;
 }
 
-static void send(const drape_track *track, drape_path *way, double t, double span, const double from[3],
+static void send(const drape_track *track, drape_path *path, double t, double span, const double from[3],
                  const double to[3], const double *v)
 {
     drape_path next = {.given = true, .t = {t, t + span}};
     memcpy(next.x[0], from, sizeof next.x[0]);
     memcpy(next.x[1], to, sizeof next.x[1]);
-    next.smooth = leading_velocity(track, way, t, next.v[0]) && v;
+    next.smooth = leading_velocity(track, path, t, next.v[0]) && v;
     if (v)
         memcpy(next.v[1], v, sizeof next.v[1]);
     for (int k = 0; !v && k < 3; k++)
         next.v[0][k] = next.v[1][k] = (to[k] - from[k]) / span;
-    *way = next;
+    *path = next;
 }
 
 /* ---- Pins ---- */
@@ -154,7 +155,8 @@ static const drape_track *pin_track(const drape_motion *motion, int32_t i)
     return motion->moved_track[i] >= 0 ? &motion->model->tracks[motion->moved_track[i]] : NULL;
 }
 
-/* Ways of pins are positions, so that one comes to exactly where the host wants it. */
+/* Paths of pins are positions, not displacements, so that a pin reaches exactly the position that the host
+ * gave. */
 static void place_pin(const drape_motion *motion, int32_t i, double t, double x[3])
 {
     const double *rest = motion->model->rest + 3 * (size_t)motion->moved_node[i];
@@ -198,12 +200,12 @@ void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double 
 void drape_motion_hold_pins(drape_motion *motion, const double *x)
 {
     for (int32_t i = 0; i < motion->moved_count; i++) {
-        drape_path *way = &motion->pin_path[i];
-        if (!way->given)
+        drape_path *path = &motion->pin_path[i];
+        if (!path->given)
             continue;
-        *way = (drape_path){.given = true, .smooth = true};
-        memcpy(way->x[0], x + 3 * (size_t)motion->moved_node[i], sizeof way->x[0]);
-        memcpy(way->x[1], way->x[0], sizeof way->x[1]);
+        *path = (drape_path){.given = true, .smooth = true};
+        memcpy(path->x[0], x + 3 * (size_t)motion->moved_node[i], sizeof path->x[0]);
+        memcpy(path->x[1], path->x[0], sizeof path->x[1]);
     }
 }
 
@@ -236,26 +238,26 @@ void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t
 
 /* ---- In a checkpoint ---- */
 
-static bool is_way(const drape_path *way)
+static bool is_path(const drape_path *path)
 {
-    bool good = isfinite(way->t[0]) && isfinite(way->t[1]) && way->t[0] <= way->t[1];
+    bool good = isfinite(path->t[0]) && isfinite(path->t[1]) && path->t[0] <= path->t[1];
     for (int i = 0; i < 2; i++)
-        good = good && drape_all_finite(way->x[i], 3) && drape_all_finite(way->v[i], 3);
+        good = good && drape_all_finite(path->x[i], 3) && drape_all_finite(path->v[i], 3);
     return good;
 }
 
-static void archive_way(drape_path *way, drape_archive *a)
+static void archive_path(drape_path *path, drape_archive *a)
 {
-    drape_archive_bool(a, &way->given);
-    if (!way->given || !drape_archive_good(a))
+    drape_archive_bool(a, &path->given);
+    if (!path->given || !drape_archive_good(a))
         return;
-    drape_archive_bool(a, &way->smooth);
-    drape_archive_doubles(a, way->t, 2);
+    drape_archive_bool(a, &path->smooth);
+    drape_archive_doubles(a, path->t, 2);
     for (int i = 0; i < 2; i++) {
-        drape_archive_doubles(a, way->x[i], 3);
-        drape_archive_doubles(a, way->v[i], 3);
+        drape_archive_doubles(a, path->x[i], 3);
+        drape_archive_doubles(a, path->v[i], 3);
     }
-    if (drape_archive_is_reading(a) && !is_way(way))
+    if (drape_archive_is_reading(a) && !is_path(path))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves something along no way");
 }
 
@@ -285,10 +287,10 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
     for (int32_t i = 0; i < count && drape_archive_good(a); i++) {
         archive_place(motion, i, a);
         if (drape_archive_good(a))
-            archive_way(&motion->pin_path[i], a);
+            archive_path(&motion->pin_path[i], a);
     }
     for (int32_t c = 0; c < motion->model->collider_count && drape_archive_good(a); c++)
-        archive_way(&motion->collider_path[c], a);
+        archive_path(&motion->collider_path[c], a);
 }
 
 /* ---- All of them ---- */

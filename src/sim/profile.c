@@ -7,10 +7,11 @@
 #include <math.h>
 #include <string.h>
 
-#define BUDGET       0.02 /* [s] for the repeats of one measurement */
-#define MOST_REPEATS 200
-/* Displacement of the nodes, as a share of the scene's mean edge. Edges that are 1e-3 shorter than at rest make
- * the matrix of a common scene indefinite, which a step seldom meets and for which solvers take other ways. */
+#define BUDGET      0.02 /* [s] for the repeats of one measurement */
+#define MAX_REPEATS 200
+/* Displacement of the nodes, as a share of the scene's mean edge. Edges that are 1e-3 shorter than at rest
+ * make the matrix of a common scene indefinite, which a step seldom meets and for which solvers take other
+ * ways. */
 #define DEFORMATION 1e-5
 
 /* Where everything is evaluated, and room for the results. */
@@ -130,7 +131,7 @@ static void solve(bench *s)
 static double shortest(bench *s, void (*call)(bench *s))
 {
     double begin = drape_clock_seconds(), best = INFINITY, now = begin;
-    for (int i = 0; i < MOST_REPEATS && (i == 0 || now - begin < BUDGET); i++) {
+    for (int i = 0; i < MAX_REPEATS && (i == 0 || now - begin < BUDGET); i++) {
         double start = drape_clock_seconds();
         call(s);
         now = drape_clock_seconds();
@@ -220,7 +221,7 @@ static void count_bytes(const drape_sim *sim, drape_profile *out)
                         sim->integrator_bytes + drape_contact_bytes(drape_system_contact(sim->system));
 }
 
-static void tell_solver(const bench *s, drape_profile *out)
+static void report_solver(const bench *s, drape_profile *out)
 {
     drape_linear_report report = {.row = s->linear};
     if (s->linear->report)
@@ -244,7 +245,7 @@ static drape_status measure_solver(bench *s, drape_profile *out)
         out->integrator_bytes += s->arena.bytes + drape_linear_bytes(s->linear, s->solver) - before;
         out->solve_seconds = shortest(s, solve);
     }
-    tell_solver(s, out);
+    report_solver(s, out);
     drape_linear_destroy(s->linear, &s->solver);
     return DRAPE_OK;
 }

@@ -1,8 +1,8 @@
 /*
- * elimination.c: see elimination.h. Order by minimum degree (AMD) or, for larger ones where METIS is there, nested
- * dissection; elimination tree with path compression (Liu 1990, The role of elimination trees in sparse
- * factorization); postorder; rows of the columns from those of their children. Then a front is merged with its last
- * child where the two take longer than the one, zeros included.
+ * elimination.c: see elimination.h. Order by minimum degree (AMD) or, for larger ones where METIS is there,
+ * nested dissection; elimination tree with path compression (Liu 1990, The role of elimination trees in
+ * sparse factorization); postorder; rows of the columns from those of their children. Then a front is merged
+ * with its last child where the two take longer than the one, zeros included.
  */
 #define _XOPEN_SOURCE 700 /* initstate */
 #include "solvers/elimination.h"
@@ -17,7 +17,7 @@
 
 #define DISSECTED 1500 /* blocks; below, nested dissection fills no less than minimum degree */
 
-/* What only the making needs. */
+/* Workspace of the construction. */
 typedef struct maker {
     drape_arena *arena, scratch;
     const drape_pattern *pattern;
@@ -33,11 +33,12 @@ typedef struct maker {
 #define RAND_STATE 128 /* [bytes] as much as rand() begins with, so that it gives the same numbers */
 
 /*
- * METIS draws its cuts from rand(), which it seeds. That is one for the whole process: two at once would have each other's
- * numbers and another order, so other bits, and a host's own sequence would begin anew. So one at a time does it, with a state of
- * rand() that is its own. What is left is a host that calls rand() from another thread meanwhile.
+ * METIS seeds rand() and draws its cuts from it. rand() belongs to the whole process: two calls at once would
+ * take each other's numbers and give another order, and so other bits, and a host's own sequence would begin
+ * again. So only one thread at a time calls METIS, with a state of rand() of its own. A host that calls
+ * rand() from another thread meanwhile still disturbs it.
  */
-static int dissect_alone(idx_t *n, idx_t *start, idx_t *other, idx_t *options, maker *m)
+static int dissect_locked(idx_t *n, idx_t *start, idx_t *other, idx_t *options, maker *m)
 {
     char own[RAND_STATE];
     drape_library_lock();
@@ -64,7 +65,7 @@ static bool dissect(maker *m)
         start[j + 1] = at;
     }
     METIS_SetDefaultOptions(options);
-    return dissect_alone(&n, start, other, options, m) == METIS_OK;
+    return dissect_locked(&n, start, other, options, m) == METIS_OK;
 }
 _Static_assert(sizeof(idx_t) == sizeof(int32_t), "METIS orders with the pattern's integers");
 #endif
@@ -148,7 +149,8 @@ static void reorder(maker *m)
 
 /* ---- Fronts ---- */
 
-/* Time of a front in arbitrary units: its arithmetic in tiles of 4 x 4 blocks, its memory, its administration. */
+/* Time of a front in arbitrary units: its arithmetic in tiles of 4 x 4 blocks, its memory, its
+ * administration. */
 static double cost_of(int32_t columns, int32_t rows)
 {
     const double w = 3.0 * columns, r = 12.0 * ((rows + 3) / 4), d = 12.0 * ((columns + 3) / 4);
@@ -161,7 +163,7 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Rows below j of the columns j of the matrix and of the fronts that end in its children, into m->stack. */
+/* Rows below j of column j of the matrix and of the fronts that end in children of j, into m->stack. */
 static int32_t gather_rows(maker *m, int32_t j)
 {
     const drape_pattern *p = m->pattern;
@@ -185,7 +187,8 @@ static int32_t gather_rows(maker *m, int32_t j)
     return count;
 }
 
-/* Front f ends: its rows are those of its first column that lie beyond its last; it waits for its parent's. */
+/* Front f ends: its rows are those of its first column that lie beyond its last column. It is listed as a
+ * child of the column above. */
 static void close_front(maker *m, int32_t f)
 {
     drape_elimination *e = m->e;
@@ -202,7 +205,7 @@ static void close_front(maker *m, int32_t f)
     }
 }
 
-/* Columns with the same rows below them, one after another, are one front. */
+/* Consecutive columns with the same rows below them are one front. */
 static bool find_fronts(maker *m)
 {
     drape_elimination *e = m->e;
@@ -211,7 +214,7 @@ static bool find_fronts(maker *m)
         m->head[j] = m->mark[j] = -1;
     for (int32_t j = 0; j < e->n; j++) {
         const bool linked = j > 0 && m->parent[j - 1] == j;
-        if (f >= 0) { /* so that its rows are seen by j, or by who is above it */
+        if (f >= 0) { /* so that j, or a column above it, sees its rows */
             e->first[f + 1] = j;
             if (!linked)
                 close_front(m, f);
@@ -246,7 +249,7 @@ static bool find_fronts(maker *m)
     return true;
 }
 
-/* Whether front f takes less time with its last child, g, as one. */
+/* Whether front f takes less time when merged with its last child g. */
 static bool is_better_merged(const maker *m, int32_t first, int32_t middle, int32_t last, int32_t g,
                              int32_t f)
 {
@@ -255,8 +258,8 @@ static bool is_better_merged(const maker *m, int32_t first, int32_t middle, int3
            cost_of(middle - first, m->length[g]) + cost_of(last - middle, m->length[f]);
 }
 
-/* Fronts are pushed on a stack that is written over the list of them; the last child of the one on top lies below
- * it. */
+/* Fronts are pushed on a stack that overwrites their list; the last child of a front is on top when it is
+ * pushed. */
 static void merge_fronts(maker *m)
 {
     drape_elimination *e = m->e;
@@ -277,7 +280,7 @@ static void merge_fronts(maker *m)
     e->first[e->count] = e->n;
 }
 
-/* ---- What stays ---- */
+/* ---- The result ---- */
 
 int32_t drape_front_find(const drape_elimination *e, int32_t front, int32_t row)
 {

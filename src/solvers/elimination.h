@@ -1,7 +1,8 @@
 /*
- * elimination.h: in which order a symmetric matrix of 3 x 3 blocks is eliminated, and what fills in. Columns of
- * blocks with the same rows below them are taken together as a front (a supernode); the fronts form a tree: what a
- * front's elimination leaves on its rows is added to its parent, whose columns and rows hold them all.
+ * elimination.h: the order in which a symmetric matrix of 3 x 3 blocks is eliminated, and the fill-in.
+ * Columns of blocks with the same rows below them are taken together as a front (a supernode); the fronts
+ * form a tree: what a front's elimination leaves on its rows is added to its parent, whose columns and rows
+ * contain all of them.
  */
 #ifndef DRAPE_SOLVERS_ELIMINATION_H
 #define DRAPE_SOLVERS_ELIMINATION_H

@@ -1,7 +1,7 @@
 /*
- * fallback.h: the general solver to which a method for symmetric positive definite matrices hands all others, as they
- * stand: the fastest one for the size. It is made for the first such matrix: most scenes have none, and its analysis would
- * be up to half of create.
+ * fallback.h: the general solver to which a method for symmetric positive definite matrices hands all others,
+ * as they stand: the fastest one for the size. It is made for the first such matrix: most scenes have none,
+ * and its analysis would be up to half of create.
  */
 #ifndef DRAPE_SOLVERS_FALLBACK_H
 #define DRAPE_SOLVERS_FALLBACK_H

@@ -1,17 +1,17 @@
-/* alone.c: see alone.h. */
+/* library_lock.c: see library_lock.h. */
 #include "solvers/library_lock.h"
 
 #include <pthread.h>
 
-/* What is guarded is of the process, so this is, too. */
-static pthread_mutex_t alone = PTHREAD_MUTEX_INITIALIZER;
+/* The libraries are shared by the whole process, and so is the lock. */
+static pthread_mutex_t library = PTHREAD_MUTEX_INITIALIZER;
 
 void drape_library_lock(void)
 {
-    pthread_mutex_lock(&alone);
+    pthread_mutex_lock(&library);
 }
 
 void drape_library_unlock(void)
 {
-    pthread_mutex_unlock(&alone);
+    pthread_mutex_unlock(&library);
 }

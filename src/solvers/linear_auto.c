@@ -1,6 +1,6 @@
 /*
- * auto: the row that was measured to be the fastest at this number of unknowns (bench/linears) among those
- * in this build: each row says from how many unknowns on it is.
+ * auto: the solver that was measured to be the fastest at this number of unknowns (bench/linears) among those
+ * in this build: each has the number from which on it is (best_from).
  */
 #include "solvers/linear.h"
 
@@ -13,7 +13,7 @@ typedef struct auto_state {
     void *solver;
 } auto_state;
 
-/* The row that takes over at some larger size; NULL: none. */
+/* The solver that is picked from the next larger size on; NULL: none. */
 static const drape_linear_ops *next_row(int64_t from)
 {
     const drape_linear_ops *next = NULL;

@@ -4,10 +4,10 @@
  * of the scalars; the factors' memory is taken there too. Nested dissection by METIS, which Debian has shared
  * only, saves a quarter of a factorisation at 10 000 nodes and nothing up to 529, for 1.6 times the analysis.
  *
- * Callers do not say whether a matrix is symmetric: each entry of the lower triangle is compared with its mirror while it
- * is copied. A matrix that is not symmetric (internal damping in continuous time and friction have such a part), not
- * positive definite, or singular to working precision goes to the fallback (fallback.h); no matrix is made symmetric that
- * is not.
+ * Callers do not say whether a matrix is symmetric: each entry of the lower triangle is compared with its
+ * mirror while it is copied. A matrix that is not symmetric (internal damping in continuous time and friction
+ * have such a part), not positive definite, or singular to working precision goes to the fallback
+ * (fallback.h); no matrix is made symmetric that is not.
  */
 #include "solvers/fallback.h"
 #include "solvers/library_lock.h"
@@ -349,8 +349,9 @@ static bool factor_lower(cholmod_state *s)
            cholmod_l_rcond(s->factor, &s->common) > MIN_RCOND;
 }
 
-/* Cholesky factors are tried for each symmetric matrix: leaving attempts out after failures saved 2 or 3 of the
- * 52 that failed in the 512 matrices of a folding sheet, and gave definite matrices to the slower fallback. */
+/* Cholesky factors are tried for each symmetric matrix: leaving attempts out after failures saved 2 or 3 of
+ * the 52 that failed in the 512 matrices of a folding sheet, and gave definite matrices to the slower
+ * fallback. */
 static drape_status factor_any(cholmod_state *s, const double *values, bool definite)
 {
     s->fallback.active = s->factored = false;

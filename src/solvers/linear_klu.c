@@ -2,8 +2,8 @@
  * klu: sparse LU by KLU (Davis & Palamadai Natarajan 2010), the reference solver. AMD ordering, because the
  * pattern is symmetric; no block triangular form, because the mesh is connected. The first factorisation
  * chooses pivots; later ones keep them (refactor), which takes no heap, and are done afresh where the kept
- * pivots turn out to be too small. The factors of a matrix depend on the one that its pivots were chosen for: its
- * values are kept, so that a checkpoint can choose them again.
+ * pivots turn out to be too small. The factors of a matrix depend on the one that its pivots were chosen for:
+ * its values are kept, so that a checkpoint can choose them again.
  */
 #include "solvers/linear.h"
 

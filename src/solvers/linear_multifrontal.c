@@ -1,13 +1,14 @@
 /*
- * multifrontal: Cholesky factors of a symmetric positive definite matrix, front by front (Duff & Reid 1983; Liu
- * 1992, The multifrontal method for sparse matrix solution). A front is a dense matrix of a few columns of the matrix and
- * all rows that fill in below them. It is assembled from the entries of its columns and from what its children's
- * eliminations left on its columns and rows; its columns are factored; what that leaves on its rows, the update, goes to
- * its parent in the elimination tree.
+ * multifrontal: Cholesky factors of a symmetric positive definite matrix, front by front (Duff & Reid 1983;
+ * Liu 1992, The multifrontal method for sparse matrix solution). A front is a dense matrix of a few columns
+ * of the matrix and all rows that fill in below them. It is assembled from the entries of its columns and
+ * from what its children's eliminations left on its columns and rows; its columns are factored; what that
+ * leaves on its rows, the update, goes to its parent in the elimination tree.
  *
- * Fronts of different branches of the tree do not depend on each other: each branch is a task for one thread, and the few
- * large fronts at the top, which join the branches, are shared by all threads. Every sum runs in an order that the pattern
- * alone decides, so the bits do not depend on the number of threads. All memory is taken in create.
+ * Fronts of different branches of the tree do not depend on each other: each branch is a task for one thread,
+ * and the few large fronts at the top, which join the branches, are shared by all threads. Every sum runs in
+ * an order that the pattern alone decides, so the bits do not depend on the number of threads. All memory is
+ * taken in create.
  *
  * A matrix that is not symmetric positive definite goes to the fallback (fallback.h).
  */
@@ -27,12 +28,14 @@
 #define BRANCHES  24    /* a branch is at most this part of all work */
 #define S         DRAPE_STRIP
 #define A_STRIP   (DRAPE_STRIP / 3) /* blocks in a strip */
-#define CHUNK     (10 * DRAPE_STRIP) /* columns multiplied at once: two strips of it fit into the nearest cache */
+/* columns multiplied at once: two strips of it fit into the nearest cache */
+#define CHUNK     (10 * DRAPE_STRIP)
 #define ALIGNMENT 64
 
 extern const drape_linear_ops drape_linear_multifrontal;
 
-/* The size of a front, and where it is stored. Its panel holds its columns, its update what it leaves to its parent. */
+/* The size of a front, and where it is stored. Its panel holds its columns, its update what it leaves to its
+ * parent. */
 typedef struct front {
     int32_t columns, rows; /* scalars: factored, and below them */
     int32_t column_strips, row_strips;
@@ -108,7 +111,8 @@ static void measure_fronts(multifrontal *s)
     }
 }
 
-/* Branches are the largest subtrees whose work is at most a BRANCHES-th of all; the other fronts are the top. */
+/* Branches are the largest subtrees whose work is at most a BRANCHES-th of all; the other fronts are the
+ * top. */
 static void find_branches(multifrontal *s, double *work, int32_t *begin)
 {
     const int32_t count = s->e.count;
@@ -134,8 +138,9 @@ static void find_branches(multifrontal *s, double *work, int32_t *begin)
     }
 }
 
-/* Updates of fronts of even depth lie on one stack, those of odd depth on another: while a front writes its own update,
- * those of its children are at the end of the other stack. Each branch has two stacks, and so has the top. */
+/* Updates of fronts of even depth lie on one stack, those of odd depth on another: while a front writes its
+ * own update, those of its children are at the end of the other stack. Each branch has two stacks, and so has
+ * the top. */
 typedef struct stacks {
     int64_t end[2], peak[2];
 } stacks;
@@ -172,7 +177,8 @@ static void place_updates(multifrontal *s)
 
 /* ---- Where entries go ---- */
 
-/* The place of block (row, column), both in the order of elimination, from the beginning of the panel of front i. */
+/* The place of block (row, column), both in the order of elimination, from the beginning of the panel of
+ * front i. */
 static int64_t place_in_panel(const multifrontal *s, int32_t i, int32_t row, int32_t column)
 {
     const front *f = &s->fronts[i];
@@ -209,9 +215,9 @@ static bool place_entries(multifrontal *s)
     return true;
 }
 
-/* Where each row of a front lies in its parent, counted from the beginning of a column: in the parent's panel, and in its
- * update, there from where the tile of the first strip would be. in_update -1: the parent factors the row. False where a
- * panel is too large for 32-bit places. */
+/* Where each row of a front lies in its parent, counted from the beginning of a column: in the parent's
+ * panel, and in its update, there from where the tile of the first strip would be. in_update -1: the parent
+ * factors the row. False where a panel is too large for 32-bit places. */
 static bool place_rows(multifrontal *s)
 {
     for (int32_t i = 0; i < s->e.count; i++) {
@@ -422,8 +428,8 @@ static double *strip_of(const job *w, int64_t strip)
     return w->panel + strip * S * w->f->columns;
 }
 
-/* The columns that are factored now, in one strip below their diagonal: products with the columns before them are
- * subtracted, then it is divided by the diagonal tile. */
+/* The columns that are factored now, in one strip below their diagonal: products with the columns before them
+ * are subtracted, then it is divided by the diagonal tile. */
 static void finish_strip(void *user, int64_t task)
 {
     const strip_job *strips = user;
@@ -537,7 +543,8 @@ static bool is_mirrored(const multifrontal *s, int32_t j, int32_t k, int32_t mir
     return symmetric;
 }
 
-/* Column by column, as the values lie: in a well-numbered mesh a mirrored block is never far from its block. */
+/* Column by column, as the values lie: in a well-numbered mesh a mirrored block is never far from its
+ * block. */
 static properties inspect(multifrontal *s)
 {
     const drape_pattern *p = s->pattern;

@@ -1,11 +1,12 @@
 /*
- * pcg: conjugate gradients for a symmetric positive definite matrix, preconditioned by two parts that are added: the
- * inverses of its diagonal blocks, and the inverse of the matrix on a coarse space (prolong.h), P (P'AP)^-1 P'. It
- * takes no factors of the matrix itself: memory and the time of an iteration grow with the nonzeros, and
- * the number of iterations hardly grows. Callers that need no exact solution ask for fewer digits.
+ * pcg: conjugate gradients for a symmetric positive definite matrix, preconditioned by two parts that are
+ * added: the inverses of its diagonal blocks, and the inverse of the matrix on a coarse space (prolong.h), P
+ * (P'AP)^-1 P'. It takes no factors of the matrix itself: memory and the time of an iteration grow with the
+ * nonzeros, and the number of iterations hardly grows. Callers that need no exact solution ask for fewer
+ * digits.
  *
- * A matrix that is not symmetric or not positive definite, which the iteration notices at the latest, goes to the
- * fallback (fallback.h).
+ * A matrix that is not symmetric or not positive definite, which the iteration notices at the latest, goes to
+ * the fallback (fallback.h).
  */
 #include "base/finite.h"
 #include "solvers/fallback.h"
@@ -18,7 +19,8 @@
 #define EXACT          1e-14 /* of the residual, for callers that want all digits */
 #define MAX_ITERATIONS 2000  /* a matrix that needs more goes to the fallback */
 #define SYMMETRY       1e-13 /* as in linear_cholmod.c: round-off in mirrored entries */
-#define HOP            0.67 /* the pattern's graph joins nodes across an edge, too: its paths are so much shorter */
+/* the pattern's graph joins nodes across an edge, too: its paths are so much shorter */
+#define HOP 0.67
 
 extern const drape_linear_ops drape_linear_pcg;
 

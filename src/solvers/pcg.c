@@ -11,8 +11,8 @@ static double dot(const double *a, const double *b, int64_t n)
     return sum;
 }
 
-/* A direction of no positive curvature before the first step: the preconditioned residual itself is taken, which
- * descends. */
+/* A direction of no positive curvature before the first step: the preconditioned residual itself is taken,
+ * which descends. */
 static void stop_indefinite(drape_pcg *s, double *x)
 {
     s->definite = false;

@@ -1,7 +1,7 @@
 /*
  * pcg.h: preconditioned conjugate gradients (Hestenes & Stiefel 1952) for A x = b, A symmetric positive
- * definite, both it and the preconditioner given as functions. Where a direction of no positive curvature
- * turns up, A was not: the iteration ends there, with what it has.
+ * definite, both it and the preconditioner given as functions. At a direction without positive curvature A is
+ * not positive definite: the iteration ends there, with its last x.
  */
 #ifndef DRAPE_SOLVERS_PCG_H
 #define DRAPE_SOLVERS_PCG_H

@@ -1,9 +1,9 @@
 /*
  * prolong.h: a coarse space on a graph of nodes, by smoothed aggregation (Vanek, Mandel & Brezina 1996,
- * Algebraic multigrid by smoothed aggregation): seeds some edges apart, each node to its nearest seed, and the
- * indicator functions of these aggregates averaged over neighbours until they overlap. The functions add up to
- * 1 at each node, so a translation of everything is in the space. It depends on the graph alone: any mesh has
- * one, and it is made once.
+ * Algebraic multigrid by smoothed aggregation): seeds some edges apart, each node to its nearest seed, and
+ * the indicator functions of these aggregates averaged over neighbours until they overlap. The functions add
+ * up to 1 at each node, so a translation of everything is in the space. It depends on the graph alone: any
+ * mesh has one, and it is made once.
  */
 #ifndef DRAPE_SOLVERS_PROLONG_H
 #define DRAPE_SOLVERS_PROLONG_H
@@ -23,8 +23,8 @@ typedef struct drape_prolong {
     double *weight;  /* their values there */
 } drape_prolong;
 
-/* The edges between seeds that suit so many nodes: the more nodes, the wider, so that the coarse matrix costs no
- * more than the fine one. */
+/* The edges between seeds that suit so many nodes: the more nodes, the wider, so that the coarse matrix costs
+ * no more than the fine one. */
 int drape_prolong_spacing(int32_t nodes);
 
 /* Errors: DRAPE_E_MEMORY. */
@@ -36,8 +36,8 @@ void drape_prolong_restrict(const drape_prolong *prolong, const double *fine, do
 void drape_prolong_add(const drape_prolong *prolong, const double *coarse, double *fine);
 
 /* Which coarse functions meet through a symmetric graph of the nodes, as one that has them on its diagonal:
- * start (coarse + 1) and neighbor, rows not sorted. Workspace is taken from the arena, too: let it be one for the moment.
- * Errors: DRAPE_E_MEMORY. */
+ * start (coarse + 1) and neighbor, rows not sorted. Workspace is taken from the arena, too: let it be one for
+ * the moment. Errors: DRAPE_E_MEMORY. */
 drape_status drape_prolong_meet(drape_arena *arena, const drape_prolong *prolong, const drape_graph *graph,
                                 int32_t **start, int32_t **neighbor);
 
