@@ -62,7 +62,7 @@ static void fill(problem *q, matrix_kind kind)
                      (m->pinned[i / 3] ? 0 : DEFORMATION * edge * sin(12.9898 * (double)(i + 1)));
     drape_system_jacobian(
         system, &(drape_point){.x = state.x, .v = state.v, .internal = state.internal, .weight = 1 / DT},
-        1 / (DT * DT), kind != INDEFINITE, q->values);
+        1 / (DT * DT), kind == INDEFINITE ? 0 : 1, q->values);
     if (kind == FRICTIONAL)
         add_friction(&m->pattern, q->values);
     for (int64_t i = 0; i < m->pattern.n; i++)

@@ -487,7 +487,7 @@ DRAPE_API void drape_model_normals(const drape_model *model, const double *x, do
  *
  * drape_sim_contact_forces: of contact and friction, with colliders and between layers, on every node;
  * drape_sim_collider_force: of cloth on one collider, as a whole. Colliders have the mean velocity of the last step, so
- * ask before moving them on. Under "newton_k" and "projective", which do not bring the residual of a step to zero, all
+ * ask before moving them on. Under "newton_k", which does not bring the residual of a step to zero, all
  * of these are far off (docs/choosing.md). An integrator that moves nodes out of what they meet ("verlet") has no such forces, and
  * says so. Errors: DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. Thread-safety: as the sim. Not for observers. */
 DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);

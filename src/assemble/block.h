@@ -18,14 +18,14 @@ typedef struct drape_request {
     const drape_point *point;
     bool energy, hessian;
     bool conservative, dissipative; /* which parts of the forces */
-    double project;                 /* share of the positive semidefinite part in Hessians, 0 to 1 */
-    bool velocity;                  /* the Hessian wanted is dg/dv alone */
-    bool remainder;                 /* only what is of no measure */
-    const double *along;            /* (node_count x 3) where stress is wanted, from the point; NULL: there */
-    double *stress;                 /* (measure_count) gets the forces on measures; NULL: not wanted */
-    const bool *without;            /* (term_count) terms that are left out; NULL: none */
-    const double *against;          /* (node_count x 3) v against the medium; NULL: it rests */
-    const double *wind_gradient;    /* (node_count x 3 x 3), beside it */
+    double positive_share; /* of the positive semidefinite part in Hessians, see drape_system_jacobian */
+    bool velocity;         /* the Hessian wanted is dg/dv alone */
+    bool remainder;        /* only what is of no measure */
+    const double *along;   /* (node_count x 3) where stress is wanted, from the point; NULL: there */
+    double *stress;        /* (measure_count) gets the forces on measures; NULL: not wanted */
+    const bool *without;   /* (term_count) terms that are left out; NULL: none */
+    const double *against; /* (node_count x 3) v against the medium; NULL: it rests */
+    const double *wind_gradient; /* (node_count x 3 x 3), beside it */
 } drape_request;
 
 /*

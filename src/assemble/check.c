@@ -419,7 +419,7 @@ static drape_status check_jacobian(checker *c, const char *what, double weight, 
     drape_status status = make_room(c, &point);
     if (status)
         return status;
-    drape_system_jacobian(c->system, &point, 0, false, c->values);
+    drape_system_jacobian(c->system, &point, 0, 0, c->values);
     report(c, "assembled", what,
            largest_direction_error(c, DIFFERENCE_STEP * c->size, &point, drape_system_force), HESSIAN_LIMIT);
     return DRAPE_OK;

@@ -379,16 +379,19 @@ static void add_masses(const drape_system *system, double mass_weight, double *v
     }
 }
 
-void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, double project,
-                           double *values)
+void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight,
+                           double positive_share, double *values)
 {
-    drape_request want = {
-        .point = point, .hessian = true, .conservative = true, .dissipative = true, .project = project};
+    drape_request want = {.point = point,
+                          .hessian = true,
+                          .conservative = true,
+                          .dissipative = true,
+                          .positive_share = positive_share};
     const drape_sums to = into_values(system, values);
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight, false, project > 0, system->pattern,
+        drape_contact_add_jacobian(system->contact, point->weight, false, positive_share > 0, system->pattern,
                                    values);
     drape_drag_spring_add_hessian(&system->drag, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
@@ -397,7 +400,7 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
 void drape_system_pairs(const drape_system *system, int32_t term, const drape_point *point, double *h)
 {
     const drape_request want = {
-        .point = point, .hessian = true, .conservative = true, .dissipative = true, .project = true};
+        .point = point, .hessian = true, .conservative = true, .dissipative = true, .positive_share = 1};
     drape_summer_pairs(system->summer, &system->model->terms[term], &want, h);
 }
 
@@ -407,7 +410,7 @@ void drape_system_remainder(drape_system *system, const drape_point *point, doub
                           .hessian = true,
                           .conservative = true,
                           .dissipative = true,
-                          .project = true,
+                          .positive_share = 1,
                           .remainder = true};
     const drape_sums to = into_values(system, values);
     evaluate_wind(system, &want);

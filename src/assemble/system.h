@@ -108,13 +108,13 @@ void drape_system_force(drape_system *system, const drape_point *point, double *
 void drape_system_force_without(drape_system *system, const drape_point *point, const bool *without,
                                 double *g);
 
-/* values (pattern.nonzeros) = mass_weight M + J over the free nodes. project: the share, 0 to 1, by which
- * element Hessians become positive semidefinite: H + project (H+ - H); Hessians of contact do entirely if it
- * is not 0. */
-void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, double project,
-                           double *values);
+/* values (pattern.nonzeros) = mass_weight M + J over the free nodes. positive_share, 0 to 1: each element's
+ * Hessian H is H + positive_share (H+ - H), with its positive semidefinite part H+: 0 exact, 1 positive
+ * semidefinite. Of contact it is H+ for any share above 0. */
+void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight,
+                           double positive_share, double *values);
 
-/* The parts of an approximate Jacobian that is cheaper than J (integrators/quasi.h), term by term.
+/* The parts of an approximate Jacobian that is cheaper than J (nonlinear/approx_jacobian.h), term by term.
  *
  * drape_system_pairs, of a term with pairs: the symmetric 3 x 3 block H of each element, xx xy xz yy yz zz,
  * as (6 x element count), such that [H -H; -H H] is the positive semidefinite part of its Hessian.

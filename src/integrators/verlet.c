@@ -202,15 +202,6 @@ typedef struct substep {
 
 /* ---- Making ---- */
 
-static void destroy(void **state)
-{
-    verlet_state *s = *state;
-    if (!s)
-        return;
-    drape_spectrum_destroy(&s->spectrum);
-    *state = NULL;
-}
-
 static drape_status create_arrays(drape_arena *arena, verlet_state *s)
 {
     const drape_model *m = s->model;
@@ -241,7 +232,7 @@ static drape_status create_parts(drape_arena *arena, verlet_state *s)
     if (!status && s->model->contact.self)
         status = drape_verlet_self_create(arena, s->model, values[PARAM_SELF_BOXES] == BOXES_OWN, &s->self);
     if (!status)
-        status = drape_spectrum_create(arena->ctx, s->system, STABILITY_ITERATIONS, &s->spectrum);
+        status = drape_spectrum_create(arena, s->system, STABILITY_ITERATIONS, &s->spectrum);
     return status;
 }
 
@@ -261,10 +252,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
                                         .offset = values[PARAM_SURFACE_OFFSET],
                                         .friction_range = values[PARAM_FRICTION_RANGE],
                                         .friction_drag = values[PARAM_FRICTION_DRAG]};
-    const drape_status status = create_parts(arena, s);
-    if (status)
-        destroy(state);
-    return status;
+    return create_parts(arena, s);
 }
 
 /* ---- Forces ---- */
@@ -562,11 +550,6 @@ static void archive(void *state, drape_archive *a)
     drape_work_archive(&((verlet_state *)state)->work, a);
 }
 
-static size_t bytes(const void *state)
-{
-    return drape_spectrum_bytes(((const verlet_state *)state)->spectrum);
-}
-
 const drape_integrator_ops drape_integrator_verlet = {
     .name = "verlet",
     .summary = "explicit Verlet steps in substeps, with the contact rules and the strain limit of CS184 and "
@@ -582,6 +565,4 @@ const drape_integrator_ops drape_integrator_verlet = {
     .stability = stability,
     .work = work,
     .archive = archive,
-    .bytes = bytes,
-    .destroy = destroy,
 };

@@ -174,7 +174,7 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
     return true;
 }
 
-void drape_sim_book(drape_sim *sim, const drape_step_info *info)
+void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
 {
     drape_audit *audit = &sim->audit;
     audit->dissipated += info->dissipated;

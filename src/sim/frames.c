@@ -84,7 +84,7 @@ static drape_status emit(drape_sim *sim, double time, const double *x, const dou
                          .positions = x,
                          .velocities = v};
     sim->next_frame++;
-    return drape_sim_tell(sim, &event);
+    return drape_sim_notify(sim, &event);
 }
 
 drape_status drape_sim_emit_frames(drape_sim *sim)

@@ -114,7 +114,7 @@ static void whole_residual(bench *s)
 
 static void whole_jacobian(bench *s)
 {
-    drape_system_jacobian(s->sim->system, &s->point, s->mass_weight, false, s->values);
+    drape_system_jacobian(s->sim->system, &s->point, s->mass_weight, 0, s->values);
 }
 
 static void factor(bench *s)
@@ -214,7 +214,9 @@ static void count_bytes(const drape_sim *sim, drape_profile *out)
     out->pattern_bytes = model->pattern_bytes;
     out->model_bytes = sizeof *model + model->arena.bytes - model->pattern_bytes;
     out->state_bytes = sim->state_bytes;
-    out->integrator_bytes = sim->integrator_bytes + sim->chosen.integrator->bytes(sim->integrator);
+    out->integrator_bytes = sim->integrator_bytes;
+    if (sim->chosen.integrator->bytes)
+        out->integrator_bytes += sim->chosen.integrator->bytes(sim->integrator);
     out->system_bytes =
         sizeof *sim + sizeof *sim->arena + sim->arena->bytes - sim->state_bytes - sim->integrator_bytes;
 }

@@ -127,9 +127,9 @@ static drape_status take_steps(drape_sim *sim, double deadline, drape_realtime *
         double start = drape_clock_seconds();
         if (report->h > 0 && start + expected(sim, sim->realtime.effort) > deadline)
             break;
-        status = drape_sim_bound(sim, &attempt);
+        status = drape_sim_check_attempts(sim, &attempt);
         if (!status)
-            status = drape_sim_heed(sim);
+            status = drape_sim_check_cancel(sim);
         if (status)
             break;
         status = drape_sim_step(sim, t1, h, &attempt);

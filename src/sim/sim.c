@@ -117,7 +117,7 @@ static drape_status start_sim(drape_sim *sim, int threads)
         return status;
     drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
                         drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
-    sim->most_attempts = drape_chosen_controller_value(&sim->chosen, "max_attempts", INFINITY);
+    sim->max_attempts = drape_chosen_controller_value(&sim->chosen, "max_attempts", INFINITY);
     drape_sim_reset_energy(sim);
     return DRAPE_OK;
 }
@@ -167,7 +167,7 @@ void drape_sim_destroy(drape_sim **out)
     if (!out || !*out)
         return;
     drape_sim *sim = *out;
-    if (sim->integrator)
+    if (sim->integrator && sim->chosen.integrator->destroy)
         sim->chosen.integrator->destroy(&sim->integrator);
     drape_system_destroy(&sim->system);
     drape_arena_destroy(&sim->arena);
@@ -203,7 +203,7 @@ void drape_sim_cancel(drape_sim *sim)
         atomic_store(&sim->cancel, true);
 }
 
-drape_status drape_sim_heed(drape_sim *sim)
+drape_status drape_sim_check_cancel(drape_sim *sim)
 {
     if (!atomic_exchange(&sim->cancel, false))
         return DRAPE_OK;
@@ -265,18 +265,18 @@ drape_status drape_sim_guard(drape_sim *sim, const char *function)
 {
     if (!sim)
         return DRAPE_E_ARGUMENT;
-    if (sim->telling)
+    if (sim->notifying)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: not from an observer, while the sim advances",
                           function);
     return DRAPE_OK;
 }
 
-drape_status drape_sim_tell(drape_sim *sim, const drape_event *event)
+drape_status drape_sim_notify(drape_sim *sim, const drape_event *event)
 {
     for (int i = 0; i < sim->observer_count; i++) {
-        sim->telling = true;
+        sim->notifying = true;
         drape_status status = sim->observers[i](sim->observer_users[i], event);
-        sim->telling = false;
+        sim->notifying = false;
         if (status > 0)
             return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: an observer asked to stop",
                               drape_sim_state(sim)->t);

@@ -53,7 +53,7 @@ struct drape_sim {
     int past[2];       /* the states before that; -1: none */
     double scratch[2]; /* the controller's memory */
     drape_schedule schedule;
-    double most_attempts; /* the controller's max_attempts; INFINITY: it has none */
+    double max_attempts; /* the controller's max_attempts; INFINITY: it has none */
     double frame_rate;
     int64_t next_frame;
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
@@ -73,7 +73,7 @@ struct drape_sim {
     drape_observer *observers[DRAPE_MAX_OBSERVERS];
     void *observer_users[DRAPE_MAX_OBSERVERS];
     int observer_count;
-    bool telling; /* an observer is running */
+    bool notifying; /* an observer is running */
 };
 
 /* Refuses a call that changes the sim at a wrong time. Errors: DRAPE_E_ARGUMENT (no sim; from an observer of
@@ -111,7 +111,7 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
 void drape_sim_energy_density_at(drape_sim *sim, const double *x, double *density);
 
 /* Adds the work of an accepted step to the energy account. */
-void drape_sim_book(drape_sim *sim, const drape_step_info *info);
+void drape_sim_add_work(drape_sim *sim, const drape_step_info *info);
 
 /* Starts the energy account from the present state. */
 void drape_sim_reset_energy(drape_sim *sim);
@@ -126,17 +126,17 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
 
 /* DRAPE_E_STEP_TOO_SMALL, with its message, if one more attempt within one dt would be too many. last: the
  * one before, if there was one in this advance. */
-drape_status drape_sim_bound(drape_sim *sim, const drape_attempt *last);
+drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last);
 
 /* Ends the advance if it was cancelled, and resets the flag: DRAPE_E_STOPPED, with its
  * message. */
-drape_status drape_sim_heed(drape_sim *sim);
+drape_status drape_sim_check_cancel(drape_sim *sim);
 
 /* Back to the scene's own steps and the best effort, without left-over time. */
 void drape_sim_leave_realtime(drape_sim *sim);
 
 /* Notifies the observers. 0 to continue, else the negative status to stop with. */
-drape_status drape_sim_tell(drape_sim *sim, const drape_event *event);
+drape_status drape_sim_notify(drape_sim *sim, const drape_event *event);
 
 /* Passes the frames that are due up to the present state to the observers. A stop leaves the rest for the
  * next call. */

@@ -106,7 +106,7 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     if (!info->committed)
         drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
     turn_states(sim);
-    drape_sim_book(sim, info);
+    drape_sim_add_work(sim, info);
     measure_strain(sim, drape_sim_state(sim)->x);
     s->h_min = s->steps_accepted == 0 ? info->h : fmin(info->h, s->h_min);
     s->h_max = fmax(info->h, s->h_max);
@@ -205,7 +205,7 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
     if (stop == DRAPE_E_MEMORY) /* the allocator set the message */
         return stop;
     if (stop == DRAPE_E_STOPPED)
-        return drape_sim_heed(sim);
+        return drape_sim_check_cancel(sim);
     describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
     if (attempt->worst.element < 0) /* the diagnostic names a node; the distortion may say why */
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
@@ -219,24 +219,24 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
 }
 
 /* An integrator that chooses its own steps has no dt, and a bound of its own. */
-drape_status drape_sim_bound(drape_sim *sim, const drape_attempt *last)
+drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
 {
     char worst[400];
     const drape_schedule *s = &sim->schedule;
-    if (!(s->dt > 0) || (double)s->tries < sim->most_attempts)
+    if (!(s->dt > 0) || (double)s->tries < sim->max_attempts)
         return DRAPE_OK;
     describe_worst(sim->model, &last->worst, worst, sizeof worst);
     return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
                       "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64 " attempts since t=%.9g did not "
                       "come as far as one dt, %.4g s, and the controller's max_attempts is %.15g%s",
                       drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status),
-                      last->iterations, s->tries, s->tries_from, s->dt, sim->most_attempts, worst);
+                      last->iterations, s->tries, s->tries_from, s->dt, sim->max_attempts, worst);
 }
 
-static drape_status tell_attempt(drape_sim *sim, const drape_attempt *attempt)
+static drape_status notify_attempt(drape_sim *sim, const drape_attempt *attempt)
 {
     drape_event event = {.kind = DRAPE_EVENT_ATTEMPT, .sim = sim, .attempt = attempt};
-    return drape_sim_tell(sim, &event);
+    return drape_sim_notify(sim, &event);
 }
 
 /* ---- One step, and all of them ---- */
@@ -293,7 +293,7 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     sim->statistics.wall_contact += contact_seconds(sim) - contact;
     log_rejection(sim, attempt);
-    drape_status told = tell_attempt(sim, attempt);
+    drape_status told = notify_attempt(sim, attempt);
     drape_status framed = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
     if (stop)
         return explain(sim, stop, attempt);
@@ -315,9 +315,9 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
     drape_sim_leave_realtime(sim);
     drape_schedule_aim(&sim->schedule, t_end);
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {
-        status = drape_sim_bound(sim, &attempt);
+        status = drape_sim_check_attempts(sim, &attempt);
         if (!status)
-            status = drape_sim_heed(sim);
+            status = drape_sim_check_cancel(sim);
         if (!status)
             status = drape_sim_step(sim, t1, h, &attempt);
     }

@@ -184,7 +184,6 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
                          .owner = s,
                          .multiply = multiply,
                          .precondition = precondition,
-                         .max_iterations = MAX_ITERATIONS,
                          .r = drape_arena_take(arena, n, sizeof(double)),
                          .z = drape_arena_take(arena, n, sizeof(double)),
                          .p = drape_arena_take(arena, n, sizeof(double)),
@@ -292,8 +291,7 @@ static drape_status solve_inexact(void *state, const double *b, double *x, doubl
     if (!s->factored)
         return DRAPE_RETRY_LINEAR;
     if (!s->fallback.active) {
-        s->pcg.tolerance = tolerance;
-        drape_pcg_solve(&s->pcg, b, x);
+        drape_pcg_solve(&s->pcg, b, x, tolerance, MAX_ITERATIONS);
         *iterations = s->pcg.iterations;
         if (s->pcg.definite && s->pcg.converged && drape_all_finite(x, (size_t)s->pattern->n))
             return DRAPE_OK;

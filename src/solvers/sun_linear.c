@@ -35,12 +35,13 @@ static int keep_solver(SUNLinearSolver solver)
     return 0;
 }
 
-drape_status drape_sun_linear_factor(drape_sun_linear *linear)
+drape_status drape_sun_linear_factor(drape_sun_linear *linear, bool definite)
 {
     double start = drape_clock_seconds();
-    bool refuses = linear->definite && linear->ops->factor_definite;
-    linear->status =
-        (refuses ? linear->ops->factor_definite : linear->ops->factor)(linear->state, linear->values);
+    if (definite && linear->ops->factor_definite)
+        linear->status = linear->ops->factor_definite(linear->state, linear->values);
+    else
+        linear->status = linear->ops->factor(linear->state, linear->values);
     linear->factor_seconds += drape_clock_seconds() - start;
     linear->factorizations++;
     return linear->status;
@@ -50,7 +51,7 @@ drape_status drape_sun_linear_factor(drape_sun_linear *linear)
 static int setup(SUNLinearSolver solver, SUNMatrix matrix)
 {
     (void)matrix;
-    return drape_sun_linear_factor(solver->content);
+    return drape_sun_linear_factor(solver->content, false);
 }
 
 drape_status drape_sun_linear_solve(drape_sun_linear *linear, const double *b, double *x)

@@ -25,10 +25,8 @@ typedef struct drape_sun_linear {
     int64_t nonzeros;
     SUNLinearSolver solver;
     SUNMatrix matrix;
-    bool definite;    /* the next factorisations refuse matrices that are not positive definite, if the solver
-                      can */
-    drape_crew *crew; /* NULL: one thread */
-    double tolerance; /* share of the residual that iterative solvers may leave; 0: none */
+    drape_crew *crew;                   /* NULL: one thread */
+    double tolerance;                   /* share of the residual that iterative solvers may leave; 0: none */
     int64_t factorizations, iterations; /* of iterative solvers; for direct ones, solves */
     double factor_seconds, solve_seconds;
     drape_status status; /* of the last factor or solve */
@@ -51,8 +49,9 @@ size_t drape_sun_linear_bytes(const drape_sun_linear *linear);
  * a solver made for the same pattern. */
 void drape_sun_linear_archive(drape_sun_linear *linear, drape_archive *a, bool factors);
 
-/* Factors the values, time and work counted: what the SUNLinearSolver does. */
-drape_status drape_sun_linear_factor(drape_sun_linear *linear);
+/* Factors the values, time and work counted: what the SUNLinearSolver does. definite: refuses a matrix that
+ * is not positive definite with DRAPE_RETRY_LINEAR, if the solver can tell. */
+drape_status drape_sun_linear_factor(drape_sun_linear *linear, bool definite);
 
 /* x = A^-1 b with the factors there are, time and work counted: what the SUNLinearSolver does. */
 drape_status drape_sun_linear_solve(drape_sun_linear *linear, const double *b, double *x);

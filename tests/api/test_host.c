@@ -78,8 +78,7 @@ static double distance(const double *a, const double *b)
     "64, %s 'duration': 1}"
 
 /* The integrators that have time. */
-static const char *const methods[] = {"be",       "bdf2",       "midpoint", "trbdf2",
-                                      "newton_k", "projective", "verlet",   "ida"};
+static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "newton_k", "verlet", "ida"};
 enum { METHODS = sizeof methods / sizeof *methods };
 
 #define FRAME (1.0 / 64) /* [s], exact in binary */

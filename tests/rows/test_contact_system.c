@@ -109,7 +109,7 @@ static double error_of(probe *t, double weight, double time)
     ck_assert_int_eq(drape_system_extend_pattern(t->system, &point, &changed), DRAPE_OK);
     const drape_pattern *pattern = drape_system_pattern(t->system);
     t->values = take(t, (size_t)pattern->nonzeros);
-    drape_system_jacobian(t->system, &point, 0, false, t->values);
+    drape_system_jacobian(t->system, &point, 0, 0, t->values);
     memset(t->jp, 0, 3 * (size_t)m->node_count * sizeof *t->jp);
     for (int64_t j = 0; j < pattern->n; j++)
         for (int64_t k = pattern->column[j]; k < pattern->column[j + 1]; k++)

@@ -89,7 +89,7 @@ static inline int ida_full_jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N
     const drape_pattern *p = &f->model->pattern;
     const drape_point point = ida_full_place(f, y);
     double *to = SUNSparseMatrix_Data(matrix);
-    drape_system_jacobian(f->system, &point, 0, false, f->k);
+    drape_system_jacobian(f->system, &point, 0, 0, f->k);
     if (f->model->has_dissipation)
         drape_system_damping(f->system, &point, f->d);
     for (int64_t j = 0; j < p->n; j++) {

@@ -1,5 +1,5 @@
-/* work.c: what integrators count, in a checkpoint. */
-#include "integrators/integrator.h"
+/* report.c: see report.h. */
+#include "nonlinear/report.h"
 
 void drape_work_archive(drape_work *work, drape_archive *a)
 {

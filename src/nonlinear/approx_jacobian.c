@@ -1,5 +1,5 @@
-/* quasi.c: see quasi.h. */
-#include "integrators/quasi_parts.h"
+/* approx_jacobian.c: see approx_jacobian.h. */
+#include "nonlinear/approx_jacobian_parts.h"
 
 #include "base/clock.h"
 
@@ -30,9 +30,9 @@ static void invert_block(double a[6])
 
 /* ---- y = A x ---- */
 
-static void multiply_scalars(const drape_quasi *s, const double *x, double *y)
+static void multiply_scalars(const drape_approx_jacobian *s, const double *x, double *y)
 {
-    const drape_scalar *c = &s->scalar;
+    const drape_scalar_stiffness *c = &s->scalar;
     for (int32_t i = 0; i < s->nodes; i++) {
         double sum[3] = {0};
         for (int32_t k = c->start[i]; k < c->start[i + 1]; k++) {
@@ -44,7 +44,7 @@ static void multiply_scalars(const drape_quasi *s, const double *x, double *y)
     }
 }
 
-static void add_pairs(const drape_quasi *s, const double *x, double *y)
+static void add_pairs(const drape_approx_jacobian *s, const double *x, double *y)
 {
     static const double pinned[3] = {0, 0, 0};
     for (int32_t p = 0; p < s->pairs; p++) {
@@ -53,16 +53,18 @@ static void add_pairs(const drape_quasi *s, const double *x, double *y)
         const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
         double f[3];
         multiply_block(s->h + 6 * (size_t)p, d, f);
-        for (int r = 0; i >= 0 && r < 3; r++)
-            y[3 * (size_t)i + (size_t)r] += f[r];
-        for (int r = 0; j >= 0 && r < 3; r++)
-            y[3 * (size_t)j + (size_t)r] -= f[r];
+        for (size_t r = 0; r < 3; r++) {
+            if (i >= 0)
+                y[3 * (size_t)i + r] += f[r];
+            if (j >= 0)
+                y[3 * (size_t)j + r] -= f[r];
+        }
     }
 }
 
-static void add_remainder(const drape_quasi *s, const double *x, double *y)
+static void add_remainder(const drape_approx_jacobian *s, const double *x, double *y)
 {
-    const drape_quasi_remainder *m = &s->remainder;
+    const remainder_matrix *m = &s->remainder;
     for (int32_t k = 0; k < m->count; k++) {
         size_t i = 3 * (size_t)m->row[k], j = 3 * (size_t)m->column[k];
         const double *b = m->block + 9 * (size_t)k;
@@ -75,7 +77,7 @@ static void add_remainder(const drape_quasi *s, const double *x, double *y)
     }
 }
 
-void drape_quasi_multiply(const drape_quasi *s, const double *x, double *y)
+void drape_approx_jacobian_multiply(const drape_approx_jacobian *s, const double *x, double *y)
 {
     multiply_scalars(s, x, y);
     add_pairs(s, x, y);
@@ -84,25 +86,25 @@ void drape_quasi_multiply(const drape_quasi *s, const double *x, double *y)
 
 static void multiply(const void *owner, const double *x, double *y)
 {
-    drape_quasi_multiply(owner, x, y);
+    drape_approx_jacobian_multiply(owner, x, y);
 }
 
-/* z = D^-1 r + P A_c^-1 P' r. The coarse solver has factors: its solve does not fail but for numbers that are
- * not finite, and then its part is left out. */
+/* z = D^-1 r + P A_c^-1 P' r. The coarse solver has factors: its solve fails only if numbers are not finite,
+ * and then its part is left out. */
 static void precondition(const void *owner, const double *r, double *z)
 {
-    const drape_quasi *s = owner;
-    const drape_quasi_coarse *c = &s->coarse;
+    const drape_approx_jacobian *s = owner;
+    const coarse_matrix *c = &s->coarse;
     for (int32_t i = 0; i < s->nodes; i++)
         multiply_block(s->inverse + 6 * (size_t)i, r + 3 * (size_t)i, z + 3 * (size_t)i);
     drape_prolong_restrict(&c->prolong, r, c->b);
-    if (c->row->solve(c->solver, c->b, c->x) == DRAPE_OK)
+    if (c->linear->solve(c->solver, c->b, c->x) == DRAPE_OK)
         drape_prolong_add(&c->prolong, c->x, z);
 }
 
 /* ---- Update ---- */
 
-static void evaluate_pairs(drape_quasi *s, const drape_point *point)
+static void evaluate_pairs(drape_approx_jacobian *s, const drape_point *point)
 {
     double *to = s->h;
     for (int32_t t = 0; t < s->model->term_count; t++) {
@@ -114,7 +116,7 @@ static void evaluate_pairs(drape_quasi *s, const drape_point *point)
     }
 }
 
-/* One block and, on the diagonal, its symmetric part: friction has another. */
+/* One block, row by row; false if it is zero. */
 static bool read_block(const drape_pattern *p, double *values, int32_t column, int32_t block, double *to)
 {
     int64_t stride;
@@ -128,7 +130,7 @@ static bool read_block(const drape_pattern *p, double *values, int32_t column, i
     return any;
 }
 
-/* b = (b + mirror')/2 */
+/* b = (b + mirror')/2: friction makes blocks nonsymmetric. */
 static void symmetrize(double *b, const double *mirror)
 {
     double t[9];
@@ -138,10 +140,10 @@ static void symmetrize(double *b, const double *mirror)
     memcpy(b, t, sizeof t);
 }
 
-static void list_remainder(drape_quasi *s)
+static void list_remainder(drape_approx_jacobian *s)
 {
     const drape_pattern *p = drape_system_pattern(s->system);
-    drape_quasi_remainder *m = &s->remainder;
+    remainder_matrix *m = &s->remainder;
     m->count = 0;
     for (int32_t j = 0; j < p->block_count; j++)
         for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
@@ -156,14 +158,14 @@ static void list_remainder(drape_quasi *s)
         }
 }
 
-static drape_status evaluate_remainder(drape_quasi *s, const drape_point *point)
+static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_point *point)
 {
     bool changed;
     if (!s->remainder.values)
         return DRAPE_OK;
     drape_status status = drape_system_extend_pattern(s->system, point, &changed);
     if (!status && changed)
-        status = drape_quasi_make_room(s);
+        status = drape_approx_jacobian_extend(s);
     if (status)
         return status;
     drape_system_remainder(s->system, point, s->remainder.values);
@@ -171,21 +173,27 @@ static drape_status evaluate_remainder(drape_quasi *s, const drape_point *point)
     return DRAPE_OK;
 }
 
-/* The diagonal blocks, inverted. */
-static void invert_diagonal(drape_quasi *s)
+static void add_upper(drape_approx_jacobian *s, int32_t node, const double upper[6])
 {
-    const drape_quasi_remainder *m = &s->remainder;
+    for (size_t c = 0; c < 6; c++)
+        s->inverse[6 * (size_t)node + c] += upper[c];
+}
+
+/* The diagonal blocks, inverted. */
+static void invert_diagonal(drape_approx_jacobian *s)
+{
+    const remainder_matrix *m = &s->remainder;
     for (int32_t i = 0; i < s->nodes; i++) {
         double scalar = s->scalar.sum[s->scalar.diagonal[i]];
         memcpy(s->inverse + 6 * (size_t)i, (double[6]){scalar, 0, 0, scalar, 0, scalar}, 6 * sizeof(double));
     }
     for (int32_t p = 0; p < 2 * s->pairs; p++)
-        for (int c = 0; s->pair[p] >= 0 && c < 6; c++)
-            s->inverse[6 * (size_t)s->pair[p] + (size_t)c] += s->h[6 * (size_t)(p / 2) + (size_t)c];
+        if (s->pair[p] >= 0)
+            add_upper(s, s->pair[p], s->h + 6 * (size_t)(p / 2));
     for (int32_t k = 0; k < m->count; k++) {
-        const double *b = m->block + 9 * (size_t)k, upper[6] = {b[0], b[1], b[2], b[4], b[5], b[8]};
-        for (int c = 0; m->row[k] == m->column[k] && c < 6; c++)
-            s->inverse[6 * (size_t)m->row[k] + (size_t)c] += upper[c];
+        const double *b = m->block + 9 * (size_t)k;
+        if (m->row[k] == m->column[k])
+            add_upper(s, m->row[k], (double[6]){b[0], b[1], b[2], b[4], b[5], b[8]});
     }
     for (int32_t i = 0; i < s->nodes; i++)
         invert_block(s->inverse + 6 * (size_t)i);
@@ -193,9 +201,9 @@ static void invert_diagonal(drape_quasi *s)
 
 /* ---- The matrix on the coarse space ---- */
 
-static void sum_coarse_pairs(drape_quasi *s)
+static void sum_coarse_pairs(drape_approx_jacobian *s)
 {
-    drape_quasi_coarse *c = &s->coarse;
+    coarse_matrix *c = &s->coarse;
     size_t slots = (size_t)c->pattern.block_start[c->pattern.block_count];
     for (size_t k = 0; k < slots; k++) {
         double scalar = c->elastic[k] + s->scalar.weight * c->damping[k] + s->scalar.mass_weight * c->mass[k];
@@ -210,10 +218,10 @@ static void sum_coarse_pairs(drape_quasi *s)
 }
 
 /* The pattern's values from the blocks at and below its diagonal. */
-static void expand_coarse(drape_quasi *s)
+static void expand_coarse(drape_approx_jacobian *s)
 {
     static const int place[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
-    drape_quasi_coarse *c = &s->coarse;
+    coarse_matrix *c = &s->coarse;
     const drape_pattern *p = &c->pattern;
     for (int32_t j = 0; j < p->block_count; j++)
         for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
@@ -227,24 +235,24 @@ static void expand_coarse(drape_quasi *s)
         }
 }
 
-static void add_coarse_block(drape_quasi *s, int32_t row, int32_t column, double w, const double *b,
+static void add_coarse_block(drape_approx_jacobian *s, int32_t row, int32_t column, double w, const double *b,
                              bool transposed)
 {
-    drape_quasi_coarse *c = &s->coarse;
+    coarse_matrix *c = &s->coarse;
     int64_t stride;
-    int32_t slot = drape_quasi_slot(&c->pattern, row, column);
-    if (slot < 0) /* cloth touches cloth far away: only a preconditioner, it need not know */
-        return;
+    if (!drape_pattern_has(&c->pattern, row, column))
+        return; /* contact of distant cloth: a preconditioner can omit it */
+    int32_t slot = drape_pattern_find(&c->pattern, row, column);
     double *to = drape_pattern_at(&c->pattern, c->values, column, slot, &stride);
     for (int r = 0; r < 3; r++)
         for (int q = 0; q < 3; q++)
             to[q * stride + r] += w * (transposed ? b[3 * q + r] : b[3 * r + q]);
 }
 
-static void add_coarse_remainder(drape_quasi *s)
+static void add_coarse_remainder(drape_approx_jacobian *s)
 {
     const drape_prolong *p = &s->coarse.prolong;
-    const drape_quasi_remainder *m = &s->remainder;
+    const remainder_matrix *m = &s->remainder;
     for (int32_t k = 0; k < m->count; k++) {
         const double *b = m->block + 9 * (size_t)k;
         for (int32_t u = p->start[m->row[k]]; u < p->start[m->row[k] + 1]; u++)
@@ -257,130 +265,99 @@ static void add_coarse_remainder(drape_quasi *s)
     }
 }
 
-static drape_status factor_coarse(drape_quasi *s)
+static drape_status factor_coarse(drape_approx_jacobian *s, drape_work *work)
 {
     double start = drape_clock_seconds();
     sum_coarse_pairs(s);
     expand_coarse(s);
     add_coarse_remainder(s);
-    drape_status status = s->coarse.row->factor(s->coarse.solver, s->coarse.values);
-    s->factorizations++;
-    s->factor_seconds += drape_clock_seconds() - start;
+    drape_status status = s->coarse.linear->factor(s->coarse.solver, s->coarse.values);
+    work->factorizations++;
+    work->factor_seconds += drape_clock_seconds() - start;
     return status;
 }
 
-drape_status drape_quasi_update(drape_quasi *s, const drape_point *point, double mass_weight)
+static drape_status update(drape_approx_jacobian *s, const drape_point *point, double mass_weight,
+                           drape_work *work)
 {
     drape_status status = evaluate_remainder(s, point);
     if (status)
         return status;
-    drape_scalar_weigh(&s->scalar, point->weight, mass_weight);
+    drape_scalar_stiffness_weigh(&s->scalar, point->weight, mass_weight);
     evaluate_pairs(s, point);
     invert_diagonal(s);
-    return factor_coarse(s);
+    return factor_coarse(s, work);
 }
 
-int drape_quasi_solve(drape_quasi *s, const double *b, double *x, double tolerance, int max_iterations)
+drape_status drape_approx_jacobian_update(drape_approx_jacobian *s, const drape_point *point,
+                                          double mass_weight, drape_work *work)
 {
-    s->pcg.tolerance = tolerance;
-    s->pcg.max_iterations = max_iterations;
-    drape_pcg_solve(&s->pcg, b, x);
+    double start = drape_system_clock(s->system) - work->factor_seconds;
+    drape_status status = update(s, point, mass_weight, work);
+    work->jacobians++;
+    work->jacobian_seconds += drape_system_clock(s->system) - work->factor_seconds - start;
+    return status;
+}
+
+int drape_approx_jacobian_solve(drape_approx_jacobian *s, const double *b, double *x, double tolerance,
+                                int max_iterations)
+{
+    drape_pcg_solve(&s->pcg, b, x, tolerance, max_iterations);
     return s->pcg.iterations;
 }
 
 /* ---- Making and freeing ---- */
 
-static drape_status create_workspace(drape_quasi *s)
+drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *system, int spacing,
+                                          drape_approx_jacobian **out)
 {
-    size_t n = 3 * (size_t)s->nodes;
-    s->inverse = drape_alloc(s->ctx, 2 * n, sizeof *s->inverse);
+    drape_approx_jacobian *s = *out = drape_arena_take(arena, 1, sizeof *s);
+    if (!s)
+        return DRAPE_E_MEMORY;
+    s->arena = arena;
+    s->remainder.arena = drape_arena_within(arena);
+    s->system = system;
+    s->model = drape_system_model(system);
+    s->nodes = s->model->free_count;
+    const size_t n = 3 * (size_t)s->nodes;
+    s->inverse = drape_arena_take(arena, 2 * n, sizeof *s->inverse);
     s->pcg = (drape_pcg){.n = (int64_t)n,
                          .owner = s,
                          .multiply = multiply,
                          .precondition = precondition,
-                         .r = drape_alloc(s->ctx, n, sizeof(double)),
-                         .z = drape_alloc(s->ctx, n, sizeof(double)),
-                         .p = drape_alloc(s->ctx, n, sizeof(double)),
-                         .q = drape_alloc(s->ctx, n, sizeof(double))};
-    return s->inverse && s->pcg.r && s->pcg.z && s->pcg.p && s->pcg.q ? DRAPE_OK : DRAPE_E_MEMORY;
+                         .r = drape_arena_take(arena, n, sizeof(double)),
+                         .z = drape_arena_take(arena, n, sizeof(double)),
+                         .p = drape_arena_take(arena, n, sizeof(double)),
+                         .q = drape_arena_take(arena, n, sizeof(double))};
+    drape_status status = drape_approx_jacobian_build(s, spacing);
+    return status ? status : drape_arena_status(arena);
 }
 
-drape_status drape_quasi_create(drape_arena *arena, drape_system *system, int spacing, drape_quasi **out)
+void drape_approx_jacobian_destroy(drape_approx_jacobian **out)
 {
-    drape_context *ctx = arena->ctx;
-    drape_quasi *s = drape_alloc(ctx, 1, sizeof *s);
-    *out = s;
-    if (!s)
-        return DRAPE_E_MEMORY;
-    s->ctx = ctx;
-    s->arena = arena;
-    s->system = system;
-    s->model = drape_system_model(system);
-    s->nodes = s->model->free_count;
-    drape_status status = drape_quasi_build(s, spacing);
-    if (!status)
-        status = create_workspace(s);
-    if (status)
-        drape_quasi_destroy(out);
-    return status;
-}
-
-void drape_quasi_destroy(drape_quasi **out)
-{
-    drape_quasi *s = *out;
+    drape_approx_jacobian *s = *out;
     if (!s)
         return;
-    drape_quasi_coarse *c = &s->coarse;
-    if (c->solver)
-        drape_linear_destroy(c->row, &c->solver);
-    drape_quasi_free_room(s);
-    drape_scalar_free(s->ctx, &s->scalar);
-    void *all[] = {s->pair,       s->h,     s->inverse, c->elastic, c->damping, c->mass,
-                   c->pair_start, c->slot,  c->weight,  c->sum,     c->values,  c->b,
-                   c->x,          s->pcg.r, s->pcg.z,   s->pcg.p,   s->pcg.q};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        drape_free(s->ctx, all[i]);
-    drape_free(s->ctx, s);
+    drape_linear_destroy(s->coarse.linear, &s->coarse.solver);
+    drape_arena_free(&s->remainder.arena);
     *out = NULL;
 }
 
-/* A step begins with an update: of the factors only what later ones depend on. */
-void drape_quasi_archive(drape_quasi *s, drape_archive *a)
+/* A step begins with an update: of the factors only what later ones depend on is kept. */
+void drape_approx_jacobian_archive(drape_approx_jacobian *s, drape_archive *a)
 {
-    drape_archive_mark(a, "quasi");
+    drape_archive_mark(a, "approximate jacobian");
     if (drape_archive_is_reading(a))
-        drape_archive_note(a, drape_quasi_make_room(s));
-    drape_archive_int64(a, &s->factorizations);
-    drape_archive_double(a, &s->factor_seconds);
-    drape_linear_archive(s->coarse.row, s->coarse.solver, a, NULL);
+        drape_archive_note(a, drape_approx_jacobian_extend(s));
+    drape_linear_archive(s->coarse.linear, s->coarse.solver, a, NULL);
 }
 
-int32_t drape_quasi_coarse_nodes(const drape_quasi *s)
+int32_t drape_approx_jacobian_coarse_nodes(const drape_approx_jacobian *s)
 {
     return s->coarse.prolong.coarse;
 }
 
-int64_t drape_quasi_factorizations(const drape_quasi *s)
+size_t drape_approx_jacobian_bytes(const drape_approx_jacobian *s)
 {
-    return s->factorizations;
-}
-
-double drape_quasi_factor_seconds(const drape_quasi *s)
-{
-    return s->factor_seconds;
-}
-
-size_t drape_quasi_bytes(const drape_quasi *s)
-{
-    const drape_quasi_coarse *c = &s->coarse;
-    const drape_pattern *fine = drape_system_pattern(s->system);
-    size_t pairs = (size_t)s->pairs, nodes = (size_t)s->nodes, added = (size_t)c->pair_start[pairs];
-    size_t slots = (size_t)c->pattern.block_start[c->pattern.block_count];
-    size_t doubles = 6 * pairs + 6 * nodes + 12 * nodes + added + 9 * slots +
-                     2 * (size_t)c->pattern.nonzeros + 2 * (size_t)c->pattern.n;
-    size_t indices = 2 * pairs + added + 2 * slots + 2 * pairs;
-    size_t lower = s->remainder.values ? ((size_t)fine->block_start[nodes] + nodes) / 2 : 0;
-    doubles += s->remainder.values ? (size_t)fine->nonzeros + 9 * lower : 0;
-    return sizeof *s + drape_scalar_bytes(&s->scalar) + doubles * sizeof(double) +
-           (indices + 2 * lower) * sizeof(int32_t) + drape_linear_bytes(c->row, c->solver);
+    return drape_linear_bytes(s->coarse.linear, s->coarse.solver);
 }
