@@ -415,8 +415,8 @@ DRAPE_API void drape_sim_cancel(drape_sim *sim);
 /* ---- Sim: what a host moves ----
  *
  * For a host that has its own idea of where things are, frame by frame: it says where pins and colliders are to be at
- * the end of the frame, advances by the frame, and says the next. Nothing here allocates, but for the first
- * drape_sim_set_wind; none is for observers; after an error nothing has changed. Thread-safety: as the sim. */
+ * the end of the frame, advances by the frame, and says the next. Nothing here allocates;
+ * none is for observers; after an error nothing has changed. Thread-safety: as the sim. */
 
 /* Sends pinned nodes, fixed ones and ones on tracks alike, on ways of the host's: node nodes[i] goes in the next
  * `seconds` of simulated time from where it is to positions[3 i ...] [m], where it then rests, or goes on by the next
@@ -452,8 +452,7 @@ typedef void drape_wind_field(void *user, double t, int32_t count, const double 
                               double *gradient);
 
 /* Moves the medium that drag terms are in ("drag.wind", added to its own steady wind, "drag.viscous", and a host's with
- * in_medium); field NULL: it rests again. Errors: DRAPE_E_ARGUMENT (no term of the model is in a medium),
- * DRAPE_E_MEMORY. */
+ * in_medium); field NULL: it rests again. Errors: DRAPE_E_ARGUMENT (no term of the model is in a medium). */
 DRAPE_API drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *field, void *user);
 
 /* ---- Sim: what can be read ---- */
@@ -488,7 +487,7 @@ DRAPE_API void drape_model_normals(const drape_model *model, const double *x, do
  *
  * drape_sim_contact_forces: of contact and friction, with colliders and between layers, on every node;
  * drape_sim_collider_force: of cloth on one collider, as a whole. Colliders have the mean velocity of the last step, so
- * ask before moving them on. Under "newton_k" and "projective", which do not bring the residual of a step to zero, all
+ * ask before moving them on. Under "newton_k", which does not bring the residual of a step to zero, all
  * of these are far off (docs/choosing.md). An integrator that moves nodes out of what they meet ("verlet") has no such forces, and
  * says so. Errors: DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. Thread-safety: as the sim. Not for observers. */
 DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);

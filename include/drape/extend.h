@@ -3,11 +3,15 @@
  * table of a term, the shape and the ops table of a collider.
  *
  * A term is a sum over elements of one cloth. Its author writes, for a range of elements in local
- * coordinates, one of measure      a scalar strain measure q(x) with gradient and Hessian; the library makes
- * E = 1/2 k (q - q0)^2 of it, energy       any energy E(x) with gradient and Hessian, dissipation  a force
- * g(x, v), positive against the motion, with its derivatives, law          a force along the strain measures
- * of the other terms of its cloth, such as a damping. The library owns the loops, the sparsity, the scatter,
- * the projection, boundary conditions and threads.
+ * coordinates, one of
+ *
+ *   - measure: a scalar strain measure q(x) with gradient and Hessian, of which the library makes the energy
+ *     E = 1/2 k (q - q0)^2
+ *   - energy: any energy E(x) with gradient and Hessian
+ *   - dissipation: a force g(x, v), positive against the motion, with its derivatives
+ *   - law: a force along the strain measures of the other terms of its cloth, such as a damping
+ *
+ * The library owns the loops, the sparsity, the scatter, the projection, boundary conditions and threads.
  *
  * Thread-safety: every function of a term may be called from several threads at once on different ranges; it
  * must not allocate and must read nothing but its arguments. The exception is build, called once per cloth
@@ -37,12 +41,12 @@ typedef enum drape_param_kind {
 /* One parameter. All values travel as doubles: integers exact, booleans 0 or 1, choices by index; a vector
  * or a turn takes three of them, so that the values of the parameters after it stand two further on. */
 typedef struct drape_param {
-    const char *name;      /* as in scenes */
-    drape_param_kind kind; /* what values it has */
-    const char *unit;      /* "N/m", "s", "1" for none */
-    double default_value;  /* NaN: there is none, see derived */
-    const char
-        *derived; /* with a NaN default: what is taken instead, in words; NULL: the parameter is required */
+    const char *name;           /* as in scenes */
+    drape_param_kind kind;      /* what values it has */
+    const char *unit;           /* "N/m", "s", "1" for none */
+    double default_value;       /* NaN: there is none, see derived */
+    const char *derived;        /* with a NaN default: what is taken instead, in words; NULL: the parameter is
+                                   required */
     double min, max;            /* closed range; ignored by booleans and choices */
     bool open_min, open_max;    /* the bound itself is excluded */
     const char *const *choices; /* NULL-ended list of names */
@@ -117,8 +121,8 @@ typedef struct drape_term_builder drape_term_builder;
  * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count);
 
-/* The same for elements of fewer nodes than the term's, on this cloth. A node may stand in several places of an
- * element, as its first does in places that are left over: its derivatives are the sum of theirs. */
+/* The same for elements of fewer nodes than the term's, on this cloth. A node may stand in several places of
+ * an element, as its first does in places that are left over: its derivatives are the sum of theirs. */
 DRAPE_API drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t element_count, int nodes,
                                                 int rest_count);
 
@@ -194,14 +198,15 @@ typedef struct drape_term_ops {
                     const double *internal, double *q, double *dq, double *ddq);
 
     /* Optional, beside measure, where nodes is 2 and q is a linear function of the distance of the nodes: the
-     * same with a tenth of the numbers. q (count), d (3 x count: all x, all y, all z) = x1 - x0 [m], c (count) with
-     * dq = (-c d, c d), so that ddq = (P -P; -P P), P = c (I - d d'/d.d). count is at most DRAPE_PAIR_BLOCK. */
+     * same with a tenth of the numbers. q (count), d (3 x count: all x, all y, all z) = x1 - x0 [m], c
+     * (count) with dq = (-c d, c d), so that ddq = (P -P; -P P), P = c (I - d d'/d.d). count is at most
+     * DRAPE_PAIR_BLOCK. */
     void (*pair)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,
                  double *d, double *c);
 
-    /* Optional, beside measure: the same for the DRAPE_LANES elements of a list at once; the same one may stand
-     * in several places. Item i of the element in place l is at [DRAPE_LANES i + l]: q (1), dq (d), ddq (d x d), of
-     * which only the 3 x 3 blocks on and below the diagonal are written. */
+    /* Optional, beside measure: the same for the DRAPE_LANES elements of a list at once; the same one may
+     * stand in several places. Item i of the element in place l is at [DRAPE_LANES i + l]: q (1), dq (d), ddq
+     * (d x d), of which only the 3 x 3 blocks on and below the diagonal are written. */
     void (*lanes)(const drape_elements *el, const int32_t *element, const double *x, const double *internal,
                   double *q, double *dq, double *ddq);
 
@@ -213,9 +218,9 @@ typedef struct drape_term_ops {
     void (*dissipation)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                         const double *v, double *g, double *dg_dx, double *dg_dv);
 
-    /* For count elements with stiffness k [J], strain = q - q0 and rate = q' [q/s]: adds the generalised force
-     * [J/q] on q, its derivatives by strain and by rate, and the energy [J] if it has one. All are (count).
-     * dissipative: the force takes work, without an energy. */
+    /* For count elements with stiffness k [J], strain = q - q0 and rate = q' [q/s]: adds the generalised
+     * force [J/q] on q, its derivatives by strain and by rate, and the energy [J] if it has one. All are
+     * (count). dissipative: the force takes work, without an energy. */
     void (*law)(const double *params, int32_t count, const double *k, const double *strain,
                 const double *rate, double *force, double *dforce_dstrain, double *dforce_drate,
                 double *energy);
@@ -236,19 +241,22 @@ typedef struct drape_term_ops {
     drape_status (*check)(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault);
 
-    /* dissipation: it is in a medium. v is the velocity against it, less by the wind of drape_sim_set_wind. */
+    /* dissipation: it is in a medium. v is the velocity against it, less by the wind of
+     * drape_sim_set_wind. */
     bool in_medium;
 
-    /* Optional, beside measure: the ddq with which force ddq is its positive semidefinite part, given the force of
-     * each element, so (ddq)+ where it pulls and (ddq)- where it pushes; ddq (count x d x d, symmetric). Without it,
-     * and without convex, what is made positive loses force ddq, and with it the stiffness that tension gives. */
+    /* Optional, beside measure: the ddq with which force ddq is its positive semidefinite part, given the
+     * force of each element, so (ddq)+ where it pulls and (ddq)- where it pushes; ddq (count x d x d,
+     * symmetric). Without it, and without convex, what is made positive loses force ddq, and with it the
+     * stiffness that tension gives. */
     void (*positive)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                      const double *internal, const double *force, double *ddq);
 } drape_term_ops;
 
-/* Registers a user-defined term: scenes compiled with this context may name it from then on. *ops is copied; what
- * it points to must outlive the context and every model compiled with it. Ops of an older, shorter version are read. Errors: DRAPE_E_ARGUMENT (not well formed, name
- * taken, more than 32), DRAPE_E_VERSION (struct_size). */
+/* Registers a user-defined term: scenes compiled with this context may name it from then on. *ops is copied;
+ * what it points to must outlive the context and every model compiled with it. Ops of an older, shorter
+ * version are read. Errors: DRAPE_E_ARGUMENT (not well formed, name taken, more than 32), DRAPE_E_VERSION
+ * (struct_size). */
 DRAPE_API drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *ops);
 
 /* Makes a range function out of a function for one element. x (d) and v (d) are local coordinates; writes
@@ -285,8 +293,7 @@ typedef struct drape_collider_shape {
     double radius;     /* [m] */
     bool inscribed;    /* of a convex body: its points and segments stay inside of a curved surface */
     const void *kept;  /* what the collider keeps for its distance, of drape_shape_take; NULL for nothing */
-    struct drape_shape_builder
-        *builder; /* of the functions below; NULL outside of the collider's function shape */
+    struct drape_shape_builder *builder; /* of the functions below; NULL outside of the function shape */
 } drape_collider_shape;
 
 /* Takes the arrays of a shape; they live as long as the model. Called once. Errors: DRAPE_E_MEMORY. */

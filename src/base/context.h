@@ -38,13 +38,14 @@ char *drape_copy_text(drape_context *ctx, const char *text);
 drape_status drape_fail(drape_context *ctx, drape_status status, const char *format, ...) DRAPE_PRINTF(3, 4);
 drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *pointer, const char *format,
                            ...) DRAPE_PRINTF(4, 5);
-/* A function of the host, before whose call the message was emptied, returned status: says so where it failed and said nothing. */
+/* A function of the host, before whose call the message was emptied, returned status: says so where it failed
+ * and said nothing. */
 drape_status drape_fail_unsaid(drape_context *ctx, drape_status status, const char *pointer,
                                const char *format, ...) DRAPE_PRINTF(4, 5);
 drape_status drape_fail_memory(drape_context *ctx, size_t bytes);
 
-/* For what takes long before a sim runs, between its stages: DRAPE_E_STOPPED with its message where the host wants no
- * more of it. */
+/* For what takes long before a sim runs, between its stages: DRAPE_E_STOPPED with its message where the host
+ * wants no more of it. */
 drape_status drape_heed(drape_context *ctx);
 
 void drape_log(drape_context *ctx, drape_log_level level, const char *format, ...) DRAPE_PRINTF(3, 4);

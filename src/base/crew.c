@@ -1,12 +1,10 @@
 /*
- * crew.c: see crew.h. The rounds of a loop that no one has taken are a number, and a round is taken by making it one less, if nothing has
- * changed since it was read. The number of the loop is in the same word: whoever read of a loop that is over takes nothing of
- * the next one, whose round it would call with the other's function. Who takes a round is for chance; what it
- * writes is not.
+ * crew.c: see crew.h. The rounds of a loop that no one has taken are a number, and a round is taken by making
+ * it one less, if nothing has changed since it was read. The number of the loop is in the same word: whoever
+ * read of a loop that is over takes nothing of the next one, whose round it would call with the other's
+ * function. Who takes a round is for chance; what it writes is not.
  */
 #include "base/crew.h"
-
-#include "base/context.h"
 
 #include <assert.h>
 #include <pthread.h>
@@ -14,21 +12,22 @@
 #include <signal.h>
 #include <stdatomic.h>
 
-/* Looks before one sleeps, each of which lets others have the core, a third of a microsecond where there are none: a millisecond or
- * two, longer than the caller takes between two loops of one step. To wake a core that has gone to sleep takes up to a tenth of that, each
- * time; where a core is taken, longer looks cost nothing that was measured. */
+/* Looks before one sleeps, each of which lets others have the core, a third of a microsecond where there are
+ * none: a millisecond or two, longer than the caller takes between two loops of one step. To wake a core that
+ * has gone to sleep takes up to a tenth of that, each time; where a core is taken, longer looks cost nothing
+ * that was measured. */
 #define HELPER_LOOKS 5000
 #define CALLER_LOOKS 3000
 #define LEFT         0xffffffffu /* of `open`: rounds not taken; above it, the number of the loop */
 #define APART        64 /* bytes: in one line of the cache, what one thread writes is taken from all others */
 
 struct drape_crew {
-    drape_context *ctx;
     int threads, helpers;
     pthread_t *helper;    /* (threads - 1), of which helpers run */
     pthread_mutex_t lock; /* of who goes to sleep */
     pthread_cond_t work, done;
-    /* The loop: written while no round of it is open, and read, of a loop that may be over, by whoever is late. */
+    /* The loop: written while no round of it is open, and read, of a loop that may be over, by whoever is
+     * late. */
     _Atomic(drape_round *) one;
     _Atomic(void *) user;
     atomic_int_fast64_t rounds;
@@ -43,11 +42,6 @@ struct drape_crew {
 int drape_crew_threads(const drape_crew *crew)
 {
     return crew ? crew->threads : 1;
-}
-
-size_t drape_crew_bytes(const drape_crew *crew)
-{
-    return crew ? sizeof *crew + (size_t)(crew->threads - 1) * sizeof *crew->helper : 0;
 }
 
 /* ---- Rounds ---- */
@@ -124,19 +118,15 @@ static void start_helpers(drape_crew *c)
     pthread_sigmask(SIG_SETMASK, &before, NULL);
 }
 
-drape_status drape_crew_create(drape_context *ctx, int threads, drape_crew **out)
+drape_status drape_crew_create(drape_arena *arena, int threads, drape_crew **out)
 {
     *out = NULL;
     if (threads <= 1)
         return DRAPE_OK;
-    drape_crew *c = drape_alloc(ctx, 1, sizeof *c);
-    pthread_t *helper = drape_alloc(ctx, (size_t)threads - 1, sizeof *helper);
-    if (!c || !helper) {
-        drape_free(ctx, helper);
-        drape_free(ctx, c);
+    drape_crew *c = drape_arena_take(arena, 1, sizeof *c);
+    pthread_t *helper = drape_arena_take(arena, (size_t)threads - 1, sizeof *helper);
+    if (!c || !helper)
         return DRAPE_E_MEMORY;
-    }
-    c->ctx = ctx;
     c->threads = threads;
     c->helper = helper;
     pthread_mutex_init(&c->lock, NULL);
@@ -166,15 +156,13 @@ void drape_crew_destroy(drape_crew **crew)
     pthread_cond_destroy(&c->work);
     pthread_cond_destroy(&c->done);
     pthread_mutex_destroy(&c->lock);
-    drape_free(c->ctx, c->helper);
-    drape_free(c->ctx, c);
     *crew = NULL;
 }
 
 /* ---- The caller ---- */
 
-/* All is said before the rounds are open; the fence between `open` and `asleep` is that both are sequentially consistent: a helper
- * that goes to sleep has counted itself before it looks for the last time. */
+/* All is said before the rounds are open; the fence between `open` and `asleep` is that both are sequentially
+ * consistent: a helper that goes to sleep has counted itself before it looks for the last time. */
 static void call_helpers(drape_crew *c, int64_t rounds, drape_round *one, void *user)
 {
     const uint_fast64_t loop = (atomic_load_explicit(&c->open, memory_order_relaxed) >> 32) + 1;

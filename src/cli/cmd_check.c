@@ -3,7 +3,7 @@
 #include "cli/signals.h"
 
 #include "assemble/check.h"
-#include "contact/intersect.h"
+#include "geometry/intersect.h"
 
 #include <stdio.h>
 

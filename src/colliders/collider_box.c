@@ -104,7 +104,7 @@ static void turn_back(const frame *f, const double *g, double *out)
         out[i] = g[0] * f->axis[0][i] + g[1] * f->axis[1][i] + g[2] * f->axis[2][i];
 }
 
-/* Outside of the core: d = |q+|; only directions in which q > 0 bend it. */
+/* Outside of the core d = |max(q, 0)|: only directions in which q > 0 have curvature. */
 static void bend(const frame *f, const double *q, const double *g, double length, double *curvature)
 {
     for (int i = 0; i < 9; i++) {

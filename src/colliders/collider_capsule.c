@@ -2,7 +2,7 @@
  * (Ericson 2005, Real-Time Collision Detection, section 5.1.2). */
 #include "colliders/colliders.h"
 
-#include "colliders/round.h"
+#include "geometry/round.h"
 
 #include <string.h>
 

@@ -4,12 +4,12 @@
  * f_rr e e + f_rz (e u + u e) + f_zz u u + f_r / rho (I - e e - u u), u along the axis, e away from it. */
 #include "colliders/colliders.h"
 
-#include "colliders/round.h"
+#include "geometry/round.h"
 
 enum { A = 0, B = 3, RADIUS = 6, ROUNDING = 7, PARAM_COUNT = 4 }; /* places of the values */
 
-#define LEAST_SIDES 12
-#define MOST_SIDES  512
+#define MIN_SIDES 12
+#define MAX_SIDES 512
 
 #define END(name_, help_)                                                                                    \
     {                                                                                                        \
@@ -66,8 +66,8 @@ static drape_status keep_axis(const double *values, drape_collider_shape *shape)
 static int32_t sides_of(double radius, double tolerance)
 {
     const double pi = 3.14159265358979323846;
-    double cosine = 1 - tolerance / radius, sides = cosine > 0 ? ceil(pi / acos(cosine)) : LEAST_SIDES;
-    return (int32_t)fmin(fmax(sides, LEAST_SIDES), MOST_SIDES); /* infinite for a tolerance of 0 */
+    double cosine = 1 - tolerance / radius, sides = cosine > 0 ? ceil(pi / acos(cosine)) : MIN_SIDES;
+    return (int32_t)fmin(fmax(sides, MIN_SIDES), MAX_SIDES); /* infinite for a tolerance of 0 */
 }
 
 /* Points 2 s and 2 s + 1 are the ends of ridge s. */

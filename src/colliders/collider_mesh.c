@@ -1,6 +1,8 @@
-/* collider_mesh.c: the solid inside of a closed triangle mesh. Its distance bends in jumps, so that nodes of
- * the cloth meet its triangles. */
-#include "colliders/tree.h"
+/* collider_mesh.c: the solid inside of a closed triangle mesh. The normal of its distance jumps at edges, so
+ * cloth nodes are in contact with its triangles instead of its distance function. */
+#include "colliders/colliders.h"
+
+#include "geometry/mesh_distance.h"
 
 #include <math.h>
 
@@ -45,7 +47,7 @@ static drape_status make_shape(const double *values, double tolerance, drape_col
         drape_shape_read_mesh(shape, "file", values + SCALE, values + ROTATE, values + TRANSLATE);
     if (status)
         return status;
-    shape->kept = drape_tree_make(shape);
+    shape->kept = drape_mesh_distance_create(shape->builder->arena, shape);
     return shape->kept ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
@@ -53,7 +55,7 @@ static double distance(const double *values, const drape_collider_shape *shape, 
                        double *normal, double *curvature)
 {
     (void)values;
-    return drape_tree_distance(shape->kept, shape, x, normal, curvature);
+    return drape_mesh_distance_at(shape->kept, shape, x, normal, curvature);
 }
 
 const drape_collider_ops drape_collider_mesh = {

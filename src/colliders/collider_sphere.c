@@ -1,7 +1,7 @@
 /* collider_sphere.c: d = |x - c| - r. */
 #include "colliders/colliders.h"
 
-#include "colliders/round.h"
+#include "geometry/round.h"
 
 #include <string.h>
 

@@ -41,7 +41,7 @@ drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t eleme
         drape_arena_take(arena, (size_t)element_count * (size_t)rest_count, sizeof *builder->rest);
     for (size_t i = 0; builder->node && i < (size_t)element_count * (size_t)el->nodes; i++)
         builder->node[i] = -1;
-    return builder->node && builder->rest ? DRAPE_OK : DRAPE_E_MEMORY;
+    return drape_arena_status(arena);
 }
 
 void drape_term_anchor(drape_term_builder *builder)
@@ -271,7 +271,7 @@ static bool well_formed(const drape_term_ops *ops)
 }
 
 /* The first version's ops ended here. */
-#define LEAST_SIZE offsetof(drape_term_ops, in_medium)
+#define MIN_SIZE offsetof(drape_term_ops, in_medium)
 
 drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *given)
 {
@@ -280,11 +280,11 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *gi
         return DRAPE_E_ARGUMENT;
     if (!given)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_context_add_term: there are no ops");
-    if (given->struct_size < LEAST_SIZE || given->struct_size > sizeof own)
+    if (given->struct_size < MIN_SIZE || given->struct_size > sizeof own)
         return drape_fail(
             ctx, DRAPE_E_VERSION,
             "the ops of a term have %zu bytes; this library's have %zu, an older one's %zu or more",
-            given->struct_size, sizeof own, LEAST_SIZE);
+            given->struct_size, sizeof own, MIN_SIZE);
     memcpy(&own, given, given->struct_size);
     if (!well_formed(ops))
         return drape_fail(

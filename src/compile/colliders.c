@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MOST_FRICTION 1e3
+#define MAX_FRICTION 1e3
 
 /* How far a polygon may stay inside a curved surface, of the activation distance: an edge of the cloth that
  * rests on a polygon then is pushed off nearly as if it were the surface. */
@@ -37,7 +37,7 @@ static drape_status name_collider(drape_model *model, const char *pointer, const
             return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "two colliders have the name \"%.60s\"",
                                  wanted);
     to->name = drape_arena_text(&model->arena, wanted);
-    return to->name ? DRAPE_OK : DRAPE_E_MEMORY;
+    return drape_arena_status(&model->arena);
 }
 
 static drape_status take_friction(drape_model *model, const char *pointer, double friction,
@@ -46,10 +46,10 @@ static drape_status take_friction(drape_model *model, const char *pointer, doubl
     char at[96];
     snprintf(at, sizeof at, "%s/friction", pointer);
     to->friction = friction;
-    if (friction >= 0 && friction <= MOST_FRICTION)
+    if (friction >= 0 && friction <= MAX_FRICTION)
         return DRAPE_OK;
     return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%.10g is not allowed; it is in [0, %g]", friction,
-                         MOST_FRICTION);
+                         MAX_FRICTION);
 }
 
 static drape_status compile_collider(drape_model *model, size_t i, const drape_scene_def *scene)
@@ -97,8 +97,9 @@ static bool well_formed(const drape_collider_ops *ops)
     return named && drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
 }
 
-/* The first version's ops ended here: `smooth` may be missing, and a collider without it is met by its triangles. */
-#define LEAST_SIZE offsetof(drape_collider_ops, smooth)
+/* The first version's ops ended here: `smooth` may be missing, and a collider without it is met by its
+ * triangles. */
+#define MIN_SIZE offsetof(drape_collider_ops, smooth)
 
 drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *given)
 {
@@ -107,11 +108,11 @@ drape_status drape_context_add_collider(drape_context *ctx, const drape_collider
         return DRAPE_E_ARGUMENT;
     if (!given)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_context_add_collider: there are no ops");
-    if (given->struct_size < LEAST_SIZE || given->struct_size > sizeof own)
+    if (given->struct_size < MIN_SIZE || given->struct_size > sizeof own)
         return drape_fail(
             ctx, DRAPE_E_VERSION,
             "the ops of a collider have %zu bytes; this library's have %zu, an older one's %zu or more",
-            given->struct_size, sizeof own, LEAST_SIZE);
+            given->struct_size, sizeof own, MIN_SIZE);
     memcpy(&own, given, given->struct_size);
     if (!well_formed(ops))
         return drape_fail(

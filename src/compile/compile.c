@@ -13,17 +13,14 @@ static drape_status copy_setting(drape_model *model, const drape_setting *from, 
     to->number = from->number;
     to->name = drape_arena_text(&model->arena, from->name);
     to->text = from->text ? drape_arena_text(&model->arena, from->text) : NULL;
-    if (!to->name || (from->text && !to->text))
-        return DRAPE_E_MEMORY;
-    if (!from->vector)
-        return DRAPE_OK;
-    double *vector = drape_arena_take(&model->arena, from->vector_count, sizeof *vector);
-    if (!vector)
-        return DRAPE_E_MEMORY;
-    memcpy(vector, from->vector, from->vector_count * sizeof *vector);
-    to->vector = vector;
-    to->vector_count = from->vector_count;
-    return DRAPE_OK;
+    if (from->vector) {
+        double *vector = drape_arena_take(&model->arena, from->vector_count, sizeof *vector);
+        if (vector)
+            memcpy(vector, from->vector, from->vector_count * sizeof *vector);
+        to->vector = vector;
+        to->vector_count = from->vector_count;
+    }
+    return drape_arena_status(&model->arena);
 }
 
 drape_status drape_compile_choice(drape_model *model, const drape_row_def *def, const char *fallback,
@@ -47,13 +44,10 @@ static drape_status copy_formats(drape_model *model, const drape_scene_def *def)
     model->formats = drape_arena_take(&model->arena, def->format_count, sizeof *model->formats);
     if (!model->formats)
         return DRAPE_E_MEMORY;
-    for (; model->format_count < def->format_count; model->format_count++) {
-        char *copy = drape_arena_text(&model->arena, def->formats[model->format_count]);
-        if (!copy)
-            return DRAPE_E_MEMORY;
-        model->formats[model->format_count] = copy;
-    }
-    return DRAPE_OK;
+    model->format_count = def->format_count;
+    for (size_t i = 0; i < def->format_count; i++)
+        model->formats[i] = drape_arena_text(&model->arena, def->formats[i]);
+    return drape_arena_status(&model->arena);
 }
 
 static drape_status take_up(drape_model *model, const char *up)
@@ -114,7 +108,7 @@ static drape_status name_cloth(drape_model *model, int32_t c, const drape_cloth_
             return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "two cloths have the name \"%.60s\"",
                                  wanted);
     model->cloths[c].name = drape_arena_text(&model->arena, wanted);
-    return model->cloths[c].name ? DRAPE_OK : DRAPE_E_MEMORY;
+    return drape_arena_status(&model->arena);
 }
 
 /* Where the mesh came from, for whoever asks what was modelled. */
@@ -211,8 +205,7 @@ static drape_status gather(drape_model *model)
     model->triangle = drape_arena_take(arena, 3 * (size_t)model->triangle_count, sizeof *model->triangle);
     model->edge = drape_arena_take(arena, 2 * edges, sizeof *model->edge);
     model->edge_length = drape_arena_take(arena, edges, sizeof *model->edge_length);
-    if (!model->rest || !model->velocity || !model->mass || !model->triangle || !model->edge ||
-        !model->edge_length)
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     for (int32_t c = 0; c < model->cloth_count; c++) {
         gather_cloth(model, &model->cloths[c], first_edge);
@@ -273,7 +266,7 @@ drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape
     if (!status)
         status = drape_compile_pattern(model);
     for (int32_t c = 0; c < model->cloth_count; c++) /* a scene without bending keeps no hinges */
-        drape_mesh_drop_topology(ctx, &model->cloths[c].mesh);
+        drape_mesh_drop_topology(&model->cloths[c].mesh);
     if (!status)
         stop_pinned(model);
     if (status)

@@ -37,8 +37,8 @@ extern const drape_registry drape_material_registry, drape_contact_registry, dra
 void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_CONTACT_PARAM_COUNT]);
 void drape_self_contact_values(const drape_contact_def *contact, double values[DRAPE_SELF_PARAM_COUNT]);
 
-/* A host's def, of this version or an older one, as one of this version: what it points to and is not the host's still
- * lives in the arena. Errors: DRAPE_E_VERSION, DRAPE_E_MEMORY. */
+/* A host's def, of this version or an older one, as one of this version: what it points to and is not the
+ * host's still lives in the arena. Errors: DRAPE_E_VERSION, DRAPE_E_MEMORY. */
 drape_status drape_compile_read_def(drape_context *ctx, drape_arena *arena, const drape_scene_def *given,
                                     drape_scene_def *out);
 

@@ -112,9 +112,9 @@ static double scene_speed(const drape_model *model)
 }
 
 /* sigma (2 |g| L + v^2) / d, sigma the largest areal density, L the scene's size: up to where it touches, the
- * barrier takes up 6 d of it an area (contact/barrier.h), 12 times the energy of that speed and of a fall over
- * L; what has more cannot be stopped. The cloth's own weight is at most d / (2 L) of the stiffness, so that at
- * rest it lies nearly d off. Without gravity L / s^2 stands for |g|. */
+ * barrier takes up 6 d of it an area (contact/barrier.h), 12 times the energy of that speed and of a fall
+ * over L; what has more cannot be stopped. The cloth's own weight is at most d / (2 L) of the stiffness, so
+ * that at rest it lies nearly d off. Without gravity L / s^2 stands for |g|. */
 static double stiffness_of_fall(const drape_model *model)
 {
     double sigma = 0, g = norm(model->gravity), v = scene_speed(model);

@@ -237,7 +237,7 @@ static drape_status number_nodes(drape_model *model, const int32_t *track_of_nod
         drape_arena_take(&model->arena, (size_t)model->moved_count, sizeof *model->moved_node);
     model->moved_track =
         drape_arena_take(&model->arena, (size_t)model->moved_count, sizeof *model->moved_track);
-    if (!model->node_of_free || !model->moved_node || !model->moved_track)
+    if (drape_arena_status(&model->arena))
         return DRAPE_E_MEMORY;
     int32_t moved = 0;
     for (int32_t i = 0; i < model->node_count; i++) {
@@ -259,10 +259,11 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
     model->tracks = drape_arena_take(&model->arena, pin_count, sizeof *model->tracks);
     model->pinned = drape_arena_take(&model->arena, nodes, sizeof *model->pinned);
     model->free_of_node = drape_arena_take(&model->arena, nodes, sizeof *model->free_of_node);
-    int32_t *track_of_node = drape_alloc(model->ctx, nodes, sizeof *track_of_node);
-    uint8_t *clamped = drape_alloc(model->ctx, nodes, sizeof *clamped);
-    drape_status status = DRAPE_E_MEMORY;
-    if (model->tracks && model->pinned && model->free_of_node && track_of_node && clamped) {
+    drape_arena scratch = drape_arena_of(model->ctx);
+    int32_t *track_of_node = drape_arena_take(&scratch, nodes, sizeof *track_of_node);
+    uint8_t *clamped = drape_arena_take(&scratch, nodes, sizeof *clamped);
+    drape_status status = drape_arena_status(&model->arena) ? DRAPE_E_MEMORY : drape_arena_status(&scratch);
+    if (!status) {
         memset(track_of_node, 0xff, nodes * sizeof *track_of_node); /* all -1 */
         status = pin_cloths(model, def, track_of_node, clamped);
         if (!status)
@@ -270,7 +271,6 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
         if (!status)
             status = number_nodes(model, track_of_node);
     }
-    drape_free(model->ctx, clamped);
-    drape_free(model->ctx, track_of_node);
+    drape_arena_free(&scratch);
     return status;
 }

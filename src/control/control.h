@@ -16,13 +16,13 @@ typedef enum drape_verdict {
 /* An attempt to be judged, and what the judge has to say. */
 typedef struct drape_trial {
     const drape_model *model;
-    const drape_state *past
-        [2]; /* the states before in, latest first; NULL where there is none, or the controller did not ask */
-    const drape_state *in, *out;            /* out is of worth only with status 0, or with info->usable */
-    int order;                              /* of the integrator */
-    double *scratch;                        /* [2] a controller's memory between steps; 0 at first */
-    double h;                               /* [s] the size that was tried */
-    double dt;                              /* [s] the nominal size */
+    const drape_state *past[2];  /* the states before in, latest first; NULL where there is none, or the row
+                                    did not ask */
+    const drape_state *in, *out; /* out is of worth only with status 0, or with info->usable */
+    int order;                   /* of the integrator */
+    double *scratch;             /* [2] a controller's memory between steps; 0 at first */
+    double h;                    /* [s] the size that was tried */
+    double dt;                   /* [s] the nominal size */
     const drape_integrator_ops *integrator; /* for its stability limit, which costs evaluations of forces */
     void *integrator_state;
     drape_step_info *info; /* a controller that rejects sets reason and worst */
@@ -32,8 +32,8 @@ typedef struct drape_trial {
 
 typedef struct drape_controller_ops {
     drape_entry entry;
-    bool own_steps; /* steps follow h_next, not the counted grid of dt */
-    int pasts;      /* how many states before in it wants, at most 2 */
+    bool own_steps;    /* steps follow h_next, not the counted grid of dt */
+    int history_depth; /* how many states before in it wants, at most 2 */
     drape_verdict (*judge)(const double *values, drape_trial *trial);
 } drape_controller_ops;
 

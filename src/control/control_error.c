@@ -34,7 +34,7 @@ enum { SCRATCH_LAST_ERROR };
 #define MAX_GROWTH   2.0 /* bdf2 is zero-stable below 1 + sqrt(2) */
 #define MAX_CUT      0.2
 #define FIRST_SHARE  10.0 /* see first_error */
-#define LEAST_ERROR  1e-4 /* smaller ones are round-off and say nothing of the next step */
+#define MIN_ERROR    1e-4 /* smaller ones are round-off and say nothing of the next step */
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
@@ -88,10 +88,10 @@ static double difference(const prediction *p, double solution, double y0, double
     return p->factor * (solution - (p->weight[0] * y0 + p->weight[1] * y1 + p->weight[2] * y2));
 }
 
-/* The first step has no past, so that its velocities have no estimate: what they change by, g h, is none, and at
- * tight tolerances would allow no step at all. Positions have one, h^2 a/2 beyond flight. So the step may also be a
- * share 1/FIRST_SHARE of that at which the whole of it is atol_x, as in Hairer, Norsett & Wanner 1993, II.4: its
- * square is as small as the tolerance is, and with it the error h^2 v''/2 of velocities. */
+/* The first step has no past, so that its velocities have no estimate: what they change by, g h, is none, and
+ * at tight tolerances would allow no step at all. Positions have one, h^2 a/2 beyond flight. So the step may
+ * also be a share 1/FIRST_SHARE of that at which the whole of it is atol_x, as in Hairer, Norsett & Wanner
+ * 1993, II.4: its square is as small as the tolerance is, and with it the error h^2 v''/2 of velocities. */
 static double first_error(double by_both, double by_positions)
 {
     return by_both <= 1 ? by_both : fmin(by_both, FIRST_SHARE * sqrt(by_positions));
@@ -160,7 +160,7 @@ static drape_verdict judge(const double *values, drape_trial *trial)
     double error = local_error(values, trial, &node), last = trial->scratch[SCRATCH_LAST_ERROR];
     if (!(error <= 1)) /* a NaN is rejected */
         return reject(values, trial, error, node);
-    double e = fmax(error, LEAST_ERROR), before = last > 0 ? last : e, p = trial->order + 1;
+    double e = fmax(error, MIN_ERROR), before = last > 0 ? last : e, p = trial->order + 1;
     trial->scratch[SCRATCH_LAST_ERROR] = e;
     trial->h_next =
         trial->h * bounded(values[PARAM_SAFETY] * pow(e, -INTEGRAL / p) * pow(before, PROPORTIONAL / p));
@@ -176,6 +176,6 @@ const drape_controller_ops drape_controller_error = {
               .reference = "Gustafsson 1991; Hairer & Wanner 1996, IV.2",
               DRAPE_PARAMS(params)},
     .own_steps = true,
-    .pasts = 2,
+    .history_depth = 2,
     .judge = judge,
 };

@@ -1,8 +1,8 @@
 /*
- * stable: steps of the nominal size where they are stable, else as large as the stability limit of an explicit
- * row allows, times a safety. The limit is found again every few steps, as the stiffness of a stretched or folded
- * sheet is another, and where a step failed: one that was above it is forgotten. Rows without a limit take nominal
- * steps. A step that fails below the limit is halved.
+ * stable: steps of the nominal size where they are stable, else as large as the stability limit of an
+ * explicit row allows, times a safety. The limit is found again every few steps, as the stiffness of a
+ * stretched or folded sheet is another, and where a step failed: one that was above it is forgotten. Rows
+ * without a limit take nominal steps. A step that fails below the limit is halved.
  *
  * A step of verlet is as many substeps as the scene says, so that it is the substeps that keep below 2/omega.
  */

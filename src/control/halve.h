@@ -1,4 +1,5 @@
-/* halve.h: what controllers share: dt_min, max_attempts, and the rule that a step is halved until it is too small. */
+/* halve.h: what controllers share: dt_min, max_attempts, and the rule that a step is halved until it is too
+ * small. */
 #ifndef DRAPE_CONTROL_HALVE_H
 #define DRAPE_CONTROL_HALVE_H
 

@@ -8,7 +8,7 @@
 
 #include "model/model.h"
 
-/* Parameters of the rows that bound a local error. */
+/* Parameters of integrators and controllers that bound a local error. */
 #define DRAPE_RTOL_PARAM                                                                                     \
     {                                                                                                        \
         .name = "rtol", .unit = "1", .default_value = 1e-3, .min = 1e-12, .max = 1,                          \
@@ -28,7 +28,7 @@
         .open_min = true, .help = "local error of velocities"                                                \
     }
 
-/* Replaces what is NaN by what the parameters say is derived. */
+/* Replaces NaN by the value that the parameters say is derived. */
 void drape_derive_tolerances(const drape_model *model, double rtol, double *atol_x, double *atol_v);
 
 #endif

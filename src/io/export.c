@@ -59,8 +59,8 @@ void drape_export_archive_size(drape_archive *a, off_t *size)
 
 /* ---- A file a frame ---- */
 
-/* frame_, so many digits or more, a dot, the ending; or that with ".part", which a killed run left. *frame: its number;
- * of the latter none is kept. */
+/* frame_, so many digits or more, a dot, the ending; or that with ".part", which a killed run left. *frame:
+ * its number; of the latter none is kept. */
 static bool is_frame_file(const char *name, size_t least, const char *ending, int64_t *frame)
 {
     size_t word = strlen(FRAME_WORD);

@@ -1,10 +1,10 @@
 /*
- * export_pc2.c: folder/positions.pc2 and positions.obj: a point cache and the mesh that it moves, for the Mesh Cache
- * of Blender and its like. The mesh is the first frame, all cloths as one object.
+ * export_pc2.c: folder/positions.pc2 and positions.obj: a point cache and the mesh that it moves, for the
+ * Mesh Cache of Blender and its like. The mesh is the first frame, all cloths as one object.
  *
- * PC2, version 1, little endian: "POINTCACHE2\0", int32 version, int32 points, float32 first frame, float32 step
- * in frames, int32 samples; then for each sample float32 x y z of each point. The number of samples is raised after
- * a sample is written: at any moment the file holds what its header says.
+ * PC2, version 1, little endian: "POINTCACHE2\0", int32 version, int32 points, float32 first frame, float32
+ * step in frames, int32 samples; then for each sample float32 x y z of each point. The number of samples is
+ * raised after a sample is written: at any moment the file holds what its header says.
  */
 #include <inttypes.h>
 #include <string.h>

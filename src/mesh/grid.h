@@ -22,8 +22,8 @@ drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_
  *
  * falling[r % 2][c % 2]: the cell is split from A to D into A B D and A D C, else from B to C into A B C and
  * B D C. Seen as drawn the triangles turn counterclockwise; with flip they turn clockwise. The triangles of a
- * cell follow each other, cells in the order of their A. drape_grid_split does one cell, of corner A = a, and returns
- * where the next goes.
+ * cell follow each other, cells in the order of their A. drape_grid_split does one cell, of corner A = a, and
+ * returns where the next goes.
  */
 int32_t *drape_grid_split(int32_t *triangle, int32_t a, int32_t columns, bool falling, bool flip);
 void drape_grid_triangulate(drape_mesh *mesh, const bool falling[2][2], bool flip);

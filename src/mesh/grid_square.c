@@ -4,7 +4,8 @@
  *
  *     horizontal: (u, 0, -w), normal +y        vertical: (u, -w, 0), normal +z.
  *
- * With noise a node is up to that far off the plane: it lets a sheet fall that would stand on its edge for ever.
+ * With noise a node is up to that far off the plane: it lets a sheet fall that would stand on its edge for
+ * ever.
  *
  * The diagonals of its cells are parallel, from (r, c) to (r+1, c+1), or alternate with r + c, beginning with
  * that one: alternating ones do not make the sheet stiffer along one diagonal than along the other.

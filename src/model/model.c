@@ -10,8 +10,7 @@ void drape_model_destroy(drape_model **model)
     drape_model *m = *model;
     drape_context *ctx = m->ctx;
     for (int32_t c = 0; c < m->cloth_count; c++)
-        drape_mesh_free(ctx, &m->cloths[c].mesh);
-    drape_pattern_free(ctx, &m->pattern);
+        drape_mesh_free(&m->cloths[c].mesh);
     drape_arena_free(&m->arena);
     drape_free(ctx, m);
     *model = NULL;

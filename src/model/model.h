@@ -94,7 +94,7 @@ typedef struct drape_contact_def {
 } drape_contact_def;
 
 struct drape_model {
-    drape_arena arena; /* holds all that is below but the meshes and the pattern */
+    drape_arena arena; /* holds all that is below but the meshes */
     drape_context *ctx;
     int32_t cloth_count, term_count, node_count, triangle_count, edge_count;
     drape_cloth *cloths;
@@ -121,8 +121,9 @@ struct drape_model {
     bool has_laws;        /* some term needs the rates of measures */
     bool has_dissipation; /* some term takes energy out */
     drape_pattern pattern;
-    double length;     /* diagonal of the rest bounding box [m], > 0 */
-    double gravity[3]; /* [m/s2] */
+    size_t pattern_bytes; /* of the arena's */
+    double length;        /* diagonal of the rest bounding box [m], > 0 */
+    double gravity[3];    /* [m/s2] */
     drape_choice integrator, controller;
     double duration, frame_rate;
     char **formats;

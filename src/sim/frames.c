@@ -1,8 +1,8 @@
 /*
  * frames.c: frame times are k / frame_rate. No step is shortened for a frame: between the states of a step,
  * positions are the cubic Hermite interpolant of both positions and velocities, of fourth order in h for
- * smooth motion. Where that leads through a collider or through cloth, the straight way is taken, and where that
- * does, too, the nearer of the two states.
+ * smooth motion. Where that leads through a collider or through cloth, the straight way is taken, and where
+ * that does, too, the nearer of the two states.
  */
 #include "sim/sim.h"
 
@@ -84,7 +84,7 @@ static drape_status emit(drape_sim *sim, double time, const double *x, const dou
                          .positions = x,
                          .velocities = v};
     sim->next_frame++;
-    return drape_sim_tell(sim, &event);
+    return drape_sim_notify(sim, &event);
 }
 
 drape_status drape_sim_emit_frames(drape_sim *sim)

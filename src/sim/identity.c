@@ -1,6 +1,7 @@
 /*
- * identity.c: what a checkpoint is of. The same model is the same numbers after compile, however the scene was written:
- * names, comments, files and the run's duration have no part. The same build has the same solvers: bits depend on them.
+ * identity.c: what a checkpoint is of. The same model is the same numbers after compile, however the scene
+ * was written: names, comments, files and the run's duration have no part. The same build has the same
+ * solvers: bits depend on them.
  */
 #include "base/hash.h"
 #include "sim/sim.h"

@@ -1,5 +1,5 @@
-/* pull.c: a spring by which a host drags a node. Setting it changes the energy of the state that is there: that is
- * the host's work, like a pin's. */
+/* pull.c: a spring by which a host drags a node. Setting it changes the energy of the state that is there:
+ * that is the host's work, like a pin's. */
 #include "sim/sim.h"
 
 #include <math.h>
@@ -31,11 +31,12 @@ drape_status drape_sim_pull(drape_sim *sim, int32_t node, double stiffness, cons
     if (status)
         return status;
     const double *x = drape_sim_state(sim)->x;
-    drape_pull pull = {.node = node, .stiffness = stiffness};
+    drape_drag_spring spring = {.node = node, .stiffness = stiffness};
     for (int k = 0; stiffness > 0 && k < 3; k++)
-        pull.target[k] = target[k];
-    double work = drape_pull_energy(&pull, x) - drape_pull_energy(drape_system_pull(sim->system), x);
-    drape_system_set_pull(sim->system, &pull);
+        spring.target[k] = target[k];
+    double work = drape_drag_spring_energy(&spring, x) -
+                  drape_drag_spring_energy(drape_system_drag_spring(sim->system), x);
+    drape_system_set_drag_spring(sim->system, &spring);
     sim->audit.pin_work += work;
     sim->audit.offered += fabs(work);
     sim->energy_known = sim->made_known = false;
@@ -45,10 +46,10 @@ drape_status drape_sim_pull(drape_sim *sim, int32_t node, double stiffness, cons
 
 void drape_sim_pull_force(const drape_sim *sim, double force[3])
 {
-    const drape_pull *pull = sim ? drape_system_pull(sim->system) : NULL;
+    const drape_drag_spring *spring = sim ? drape_system_drag_spring(sim->system) : NULL;
     for (int k = 0; k < 3; k++)
-        force[k] = pull && pull->stiffness > 0
-                       ? pull->stiffness *
-                             (pull->target[k] - drape_sim_state(sim)->x[3 * (size_t)pull->node + (size_t)k])
+        force[k] = spring && spring->stiffness > 0
+                       ? spring->stiffness * (spring->target[k] -
+                                              drape_sim_state(sim)->x[3 * (size_t)spring->node + (size_t)k])
                        : 0;
 }

@@ -83,18 +83,18 @@ static void measure_strain(drape_sim *sim, const double *x)
     s->strain_max = high;
 }
 
-/* The new state counts. What was now becomes past, as far back as the controller looks; the oldest is
- * written over next. */
+/* Makes the new state the present one. The present one becomes past, as many as the controller wants; the
+ * oldest is overwritten next. */
 static void turn_states(drape_sim *sim)
 {
-    int pasts = sim->chosen.controller->pasts, spare = sim->now;
-    for (int k = 0; k < pasts; k++) {
+    int history_depth = sim->chosen.controller->history_depth, spare = sim->now;
+    for (int k = 0; k < history_depth; k++) {
         int older = sim->past[k];
         sim->past[k] = spare;
         spare = older;
     }
     while (spare < 0 || spare == sim->next || spare == sim->past[0] || spare == sim->past[1])
-        spare++; /* not all places are filled yet: the first free one */
+        spare++; /* not all states are used yet: take the first free one */
     sim->before = sim->now;
     sim->now = sim->next;
     sim->next = spare;
@@ -106,7 +106,7 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     if (!info->committed)
         drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
     turn_states(sim);
-    drape_sim_book(sim, info);
+    drape_sim_add_work(sim, info);
     measure_strain(sim, drape_sim_state(sim)->x);
     s->h_min = s->steps_accepted == 0 ? info->h : fmin(info->h, s->h_min);
     s->h_max = fmax(info->h, s->h_max);
@@ -129,8 +129,9 @@ static void count_reason(drape_sim *sim, const char *reason)
     sim->reasons[i].count++;
 }
 
-/* Where the attempt was made over the state that the last step began with, that one is gone: the sim is as at a start. A row
- * without time tells no frames after its first step, and needs to know that there was one. */
+/* If the attempt overwrote the state that the last step began with, the sim has no state before, as at a
+ * start. A steady-state integrator keeps `before`: it has no frames after its first step, and needs to know
+ * that there was one. */
 static void reject(drape_sim *sim, const drape_step_info *info)
 {
     if (sim->before == sim->next && !sim->chosen.integrator->timeless)
@@ -163,7 +164,7 @@ static drape_verdict judge(drape_sim *sim, drape_step_info *info, drape_status s
     return sim->chosen.controller->judge(sim->chosen.controller_values, trial);
 }
 
-/* ---- Telling ---- */
+/* ---- Reporting ---- */
 
 /* "bend.hinge 37 (nodes 4 5 9 10 of sheet): altitude / rest altitude = 3e-09, limit 1e-06" */
 static void describe_worst(const drape_model *model, const drape_worst *worst, char *text, size_t size)
@@ -187,7 +188,7 @@ static void describe_worst(const drape_model *model, const drape_worst *worst, c
                  worst->value, worst->limit);
 }
 
-/* For the host's log: what was rejected, and why. */
+/* Logs what was rejected, and why. */
 static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
 {
     char worst[400];
@@ -201,14 +202,15 @@ static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
     char worst[400], residual[100] = "", distortion[200] = "";
-    if (stop == DRAPE_E_MEMORY) /* the allocator said it */
+    if (stop == DRAPE_E_MEMORY) /* the allocator set the message */
         return stop;
     if (stop == DRAPE_E_STOPPED)
-        return drape_sim_heed(sim);
+        return drape_sim_check_cancel(sim);
     describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
-    if (attempt->worst.element < 0) /* a node says where, an element may say why */
+    if (attempt->worst.element < 0) /* the diagnostic names a node; the distortion may say why */
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
-    if (!isnan(attempt->tolerance) && !isnan(attempt->residual)) /* rows that bound errors have none */
+    if (!isnan(attempt->tolerance) && !isnan(attempt->residual)) /* integrators that bound errors have no
+                                                                    residual */
         snprintf(residual, sizeof residual, ", residual %.4g N for a tolerance of %.4g N", attempt->residual,
                  attempt->tolerance);
     return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s", attempt->t,
@@ -216,30 +218,30 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
                       residual, worst, distortion);
 }
 
-/* A row that chooses its own steps has no dt, and a bound of its own. */
-drape_status drape_sim_bound(drape_sim *sim, const drape_attempt *last)
+/* An integrator that chooses its own steps has no dt, and a bound of its own. */
+drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
 {
     char worst[400];
     const drape_schedule *s = &sim->schedule;
-    if (!(s->dt > 0) || (double)s->tries < sim->most_attempts)
+    if (!(s->dt > 0) || (double)s->tries < sim->max_attempts)
         return DRAPE_OK;
     describe_worst(sim->model, &last->worst, worst, sizeof worst);
     return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
                       "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64 " attempts since t=%.9g did not "
                       "come as far as one dt, %.4g s, and the controller's max_attempts is %.15g%s",
                       drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status),
-                      last->iterations, s->tries, s->tries_from, s->dt, sim->most_attempts, worst);
+                      last->iterations, s->tries, s->tries_from, s->dt, sim->max_attempts, worst);
 }
 
-static drape_status tell_attempt(drape_sim *sim, const drape_attempt *attempt)
+static drape_status notify_attempt(drape_sim *sim, const drape_attempt *attempt)
 {
     drape_event event = {.kind = DRAPE_EVENT_ATTEMPT, .sim = sim, .attempt = attempt};
-    return drape_sim_tell(sim, &event);
+    return drape_sim_notify(sim, &event);
 }
 
 /* ---- One step, and all of them ---- */
 
-/* What an attempt was, for the observers. */
+/* The description of an attempt for the observers. */
 static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *info, drape_status status,
                                bool accepted)
 {
@@ -274,14 +276,14 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     return record_of(sim, t, &info, refused ? DRAPE_RETRY_REJECTED : status, verdict == DRAPE_ACCEPT);
 }
 
-/* Of this step and all else that asked for contact, energies that are told for example. */
+/* Contact time so far, including queries outside steps such as energies for observers. */
 static double contact_seconds(const drape_sim *sim)
 {
     return sim->chosen.integrator->work(sim->integrator).contact_seconds +
            drape_contact_seconds(drape_system_contact(sim->system));
 }
 
-/* The frames inside an accepted step belong to it even if an observer stops the run there. */
+/* The frames inside an accepted step are passed on even if an observer stops the run at the attempt. */
 drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *attempt)
 {
     drape_status stop = DRAPE_OK;
@@ -291,7 +293,7 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     sim->statistics.wall_contact += contact_seconds(sim) - contact;
     log_rejection(sim, attempt);
-    drape_status told = tell_attempt(sim, attempt);
+    drape_status told = notify_attempt(sim, attempt);
     drape_status framed = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
     if (stop)
         return explain(sim, stop, attempt);
@@ -305,17 +307,17 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
     drape_status guarded = drape_sim_guard(sim, "drape_sim_advance");
     if (guarded)
         return guarded;
-    sim->ctx->message[0] = 0; /* what it says after a failure is of this advance */
+    sim->ctx->message[0] = 0; /* after a failure the message is of this advance */
     if (!isfinite(t_end))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_advance: t_end is not finite");
     drape_status status =
-        drape_sim_emit_frames(sim); /* the first, and those that an observer's stop left over */
+        drape_sim_emit_frames(sim); /* the first frame, and those that a stop by an observer left */
     drape_sim_leave_realtime(sim);
     drape_schedule_aim(&sim->schedule, t_end);
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {
-        status = drape_sim_bound(sim, &attempt);
+        status = drape_sim_check_attempts(sim, &attempt);
         if (!status)
-            status = drape_sim_heed(sim);
+            status = drape_sim_check_cancel(sim);
         if (!status)
             status = drape_sim_step(sim, t1, h, &attempt);
     }

@@ -1,6 +1,6 @@
 /*
- * auto: the row that was measured to be the fastest at this number of unknowns (bench/linears) among those
- * in this build: each row says from how many unknowns on it is.
+ * auto: the solver that was measured to be the fastest at this number of unknowns (bench/linears) among those
+ * in this build: each has the number from which on it is (best_from).
  */
 #include "solvers/linear.h"
 
@@ -8,13 +8,12 @@
 #include <stdio.h>
 
 typedef struct auto_state {
-    drape_context *ctx;
     const drape_linear_ops *row;
     int64_t n;
     void *solver;
 } auto_state;
 
-/* The row that takes over at some larger size; NULL: none. */
+/* The solver that is picked from the next larger size on; NULL: none. */
 static const drape_linear_ops *next_row(int64_t from)
 {
     const drape_linear_ops *next = NULL;
@@ -27,23 +26,18 @@ static const drape_linear_ops *next_row(int64_t from)
 static void destroy(void **state)
 {
     auto_state *s = *state;
-    if (!s)
-        return;
-    s->row->destroy(&s->solver);
-    drape_free(s->ctx, s);
-    *state = NULL;
+    drape_linear_destroy(s->row, &s->solver);
 }
 
-static drape_status create(drape_context *ctx, const drape_pattern *pattern, void **state)
+static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
 {
-    auto_state *s = drape_alloc(ctx, 1, sizeof *s);
-    *state = s;
+    auto_state *s = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (auto_state){.ctx = ctx, .row = drape_linear_best(pattern->n), .n = pattern->n};
-    drape_status status = s->row->create(ctx, pattern, &s->solver);
-    if (status)
-        destroy(state);
+    *s = (auto_state){.row = drape_linear_best(pattern->n), .n = pattern->n};
+    drape_status status = s->row->create(arena, pattern, &s->solver);
+    if (!status)
+        *state = s;
     return status;
 }
 
@@ -81,7 +75,7 @@ static void archive(void *state, drape_archive *a, const double *values)
 static size_t bytes(const void *state)
 {
     const auto_state *s = state;
-    return sizeof *s + s->row->bytes(s->solver);
+    return drape_linear_bytes(s->row, s->solver);
 }
 
 static void report(const void *state, drape_linear_report *out)

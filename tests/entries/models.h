@@ -146,10 +146,10 @@ static inline drape_context *make_context(void)
     return ctx;
 }
 
-static inline drape_system *make_system(drape_context *ctx, const drape_model *model, int threads)
+static inline drape_system *make_system(drape_arena *arena, const drape_model *model, int threads)
 {
     drape_system *system = NULL;
-    ck_assert_int_eq(drape_system_create(ctx, model, threads, &system), DRAPE_OK);
+    ck_assert_int_eq(drape_system_create(arena, model, threads, &system), DRAPE_OK);
     return system;
 }
 

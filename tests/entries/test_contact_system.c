@@ -3,6 +3,8 @@
  * for every row of the colliders, resting and moving, with implicit and lagged friction, and for cloth on cloth.
  */
 #include "assemble/check.h"
+#include "contact/broad_phase.h"
+#include "contact/force.h"
 #include "entries/models.h"
 #include "support/scene.h"
 
@@ -31,13 +33,13 @@ typedef struct probe {
     scene s;
     drape_system *system;
     drape_state at;
-    drape_arena arena;
+    drape_arena *arena;
     double *p, *x, *v, *g[2], *jp, *values;
 } probe;
 
 static double *take(probe *t, size_t n)
 {
-    double *out = drape_arena_take(&t->arena, n, sizeof *out);
+    double *out = drape_arena_take(t->arena, n, sizeof *out);
     ck_assert_ptr_nonnull(out);
     return out;
 }
@@ -48,10 +50,10 @@ static probe open_probe(scene s, double lift, uint64_t seed)
     probe t = {.s = s};
     const size_t n = 3 * (size_t)s.model->node_count;
     const int32_t high = s.model->cloths[s.model->cloth_count - 1].first_node;
-    ck_assert_int_eq(drape_system_create(s.ctx, s.model, 1, &t.system), DRAPE_OK);
+    t.arena = drape_arena_create(s.ctx);
+    ck_assert_int_eq(drape_system_create(t.arena, s.model, 1, &t.system), DRAPE_OK);
     ck_assert_int_eq(drape_system_add_contact(t.system), DRAPE_OK);
-    t.arena = drape_arena_of(s.ctx);
-    ck_assert_int_eq(drape_state_create(&t.arena, s.model, &t.at), DRAPE_OK);
+    ck_assert_int_eq(drape_state_create(t.arena, s.model, &t.at), DRAPE_OK);
     double **arrays[] = {&t.p, &t.x, &t.v, &t.g[0], &t.g[1], &t.jp};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
         *arrays[i] = take(&t, n);
@@ -67,7 +69,7 @@ static probe open_probe(scene s, double lift, uint64_t seed)
 static void close_probe(probe *t)
 {
     drape_system_destroy(&t->system);
-    drape_arena_free(&t->arena);
+    drape_arena_destroy(&t->arena);
     scene_close(&t->s);
 }
 
@@ -104,10 +106,10 @@ static double error_of(probe *t, double weight, double time)
                                .span = {time - 0.01, time}};
     bool changed;
     double best = INFINITY;
-    ck_assert_int_eq(drape_system_fit(t->system, &point, &changed), DRAPE_OK);
+    ck_assert_int_eq(drape_system_extend_pattern(t->system, &point, &changed), DRAPE_OK);
     const drape_pattern *pattern = drape_system_pattern(t->system);
     t->values = take(t, (size_t)pattern->nonzeros);
-    drape_system_jacobian(t->system, &point, 0, false, t->values);
+    drape_system_jacobian(t->system, &point, 0, 0, t->values);
     memset(t->jp, 0, 3 * (size_t)m->node_count * sizeof *t->jp);
     for (int64_t j = 0; j < pattern->n; j++)
         for (int64_t k = pattern->column[j]; k < pattern->column[j + 1]; k++)
@@ -128,7 +130,7 @@ static void check(probe *t, const char *what, double time)
     double gap;
     const double steps = error_of(t, 100, time), still = error_of(t, 0, time);
     const drape_contact *contact = drape_system_contact(t->system);
-    const int32_t active = drape_contact_active((drape_contact *)(uintptr_t)contact, &gap);
+    const int32_t active = drape_contact_active(contact, &gap);
     printf("# %.60s: %d active, least gap %.2g m; errors %.2g with w = 100, %.2g with w = 0\n", what,
            (int)active, gap, steps, still);
     ck_assert_msg(active >= 2, "%s: %d active", what, (int)active);
@@ -217,8 +219,7 @@ START_TEST(nan_is_forgotten)
     drape_point point = {.x = t.at.x, .v = t.at.v, .internal = t.at.internal, .t = 0.01, .span = {0, 0.01}};
     double gap;
     drape_system_force(t.system, &point, t.g[0]);
-    ck_assert_int_gt(drape_contact_active((drape_contact *)(uintptr_t)drape_system_contact(t.system), &gap),
-                     0);
+    ck_assert_int_gt(drape_contact_active(drape_system_contact(t.system), &gap), 0);
     for (size_t broken = 0; broken < n; broken += 7) {
         const char *reason = "";
         drape_worst worst;
@@ -226,7 +227,7 @@ START_TEST(nan_is_forgotten)
         t.x[broken] = broken % 2 ? NAN : INFINITY;
         point.x = t.x;
         drape_system_force(t.system, &point, t.g[1]);
-        drape_system_way(t.system, t.at.x, t.x, 0.01);
+        drape_system_step_fraction(t.system, t.at.x, t.x, 0.01);
         drape_system_crosses(t.system, t.x, 0.01);
         drape_system_check_contact(t.system, t.x, 0.01, &reason, &worst);
         point.x = t.at.x;
@@ -332,7 +333,7 @@ START_TEST(bytes_are_all_of_them)
         0.0, 0.1);
     const drape_context_def def = s.ctx->def;
     drape_system *system = NULL;
-    drape_arena arena = drape_arena_of(s.ctx);
+    drape_arena arena = drape_arena_of(s.ctx), own = drape_arena_of(s.ctx);
     drape_state at;
     bool changed;
     ck_assert_int_eq(drape_state_create(&arena, s.model, &at), DRAPE_OK);
@@ -340,17 +341,18 @@ START_TEST(bytes_are_all_of_them)
         at.x[3 * (size_t)i + 1] = 2e-3;
     s.ctx->def.allocate = hold;
     s.ctx->def.release = let_go;
-    ck_assert_int_eq(drape_system_create(s.ctx, s.model, 1, &system), DRAPE_OK);
+    ck_assert_int_eq(drape_system_create(&own, s.model, 1, &system), DRAPE_OK);
     ck_assert_int_eq(drape_system_add_contact(system), DRAPE_OK);
-    ck_assert_uint_eq(drape_system_bytes(system), held);
+    ck_assert_uint_eq(own.bytes, held);
     const size_t before = held;
     const drape_point point = {.x = at.x, .v = at.v, .internal = at.internal};
     ck_assert_int_eq(drape_system_begin(system, &at), DRAPE_OK);
-    ck_assert_int_eq(drape_system_fit(system, &point, &changed), DRAPE_OK);
+    ck_assert_int_eq(drape_system_extend_pattern(system, &point, &changed), DRAPE_OK);
     ck_assert(changed);
     ck_assert_uint_gt(held, before);
-    ck_assert_uint_eq(drape_system_bytes(system), held);
+    ck_assert_uint_eq(own.bytes, held);
     drape_system_destroy(&system);
+    drape_arena_free(&own);
     ck_assert_uint_eq(held, 0);
     s.ctx->def = def;
     drape_arena_free(&arena);
@@ -361,7 +363,7 @@ END_TEST
 /* Energy pair by pair, none left out and none merged. */
 typedef struct pairwise {
     const drape_model *model;
-    const drape_search *search;
+    const drape_broad_phase *broad;
     const double *x;
     double energy;
     int acting;
@@ -372,9 +374,10 @@ static void add_energy(void *user, const drape_pair *found)
     pairwise *w = user;
     drape_pair pair = *found;
     drape_gap gap;
-    const drape_placed rest = {.model = w->model, .x = w->search->rest}, now = {.model = w->model, .x = w->x};
+    const drape_configuration rest = {.model = w->model, .x = w->broad->rest},
+                              now = {.model = w->model, .x = w->x};
     pair.distance = fmin(pair.distance, 0.5 * drape_pair_gap_value(&pair, &rest));
-    if (!drape_pair_gap(&pair, &now, w->search->rest, false, &gap))
+    if (!drape_pair_gap(&pair, &now, w->broad->rest, &gap))
         return;
     const drape_contact_law law = {.distance = pair.distance,
                                    .stiffness = w->model->contact.stiffness * pair.area *
@@ -385,26 +388,27 @@ static void add_energy(void *user, const drape_pair *found)
 
 /* What pairs share is counted once with all its area: the sum is that of all pairs, to the rounding of some hundred
  * numbers of one sign, and they are fewer. */
-START_TEST(touches_are_all_pairs)
+START_TEST(active_contacts_are_all_pairs)
 {
     scene s = scene_model("{'drape': 1, 'cloth': [" LAYER ", " LAYER "], 'self_contact': {'thickness': 2e-2},"
                           " 'contact': {'distance': 4e-3}, 'duration': 1}",
                           0.0, 0.1);
     probe t = open_probe(s, -0.08, 5);
     const drape_point point = {.x = t.at.x, .v = t.at.v, .internal = t.at.internal};
-    drape_search search;
+    drape_broad_phase broad;
+    drape_arena arena = drape_arena_of(s.ctx);
     double gap;
-    ck_assert_int_eq(drape_search_create(s.ctx, s.model, &search), DRAPE_OK);
-    pairwise w = {.model = s.model, .search = &search, .x = t.at.x};
-    drape_search_pairs(&search, t.at.x, NULL, 0, add_energy, &w);
+    ck_assert_int_eq(drape_broad_phase_create(&arena, s.model, &broad), DRAPE_OK);
+    pairwise w = {.model = s.model, .broad = &broad, .x = t.at.x};
+    drape_broad_phase_pairs(&broad, t.at.x, NULL, 0, add_energy, &w);
     const double merged = drape_system_contact_energy(t.system, &point);
-    const int32_t touches =
-        drape_contact_active((drape_contact *)(uintptr_t)drape_system_contact(t.system), &gap);
-    printf("# %d pairs are %d touches: %.17g J, %.17g J\n", w.acting, (int)touches, w.energy, merged);
-    ck_assert_int_gt(2 * w.acting, 3 * touches);
+    const int32_t contacts = drape_contact_active(drape_system_contact(t.system), &gap);
+    printf("# %d pairs are %d active contacts: %.17g J, %.17g J\n", w.acting, (int)contacts, w.energy,
+           merged);
+    ck_assert_int_gt(2 * w.acting, 3 * contacts);
     ck_assert_double_gt(merged, 0);
     assert_below(fabs(merged / w.energy - 1), 1e-13);
-    drape_search_destroy(&search);
+    drape_arena_free(&arena);
     close_probe(&t);
 }
 END_TEST
@@ -451,4 +455,5 @@ START_TEST(who_looks_on_changes_nothing)
 END_TEST
 
 SUITE("contact_system", colliders_of_every_row, cloth_on_cloth, nan_is_forgotten, contact_has_rows_of_its_own,
-      who_has_none_pays_nothing, bytes_are_all_of_them, touches_are_all_pairs, who_looks_on_changes_nothing)
+      who_has_none_pays_nothing, bytes_are_all_of_them, active_contacts_are_all_pairs,
+      who_looks_on_changes_nothing)

@@ -13,7 +13,7 @@ typedef struct hinge {
     drape_context *ctx;
     drape_model *model;
     drape_system *system;
-    drape_arena arena;
+    drape_arena *arena;
     drape_state before, after;
     double k;
 } hinge;
@@ -52,10 +52,10 @@ static hinge make_hinge(double rest_angle, const char *rest)
     memset(scene.gravity, 0, sizeof scene.gravity);
     ck_assert_msg(drape_model_create(h.ctx, &scene, &h.model) == DRAPE_OK, "%s",
                   drape_context_message(h.ctx));
-    h.system = make_system(h.ctx, h.model, 1);
-    h.arena = drape_arena_of(h.ctx);
-    ck_assert_int_eq(drape_state_create(&h.arena, h.model, &h.before), DRAPE_OK);
-    ck_assert_int_eq(drape_state_create(&h.arena, h.model, &h.after), DRAPE_OK);
+    h.arena = drape_arena_create(h.ctx);
+    h.system = make_system(h.arena, h.model, 1);
+    ck_assert_int_eq(drape_state_create(h.arena, h.model, &h.before), DRAPE_OK);
+    ck_assert_int_eq(drape_state_create(h.arena, h.model, &h.after), DRAPE_OK);
     h.k = h.model->terms[0].elements.rest[0];
     ck_assert_double_gt(h.k, 0);
     return h;
@@ -64,7 +64,7 @@ static hinge make_hinge(double rest_angle, const char *rest)
 static void free_hinge(hinge *h)
 {
     drape_system_destroy(&h->system);
-    drape_arena_free(&h->arena);
+    drape_arena_destroy(&h->arena);
     drape_model_destroy(&h->model);
     drape_context_destroy(&h->ctx);
 }
@@ -172,7 +172,7 @@ typedef struct sheet {
     drape_context *ctx;
     drape_model *model;
     drape_system *system;
-    drape_arena arena;
+    drape_arena *arena;
     drape_state state;
 } sheet;
 
@@ -181,16 +181,16 @@ static sheet make_sheet(const char *term)
     const drape_row_def def = {.type = term};
     sheet s = {.ctx = make_context()};
     s.model = make_model(s.ctx, &(model_def){.mesh = MESH_CURVED, .terms = &def, .term_count = 1});
-    s.system = make_system(s.ctx, s.model, 1);
-    s.arena = drape_arena_of(s.ctx);
-    ck_assert_int_eq(drape_state_create(&s.arena, s.model, &s.state), DRAPE_OK);
+    s.arena = drape_arena_create(s.ctx);
+    s.system = make_system(s.arena, s.model, 1);
+    ck_assert_int_eq(drape_state_create(s.arena, s.model, &s.state), DRAPE_OK);
     return s;
 }
 
 static void free_sheet(sheet *s)
 {
     drape_system_destroy(&s->system);
-    drape_arena_free(&s->arena);
+    drape_arena_destroy(&s->arena);
     drape_model_destroy(&s->model);
     drape_context_destroy(&s->ctx);
 }

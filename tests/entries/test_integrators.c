@@ -19,7 +19,7 @@ START_TEST(entries_are_well_formed)
         const drape_integrator_ops *ops = drape_integrators[count];
         ck_assert_ptr_eq(drape_integrator_registry.entries[count], &ops->entry);
         ck_assert_int_ge(ops->order, ops->timeless ? 0 : 1);
-        ck_assert(ops->create && ops->step && ops->restart && ops->work && ops->bytes && ops->destroy);
+        ck_assert(ops->create && ops->step && ops->restart && ops->work);
         int dt = param_of(ops, "dt");
         ck_assert(dt >= 0 ? strcmp(ops->entry.params[dt].unit, "s") == 0 : ops->own_steps);
     }
@@ -52,7 +52,7 @@ typedef struct stepper {
     drape_system *system;
     void *state;
     size_t n;
-    drape_arena arena;
+    drape_arena *arena;
     drape_state in, out, kept;
 } stepper;
 
@@ -68,23 +68,23 @@ static stepper open_stepper(const drape_integrator_ops *ops, const double *value
     s.model = make_model(
         s.ctx,
         &(model_def){.mesh = MESH_CURVED, .terms = terms, .term_count = 4, .gravity = true, .pinned = true});
-    s.system = make_system(s.ctx, s.model, 1);
-    ck_assert_msg(ops->create(s.ctx, s.system, values, &s.state) == DRAPE_OK, "%s",
+    s.arena = drape_arena_create(s.ctx);
+    s.system = make_system(s.arena, s.model, 1);
+    ck_assert_msg(ops->create(s.arena, s.system, values, &s.state) == DRAPE_OK, "%s",
                   drape_context_message(s.ctx));
     s.n = 3 * (size_t)s.model->node_count;
-    s.arena = drape_arena_of(s.ctx);
-    ck_assert_int_eq(drape_state_create(&s.arena, s.model, &s.in), DRAPE_OK);
-    ck_assert_int_eq(drape_state_create(&s.arena, s.model, &s.out), DRAPE_OK);
-    ck_assert_int_eq(drape_state_create(&s.arena, s.model, &s.kept), DRAPE_OK);
+    ck_assert_int_eq(drape_state_create(s.arena, s.model, &s.in), DRAPE_OK);
+    ck_assert_int_eq(drape_state_create(s.arena, s.model, &s.out), DRAPE_OK);
+    ck_assert_int_eq(drape_state_create(s.arena, s.model, &s.kept), DRAPE_OK);
     return s;
 }
 
 static void close_stepper(stepper *s)
 {
-    s->ops->destroy(&s->state);
-    ck_assert_ptr_null(s->state);
+    if (s->ops->destroy)
+        s->ops->destroy(&s->state);
     drape_system_destroy(&s->system);
-    drape_arena_free(&s->arena);
+    drape_arena_destroy(&s->arena);
     drape_model_destroy(&s->model);
     drape_context_destroy(&s->ctx);
 }
@@ -155,7 +155,7 @@ static void check_steps(const drape_integrator_ops *ops, const double *values, c
     stepper s = open_stepper(ops, values);
     drape_state first;
     bool modified = strcmp(what, "newton modified") == 0;
-    ck_assert_int_eq(drape_state_create(&s.arena, s.model, &first), DRAPE_OK);
+    ck_assert_int_eq(drape_state_create(s.arena, s.model, &first), DRAPE_OK);
     for (int k = 0; k < 12; k++) {
         drape_step_info info;
         bool hopeless = k == 6;
@@ -240,8 +240,8 @@ static void check_residual(const drape_integrator_ops *ops, const double *values
     if (strcmp(ops->entry.name, "be") != 0)
         return;
     stepper s = open_stepper(ops, values);
-    double *history = drape_arena_take(&s.arena, (size_t)s.model->measure_count, sizeof *history);
-    double *g = drape_arena_take(&s.arena, s.n, sizeof *g);
+    double *history = drape_arena_take(s.arena, (size_t)s.model->measure_count, sizeof *history);
+    double *g = drape_arena_take(s.arena, s.n, sizeof *g);
     for (int k = 0; k < 30; k++) {
         drape_step_info info;
         double h = k % 10 == 9 ? 0.005 : 0.02;

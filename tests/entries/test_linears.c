@@ -13,6 +13,7 @@
 
 typedef struct problem {
     drape_context *ctx;
+    drape_arena *arena; /* of solvers */
     drape_model *model;
     const drape_pattern *p;
     size_t n;
@@ -31,6 +32,7 @@ static problem open_problem(void)
 {
     const drape_row_def terms[] = {{.type = "stretch.edge"}, {.type = "bend.hinge"}};
     problem q = {.ctx = make_context()};
+    q.arena = drape_arena_create(q.ctx);
     q.model = make_model(
         q.ctx, &(model_def){.mesh = MESH_IRREGULAR, .terms = terms, .term_count = 2, .pinned = true});
     q.p = &q.model->pattern;
@@ -54,6 +56,7 @@ static void close_problem(problem *q)
     free(q->x);
     free(q->expected);
     free(q->dense);
+    drape_arena_destroy(&q->arena);
     drape_model_destroy(&q->model);
     drape_context_destroy(&q->ctx);
 }
@@ -138,7 +141,7 @@ static void check_solution(problem *q, const drape_linear_ops *ops, void *solver
 static void *open_solver(problem *q, const drape_linear_ops *ops)
 {
     void *solver = NULL;
-    ck_assert_msg(ops->create(q->ctx, q->p, &solver) == DRAPE_OK, "%s", drape_context_message(q->ctx));
+    ck_assert_msg(ops->create(q->arena, q->p, &solver) == DRAPE_OK, "%s", drape_context_message(q->ctx));
     ck_assert_ptr_nonnull(solver);
     return solver;
 }
@@ -161,7 +164,7 @@ START_TEST(entries_are_well_formed)
         const drape_linear_ops *ops = drape_linears[count];
         ck_assert_ptr_eq(drape_linear_registry.entries[count], &ops->entry);
         ck_assert_str_eq(ops->entry.name, drape_linears_names[count]);
-        ck_assert(ops->create && ops->factor && ops->solve && ops->destroy && ops->bytes);
+        ck_assert(ops->create && ops->factor && ops->solve);
     }
     ck_assert_ptr_null(drape_linears_names[count]);
     ck_assert_int_eq(drape_registry_count(&drape_linear_registry), count);
@@ -178,10 +181,11 @@ START_TEST(random_systems_are_solved)
             fill(&q, (matrix_kind)(seed * 3 % KIND_COUNT), seed);
             check_solution(&q, drape_linears[i], solver, names[seed * 3 % KIND_COUNT]);
         }
-        ck_assert_uint_gt(drape_linears[i]->bytes(solver), q.n * sizeof(double));
-        drape_linears[i]->destroy(&solver);
+        ck_assert_uint_gt(q.arena->bytes + drape_linear_bytes(drape_linears[i], solver),
+                          q.n * sizeof(double));
+        drape_linear_destroy(drape_linears[i], &solver);
         ck_assert_ptr_null(solver);
-        drape_linears[i]->destroy(&solver);
+        drape_linear_destroy(drape_linears[i], &solver);
     }
     close_problem(&q);
 }
@@ -200,7 +204,7 @@ START_TEST(several_right_hand_sides_of_one_factorisation)
             q.b[k] *= -2;
         ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
         ck_assert_double_eq(q.x[0], -2 * first);
-        ops->destroy(&solver);
+        drape_linear_destroy(ops, &solver);
     }
     close_problem(&q);
 }
@@ -276,7 +280,7 @@ START_TEST(broken_matrices_are_told_and_good_ones_work_again)
                     fill(&q, (matrix_kind)(seed % 2), seed);
                     check_solution(&q, ops, solver, "after a broken one");
                 }
-                ops->destroy(&solver);
+                drape_linear_destroy(ops, &solver);
             }
     close_problem(&q);
 }
@@ -293,7 +297,7 @@ START_TEST(a_right_hand_side_that_is_not_finite_is_told)
         ck_assert_int_eq(drape_linears[i]->solve(solver, q.b, q.x), DRAPE_RETRY_LINEAR);
         fill(&q, SPD, 2);
         check_solution(&q, drape_linears[i], solver, "after");
-        drape_linears[i]->destroy(&solver);
+        drape_linear_destroy(drape_linears[i], &solver);
     }
     close_problem(&q);
 }
@@ -314,7 +318,7 @@ START_TEST(kept_pivots_that_become_zero_are_chosen_again)
                 q.values[k] = own ? (q.p->row[k] % 3 == (c + 1) % 3 ? 2.385 : 0) : 1e-3 * q.values[k];
             }
         check_solution(&q, drape_linears[i], solver, "other pivots");
-        drape_linears[i]->destroy(&solver);
+        drape_linear_destroy(drape_linears[i], &solver);
     }
     close_problem(&q);
 }
@@ -336,7 +340,7 @@ START_TEST(a_small_part_that_is_not_symmetric_is_not_lost)
                         q.values[k] *= 1 + size;
                 check_solution(&q, drape_linears[i], solver, "a little unsymmetric");
             }
-        drape_linears[i]->destroy(&solver);
+        drape_linear_destroy(drape_linears[i], &solver);
     }
     close_problem(&q);
 }
@@ -371,7 +375,7 @@ START_TEST(fallbacks_are_counted)
         ck_assert_int_eq(counts[SPD] + counts[TINY] + counts[HUGE_ENTRIES], 0);
         ck_assert_int_eq(counts[INDEFINITE], falls);
         ck_assert_int_eq(counts[UNSYMMETRIC], falls);
-        ops->destroy(&solver);
+        drape_linear_destroy(ops, &solver);
     }
     close_problem(&q);
 }
@@ -381,6 +385,7 @@ END_TEST
 
 typedef struct sheet {
     drape_context *ctx;
+    drape_arena *arena; /* of the pattern and solvers */
     drape_pattern p;
     double *values, *b, *x, *again;
 } sheet;
@@ -389,6 +394,7 @@ typedef struct sheet {
 static sheet open_sheet(int32_t side)
 {
     sheet q = {.ctx = make_context()};
+    q.arena = drape_arena_create(q.ctx);
     int32_t count = side * side, patches = (side - 2) * (side - 2),
             *block = take((size_t)count, sizeof *block), *node = take(9 * (size_t)patches, sizeof *node),
             *next = node;
@@ -399,7 +405,7 @@ static sheet open_sheet(int32_t side)
             for (int32_t k = 0; k < 9; k++)
                 *next++ = (r + k / 3) * side + c + k % 3;
     const drape_coupling coupling = {.count = patches, .nodes = 9, .node = node};
-    ck_assert_int_eq(drape_pattern_build(q.ctx, count, block, &coupling, 1, &q.p), DRAPE_OK);
+    ck_assert_int_eq(drape_pattern_build(q.arena, count, block, &coupling, 1, &q.p), DRAPE_OK);
     free(block);
     free(node);
     q.values = take((size_t)q.p.nonzeros, sizeof *q.values);
@@ -415,7 +421,7 @@ static void close_sheet(sheet *q)
     free(q->b);
     free(q->x);
     free(q->again);
-    drape_pattern_free(q->ctx, &q->p);
+    drape_arena_destroy(&q->arena);
     drape_context_destroy(&q->ctx);
 }
 
@@ -483,8 +489,8 @@ START_TEST(a_sheet_of_many_supernodes)
     for (int i = 0; drape_linears[i]; i++) {
         const drape_linear_ops *ops = drape_linears[i];
         void *solver = NULL, *other = NULL;
-        ck_assert_int_eq(ops->create(q.ctx, &q.p, &solver), DRAPE_OK);
-        ck_assert_int_eq(ops->create(q.ctx, &q.p, &other), DRAPE_OK);
+        ck_assert_int_eq(ops->create(q.arena, &q.p, &solver), DRAPE_OK);
+        ck_assert_int_eq(ops->create(q.arena, &q.p, &other), DRAPE_OK);
         for (size_t k = 0; k < sizeof shifts / sizeof *shifts; k++) {
             fill_sheet(&q, shifts[k], 7);
             ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
@@ -496,8 +502,8 @@ START_TEST(a_sheet_of_many_supernodes)
         }
         drape_linear_report report = report_of(ops, solver);
         check_fallback(&report, q.p.n, 2);
-        ops->destroy(&solver);
-        ops->destroy(&other);
+        drape_linear_destroy(ops, &solver);
+        drape_linear_destroy(ops, &other);
     }
     close_sheet(&q);
 }
@@ -513,12 +519,12 @@ START_TEST(threads_give_the_same_bits)
             const drape_linear_ops *ops = drape_linears[i];
             sheet q = open_sheet(sides[k]);
             void *solver = NULL;
-            ck_assert_int_eq(ops->create(q.ctx, &q.p, &solver), DRAPE_OK);
+            ck_assert_int_eq(ops->create(q.arena, &q.p, &solver), DRAPE_OK);
             fill_sheet(&q, 1.01, 7);
             for (int threads = 1; threads <= 3; threads += 2) {
                 double *x = threads == 1 ? q.x : q.again;
                 drape_crew *crew = NULL;
-                ck_assert_int_eq(drape_crew_create(q.ctx, threads, &crew), DRAPE_OK);
+                ck_assert_int_eq(drape_crew_create(q.arena, threads, &crew), DRAPE_OK);
                 ops->use_threads(solver, crew);
                 ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
                 ck_assert_int_eq(ops->solve(solver, q.b, x), DRAPE_OK);
@@ -527,7 +533,7 @@ START_TEST(threads_give_the_same_bits)
                 drape_crew_destroy(&crew);
             }
             check_residual(&q, true, ops->entry.name);
-            ops->destroy(&solver);
+            drape_linear_destroy(ops, &solver);
             close_sheet(&q);
         }
 }
@@ -543,13 +549,14 @@ START_TEST(no_memory_for_the_fallback)
             const drape_linear_ops *ops = drape_linears[i];
             failing_allocator memory = {0};
             drape_context *ctx = failing_context(&memory);
+            drape_arena arena = drape_arena_of(ctx);
             sheet q = open_sheet(sides[k]);
             void *solver = NULL;
-            ck_assert_int_eq(ops->create(ctx, &q.p, &solver), DRAPE_OK);
+            ck_assert_int_eq(ops->create(&arena, &q.p, &solver), DRAPE_OK);
             fill_sheet(&q, 1.5, 7);
             ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
             ck_assert_ptr_null(report_of(ops, solver).fallback);
-            size_t definite = ops->bytes(solver);
+            size_t definite = arena.bytes + drape_linear_bytes(ops, solver);
             long before = memory.calls, failed = 0;
             fill_sheet(&q, 0.2, 7);
             drape_status status = DRAPE_E_MEMORY;
@@ -568,8 +575,9 @@ START_TEST(no_memory_for_the_fallback)
             bool falls = report_of(ops, solver).fallback;
             ck_assert_int_eq(failed > 0, falls);
             if (falls)
-                ck_assert_uint_gt(ops->bytes(solver), definite);
-            ops->destroy(&solver);
+                ck_assert_uint_gt(arena.bytes + drape_linear_bytes(ops, solver), definite);
+            drape_linear_destroy(ops, &solver);
+            drape_arena_free(&arena);
             close_sheet(&q);
             drape_context_destroy(&ctx);
             ck_assert_int_eq(memory.live, 0);
@@ -586,14 +594,14 @@ START_TEST(made_again_on_other_patterns)
         for (size_t k = 0; k < sizeof sides / sizeof *sides; k++) {
             sheet q = open_sheet(sides[k]);
             void *solver = NULL;
-            ck_assert_int_eq(ops->create(q.ctx, &q.p, &solver), DRAPE_OK);
+            ck_assert_int_eq(ops->create(q.arena, &q.p, &solver), DRAPE_OK);
             if (k % 3 != 2) { /* and once without a factorisation */
                 fill_sheet(&q, k % 2 ? 0.2 : 1.01, 9);
                 ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
                 ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
                 check_residual(&q, k % 2 == 0, ops->entry.name);
             }
-            ops->destroy(&solver);
+            drape_linear_destroy(ops, &solver);
             close_sheet(&q);
         }
     }
@@ -615,14 +623,14 @@ START_TEST(auto_picks_by_size_and_says_so)
             if (drape_linears[i]->best_from > 0 && drape_linears[i]->best_from <= q.p.n &&
                 (!expected || drape_linears[i]->best_from > expected->best_from))
                 expected = drape_linears[i];
-        ck_assert_int_eq(chooser->create(q.ctx, &q.p, &solver), DRAPE_OK);
+        ck_assert_int_eq(chooser->create(q.arena, &q.p, &solver), DRAPE_OK);
         drape_linear_report report = report_of(chooser, solver);
         ck_assert_ptr_eq(report.row, expected);
         ck_assert_ptr_nonnull(report.row);
         ck_assert_str_ne(report.why, "");
         if (k == 0)
             ck_assert_str_eq(report.row->entry.name, "klu");
-        chooser->destroy(&solver);
+        drape_linear_destroy(chooser, &solver);
         close_sheet(&q);
     }
 }

@@ -141,13 +141,15 @@ START_TEST(clamps_have_exact_derivatives)
     static drape_check_row rows[DRAPE_MAX_CHECK_ROWS];
     drape_context *ctx = make_context();
     drape_model *model = clamped(ctx, true);
-    drape_system *system = make_system(ctx, model, 1);
+    drape_arena memory = drape_arena_of(ctx);
+    drape_system *system = make_system(&memory, model, 1);
     int count = 0;
     ck_assert(model->terms[1].anchored);
     ck_assert_int_eq(drape_check_derivatives(ctx, system, 3, rows, &count), DRAPE_OK);
     for (int i = 0; i < count; i++)
         ck_assert_msg(rows[i].pass, "%s of %s is off by %g", rows[i].what, rows[i].term, rows[i].error);
     drape_system_destroy(&system);
+    drape_arena_free(&memory);
     drape_model_destroy(&model);
     drape_context_destroy(&ctx);
 }
@@ -160,7 +162,8 @@ START_TEST(clamps_hold)
     drape_context *ctx = make_context();
     for (int clamp = 0; clamp < 2; clamp++) {
         drape_model *m = clamped(ctx, clamp);
-        drape_system *system = make_system(ctx, m, 1);
+        drape_arena memory = drape_arena_of(ctx);
+        drape_system *system = make_system(&memory, m, 1);
         double *x = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *x), elastic, gravity;
         double *internal = drape_alloc(ctx, (size_t)m->internal_count, sizeof *internal);
         for (int32_t i = 0; i < m->node_count; i++) { /* turned by 0.1 about the left side */
@@ -179,6 +182,7 @@ START_TEST(clamps_hold)
         drape_free(ctx, x);
         drape_free(ctx, internal);
         drape_system_destroy(&system);
+        drape_arena_free(&memory);
         drape_model_destroy(&m);
     }
     drape_context_destroy(&ctx);
@@ -199,7 +203,8 @@ START_TEST(constant_moments_are_in_equilibrium)
         "\"areal_density\": 0.2}, \"terms\": [\"bend.midedge\"]}], \"gravity\": [0, 0, 0], \"duration\": 1}";
     ck_assert_int_eq(drape_scene_parse(ctx, text, "moment", &scene), DRAPE_OK);
     ck_assert_int_eq(drape_scene_compile(scene, &m), DRAPE_OK);
-    drape_system *system = make_system(ctx, m, 1);
+    drape_arena memory = drape_arena_of(ctx);
+    drape_system *system = make_system(&memory, m, 1);
     double *x = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *x);
     double *g = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *g);
     double *internal = drape_alloc(ctx, (size_t)m->internal_count, sizeof *internal);
@@ -219,6 +224,7 @@ START_TEST(constant_moments_are_in_equilibrium)
     drape_free(ctx, g);
     drape_free(ctx, x);
     drape_system_destroy(&system);
+    drape_arena_free(&memory);
     drape_model_destroy(&m);
     drape_scene_destroy(&scene);
     drape_context_destroy(&ctx);

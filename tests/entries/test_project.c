@@ -204,10 +204,11 @@ static double projected_away(drape_context *ctx, const drape_model *m, double al
     double *x = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *x),
            *v = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *v),
            *exact = drape_alloc(ctx, values, sizeof *exact), *projected = drape_alloc(ctx, values, sizeof *x);
+    drape_arena memory = drape_arena_of(ctx);
     drape_system *system = NULL;
     double most = 0, away = 0;
     ck_assert(x && v && exact && projected);
-    ck_assert_int_eq(drape_system_create(ctx, m, 1, &system), DRAPE_OK);
+    ck_assert_int_eq(drape_system_create(&memory, m, 1, &system), DRAPE_OK);
     for (int32_t i = 0; i < m->node_count; i++) {
         const double *rest = m->rest + 3 * (size_t)i;
         x[3 * i] = along * rest[0], x[3 * i + 1] = rest[1], x[3 * i + 2] = across * rest[2];
@@ -220,6 +221,7 @@ static double projected_away(drape_context *ctx, const drape_model *m, double al
         away = fmax(away, fabs(projected[i] - exact[i]));
     }
     drape_system_destroy(&system);
+    drape_arena_free(&memory);
     drape_free(ctx, x), drape_free(ctx, v), drape_free(ctx, exact), drape_free(ctx, projected);
     return away / most;
 }

@@ -213,7 +213,8 @@ static void check_limits(const drape_check_row *row)
 static void check_variant(drape_context *ctx, const variant *v, const drape_model *model)
 {
     static drape_check_row rows[DRAPE_MAX_CHECK_ROWS];
-    drape_system *system = make_system(ctx, model, 1);
+    drape_arena memory = drape_arena_of(ctx);
+    drape_system *system = make_system(&memory, model, 1);
     for (unsigned seed = 1; seed <= SEEDS; seed++) {
         int count = 0, own = 0;
         ck_assert_int_eq(drape_check_derivatives(ctx, system, 7919 * seed, rows, &count), DRAPE_OK);
@@ -227,6 +228,7 @@ static void check_variant(drape_context *ctx, const variant *v, const drape_mode
         ck_assert_msg(own >= 2, "%s: %d comparisons", name_of(v), own);
     }
     drape_system_destroy(&system);
+    drape_arena_free(&memory);
 }
 
 START_TEST(derivatives_agree_with_differences)
@@ -291,7 +293,8 @@ START_TEST(mistakes_are_found)
     ck_assert_int_eq(drape_context_add_term(ctx, &wrong_term), DRAPE_OK);
     const drape_row_def term = {.type = "host.wrong"};
     drape_model *model = make_model(ctx, &(model_def){.mesh = MESH_CURVED, .terms = &term, .term_count = 1});
-    drape_system *system = make_system(ctx, model, 1);
+    drape_arena memory = drape_arena_of(ctx);
+    drape_system *system = make_system(&memory, model, 1);
     for (int w = WRONG_NOTHING; w <= WRONG_MANNERS; w++) {
         int count = 0;
         bool found = false, pass = true;
@@ -305,6 +308,7 @@ START_TEST(mistakes_are_found)
         ck_assert_msg(found || w == WRONG_NOTHING, "mistake %d", w);
     }
     drape_system_destroy(&system);
+    drape_arena_free(&memory);
     drape_model_destroy(&model);
     drape_context_destroy(&ctx);
 }
@@ -336,7 +340,8 @@ static void check_invariance(drape_context *ctx, const variant *v, const drape_m
 {
     if (is_external(v->ops))
         return;
-    drape_system *system = make_system(ctx, model, 1);
+    drape_arena memory = drape_arena_of(ctx);
+    drape_system *system = make_system(&memory, model, 1);
     for (uint64_t seed = 1; seed <= SEEDS; seed++) {
         double r[9], shift[3], before, after, gravity;
         uint64_t random = 31 * seed;
@@ -357,6 +362,7 @@ static void check_invariance(drape_context *ctx, const variant *v, const drape_m
         drape_arena_free(&s.arena);
     }
     drape_system_destroy(&system);
+    drape_arena_free(&memory);
 }
 
 START_TEST(energy_does_not_change_with_rigid_motion)
@@ -390,7 +396,8 @@ static void check_rest(drape_context *ctx, const variant *v, const drape_model *
                 strcmp(v->ops->entry.params[v->param].choices[v->choice], "flat") == 0;
     if (is_external(v->ops) || (flat && v->mesh == MESH_CURVED))
         return;
-    drape_system *system = make_system(ctx, model, 1);
+    drape_arena memory = drape_arena_of(ctx);
+    drape_system *system = make_system(&memory, model, 1);
     state s = make_state(ctx, model, 1, 0);
     double elastic, gravity;
     memset(s.v, 0, s.n * sizeof *s.v);
@@ -402,6 +409,7 @@ static void check_rest(drape_context *ctx, const variant *v, const drape_model *
     ck_assert_double_le(fabs(elastic), 1e-20);
     drape_arena_free(&s.arena);
     drape_system_destroy(&system);
+    drape_arena_free(&memory);
 }
 
 START_TEST(no_force_at_rest)
@@ -416,7 +424,8 @@ static void check_power(drape_context *ctx, const variant *v, const drape_model 
 {
     if (!model->has_dissipation)
         return;
-    drape_system *system = make_system(ctx, model, 1);
+    drape_arena memory = drape_arena_of(ctx);
+    drape_system *system = make_system(&memory, model, 1);
     ck_assert(v->ops->dissipative || v->ops->damped);
     for (uint64_t seed = 1; seed <= SEEDS; seed++) {
         double power = 0, scale, spin[3] = {0.3, -1.1, 0.7};
@@ -437,6 +446,7 @@ static void check_power(drape_context *ctx, const variant *v, const drape_model 
         drape_arena_free(&s.arena);
     }
     drape_system_destroy(&system);
+    drape_arena_free(&memory);
 }
 
 START_TEST(dissipation_takes_power)
@@ -455,7 +465,8 @@ static void check_stress(drape_context *ctx, const variant *v, const drape_model
     if (n == 0)
         return;
     state s = make_state(ctx, model, 13, 0.01);
-    drape_system *system = make_system(ctx, model, 1);
+    drape_arena memory = drape_arena_of(ctx);
+    drape_system *system = make_system(&memory, model, 1);
     double *p = drape_arena_take(&s.arena, s.n, sizeof *p), *x = drape_arena_take(&s.arena, s.n, sizeof *x);
     double *here = drape_arena_take(&s.arena, n, sizeof *here),
            *ahead = drape_arena_take(&s.arena, n, sizeof *ahead);
@@ -482,6 +493,7 @@ static void check_stress(drape_context *ctx, const variant *v, const drape_model
     const double size = fmax(largest(here, n), largest(ahead, n)), error = largest(sum, n);
     ck_assert_msg(error <= 1e-7 * size, "%s: %g of %g", name_of(v), error, size);
     drape_system_destroy(&system);
+    drape_arena_free(&memory);
     drape_arena_free(&s.arena);
 }
 
@@ -559,14 +571,16 @@ static void check_threads(drape_context *ctx, const variant *v, const drape_mode
     double *f1 = drape_arena_take(&s.arena, measures + 1, sizeof *f1);
     double *f2 = drape_arena_take(&s.arena, measures + 1, sizeof *f2);
     for (int threads = 1; threads <= 3; threads++) {
-        drape_system *system = make_system(ctx, model, threads);
+        drape_arena memory = drape_arena_of(ctx);
+        drape_system *system = make_system(&memory, model, threads);
         drape_system_force(system, &s.point, threads == 1 ? s.g : g);
-        drape_system_jacobian(system, &s.point, 3600, false, threads == 1 ? j1 : j2);
+        drape_system_jacobian(system, &s.point, 3600, 0, threads == 1 ? j1 : j2);
         ck_assert_msg(threads == 1 || memcmp(g, s.g, s.n * sizeof *g) == 0, "%s: force", name_of(v));
         ck_assert_msg(threads == 1 || memcmp(j1, j2, values * sizeof *j1) == 0, "%s: Jacobian", name_of(v));
         drape_system_stress(system, &s.point, s.v, threads == 1 ? f1 : f2);
         ck_assert_msg(threads == 1 || memcmp(f1, f2, measures * sizeof *f1) == 0, "%s: stress", name_of(v));
         drape_system_destroy(&system);
+        drape_arena_free(&memory);
     }
     drape_arena_free(&s.arena);
 }
@@ -585,8 +599,9 @@ static void check_projection(drape_context *ctx, const variant *v, const drape_m
     const drape_pattern *p = &model->pattern;
     double *j = drape_arena_take(&s.arena, (size_t)p->nonzeros, sizeof *j);
     double *b = drape_arena_take(&s.arena, (size_t)p->n, sizeof *b);
-    drape_system *system = make_system(ctx, model, 1);
-    drape_system_jacobian(system, &s.point, 0, true, j);
+    drape_arena memory = drape_arena_of(ctx);
+    drape_system *system = make_system(&memory, model, 1);
+    drape_system_jacobian(system, &s.point, 0, 1, j);
     for (uint64_t trial = 1; trial <= 50; trial++) {
         uint64_t seed = trial;
         double sum = 0, size = 0;
@@ -600,6 +615,7 @@ static void check_projection(drape_context *ctx, const variant *v, const drape_m
         ck_assert_msg(sum >= -1e-13 * size, "%s: %g of %g", name_of(v), sum, size);
     }
     drape_system_destroy(&system);
+    drape_arena_free(&memory);
     drape_arena_free(&s.arena);
 }
 

@@ -282,8 +282,9 @@ END_TEST
 START_TEST(friction_on_forces_as_in_boson)
 {
     scene s = flyers("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], 'friction': 0.25}");
+    drape_arena memory = drape_arena_of(s.ctx);
     drape_motion *motion = NULL;
-    ck_assert_int_eq(drape_motion_create(s.ctx, s.model, &motion), DRAPE_OK);
+    ck_assert_int_eq(drape_motion_create(&memory, s.model, &motion), DRAPE_OK);
     const drape_verlet_contact rule = {.model = s.model,
                                        .motion = motion,
                                        .rule = DRAPE_VERLET_BOSON,
@@ -296,7 +297,7 @@ START_TEST(friction_on_forces_as_in_boson)
     drape_verlet_rub(&rule, 0, x, v, g);
     for (int i = 0; i < 12; i++)
         ck_assert_double_eq_tol(g[i], expected[i], 1e-15);
-    drape_motion_destroy(&motion);
+    drape_arena_free(&memory);
     scene_close(&s);
 }
 END_TEST
@@ -312,7 +313,8 @@ START_TEST(strains_are_limited)
                               "'pins': [{'nodes': [0, 3]}]}], 'gravity': [0, 0, 0], 'duration': 1}",
                               3, 2, 2.0, 1e3, 6.0);
         drape_verlet_limit limit;
-        ck_assert_int_eq(drape_verlet_limit_create(s.ctx, s.model, 0.1, many ? 1000 : 1, 1e-9, &limit),
+        drape_arena arena = drape_arena_of(s.ctx);
+        ck_assert_int_eq(drape_verlet_limit_create(&arena, s.model, 0.1, many ? 1000 : 1, 1e-9, &limit),
                          DRAPE_OK);
         ck_assert_int_eq(limit.count, 7);
         double x[18];
@@ -328,7 +330,7 @@ START_TEST(strains_are_limited)
             ck_assert_double_eq_tol(x[6], 3.5 - 0.65, 1e-12);
         }
         ck_assert(x[0] == 0);
-        drape_verlet_limit_free(s.ctx, &limit);
+        drape_arena_free(&arena);
         scene_close(&s);
     }
 }
@@ -375,14 +377,15 @@ START_TEST(patches_are_one_spring_after_the_other)
         double x[3 * 33 * 12], y[3 * 33 * 12];
         scene s = shaken(moves[k], x);
         drape_verlet_limit limit;
-        ck_assert_int_eq(drape_verlet_limit_create(s.ctx, s.model, 0.1, 1, 1e-9, &limit), DRAPE_OK);
+        drape_arena arena = drape_arena_of(s.ctx);
+        ck_assert_int_eq(drape_verlet_limit_create(&arena, s.model, 0.1, 1, 1e-9, &limit), DRAPE_OK);
         for (int again = 0; again < 5; again++) {
             memcpy(y, x, sizeof x);
             drape_verlet_limit_lengths(&limit, x);
             limit_by_hand(&limit, y);
             ck_assert_msg(memcmp(x, y, sizeof x) == 0, "moved by %g, pass %d", moves[k], again);
         }
-        drape_verlet_limit_free(s.ctx, &limit);
+        drape_arena_free(&arena);
         scene_close(&s);
     }
 }
@@ -397,14 +400,15 @@ START_TEST(forces_are_those_of_the_system)
     const drape_setting settings[] = {number("substeps", 1)};
     start(&s, settings, 1, "fixed", 0.01);
     drape_verlet_force *force = NULL;
+    drape_arena arena = drape_arena_of(s.ctx);
     for (size_t i = 0; i < sizeof v / sizeof *v; i++)
         v[i] = sin(3.1 * (double)i);
-    ck_assert_int_eq(drape_verlet_force_create(s.ctx, s.sim->system, &force), DRAPE_OK);
+    ck_assert_int_eq(drape_verlet_force_create(&arena, s.sim->system, &force), DRAPE_OK);
     drape_verlet_force_sum(force, &(drape_point){.x = x, .v = v}, g);
     drape_system_force(s.sim->system, &(drape_point){.x = x, .v = v}, expected);
     for (size_t i = 0; i < sizeof g / sizeof *g; i++)
         ck_assert_double_eq_tol(g[i], expected[i], 50 * 3 * 2.3e-16);
-    drape_verlet_force_destroy(&force);
+    drape_arena_free(&arena);
     scene_close(&s);
 }
 END_TEST
@@ -465,11 +469,12 @@ static void hold_to_the_rule(double size, bool own, double share)
 {
     double x[3 * 196], y[3 * 196];
     scene s = crumpled(size, 0.02, x);
-    drape_verlet_self *self = NULL;
-    ck_assert_int_eq(drape_verlet_self_create(s.ctx, s.model, own, &self), DRAPE_OK);
+    drape_verlet_self self;
+    drape_arena arena = drape_arena_of(s.ctx);
+    ck_assert_int_eq(drape_verlet_self_create(&arena, s.model, own, &self), DRAPE_OK);
     for (int again = 0; again < 30; again++) {
         memcpy(y, x, sizeof x);
-        drape_verlet_self_push(self, share, x);
+        drape_verlet_self_push(&self, share, x);
         push_by_hand(s.model, own, share, y);
         double worst = 0;
         for (int i = 0; i < 3 * 196; i++)
@@ -478,7 +483,7 @@ static void hold_to_the_rule(double size, bool own, double share)
         for (int i = 0; i < 3 * 196; i++)
             x[i] += 1e-3 * sin(0.7 * i + again);
     }
-    drape_verlet_self_destroy(&self);
+    drape_arena_free(&arena);
     scene_close(&s);
 }
 
@@ -503,12 +508,13 @@ START_TEST(own_boxes_miss_what_cs184_misses)
     memcpy(x + 30, pairs, sizeof pairs);
     double before[3 * 196];
     memcpy(before, x, sizeof x);
-    drape_verlet_self *self = NULL;
-    ck_assert_int_eq(drape_verlet_self_create(s.ctx, s.model, true, &self), DRAPE_OK);
-    drape_verlet_self_push(self, 1, x);
+    drape_verlet_self self;
+    drape_arena arena = drape_arena_of(s.ctx);
+    ck_assert_int_eq(drape_verlet_self_create(&arena, s.model, true, &self), DRAPE_OK);
+    drape_verlet_self_push(&self, 1, x);
     ck_assert(memcmp(x + 30, before + 30, 6 * sizeof *x) == 0);
     ck_assert_double_eq_tol(x[36], 0.05 - 0.03, 1e-12);
-    drape_verlet_self_destroy(&self);
+    drape_arena_free(&arena);
     scene_close(&s);
 }
 END_TEST

@@ -310,11 +310,11 @@ void fuzz_mesh(const char *format, const uint8_t *data, size_t size)
     status = status ? status : drape_mesh_validate_triangles(ctx, &source, &mesh);
     status = status ? status : drape_mesh_connect(ctx, &source, &mesh);
     status = status ? status : drape_mesh_validate_nodes(ctx, &source, &mesh);
-    status = status ? status : drape_mesh_measure(ctx, &mesh);
+    status = status ? status : drape_mesh_measure(&mesh);
     fuzz_check(ctx, status, "a stage of the mesh");
     if (!status)
         check_measures(&mesh);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     free(ended);
     fuzz_close(&ctx);
 }

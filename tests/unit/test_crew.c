@@ -60,9 +60,10 @@ START_TEST(every_round_is_done_once)
 {
     static ledger l;
     drape_context *ctx = open_context();
+    drape_arena arena = drape_arena_of(ctx);
     for (int threads = 1; threads <= 5; threads++) {
         drape_crew *crew = NULL;
-        ck_assert_int_eq(drape_crew_create(ctx, threads, &crew), DRAPE_OK);
+        ck_assert_int_eq(drape_crew_create(&arena, threads, &crew), DRAPE_OK);
         ck_assert_int_eq(drape_crew_threads(crew), threads);
         ck_assert_int_eq(crew != NULL, threads > 1);
         for (int k = 0; k < 400; k++)
@@ -70,6 +71,7 @@ START_TEST(every_round_is_done_once)
         drape_crew_destroy(&crew);
         ck_assert_ptr_null(crew);
     }
+    drape_arena_free(&arena);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -89,8 +91,9 @@ static void meet(void *user, int64_t round)
 START_TEST(helpers_that_sleep_are_woken)
 {
     drape_context *ctx = open_context();
+    drape_arena arena = drape_arena_of(ctx);
     drape_crew *crew = NULL;
-    ck_assert_int_eq(drape_crew_create(ctx, 2, &crew), DRAPE_OK);
+    ck_assert_int_eq(drape_crew_create(&arena, 2, &crew), DRAPE_OK);
     for (int k = 0; k < 20; k++) {
         nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
         atomic_store(&here, 0);
@@ -98,6 +101,7 @@ START_TEST(helpers_that_sleep_are_woken)
         ck_assert_int_eq(atomic_load(&here), 2);
     }
     drape_crew_destroy(&crew);
+    drape_arena_free(&arena);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -122,14 +126,16 @@ static void hold(void *user, int64_t round)
 START_TEST(the_caller_does_what_no_helper_takes)
 {
     drape_context *ctx = open_context();
+    drape_arena arena = drape_arena_of(ctx);
     drape_crew *crew = NULL;
-    ck_assert_int_eq(drape_crew_create(ctx, 2, &crew), DRAPE_OK);
+    ck_assert_int_eq(drape_crew_create(&arena, 2, &crew), DRAPE_OK);
     for (int k = 0; k < 200; k++) {
         held h = {.caller = pthread_self()};
         drape_parallel(crew, MOST, hold, &h);
         ck_assert_int_eq(h.done, MOST);
     }
     drape_crew_destroy(&crew);
+    drape_arena_free(&arena);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -151,11 +157,12 @@ static void *loop_often(void *crew)
 START_TEST(crews_work_beside_each_other)
 {
     drape_context *ctx = open_context();
+    drape_arena arena = drape_arena_of(ctx);
     drape_crew *crews[2];
     for (int repeat = 0; repeat < 3; repeat++) {
         pthread_t callers[2];
         for (int i = 0; i < 2; i++) {
-            ck_assert_int_eq(drape_crew_create(ctx, 3, &crews[i]), DRAPE_OK);
+            ck_assert_int_eq(drape_crew_create(&arena, 3, &crews[i]), DRAPE_OK);
             ck_assert_int_eq(pthread_create(&callers[i], NULL, loop_often, crews[i]), 0);
         }
         for (int i = 0; i < 2; i++) {
@@ -166,6 +173,7 @@ START_TEST(crews_work_beside_each_other)
             drape_crew_destroy(&crews[i]);
         }
     }
+    drape_arena_free(&arena);
     drape_context_destroy(&ctx);
 }
 END_TEST

@@ -1,6 +1,6 @@
 /* test_intersect.c: edges that pass through triangles are counted exactly, whatever cells the grid puts
  * them in. */
-#include "contact/intersect.h"
+#include "geometry/intersect.h"
 #include "support/suite.h"
 
 #include <math.h>

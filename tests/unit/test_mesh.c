@@ -177,7 +177,7 @@ START_TEST(equilateral_counts_and_positions)
                 ck_assert_double_eq(x[1], 0);
                 ck_assert_double_eq_tol(x[2], -r * sqrt(3.0) / 2 * l, 30 * ROUNDING);
             }
-        drape_mesh_free(ctx, &mesh);
+        drape_mesh_free(&mesh);
         assert_empty(&mesh);
     }
     drape_context_destroy(&ctx);
@@ -194,7 +194,7 @@ START_TEST(equilateral_triangles_are_equilateral)
         ck_assert_double_eq_tol(mesh.edge_length[e], 0.05, 4 * ROUNDING);
     for (int32_t t = 0; t < mesh.triangle_count; t++)
         ck_assert_double_eq_tol(mesh.triangle_area[t], sqrt(3.0) / 4 * 0.05 * 0.05, ROUNDING);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -234,7 +234,7 @@ static void check_square(drape_context *ctx, const char *diagonals, const char *
             ck_assert_int_eq(has_edge(&mesh, node, node + columns + 1), falling);
             ck_assert_int_eq(has_edge(&mesh, node + 1, node + columns), !falling);
         }
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
 }
 
 START_TEST(square_grids)
@@ -258,8 +258,8 @@ START_TEST(square_defaults)
     drape_mesh a = make(ctx, &given), b = make(ctx, &defaulted);
     ck_assert_int_eq(memcmp(a.x, b.x, (size_t)a.node_count * 3 * sizeof *a.x), 0);
     ck_assert_int_eq(memcmp(a.triangle, b.triangle, (size_t)a.triangle_count * 3 * sizeof *a.triangle), 0);
-    drape_mesh_free(ctx, &a);
-    drape_mesh_free(ctx, &b);
+    drape_mesh_free(&a);
+    drape_mesh_free(&b);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -276,7 +276,7 @@ START_TEST(equilateral_strips)
     ck_assert_int_eq(mesh.columns, 3);
     ck_assert_int_eq(mesh.triangle_count, 2 * 2 * 5);
     ck_assert_double_eq_tol(mesh.x[3 * 17 + 2], -5 * sqrt(3) / 2 * 0.1, 1e-15);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -318,7 +318,7 @@ START_TEST(annuli)
         for (int32_t b = a + 1; b < mesh.node_count; b++)
             edges += has_edge(&mesh, a, b);
     ck_assert_int_eq(mesh.node_count - edges + mesh.triangle_count, 0);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_setting wrong[4];
     memcpy(wrong, settings, sizeof wrong);
     wrong[3].number = 0.5;
@@ -408,7 +408,7 @@ START_TEST(transform_scales_then_rotates_then_translates)
     static const double expected[] = {10, 22, 30, 7, 20, 30, 10, 20, 34};
     for (int i = 0; i < 9; i++)
         ck_assert_double_eq(mesh.x[i], expected[i]);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -583,7 +583,7 @@ START_TEST(closed_and_inconsistently_wound_meshes_are_fine)
     assert_consistent(&mesh, false);
     static const int32_t hinges[] = {0, 1, 3, 2, 0, 2, 3, 1, 0, 3, 2, 1, 1, 2, 3, 0, 1, 3, 2, 0, 2, 3, 1, 0};
     ck_assert_mem_eq(mesh.hinge, hinges, sizeof hinges);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -604,7 +604,7 @@ START_TEST(measures_of_a_known_triangle)
     for (int i = 0; i < 3; i++)
         ck_assert_double_eq(mesh.node_area[i], 2);
     ck_assert_int_eq(mesh.hinge_count, 0);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -628,7 +628,7 @@ START_TEST(a_node_of_high_degree)
     drape_mesh mesh = make(ctx, &def);
     ck_assert_int_eq(mesh.hinge_count, SPOKES);
     ck_assert_int_eq(mesh.edge_count, 2 * SPOKES);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     free(triangle);
     free(x);
     drape_context_destroy(&ctx);
@@ -649,7 +649,7 @@ START_TEST(every_failed_allocation_is_reported_and_none_leaks)
         ck_assert(status == DRAPE_OK || status == DRAPE_E_MEMORY);
         if (status)
             assert_empty(&mesh);
-        drape_mesh_free(ctx, &mesh);
+        drape_mesh_free(&mesh);
         drape_context_destroy(&ctx);
         ck_assert_int_eq(memory.live, 0);
     }

@@ -31,7 +31,7 @@ START_TEST(force_and_jacobian_are_those_of_a_spring)
         g[i] = calloc(3 * 16, sizeof **g);
         if (i)
             ck_assert_int_eq(drape_sim_pull(h.sim, 7, STIFFNESS, target), DRAPE_OK);
-        drape_system_jacobian(h.sim->system, &point, 1, false, values[i]);
+        drape_system_jacobian(h.sim->system, &point, 1, 0, values[i]);
         drape_system_force(h.sim->system, &point, g[i]);
     }
     int64_t stride;
