@@ -1,8 +1,8 @@
 /*
- * crew.c: see crew.h. The rounds of a loop that no one has taken are a number, and a round is taken by making
- * it one less, if nothing has changed since it was read. The number of the loop is in the same word: whoever
- * read of a loop that is over takes nothing of the next one, whose round it would call with the other's
- * function. Who takes a round is for chance; what it writes is not.
+ * crew.c: see crew.h. The number of open tasks and the number of the loop are in one atomic word. A thread
+ * takes a task by decrementing it, if it is unchanged since it was read: so a thread that has read a loop
+ * that is over takes no task of the next loop, which it would run with the function of the other. Which
+ * thread runs a task is left to chance; what the task writes is not.
  */
 #include "base/crew.h"
 
@@ -12,29 +12,29 @@
 #include <signal.h>
 #include <stdatomic.h>
 
-/* Looks before one sleeps, each of which lets others have the core, a third of a microsecond where there are
- * none: a millisecond or two, longer than the caller takes between two loops of one step. To wake a core that
- * has gone to sleep takes up to a tenth of that, each time; where a core is taken, longer looks cost nothing
- * that was measured. */
-#define HELPER_LOOKS 5000
-#define CALLER_LOOKS 3000
-#define LEFT         0xffffffffu /* of `open`: rounds not taken; above it, the number of the loop */
-#define APART        64 /* bytes: in one line of the cache, what one thread writes is taken from all others */
+/* Spins before a thread sleeps. Each yields the core and takes a third of a microsecond if nobody wants it:
+ * together a millisecond or two, longer than the caller takes between two loops of one step. Waking a core
+ * that sleeps takes up to a tenth of that, each time; longer spinning on a core that others want had no
+ * measurable cost. */
+#define HELPER_SPINS 5000
+#define CALLER_SPINS 3000
+/* mask of `open`: tasks not taken; the bits above it are the number of the loop */
+#define LEFT  0xffffffffu
+#define APART 64 /* bytes of a cache line: a write by one thread invalidates the line for all others */
 
 struct drape_crew {
     int threads, helpers;
     pthread_t *helper;    /* (threads - 1), of which helpers run */
-    pthread_mutex_t lock; /* of who goes to sleep */
+    pthread_mutex_t lock; /* for going to sleep */
     pthread_cond_t work, done;
-    /* The loop: written while no round of it is open, and read, of a loop that may be over, by whoever is
-     * late. */
-    _Atomic(drape_round *) one;
+    /* The loop: written while it has no open task, and read by threads for which it may be over already. */
+    _Atomic(drape_round *) run;
     _Atomic(void *) user;
-    atomic_int_fast64_t rounds;
+    atomic_int_fast64_t tasks;
     char apart[APART];
     atomic_uint_fast64_t open;
-    char apart_too[APART];
-    atomic_int_fast64_t unfinished; /* rounds, less those that were told */
+    char apart_again[APART];
+    atomic_int_fast64_t unfinished; /* tasks that are not reported done */
     atomic_int asleep;              /* helpers */
     atomic_bool waiting, ended;     /* waiting: the caller sleeps */
 };
@@ -44,29 +44,29 @@ int drape_crew_threads(const drape_crew *crew)
     return crew ? crew->threads : 1;
 }
 
-/* ---- Rounds ---- */
+/* ---- Tasks ---- */
 
-/* Takes a round and does it; false where none is open. */
-static bool do_round(drape_crew *c)
+/* Takes a task and runs it; false if none is open. */
+static bool run_task(drape_crew *c)
 {
     uint_fast64_t open = atomic_load(&c->open);
     while (open & LEFT) {
-        drape_round *one = atomic_load_explicit(&c->one, memory_order_relaxed);
+        drape_round *run = atomic_load_explicit(&c->run, memory_order_relaxed);
         void *user = atomic_load_explicit(&c->user, memory_order_relaxed);
-        const int64_t round = atomic_load_explicit(&c->rounds, memory_order_relaxed) - (int64_t)(open & LEFT);
+        const int64_t task = atomic_load_explicit(&c->tasks, memory_order_relaxed) - (int64_t)(open & LEFT);
         if (!atomic_compare_exchange_weak(&c->open, &open, open - 1))
             continue;
-        one(user, round);
+        run(user, task);
         return true;
     }
     return false;
 }
 
-/* As many as there are; all are of one loop, which does not end before they are told. */
-static void do_rounds(drape_crew *c)
+/* Runs all it can take. They belong to one loop, which does not end before they are reported done. */
+static void run_tasks(drape_crew *c)
 {
     int64_t done = 0;
-    while (do_round(c))
+    while (run_task(c))
         done++;
     if (done > 0 && atomic_fetch_sub(&c->unfinished, done) == done && atomic_load(&c->waiting)) {
         pthread_mutex_lock(&c->lock);
@@ -84,7 +84,7 @@ static bool is_called(drape_crew *c)
 
 static void await_call(drape_crew *c)
 {
-    for (int i = 0; i < HELPER_LOOKS; i++) {
+    for (int i = 0; i < HELPER_SPINS; i++) {
         if (is_called(c))
             return;
         sched_yield();
@@ -102,12 +102,12 @@ static void *help(void *crew)
     drape_crew *c = crew;
     while (!atomic_load(&c->ended)) {
         await_call(c);
-        do_rounds(c);
+        run_tasks(c);
     }
     return NULL;
 }
 
-/* Signals are for the host's threads. */
+/* Helpers block all signals: these are for the host's threads. */
 static void start_helpers(drape_crew *c)
 {
     sigset_t all, before;
@@ -161,23 +161,23 @@ void drape_crew_destroy(drape_crew **crew)
 
 /* ---- The caller ---- */
 
-/* All is said before the rounds are open; the fence between `open` and `asleep` is that both are sequentially
- * consistent: a helper that goes to sleep has counted itself before it looks for the last time. */
-static void call_helpers(drape_crew *c, int64_t rounds, drape_round *one, void *user)
+/* The loop is written before its tasks are open. `open` and `asleep` are both sequentially consistent: a
+ * helper that goes to sleep has counted itself before it reads `open` for the last time. */
+static void call_helpers(drape_crew *c, int64_t tasks, drape_round *run, void *user)
 {
     const uint_fast64_t loop = (atomic_load_explicit(&c->open, memory_order_relaxed) >> 32) + 1;
-    atomic_store_explicit(&c->one, one, memory_order_relaxed);
+    atomic_store_explicit(&c->run, run, memory_order_relaxed);
     atomic_store_explicit(&c->user, user, memory_order_relaxed);
-    atomic_store_explicit(&c->rounds, rounds, memory_order_relaxed);
-    atomic_store_explicit(&c->unfinished, rounds, memory_order_relaxed);
-    atomic_store(&c->open, loop << 32 | (uint_fast64_t)rounds);
+    atomic_store_explicit(&c->tasks, tasks, memory_order_relaxed);
+    atomic_store_explicit(&c->unfinished, tasks, memory_order_relaxed);
+    atomic_store(&c->open, loop << 32 | (uint_fast64_t)tasks);
     if (atomic_load(&c->asleep))
         wake(c);
 }
 
 static void await_helpers(drape_crew *c)
 {
-    for (int i = 0; i < CALLER_LOOKS; i++) {
+    for (int i = 0; i < CALLER_SPINS; i++) {
         if (!atomic_load(&c->unfinished))
             return;
         sched_yield();
@@ -190,15 +190,15 @@ static void await_helpers(drape_crew *c)
     pthread_mutex_unlock(&c->lock);
 }
 
-void drape_parallel(drape_crew *crew, int64_t rounds, drape_round *one, void *user)
+void drape_parallel(drape_crew *crew, int64_t tasks, drape_round *run, void *user)
 {
-    if (!crew || crew->helpers == 0 || rounds <= 1) {
-        for (int64_t k = 0; k < rounds; k++)
-            one(user, k);
+    if (!crew || crew->helpers == 0 || tasks <= 1) {
+        for (int64_t k = 0; k < tasks; k++)
+            run(user, k);
         return;
     }
-    assert(rounds <= INT32_MAX);
-    call_helpers(crew, rounds, one, user);
-    do_rounds(crew);
+    assert(tasks <= INT32_MAX);
+    call_helpers(crew, tasks, run, user);
+    run_tasks(crew);
     await_helpers(crew);
 }
