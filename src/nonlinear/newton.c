@@ -485,7 +485,7 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s)
         return DRAPE_OK;
     drape_status status =
         drape_sun_linear_create(arena, s->sun, drape_linears[(int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]],
-                                drape_system_pattern(system), drape_system_crew(system), &s->linear);
+                                drape_system_pattern(system), drape_system_pool(system), &s->linear);
     if (status)
         return status;
     s->linear->tolerance = s->values[DRAPE_NEWTON_LINEAR_TOLERANCE];
