@@ -39,9 +39,8 @@ struct drape_contact {
     bool begun;                      /* there was a step: */
     double *start;                   /* (points x 3) its beginning */
     drape_collider_pose *start_pose; /* (collider_count) */
-    double
-        *start_gaps; /* (node_count) least distance of a node from any smooth collider there, at most 0 [m] */
-    double start_least;   /* least gap of a feature of a collider there, at most 0 [m] */
+    double *start_gaps;   /* (node_count) least distance from the surfaces of colliders, at most 0 [m] */
+    double start_least;   /* least gap of a feature of a collider, at most 0 [m] */
     drape_lagged *lagged; /* (lagged_count of lagged_room) lagged friction */
     int32_t lagged_count, lagged_room;
 

@@ -264,7 +264,7 @@ static void evaluate(verlet_state *s, const substep *sub, double t, const double
         s->force, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal, .t = t, .span = {t, t}}, g);
     s->work.residual_seconds += drape_clock_seconds() - start;
     s->work.residuals++;
-    drape_verlet_rub(&s->contact, t, sub->x, v, g);
+    drape_verlet_friction(&s->contact, t, sub->x, v, g);
 }
 
 /* Adds the work of the dissipative forces at x, v and t over a share of the substep. */

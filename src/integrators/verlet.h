@@ -7,7 +7,7 @@
  *
  *     forces      springs, weight and drag; Boson: friction changes the force of nodes near a
  *                 surface                                                     verlet_force.c,
- *                 drape_verlet_rub
+ *                 drape_verlet_friction
  *     step        x' = x + c (x - x_before) + h^2 a, c = 1 - damping/100      verlet.c, form "position"
  *     self        CS184: points nearer than 2 thickness are pushed apart      drape_verlet_self_push
  *     colliders   CS184, Boson: nodes inside of one are put on its surface    drape_verlet_project
@@ -54,8 +54,8 @@ void drape_verlet_project(const drape_verlet_contact *contact, double t0, double
                           double *x);
 
 /* Boson: changes g, the negative force, of nodes under friction at time t. CS184: does nothing. */
-void drape_verlet_rub(const drape_verlet_contact *contact, double t, const double *x, const double *v,
-                      double *g);
+void drape_verlet_friction(const drape_verlet_contact *contact, double t, const double *x, const double *v,
+                           double *g);
 
 /* ---- Cloth against cloth: verlet_rules.c ---- */
 

@@ -56,42 +56,59 @@ static bool is_flat(const pose *p, const double *x)
     return sum == 0;
 }
 
-/* ---- CS184 ---- */
-
-static void surface_point(const pose *p, double offset, const double *y0, const double *x, double phi,
-                          const double *n, double *t)
-{
-    bool flat = is_flat(p, x);
-    double before = flat ? drape_collider_distance(p->collider, &p->at, y0, NULL, NULL) : 0;
-    for (int k = 0; k < 3; k++)
-        t[k] = before > 0 ? y0[k] + before / (before - phi) * (x[k] - y0[k]) : x[k] - phi * n[k];
-    if (flat)
-        vec3_add_scaled(offset, n, t);
-}
-
 static void project_cs184(const drape_verlet_contact *contact, const pose *p, const double *y0, double phi,
                           const double *n, double *x)
 {
-    double t[3], share = 1 - fmin(p->collider->friction, 1);
-    surface_point(p, contact->offset, y0, x, phi, n, t);
+    const bool flat = is_flat(p, x);
+    const double share = 1 - fmin(p->collider->friction, 1);
+    double t[3], before = flat ? drape_collider_distance(p->collider, &p->at, y0, NULL, NULL) : 0;
+    for (int k = 0; k < 3; k++)
+        t[k] = before > 0 ? y0[k] + before / (before - phi) * (x[k] - y0[k]) : x[k] - phi * n[k];
+    if (flat)
+        vec3_add_scaled(contact->offset, n, t);
     for (int k = 0; k < 3; k++)
         x[k] = y0[k] + share * (t[k] - y0[k]);
 }
 
-/* ---- Boson ---- */
-
-static void project_boson(const drape_verlet_contact *contact, const pose *p, const double *y0, double phi,
-                          const double *n, double *x)
+static void project_boson(const pose *p, const double *y0, double phi, const double *n, double *x)
 {
-    (void)contact;
     if (is_flat(p, x))
         memcpy(x, y0, 3 * sizeof *x);
     else
         vec3_add_scaled(-phi, n, x);
 }
 
-static void rub(const drape_verlet_contact *contact, const drape_collider *c, const double velocity[3],
-                const double *n, const double *v, double *g)
+static void project_on(const drape_verlet_contact *contact, const pose *p, const double *x0, double *x)
+{
+    const drape_model *m = contact->model;
+    for (int32_t f = 0; f < m->free_count; f++) {
+        size_t i = 3 * (size_t)m->node_of_free[f];
+        double n[3], y0[3], phi = drape_collider_distance(p->collider, &p->at, x + i, n, NULL);
+        if (!(phi <= 0))
+            continue;
+        for (size_t k = 0; k < 3; k++)
+            y0[k] = x0[i + k] + p->moved[k];
+        if (contact->rule == DRAPE_VERLET_CS184)
+            project_cs184(contact, p, y0, phi, n, x + i);
+        else
+            project_boson(p, y0, phi, n, x + i);
+    }
+}
+
+void drape_verlet_project(const drape_verlet_contact *contact, double t0, double t, const double *x0,
+                          double *x)
+{
+    for (int32_t c = 0; c < contact->model->collider_count; c++) {
+        pose p = {.collider = &contact->model->colliders[c], .at = pose_at(contact->motion, c, t)};
+        const drape_collider_pose before = pose_at(contact->motion, c, t0);
+        vec3_sub(p.at.displacement, before.displacement, p.moved);
+        project_on(contact, &p, x0, x);
+    }
+}
+
+/* Boson's friction on one node, whose negative force is g. */
+static void apply_friction(const drape_verlet_contact *contact, const drape_collider *c,
+                           const double velocity[3], const double *n, const double *v, double *g)
 {
     double press = vec3_dot(g, n), tangential[3], slip[3];
     if (!(press > 0))
@@ -104,59 +121,20 @@ static void rub(const drape_verlet_contact *contact, const drape_collider *c, co
         g[k] = contact->friction_drag * slip[k] - (force > 0 ? left / force * tangential[k] : 0);
 }
 
-static void rub_on(const drape_verlet_contact *contact, int32_t collider, double t, const double *x,
-                   const double *v, double *g)
+void drape_verlet_friction(const drape_verlet_contact *contact, double t, const double *x, const double *v,
+                           double *g)
 {
     const drape_model *m = contact->model;
-    const drape_collider *c = &m->colliders[collider];
-    const drape_collider_pose pose_now = pose_at(contact->motion, collider, t);
-    double n[3];
-    for (int32_t f = 0; f < m->free_count; f++) {
-        size_t i = 3 * (size_t)m->node_of_free[f];
-        if (drape_collider_distance(c, &pose_now, x + i, n, NULL) < contact->friction_range)
-            rub(contact, c, pose_now.velocity, n, v + i, g + i);
-    }
-}
-
-void drape_verlet_rub(const drape_verlet_contact *contact, double t, const double *x, const double *v,
-                      double *g)
-{
     if (contact->rule != DRAPE_VERLET_BOSON)
         return;
-    for (int32_t c = 0; c < contact->model->collider_count; c++)
-        rub_on(contact, c, t, x, v, g);
-}
-
-/* ---- Colliders, by either rule ---- */
-
-typedef void project_function(const drape_verlet_contact *contact, const pose *p, const double *y0,
-                              double phi, const double *n, double *x);
-
-static void project_on(const drape_verlet_contact *contact, const pose *p, const double *x0, double *x)
-{
-    static project_function *const rules[] = {
-        [DRAPE_VERLET_CS184] = project_cs184, [DRAPE_VERLET_BOSON] = project_boson};
-    const drape_model *m = contact->model;
-    for (int32_t f = 0; f < m->free_count; f++) {
-        size_t i = 3 * (size_t)m->node_of_free[f];
-        double n[3], y0[3], phi = drape_collider_distance(p->collider, &p->at, x + i, n, NULL);
-        if (!(phi <= 0))
-            continue;
-        for (size_t k = 0; k < 3; k++)
-            y0[k] = x0[i + k] + p->moved[k];
-        rules[contact->rule](contact, p, y0, phi, n, x + i);
-    }
-}
-
-void drape_verlet_project(const drape_verlet_contact *contact, double t0, double t, const double *x0,
-                          double *x)
-{
-    for (int32_t c = 0; c < contact->model->collider_count; c++) {
-        pose p = {.collider = &contact->model->colliders[c]};
-        const drape_collider_pose before = pose_at(contact->motion, c, t0);
-        p.at = pose_at(contact->motion, c, t);
-        vec3_sub(p.at.displacement, before.displacement, p.moved);
-        project_on(contact, &p, x0, x);
+    for (int32_t k = 0; k < m->collider_count; k++) {
+        const drape_collider_pose at = pose_at(contact->motion, k, t);
+        for (int32_t f = 0; f < m->free_count; f++) {
+            const size_t i = 3 * (size_t)m->node_of_free[f];
+            double n[3];
+            if (drape_collider_distance(&m->colliders[k], &at, x + i, n, NULL) < contact->friction_range)
+                apply_friction(contact, &m->colliders[k], at.velocity, n, v + i, g + i);
+        }
     }
 }
 

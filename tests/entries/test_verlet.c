@@ -294,7 +294,7 @@ START_TEST(friction_on_forces_as_in_boson)
     const double v[12] = {0.2, 0.1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     double g[12] = {-3, 8, 0, 0, 8, 0, -3, -8, 0, -3, 8, 0};
     const double expected[12] = {-1 + 0.1, 0.05, 0, 0, 0, 0, -3, -8, 0, -3, 8, 0};
-    drape_verlet_rub(&rule, 0, x, v, g);
+    drape_verlet_friction(&rule, 0, x, v, g);
     for (int i = 0; i < 12; i++)
         ck_assert_double_eq_tol(g[i], expected[i], 1e-15);
     drape_arena_free(&memory);
