@@ -492,7 +492,7 @@ drape_status drape_newton_create(drape_arena *arena, drape_system *system, const
     if (!status && s->n > 0)
         status =
             drape_sun_linear_create(arena, s->sun, drape_linears[(int)values[DRAPE_NEWTON_LINEAR_SOLVER]],
-                                    drape_system_pattern(system), drape_system_crew(s->system), &s->linear);
+                                    drape_system_pattern(system), drape_system_pool(s->system), &s->linear);
     if (!status && s->n > 0)
         s->linear->tolerance = values[DRAPE_NEWTON_LINEAR_TOLERANCE];
     if (!status && s->n > 0 && (s->ahead || s->trial)) {

@@ -1,10 +1,10 @@
 /*
- * crew.c: see crew.h. The number of open tasks and the number of the loop are in one atomic word. A thread
+ * thread_pool.c: see thread_pool.h. The number of open tasks and the number of the loop are in one atomic word. A thread
  * takes a task by decrementing it, if it is unchanged since it was read: so a thread that has read a loop
  * that is over takes no task of the next loop, which it would run with the function of the other. Which
  * thread runs a task is left to chance; what the task writes is not.
  */
-#include "base/crew.h"
+#include "base/thread_pool.h"
 
 #include <assert.h>
 #include <pthread.h>
@@ -22,13 +22,13 @@
 #define LEFT  0xffffffffu
 #define APART 64 /* bytes of a cache line: a write by one thread invalidates the line for all others */
 
-struct drape_crew {
+struct drape_pool {
     int threads, helpers;
     pthread_t *helper;    /* (threads - 1), of which helpers run */
     pthread_mutex_t lock; /* for going to sleep */
     pthread_cond_t work, done;
     /* The loop: written while it has no open task, and read by threads for which it may be over already. */
-    _Atomic(drape_round *) run;
+    _Atomic(drape_task *) run;
     _Atomic(void *) user;
     atomic_int_fast64_t tasks;
     char apart[APART];
@@ -39,19 +39,19 @@ struct drape_crew {
     atomic_bool waiting, ended;     /* waiting: the caller sleeps */
 };
 
-int drape_crew_threads(const drape_crew *crew)
+int drape_pool_threads(const drape_pool *pool)
 {
-    return crew ? crew->threads : 1;
+    return pool ? pool->threads : 1;
 }
 
 /* ---- Tasks ---- */
 
 /* Takes a task and runs it; false if none is open. */
-static bool run_task(drape_crew *c)
+static bool run_task(drape_pool *c)
 {
     uint_fast64_t open = atomic_load(&c->open);
     while (open & LEFT) {
-        drape_round *run = atomic_load_explicit(&c->run, memory_order_relaxed);
+        drape_task *run = atomic_load_explicit(&c->run, memory_order_relaxed);
         void *user = atomic_load_explicit(&c->user, memory_order_relaxed);
         const int64_t task = atomic_load_explicit(&c->tasks, memory_order_relaxed) - (int64_t)(open & LEFT);
         if (!atomic_compare_exchange_weak(&c->open, &open, open - 1))
@@ -63,7 +63,7 @@ static bool run_task(drape_crew *c)
 }
 
 /* Runs all it can take. They belong to one loop, which does not end before they are reported done. */
-static void run_tasks(drape_crew *c)
+static void run_tasks(drape_pool *c)
 {
     int64_t done = 0;
     while (run_task(c))
@@ -77,12 +77,12 @@ static void run_tasks(drape_crew *c)
 
 /* ---- Helpers ---- */
 
-static bool is_called(drape_crew *c)
+static bool is_called(drape_pool *c)
 {
     return atomic_load(&c->open) & LEFT || atomic_load(&c->ended);
 }
 
-static void await_call(drape_crew *c)
+static void await_call(drape_pool *c)
 {
     for (int i = 0; i < HELPER_SPINS; i++) {
         if (is_called(c))
@@ -97,9 +97,9 @@ static void await_call(drape_crew *c)
     pthread_mutex_unlock(&c->lock);
 }
 
-static void *help(void *crew)
+static void *help(void *pool)
 {
-    drape_crew *c = crew;
+    drape_pool *c = pool;
     while (!atomic_load(&c->ended)) {
         await_call(c);
         run_tasks(c);
@@ -108,7 +108,7 @@ static void *help(void *crew)
 }
 
 /* Helpers block all signals: these are for the host's threads. */
-static void start_helpers(drape_crew *c)
+static void start_helpers(drape_pool *c)
 {
     sigset_t all, before;
     sigfillset(&all);
@@ -118,12 +118,12 @@ static void start_helpers(drape_crew *c)
     pthread_sigmask(SIG_SETMASK, &before, NULL);
 }
 
-drape_status drape_crew_create(drape_arena *arena, int threads, drape_crew **out)
+drape_status drape_pool_create(drape_arena *arena, int threads, drape_pool **out)
 {
     *out = NULL;
     if (threads <= 1)
         return DRAPE_OK;
-    drape_crew *c = drape_arena_take(arena, 1, sizeof *c);
+    drape_pool *c = drape_arena_take(arena, 1, sizeof *c);
     pthread_t *helper = drape_arena_take(arena, (size_t)threads - 1, sizeof *helper);
     if (!c || !helper)
         return DRAPE_E_MEMORY;
@@ -137,16 +137,16 @@ drape_status drape_crew_create(drape_arena *arena, int threads, drape_crew **out
     return DRAPE_OK;
 }
 
-static void wake(drape_crew *c)
+static void wake(drape_pool *c)
 {
     pthread_mutex_lock(&c->lock);
     pthread_cond_broadcast(&c->work);
     pthread_mutex_unlock(&c->lock);
 }
 
-void drape_crew_destroy(drape_crew **crew)
+void drape_pool_destroy(drape_pool **pool)
 {
-    drape_crew *c = *crew;
+    drape_pool *c = *pool;
     if (!c)
         return;
     atomic_store(&c->ended, true);
@@ -156,14 +156,14 @@ void drape_crew_destroy(drape_crew **crew)
     pthread_cond_destroy(&c->work);
     pthread_cond_destroy(&c->done);
     pthread_mutex_destroy(&c->lock);
-    *crew = NULL;
+    *pool = NULL;
 }
 
 /* ---- The caller ---- */
 
 /* The loop is written before its tasks are open. `open` and `asleep` are both sequentially consistent: a
  * helper that goes to sleep has counted itself before it reads `open` for the last time. */
-static void call_helpers(drape_crew *c, int64_t tasks, drape_round *run, void *user)
+static void call_helpers(drape_pool *c, int64_t tasks, drape_task *run, void *user)
 {
     const uint_fast64_t loop = (atomic_load_explicit(&c->open, memory_order_relaxed) >> 32) + 1;
     atomic_store_explicit(&c->run, run, memory_order_relaxed);
@@ -175,7 +175,7 @@ static void call_helpers(drape_crew *c, int64_t tasks, drape_round *run, void *u
         wake(c);
 }
 
-static void await_helpers(drape_crew *c)
+static void await_helpers(drape_pool *c)
 {
     for (int i = 0; i < CALLER_SPINS; i++) {
         if (!atomic_load(&c->unfinished))
@@ -190,15 +190,15 @@ static void await_helpers(drape_crew *c)
     pthread_mutex_unlock(&c->lock);
 }
 
-void drape_parallel(drape_crew *crew, int64_t tasks, drape_round *run, void *user)
+void drape_parallel(drape_pool *pool, int64_t tasks, drape_task *run, void *user)
 {
-    if (!crew || crew->helpers == 0 || tasks <= 1) {
+    if (!pool || pool->helpers == 0 || tasks <= 1) {
         for (int64_t k = 0; k < tasks; k++)
             run(user, k);
         return;
     }
     assert(tasks <= INT32_MAX);
-    call_helpers(crew, tasks, run, user);
-    run_tasks(crew);
-    await_helpers(crew);
+    call_helpers(pool, tasks, run, user);
+    run_tasks(pool);
+    await_helpers(pool);
 }
