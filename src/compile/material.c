@@ -16,72 +16,31 @@ enum { MASS_AREA, MASS_UNIFORM };
 static const char *const mass_choices[] = {"area", "uniform", NULL};
 
 const drape_param drape_material_params[DRAPE_MATERIAL_PARAM_COUNT] = {
-    [DRAPE_MATERIAL_YOUNG_MODULUS] = {.name = "young_modulus",
-                                      .unit = "Pa",
-                                      .default_value = NAN,
-                                      .derived = "required without a fabric",
-                                      .min = 0,
-                                      .max = 1e15,
-                                      .open_min = true,
-                                      .help = "Young's modulus E of the sheet"},
-    [DRAPE_MATERIAL_POISSON_RATIO] = {.name = "poisson_ratio",
-                                      .unit = "1",
-                                      .default_value = 1.0 / 3.0,
-                                      .min = -1,
-                                      .max = 0.5,
-                                      .open_min = true,
-                                      .help =
-                                          "Poisson's ratio nu; stretch.edge has 1/3 whatever is said here"},
-    [DRAPE_MATERIAL_THICKNESS] = {.name = "thickness",
-                                  .unit = "m",
-                                  .default_value = NAN,
-                                  .derived = "required without a fabric",
-                                  .min = 0,
-                                  .max = 10,
-                                  .open_min = true,
-                                  .help = "thickness h of the sheet"},
-    [DRAPE_MATERIAL_DENSITY] = {.name = "density",
-                                .unit = "kg/m3",
-                                .default_value = NAN,
-                                .derived = "from areal_density or total_mass",
-                                .min = 0,
-                                .max = 1e9,
-                                .open_min = true,
-                                .help = "mass per volume; times thickness is the areal density"},
-    [DRAPE_MATERIAL_AREAL_DENSITY] = {.name = "areal_density",
-                                      .unit = "kg/m2",
-                                      .default_value = NAN,
-                                      .derived = "from density or total_mass",
-                                      .min = 0,
-                                      .max = 1e9,
-                                      .open_min = true,
-                                      .help = "mass per area, in place of density"},
-    [DRAPE_MATERIAL_TOTAL_MASS] = {.name = "total_mass",
-                                   .unit = "kg",
-                                   .default_value = NAN,
-                                   .derived = "from density or areal_density",
-                                   .min = 0,
-                                   .max = 1e12,
-                                   .open_min = true,
-                                   .help = "mass of the whole cloth, in place of density"},
+    [DRAPE_MATERIAL_YOUNG_MODULUS] =
+        DRAPE_NUMBER("young_modulus", "Pa", DRAPE_DERIVED("required without a fabric"), DRAPE_ABOVE(0), 1e15,
+                     "Young's modulus E of the sheet"),
+    [DRAPE_MATERIAL_POISSON_RATIO] =
+        DRAPE_NUMBER("poisson_ratio", "1", 1.0 / 3.0, DRAPE_ABOVE(-1), 0.5,
+                     "Poisson's ratio nu; stretch.edge has 1/3 whatever is said here"),
+    [DRAPE_MATERIAL_THICKNESS] = DRAPE_NUMBER("thickness", "m", DRAPE_DERIVED("required without a fabric"),
+                                              DRAPE_ABOVE(0), 10, "thickness h of the sheet"),
+    [DRAPE_MATERIAL_DENSITY] =
+        DRAPE_NUMBER("density", "kg/m3", DRAPE_DERIVED("from areal_density or total_mass"), DRAPE_ABOVE(0),
+                     1e9, "mass per volume; times thickness is the areal density"),
+    [DRAPE_MATERIAL_AREAL_DENSITY] =
+        DRAPE_NUMBER("areal_density", "kg/m2", DRAPE_DERIVED("from density or total_mass"), DRAPE_ABOVE(0),
+                     1e9, "mass per area, in place of density"),
+    [DRAPE_MATERIAL_TOTAL_MASS] =
+        DRAPE_NUMBER("total_mass", "kg", DRAPE_DERIVED("from density or areal_density"), DRAPE_ABOVE(0), 1e12,
+                     "mass of the whole cloth, in place of density"),
     [DRAPE_MATERIAL_MASS] =
-        {.name = "mass",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = MASS_AREA,
-         .choices = mass_choices,
-         .help = "area: lumped, a third of each triangle to each node; uniform: the same on every node"},
+        DRAPE_CHOICE("mass", MASS_AREA, mass_choices,
+                     "area: lumped, a third of each triangle to each node; uniform: the same on every node"),
     [DRAPE_MATERIAL_FABRIC] =
-        {.name = "fabric",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = 0,
-         .choices = drape_fabric_names,
-         .help =
-             "a measured one (`drape list fabrics`): its areal density where none is given; its bending is "
-             "that of bend.midedge, and without young_modulus and thickness its tension and shear are those "
-             "of "
-             "stretch.cst"},
+        DRAPE_CHOICE("fabric", 0, drape_fabric_names,
+                     "a measured one (`drape list fabrics`): its areal density where none is given; its "
+                     "bending is that of bend.midedge, and without young_modulus and thickness its tension "
+                     "and shear are those of stretch.cst"),
 };
 
 static double total_area(const drape_mesh *mesh)

@@ -26,42 +26,15 @@
 enum { PARAM_DT, PARAM_ITERATIONS, PARAM_TOLERANCE, PARAM_EXTRAPOLATION, PARAM_ACCELERATION, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_DT] = {.name = "dt",
-                  .unit = "s",
-                  .default_value = 1.0 / 60,
-                  .min = 0,
-                  .max = 1e6,
-                  .open_min = true,
-                  .help = "nominal step"},
-    [PARAM_ITERATIONS] = {.name = "iterations",
-                          .kind = DRAPE_PARAM_INTEGER,
-                          .unit = "1",
-                          .default_value = 10,
-                          .min = 1,
-                          .max = 1000,
-                          .help = "of the fixed point, a step"},
-    [PARAM_TOLERANCE] = {.name = "tolerance",
-                         .unit = "N",
-                         .default_value = 1e-6,
-                         .min = 0,
-                         .max = 1e12,
-                         .open_min = true,
-                         .help =
-                             "residual of the free nodes, largest component, that ends the iteration; not a "
-                             "bound on an accepted state"},
-    [PARAM_EXTRAPOLATION] = {.name = "extrapolation",
-                             .unit = "1",
-                             .default_value = 0.5,
-                             .min = 0,
-                             .max = 1,
-                             .help = "share of the last change of velocity that the guess takes along"},
-    [PARAM_ACCELERATION] = {.name = "acceleration",
-                            .kind = DRAPE_PARAM_INTEGER,
-                            .unit = "1",
-                            .default_value = 5,
-                            .min = 0,
-                            .max = 20,
-                            .help = "iterates that Anderson acceleration combines; 0: none"},
+    [PARAM_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),
+    [PARAM_ITERATIONS] = DRAPE_INTEGER("iterations", "1", 10, 1, 1000, "of the fixed point, a step"),
+    [PARAM_TOLERANCE] = DRAPE_NUMBER("tolerance", "N", 1e-6, DRAPE_ABOVE(0), 1e12,
+                                     "residual of the free nodes, largest component, that ends the "
+                                     "iteration; not a bound on an accepted state"),
+    [PARAM_EXTRAPOLATION] = DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
+                                         "share of the last change of velocity that the guess takes along"),
+    [PARAM_ACCELERATION] =
+        DRAPE_INTEGER("acceleration", "1", 5, 0, 20, "iterates that Anderson acceleration combines; 0: none"),
 };
 
 #define ORDER_AMD 0
