@@ -119,40 +119,40 @@ static json_t *all_or_none(json_t *object, const char *const *names)
     return with(object, "dependentRequired", dependents);
 }
 
-/* ---- Parameters of rows ---- */
+/* ---- Parameters and keys ---- */
 
-static bool is_required(const drape_param *p)
+static json_t *three(const double *values)
 {
-    return isnan(p->default_value) && !p->derived;
+    return and_also(and_also(and_also(json_array(), number(values[0])), number(values[1])),
+                    number(values[2]));
 }
 
-static json_t *three(double value)
-{
-    return and_also(and_also(and_also(json_array(), number(value)), number(value)), number(value));
-}
-
-static json_t *default_of(const drape_param *p)
+static json_t *default_of(const drape_param *p, const double *values)
 {
     switch (p->kind) {
     case DRAPE_PARAM_BOOLEAN:
-        return json_boolean(p->default_value != 0);
+        return json_boolean(*values != 0);
     case DRAPE_PARAM_CHOICE:
-        return json_string(p->choices[(int)p->default_value]);
+        return json_string(p->choices[(int)*values]);
     case DRAPE_PARAM_VECTOR:
     case DRAPE_PARAM_TURN:
-        return three(p->default_value);
+        return three(values);
+    case DRAPE_PARAM_TEXT:
+        return json_string(p->derived);
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
-    case DRAPE_PARAM_TEXT: /* always required */
         break;
     }
-    return number(p->default_value);
+    return number(*values);
 }
 
 static json_t *bounded(const char *type, const drape_param *p)
 {
-    json_t *value = with(typed(type), p->open_min ? "exclusiveMinimum" : "minimum", number(p->min));
-    return with(value, p->open_max ? "exclusiveMaximum" : "maximum", number(p->max));
+    json_t *value = typed(type);
+    if (isfinite(p->min))
+        value = with(value, p->open_min ? "exclusiveMinimum" : "minimum", number(p->min));
+    return isfinite(p->max) ? with(value, p->open_max ? "exclusiveMaximum" : "maximum", number(p->max))
+                            : value;
 }
 
 static json_t *vector_of(const drape_param *p)
@@ -192,8 +192,10 @@ static json_t *described(json_t *value, const char *help, const char *unit)
 
 static json_t *param(const drape_param *p)
 {
+    double values[DRAPE_PARAM_WIDEST];
     json_t *value = described(value_of(p), p->help, p->unit);
-    return isnan(p->default_value) ? value : with(value, "default", default_of(p));
+    drape_param_default(p, values);
+    return isnan(*values) ? value : with(value, "default", default_of(p, values));
 }
 
 /* A parameter of several rows with different bounds must be right for each of them, as the reader has it. */
@@ -220,7 +222,7 @@ static json_t *with_params(json_t *properties, const cli_row *row)
 static bool needs_params(const cli_row *row)
 {
     for (int i = 0; i < row->param_count; i++)
-        if (is_required(&row->params[i]))
+        if (drape_param_is_required(&row->params[i]))
             return true;
     return false;
 }
@@ -228,7 +230,7 @@ static bool needs_params(const cli_row *row)
 static json_t *with_required(json_t *required, const cli_row *row)
 {
     for (int i = 0; i < row->param_count; i++)
-        if (is_required(&row->params[i]))
+        if (drape_param_is_required(&row->params[i]))
             required = and_also(required, json_string(row->params[i].name));
     return required;
 }
@@ -279,25 +281,20 @@ static const struct opening *opening_of(const drape_scene_object *object)
     return NULL;
 }
 
-/* Words that name rows. */
-static json_t *words_of(const drape_scene_object *object, const drape_scene_key *key)
+/* Texts that name entries of a table. */
+static json_t *names_of(const drape_scene_object *object, const drape_scene_key *key)
 {
     const struct opening *opening = object->open ? opening_of(object) : NULL;
-    if (opening && opening->key && strcmp(opening->key, key->name) == 0)
+    if (opening && opening->key && strcmp(opening->key, key->param.name) == 0)
         return row_names(opening->table, false);
-    if (strcmp(object->name, "output") == 0 && strcmp(key->name, "formats") == 0)
+    if (object == &drape_form_output && key->param.kind == DRAPE_PARAM_TEXT)
         return row_names(&cli_exporters, false);
-    return key->words ? one_of_words(key->words) : word();
+    return value_of(&key->param);
 }
 
 /* ---- Keys ---- */
 
 static json_t *object_schema(const drape_scene_object *object);
-
-static json_t *ranged(const drape_scene_key *key, const char *type, const char *least)
-{
-    return with(with(typed(type), least, number(key->min)), "maximum", number(key->max));
-}
 
 static json_t *row_or_name(const drape_scene_key *key)
 {
@@ -306,55 +303,53 @@ static json_t *row_or_name(const drape_scene_key *key)
 
 static json_t *key_value(const drape_scene_object *object, const drape_scene_key *key)
 {
-    switch (key->kind) {
+    switch (key->shape) {
+    case DRAPE_SCENE_VALUE:
+        return names_of(object, key);
+    case DRAPE_SCENE_LIST:
+        return array_of(names_of(object, key), key->at_least, key->at_most);
     case DRAPE_SCENE_VERSION:
         return with(json_object(), "const", json_integer(DRAPE_SCENE_FORM));
-    case DRAPE_SCENE_TEXT:
+    case DRAPE_SCENE_REMARK:
         return typed("string");
-    case DRAPE_SCENE_WORD:
-        return words_of(object, key);
-    case DRAPE_SCENE_WORDS:
-        return array_of(words_of(object, key), key->at_least, 0);
-    case DRAPE_SCENE_BOOLEAN:
-        return typed("boolean");
-    case DRAPE_SCENE_NUMBER:
-        return ranged(key, "number", key->closed ? "minimum" : "exclusiveMinimum");
-    case DRAPE_SCENE_INTEGER:
-        return ranged(key, "integer", "minimum");
-    case DRAPE_SCENE_INTEGERS:
-        return array_of(ranged(key, "integer", "minimum"), key->at_least, 0);
-    case DRAPE_SCENE_VECTOR:
-        return numbers(3, 3);
-    case DRAPE_SCENE_SCALE:
-        return any_of(typed("number"), numbers(3, 3));
-    case DRAPE_SCENE_ROTATION:
-        return numbers(3, 4);
     case DRAPE_SCENE_BOX:
         return array_of(numbers(3, 3), 2, 2);
     case DRAPE_SCENE_TRACK: {
         json_t *pair = and_also(and_also(json_array(), typed("number")), numbers(3, 3));
         json_t *item = with(with(typed("array"), "prefixItems", pair), "minItems", json_integer(2));
-        return array_of(with(item, "maxItems", json_integer(2)), key->at_least, 0);
+        return array_of(with(item, "maxItems", json_integer(2)), key->at_least, key->at_most);
     }
     case DRAPE_SCENE_OBJECT:
         return object_schema(key->child);
     case DRAPE_SCENE_OBJECTS:
-        return array_of(object_schema(key->child), key->at_least, 0);
-    case DRAPE_SCENE_ROWS:
-        return array_of(row_or_name(key), key->at_least, 0);
+        return array_of(object_schema(key->child), key->at_least, key->at_most);
+    case DRAPE_SCENE_ENTRIES:
+        return array_of(row_or_name(key), key->at_least, key->at_most);
     }
     return NULL;
+}
+
+static json_t *key_schema(const drape_scene_object *object, const drape_scene_key *key)
+{
+    double values[DRAPE_PARAM_WIDEST];
+    json_t *schema = described(key_value(object, key), key->param.help, key->param.unit);
+    drape_param_default(&key->param, values);
+    if (isnan(*values) && !key->literal)
+        return schema;
+    json_t *value = default_of(&key->param, key->vector ? key->vector : values);
+    return with(schema, "default", key->shape == DRAPE_SCENE_LIST ? and_also(json_array(), value) : value);
 }
 
 /* An object that itself may be left out cannot be left out if something in it is required. */
 static bool key_is_required(const drape_scene_key *key)
 {
-    const struct opening *opening = key->kind == DRAPE_SCENE_OBJECT ? opening_of(key->child) : NULL;
+    const struct opening *opening = key->shape == DRAPE_SCENE_OBJECT ? opening_of(key->child) : NULL;
     cli_row row;
     if (key->optional)
         return false;
-    return key->required || (opening && !opening->key && opening->table->row(0, &row) &&
-                             (needs_params(&row) || opening->all_of));
+    return drape_param_is_required(&key->param) ||
+           (opening && !opening->key && opening->table->row(0, &row) &&
+            (needs_params(&row) || opening->all_of));
 }
 
 /* ---- Objects ---- */
@@ -373,8 +368,8 @@ static json_t *properties_of(const drape_scene_object *object, const char *chose
     json_t *properties = json_object();
     for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
-        if (!is_excluded(object, key->name, chosen))
-            properties = with(properties, key->name, described(key_value(object, key), key->help, key->unit));
+        if (!is_excluded(object, key->param.name, chosen))
+            properties = with(properties, key->param.name, key_schema(object, key));
     }
     return properties;
 }
@@ -384,7 +379,7 @@ static json_t *required_of(const drape_scene_object *object)
     json_t *required = json_array();
     for (size_t i = 0; i < object->key_count; i++)
         if (key_is_required(&object->keys[i]))
-            required = and_also(required, json_string(object->keys[i].name));
+            required = and_also(required, json_string(object->keys[i].param.name));
     return required;
 }
 
@@ -478,7 +473,7 @@ json_t *cli_schema(void)
     json_t *schema = json_object();
     schema = with(schema, "$schema", json_string("https://json-schema.org/draft/2020-12/schema"));
     schema = with(schema, "title", json_string("A scene of Drape"));
-    json_t *form = object_schema(&drape_scene_form);
+    json_t *form = object_schema(&drape_form_scene);
     if (form && schema)
         json_object_update(schema, form);
     else

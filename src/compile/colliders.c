@@ -5,8 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_NAMES     128
-#define MOST_FRICTION 1e3
+#define MAX_NAMES 128
 
 /* How far a polygon may stay inside a curved surface, of the activation distance: an edge of the cloth that
  * rests on a polygon then is pushed off nearly as if it were the surface. */
@@ -58,18 +57,6 @@ static drape_status name_collider(drape_model *model, const char *pointer, const
     return to->name ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-static drape_status take_friction(drape_model *model, const char *pointer, double friction,
-                                  drape_collider *to)
-{
-    char at[96];
-    snprintf(at, sizeof at, "%s/friction", pointer);
-    to->friction = friction;
-    if (friction >= 0 && friction <= MOST_FRICTION)
-        return DRAPE_OK;
-    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%.10g is not allowed; it is in [0, %g]", friction,
-                         MOST_FRICTION);
-}
-
 static drape_status compile_collider(drape_model *model, size_t i, const drape_scene_def *scene)
 {
     const drape_collider_def *def = &scene->colliders[i];
@@ -77,10 +64,9 @@ static drape_status compile_collider(drape_model *model, size_t i, const drape_s
     char pointer[64];
     snprintf(pointer, sizeof pointer, "/colliders/%zu", i);
     drape_status status = name_collider(model, pointer, def->name, to);
+    to->friction = def->friction;
     if (!status)
         status = find_row(model->ctx, pointer, def->row.type, &to->ops);
-    if (!status)
-        status = take_friction(model, pointer, def->friction, to);
     if (!status)
         status = drape_compile_choice(model, &def->row, "", &to->choice);
     if (!status && def->key_count > 0)

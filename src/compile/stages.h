@@ -13,9 +13,6 @@ drape_status drape_compile_check_def(drape_context *ctx, const drape_scene_def *
 drape_status drape_compile_material(drape_model *model, const char *pointer, const drape_cloth_def *def,
                                     drape_cloth *cloth);
 
-#define DRAPE_MOST_CLOTHS    (1 << 20)
-#define DRAPE_MOST_COLLIDERS 4096
-
 /* Marks the pinned nodes of all cloths, numbers the free ones, keeps the tracks. */
 drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def);
 

@@ -983,13 +983,14 @@ START_TEST(a_collider_in_memory_is_the_same_as_in_a_file)
 
     def.friction = -1;
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
-    check_message(ctx, "/colliders/0/friction: -1 is not allowed; it is in [0, 1000]");
+    check_message(ctx, "/colliders/0/friction: -1 is not allowed; friction is a number in [0, 1000]");
     def.friction = NAN;
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
     def.friction = 0;
     s.scene.collider_count = 4097;
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
-    check_message(ctx, "/colliders: the scene has 4097 colliders; it has at most 4096");
+    check_message(
+        ctx, "/colliders: an array of 4097 is not allowed; colliders is an array of objects, at most 4096");
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -999,7 +1000,8 @@ START_TEST(a_collider_of_the_host_works)
     static const struct {
         const char *scene, *says;
     } cases[] = {
-        {WITH_COLLIDERS("{'type': 'host.blob'}"), "/colliders/0: \"size\" is missing: its radius, [0, 2] m"},
+        {WITH_COLLIDERS("{'type': 'host.blob'}"),
+         "/colliders/0: \"size\" is missing: its radius; a number in [0, 2] m"},
         {WITH_COLLIDERS("{'type': 'host.blob', 'size': 2}"), "/colliders/0/size: 2 m is not?to its taste"},
         {WITH_COLLIDERS("{'type': 'host.blob', 'size': 1}"),
          "/colliders/0: the shape announced 1 points, 0 segments, 0 triangles, or twice"},

@@ -186,11 +186,11 @@ START_TEST(test_transforms)
     check_vector(mesh->rotate, 0, 1, 0);
     ck_assert_double_eq(mesh->rotate[3], 90);
     check_vector(mesh->scale, 2, 2, 2);
-    ck_assert_int_eq(read_quoted(TRANSFORMED("'rotate': [0, -30, 40], 'scale': [1, -2, 1e-3]")), 0);
+    ck_assert_int_eq(read_quoted(TRANSFORMED("'rotate': [0, -30, 40], 'scale': [1, 2, 1e-3]")), 0);
     mesh = &def.cloths[0].mesh;
     check_vector(mesh->rotate, 0, -30, 40);
     ck_assert_double_eq(mesh->rotate[3], 50);
-    check_vector(mesh->scale, 1, -2, 1e-3);
+    check_vector(mesh->scale, 1, 2, 1e-3);
     ck_assert_int_eq(read_quoted(TRANSFORMED("'rotate': [0, 0, 0]")), 0);
     ck_assert_double_eq(def.cloths[0].mesh.rotate[3], 0);
     close_context();
@@ -414,12 +414,12 @@ static const struct {
     {"{'drape': 2, 'newer': 1}", "s.json:1:2: /drape: a scene of version 2; this library reads version 1"},
     {"{'drape': '1'}", "s.json:1:2: /drape: \"1\" is not allowed; drape is the number 1"},
     {"{'drape': null}", "s.json:1:2: /drape: null is not allowed; drape is the number 1"},
-    {"{'drape': 1}",
-     "s.json:1:1: /cloth: \"cloth\" is missing: the pieces of cloth; an array of objects, at least one"},
-    {"{'drape': 1, 'cloth': []}",
-     "s.json:1:14: /cloth: an empty array is not allowed; cloth is an array of objects, at least one"},
-    {"{'drape': 1, 'cloth': {}}",
-     "s.json:1:14: /cloth: an object is not allowed; cloth is an array of objects, at least one"},
+    {"{'drape': 1}", "s.json:1:1: /cloth: \"cloth\" is missing: the pieces of cloth; an array of objects, at "
+                     "least one, at most 1048576"},
+    {"{'drape': 1, 'cloth': []}", "s.json:1:14: /cloth: an empty array is not allowed; cloth is an array of "
+                                  "objects, at least one, at most 1048576"},
+    {"{'drape': 1, 'cloth': {}}", "s.json:1:14: /cloth: an object is not allowed; cloth is an array of "
+                                  "objects, at least one, at most 1048576"},
     {"{'drape': 1, 'cloth': [{'mesh': {'grid': 'g'}}]}",
      "s.json:1:1: /duration: \"duration\" is missing: the simulated time; a number in (0, 1000000000] s"},
     {"{'drape': 1, 'cloth': [1]}", "s.json:1:24: /cloth/0: 1 is not allowed; an element is an object"},
@@ -427,7 +427,8 @@ static const struct {
      "s.json:1:24: /cloth/0/mesh: \"mesh\" is missing: a grid or a file; an object"},
     {"{'drape': 1, 'durration': 1}",
      "s.json:1:14: /durration: unknown key \"durration\"; did you mean \"duration\"?"},
-    {ROOT("'colliders': 3"), "s.json:2:1: /colliders: 3 is not allowed; colliders is an array of objects"},
+    {ROOT("'colliders': 3"),
+     "s.json:2:1: /colliders: 3 is not allowed; colliders is an array of objects, at most 4096"},
     {ROOT("'colliders': ['plane']"),
      "s.json:2:15: /colliders/0: \"plane\" is not allowed; an element is an object"},
     {ROOT("'colliders': [{}]"), "s.json:2:15: /colliders/0/type: \"type\" is missing: a row of the "
@@ -460,10 +461,10 @@ static const struct {
      "s.json:1:1: /é?: unknown key \"é?\"; known: drape, description, cloth, "
      "gravity, colliders, self_contact, contact, integrator, controller, duration, frame_rate, output"},
     {ROOT("'description': 1"), "s.json:2:1: /description: 1 is not allowed; description is a string"},
-    {ROOT("'gravity': 9.81"),
-     "s.json:2:1: /gravity: 9.81 is not allowed; gravity is three numbers, [x, y, z], in m/s2"},
-    {ROOT("'gravity': [0, -9.81]"),
-     "s.json:2:1: /gravity: an array of 2 is not allowed; gravity is three numbers, [x, y, z], in m/s2"},
+    {ROOT("'gravity': 9.81"), "s.json:2:1: /gravity: 9.81 is not allowed; gravity is [x, y, z], each in "
+                              "[-1000000000, 1000000000] m/s2"},
+    {ROOT("'gravity': [0, -9.81]"), "s.json:2:1: /gravity: an array of 2 is not allowed; gravity is [x, y, "
+                                    "z], each in [-1000000000, 1000000000] m/s2"},
     {ROOT("'gravity': [0, '-9.81', 0]"),
      "s.json:2:16: /gravity/1: \"-9.81\" is not allowed; an element is a number"},
     {ROOT("'integrator': 'be'"), "s.json:2:1: /integrator: \"be\" is not allowed; integrator is an object"},
@@ -489,14 +490,14 @@ static const struct {
     {ROOT("'frame_rate': 0"),
      "s.json:2:1: /frame_rate: 0 is not allowed; frame_rate is a number in (0, 1000000] 1/s"},
     {ROOT("'frame_rate': 1e7"),
-     "s.json:2:1: /frame_rate: 1e+07 is not allowed; frame_rate is a number in (0, 1000000] 1/s"},
+     "s.json:2:1: /frame_rate: 10000000 is not allowed; frame_rate is a number in (0, 1000000] 1/s"},
     {ROOT("'frame_rate': true"),
      "s.json:2:1: /frame_rate: true is not allowed; frame_rate is a number in (0, 1000000] 1/s"},
     {ROOT("'output': ['npy']"), "s.json:2:1: /output: an array of 1 is not allowed; output is an object"},
     {ROOT("'output': {'format': ['npy']}"),
      "s.json:2:12: /output/format: unknown key \"format\"; did you mean \"formats\"?"},
     {ROOT("'output': {'formats': 'npy'}"),
-     "s.json:2:12: /output/formats: \"npy\" is not allowed; formats is an array of strings, none empty"},
+     "s.json:2:12: /output/formats: \"npy\" is not allowed; formats is an array, each a string, not empty"},
     {ROOT("'output': {'formats': ['npy', '']}"),
      "s.json:2:31: /output/formats/1: \"\" is not allowed; an element is a string, not empty"},
     {ROOT("'output': {'formats': [1]}"),
@@ -524,7 +525,7 @@ static const struct {
      "s.json:2:34: /cloth/0/terms/0/stiffness: null is not allowed; a setting is a number, true, false, a "
      "string or an array of numbers"},
     {CLOTH("'velocity': [1, 2, 3, 4]"), "s.json:2:1: /cloth/0/velocity: an array of 4 is not allowed; "
-                                        "velocity is three numbers, [x, y, z], in m/s"},
+                                        "velocity is [x, y, z], each in [-1000000000, 1000000000] m/s"},
     {CLOTH("'velocity': [null, 2, 3]"),
      "s.json:2:14: /cloth/0/velocity/0: null is not allowed; an element is a number"},
     {CLOTH("'pins': []}, {'name': 'cloth0', 'mesh': {'grid': 'g'}"),
@@ -553,24 +554,24 @@ static const struct {
      "s.json:2:29: /cloth/0/mesh/transform/translation: unknown key \"translation\"; did you mean "
      "\"translate\"?"},
     {MESH("{'grid': 'g', 'transform': {'translate': 1}}"),
-     "s.json:2:29: /cloth/0/mesh/transform/translate: 1 is not allowed; translate is three numbers, [x, y, "
-     "z], in m"},
+     "s.json:2:29: /cloth/0/mesh/transform/translate: 1 is not allowed; translate is [x, y, z], each in "
+     "(-inf, inf) m"},
     {MESH("{'grid': 'g', 'transform': {'rotate': 90}}"),
-     "s.json:2:29: /cloth/0/mesh/transform/rotate: 90 is not allowed; rotate is axis and angle, [x, y, z, "
-     "angle], or a rotation vector, [x, y, z], in degrees"},
+     "s.json:2:29: /cloth/0/mesh/transform/rotate: 90 is not allowed; rotate is [x, y, z, angle], or [x, y, "
+     "z] as long as the angle, which is in (-inf, inf) degrees"},
     {MESH("{'grid': 'g', 'transform': {'rotate': [0, 90]}}"),
-     "s.json:2:29: /cloth/0/mesh/transform/rotate: an array of 2 is not allowed; rotate is axis and angle, "
-     "[x, y, z, angle], or a rotation vector, [x, y, z], in degrees"},
+     "s.json:2:29: /cloth/0/mesh/transform/rotate: an array of 2 is not allowed; rotate is [x, y, z, angle], "
+     "or [x, y, z] as long as the angle, which is in (-inf, inf) degrees"},
     {MESH("{'grid': 'g', 'transform': {'rotate': [0, 1, 0, '90']}}"),
      "s.json:2:49: /cloth/0/mesh/transform/rotate/3: \"90\" is not allowed; an element is a number"},
     {MESH("{'grid': 'g', 'transform': {'rotate': [1e308, 1e308, 1e308]}}"),
      "s.json:2:29: /cloth/0/mesh/transform/rotate: the rotation vector is too long"},
     {MESH("{'grid': 'g', 'transform': {'scale': '2'}}"),
-     "s.json:2:29: /cloth/0/mesh/transform/scale: \"2\" is not allowed; scale is a number, or three, [x, y, "
-     "z]"},
+     "s.json:2:29: /cloth/0/mesh/transform/scale: \"2\" is not allowed; scale is a number or [x, y, z], each "
+     "in (0, inf)"},
     {MESH("{'grid': 'g', 'transform': {'scale': [1, 2]}}"),
-     "s.json:2:29: /cloth/0/mesh/transform/scale: an array of 2 is not allowed; scale is a number, or three, "
-     "[x, y, z]"},
+     "s.json:2:29: /cloth/0/mesh/transform/scale: an array of 2 is not allowed; scale is a number or [x, y, "
+     "z], each in (0, inf)"},
     /* pins */
     {CLOTH("'pins': {}"), "s.json:2:1: /cloth/0/pins: an object is not allowed; pins is an array of objects"},
     {CLOTH("'pins': ['top']"),
@@ -582,9 +583,9 @@ static const struct {
     {CLOTH("'pins': [{'row': 0, 'nodes': [1]}]"), "s.json:2:10: /cloth/0/pins/0: exactly one of nodes, "
                                                   "corner, edge, row, box is needed; given: nodes, row"},
     {CLOTH("'pins': [{'nodes': 1}]"), "s.json:2:11: /cloth/0/pins/0/nodes: 1 is not allowed; nodes is an "
-                                      "array of integers in [0, 2147483647], at least one"},
+                                      "array, each an integer in [0, 2147483647], at least one"},
     {CLOTH("'pins': [{'nodes': []}]"), "s.json:2:11: /cloth/0/pins/0/nodes: an empty array is not allowed; "
-                                       "nodes is an array of integers in [0, 2147483647], at least one"},
+                                       "nodes is an array, each an integer in [0, 2147483647], at least one"},
     {CLOTH("'pins': [{'nodes': [0, 1.5]}]"),
      "s.json:2:24: /cloth/0/pins/0/nodes/1: 1.5 is not allowed; an element is an integer in [0, 2147483647]"},
     {CLOTH("'pins': [{'nodes': [0, 2147483648]}]"), "s.json:2:24: /cloth/0/pins/0/nodes/1: 2147483648 is not "
@@ -601,10 +602,10 @@ static const struct {
      "s.json:2:11: /cloth/0/pins/0/row: \"0\" is not allowed; row is an integer in [0, 2147483647]"},
     {CLOTH("'pins': [{'row': 99999999999999999999}]"),
      "s.json:2:11: /cloth/0/pins/0/row: 1e+20 is not allowed; row is an integer in [0, 2147483647]"},
-    {CLOTH("'pins': [{'corner': 0}]"),
-     "s.json:2:11: /cloth/0/pins/0/corner: 0 is not allowed; corner is a string, not empty"},
-    {CLOTH("'pins': [{'edge': ['top']}]"),
-     "s.json:2:11: /cloth/0/pins/0/edge: an array of 1 is not allowed; edge is a string, not empty"},
+    {CLOTH("'pins': [{'corner': 0}]"), "s.json:2:11: /cloth/0/pins/0/corner: 0 is not allowed; corner is one "
+                                       "of: top-left, top-right, bottom-left, bottom-right"},
+    {CLOTH("'pins': [{'edge': ['top']}]"), "s.json:2:11: /cloth/0/pins/0/edge: an array of 1 is not allowed; "
+                                           "edge is one of: top, bottom, left, right"},
     {CLOTH("'pins': [{'box': [0, 1]}]"),
      "s.json:2:19: /cloth/0/pins/0/box/0: 0 is not allowed; a corner is three numbers, [x, y, z]"},
     {CLOTH("'pins': [{'box': [[0, 0, 0]]}]"), "s.json:2:11: /cloth/0/pins/0/box: an array of 1 is not "
@@ -812,16 +813,16 @@ static const struct {
     {"/duration", "+-1",
      "--set /duration=+-1: /duration: \"+-1\" is not allowed; duration is a number in (0, 1000000000] s"},
     {"/gravity", "[0, 0]",
-     "--set /gravity=[0, 0]: /gravity: an array of 2 is not allowed; gravity is three "
-     "numbers, [x, y, z], in m/s2"},
+     "--set /gravity=[0, 0]: /gravity: an array of 2 is not allowed; gravity is [x, y, z], each in "
+     "[-1000000000, 1000000000] m/s2"},
     {"/gravity", "[0, 0",
-     "--set /gravity=[0, 0: /gravity: \"[0, 0\" is not allowed; gravity is three numbers, "
-     "[x, y, z], in m/s2"},
+     "--set /gravity=[0, 0: /gravity: \"[0, 0\" is not allowed; gravity is [x, y, z], each in [-1000000000, "
+     "1000000000] m/s2"},
     {"/gravity/1", "down",
      "--set /gravity/1=down: /gravity/1: \"down\" is not allowed; an element is a number"},
     {"/gravity/-", "1",
-     "s.json:12:3: /gravity: an array of 4 is not allowed; gravity is three numbers, "
-     "[x, y, z], in m/s2"},
+     "s.json:12:3: /gravity: an array of 4 is not allowed; gravity is [x, y, z], each in [-1000000000, "
+     "1000000000] m/s2"},
     {"/cloth/0/pins/-", "{'edge': 'top',\n'row': 0}",
      "--set /cloth/0/pins/-={\"edge\": \"top\", \"row\": 0}: /cloth/0/pins/3: exactly one of nodes, corner, "
      "edge, "
@@ -1178,19 +1179,20 @@ static void check_form(const drape_scene_object *object)
     ck_assert_uint_le(object->key_count, 16);
     for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
-        ck_assert_msg(key->help && *key->help, "%s has no help", key->name);
-        ck_assert_msg((key->kind >= DRAPE_SCENE_OBJECT) == (key->child != NULL), "%s: child", key->name);
+        ck_assert_msg(key->param.help && *key->param.help, "%s has no help", key->param.name);
+        ck_assert_msg((key->shape >= DRAPE_SCENE_OBJECT) == (key->child != NULL), "%s: child",
+                      key->param.name);
         if (key->child)
             check_form(key->child);
-        if (key->kind == DRAPE_SCENE_ROWS)
-            ck_assert_str_eq(key->child->keys[0].name, "type");
+        if (key->shape == DRAPE_SCENE_ENTRIES)
+            ck_assert_str_eq(key->child->keys[0].param.name, "type");
     }
 }
 
 START_TEST(test_form)
 {
-    check_form(&drape_scene_form);
-    ck_assert_str_eq(drape_scene_form.keys[0].name, "drape");
+    check_form(&drape_form_scene);
+    ck_assert_str_eq(drape_form_scene.keys[0].param.name, "drape");
 }
 END_TEST
 
