@@ -146,7 +146,9 @@ static drape_status gather(const cli_scene *in, cli_info *info)
         info->cloths[c] = cloth_info(model, &model->cloths[c]);
     for (int32_t c = 0; c < model->collider_count; c++)
         info->colliders[c] = collider_info(in->sim, &model->colliders[c]);
-    drape_status status = drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
+    drape_status status = drape_scene_to_def(in->scene, &info->def);
+    if (!status)
+        status = drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
     const drape_integrator_ops *integrator = in->sim->chosen.integrator;
     info->has_limit = integrator->stability;
     if (!status && info->has_limit)

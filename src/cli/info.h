@@ -6,6 +6,7 @@
 #include "cli/cli.h"
 #include "compile/compile.h"
 #include "mesh/mesh.h"
+#include "model/scene.h"
 #include "sim/profile.h"
 
 #include <jansson.h>
@@ -23,6 +24,7 @@ typedef struct cli_info {
     const char *path;
     const drape_model *model;
     const drape_sim *sim;
+    drape_scene_def def; /* what the model was compiled from */
     drape_profile profile;
     bool has_limit;               /* the integrator has a stability limit: */
     drape_stability stability;    /* at the start, of a step of profile.dt */

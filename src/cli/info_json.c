@@ -85,6 +85,44 @@ static json_t *params_of(const drape_param *params, int param_count, const doubl
     return object;
 }
 
+static json_t *numbers(const double *values, size_t count)
+{
+    json_t *array = json_array();
+    for (size_t i = 0; i < count; i++)
+        array = and_also(array, number(values[i]));
+    return array;
+}
+
+/* NULL where none is given. */
+static json_t *key_value(const drape_scene_key *key, const void *def)
+{
+    const char *const *texts;
+    drape_setting value;
+    if (key->shape == DRAPE_SCENE_LIST) {
+        json_t *array = json_array();
+        for (size_t i = 0, count = drape_scene_texts(key, def, &texts); i < count; i++)
+            array = and_also(array, text(texts[i]));
+        return array;
+    }
+    if (!drape_scene_value(key, def, &value))
+        return NULL;
+    if (value.vector)
+        return numbers(value.vector, value.vector_count);
+    return value.text ? text(value.text) : value_of(&key->param, &value.number, NULL);
+}
+
+/* Keys that have values of their own; a name stands where it is used. */
+static json_t *with_keys(json_t *object, const drape_scene_object *form, const void *def)
+{
+    for (size_t i = 0; i < form->key_count; i++) {
+        const drape_scene_key *key = &form->keys[i];
+        const bool named = key->param.kind == DRAPE_PARAM_TEXT && key->shape == DRAPE_SCENE_VALUE;
+        if (key->shape <= DRAPE_SCENE_LIST && !named)
+            object = with(object, key->param.name, key_value(key, def));
+    }
+    return object;
+}
+
 static json_t *track(const drape_track *track)
 {
     json_t *keys = json_array();
@@ -94,13 +132,14 @@ static json_t *track(const drape_track *track)
     return keys;
 }
 
-static json_t *collider(const drape_collider *from, const cli_collider_info *info)
+static json_t *collider(const drape_collider *from, const drape_collider_def *def,
+                        const cli_collider_info *info)
 {
     json_t *object = with(json_object(), "name", text(from->name));
     object = with(object, "type", json_string(from->ops->name));
     object = with(object, "parameters",
                   params_of(from->ops->params, from->ops->param_count, from->values, &from->choice));
-    object = with(object, "friction", number(from->friction));
+    object = with_keys(object, &drape_form_collider, def);
     if (from->track.key_count > 0)
         object = with(object, "track", track(&from->track));
     object = with(object, "points", count(from->shape.point_count));
@@ -114,7 +153,8 @@ static json_t *with_contact(json_t *object, const cli_info *info)
     cli_contact_rows contact;
     json_t *colliders = json_array();
     for (int32_t c = 0; c < info->model->collider_count; c++)
-        colliders = and_also(colliders, collider(&info->model->colliders[c], &info->colliders[c]));
+        colliders = and_also(
+            colliders, collider(&info->model->colliders[c], &info->def.colliders[c], &info->colliders[c]));
     if (info->model->collider_count > 0)
         object = with(object, "colliders", json_incref(colliders));
     json_decref(colliders);
@@ -155,22 +195,7 @@ static json_t *values_of(const drape_param *params, int param_count, const doubl
     return object;
 }
 
-static json_t *numbers(const double *values, int n)
-{
-    json_t *array = json_array();
-    for (int i = 0; i < n; i++)
-        json_array_append_new(array, number(values[i]));
-    return array;
-}
-
-static json_t *transform(const drape_cloth *cloth)
-{
-    json_t *object = with(json_object(), "scale", numbers(cloth->scale, 3));
-    object = with(object, "rotate", numbers(cloth->rotate, 4));
-    return with(object, "translate", numbers(cloth->translate, 3));
-}
-
-static json_t *mesh(const drape_cloth *cloth)
+static json_t *mesh(const drape_cloth *cloth, const drape_mesh_def *def)
 {
     double values[DRAPE_MAX_PARAMS];
     const drape_grid_ops *grid = cli_grid_of(cloth, values);
@@ -179,7 +204,7 @@ static json_t *mesh(const drape_cloth *cloth)
         object = with(object, "grid", text(grid->name));
     if (cloth->file)
         object = with(object, "file", text(cloth->file));
-    return with(object, "transform", transform(cloth));
+    return with(object, "transform", with_keys(json_object(), &drape_form_transform, def));
 }
 
 /* Of a measured fabric. */
@@ -213,8 +238,9 @@ static json_t *cloth(const cli_info *info, int32_t c)
     object = with(object, "area", number(more->area));
     object = with(object, "pinned", count(more->pinned));
     object = with(object, "moved", count(more->moved));
-    object = with(object, "velocity", vector(from->velocity));
-    return with(with(object, "mesh", mesh(from)), "material", material(from));
+    object = with_keys(object, &drape_form_cloth, &info->def.cloths[c]);
+    object = with(object, "mesh", mesh(from, &info->def.cloths[c].mesh));
+    return with(object, "material", material(from));
 }
 
 static json_t *term(const cli_info *info, int32_t i)
@@ -268,14 +294,6 @@ static json_t *bytes(const cli_info *info)
     return with(object, "a_node", number((double)sum / info->model->node_count));
 }
 
-static json_t *formats(const drape_model *model)
-{
-    json_t *array = json_array();
-    for (size_t i = 0; i < model->format_count; i++)
-        array = and_also(array, text(model->formats[i]));
-    return array;
-}
-
 /* A limit that is infinite is null. */
 static json_t *stability(const drape_stability *s)
 {
@@ -296,12 +314,9 @@ json_t *cli_info_json(const cli_info *info)
     for (int32_t i = 0; i < model->term_count; i++)
         terms = and_also(terms, term(info, i));
     json_t *object = with(json_object(), "scene", text(info->path));
-    object = with(object, "duration", number(model->duration));
-    object = with(object, "frame_rate", number(model->frame_rate));
+    object = with_keys(object, &drape_form_scene, &info->def);
+    object = with_keys(object, &drape_form_output, &info->def);
     object = with(object, "frames", count(info->frames));
-    object = with(object, "formats", formats(model));
-    object = with(object, "up", json_string(model->z_up ? "z" : "y"));
-    object = with(object, "gravity", vector(model->gravity));
     object = with(object, "nodes", count(model->node_count));
     object = with(object, "dofs", count(model->pattern.n));
     object = with(object, "nnz", count(model->pattern.nonzeros));

@@ -87,6 +87,9 @@ extern const drape_scene_object drape_form_scene, drape_form_output, drape_form_
 /* The value of a key as a setting, which points into the def. False: none is given. */
 bool drape_scene_value(const drape_scene_key *key, const void *def, drape_setting *out);
 
+/* The texts of a LIST of them, and how many there are. */
+size_t drape_scene_texts(const drape_scene_key *key, const void *def, const char *const **texts);
+
 /* Puts a value that is good for the parameter into the def: of a setting, and as drape_param_value made numbers
  * of it. */
 void drape_scene_store(const drape_scene_key *key, const drape_setting *setting, const double *values,
@@ -97,6 +100,9 @@ void drape_scene_set_defaults(const drape_scene_object *object, void *def);
 
 /* What a key takes, in words: "a number in (0, 1e6] s", "an array of objects, at least one". */
 void drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size);
+
+/* Its value in a def in words, of a list of texts too: "[0, 1, 0]", "npy, glb"; "" where none is given. */
+void drape_scene_value_text(const drape_scene_key *key, const void *def, char *text, size_t size);
 
 /* Its default in words: "60", "required", "" where there is nothing to say. */
 void drape_scene_default_text(const drape_scene_key *key, char *text, size_t size);
