@@ -217,7 +217,7 @@ static json_t *woven(const drape_woven *w, const char *shear)
 static json_t *material(const drape_cloth *cloth)
 {
     const drape_material *m = &cloth->material;
-    json_t *object = values_of(drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, cloth->material_values);
+    json_t *object = values_of(drape_material_params, drape_material_param_count, cloth->material_values);
     object = with(object, "areal_density", number(m->areal_density));
     object = with(object, "membrane_stiffness", number(m->membrane_stiffness));
     object = with(object, "flexural_rigidity", number(m->flexural_rigidity));

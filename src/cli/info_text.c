@@ -110,7 +110,7 @@ static void print_material(const drape_cloth *cloth)
                  {"E h", "N/m, membrane stiffness", m->membrane_stiffness},
                  {"D", "N m, flexural rigidity E h^3/(12 (1 - nu^2))", m->flexural_rigidity}};
     puts("  material");
-    print_params("    ", drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, cloth->material_values);
+    print_params("    ", drape_material_params, drape_material_param_count, cloth->material_values);
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
         printf("    %-16s %.9g %s\n", lines[i].name, lines[i].value, lines[i].unit);
     print_woven("tension", "N/m", "shear", &cloth->tension);

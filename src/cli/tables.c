@@ -40,7 +40,7 @@ static bool material(int index, cli_row *row)
         *row = (cli_row){.name = "material",
                          .summary = "a sheet; exactly one of density, areal_density, total_mass is given",
                          .params = drape_material_params,
-                         .param_count = DRAPE_MATERIAL_PARAM_COUNT};
+                         .param_count = drape_material_param_count};
     return index == 0;
 }
 

@@ -9,6 +9,7 @@
 #include "control/control.h"
 #include "integrators/integrator.h"
 #include "mesh/mesh.h"
+#include "model/scene.h"
 #include "terms/terms.h"
 
 #include <string.h>
@@ -34,7 +35,7 @@ PARAMS_OF(controllers, drape_controllers)
 
 static const drape_param *materials(int row, int *count)
 {
-    *count = DRAPE_MATERIAL_PARAM_COUNT;
+    *count = drape_material_param_count;
     return row == 0 ? drape_material_params : NULL;
 }
 
@@ -62,11 +63,6 @@ static const struct {
               {"/integrator/", integrators},
               {"/controller/", controllers}};
 
-/* Values of the scene that are no row's, by how their pointers begin. */
-static const struct {
-    const char *start, *unit;
-} plain[] = {{"/gravity", "m/s2"}, {"/duration", "s"}, {"/frame_rate", "1/s"}};
-
 static const char *unit_in(params_of *params, const char *name)
 {
     const char *unit = NULL;
@@ -85,9 +81,9 @@ static const char *unit_in(params_of *params, const char *name)
 
 const char *lab_unit(const char *pointer)
 {
-    for (size_t i = 0; i < sizeof plain / sizeof *plain; i++)
-        if (strncmp(pointer, plain[i].start, strlen(plain[i].start)) == 0)
-            return plain[i].unit;
+    const drape_scene_key *key = drape_scene_key_at(pointer);
+    if (key && key->shape == DRAPE_SCENE_VALUE)
+        return strcmp(key->param.unit, "1") != 0 ? key->param.unit : "";
     for (size_t i = 0; i < sizeof tables / sizeof *tables; i++)
         if (strstr(pointer, tables[i].part))
             return unit_in(tables[i].params, strrchr(pointer, '/') + 1);

@@ -84,6 +84,12 @@ typedef struct drape_scene_object {
 extern const drape_scene_object drape_form_scene, drape_form_output, drape_form_cloth, drape_form_mesh,
     drape_form_transform, drape_form_pin, drape_form_collider;
 
+/* The key of an object by its name; NULL: it has none of that name. */
+const drape_scene_key *drape_scene_key_of(const drape_scene_object *object, const char *name);
+
+/* The key that a JSON pointer leads to, or into the value of; NULL: it leads to no key. */
+const drape_scene_key *drape_scene_key_at(const char *pointer);
+
 /* The value of a key as a setting, which points into the def. False: none is given. */
 bool drape_scene_value(const drape_scene_key *key, const void *def, drape_setting *out);
 

@@ -6,6 +6,36 @@
 #include <string.h>
 
 #include "base/vec3.h"
+#include "model/scene_text.h"
+
+/* ---- Keys by name and place ---- */
+
+const drape_scene_key *drape_scene_key_of(const drape_scene_object *object, const char *name)
+{
+    for (size_t i = 0; i < object->key_count; i++)
+        if (strcmp(object->keys[i].param.name, name) == 0)
+            return &object->keys[i];
+    return NULL;
+}
+
+const drape_scene_key *drape_scene_key_at(const char *pointer)
+{
+    const drape_scene_object *object = &drape_form_scene;
+    const drape_scene_key *key = NULL;
+    char name[DRAPE_POINTER_SIZE];
+    while (object && *pointer) {
+        pointer = drape_pointer_next(pointer, name);
+        key = pointer ? drape_scene_key_of(object, name) : NULL;
+        if (!key)
+            return NULL;
+        object = key->child;
+        if (object && key->shape != DRAPE_SCENE_OBJECT && *pointer) /* the index of an element */
+            pointer = drape_pointer_next(pointer, name);
+        if (!pointer)
+            return NULL;
+    }
+    return key;
+}
 
 /* ---- Values ---- */
 

@@ -302,14 +302,6 @@ static drape_status read_track(reader *r, const drape_scene_key *key, json_t *va
 
 /* ---- Objects ---- */
 
-static bool has_key(const drape_scene_object *object, const char *name)
-{
-    for (size_t i = 0; i < object->key_count; i++)
-        if (strcmp(object->keys[i].param.name, name) == 0)
-            return true;
-    return false;
-}
-
 /* The compiler knows the parameter that it is for. */
 static drape_status read_member(reader *r, const char *name, json_t *value, drape_setting *out)
 {
@@ -337,7 +329,7 @@ static drape_status read_others(reader *r, const drape_scene_object *object, jso
     }
     for (void *it = json_object_iter(value); it; it = json_object_iter_next(value, it)) {
         const char *name = json_object_iter_key(it);
-        if (has_key(object, name))
+        if (drape_scene_key_of(object, name))
             continue;
         drape_status status = open ? read_member(r, name, json_object_iter_value(it), &settings[count])
                                    : unknown_key(r, object, name);

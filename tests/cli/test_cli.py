@@ -529,6 +529,37 @@ def test_list_of_keys():
     assert len(wanted) > 100 and wanted <= shown, wanted - shown
 
 
+def test_every_key_is_everywhere():
+    """a key of a scene, declared once, is in the list, in the schema and in the info of a scene, with the same default"""
+    def forms(part):
+        return [part] + [form for one in part.get("anyOf", []) for form in forms(one)]
+
+    def schema_of(part, pointer):
+        for step in pointer.strip("/").split("/"):
+            part = part["items"] if step == "N" else next(form["properties"][step] for form in forms(part) if step in form.get("properties", {}))
+        return part
+
+    write_scene(colliders=[{"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0]}])
+    schema, found, seen = json.loads(good("list", "--schema")), json.loads(good("info", "scene.json", "--json")), set()
+    objects = {"/": found, "/output": found, "/cloth/N": found["cloths"][0], "/cloth/N/mesh/transform": found["cloths"][0]["mesh"]["transform"],
+               "/colliders/N": found["colliders"][0]}
+    table = good("list", "--markdown").split("\n### ")[0]
+    for place, name, unit, default, takes, what in re.findall(r"^\| `(/.*?)` \| `(.*?)` \|(.*?) \|(.*?) \|(.*?) \| (.*) \|$", table, re.M):
+        entry = schema_of(schema, f"{place}/{name}")
+        assert takes and what, (place, name)
+        assert "const" in entry or (what in entry["description"] and unit.strip() in entry["description"]), (place, name, entry)
+        if "default" not in entry:
+            continue
+        usual = entry["default"]
+        if usual == ["npy"]:  # a list of one text
+            usual = usual[0]
+        equal(default.strip(' "') if isinstance(usual, str) else json.loads(default), usual, (place, name))
+        if place in objects:
+            seen.add(name)
+            assert name in objects[place], (place, name)
+    assert {"gravity", "frame_rate", "friction", "translate", "up", "formats", "velocity"} <= seen, seen
+
+
 def test_info_of_contact():
     """info shows colliders and contact where they are modelled, and how many nodes start inside"""
     write_scene()

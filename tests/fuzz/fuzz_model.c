@@ -107,7 +107,7 @@ typedef struct cloth {
     drape_pin_def pins[MOST_PINS];
     int32_t pinned[MOST_PINS];
     drape_track_key keys[MOST_PINS][2];
-    drape_setting material[DRAPE_MATERIAL_PARAM_COUNT];
+    drape_setting material[DRAPE_MAX_PARAMS];
 } cloth;
 
 typedef struct scene {

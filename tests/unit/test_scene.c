@@ -1,5 +1,6 @@
 /* test_scene.c: the text of a scene becomes the right defs, or one line that says what is wrong and where. */
 #include <jansson.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -1196,8 +1197,146 @@ START_TEST(test_form)
 }
 END_TEST
 
+/* ---- Every key, whatever it is called ---- */
+
+static const char whole[] =
+    "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g', 'transform': {}}, 'terms': [{'type': 't'}],"
+    "'pins': [{'nodes': [0]}]}], 'colliders': [{'type': 'c'}], 'integrator': {}, 'controller': {}, 'output': "
+    "{}}";
+
+/* The key that a pointer leads to, and the def that it is in. */
+static const drape_scene_key *find_key(const char *pointer, const char **at)
+{
+    const drape_scene_key *key = NULL;
+    char name[DRAPE_POINTER_SIZE];
+    *at = (const char *)&def;
+    for (const drape_scene_object *object = &drape_form_scene;; object = key->child) {
+        pointer = drape_pointer_next(pointer, name);
+        ck_assert_ptr_nonnull(key = drape_scene_key_of(object, name));
+        if (!*pointer)
+            return key;
+        *at += key->offset;
+        if (key->shape == DRAPE_SCENE_OBJECT)
+            continue;
+        memcpy(at, *at, sizeof *at);
+        ck_assert_ptr_nonnull(*at);
+        pointer = drape_pointer_next(pointer, name);
+    }
+}
+
+/* A value that is allowed, and is not the default. */
+static void write_value(const drape_param *param, char *text, size_t size)
+{
+    int last = 0;
+    switch (param->kind) {
+    case DRAPE_PARAM_NUMBER:
+        snprintf(text, size, "%.10g", 0.75 > param->min && 0.75 < param->max ? 0.75 : param->max);
+        return;
+    case DRAPE_PARAM_INTEGER:
+        snprintf(text, size, "%.10g", param->max);
+        return;
+    case DRAPE_PARAM_BOOLEAN:
+        snprintf(text, size, param->default_value == 0 ? "true" : "false");
+        return;
+    case DRAPE_PARAM_CHOICE:
+        while (param->choices[last + 1])
+            last++;
+        snprintf(text, size, "\"%s\"", param->choices[last]);
+        return;
+    case DRAPE_PARAM_VECTOR:
+        snprintf(text, size, "[0.25, 0.5, 0.75]");
+        return;
+    case DRAPE_PARAM_TURN:
+        snprintf(text, size, "[0, 0, 1, 30]");
+        return;
+    case DRAPE_PARAM_TEXT:
+        snprintf(text, size, "\"other\"");
+    }
+}
+
+static void check_value(const char *pointer, const char *written)
+{
+    const char *at;
+    char text[256], quoted[300];
+    const drape_scene_key *key = find_key(pointer, &at);
+    drape_scene_value_text(key, at, text, sizeof text);
+    snprintf(quoted, sizeof quoted, *written == '"' ? "\"%s\"" : "%s", text);
+    ck_assert_msg(strcmp(quoted, written) == 0, "%s: %s, not %s", pointer, quoted, written);
+}
+
+static void append(void *user, const char *text, size_t size)
+{
+    strncat(user, text, size);
+}
+
+/* What is set is read, and is still so after the scene was printed and read again; a default is read where nothing
+ * is set; what is out of range is refused; the key is where its pointer says. */
+static void check_key(const drape_scene_key *key, const char *pointer)
+{
+    static char printed[1 << 14];
+    char text[256], written[64];
+    const char *at;
+    write_value(&key->param, written, sizeof written);
+    ck_assert_ptr_eq(drape_scene_key_at(pointer), key);
+    ck_assert_int_eq(read_quoted(whole), DRAPE_OK);
+    ck_assert_ptr_eq(find_key(pointer, &at), key);
+    drape_scene_value_text(key, at, text, sizeof text);
+    drape_scene_default_text(key, printed, sizeof printed);
+    if (!isnan(key->param.default_value) && key->param.kind != DRAPE_PARAM_TURN)
+        ck_assert_str_eq(text, printed);
+    ck_assert_int_eq(drape_scene_set(scene, pointer, written), DRAPE_OK);
+    ck_assert_msg(drape_scene_to_def(scene, &def) == DRAPE_OK, "%s", message());
+    check_value(pointer, written);
+    *printed = 0;
+    drape_scene_print(scene, append, printed);
+    ck_assert_int_eq(read_text(printed), DRAPE_OK);
+    check_value(pointer, written);
+    ck_assert_int_eq(drape_scene_set(scene, pointer, "{}"), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
+    if (key->param.kind > DRAPE_PARAM_INTEGER || isinf(key->param.max))
+        return;
+    snprintf(written, sizeof written, "%.17g", 2 * key->param.max);
+    ck_assert_int_eq(drape_scene_set(scene, pointer, written), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
+}
+
+static bool is_alternative(const drape_scene_object *object, const drape_scene_key *key)
+{
+    for (int i = 0; object->one_of && object->one_of[i]; i++)
+        if (strcmp(object->one_of[i], key->param.name) == 0)
+            return true;
+    return false;
+}
+
+static int check_keys(const drape_scene_object *object, const char *pointer)
+{
+    int checked = 0;
+    for (size_t i = 0; i < object->key_count; i++) {
+        const drape_scene_key *key = &object->keys[i];
+        char below[128];
+        snprintf(below, sizeof below, "%s/%s%s", pointer, key->param.name,
+                 key->shape > DRAPE_SCENE_OBJECT ? "/0" : "");
+        if (key->child)
+            checked += check_keys(key->child, below);
+        if (key->shape != DRAPE_SCENE_VALUE || is_alternative(object, key))
+            continue;
+        check_key(key, below);
+        checked++;
+    }
+    return checked;
+}
+
+START_TEST(test_every_key)
+{
+    open_context();
+    ck_assert_int_gt(check_keys(&drape_form_scene, ""), 15);
+    close_context();
+}
+END_TEST
+
 SUITE("scene", test_example_scene, test_example_cloth, test_example_pins, test_transforms, test_defaults,
       test_numbers, test_def_sizes, test_comments, test_places, test_mend_end, test_colliders_and_contact,
       test_wrong_scenes, test_long_texts, test_deep_nesting, test_truncations, test_mutations, test_sets,
       test_set_values, test_set_loose_numbers, test_set_order, test_locate_fault, test_files, test_pipe,
-      test_arguments, test_many_nodes, test_locale, test_no_memory, test_no_memory_for_json, test_form)
+      test_arguments, test_many_nodes, test_locale, test_no_memory, test_no_memory_for_json, test_form,
+      test_every_key)
