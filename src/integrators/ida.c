@@ -74,8 +74,7 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_MAX_STEPS] = DRAPE_INTEGER(
         "max_steps", "1/s", 100000, 1, 1e9,
         "steps within one second of simulated time, those that end an advance apart; one more ends the run"),
-    [PARAM_LINEAR_SOLVER] =
-        DRAPE_CHOICE("linear_solver", 0, drape_linears_words, "a row of the linear solvers"),
+    [PARAM_LINEAR_SOLVER] = DRAPE_CHOICE("linear_solver", 0, drape_linears_words, "name of a linear solver"),
     [PARAM_MATRIX] = DRAPE_CHOICE(
         "matrix", MATRIX_AUTO, matrix_choices,
         "of Newton's corrections; symmetric: the symmetric part of the exact one, which friction and "

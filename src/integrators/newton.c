@@ -69,7 +69,7 @@ const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT] = {
     [DRAPE_NEWTON_PROJECT] =
         DRAPE_BOOLEAN("project", false, "project the Hessian of every element to positive semidefinite"),
     [DRAPE_NEWTON_LINEAR_SOLVER] =
-        DRAPE_CHOICE("linear_solver", 0, drape_linears_words, "a row of the linear solvers"),
+        DRAPE_CHOICE("linear_solver", 0, drape_linears_words, "name of a linear solver"),
     [DRAPE_NEWTON_LINEAR_TOLERANCE] =
         DRAPE_NUMBER("linear_tolerance", "1", 1e-3, 1e-14, DRAPE_BELOW(1),
                      "share of the residual that iterative linear solvers leave in a correction"),

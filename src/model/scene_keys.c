@@ -57,7 +57,7 @@ const drape_scene_object drape_form_pin = {
 /* ---- Objects with settings ---- */
 
 static const drape_scene_key term_keys[] = {
-    {DRAPE_TEXT("type", "a row of the terms"), IN(drape_row_def, type)},
+    {DRAPE_TEXT("type", "name of a term"), IN(drape_row_def, type)},
 };
 static const drape_scene_object term = {.name = "term",
                                         KEYS(term_keys),
@@ -65,13 +65,13 @@ static const drape_scene_object term = {.name = "term",
                                         .def_size = sizeof(drape_row_def)};
 
 static const drape_scene_key integrator_keys[] = {
-    {TEXT_OR("method", "be", "a row of the integrators"), IN(drape_row_def, type)},
+    {TEXT_OR("method", "be", "name of a time integrator"), IN(drape_row_def, type)},
 };
 static const drape_scene_object integrator = {
     .name = "integrator", KEYS(integrator_keys), SETTINGS(drape_row_def, settings, setting_count)};
 
 static const drape_scene_key controller_keys[] = {
-    {TEXT_OR("type", "halving", "a row of the controllers"), IN(drape_row_def, type)},
+    {TEXT_OR("type", "halving", "name of a step controller"), IN(drape_row_def, type)},
 };
 static const drape_scene_object controller = {
     .name = "controller", KEYS(controller_keys), SETTINGS(drape_row_def, settings, setting_count)};
@@ -93,7 +93,7 @@ static const drape_scene_key transform_keys[] = {
 const drape_scene_object drape_form_transform = {.name = "transform", KEYS(transform_keys)};
 
 static const drape_scene_key mesh_keys[] = {
-    {DRAPE_TEXT("grid", "a row of the grids; its parameters stand beside it", .derived = ""),
+    {DRAPE_TEXT("grid", "name of a grid; its parameters stand beside it", .derived = ""),
      IN(drape_mesh_def, grid.type)},
     {DRAPE_TEXT("file", "an OBJ or PLY file, relative to the scene", .derived = ""),
      IN(drape_mesh_def, file)},
@@ -111,7 +111,8 @@ const drape_scene_object drape_form_mesh = {.name = "mesh",
 /* ---- Cloth ---- */
 
 static const drape_scene_key cloth_keys[] = {
-    {DRAPE_TEXT("name", "its own", .derived = "\"cloth0\", \"cloth1\" ..."), IN(drape_cloth_def, name)},
+    {DRAPE_TEXT("name", "name of its own", .derived = "\"cloth0\", \"cloth1\" ..."),
+     IN(drape_cloth_def, name)},
     {SHAPED(DRAPE_SCENE_OBJECT, "mesh", DRAPE_REQUIRED, "a grid or a file"), IN(drape_cloth_def, mesh),
      .child = &drape_form_mesh},
     {SHAPED(DRAPE_SCENE_OBJECT, "material", UNSAID, "parameters of the material"), .child = &material},
@@ -128,9 +129,9 @@ const drape_scene_object drape_form_cloth = {
 /* ---- Colliders and contact ---- */
 
 static const drape_scene_key collider_keys[] = {
-    {DRAPE_TEXT("type", "a row of the colliders; its parameters stand beside it"),
+    {DRAPE_TEXT("type", "name of a collider; its parameters stand beside it"),
      IN(drape_collider_def, row.type)},
-    {DRAPE_TEXT("name", "its own", .derived = "\"collider0\", \"collider1\" ..."),
+    {DRAPE_TEXT("name", "name of its own", .derived = "\"collider0\", \"collider1\" ..."),
      IN(drape_collider_def, name)},
     {DRAPE_NUMBER("friction", "1", 0, 0, 1e3, "Coulomb's mu between it and cloth"),
      IN(drape_collider_def, friction)},
@@ -156,7 +157,7 @@ static const drape_scene_object contact = {.name = "contact",
 /* ---- Scene ---- */
 
 static const drape_scene_key output_keys[] = {
-    {TEXT_OR("formats", "npy", "rows of the exporters"), .shape = DRAPE_SCENE_LIST,
+    {TEXT_OR("formats", "npy", "names of frame formats"), .shape = DRAPE_SCENE_LIST,
      ARRAY(drape_scene_def, formats, format_count)},
     {DRAPE_CHOICE("up", 0, up_axes,
                   "the axis that points up in frames: \"z\" turns them, (x, y, z) to (x, -z, y); npy and glb "

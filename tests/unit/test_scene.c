@@ -432,8 +432,8 @@ static const struct {
      "s.json:2:1: /colliders: 3 is not allowed; colliders is an array of objects, at most 4096"},
     {ROOT("'colliders': ['plane']"),
      "s.json:2:15: /colliders/0: \"plane\" is not allowed; an element is an object"},
-    {ROOT("'colliders': [{}]"), "s.json:2:15: /colliders/0/type: \"type\" is missing: a row of the "
-                                "colliders; its parameters stand beside "
+    {ROOT("'colliders': [{}]"), "s.json:2:15: /colliders/0/type: \"type\" is missing: name of a "
+                                "collider; its parameters stand beside "
                                 "it; a string, not empty"},
     {ROOT("'colliders': [{'type': 's', 'friction': -0.1}]"),
      "s.json:2:29: /colliders/0/friction: -0.1 is not allowed; friction is a number in [0, 1000]"},
@@ -521,7 +521,7 @@ static const struct {
     {CLOTH("'terms': [3]"),
      "s.json:2:11: /cloth/0/terms/0: 3 is not allowed; an element is a name, or an object with a \"type\""},
     {CLOTH("'terms': ['stretch.edge', {'stiffness': 1}]"),
-     "s.json:2:27: /cloth/0/terms/1/type: \"type\" is missing: a row of the terms; a string, not empty"},
+     "s.json:2:27: /cloth/0/terms/1/type: \"type\" is missing: name of a term; a string, not empty"},
     {CLOTH("'terms': [{'type': 'bend.hinge', 'stiffness': null}]"),
      "s.json:2:34: /cloth/0/terms/0/stiffness: null is not allowed; a setting is a number, true, false, a "
      "string or an array of numbers"},
