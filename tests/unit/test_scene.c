@@ -452,9 +452,8 @@ static const struct {
     {ROOT("'contact': []"), "s.json:2:1: /contact: an empty array is not allowed; contact is an object"},
     {ROOT("'Gravity': [0, 0, 0]"),
      "s.json:2:1: /Gravity: unknown key \"Gravity\"; did you mean \"gravity\"?"},
-    {ROOT("'a/b~c': 1"),
-     "s.json:2:1: /a~1b~0c: unknown key \"a/b~c\"; known: drape, description, cloth, "
-     "gravity, colliders, self_contact, contact, integrator, controller, duration, frame_rate, output"},
+    {ROOT("'output': {'a/b~c': 1}"),
+     "s.json:2:12: /output/a~1b~0c: unknown key \"a/b~c\"; known: formats, up"},
     {ROOT("'': 1"), "s.json:2:1: /: unknown key \"\"; known: drape, description, cloth, gravity, colliders, "
                     "self_contact, contact, integrator, "
                     "controller, duration, frame_rate, output"},
@@ -790,9 +789,7 @@ static const struct {
     {"/integrator/dt", "0.5", NULL},
     {"/integrator/method", "verlet", NULL},
     {"/integrator/method", "'verlet'", NULL},
-    {"/self", "1",
-     "--set /self=1: /self: unknown key \"self\"; known: drape, description, cloth, gravity, "
-     "colliders, self_contact, contact, integrator, controller, duration, frame_rate, output"},
+    {"/output/self", "1", "--set /output/self=1: /output/self: unknown key \"self\"; known: formats, up"},
     {"/cloth/0/pins/-", "{'edge': 'top'}", NULL},
     {"/cloth/0/pins/-/edge", "top", NULL},
     {"/cloth/0/pins", "[]", NULL},
