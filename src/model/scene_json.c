@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "model/scene.h"
-#include "model/scene_text.h"
 
 #define MAX_KEYS  16  /* of one object, for the lists in messages */
 #define MAX_TAKES 600 /* bytes of what a key takes, in words */
@@ -188,7 +187,9 @@ static bool is_writable(const drape_param *param, json_t *value)
         return drape_param_width(param) > 1;
     if (json_is_boolean(value))
         return param->kind == DRAPE_PARAM_BOOLEAN;
-    return json_is_number(value) || json_is_string(value);
+    if (json_is_string(value))
+        return param->kind != DRAPE_PARAM_BOOLEAN;
+    return json_is_number(value);
 }
 
 static drape_status read_param(reader *r, const drape_param *param, json_t *value, drape_setting *setting,
@@ -201,6 +202,18 @@ static drape_status read_param(reader *r, const drape_param *param, json_t *valu
     }
     drape_status status = read_setting(r, param->name, value, setting);
     return status ? status : drape_param_value(r->ctx, r->at.text, param, setting, values);
+}
+
+drape_status drape_json_check(drape_context *ctx, const drape_pointer *at, const drape_param *param,
+                              json_t *value)
+{
+    drape_arena arena = drape_arena_of(ctx);
+    reader r = {.ctx = ctx, .arena = &arena, .at = *at};
+    drape_setting setting;
+    double values[DRAPE_PARAM_WIDEST];
+    drape_status status = read_param(&r, param, value, &setting, values);
+    drape_arena_free(&arena);
+    return status;
 }
 
 static drape_status read_one(reader *r, const drape_scene_key *key, json_t *value, char *def)

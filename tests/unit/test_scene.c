@@ -835,7 +835,8 @@ static const struct {
      "--set /integrater/dt=1: /integrater: unknown key \"integrater\"; did you mean "
      "\"integrator\"?"},
     {"/cloth/0/terms/-/beta", "1",
-     "--set /cloth/0/terms/-/beta=1: /cloth/0/terms/3/type: \"type\" is missing: name of a term; a string, not empty"},
+     "--set /cloth/0/terms/-/beta=1: /cloth/0/terms/3/type: \"type\" is missing: name of a term; a string, "
+     "not empty"},
     {"", "{}", "--set ={}: /drape: \"drape\" is missing: the version of this form of scenes; the number 1"},
     {"", "3", "cannot set the whole scene to what is no object"},
     {"integrator", "1", "\"integrator\" is not a JSON pointer, as \"/integrator/dt\" is one"},
