@@ -2,6 +2,7 @@
 #include "cli/info.h"
 #include "cli/signals.h"
 
+#include "base/arena.h"
 #include "colliders/colliders.h"
 
 #include <math.h>
@@ -13,49 +14,49 @@ typedef struct info_request {
     bool json;
 } info_request;
 
-void cli_chosen_rows(const drape_sim *sim, cli_chosen_row rows[CLI_CHOSEN_ROWS])
+void cli_chosen_entries(const drape_sim *sim, cli_chosen entries[CLI_CHOSEN])
 {
     const drape_integrator_ops *integrator = sim->chosen.integrator;
     const drape_controller_ops *controller = sim->chosen.controller;
-    rows[0] = (cli_chosen_row){"integrator",
-                               integrator->name,
-                               integrator->summary,
-                               integrator->params,
-                               integrator->param_count,
-                               sim->chosen.integrator_values,
-                               &sim->model->integrator,
-                               drape_chosen_ignores_integrator};
-    rows[1] = (cli_chosen_row){"controller",
-                               controller->name,
-                               controller->summary,
-                               controller->params,
-                               controller->param_count,
-                               sim->chosen.controller_values,
-                               &sim->model->controller,
-                               drape_chosen_ignores_controller};
+    entries[0] = (cli_chosen){"integrator",
+                              integrator->name,
+                              integrator->summary,
+                              integrator->params,
+                              integrator->param_count,
+                              sim->chosen.integrator_values,
+                              &sim->model->integrator,
+                              drape_chosen_ignores_integrator};
+    entries[1] = (cli_chosen){"controller",
+                              controller->name,
+                              controller->summary,
+                              controller->params,
+                              controller->param_count,
+                              sim->chosen.controller_values,
+                              &sim->model->controller,
+                              drape_chosen_ignores_controller};
 }
 
-void cli_contact(const drape_sim *sim, cli_contact_rows *out)
+void cli_contact(const drape_sim *sim, cli_contact_entries *out)
 {
     const drape_model *model = sim->model;
     const bool forces = !sim->chosen.integrator->projects_contact; /* else only the distance of layers acts */
     out->count = 0;
     if (forces && (model->collider_count > 0 || model->contact.self)) {
         drape_contact_values(&model->contact, out->values[0]);
-        out->rows[out->count++] = (cli_chosen_row){.title = "contact",
-                                                   .params = drape_contact_params,
-                                                   .param_count = DRAPE_CONTACT_PARAM_COUNT,
-                                                   .values = out->values[0],
-                                                   .choice = &model->contact_choice};
+        out->entries[out->count++] = (cli_chosen){.title = "contact",
+                                                  .params = drape_contact_params,
+                                                  .param_count = DRAPE_CONTACT_PARAM_COUNT,
+                                                  .values = out->values[0],
+                                                  .choice = &model->contact_choice};
     }
     if (model->contact.self) {
         drape_self_contact_values(&model->contact, out->values[1]);
-        out->rows[out->count++] =
-            (cli_chosen_row){.title = "self_contact",
-                             .params = drape_self_contact_params,
-                             .param_count = forces ? DRAPE_SELF_PARAM_COUNT : DRAPE_SELF_THICKNESS + 1,
-                             .values = out->values[1],
-                             .choice = &model->self_choice};
+        out->entries[out->count++] =
+            (cli_chosen){.title = "self_contact",
+                         .params = drape_self_contact_params,
+                         .param_count = forces ? DRAPE_SELF_PARAM_COUNT : DRAPE_SELF_THICKNESS + 1,
+                         .values = out->values[1],
+                         .choice = &model->self_choice};
     }
 }
 
@@ -81,7 +82,7 @@ double cli_share(const cli_info *info, double seconds)
     return whole > 0 ? seconds / whole : 0;
 }
 
-/* Single measurements may add up to more than the whole did. */
+/* Measured one by one, the terms may add up to more than the whole. */
 double cli_other_residual_seconds(const cli_info *info)
 {
     double other = info->profile.residual_seconds;
@@ -130,14 +131,14 @@ static int64_t count_frames(const drape_model *model)
     return (int64_t)whole + (intervals - whole > 1e-9 ? 2 : 1);
 }
 
-static drape_status gather(const cli_scene *in, cli_info *info)
+static drape_status gather(const cli_scene *in, drape_arena *arena, cli_info *info)
 {
     const drape_model *model = in->model;
-    drape_profile_term *terms = drape_alloc(in->ctx, (size_t)model->term_count, sizeof *terms);
+    drape_profile_term *terms = drape_arena_take(arena, (size_t)model->term_count, sizeof *terms);
     info->profile.terms = terms;
-    info->cloths = drape_alloc(in->ctx, (size_t)model->cloth_count, sizeof *info->cloths);
-    info->colliders = drape_alloc(in->ctx, (size_t)model->collider_count, sizeof *info->colliders);
-    if (!terms || !info->cloths || !info->colliders)
+    info->cloths = drape_arena_take(arena, (size_t)model->cloth_count, sizeof *info->cloths);
+    info->colliders = drape_arena_take(arena, (size_t)model->collider_count, sizeof *info->colliders);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     info->model = model;
     info->sim = in->sim;
@@ -169,8 +170,9 @@ static int print_json(const cli_info *info)
 static int print_info(const info_request *request, const cli_scene *in)
 {
     cli_info info = {.path = request->command.operand};
+    drape_arena arena = drape_arena_of(in->ctx);
     int code = CLI_DONE;
-    drape_status status = gather(in, &info);
+    drape_status status = gather(in, &arena, &info);
     if (status == DRAPE_E_STOPPED) {
         code = cli_tell_interrupted(request->command.verb);
     } else if (status) {
@@ -181,9 +183,7 @@ static int print_info(const info_request *request, const cli_scene *in)
     } else {
         cli_info_text(&info);
     }
-    drape_free(in->ctx, info.profile.terms);
-    drape_free(in->ctx, info.cloths);
-    drape_free(in->ctx, info.colliders);
+    drape_arena_free(&arena);
     return code;
 }
 

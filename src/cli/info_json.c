@@ -1,4 +1,4 @@
-/* info_json.c: `drape info --json`. As in info_text.c, what a scene does not model has no key.
+/* info_json.c: `drape info --json`. As in info_text.c, nothing has a key that the scene does not model.
  *
  * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere below ends
  * as a NULL at the top. */
@@ -48,7 +48,7 @@ static json_t *vector(const double v[3])
 
 /* ---- Parameters ---- */
 
-/* choice: where a text is; NULL where there are none. */
+/* choice: gives the texts; NULL: there are none. */
 static json_t *value_of(const drape_param *param, const double *value, const drape_choice *choice)
 {
     if (isnan(*value) && param->derived)
@@ -150,7 +150,7 @@ static json_t *collider(const drape_collider *from, const drape_collider_def *de
 
 static json_t *with_contact(json_t *object, const cli_info *info)
 {
-    cli_contact_rows contact;
+    cli_contact_entries contact;
     json_t *colliders = json_array();
     for (int32_t c = 0; c < info->model->collider_count; c++)
         colliders = and_also(
@@ -160,20 +160,22 @@ static json_t *with_contact(json_t *object, const cli_info *info)
     json_decref(colliders);
     cli_contact(info->sim, &contact);
     for (int i = 0; i < contact.count; i++) {
-        const cli_chosen_row *row = &contact.rows[i];
-        object = with(object, row->title, params_of(row->params, row->param_count, row->values, row->choice));
+        const cli_chosen *entry = &contact.entries[i];
+        object = with(object, entry->title,
+                      params_of(entry->params, entry->param_count, entry->values, entry->choice));
     }
     return object;
 }
 
-static json_t *chosen(const cli_chosen_row *row, const drape_chosen *all)
+static json_t *chosen(const cli_chosen *entry, const drape_chosen *all)
 {
     json_t *ignored = json_array();
-    for (size_t i = 0; i < row->choice->setting_count; i++)
-        if (row->ignores(all, row->choice->settings[i].name))
-            ignored = and_also(ignored, text(row->choice->settings[i].name));
-    json_t *object = with(json_object(), "type", json_string(row->name));
-    object = with(object, "parameters", params_of(row->params, row->param_count, row->values, row->choice));
+    for (size_t i = 0; i < entry->choice->setting_count; i++)
+        if (entry->ignores(all, entry->choice->settings[i].name))
+            ignored = and_also(ignored, text(entry->choice->settings[i].name));
+    json_t *object = with(json_object(), "type", json_string(entry->name));
+    object = with(object, "parameters",
+                  params_of(entry->params, entry->param_count, entry->values, entry->choice));
     return with(object, "ignored", ignored);
 }
 
@@ -207,7 +209,7 @@ static json_t *mesh(const drape_cloth *cloth, const drape_mesh_def *def)
     return with(object, "transform", with_keys(json_object(), &drape_form_transform, def));
 }
 
-/* Of a measured fabric. */
+/* A stiffness of a measured fabric. */
 static json_t *woven(const drape_woven *w, const char *shear)
 {
     json_t *object = with(with(json_object(), "warp", number(w->warp)), "weft", number(w->weft));
@@ -307,7 +309,7 @@ static json_t *stability(const drape_stability *s)
 json_t *cli_info_json(const cli_info *info)
 {
     const drape_model *model = info->model;
-    cli_chosen_row rows[CLI_CHOSEN_ROWS];
+    cli_chosen entries[CLI_CHOSEN];
     json_t *cloths = json_array(), *terms = json_array();
     for (int32_t c = 0; c < model->cloth_count; c++)
         cloths = and_also(cloths, cloth(info, c));
@@ -322,9 +324,9 @@ json_t *cli_info_json(const cli_info *info)
     object = with(object, "nnz", count(model->pattern.nonzeros));
     object = with(object, "cloths", cloths);
     object = with_contact(object, info);
-    cli_chosen_rows(info->sim, rows);
-    for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
-        object = with(object, rows[i].title, chosen(&rows[i], &info->sim->chosen));
+    cli_chosen_entries(info->sim, entries);
+    for (int i = 0; i < CLI_CHOSEN; i++)
+        object = with(object, entries[i].title, chosen(&entries[i], &info->sim->chosen));
     if (info->has_limit)
         object = with(object, "stability", stability(&info->stability));
     object = with(object, "terms", terms);

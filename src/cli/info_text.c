@@ -1,5 +1,5 @@
-/* info_text.c: `drape info` for people. What a scene does not model is not mentioned: a mesh always has, for
- * instance, pairs of neighbouring triangles, but they are named by the term that uses them alone. */
+/* info_text.c: `drape info` for people. Nothing is mentioned that the scene does not model: every mesh has
+ * pairs of neighbouring triangles, for instance, but only the term that uses them names them. */
 #include "cli/info.h"
 
 #include <math.h>
@@ -51,7 +51,7 @@ static void print_pins(const drape_model *model, const drape_cloth *cloth, const
     printf("%s\n", info->pinned > listed ? " ..." : "");
 }
 
-/* With its unit, unless it is words or has none. */
+/* A value with its unit, if it is a number that has one. */
 static void print_value(const drape_param *param, const double *value)
 {
     char text[128];
@@ -92,7 +92,7 @@ static void print_source(const drape_cloth *cloth, const drape_mesh_def *def)
     print_keys("    ", 16, &drape_form_transform, def);
 }
 
-/* Of a measured fabric; nothing where it is none. */
+/* A stiffness of a measured fabric; nothing for other materials. */
 static void print_woven(const char *name, const char *unit, const char *shear, const drape_woven *w)
 {
     if (w->warp > 0)
@@ -136,18 +136,18 @@ static void print_cloth(const cli_info *info, int32_t c)
 
 /* ---- Integrator and controller ---- */
 
-static void print_ignored(const cli_chosen_row *row, const drape_chosen *chosen)
+static void print_ignored(const cli_chosen *entry, const drape_chosen *chosen)
 {
     bool any = false;
-    for (size_t i = 0; i < row->choice->setting_count; i++)
-        if (row->ignores(chosen, row->choice->settings[i].name)) {
-            printf("%s %s", any ? "," : "  ignored by it:", row->choice->settings[i].name);
+    for (size_t i = 0; i < entry->choice->setting_count; i++)
+        if (entry->ignores(chosen, entry->choice->settings[i].name)) {
+            printf("%s %s", any ? "," : "  ignored by it:", entry->choice->settings[i].name);
             any = true;
         }
     fputs(any ? "\n" : "", stdout);
 }
 
-/* As the scene gave them, or by default. */
+/* Parameters that the scene gave, and those by default. */
 static void print_given(const drape_param *params, int count, const double *values,
                         const drape_choice *choice)
 {
@@ -161,11 +161,11 @@ static void print_given(const drape_param *params, int count, const double *valu
     }
 }
 
-static void print_chosen(const cli_chosen_row *row, const drape_chosen *chosen)
+static void print_chosen(const cli_chosen *entry, const drape_chosen *chosen)
 {
-    printf("\n%s %s: %s\n", row->title, row->name, row->summary);
-    print_given(row->params, row->param_count, row->values, row->choice);
-    print_ignored(row, chosen);
+    printf("\n%s %s: %s\n", entry->title, entry->name, entry->summary);
+    print_given(entry->params, entry->param_count, entry->values, entry->choice);
+    print_ignored(entry, chosen);
 }
 
 /* ---- Colliders and contact ---- */
@@ -189,12 +189,12 @@ static void print_collider(const drape_collider *collider, const drape_collider_
 
 static void print_contact(const drape_sim *sim)
 {
-    cli_contact_rows contact;
+    cli_contact_entries contact;
     cli_contact(sim, &contact);
     for (int i = 0; i < contact.count; i++) {
-        const cli_chosen_row *row = &contact.rows[i];
-        printf("\n%s\n", row->title);
-        print_given(row->params, row->param_count, row->values, row->choice);
+        const cli_chosen *entry = &contact.entries[i];
+        printf("\n%s\n", entry->title);
+        print_given(entry->params, entry->param_count, entry->values, entry->choice);
     }
 }
 
@@ -331,16 +331,16 @@ static void print_stability(const cli_info *info)
 
 void cli_info_text(const cli_info *info)
 {
-    cli_chosen_row rows[CLI_CHOSEN_ROWS];
+    cli_chosen entries[CLI_CHOSEN];
     print_scene(info);
     for (int32_t c = 0; c < info->model->cloth_count; c++)
         print_cloth(info, c);
     for (int32_t c = 0; c < info->model->collider_count; c++)
         print_collider(&info->model->colliders[c], &info->def.colliders[c], &info->colliders[c]);
     print_contact(info->sim);
-    cli_chosen_rows(info->sim, rows);
-    for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
-        print_chosen(&rows[i], &info->sim->chosen);
+    cli_chosen_entries(info->sim, entries);
+    for (int i = 0; i < CLI_CHOSEN; i++)
+        print_chosen(&entries[i], &info->sim->chosen);
     print_stability(info);
     print_terms(info);
     print_costs(info);

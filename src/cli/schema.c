@@ -69,20 +69,17 @@ static json_t *word(void)
     return with(typed("string"), "minLength", json_integer(1));
 }
 
-static json_t *one_of_words(const char *const *words)
-{
-    json_t *array = json_array();
-    for (int i = 0; words[i]; i++)
-        array = and_also(array, json_string(words[i]));
-    return with(json_object(), "enum", array);
-}
-
 static json_t *words(const char *const *names)
 {
     json_t *array = json_array();
     for (int i = 0; names[i]; i++)
         array = and_also(array, json_string(names[i]));
     return array;
+}
+
+static json_t *one_of_words(const char *const *names)
+{
+    return with(json_object(), "enum", words(names));
 }
 
 static json_t *that_requires(json_t *names)
@@ -110,7 +107,7 @@ static json_t *at_most_one(json_t *object, const char *const *names)
     return with(object, "oneOf", and_also(each_required(names), none));
 }
 
-/* Of several keys all or none. */
+/* All of the keys, or none. */
 static json_t *all_or_none(json_t *object, const char *const *names)
 {
     json_t *dependents = json_object();
@@ -181,24 +178,30 @@ static json_t *value_of(const drape_param *p)
     return bounded(p->kind == DRAPE_PARAM_INTEGER ? "integer" : "number", p);
 }
 
-static json_t *described(json_t *value, const char *help, const char *unit)
+/* Adds the help and the default of a key to the schema of its value. */
+static json_t *described(json_t *value, const drape_scene_key *key)
 {
     char text[512];
-    bool has_unit = unit && strcmp(unit, "1") != 0;
-    snprintf(text, sizeof text, "%s%s%s%s", help, has_unit ? " [" : "", has_unit ? unit : "",
+    double defaults[DRAPE_PARAM_WIDEST];
+    const drape_param *p = &key->param;
+    const bool has_unit = strcmp(p->unit, "1") != 0;
+    snprintf(text, sizeof text, "%s%s%s%s", p->help, has_unit ? " [" : "", has_unit ? p->unit : "",
              has_unit ? "]" : "");
-    return with(value, "description", json_string(text));
+    value = with(value, "description", json_string(text));
+    drape_param_default(p, defaults);
+    if (isnan(*defaults) && !key->literal)
+        return value;
+    json_t *one = default_of(p, key->vector ? key->vector : defaults);
+    return with(value, "default", key->shape == DRAPE_SCENE_LIST ? and_also(json_array(), one) : one);
 }
 
 static json_t *param(const drape_param *p)
 {
-    double values[DRAPE_PARAM_WIDEST];
-    json_t *value = described(value_of(p), p->help, p->unit);
-    drape_param_default(p, values);
-    return isnan(*values) ? value : with(value, "default", default_of(p, values));
+    return described(value_of(p), &(drape_scene_key){.param = *p});
 }
 
-/* A parameter of several rows with different bounds must be right for each of them, as the reader has it. */
+/* A value of a parameter that several entries have with different bounds must be right for each of them, as for
+ * the reader. */
 static json_t *with_param(json_t *properties, const drape_param *p)
 {
     json_t *schema = param(p), *before = json_object_get(properties, p->name);
@@ -235,7 +238,7 @@ static json_t *with_required(json_t *required, const cli_row *row)
     return required;
 }
 
-/* Rows that a scene may name: those that need no parameters where only a name is given. */
+/* The entries that a scene may name; `alone`: without parameters beside the name. */
 static json_t *row_names(const cli_table *table, bool alone)
 {
     json_t *names = json_array();
@@ -249,16 +252,17 @@ static json_t *row_names(const cli_table *table, bool alone)
 /* ---- Which tables stand where in a scene ---- */
 
 typedef enum opening_kind {
-    ROW_PARAMS,  /* the parameters of the named row, and no others */
-    TABLE_PARAMS /* parameters of any row of the table, whichever is named */
+    ROW_PARAMS,  /* the parameters of the named entry, and no others */
+    TABLE_PARAMS /* parameters of any entry of the table, whichever is named */
 } opening_kind;
 
 /* The open objects of scene_keys.c. */
 static const struct opening {
-    const char *object, *key; /* the key that names the row; NULL: there is but one */
+    const char *object, *key; /* the key that names the entry; NULL: the table has only one */
     opening_kind kind;
     const cli_table *table;
-    const char *const *one_of, *const *all_of; /* but where `preset` says them: at most one, all or none */
+    const char *const *one_of, *const
+                                   *all_of; /* where `preset` gives their values: at most one, all or none */
     const char *preset;
 } openings[] = {
     {"term", "type", ROW_PARAMS, &cli_terms, NULL, NULL, NULL},
@@ -329,17 +333,6 @@ static json_t *key_value(const drape_scene_object *object, const drape_scene_key
     return NULL;
 }
 
-static json_t *key_schema(const drape_scene_object *object, const drape_scene_key *key)
-{
-    double values[DRAPE_PARAM_WIDEST];
-    json_t *schema = described(key_value(object, key), key->param.help, key->param.unit);
-    drape_param_default(&key->param, values);
-    if (isnan(*values) && !key->literal)
-        return schema;
-    json_t *value = default_of(&key->param, key->vector ? key->vector : values);
-    return with(schema, "default", key->shape == DRAPE_SCENE_LIST ? and_also(json_array(), value) : value);
-}
-
 /* An object that itself may be left out cannot be left out if something in it is required. */
 static bool key_is_required(const drape_scene_key *key)
 {
@@ -369,7 +362,7 @@ static json_t *properties_of(const drape_scene_object *object, const char *chose
     for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
         if (!is_excluded(object, key->param.name, chosen))
-            properties = with(properties, key->param.name, key_schema(object, key));
+            properties = with(properties, key->param.name, described(key_value(object, key), key));
     }
     return properties;
 }
@@ -393,7 +386,7 @@ static json_t *closed(json_t *properties, json_t *required)
     return with(object, "additionalProperties", json_false());
 }
 
-/* An object in which `key` names the row. */
+/* An object in which `key` names the entry. */
 static json_t *row_schema(const drape_scene_object *object, const char *key, const cli_row *row)
 {
     json_t *name =
@@ -430,7 +423,7 @@ static json_t *rows_schema(const drape_scene_object *object, const struct openin
     return with(json_object(), "anyOf", with_closed_forms(forms, object));
 }
 
-/* Parameters of all rows of the table; for a table of one row that has no name, they are its own. */
+/* Parameters of all entries of the table; for a table of one entry without a name, its own. */
 static json_t *table_schema(const drape_scene_object *object, const struct opening *opening)
 {
     json_t *properties = properties_of(object, NULL), *required = required_of(object);
@@ -443,7 +436,7 @@ static json_t *table_schema(const drape_scene_object *object, const struct openi
     return closed(properties, required);
 }
 
-/* Its first word is that there is none. */
+/* The first choice of the preset says that there is none. */
 static json_t *with_preset(json_t *schema, const struct opening *opening)
 {
     json_t *none = with(json_object(), "const", json_string("none"));

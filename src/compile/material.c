@@ -75,7 +75,7 @@ static drape_status total_mass(drape_context *ctx, const char *pointer, const do
     return DRAPE_OK;
 }
 
-/* Without a fabric, and with half of it said, all is. */
+/* Young's modulus and thickness: both are required without a fabric, and both or none with one. */
 static drape_status check_stiffness(drape_context *ctx, const char *pointer, const double *values)
 {
     static const int needed[] = {YOUNG_MODULUS, THICKNESS};
@@ -88,8 +88,8 @@ static drape_status check_stiffness(drape_context *ctx, const char *pointer, con
     return DRAPE_OK;
 }
 
-/* Of the isotropic sheet whose strips have the mean tension K and bending B of the fabric: h = sqrt(12 B/K), E = K/h. So
- * hinges and edges, which know no fabrics, come as near as they can. */
+/* Thickness and modulus of the isotropic sheet whose strips have the mean tension K and bending B of the fabric,
+ * h = sqrt(12 B/K), E = K/h, for terms that know no fabrics, such as hinges and edges. */
 static void fill_in(const drape_woven *tension, const drape_woven *bending, double *values)
 {
     const double k = sqrt(tension->warp * tension->weft), b = sqrt(bending->warp * bending->weft);
@@ -105,7 +105,7 @@ static bool is_given(const drape_cloth_def *def, const char *name)
     return false;
 }
 
-/* What the scene says of itself goes before what was measured. */
+/* Values that the scene gives go before measured ones. */
 static void take_fabric(const drape_cloth_def *def, double *values, drape_cloth *cloth)
 {
     const drape_fabric *fabric = &drape_fabrics[(int)values[FABRIC]];

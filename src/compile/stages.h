@@ -6,7 +6,7 @@
 #include "base/param.h"
 #include "compile/compile.h"
 
-/* Nothing that a count promises is NULL. */
+/* Checks a def along the keys of a scene: no array is NULL, all values are in range. */
 drape_status drape_compile_check_def(drape_context *ctx, const drape_scene_def *def);
 
 /* Resolves the material of a cloth whose mesh stands, and lumps its mass. pointer: "/cloth/0". */

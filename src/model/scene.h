@@ -26,8 +26,8 @@ drape_context *drape_scene_context(drape_scene *scene);
 /* Receives a piece of a text. */
 typedef void drape_text_sink(void *user, const char *text, size_t size);
 
-/* The scene as it is by now, what was set in it included, as JSON without comments: the text of a scene of our
- * form also where the scene is of another one, after a drape_scene_to_def or a compilation that was good. */
+/* Prints the scene with all values that were set, as JSON without comments. A scene of another form is printed in
+ * ours, once drape_scene_to_def or a compilation succeeded. */
 void drape_scene_print(drape_scene *scene, drape_text_sink *sink, void *user);
 
 /* ---- The form of a scene ----------------------------------------------------------------------------- */

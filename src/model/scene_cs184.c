@@ -1,18 +1,18 @@
 /*
- * scene_cs184.c: see scene_cs184.h. A scene of theirs is an object of at most "cloth", "sphere" and "plane",
- * whose members are checked here, those that they do not know ignored, as there. What their program has in its
- * windows and constants is what it begins with: gravity -9.8, 90 frames a second of 30 substeps, bend springs of
- * 0.2 ks, strains limited to 10 % in one pass, cloth that never passes through cloth.
+ * scene_cs184.c: see scene_cs184.h. Such a scene is an object of at most "cloth", "sphere" and "plane", whose
+ * members are checked here; members that CS184 does not know are ignored, as there. Settings that its program
+ * keeps in windows and constants have the values it starts with: gravity -9.8, 90 frames a second of 30 substeps,
+ * bend springs of 0.2 ks, strains limited to 10 % in one pass, self-contact.
  *
- * Beside their keys a scene may have our own of the whole scene, so that a command line can set the integrator,
- * the duration, the output: they stand as they are. An integrator without a method is verlet.
+ * Beside these a scene may have keys of our form for the whole scene, so that a command line can set the
+ * integrator, the duration, the output; they are copied. An integrator without a method is verlet.
  *
- * Their sheets lie at y = 1, rows along +z, or stand, rows along +y, with a random z of at most 1 mm that breaks
- * the symmetry. Ours begin at row 0 and go along -z or -y: half a turn about x makes one of the other. Mass is
- * the same on all points.
+ * Sheets of CS184 lie at y = 1 with rows along +z, or stand with rows along +y and a random z of at most 1 mm that
+ * breaks the symmetry. Rows of our grids go along -z or -y: a rotation by 180 degrees about x maps one to the other.
+ * All points have the same mass.
  *
- * For methods that do not move nodes there are limit.strain and contact; Verlet leaves them out. friction is
- * taken as mu there.
+ * Methods that do not move nodes use limit.strain and contact, which Verlet leaves out; friction is Coulomb's mu
+ * for them.
  */
 #include "model/scene_cs184.h"
 
@@ -69,7 +69,7 @@ static const object objects[] = {{"cloth", true, PARAMS(cloth_params)},
                                  {"plane", false, PARAMS(plane_params)}};
 #define OBJECTS (sizeof objects / sizeof *objects)
 
-/* Of our form, and taken as they are. */
+/* Keys of our form that are copied. */
 static const char *const ours[] = {"description", "gravity", "integrator", "controller", "duration",
                                    "frame_rate",  "output",  "contact",    NULL};
 
@@ -148,7 +148,7 @@ static double number_of(json_t *object_value, const char *name)
     return json_number_value(json_object_get(object_value, name));
 }
 
-/* One pin, at its pointer. */
+/* Checks one pin, at its pointer. */
 static drape_status check_pin(drape_context *ctx, drape_pointer *at, json_t *pin, const double points[2])
 {
     if (json_array_size(pin) != 2)
@@ -237,7 +237,7 @@ static double stiffness_of(json_t *cloth, const char *enabled)
     return on ? number_of(cloth, "ks") : 0;
 }
 
-/* Springs that are switched off have no stiffness: theirs still obey the limit. */
+/* Springs that are switched off have no stiffness, but still obey the strain limit, as in CS184. */
 static json_t *terms_of(json_t *cloth)
 {
     return json_pack("[{s:s,s:f},{s:s,s:f},{s:s,s:f,s:f},{s:s,s:f,s:s}]", "type", "spring.structural",
@@ -293,7 +293,7 @@ static json_t *colliders_of(json_t *root)
     return array;
 }
 
-/* Their program's, changed by what the scene says of ours. */
+/* That of the CS184 program, with the settings that the scene gives of our form. */
 static json_t *integrator_of(json_t *root)
 {
     json_t *cloth = json_object_get(root, "cloth");

@@ -99,7 +99,7 @@ void drape_scene_store(const drape_scene_key *key, const drape_setting *setting,
     case DRAPE_PARAM_VECTOR:
         memcpy(at, values, 3 * sizeof *values);
         return;
-    case DRAPE_PARAM_TURN: /* axis and angle as they were given, not as `values` has them: to the bit */
+    case DRAPE_PARAM_TURN: /* axis and angle exactly as given, not converted as in `values` */
         memcpy(rotation, setting->vector, setting->vector_count * sizeof *rotation);
         if (setting->vector_count == 3)
             rotation[3] = vec3_norm(rotation);
@@ -116,7 +116,7 @@ void drape_scene_store(const drape_scene_key *key, const drape_setting *setting,
 
 /* ---- Defaults ---- */
 
-/* Arrays are empty and fixed objects zero, as the def begins, but for a list whose default is one text. */
+/* Arrays without a default stay empty, as the zeros of the def have them; a list has a default of one text or none. */
 static void set_default(const drape_scene_key *key, void *def)
 {
     static const double no_rotation[4] = {0};
@@ -157,8 +157,7 @@ static void give(void *def, size_t struct_size, bool sized, const void *defaults
         memcpy(def, &struct_size, struct_size < sizeof struct_size ? struct_size : sizeof struct_size);
 }
 
-/* What a text must say, or gets in its own way, is otherwise for a host: it may leave out the duration, and has
- * no frames written. */
+/* Two defaults are those of hosts only: the text of a scene must give a duration, and has frames written. */
 void drape_scene_def_init(drape_scene_def *def, size_t struct_size)
 {
     drape_scene_def defaults = {.struct_size = struct_size};

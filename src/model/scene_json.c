@@ -155,14 +155,14 @@ static drape_status read_numbers(reader *r, json_t *array, double *out)
     return DRAPE_OK;
 }
 
-/* Three numbers inside of another array, whose key would say too much. */
+/* Three numbers inside another array; `what` is their name in messages. */
 static drape_status read_three(reader *r, json_t *value, const char *what, double *out)
 {
     return json_array_size(value) == 3 ? read_numbers(r, value, out)
                                        : refuse_as(r, value, what, "three numbers, [x, y, z]");
 }
 
-/* Booleans become texts, so that no number takes them. */
+/* Booleans become texts, so that no parameter takes them for a number. */
 static drape_status read_setting(reader *r, const char *name, json_t *value, drape_setting *out)
 {
     *out = (drape_setting){.name = name};
@@ -180,7 +180,7 @@ static drape_status read_setting(reader *r, const char *name, json_t *value, dra
     return numbers ? read_numbers(r, value, numbers) : DRAPE_E_MEMORY;
 }
 
-/* Whether a parameter of this kind is ever written as such a value; what it is then decides drape_param_value. */
+/* Whether a parameter of this kind may be written as a JSON value of this type; drape_param_value checks the rest. */
 static bool is_writable(const drape_param *param, json_t *value)
 {
     if (json_is_array(value))
@@ -315,7 +315,7 @@ static drape_status read_track(reader *r, const drape_scene_key *key, json_t *va
 
 /* ---- Objects ---- */
 
-/* The compiler knows the parameter that it is for. */
+/* A setting, whose parameter only the compiler knows. */
 static drape_status read_member(reader *r, const char *name, json_t *value, drape_setting *out)
 {
     size_t mark = r->at.length;
@@ -329,7 +329,7 @@ static drape_status read_member(reader *r, const char *name, json_t *value, drap
     return status;
 }
 
-/* The members that are no keys: settings in an open object, faults in others. */
+/* Members that are not keys are settings in an open object, and faults in others. */
 static drape_status read_others(reader *r, const drape_scene_object *object, json_t *value, char *def)
 {
     drape_setting *settings = NULL;
@@ -350,7 +350,7 @@ static drape_status read_others(reader *r, const drape_scene_object *object, jso
             return status;
         count++;
     }
-    if (open) { /* none is not the same as no object */
+    if (open) { /* an object without settings differs from no object */
         memcpy(def + object->settings_offset, &settings, sizeof settings);
         memcpy(def + object->settings_count_offset, &count, sizeof count);
     }
@@ -450,7 +450,7 @@ static drape_status read_value(reader *r, const drape_scene_key *key, json_t *va
 
 /* ---- The scene ---- */
 
-/* The version before all else: in another version other keys would be right. */
+/* The version is checked first, as another version has other keys. */
 static drape_status check_version(reader *r, json_t *root)
 {
     const drape_scene_key *key = &drape_form_scene.keys[0];
@@ -464,7 +464,7 @@ static drape_status check_version(reader *r, json_t *root)
     return status;
 }
 
-/* Names of cloths are their own, those that the library gives to nameless ones included. */
+/* No two cloths have the same name, with the names that the library gives included. */
 static drape_status check_names(reader *r, const drape_scene_def *def)
 {
     json_t *names = json_object(); /* used as a set */

@@ -76,7 +76,7 @@ static const drape_scene_key controller_keys[] = {
 static const drape_scene_object controller = {
     .name = "controller", KEYS(controller_keys), SETTINGS(drape_row_def, settings, setting_count)};
 
-/* Its members are the parameters of a material, settings all of them. */
+/* All members of a material are settings. */
 static const drape_scene_object material = {.name = "material",
                                             SETTINGS(drape_cloth_def, material, material_count)};
 
@@ -148,7 +148,7 @@ const drape_scene_object drape_form_collider = {
     .sized = true,
 };
 
-/* Their members are settings all of them, as those of a material. */
+/* All members of these two are settings. */
 static const drape_scene_object self_contact = {.name = "self_contact",
                                                 SETTINGS(drape_scene_def, self_contact, self_contact_count)};
 static const drape_scene_object contact = {.name = "contact",
