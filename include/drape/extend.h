@@ -20,6 +20,8 @@
 #ifndef DRAPE_EXTEND_H
 #define DRAPE_EXTEND_H
 
+#include <math.h>
+
 #include "drape.h"
 
 DRAPE_C_BEGIN
@@ -39,7 +41,8 @@ typedef enum drape_param_kind {
 } drape_param_kind;
 
 /* One parameter. All values travel as doubles: integers exact, booleans 0 or 1, choices by index; a vector
- * or a turn takes three of them, so that the values of the parameters after it stand two further on. */
+ * or a turn takes three of them, so that the values of the parameters after it stand two further on. In C the
+ * macros below write one. */
 typedef struct drape_param {
     const char *name;           /* as in scenes */
     drape_param_kind kind;      /* what values it has */
@@ -54,6 +57,64 @@ typedef struct drape_param {
     bool uniform;               /* VECTOR: one number may stand for three equal ones */
     const char *numbers;        /* VECTOR: what the three are, "[k11, k22, k12]"; NULL: [x, y, z] */
 } drape_param;
+
+/* A parameter that is a number: name, unit, default, range and help. C only, as C++17 has no designated
+ * initialisers:
+ *     static const drape_param params[] = {
+ *         DRAPE_NUMBER("tolerance", "N", 1e-6, DRAPE_ABOVE(0), 1e12, "bound on the residual"),
+ *         DRAPE_VECTOR("size", "m", DRAPE_REQUIRED, 0, 1e9, "lengths of the edges", .uniform = true),
+ *         DRAPE_CHOICE("rest", 0, rest_choices, "rest angles: those of the mesh, or flat")};
+ * DRAPE_REQUIRED and DRAPE_DERIVED stand for a default, DRAPE_ABOVE and DRAPE_BELOW for a bound that the
+ * range excludes. Other members may follow the help. */
+#define DRAPE_NUMBER(name_, unit_, default_, min_, max_, ...)                                                \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_NUMBER, .unit = unit_, .default_value = default_, .min = min_,    \
+        .max = max_, .help = __VA_ARGS__                                                                     \
+    }
+/* A whole number. */
+#define DRAPE_INTEGER(name_, unit_, default_, min_, max_, ...)                                               \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_INTEGER, .unit = unit_, .default_value = default_, .min = min_,   \
+        .max = max_, .help = __VA_ARGS__                                                                     \
+    }
+/* Three numbers; default and range are those of each. */
+#define DRAPE_VECTOR(name_, unit_, default_, min_, max_, ...)                                                \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_VECTOR, .unit = unit_, .default_value = default_, .min = min_,    \
+        .max = max_, .help = __VA_ARGS__                                                                     \
+    }
+/* A rotation; the range is that of its angle [degrees]. */
+#define DRAPE_TURN(name_, default_, min_, max_, ...)                                                         \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_TURN, .unit = "degrees", .default_value = default_, .min = min_,  \
+        .max = max_, .help = __VA_ARGS__                                                                     \
+    }
+/* True or false. */
+#define DRAPE_BOOLEAN(name_, default_, ...)                                                                  \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_BOOLEAN, .unit = "1", .default_value = default_,                  \
+        .help = __VA_ARGS__                                                                                  \
+    }
+/* One of a NULL-ended list of names; the default is an index. */
+#define DRAPE_CHOICE(name_, default_, choices_, ...)                                                         \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_CHOICE, .unit = "1", .default_value = default_,                   \
+        .choices = choices_, .help = __VA_ARGS__                                                             \
+    }
+/* A text, always required. */
+#define DRAPE_TEXT(name_, ...)                                                                               \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_TEXT, .unit = "1", .default_value = DRAPE_REQUIRED,               \
+        .help = __VA_ARGS__                                                                                  \
+    }
+/* In place of a default: the parameter must be given. */
+#define DRAPE_REQUIRED ((double)NAN)
+/* In place of a default: what is taken instead, in words. */
+#define DRAPE_DERIVED(words) DRAPE_REQUIRED, .derived = words
+/* In place of min: values are above it. */
+#define DRAPE_ABOVE(bound) bound, .open_min = true
+/* In place of max: values are below it. */
+#define DRAPE_BELOW(bound) bound, .open_max = true
 
 #define DRAPE_MAX_PARAMS 24 /* values of all parameters of an entry */
 

@@ -2,6 +2,7 @@
 #include "cli/info.h"
 #include "cli/signals.h"
 
+#include "base/arena.h"
 #include "colliders/colliders.h"
 
 #include <math.h>
@@ -13,49 +14,49 @@ typedef struct info_request {
     bool json;
 } info_request;
 
-void cli_chosen_rows(const drape_sim *sim, cli_chosen_row rows[CLI_CHOSEN_ROWS])
+void cli_chosen_entries(const drape_sim *sim, cli_chosen entries[CLI_CHOSEN])
 {
     const drape_integrator_ops *integrator = sim->chosen.integrator;
     const drape_controller_ops *controller = sim->chosen.controller;
-    rows[0] = (cli_chosen_row){"integrator",
-                               integrator->entry.name,
-                               integrator->entry.summary,
-                               integrator->entry.params,
-                               integrator->entry.param_count,
-                               sim->chosen.integrator_values,
-                               &sim->model->integrator,
-                               drape_chosen_ignores_integrator};
-    rows[1] = (cli_chosen_row){"controller",
-                               controller->entry.name,
-                               controller->entry.summary,
-                               controller->entry.params,
-                               controller->entry.param_count,
-                               sim->chosen.controller_values,
-                               &sim->model->controller,
-                               drape_chosen_ignores_controller};
+    entries[0] = (cli_chosen){"integrator",
+                              integrator->entry.name,
+                              integrator->entry.summary,
+                              integrator->entry.params,
+                              integrator->entry.param_count,
+                              sim->chosen.integrator_values,
+                              &sim->model->integrator,
+                              drape_chosen_ignores_integrator};
+    entries[1] = (cli_chosen){"controller",
+                              controller->entry.name,
+                              controller->entry.summary,
+                              controller->entry.params,
+                              controller->entry.param_count,
+                              sim->chosen.controller_values,
+                              &sim->model->controller,
+                              drape_chosen_ignores_controller};
 }
 
-void cli_contact(const drape_sim *sim, cli_contact_rows *out)
+void cli_contact(const drape_sim *sim, cli_contact_entries *out)
 {
     const drape_model *model = sim->model;
     const bool forces = !sim->chosen.integrator->projects_contact; /* else only the thickness acts */
     out->count = 0;
     if (forces && (model->collider_count > 0 || model->contact.self)) {
         drape_contact_values(&model->contact, out->values[0]);
-        out->rows[out->count++] = (cli_chosen_row){.title = "contact",
-                                                   .params = drape_contact_params,
-                                                   .param_count = DRAPE_CONTACT_PARAM_COUNT,
-                                                   .values = out->values[0],
-                                                   .choice = &model->contact_choice};
+        out->entries[out->count++] = (cli_chosen){.title = "contact",
+                                                  .params = drape_contact_params,
+                                                  .param_count = DRAPE_CONTACT_PARAM_COUNT,
+                                                  .values = out->values[0],
+                                                  .choice = &model->contact_choice};
     }
     if (model->contact.self) {
         drape_self_contact_values(&model->contact, out->values[1]);
-        out->rows[out->count++] =
-            (cli_chosen_row){.title = "self_contact",
-                             .params = drape_self_contact_params,
-                             .param_count = forces ? DRAPE_SELF_PARAM_COUNT : DRAPE_SELF_THICKNESS + 1,
-                             .values = out->values[1],
-                             .choice = &model->self_choice};
+        out->entries[out->count++] =
+            (cli_chosen){.title = "self_contact",
+                         .params = drape_self_contact_params,
+                         .param_count = forces ? DRAPE_SELF_PARAM_COUNT : DRAPE_SELF_THICKNESS + 1,
+                         .values = out->values[1],
+                         .choice = &model->self_choice};
     }
 }
 
@@ -146,7 +147,9 @@ static drape_status gather(drape_arena *arena, const cli_scene *in, cli_info *in
         info->cloths[c] = cloth_info(model, &model->cloths[c]);
     for (int32_t c = 0; c < model->collider_count; c++)
         info->colliders[c] = collider_info(in->sim, &model->colliders[c]);
-    drape_status status = drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
+    drape_status status = drape_scene_to_def(in->scene, &info->def);
+    if (!status)
+        status = drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
     const drape_integrator_ops *integrator = in->sim->chosen.integrator;
     info->has_limit = integrator->stability;
     if (!status && info->has_limit)

@@ -34,20 +34,31 @@ typedef struct list_style {
     bool params_apart; /* in a table of their own, after all entries */
 } list_style;
 
+/* What a parameter, or a key of a scene, takes and has by default, in words; the unit has a place of its own. */
 typedef struct param_text {
-    char range[1024], value[256], unit[64];
+    char takes[1024], value[256], unit[64];
 } param_text;
 
 static param_text text_of(const drape_param *param)
 {
     param_text text;
     drape_param plain = *param;
-    plain.unit = "1"; /* the range without its unit, which has a place of its own */
-    drape_param_range_text(&plain, text.range, sizeof text.range);
+    plain.unit = "1";
+    drape_param_range_text(&plain, text.takes, sizeof text.takes);
     double value[DRAPE_PARAM_WIDEST];
     drape_param_default(param, value);
     drape_param_value_text(param, value, text.value, sizeof text.value);
     snprintf(text.unit, sizeof text.unit, "%s", strcmp(param->unit, "1") == 0 ? "" : param->unit);
+    return text;
+}
+
+static param_text text_of_key(const drape_scene_key *key)
+{
+    param_text text = text_of(&key->param);
+    drape_scene_key plain = *key;
+    plain.param.unit = "1";
+    drape_scene_takes_text(&plain, text.takes, sizeof text.takes);
+    drape_scene_default_text(key, text.value, sizeof text.value);
     return text;
 }
 
@@ -73,13 +84,20 @@ static void text_object(const cli_object *object)
            *one_of ? "; " : "", one_of);
 }
 
+static void print_param(const char *name, const char *help, const param_text *text, const char *prefix)
+{
+    printf("    %-18s %s\n    %-18s %s%s%s%s%s%s\n", name, help, "", text->takes, *text->unit ? " " : "",
+           text->unit, *text->value ? "; " : "", *text->value ? prefix : "", text->value);
+}
+
 static void text_key(const cli_object *object, const drape_scene_key *key)
 {
     (void)object;
-    char text[256];
-    cli_key_text(key, text, sizeof text);
-    printf("    %-18s %s\n    %-18s %s%s%s%s\n", key->name, key->help, "", text, key->unit ? " [" : "",
-           key->unit ? key->unit : "", key->unit ? "]" : "");
+    param_text text = text_of_key(key);
+    drape_scene_takes_text(key, text.takes, sizeof text.takes); /* the unit included */
+    *text.unit = 0;
+    print_param(key->param.name, key->param.help, &text,
+                drape_param_is_required(&key->param) ? "" : "default ");
 }
 
 static void text_table(const drape_registry *table)
@@ -98,9 +116,7 @@ static void text_param(const drape_entry *entry, const drape_param *param)
 {
     (void)entry;
     const param_text text = text_of(param);
-    printf("    %-18s %s\n", param->name, param->help);
-    printf("    %-18s %s%s%s; %s%s\n", "", text.range, *text.unit ? " " : "", text.unit,
-           isnan(param->default_value) ? "" : "default ", text.value);
+    print_param(param->name, param->help, &text, isnan(param->default_value) ? "" : "default ");
 }
 
 /* ---- As Markdown ---- */
@@ -126,26 +142,31 @@ static void code_cell(const char *text)
 
 static void markdown_scene(void)
 {
-    puts("### " SCENE_TITLE "\n\n| in | key | unit | takes | what |\n|---|---|---|---|---|");
+    puts("### " SCENE_TITLE "\n\n| in | key | unit | default | takes | what |\n|---|---|---|---|---|---|");
 }
 
-/* A key that stands for others says so: its line is read alone. */
+static void markdown_cells(const char *of, const char *name, const char *help, const param_text *text)
+{
+    fputs("|", stdout);
+    code_cell(of);
+    code_cell(name);
+    cell(text->unit);
+    cell(text->value);
+    cell(text->takes);
+    cell(help);
+    fputc('\n', stdout);
+}
+
+/* A key that stands for others says so: its row of the table is read alone. */
 static void markdown_key(const cli_object *object, const drape_scene_key *key)
 {
-    char text[512];
-    cli_key_text(key, text, sizeof text);
-    const size_t length = strlen(text);
+    param_text text = text_of_key(key);
+    const size_t length = strlen(text.takes);
     if (cli_is_one_of(object->form, key)) {
-        snprintf(text + length, sizeof text - length, "; ");
-        cli_one_of_text(object->form, text + length + 2, sizeof text - length - 2);
+        snprintf(text.takes + length, sizeof text.takes - length, "; ");
+        cli_one_of_text(object->form, text.takes + length + 2, sizeof text.takes - length - 2);
     }
-    fputs("|", stdout);
-    code_cell(*object->pointer ? object->pointer : "/");
-    code_cell(key->name);
-    cell(key->unit ? key->unit : "");
-    cell(text);
-    cell(key->help);
-    fputc('\n', stdout);
+    markdown_cells(*object->pointer ? object->pointer : "/", key->param.name, key->param.help, &text);
 }
 
 static void markdown_object(const cli_object *object)
@@ -183,14 +204,7 @@ static void markdown_params_begin(const drape_registry *table)
 static void markdown_param(const drape_entry *entry, const drape_param *param)
 {
     const param_text text = text_of(param);
-    fputs("|", stdout);
-    code_cell(entry->name);
-    code_cell(param->name);
-    cell(text.unit);
-    cell(text.value);
-    cell(text.range);
-    cell(param->help);
-    fputc('\n', stdout);
+    markdown_cells(entry->name, param->name, param->help, &text);
 }
 
 static const list_style text_style = {.scene = text_scene,
@@ -309,7 +323,7 @@ static int print_schema(void)
     return failed && !ferror(stdout) ? cli_misuse("list", "out of memory for the schema") : CLI_DONE;
 }
 
-static int run(const void *command)
+static int print_request(const void *command)
 {
     const list_request *request = command;
     if (request->schema && (request->command.operand || request->markdown))
@@ -336,5 +350,5 @@ const drape_verb drape_verb_list = {
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(list_request),
-    .run = run,
+    .run = print_request,
 };

@@ -72,20 +72,17 @@ static json_t *word(void)
     return with(typed("string"), "minLength", json_integer(1));
 }
 
-static json_t *one_of_words(const char *const *words)
-{
-    json_t *array = json_array();
-    for (int i = 0; words[i]; i++)
-        array = and_also(array, json_string(words[i]));
-    return with(json_object(), "enum", array);
-}
-
 static json_t *words(const char *const *names)
 {
     json_t *array = json_array();
     for (int i = 0; names[i]; i++)
         array = and_also(array, json_string(names[i]));
     return array;
+}
+
+static json_t *one_of_words(const char *const *names)
+{
+    return with(json_object(), "enum", words(names));
 }
 
 static json_t *that_requires(json_t *names)
@@ -113,7 +110,7 @@ static json_t *at_most_one(json_t *object, const char *const *names)
     return with(object, "oneOf", and_also(each_required(names), none));
 }
 
-/* Of several keys all or none. */
+/* All of the keys, or none. */
 static json_t *all_or_none(json_t *object, const char *const *names)
 {
     json_t *dependents = json_object();
@@ -122,40 +119,40 @@ static json_t *all_or_none(json_t *object, const char *const *names)
     return with(object, "dependentRequired", dependents);
 }
 
-/* ---- Parameters of entries ---- */
+/* ---- Parameters and keys ---- */
 
-static bool is_required(const drape_param *p)
+static json_t *three(const double *values)
 {
-    return isnan(p->default_value) && !p->derived;
+    return and_also(and_also(and_also(json_array(), number(values[0])), number(values[1])),
+                    number(values[2]));
 }
 
-static json_t *three(double value)
-{
-    return and_also(and_also(and_also(json_array(), number(value)), number(value)), number(value));
-}
-
-static json_t *default_of(const drape_param *p)
+static json_t *default_of(const drape_param *p, const double *values)
 {
     switch (p->kind) {
     case DRAPE_PARAM_BOOLEAN:
-        return json_boolean(p->default_value != 0);
+        return json_boolean(*values != 0);
     case DRAPE_PARAM_CHOICE:
-        return json_string(p->choices[(int)p->default_value]);
+        return json_string(p->choices[(int)*values]);
     case DRAPE_PARAM_VECTOR:
     case DRAPE_PARAM_TURN:
-        return three(p->default_value);
+        return three(values);
+    case DRAPE_PARAM_TEXT:
+        return json_string(p->derived);
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
-    case DRAPE_PARAM_TEXT: /* always required */
         break;
     }
-    return number(p->default_value);
+    return number(*values);
 }
 
 static json_t *bounded(const char *type, const drape_param *p)
 {
-    json_t *value = with(typed(type), p->open_min ? "exclusiveMinimum" : "minimum", number(p->min));
-    return with(value, p->open_max ? "exclusiveMaximum" : "maximum", number(p->max));
+    json_t *value = typed(type);
+    if (isfinite(p->min))
+        value = with(value, p->open_min ? "exclusiveMinimum" : "minimum", number(p->min));
+    return isfinite(p->max) ? with(value, p->open_max ? "exclusiveMaximum" : "maximum", number(p->max))
+                            : value;
 }
 
 static json_t *vector_of(const drape_param *p)
@@ -184,22 +181,30 @@ static json_t *value_of(const drape_param *p)
     return bounded(p->kind == DRAPE_PARAM_INTEGER ? "integer" : "number", p);
 }
 
-static json_t *described(json_t *value, const char *help, const char *unit)
+/* Adds the help and the default of a key to the schema of its value. */
+static json_t *described(json_t *value, const drape_scene_key *key)
 {
     char text[512];
-    bool has_unit = unit && strcmp(unit, "1") != 0;
-    snprintf(text, sizeof text, "%s%s%s%s", help, has_unit ? " [" : "", has_unit ? unit : "",
+    double defaults[DRAPE_PARAM_WIDEST];
+    const drape_param *p = &key->param;
+    const bool has_unit = strcmp(p->unit, "1") != 0;
+    snprintf(text, sizeof text, "%s%s%s%s", p->help, has_unit ? " [" : "", has_unit ? p->unit : "",
              has_unit ? "]" : "");
-    return with(value, "description", json_string(text));
+    value = with(value, "description", json_string(text));
+    drape_param_default(p, defaults);
+    if (isnan(*defaults) && !key->literal)
+        return value;
+    json_t *one = default_of(p, key->vector ? key->vector : defaults);
+    return with(value, "default", key->shape == DRAPE_SCENE_LIST ? and_also(json_array(), one) : one);
 }
 
 static json_t *param(const drape_param *p)
 {
-    json_t *value = described(value_of(p), p->help, p->unit);
-    return isnan(p->default_value) ? value : with(value, "default", default_of(p));
+    return described(value_of(p), &(drape_scene_key){.param = *p});
 }
 
-/* A parameter of several entries with different bounds must be right for each of them, as the reader has it. */
+/* A value of a parameter that several entries have with different bounds must be right for each of them, as for
+ * the reader. */
 static json_t *with_param(json_t *properties, const drape_param *p)
 {
     json_t *schema = param(p), *before = json_object_get(properties, p->name);
@@ -223,7 +228,7 @@ static json_t *with_params(json_t *properties, const drape_entry *entry)
 static bool needs_params(const drape_entry *entry)
 {
     for (int i = 0; i < entry->param_count; i++)
-        if (is_required(&entry->params[i]))
+        if (drape_param_is_required(&entry->params[i]))
             return true;
     return false;
 }
@@ -231,7 +236,7 @@ static bool needs_params(const drape_entry *entry)
 static json_t *with_required(json_t *required, const drape_entry *entry)
 {
     for (int i = 0; i < entry->param_count; i++)
-        if (is_required(&entry->params[i]))
+        if (drape_param_is_required(&entry->params[i]))
             required = and_also(required, json_string(entry->params[i].name));
     return required;
 }
@@ -242,7 +247,7 @@ static bool is_implied(const drape_registry *table, int index)
     return table == &drape_term_registry && drape_terms[index]->potential_of_gravity;
 }
 
-/* Entries that a scene may name: those that need no parameters where only a name is given. */
+/* The entries that a scene may name; `alone`: without parameters beside the name. */
 static json_t *entry_names(const drape_registry *table, bool alone)
 {
     json_t *names = json_array();
@@ -262,10 +267,11 @@ typedef enum opening_kind {
 
 /* The open objects of scene_keys.c. */
 static const struct opening {
-    const char *object, *key; /* the key that names the entry; NULL: there is but one */
+    const char *object, *key; /* the key that names the entry; NULL: the table has only one */
     opening_kind kind;
     const drape_registry *table;
-    const char *const *one_of, *const *all_of; /* but where `preset` says them: at most one, all or none */
+    const char *const *one_of, *const
+                                   *all_of; /* where `preset` gives their values: at most one, all or none */
     const char *preset;
 } openings[] = {
     {"term", "type", ENTRY_PARAMS, &drape_term_registry, NULL, NULL, NULL},
@@ -288,25 +294,20 @@ static const struct opening *opening_of(const drape_scene_object *object)
     return NULL;
 }
 
-/* Names of entries. */
-static json_t *words_of(const drape_scene_object *object, const drape_scene_key *key)
+/* Texts that name entries of a table. */
+static json_t *names_of(const drape_scene_object *object, const drape_scene_key *key)
 {
     const struct opening *opening = object->open ? opening_of(object) : NULL;
-    if (opening && opening->key && strcmp(opening->key, key->name) == 0)
+    if (opening && opening->key && strcmp(opening->key, key->param.name) == 0)
         return entry_names(opening->table, false);
-    if (strcmp(object->name, "output") == 0 && strcmp(key->name, "formats") == 0)
+    if (object == &drape_form_output && key->param.kind == DRAPE_PARAM_TEXT)
         return entry_names(&drape_exporter_registry, false);
-    return key->words ? one_of_words(key->words) : word();
+    return value_of(&key->param);
 }
 
 /* ---- Keys ---- */
 
 static json_t *object_schema(const drape_scene_object *object);
-
-static json_t *ranged(const drape_scene_key *key, const char *type, const char *least)
-{
-    return with(with(typed(type), least, number(key->min)), "maximum", number(key->max));
-}
 
 static json_t *entry_or_name(const drape_scene_key *key)
 {
@@ -315,42 +316,28 @@ static json_t *entry_or_name(const drape_scene_key *key)
 
 static json_t *key_value(const drape_scene_object *object, const drape_scene_key *key)
 {
-    switch (key->kind) {
+    switch (key->shape) {
+    case DRAPE_SCENE_VALUE:
+        return names_of(object, key);
+    case DRAPE_SCENE_LIST:
+        return array_of(names_of(object, key), key->at_least, key->at_most);
     case DRAPE_SCENE_VERSION:
         return with(json_object(), "const", json_integer(DRAPE_SCENE_FORM));
-    case DRAPE_SCENE_TEXT:
+    case DRAPE_SCENE_REMARK:
         return typed("string");
-    case DRAPE_SCENE_WORD:
-        return words_of(object, key);
-    case DRAPE_SCENE_WORDS:
-        return array_of(words_of(object, key), key->at_least, 0);
-    case DRAPE_SCENE_BOOLEAN:
-        return typed("boolean");
-    case DRAPE_SCENE_NUMBER:
-        return ranged(key, "number", key->closed ? "minimum" : "exclusiveMinimum");
-    case DRAPE_SCENE_INTEGER:
-        return ranged(key, "integer", "minimum");
-    case DRAPE_SCENE_INTEGERS:
-        return array_of(ranged(key, "integer", "minimum"), key->at_least, 0);
-    case DRAPE_SCENE_VECTOR:
-        return numbers(3, 3);
-    case DRAPE_SCENE_SCALE:
-        return any_of(typed("number"), numbers(3, 3));
-    case DRAPE_SCENE_ROTATION:
-        return numbers(3, 4);
     case DRAPE_SCENE_BOX:
         return array_of(numbers(3, 3), 2, 2);
     case DRAPE_SCENE_TRACK: {
         json_t *pair = and_also(and_also(json_array(), typed("number")), numbers(3, 3));
         json_t *item = with(with(typed("array"), "prefixItems", pair), "minItems", json_integer(2));
-        return array_of(with(item, "maxItems", json_integer(2)), key->at_least, 0);
+        return array_of(with(item, "maxItems", json_integer(2)), key->at_least, key->at_most);
     }
     case DRAPE_SCENE_OBJECT:
         return object_schema(key->child);
     case DRAPE_SCENE_OBJECTS:
-        return array_of(object_schema(key->child), key->at_least, 0);
-    case DRAPE_SCENE_ROWS:
-        return array_of(entry_or_name(key), key->at_least, 0);
+        return array_of(object_schema(key->child), key->at_least, key->at_most);
+    case DRAPE_SCENE_ENTRIES:
+        return array_of(entry_or_name(key), key->at_least, key->at_most);
     }
     return NULL;
 }
@@ -358,10 +345,10 @@ static json_t *key_value(const drape_scene_object *object, const drape_scene_key
 /* An object that itself may be left out cannot be left out if something in it is required. */
 static bool key_is_required(const drape_scene_key *key)
 {
-    const struct opening *opening = key->kind == DRAPE_SCENE_OBJECT ? opening_of(key->child) : NULL;
+    const struct opening *opening = key->shape == DRAPE_SCENE_OBJECT ? opening_of(key->child) : NULL;
     if (key->optional)
         return false;
-    return key->required ||
+    return drape_param_is_required(&key->param) ||
            (opening && !opening->key && (needs_params(opening->table->entries[0]) || opening->all_of));
 }
 
@@ -381,8 +368,8 @@ static json_t *properties_of(const drape_scene_object *object, const char *chose
     json_t *properties = json_object();
     for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
-        if (!is_excluded(object, key->name, chosen))
-            properties = with(properties, key->name, described(key_value(object, key), key->help, key->unit));
+        if (!is_excluded(object, key->param.name, chosen))
+            properties = with(properties, key->param.name, described(key_value(object, key), key));
     }
     return properties;
 }
@@ -392,7 +379,7 @@ static json_t *required_of(const drape_scene_object *object)
     json_t *required = json_array();
     for (size_t i = 0; i < object->key_count; i++)
         if (key_is_required(&object->keys[i]))
-            required = and_also(required, json_string(object->keys[i].name));
+            required = and_also(required, json_string(object->keys[i].param.name));
     return required;
 }
 
@@ -443,7 +430,7 @@ static json_t *entries_schema(const drape_scene_object *object, const struct ope
     return with(json_object(), "anyOf", with_closed_forms(forms, object));
 }
 
-/* Parameters of all entries of the table; for a table of one entry that has no name, they are its own. */
+/* Parameters of all entries of the table; for a table of one entry without a name, its own. */
 static json_t *table_schema(const drape_scene_object *object, const struct opening *opening)
 {
     json_t *properties = properties_of(object, NULL), *required = required_of(object);
@@ -456,7 +443,7 @@ static json_t *table_schema(const drape_scene_object *object, const struct openi
     return closed(properties, required);
 }
 
-/* Its first word is that there is none. */
+/* The first choice of the preset says that there is none. */
 static json_t *with_preset(json_t *schema, const struct opening *opening)
 {
     json_t *none = with(json_object(), "const", json_string("none"));
@@ -486,7 +473,7 @@ json_t *cli_schema(void)
     json_t *schema = json_object();
     schema = with(schema, "$schema", json_string("https://json-schema.org/draft/2020-12/schema"));
     schema = with(schema, "title", json_string("A scene of Drape"));
-    json_t *form = object_schema(&drape_scene_form);
+    json_t *form = object_schema(&drape_form_scene);
     if (form && schema)
         json_object_update(schema, form);
     else

@@ -11,28 +11,14 @@ enum { A = 0, B = 3, RADIUS = 6, ROUNDING = 7, PARAM_COUNT = 4 }; /* places of t
 #define MIN_SIDES 12
 #define MAX_SIDES 512
 
-#define END(name_, help_)                                                                                    \
-    {                                                                                                        \
-        .name = name_, .kind = DRAPE_PARAM_VECTOR, .unit = "m", .default_value = NAN, .min = -1e9,           \
-        .max = 1e9, .help = help_                                                                            \
-    }
+#define END(name, help) DRAPE_VECTOR(name, "m", DRAPE_REQUIRED, -1e9, 1e9, help)
 
 static const drape_param params[PARAM_COUNT] = {
     END("a", "center of one of the flat ends"),
     END("b", "center of the other one"),
-    {.name = "radius",
-     .unit = "m",
-     .default_value = NAN,
-     .min = 0,
-     .max = 1e9,
-     .open_min = true,
-     .help = "radius around the axis from a to b"},
-    {.name = "rounding",
-     .unit = "m",
-     .default_value = 0,
-     .min = 0,
-     .max = 1e9,
-     .help = "radius of its rims, below its radius and half of its length; length and radius stay"},
+    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "radius around the axis from a to b"),
+    DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
+                 "radius of its rims, below its radius and half of its length; length and radius stay"),
 };
 
 typedef struct axis {

@@ -8,20 +8,8 @@
 enum { CENTER = 0, RADIUS = 3, PARAM_COUNT = 2 }; /* places of the values */
 
 static const drape_param params[PARAM_COUNT] = {
-    {.name = "center",
-     .kind = DRAPE_PARAM_VECTOR,
-     .unit = "m",
-     .default_value = NAN,
-     .min = -1e9,
-     .max = 1e9,
-     .help = "center of the sphere"},
-    {.name = "radius",
-     .unit = "m",
-     .default_value = NAN,
-     .min = 0,
-     .max = 1e9,
-     .open_min = true,
-     .help = "radius of the sphere"},
+    DRAPE_VECTOR("center", "m", DRAPE_REQUIRED, -1e9, 1e9, "center of the sphere"),
+    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "radius of the sphere"),
 };
 
 static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)

@@ -5,8 +5,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_FRICTION 1e3
-
 /* How far a polygon may stay inside a curved surface, of the activation distance: an edge of the cloth that
  * rests on a polygon then is pushed off nearly as if it were the surface. */
 #define SHARE_OF_DISTANCE 0.1
@@ -40,18 +38,6 @@ static drape_status name_collider(drape_model *model, const char *pointer, const
     return drape_arena_status(&model->arena);
 }
 
-static drape_status take_friction(drape_model *model, const char *pointer, double friction,
-                                  drape_collider *to)
-{
-    char at[96];
-    snprintf(at, sizeof at, "%s/friction", pointer);
-    to->friction = friction;
-    if (friction >= 0 && friction <= MAX_FRICTION)
-        return DRAPE_OK;
-    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%.10g is not allowed; it is in [0, %g]", friction,
-                         MAX_FRICTION);
-}
-
 static drape_status compile_collider(drape_model *model, size_t i, const drape_scene_def *scene)
 {
     const drape_collider_def *def = &scene->colliders[i];
@@ -59,10 +45,9 @@ static drape_status compile_collider(drape_model *model, size_t i, const drape_s
     char pointer[64];
     snprintf(pointer, sizeof pointer, "/colliders/%zu", i);
     drape_status status = name_collider(model, pointer, def->name, to);
+    to->friction = def->friction;
     if (!status)
         status = find_collider(model->ctx, pointer, def->row.type, &to->ops);
-    if (!status)
-        status = take_friction(model, pointer, def->friction, to);
     if (!status)
         status = drape_compile_choice(model, &def->row, "", &to->choice);
     if (!status && def->key_count > 0)

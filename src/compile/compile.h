@@ -5,19 +5,7 @@
 #include "base/registry.h"
 #include "model/model.h"
 
-/* The parameters of a material, in this order. */
-enum {
-    DRAPE_MATERIAL_YOUNG_MODULUS,
-    DRAPE_MATERIAL_POISSON_RATIO,
-    DRAPE_MATERIAL_THICKNESS,
-    DRAPE_MATERIAL_DENSITY,
-    DRAPE_MATERIAL_AREAL_DENSITY,
-    DRAPE_MATERIAL_TOTAL_MASS,
-    DRAPE_MATERIAL_MASS,
-    DRAPE_MATERIAL_FABRIC,
-    DRAPE_MATERIAL_PARAM_COUNT
-};
-extern const drape_param drape_material_params[DRAPE_MATERIAL_PARAM_COUNT];
+extern const drape_entry drape_material_entry; /* its parameters are those of a material */
 
 /* The parameters of contact and of self-contact, in this order, and their values in a model. */
 enum {

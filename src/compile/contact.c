@@ -9,55 +9,25 @@ static const char *const frictions[] = {"implicit", "lagged", NULL};
 
 const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
     [DRAPE_CONTACT_DISTANCE] =
-        {.name = "distance",
-         .unit = "m",
-         .default_value = NAN,
-         .derived = "the largest thickness of the cloths",
-         .min = 0,
-         .max = 1e3,
-         .open_min = true,
-         .help = "activation distance: nearer to a collider than this, cloth is pushed off"},
-    [DRAPE_CONTACT_STIFFNESS] =
-        {.name = "stiffness",
-         .unit = "Pa",
-         .default_value = NAN,
-         .derived =
-             "areal density (2 gravity L + v^2) / distance, L the diagonal of the rest bounding box, v the "
-             "greatest speed of cloth at the start and of colliders, together",
-         .min = 0,
-         .max = 1e15,
-         .open_min = true,
-         .help = "scale of the contact pressure at that distance"},
-    [DRAPE_CONTACT_FRICTION_VELOCITY] = {.name = "friction_velocity",
-                                         .unit = "m/s",
-                                         .default_value = 1e-3,
-                                         .min = 0,
-                                         .max = 1e3,
-                                         .open_min = true,
-                                         .help = "sliding slower than this, friction falls to zero smoothly"},
+        DRAPE_NUMBER("distance", "m", DRAPE_DERIVED("the largest thickness of the cloths"), DRAPE_ABOVE(0),
+                     1e3, "activation distance: nearer to a collider than this, cloth is pushed off"),
+    [DRAPE_CONTACT_STIFFNESS] = DRAPE_NUMBER(
+        "stiffness", "Pa",
+        DRAPE_DERIVED("areal density (2 gravity L + v^2) / distance, L the diagonal of the rest bounding "
+                      "box, v the greatest speed of cloth at the start and of colliders, together"),
+        DRAPE_ABOVE(0), 1e15, "scale of the contact pressure at that distance"),
+    [DRAPE_CONTACT_FRICTION_VELOCITY] =
+        DRAPE_NUMBER("friction_velocity", "m/s", 1e-3, DRAPE_ABOVE(0), 1e3,
+                     "sliding slower than this, friction falls to zero smoothly"),
     [DRAPE_CONTACT_FRICTION] =
-        {.name = "friction",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = IMPLICIT,
-         .choices = frictions,
-         .help = "implicit: of the normal force at the end of the step; lagged: at its start"},
+        DRAPE_CHOICE("friction", IMPLICIT, frictions,
+                     "implicit: of the normal force at the end of the step; lagged: at its start"),
 };
 
 const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT] = {
-    [DRAPE_SELF_THICKNESS] = {.name = "thickness",
-                              .unit = "m",
-                              .default_value = NAN,
-                              .min = 0,
-                              .max = 1e3,
-                              .open_min = true,
-                              .help = "half the distance that layers of cloth are kept apart"},
-    [DRAPE_SELF_FRICTION] = {.name = "friction",
-                             .unit = "1",
-                             .default_value = 0,
-                             .min = 0,
-                             .max = 1e3,
-                             .help = "Coulomb's mu between layers of cloth"},
+    [DRAPE_SELF_THICKNESS] = DRAPE_NUMBER("thickness", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e3,
+                                          "half the distance that layers of cloth are kept apart"),
+    [DRAPE_SELF_FRICTION] = DRAPE_NUMBER("friction", "1", 0, 0, 1e3, "Coulomb's mu between layers of cloth"),
 };
 
 void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_CONTACT_PARAM_COUNT])

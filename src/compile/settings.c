@@ -1,10 +1,6 @@
-/* settings.c: what of a scene has parameters and no kinds, as tables of one entry. */
+/* settings.c: "contact" and "self_contact" of a scene, as tables of one entry. */
 #include "compile/compile.h"
 
-static const drape_entry material = {
-    .name = "material",
-    .summary = "a sheet; exactly one of density, areal_density, total_mass is given",
-    DRAPE_PARAMS(drape_material_params)};
 static const drape_entry contact = {.name = "contact",
                                     .summary = "how contact with colliders and between layers of cloth acts",
                                     DRAPE_PARAMS(drape_contact_params)};
@@ -13,9 +9,6 @@ static const drape_entry self_contact = {
     .summary = "cloth against cloth; a scene without it lets cloth through itself",
     DRAPE_PARAMS(drape_self_contact_params)};
 
-const drape_registry drape_material_registry = {
-    "material", "materials", "Material", "\"material\" of a cloth", (const drape_entry *[]){&material, NULL},
-    NULL};
 const drape_registry drape_contact_registry = {
     "contact", "contacts", "Contact", "\"contact\" of the scene", (const drape_entry *[]){&contact, NULL},
     NULL};

@@ -42,20 +42,8 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_RTOL] = DRAPE_RTOL_PARAM,
     [PARAM_ATOL_X] = DRAPE_ATOL_X_PARAM,
     [PARAM_ATOL_V] = DRAPE_ATOL_V_PARAM,
-    [PARAM_DT_MAX] = {.name = "dt_max",
-                      .unit = "s",
-                      .default_value = NAN,
-                      .derived = "none",
-                      .min = 0,
-                      .max = 1e9,
-                      .open_min = true,
-                      .help = "largest step"},
-    [PARAM_SAFETY] = {.name = "safety",
-                      .unit = "1",
-                      .default_value = 0.9,
-                      .min = 0.1,
-                      .max = 1,
-                      .help = "share of the step that the estimate allows"},
+    [PARAM_DT_MAX] = DRAPE_NUMBER("dt_max", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),
+    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1, "share of the step that the estimate allows"),
 };
 
 /* A prediction: weights of the states in, past[0], past[1], and the factor from its difference to the

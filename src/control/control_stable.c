@@ -18,19 +18,9 @@ enum { SCRATCH_LIMIT, SCRATCH_LEFT };
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
     [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(1000000),
-    [PARAM_SAFETY] = {.name = "safety",
-                      .unit = "1",
-                      .default_value = 0.9,
-                      .min = 0.1,
-                      .max = 1,
-                      .help = "share of the step that the estimate allows"},
-    [PARAM_EVERY] = {.name = "every",
-                     .kind = DRAPE_PARAM_INTEGER,
-                     .unit = "1",
-                     .default_value = 10,
-                     .min = 1,
-                     .max = 1e6,
-                     .help = "steps between two estimates of the stability limit"},
+    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1, "share of the step that the estimate allows"),
+    [PARAM_EVERY] =
+        DRAPE_INTEGER("every", "1", 10, 1, 1e6, "steps between two estimates of the stability limit"),
 };
 
 static double stable_step(const drape_trial *trial, const drape_state *at)

@@ -13,21 +13,12 @@ enum { PARAM_DT_MIN, PARAM_MAX_ATTEMPTS, PARAM_MAX_STRETCH, PARAM_MAX_MOVE, PARA
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
     [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(10000),
-    [PARAM_MAX_STRETCH] = {.name = "max_stretch",
-                           .unit = "1",
-                           .default_value = 0.1,
-                           .min = 0,
-                           .max = 1e6,
-                           .open_min = true,
-                           .help = "largest change of an edge's length in one step, over its rest length"},
+    [PARAM_MAX_STRETCH] =
+        DRAPE_NUMBER("max_stretch", "1", 0.1, DRAPE_ABOVE(0), 1e6,
+                     "largest change of an edge's length in one step, over its rest length"),
     [PARAM_MAX_MOVE] =
-        {.name = "max_move",
-         .unit = "1",
-         .default_value = 10,
-         .min = 0,
-         .max = 1e9,
-         .open_min = true,
-         .help = "largest way of a node in one step, over the length of the shortest of its edges"},
+        DRAPE_NUMBER("max_move", "1", 10, DRAPE_ABOVE(0), 1e9,
+                     "largest way of a node in one step, over the length of the shortest of its edges"),
 };
 
 static double length_between(const double *x, const int32_t *node)

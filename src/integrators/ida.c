@@ -72,44 +72,18 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_RTOL] = DRAPE_RTOL_PARAM,
     [PARAM_ATOL_X] = DRAPE_ATOL_X_PARAM,
     [PARAM_ATOL_V] = DRAPE_ATOL_V_PARAM,
-    [PARAM_MAX_ORDER] = {.name = "max_order",
-                         .kind = DRAPE_PARAM_INTEGER,
-                         .unit = "1",
-                         .default_value = NAN,
-                         .derived = "2 for rtol >= 1e-4, else 5",
-                         .min = 1,
-                         .max = 5,
-                         .help = "highest order of the BDF"},
-    [PARAM_MAX_STEP] = {.name = "max_step",
-                        .unit = "s",
-                        .default_value = NAN,
-                        .derived = "none",
-                        .min = 0,
-                        .max = 1e9,
-                        .open_min = true,
-                        .help = "largest step"},
-    [PARAM_MAX_STEPS] = {.name = "max_steps",
-                         .kind = DRAPE_PARAM_INTEGER,
-                         .unit = "1/s",
-                         .default_value = 100000,
-                         .min = 1,
-                         .max = 1e9,
-                         .help = "steps within one second of simulated time, those that end an advance "
-                                 "apart; one more ends the run"},
-    [PARAM_LINEAR_SOLVER] = {.name = "linear_solver",
-                             .kind = DRAPE_PARAM_CHOICE,
-                             .unit = "1",
-                             .default_value = 0,
-                             .choices = drape_linears_names,
-                             .help = "a row of the linear solvers"},
-    [PARAM_MATRIX] =
-        {.name = "matrix",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = MATRIX_AUTO,
-         .choices = matrix_choices,
-         .help = "of Newton's corrections; symmetric: the symmetric part of the exact one, which friction "
-                 "and dashpots make another; auto: that, and exact ones for a while where it fails"},
+    [PARAM_MAX_ORDER] = DRAPE_INTEGER("max_order", "1", DRAPE_DERIVED("2 for rtol >= 1e-4, else 5"), 1, 5,
+                                      "highest order of the BDF"),
+    [PARAM_MAX_STEP] =
+        DRAPE_NUMBER("max_step", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),
+    [PARAM_MAX_STEPS] = DRAPE_INTEGER(
+        "max_steps", "1/s", 100000, 1, 1e9,
+        "steps within one second of simulated time, those that end an advance apart; one more ends the run"),
+    [PARAM_LINEAR_SOLVER] = DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver"),
+    [PARAM_MATRIX] = DRAPE_CHOICE(
+        "matrix", MATRIX_AUTO, matrix_choices,
+        "of Newton's corrections; symmetric: the symmetric part of the exact one, which friction and "
+        "dashpots make another; auto: that, and exact ones for a while where it fails"),
 };
 
 typedef struct ida_state {

@@ -27,67 +27,24 @@ enum {
 };
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_DT] = {.name = "dt",
-                  .unit = "s",
-                  .default_value = 1.0 / 60,
-                  .min = 0,
-                  .max = 1e6,
-                  .open_min = true,
-                  .help = "nominal step"},
-    [PARAM_ITERATIONS] = {.name = "iterations",
-                          .kind = DRAPE_PARAM_INTEGER,
-                          .unit = "1",
-                          .default_value = 1,
-                          .min = 1,
-                          .max = 1000,
-                          .help = "inexact Newton iterations a step"},
-    [PARAM_TOLERANCE] = {.name = "tolerance",
-                         .unit = "N",
-                         .default_value = 1e-6,
-                         .min = 0,
-                         .max = 1e12,
-                         .open_min = true,
-                         .help = "residual of the free nodes, largest component, below which no iteration is "
-                                 "made; not a bound on an accepted state"},
-    [PARAM_RESCUE_ITERATIONS] = {.name = "rescue_iterations",
-                                 .kind = DRAPE_PARAM_INTEGER,
-                                 .unit = "1",
-                                 .default_value = 8,
-                                 .min = 0,
-                                 .max = 100000,
-                                 .help = "more iterations where the residual is not below that of the guess "
-                                         "after the others; then the step is rejected"},
-    [PARAM_EXTRAPOLATION] = {.name = "extrapolation",
-                             .unit = "1",
-                             .default_value = 0.5,
-                             .min = 0,
-                             .max = 1,
-                             .help = "share of the last change of velocity that the guess takes along"},
-    [PARAM_LINEAR_TOLERANCE] =
-        {.name = "linear_tolerance",
-         .unit = "1",
-         .default_value = 0.1,
-         .min = 1e-14,
-         .max = 1,
-         .open_max = true,
-         .help = "conjugate gradients reduce the residual of a correction to this share at "
-                 "1/60 s, in proportion to the step at others"},
-    [PARAM_LINEAR_ITERATIONS] = {.name = "max_linear_iterations",
-                                 .kind = DRAPE_PARAM_INTEGER,
-                                 .unit = "1",
-                                 .default_value = 60,
-                                 .min = 1,
-                                 .max = 100000,
-                                 .help = "of conjugate gradients, a correction"},
-    [PARAM_COARSE_SPACING] = {.name = "coarse_spacing",
-                              .kind = DRAPE_PARAM_INTEGER,
-                              .unit = "1",
-                              .default_value = 0,
-                              .min = 0,
-                              .max = 100,
-                              .help =
-                                  "edges between the centres of the coarse functions; 0: by the number of "
-                                  "nodes"},
+    [PARAM_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),
+    [PARAM_ITERATIONS] = DRAPE_INTEGER("iterations", "1", 1, 1, 1000, "inexact Newton iterations a step"),
+    [PARAM_TOLERANCE] = DRAPE_NUMBER("tolerance", "N", 1e-6, DRAPE_ABOVE(0), 1e12,
+                                     "residual of the free nodes, largest component, below which no "
+                                     "iteration is made; not a bound on an accepted state"),
+    [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
+                                              "more iterations where the residual is not below that of the "
+                                              "guess after the others; then the step is rejected"),
+    [PARAM_EXTRAPOLATION] = DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
+                                         "share of the last change of velocity that the guess takes along"),
+    [PARAM_LINEAR_TOLERANCE] = DRAPE_NUMBER("linear_tolerance", "1", 0.1, 1e-14, DRAPE_BELOW(1),
+                                            "conjugate gradients reduce the residual of a correction to this "
+                                            "share at 1/60 s, in proportion to the step at others"),
+    [PARAM_LINEAR_ITERATIONS] =
+        DRAPE_INTEGER("max_linear_iterations", "1", 60, 1, 100000, "of conjugate gradients, a correction"),
+    [PARAM_COARSE_SPACING] =
+        DRAPE_INTEGER("coarse_spacing", "1", 0, 0, 100,
+                      "edges between the centres of the coarse functions; 0: by the number of nodes"),
 };
 
 #define NOMINAL_RATE        60. /* [1/s] linear_tolerance is for steps of its inverse */

@@ -10,45 +10,44 @@
 #include "control/control.h"
 #include "integrators/integrator.h"
 #include "mesh/mesh.h"
+#include "model/scene.h"
 #include "terms/terms.h"
 
 #include <string.h>
 
-/* The unit so far (NULL: the name was not found), and that of another list of parameters. */
-static const char *common_unit(const char *unit, const drape_param *params, int count, const char *name)
-{
-    const int i = drape_param_find(params, count, name);
-    return i < 0 ? unit : !unit || strcmp(unit, params[i].unit) == 0 ? params[i].unit : "";
-}
+static const struct {
+    const char *part; /* of the pointer */
+    const drape_registry *registry;
+} tables[] = {{"/mesh/", &drape_grid_registry},
+              {"/material/", &drape_material_registry},
+              {"/terms/", &drape_term_registry},
+              {"/colliders/", &drape_collider_registry},
+              {"/contact/", &drape_contact_registry},
+              {"/self_contact/", &drape_self_contact_registry},
+              {"/integrator/", &drape_integrator_registry},
+              {"/controller/", &drape_controller_registry}};
 
-#define LOOK_IN(table)                                                                                       \
-    for (int i = 0; (table)[i]; i++)                                                                         \
-    unit = common_unit(unit, (table)[i]->entry.params, (table)[i]->entry.param_count, name)
+static const char *unit_in(const drape_registry *registry, const char *name)
+{
+    const char *unit = NULL;
+    const drape_entry *entry;
+    for (int i = 0; (entry = drape_registry_entry(registry, NULL, i)) != NULL; i++) {
+        const int p = drape_param_find(entry->params, entry->param_count, name);
+        if (p >= 0 && unit && strcmp(unit, entry->params[p].unit) != 0)
+            return "";
+        if (p >= 0)
+            unit = entry->params[p].unit;
+    }
+    return unit && strcmp(unit, "1") != 0 ? unit : "";
+}
 
 const char *lab_unit(const char *pointer)
 {
-    const char *name = strrchr(pointer, '/') + 1, *unit = NULL;
-    if (strncmp(pointer, "/gravity", strlen("/gravity")) == 0)
-        return "m/s2";
-    if (strcmp(pointer, "/duration") == 0)
-        return "s";
-    if (strcmp(pointer, "/frame_rate") == 0)
-        return "1/s";
-    if (strstr(pointer, "/mesh/"))
-        LOOK_IN(drape_grids);
-    else if (strstr(pointer, "/material/"))
-        unit = common_unit(NULL, drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, name);
-    else if (strstr(pointer, "/terms/"))
-        LOOK_IN(drape_terms);
-    else if (strstr(pointer, "/colliders/"))
-        LOOK_IN(drape_colliders);
-    else if (strstr(pointer, "/contact/"))
-        unit = common_unit(NULL, drape_contact_params, DRAPE_CONTACT_PARAM_COUNT, name);
-    else if (strstr(pointer, "/self_contact/"))
-        unit = common_unit(NULL, drape_self_contact_params, DRAPE_SELF_PARAM_COUNT, name);
-    else if (strstr(pointer, "/integrator/"))
-        LOOK_IN(drape_integrators);
-    else if (strstr(pointer, "/controller/"))
-        LOOK_IN(drape_controllers);
-    return unit && strcmp(unit, "1") != 0 ? unit : "";
+    const drape_scene_key *key = drape_scene_key_at(pointer);
+    if (key && key->shape == DRAPE_SCENE_VALUE)
+        return strcmp(key->param.unit, "1") != 0 ? key->param.unit : "";
+    for (size_t i = 0; i < sizeof tables / sizeof *tables; i++)
+        if (strstr(pointer, tables[i].part))
+            return unit_in(tables[i].registry, strrchr(pointer, '/') + 1);
+    return "";
 }

@@ -21,21 +21,11 @@ static const char *const diagonals[] = {[ALTERNATING] = "alternating", [PARALLEL
 
 static const drape_param params[PARAM_COUNT] = {
     GRID_RECTANGLE,
-    [DIAGONALS] = {.name = "diagonals",
-                   .kind = DRAPE_PARAM_CHOICE,
-                   .unit = "1",
-                   .default_value = ALTERNATING,
-                   .choices = diagonals,
-                   .help = "how the cells are split into triangles"},
+    [DIAGONALS] = DRAPE_CHOICE("diagonals", ALTERNATING, diagonals, "how the cells are split into triangles"),
     [ORIENTATION] = GRID_ORIENTATION,
-    [NOISE] = {.name = "noise",
-               .kind = DRAPE_PARAM_NUMBER,
-               .unit = "m",
-               .default_value = 0,
-               .min = 0,
-               .max = 1e9,
-               .help =
-                   "nodes are off the plane by up to this, at random and always the same: breaks symmetry"},
+    [NOISE] =
+        DRAPE_NUMBER("noise", "m", 0, 0, 1e9,
+                     "nodes are off the plane by up to this, at random and always the same: breaks symmetry"),
 };
 
 static void place_nodes(drape_mesh *mesh, double width, double height, bool vertical)

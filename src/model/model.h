@@ -55,7 +55,7 @@ typedef struct drape_cloth {
     drape_choice grid; /* type "" where the mesh is no grid */
     char *file;        /* NULL where it is from no file */
     double scale[3], rotate[4], translate[3];
-    double material_values[8]; /* in the order of drape_material_params */
+    double material_values[DRAPE_MAX_PARAMS]; /* in the order of the parameters of drape_material_entry */
     drape_material material;
     drape_woven tension, bending; /* of a measured fabric; warp 0: it is none */
     double *node_mass;            /* (mesh.node_count) [kg] */

@@ -42,52 +42,20 @@ void drape_orthotropic_squares(const double c[9], int rank, double k[3], double 
  * (count x 3) then do no work. */
 void drape_orthotropic_release(double c[9], const double *f, int count);
 
-/* The parameters, with the unit of warp, weft and shear and the text of their defaults. */
-#define DRAPE_ORTHOTROPIC_PARAMS(unit_, of, shear_name, shear_of)                                            \
-    [DRAPE_ORTHOTROPIC_WARP] = {.name = "warp",                                                              \
-                                .kind = DRAPE_PARAM_NUMBER,                                                  \
-                                .unit = unit_,                                                               \
-                                .default_value = NAN,                                                        \
-                                .derived = of,                                                               \
-                                .min = 0,                                                                    \
-                                .max = 1e15,                                                                 \
-                                .open_min = true,                                                            \
-                                .help = "stiffness of a strip along the warp, its sides free"},              \
-    [DRAPE_ORTHOTROPIC_WEFT] = {.name = "weft",                                                              \
-                                .kind = DRAPE_PARAM_NUMBER,                                                  \
-                                .unit = unit_,                                                               \
-                                .default_value = NAN,                                                        \
-                                .derived = of,                                                               \
-                                .min = 0,                                                                    \
-                                .max = 1e15,                                                                 \
-                                .open_min = true,                                                            \
-                                .help = "stiffness of a strip along the weft"},                              \
-    [DRAPE_ORTHOTROPIC_SHEAR] = {.name = shear_name,                                                         \
-                                 .kind = DRAPE_PARAM_NUMBER,                                                 \
-                                 .unit = unit_,                                                              \
-                                 .default_value = NAN,                                                       \
-                                 .derived =                                                                  \
-                                     "of the fabric, or sqrt(warp weft)/(2 (1 + poisson)), as if isotropic", \
-                                 .min = 0,                                                                   \
-                                 .max = 1e15,                                                                \
-                                 .open_min = true,                                                           \
-                                 .help = shear_of},                                                          \
-    [DRAPE_ORTHOTROPIC_POISSON] = {.name = "poisson",                                                        \
-                                   .kind = DRAPE_PARAM_NUMBER,                                               \
-                                   .unit = "1",                                                              \
-                                   .default_value = NAN,                                                     \
-                                   .derived = "of the fabric, or poisson_ratio",                             \
-                                   .min = -1,                                                                \
-                                   .max = 1,                                                                 \
-                                   .open_min = true,                                                         \
-                                   .open_max = true,                                                         \
-                                   .help = "sqrt(nu12 nu21), of warp and weft"},                             \
-    [DRAPE_ORTHOTROPIC_DIRECTION] = {.name = "warp_direction",                                               \
-                                     .kind = DRAPE_PARAM_VECTOR,                                             \
-                                     .unit = "1",                                                            \
-                                     .default_value = 0,                                                     \
-                                     .min = -1e9,                                                            \
-                                     .max = 1e9,                                                             \
-                                     .help = "along the warp, at rest; 0 0 0: x"}
+/* The parameters: the unit of warp, weft and shear, and what they are by default. */
+#define DRAPE_ORTHOTROPIC_PARAMS(unit, of, shear_name, shear_of)                                             \
+    [DRAPE_ORTHOTROPIC_WARP] = DRAPE_NUMBER("warp", unit, DRAPE_DERIVED(of), DRAPE_ABOVE(0), 1e15,           \
+                                            "stiffness of a strip along the warp, its sides free"),          \
+    [DRAPE_ORTHOTROPIC_WEFT] = DRAPE_NUMBER("weft", unit, DRAPE_DERIVED(of), DRAPE_ABOVE(0), 1e15,           \
+                                            "stiffness of a strip along the weft"),                          \
+    [DRAPE_ORTHOTROPIC_SHEAR] =                                                                              \
+        DRAPE_NUMBER(shear_name, unit,                                                                       \
+                     DRAPE_DERIVED("of the fabric, or sqrt(warp weft)/(2 (1 + poisson)), as if isotropic"),  \
+                     DRAPE_ABOVE(0), 1e15, shear_of),                                                        \
+    [DRAPE_ORTHOTROPIC_POISSON] =                                                                            \
+        DRAPE_NUMBER("poisson", "1", DRAPE_DERIVED("of the fabric, or poisson_ratio"), DRAPE_ABOVE(-1),      \
+                     DRAPE_BELOW(1), "sqrt(nu12 nu21), of warp and weft"),                                   \
+    [DRAPE_ORTHOTROPIC_DIRECTION] =                                                                          \
+        DRAPE_VECTOR("warp_direction", "1", 0, -1e9, 1e9, "along the warp, at rest; 0 0 0: x")
 
 #endif

@@ -15,55 +15,24 @@ const drape_spring_offset drape_spring_offsets[DRAPE_SPRING_OFFSETS] = {
     [DRAPE_SPRING_BEND] = {0, 2},       {2, 0}};
 
 const drape_param drape_spring_params[DRAPE_SPRING_PARAM_COUNT] = {
-    [DRAPE_SPRING_STIFFNESS] = {.name = "stiffness",
-                                .kind = DRAPE_PARAM_NUMBER,
-                                .unit = "N/m",
-                                .default_value = NAN,
-                                .min = 0,
-                                .max = 1e15,
-                                .help = "spring constant of each spring, whatever its length and the mesh"},
-    [DRAPE_SPRING_FACTOR] =
-        {.name = "factor",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 1,
-         .min = 0,
-         .max = 1e6,
-         .help = "multiplies stiffness, so that all kinds may share one: 0.2 for the bend springs of CS184"},
+    [DRAPE_SPRING_STIFFNESS] =
+        DRAPE_NUMBER("stiffness", "N/m", DRAPE_REQUIRED, 0, 1e15,
+                     "spring constant of each spring, whatever its length and the mesh"),
+    [DRAPE_SPRING_FACTOR] = DRAPE_NUMBER(
+        "factor", "1", 1, 0, 1e6,
+        "multiplies stiffness, so that all kinds may share one: 0.2 for the bend springs of CS184"),
     [DRAPE_SPRING_DAMPING] =
-        {.name = "damping",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "N s/m",
-         .default_value = 0,
-         .min = 0,
-         .max = 1e12,
-         .help = "dashpot beside each spring: force on the rate of its length, none on rigid motion"},
+        DRAPE_NUMBER("damping", "N s/m", 0, 0, 1e12,
+                     "dashpot beside each spring: force on the rate of its length, none on rigid motion"),
     [DRAPE_SPRING_GRADIENT] =
-        {.name = "gradient",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 0,
-         .min = -1,
-         .max = 1e6,
-         .help = "stiffness times 1 + gradient (1 - row/rows), the mean of both ends: stiffer at row 0"},
+        DRAPE_NUMBER("gradient", "1", 0, -1, 1e6,
+                     "stiffness times 1 + gradient (1 - row/rows), the mean of both ends: stiffer at row 0"),
     [DRAPE_SPRING_REST_SCALE] =
-        {.name = "rest_scale",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 1,
-         .min = 0,
-         .max = 1e3,
-         .open_min = true,
-         .help = "rest length over the distance in the mesh: below 1 the springs begin stretched"},
+        DRAPE_NUMBER("rest_scale", "1", 1, DRAPE_ABOVE(0), 1e3,
+                     "rest length over the distance in the mesh: below 1 the springs begin stretched"),
     [DRAPE_SPRING_MIN_LENGTH] =
-        {.name = "min_length",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 1e-6,
-         .min = 0,
-         .max = 1,
-         .open_max = true,
-         .help = "a step that leaves a spring shorter than this share of its rest length is rejected"},
+        DRAPE_NUMBER("min_length", "1", 1e-6, 0, DRAPE_BELOW(1),
+                     "a step that leaves a spring shorter than this share of its rest length is rejected"),
 };
 
 /* ---- Pairs of nodes ---- */

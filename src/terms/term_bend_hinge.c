@@ -26,36 +26,15 @@ static const char *const rest_choices[] = {"mesh", "flat", NULL};
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_STIFFNESS] =
-        {.name = "stiffness",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = STIFFNESS_CONSISTENT,
-         .choices = stiffness_choices,
-         .help = "consistent: k = D |e|^2/(A1 + A2); report: k = 2/sqrt(3) E h^3/12 on every hinge"},
-    [PARAM_REST] = {.name = "rest",
-                    .kind = DRAPE_PARAM_CHOICE,
-                    .unit = "1",
-                    .default_value = REST_MESH,
-                    .choices = rest_choices,
-                    .help = "rest angles: those of the mesh, or flat"},
-    [PARAM_MIN_ALTITUDE] =
-        {.name = "min_altitude",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 1e-6,
-         .min = 0,
-         .max = 1,
-         .open_max = true,
-         .help = "a step that takes an altitude over a hinge below this share of its rest value is rejected"},
-    [PARAM_MAX_TURN] =
-        {.name = "max_turn",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "rad",
-         .default_value = 2.8,
-         .min = 0,
-         .max = 3.14159265358979,
-         .open_min = true,
-         .help = "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"},
+        DRAPE_CHOICE("stiffness", STIFFNESS_CONSISTENT, stiffness_choices,
+                     "consistent: k = D |e|^2/(A1 + A2); report: k = 2/sqrt(3) E h^3/12 on every hinge"),
+    [PARAM_REST] = DRAPE_CHOICE("rest", REST_MESH, rest_choices, "rest angles: those of the mesh, or flat"),
+    [PARAM_MIN_ALTITUDE] = DRAPE_NUMBER(
+        "min_altitude", "1", 1e-6, 0, DRAPE_BELOW(1),
+        "a step that takes an altitude over a hinge below this share of its rest value is rejected"),
+    [PARAM_MAX_TURN] = DRAPE_NUMBER(
+        "max_turn", "rad", 2.8, DRAPE_ABOVE(0), 3.14159265358979,
+        "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"),
 };
 
 /* The hinges of LANES elements. */

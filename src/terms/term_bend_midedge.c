@@ -50,40 +50,17 @@ static const char *const rest_choices[] = {"mesh", "flat", NULL};
 static const drape_param params[LIST_COUNT] = {
     DRAPE_ORTHOTROPIC_PARAMS("N m", "of the material: its fabric, or E h^3/12", "twist",
                              "torsional rigidity: a twist of curvature K12 takes 2 twist K12^2 per area"),
-    [LIST_REST] = {.name = "rest",
-                   .kind = DRAPE_PARAM_CHOICE,
-                   .unit = "1",
-                   .default_value = REST_MESH,
-                   .choices = rest_choices,
-                   .help = "rest curvature: that of the mesh, or flat"},
-    [LIST_CURVATURE] =
-        {.name = "curvature",
-         .kind = DRAPE_PARAM_VECTOR,
-         .unit = "1/m",
-         .default_value = 0,
-         .min = -1e9,
-         .max = 1e9,
-         .numbers = "[k11, k22, k12]",
-         .help = "added to the rest curvature: along the warp, along the weft, twist; positive towards "
-                 "the side from which triangles turn counterclockwise"},
-    [LIST_MIN_ALTITUDE] = {.name = "min_altitude",
-                           .kind = DRAPE_PARAM_NUMBER,
-                           .unit = "1",
-                           .default_value = 1e-6,
-                           .min = 0,
-                           .max = 1,
-                           .open_max = true,
-                           .help = "a step that takes an altitude of a triangle below this share of its "
-                                   "least one at rest is rejected"},
-    [LIST_MAX_TURN] =
-        {.name = "max_turn",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "rad",
-         .default_value = 2.8,
-         .min = 0,
-         .max = 3.14159265358979,
-         .open_min = true,
-         .help = "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"},
+    [LIST_REST] = DRAPE_CHOICE("rest", REST_MESH, rest_choices, "rest curvature: that of the mesh, or flat"),
+    [LIST_CURVATURE] = DRAPE_VECTOR("curvature", "1/m", 0, -1e9, 1e9,
+                                    "added to the rest curvature: along the warp, along the weft, twist; "
+                                    "positive towards the side from which triangles turn counterclockwise",
+                                    .numbers = "[k11, k22, k12]"),
+    [LIST_MIN_ALTITUDE] = DRAPE_NUMBER(
+        "min_altitude", "1", 1e-6, 0, DRAPE_BELOW(1),
+        "a step that takes an altitude of a triangle below this share of its least one at rest is rejected"),
+    [LIST_MAX_TURN] = DRAPE_NUMBER(
+        "max_turn", "rad", 2.8, DRAPE_ABOVE(0), 3.14159265358979,
+        "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"),
 };
 
 /* r of an own edge; false if it is not clamped. */

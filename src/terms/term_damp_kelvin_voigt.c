@@ -10,14 +10,9 @@
 enum { PARAM_BETA, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_BETA] = {.name = "beta",
-                    .kind = DRAPE_PARAM_NUMBER,
-                    .unit = "s",
-                    .default_value = NAN,
-                    .min = 0,
-                    .max = 1e6,
-                    .help =
-                        "retardation time: damping stiffness over elastic stiffness of every strain measure"},
+    [PARAM_BETA] =
+        DRAPE_NUMBER("beta", "s", DRAPE_REQUIRED, 0, 1e6,
+                     "retardation time: damping stiffness over elastic stiffness of every strain measure"),
 };
 
 static void law(const double *values, int32_t count, const double *k, const double *strain,

@@ -14,21 +14,11 @@ static const char *const area_choices[] = {[AREA_LUMPED] = "lumped", [AREA_UNIFO
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_COEFFICIENT] =
-        {.name = "coefficient",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "kg/(m2 s)",
-         .default_value = NAN,
-         .min = 0,
-         .max = 1e9,
-         .help = "drag per area and speed: a node loses speed at the rate coefficient / areal density"},
-    [PARAM_AREA] = {.name = "area",
-                    .kind = DRAPE_PARAM_CHOICE,
-                    .unit = "1",
-                    .default_value = AREA_LUMPED,
-                    .choices = area_choices,
-                    .help =
-                        "a node's share; lumped: a third of each triangle; uniform: the same for every node, "
-                        "as Boson's drag"},
+        DRAPE_NUMBER("coefficient", "kg/(m2 s)", DRAPE_REQUIRED, 0, 1e9,
+                     "drag per area and speed: a node loses speed at the rate coefficient / areal density"),
+    [PARAM_AREA] = DRAPE_CHOICE("area", AREA_LUMPED, area_choices,
+                                "a node's share; lumped: a third of each triangle; uniform: the same for "
+                                "every node, as Boson's drag"),
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

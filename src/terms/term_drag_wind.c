@@ -21,27 +21,11 @@ enum { REST_FACTOR, REST_WIND, REST_COUNT = REST_WIND + 3 };
 enum { D = 9 };
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_DENSITY] = {.name = "density",
-                       .kind = DRAPE_PARAM_NUMBER,
-                       .unit = "kg/m3",
-                       .default_value = 1.225,
-                       .min = 0,
-                       .max = 1e6,
-                       .help = "density of the medium: 1.225 is air at sea level and 15 degrees"},
-    [PARAM_COEFFICIENT] = {.name = "coefficient",
-                           .kind = DRAPE_PARAM_NUMBER,
-                           .unit = "1",
-                           .default_value = 1.17,
-                           .min = 0,
-                           .max = 1e6,
-                           .help = "drag coefficient across the sheet: 1.17 is a square plate"},
-    [PARAM_WIND] = {.name = "wind",
-                    .kind = DRAPE_PARAM_VECTOR,
-                    .unit = "m/s",
-                    .default_value = 0,
-                    .min = -1e6,
-                    .max = 1e6,
-                    .help = "velocity of the medium"},
+    [PARAM_DENSITY] = DRAPE_NUMBER("density", "kg/m3", 1.225, 0, 1e6,
+                                   "density of the medium: 1.225 is air at sea level and 15 degrees"),
+    [PARAM_COEFFICIENT] = DRAPE_NUMBER("coefficient", "1", 1.17, 0, 1e6,
+                                       "drag coefficient across the sheet: 1.17 is a square plate"),
+    [PARAM_WIND] = DRAPE_VECTOR("wind", "m/s", 0, -1e6, 1e6, "velocity of the medium"),
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

@@ -27,50 +27,23 @@ enum { REST_K, REST_LENGTH, REST_COUNT };
 static const char *const over_choices[] = {[OVER_EDGES] = "edges", [OVER_SPRINGS] = "springs", NULL};
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_LIMIT] = {.name = "limit",
-                     .kind = DRAPE_PARAM_NUMBER,
-                     .unit = "1",
-                     .default_value = 0.1,
-                     .min = 0,
-                     .max = 100,
-                     .open_min = true,
-                     .help = "strain |e|/L - 1 that no accepted state of an implicit row exceeds; verlet "
-                             "leaves it out, and has strain_limit"},
-    [PARAM_ONSET] = {.name = "onset",
-                     .kind = DRAPE_PARAM_NUMBER,
-                     .unit = "1",
-                     .default_value = NAN,
-                     .derived = "half of limit",
-                     .min = 0,
-                     .max = 100,
-                     .help = "strain below limit from which it is resisted; none is below"},
-    [PARAM_STIFFNESS] =
-        {.name = "stiffness",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "N/m",
-         .default_value = NAN,
-         .derived = "the larger of E h and the cloth's weight over its mean rest length times limit - onset",
-         .min = 0,
-         .max = 1e15,
-         .open_min = true,
-         .help = "scale of the resistance: a spring of this constant, 6.4 times it halfway from onset to "
-                 "limit"},
-    [PARAM_OVER] = {.name = "over",
-                    .kind = DRAPE_PARAM_CHOICE,
-                    .unit = "1",
-                    .default_value = OVER_EDGES,
-                    .choices = over_choices,
-                    .help =
-                        "edges: of the mesh; springs: all structural, shear and bend pairs of a square grid"},
-    [PARAM_CAP] = {.name = "cap",
-                   .kind = DRAPE_PARAM_NUMBER,
-                   .unit = "1",
-                   .default_value = 0.01,
-                   .min = 1e-9,
-                   .max = 0.5,
-                   .help =
-                       "share of limit - onset, next to the limit, where the barrier goes on as a parabola: "
-                       "forces at the limit are some 2/cap stiffness L (limit - onset)"},
+    [PARAM_LIMIT] = DRAPE_NUMBER("limit", "1", 0.1, DRAPE_ABOVE(0), 100,
+                                 "strain |e|/L - 1 that no accepted state of an implicit row exceeds; verlet "
+                                 "leaves it out, and has strain_limit"),
+    [PARAM_ONSET] = DRAPE_NUMBER("onset", "1", DRAPE_DERIVED("half of limit"), 0, 100,
+                                 "strain below limit from which it is resisted; none is below"),
+    [PARAM_STIFFNESS] = DRAPE_NUMBER(
+        "stiffness", "N/m",
+        DRAPE_DERIVED(
+            "the larger of E h and the cloth's weight over its mean rest length times limit - onset"),
+        DRAPE_ABOVE(0), 1e15,
+        "scale of the resistance: a spring of this constant, 6.4 times it halfway from onset to limit"),
+    [PARAM_OVER] =
+        DRAPE_CHOICE("over", OVER_EDGES, over_choices,
+                     "edges: of the mesh; springs: all structural, shear and bend pairs of a square grid"),
+    [PARAM_CAP] = DRAPE_NUMBER("cap", "1", 0.01, 1e-9, 0.5,
+                               "share of limit - onset, next to the limit, where the barrier goes on as a "
+                               "parabola: forces at the limit are some 2/cap stiffness L (limit - onset)"),
 };
 
 static double onset_of(const double *values)

@@ -9,13 +9,8 @@ enum { REST_HALF_X, REST_HALF_Y, REST_HALF_Z, REST_COUNT }; /* half the force on
 
 static const drape_param params[LIST_COUNT] = {
     DRAPE_LOAD_PARAMS,
-    [LIST_FORCE] = {.name = "force",
-                    .kind = DRAPE_PARAM_VECTOR,
-                    .unit = "N/m",
-                    .default_value = 0,
-                    .min = -1e12,
-                    .max = 1e12,
-                    .help = "force per length of the edge at rest; it keeps its direction"},
+    [LIST_FORCE] = DRAPE_VECTOR("force", "N/m", 0, -1e12, 1e12,
+                                "force per length of the edge at rest; it keeps its direction"),
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

@@ -26,15 +26,9 @@ enum { REST_MOMENT, REST_TANGENT, REST_NORMAL = 4, REST_COUNT = 7 }; /* M L [N m
 
 static const drape_param params[LIST_COUNT] = {
     DRAPE_LOAD_PARAMS,
-    [LIST_MOMENT] =
-        {.name = "moment",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "N",
-         .default_value = NAN,
-         .min = -1e12,
-         .max = 1e12,
-         .help = "moment per length of the edge [N m/m]; positive: it bends towards the side from which "
-                 "triangles turn counterclockwise"},
+    [LIST_MOMENT] = DRAPE_NUMBER("moment", "N", DRAPE_REQUIRED, -1e12, 1e12,
+                                 "moment per length of the edge [N m/m]; positive: it bends towards the side "
+                                 "from which triangles turn counterclockwise"),
 };
 
 /* The edge in the orientation of its triangle, then the apex. */

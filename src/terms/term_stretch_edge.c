@@ -22,24 +22,12 @@ enum { REST_K, REST_Q0, REST_INVERSE_LENGTH, REST_COUNT };
 static const char *const stiffness_choices[] = {"consistent", "report", NULL};
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_STIFFNESS] =
-        {.name = "stiffness",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = STIFFNESS_CONSISTENT,
-         .choices = stiffness_choices,
-         .help =
-             "consistent: E h (A1 + A2)/L^2 as a spring constant; report: as the DEP report's code, one edge "
-             "length too soft"},
+    [PARAM_STIFFNESS] = DRAPE_CHOICE("stiffness", STIFFNESS_CONSISTENT, stiffness_choices,
+                                     "consistent: E h (A1 + A2)/L^2 as a spring constant; report: as the DEP "
+                                     "report's code, one edge length too soft"),
     [PARAM_COLLAPSE] =
-        {.name = "min_length",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 1e-6,
-         .min = 0,
-         .max = 1,
-         .open_max = true,
-         .help = "a step that makes an edge shorter than this share of its rest length is rejected"},
+        DRAPE_NUMBER("min_length", "1", 1e-6, 0, DRAPE_BELOW(1),
+                     "a step that makes an edge shorter than this share of its rest length is rejected"),
 };
 
 static double element_stiffness(const drape_cloth_view *cloth, int32_t edge, double choice)

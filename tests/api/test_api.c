@@ -713,13 +713,9 @@ END_TEST
 
 /* E = 1/2 k |x - c|^2 of every node. */
 static const drape_param attract_params[] = {
-    {.name = "stiffness", .unit = "N/m", .default_value = NAN, .min = 0, .max = 1e6, .help = "k"},
-    {.name = "height", .unit = "m", .default_value = 1, .min = -100, .max = 100, .help = "y of the point"},
-    {.name = "refuse",
-     .kind = DRAPE_PARAM_BOOLEAN,
-     .unit = "1",
-     .default_value = 0,
-     .help = "for tests: build says no"},
+    DRAPE_NUMBER("stiffness", "N/m", DRAPE_REQUIRED, 0, 1e6, "k"),
+    DRAPE_NUMBER("height", "m", 1, -100, 100, "y of the point"),
+    DRAPE_BOOLEAN("refuse", false, "for tests: build says no"),
 };
 
 static drape_status attract_build(const drape_cloth_view *cloth, const double *params,
@@ -893,21 +889,9 @@ END_TEST
 
 /* A ball about the host's own center: of two vectors and a number, the values are 7. */
 static const drape_param blob_params[] = {
-    {.name = "tilt",
-     .kind = DRAPE_PARAM_TURN,
-     .unit = "degrees",
-     .default_value = 0,
-     .min = -360,
-     .max = 360,
-     .help = "what it is turned by"},
-    {.name = "middle",
-     .kind = DRAPE_PARAM_VECTOR,
-     .unit = "m",
-     .default_value = 0.25,
-     .min = -1,
-     .max = 1,
-     .help = "its center"},
-    {.name = "size", .unit = "m", .default_value = NAN, .min = 0, .max = 2, .help = "its radius"},
+    DRAPE_TURN("tilt", 0, -360, 360, "what it is turned by"),
+    DRAPE_VECTOR("middle", "m", 0.25, -1, 1, "its center"),
+    DRAPE_NUMBER("size", "m", DRAPE_REQUIRED, 0, 2, "its radius"),
 };
 
 static drape_status blob_shape(const double *values, double tolerance, drape_collider_shape *shape)
@@ -999,13 +983,14 @@ START_TEST(a_collider_in_memory_is_the_same_as_in_a_file)
 
     def.friction = -1;
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
-    check_message(ctx, "/colliders/0/friction: -1 is not allowed; it is in [0, 1000]");
+    check_message(ctx, "/colliders/0/friction: -1 is not allowed; friction is a number in [0, 1000]");
     def.friction = NAN;
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
     def.friction = 0;
     s.scene.collider_count = 4097;
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
-    check_message(ctx, "/colliders: the scene has 4097 colliders; it has at most 4096");
+    check_message(
+        ctx, "/colliders: an array of 4097 is not allowed; colliders is an array of objects, at most 4096");
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -1015,7 +1000,8 @@ START_TEST(a_collider_of_the_host_works)
     static const struct {
         const char *scene, *says;
     } cases[] = {
-        {WITH_COLLIDERS("{'type': 'host.blob'}"), "/colliders/0: \"size\" is missing: its radius, [0, 2] m"},
+        {WITH_COLLIDERS("{'type': 'host.blob'}"),
+         "/colliders/0: \"size\" is missing: its radius; a number in [0, 2] m"},
         {WITH_COLLIDERS("{'type': 'host.blob', 'size': 2}"), "/colliders/0/size: 2 m is not?to its taste"},
         {WITH_COLLIDERS("{'type': 'host.blob', 'size': 1}"),
          "/colliders/0: the shape announced 1 points, 0 segments, 0 triangles, or twice"},
@@ -1120,11 +1106,10 @@ START_TEST(malformed_parameters_are_refused)
     static const char *const none[] = {NULL};
     static drape_param wide[9];
     for (int i = 0; i < 9; i++)
-        wide[i] =
-            (drape_param){.name = "wide", .kind = DRAPE_PARAM_VECTOR, .unit = "m", .max = 1, .help = "three"};
+        wide[i] = (drape_param)DRAPE_VECTOR("wide", "m", 0, 0, 1, "three");
     drape_context *ctx = make_context();
     for (int i = 0; i < 12; i++) {
-        drape_param one = {.name = "one", .kind = DRAPE_PARAM_NUMBER, .unit = "m", .max = 1, .help = "one"};
+        drape_param one = DRAPE_NUMBER("one", "m", 0, 0, 1, "one");
         const drape_param *params = &one;
         int count = 1;
         switch (i / 2) {

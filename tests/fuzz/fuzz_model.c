@@ -107,7 +107,7 @@ typedef struct cloth {
     drape_pin_def pins[MOST_PINS];
     int32_t pinned[MOST_PINS];
     drape_track_key keys[MOST_PINS][2];
-    drape_setting material[DRAPE_MATERIAL_PARAM_COUNT];
+    drape_setting material[DRAPE_MAX_PARAMS];
 } cloth;
 
 typedef struct scene {
@@ -207,7 +207,7 @@ static void draw_material(cloth *c, drape_cloth_def *def, fuzz_bytes *in)
     const double values[] = {fuzz_magnitude(in, 1e-3, 1e13), fuzz_between(in, 0, 0.5),
                              fuzz_magnitude(in, 1e-7, 1), fuzz_magnitude(in, 1e-3, 1e5)};
     for (int i = 0; i < 4; i++)
-        c->material[i] = (drape_setting){.name = drape_material_params[i].name, .number = values[i]};
+        c->material[i] = (drape_setting){.name = drape_material_entry.params[i].name, .number = values[i]};
     def->material = c->material;
     def->material_count = 4;
 }

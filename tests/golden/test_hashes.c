@@ -8,12 +8,14 @@
  * which makes all ten times slower, every other scene is left out: box_edge, crumple, flag, fold, hung_sheet, sphere_drape and
  * verlet_100 stay, under every integrator.
  *
- * hashes.txt begins with the build that it is of. Bits depend on the compiler and the solvers, and on the C library: it picks its
- * sines and logarithms by the processor, and they differ in a last digit. So the build's name has a hash of what these give.
- * OpenBLAS does the same with its products. `tools/hashes` writes the file anew: with DRAPE_HASHES=FILE this program writes its own hashes there and tests nothing.
+ * hashes.txt begins with the build that its bits belong to: they depend on the compiler, the solvers, and on the C library and
+ * BLAS, which pick their functions by the processor. The name of the build has a hash of what the C library's functions give, and the
+ * name of OpenBLAS's kernels. On another build the runs are compared with those of a second process instead. `tools/hashes`
+ * writes the file anew: with DRAPE_HASHES=FILE this program writes its own hashes there and tests nothing.
  */
 #include <dirent.h>
 #include <dlfcn.h>
+#include <gnu/libc-version.h>
 #include <inttypes.h>
 #include <math.h>
 #include <pthread.h>
@@ -81,37 +83,27 @@ static uint64_t library_hash(void)
     return hash;
 }
 
-typedef void multiply(const char *, const char *, const int *, const int *, const int *, const double *,
-                      const double *, const int *, const double *, const int *, const double *, double *,
-                      const int *);
-
-/* What BLAS makes of a product, where there is one: OpenBLAS picks its kernels by the processor. */
-static uint64_t blas_hash(void)
+/* BLAS picks its kernels by the processor, and those for triangular solves differ in a last digit where products of
+ * matrices agree: so the kernels are named and not sampled. A BLAS that is not OpenBLAS has no name for them. */
+static const char *blas_kernels(void)
 {
-    enum { N = 96 };
-    static double a[N * N], b[N * N], c[N * N];
-    const int n = N;
-    const double one = 1, zero = 0;
-    void *program = dlopen(NULL, RTLD_NOW), *symbol = program ? dlsym(program, "dgemm_") : NULL;
-    multiply *gemm;
+    typedef char *describe(void);
+    describe *corename;
+    void *program = dlopen(NULL, RTLD_NOW),
+         *symbol = program ? dlsym(program, "openblas_get_corename") : NULL;
     if (!symbol)
-        return 0;
-    memcpy(&gemm, &symbol, sizeof gemm);
-    for (int i = 0; i < N * N; i++) {
-        a[i] = (i * 37 % 101) / 101.0 - 0.5;
-        b[i] = (i * 53 % 97) / 97.0 - 0.5;
-    }
-    gemm("N", "N", &n, &n, &n, &one, a, &n, b, &n, &zero, c, &n);
+        return "unnamed";
+    memcpy(&corename, &symbol, sizeof corename);
     dlclose(program);
-    return drape_hash_bytes(DRAPE_HASH_START, c, sizeof c);
+    return corename();
 }
 
 static void name_build(char *text, size_t size)
 {
     char build[LINE / 2];
     drape_sim_describe_build(build, sizeof build);
-    snprintf(text, size, "%s, functions of the C library %016" PRIx64 ", of BLAS %016" PRIx64, build,
-             library_hash(), blas_hash());
+    snprintf(text, size, "%s, C library %s with functions %016" PRIx64 ", BLAS kernels %s", build,
+             gnu_get_libc_version(), library_hash(), blas_kernels());
 }
 
 /* ---- Scenes ---- */
