@@ -221,8 +221,23 @@ static int keep_box(const drape_verlet_self *s, int32_t i, const int32_t *near, 
     return number;
 }
 
-/* A point with more near points than a list holds, in a heap of cloth much thicker than its mesh is fine,
- * asks all. */
+/* The near points of a point that push it; NULL: all points do, in a heap of cloth much thicker than its mesh is
+ * fine, where a point has more near points than a list holds. */
+static int find_near(const drape_verlet_self *s, int32_t i, const double *x,
+                     int32_t room[DRAPE_MAX_NEIGHBOURS + 1], const int32_t **near)
+{
+    int count = drape_neighbours_of(&s->neighbours, i, x + 3 * (size_t)i, room, near);
+    if (count < 0) {
+        *near = NULL;
+        count = s->model->node_count;
+    }
+    if (!s->box)
+        return count;
+    count = keep_box(s, i, *near, count, x, room);
+    *near = room;
+    return count;
+}
+
 void drape_verlet_self_push(drape_verlet_self *s, double share, double *x)
 {
     drape_neighbours_update(&s->neighbours, share, x);
@@ -233,15 +248,7 @@ void drape_verlet_self_push(drape_verlet_self *s, double share, double *x)
         const int32_t *near;
         if (s->model->pinned[i])
             continue;
-        int count = drape_neighbours_of(&s->neighbours, i, x + 3 * (size_t)i, room, &near);
-        if (count < 0) {
-            near = NULL;
-            count = s->model->node_count;
-        }
-        if (s->box) {
-            count = keep_box(s, i, near, count, x, room);
-            near = room;
-        }
+        const int count = find_near(s, i, x, room, &near);
         push_node(s, i, near, count, share, x);
         drape_neighbours_moved(&s->neighbours, i, x + 3 * (size_t)i);
     }
