@@ -15,7 +15,7 @@ typedef struct share {
 
 struct drape_summer {
     const drape_model *model;
-    drape_crew *crew; /* of the system; NULL: none */
+    drape_pool *pool; /* of the system; NULL: none */
     int threads;
     bool unconstrained;
     drape_block *blocks; /* (threads) */
@@ -58,13 +58,13 @@ static void find_reaches(drape_arena *arena, drape_summer *s)
     }
 }
 
-drape_status drape_summer_create(drape_arena *arena, const drape_model *model, drape_crew *crew,
+drape_status drape_summer_create(drape_arena *arena, const drape_model *model, drape_pool *pool,
                                  drape_summer **out)
 {
     drape_summer *s = *out = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (drape_summer){.model = model, .crew = crew, .threads = drape_crew_threads(crew)};
+    *s = (drape_summer){.model = model, .pool = pool, .threads = drape_pool_threads(pool)};
     s->blocks = drape_arena_take(arena, (size_t)s->threads, sizeof *s->blocks);
     if (s->threads > 1)
         find_reaches(arena, s);
@@ -296,7 +296,7 @@ static void add_task(void *user, int64_t thread)
 /* There may be fewer threads than shares: shares are tasks, not threads. */
 void drape_summer_add(drape_summer *s, const drape_request *want, const drape_sums *to)
 {
-    drape_parallel(s->crew, s->threads, add_task, &(order){s, want, to});
+    drape_parallel(s->pool, s->threads, add_task, &(order){s, want, to});
 }
 
 static void stress_task(void *user, int64_t thread)
@@ -307,7 +307,7 @@ static void stress_task(void *user, int64_t thread)
 
 void drape_summer_stress(drape_summer *s, const drape_request *want)
 {
-    drape_parallel(s->crew, s->threads, stress_task, &(order){.summer = s, .want = want});
+    drape_parallel(s->pool, s->threads, stress_task, &(order){.summer = s, .want = want});
 }
 
 void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_request *want,

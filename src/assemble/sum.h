@@ -9,7 +9,7 @@
 #define DRAPE_ASSEMBLE_SUM_H
 
 #include "assemble/block.h"
-#include "base/crew.h"
+#include "base/thread_pool.h"
 
 typedef struct drape_summer drape_summer;
 
@@ -23,8 +23,8 @@ typedef struct drape_sums {
         *blocks; /* (term_count) each as drape_term.block, for this pattern; NULL: those of the terms */
 } drape_sums;
 
-/* crew outlives it; NULL: one thread. Errors: DRAPE_E_MEMORY. */
-drape_status drape_summer_create(drape_arena *arena, const drape_model *model, drape_crew *crew,
+/* pool outlives it; NULL: one thread. Errors: DRAPE_E_MEMORY. */
+drape_status drape_summer_create(drape_arena *arena, const drape_model *model, drape_pool *pool,
                                  drape_summer **out);
 
 /* From now on terms that are constraints are left out. */

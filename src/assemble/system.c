@@ -12,7 +12,7 @@
 struct drape_system {
     drape_arena *arena;
     const drape_model *model;
-    drape_crew *crew;             /* NULL: one thread */
+    drape_pool *pool;             /* NULL: one thread */
     drape_summer *summer;         /* over the elements of terms */
     drape_contact *contact;       /* NULL: none */
     const drape_pattern *pattern; /* the model's, or the extended one */
@@ -37,9 +37,9 @@ drape_status drape_system_create(drape_arena *arena, const drape_model *model, i
     *system = (drape_system){
         .arena = arena, .model = model, .pattern = &model->pattern, .extension = drape_arena_within(arena)};
     system->push = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->push);
-    drape_status status = drape_crew_create(arena, threads, &system->crew);
+    drape_status status = drape_pool_create(arena, threads, &system->pool);
     if (!status)
-        status = drape_summer_create(arena, model, system->crew, &system->summer);
+        status = drape_summer_create(arena, model, system->pool, &system->summer);
     if (!status)
         status = drape_motion_create(arena, model, &system->motion);
     if (!status)
@@ -62,7 +62,7 @@ void drape_system_destroy(drape_system **system)
         return;
     drape_contact_destroy(&(*system)->contact);
     drape_arena_free(&(*system)->extension);
-    drape_crew_destroy(&(*system)->crew);
+    drape_pool_destroy(&(*system)->pool);
     *system = NULL;
 }
 
@@ -76,9 +76,9 @@ const drape_model *drape_system_model(const drape_system *system)
     return system->model;
 }
 
-drape_crew *drape_system_crew(const drape_system *system)
+drape_pool *drape_system_pool(const drape_system *system)
 {
-    return system->crew;
+    return system->pool;
 }
 
 void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *spring)

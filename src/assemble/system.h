@@ -16,7 +16,7 @@
 #include "assemble/drag_spring.h"
 #include "assemble/state.h"
 #include "assemble/wind.h"
-#include "base/crew.h"
+#include "base/thread_pool.h"
 #include "contact/contact.h"
 
 typedef struct drape_system drape_system;
@@ -45,7 +45,7 @@ void drape_system_leave_constraints(drape_system *system);
 
 const drape_model *drape_system_model(const drape_system *system);
 /* Its threads, for those who work on what it assembles; NULL: one thread. */
-drape_crew *drape_system_crew(const drape_system *system);
+drape_pool *drape_system_pool(const drape_system *system);
 
 /* A spring that belongs to the system from now on, and its energy to the elastic energy; stiffness 0: no
  * spring. Its node is free. */

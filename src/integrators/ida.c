@@ -655,7 +655,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
         status = create_vectors(s);
     if (!status && s->n > 0)
         status = drape_sun_linear_create(arena, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
-                                         drape_system_pattern(s->system), drape_system_crew(s->system),
+                                         drape_system_pattern(s->system), drape_system_pool(s->system),
                                          &s->linear);
     if (status || s->n == 0)
         return status;

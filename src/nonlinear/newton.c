@@ -5,8 +5,8 @@
  *   residual   F(d)
  *   jacobian   J(d), in the pattern that contact has there
  *   factor     factors of J; an indefinite J is repaired by a share of the positive parts of its elements
- *   correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress predicted for
- *              the next J; p shortened or lengthened by line search, completed by chord steps
+ *   correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress predicted
+ *              for the next J; p shortened or lengthened by line search, completed by chord steps
  *   conclude   what KINSOL's return code means, and F at the d where it ended, in the norm that was asked for
  *
  * KINSOL calls those between guess and conclude in each iteration: residual as its system function, jacobian
@@ -485,7 +485,7 @@ static drape_status create_solver(drape_arena *arena, drape_newton *s)
         return DRAPE_OK;
     drape_status status =
         drape_sun_linear_create(arena, s->sun, drape_linears[(int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]],
-                                drape_system_pattern(system), drape_system_crew(system), &s->linear);
+                                drape_system_pattern(system), drape_system_pool(system), &s->linear);
     if (status)
         return status;
     s->linear->tolerance = s->values[DRAPE_NEWTON_LINEAR_TOLERANCE];

@@ -128,7 +128,7 @@ drape_status drape_sim_create_like(const drape_sim *like, drape_sim **out)
         open_sim(like->ctx, like->model, like->frame_rate, like->realtime.longest_asked, out);
     if (!status) {
         (*out)->chosen = like->chosen;
-        status = start_sim(*out, drape_crew_threads(drape_system_crew(like->system)));
+        status = start_sim(*out, drape_pool_threads(drape_system_pool(like->system)));
     }
     if (status)
         drape_sim_destroy(out);

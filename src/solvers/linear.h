@@ -9,7 +9,7 @@
 
 #include "base/archive.h"
 #include "base/arena.h"
-#include "base/crew.h"
+#include "base/thread_pool.h"
 #include "sparse/pattern.h"
 
 typedef struct drape_linear_ops drape_linear_ops;
@@ -37,7 +37,7 @@ struct drape_linear_ops {
     drape_status (*create)(drape_arena *arena, const drape_pattern *pattern, void **state);
     /* The threads that it may use from now on, which outlive it; the result does not depend on them. NULL: it
      * uses one thread. */
-    void (*use_threads)(void *state, drape_crew *crew);
+    void (*use_threads)(void *state, drape_pool *pool);
     /* Takes the values (pattern->nonzeros). DRAPE_OK, or DRAPE_RETRY_LINEAR: singular to working precision,
      * or not finite. Where it borrows heap also DRAPE_E_MEMORY, and it may be called again. */
     drape_status (*factor)(void *state, const double *values);

@@ -41,11 +41,11 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     return status;
 }
 
-static void use_threads(void *state, drape_crew *crew)
+static void use_threads(void *state, drape_pool *pool)
 {
     auto_state *s = state;
     if (s->row->use_threads)
-        s->row->use_threads(s->solver, crew);
+        s->row->use_threads(s->solver, pool);
 }
 
 static drape_status factor(void *state, const double *values)

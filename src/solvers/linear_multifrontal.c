@@ -66,7 +66,7 @@ typedef struct multifrontal {
     int64_t panel_size, update_size;
     int32_t widest, tallest; /* scalars, of all fronts, in whole strips */
     double *diagonal;        /* (n) in the pattern's order */
-    drape_crew *crew;        /* NULL: one thread */
+    drape_pool *pool;        /* NULL: one thread */
     bool *failed;            /* (e.count) the front is not positive definite */
     const double *values;    /* of the matrix that is being factored */
     drape_fallback fallback;
@@ -313,9 +313,9 @@ static void destroy(void **state)
     drape_fallback_destroy(&s->fallback);
 }
 
-static void use_threads(void *state, drape_crew *crew)
+static void use_threads(void *state, drape_pool *pool)
 {
-    ((multifrontal *)state)->crew = crew;
+    ((multifrontal *)state)->pool = pool;
 }
 
 /* ---- One front ---- */
@@ -352,7 +352,7 @@ typedef struct job {
     int32_t index;
     const front *f;
     double *panel, *update;
-    drape_crew *crew; /* NULL: this thread alone, in a branch */
+    drape_pool *pool; /* NULL: this thread alone, in a branch */
 } job;
 
 /* The update of a child, from its block column `first` on, for add_child_column. */
@@ -407,7 +407,7 @@ static void add_children(const job *w, bool factored)
     for (int32_t child = w->f->first_child; child >= 0; child = s->fronts[child].sibling) {
         const int32_t middle = first_row_left(s, child), all = s->fronts[child].rows / 3;
         child_job columns = {.to = w, .child = child, .first = factored ? 0 : middle};
-        drape_parallel(w->crew, factored ? middle : all - middle, add_child_column, &columns);
+        drape_parallel(w->pool, factored ? middle : all - middle, add_child_column, &columns);
     }
 }
 
@@ -452,7 +452,7 @@ static bool factor_columns(const job *w)
         if (!drape_tile_factor(width, tile, w->s->inverse + 3 * w->s->e.first[w->index] + first))
             return false;
         strip_job strips = {.of = w, .first = first, .width = width};
-        drape_parallel(w->crew, f->column_strips + f->row_strips - diagonal - 1, finish_strip, &strips);
+        drape_parallel(w->pool, f->column_strips + f->row_strips - diagonal - 1, finish_strip, &strips);
     }
     return true;
 }
@@ -472,7 +472,7 @@ static void make_update_column(void *user, int64_t task)
     }
 }
 
-static void make_front(multifrontal *s, int32_t i, drape_crew *crew)
+static void make_front(multifrontal *s, int32_t i, drape_pool *pool)
 {
     const front *f = &s->fronts[i];
     job w = {.s = s,
@@ -480,12 +480,12 @@ static void make_front(multifrontal *s, int32_t i, drape_crew *crew)
              .f = f,
              .panel = s->panels + f->panel,
              .update = s->updates + f->update,
-             .crew = crew};
+             .pool = pool};
     assemble(&w);
     s->failed[i] = !factor_columns(&w);
     if (s->failed[i])
         return;
-    drape_parallel(crew, f->row_strips, make_update_column, &w);
+    drape_parallel(pool, f->row_strips, make_update_column, &w);
     add_children(&w, false);
 }
 
@@ -571,12 +571,12 @@ static bool is_well_conditioned(const multifrontal *s)
 static bool factor_cholesky(multifrontal *s)
 {
     memset(s->failed, 0, (size_t)s->e.count * sizeof *s->failed);
-    drape_parallel(s->crew, s->branch_count, make_branch, s);
+    drape_parallel(s->pool, s->branch_count, make_branch, s);
     for (int32_t i = 0; i < s->e.count; i++)
         if (s->failed[i])
             return false;
     for (int32_t k = 0; k < s->top_count; k++) {
-        make_front(s, s->top[k], s->crew);
+        make_front(s, s->top[k], s->pool);
         if (s->failed[s->top[k]])
             return false;
     }
@@ -733,12 +733,12 @@ static drape_status solve(void *state, const double *b, double *x)
         return s->fallback.ops->solve(s->fallback.solver, b, x);
     for (int32_t k = 0; k < s->e.n; k++)
         memcpy(s->work + 3 * (size_t)k, b + 3 * (size_t)s->e.order[k], 3 * sizeof *b);
-    drape_parallel(s->crew, s->branch_count, forward_branch, s);
+    drape_parallel(s->pool, s->branch_count, forward_branch, s);
     for (int32_t k = 0; k < s->top_count; k++)
         solve_forward(s, s->top[k]);
     for (int32_t k = s->top_count - 1; k >= 0; k--)
         solve_backward(s, s->top[k]);
-    drape_parallel(s->crew, s->branch_count, backward_branch, s);
+    drape_parallel(s->pool, s->branch_count, backward_branch, s);
     for (int32_t k = 0; k < s->e.n; k++)
         memcpy(x + 3 * (size_t)s->e.order[k], s->work + 3 * (size_t)k, 3 * sizeof *x);
     return drape_all_finite(x, n) ? DRAPE_OK : DRAPE_RETRY_LINEAR;

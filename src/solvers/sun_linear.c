@@ -83,19 +83,19 @@ static drape_status create_state(drape_sun_linear *linear, const drape_pattern *
         return DRAPE_E_MEMORY;
     drape_status status = linear->ops->create(&linear->arena, pattern, &linear->state);
     if (!status && linear->ops->use_threads)
-        linear->ops->use_threads(linear->state, linear->crew);
+        linear->ops->use_threads(linear->state, linear->pool);
     return status;
 }
 
 drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const drape_linear_ops *ops,
-                                     const drape_pattern *pattern, drape_crew *crew, drape_sun_linear **out)
+                                     const drape_pattern *pattern, drape_pool *pool, drape_sun_linear **out)
 {
     drape_sun_linear *linear = *out = drape_arena_take(arena, 1, sizeof *linear);
     if (!linear)
         return DRAPE_E_MEMORY;
     linear->arena = drape_arena_within(arena);
     linear->ops = ops;
-    linear->crew = crew;
+    linear->pool = pool;
     linear->solver = SUNLinSolNewEmpty(sun);
     linear->matrix = SUNMatNewEmpty(sun);
     drape_status status = linear->solver && linear->matrix

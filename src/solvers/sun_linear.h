@@ -25,7 +25,7 @@ typedef struct drape_sun_linear {
     int64_t nonzeros;
     SUNLinearSolver solver;
     SUNMatrix matrix;
-    drape_crew *crew;                   /* NULL: one thread */
+    drape_pool *pool;                   /* NULL: one thread */
     double tolerance;                   /* share of the residual that iterative solvers may leave; 0: none */
     int64_t factorizations, iterations; /* of iterative solvers; for direct ones, solves */
     double factor_seconds, solve_seconds;
@@ -33,7 +33,7 @@ typedef struct drape_sun_linear {
 } drape_sun_linear;
 
 drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const drape_linear_ops *ops,
-                                     const drape_pattern *pattern, drape_crew *crew, drape_sun_linear **out);
+                                     const drape_pattern *pattern, drape_pool *pool, drape_sun_linear **out);
 
 /* Takes another pattern: the values are cleared, the solver is made again. Errors: those of create; then it
  * can only be destroyed, or take a pattern again. */

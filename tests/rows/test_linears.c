@@ -524,14 +524,14 @@ START_TEST(threads_give_the_same_bits)
             fill_sheet(&q, 1.01, 7);
             for (int threads = 1; threads <= 3; threads += 2) {
                 double *x = threads == 1 ? q.x : q.again;
-                drape_crew *crew = NULL;
-                ck_assert_int_eq(drape_crew_create(q.arena, threads, &crew), DRAPE_OK);
-                ops->use_threads(solver, crew);
+                drape_pool *pool = NULL;
+                ck_assert_int_eq(drape_pool_create(q.arena, threads, &pool), DRAPE_OK);
+                ops->use_threads(solver, pool);
                 ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
                 ck_assert_int_eq(ops->solve(solver, q.b, x), DRAPE_OK);
                 ck_assert_mem_eq(x, q.x, (size_t)q.p.n * sizeof *x);
                 ops->use_threads(solver, NULL);
-                drape_crew_destroy(&crew);
+                drape_pool_destroy(&pool);
             }
             check_residual(&q, true, ops->name);
             drape_linear_destroy(ops, &solver);

@@ -2,7 +2,7 @@
  * test_crew.c: loops dealt out to threads. Every round is done once, by the function of its own loop, before the loop returns,
  * whatever the number of rounds and threads; helpers that slept come again; a caller whose helpers do not come does all.
  */
-#include "base/crew.h"
+#include "base/thread_pool.h"
 
 #include <pthread.h>
 #include <sched.h>
@@ -44,12 +44,12 @@ static drape_context *open_context(void)
     return ctx;
 }
 
-static void check_loop(drape_crew *crew, ledger *l, int64_t sign, int rounds)
+static void check_loop(drape_pool *pool, ledger *l, int64_t sign, int rounds)
 {
     const bool twice = sign % 2;
     memset(l, 0, sizeof *l);
     l->sign = sign;
-    drape_parallel(crew, rounds, twice ? enter_twice : enter, l);
+    drape_parallel(pool, rounds, twice ? enter_twice : enter, l);
     for (int k = 0; k < MOST; k++) {
         ck_assert_int_eq(l->times[k], k < rounds ? 1 + twice : 0);
         ck_assert_int_eq(l->entry[k], k < rounds ? sign + k : 0);
@@ -62,14 +62,14 @@ START_TEST(every_round_is_done_once)
     drape_context *ctx = open_context();
     drape_arena arena = drape_arena_of(ctx);
     for (int threads = 1; threads <= 5; threads++) {
-        drape_crew *crew = NULL;
-        ck_assert_int_eq(drape_crew_create(&arena, threads, &crew), DRAPE_OK);
-        ck_assert_int_eq(drape_crew_threads(crew), threads);
-        ck_assert_int_eq(crew != NULL, threads > 1);
+        drape_pool *pool = NULL;
+        ck_assert_int_eq(drape_pool_create(&arena, threads, &pool), DRAPE_OK);
+        ck_assert_int_eq(drape_pool_threads(pool), threads);
+        ck_assert_int_eq(pool != NULL, threads > 1);
         for (int k = 0; k < 400; k++)
-            check_loop(crew, &l, 1000 * k + k, k % MOST + k % 2);
-        drape_crew_destroy(&crew);
-        ck_assert_ptr_null(crew);
+            check_loop(pool, &l, 1000 * k + k, k % MOST + k % 2);
+        drape_pool_destroy(&pool);
+        ck_assert_ptr_null(pool);
     }
     drape_arena_free(&arena);
     drape_context_destroy(&ctx);
@@ -92,15 +92,15 @@ START_TEST(helpers_that_sleep_are_woken)
 {
     drape_context *ctx = open_context();
     drape_arena arena = drape_arena_of(ctx);
-    drape_crew *crew = NULL;
-    ck_assert_int_eq(drape_crew_create(&arena, 2, &crew), DRAPE_OK);
+    drape_pool *pool = NULL;
+    ck_assert_int_eq(drape_pool_create(&arena, 2, &pool), DRAPE_OK);
     for (int k = 0; k < 20; k++) {
         nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
         atomic_store(&here, 0);
-        drape_parallel(crew, 2, meet, NULL);
+        drape_parallel(pool, 2, meet, NULL);
         ck_assert_int_eq(atomic_load(&here), 2);
     }
-    drape_crew_destroy(&crew);
+    drape_pool_destroy(&pool);
     drape_arena_free(&arena);
     drape_context_destroy(&ctx);
 }
@@ -127,50 +127,50 @@ START_TEST(the_caller_does_what_no_helper_takes)
 {
     drape_context *ctx = open_context();
     drape_arena arena = drape_arena_of(ctx);
-    drape_crew *crew = NULL;
-    ck_assert_int_eq(drape_crew_create(&arena, 2, &crew), DRAPE_OK);
+    drape_pool *pool = NULL;
+    ck_assert_int_eq(drape_pool_create(&arena, 2, &pool), DRAPE_OK);
     for (int k = 0; k < 200; k++) {
         held h = {.caller = pthread_self()};
-        drape_parallel(crew, MOST, hold, &h);
+        drape_parallel(pool, MOST, hold, &h);
         ck_assert_int_eq(h.done, MOST);
     }
-    drape_crew_destroy(&crew);
+    drape_pool_destroy(&pool);
     drape_arena_free(&arena);
     drape_context_destroy(&ctx);
 }
 END_TEST
 
-/* Two crews do not see each other, and a crew works for whatever thread calls. */
-static void *loop_often(void *crew)
+/* Two pools do not see each other, and a pool works for whatever thread calls. */
+static void *loop_often(void *pool)
 {
     ledger l;
     for (int k = 0; k < 400; k++) {
         memset(&l, 0, sizeof l);
-        drape_parallel(crew, 7, enter, &l);
+        drape_parallel(pool, 7, enter, &l);
         for (int r = 0; r < 7; r++)
             if (l.times[r] != 1)
-                return crew;
+                return pool;
     }
     return NULL;
 }
 
-START_TEST(crews_work_beside_each_other)
+START_TEST(pools_work_beside_each_other)
 {
     drape_context *ctx = open_context();
     drape_arena arena = drape_arena_of(ctx);
-    drape_crew *crews[2];
+    drape_pool *pools[2];
     for (int repeat = 0; repeat < 3; repeat++) {
         pthread_t callers[2];
         for (int i = 0; i < 2; i++) {
-            ck_assert_int_eq(drape_crew_create(&arena, 3, &crews[i]), DRAPE_OK);
-            ck_assert_int_eq(pthread_create(&callers[i], NULL, loop_often, crews[i]), 0);
+            ck_assert_int_eq(drape_pool_create(&arena, 3, &pools[i]), DRAPE_OK);
+            ck_assert_int_eq(pthread_create(&callers[i], NULL, loop_often, pools[i]), 0);
         }
         for (int i = 0; i < 2; i++) {
             void *wrong = NULL;
             ck_assert_int_eq(pthread_join(callers[i], &wrong), 0);
             ck_assert_ptr_null(wrong);
-            ck_assert_ptr_null(loop_often(crews[i]));
-            drape_crew_destroy(&crews[i]);
+            ck_assert_ptr_null(loop_often(pools[i]));
+            drape_pool_destroy(&pools[i]);
         }
     }
     drape_arena_free(&arena);
@@ -178,5 +178,5 @@ START_TEST(crews_work_beside_each_other)
 }
 END_TEST
 
-SUITE("crew", every_round_is_done_once, helpers_that_sleep_are_woken, the_caller_does_what_no_helper_takes,
-      crews_work_beside_each_other)
+SUITE("thread_pool", every_round_is_done_once, helpers_that_sleep_are_woken,
+      the_caller_does_what_no_helper_takes, pools_work_beside_each_other)
