@@ -53,11 +53,13 @@ static void add_pairs(const drape_approx_jacobian *s, const double *x, double *y
         const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
         double f[3];
         multiply_block(s->h + 6 * (size_t)p, d, f);
-        for (size_t r = 0; r < 3; r++) {
-            if (i >= 0)
-                y[3 * (size_t)i + r] += f[r];
-            if (j >= 0)
-                y[3 * (size_t)j + r] -= f[r];
+        if (i >= 0) {
+            double *to = y + 3 * (size_t)i;
+            to[0] += f[0], to[1] += f[1], to[2] += f[2];
+        }
+        if (j >= 0) {
+            double *to = y + 3 * (size_t)j;
+            to[0] -= f[0], to[1] -= f[1], to[2] -= f[2];
         }
     }
 }

@@ -5,8 +5,8 @@
  *   residual   F(d)
  *   jacobian   J(d), in the pattern that contact has there
  *   factor     factors of J; an indefinite J is repaired by a share of the positive parts of its elements
- *   correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress predicted for
- *              the next J; p shortened or lengthened by line search, completed by chord steps
+ *   correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress predicted
+ *              for the next J; p shortened or lengthened by line search, completed by chord steps
  *   conclude   what KINSOL's return code means, and F at the d where it ended, in the norm that was asked for
  *
  * KINSOL calls those between guess and conclude in each iteration: residual as its system function, jacobian

@@ -97,7 +97,7 @@ typedef struct norms {
 
 static void add_entry(norms *sum, double f)
 {
-    sum->max = fmax(sum->max, fabs(f));
+    sum->max = fabs(f) > sum->max ? fabs(f) : sum->max;
     sum->l1 += fabs(f);
     sum->squares += f * f;
 }
