@@ -85,7 +85,7 @@ static void measure(drape_context *ctx, int side, double thickness, double frict
     stages a = read_stages(sim);
     advance(ctx, sim, steps);
     stages b = read_stages(sim);
-    int32_t active = drape_contact_active((drape_contact *)drape_system_contact(sim->system), &least);
+    int32_t active = drape_contact_active(drape_system_contact(sim->system), &least);
     double step = b.step - a.step;
     printf("%6d %10g %8g %8d %10.1f %6.1f %10.1f %8.1f %8.1f\n", side * side, thickness, friction,
            (int)active, 1e3 * step / steps, (double)(b.iterations - a.iterations) / steps,

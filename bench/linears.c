@@ -54,7 +54,7 @@ static void fill(problem *q, matrix_kind kind)
     drape_system *system = NULL;
     drape_arena arena = drape_arena_of(q->ctx);
     drape_state state = {0};
-    if (drape_system_create(q->ctx, m, 1, &system) || drape_state_create(&arena, m, &state))
+    if (drape_system_create(&arena, m, 1, &system) || drape_state_create(&arena, m, &state))
         bench_fail(q->ctx, "the state");
     const double edge = m->edge_length[0];
     for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
@@ -62,13 +62,13 @@ static void fill(problem *q, matrix_kind kind)
                      (m->pinned[i / 3] ? 0 : DEFORMATION * edge * sin(12.9898 * (double)(i + 1)));
     drape_system_jacobian(
         system, &(drape_point){.x = state.x, .v = state.v, .internal = state.internal, .weight = 1 / DT},
-        1 / (DT * DT), kind != INDEFINITE, q->values);
+        1 / (DT * DT), kind == INDEFINITE ? 0 : 1, q->values);
     if (kind == FRICTIONAL)
         add_friction(&m->pattern, q->values);
     for (int64_t i = 0; i < m->pattern.n; i++)
         q->b[i] = cos((double)i);
-    drape_arena_free(&arena);
     drape_system_destroy(&system);
+    drape_arena_free(&arena);
 }
 
 static problem open_problem(int side, matrix_kind kind)
@@ -108,32 +108,34 @@ static times measure(problem *q, const drape_linear_ops *ops)
 {
     times t = {INFINITY, INFINITY, INFINITY, INFINITY, 0};
     void *solver = NULL;
+    drape_arena arena = drape_arena_of(q->ctx);
     double begin = drape_clock_cpu_seconds();
     do {
-        if (solver)
-            ops->destroy(&solver);
+        drape_linear_destroy(ops, &solver);
+        drape_arena_free(&arena);
         double start = drape_clock_cpu_seconds();
-        if (ops->create(q->ctx, &q->model->pattern, &solver))
-            bench_fail(q->ctx, "%s", ops->name);
+        if (ops->create(&arena, &q->model->pattern, &solver))
+            bench_fail(q->ctx, "%s", ops->entry.name);
         keep_least(&t.create, start);
         start = drape_clock_cpu_seconds();
         if (ops->factor(solver, q->values))
-            bench_fail(q->ctx, "%s cannot factor", ops->name);
+            bench_fail(q->ctx, "%s cannot factor", ops->entry.name);
         keep_least(&t.first, start);
     } while (drape_clock_cpu_seconds() - begin < BUDGET);
     begin = drape_clock_cpu_seconds();
     do {
         double start = drape_clock_cpu_seconds();
         if (ops->factor(solver, q->values))
-            bench_fail(q->ctx, "%s cannot factor", ops->name);
+            bench_fail(q->ctx, "%s cannot factor", ops->entry.name);
         keep_least(&t.factor, start);
         start = drape_clock_cpu_seconds();
         if (ops->solve(solver, q->b, q->x))
-            bench_fail(q->ctx, "%s cannot solve", ops->name);
+            bench_fail(q->ctx, "%s cannot solve", ops->entry.name);
         keep_least(&t.solve, start);
     } while (drape_clock_cpu_seconds() - begin < BUDGET);
-    t.bytes = ops->bytes(solver);
-    ops->destroy(&solver);
+    t.bytes = arena.bytes + drape_linear_bytes(ops, solver);
+    drape_linear_destroy(ops, &solver);
+    drape_arena_free(&arena);
     return t;
 }
 
@@ -155,7 +157,7 @@ static void report(FILE *csv, int nodes, const problem *q, matrix_kind kind, con
 /* n^3: beyond, minutes. */
 static bool affordable(const drape_linear_ops *ops, int side)
 {
-    return side <= 16 || strcmp(ops->name, "dense") != 0;
+    return side <= 16 || strcmp(ops->entry.name, "dense") != 0;
 }
 
 static void measure_all(FILE *csv, int side, matrix_kind kind)
@@ -164,7 +166,7 @@ static void measure_all(FILE *csv, int side, matrix_kind kind)
     for (int k = 0; drape_linears[k]; k++)
         if (affordable(drape_linears[k], side)) {
             times t = measure(&q, drape_linears[k]);
-            report(csv, side * side, &q, kind, drape_linears[k]->name, &t);
+            report(csv, side * side, &q, kind, drape_linears[k]->entry.name, &t);
         }
     close_problem(&q);
 }

@@ -66,14 +66,15 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
     drape_energy_range(el, first, count, x, e, g, hess, one);
 }
 
-static const drape_term_ops harmonic = {.struct_size = sizeof(drape_term_ops),
-                                        .name = "bench.harmonic",
-                                        .summary = "a spring that holds every node to its rest position",
-                                        .reference = "-",
-                                        .element_name = "node",
-                                        .nodes = 1,
-                                        .build = build,
-                                        .energy = energy};
+static const drape_term_ops harmonic = {
+    .struct_size = sizeof(drape_term_ops),
+    .entry = {.name = "bench.harmonic",
+              .summary = "a spring that holds every node to its rest position",
+              .reference = "-"},
+    .element_name = "node",
+    .nodes = 1,
+    .build = build,
+    .energy = energy};
 
 /* E/E0 - 1 after 100 periods; NaN where the run did not come to its end. */
 static double drift(drape_context *ctx, const drape_model *model, const char *integrator,
@@ -122,8 +123,8 @@ static void over_steps(drape_context *ctx, const drape_model *model, const drape
     for (size_t k = 0; k < sizeof phases / sizeof *phases; k++) {
         const drape_setting settings[] = {{"dt", phases[k] / OMEGA, NULL}, {"tolerance", 1e-13, NULL}, {0}};
         drape_statistics work;
-        double change = drift(ctx, model, row->name, settings, &work);
-        print(csv, row->name, row->order, "w h", phases[k], change, &work);
+        double change = drift(ctx, model, row->entry.name, settings, &work);
+        print(csv, row->entry.name, row->order, "w h", phases[k], change, &work);
     }
 }
 
@@ -205,7 +206,7 @@ int main(int argc, char **argv)
            "residuals");
     over_tolerances(ctx, model, csv);
     for (int i = 0; drape_integrators[i]; i++)
-        if (!drape_integrators[i]->own_steps && !drape_integrators[i]->timeless)
+        if (!drape_integrators[i]->own_steps && !drape_integrators[i]->steady_state)
             over_steps(ctx, model, drape_integrators[i], csv);
     alone(csv);
     drape_model_destroy(&model);

@@ -51,8 +51,7 @@ static const rung be = {"be", "be", {{NULL, 0, NULL}}, 1}, be_two = {"be", "be",
                             2500},
                   newton_1 = {"newton_k 1", "newton_k", {{NULL, 0, NULL}}, 1},
                   newton_2 = {"newton_k 2", "newton_k", {{"iterations", 2, NULL}}, 1},
-                  newton_3 = {"newton_k 3", "newton_k", {{"iterations", 3, NULL}}, 1},
-                  projective = {"projective 10", "projective", {{NULL, 0, NULL}}, 1};
+                  newton_3 = {"newton_k 3", "newton_k", {{"iterations", 3, NULL}}, 1};
 
 typedef struct bench_group {
     const char *name;
@@ -71,18 +70,8 @@ static const bench_group groups[] = {
     {"linear", SHEET, 0.1, {50}, {&be, &be_cholmod, &be_klu}, false},
     {"growth", SHEET, 0.1, {5, 10, 25, 50, 100, 160, 226, 320}, {&be, &be_cholmod}, false},
     {"threads", SHEET, 0.25, {100}, {&be, &be_two}, false},
-    {"rungs",
-     SHEET,
-     2,
-     {5, 12, 23, 50, 100},
-     {&projective, &newton_1, &newton_2, &newton_3, &be_pcg, &be},
-     true},
-    {"rungs_growth",
-     SHEET,
-     0.5,
-     {50, 100, 160, 226, 320},
-     {&projective, &newton_1, &newton_2, &newton_3},
-     false},
+    {"rungs", SHEET, 2, {5, 12, 23, 50, 100}, {&newton_1, &newton_2, &newton_3, &be_pcg, &be}, true},
+    {"rungs_growth", SHEET, 0.5, {50, 100, 160, 226, 320}, {&newton_1, &newton_2, &newton_3}, false},
 };
 
 /* Of one size and rung, a step; times in ms. */
@@ -390,12 +379,8 @@ static bool is_for(const rung *g, int side)
     if (g->most > 0 && side * side > g->most)
         return false;
     const drape_setting *linear = &g->settings[0];
-    if (!linear->name || strcmp(linear->name, "linear_solver") != 0)
-        return true;
-    for (int i = 0; drape_linears_words[i]; i++)
-        if (strcmp(drape_linears_words[i], linear->text) == 0)
-            return true;
-    return false;
+    return !linear->name || strcmp(linear->name, "linear_solver") != 0 ||
+           drape_registry_find(&drape_linear_registry, NULL, linear->text) >= 0;
 }
 
 static void run_side(const bench_group *group, int side, FILE *csv, growth *grown)

@@ -144,11 +144,11 @@ static void add_row(bench *b, const drape_integrator_ops *row)
     static const int rates[] = {30, 60, 120, 240, 480, 960, 1920}, orders[] = {2, 5};
     for (size_t i = 0; row->own_steps && i < sizeof orders / sizeof *orders; i++)
         for (size_t k = 0; k < sizeof rtols / sizeof *rtols; k++)
-            add(b, row->name, "halving", "rtol", rtols[k], orders[i]);
+            add(b, row->entry.name, "halving", "rtol", rtols[k], orders[i]);
     for (size_t i = 0; !row->own_steps && i < sizeof rates / sizeof *rates; i++)
-        add(b, row->name, "halving", "dt", 1.0 / rates[i], 0);
+        add(b, row->entry.name, "halving", "dt", 1.0 / rates[i], 0);
     for (size_t i = 0; !row->own_steps && i < sizeof controlled / sizeof *controlled; i++)
-        add(b, row->name, "error", "rtol", controlled[i], 0);
+        add(b, row->entry.name, "error", "rtol", controlled[i], 0);
 }
 
 static const point *find(const bench *b, const char *integrator, double value, int max_order)
@@ -218,7 +218,7 @@ int main(int argc, char **argv)
     printf("%10s %-8s %-14s %10s %10s %7s %5s %9s %9s %8s %9s\n", "row", "control", "dt or rtol", "error m",
            "m/s", "steps", "rej.", "residuals", "jacobians", "factors", "CPU s");
     for (int i = 0; drape_integrators[i]; i++)
-        if (!drape_integrators[i]->timeless)
+        if (!drape_integrators[i]->steady_state)
             add_row(&b, drape_integrators[i]);
     compare(&b);
     free(b.x);

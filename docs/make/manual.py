@@ -130,13 +130,19 @@ def rows_of(lines):
     return [table for table in found if table]
 
 
+def parameter(name, unit, default, takes, what):
+    """One of an entry, or a key of a scene."""
+    usual = default if default == "required" else f"default {default}" if default else ""
+    return item(name, what, f"{takes}{' ' + unit if unit else ''}{'; ' + usual if usual else ''}")
+
+
 def keys(table):
     out, before = [], None
-    for place, key, unit, takes, what in table[1]:
+    for place, key, unit, default, takes, what in table[1]:
         if place != before:
             out.append(f".SS {plain(place.strip('`'))}" if place != "`/`" else ".SS at the top")
         before = place
-        out.append(item(plain(key), what, takes + (f" [{unit}]" if unit else "")))
+        out.append(parameter(plain(key), unit, default, takes, what))
     return "\n".join(out)
 
 
@@ -148,9 +154,8 @@ def rows(tables):
         own = [line for table in tables[1:] for line in table[1] if line[0] == name]
         if own:
             out.append(".RS")
-            for _, parameter, unit, default, span, help_text in own:
-                out.append(item(f"\\fI{plain(parameter.strip('`'))}\\fR", help_text, f"{span}{' ' + unit if unit else ''}; default {default}"
-                                if default != "required" else f"{span}{' ' + unit if unit else ''}; required"))
+            for _, name_of, unit, default, takes, what_it_is in own:
+                out.append(parameter(f"\\fI{plain(name_of.strip('`'))}\\fR", unit, default, takes, what_it_is))
             out.append(".RE")
     return "\n".join(out)
 

@@ -1,5 +1,5 @@
-/* host.c: a sheet drapes over a ball that this program moves, in real time: 60 frames a second, the work of each bounded by its
- * time. Build and run:  cc host.c $(pkg-config --cflags --libs drape) -lm -o host && ./host [FRAMES] */
+/* host.c: a sheet drapes over a ball that this program moves, in real time: 60 frames per second, with a time budget for
+ * each. Build and run:  cc host.c $(pkg-config --cflags --libs drape) -lm -o host && ./host [FRAMES] */
 #include <drape/drape.h>
 #include <math.h>
 #include <stdio.h>
@@ -12,16 +12,16 @@ static drape_status make_model(drape_context *ctx, drape_model **model)
     const drape_setting grid[] = {{"columns", 20}, {"rows", 20}, {"width", 1}, {"height", 1}},
                         material[] = {{"young_modulus", 1e5}, {"thickness", 1e-3}, {"density", 200}},
                         ball[] = {{"center", .vector = center, .vector_count = 3}, {"radius", 0.2}};
-    const drape_row_def terms[] = {{"stretch.edge"}, {"bend.hinge"}};
+    const drape_entry_def terms[] = {{"stretch.edge"}, {"bend.hinge"}};
     drape_cloth_def cloth;
     drape_collider_def sphere;
     drape_scene_def scene;
     drape_cloth_def_init(&cloth, sizeof cloth);
-    cloth.mesh.grid = (drape_row_def){"square", grid, 4};
+    cloth.mesh.grid = (drape_entry_def){"square", grid, 4};
     cloth.material = material, cloth.material_count = 3;
     cloth.terms = terms, cloth.term_count = 2;
     drape_collider_def_init(&sphere, sizeof sphere);
-    sphere.row = (drape_row_def){"sphere", ball, 2}, sphere.friction = 0.5;
+    sphere.row = (drape_entry_def){"sphere", ball, 2}, sphere.friction = 0.5;
     drape_scene_def_init(&scene, sizeof scene);
     scene.cloths = &cloth, scene.cloth_count = 1;
     scene.colliders = &sphere, scene.collider_count = 1;
@@ -48,7 +48,7 @@ int main(int argc, char **argv)
         for (int32_t i = 0; !status && i < drape_model_node_count(model); i++)
             low = fmin(low, drape_sim_positions(sim)[3 * i + 1]);
         if (!status && k % 30 == 0)
-            printf("t %.2f s: down to %.3f m; %.1f ms, %s\n", t, low, 1e3 * report.seconds, report.rung);
+            printf("t %.2f s: down to %.3f m; %.1f ms, %s\n", t, low, 1e3 * report.seconds, report.level);
         nanosleep(&(struct timespec){.tv_nsec = (long)(1e9 * fmax(0, frame - report.seconds))}, NULL);
     }
     if (status)

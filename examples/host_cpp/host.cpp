@@ -1,4 +1,4 @@
-// host.cpp: a flag whose pole is carried through gusts that this program makes; what the pole takes is told. Build and run:
+// host.cpp: a flag whose pole is carried through gusts made by this program, which prints the force on the pole. Build and run:
 //     cmake -S . -B build && cmake --build build && build/host [FRAMES]
 #include <drape/drape.h>
 
@@ -17,7 +17,7 @@ using Scene = std::unique_ptr<drape_scene, Release<drape_scene, drape_scene_dest
 using Model = std::unique_ptr<drape_model, Release<drape_model, drape_model_destroy>>;
 using Sim = std::unique_ptr<drape_sim, Release<drape_sim, drape_sim_destroy>>;
 
-// A gust that runs along x: w = w0 (1 + 1/2 sin(k x - c t)), with its derivative for Newton's method.
+// A gust that travels along x: w = w0 (1 + 1/2 sin(k x - c t)), with its derivative for Newton's method.
 extern "C" void gust(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
 {
     const double w0 = *static_cast<const double *>(user), k = 4, c = 12;

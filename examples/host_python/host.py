@@ -19,7 +19,7 @@ call("scene_parse", ctx, SCENE, b"scene", c.byref(scene))
 call("scene_compile", scene, c.byref(model))
 call("sim_create", ctx, model, None, c.byref(sim))
 frame, a, w, start = 1 / 60, 0.1, 3, time.perf_counter()
-report = (c.c_double * 20)()  # room for a drape_realtime, which begins with the time and what is owed
+report = (c.c_double * 20)()  # memory for a drape_realtime, which begins with the time and the debt
 for k in range(1, int(sys.argv[1]) + 1 if len(sys.argv) > 1 else 301):
     t, vector = k * frame, c.c_double * 3
     call("sim_move_collider", sim, 0, c.c_double(frame + report[1]), vector(a * math.sin(w * t)), vector(a * w * math.cos(w * t)))

@@ -111,16 +111,16 @@ typedef struct drape_setting {
 
 /* A row of one of Drape's tables by name, with the parameters that differ from their defaults. `drape list`
  * shows all. */
-typedef struct drape_row_def {
+typedef struct drape_entry_def {
     const char *type;              /* the name of the row */
     const drape_setting *settings; /* setting_count of them; NULL for none */
     size_t setting_count;          /* of settings */
-} drape_row_def;
+} drape_entry_def;
 
 /* A triangle mesh: one of three sources. Exactly one of grid.type, file, positions is set. It lies inside the def of a
  * cloth and grows into what is reserved. */
 typedef struct drape_mesh_def {
-    drape_row_def grid;                /* a row of the grids: "equilateral", "square" */
+    drape_entry_def grid;              /* a row of the grids: "equilateral", "square" */
     const char *file;                  /* an OBJ or PLY file, by its ending */
     const double *positions;           /* node_count x 3 [m], copied */
     const int32_t *triangles;          /* triangle_count x 3, 0-based, copied */
@@ -163,17 +163,17 @@ typedef struct drape_cloth_def {
     const drape_setting
         *material;         /* young_modulus, poisson_ratio, thickness, density ...: `drape list` shows all */
     size_t material_count; /* of material */
-    const drape_row_def *terms; /* rows of the terms that are modelled */
-    size_t term_count;          /* of terms */
-    const drape_pin_def *pins;  /* nodes that are held or moved; NULL: none */
-    size_t pin_count;           /* of pins */
-    double velocity[3];         /* [m/s] of every node at t = 0 */
+    const drape_entry_def *terms; /* rows of the terms that are modelled */
+    size_t term_count;            /* of terms */
+    const drape_pin_def *pins;    /* nodes that are held or moved; NULL: none */
+    size_t pin_count;             /* of pins */
+    double velocity[3];           /* [m/s] of every node at t = 0 */
 } drape_cloth_def;
 
 /* A rigid obstacle: a row of the colliders with its parameters. Initialise with drape_collider_def_init. */
 typedef struct drape_collider_def {
     size_t struct_size;           /* set by drape_collider_def_init */
-    drape_row_def row;            /* "plane", "sphere" ... */
+    drape_entry_def entry;        /* "plane", "sphere" ... */
     const char *name;             /* NULL: "collider0", "collider1" ... */
     double friction;              /* Coulomb's mu between it and cloth [1], [0, 1000]; default 0 */
     const drape_track_key *track; /* displacement from where the parameters put it; NULL: it rests */
@@ -187,9 +187,9 @@ typedef struct drape_scene_def {
     const drape_cloth_def *cloths; /* at least one */
     size_t cloth_count;            /* of cloths */
     double gravity[3];             /* [m/s2]; default 0 -9.81 0 */
-    drape_row_def integrator;   /* default "be"; keys of any integrator row are accepted, those of other rows
+    drape_entry_def integrator; /* default "be"; keys of any integrator row are accepted, those of other rows
                                    are ignored */
-    drape_row_def controller;   /* default "halving" */
+    drape_entry_def controller; /* default "halving" */
     double duration;            /* [s], required > 0 when run from the command line; default 1 */
     double frame_rate;          /* [1/s] of frame events; default 60 */
     const char *const *formats; /* frame formats of `drape run`, rows of the exporters; default none */
@@ -353,7 +353,7 @@ typedef struct drape_realtime {
     double dropped_total;   /* [s] since the sim was made */
     double seconds;         /* [s] of wall clock that the call took, its observers included */
     bool kept;              /* that was within the budget */
-    const char *rung;       /* "full"; "fewer iterations"; "larger steps": longer than dt, or time is owed */
+    const char *level;      /* "full"; "fewer iterations"; "larger steps": longer than dt, or time is owed */
     int effort;             /* of the integrator: 0, as its parameters say, and up, cheaper */
     int attempts, rejected; /* steps of this call, and those of them that were forgotten */
     double h;               /* [s] largest accepted step; 0: none was accepted */
@@ -401,10 +401,11 @@ DRAPE_API drape_status drape_sim_set_state(drape_sim *sim, double t, const doubl
  * stiffness 0 lets go. The spring's energy is counted as elastic, and what moving its target takes as the work of a
  * pin. Integrators start anew. Nothing is allocated. Not for observers. Errors: DRAPE_E_ARGUMENT (no such node, a
  * pinned one, a stiffness below 0, not finite), and then nothing has changed. Thread-safety: as the sim. */
-DRAPE_API drape_status drape_sim_pull(drape_sim *sim, int32_t node, double stiffness, const double target[3]);
+DRAPE_API drape_status drape_sim_set_drag_spring(drape_sim *sim, int32_t node, double stiffness,
+                                                 const double target[3]);
 
 /* The force of that spring on its node in the present state [N]; 0 without one. */
-DRAPE_API void drape_sim_pull_force(const drape_sim *sim, double force[3]);
+DRAPE_API void drape_sim_drag_spring_force(const drape_sim *sim, double force[3]);
 
 /* Makes the advance that is running, or else the next one, return DRAPE_E_STOPPED with the last accepted state: before
  * its next step, or at the next evaluation of forces within one, which is then forgotten and counted as rejected
@@ -415,8 +416,8 @@ DRAPE_API void drape_sim_cancel(drape_sim *sim);
 /* ---- Sim: what a host moves ----
  *
  * For a host that has its own idea of where things are, frame by frame: it says where pins and colliders are to be at
- * the end of the frame, advances by the frame, and says the next. Nothing here allocates, but for the first
- * drape_sim_set_wind; none is for observers; after an error nothing has changed. Thread-safety: as the sim. */
+ * the end of the frame, advances by the frame, and says the next. Nothing here allocates;
+ * none is for observers; after an error nothing has changed. Thread-safety: as the sim. */
 
 /* Sends pinned nodes, fixed ones and ones on tracks alike, on ways of the host's: node nodes[i] goes in the next
  * `seconds` of simulated time from where it is to positions[3 i ...] [m], where it then rests, or goes on by the next
@@ -452,8 +453,7 @@ typedef void drape_wind_field(void *user, double t, int32_t count, const double 
                               double *gradient);
 
 /* Moves the medium that drag terms are in ("drag.wind", added to its own steady wind, "drag.viscous", and a host's with
- * in_medium); field NULL: it rests again. Errors: DRAPE_E_ARGUMENT (no term of the model is in a medium),
- * DRAPE_E_MEMORY. */
+ * in_medium); field NULL: it rests again. Errors: DRAPE_E_ARGUMENT (no term of the model is in a medium). */
 DRAPE_API drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *field, void *user);
 
 /* ---- Sim: what can be read ---- */
@@ -488,7 +488,7 @@ DRAPE_API void drape_model_normals(const drape_model *model, const double *x, do
  *
  * drape_sim_contact_forces: of contact and friction, with colliders and between layers, on every node;
  * drape_sim_collider_force: of cloth on one collider, as a whole. Colliders have the mean velocity of the last step, so
- * ask before moving them on. Under "newton_k" and "projective", which do not bring the residual of a step to zero, all
+ * ask before moving them on. Under "newton_k", which does not bring the residual of a step to zero, all
  * of these are far off (docs/choosing.md). An integrator that moves nodes out of what they meet ("verlet") has no such forces, and
  * says so. Errors: DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. Thread-safety: as the sim. Not for observers. */
 DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);
@@ -501,7 +501,7 @@ DRAPE_API drape_collider_motion drape_sim_collider(const drape_sim *sim, int32_t
 /* Energies of the last accepted state [J]. */
 typedef struct drape_energy {
     double kinetic;    /* [J] of the free nodes, as the motion of pinned ones is prescribed */
-    double elastic;    /* [J] of all terms that have an energy, and of drape_sim_pull */
+    double elastic;    /* [J] of all terms that have an energy, and of drape_sim_set_drag_spring */
     double gravity;    /* [J] the potential, zero at the origin */
     double contact;    /* [J] of pairs that are nearer than their activation distance */
     double dissipated; /* [J] the work that damping and drag terms took since t = 0 or drape_sim_set_state */
@@ -584,7 +584,7 @@ DRAPE_API drape_status drape_sim_restore_from(drape_sim *sim, const void *bytes,
 /* ---- Observers ---- */
 
 /* The element or node that an attempt has most to say about. */
-typedef struct drape_worst {
+typedef struct drape_diagnostic {
     const char
         *what; /* "residual", "edge length / rest length", "altitude / rest altitude" ...; "" for none */
     const char *term;    /* the row that found it, "" for a node */
@@ -592,7 +592,7 @@ typedef struct drape_worst {
     int32_t node[4];     /* its first nodes, numbers of the whole model; -1 past the last */
     int32_t cloth;       /* index of its cloth; -1 for none */
     double value, limit; /* in the unit of what */
-} drape_worst;
+} drape_diagnostic;
 
 /* One attempted step. */
 typedef struct drape_attempt {
@@ -606,7 +606,7 @@ typedef struct drape_attempt {
     double
         tolerance; /* that it was to reach [N]; with the reason "rounding" what rounding alone leaves; NaN: the
                          row promises none */
-    drape_worst worst; /* what the attempt has most to say about */
+    drape_diagnostic diagnostic; /* what the attempt has most to say about */
 } drape_attempt;
 
 /* What an observer is told about. */

@@ -3,24 +3,30 @@
  * table of a term, the shape and the ops table of a collider.
  *
  * A term is a sum over elements of one cloth. Its author writes, for a range of elements in local
- * coordinates, one of measure      a scalar strain measure q(x) with gradient and Hessian; the library makes
- * E = 1/2 k (q - q0)^2 of it, energy       any energy E(x) with gradient and Hessian, dissipation  a force
- * g(x, v), positive against the motion, with its derivatives, law          a force along the strain measures
- * of the other terms of its cloth, such as a damping. The library owns the loops, the sparsity, the scatter,
- * the projection, boundary conditions and threads.
+ * coordinates, one of
  *
- * Thread-safety: every function of a row may be called from several threads at once on different ranges; it
+ *   - measure: a scalar strain measure q(x) with gradient and Hessian, of which the library makes the energy
+ *     E = 1/2 k (q - q0)^2
+ *   - energy: any energy E(x) with gradient and Hessian
+ *   - dissipation: a force g(x, v), positive against the motion, with its derivatives
+ *   - law: a force along the strain measures of the other terms of its cloth, such as a damping
+ *
+ * The library owns the loops, the sparsity, the scatter, the projection, boundary conditions and threads.
+ *
+ * Thread-safety: every function of a term may be called from several threads at once on different ranges; it
  * must not allocate and must read nothing but its arguments. The exception is build, called once per cloth
  * while a model is compiled.
  */
 #ifndef DRAPE_EXTEND_H
 #define DRAPE_EXTEND_H
 
+#include <math.h>
+
 #include "drape.h"
 
 DRAPE_C_BEGIN
 
-/* ---- Parameters of a row ---- */
+/* ---- Parameters ---- */
 
 /* What a parameter is. */
 typedef enum drape_param_kind {
@@ -35,23 +41,97 @@ typedef enum drape_param_kind {
 } drape_param_kind;
 
 /* One parameter. All values travel as doubles: integers exact, booleans 0 or 1, choices by index; a vector
- * or a turn takes three of them, so that the values of the parameters after it stand two further on. */
+ * or a turn takes three of them, so that the values of the parameters after it stand two further on. In C the
+ * macros below write one. */
 typedef struct drape_param {
-    const char *name;      /* as in scenes */
-    drape_param_kind kind; /* what values it has */
-    const char *unit;      /* "N/m", "s", "1" for none */
-    double default_value;  /* NaN: there is none, see derived */
-    const char
-        *derived; /* with a NaN default: what is taken instead, in words; NULL: the parameter is required */
+    const char *name;           /* as in scenes */
+    drape_param_kind kind;      /* what values it has */
+    const char *unit;           /* "N/m", "s", "1" for none */
+    double default_value;       /* NaN: there is none, see derived */
+    const char *derived;        /* with a NaN default: what is taken instead, in words; NULL: the parameter is
+                                   required */
     double min, max;            /* closed range; ignored by booleans and choices */
     bool open_min, open_max;    /* the bound itself is excluded */
-    const char *const *choices; /* NULL-ended list of words */
+    const char *const *choices; /* NULL-ended list of names */
     const char *help;           /* what it is and what it does, one line */
     bool uniform;               /* VECTOR: one number may stand for three equal ones */
     const char *numbers;        /* VECTOR: what the three are, "[k11, k22, k12]"; NULL: [x, y, z] */
 } drape_param;
 
-#define DRAPE_MAX_PARAMS 24 /* values of the parameters of a row */
+/* A parameter that is a number: name, unit, default, range and help. C only, as C++17 has no designated
+ * initialisers:
+ *     static const drape_param params[] = {
+ *         DRAPE_NUMBER("tolerance", "N", 1e-6, DRAPE_ABOVE(0), 1e12, "bound on the residual"),
+ *         DRAPE_VECTOR("size", "m", DRAPE_REQUIRED, 0, 1e9, "lengths of the edges", .uniform = true),
+ *         DRAPE_CHOICE("rest", 0, rest_choices, "rest angles: those of the mesh, or flat")};
+ * DRAPE_REQUIRED and DRAPE_DERIVED stand for a default, DRAPE_ABOVE and DRAPE_BELOW for a bound that the
+ * range excludes. Other members may follow the help. */
+#define DRAPE_NUMBER(name_, unit_, default_, min_, max_, ...)                                                \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_NUMBER, .unit = unit_, .default_value = default_, .min = min_,    \
+        .max = max_, .help = __VA_ARGS__                                                                     \
+    }
+/* A whole number. */
+#define DRAPE_INTEGER(name_, unit_, default_, min_, max_, ...)                                               \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_INTEGER, .unit = unit_, .default_value = default_, .min = min_,   \
+        .max = max_, .help = __VA_ARGS__                                                                     \
+    }
+/* Three numbers; default and range are those of each. */
+#define DRAPE_VECTOR(name_, unit_, default_, min_, max_, ...)                                                \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_VECTOR, .unit = unit_, .default_value = default_, .min = min_,    \
+        .max = max_, .help = __VA_ARGS__                                                                     \
+    }
+/* A rotation; the range is that of its angle [degrees]. */
+#define DRAPE_TURN(name_, default_, min_, max_, ...)                                                         \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_TURN, .unit = "degrees", .default_value = default_, .min = min_,  \
+        .max = max_, .help = __VA_ARGS__                                                                     \
+    }
+/* True or false. */
+#define DRAPE_BOOLEAN(name_, default_, ...)                                                                  \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_BOOLEAN, .unit = "1", .default_value = default_,                  \
+        .help = __VA_ARGS__                                                                                  \
+    }
+/* One of a NULL-ended list of names; the default is an index. */
+#define DRAPE_CHOICE(name_, default_, choices_, ...)                                                         \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_CHOICE, .unit = "1", .default_value = default_,                   \
+        .choices = choices_, .help = __VA_ARGS__                                                             \
+    }
+/* A text, always required. */
+#define DRAPE_TEXT(name_, ...)                                                                               \
+    {                                                                                                        \
+        .name = name_, .kind = DRAPE_PARAM_TEXT, .unit = "1", .default_value = DRAPE_REQUIRED,               \
+        .help = __VA_ARGS__                                                                                  \
+    }
+/* In place of a default: the parameter must be given. */
+#define DRAPE_REQUIRED ((double)NAN)
+/* In place of a default: what is taken instead, in words. */
+#define DRAPE_DERIVED(words) DRAPE_REQUIRED, .derived = words
+/* In place of min: values are above it. */
+#define DRAPE_ABOVE(bound) bound, .open_min = true
+/* In place of max: values are below it. */
+#define DRAPE_BELOW(bound) bound, .open_max = true
+
+#define DRAPE_MAX_PARAMS 24 /* values of all parameters of an entry */
+
+/* ---- Entries ---- */
+
+/* What every implementation that is chosen by name says of itself: a term, a collider, and all that `drape list` shows. The
+ * struct of its functions begins with it, behind its size where it has one. Texts and parameters are static. */
+typedef struct drape_entry {
+    const char *name;          /* as in scenes: "bend.hinge" */
+    const char *summary;       /* one line for `drape list` */
+    const char *reference;     /* where the method is from: paper and equation; NULL: nowhere else */
+    const drape_param *params; /* param_count of them; NULL: none */
+    int param_count;           /* of params */
+} drape_entry;
+
+/* Initialises params and param_count of an entry from an array. */
+#define DRAPE_PARAMS(array) .params = (array), .param_count = (int)(sizeof(array) / sizeof *(array))
 
 /* ---- What a term is built from ---- */
 
@@ -102,8 +182,8 @@ typedef struct drape_term_builder drape_term_builder;
  * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count);
 
-/* The same for elements of fewer nodes than the row's, on this cloth. A node may stand in several places of an
- * element, as its first does in places that are left over: its derivatives are the sum of theirs. */
+/* The same for elements of fewer nodes than the term's, on this cloth. A node may stand in several places of
+ * an element, as its first does in places that are left over: its derivatives are the sum of theirs. */
 DRAPE_API drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t element_count, int nodes,
                                                 int rest_count);
 
@@ -111,7 +191,7 @@ DRAPE_API drape_status drape_term_reserve_nodes(drape_term_builder *builder, int
 DRAPE_API void drape_term_anchor(drape_term_builder *builder);
 
 /* Sets element `element`: its nodes (local to the cloth) and its rest data. Measures keep k [J/q2] in rest[0]
- * and q0 in rest[1]; rows that are damped keep c >= 0 [J s/q2] in rest[2]. */
+ * and q0 in rest[1]; terms that are damped keep c >= 0 [J s/q2] in rest[2]. */
 DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes,
                               const double *rest);
 
@@ -132,7 +212,7 @@ typedef struct drape_elements {
     int rest_count;       /* numbers of rest data an element */
     const int32_t *node;  /* (count x nodes) node numbers of the whole model */
     const double *rest;   /* (rest_count x count): item k of element e is rest[k * count + e] */
-    const double *params; /* values in the order of the row's parameter list */
+    const double *params; /* values in the order of the term's parameters */
 } drape_elements;
 
 /* What a check found, for the message of a rejected step. */
@@ -151,19 +231,15 @@ typedef struct drape_fault {
 #define DRAPE_LANES 4
 
 /*
- * A row. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first + count
+ * A term. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first + count
  * - 1; outputs are element-major: item i belongs to element first + i. d = 3 * nodes. Gradients have the sign
  * of dE/dx, so a force is minus that. x, v: (nodes of the model x 3). internal: (element_count) internal
- * variables of the last accepted state, of rows that have them, else NULL. An output pointer that is NULL is
+ * variables of the last accepted state, of terms that have them, else NULL. An output pointer that is NULL is
  * not wanted.
  */
 typedef struct drape_term_ops {
     size_t struct_size;        /* sizeof(drape_term_ops) of the author */
-    const char *name;          /* "bend.hinge" */
-    const char *summary;       /* one line for `drape list` */
-    const char *reference;     /* paper and equation of the formula */
-    const drape_param *params; /* param_count of them, static; NULL for none */
-    int param_count;           /* of params */
+    drape_entry entry;         /* with a reference: paper and equation of the formula */
     const char *element_name;  /* "edge", "hinge", "node": for messages */
     int nodes;                 /* nodes an element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
     bool linear;               /* energy: its Hessian is zero and takes no sparsity */
@@ -183,14 +259,15 @@ typedef struct drape_term_ops {
                     const double *internal, double *q, double *dq, double *ddq);
 
     /* Optional, beside measure, where nodes is 2 and q is a linear function of the distance of the nodes: the
-     * same with a tenth of the numbers. q (count), d (3 x count: all x, all y, all z) = x1 - x0 [m], c (count) with
-     * dq = (-c d, c d), so that ddq = (P -P; -P P), P = c (I - d d'/d.d). count is at most DRAPE_PAIR_BLOCK. */
+     * same with a tenth of the numbers. q (count), d (3 x count: all x, all y, all z) = x1 - x0 [m], c
+     * (count) with dq = (-c d, c d), so that ddq = (P -P; -P P), P = c (I - d d'/d.d). count is at most
+     * DRAPE_PAIR_BLOCK. */
     void (*pair)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,
                  double *d, double *c);
 
-    /* Optional, beside measure: the same for the DRAPE_LANES elements of a list at once; the same one may stand
-     * in several places. Item i of the element in place l is at [DRAPE_LANES i + l]: q (1), dq (d), ddq (d x d), of
-     * which only the 3 x 3 blocks on and below the diagonal are written. */
+    /* Optional, beside measure: the same for the DRAPE_LANES elements of a list at once; the same one may
+     * stand in several places. Item i of the element in place l is at [DRAPE_LANES i + l]: q (1), dq (d), ddq
+     * (d x d), of which only the 3 x 3 blocks on and below the diagonal are written. */
     void (*lanes)(const drape_elements *el, const int32_t *element, const double *x, const double *internal,
                   double *q, double *dq, double *ddq);
 
@@ -202,9 +279,9 @@ typedef struct drape_term_ops {
     void (*dissipation)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                         const double *v, double *g, double *dg_dx, double *dg_dv);
 
-    /* For count elements with stiffness k [J], strain = q - q0 and rate = q' [q/s]: adds the generalised force
-     * [J/q] on q, its derivatives by strain and by rate, and the energy [J] if it has one. All are (count).
-     * dissipative: the force takes work, without an energy. */
+    /* For count elements with stiffness k [J], strain = q - q0 and rate = q' [q/s]: adds the generalised
+     * force [J/q] on q, its derivatives by strain and by rate, and the energy [J] if it has one. All are
+     * (count). dissipative: the force takes work, without an energy. */
     void (*law)(const double *params, int32_t count, const double *k, const double *strain,
                 const double *rate, double *force, double *dforce_dstrain, double *dforce_drate,
                 double *energy);
@@ -225,19 +302,22 @@ typedef struct drape_term_ops {
     drape_status (*check)(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault);
 
-    /* dissipation: it is in a medium. v is the velocity against it, less by the wind of drape_sim_set_wind. */
+    /* dissipation: it is in a medium. v is the velocity against it, less by the wind of
+     * drape_sim_set_wind. */
     bool in_medium;
 
-    /* Optional, beside measure: the ddq with which force ddq is its positive semidefinite part, given the force of
-     * each element, so (ddq)+ where it pulls and (ddq)- where it pushes; ddq (count x d x d, symmetric). Without it,
-     * and without convex, what is made positive loses force ddq, and with it the stiffness that tension gives. */
+    /* Optional, beside measure: the ddq with which force ddq is its positive semidefinite part, given the
+     * force of each element, so (ddq)+ where it pulls and (ddq)- where it pushes; ddq (count x d x d,
+     * symmetric). Without it, and without convex, what is made positive loses force ddq, and with it the
+     * stiffness that tension gives. */
     void (*positive)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                      const double *internal, const double *force, double *ddq);
 } drape_term_ops;
 
-/* Registers a term of the host's own: scenes compiled with this context may name it from then on. *ops is copied; what
- * it points to must outlive the context and every model compiled with it. Ops of an older, shorter version are read. Errors: DRAPE_E_ARGUMENT (not well formed, name
- * taken, more than 32), DRAPE_E_VERSION (struct_size). */
+/* Registers a user-defined term: scenes compiled with this context may name it from then on. *ops is copied;
+ * what it points to must outlive the context and every model compiled with it. Ops of an older, shorter
+ * version are read. Errors: DRAPE_E_ARGUMENT (not well formed, name taken, more than 32), DRAPE_E_VERSION
+ * (struct_size). */
 DRAPE_API drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *ops);
 
 /* Makes a range function out of a function for one element. x (d) and v (d) are local coordinates; writes
@@ -249,14 +329,14 @@ typedef void drape_element_energy(const drape_elements *el, int32_t element, con
 DRAPE_API void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                   double *e, double *g, double *hess, drape_element_energy *one);
 
-/* Makes the function measure of a row out of its lanes, for a range of any count. */
+/* Makes the function measure of a term out of its lanes, for a range of any count. */
 typedef void drape_measure_lanes(const drape_elements *el, const int32_t *element, const double *x,
                                  const double *internal, double *q, double *dq, double *ddq);
 DRAPE_API void drape_measure_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                    const double *internal, double *q, double *dq, double *ddq,
                                    drape_measure_lanes *lanes);
 
-/* For rows with pair: d (3 x count) and the distance l (count) of the two nodes of each element. */
+/* For terms with pair: d (3 x count) and the distance l (count) of the two nodes of each element. */
 DRAPE_API void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                    double *l, double *d);
 
@@ -264,7 +344,7 @@ DRAPE_API void drape_pair_distance(const drape_elements *el, int32_t first, int3
 
 /* What of a collider cloth can touch besides its smooth surface, in the collider's own coordinates, with the
  * surface `radius` outside of it: points against the faces of a cloth, segments against its edges, and
- * triangles (rows without a smooth distance) against its nodes. No segment has the length 0. A shape begins
+ * triangles (colliders without a smooth distance) against its nodes. No segment has the length 0. A shape begins
  * as all zeros; arrays are taken by drape_shape_reserve. */
 typedef struct drape_collider_shape {
     int32_t point_count, segment_count, triangle_count; /* of the arrays below */
@@ -273,16 +353,15 @@ typedef struct drape_collider_shape {
     int32_t *triangle; /* (triangle_count x 3) numbers of points, counterclockwise from outside */
     double radius;     /* [m] */
     bool inscribed;    /* of a convex body: its points and segments stay inside of a curved surface */
-    const void *kept;  /* what the row keeps for its distance, of drape_shape_take; NULL for nothing */
-    struct drape_shape_builder
-        *builder; /* of the functions below; NULL outside of the row's function shape */
+    const void *kept;  /* what the collider keeps for its distance, of drape_shape_take; NULL for nothing */
+    struct drape_shape_builder *builder; /* of the functions below; NULL outside of the function shape */
 } drape_collider_shape;
 
 /* Takes the arrays of a shape; they live as long as the model. Called once. Errors: DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_shape_reserve(drape_collider_shape *shape, int32_t points, int32_t segments,
                                            int32_t triangles);
 
-/* Memory that lives as long as the model, zeroed, for what the row keeps; NULL: return DRAPE_E_MEMORY. */
+/* Memory that lives as long as the model, zeroed, for what the collider keeps; NULL: return DRAPE_E_MEMORY. */
 DRAPE_API void *drape_shape_take(drape_collider_shape *shape, size_t count, size_t size);
 
 /* Refuses a value: the reason is reported at the parameter in the scene. Returns DRAPE_E_ARGUMENT. */
@@ -298,17 +377,13 @@ DRAPE_API drape_status drape_shape_read_mesh(drape_collider_shape *shape, const 
                                              const double translate[3]);
 
 /*
- * A row of the colliders: a rigid, closed obstacle. values: in the order of params; a vector takes three.
+ * A collider: a rigid, closed obstacle. values: in the order of params; a vector takes three.
  * Coordinates are the collider's own: a track moves it as a whole. Thread-safety: as for terms; shape, called
  * once a collider while a model is compiled, may allocate.
  */
 typedef struct drape_collider_ops {
-    size_t struct_size;        /* sizeof(drape_collider_ops) of the author */
-    const char *name;          /* "sphere" */
-    const char *summary;       /* one line for `drape list` */
-    const char *reference;     /* where its distance is from */
-    const drape_param *params; /* param_count of them, static; NULL for none */
-    int param_count;           /* of params */
+    size_t struct_size; /* sizeof(drape_collider_ops) of the author */
+    drape_entry entry;  /* with a reference: where its distance is from */
 
     /* Refuses values that do not go together, and fills the shape. tolerance [m]: how far a polygon may stay
      * inside a curved surface. */
@@ -325,7 +400,7 @@ typedef struct drape_collider_ops {
     bool smooth;
 } drape_collider_ops;
 
-/* Registers a collider of the host's own, as drape_context_add_term does a term. Errors: DRAPE_E_ARGUMENT
+/* Registers a user-defined collider, as drape_context_add_term does a term. Errors: DRAPE_E_ARGUMENT
  * (not well formed, name taken, more than 32), DRAPE_E_VERSION (struct_size). */
 DRAPE_API drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *ops);
 

@@ -59,9 +59,9 @@ static void write_stress(const drape_term *term, const drape_request *want, cons
         to[i] = b->force[i] + (b->by_strain[i] + want->point->weight * b->by_rate[i]) * ahead[i];
 }
 
-/* The weights of ddq and dq dq' in the Hessian. With `project` of the positive semidefinite part that is known
- * without eigenvalues: f ddq where the measure is convex and pulls, and the Gauss-Newton part (Teran et al. 2005;
- * Tamstorf & Grinspun 2013, 5). A row that splits ddq by itself (`positive`) keeps the weight. */
+/* The weights of ddq and dq dq' in the Hessian. With a share of the positive semidefinite part that is
+ * known without eigenvalues: f ddq where the measure is convex and pulls, and the Gauss-Newton part (Teran et
+ * al. 2005; Tamstorf & Grinspun 2013, 5). A row that splits ddq by itself (`positive`) keeps the weight. */
 static void weigh(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const bool convex = term->ops->convex, split = term->ops->positive;
@@ -71,10 +71,10 @@ static void weigh(const drape_term *term, const drape_request *want, drape_block
         b->of_ddq[i] = force[i];
         b->of_dq[i] = b->by_strain[i] + want->point->weight * b->by_rate[i];
     }
-    for (int32_t i = 0; want->project > 0 && i < b->count; i++) {
+    for (int32_t i = 0; want->positive_share > 0 && i < b->count; i++) {
         const double ddq = convex ? fmax(0, b->of_ddq[i]) : 0, dq = fmax(0, b->of_dq[i]);
-        b->of_ddq[i] += split ? 0 : want->project * (ddq - b->of_ddq[i]);
-        b->of_dq[i] += want->project * (dq - b->of_dq[i]);
+        b->of_ddq[i] += split ? 0 : want->positive_share * (ddq - b->of_ddq[i]);
+        b->of_dq[i] += want->positive_share * (dq - b->of_dq[i]);
     }
     for (int32_t i = 0; want->velocity && i < b->count; i++) {
         b->of_ddq[i] = 0;
@@ -83,9 +83,10 @@ static void weigh(const drape_term *term, const drape_request *want, drape_block
 }
 
 /* Whether the Hessian has the part df/dq' dq (ddq v)', which is not symmetric. */
-static bool is_lopsided(const drape_term *term, const drape_request *want)
+static bool is_nonsymmetric(const drape_term *term, const drape_request *want)
 {
-    return has_rates(term) && want->dissipative && !want->point->history && !want->velocity && !want->project;
+    return has_rates(term) && want->dissipative && !want->point->history && !want->velocity &&
+           !want->positive_share;
 }
 
 /* ---- Measures of pairs ---- */
@@ -135,7 +136,7 @@ LANES_DISPATCH static void pair_blocks(drape_block *b, const pairs *p)
 }
 
 /* df/dq' dq (ddq v)', with ddq v = (-u, u), u = P (v1 - v0) */
-static void add_lopsided_pairs(drape_block *b, const pairs *p)
+static void add_nonsymmetric_pairs(drape_block *b, const pairs *p)
 {
     for (int32_t i = 0; i < b->count; i++) {
         const double c = b->per_length[i], d[3] = {p->d[0][i], p->d[1][i], p->d[2][i]};
@@ -172,8 +173,8 @@ static void evaluate_pairs(const drape_term *term, const drape_request *want, dr
         b->per_length[i] = b->of_ddq[i] = b->of_dq[i] = 0, p.d[0][i] = p.d[1][i] = p.d[2][i] = 1;
     weigh(term, want, b);
     pair_blocks(b, &p);
-    if (is_lopsided(term, want))
-        add_lopsided_pairs(b, &p);
+    if (is_nonsymmetric(term, want))
+        add_nonsymmetric_pairs(b, &p);
 }
 
 /* ---- Other measures, side by side in lanes ---- */
@@ -268,7 +269,7 @@ LANES_DISPATCH static void velocity_hessians(int d, drape_block *b)
 }
 
 /* The whole of one element's Hessian, with the part that is not symmetric. */
-static void lopsided_hessian(const drape_term *term, const drape_request *want, drape_block *b, int32_t i)
+static void nonsymmetric_hessian(const drape_term *term, const drape_request *want, drape_block *b, int32_t i)
 {
     const int d = 3 * term->elements.nodes;
     double *h = b->hessian + drape_block_start(b, i, d * d), v[D], along[D];
@@ -288,7 +289,7 @@ static void lopsided_hessian(const drape_term *term, const drape_request *want, 
                                      dq[LANES * r] * (b->of_dq[i] * dq[LANES * c] + along[c]);
 }
 
-/* ddq in b->hessian, moved by the share of project to the part of it that its force makes positive. */
+/* ddq in b->hessian, moved by positive_share to the part of it that its force makes positive. */
 static void split_hessians(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const drape_elements *el = &term->elements;
@@ -298,7 +299,7 @@ static void split_hessians(const drape_term *term, const drape_request *want, dr
     for (int32_t i = 0; i < b->count; i++) {
         double *h = b->hessian + drape_block_start(b, i, size);
         for (int k = 0; k < size; k++)
-            h[LANES * k] += want->project * (b->scratch[i * size + k] - h[LANES * k]);
+            h[LANES * k] += want->positive_share * (b->scratch[i * size + k] - h[LANES * k]);
     }
 }
 
@@ -306,16 +307,16 @@ static void hessians_of_measures(const drape_term *term, const drape_request *wa
 {
     const int d = 3 * term->elements.nodes;
     weigh(term, want, b);
-    if (term->ops->positive && want->project > 0 && !want->velocity)
+    if (term->ops->positive && want->positive_share > 0 && !want->velocity)
         split_hessians(term, want, b);
-    b->mirrored = !is_lopsided(term, want);
+    b->mirrored = !is_nonsymmetric(term, want);
     if (want->velocity)
         velocity_hessians(d, b);
     else if (b->mirrored)
         measure_hessians(d, b);
     else
         for (int32_t i = 0; i < b->count; i++)
-            lopsided_hessian(term, want, b, i);
+            nonsymmetric_hessian(term, want, b, i);
 }
 
 static void evaluate_measures(const drape_term *term, const drape_request *want, drape_block *b)
@@ -400,6 +401,6 @@ void drape_block_evaluate(const drape_term *term, const drape_request *want, dra
         evaluate_dissipations(term, want, b);
     const int d = 3 * term->elements.nodes;
     const bool given = term->ops->measure; /* with its positive part already */
-    for (int32_t i = 0; want->hessian && want->project > 0 && !given && i < b->count; i++)
-        project(d, want->project, b->hessian + (size_t)i * (size_t)(d * d), b->scratch);
+    for (int32_t i = 0; want->hessian && want->positive_share > 0 && !given && i < b->count; i++)
+        project(d, want->positive_share, b->hessian + (size_t)i * (size_t)(d * d), b->scratch);
 }

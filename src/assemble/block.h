@@ -1,6 +1,6 @@
 /*
- * block.h: a block of elements of one term, evaluated: their forces and Hessians, not yet added anywhere. What
- * is known of strain measures becomes forces here:
+ * block.h: a block of elements of one term, evaluated: their forces and Hessians, not yet added anywhere.
+ * What is known of strain measures becomes forces here:
  *     g = f dq,  f summed over elasticity, the elements' own dashpots and laws
  *     H = f ddq + (df/dq + w df/dq') dq dq'                       step methods: q' = w q + history
  *     H = f ddq + df/dq dq dq' + df/dq' dq (ddq v + w dq)'        continuous time: q' = dq . v
@@ -18,20 +18,21 @@ typedef struct drape_request {
     const drape_point *point;
     bool energy, hessian;
     bool conservative, dissipative; /* which parts of the forces */
-    double project;                 /* share of the positive semidefinite part in Hessians, 0 to 1 */
-    bool velocity;                  /* the Hessian wanted is dg/dv alone */
-    bool remainder;                 /* only what is of no measure */
-    const double *along;            /* (node_count x 3) where stress is wanted, from the point; NULL: there */
-    double *stress;                 /* (measure_count) gets the forces on measures; NULL: not wanted */
-    const bool *without;            /* (term_count) terms that are left out; NULL: none */
-    const double *against;          /* (node_count x 3) v against the medium; NULL: it rests */
-    const double *wind_gradient;    /* (node_count x 3 x 3), beside it */
+    double positive_share; /* of the positive semidefinite part in Hessians, see drape_system_jacobian */
+    bool velocity;         /* the Hessian wanted is dg/dv alone */
+    bool remainder;        /* only what is of no measure */
+    const double *along;   /* (node_count x 3) where stress is wanted, from the point; NULL: there */
+    double *stress;        /* (measure_count) gets the forces on measures; NULL: not wanted */
+    const bool *without;   /* (term_count) terms that are left out; NULL: none */
+    const double *against; /* (node_count x 3) v against the medium; NULL: it rests */
+    const double *wind_gradient; /* (node_count x 3 x 3), beside it */
 } drape_request;
 
 /*
- * With `pairs` the results are the force and the block of a pair: g = (-pull, pull), H = (block -block; -block
- * block), component k of element i at [k DRAPE_BLOCK + i]. Else number k of element i lies at [start(i) + stride k], and
- * `mirrored` says that of a Hessian the blocks above the diagonal are those below it, transposed, and not written.
+ * With `pairs` the results are the force and the block of a pair: g = (-pull, pull), H = (block -block;
+ * -block block), component k of element i at [k DRAPE_BLOCK + i]. Else number k of element i lies at
+ * [start(i) + stride k], and `mirrored` says that of a Hessian the blocks above the diagonal are those below
+ * it, transposed, and not written.
  */
 typedef struct drape_block {
     int32_t first, count;

@@ -5,45 +5,45 @@
  * term has none.
  *
  * The step of the differences is 1e-5 of the element's size: truncation is about its square, 1e-10, rounding
- * 1e-16/1e-5. Barriers change over lengths far below that size, so shorter steps are tried, too, and the best
- * counts: a wrong derivative is wrong at all of them. Where a barrier begins its gradient is as small as one
- * likes, so an element's error is relative to no less than a millionth of the term's largest entry.
+ * 1e-16/1e-5. Barriers change over lengths far below that size, so shorter steps are tried, too, and the
+ * smallest error counts: a wrong derivative is wrong at all of them. Where a barrier begins its gradient is
+ * arbitrarily small, so an element's error is relative to at least a millionth of the term's largest entry.
  *
- * Contact is looked at where there is some: the sheet is moved until its deepest node lies half of the activation
- * distance off a collider, or folded onto itself; steps are relative to that distance.
+ * Contact is checked where the scene has it: the sheet is moved until its deepest node lies half of the
+ * activation distance off a collider, or folded onto itself; steps are relative to that distance.
  */
 #include "assemble/check.h"
+
+#include "colliders/colliders.h"
 
 #include <math.h>
 #include <string.h>
 
 #define D                DRAPE_MAX_ELEMENT_DOFS
-#define SAMPLE           200 /* elements of a term that are looked at */
+#define SAMPLE           200 /* elements of a term that are checked, about */
 #define DIRECTIONS       8
 #define DEFORMATION      0.08 /* of the mean edge length, a coordinate */
-#define DIFFERENCE_STEP  1e-5 /* of the mean edge length; */
-#define SHORTER_STEP     0.1  /* the next is shorter by this */
+#define DIFFERENCE_STEP  1e-5 /* of the mean edge length */
+#define SHORTER_STEP     0.1  /* factor from one step of differences to the next */
 #define STEPS            3
-#define LEAST_SCALE      1e-6 /* of the largest in a term, for an element's own */
+#define MIN_SCALE        1e-6 /* of the largest derivative in a term, for an element's own */
 #define GRADIENT_LIMIT   1e-7
 #define HESSIAN_LIMIT    1e-6
 #define INVARIANCE_LIMIT 1e-9
-#define CONTACT_STEP     1e-4 /* of the distance over which contact acts; */
+#define CONTACT_STEP     1e-4 /* of the distance over which contact acts */
 #define APPROACHES       20   /* moves of the sheet towards a collider */
-#define FOLD_SHIFT       0.07 /* of a layer's way: no edge lies exactly on another */
+#define FOLD_SHIFT       0.07 /* of the displacement of a layer, so that no edge lies exactly on another */
 
 typedef struct checker {
     drape_system *system;
     const drape_model *model;
     uint64_t random;
-    double size, step; /* [m] */
+    double size; /* [m] mean edge length */
     double *x, *v, *internal, *history;
     double *x2, *v2, *g1, *g2, *direction; /* scratch, nodes */
     double *values;                        /* a Jacobian in the system's pattern */
-    size_t room;                           /* of values */
-    drape_context *ctx;
     drape_arena *arena;
-    drape_check_row *rows;
+    drape_check_result *rows;
     int row_count;
 } checker;
 
@@ -56,8 +56,8 @@ static double uniform(checker *c)
 
 static void report(checker *c, const char *term, const char *what, double error, double limit)
 {
-    if (c->row_count < DRAPE_MAX_CHECK_ROWS)
-        c->rows[c->row_count++] = (drape_check_row){
+    if (c->row_count < DRAPE_MAX_CHECK_RESULTS)
+        c->rows[c->row_count++] = (drape_check_result){
             .term = term, .what = what, .error = error, .limit = limit, .pass = error <= limit};
 }
 
@@ -149,7 +149,8 @@ static int first_place(const drape_elements *el, int32_t e, int a)
     return a;
 }
 
-/* What stands in further places of a node is added to its first: derivatives by nodes, not by places. */
+/* Adds the derivatives in further places of a node to those in its first: derivatives by nodes, not by
+ * places. */
 static void gather_places(const drape_elements *el, int32_t e, local *l)
 {
     const int d = 3 * el->nodes;
@@ -172,22 +173,22 @@ static void gather_places(const drape_elements *el, int32_t e, local *l)
 }
 
 /* Moves coordinate i of an element by +- step in array (positions or velocities) and evaluates. */
-static void evaluate_beside(checker *c, const drape_term *term, int32_t e, int i, double *array, local *plus,
-                            local *minus)
+static void evaluate_beside(const checker *c, const drape_term *term, int32_t e, int i, double step,
+                            double *array, local *plus, local *minus)
 {
     size_t at = 3 * (size_t)term->elements.node[(size_t)e * (size_t)term->elements.nodes + (size_t)(i / 3)] +
                 (size_t)(i % 3);
     double kept = array[at];
-    array[at] = kept + c->step;
+    array[at] = kept + step;
     evaluate(term, e, c->x, c->v, c->internal, plus);
-    array[at] = kept - c->step;
+    array[at] = kept - step;
     evaluate(term, e, c->x, c->v, c->internal, minus);
     array[at] = kept;
     gather_places(&term->elements, e, plus);
     gather_places(&term->elements, e, minus);
 }
 
-/* Of the derivatives of an element, or of a term: their sizes, or their errors over them. */
+/* The sizes of the derivatives of an element or a term, or their errors relative to these. */
 typedef struct errors {
     double gradient, hessian, velocity, symmetry;
 } errors;
@@ -211,8 +212,8 @@ static errors size_of(const checker *c, const drape_term *term, const local *her
     return (errors){g, h, fmax(largest(here->velocity, d * d), g / c->size), h};
 }
 
-/* The errors of one element with the step as it stands; least: scales are no smaller. */
-static errors compare_once(checker *c, const drape_term *term, int32_t e, errors least)
+/* The errors of one element with one step; min: scales are no smaller. */
+static errors compare_once(const checker *c, const drape_term *term, int32_t e, double step, errors min)
 {
     int d = 3 * term->elements.nodes;
     local here, plus, minus;
@@ -225,67 +226,66 @@ static errors compare_once(checker *c, const drape_term *term, int32_t e, errors
             dh[d * j + i] = 0;
         if (first_place(&term->elements, e, i / 3) < i / 3)
             continue;
-        evaluate_beside(c, term, e, i, c->x, &plus, &minus);
-        dg[i] = (plus.scalar - minus.scalar) / (2 * c->step);
+        evaluate_beside(c, term, e, i, step, c->x, &plus, &minus);
+        dg[i] = (plus.scalar - minus.scalar) / (2 * step);
         for (int j = 0; j < d; j++)
-            dh[d * j + i] = (plus.gradient[j] - minus.gradient[j]) / (2 * c->step);
+            dh[d * j + i] = (plus.gradient[j] - minus.gradient[j]) / (2 * step);
         if (term->ops->dissipation)
-            evaluate_beside(c, term, e, i, c->v, &plus, &minus);
+            evaluate_beside(c, term, e, i, step, c->v, &plus, &minus);
         for (int j = 0; term->ops->dissipation && j < d; j++)
-            dv[d * j + i] = (plus.gradient[j] - minus.gradient[j]) / (2 * c->step);
+            dv[d * j + i] = (plus.gradient[j] - minus.gradient[j]) / (2 * step);
     }
     for (int i = 0; i < d; i++)
         for (int j = 0; j < i; j++)
             symmetry = fmax(symmetry, fabs(here.hessian[d * i + j] - here.hessian[d * j + i]));
-    errors scale = largest_of(size_of(c, term, &here), least);
+    errors scale = largest_of(size_of(c, term, &here), min);
     return (errors){ratio(largest_difference(dg, here.gradient, (size_t)d), scale.gradient),
                     ratio(largest_difference(dh, here.hessian, (size_t)(d * d)), scale.hessian),
                     ratio(largest_difference(dv, here.velocity, (size_t)(d * d)), scale.velocity),
                     ratio(symmetry, scale.symmetry)};
 }
 
-static errors compare_element(checker *c, const drape_term *term, int32_t e, errors least)
+static errors compare_element(const checker *c, const drape_term *term, int32_t e, errors min)
 {
-    double step = c->step;
-    errors best = compare_once(c, term, e, least);
+    double step = DIFFERENCE_STEP * c->size;
+    errors best = compare_once(c, term, e, step, min);
     for (int k = 1; k < STEPS; k++) {
-        c->step *= SHORTER_STEP;
-        best = smallest_of(best, compare_once(c, term, e, least));
+        step *= SHORTER_STEP;
+        best = smallest_of(best, compare_once(c, term, e, step, min));
     }
-    c->step = step;
     return best;
 }
 
-/* What is LEAST_SCALE of the largest derivatives of a term, over every stride-th element. */
-static errors least_scale(checker *c, const drape_term *term, int32_t stride)
+/* MIN_SCALE of the largest derivatives of a term, over every stride-th element. */
+static errors min_scale(const checker *c, const drape_term *term, int32_t stride)
 {
-    errors most = {0};
+    errors max = {0};
     for (int32_t e = 0; e < term->elements.count; e += stride) {
         local here;
         evaluate(term, e, c->x, c->v, c->internal, &here);
-        most = largest_of(most, size_of(c, term, &here));
+        max = largest_of(max, size_of(c, term, &here));
     }
-    return (errors){LEAST_SCALE * most.gradient, LEAST_SCALE * most.hessian, LEAST_SCALE * most.velocity,
-                    LEAST_SCALE * most.symmetry};
+    return (errors){MIN_SCALE * max.gradient, MIN_SCALE * max.hessian, MIN_SCALE * max.velocity,
+                    MIN_SCALE * max.symmetry};
 }
 
 static void check_elements(checker *c, const drape_term *term)
 {
-    errors worst = {0};
+    errors max = {0};
     int32_t stride = term->elements.count / SAMPLE + 1;
-    const errors least = least_scale(c, term, stride);
+    const errors min = min_scale(c, term, stride);
     for (int32_t e = 0; e < term->elements.count; e += stride)
-        worst = largest_of(worst, compare_element(c, term, e, least));
+        max = largest_of(max, compare_element(c, term, e, min));
     if (term->ops->dissipation) {
-        report(c, term->ops->name, "force by position", worst.hessian, HESSIAN_LIMIT);
-        report(c, term->ops->name, "force by velocity", worst.velocity, HESSIAN_LIMIT);
+        report(c, term->ops->entry.name, "force by position", max.hessian, HESSIAN_LIMIT);
+        report(c, term->ops->entry.name, "force by velocity", max.velocity, HESSIAN_LIMIT);
         return;
     }
-    report(c, term->ops->name, term->ops->measure ? "gradient of measure" : "gradient", worst.gradient,
+    report(c, term->ops->entry.name, term->ops->measure ? "gradient of measure" : "gradient", max.gradient,
            GRADIENT_LIMIT);
-    report(c, term->ops->name, term->ops->measure ? "Hessian of measure" : "Hessian", worst.hessian,
+    report(c, term->ops->entry.name, term->ops->measure ? "Hessian of measure" : "Hessian", max.hessian,
            HESSIAN_LIMIT);
-    report(c, term->ops->name, "symmetry", worst.symmetry, INVARIANCE_LIMIT);
+    report(c, term->ops->entry.name, "symmetry", max.symmetry, INVARIANCE_LIMIT);
 }
 
 /* Net force and net torque of a measure's term, over the sum of magnitudes: internal forces have neither. */
@@ -307,9 +307,10 @@ static void check_invariance(checker *c, int32_t t)
             size = fmax(size, fabs(x[k]));
         }
     }
-    report(c, term->ops->name, "net force", ratio(largest(net, 3), scale), INVARIANCE_LIMIT);
+    report(c, term->ops->entry.name, "net force", ratio(largest(net, 3), scale), INVARIANCE_LIMIT);
     if (!term->anchored)
-        report(c, term->ops->name, "net torque", ratio(largest(net + 3, 3), scale * size), INVARIANCE_LIMIT);
+        report(c, term->ops->entry.name, "net torque", ratio(largest(net + 3, 3), scale * size),
+               INVARIANCE_LIMIT);
 }
 
 /* At one state and at two steps along each of its arguments. */
@@ -322,10 +323,10 @@ static void check_law(checker *c, const drape_term *law)
     law->ops->law(law->params, 5, stiffness, strain, rate, f, fs, fr, e);
     double by_strain = (f[1] - f[2]) / (2 * h), by_rate = (f[3] - f[4]) / (2 * h);
     double scale = fmax(fmax(fabs(fs[0]), fabs(fr[0])), fabs(f[0]));
-    report(c, law->ops->name, "force by strain", ratio(fabs(by_strain - fs[0]), scale), HESSIAN_LIMIT);
-    report(c, law->ops->name, "force by rate", ratio(fabs(by_rate - fr[0]), scale), HESSIAN_LIMIT);
+    report(c, law->ops->entry.name, "force by strain", ratio(fabs(by_strain - fs[0]), scale), HESSIAN_LIMIT);
+    report(c, law->ops->entry.name, "force by rate", ratio(fabs(by_rate - fr[0]), scale), HESSIAN_LIMIT);
     if (!law->ops->dissipative)
-        report(c, law->ops->name, "force of energy", ratio(fabs((e[1] - e[2]) / (2 * h) - f[0]), scale),
+        report(c, law->ops->entry.name, "force of energy", ratio(fabs((e[1] - e[2]) / (2 * h) - f[0]), scale),
                GRADIENT_LIMIT);
 }
 
@@ -343,15 +344,15 @@ static void move(checker *c, double s, double weight)
 }
 
 /* Room for a Jacobian at a point, whatever contact couples there. */
-static drape_status fit(checker *c, const drape_point *point)
+static drape_status make_room(checker *c, const drape_point *point)
 {
     bool changed;
-    drape_status status = drape_system_fit(c->system, point, &changed);
-    size_t nonzeros = (size_t)drape_system_pattern(c->system)->nonzeros;
-    if (status || (c->values && nonzeros <= c->room))
+    drape_status status = drape_system_extend_pattern(c->system, point, &changed);
+    if (status)
         return status;
-    c->values = drape_arena_take(c->arena, nonzeros, sizeof(double));
-    c->room = nonzeros;
+    drape_arena_release(c->arena, c->values);
+    c->values =
+        drape_arena_take(c->arena, (size_t)drape_system_pattern(c->system)->nonzeros, sizeof *c->values);
     return c->values ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
@@ -378,54 +379,50 @@ static void contact_force(drape_system *system, const drape_point *point, double
     drape_system_contact_part(system, point, true, g, NULL);
 }
 
-/* Error of the Jacobian in c->values along c->direction, with the step as it stands. point is c's. */
-static double direction_error(checker *c, drape_point point, force *of)
+/* Error of the Jacobian in c->values along c->direction at a point that is c's. */
+static double direction_error(checker *c, double step, drape_point point, force *of)
 {
     const drape_model *m = c->model;
     size_t n = 3 * (size_t)m->node_count;
     point.x = c->x2;
     point.v = c->v2;
-    move(c, c->step, point.weight);
+    move(c, step, point.weight);
     of(c->system, &point, c->g1);
-    move(c, -c->step, point.weight);
+    move(c, -step, point.weight);
     of(c->system, &point, c->g2);
     for (size_t i = 0; i < n; i++)
-        c->g1[i] = m->pinned[i / 3] ? 0 : (c->g1[i] - c->g2[i]) / (2 * c->step);
+        c->g1[i] = m->pinned[i / 3] ? 0 : (c->g1[i] - c->g2[i]) / (2 * step);
     multiply(c, c->g2);
     double scale = fmax(largest(c->g2, n), largest(c->g1, n));
     return ratio(largest_difference(c->g1, c->g2, n), scale);
 }
 
-static void choose_direction(checker *c)
+/* Of the Jacobian in c->values: over all directions the largest error, each with its best step; step: the
+ * longest. */
+static double largest_direction_error(checker *c, double step, const drape_point *point, force *of)
 {
-    for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++)
-        c->direction[i] = uniform(c);
-}
-
-/* Of the Jacobian in c->values, over all directions. */
-static double worst_direction(checker *c, const drape_point *point, force *of)
-{
-    double worst = 0, step = c->step;
+    double error = 0;
     for (int r = 0; r < DIRECTIONS; r++) {
-        double best = INFINITY;
-        choose_direction(c);
-        for (int k = 0; k < STEPS; k++, c->step *= SHORTER_STEP)
-            best = fmin(best, direction_error(c, *point, of));
-        c->step = step;
-        worst = fmax(worst, best);
+        double best = INFINITY, shorter = step;
+        for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++)
+            c->direction[i] = uniform(c);
+        for (int k = 0; k < STEPS; k++, shorter *= SHORTER_STEP)
+            best = fmin(best, direction_error(c, shorter, *point, of));
+        error = fmax(error, best);
     }
-    return worst;
+    return error;
 }
 
 static drape_status check_jacobian(checker *c, const char *what, double weight, const double *history)
 {
     const drape_point point = {
         .x = c->x, .v = c->v, .internal = c->internal, .weight = weight, .history = history};
-    drape_status status = fit(c, &point);
+    drape_status status = make_room(c, &point);
     if (status)
         return status;
-    drape_system_jacobian(c->system, &point, 0, false, c->values);
-    report(c, "assembled", what, worst_direction(c, &point, drape_system_force), HESSIAN_LIMIT);
+    drape_system_jacobian(c->system, &point, 0, 0, c->values);
+    report(c, "assembled", what,
+           largest_direction_error(c, DIFFERENCE_STEP * c->size, &point, drape_system_force), HESSIAN_LIMIT);
     return DRAPE_OK;
 }
 
@@ -437,17 +434,17 @@ static void approach(checker *c, const drape_collider *collider, double gap)
     const drape_model *m = c->model;
     const drape_collider_pose pose = drape_collider_pose_at(collider, 0);
     for (int k = 0; k < APPROACHES; k++) {
-        double least = INFINITY, normal[3] = {0}, n[3];
+        double deepest = INFINITY, normal[3] = {0}, n[3];
         for (int32_t i = 0; i < m->free_count; i++) {
             double d =
                 drape_collider_distance(collider, &pose, c->x + 3 * (size_t)m->node_of_free[i], n, NULL);
-            if (d < least) {
-                least = d;
+            if (d < deepest) {
+                deepest = d;
                 memcpy(normal, n, sizeof normal);
             }
         }
         for (size_t i = 0; i < 3 * (size_t)m->node_count; i++)
-            c->x[i] += (gap - least) * normal[i % 3];
+            c->x[i] += (gap - deepest) * normal[i % 3];
     }
 }
 
@@ -476,89 +473,83 @@ static void fold(checker *c, double gap)
     }
 }
 
-/* Energy, force and Jacobian of contact alone, where c->x is. */
-static drape_status compare_contact(checker *c, double distance, errors *worst)
+/* Energy, force and Jacobian of contact alone, where c->x is; errors above those in *max are kept there. */
+static drape_status compare_contact(checker *c, double distance, errors *max)
 {
     drape_state state = {.x = c->x, .v = c->v};
     drape_point point = {.x = c->x, .v = c->v, .internal = c->internal, .weight = 60};
     size_t n = 3 * (size_t)c->model->node_count;
     drape_status status = drape_system_begin(c->system, &state);
     if (!status)
-        status = fit(c, &point);
+        status = make_room(c, &point);
     if (status)
         return status;
-    double step = c->step, best = INFINITY;
-    c->step = CONTACT_STEP * distance;
+    double step = CONTACT_STEP * distance, best = INFINITY;
     drape_system_contact_part(c->system, &point, true, NULL, c->values);
-    worst->hessian = fmax(worst->hessian, worst_direction(c, &point, contact_force));
+    max->hessian = fmax(max->hessian, largest_direction_error(c, step, &point, contact_force));
     drape_system_contact_part(c->system, &point, false, c->g1, NULL);
     double along = 0, scale = largest(c->g1, n);
     for (size_t i = 0; i < n; i++)
         along += c->model->pinned[i / 3] ? 0 : c->g1[i] * c->direction[i];
     point.x = c->x2;
-    for (int k = 0; k < STEPS; k++, c->step *= SHORTER_STEP) {
-        move(c, c->step, 0);
+    for (int k = 0; k < STEPS; k++, step *= SHORTER_STEP) {
+        move(c, step, 0);
         double after = drape_system_contact_energy(c->system, &point);
-        move(c, -c->step, 0);
+        move(c, -step, 0);
         double before = drape_system_contact_energy(c->system, &point);
-        best = fmin(best, ratio(fabs((after - before) / (2 * c->step) - along), scale));
+        best = fmin(best, ratio(fabs((after - before) / (2 * step) - along), scale));
     }
-    worst->gradient = fmax(worst->gradient, best);
-    c->step = step;
+    max->gradient = fmax(max->gradient, best);
     return DRAPE_OK;
 }
 
-static void report_contact(checker *c, const char *name, errors worst)
+static void report_contact(checker *c, const char *name, errors max)
 {
-    report(c, name, "gradient", worst.gradient, HESSIAN_LIMIT); /* gaps have the rounding of positions */
-    report(c, name, "Jacobian with friction", worst.hessian, HESSIAN_LIMIT);
+    report(c, name, "gradient", max.gradient, HESSIAN_LIMIT); /* gaps have the rounding of positions */
+    report(c, name, "Jacobian with friction", max.hessian, HESSIAN_LIMIT);
 }
 
 static drape_status check_contact(checker *c, const drape_state *rest)
 {
     const drape_contact_def *def = &c->model->contact;
     drape_status status = DRAPE_OK;
-    errors worst = {0};
+    errors max = {0};
     if (!drape_system_contact(c->system))
         return status;
     for (int32_t k = 0; !status && k < c->model->collider_count; k++) {
         make_state(c, rest);
         approach(c, &c->model->colliders[k], def->distance / 2);
-        status = compare_contact(c, def->distance, &worst);
+        status = compare_contact(c, def->distance, &max);
     }
     if (!status && c->model->collider_count > 0)
-        report_contact(c, "contact", worst);
+        report_contact(c, "contact", max);
     if (status || !def->self)
         return status;
-    worst = (errors){0};
+    max = (errors){0};
     fold(c, def->self_thickness);
-    status = compare_contact(c, def->self_thickness, &worst);
-    report_contact(c, "self_contact", worst);
+    status = compare_contact(c, def->self_thickness, &max);
+    report_contact(c, "self_contact", max);
     return status;
 }
 
-/* ---- All of it
- * ------------------------------------------------------------------------------------------------------------
- */
+/* ---- All of it ---- */
 
-static bool allocate(checker *c, drape_context *ctx, drape_arena *arena)
+static drape_status allocate(checker *c, drape_arena *arena)
 {
     size_t n = 3 * (size_t)c->model->node_count, measures = (size_t)c->model->measure_count;
     double **arrays[] = {&c->x, &c->v, &c->x2, &c->v2, &c->g1, &c->g2, &c->direction};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        if (!(*arrays[i] = drape_arena_take(arena, n, sizeof(double))))
-            return false;
+        *arrays[i] = drape_arena_take(arena, n, sizeof(double));
     c->internal = drape_arena_take(arena, (size_t)c->model->internal_count, sizeof(double));
     c->history = drape_arena_take(arena, measures, sizeof(double));
-    c->ctx = ctx;
     c->arena = arena;
-    return c->internal && c->history;
+    return drape_arena_status(arena);
 }
 
 static drape_status check_terms(drape_context *ctx, checker *c)
 {
     drape_status status = DRAPE_OK;
-    for (int32_t t = 0; t < c->model->term_count && !(status = drape_heed(ctx)); t++) {
+    for (int32_t t = 0; t < c->model->term_count && !(status = drape_check_cancel(ctx)); t++) {
         const drape_term *term = &c->model->terms[t];
         if (term->ops->law)
             check_law(c, term);
@@ -571,17 +562,16 @@ static drape_status check_terms(drape_context *ctx, checker *c)
 }
 
 drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, unsigned seed,
-                                     drape_check_row *rows, int *row_count)
+                                     drape_check_result *rows, int *row_count)
 {
     const drape_model *model = drape_system_model(system);
     drape_arena arena = drape_arena_of(ctx);
     drape_state rest;
     checker c = {.system = system, .model = model, .random = seed, .size = mean_edge(model), .rows = rows};
-    c.step = DIFFERENCE_STEP * c.size;
     *row_count = 0;
     drape_status status = drape_state_create(&arena, model, &rest);
-    if (!status && !allocate(&c, ctx, &arena))
-        status = DRAPE_E_MEMORY;
+    if (!status)
+        status = allocate(&c, &arena);
     if (!status) {
         make_state(&c, &rest);
         status = check_terms(ctx, &c);
@@ -591,7 +581,7 @@ drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, u
     if (!status)
         status = check_jacobian(&c, "Jacobian in continuous time", 60, NULL);
     if (!status)
-        status = drape_heed(ctx);
+        status = drape_check_cancel(ctx);
     if (!status)
         status = check_contact(&c, &rest);
     *row_count = c.row_count;

@@ -14,13 +14,12 @@ typedef struct share {
 } share;
 
 struct drape_summer {
-    drape_context *ctx;
     const drape_model *model;
-    drape_crew *crew; /* of the system; NULL: none */
+    drape_pool *pool; /* of the system; NULL: none */
     int threads;
     bool unconstrained;
     drape_block *blocks; /* (threads) */
-    reach **reaches;     /* (term_count) of each of its blocks; NULL: one thread needs none */
+    reach **reaches;     /* (term_count) for each block of each term; NULL: one thread needs none */
 };
 
 static int32_t block_count(const drape_term *term)
@@ -34,7 +33,7 @@ static int32_t elements_in(const drape_term *term, int32_t block)
     return left < DRAPE_BLOCK ? left : DRAPE_BLOCK;
 }
 
-/* ---- Making and freeing ---- */
+/* ---- Making ---- */
 
 static reach reach_of(const drape_term *term, int32_t block)
 {
@@ -48,50 +47,28 @@ static reach reach_of(const drape_term *term, int32_t block)
     return r;
 }
 
-static drape_status create_reaches(drape_summer *s)
+static void find_reaches(drape_arena *arena, drape_summer *s)
 {
-    s->reaches = drape_alloc(s->ctx, (size_t)s->model->term_count, sizeof *s->reaches);
-    if (!s->reaches)
-        return DRAPE_E_MEMORY;
-    for (int32_t i = 0; i < s->model->term_count; i++) {
+    s->reaches = drape_arena_take(arena, (size_t)s->model->term_count, sizeof *s->reaches);
+    for (int32_t i = 0; s->reaches && i < s->model->term_count; i++) {
         const drape_term *term = &s->model->terms[i];
-        s->reaches[i] = drape_alloc(s->ctx, (size_t)block_count(term), sizeof **s->reaches);
-        if (!s->reaches[i])
-            return DRAPE_E_MEMORY;
-        for (int32_t k = 0; k < block_count(term); k++)
+        s->reaches[i] = drape_arena_take(arena, (size_t)block_count(term), sizeof **s->reaches);
+        for (int32_t k = 0; s->reaches[i] && k < block_count(term); k++)
             s->reaches[i][k] = reach_of(term, k);
     }
-    return DRAPE_OK;
 }
 
-drape_status drape_summer_create(drape_context *ctx, const drape_model *model, drape_crew *crew,
+drape_status drape_summer_create(drape_arena *arena, const drape_model *model, drape_pool *pool,
                                  drape_summer **out)
 {
-    drape_summer *s = drape_alloc(ctx, 1, sizeof *s);
-    *out = s;
+    drape_summer *s = *out = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (drape_summer){.ctx = ctx, .model = model, .crew = crew, .threads = drape_crew_threads(crew)};
-    s->blocks = drape_alloc(ctx, (size_t)s->threads, sizeof *s->blocks);
-    drape_status status = s->blocks ? DRAPE_OK : DRAPE_E_MEMORY;
-    if (!status && s->threads > 1)
-        status = create_reaches(s);
-    if (status)
-        drape_summer_destroy(out);
-    return status;
-}
-
-void drape_summer_destroy(drape_summer **summer)
-{
-    drape_summer *s = *summer;
-    if (!s)
-        return;
-    for (int32_t i = 0; s->reaches && i < s->model->term_count; i++)
-        drape_free(s->ctx, s->reaches[i]);
-    drape_free(s->ctx, s->reaches);
-    drape_free(s->ctx, s->blocks);
-    drape_free(s->ctx, s);
-    *summer = NULL;
+    *s = (drape_summer){.model = model, .pool = pool, .threads = drape_pool_threads(pool)};
+    s->blocks = drape_arena_take(arena, (size_t)s->threads, sizeof *s->blocks);
+    if (s->threads > 1)
+        find_reaches(arena, s);
+    return drape_arena_status(arena);
 }
 
 void drape_summer_leave_constraints(drape_summer *s)
@@ -102,14 +79,6 @@ void drape_summer_leave_constraints(drape_summer *s)
 bool drape_summer_leaves(const drape_summer *s, const drape_term *term)
 {
     return s->unconstrained && term->ops->constraint;
-}
-
-size_t drape_summer_bytes(const drape_summer *s)
-{
-    size_t bytes = sizeof *s + (size_t)s->threads * sizeof *s->blocks;
-    for (int32_t i = 0; s->reaches && i < s->model->term_count; i++)
-        bytes += sizeof *s->reaches + (size_t)block_count(&s->model->terms[i]) * sizeof **s->reaches;
-    return bytes;
 }
 
 /* ---- Adding a block ---- */
@@ -156,7 +125,7 @@ static void share_energies(const drape_term *term, const drape_block *b, double 
     }
 }
 
-/* to (r, c) += sign from (r, c), whose rows are `row` apart and whose columns `column`. */
+/* to (r, c) += sign from (r, c); rows of from are `row` apart, its columns `column`. */
 static inline void add_block(const double *from, int row, int column, double sign, double *to, int64_t stride)
 {
     for (int c = 0; c < 3; c++)
@@ -279,7 +248,7 @@ static void clear(const drape_summer *s, const share *own, const drape_sums *to)
         }
 }
 
-/* The nodes of one share. */
+/* Sums for the nodes of one share. */
 static void add_share(drape_summer *s, const drape_request *want, const drape_sums *to, int thread)
 {
     const int64_t nodes = s->model->node_count;
@@ -300,7 +269,7 @@ static void add_share(drape_summer *s, const drape_request *want, const drape_su
     }
 }
 
-/* Of each term a share of its blocks. */
+/* Stresses of a share of the blocks of each term. */
 static void stress_of_share(drape_summer *s, const drape_request *want, int thread)
 {
     for (int32_t i = 0; i < s->model->term_count; i++) {
@@ -311,26 +280,26 @@ static void stress_of_share(drape_summer *s, const drape_request *want, int thre
     }
 }
 
-/* What all threads are to do. */
+/* The job that is dealt out to threads. */
 typedef struct order {
     drape_summer *summer;
     const drape_request *want;
     const drape_sums *to;
 } order;
 
-static void add_round(void *user, int64_t thread)
+static void add_task(void *user, int64_t thread)
 {
     const order *o = user;
     add_share(o->summer, o->want, o->to, (int)thread);
 }
 
-/* There may be fewer threads than shares: they are dealt out, not assumed. */
+/* There may be fewer threads than shares: shares are tasks, not threads. */
 void drape_summer_add(drape_summer *s, const drape_request *want, const drape_sums *to)
 {
-    drape_parallel(s->crew, s->threads, add_round, &(order){s, want, to});
+    drape_parallel(s->pool, s->threads, add_task, &(order){s, want, to});
 }
 
-static void stress_round(void *user, int64_t thread)
+static void stress_task(void *user, int64_t thread)
 {
     const order *o = user;
     stress_of_share(o->summer, o->want, (int)thread);
@@ -338,7 +307,7 @@ static void stress_round(void *user, int64_t thread)
 
 void drape_summer_stress(drape_summer *s, const drape_request *want)
 {
-    drape_parallel(s->crew, s->threads, stress_round, &(order){.summer = s, .want = want});
+    drape_parallel(s->pool, s->threads, stress_task, &(order){.summer = s, .want = want});
 }
 
 void drape_summer_add_term(drape_summer *s, const drape_term *term, const drape_request *want,

@@ -1,18 +1,19 @@
 /*
- * sum.h: sums over the elements of terms, by several threads. Each thread owns a range of nodes: it adds to their
- * forces and to their columns of matrices, and to no others, and evaluates all blocks of elements that touch
- * one of them; those that touch nodes of two threads are evaluated by both. So no two threads write to one place,
- * and every place is added to in the order of elements: the bits are the same for any number of threads.
+ * sum.h: sums over the elements of terms, by several threads. Each thread owns a range of nodes: it adds to
+ * their forces and to their columns of matrices, and to no others, and evaluates all blocks of elements that
+ * touch one of them; those that touch nodes of two threads are evaluated by both. So no two threads write to
+ * one place, and every place is added to in the order of elements: the bits are the same for any number of
+ * threads.
  */
 #ifndef DRAPE_ASSEMBLE_SUM_H
 #define DRAPE_ASSEMBLE_SUM_H
 
 #include "assemble/block.h"
-#include "base/crew.h"
+#include "base/thread_pool.h"
 
 typedef struct drape_summer drape_summer;
 
-/* Where sums go; NULL: not wanted. */
+/* Where sums are written; NULL: not wanted. */
 typedef struct drape_sums {
     double *node_energy;          /* (node_count) an element's energy in equal parts on its nodes */
     double *g;                    /* (node_count x 3) */
@@ -22,28 +23,26 @@ typedef struct drape_sums {
         *blocks; /* (term_count) each as drape_term.block, for this pattern; NULL: those of the terms */
 } drape_sums;
 
-/* crew outlives it; NULL: one thread. Errors: DRAPE_E_MEMORY. */
-drape_status drape_summer_create(drape_context *ctx, const drape_model *model, drape_crew *crew,
+/* pool outlives it; NULL: one thread. Errors: DRAPE_E_MEMORY. */
+drape_status drape_summer_create(drape_arena *arena, const drape_model *model, drape_pool *pool,
                                  drape_summer **out);
-void drape_summer_destroy(drape_summer **summer);
 
-/* From here on terms that are a constraint are left out. */
+/* From now on terms that are constraints are left out. */
 void drape_summer_leave_constraints(drape_summer *summer);
 bool drape_summer_leaves(const drape_summer *summer, const drape_term *term);
 
-/* Over all terms; what is there is overwritten. */
+/* Sums over all terms, and overwrites. */
 void drape_summer_add(drape_summer *summer, const drape_request *want, const drape_sums *to);
 
-/* Over one, in one thread, added to what is there; *energy, if not NULL, gets its energy. */
+/* Adds one term, in one thread; *energy, if not NULL, gets its energy. */
 void drape_summer_add_term(drape_summer *summer, const drape_term *term, const drape_request *want,
                            const drape_sums *to, double *energy);
 
 /* The forces on the measures of all terms, into want->stress. */
 void drape_summer_stress(drape_summer *summer, const drape_request *want);
 
-/* Of a term of pairs: the block of each element, xx xy xz yy yz zz, as (element count x 6). want->hessian is set. */
+/* For a term of pairs: the block of each element, xx xy xz yy yz zz, as (element count x 6). want->hessian is
+ * set. */
 void drape_summer_pairs(drape_summer *summer, const drape_term *term, const drape_request *want, double *h);
-
-size_t drape_summer_bytes(const drape_summer *summer);
 
 #endif

@@ -10,67 +10,58 @@
 #include <string.h>
 
 struct drape_system {
-    drape_context *ctx;
+    drape_arena *arena;
     const drape_model *model;
-    drape_crew *crew;             /* NULL: one thread */
+    drape_pool *pool;             /* NULL: one thread */
     drape_summer *summer;         /* over the elements of terms */
     drape_contact *contact;       /* NULL: none */
-    const drape_pattern *pattern; /* the model's, or wider */
-    drape_pattern wider;          /* with what contact couples */
-    int32_t **blocks;    /* (term_count) as in the terms, for the wider one; NULL while there is none */
+    const drape_pattern *pattern; /* the model's, or the extended one */
+    drape_arena extension;        /* holds the extended pattern and blocks */
+    drape_pattern extended;       /* with what contact couples */
+    int32_t **blocks; /* (term_count) as in the terms, for the extended pattern; NULL while there is none */
     drape_status status; /* of placing contact */
     drape_motion *motion;
-    drape_pull pull;
+    drape_drag_spring drag;
     double *push; /* (node_count x 3) */
     bool pushed;
     drape_wind wind;
-    const atomic_bool *cancel; /* NULL: nobody does */
+    const atomic_bool *cancel; /* NULL: nobody cancels */
 };
 
-static void forget_wider(drape_system *system)
-{
-    for (int32_t i = 0; system->blocks && i < system->model->term_count; i++)
-        drape_free(system->ctx, system->blocks[i]);
-    drape_free(system->ctx, system->blocks);
-    system->blocks = NULL;
-    drape_pattern_free(system->ctx, &system->wider);
-    system->pattern = &system->model->pattern;
-}
-
-drape_status drape_system_create(drape_context *ctx, const drape_model *model, int threads,
+drape_status drape_system_create(drape_arena *arena, const drape_model *model, int threads,
                                  drape_system **out)
 {
-    drape_system *system = drape_alloc(ctx, 1, sizeof *system);
-    *out = system;
+    drape_system *system = *out = drape_arena_take(arena, 1, sizeof *system);
     if (!system)
         return DRAPE_E_MEMORY;
-    *system = (drape_system){.ctx = ctx, .model = model, .pattern = &model->pattern};
-    drape_status status = drape_crew_create(ctx, threads, &system->crew);
+    *system = (drape_system){
+        .arena = arena, .model = model, .pattern = &model->pattern, .extension = drape_arena_within(arena)};
+    system->push = drape_arena_take(arena, 3 * (size_t)model->node_count, sizeof *system->push);
+    drape_status status = drape_pool_create(arena, threads, &system->pool);
     if (!status)
-        status = drape_summer_create(ctx, model, system->crew, &system->summer);
+        status = drape_summer_create(arena, model, system->pool, &system->summer);
     if (!status)
-        status = drape_motion_create(ctx, model, &system->motion);
-    system->push = drape_alloc(ctx, 3 * (size_t)model->node_count, sizeof *system->push);
-    if (!status && !system->push)
-        status = DRAPE_E_MEMORY;
+        status = drape_motion_create(arena, model, &system->motion);
+    if (!status)
+        status = drape_wind_create(arena, model, &system->wind);
     if (status)
         drape_system_destroy(out);
     return status;
+}
+
+static void forget_extension(drape_system *system)
+{
+    drape_arena_free(&system->extension);
+    system->blocks = NULL;
+    system->pattern = &system->model->pattern;
 }
 
 void drape_system_destroy(drape_system **system)
 {
     if (!*system)
         return;
-    drape_context *ctx = (*system)->ctx;
-    drape_contact_destroy(&(*system)->contact);
-    forget_wider(*system);
-    drape_summer_destroy(&(*system)->summer);
-    drape_crew_destroy(&(*system)->crew);
-    drape_motion_destroy(&(*system)->motion);
-    drape_wind_free(ctx, &(*system)->wind);
-    drape_free(ctx, (*system)->push);
-    drape_free(ctx, *system);
+    drape_arena_free(&(*system)->extension);
+    drape_pool_destroy(&(*system)->pool);
     *system = NULL;
 }
 
@@ -84,19 +75,19 @@ const drape_model *drape_system_model(const drape_system *system)
     return system->model;
 }
 
-drape_crew *drape_system_crew(const drape_system *system)
+drape_pool *drape_system_pool(const drape_system *system)
 {
-    return system->crew;
+    return system->pool;
 }
 
-void drape_system_set_pull(drape_system *system, const drape_pull *pull)
+void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *spring)
 {
-    system->pull = *pull;
+    system->drag = *spring;
 }
 
-const drape_pull *drape_system_pull(const drape_system *system)
+const drape_drag_spring *drape_system_drag_spring(const drape_system *system)
 {
-    return &system->pull;
+    return &system->drag;
 }
 
 const drape_motion *drape_system_motion(const drape_system *system)
@@ -125,21 +116,20 @@ double drape_system_push_work(const drape_system *system, const double *x, const
     return work;
 }
 
-drape_status drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user)
+void drape_system_set_wind(drape_system *system, drape_wind_field *field, void *user)
 {
-    return drape_wind_set(system->ctx, system->model, field, user, &system->wind);
+    system->wind.field = field;
+    system->wind.user = user;
 }
 
-void drape_system_swap_winds(drape_system *system, drape_system *other)
+void drape_system_copy_wind(drape_system *system, const drape_system *from)
 {
-    const drape_wind wind = system->wind;
-    system->wind = other->wind;
-    other->wind = wind;
+    drape_system_set_wind(system, from->wind.field, from->wind.user);
 }
 
 void drape_system_add_loads(const drape_system *system, const double *x, double *g)
 {
-    drape_pull_add_gradient(&system->pull, x, g);
+    drape_drag_spring_add_gradient(&system->drag, x, g);
     for (size_t i = 0; system->pushed && i < 3 * (size_t)system->model->node_count; i++)
         g[i] -= system->push[i];
 }
@@ -157,35 +147,11 @@ bool drape_system_cancelled(drape_system *system)
     return cancelled;
 }
 
-/* Of the wider pattern and the terms' places in it. */
-static size_t wider_bytes(const drape_system *system)
-{
-    size_t terms = (size_t)system->model->term_count;
-    if (!system->blocks)
-        return 0;
-    size_t sum = drape_pattern_bytes(&system->wider) + terms * sizeof *system->blocks;
-    for (size_t i = 0; i < terms; i++)
-        if (system->blocks[i]) {
-            const drape_coupling coupling = drape_term_coupling(&system->model->terms[i]);
-            sum +=
-                (size_t)coupling.count * (size_t)(coupling.nodes * coupling.nodes) * sizeof **system->blocks;
-        }
-    return sum;
-}
-
-size_t drape_system_bytes(const drape_system *system)
-{
-    return sizeof *system + drape_crew_bytes(system->crew) + drape_summer_bytes(system->summer) +
-           drape_contact_bytes(system->contact) + wider_bytes(system) + drape_motion_bytes(system->motion) +
-           drape_wind_bytes(&system->wind, system->model) +
-           3 * (size_t)system->model->node_count * sizeof *system->push;
-}
-
 /* ---- Contact ---- */
 
 drape_status drape_system_add_contact(drape_system *system)
 {
-    return drape_contact_create(system->ctx, system->motion, &system->contact);
+    return drape_contact_create(system->arena, system->motion, &system->contact);
 }
 
 const drape_contact *drape_system_contact(const drape_system *system)
@@ -207,7 +173,7 @@ drape_status drape_system_begin(drape_system *system, const drape_state *in)
 void drape_system_rest(drape_system *system)
 {
     if (system->contact)
-        drape_contact_rest(system->contact);
+        drape_contact_end(system->contact);
 }
 
 drape_status drape_system_status(const drape_system *system)
@@ -234,55 +200,53 @@ static bool place_contact(drape_system *system, const drape_point *point)
     return status == DRAPE_OK;
 }
 
-/* The places of the terms in the wider pattern. */
+/* The places of the terms in the extended pattern. */
 static drape_status place_terms(drape_system *system)
 {
     const drape_model *model = system->model;
-    system->blocks = drape_alloc(system->ctx, (size_t)model->term_count, sizeof *system->blocks);
-    if (!system->blocks)
-        return DRAPE_E_MEMORY;
-    for (int32_t i = 0; i < model->term_count; i++) {
+    drape_arena *arena = &system->extension;
+    system->blocks = drape_arena_take(arena, (size_t)model->term_count, sizeof *system->blocks);
+    for (int32_t i = 0; system->blocks && i < model->term_count; i++) {
         if (!drape_term_couples(&model->terms[i]))
             continue;
         const drape_coupling coupling = drape_term_coupling(&model->terms[i]);
-        system->blocks[i] =
-            drape_alloc(system->ctx, (size_t)coupling.count * (size_t)(coupling.nodes * coupling.nodes),
-                        sizeof **system->blocks);
-        if (!system->blocks[i])
-            return DRAPE_E_MEMORY;
-        drape_pattern_place(&system->wider, model->free_of_node, &coupling, system->blocks[i]);
+        const size_t places = (size_t)coupling.count * (size_t)(coupling.nodes * coupling.nodes);
+        system->blocks[i] = drape_arena_take(arena, places, sizeof **system->blocks);
+        if (system->blocks[i])
+            drape_pattern_place(&system->extended, model->free_of_node, &coupling, system->blocks[i]);
     }
-    return DRAPE_OK;
+    return drape_arena_status(arena);
 }
 
-/* With these pairs (x 4 nodes) besides the terms. */
-static drape_status widen(drape_system *system, int32_t pairs, const int32_t *nodes)
+/* A pattern of these pairs (pairs x 4 nodes) and the terms. */
+static drape_status extend(drape_system *system, int32_t pairs, const int32_t *nodes)
 {
     const drape_model *model = system->model;
-    drape_coupling *couplings = drape_alloc(system->ctx, (size_t)model->term_count + 1, sizeof *couplings);
+    drape_context *ctx = system->arena->ctx;
+    drape_coupling *couplings = drape_alloc(ctx, (size_t)model->term_count + 1, sizeof *couplings);
     int count = 0;
     if (pairs < 0 || !couplings) {
-        drape_free(system->ctx, couplings);
+        drape_free(ctx, couplings);
         return DRAPE_E_MEMORY;
     }
     for (int32_t i = 0; i < model->term_count; i++)
         if (drape_term_couples(&model->terms[i]))
             couplings[count++] = drape_term_coupling(&model->terms[i]);
     couplings[count++] = (drape_coupling){.count = pairs, .nodes = 4, .node = nodes};
-    forget_wider(system);
-    drape_status status = drape_pattern_build(system->ctx, model->free_count, model->free_of_node, couplings,
-                                              count, &system->wider);
-    drape_free(system->ctx, couplings);
+    forget_extension(system);
+    drape_status status = drape_pattern_build(&system->extension, model->free_count, model->free_of_node,
+                                              couplings, count, &system->extended);
+    drape_free(ctx, couplings);
     if (!status)
         status = place_terms(system);
-    if (status) /* the model's own again, which is another one than before, too */
-        forget_wider(system);
+    if (status) /* the model's own again: it too differs from the pattern before */
+        forget_extension(system);
     else
-        system->pattern = &system->wider;
+        system->pattern = &system->extended;
     return status;
 }
 
-drape_status drape_system_fit(drape_system *system, const drape_point *point, bool *changed)
+drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed)
 {
     *changed = false;
     if (!place_contact(system, point))
@@ -292,20 +256,20 @@ drape_status drape_system_fit(drape_system *system, const drape_point *point, bo
     *changed = true;
     const int32_t *nodes = NULL;
     int32_t pairs = drape_contact_couplings(system->contact, &nodes);
-    return widen(system, pairs, nodes);
+    return extend(system, pairs, nodes);
 }
 
-static void archive_pull(drape_system *system, drape_archive *a)
+static void archive_drag_spring(drape_system *system, drape_archive *a)
 {
     const drape_model *m = system->model;
-    drape_pull *pull = &system->pull;
-    drape_archive_int32(a, &pull->node);
-    drape_archive_double(a, &pull->stiffness);
-    drape_archive_doubles(a, pull->target, 3);
-    if (drape_archive_is_reading(a) && pull->stiffness > 0 &&
-        (pull->node < 0 || pull->node >= m->node_count || m->pinned[pull->node]))
+    drape_drag_spring *spring = &system->drag;
+    drape_archive_int32(a, &spring->node);
+    drape_archive_double(a, &spring->stiffness);
+    drape_archive_doubles(a, spring->target, 3);
+    if (drape_archive_is_reading(a) && spring->stiffness > 0 &&
+        (spring->node < 0 || spring->node >= m->node_count || m->pinned[spring->node]))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pulls node %d, which is not free",
-                           (int)pull->node);
+                           (int)spring->node);
 }
 
 static void archive_push(drape_system *system, drape_archive *a)
@@ -318,23 +282,23 @@ static void archive_push(drape_system *system, drape_archive *a)
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pushes with a force that is not finite");
 }
 
-/* A wider pattern is made of what was near when the one before it was too narrow: that list is kept. */
+/* The list of pairs that the extended pattern was made of is archived: it is that of an earlier state. */
 void drape_system_archive(drape_system *system, drape_archive *a)
 {
-    bool contact = system->contact != NULL, wider = system->blocks != NULL;
+    bool contact = system->contact != NULL, extended = system->blocks != NULL;
     const int32_t *nodes = NULL;
     drape_archive_mark(a, "system");
     drape_motion_archive(system->motion, a);
-    archive_pull(system, a);
+    archive_drag_spring(system, a);
     archive_push(system, a);
     drape_archive_same(a, "whether there is contact", contact);
     if (contact)
         drape_contact_archive(system->contact, a);
-    drape_archive_bool(a, &wider);
-    if (!drape_archive_is_reading(a) || !contact || !wider)
+    drape_archive_bool(a, &extended);
+    if (!drape_archive_is_reading(a) || !contact || !extended)
         return;
     int32_t pairs = drape_contact_coupled(system->contact, &nodes);
-    drape_archive_note(a, widen(system, pairs, nodes));
+    drape_archive_note(a, extend(system, pairs, nodes));
 }
 
 const double *drape_system_on_colliders(const drape_system *system)
@@ -342,9 +306,9 @@ const double *drape_system_on_colliders(const drape_system *system)
     return system->contact ? drape_contact_on_colliders(system->contact) : NULL;
 }
 
-double drape_system_way(drape_system *system, const double *x, const double *y, double t)
+double drape_system_step_fraction(drape_system *system, const double *x, const double *y, double t)
 {
-    return system->contact ? drape_contact_way(system->contact, x, y, t) : 1;
+    return system->contact ? drape_contact_step_fraction(system->contact, x, y, t) : 1;
 }
 
 bool drape_system_crosses(drape_system *system, const double *y, double t)
@@ -353,9 +317,9 @@ bool drape_system_crosses(drape_system *system, const double *y, double t)
 }
 
 drape_status drape_system_check_contact(drape_system *system, const double *x, double t, const char **reason,
-                                        drape_worst *worst)
+                                        drape_diagnostic *diagnostic)
 {
-    return system->contact ? drape_contact_check(system->contact, x, t, reason, worst) : DRAPE_OK;
+    return system->contact ? drape_contact_check(system->contact, x, t, reason, diagnostic) : DRAPE_OK;
 }
 
 /* ---- Sums over terms ---- */
@@ -365,14 +329,14 @@ static drape_sums into_values(const drape_system *system, double *values)
     return (drape_sums){.values = values, .pattern = system->pattern, .blocks = system->blocks};
 }
 
-/* Terms in a medium are told how fast it is at the point. */
-static void feel_wind(drape_system *system, drape_request *want)
+/* Gives terms in a medium its velocity at the point. */
+static void evaluate_wind(drape_system *system, drape_request *want)
 {
     const drape_point *point = want->point;
     if (!system->wind.field)
         return;
-    drape_wind_feel(&system->wind, system->model->node_count, point->t, point->x, point->v,
-                    want->hessian && !want->velocity);
+    drape_wind_evaluate(&system->wind, system->model->node_count, point->t, point->x, point->v,
+                        want->hessian && !want->velocity);
     want->against = system->wind.against;
     want->wind_gradient = system->wind.gradient;
 }
@@ -387,7 +351,7 @@ void drape_system_force_without(drape_system *system, const drape_point *point, 
 {
     drape_request want = {.point = point, .conservative = true, .dissipative = true, .without = without};
     drape_system_cancelled(system);
-    feel_wind(system, &want);
+    evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
     drape_system_add_loads(system, point->x, g);
     if (place_contact(system, point))
@@ -397,7 +361,7 @@ void drape_system_force_without(drape_system *system, const drape_point *point, 
 void drape_system_dissipation(drape_system *system, const drape_point *point, double *g)
 {
     drape_request want = {.point = point, .dissipative = true};
-    feel_wind(system, &want);
+    evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
     if (place_contact(system, point))
         drape_contact_add_forces(system->contact, false, true, g);
@@ -415,25 +379,28 @@ static void add_masses(const drape_system *system, double mass_weight, double *v
     }
 }
 
-void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight, double project,
-                           double *values)
+void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight,
+                           double positive_share, double *values)
 {
-    drape_request want = {
-        .point = point, .hessian = true, .conservative = true, .dissipative = true, .project = project};
+    drape_request want = {.point = point,
+                          .hessian = true,
+                          .conservative = true,
+                          .dissipative = true,
+                          .positive_share = positive_share};
     const drape_sums to = into_values(system, values);
-    feel_wind(system, &want);
+    evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
-        drape_contact_add_jacobian(system->contact, point->weight, false, project > 0, system->pattern,
+        drape_contact_add_jacobian(system->contact, point->weight, false, positive_share > 0, system->pattern,
                                    values);
-    drape_pull_add_hessian(&system->pull, system->model, system->pattern, values);
+    drape_drag_spring_add_hessian(&system->drag, system->model, system->pattern, values);
     add_masses(system, mass_weight, values);
 }
 
 void drape_system_pairs(const drape_system *system, int32_t term, const drape_point *point, double *h)
 {
     const drape_request want = {
-        .point = point, .hessian = true, .conservative = true, .dissipative = true, .project = true};
+        .point = point, .hessian = true, .conservative = true, .dissipative = true, .positive_share = 1};
     drape_summer_pairs(system->summer, &system->model->terms[term], &want, h);
 }
 
@@ -443,10 +410,10 @@ void drape_system_remainder(drape_system *system, const drape_point *point, doub
                           .hessian = true,
                           .conservative = true,
                           .dissipative = true,
-                          .project = true,
+                          .positive_share = 1,
                           .remainder = true};
     const drape_sums to = into_values(system, values);
-    feel_wind(system, &want);
+    evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
         drape_contact_add_jacobian(system->contact, point->weight, false, true, system->pattern, values);
@@ -467,7 +434,7 @@ void drape_system_damping(drape_system *system, const drape_point *point, double
 {
     drape_request want = {.point = point, .hessian = true, .velocity = true, .dissipative = true};
     const drape_sums to = into_values(system, values);
-    feel_wind(system, &want);
+    evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
     if (place_contact(system, point))
         drape_contact_add_jacobian(system->contact, 0, true, false, system->pattern, values);
@@ -509,7 +476,7 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
             drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
         *(term->ops->potential_of_gravity ? gravity : elastic) += energy;
     }
-    *elastic += drape_pull_energy(&system->pull, point->x);
+    *elastic += drape_drag_spring_energy(&system->drag, point->x);
 }
 
 void drape_system_node_energy(drape_system *system, const drape_point *point, double *energy)
@@ -531,7 +498,7 @@ void drape_system_term(drape_system *system, int32_t term, const drape_point *po
     drape_request want = {
         .point = point, .energy = energy, .hessian = values, .conservative = true, .dissipative = true};
     drape_sums to = into_values(system, t->block ? values : NULL);
-    feel_wind(system, &want);
+    evaluate_wind(system, &want);
     to.g = g;
     if (energy)
         *energy = 0;
@@ -558,25 +525,25 @@ void drape_system_stress(drape_system *system, const drape_point *point, const d
     drape_summer_stress(system->summer, &want);
 }
 
-/* ---- Finding what is wrong ---- */
+/* ---- Checks ---- */
 
-static drape_worst worst_element(const drape_term *term, const drape_fault *fault)
+static drape_diagnostic diagnose_element(const drape_term *term, const drape_fault *fault)
 {
     const drape_elements *el = &term->elements;
-    drape_worst worst = {.what = fault->what,
-                         .term = term->ops->name,
-                         .element = fault->element,
-                         .node = {-1, -1, -1, -1},
-                         .cloth = term->cloth,
-                         .value = fault->value,
-                         .limit = fault->limit};
+    drape_diagnostic diagnostic = {.what = fault->what,
+                                   .term = term->ops->entry.name,
+                                   .element = fault->element,
+                                   .node = {-1, -1, -1, -1},
+                                   .cloth = term->cloth,
+                                   .value = fault->value,
+                                   .limit = fault->limit};
     for (int a = 0; fault->element >= 0 && a < el->nodes && a < 4; a++)
-        worst.node[a] = el->node[(size_t)fault->element * (size_t)el->nodes + (size_t)a];
-    return worst;
+        diagnostic.node[a] = el->node[(size_t)fault->element * (size_t)el->nodes + (size_t)a];
+    return diagnostic;
 }
 
 drape_status drape_system_check(const drape_system *system, const double *x, const double *before,
-                                const double *internal, const char **reason, drape_worst *worst)
+                                const double *internal, const char **reason, drape_diagnostic *diagnostic)
 {
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
@@ -587,7 +554,7 @@ drape_status drape_system_check(const drape_system *system, const double *x, con
         drape_status status = term->ops->check(&term->elements, x, before, own, &fault);
         if (status) {
             *reason = fault.reason;
-            *worst = worst_element(term, &fault);
+            *diagnostic = diagnose_element(term, &fault);
             return status;
         }
     }
@@ -609,25 +576,25 @@ bool drape_system_breaks_limit(const drape_system *system, const double *x, cons
     return false;
 }
 
-drape_worst drape_system_worst_dof(const drape_system *system, const double *free_vector, const char *what,
-                                   double limit)
+drape_diagnostic drape_system_diagnose_dof(const drape_system *system, const double *free_vector,
+                                           const char *what, double limit)
 {
     const drape_model *model = system->model;
-    int64_t worst = 0;
+    int64_t diagnostic = 0;
     for (int64_t i = 0; i < 3 * (int64_t)model->free_count; i++) {
         if (!isfinite(free_vector[i])) {
-            worst = i;
+            diagnostic = i;
             break;
         }
-        if (fabs(free_vector[i]) > fabs(free_vector[worst]))
-            worst = i;
+        if (fabs(free_vector[i]) > fabs(free_vector[diagnostic]))
+            diagnostic = i;
     }
-    int32_t node = model->free_count > 0 ? model->node_of_free[worst / 3] : -1;
-    return (drape_worst){.what = what,
-                         .term = "",
-                         .element = -1,
-                         .node = {node, -1, -1, -1},
-                         .cloth = node >= 0 ? drape_model_cloth_of(model, node) : -1,
-                         .value = model->free_count > 0 ? fabs(free_vector[worst]) : 0,
-                         .limit = limit};
+    int32_t node = model->free_count > 0 ? model->node_of_free[diagnostic / 3] : -1;
+    return (drape_diagnostic){.what = what,
+                              .term = "",
+                              .element = -1,
+                              .node = {node, -1, -1, -1},
+                              .cloth = node >= 0 ? drape_model_cloth_of(model, node) : -1,
+                              .value = model->free_count > 0 ? fabs(free_vector[diagnostic]) : 0,
+                              .limit = limit};
 }

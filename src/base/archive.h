@@ -1,15 +1,15 @@
 /*
- * archive.h: a state as bytes, written and read back by the same code: each function that archives something names
- * its parts once, and the archive knows the direction. What is read is put where what is written was.
+ * archive.h: a state as bytes, written and read back by the same code: each function that archives something
+ * names its parts once, and the archive knows the direction. What is read is put where what is written was.
  *
  *     magic, version of the format     12 bytes
  *     what was archived                in the byte order of the machine, which the reader must share
  *     length of all before, checksum   16 bytes
  *
- * The checksum is FNV-1a, whose every step is a bijection: one byte that differs makes it differ, whatever the rest. It
- * is compared before anything is read, so whoever reads needs to guard against what was archived of something else, not
- * against damage. After a failure nothing is read or written any more and the first status stays: no caller needs to
- * look before the end. Nothing is allocated.
+ * The checksum is FNV-1a, whose every step is a bijection: one byte that differs makes it differ, whatever
+ * the rest. It is compared before anything is read, so whoever reads needs to guard against what was archived
+ * of something else, not against damage. After a failure nothing is read or written any more and the first
+ * status stays: no caller needs to look before the end. Nothing is allocated.
  */
 #ifndef DRAPE_BASE_ARCHIVE_H
 #define DRAPE_BASE_ARCHIVE_H
@@ -37,8 +37,8 @@ typedef struct drape_archive {
 void drape_archive_write_to(drape_archive *a, drape_context *ctx, const char *name, drape_write *write,
                             void *user);
 
-/* Checks the whole: length, checksum, version of the format. bytes outlive the archive. Errors, in a->status too:
- * DRAPE_E_PARSE, DRAPE_E_VERSION. */
+/* Checks the whole: length, checksum, version of the format. bytes outlive the archive. Errors, in a->status
+ * too: DRAPE_E_PARSE, DRAPE_E_VERSION. */
 drape_status drape_archive_read_from(drape_archive *a, drape_context *ctx, const char *name,
                                      const void *bytes, size_t size);
 
@@ -60,7 +60,8 @@ void drape_archive_text(drape_archive *a, char *text, size_t size);
 /* A name between parts: reading stops where another one stands. */
 void drape_archive_mark(drape_archive *a, const char *name);
 
-/* Something that must be the same where it is read, such as a size; what: for the message "WHAT is 3 there, 4 here". */
+/* Something that must be the same where it is read, such as a size; what: for the message "WHAT is 3 there, 4
+ * here". */
 void drape_archive_same(drape_archive *a, const char *what, int64_t value);
 
 /* Whether to go on: for loops and for what must not be done after a failure. */

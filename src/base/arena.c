@@ -15,6 +15,34 @@ drape_arena drape_arena_of(drape_context *ctx)
     return (drape_arena){.ctx = ctx};
 }
 
+drape_arena *drape_arena_create(drape_context *ctx)
+{
+    drape_arena *arena = drape_alloc(ctx, 1, sizeof *arena);
+    if (arena)
+        *arena = drape_arena_of(ctx);
+    return arena;
+}
+
+void drape_arena_destroy(drape_arena **arena)
+{
+    if (!*arena)
+        return;
+    drape_arena_free(*arena);
+    drape_free((*arena)->ctx, *arena);
+    *arena = NULL;
+}
+
+drape_arena drape_arena_within(drape_arena *owner)
+{
+    return (drape_arena){.ctx = owner->ctx, .owner = owner};
+}
+
+static void count_bytes(drape_arena *arena, size_t taken, size_t released)
+{
+    for (; arena; arena = arena->owner)
+        arena->bytes += taken - released;
+}
+
 void *drape_arena_take(drape_arena *arena, size_t count, size_t size)
 {
     size_t bytes = 0, total = SIZE_MAX; /* an overflow is refused by drape_alloc, with its message */
@@ -31,7 +59,7 @@ void *drape_arena_take(drape_arena *arena, size_t count, size_t size)
     if (block->before)
         block->before->after = block;
     arena->last = block;
-    arena->bytes += total;
+    count_bytes(arena, total, 0);
     return block->memory;
 }
 
@@ -71,7 +99,7 @@ void drape_arena_release(drape_arena *arena, void *memory)
         block->after->before = block->before;
     else
         arena->last = block->before;
-    arena->bytes -= sizeof *block + block->size;
+    count_bytes(arena, 0, sizeof *block + block->size);
     drape_free(arena->ctx, block);
 }
 
@@ -82,10 +110,11 @@ drape_status drape_arena_status(const drape_arena *arena)
 
 void drape_arena_free(drape_arena *arena)
 {
+    count_bytes(arena->owner, 0, arena->bytes);
     while (arena->last) {
         struct drape_arena_block *block = arena->last;
         arena->last = block->before;
         drape_free(arena->ctx, block);
     }
-    *arena = drape_arena_of(arena->ctx);
+    *arena = (drape_arena){.ctx = arena->ctx, .owner = arena->owner};
 }

@@ -125,6 +125,16 @@ drape_status drape_fail(drape_context *ctx, drape_status status, const char *for
     return status;
 }
 
+const drape_entry *drape_context_term(const drape_context *ctx, int index)
+{
+    return index < ctx->host_term_count ? &ctx->host_terms[index].entry : NULL;
+}
+
+const drape_entry *drape_context_collider(const drape_context *ctx, int index)
+{
+    return index < ctx->host_collider_count ? &ctx->host_colliders[index].entry : NULL;
+}
+
 drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *pointer, const char *format,
                            ...)
 {
@@ -152,7 +162,7 @@ drape_status drape_fail_memory(drape_context *ctx, size_t bytes)
     return drape_fail(ctx, DRAPE_E_MEMORY, "out of memory: an allocation of %zu bytes failed", bytes);
 }
 
-drape_status drape_heed(drape_context *ctx)
+drape_status drape_check_cancel(drape_context *ctx)
 {
     if (!ctx->def.cancel || !ctx->def.cancel(ctx->def.cancel_user))
         return DRAPE_OK;

@@ -1,4 +1,4 @@
-/* context.h: allocator, last message, log, rows of the host. Every function that can fail reports through
+/* context.h: allocator, last message, log, user-defined terms and colliders. Every function that can fail reports through
  * its context. */
 #ifndef DRAPE_BASE_CONTEXT_H
 #define DRAPE_BASE_CONTEXT_H
@@ -23,6 +23,10 @@ struct drape_context {
     int host_collider_count;
 };
 
+/* User-defined entry `index` of the context; NULL past the last. */
+const drape_entry *drape_context_term(const drape_context *ctx, int index);
+const drape_entry *drape_context_collider(const drape_context *ctx, int index);
+
 /* count x size bytes, zeroed, aligned for any type; NULL with a message on failure or overflow. 0 bytes give
  * a valid pointer. */
 void *drape_alloc(drape_context *ctx, size_t count, size_t size);
@@ -34,14 +38,15 @@ char *drape_copy_text(drape_context *ctx, const char *text);
 drape_status drape_fail(drape_context *ctx, drape_status status, const char *format, ...) DRAPE_PRINTF(3, 4);
 drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *pointer, const char *format,
                            ...) DRAPE_PRINTF(4, 5);
-/* A function of the host, before whose call the message was emptied, returned status: says so where it failed and said nothing. */
+/* A function of the host, before whose call the message was emptied, returned status: says so where it failed
+ * and said nothing. */
 drape_status drape_fail_unsaid(drape_context *ctx, drape_status status, const char *pointer,
                                const char *format, ...) DRAPE_PRINTF(4, 5);
 drape_status drape_fail_memory(drape_context *ctx, size_t bytes);
 
-/* For what takes long before a sim runs, between its stages: DRAPE_E_STOPPED with its message where the host wants no
- * more of it. */
-drape_status drape_heed(drape_context *ctx);
+/* For what takes long before a sim runs, between its stages: DRAPE_E_STOPPED with its message where the host
+ * wants no more of it. */
+drape_status drape_check_cancel(drape_context *ctx);
 
 void drape_log(drape_context *ctx, drape_log_level level, const char *format, ...) DRAPE_PRINTF(3, 4);
 

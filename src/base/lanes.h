@@ -1,10 +1,10 @@
 /*
- * lanes.h: four doubles at once. GCC and Clang make of it what the processor has; a lane is computed as a lone
- * double would be, with the same bits on all of them.
+ * lanes.h: four doubles at once. GCC and Clang make of it what the processor has; a lane is computed as a
+ * lone double would be, with the same bits on all of them.
  *
- * A function over lanes is LANES_INLINE, so that it becomes part of one that is LANES_DISPATCH: that is compiled
- * for several processors and picked when the program starts. A call between functions for different processors
- * must not pass lanes.
+ * A function over lanes is LANES_INLINE, so that it becomes part of one that is LANES_DISPATCH: that is
+ * compiled for several processors and picked when the program starts. A call between functions for different
+ * processors must not pass lanes.
  */
 #ifndef DRAPE_BASE_LANES_H
 #define DRAPE_BASE_LANES_H

@@ -3,10 +3,11 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
-#define LONGEST_WORD 63
-#define RANGE_SIZE   1024 /* bytes of a range in words: lists of choices are long */
+#define MAX_WORD   63
+#define RANGE_SIZE 1024 /* bytes of a range in words: lists of choices are long */
 
 int drape_param_find(const drape_param *params, int param_count, const char *name)
 {
@@ -47,11 +48,16 @@ void drape_param_default(const drape_param *param, double *values)
         values[k] = param->default_value;
 }
 
-/* Levenshtein distance by one row of the table; words longer than LONGEST_WORD are never meant. */
+bool drape_param_is_required(const drape_param *param)
+{
+    return isnan(param->default_value) && !param->derived;
+}
+
+/* Levenshtein distance by one row of the table; words longer than MAX_WORD are never meant. */
 static size_t edit_distance(const char *a, const char *b)
 {
-    size_t na = strlen(a), nb = strlen(b), row[LONGEST_WORD + 1];
-    if (na > LONGEST_WORD || nb > LONGEST_WORD)
+    size_t na = strlen(a), nb = strlen(b), row[MAX_WORD + 1];
+    if (na > MAX_WORD || nb > MAX_WORD)
         return SIZE_MAX;
     for (size_t j = 0; j <= nb; j++)
         row[j] = j;
@@ -92,21 +98,11 @@ static void choices_text(const drape_param *param, char *text, size_t size)
         used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", param->choices[i]);
 }
 
-/* What stands before the range of each number of several. */
-static void several_text(const drape_param *param, char *text, size_t size)
-{
-    const char *numbers = param->numbers ? param->numbers : "[x, y, z]";
-    *text = 0;
-    if (param->kind == DRAPE_PARAM_TURN)
-        snprintf(text, size, "[x, y, z, angle], or %s as long as the angle, which is in ", numbers);
-    if (param->kind == DRAPE_PARAM_VECTOR)
-        snprintf(text, size, "%s%s, each in ", param->uniform ? "a number or " : "", numbers);
-}
-
 void drape_param_range_text(const drape_param *param, char *text, size_t size)
 {
     const char *unit = strcmp(param->unit, "1") == 0 ? "" : param->unit;
-    char several[96];
+    const char *numbers = param->numbers ? param->numbers : "[x, y, z]";
+    char several[96] = "";
     switch (param->kind) {
     case DRAPE_PARAM_BOOLEAN:
         snprintf(text, size, "true or false");
@@ -117,13 +113,38 @@ void drape_param_range_text(const drape_param *param, char *text, size_t size)
     case DRAPE_PARAM_TEXT:
         snprintf(text, size, "a string, not empty");
         return;
+    case DRAPE_PARAM_VECTOR:
+        snprintf(several, sizeof several, "%s%s, each in ", param->uniform ? "a number or " : "", numbers);
+        break;
+    case DRAPE_PARAM_TURN:
+        snprintf(several, sizeof several, "[x, y, z, angle], or %s as long as the angle, which is in ",
+                 numbers);
+        break;
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
-    case DRAPE_PARAM_VECTOR:
-    case DRAPE_PARAM_TURN:
-        several_text(param, several, sizeof several);
-        snprintf(text, size, "%s%c%.10g, %.10g%c%s%s", several, param->open_min ? '(' : '[', param->min,
-                 param->max, param->open_max ? ')' : ']', *unit ? " " : "", unit);
+        break;
+    }
+    snprintf(text, size, "%s%c%.10g, %.10g%c%s%s", several, param->open_min ? '(' : '[', param->min,
+             param->max, param->open_max ? ')' : ']', *unit ? " " : "", unit);
+}
+
+void drape_param_takes_text(const drape_param *param, char *text, size_t size)
+{
+    const char *kind = param->kind == DRAPE_PARAM_INTEGER  ? "an integer in "
+                       : param->kind == DRAPE_PARAM_NUMBER ? "a number in "
+                                                           : "";
+    const size_t used = strlen(kind);
+    snprintf(text, size, "%s", kind);
+    if (used < size)
+        drape_param_range_text(param, text + used, size - used);
+}
+
+void drape_number_text(double number, char *text, size_t size)
+{
+    for (int digits = 10; digits <= 17; digits++) {
+        snprintf(text, size, "%.*g", digits, number);
+        if (strtod(text, NULL) == number)
+            return;
     }
 }
 
@@ -153,45 +174,21 @@ void drape_param_value_text(const drape_param *param, const double *value, char 
     }
 }
 
-static drape_status refuse(drape_context *ctx, const char *pointer, const drape_param *param,
-                           const char *given)
+drape_status drape_param_refuse(drape_context *ctx, const char *pointer, const drape_param *param,
+                                const char *given)
 {
-    const char *kind = param->kind == DRAPE_PARAM_INTEGER  ? "an integer in "
-                       : param->kind == DRAPE_PARAM_NUMBER ? "in "
-                                                           : "";
-    char range[RANGE_SIZE];
-    drape_param_range_text(param, range, sizeof range);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%.100s is not allowed; %s is %s%s", given,
-                         param->name, kind, range);
+    char takes[RANGE_SIZE];
+    drape_param_takes_text(param, takes, sizeof takes);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%.100s is not allowed; %s is %s", given,
+                         param->name, takes);
 }
 
 static drape_status refuse_number(drape_context *ctx, const char *pointer, const drape_param *param,
                                   double number)
 {
     char given[40];
-    snprintf(given, sizeof given, "%.17g", number);
-    double shorter = 0; /* the shortest of the two that says the same */
-    char brief[40];
-    snprintf(brief, sizeof brief, "%.10g", number);
-    if (sscanf(brief, "%lf", &shorter) == 1 && shorter == number)
-        return refuse(ctx, pointer, param, brief);
-    return refuse(ctx, pointer, param, given);
-}
-
-static drape_status choice_value(drape_context *ctx, const char *pointer, const drape_param *param,
-                                 const char *word, double *value)
-{
-    size_t count = 0;
-    for (; param->choices[count]; count++)
-        if (strcmp(param->choices[count], word) == 0) {
-            *value = (double)count;
-            return DRAPE_OK;
-        }
-    char range[RANGE_SIZE];
-    choices_text(param, range, sizeof range);
-    const char *meant = drape_did_you_mean(word, param->choices, count);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%.60s\" is not allowed; %s is %s%s%s%s", word,
-                         param->name, range, DRAPE_MEANT(meant));
+    drape_number_text(number, given, sizeof given);
+    return drape_param_refuse(ctx, pointer, param, given);
 }
 
 static bool in_range(const drape_param *param, double number)
@@ -203,12 +200,28 @@ static bool in_range(const drape_param *param, double number)
 static drape_status number_value(drape_context *ctx, const char *pointer, const drape_param *param,
                                  double number, double *value)
 {
-    bool good = in_range(param, number) && (param->kind != DRAPE_PARAM_INTEGER || number == floor(number));
-    if (param->kind == DRAPE_PARAM_BOOLEAN)
+    bool good = false;
+    switch (param->kind) {
+    case DRAPE_PARAM_NUMBER:
+        good = in_range(param, number);
+        break;
+    case DRAPE_PARAM_INTEGER:
+        good = in_range(param, number) && number == floor(number);
+        break;
+    case DRAPE_PARAM_BOOLEAN:
         good = number == 0 || number == 1;
-    if (!good || param->kind == DRAPE_PARAM_TEXT)
+        break;
+    case DRAPE_PARAM_VECTOR:
+        good = in_range(param, number) && param->uniform;
+        break;
+    case DRAPE_PARAM_CHOICE:
+    case DRAPE_PARAM_TURN:
+    case DRAPE_PARAM_TEXT:
+        break;
+    }
+    if (!good)
         return refuse_number(ctx, pointer, param, number);
-    for (int k = 0; k < drape_param_width(param); k++) /* a vector: one number for all three */
+    for (int k = 0; k < drape_param_width(param); k++)
         value[k] = number;
     return DRAPE_OK;
 }
@@ -219,6 +232,8 @@ static drape_status turn_value(drape_context *ctx, const char *pointer, const dr
 {
     const double *v = setting->vector;
     double axis = hypot(hypot(v[0], v[1]), v[2]), angle = setting->vector_count == 4 ? v[3] : axis;
+    if (setting->vector_count == 3 && !isfinite(axis * axis)) /* a square that others take */
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "the rotation vector is too long");
     if (!in_range(param, angle) || !isfinite(axis))
         return refuse_number(ctx, pointer, param, isfinite(axis) ? angle : axis);
     if (axis == 0 && angle != 0)
@@ -232,45 +247,43 @@ static drape_status turn_value(drape_context *ctx, const char *pointer, const dr
 static drape_status vector_value(drape_context *ctx, const char *pointer, const drape_param *param,
                                  const drape_setting *setting, double *value)
 {
-    char given[64];
-    bool turn = param->kind == DRAPE_PARAM_TURN;
-    if (drape_param_width(param) == 3 &&
-        (setting->vector_count == 3 || (turn && setting->vector_count == 4))) {
-        if (turn)
-            return turn_value(ctx, pointer, param, setting, value);
-        for (int k = 0; k < 3; k++) {
-            if (!in_range(param, setting->vector[k]))
-                return refuse_number(ctx, pointer, param, setting->vector[k]);
-            value[k] = setting->vector[k];
-        }
-        return DRAPE_OK;
+    const size_t count = setting->vector_count;
+    char given[40];
+    if (param->kind == DRAPE_PARAM_TURN && (count == 3 || count == 4))
+        return turn_value(ctx, pointer, param, setting, value);
+    snprintf(given, sizeof given, count ? "an array of %zu" : "an empty array", count);
+    if (param->kind != DRAPE_PARAM_VECTOR || count != 3)
+        return drape_param_refuse(ctx, pointer, param, given);
+    for (int k = 0; k < 3; k++) {
+        if (!in_range(param, setting->vector[k]))
+            return refuse_number(ctx, pointer, param, setting->vector[k]);
+        value[k] = setting->vector[k];
     }
-    snprintf(given, sizeof given, "an array of %zu", setting->vector_count);
-    return refuse(ctx, pointer, param, given);
-}
-
-static drape_status refuse_text(drape_context *ctx, const char *pointer, const drape_param *param,
-                                const char *text)
-{
-    char given[80];
-    bool word = strcmp(text, "true") == 0 || strcmp(text, "false") == 0; /* a boolean */
-    snprintf(given, sizeof given, word ? "%.60s" : "\"%.60s\"", text);
-    return refuse(ctx, pointer, param, given);
+    return DRAPE_OK;
 }
 
 static drape_status text_value(drape_context *ctx, const char *pointer, const drape_param *param,
                                const char *text, double *value)
 {
-    bool yes = strcmp(text, "true") == 0, no = strcmp(text, "false") == 0;
-    if (param->kind == DRAPE_PARAM_CHOICE)
-        return choice_value(ctx, pointer, param, text, value);
-    if (param->kind == DRAPE_PARAM_BOOLEAN && (yes || no))
-        *value = yes;
-    else if (param->kind == DRAPE_PARAM_TEXT && *text)
-        *value = 0;
-    else
-        return refuse_text(ctx, pointer, param, text);
-    return DRAPE_OK;
+    const bool yes = strcmp(text, "true") == 0, boolean = yes || strcmp(text, "false") == 0;
+    char given[80], takes[RANGE_SIZE];
+    size_t count = 0;
+    for (; param->kind == DRAPE_PARAM_CHOICE && param->choices[count]; count++)
+        if (strcmp(param->choices[count], text) == 0) {
+            *value = (double)count;
+            return DRAPE_OK;
+        }
+    if ((param->kind == DRAPE_PARAM_BOOLEAN && boolean) || (param->kind == DRAPE_PARAM_TEXT && *text)) {
+        *value = param->kind == DRAPE_PARAM_BOOLEAN && yes;
+        return DRAPE_OK;
+    }
+    snprintf(given, sizeof given, boolean ? "%.60s" : "\"%.60s\"", text);
+    if (count == 0)
+        return drape_param_refuse(ctx, pointer, param, given);
+    drape_param_takes_text(param, takes, sizeof takes);
+    const char *meant = drape_did_you_mean(text, param->choices, count);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s is not allowed; %s is %s%s%s%s", given,
+                         param->name, takes, DRAPE_MEANT(meant));
 }
 
 drape_status drape_param_value(drape_context *ctx, const char *pointer, const drape_param *param,
@@ -280,9 +293,6 @@ drape_status drape_param_value(drape_context *ctx, const char *pointer, const dr
         return text_value(ctx, pointer, param, setting->text, value);
     if (setting->vector)
         return vector_value(ctx, pointer, param, setting, value);
-    if (param->kind == DRAPE_PARAM_CHOICE || param->kind == DRAPE_PARAM_TURN ||
-        (param->kind == DRAPE_PARAM_VECTOR && !param->uniform))
-        return refuse_number(ctx, pointer, param, setting->number);
     return number_value(ctx, pointer, param, setting->number, value);
 }
 
@@ -299,10 +309,10 @@ static drape_status unknown_name(drape_context *ctx, const char *pointer, const 
 
 drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param)
 {
-    char range[RANGE_SIZE];
-    drape_param_range_text(param, range, sizeof range);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%s\" is missing: %s, %s", param->name,
-                         param->help, range);
+    char takes[RANGE_SIZE];
+    drape_param_takes_text(param, takes, sizeof takes);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "\"%s\" is missing: %s; %s", param->name,
+                         param->help, takes);
 }
 
 drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_param *params,
@@ -325,7 +335,7 @@ drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const
         given[i] = true;
     }
     for (int i = 0; i < param_count; i++)
-        if (!given[i] && isnan(params[i].default_value) && !params[i].derived)
+        if (!given[i] && drape_param_is_required(&params[i]))
             return drape_param_missing(ctx, pointer, &params[i]);
     return DRAPE_OK;
 }

@@ -1,32 +1,27 @@
-/* cmd_check.c: `drape check`: every analytic derivative of a scene against differences. */
+/* cmd_check.c: `drape check`: compares every analytic derivative of a scene with differences. */
 #include "cli/cli.h"
 #include "cli/signals.h"
 
 #include "assemble/check.h"
-#include "contact/intersect.h"
+#include "geometry/intersect.h"
 
 #include <stdio.h>
 
 #define DEFAULT_SEED 1
-#define LARGEST_SEED 1000000000
+#define MAX_SEED     1000000000
 
 typedef struct check_request {
     cli_command command;
-    int seed;
+    int seed; /* 0: not given */
 } check_request;
 
-static void print_row(const drape_check_row *row)
-{
-    printf("%-20s %-28s %12.3e %10.1e  %s\n", row->term, row->what, row->error, row->limit,
-           row->pass ? "ok" : "FAILED");
-}
-
-static int print_rows(const drape_check_row *rows, int count)
+static int print_comparisons(const drape_check_result *rows, int count)
 {
     int failed = 0;
     printf("%-20s %-28s %12s %10s\n", "term", "what", "error", "limit");
     for (int i = 0; i < count; i++) {
-        print_row(&rows[i]);
+        printf("%-20s %-28s %12.3e %10.1e  %s\n", rows[i].term, rows[i].what, rows[i].error, rows[i].limit,
+               rows[i].pass ? "ok" : "FAILED");
         failed += !rows[i].pass;
     }
     printf("%d passed, %d failed\n", count - failed, failed);
@@ -36,8 +31,7 @@ static int print_rows(const drape_check_row *rows, int count)
     return failed ? CLI_FAILED : CLI_DONE;
 }
 
-/* Where the cloths pass through themselves or each other at the start. No failure: a scene without
- * self-contact may. */
+/* Prints where cloth passes through cloth at the start. It is not a failure, as a scene without self-contact may have it. */
 static drape_status print_intersections(const cli_scene *in)
 {
     drape_intersections found;
@@ -55,52 +49,44 @@ static drape_status print_intersections(const cli_scene *in)
 static int check(const check_request *request, const cli_scene *in)
 {
     int count = 0, code = CLI_FAILED;
-    drape_check_row *rows = drape_alloc(in->ctx, DRAPE_MAX_CHECK_ROWS, sizeof *rows);
-    bool done =
-        rows && !drape_check_derivatives(in->ctx, in->sim->system, (unsigned)request->seed, rows, &count);
+    unsigned seed = request->seed ? (unsigned)request->seed : DEFAULT_SEED;
+    drape_check_result *rows =
+        drape_arena_take(request->command.arena, DRAPE_MAX_CHECK_RESULTS, sizeof *rows);
+    bool done = rows && !drape_check_derivatives(in->ctx, in->sim->system, seed, rows, &count);
     if (done)
-        code = print_rows(rows, count);
-    if (cli_interrupted()) {
-        code = cli_tell_interrupted(request->command.verb);
-    } else if (!done || print_intersections(in)) {
-        code = CLI_FAILED;
-        fprintf(stderr, "%s\n", drape_context_message(in->ctx));
-    }
-    drape_free(in->ctx, rows);
+        code = print_comparisons(rows, count);
+    if (cli_interrupted())
+        return cli_report_interrupted(request->command.verb);
+    return done && !print_intersections(in) ? code : cli_report(in->ctx, CLI_FAILED);
+}
+
+static int run(const void *command)
+{
+    const check_request *request = command;
+    cli_scene in;
+    int code = cli_scene_load(&request->command, request->command.operand, &in);
+    if (code == CLI_GO_ON)
+        code = check(request, &in);
+    cli_scene_free(&in);
     return code;
 }
 
 static const cli_option options[] = {
     {"seed", CLI_NUMBER, "N", "another deformation, rotation and motion (default 1)",
-     offsetof(check_request, seed), LARGEST_SEED, NULL},
+     offsetof(check_request, seed), MAX_SEED, NULL},
 };
 
-static int main_check(int argc, char **argv);
-
 const drape_verb drape_verb_check = {
-    .name = "check",
+    .entry = {.name = "check",
+              .summary = "differences against every analytic derivative of a scene; edge-face intersections"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "differences against every analytic derivative of a scene; edge-face intersections",
     .details =
         "Compares every analytic derivative of a scene with central differences at a deformed, rotated,\n"
         "moving state, and counts the edges that pass through triangles at the start. Exit code 0: all\n"
         "derivatives are within their limits.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_check,
+    .request_size = sizeof(check_request),
+    .run = run,
 };
-
-static int main_check(int argc, char **argv)
-{
-    check_request request = {.seed = DEFAULT_SEED};
-    cli_scene in = {.ctx = NULL};
-    int code = cli_parse(&drape_verb_check, argc, argv, &request.command);
-    if (code == CLI_GO_ON)
-        code = cli_scene_load(&request.command, &in);
-    if (code == CLI_GO_ON)
-        code = check(&request, &in);
-    cli_scene_free(&in);
-    cli_command_free(&request.command);
-    return code;
-}

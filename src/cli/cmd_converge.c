@@ -3,28 +3,25 @@
 
 static const cli_option options[] = {
     CLI_LAB_OPTIONS,
-    {"levels", CLI_TEXT, "N", "refinements, 3 to 12 (default 6)", offsetof(cli_lab_request, levels), 0, NULL},
-    {"space", CLI_FLAG, NULL, "also refine the grids of all cloths", offsetof(cli_lab_request, space), 0,
-     NULL},
+    CLI_LAB_OPTION("levels", CLI_TEXT, "N", "refinements, 3 to 12 (default 6)", levels, 0),
+    CLI_LAB_OPTION("space", CLI_FLAG, NULL, "also refine the grids of all cloths", space, 0),
 };
 
-static int main_converge(int argc, char **argv);
+static int run(const void *request)
+{
+    return cli_lab_run(request, 1);
+}
 
 const drape_verb drape_verb_converge = {
-    .name = "converge",
+    .entry = {.name = "converge", .summary = "orders of convergence in time, and in space"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "orders of convergence in time, and in space",
     .details =
-        "Halves the step of every integrator again and again (ida: cuts rtol to a tenth), and the edges of "
+        "Halves the step of every integrator again and again (ida: divides rtol by 10), and the edges of "
         "the\n"
         "grids with --space; the distances between successive ends give the order, with its confidence.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_converge,
+    .request_size = sizeof(cli_lab_request),
+    .run = run,
 };
-
-static int main_converge(int argc, char **argv)
-{
-    return cli_lab_main(&drape_verb_converge, 1, argc, argv);
-}

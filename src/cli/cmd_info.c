@@ -2,6 +2,7 @@
 #include "cli/info.h"
 #include "cli/signals.h"
 
+#include "base/arena.h"
 #include "colliders/colliders.h"
 
 #include <math.h>
@@ -13,49 +14,49 @@ typedef struct info_request {
     bool json;
 } info_request;
 
-void cli_chosen_rows(const drape_sim *sim, cli_chosen_row rows[CLI_CHOSEN_ROWS])
+void cli_chosen_entries(const drape_sim *sim, cli_chosen entries[CLI_CHOSEN])
 {
     const drape_integrator_ops *integrator = sim->chosen.integrator;
     const drape_controller_ops *controller = sim->chosen.controller;
-    rows[0] = (cli_chosen_row){"integrator",
-                               integrator->name,
-                               integrator->summary,
-                               integrator->params,
-                               integrator->param_count,
-                               sim->chosen.integrator_values,
-                               &sim->model->integrator,
-                               drape_chosen_ignores_integrator};
-    rows[1] = (cli_chosen_row){"controller",
-                               controller->name,
-                               controller->summary,
-                               controller->params,
-                               controller->param_count,
-                               sim->chosen.controller_values,
-                               &sim->model->controller,
-                               drape_chosen_ignores_controller};
+    entries[0] = (cli_chosen){"integrator",
+                              integrator->entry.name,
+                              integrator->entry.summary,
+                              integrator->entry.params,
+                              integrator->entry.param_count,
+                              sim->chosen.integrator_values,
+                              &sim->model->integrator,
+                              drape_chosen_ignores_integrator};
+    entries[1] = (cli_chosen){"controller",
+                              controller->entry.name,
+                              controller->entry.summary,
+                              controller->entry.params,
+                              controller->entry.param_count,
+                              sim->chosen.controller_values,
+                              &sim->model->controller,
+                              drape_chosen_ignores_controller};
 }
 
-void cli_contact(const drape_sim *sim, cli_contact_rows *out)
+void cli_contact(const drape_sim *sim, cli_contact_entries *out)
 {
     const drape_model *model = sim->model;
-    const bool forces = !sim->chosen.integrator->projects_contact; /* else only the distance of layers acts */
+    const bool forces = !sim->chosen.integrator->projects_contact; /* else only the thickness acts */
     out->count = 0;
     if (forces && (model->collider_count > 0 || model->contact.self)) {
         drape_contact_values(&model->contact, out->values[0]);
-        out->rows[out->count++] = (cli_chosen_row){.title = "contact",
-                                                   .params = drape_contact_params,
-                                                   .param_count = DRAPE_CONTACT_PARAM_COUNT,
-                                                   .values = out->values[0],
-                                                   .choice = &model->contact_choice};
+        out->entries[out->count++] = (cli_chosen){.title = "contact",
+                                                  .params = drape_contact_params,
+                                                  .param_count = DRAPE_CONTACT_PARAM_COUNT,
+                                                  .values = out->values[0],
+                                                  .choice = &model->contact_choice};
     }
     if (model->contact.self) {
         drape_self_contact_values(&model->contact, out->values[1]);
-        out->rows[out->count++] =
-            (cli_chosen_row){.title = "self_contact",
-                             .params = drape_self_contact_params,
-                             .param_count = forces ? DRAPE_SELF_PARAM_COUNT : DRAPE_SELF_THICKNESS + 1,
-                             .values = out->values[1],
-                             .choice = &model->self_choice};
+        out->entries[out->count++] =
+            (cli_chosen){.title = "self_contact",
+                         .params = drape_self_contact_params,
+                         .param_count = forces ? DRAPE_SELF_PARAM_COUNT : DRAPE_SELF_THICKNESS + 1,
+                         .values = out->values[1],
+                         .choice = &model->self_choice};
     }
 }
 
@@ -81,7 +82,7 @@ double cli_share(const cli_info *info, double seconds)
     return whole > 0 ? seconds / whole : 0;
 }
 
-/* Single measurements may add up to more than the whole did. */
+/* The rest of the whole; not negative, as the parts are measured separately and may add up to more. */
 double cli_other_residual_seconds(const cli_info *info)
 {
     double other = info->profile.residual_seconds;
@@ -123,21 +124,21 @@ static cli_collider_info collider_info(const drape_sim *sim, const drape_collide
     return info;
 }
 
-/* The frames at k / rate up to the end, and one at the end where none of them is there. */
+/* Frames at k / rate up to the end, and one at the end if none of them is there. */
 static int64_t count_frames(const drape_model *model)
 {
     double intervals = model->duration * model->frame_rate, whole = floor(intervals + 1e-9);
     return (int64_t)whole + (intervals - whole > 1e-9 ? 2 : 1);
 }
 
-static drape_status gather(const cli_scene *in, cli_info *info)
+static drape_status gather(drape_arena *arena, const cli_scene *in, cli_info *info)
 {
     const drape_model *model = in->model;
-    drape_profile_term *terms = drape_alloc(in->ctx, (size_t)model->term_count, sizeof *terms);
+    drape_profile_term *terms = drape_arena_take(arena, (size_t)model->term_count, sizeof *terms);
     info->profile.terms = terms;
-    info->cloths = drape_alloc(in->ctx, (size_t)model->cloth_count, sizeof *info->cloths);
-    info->colliders = drape_alloc(in->ctx, (size_t)model->collider_count, sizeof *info->colliders);
-    if (!terms || !info->cloths || !info->colliders)
+    info->cloths = drape_arena_take(arena, (size_t)model->cloth_count, sizeof *info->cloths);
+    info->colliders = drape_arena_take(arena, (size_t)model->collider_count, sizeof *info->colliders);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     info->model = model;
     info->sim = in->sim;
@@ -146,7 +147,9 @@ static drape_status gather(const cli_scene *in, cli_info *info)
         info->cloths[c] = cloth_info(model, &model->cloths[c]);
     for (int32_t c = 0; c < model->collider_count; c++)
         info->colliders[c] = collider_info(in->sim, &model->colliders[c]);
-    drape_status status = drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
+    drape_status status = drape_scene_to_def(in->scene, &info->def);
+    if (!status)
+        status = drape_profile_measure(in->ctx, in->sim, terms, &info->profile);
     const drape_integrator_ops *integrator = in->sim->chosen.integrator;
     info->has_limit = integrator->stability;
     if (!status && info->has_limit)
@@ -164,24 +167,22 @@ static int print_json(const cli_info *info)
     return failed && !ferror(stdout) ? CLI_FAILED : CLI_DONE;
 }
 
-static int print_info(const info_request *request, const cli_scene *in)
+static int run(const void *command)
 {
+    const info_request *request = command;
     cli_info info = {.path = request->command.operand};
-    int code = CLI_DONE;
-    drape_status status = gather(in, &info);
-    if (status == DRAPE_E_STOPPED) {
-        code = cli_tell_interrupted(request->command.verb);
-    } else if (status) {
-        fprintf(stderr, "%s\n", drape_context_message(in->ctx));
-        code = CLI_FAILED;
-    } else if (request->json) {
-        code = print_json(&info);
-    } else {
-        cli_info_text(&info);
+    cli_scene in;
+    int code = cli_scene_load(&request->command, request->command.operand, &in);
+    if (code == CLI_GO_ON) {
+        drape_status status = gather(request->command.arena, &in, &info);
+        code = status == DRAPE_E_STOPPED ? cli_report_interrupted(request->command.verb)
+               : status                  ? cli_report(in.ctx, CLI_FAILED)
+               : request->json           ? print_json(&info)
+                                         : CLI_DONE;
+        if (!status && !request->json)
+            cli_info_text(&info);
     }
-    drape_free(in->ctx, info.profile.terms);
-    drape_free(in->ctx, info.cloths);
-    drape_free(in->ctx, info.colliders);
+    cli_scene_free(&in);
     return code;
 }
 
@@ -189,47 +190,29 @@ static const cli_option options[] = {
     {"json", CLI_FLAG, NULL, "the same as JSON", offsetof(info_request, json), 0, NULL},
 };
 
-/* The settings were good when the model was compiled, so they are now. */
+/* The settings were valid when the model was compiled, so they are valid now. */
 const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values)
 {
-    for (int g = 0; drape_grids[g]; g++) {
-        const drape_grid_ops *grid = drape_grids[g];
-        drape_context *ctx = NULL;
-        if (strcmp(grid->name, cloth->grid.type) != 0 || drape_context_create(NULL, &ctx))
-            continue;
-        drape_status status = drape_params_resolve(ctx, "", grid->params, grid->param_count,
-                                                   cloth->grid.settings, cloth->grid.setting_count, values);
-        drape_context_destroy(&ctx);
-        return status ? NULL : grid;
-    }
-    return NULL;
+    const int i = drape_registry_find(&drape_grid_registry, NULL, cloth->grid.type);
+    drape_context *ctx = NULL;
+    if (i < 0 || drape_context_create(NULL, &ctx))
+        return NULL;
+    const drape_grid_ops *grid = drape_grids[i];
+    drape_status status = drape_params_resolve(ctx, "", grid->entry.params, grid->entry.param_count,
+                                               cloth->grid.settings, cloth->grid.setting_count, values);
+    drape_context_destroy(&ctx);
+    return status ? NULL : grid;
 }
 
-static int main_info(int argc, char **argv);
-
 const drape_verb drape_verb_info = {
-    .name = "info",
+    .entry = {.name = "info", .summary = "what a scene models and what it costs"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "what a scene models and what it costs",
     .details =
         "Shows what a scene models, every parameter with its value, and what each part costs: elements,\n"
         "nonzeros, bytes, and its share of one Newton iteration, measured at a slightly deformed state.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_info,
+    .request_size = sizeof(info_request),
+    .run = run,
 };
-
-static int main_info(int argc, char **argv)
-{
-    info_request request = {.json = false};
-    cli_scene in = {.ctx = NULL};
-    int code = cli_parse(&drape_verb_info, argc, argv, &request.command);
-    if (code == CLI_GO_ON)
-        code = cli_scene_load(&request.command, &in);
-    if (code == CLI_GO_ON)
-        code = print_info(&request, &in);
-    cli_scene_free(&in);
-    cli_command_free(&request.command);
-    return code;
-}

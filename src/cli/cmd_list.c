@@ -26,24 +26,25 @@ typedef struct list_style {
     void (*scene)(void);
     void (*object)(const cli_object *object);
     void (*key)(const cli_object *object, const drape_scene_key *key);
-    void (*table)(const cli_table *table);
-    void (*rows_begin)(void);
-    void (*row)(const cli_row *row);
-    void (*params_begin)(const cli_table *table);
-    void (*param)(const cli_row *row, const drape_param *param);
-    bool params_apart; /* in a table of their own, after all rows */
+    void (*table)(const drape_registry *table);
+    void (*entries_begin)(void);
+    void (*entry)(const drape_entry *entry);
+    void (*params_begin)(const drape_registry *table);
+    void (*param)(const drape_entry *entry, const drape_param *param);
+    bool params_apart; /* in a table of their own, after all entries */
 } list_style;
 
+/* What a parameter, or a key of a scene, takes and has by default, in words; the unit has a place of its own. */
 typedef struct param_text {
-    char range[1024], value[256], unit[64];
+    char takes[1024], value[256], unit[64];
 } param_text;
 
 static param_text text_of(const drape_param *param)
 {
     param_text text;
     drape_param plain = *param;
-    plain.unit = "1"; /* the range without its unit, which has a place of its own */
-    drape_param_range_text(&plain, text.range, sizeof text.range);
+    plain.unit = "1";
+    drape_param_range_text(&plain, text.takes, sizeof text.takes);
     double value[DRAPE_PARAM_WIDEST];
     drape_param_default(param, value);
     drape_param_value_text(param, value, text.value, sizeof text.value);
@@ -51,11 +52,21 @@ static param_text text_of(const drape_param *param)
     return text;
 }
 
+static param_text text_of_key(const drape_scene_key *key)
+{
+    param_text text = text_of(&key->param);
+    drape_scene_key plain = *key;
+    plain.param.unit = "1";
+    drape_scene_takes_text(&plain, text.takes, sizeof text.takes);
+    drape_scene_default_text(key, text.value, sizeof text.value);
+    return text;
+}
+
 /* ---- As text ---- */
 
 static void nothing(void) {}
 
-static void no_params(const cli_table *table)
+static void no_params(const drape_registry *table)
 {
     (void)table;
 }
@@ -73,35 +84,39 @@ static void text_object(const cli_object *object)
            *one_of ? "; " : "", one_of);
 }
 
+static void print_param(const char *name, const char *help, const param_text *text, const char *prefix)
+{
+    printf("    %-18s %s\n    %-18s %s%s%s%s%s%s\n", name, help, "", text->takes, *text->unit ? " " : "",
+           text->unit, *text->value ? "; " : "", *text->value ? prefix : "", text->value);
+}
+
 static void text_key(const cli_object *object, const drape_scene_key *key)
 {
     (void)object;
-    char text[256];
-    cli_key_text(key, text, sizeof text);
-    printf("    %-18s %s\n    %-18s %s%s%s%s\n", key->name, key->help, "", text, key->unit ? " [" : "",
-           key->unit ? key->unit : "", key->unit ? "]" : "");
+    param_text text = text_of_key(key);
+    drape_scene_takes_text(key, text.takes, sizeof text.takes); /* the unit included */
+    *text.unit = 0;
+    print_param(key->param.name, key->param.help, &text,
+                drape_param_is_required(&key->param) ? "" : "default ");
 }
 
-static void text_table(const cli_table *table)
+static void text_table(const drape_registry *table)
 {
-    printf("%s (%s)%s%s\n", table->title, table->name, table->place ? ": " : "",
-           table->place ? table->place : "");
+    printf("%s (%s)%s%s\n", table->title, table->key, *table->place ? ": " : "", table->place);
 }
 
-static void text_row(const cli_row *row)
+static void text_entry(const drape_entry *entry)
 {
-    printf("\n  %-20s %s\n", row->name, row->summary);
-    if (row->reference && strcmp(row->reference, "-") != 0)
-        printf("  %-20s [%s]\n", "", row->reference);
+    printf("\n  %-20s %s\n", entry->name, entry->summary);
+    if (entry->reference && strcmp(entry->reference, "-") != 0)
+        printf("  %-20s [%s]\n", "", entry->reference);
 }
 
-static void text_param(const cli_row *row, const drape_param *param)
+static void text_param(const drape_entry *entry, const drape_param *param)
 {
-    (void)row;
+    (void)entry;
     const param_text text = text_of(param);
-    printf("    %-18s %s\n", param->name, param->help);
-    printf("    %-18s %s%s%s; %s%s\n", "", text.range, *text.unit ? " " : "", text.unit,
-           isnan(param->default_value) ? "" : "default ", text.value);
+    print_param(param->name, param->help, &text, isnan(param->default_value) ? "" : "default ");
 }
 
 /* ---- As Markdown ---- */
@@ -127,26 +142,31 @@ static void code_cell(const char *text)
 
 static void markdown_scene(void)
 {
-    puts("### " SCENE_TITLE "\n\n| in | key | unit | takes | what |\n|---|---|---|---|---|");
+    puts("### " SCENE_TITLE "\n\n| in | key | unit | default | takes | what |\n|---|---|---|---|---|---|");
 }
 
-/* A key that stands for others says so: its row is read alone. */
+static void markdown_cells(const char *of, const char *name, const char *help, const param_text *text)
+{
+    fputs("|", stdout);
+    code_cell(of);
+    code_cell(name);
+    cell(text->unit);
+    cell(text->value);
+    cell(text->takes);
+    cell(help);
+    fputc('\n', stdout);
+}
+
+/* A key that stands for others says so: its row of the table is read alone. */
 static void markdown_key(const cli_object *object, const drape_scene_key *key)
 {
-    char text[512];
-    cli_key_text(key, text, sizeof text);
-    const size_t length = strlen(text);
+    param_text text = text_of_key(key);
+    const size_t length = strlen(text.takes);
     if (cli_is_one_of(object->form, key)) {
-        snprintf(text + length, sizeof text - length, "; ");
-        cli_one_of_text(object->form, text + length + 2, sizeof text - length - 2);
+        snprintf(text.takes + length, sizeof text.takes - length, "; ");
+        cli_one_of_text(object->form, text.takes + length + 2, sizeof text.takes - length - 2);
     }
-    fputs("|", stdout);
-    code_cell(*object->pointer ? object->pointer : "/");
-    code_cell(key->name);
-    cell(key->unit ? key->unit : "");
-    cell(text);
-    cell(key->help);
-    fputc('\n', stdout);
+    markdown_cells(*object->pointer ? object->pointer : "/", key->param.name, key->param.help, &text);
 }
 
 static void markdown_object(const cli_object *object)
@@ -154,108 +174,90 @@ static void markdown_object(const cli_object *object)
     (void)object;
 }
 
-static void markdown_table(const cli_table *table)
+static void markdown_table(const drape_registry *table)
 {
     printf("### %s\n", table->title);
-    if (table->place)
+    if (*table->place)
         printf("\nIn a scene: %s.\n", table->place);
 }
 
-static void markdown_rows_begin(void)
+static void markdown_entries_begin(void)
 {
     puts("\n| name | what | reference |\n|---|---|---|");
 }
 
-static void markdown_row(const cli_row *row)
+static void markdown_entry(const drape_entry *entry)
 {
     fputs("|", stdout);
-    code_cell(row->name);
-    cell(row->summary);
-    cell(row->reference && strcmp(row->reference, "-") != 0 ? row->reference : "");
+    code_cell(entry->name);
+    cell(entry->summary);
+    cell(entry->reference && strcmp(entry->reference, "-") != 0 ? entry->reference : "");
     fputc('\n', stdout);
 }
 
-static void markdown_params_begin(const cli_table *table)
+static void markdown_params_begin(const drape_registry *table)
 {
     (void)table;
     puts("\n| of | parameter | unit | default | range | what |\n|---|---|---|---|---|---|");
 }
 
-static void markdown_param(const cli_row *row, const drape_param *param)
+static void markdown_param(const drape_entry *entry, const drape_param *param)
 {
     const param_text text = text_of(param);
-    fputs("|", stdout);
-    code_cell(row->name);
-    code_cell(param->name);
-    cell(text.unit);
-    cell(text.value);
-    cell(text.range);
-    cell(param->help);
-    fputc('\n', stdout);
+    markdown_cells(entry->name, param->name, param->help, &text);
 }
 
 static const list_style text_style = {.scene = text_scene,
                                       .object = text_object,
                                       .key = text_key,
                                       .table = text_table,
-                                      .rows_begin = nothing,
-                                      .row = text_row,
+                                      .entries_begin = nothing,
+                                      .entry = text_entry,
                                       .params_begin = no_params,
                                       .param = text_param};
 static const list_style markdown_style = {.scene = markdown_scene,
                                           .object = markdown_object,
                                           .key = markdown_key,
                                           .table = markdown_table,
-                                          .rows_begin = markdown_rows_begin,
-                                          .row = markdown_row,
+                                          .entries_begin = markdown_entries_begin,
+                                          .entry = markdown_entry,
                                           .params_begin = markdown_params_begin,
                                           .param = markdown_param,
                                           .params_apart = true};
 
 /* ---- What is printed ---- */
 
-static bool has_params(const cli_table *table, const char *only)
+static bool is_shown(const drape_entry *entry, const char *only)
 {
-    cli_row row;
-    for (int i = 0; table->row(i, &row); i++)
-        if (row.param_count > 0 && (!only || strcmp(only, row.name) == 0))
-            return true;
-    return false;
+    return !only || strcmp(only, entry->name) == 0;
 }
 
-static void print_params(const list_style *style, const cli_row *row)
+static void print_params(const list_style *style, const drape_entry *entry)
 {
-    for (int p = 0; p < row->param_count; p++)
-        style->param(row, &row->params[p]);
+    for (int p = 0; p < entry->param_count; p++)
+        style->param(entry, &entry->params[p]);
 }
 
-/* only: the name of one row; NULL: all. */
-static void print_table(const list_style *style, const cli_table *table, const char *only)
+/* only: the name of one entry; NULL: all. */
+static void print_table(const list_style *style, const drape_registry *table, const char *only)
 {
-    cli_row row;
+    const drape_entry *entry;
+    bool params = false;
     style->table(table);
-    style->rows_begin();
-    for (int i = 0; table->row(i, &row); i++)
-        if (!only || strcmp(only, row.name) == 0) {
-            style->row(&row);
+    style->entries_begin();
+    for (int i = 0; (entry = table->entries[i]) != NULL; i++)
+        if (is_shown(entry, only)) {
+            style->entry(entry);
             if (!style->params_apart)
-                print_params(style, &row);
+                print_params(style, entry);
+            params = params || entry->param_count > 0;
         }
-    if (style->params_apart && has_params(table, only)) {
+    if (style->params_apart && params) {
         style->params_begin(table);
-        for (int i = 0; table->row(i, &row); i++)
-            if (!only || strcmp(only, row.name) == 0)
-                print_params(style, &row);
+        for (int i = 0; (entry = table->entries[i]) != NULL; i++)
+            if (is_shown(entry, only))
+                print_params(style, entry);
     }
-}
-
-static bool has_row(const cli_table *table, const char *name)
-{
-    cli_row row;
-    for (int i = 0; table->row(i, &row); i++)
-        if (strcmp(row.name, name) == 0)
-            return true;
-    return false;
 }
 
 /* only: the name of one object; NULL: all. Returns how many were printed. */
@@ -280,30 +282,30 @@ static int unknown_name(const char *name)
 {
     const char *names[MAX_NAMES];
     size_t count = 0;
-    cli_row row;
+    const drape_registry *const *tables = cli_tables();
     cli_object objects[CLI_MAX_OBJECTS];
     const int object_count = cli_objects(objects);
     for (int i = 0; i < object_count; i++)
         names[count++] = objects[i].form->name;
-    for (int t = 0; cli_tables[t] && count < MAX_NAMES; t++) {
-        names[count++] = cli_tables[t]->name;
-        for (int i = 0; cli_tables[t]->row(i, &row) && count < MAX_NAMES; i++)
-            names[count++] = row.name;
+    for (int t = 0; tables[t] && count < MAX_NAMES; t++) {
+        names[count++] = tables[t]->key;
+        for (int i = 0; tables[t]->entries[i] && count < MAX_NAMES; i++)
+            names[count++] = tables[t]->entries[i]->name;
     }
     const char *meant = drape_did_you_mean(name, names, count);
-    return cli_misuse("list", "there is no table and no row \"%.60s\"%s%s%s; `drape list` shows all", name,
+    return cli_misuse("list", "there is no table and no entry \"%.60s\"%s%s%s; `drape list` shows all", name,
                       DRAPE_MEANT(meant));
 }
 
-/* name: of a table, of a row or of an object of a scene; NULL: all tables, the keys of a scene first. */
+/* name: of a table, of an entry or of an object of a scene; NULL: all tables, the keys of a scene first. */
 static int print_tables(const list_style *style, const char *name)
 {
     const bool keys = name && strcmp(name, SCENE_NAME) == 0;
     int printed = print_scene(style, keys ? NULL : name);
-    for (int t = 0; cli_tables[t]; t++) {
-        const cli_table *table = cli_tables[t];
-        bool whole = !name || strcmp(name, table->name) == 0;
-        if (!whole && !has_row(table, name))
+    for (const drape_registry *const *t = cli_tables(); *t; t++) {
+        const drape_registry *table = *t;
+        bool whole = !name || strcmp(name, table->key) == 0;
+        if (!whole && drape_registry_find(table, NULL, name) < 0)
             continue;
         if (printed++)
             fputc('\n', stdout);
@@ -321,8 +323,9 @@ static int print_schema(void)
     return failed && !ferror(stdout) ? cli_misuse("list", "out of memory for the schema") : CLI_DONE;
 }
 
-static int print_request(const list_request *request)
+static int print_request(const void *command)
 {
+    const list_request *request = command;
     if (request->schema && (request->command.operand || request->markdown))
         return cli_misuse("list", "--schema stands alone: it is the form of a whole scene");
     if (request->schema)
@@ -335,27 +338,17 @@ static const cli_option options[] = {
     {"schema", CLI_FLAG, NULL, "the JSON Schema of a scene", offsetof(list_request, schema), 0, NULL},
 };
 
-static int main_list(int argc, char **argv);
-
 const drape_verb drape_verb_list = {
-    .name = "list",
-    .operand = "TABLE|ROW",
+    .entry = {.name = "list",
+              .summary =
+                  "the keys of a scene, every entry of every table: parameters, units, defaults, references"},
+    .operand = "TABLE|ENTRY",
     .operand_optional = true,
-    .summary = "the keys of a scene, every row of every table: parameters, units, defaults, references",
     .details =
-        "Prints the keys of a scene and all that it can choose from, or one table, or one row. The table\n"
-        "`scene` is the keys of all objects of a scene; one of its rows, as `pin`, is the keys of one.",
+        "Prints the keys of a scene and all that it can choose from, or one table, or one entry. The table\n"
+        "`scene` is the keys of all objects of a scene; one of its objects, as `pin`, is the keys of one.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_list,
+    .request_size = sizeof(list_request),
+    .run = print_request,
 };
-
-static int main_list(int argc, char **argv)
-{
-    list_request request = {.markdown = false};
-    int code = cli_parse(&drape_verb_list, argc, argv, &request.command);
-    if (code == CLI_GO_ON)
-        code = print_request(&request);
-    cli_command_free(&request.command);
-    return code;
-}

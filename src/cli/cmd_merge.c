@@ -14,43 +14,29 @@ static const cli_option options[] = {
     {"out", CLI_TEXT, "DIR", "folder for all lines and the report", offsetof(merge_request, out), 0, NULL},
 };
 
-static int main_merge(int argc, char **argv);
-
-const drape_verb drape_verb_merge = {
-    .name = "merge",
-    .operand = "DIR...",
-    .operands_most = 100000,
-    .summary = "the shards of a sweep into one, with its report",
-    .details =
-        "Takes the lines of the folders of an experiment that ran in parts (--shard I/N), and makes the\n"
-        "report once all cases are there. Says how many are missing where some are.",
-    .options = options,
-    .option_count = sizeof options / sizeof *options,
-    .run = main_merge,
-};
-
-static int merge(const merge_request *request)
+static int merge(const void *command)
 {
-    drape_context *ctx = NULL;
+    const merge_request *request = command;
     drape_lab_outcome outcome;
     if (!request->out)
         return cli_misuse("merge", "--out is missing: the folder for the report");
-    if (cli_context_create(&ctx))
-        return cli_misuse("merge", "out of memory");
-    drape_status status = drape_lab_merge(ctx, (const char *const *)request->command.operands,
-                                          (size_t)request->command.operand_count, request->out, &outcome);
+    drape_status status =
+        drape_lab_merge(request->command.ctx, (const char *const *)request->command.operands,
+                        (size_t)request->command.operand_count, request->out, &outcome);
     bool whole = outcome.done == outcome.cases;
-    int code = cli_lab_conclude(ctx, status, &outcome);
-    drape_context_destroy(&ctx);
+    int code = cli_lab_conclude(request->command.ctx, status, &outcome);
     return code == CLI_DONE && !whole ? CLI_FAILED : code;
 }
 
-static int main_merge(int argc, char **argv)
-{
-    merge_request request = {.out = NULL};
-    int code = cli_parse(&drape_verb_merge, argc, argv, &request.command);
-    if (code == CLI_GO_ON)
-        code = merge(&request);
-    cli_command_free(&request.command);
-    return code;
-}
+const drape_verb drape_verb_merge = {
+    .entry = {.name = "merge", .summary = "the shards of a sweep into one, with its report"},
+    .operand = "DIR...",
+    .max_operands = 100000,
+    .details =
+        "Takes the results of the folders of an experiment that ran in parts (--shard I/N), and makes the\n"
+        "report once all cases are done. Says how many are missing otherwise.",
+    .options = options,
+    .option_count = sizeof options / sizeof *options,
+    .request_size = sizeof(merge_request),
+    .run = merge,
+};

@@ -1,9 +1,7 @@
-/* cmd_render.c: `drape render`: scenes and finished runs to pictures and films. */
+/* cmd_render.c: `drape render`: draws pictures and films of scenes and finished runs. */
 #include "cli/frames.h"
 #include "cli/signals.h"
-#include "cli/tables.h"
 
-#include "base/param.h"
 #include "io/export.h"
 #include "render/film.h"
 #include "render/images.h"
@@ -18,10 +16,10 @@
 
 #define DEFAULT_WIDTH  1280
 #define DEFAULT_HEIGHT 720
-#define LEAST_SIDE     16
-#define LEAST_RANGE    1e-9 /* of a field whose values are all the same */
-#define PICTURE_DIGITS 5    /* in the name of a frame, at least */
-#define PICTURE_NAME   32   /* bytes of "/frame_000000.png", for any number */
+#define MIN_SIDE       16
+#define MIN_RANGE      1e-9 /* of a field whose values are all the same */
+#define PICTURE_DIGITS 5    /* least number of digits in the name of a frame */
+#define PICTURE_NAME   32   /* upper bound of the bytes of "/frame_00000.png" */
 
 typedef struct render_request {
     cli_command command;
@@ -35,9 +33,9 @@ typedef struct render {
     cli_frames_def frames;
     int width, height;
     double azimuth, elevation, zoom; /* of the camera */
-    double low, high;                /* of the field; NaN: of what is there */
+    double low, high;                /* range of the field; NaN: that of its values */
     const drape_shading *shading;
-    bool film, picture; /* what is made; else a folder of pictures */
+    bool film, picture; /* to be made; neither: a folder of pictures */
     cli_source *sources;
     int source_count;
     drape_context *ctx;
@@ -48,28 +46,20 @@ typedef struct render {
     uint8_t *pixels;
 } render;
 
-bool cli_shading_row(int index, cli_row *row)
-{
-    const drape_shading *shading = drape_shadings[index];
-    if (shading)
-        *row = (cli_row){.name = shading->name, .summary = shading->summary, .reference = shading->reference};
-    return shading;
-}
-
 /* ---- The command line ---- */
 
-/* count numbers between commas, nothing after them. */
-static bool read_numbers(const char *text, double *values, int least, int most)
+/* Between min and max numbers separated by commas, and nothing after them. */
+static bool read_numbers(const char *text, double *values, int min, int max)
 {
     int count = 0;
     char *end;
-    for (; count < most; text = end + 1) {
+    for (; count < max; text = end + 1) {
         values[count] = strtod(text, &end);
         if (end == text || !isfinite(values[count]))
             return false;
         count++;
         if (*end != ',')
-            return *end == 0 && count >= least;
+            return *end == 0 && count >= min;
     }
     return false;
 }
@@ -77,16 +67,14 @@ static bool read_numbers(const char *text, double *values, int least, int most)
 static int read_shade(render *r)
 {
     const char *name = r->request->shade ? r->request->shade : "diffuse";
-    size_t count = 0;
-    while (drape_shadings_words[count])
-        count++;
-    r->shading = drape_shading_find(name);
-    if (r->shading)
-        return CLI_GO_ON;
-    const char *meant = drape_did_you_mean(name, drape_shadings_words, count);
-    return cli_misuse("render",
-                      "--shade \"%.60s\": there is no such shading%s%s%s; `drape list shadings` shows all",
-                      name, DRAPE_MEANT(meant));
+    const int i = drape_registry_find(&drape_shading_registry, NULL, name);
+    if (i < 0) {
+        char text[DRAPE_UNKNOWN_SIZE];
+        drape_registry_unknown(&drape_shading_registry, NULL, name, text);
+        return cli_misuse("render", "--shade: %s", text);
+    }
+    r->shading = drape_shadings[i];
+    return CLI_GO_ON;
 }
 
 static int read_size(render *r)
@@ -95,10 +83,10 @@ static int read_size(render *r)
     r->width = DEFAULT_WIDTH;
     r->height = DEFAULT_HEIGHT;
     if (r->request->size &&
-        (sscanf(r->request->size, "%5dx%5d%c", &r->width, &r->height, &end) != 2 || r->width < LEAST_SIDE ||
-         r->height < LEAST_SIDE || r->width > DRAPE_MAX_PICTURE || r->height > DRAPE_MAX_PICTURE))
+        (sscanf(r->request->size, "%5dx%5d%c", &r->width, &r->height, &end) != 2 || r->width < MIN_SIDE ||
+         r->height < MIN_SIDE || r->width > DRAPE_MAX_PICTURE || r->height > DRAPE_MAX_PICTURE))
         return cli_misuse("render", "--size \"%.60s\": it is WIDTHxHEIGHT, each %d to %d pixels",
-                          r->request->size, LEAST_SIDE, DRAPE_MAX_PICTURE);
+                          r->request->size, MIN_SIDE, DRAPE_MAX_PICTURE);
     return CLI_GO_ON;
 }
 
@@ -121,7 +109,7 @@ static int read_range(render *r)
 {
     double v[2] = {NAN, NAN};
     if (r->request->range && !r->shading->field)
-        return cli_misuse("render", "--range: the shading \"%s\" shows no field", r->shading->name);
+        return cli_misuse("render", "--range: the shading \"%s\" shows no field", r->shading->entry.name);
     if (r->request->range && (!read_numbers(r->request->range, v, 2, 2) || v[0] >= v[1]))
         return cli_misuse("render", "--range \"%.60s\": it is low,high, in %s", r->request->range,
                           r->shading->field->shown_unit);
@@ -131,7 +119,7 @@ static int read_range(render *r)
     return CLI_GO_ON;
 }
 
-/* Files that the shading does not read are none that were meant. */
+/* Refuses files that the shading does not read. */
 static int read_images(render *r)
 {
     const render_request *q = r->request;
@@ -149,14 +137,14 @@ static int read_images(render *r)
         for (int k = 0; drape_shadings[k] && used < sizeof names; k++)
             if (drape_shadings[k]->reads & images[i].reads)
                 used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : "",
-                                         drape_shadings[k]->name);
+                                         drape_shadings[k]->entry.name);
         return cli_misuse("render", "--%s: the shading \"%s\" does not show it; --shade may be %s",
-                          images[i].option, r->shading->name, names);
+                          images[i].option, r->shading->entry.name, names);
     }
     return CLI_GO_ON;
 }
 
-/* ".png" of "a.b/x.png"; "" of a name that has no dot but at its beginning, or ends in a slash. */
+/* ".png" of "a.b/x.png"; "" if the name has no dot after its beginning or ends in a slash. */
 static const char *ending_of(const char *path)
 {
     const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
@@ -173,7 +161,7 @@ static const char *film_endings(char *text, size_t size)
     return text;
 }
 
-/* What is made is in the ending of its name. A folder that is there already may be called as it is. */
+/* The ending of the name says what is made. A folder that exists may have any name. */
 static int read_kind(render *r)
 {
     char films[80];
@@ -210,7 +198,7 @@ static int read_out(render *r)
     if (r->film && drape_film_check(r->ctx))
         return cli_misuse("render", "%s", drape_context_message(r->ctx));
     r->frames = (cli_frames_def){.every = r->picture || !q->every ? 1 : q->every,
-                                 .one = r->picture ? (int)frame : -1,
+                                 .one = r->picture ? (int)frame : CLI_ALL_FRAMES,
                                  .field = r->shading->field};
     return CLI_GO_ON;
 }
@@ -225,7 +213,7 @@ static int read_request(render *r)
     return code;
 }
 
-/* ---- Making ready ---- */
+/* ---- Preparing ---- */
 
 static int report(const render *r, int code)
 {
@@ -237,7 +225,7 @@ static int open_sources(render *r)
 {
     const cli_command *command = &r->request->command;
     int code = CLI_GO_ON;
-    r->sources = drape_alloc(r->ctx, (size_t)command->operand_count, sizeof *r->sources);
+    r->sources = drape_arena_take(command->arena, (size_t)command->operand_count, sizeof *r->sources);
     if (!r->sources)
         return report(r, CLI_FAILED);
     for (int i = 0; i < command->operand_count && code == CLI_GO_ON; i++) {
@@ -247,7 +235,7 @@ static int open_sources(render *r)
     return code;
 }
 
-/* Before anything is simulated: what cannot be drawn is found at once. */
+/* Before anything is simulated, so that failures to draw are reported at once. */
 static int open_painter(render *r)
 {
     const drape_painter_def def = {.width = r->width,
@@ -258,9 +246,8 @@ static int open_painter(render *r)
     drape_status status = drape_offscreen_create(r->ctx, &r->offscreen);
     if (!status)
         status = drape_painter_create(r->ctx, &def, &r->painter);
-    if (!status && !(r->pixels = drape_alloc(r->ctx, (size_t)r->width * (size_t)r->height, 4)))
-        status = DRAPE_E_MEMORY;
-    return status ? report(r, CLI_BAD_INPUT) : CLI_GO_ON;
+    r->pixels = drape_arena_take(r->request->command.arena, (size_t)r->width * (size_t)r->height, 4);
+    return status || !r->pixels ? report(r, CLI_BAD_INPUT) : CLI_GO_ON;
 }
 
 static int fill_sources(render *r)
@@ -277,7 +264,7 @@ static int set_stages(render *r)
     const drape_picture picture = {.panel_count = r->source_count, .shading = r->shading};
     float aspect = drape_painter_aspect(r->painter, &picture);
     drape_framing framing = drape_framing_begin((float)r->azimuth, (float)r->elevation, aspect);
-    r->stages = drape_alloc(r->ctx, (size_t)r->source_count, sizeof *r->stages);
+    r->stages = drape_arena_take(r->request->command.arena, (size_t)r->source_count, sizeof *r->stages);
     if (!r->stages)
         return report(r, CLI_FAILED);
     for (int i = 0; i < r->source_count; i++) {
@@ -286,16 +273,16 @@ static int set_stages(render *r)
         if (drape_stage_create(r->ctx, r->sources[i].in.model, stage))
             return report(r, CLI_FAILED);
         for (size_t k = 0; k < reel->count; k++) {
-            drape_stage_see(stage, drape_reel_positions(reel, k));
+            drape_stage_add(stage, drape_reel_positions(reel, k));
             drape_stage_frame(stage, &framing, reel->times[k], drape_reel_positions(reel, k));
         }
-        drape_stage_settle(stage);
+        drape_stage_finish(stage);
     }
     r->view = drape_framing_end(&framing, (float)r->azimuth, (float)r->elevation, (float)r->zoom);
     return CLI_GO_ON;
 }
 
-/* Of all values of all runs, unless it was given; with 0 where they do not reach it. */
+/* The range of all values of all runs, extended to 0, unless a range was given. */
 static void set_range(render *r)
 {
     double low = 0, high = 0;
@@ -306,12 +293,12 @@ static void set_range(render *r)
         high = fmax(high, r->sources[i].reel.high);
     }
     r->low = low;
-    r->high = high - low > LEAST_RANGE ? high : low + LEAST_RANGE;
+    r->high = high - low > MIN_RANGE ? high : low + MIN_RANGE;
 }
 
 /* ---- Drawing ---- */
 
-/* Frame k of the first run, and of the others what they have at its time. */
+/* Draws frame k of the first run, and the frames of the others at its time. */
 static drape_status draw(render *r, size_t k)
 {
     drape_panel panels[DRAPE_MAX_PANELS];
@@ -337,37 +324,34 @@ static drape_status draw(render *r, size_t k)
     return drape_painter_draw(r->painter, &picture);
 }
 
-static drape_status read_pixels(render *r)
+static drape_status write_png(render *r, const char *path)
 {
-    return drape_canvas_read(r->ctx, drape_painter_canvas(r->painter), r->pixels);
+    return drape_png_write(r->ctx, path, r->pixels, r->width, r->height, r->request->small);
 }
 
-static drape_status make_picture(render *r)
-{
-    drape_status status = draw(r, 0);
-    if (!status)
-        status = read_pixels(r);
-    return status
-               ? status
-               : drape_png_write(r->ctx, r->request->out, r->pixels, r->width, r->height, r->request->small);
-}
+/* Writes frame k, which is in r->pixels. */
+typedef drape_status frame_writer(render *r, size_t k, void *user);
 
-/* Takes frame k, which is in r->pixels. */
-typedef drape_status (*frame_taker)(render *r, size_t k, void *taker);
-
-/* The driver draws the next frame while the last one is taken. */
-static drape_status draw_frames(render *r, frame_taker take, void *taker)
+/* The driver draws the next frame while this one is written. */
+static drape_status draw_frames(render *r, frame_writer *write, void *user)
 {
     size_t count = r->sources[0].reel.count;
     drape_status status = draw(r, 0);
     for (size_t k = 0; k < count && !status && !cli_interrupted(); k++) {
-        status = read_pixels(r);
+        status = drape_canvas_read(r->ctx, drape_painter_canvas(r->painter), r->pixels);
         drape_status next = !status && k + 1 < count ? draw(r, k + 1) : DRAPE_OK;
         if (!status)
-            status = take(r, k, taker);
+            status = write(r, k, user);
         status = status ? status : next;
     }
     return status;
+}
+
+static drape_status write_picture(render *r, size_t k, void *user)
+{
+    (void)k;
+    (void)user;
+    return write_png(r, r->request->out);
 }
 
 static drape_status add_to_film(render *r, size_t k, void *film)
@@ -393,11 +377,11 @@ static drape_status make_film(render *r)
 }
 
 /* folder: its path, with room for the name of a picture. */
-static drape_status put_in_folder(render *r, size_t k, void *folder)
+static drape_status write_into_folder(render *r, size_t k, void *folder)
 {
     char *path = folder, *end = path + strlen(path);
     snprintf(end, PICTURE_NAME, "/frame_%0*zu.png", PICTURE_DIGITS, k);
-    drape_status status = drape_png_write(r->ctx, path, r->pixels, r->width, r->height, r->request->small);
+    drape_status status = write_png(r, path);
     *end = 0;
     return status;
 }
@@ -405,113 +389,93 @@ static drape_status put_in_folder(render *r, size_t k, void *folder)
 static drape_status make_folder(render *r)
 {
     size_t size = strlen(r->request->out) + PICTURE_NAME;
-    char *folder = drape_alloc(r->ctx, size, 1);
+    char *folder = drape_arena_take(r->request->command.arena, size, 1);
     if (!folder)
         return DRAPE_E_MEMORY;
     snprintf(folder, size, "%s", r->request->out);
     drape_status status = drape_folder_make(r->ctx, folder);
-    if (!status) /* frames of two runs must not lie side by side */
+    if (!status) /* so that frames of two runs do not mix */
         status = drape_frame_files_clean(r->ctx, folder, PICTURE_DIGITS, "png");
     if (!status)
-        status = draw_frames(r, put_in_folder, folder);
-    drape_free(r->ctx, folder);
+        status = draw_frames(r, write_into_folder, folder);
     return status;
 }
 
 static int make(render *r)
 {
     bool incomplete = false;
-    drape_status status = r->film ? make_film(r) : r->picture ? make_picture(r) : make_folder(r);
+    drape_status status = r->film      ? make_film(r)
+                          : r->picture ? draw_frames(r, write_picture, NULL)
+                                       : make_folder(r);
     if (status)
         return report(r, CLI_FAILED);
-    if (cli_interrupted() && !r->picture) /* a picture is there */
-        return cli_tell_interrupted("render");
+    if (cli_interrupted() && !r->picture) /* a picture is complete */
+        return cli_report_interrupted("render");
     for (int i = 0; i < r->source_count; i++)
         incomplete |= r->sources[i].incomplete;
     printf("%s: %zu frame%s, %d x %d, %s\n", r->request->out, r->sources[0].reel.count,
-           r->sources[0].reel.count == 1 ? "" : "s", r->width, r->height, r->shading->name);
+           r->sources[0].reel.count == 1 ? "" : "s", r->width, r->height, r->shading->entry.name);
     return incomplete ? CLI_FAILED : CLI_DONE;
 }
 
-static int run(render *r)
+static int run(const void *command)
 {
-    int (*const stages[])(render *) = {read_request, open_sources, open_painter, fill_sources, set_stages};
+    static int (*const stages[])(render *) = {read_request, open_sources, open_painter, fill_sources,
+                                              set_stages};
+    const render_request *request = command;
+    render r = {.request = request, .ctx = request->command.ctx};
     int code = CLI_GO_ON;
     for (size_t i = 0; i < sizeof stages / sizeof *stages && code == CLI_GO_ON; i++)
-        code = stages[i](r);
+        code = stages[i](&r);
     if (code == CLI_GO_ON && cli_interrupted())
-        code = cli_tell_interrupted("render");
-    if (code != CLI_GO_ON)
-        return code;
-    set_range(r);
-    return make(r);
-}
-
-static void release(render *r)
-{
-    for (int i = 0; i < r->source_count; i++) {
-        if (r->stages)
-            drape_stage_free(&r->stages[i]);
-        cli_source_free(&r->sources[i]);
+        code = cli_report_interrupted("render");
+    if (code == CLI_GO_ON) {
+        set_range(&r);
+        code = make(&r);
     }
-    drape_painter_destroy(&r->painter);
-    drape_offscreen_destroy(&r->offscreen);
-    drape_free(r->ctx, r->stages);
-    drape_free(r->ctx, r->sources);
-    drape_free(r->ctx, r->pixels);
+    for (int i = 0; i < r.source_count; i++) {
+        if (r.stages)
+            drape_stage_free(&r.stages[i]);
+        cli_source_free(&r.sources[i]);
+    }
+    drape_painter_destroy(&r.painter);
+    drape_offscreen_destroy(&r.offscreen);
+    return code;
 }
 
 #define AT(member) offsetof(render_request, member)
 static const cli_option options[] = {
     {"out", CLI_TEXT, "FILE|DIR",
-     "x.png: one frame; x.mp4, x.webm, x.gif: a film, by ffmpeg; without an ending: a folder of frames",
-     AT(out), 0, NULL},
-    {"frame", CLI_TEXT, "N", "the frame of a picture, from 0; the last without it", AT(frame), 0, NULL},
-    {"every", CLI_NUMBER, "N", "each Nth frame of a film or folder", AT(every), 1000000, NULL},
-    {"shade", CLI_TEXT, "ROW", "how cloth is coloured, diffuse without it; `drape list shadings` shows all",
+     "x.png: one frame; x.mp4, x.webm, x.gif: a film, by ffmpeg; no ending: a folder of frames", AT(out), 0,
+     NULL},
+    {"frame", CLI_TEXT, "N", "the frame of a picture, from 0 (default: the last)", AT(frame), 0, NULL},
+    {"every", CLI_NUMBER, "N", "every Nth frame in a film or folder", AT(every), 1000000, NULL},
+    {"shade", CLI_TEXT, "NAME", "how cloth is coloured (default diffuse); `drape list shadings` shows all",
      AT(shade), 0, NULL},
-    {"size", CLI_TEXT, "WxH", "pixels, 1280x720 without it", AT(size), 0, NULL},
+    {"size", CLI_TEXT, "WxH", "pixels (default 1280x720)", AT(size), 0, NULL},
     {"camera", CLI_TEXT, "A,E[,Z]",
-     "azimuth and elevation in degrees, zoom; 32,24,1 without it, always framing all", AT(camera), 0, NULL},
+     "azimuth and elevation in degrees, zoom (default 32,24,1, which shows all)", AT(camera), 0, NULL},
     {"range", CLI_TEXT, "LOW,HIGH",
-     "of the colours of a field, in the legend's unit; of its values without it", AT(range), 0, NULL},
+     "range of a field's colours, in the legend's unit (default: that of its values)", AT(range), 0, NULL},
     {"compare", CLI_FLAG, NULL, "several scenes or runs side by side, by time", AT(compare), 0, NULL},
     {"texture", CLI_TEXT, "PNG", "picture on the cloth", AT(texture), 0, NULL},
-    {"height", CLI_TEXT, "PNG", "height map of bump, displacement and pbr, in red; its alpha is metal in pbr",
-     AT(height), 0, NULL},
-    {"environment", CLI_TEXT, "PNG", "the world that mirror, refraction and pbr show: longitude x latitude",
+    {"height", CLI_TEXT, "PNG",
+     "height map for bump, displacement and pbr, in red; its alpha is metal in pbr", AT(height), 0, NULL},
+    {"environment", CLI_TEXT, "PNG", "surroundings for mirror, refraction and pbr, by longitude and latitude",
      AT(environment), 0, NULL},
-    {"small", CLI_FLAG, NULL, "PNG files as small as they get, slower", AT(small), 0, NULL},
+    {"small", CLI_FLAG, NULL, "smaller PNG files, slower", AT(small), 0, NULL},
 };
-
-static int main_render(int argc, char **argv);
 
 const drape_verb drape_verb_render = {
-    .name = "render",
+    .entry = {.name = "render", .summary = "pictures and films of a scene or a finished run"},
     .operand = "SCENE|RUN",
-    .operands_most = DRAPE_MAX_PANELS,
+    .max_operands = DRAPE_MAX_PANELS,
     .takes_scene = true,
-    .summary = "pictures and films of a scene or a finished run",
     .details =
         "Draws a scene, which is simulated, or a folder that drape run --out wrote. It needs no display.\n"
-        "With --compare several are put side by side in one picture or film.",
+        "With --compare, several are drawn side by side in one picture or film.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_render,
+    .request_size = sizeof(render_request),
+    .run = run,
 };
-
-static int main_render(int argc, char **argv)
-{
-    render_request request = {.out = NULL};
-    render r = {.request = &request};
-    int code = cli_parse(&drape_verb_render, argc, argv, &request.command);
-    if (code == CLI_GO_ON && cli_context_create(&r.ctx))
-        code = cli_misuse("render", "out of memory");
-    if (code == CLI_GO_ON) {
-        code = run(&r);
-        release(&r);
-    }
-    drape_context_destroy(&r.ctx);
-    cli_command_free(&request.command);
-    return code;
-}

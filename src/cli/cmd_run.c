@@ -1,4 +1,4 @@
-/* cmd_run.c: `drape run`: simulates a scene; frames, step log and summary into a folder. */
+/* cmd_run.c: `drape run`: simulates a scene and writes frames, step log and summary into a folder. */
 #include "cli/cli.h"
 #include "cli/progress.h"
 #include "cli/realtime.h"
@@ -30,19 +30,19 @@ typedef struct run {
     const run_request *request;
     cli_scene in;
     drape_recorder *recorder; /* NULL without --out */
-    char *summary_path;       /* in the folder of --out; NULL without it */
-    void *checkpoint;         /* the file that the run goes on from; NULL: it begins */
-    drape_archive archive;    /* of it */
+    char *summary_path;       /* in the folder of --out; NULL without --out */
+    void *checkpoint;         /* contents of the file that the run resumes from; NULL: it starts */
+    drape_archive archive;    /* that reads them */
     cli_progress progress;
     cli_realtime realtime; /* of --realtime */
-    double start;          /* [s] of the clock, less what the run took before a checkpoint */
-    double wall;           /* [s] that it took */
-    bool begun;            /* there is a place for what comes out */
+    double start;          /* clock at the start less the time before the checkpoint [s] */
+    double wall;           /* duration of the run [s] */
+    bool begun;            /* the output could be created */
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
 } run;
 
-/* The first failure is the one that is told. */
+/* Only the first failure is reported. */
 static void note(run *r, drape_status status)
 {
     if (!status || r->status)
@@ -52,24 +52,6 @@ static void note(run *r, drape_status status)
 }
 
 /* ---- Output ---- */
-
-/* A run that is killed must not leave the summary of the one before. What is no regular file stays: a
- * summary is written through it. */
-static void remove_old_summary(const char *path)
-{
-    struct stat info;
-    if (lstat(path, &info) == 0 && S_ISREG(info.st_mode))
-        remove(path); /* if it stays, it is replaced at the end, or that failure is told */
-}
-
-/* Where the scene lies in the folder already, under that name, it is not written over. */
-static drape_status keep_scene(const run *r)
-{
-    const char *path = r->request->command.operand, *folder = r->request->out;
-    return drape_scene_copy_is(path, folder)
-               ? DRAPE_OK
-               : drape_scene_copy(r->in.ctx, r->in.scene, r->in.model, path, folder);
-}
 
 static bool keeps_checkpoints(const run *r)
 {
@@ -86,7 +68,8 @@ static drape_recorder_def recorder_def(const run *r)
                                 .start = r->start};
 }
 
-/* Of a run that goes on, the recorder is there already, and so is the scene. */
+/* When a run is resumed, the recorder and the copy of the scene are there already. A killed run must not leave the summary
+ * of the run before it; a summary that is not a regular file stays, as it will be written through. */
 static drape_status begin_output(run *r)
 {
     if (!r->request->out)
@@ -96,20 +79,24 @@ static drape_status begin_output(run *r)
         return DRAPE_E_MEMORY;
     if (drape_recorder_is_finished(r->recorder))
         return DRAPE_OK;
-    const bool begins = !r->recorder;
+    const bool starts = !r->recorder;
+    const char *path = r->request->command.operand, *folder = r->request->out;
     const drape_recorder_def def = recorder_def(r);
-    drape_status status = begins ? drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder) : DRAPE_OK;
+    struct stat info;
+    drape_status status = starts ? drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder) : DRAPE_OK;
     if (status)
         return status;
-    remove_old_summary(r->summary_path);
-    return begins ? keep_scene(r) : DRAPE_OK;
+    if (lstat(r->summary_path, &info) == 0 && S_ISREG(info.st_mode))
+        remove(r->summary_path); /* if this fails, writing the summary reports it */
+    if (!starts || drape_scene_copy_is(path, folder))
+        return DRAPE_OK;
+    return drape_scene_copy(r->in.ctx, r->in.scene, r->in.model, path, folder);
 }
 
-/* ---- Going on ---- */
+/* ---- Resuming ---- */
 
-/* The sim where the checkpoint in the folder has it, and a recorder that goes on there. A folder without one: a run that
- * begins. */
-static drape_status go_on(run *r)
+/* Restores the sim and the recorder from the checkpoint in the folder. Without a checkpoint the run starts anew. */
+static drape_status restore(run *r)
 {
     bool there;
     size_t size;
@@ -129,16 +116,13 @@ static drape_status go_on(run *r)
     return status;
 }
 
-/* Nothing was written where it is refused. */
+/* Nothing is written if this fails. */
 static int resume(run *r)
 {
-    drape_status status = r->request->resume ? go_on(r) : DRAPE_OK;
-    if (!status)
-        return CLI_GO_ON;
+    drape_status status = r->request->resume ? restore(r) : DRAPE_OK;
     if (status == DRAPE_E_STOPPED)
-        return cli_tell_interrupted(r->request->command.verb);
-    fprintf(stderr, "%s\n", drape_context_message(r->in.ctx));
-    return CLI_BAD_INPUT;
+        return cli_report_interrupted(r->request->command.verb);
+    return status ? cli_report(r->in.ctx, CLI_BAD_INPUT) : CLI_GO_ON;
 }
 
 static void write_summary(run *r, const char *path)
@@ -214,7 +198,7 @@ static void print_wall(const run *r, const drape_statistics *s)
     fputc('\n', stdout);
 }
 
-/* Nothing where all is well: a scene without colliders has no such line, and one that comes out of them neither. */
+/* Only printed if cloth reaches into a collider at the end. */
 static void print_inside(const run *r)
 {
     double deepest;
@@ -251,7 +235,7 @@ static void print_results(const run *r)
 
 /* ---- The run ---- */
 
-/* Comes after the recorder, so that the step in which the signal came is logged. */
+/* Registered after the recorder, so that the step during which the signal came is logged. */
 static drape_status watch(void *user, const drape_event *event)
 {
     run *r = user;
@@ -270,10 +254,10 @@ static void advance(run *r)
     if (r->status)
         return;
     cli_progress_begin(&r->progress, drape_sim_time(r->in.sim), end);
-    if (r->in.sim->chosen.integrator->timeless) /* its one step may take minutes */
+    if (r->in.sim->chosen.integrator->steady_state) /* its single step may take minutes */
         cli_signals_cancel(r->in.sim);
-    drape_status status =
-        r->request->realtime ? cli_realtime_run(&r->realtime, &r->in) : drape_sim_advance(r->in.sim, end);
+    drape_status status = r->request->realtime ? cli_realtime_run(&r->realtime, &r->request->command, &r->in)
+                                               : drape_sim_advance(r->in.sim, end);
     cli_signals_cancel(NULL);
     if (status == DRAPE_E_STOPPED && cli_interrupted())
         drape_context_set_message(r->in.ctx, "t=%.9g: interrupted", drape_sim_time(r->in.sim));
@@ -281,7 +265,8 @@ static void advance(run *r)
     cli_progress_clear(&r->progress);
 }
 
-/* Of an interrupted run before its last frame, which is none of the whole run's; of one that is done after it. */
+/* An interrupted run writes its checkpoint before its last frame, as a resumed run will not have that frame; a completed
+ * run writes it afterwards. */
 static void finish(run *r)
 {
     const bool keeps = r->recorder && keeps_checkpoints(r);
@@ -309,7 +294,7 @@ static void simulate(run *r)
     write_summary(r, r->request->summary);
 }
 
-/* A signal that came after the last step has nothing left to stop. */
+/* A signal after the last step has nothing left to stop. */
 static int conclude(const run *r)
 {
     if (r->begun)
@@ -321,8 +306,8 @@ static int conclude(const run *r)
     return r->status == DRAPE_E_STOPPED ? CLI_INTERRUPTED : CLI_FAILED;
 }
 
-/* The folder of a run has the scene as it was run; one that was changed on the way would take the place of the
- * user's own. */
+/* The folder of a run gets a copy of the scene as it was run. If the scene itself lies there under that name, options that
+ * change it would overwrite the user's file. */
 static int check_folder(const run_request *request)
 {
     const cli_command *command = &request->command;
@@ -330,8 +315,8 @@ static int check_folder(const run_request *request)
         return CLI_GO_ON;
     return cli_misuse(command->verb,
                       "--out \"%.500s\": its " DRAPE_SCENE_COPY
-                      " is the scene itself, and the scene as it is "
-                      "changed here would be written over it; choose another folder",
+                      " is the scene itself, and would be overwritten by the "
+                      "scene as it is changed here; choose another folder",
                       request->out);
 }
 
@@ -348,31 +333,32 @@ static int check_checkpoints(const run_request *request)
     return CLI_GO_ON;
 }
 
-/* What was asked for and would be left out without a word. */
+/* Refuses options that would be ignored silently. */
 static int check_integrator(const run *r)
 {
     const cli_command *command = &r->request->command;
     const drape_chosen *chosen = &r->in.sim->chosen;
-    if (r->request->realtime && chosen->integrator->timeless)
+    if (r->request->realtime && chosen->integrator->steady_state)
         return cli_misuse(command->verb, "--realtime: the integrator \"%s\" has no time to keep",
-                          chosen->integrator->name);
+                          chosen->integrator->entry.name);
     for (size_t i = 0; i < command->setting_count; i++) {
         const cli_setting *s = &command->settings[i];
         if (s->must_act && drape_chosen_ignores_integrator(chosen, strrchr(s->pointer, '/') + 1))
             return cli_misuse(command->verb,
                               "--%s \"%.60s\": the integrator \"%s\" has none to choose; leave it out",
-                              s->option, s->value, chosen->integrator->name);
+                              s->option, s->value, chosen->integrator->entry.name);
     }
     return CLI_GO_ON;
 }
 
-static int load_and_run(const run_request *request)
+static int load_and_run(const void *command)
 {
+    const run_request *request = command;
     run r = {.request = request, .start = drape_clock_seconds()};
     int code = check_checkpoints(request);
     if (code != CLI_GO_ON)
         return code;
-    code = cli_scene_load(&request->command, &r.in);
+    code = cli_scene_load(&request->command, request->command.operand, &r.in);
     if (code == CLI_GO_ON)
         code = check_integrator(&r);
     if (code == CLI_GO_ON)
@@ -384,53 +370,40 @@ static int load_and_run(const run_request *request)
         code = conclude(&r);
     }
     drape_recorder_destroy(&r.recorder);
-    cli_realtime_free(&r.realtime);
-    if (r.in.ctx) {
-        drape_free(r.in.ctx, r.summary_path);
-        drape_free(r.in.ctx, r.checkpoint);
-    }
+    drape_free(r.in.ctx, r.summary_path);
+    drape_free(r.in.ctx, r.checkpoint);
     cli_scene_free(&r.in);
     return code;
 }
 
 static const cli_option options[] = {
     {"out", CLI_TEXT, "DIR",
-     "folder for frames, steps.csv, energy.csv, summary.json and scene.json; made if it is not there",
+     "folder for frames, steps.csv, energy.csv, summary.json and scene.json; created if necessary",
      offsetof(run_request, out), 0, NULL},
-    {"summary", CLI_TEXT, "FILE", "write the summary there, too", offsetof(run_request, summary), 0, NULL},
+    {"summary", CLI_TEXT, "FILE", "write the summary to this file too", offsetof(run_request, summary), 0,
+     NULL},
     {"checkpoint-every", CLI_NUMBER, "N", "save the run in DIR/checkpoint.drape with every N-th frame",
      offsetof(run_request, checkpoint_every), INT_MAX, NULL},
     {"resume", CLI_FLAG, NULL,
-     "go on from the checkpoint in DIR, of the same scene; from the beginning where there is none",
+     "continue from the checkpoint in DIR, of the same scene; start if there is none",
      offsetof(run_request, resume), 0, NULL},
-    {"realtime", CLI_FLAG, NULL, "frames of 1/frame_rate with that time as budget; tells how long they took",
+    {"realtime", CLI_FLAG, NULL,
+     "frames of 1/frame_rate with that time as budget; reports how long they took",
      offsetof(run_request, realtime), 0, NULL},
 };
 
-static int main_run(int argc, char **argv);
-
 const drape_verb drape_verb_run = {
-    .name = "run",
+    .entry = {.name = "run", .summary = "simulate a scene; write frames, step log and summary into a folder"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "simulate a scene; frames, step log and summary into a folder",
     .details =
-        "Simulates a scene. Without --out nothing is written but the results on the standard output.\n"
-        "Ctrl-C ends the run after the step in progress, or in it where it is the only one (static), and\n"
-        "keeps what was written; before the first step, nothing is.\n"
-        "A run with --checkpoint-every that was killed goes on with --resume, and ends as if it had "
-        "not been.",
+        "Simulates a scene. Without --out, only the results on the standard output are written.\n"
+        "Ctrl-C ends the run after the step in progress (or during it if it is the only one: static) and\n"
+        "keeps what was written; before the first step, nothing is written.\n"
+        "A run with --checkpoint-every that was killed continues with --resume, with the same results as\n"
+        "if it had not been killed.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_run,
+    .request_size = sizeof(run_request),
+    .run = load_and_run,
 };
-
-static int main_run(int argc, char **argv)
-{
-    run_request request = {.out = NULL};
-    int code = cli_parse(&drape_verb_run, argc, argv, &request.command);
-    if (code == CLI_GO_ON)
-        code = load_and_run(&request);
-    cli_command_free(&request.command);
-    return code;
-}

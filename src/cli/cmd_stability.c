@@ -4,34 +4,34 @@
 #include <unistd.h>
 
 static const cli_option options[] = {
-    {"axis", CLI_TEXTS, "/POINTER=FROM:TO:N[log]", "2 or 3 values of the scene, and where",
-     offsetof(cli_lab_request, axes), 0, NULL},
+    CLI_LAB_OPTION("axis", CLI_TEXTS, "/POINTER=FROM:TO:N[log]", "2 or 3 values of the scene, and where",
+                   axes, 0),
     CLI_LAB_OPTIONS,
-    {"strain-limit", CLI_REAL, "E", "strain of an edge that no cloth has (default 0.2)",
-     offsetof(cli_lab_request, strain_limit), 0, NULL},
+    CLI_LAB_OPTION("strain-limit", CLI_REAL, "E", "strain of an edge that no cloth has (default 0.2)",
+                   strain_limit, 0),
 };
 
-static int main_stability(int argc, char **argv);
+static int run(const void *request)
+{
+    long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    return cli_lab_run(request, cores < 1 ? 1 : cores > 256 ? 256 : (int)cores);
+}
 
 const drape_verb drape_verb_stability = {
-    .name = "stability",
+    .entry = {.name = "stability",
+              .summary =
+                  "maps over dt, stiffness, mass, resolution: what completes, rejects, stops or explodes"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "maps over dt, stiffness, mass, resolution: what completes, rejects, stops or explodes",
     .details = "Runs a scene at every point of a grid of its values with several integrators (be, bdf2, ida, "
                "verlet\n"
                "unless --integrators says which), as\n"
                "  drape stability scene.json --axis /integrator/dt=1e-4:1e-1:32log \\\n"
                "      --axis /cloth/0/material/young_modulus=1e4:1e8:32log --out maps\n"
-               "Uses all cores unless --jobs says how many. Stopped by Ctrl-C, the same command goes on "
-               "where it was.",
+               "Uses all cores unless --jobs says how many. After Ctrl-C, the same command resumes where it "
+               "stopped.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_stability,
+    .request_size = sizeof(cli_lab_request),
+    .run = run,
 };
-
-static int main_stability(int argc, char **argv)
-{
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    return cli_lab_main(&drape_verb_stability, cores < 1 ? 1 : cores > 256 ? 256 : (int)cores, argc, argv);
-}

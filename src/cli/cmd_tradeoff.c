@@ -3,28 +3,27 @@
 
 static const cli_option options[] = {
     CLI_LAB_OPTIONS,
-    {"repeats", CLI_NUMBER, "N", "runs of a short case, of which the fastest counts (default 3)",
-     offsetof(cli_lab_request, repeats), 100, NULL},
+    CLI_LAB_OPTION("repeats", CLI_NUMBER, "N",
+                   "runs of a short case, of which the fastest counts (default 3)", repeats, 100),
 };
 
-static int main_tradeoff(int argc, char **argv);
+static int run(const void *request)
+{
+    return cli_lab_run(request, 1);
+}
 
 const drape_verb drape_verb_tradeoff = {
-    .name = "tradeoff",
+    .entry = {.name = "tradeoff",
+              .summary = "work against accuracy of every integrator, against a tight reference"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "work against accuracy of every integrator, against a tight reference",
-    .details = "Runs a scene with every integrator over its dt or rtol, and compares with a reference whose "
-               "own error\n"
-               "is estimated. Stopped by Ctrl-C, the same command goes on where it was. Cases run one at a "
-               "time, so\n"
-               "that their CPU times can be compared; --jobs runs several.",
+    .details = "Runs a scene with every integrator over its dt or rtol, and compares with a reference "
+               "solution whose\n"
+               "own error is estimated. After Ctrl-C, the same command resumes where it stopped. Cases run "
+               "one at a\n"
+               "time, so that their CPU times can be compared; --jobs runs several.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_tradeoff,
+    .request_size = sizeof(cli_lab_request),
+    .run = run,
 };
-
-static int main_tradeoff(int argc, char **argv)
-{
-    return cli_lab_main(&drape_verb_tradeoff, 1, argc, argv);
-}

@@ -1,12 +1,10 @@
-/* cmd_validate.c: `drape validate`: what scenes give against what is known, as a table, as Markdown, as
- * JSON. */
+/* cmd_validate.c: `drape validate`: measured against expected values, as a table, as Markdown, as JSON. */
 #include "cli/cli.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "lab/record.h"
 
 #include "base/clock.h"
-#include "base/param.h"
 
 #include <errno.h>
 #include <jansson.h>
@@ -14,8 +12,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
-
-#define MOST_NAMES 64
 
 typedef struct validate_request {
     cli_command command;
@@ -25,27 +21,20 @@ typedef struct validate_request {
 
 /* How results are printed. */
 typedef struct validate_style {
-    void (*begin)(void);
-    void (*row)(const lab_record *record);
+    const char *begin;
+    void (*record)(const lab_record *record, bool first);
     void (*end)(const int counts[4]);
 } validate_style;
 
-/* ---- As text, as Markdown ---- */
-
-static void text_begin(void)
-{
-    printf("%-18s %12s %14s %14s %10s %9s  %s\n", "reference", "case", "expected", "obtained", "error",
-           "limit", "verdict");
-}
-
-static void text_row(const lab_record *record)
+static void text_record(const lab_record *record, bool first)
 {
     const drape_reference *reference = record->reference;
     const drape_validation *v = &record->v;
     char parameter[24] = "";
+    (void)first;
     if (reference->parameter)
         snprintf(parameter, sizeof parameter, "%.6g", v->parameter);
-    printf("%-18s %12s %14.8g %14.8g %9.4f%% %8.3g%%  %s", reference->name, parameter, v->expected,
+    printf("%-18s %12s %14.8g %14.8g %9.4f%% %8.3g%%  %s", reference->entry.name, parameter, v->expected,
            v->obtained, 100 * (v->obtained / v->expected - 1), 100 * reference->tolerance,
            drape_outcome_name(v->verdict));
     if (reference->documented)
@@ -61,24 +50,18 @@ static void text_end(const int counts[4])
            counts[DRAPE_OUTCOME_DOCUMENTED], counts[DRAPE_OUTCOME_FAIL] + counts[DRAPE_OUTCOME_STOPPED]);
 }
 
-static void markdown_begin(void)
-{
-    printf(
-        "| reference | quantity | case | model | expected | obtained | error | limit | verdict | source |\n"
-        "|---|---|---|---|---|---|---|---|---|---|\n");
-}
-
-static void markdown_row(const lab_record *record)
+static void markdown_record(const lab_record *record, bool first)
 {
     const drape_reference *reference = record->reference;
     const drape_validation *v = &record->v;
     char parameter[200] = "";
+    (void)first;
     if (reference->parameter)
         snprintf(parameter, sizeof parameter, "%s = %.6g", reference->parameter, v->parameter);
-    printf("| %s | %s [%s] | %s | %s | %.8g | %.8g | %.4f %% | %.3g %% | %s | %s |\n", reference->name,
-           reference->quantity, reference->unit, parameter, reference->model, v->expected, v->obtained,
+    printf("| %s | %s [%s] | %s | %s | %.8g | %.8g | %.4f %% | %.3g %% | %s | %s |\n", reference->entry.name,
+           reference->entry.summary, reference->unit, parameter, reference->model, v->expected, v->obtained,
            100 * (v->obtained / v->expected - 1), 100 * reference->tolerance, drape_outcome_name(v->verdict),
-           reference->source);
+           reference->entry.reference);
 }
 
 static void markdown_end(const int counts[4])
@@ -87,23 +70,13 @@ static void markdown_end(const int counts[4])
     text_end(counts);
 }
 
-/* ---- As JSON: one array, an object a case ---- */
-
-static int json_rows;
-
-static void json_begin(void)
+static void json_record(const lab_record *record, bool first)
 {
-    json_rows = 0;
-    printf("[");
-}
-
-static void json_row(const lab_record *record)
-{
-    json_t *row = lab_record_json(record);
-    char *text = row ? json_dumps(row, JSON_REAL_PRECISION(17)) : NULL;
-    printf("%s\n%s", json_rows++ ? "," : "", text ? text : "{}");
+    json_t *object = lab_record_json(record);
+    char *text = object ? json_dumps(object, JSON_REAL_PRECISION(17)) : NULL;
+    printf("%s\n%s", first ? "" : ",", text ? text : "{}");
     free(text);
-    json_decref(row);
+    json_decref(object);
 }
 
 static void json_end(const int counts[4])
@@ -112,6 +85,16 @@ static void json_end(const int counts[4])
     printf("\n]\n");
 }
 
+static const validate_style
+    text_style =
+        {"reference                  case       expected       obtained      error     limit  verdict\n",
+         text_record, text_end},
+    markdown_style =
+        {"| reference | quantity | case | model | expected | obtained | error | limit | verdict | source |\n"
+         "|---|---|---|---|---|---|---|---|---|---|\n",
+         markdown_record, markdown_end},
+    json_style = {"[", json_record, json_end};
+
 /* ---- Running ---- */
 
 static int write_scenes(const drape_reference *reference, const char *folder)
@@ -119,10 +102,10 @@ static int write_scenes(const drape_reference *reference, const char *folder)
     for (int i = 0; i < reference->case_count; i++) {
         char path[1024], text[DRAPE_LAB_TEXT];
         const double p = reference->parameters[i];
-        reference->scene(p, reference->high > 0 ? reference->expected(p) : 0, text, sizeof text);
-        for (char *c = text; *c; c++)
-            *c = *c == '\'' ? '"' : *c;
-        snprintf(path, sizeof path, "%s/%s_%d.json", folder, reference->name, i);
+        const drape_reference_case one = {reference, p, reference->high > 0 ? reference->expected(p) : 0};
+        reference->scene(&one, text);
+        drape_reference_quote(text);
+        snprintf(path, sizeof path, "%s/%s_%d.json", folder, reference->entry.name, i);
         FILE *file = fopen(path, "w");
         if (!file || fprintf(file, "%s\n", text) < 0 || fclose(file)) {
             fprintf(stderr, "drape validate: %s: %s\n", path, strerror(errno));
@@ -134,21 +117,14 @@ static int write_scenes(const drape_reference *reference, const char *folder)
 
 static int find(const char *name, const drape_reference **only)
 {
-    const char *names[MOST_NAMES];
-    size_t count = 0;
-    for (int i = 0; drape_references[i] && count < MOST_NAMES; i++) {
-        names[count++] = drape_references[i]->name;
-        if (strcmp(drape_references[i]->name, name) == 0) {
-            *only = drape_references[i];
-            return CLI_GO_ON;
-        }
+    const int i = drape_registry_find(&drape_reference_registry, NULL, name);
+    if (i < 0) {
+        char text[DRAPE_UNKNOWN_SIZE];
+        drape_registry_unknown(&drape_reference_registry, NULL, name, text);
+        return cli_misuse("validate", "%s", text);
     }
-    char all[2048] = "";
-    for (size_t i = 0; i < count; i++)
-        snprintf(all + strlen(all), sizeof all - strlen(all), "%s%s", i ? ", " : "", names[i]);
-    const char *meant = drape_did_you_mean(name, names, count);
-    return cli_misuse("validate", "there is no reference \"%.60s\"%s%s%s; there are %s", name,
-                      DRAPE_MEANT(meant), all);
+    *only = drape_references[i];
+    return CLI_GO_ON;
 }
 
 static bool interrupted(void *user)
@@ -161,13 +137,13 @@ static bool interrupted(void *user)
 typedef struct run {
     drape_context *ctx;
     lab_record *records;
-    size_t count, found; /* found: done before */
-    drape_file file;     /* of their lines; not there without --out */
+    size_t count;
+    drape_file file; /* of their lines; closed without --out */
     cli_progress progress;
     double start; /* [s] of the clock */
 } run;
 
-/* By simulations: a search is several of them. */
+/* By the number of simulations: a search takes several. */
 static void show_progress(run *r, size_t next)
 {
     double done = 0, left = 0;
@@ -182,27 +158,23 @@ static void show_progress(run *r, size_t next)
     cli_progress_count(&r->progress, (int64_t)next, (int64_t)r->count, done > 0 ? wall / done * left : NAN);
 }
 
-static drape_status run_case(run *r, lab_record *record)
-{
-    drape_status status =
-        drape_validate(r->ctx, record->reference, record->index, interrupted, NULL, &record->v);
-    record->done = !status;
-    return status || !r->file.open ? status : lab_record_keep(&r->file, record);
-}
-
 static drape_status run_cases(run *r, const validate_style *style, int counts[4])
 {
     drape_status status = DRAPE_OK;
     for (size_t i = 0; !status && i < r->count; i++) {
         lab_record *record = &r->records[i];
         show_progress(r, i);
-        if (!record->done)
-            status = run_case(r, record);
+        if (!record->done) {
+            status = drape_validate(r->ctx, record->reference, record->index, interrupted, NULL, &record->v);
+            record->done = !status;
+            if (!status && r->file.open)
+                status = lab_record_keep(&r->file, record);
+        }
         if (status)
             break;
         counts[record->v.verdict]++;
         cli_progress_hide(&r->progress);
-        style->row(record);
+        style->record(record, i == 0);
         fflush(stdout);
     }
     cli_progress_clear(&r->progress);
@@ -227,18 +199,17 @@ static int conclude(const run *r, const validate_request *request, drape_status 
 
 static int run_references(drape_context *ctx, const validate_request *request, const drape_reference *only)
 {
-    static const validate_style text = {text_begin, text_row, text_end},
-                                markdown = {markdown_begin, markdown_row, markdown_end},
-                                json = {json_begin, json_row, json_end};
-    const validate_style *style = request->json ? &json : request->markdown ? &markdown : &text;
+    const validate_style *style = request->json       ? &json_style
+                                  : request->markdown ? &markdown_style
+                                                      : &text_style;
     run r = {.ctx = ctx, .start = drape_clock_seconds()};
     int counts[4] = {0};
     r.records = lab_records_make(ctx, only, &r.count);
     drape_status status = r.records ? DRAPE_OK : DRAPE_E_MEMORY;
     if (!status && request->out)
-        status = lab_records_open(ctx, request->out, r.records, r.count, &r.file, &r.found);
+        status = lab_records_open(ctx, request->out, r.records, r.count, &r.file);
     if (!status) {
-        style->begin();
+        fputs(style->begin, stdout);
         cli_progress_begin(&r.progress, 0, 0);
         status = run_cases(&r, style, counts);
         style->end(counts);
@@ -277,40 +248,30 @@ static int validate(const validate_request *request, drape_context *ctx)
 static const cli_option options[] = {
     {"json", CLI_FLAG, NULL, "one array of objects, one a case", offsetof(validate_request, json), 0, NULL},
     {"markdown", CLI_FLAG, NULL, "a table for a page", offsetof(validate_request, markdown), 0, NULL},
-    {"out", CLI_TEXT, "DIR", "keep a line of JSON a case; the same command goes on where it was stopped",
+    {"out", CLI_TEXT, "DIR", "save a line of JSON a case; the same command resumes where it stopped",
      offsetof(validate_request, out), 0, NULL},
     {"scenes", CLI_TEXT, "DIR", "run nothing: write the scene of every case into DIR",
      offsetof(validate_request, scenes), 0, NULL},
 };
 
-static int main_validate(int argc, char **argv);
+static int main_validate(const void *command)
+{
+    const validate_request *request = command;
+    return validate(request, request->command.ctx);
+}
 
 const drape_verb drape_verb_validate = {
-    .name = "validate",
+    .entry = {.name = "validate", .summary = "the physics references: obtained against expected"},
     .operand = "REFERENCE",
     .operand_optional = true,
-    .summary = "the physics references: obtained against expected",
     .details =
-        "Runs the scene of every reference, or of one, and compares what is measured in it with the "
-        "closed form,\n"
-        "series or differential equation that it is known by. Terms that converge to something else "
-        "show that as\n"
+        "Runs the scene of every reference, or of one, and compares a measured quantity with its closed "
+        "form,\n"
+        "series or differential equation. Terms that are known to converge to something else are reported "
+        "as\n"
         "a documented model error. Exit code 0: none failed. All of them take four minutes of CPU time.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
+    .request_size = sizeof(validate_request),
     .run = main_validate,
 };
-
-static int main_validate(int argc, char **argv)
-{
-    validate_request request = {.scenes = NULL};
-    drape_context *ctx = NULL;
-    int code = cli_parse(&drape_verb_validate, argc, argv, &request.command);
-    if (code == CLI_GO_ON && cli_context_create(&ctx))
-        code = cli_misuse("validate", "out of memory");
-    if (code == CLI_GO_ON)
-        code = validate(&request, ctx);
-    drape_context_destroy(&ctx);
-    cli_command_free(&request.command);
-    return code;
-}

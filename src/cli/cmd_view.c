@@ -1,9 +1,8 @@
-/* cmd_view.c: `drape view`: a window on a scene that runs. */
+/* cmd_view.c: `drape view`: a window that shows a running scene. */
 #include "cli/signals.h"
 #include "cli/view.h"
 
 #include "base/clock.h"
-#include "base/param.h"
 #include "render/painter.h"
 #include "render/reel.h"
 #include "render/window.h"
@@ -14,16 +13,16 @@
 
 #define WIDTH  1280
 #define HEIGHT 720
-#define REACH  22.0f /* pixels at 720 rows: how near a node is taken */
-#define TURN   0.4f  /* degrees a pixel */
-#define NOTCH  0.9f  /* of the distance, a notch of the wheel */
-#define STEP   0.04  /* of the scene's size: of a movable */
-#define SCALE  1.5
-#define IDLE   0.05 /* [s] that a paused window waits for input */
+#define REACH  22.0f /* largest distance of a node from the pointer that grabs it [pixels at 720 rows] */
+#define TURN   0.4f  /* [degrees per pixel] */
+#define NOTCH  0.9f  /* factor on the distance for a notch of the wheel */
+#define STEP   0.04  /* displacement by an arrow key over the size of the scene */
+#define SCALE  1.5   /* factor on values that keys change */
+#define IDLE   0.05  /* how long a paused window waits for input [s] */
 #define LINES  16
 #define LINE   120
-#define COLUMN 320   /* pixels at 720 rows: of the state or the keys, at the left */
-#define WIDEST 0.42f /* of the window, at most */
+#define COLUMN 320   /* width of the state or the keys at the left [pixels at 720 rows] */
+#define WIDEST 0.42f /* largest share of the window for them */
 
 typedef struct view_request {
     cli_command command;
@@ -38,23 +37,23 @@ typedef enum drag { DRAG_NONE, DRAG_TURN, DRAG_PAN, DRAG_NODE } drag;
 typedef struct window_view {
     const view_request *request;
     cli_view v;
-    drape_context *ctx; /* of all that is drawn */
+    drape_context *ctx;
     drape_window *window;
     drape_painter *painter;
     drape_stage stage;
     drape_reel reel;
     drape_camera camera, home;
-    int shading;      /* index of its row */
-    double low, high; /* of its field, as far as it was seen */
+    int shading;      /* index in drape_shadings */
+    double low, high; /* range of its field so far */
     drag drag;
     double x, y; /* of the pointer */
-    float depth; /* [m] of the dragged node from the eye */
+    float depth; /* of the dragged node in front of the eye [m] */
     side shown;  /* at the left */
     bool changed, quit;
-    double frame_seconds, step_seconds; /* of the last frame that was shown */
+    double frame_seconds, step_seconds; /* of the last frame */
 } window_view;
 
-/* ---- What is drawn ---- */
+/* ---- Drawing ---- */
 
 static const drape_shading *shading_of(const window_view *w)
 {
@@ -75,7 +74,8 @@ static drape_status make_painter(window_view *w)
     return drape_painter_create(w->ctx, &def, &w->painter);
 }
 
-/* The present state, and the field of the shading. A field that the integrator does not have is told and not shown. */
+/* Puts the present state and the field of the shading into the reel. If the integrator does not have the field, a message
+ * says so and its values are 0. */
 static drape_status take_frame(window_view *w)
 {
     drape_sim *sim = w->v.in.sim;
@@ -95,10 +95,10 @@ static drape_status take_frame(window_view *w)
     return status;
 }
 
-/* The stage of a new model; where it stands and how large it is stay what they were. */
+/* Makes the stage of a new model. The size of the scene stays as it was, so that the view does not jump. */
 static drape_status make_stage(window_view *w)
 {
-    const drape_stage old = w->stage;
+    drape_stage old = w->stage;
     drape_status status = drape_stage_create(w->ctx, w->v.in.model, &w->stage);
     if (status)
         return status;
@@ -107,13 +107,12 @@ static drape_status make_stage(window_view *w)
         w->stage.radius = old.radius;
         w->stage.floor = old.floor;
     }
-    drape_stage copy = old;
-    drape_stage_free(&copy);
+    drape_stage_free(&old);
     w->changed = true;
     return DRAPE_OK;
 }
 
-/* Of one panel, without its lines. */
+/* The picture of one panel, without its lines. */
 static drape_picture picture_of(const window_view *w, const drape_panel *panel)
 {
     const drape_overlay *o = drape_painter_overlay(w->painter);
@@ -127,7 +126,7 @@ static drape_picture picture_of(const window_view *w, const drape_panel *panel)
                            .column = column};
 }
 
-/* The start has to fit, and as far as it may hang down. */
+/* Frames the start, with room for cloth to hang down. */
 static void set_camera(window_view *w)
 {
     const drape_picture picture = picture_of(w, NULL);
@@ -135,7 +134,7 @@ static void set_camera(window_view *w)
     drape_framing framing = drape_framing_begin(DRAPE_CAMERA_AZIMUTH, DRAPE_CAMERA_ELEVATION, aspect);
     const float *x = drape_reel_positions(&w->reel, 0);
     drape_stage_frame(&w->stage, &framing, 0, x);
-    drape_stage_see(&w->stage, x);
+    drape_stage_add(&w->stage, x);
     if (!w->stage.has_ground) {
         float low[3] = {0};
         size_t lowest = 0;
@@ -148,7 +147,7 @@ static void set_camera(window_view *w)
         for (int k = 0; k < 3; k++)
             w->stage.low[k] = fminf(w->stage.low[k], low[k]);
     }
-    drape_stage_settle(&w->stage);
+    drape_stage_finish(&w->stage);
     w->home = w->camera = drape_framing_end(&framing, DRAPE_CAMERA_AZIMUTH, DRAPE_CAMERA_ELEVATION, 1);
 }
 
@@ -166,7 +165,7 @@ static void put_lines(const window_view *w, char lines[LINES][LINE])
     drape_energy e = drape_sim_energy(v->in.sim);
     double force[3];
     int n = 0;
-    drape_sim_pull_force(v->in.sim, force);
+    drape_sim_drag_spring_force(v->in.sim, force);
     snprintf(lines[n++], LINE, "%s\tt = %.3f s", v->paused ? "paused" : "running", drape_sim_time(v->in.sim));
     snprintf(lines[n++], LINE, "integrator\t%s, dt = %.4g s", view_integrator(v), view_dt(v));
     snprintf(lines[n++], LINE, "frame\t%.1f ms, of it steps %.1f", 1e3 * w->frame_seconds,
@@ -181,7 +180,7 @@ static void put_lines(const window_view *w, char lines[LINES][LINE])
     snprintf(lines[n++], LINE, "stiffness\tx %.3g", v->stiffness);
     snprintf(lines[n++], LINE, "damping\tx %.3g", v->damping);
     snprintf(lines[n++], LINE, "gravity\tx %.3g", v->gravity);
-    snprintf(lines[n++], LINE, "shading\t%s", shading_of(w)->name);
+    snprintf(lines[n++], LINE, "shading\t%s", shading_of(w)->entry.name);
     if (v->movable_count > 0)
         snprintf(lines[n++], LINE, "arrows\tmove %s", v->movables[v->moved].name);
     if (v->pulled >= 0)
@@ -194,19 +193,19 @@ static void put_lines(const window_view *w, char lines[LINES][LINE])
 
 static const char *const help_lines[] = {"space, P\trun or pause",
                                          "N\tone step",
-                                         "R\tfrom the start",
+                                         "R\tstart again",
                                          "Esc, Q\tquit",
-                                         "left drag\tpull a node; beside it turn",
+                                         "left drag\tpull a node; elsewhere: turn",
                                          "right drag\tpan",
                                          "wheel\tzoom",
-                                         "C\tcamera back",
+                                         "C\tfirst view again",
                                          "S\tnext shading",
                                          "I\tnext integrator",
                                          "D K B G\ttime step, stiffness, damping, gravity: less",
-                                         "shift\tmore, or back",
+                                         "shift\tmore, or previous",
                                          "tab\tnext collider or pin",
                                          "arrows\tmove it, page keys up and down",
-                                         "H\thide this; once more: show the state",
+                                         "H\thide this; again: show the state",
                                          NULL};
 
 static bool project(const window_view *w, const drape_view *view, const float *p, float *x, float *y,
@@ -223,7 +222,7 @@ static bool project(const window_view *w, const drape_view *view, const float *p
     return q[3] > 0;
 }
 
-/* The spring, from the node to where it is pulled. */
+/* Draws the drag spring, from the node to the point that it is pulled to. */
 static void mark_pull(window_view *w)
 {
     static const float blue[4] = {0.05f, 0.30f, 0.75f, 0.95f};
@@ -268,7 +267,7 @@ static drape_status draw(window_view *w)
     return status;
 }
 
-/* ---- What the user does ---- */
+/* ---- Input ---- */
 
 static void forget_range(window_view *w)
 {
@@ -276,158 +275,93 @@ static void forget_range(window_view *w)
     w->high = 0;
 }
 
-static void new_model(window_view *w, bool changed)
+/* After a change; a new model needs a new stage. */
+static void redraw(window_view *w, bool new_model)
 {
     w->changed = true;
-    if (changed && make_stage(w))
+    if (new_model && make_stage(w))
         w->quit = true;
 }
 
-static void choose_shading(window_view *w, int step)
+static void next_shading(window_view *w, int step)
 {
-    int count = 0;
-    while (drape_shadings[count])
-        count++;
+    const int count = drape_registry_count(&drape_shading_registry);
     w->shading = (w->shading + step + count) % count;
     forget_range(w);
 }
 
-static void move_movable(window_view *w, int axis, double sign)
+/* Keys that scale a value and keys that move a collider or pin. */
+static void scale_or_move(window_view *w, int key, double factor)
 {
-    double way[3] = {0};
-    way[axis] = sign * STEP * w->v.in.model->length;
-    new_model(w, view_move(&w->v, way));
+    static const struct {
+        int key;
+        bool (*scale)(cli_view *v, double factor);
+    } scales[] = {{'D', view_scale_dt},
+                  {'K', view_scale_stiffness},
+                  {'B', view_scale_damping},
+                  {'G', view_scale_gravity}};
+    static const struct {
+        int key, axis;
+        double sign;
+    } moves[] = {{DRAPE_KEY_LEFT, 0, -1}, {DRAPE_KEY_RIGHT, 0, 1},   {DRAPE_KEY_UP, 2, -1},
+                 {DRAPE_KEY_DOWN, 2, 1},  {DRAPE_KEY_PAGE_UP, 1, 1}, {DRAPE_KEY_PAGE_DOWN, 1, -1}};
+    for (size_t i = 0; i < sizeof scales / sizeof *scales; i++)
+        if (scales[i].key == key)
+            redraw(w, scales[i].scale(&w->v, factor));
+    for (size_t i = 0; i < sizeof moves / sizeof *moves; i++)
+        if (moves[i].key == key) {
+            double displacement[3] = {0};
+            displacement[moves[i].axis] = moves[i].sign * STEP * w->v.in.model->length;
+            redraw(w, view_move(&w->v, displacement));
+        }
 }
 
-/* A key and what it does; with shift the other way. */
-static void toggle_pause(window_view *w, int sign)
+/* back: shift is held, and the key does the opposite. */
+static void on_key(window_view *w, int key, bool back)
 {
-    (void)sign;
-    w->v.paused = !w->v.paused;
-}
-static void single_step(window_view *w, int sign)
-{
-    (void)sign;
-    w->v.paused = true;
-    view_advance(&w->v, true);
-}
-static void start_again(window_view *w, int sign)
-{
-    (void)sign;
-    view_reset(&w->v);
-    forget_range(w);
-    new_model(w, true);
-}
-static void quit(window_view *w, int sign)
-{
-    (void)sign;
-    w->quit = true;
-}
-static void camera_back(window_view *w, int sign)
-{
-    (void)sign;
-    w->camera = w->home;
-}
-static void next_panel(window_view *w, int sign)
-{
-    (void)sign;
-    w->shown = (w->shown + 1) % PANEL_COUNT;
-}
-static void next_shading(window_view *w, int sign)
-{
-    choose_shading(w, -sign);
-}
-static void next_integrator(window_view *w, int sign)
-{
-    new_model(w, view_next_integrator(&w->v, -sign));
-}
-static void scale_dt(window_view *w, int sign)
-{
-    new_model(w, view_scale_dt(&w->v, pow(SCALE, sign)));
-}
-static void scale_stiffness(window_view *w, int sign)
-{
-    new_model(w, view_scale_stiffness(&w->v, pow(SCALE, sign)));
-}
-static void scale_damping(window_view *w, int sign)
-{
-    new_model(w, view_scale_damping(&w->v, pow(SCALE, sign)));
-}
-static void scale_gravity(window_view *w, int sign)
-{
-    new_model(w, view_scale_gravity(&w->v, pow(SCALE, sign)));
-}
-static void next_movable(window_view *w, int sign)
-{
-    if (w->v.movable_count > 0)
-        w->v.moved = (w->v.moved - sign + w->v.movable_count) % w->v.movable_count;
-}
-static void move_left(window_view *w, int sign)
-{
-    (void)sign;
-    move_movable(w, 0, -1);
-}
-static void move_right(window_view *w, int sign)
-{
-    (void)sign;
-    move_movable(w, 0, 1);
-}
-static void move_away(window_view *w, int sign)
-{
-    (void)sign;
-    move_movable(w, 2, -1);
-}
-static void move_near(window_view *w, int sign)
-{
-    (void)sign;
-    move_movable(w, 2, 1);
-}
-static void move_up(window_view *w, int sign)
-{
-    (void)sign;
-    move_movable(w, 1, 1);
-}
-static void move_down(window_view *w, int sign)
-{
-    (void)sign;
-    move_movable(w, 1, -1);
-}
-
-/* sign: -1, with shift 1. */
-static const struct {
-    int key;
-    void (*act)(window_view *w, int sign);
-} keys[] = {{' ', toggle_pause},
-            {'P', toggle_pause},
-            {'N', single_step},
-            {'R', start_again},
-            {'Q', quit},
-            {DRAPE_KEY_ESCAPE, quit},
-            {'C', camera_back},
-            {'H', next_panel},
-            {'S', next_shading},
-            {'I', next_integrator},
-            {'D', scale_dt},
-            {'K', scale_stiffness},
-            {'B', scale_damping},
-            {'G', scale_gravity},
-            {DRAPE_KEY_TAB, next_movable},
-            {DRAPE_KEY_LEFT, move_left},
-            {DRAPE_KEY_RIGHT, move_right},
-            {DRAPE_KEY_UP, move_away},
-            {DRAPE_KEY_DOWN, move_near},
-            {DRAPE_KEY_PAGE_UP, move_up},
-            {DRAPE_KEY_PAGE_DOWN, move_down}};
-
-static void on_key(window_view *w, const drape_input *in)
-{
-    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
-        if (keys[i].key == in->key)
-            keys[i].act(w, in->shift ? 1 : -1);
     w->changed = true;
+    const int step = back ? -1 : 1;
+    cli_view *v = &w->v;
+    switch (key) {
+    case ' ':
+    case 'P':
+        v->paused = !v->paused;
+        break;
+    case 'N':
+        v->paused = true;
+        view_advance(v, true);
+        break;
+    case 'R':
+        view_reset(v);
+        forget_range(w);
+        redraw(w, true);
+        break;
+    case 'Q':
+    case DRAPE_KEY_ESCAPE:
+        w->quit = true;
+        break;
+    case 'C':
+        w->camera = w->home;
+        break;
+    case 'H':
+        w->shown = (w->shown + 1) % PANEL_COUNT;
+        break;
+    case 'S':
+        next_shading(w, step);
+        break;
+    case 'I':
+        redraw(w, view_next_integrator(v, step));
+        break;
+    case DRAPE_KEY_TAB:
+        if (v->movable_count > 0)
+            v->moved = (v->moved + step + v->movable_count) % v->movable_count;
+        break;
+    default:
+        scale_or_move(w, key, back ? SCALE : 1 / SCALE);
+    }
 }
 
-/* The free node nearest to the eye of those near the pointer; -1: none. */
+/* Of the nodes near the pointer that are not pinned, the one nearest to the eye; -1: none. */
 static int32_t node_at(const window_view *w, double x, double y, float *depth)
 {
     const drape_view view = view_of(w);
@@ -439,9 +373,9 @@ static int32_t node_at(const window_view *w, double x, double y, float *depth)
         if (m->pinned[i] ||
             !project(w, &view, drape_reel_positions(&w->reel, 0) + 3 * (size_t)i, &px, &py, &pz))
             continue;
-        float away = hypotf(px - (float)x, py - (float)y);
-        if (away < reach && pz * (1 + away / reach * 0.02f) < best) {
-            best = pz * (1 + away / reach * 0.02f);
+        float offset = hypotf(px - (float)x, py - (float)y);
+        if (offset < reach && pz * (1 + offset / reach * 0.02f) < best) {
+            best = pz * (1 + offset / reach * 0.02f);
             *depth = pz;
             found = i;
         }
@@ -449,7 +383,7 @@ static int32_t node_at(const window_view *w, double x, double y, float *depth)
     return found;
 }
 
-/* Where the pointer is in the plane of this depth before the eye. */
+/* The point under the pointer, at a depth in front of the eye. */
 static void point_at(const window_view *w, double x, double y, float depth, double *p)
 {
     const drape_view view = view_of(w);
@@ -512,7 +446,7 @@ static void take_inputs(window_view *w)
     drape_input in;
     while (drape_window_next(w->window, &in)) {
         if (in.kind == DRAPE_INPUT_KEY)
-            on_key(w, &in);
+            on_key(w, in.key, in.shift);
         else if (in.kind == DRAPE_INPUT_PRESS)
             on_press(w, &in);
         else if (in.kind == DRAPE_INPUT_RELEASE)
@@ -584,24 +518,15 @@ static drape_status set_up(window_view *w, int width, int height)
 static int read_shade(window_view *w)
 {
     const char *name = w->request->shade ? w->request->shade : "diffuse";
-    for (w->shading = 0; drape_shadings[w->shading]; w->shading++)
-        if (strcmp(drape_shadings[w->shading]->name, name) == 0)
-            return CLI_GO_ON;
-    return cli_misuse("view", "--shade \"%.60s\": there is no such shading; `drape list shadings` shows all",
-                      name);
+    char text[DRAPE_UNKNOWN_SIZE];
+    w->shading = drape_registry_find(&drape_shading_registry, NULL, name);
+    if (w->shading >= 0)
+        return CLI_GO_ON;
+    drape_registry_unknown(&drape_shading_registry, NULL, name, text);
+    return cli_misuse("view", "--shade: %s", text);
 }
 
-/* What it came to, for whoever closed the window. */
-static void print_end(const window_view *w)
-{
-    drape_statistics s = drape_sim_statistics(w->v.in.sim);
-    printf("t = %.6g s, %s, dt = %.6g s, %lld steps, %lld rejected, shade %s, stiffness x %.4g, gravity x "
-           "%.4g\n",
-           drape_sim_time(w->v.in.sim), view_integrator(&w->v), view_dt(&w->v), (long long)s.steps_accepted,
-           (long long)s.steps_rejected, shading_of(w)->name, w->v.stiffness, w->v.gravity);
-}
-
-static int run(window_view *w)
+static int show(window_view *w)
 {
     int width = WIDTH, height = HEIGHT;
     char end;
@@ -620,49 +545,44 @@ static int run(window_view *w)
     w->v.paused = !w->request->running;
     if (loop(w))
         return report(w, CLI_FAILED);
-    print_end(w);
-    return cli_interrupted() ? cli_tell_interrupted("view") : CLI_DONE;
+    drape_statistics s = drape_sim_statistics(w->v.in.sim);
+    printf("t = %.6g s, %s, dt = %.6g s, %lld steps, %lld rejected, shade %s, stiffness x %.4g, gravity x "
+           "%.4g\n",
+           drape_sim_time(w->v.in.sim), view_integrator(&w->v), view_dt(&w->v), (long long)s.steps_accepted,
+           (long long)s.steps_rejected, shading_of(w)->entry.name, w->v.stiffness, w->v.gravity);
+    return cli_interrupted() ? cli_report_interrupted("view") : CLI_DONE;
+}
+
+static int run(const void *command)
+{
+    const view_request *request = command;
+    window_view w = {.request = request, .ctx = request->command.ctx};
+    int code = show(&w);
+    drape_stage_free(&w.stage);
+    drape_reel_free(&w.reel);
+    drape_painter_destroy(&w.painter);
+    drape_window_destroy(&w.window);
+    cli_scene_free(&w.v.in);
+    return code;
 }
 
 static const cli_option options[] = {
-    {"shade", CLI_TEXT, "ROW", "how cloth is coloured; `drape list shadings` shows all",
+    {"shade", CLI_TEXT, "NAME", "how cloth is coloured (default diffuse); `drape list shadings` shows all",
      offsetof(view_request, shade), 0, NULL},
-    {"size", CLI_TEXT, "WxH", "pixels of the window, 1280x720 without it", offsetof(view_request, size), 0,
+    {"size", CLI_TEXT, "WxH", "pixels of the window (default 1280x720)", offsetof(view_request, size), 0,
      NULL},
-    {"running", CLI_FLAG, NULL, "starts at once, not paused", offsetof(view_request, running), 0, NULL},
+    {"running", CLI_FLAG, NULL, "start at once, not paused", offsetof(view_request, running), 0, NULL},
 };
-
-static int main_view(int argc, char **argv);
 
 const drape_verb drape_verb_view = {
-    .name = "view",
+    .entry = {.name = "view", .summary = "a window on a scene that runs: turn it, pull at it, change it"},
     .operand = "SCENE",
     .takes_scene = true,
-    .summary = "a window on a scene that runs: turn it, pull at it, change it",
     .details = "Opens a window, paused. Space runs and pauses, N makes one step, R starts again, Esc quits, "
                "H shows all\n"
-               "keys. Drag a node with the left button; drag beside the cloth turns the camera.",
+               "keys. Drag a node with the left button; dragging elsewhere turns the camera.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
-    .run = main_view,
+    .request_size = sizeof(view_request),
+    .run = run,
 };
-
-static int main_view(int argc, char **argv)
-{
-    view_request request = {.shade = NULL};
-    window_view w = {.request = &request};
-    int code = cli_parse(&drape_verb_view, argc, argv, &request.command);
-    if (code == CLI_GO_ON && cli_context_create(&w.ctx))
-        code = cli_misuse("view", "out of memory");
-    if (code == CLI_GO_ON) {
-        code = run(&w);
-        drape_stage_free(&w.stage);
-        drape_reel_free(&w.reel);
-        drape_painter_destroy(&w.painter);
-        drape_window_destroy(&w.window);
-        view_free(&w.v);
-    }
-    drape_context_destroy(&w.ctx);
-    cli_command_free(&request.command);
-    return code;
-}

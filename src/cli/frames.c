@@ -7,7 +7,6 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
@@ -17,12 +16,6 @@ bool cli_is_folder(const char *path)
 {
     struct stat info;
     return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
-}
-
-static int report(const cli_source *s, int code)
-{
-    fprintf(stderr, "%s\n", drape_context_message(s->in.ctx));
-    return code;
 }
 
 /* "runs/be/" -> "be", "a/sphere_drape.json" -> "sphere_drape" */
@@ -43,33 +36,16 @@ static int open_run(const cli_command *command, cli_source *s)
     char *path = NULL;
     if (command->setting_count > 0)
         return cli_misuse(command->verb,
-                          "--%s is of a simulation, and %s is a finished run; give its scene, which is "
+                          "--%s changes a simulation, and %s is a finished run; give its scene, which is "
                           "simulated again: %s/scene.json",
                           command->settings[0].option, s->operand, s->operand);
-    drape_context *ctx = NULL;
-    if (cli_context_create(&ctx))
-        return cli_misuse(command->verb, "out of memory");
-    int code = drape_record_scene(ctx, s->operand, &path) == DRAPE_OK
-                   ? cli_scene_load_from(command, path, &s->in)
-                   : cli_misuse(command->verb, "%s", drape_context_message(ctx));
-    drape_free(ctx, path);
-    drape_context_destroy(&ctx);
-    if (code == CLI_GO_ON && drape_record_open(s->in.ctx, s->operand, s->in.model->node_count, &s->run))
-        code = report(s, CLI_BAD_INPUT);
+    int code = drape_record_scene(command->ctx, s->operand, &path) == DRAPE_OK
+                   ? cli_scene_load(command, path, &s->in)
+                   : cli_misuse(command->verb, "%s", drape_context_message(command->ctx));
+    drape_free(command->ctx, path);
+    if (code == CLI_GO_ON && drape_record_open(command->ctx, s->operand, s->in.model->node_count, &s->run))
+        code = cli_report(command->ctx, CLI_BAD_INPUT);
     return code;
-}
-
-static int check_def(const cli_command *command, const cli_frames_def *def, const cli_source *s)
-{
-    if (def->one >= 0 && s->run.frames > 0 && def->one >= s->run.frames)
-        return cli_misuse(command->verb, "--frame %d: %s has the frames 0 to %" PRId64, def->one, s->operand,
-                          s->run.frames - 1);
-    if (def->field && def->field->of_steps && s->run.frames > 0)
-        return cli_misuse(command->verb,
-                          "--shade %s: a run's frames do not have it; give the scene, which is "
-                          "simulated again: %s/scene.json",
-                          def->field->name, s->operand);
-    return CLI_GO_ON;
 }
 
 int cli_source_open(const cli_command *command, const char *operand, const cli_frames_def *def,
@@ -77,14 +53,20 @@ int cli_source_open(const cli_command *command, const char *operand, const cli_f
 {
     *out = (cli_source){.operand = operand};
     make_label(operand, out->label, sizeof out->label);
-    int code =
-        cli_is_folder(operand) ? open_run(command, out) : cli_scene_load_from(command, operand, &out->in);
-    if (code == CLI_GO_ON)
-        code = check_def(command, def, out);
-    if (code == CLI_GO_ON &&
-        drape_reel_create(out->in.ctx, (size_t)out->in.model->node_count, def->field, &out->reel))
-        code = report(out, CLI_BAD_INPUT);
-    return code;
+    int code = cli_is_folder(operand) ? open_run(command, out) : cli_scene_load(command, operand, &out->in);
+    if (code != CLI_GO_ON)
+        return code;
+    if (out->run.frames > 0 && def->one >= out->run.frames)
+        return cli_misuse(command->verb, "--frame %d: %s has the frames 0 to %" PRId64, def->one, operand,
+                          out->run.frames - 1);
+    if (out->run.frames > 0 && def->field && def->field->of_steps)
+        return cli_misuse(command->verb,
+                          "--shade %s: the frames of a run do not have it; give the scene, which is "
+                          "simulated again: %s/scene.json",
+                          def->field->entry.name, operand);
+    if (drape_reel_create(command->ctx, (size_t)out->in.model->node_count, def->field, &out->reel))
+        return cli_report(command->ctx, CLI_BAD_INPUT);
+    return CLI_GO_ON;
 }
 
 void cli_source_free(cli_source *source)
@@ -96,43 +78,43 @@ void cli_source_free(cli_source *source)
 
 /* ---- From a run ---- */
 
-/* Velocities between the frames beside this one, for fields that want them. */
-static drape_status put_state(cli_source *s, int64_t frame, double *x, double *v, double *beside)
+/* Sets the sim to a frame. Fields may need velocities: they are differences of the frames before and after it. */
+static drape_status set_state(cli_source *s, int64_t frame, double *x, double *v, double *other)
 {
     drape_record *run = &s->run;
     int64_t before = frame > 0 ? frame - 1 : frame, after = frame + 1 < run->frames ? frame + 1 : frame;
     double span = run->times[after] - run->times[before];
     drape_status status = drape_record_read(run, after, v);
     if (!status)
-        status = drape_record_read(run, before, beside);
+        status = drape_record_read(run, before, other);
     if (!status)
         status = drape_record_read(run, frame, x);
     for (size_t i = 0; i < 3 * (size_t)run->nodes; i++)
-        v[i] = span > 0 ? (v[i] - beside[i]) / span : 0;
+        v[i] = span > 0 ? (v[i] - other[i]) / span : 0;
     return status ? status : drape_sim_set_state(s->in.sim, run->times[frame], x, v);
 }
 
-static drape_status read_frame(const cli_frames_def *def, cli_source *s, int64_t frame, double *room)
+/* scratch: (9 nodes) */
+static drape_status read_frame(const cli_frames_def *def, cli_source *s, int64_t frame, double *scratch)
 {
     size_t n = 3 * (size_t)s->run.nodes;
-    drape_status status = def->field ? put_state(s, frame, room, room + n, room + 2 * n)
-                                     : drape_record_read(&s->run, frame, room);
-    return status ? status : drape_reel_add(&s->reel, s->run.times[frame], room, s->in.sim, def->field);
+    drape_status status = def->field ? set_state(s, frame, scratch, scratch + n, scratch + 2 * n)
+                                     : drape_record_read(&s->run, frame, scratch);
+    return status ? status : drape_reel_add(&s->reel, s->run.times[frame], scratch, s->in.sim, def->field);
 }
 
 static int read_frames(const cli_frames_def *def, cli_source *s)
 {
-    double *room = drape_alloc(s->in.ctx, 9 * (size_t)s->run.nodes, sizeof *room);
-    drape_status status = room ? DRAPE_OK : DRAPE_E_MEMORY;
-    int64_t last = s->run.frames - 1, only = def->one == CLI_LAST_FRAME ? last : def->one;
-    if (!status && def->one != -1)
-        status = read_frame(def, s, only, room);
-    for (int64_t i = 0; def->one == -1 && i <= last && !status && !cli_interrupted(); i += def->every)
-        status = read_frame(def, s, i, room);
-    drape_free(s->in.ctx, room);
+    double *scratch = drape_alloc(s->in.ctx, 9 * (size_t)s->run.nodes, sizeof *scratch);
+    drape_status status = scratch ? DRAPE_OK : DRAPE_E_MEMORY;
+    const bool all = def->one == CLI_ALL_FRAMES;
+    const int64_t end = s->run.frames - 1, first = all ? 0 : def->one == CLI_LAST_FRAME ? end : def->one;
+    for (int64_t i = first; i <= (all ? end : first) && !status && !cli_interrupted(); i += def->every)
+        status = read_frame(def, s, i, scratch);
+    drape_free(s->in.ctx, scratch);
     if (cli_interrupted())
-        return cli_tell_interrupted("render");
-    return status ? report(s, CLI_FAILED) : CLI_GO_ON;
+        return cli_report_interrupted("render");
+    return status ? cli_report(s->in.ctx, CLI_FAILED) : CLI_GO_ON;
 }
 
 /* ---- From a simulation ---- */
@@ -141,8 +123,8 @@ typedef struct watch {
     const cli_frames_def *def;
     cli_source *source;
     cli_progress progress;
-    double last; /* [s] of the last frame, kept or not */
-    bool enough; /* the one frame is there */
+    double last; /* time of the last frame, kept or not [s] */
+    bool found;  /* the single frame that is wanted */
 } watch;
 
 static drape_status keep(watch *w, double t, const double *x)
@@ -167,39 +149,33 @@ static drape_status observe(void *user, const drape_event *event)
         event->frame % w->def->every != 0)
         return DRAPE_OK;
     drape_status status = keep(w, event->time, event->positions);
-    w->enough = w->def->one >= 0;
-    return status ? status : w->enough ? DRAPE_E_STOPPED : DRAPE_OK;
-}
-
-/* The state that the simulation ends with, unless the last frame has it. */
-static drape_status keep_end(watch *w)
-{
-    double t = drape_sim_time(w->source->in.sim);
-    bool due =
-        w->def->one == CLI_LAST_FRAME || (w->def->one == -1 && (w->source->reel.count == 0 || t > w->last));
-    return due ? keep(w, t, drape_sim_positions(w->source->in.sim)) : DRAPE_OK;
+    w->found = w->def->one >= 0;
+    return status ? status : w->found ? DRAPE_E_STOPPED : DRAPE_OK;
 }
 
 static int simulate(const cli_frames_def *def, cli_source *s)
 {
     watch w = {.def = def, .source = s};
-    double end = drape_model_duration(s->in.model);
+    double end = drape_model_duration(s->in.model), t;
     drape_status status = drape_sim_observe(s->in.sim, observe, &w);
     cli_progress_begin(&w.progress, 0, end);
     if (!status)
         status = drape_sim_advance(s->in.sim, end);
     cli_progress_clear(&w.progress);
-    if (w.enough)
+    if (w.found)
         return CLI_GO_ON;
     s->incomplete = status != DRAPE_OK;
     if (cli_interrupted())
-        return status == DRAPE_E_STOPPED ? report(s, CLI_INTERRUPTED) : cli_tell_interrupted("render");
+        return status == DRAPE_E_STOPPED ? cli_report(s->in.ctx, CLI_INTERRUPTED)
+                                         : cli_report_interrupted("render");
     if (status)
-        report(s, CLI_FAILED);
+        cli_report(s->in.ctx, CLI_FAILED);
     if (status == DRAPE_E_ARGUMENT || status == DRAPE_E_MEMORY)
         return CLI_FAILED;
-    if (keep_end(&w))
-        return report(s, CLI_FAILED);
+    t = drape_sim_time(s->in.sim); /* the state at the end is a frame too, unless it is the last one */
+    if ((def->one == CLI_LAST_FRAME || (def->one == CLI_ALL_FRAMES && (s->reel.count == 0 || t > w.last))) &&
+        keep(&w, t, drape_sim_positions(s->in.sim)))
+        return cli_report(s->in.ctx, CLI_FAILED);
     if (s->reel.count > 0)
         return CLI_GO_ON;
     fprintf(stderr, "--frame %d: %s has fewer frames\n", def->one, s->operand);

@@ -1,4 +1,4 @@
-/* frames.h: where the frames that are drawn come from: a scene that is simulated, or the folder of a finished run. */
+/* frames.h: the frames to be drawn, from a scene, which is simulated, or from the folder of a finished run. */
 #ifndef DRAPE_CLI_FRAMES_H
 #define DRAPE_CLI_FRAMES_H
 
@@ -9,12 +9,12 @@
 
 /* Which frames are wanted. */
 typedef struct cli_frames_def {
-    int every;                    /* each so many; with one: not asked */
-    int one;                      /* the number of a single frame from 0; -1: all; CLI_LAST_FRAME */
+    int every;                    /* every n-th frame; not used with `one` */
+    int one;                      /* number of a single frame, from 0; CLI_ALL_FRAMES; CLI_LAST_FRAME */
     const drape_field_ops *field; /* NULL: none */
 } cli_frames_def;
 
-#define CLI_LAST_FRAME (-2)
+enum { CLI_ALL_FRAMES = -1, CLI_LAST_FRAME = -2 };
 
 bool cli_is_folder(const char *path);
 
@@ -22,17 +22,17 @@ typedef struct cli_source {
     const char *operand;
     char label[80]; /* for the picture */
     cli_scene in;
-    drape_record run; /* of a folder; empty: the scene is simulated */
+    drape_record run; /* of a folder; without frames: the scene is simulated */
     drape_reel reel;  /* filled by cli_source_fill */
-    bool incomplete;  /* the simulation stopped: its frames so far are there */
+    bool incomplete;  /* the simulation stopped early: the reel has the frames up to then */
 } cli_source;
 
-/* Opens a scene or a run. CLI_GO_ON, or CLI_BAD_INPUT after the fault was printed. cli_source_free in any case. */
+/* Opens a scene or a run. CLI_GO_ON, or CLI_BAD_INPUT after the error was printed. cli_source_free in any case. */
 int cli_source_open(const cli_command *command, const char *operand, const cli_frames_def *def,
                     cli_source *out);
 void cli_source_free(cli_source *source);
 
-/* Reads or simulates the frames. CLI_GO_ON, also where the simulation stopped after the first frame, which is told on
+/* Reads or simulates the frames. CLI_GO_ON, also if the simulation stopped after the first frame, which is reported on
  * stderr; or an exit code. */
 int cli_source_fill(const cli_frames_def *def, cli_source *source);
 

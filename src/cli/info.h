@@ -1,4 +1,4 @@
-/* info.h: what `drape info` knows of a scene, for both of its forms. */
+/* info.h: what `drape info` gathers about a scene, for both of its outputs. */
 #ifndef DRAPE_CLI_INFO_H
 #define DRAPE_CLI_INFO_H
 
@@ -6,6 +6,7 @@
 #include "cli/cli.h"
 #include "compile/compile.h"
 #include "mesh/mesh.h"
+#include "model/scene.h"
 #include "sim/profile.h"
 
 #include <jansson.h>
@@ -23,6 +24,7 @@ typedef struct cli_info {
     const char *path;
     const drape_model *model;
     const drape_sim *sim;
+    drape_scene_def def; /* what the model was compiled from */
     drape_profile profile;
     bool has_limit;               /* the integrator has a stability limit: */
     drape_stability stability;    /* at the start, of a step of profile.dt */
@@ -31,26 +33,26 @@ typedef struct cli_info {
     cli_collider_info *colliders; /* likewise */
 } cli_info;
 
-/* A row that was chosen by name. */
-typedef struct cli_chosen_row {
+/* What was chosen by name, an integrator or a controller, or contact. */
+typedef struct cli_chosen {
     const char *title, *name, *summary; /* "integrator", "be" */
     const drape_param *params;
     int param_count;
     const double *values;
     const drape_choice *choice; /* what the scene said */
     bool (*ignores)(const drape_chosen *chosen, const char *name);
-} cli_chosen_row;
+} cli_chosen;
 
-#define CLI_CHOSEN_ROWS 2
-void cli_chosen_rows(const drape_sim *sim, cli_chosen_row rows[CLI_CHOSEN_ROWS]);
+#define CLI_CHOSEN 2
+void cli_chosen_entries(const drape_sim *sim, cli_chosen entries[CLI_CHOSEN]);
 
-/* Contact and self-contact as far as they are modelled, seen as rows that were chosen; how many. */
-typedef struct cli_contact_rows {
+/* Contact and self-contact as far as they are modelled, likewise. */
+typedef struct cli_contact_entries {
     int count;
-    cli_chosen_row rows[2];
+    cli_chosen entries[2];
     double values[2][DRAPE_MAX_PARAMS];
-} cli_contact_rows;
-void cli_contact(const drape_sim *sim, cli_contact_rows *out);
+} cli_contact_entries;
+void cli_contact(const drape_sim *sim, cli_contact_entries *out);
 
 /* Whether the scene gave the parameter. */
 bool cli_is_given(const drape_choice *choice, const char *name);
@@ -68,7 +70,7 @@ double cli_other_jacobian_seconds(const cli_info *info);
 void cli_info_text(const cli_info *info);    /* on stdout */
 json_t *cli_info_json(const cli_info *info); /* a new reference; NULL: out of memory */
 
-/* The grid that a cloth's mesh is, with its values; NULL where it is none. */
+/* The grid of a cloth, with its values; NULL where its mesh is not a grid. */
 const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values);
 
 #endif

@@ -1,4 +1,4 @@
-/* info_json.c: `drape info --json`. As in info_text.c, what a scene does not model has no key.
+/* info_json.c: `drape info --json`. As in info_text.c, nothing has a key that the scene does not model.
  *
  * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere below ends
  * as a NULL at the top. */
@@ -48,7 +48,7 @@ static json_t *vector(const double v[3])
 
 /* ---- Parameters ---- */
 
-/* choice: where a text is; NULL where there are none. */
+/* choice: gives the texts; NULL: there are none. */
 static json_t *value_of(const drape_param *param, const double *value, const drape_choice *choice)
 {
     if (isnan(*value) && param->derived)
@@ -85,6 +85,44 @@ static json_t *params_of(const drape_param *params, int param_count, const doubl
     return object;
 }
 
+static json_t *numbers(const double *values, size_t count)
+{
+    json_t *array = json_array();
+    for (size_t i = 0; i < count; i++)
+        array = and_also(array, number(values[i]));
+    return array;
+}
+
+/* NULL where none is given. */
+static json_t *key_value(const drape_scene_key *key, const void *def)
+{
+    const char *const *texts;
+    drape_setting value;
+    if (key->shape == DRAPE_SCENE_LIST) {
+        json_t *array = json_array();
+        for (size_t i = 0, count = drape_scene_texts(key, def, &texts); i < count; i++)
+            array = and_also(array, text(texts[i]));
+        return array;
+    }
+    if (!drape_scene_value(key, def, &value))
+        return NULL;
+    if (value.vector)
+        return numbers(value.vector, value.vector_count);
+    return value.text ? text(value.text) : value_of(&key->param, &value.number, NULL);
+}
+
+/* Keys that have values of their own; a name stands where it is used. */
+static json_t *with_keys(json_t *object, const drape_scene_object *form, const void *def)
+{
+    for (size_t i = 0; i < form->key_count; i++) {
+        const drape_scene_key *key = &form->keys[i];
+        const bool named = key->param.kind == DRAPE_PARAM_TEXT && key->shape == DRAPE_SCENE_VALUE;
+        if (key->shape <= DRAPE_SCENE_LIST && !named)
+            object = with(object, key->param.name, key_value(key, def));
+    }
+    return object;
+}
+
 static json_t *track(const drape_track *track)
 {
     json_t *keys = json_array();
@@ -94,13 +132,15 @@ static json_t *track(const drape_track *track)
     return keys;
 }
 
-static json_t *collider(const drape_collider *from, const cli_collider_info *info)
+static json_t *collider(const drape_collider *from, const drape_collider_def *def,
+                        const cli_collider_info *info)
 {
     json_t *object = with(json_object(), "name", text(from->name));
-    object = with(object, "type", json_string(from->ops->name));
-    object = with(object, "parameters",
-                  params_of(from->ops->params, from->ops->param_count, from->values, &from->choice));
-    object = with(object, "friction", number(from->friction));
+    object = with(object, "type", json_string(from->ops->entry.name));
+    object =
+        with(object, "parameters",
+             params_of(from->ops->entry.params, from->ops->entry.param_count, from->values, &from->choice));
+    object = with_keys(object, &drape_form_collider, def);
     if (from->track.key_count > 0)
         object = with(object, "track", track(&from->track));
     object = with(object, "points", count(from->shape.point_count));
@@ -111,29 +151,32 @@ static json_t *collider(const drape_collider *from, const cli_collider_info *inf
 
 static json_t *with_contact(json_t *object, const cli_info *info)
 {
-    cli_contact_rows contact;
+    cli_contact_entries contact;
     json_t *colliders = json_array();
     for (int32_t c = 0; c < info->model->collider_count; c++)
-        colliders = and_also(colliders, collider(&info->model->colliders[c], &info->colliders[c]));
+        colliders = and_also(
+            colliders, collider(&info->model->colliders[c], &info->def.colliders[c], &info->colliders[c]));
     if (info->model->collider_count > 0)
         object = with(object, "colliders", json_incref(colliders));
     json_decref(colliders);
     cli_contact(info->sim, &contact);
     for (int i = 0; i < contact.count; i++) {
-        const cli_chosen_row *row = &contact.rows[i];
-        object = with(object, row->title, params_of(row->params, row->param_count, row->values, row->choice));
+        const cli_chosen *entry = &contact.entries[i];
+        object = with(object, entry->title,
+                      params_of(entry->params, entry->param_count, entry->values, entry->choice));
     }
     return object;
 }
 
-static json_t *chosen(const cli_chosen_row *row, const drape_chosen *all)
+static json_t *chosen(const cli_chosen *entry, const drape_chosen *all)
 {
     json_t *ignored = json_array();
-    for (size_t i = 0; i < row->choice->setting_count; i++)
-        if (row->ignores(all, row->choice->settings[i].name))
-            ignored = and_also(ignored, text(row->choice->settings[i].name));
-    json_t *object = with(json_object(), "type", json_string(row->name));
-    object = with(object, "parameters", params_of(row->params, row->param_count, row->values, row->choice));
+    for (size_t i = 0; i < entry->choice->setting_count; i++)
+        if (entry->ignores(all, entry->choice->settings[i].name))
+            ignored = and_also(ignored, text(entry->choice->settings[i].name));
+    json_t *object = with(json_object(), "type", json_string(entry->name));
+    object = with(object, "parameters",
+                  params_of(entry->params, entry->param_count, entry->values, entry->choice));
     return with(object, "ignored", ignored);
 }
 
@@ -155,34 +198,19 @@ static json_t *values_of(const drape_param *params, int param_count, const doubl
     return object;
 }
 
-static json_t *numbers(const double *values, int n)
-{
-    json_t *array = json_array();
-    for (int i = 0; i < n; i++)
-        json_array_append_new(array, number(values[i]));
-    return array;
-}
-
-static json_t *transform(const drape_cloth *cloth)
-{
-    json_t *object = with(json_object(), "scale", numbers(cloth->scale, 3));
-    object = with(object, "rotate", numbers(cloth->rotate, 4));
-    return with(object, "translate", numbers(cloth->translate, 3));
-}
-
-static json_t *mesh(const drape_cloth *cloth)
+static json_t *mesh(const drape_cloth *cloth, const drape_mesh_def *def)
 {
     double values[DRAPE_MAX_PARAMS];
     const drape_grid_ops *grid = cli_grid_of(cloth, values);
-    json_t *object = grid ? values_of(grid->params, grid->param_count, values) : json_object();
+    json_t *object = grid ? values_of(grid->entry.params, grid->entry.param_count, values) : json_object();
     if (grid)
-        object = with(object, "grid", text(grid->name));
+        object = with(object, "grid", text(grid->entry.name));
     if (cloth->file)
         object = with(object, "file", text(cloth->file));
-    return with(object, "transform", transform(cloth));
+    return with(object, "transform", with_keys(json_object(), &drape_form_transform, def));
 }
 
-/* Of a measured fabric. */
+/* A stiffness of a measured fabric. */
 static json_t *woven(const drape_woven *w, const char *shear)
 {
     json_t *object = with(with(json_object(), "warp", number(w->warp)), "weft", number(w->weft));
@@ -192,7 +220,8 @@ static json_t *woven(const drape_woven *w, const char *shear)
 static json_t *material(const drape_cloth *cloth)
 {
     const drape_material *m = &cloth->material;
-    json_t *object = values_of(drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, cloth->material_values);
+    json_t *object =
+        values_of(drape_material_entry.params, drape_material_entry.param_count, cloth->material_values);
     object = with(object, "areal_density", number(m->areal_density));
     object = with(object, "membrane_stiffness", number(m->membrane_stiffness));
     object = with(object, "flexural_rigidity", number(m->flexural_rigidity));
@@ -213,15 +242,16 @@ static json_t *cloth(const cli_info *info, int32_t c)
     object = with(object, "area", number(more->area));
     object = with(object, "pinned", count(more->pinned));
     object = with(object, "moved", count(more->moved));
-    object = with(object, "velocity", vector(from->velocity));
-    return with(with(object, "mesh", mesh(from)), "material", material(from));
+    object = with_keys(object, &drape_form_cloth, &info->def.cloths[c]);
+    object = with(object, "mesh", mesh(from, &info->def.cloths[c].mesh));
+    return with(object, "material", material(from));
 }
 
 static json_t *term(const cli_info *info, int32_t i)
 {
     const drape_term *from = &info->model->terms[i];
     const drape_profile_term *cost = &info->profile.terms[i];
-    json_t *object = with(json_object(), "name", json_string(from->ops->name));
+    json_t *object = with(json_object(), "name", json_string(from->ops->entry.name));
     object = with(object, "cloth", text(info->model->cloths[from->cloth].name));
     if (from->ops->law)
         object = with(object, "acts_on", count(cost->acts_on));
@@ -234,7 +264,7 @@ static json_t *term(const cli_info *info, int32_t i)
     object = with(object, "jacobian_s", number(cost->jacobian_seconds));
     object = with(object, "share", number(cli_share(info, cost->residual_seconds + cost->jacobian_seconds)));
     return with(object, "parameters",
-                params_of(from->ops->params, from->ops->param_count, from->params, NULL));
+                params_of(from->ops->entry.params, from->ops->entry.param_count, from->params, NULL));
 }
 
 /* ---- Costs ---- */
@@ -268,14 +298,6 @@ static json_t *bytes(const cli_info *info)
     return with(object, "a_node", number((double)sum / info->model->node_count));
 }
 
-static json_t *formats(const drape_model *model)
-{
-    json_t *array = json_array();
-    for (size_t i = 0; i < model->format_count; i++)
-        array = and_also(array, text(model->formats[i]));
-    return array;
-}
-
 /* A limit that is infinite is null. */
 static json_t *stability(const drape_stability *s)
 {
@@ -289,27 +311,24 @@ static json_t *stability(const drape_stability *s)
 json_t *cli_info_json(const cli_info *info)
 {
     const drape_model *model = info->model;
-    cli_chosen_row rows[CLI_CHOSEN_ROWS];
+    cli_chosen entries[CLI_CHOSEN];
     json_t *cloths = json_array(), *terms = json_array();
     for (int32_t c = 0; c < model->cloth_count; c++)
         cloths = and_also(cloths, cloth(info, c));
     for (int32_t i = 0; i < model->term_count; i++)
         terms = and_also(terms, term(info, i));
     json_t *object = with(json_object(), "scene", text(info->path));
-    object = with(object, "duration", number(model->duration));
-    object = with(object, "frame_rate", number(model->frame_rate));
+    object = with_keys(object, &drape_form_scene, &info->def);
+    object = with_keys(object, &drape_form_output, &info->def);
     object = with(object, "frames", count(info->frames));
-    object = with(object, "formats", formats(model));
-    object = with(object, "up", json_string(model->z_up ? "z" : "y"));
-    object = with(object, "gravity", vector(model->gravity));
     object = with(object, "nodes", count(model->node_count));
     object = with(object, "dofs", count(model->pattern.n));
     object = with(object, "nnz", count(model->pattern.nonzeros));
     object = with(object, "cloths", cloths);
     object = with_contact(object, info);
-    cli_chosen_rows(info->sim, rows);
-    for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
-        object = with(object, rows[i].title, chosen(&rows[i], &info->sim->chosen));
+    cli_chosen_entries(info->sim, entries);
+    for (int i = 0; i < CLI_CHOSEN; i++)
+        object = with(object, entries[i].title, chosen(&entries[i], &info->sim->chosen));
     if (info->has_limit)
         object = with(object, "stability", stability(&info->stability));
     object = with(object, "terms", terms);

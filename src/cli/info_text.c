@@ -1,26 +1,40 @@
-/* info_text.c: `drape info` for people. What a scene does not model is not mentioned: a mesh always has, for
- * instance, pairs of neighbouring triangles, but they are named by the term that uses them alone. */
+/* info_text.c: `drape info` for people. Nothing is mentioned that the scene does not model: every mesh has
+ * pairs of neighbouring triangles, for instance, but only the term that uses them names them. */
 #include "cli/info.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#define MOST_NODES 12 /* that are listed by number */
+#define MAX_LISTED 12 /* that are listed by number */
 
 /* ---- Scene and cloths ---- */
+
+/* Keys that have values of their own; a name stands where it is used. */
+static void print_keys(const char *indent, int width, const drape_scene_object *object, const void *def)
+{
+    char value[256], usual[256];
+    for (size_t i = 0; i < object->key_count; i++) {
+        const drape_scene_key *key = &object->keys[i];
+        const bool named = key->param.kind == DRAPE_PARAM_TEXT && key->shape == DRAPE_SCENE_VALUE;
+        if (key->shape > DRAPE_SCENE_LIST || named)
+            continue;
+        drape_scene_value_text(key, def, value, sizeof value);
+        drape_scene_default_text(key, usual, sizeof usual);
+        const bool has_unit = strcmp(key->param.unit, "1") != 0;
+        printf("%s%-*s %s%s%s%s\n", indent, width, key->param.name, *value ? value : "none",
+               has_unit ? " " : "", has_unit ? key->param.unit : "",
+               strcmp(value, usual) == 0 ? " (default)" : "");
+    }
+}
 
 static void print_scene(const cli_info *info)
 {
     const drape_model *m = info->model;
     printf("scene       %s\n", info->path);
-    printf("duration    %.9g s, %lld frames at %.9g a second\n", m->duration, (long long)info->frames,
-           m->frame_rate);
-    printf("formats    ");
-    for (size_t i = 0; i < m->format_count; i++)
-        printf(" %s", m->formats[i]);
-    printf("%s\n", m->format_count ? m->z_up ? ", z up" : "" : " none");
-    printf("gravity     %.9g %.9g %.9g m/s2\n", m->gravity[0], m->gravity[1], m->gravity[2]);
+    print_keys("", 11, &drape_form_scene, &info->def);
+    print_keys("", 11, &drape_form_output, &info->def);
+    printf("frames      %lld\n", (long long)info->frames);
     printf("nodes       %d, %d of them free\n", (int)m->node_count, (int)m->free_count);
     printf("unknowns    %lld degrees of freedom, %lld nonzeros in their Jacobian\n", (long long)m->pattern.n,
            (long long)m->pattern.nonzeros);
@@ -31,13 +45,13 @@ static void print_pins(const drape_model *model, const drape_cloth *cloth, const
     int listed = 0;
     printf("  pins      %d node%s, %d moved", (int)info->pinned, info->pinned == 1 ? "" : "s",
            (int)info->moved);
-    for (int32_t i = 0; i < cloth->mesh.node_count && listed < MOST_NODES; i++)
+    for (int32_t i = 0; i < cloth->mesh.node_count && listed < MAX_LISTED; i++)
         if (model->pinned[cloth->first_node + i])
             printf("%s%d", listed++ ? " " : ": ", (int)i);
     printf("%s\n", info->pinned > listed ? " ..." : "");
 }
 
-/* With its unit, unless it is words or has none. */
+/* A value with its unit, if it is a number that has one. */
 static void print_value(const drape_param *param, const double *value)
 {
     char text[128];
@@ -64,23 +78,21 @@ static void print_params(const char *indent, const drape_param *params, int coun
     }
 }
 
-static void print_source(const drape_cloth *cloth)
+static void print_source(const drape_cloth *cloth, const drape_mesh_def *def)
 {
     double values[DRAPE_MAX_PARAMS];
     const drape_grid_ops *grid = cli_grid_of(cloth, values);
     if (cloth->file)
         printf("  file      %s\n", cloth->file);
     if (grid) {
-        printf("  grid      %s\n", grid->name);
-        print_params("    ", grid->params, grid->param_count, values);
+        printf("  grid      %s\n", grid->entry.name);
+        print_params("    ", grid->entry.params, grid->entry.param_count, values);
     }
-    printf("  transform scale %.9g %.9g %.9g, turn about %.9g %.9g %.9g by %.9g degrees, shift %.9g %.9g "
-           "%.9g m\n",
-           cloth->scale[0], cloth->scale[1], cloth->scale[2], cloth->rotate[0], cloth->rotate[1],
-           cloth->rotate[2], cloth->rotate[3], cloth->translate[0], cloth->translate[1], cloth->translate[2]);
+    puts("  transform");
+    print_keys("    ", 16, &drape_form_transform, def);
 }
 
-/* Of a measured fabric; nothing where it is none. */
+/* A stiffness of a measured fabric; nothing for other materials. */
 static void print_woven(const char *name, const char *unit, const char *shear, const drape_woven *w)
 {
     if (w->warp > 0)
@@ -98,7 +110,8 @@ static void print_material(const drape_cloth *cloth)
                  {"E h", "N/m, membrane stiffness", m->membrane_stiffness},
                  {"D", "N m, flexural rigidity E h^3/(12 (1 - nu^2))", m->flexural_rigidity}};
     puts("  material");
-    print_params("    ", drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, cloth->material_values);
+    print_params("    ", drape_material_entry.params, drape_material_entry.param_count,
+                 cloth->material_values);
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
         printf("    %-16s %.9g %s\n", lines[i].name, lines[i].value, lines[i].unit);
     print_woven("tension", "N/m", "shear", &cloth->tension);
@@ -115,27 +128,27 @@ static void print_cloth(const cli_info *info, int32_t c)
     if (mesh->rows)
         printf("; a grid of %d rows and %d columns of nodes", (int)mesh->rows, (int)mesh->columns);
     putchar('\n');
-    print_source(cloth);
+    print_source(cloth, &info->def.cloths[c].mesh);
     printf("  mass      %.9g kg on %.9g m2\n", info->cloths[c].mass, info->cloths[c].area);
-    printf("  velocity  %.9g %.9g %.9g m/s\n", cloth->velocity[0], cloth->velocity[1], cloth->velocity[2]);
+    print_keys("  ", 9, &drape_form_cloth, &info->def.cloths[c]);
     print_pins(info->model, cloth, &info->cloths[c]);
     print_material(cloth);
 }
 
 /* ---- Integrator and controller ---- */
 
-static void print_ignored(const cli_chosen_row *row, const drape_chosen *chosen)
+static void print_ignored(const cli_chosen *entry, const drape_chosen *chosen)
 {
     bool any = false;
-    for (size_t i = 0; i < row->choice->setting_count; i++)
-        if (row->ignores(chosen, row->choice->settings[i].name)) {
-            printf("%s %s", any ? "," : "  ignored by it:", row->choice->settings[i].name);
+    for (size_t i = 0; i < entry->choice->setting_count; i++)
+        if (entry->ignores(chosen, entry->choice->settings[i].name)) {
+            printf("%s %s", any ? "," : "  ignored by it:", entry->choice->settings[i].name);
             any = true;
         }
     fputs(any ? "\n" : "", stdout);
 }
 
-/* As the scene gave them, or by default. */
+/* Parameters that the scene gave, and those by default. */
 static void print_given(const drape_param *params, int count, const double *values,
                         const drape_choice *choice)
 {
@@ -149,21 +162,24 @@ static void print_given(const drape_param *params, int count, const double *valu
     }
 }
 
-static void print_chosen(const cli_chosen_row *row, const drape_chosen *chosen)
+static void print_chosen(const cli_chosen *entry, const drape_chosen *chosen)
 {
-    printf("\n%s %s: %s\n", row->title, row->name, row->summary);
-    print_given(row->params, row->param_count, row->values, row->choice);
-    print_ignored(row, chosen);
+    printf("\n%s %s: %s\n", entry->title, entry->name, entry->summary);
+    print_given(entry->params, entry->param_count, entry->values, entry->choice);
+    print_ignored(entry, chosen);
 }
 
 /* ---- Colliders and contact ---- */
 
-static void print_collider(const drape_collider *collider, const cli_collider_info *info)
+static void print_collider(const drape_collider *collider, const drape_collider_def *def,
+                           const cli_collider_info *info)
 {
     const drape_collider_shape *shape = &collider->shape;
-    printf("\ncollider %s: %s, %s\n", collider->name, collider->ops->name, collider->ops->summary);
-    print_given(collider->ops->params, collider->ops->param_count, collider->values, &collider->choice);
-    printf("  %-16s %.9g\n", "friction", collider->friction);
+    printf("\ncollider %s: %s, %s\n", collider->name, collider->ops->entry.name,
+           collider->ops->entry.summary);
+    print_given(collider->ops->entry.params, collider->ops->entry.param_count, collider->values,
+                &collider->choice);
+    print_keys("  ", 16, &drape_form_collider, def);
     if (collider->track.key_count > 0)
         printf("  %-16s %zu keys, %.9g s to %.9g s\n", "track", collider->track.key_count,
                collider->track.keys[0].time, collider->track.keys[collider->track.key_count - 1].time);
@@ -176,12 +192,12 @@ static void print_collider(const drape_collider *collider, const cli_collider_in
 
 static void print_contact(const drape_sim *sim)
 {
-    cli_contact_rows contact;
+    cli_contact_entries contact;
     cli_contact(sim, &contact);
     for (int i = 0; i < contact.count; i++) {
-        const cli_chosen_row *row = &contact.rows[i];
-        printf("\n%s\n", row->title);
-        print_given(row->params, row->param_count, row->values, row->choice);
+        const cli_chosen *entry = &contact.entries[i];
+        printf("\n%s\n", entry->title);
+        print_given(entry->params, entry->param_count, entry->values, entry->choice);
     }
 }
 
@@ -191,17 +207,17 @@ static void print_term(const cli_info *info, int32_t i)
 {
     const drape_term *term = &info->model->terms[i];
     const drape_profile_term *cost = &info->profile.terms[i];
-    printf("  %-20s of %s: ", term->ops->name, info->model->cloths[term->cloth].name);
+    printf("  %-20s of %s: ", term->ops->entry.name, info->model->cloths[term->cloth].name);
     if (term->ops->law)
         printf("acts on %lld strain measures, its time is in theirs", (long long)cost->acts_on);
     else
         printf("%d %s elements of %d node%s", (int)term->elements.count, term->ops->element_name,
                term->elements.nodes, term->elements.nodes == 1 ? "" : "s");
-    for (int p = 0; p < term->ops->param_count; p++) {
-        printf("; %s ", term->ops->params[p].name);
-        const double *value = term->params + drape_param_place(term->ops->params, p);
-        print_value(&term->ops->params[p], value);
-        fputs(is_default(&term->ops->params[p], value) ? " (default)" : "", stdout);
+    for (int p = 0; p < term->ops->entry.param_count; p++) {
+        printf("; %s ", term->ops->entry.params[p].name);
+        const double *value = term->params + drape_param_place(term->ops->entry.params, p);
+        print_value(&term->ops->entry.params[p], value);
+        fputs(is_default(&term->ops->entry.params[p], value) ? " (default)" : "", stdout);
     }
     fputc('\n', stdout);
 }
@@ -272,7 +288,7 @@ static void print_costs(const cli_info *info)
     for (int32_t i = 0; i < info->model->term_count; i++) {
         const drape_term *term = &info->model->terms[i];
         const drape_profile_term *cost = &p->terms[i];
-        print_cost(info, term->ops->name, info->model->cloths[term->cloth].name, cost->nonzeros,
+        print_cost(info, term->ops->entry.name, info->model->cloths[term->cloth].name, cost->nonzeros,
                    (long long)cost->bytes, cost->residual_seconds, cost->jacobian_seconds);
     }
     print_cost(info, "masses, clearing", "", p->implicit ? info->model->pattern.n : 0,
@@ -318,16 +334,16 @@ static void print_stability(const cli_info *info)
 
 void cli_info_text(const cli_info *info)
 {
-    cli_chosen_row rows[CLI_CHOSEN_ROWS];
+    cli_chosen entries[CLI_CHOSEN];
     print_scene(info);
     for (int32_t c = 0; c < info->model->cloth_count; c++)
         print_cloth(info, c);
     for (int32_t c = 0; c < info->model->collider_count; c++)
-        print_collider(&info->model->colliders[c], &info->colliders[c]);
+        print_collider(&info->model->colliders[c], &info->def.colliders[c], &info->colliders[c]);
     print_contact(info->sim);
-    cli_chosen_rows(info->sim, rows);
-    for (int i = 0; i < CLI_CHOSEN_ROWS; i++)
-        print_chosen(&rows[i], &info->sim->chosen);
+    cli_chosen_entries(info->sim, entries);
+    for (int i = 0; i < CLI_CHOSEN; i++)
+        print_chosen(&entries[i], &info->sim->chosen);
     print_stability(info);
     print_terms(info);
     print_costs(info);

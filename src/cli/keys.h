@@ -1,5 +1,4 @@
-/* keys.h: the keys of a scene, seen as `drape list` shows tables: objects, where they lie, and what each key
- * takes, from the tables that the reader uses. */
+/* keys.h: the objects of a scene and where they lie, from the tables that the reader uses, for `drape list`. */
 #ifndef DRAPE_CLI_KEYS_H
 #define DRAPE_CLI_KEYS_H
 
@@ -16,10 +15,7 @@ typedef struct cli_object {
 /* The objects of a scene, each before those inside it, in the order of their keys. Returns their number. */
 int cli_objects(cli_object objects[CLI_MAX_OBJECTS]);
 
-/* What a key takes, in words: "a number above 0, at most 1e+09". */
-void cli_key_text(const drape_scene_key *key, char *text, size_t size);
-
-/* Which keys of an object stand for each other: "exactly one of grid, file"; "" for none. */
+/* Which keys of an object are alternatives: "exactly one of grid, file"; "" for none. */
 void cli_one_of_text(const drape_scene_object *form, char *text, size_t size);
 
 bool cli_is_one_of(const drape_scene_object *form, const drape_scene_key *key);

@@ -1,6 +1,7 @@
 /* lab.c: see lab.h. */
 #include "cli/lab.h"
 
+#include "base/arena.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "drape/lab.h"
@@ -35,7 +36,7 @@ static int read_shard(const cli_lab_request *request, drape_lab_def *def)
     return CLI_GO_ON;
 }
 
-/* Its range is the experiment's, with the same words. */
+/* Its range is checked by the experiment. */
 static int read_levels(const cli_lab_request *request, drape_lab_def *def)
 {
     const char *text = request->levels;
@@ -49,66 +50,31 @@ static int read_levels(const cli_lab_request *request, drape_lab_def *def)
     return CLI_GO_ON;
 }
 
-/* What a command line becomes; freed by free_words. */
-typedef struct words {
-    drape_lab_setting *settings;
-    char *text;         /* of the integrators, cut at the commas */
-    const char **items; /* into it */
-    char *folder;
-} words;
-
-static void free_words(words *w)
-{
-    free(w->settings);
-    free(w->text);
-    free(w->items);
-    free(w->folder);
-}
-
-/* "be,ida" */
-static size_t split(words *w)
-{
-    size_t count = 0;
-    for (char *word = strtok(w->text, ","); word; word = strtok(NULL, ","))
-        w->items[count++] = word;
-    return count;
-}
-
-/* scenes/flag.json, tradeoff -> flag.tradeoff */
-static void name_folder(const char *scene, const char *verb, char *folder, size_t size)
-{
-    const char *slash = strrchr(scene, '/'), *name = slash ? slash + 1 : scene, *dot = strrchr(name, '.');
-    snprintf(folder, size, "%.*s.%s", dot ? (int)(dot - name) : (int)strlen(name), name, verb);
-}
-
-static bool make_words(const cli_lab_request *request, words *w)
+/* Fills the def; its texts and arrays are the request's or in the arena. */
+static int make_def(const cli_lab_request *request, int default_jobs, drape_arena *arena, drape_lab_def *def)
 {
     const cli_command *command = &request->command;
-    const char *rows = request->integrators ? request->integrators : "";
-    size_t room = strlen(command->operand) + strlen(command->verb) + 2;
-    w->settings = calloc(command->setting_count + 1, sizeof *w->settings);
-    w->text = strdup(rows);
-    w->items = calloc(strlen(rows) + 1, sizeof *w->items);
-    w->folder = calloc(room, 1);
-    if (!w->settings || !w->text || !w->items || !w->folder)
-        return false;
-    name_folder(command->operand, command->verb, w->folder, room);
-    for (size_t i = 0; i < command->setting_count; i++)
-        w->settings[i] = (drape_lab_setting){command->settings[i].pointer, command->settings[i].value};
-    return true;
-}
-
-static int make_def(const cli_lab_request *request, int default_jobs, words *w, cli_progress *progress,
-                    drape_lab_def *def)
-{
-    const cli_command *command = &request->command;
+    const char *slash = strrchr(command->operand, '/'), *name = slash ? slash + 1 : command->operand,
+               *dot = strrchr(name, '.');
+    const size_t room = strlen(name) + strlen(command->verb) + 2;
+    char *text = drape_arena_text(arena, request->integrators ? request->integrators : ""), *rest;
+    const char **integrators = drape_arena_take(arena, text ? strlen(text) + 1 : 1, sizeof *integrators);
+    char *folder = drape_arena_take(arena, room, 1);
+    drape_lab_setting *settings = drape_arena_take(arena, command->setting_count, sizeof *settings);
+    if (drape_arena_status(arena))
+        return cli_misuse(command->verb, "out of memory");
     drape_lab_def_init(def, sizeof *def);
+    for (char *word = strtok_r(text, ",", &rest); word; word = strtok_r(NULL, ",", &rest))
+        integrators[def->integrator_count++] = word;
+    for (size_t i = 0; i < command->setting_count; i++)
+        settings[i] = (drape_lab_setting){command->settings[i].pointer, command->settings[i].value};
+    /* scenes/flag.json, tradeoff -> flag.tradeoff */
+    snprintf(folder, room, "%.*s.%s", dot ? (int)(dot - name) : (int)strlen(name), name, command->verb);
     def->scene = command->operand;
-    def->folder = request->out ? request->out : w->folder;
-    def->settings = w->settings;
+    def->folder = request->out ? request->out : folder;
+    def->settings = settings;
     def->setting_count = command->setting_count;
-    def->integrators = w->items;
-    def->integrator_count = split(w);
+    def->integrators = integrators;
     def->axes = request->axes.items;
     def->axis_count = request->axes.count;
     def->space = request->space;
@@ -118,63 +84,42 @@ static int make_def(const cli_lab_request *request, int default_jobs, words *w, 
     def->strain_limit = request->strain_limit > 0 ? request->strain_limit : def->strain_limit;
     def->progress = show;
     def->cancel = interrupted;
-    def->user = progress;
     int code = read_levels(request, def);
-    return code == CLI_GO_ON ? read_shard(request, def) : code;
-}
-
-static int exit_code(drape_status status, bool input)
-{
-    if (!status)
-        return CLI_DONE;
-    if (status == DRAPE_E_STOPPED)
-        return CLI_INTERRUPTED;
-    return input && status != DRAPE_E_MEMORY ? CLI_BAD_INPUT : CLI_FAILED;
+    if (code == CLI_GO_ON)
+        code = read_shard(request, def);
+    if (code == CLI_GO_ON && command->threads)
+        code = cli_misuse(command->verb,
+                          "--threads has no effect: a case takes one; --jobs runs cases at a time");
+    return code;
 }
 
 int cli_lab_conclude(drape_context *ctx, drape_status status, drape_lab_outcome *outcome)
 {
+    const int code = !status                                      ? CLI_DONE
+                     : status == DRAPE_E_STOPPED                  ? CLI_INTERRUPTED
+                     : outcome->input && status != DRAPE_E_MEMORY ? CLI_BAD_INPUT
+                                                                  : CLI_FAILED;
     if (status)
-        fprintf(stderr, "%s\n", status == DRAPE_E_STOPPED ? "interrupted" : drape_context_message(ctx));
+        fprintf(stderr, "%s\n", code == CLI_INTERRUPTED ? "interrupted" : drape_context_message(ctx));
     else
         fputs(outcome->text ? outcome->text : "", stdout);
-    const int code = exit_code(status, outcome->input);
     drape_lab_outcome_free(outcome);
     return code;
 }
 
-static int run(const drape_verb *verb, const cli_lab_request *request, int default_jobs)
+int cli_lab_run(const cli_lab_request *request, int default_jobs)
 {
+    const cli_command *command = &request->command;
     drape_lab_def def;
-    drape_lab_outcome outcome;
-    drape_context *ctx = NULL;
-    cli_progress progress;
-    words w = {.settings = NULL};
-    if (!make_words(request, &w) || cli_context_create(&ctx)) {
-        free_words(&w);
-        return cli_misuse(verb->name, "out of memory");
-    }
-    int code = make_def(request, default_jobs, &w, &progress, &def);
-    if (code == CLI_GO_ON && request->command.threads)
-        code =
-            cli_misuse(verb->name, "--threads has no effect: a case takes one; --jobs runs cases at a time");
+    int code = make_def(request, default_jobs, command->arena, &def);
     if (code == CLI_GO_ON) {
+        cli_progress progress;
+        drape_lab_outcome outcome;
+        def.user = &progress;
         cli_progress_begin(&progress, 0, 0);
-        drape_status status = drape_lab_run(ctx, verb->name, &def, &outcome);
+        drape_status status = drape_lab_run(command->ctx, command->verb, &def, &outcome);
         cli_progress_clear(&progress);
-        code = cli_lab_conclude(ctx, status, &outcome);
+        code = cli_lab_conclude(command->ctx, status, &outcome);
     }
-    drape_context_destroy(&ctx);
-    free_words(&w);
-    return code;
-}
-
-int cli_lab_main(const drape_verb *verb, int default_jobs, int argc, char **argv)
-{
-    cli_lab_request request = {.out = NULL};
-    int code = cli_parse(verb, argc, argv, &request.command);
-    if (code == CLI_GO_ON)
-        code = run(verb, &request, default_jobs);
-    cli_command_free(&request.command);
     return code;
 }

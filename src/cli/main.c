@@ -1,9 +1,7 @@
-/* main.c: the program `drape`: finds the verb, hands it the command line, and sees that its output arrived.
- */
+/* main.c: the program `drape`: finds the verb, reads its command line, runs it, and checks that its output was
+ * written. */
 #include "cli/cli.h"
 #include "cli/signals.h"
-
-#include "base/param.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -11,8 +9,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* A file that is opened later must not become the standard output: with a descriptor closed, it would. The
- * stand-ins refuse what the real ones are for, so that it is still seen to fail. */
+/* If the program is started with a standard descriptor closed, a file that is opened later would become the standard
+ * output. The substitutes refuse what the descriptor is for, so that writing to it still fails. */
 static void fill_descriptors(void)
 {
     static const int modes[] = {O_WRONLY, O_RDONLY, O_RDONLY};
@@ -21,7 +19,7 @@ static void fill_descriptors(void)
             return;
 }
 
-/* A closed pipe and a full quota are errors of a write, which is checked, and no reason to die. */
+/* A closed pipe or a full quota must not end the program: writes are checked. */
 static void ignore_write_signals(void)
 {
     const struct sigaction ignore = {.sa_handler = SIG_IGN};
@@ -31,25 +29,15 @@ static void ignore_write_signals(void)
 
 static const drape_verb *find_verb(const char *name)
 {
-    for (int i = 0; drape_verbs[i]; i++)
-        if (strcmp(drape_verbs[i]->name, name) == 0)
-            return drape_verbs[i];
-    return NULL;
-}
-
-static size_t verb_count(void)
-{
-    size_t count = 0;
-    while (drape_verbs[count])
-        count++;
-    return count;
+    const int i = drape_registry_find(&drape_verb_registry, NULL, name);
+    return i < 0 ? NULL : drape_verbs[i];
 }
 
 static int unknown_verb(const char *name)
 {
-    const char *meant = drape_did_you_mean(name, drape_verbs_words, verb_count());
-    fprintf(stderr, "drape: there is no verb \"%.60s\"%s%s%s; `drape --help` shows all\n", name,
-            DRAPE_MEANT(meant));
+    char text[DRAPE_UNKNOWN_SIZE];
+    drape_registry_unknown(&drape_verb_registry, NULL, name, text);
+    fprintf(stderr, "drape: %s\n", text);
     return CLI_BAD_INPUT;
 }
 
@@ -59,7 +47,7 @@ static void print_overview(void)
     char operand[64];
     for (int i = 0; drape_verbs[i]; i++) {
         cli_operand_text(drape_verbs[i], operand, sizeof operand);
-        printf("  %-10s %-15s %s\n", drape_verbs[i]->name, operand, drape_verbs[i]->summary);
+        printf("  %-10s %-15s %s\n", drape_verbs[i]->entry.name, operand, drape_verbs[i]->entry.summary);
     }
     puts("\n  drape VERB --help   what a verb takes\n"
          "  drape --version     the version\n\n"
@@ -86,6 +74,27 @@ static int version(int argc, char **argv)
     return CLI_DONE;
 }
 
+static int run_verb(const drape_verb *verb, int argc, char **argv)
+{
+    drape_context *ctx = NULL;
+    drape_status status = cli_context_create(&ctx);
+    drape_arena arena = drape_arena_of(ctx);
+    cli_command *request = status ? NULL : drape_arena_take(&arena, 1, verb->request_size);
+    int code = CLI_BAD_INPUT;
+    if (request) {
+        request->arena = &arena;
+        request->ctx = ctx;
+        code = cli_parse(verb, argc, argv, request);
+        if (code == CLI_GO_ON)
+            code = verb->run(request);
+        drape_arena_free(&arena);
+    } else {
+        cli_misuse(verb->entry.name, "out of memory");
+    }
+    drape_context_destroy(&ctx);
+    return code;
+}
+
 static int run(int argc, char **argv)
 {
     static const struct {
@@ -101,10 +110,10 @@ static int run(int argc, char **argv)
         if (strcmp(argv[1], words[i].word) == 0)
             return words[i].run(argc, argv);
     const drape_verb *verb = find_verb(argv[1]);
-    return verb ? verb->run(argc - 1, argv + 1) : unknown_verb(argv[1]);
+    return verb ? run_verb(verb, argc - 1, argv + 1) : unknown_verb(argv[1]);
 }
 
-/* Results that did not arrive are a failure, whatever the verb thought. */
+/* Results that could not be written are a failure, whatever the verb returned. */
 static int finish_output(int code)
 {
     bool lost = ferror(stdout);

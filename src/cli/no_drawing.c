@@ -1,46 +1,21 @@
-/* no_drawing.c: stands for the verbs that draw in a program that was built without what they need. */
+/* no_drawing.c: stands for the verbs that draw, in a build without the libraries that they need. */
 #include "cli/cli.h"
-#include "cli/tables.h"
 
-#include <string.h>
+#define MISSING                                                                                              \
+    "this drape was built without drawing: install Debian's libepoxy-dev, libpng-dev and libglfw3-dev, and " \
+    "build anew with -Drender=enabled"
 
 extern const drape_verb drape_verb_render, drape_verb_view;
 
-static int refuse(const drape_verb *verb, int argc, char **argv)
-{
-    if (argc > 1 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)) {
-        cli_print_help(verb);
-        return CLI_DONE;
-    }
-    return cli_misuse(verb->name,
-                      "this drape was built without drawing: install Debian's libepoxy-dev, libpng-dev and "
-                      "libglfw3-dev, and build anew with -Drender=enabled");
-}
+const drape_verb drape_verb_render = {
+    .entry = {.name = "render", .summary = "pictures and films: not in this build"},
+    .operand = "SCENE|RUN",
+    .missing = MISSING,
+    .details = "This drape was built without drawing.",
+    .request_size = sizeof(cli_command)};
 
-bool cli_shading_row(int index, cli_row *row)
-{
-    (void)index, (void)row;
-    return false;
-}
-
-static int main_render(int argc, char **argv)
-{
-    return refuse(&drape_verb_render, argc, argv);
-}
-
-static int main_view(int argc, char **argv)
-{
-    return refuse(&drape_verb_view, argc, argv);
-}
-
-const drape_verb drape_verb_render = {.name = "render",
-                                      .operand = "SCENE|RUN",
-                                      .summary = "pictures and films: not in this build",
-                                      .details = "This drape was built without drawing.",
-                                      .run = main_render};
-
-const drape_verb drape_verb_view = {.name = "view",
+const drape_verb drape_verb_view = {.entry = {.name = "view", .summary = "a window: not in this build"},
                                     .operand = "SCENE",
-                                    .summary = "a window: not in this build",
+                                    .missing = MISSING,
                                     .details = "This drape was built without drawing.",
-                                    .run = main_view};
+                                    .request_size = sizeof(cli_command)};

@@ -1,4 +1,4 @@
-/* options.c: command lines and their help, along the tables of a verb. */
+/* options.c: command lines and their help, by the option tables of the verbs. */
 #include "cli/cli.h"
 
 #include "base/param.h"
@@ -12,21 +12,21 @@
 #include <string.h>
 
 #define MAX_OPTIONS 40
-#define FIRST_VALUE 256 /* of getopt_long for option 0: beyond all letters */
+#define FIRST_VALUE 256 /* what getopt_long returns for option 0: beyond all letters */
 #define HELP_VALUE  'h'
 
-/* The options of every verb that takes a scene. Those with a pointer are --set in short. */
+/* The options of every verb that takes a scene. Those with a pointer are short forms of --set. */
 static const cli_option scene_options[] = {
     {"set", CLI_SET, "/POINTER=VALUE", "a value of the scene, by its JSON pointer; may be repeated", 0, 0,
      NULL},
     {"duration", CLI_VALUE, "SECONDS", "simulated time", 0, 0, "/duration"},
-    {"frame-rate", CLI_VALUE, "RATE", "frames a simulated second", 0, 0, "/frame_rate"},
-    {"format", CLI_LIST, "A,B", "formats of the frames, in place of the scene's", 0, 0, "/output/formats"},
-    {"integrator", CLI_VALUE, "ROW", "time integrator", 0, 0, "/integrator/method"},
+    {"frame-rate", CLI_VALUE, "RATE", "frames per simulated second", 0, 0, "/frame_rate"},
+    {"format", CLI_LIST, "A,B", "formats of the frames, instead of the scene's", 0, 0, "/output/formats"},
+    {"integrator", CLI_VALUE, "NAME", "time integrator", 0, 0, "/integrator/method"},
     {"dt", CLI_VALUE, "SECONDS", "nominal step", 0, 0, "/integrator/dt"},
     {"tolerance", CLI_VALUE, "NEWTONS", "bound on the residual of a step", 0, 0, "/integrator/tolerance"},
-    {"linear-solver", CLI_VALUE, "ROW", "linear solver", 0, 0, "/integrator/linear_solver", true},
-    {"controller", CLI_VALUE, "ROW", "step controller", 0, 0, "/controller/type"},
+    {"linear-solver", CLI_VALUE, "NAME", "linear solver", 0, 0, "/integrator/linear_solver", true},
+    {"controller", CLI_VALUE, "NAME", "step controller", 0, 0, "/controller/type"},
     {"threads", CLI_NUMBER, "N", "threads that evaluate elements; the result does not depend on it",
      offsetof(cli_command, threads), 256, NULL},
 };
@@ -48,7 +48,7 @@ static option_list list_options(const drape_verb *verb)
     return list;
 }
 
-/* ---- Help and faults ---- */
+/* ---- Help and errors ---- */
 
 static void print_option(const char *name, const char *argument, const char *text)
 {
@@ -67,7 +67,7 @@ void cli_print_help(const drape_verb *verb)
     const option_list list = list_options(verb);
     char operand[64];
     cli_operand_text(verb, operand, sizeof operand);
-    printf("usage: drape %s %s [options]\n\n%s\n\n", verb->name, operand, verb->details);
+    printf("usage: drape %s %s [options]\n\n%s\n\n", verb->entry.name, operand, verb->details);
     for (size_t i = 0; i < list.count; i++)
         print_option(list.options[i]->name, list.options[i]->argument, list.options[i]->help);
     print_option("help", NULL, "this text");
@@ -84,6 +84,12 @@ int cli_misuse(const char *verb, const char *format, ...)
     return CLI_BAD_INPUT;
 }
 
+int cli_report(drape_context *ctx, int code)
+{
+    fprintf(stderr, "%s\n", drape_context_message(ctx));
+    return code;
+}
+
 static int unknown_option(const drape_verb *verb, const option_list *list, const char *given)
 {
     const char *names[MAX_OPTIONS + 1];
@@ -94,95 +100,36 @@ static int unknown_option(const drape_verb *verb, const option_list *list, const
     snprintf(word, sizeof word, "%.*s", (int)strcspn(given + strspn(given, "-"), "="),
              given + strspn(given, "-"));
     const char *meant = drape_did_you_mean(word, names, list->count + 1);
-    return cli_misuse(verb->name, "there is no option \"%.60s\"%s%s%s; `drape %s --help` shows all", given,
-                      meant ? "; did you mean \"--" : "", meant ? meant : "", meant ? "\"?" : "", verb->name);
+    return cli_misuse(verb->entry.name, "there is no option \"%.60s\"%s%s%s; `drape %s --help` shows all",
+                      given, meant ? "; did you mean \"--" : "", meant ? meant : "", meant ? "\"?" : "",
+                      verb->entry.name);
 }
 
 /* ---- Values ---- */
 
-static int no_memory(const cli_command *command)
+static int add_setting(cli_command *command, const cli_option *option, const char *pointer, const char *value)
 {
-    return cli_misuse(command->verb, "out of memory for the command line");
-}
-
-static int add_setting(cli_command *command, const cli_option *option, const char *pointer, const char *value,
-                       char *memory)
-{
-    command->settings[command->setting_count++] = (cli_setting){.option = option->name,
-                                                                .pointer = pointer,
-                                                                .value = value,
-                                                                .memory = memory,
-                                                                .must_act = option->must_act};
+    if (!pointer || !value)
+        return cli_misuse(command->verb, "out of memory for the command line");
+    command->settings[command->setting_count++] = (cli_setting){
+        .option = option->name, .pointer = pointer, .value = value, .must_act = option->must_act};
     return CLI_GO_ON;
 }
 
-static int take_flag(cli_command *command, const cli_option *option, const char *argument)
-{
-    (void)argument;
-    *(bool *)(void *)((char *)command + option->offset) = true;
-    return CLI_GO_ON;
-}
-
-static int take_text(cli_command *command, const cli_option *option, const char *argument)
-{
-    if (!*argument)
-        return cli_misuse(command->verb, "--%s \"\": a name of at least one letter is needed", option->name);
-    memcpy((char *)command + option->offset, &argument, sizeof argument);
-    return CLI_GO_ON;
-}
-
-static int take_texts(cli_command *command, const cli_option *option, const char *argument)
-{
-    cli_texts *texts = (cli_texts *)(void *)((char *)command + option->offset);
-    if (texts->count == CLI_MAX_TEXTS)
-        return cli_misuse(command->verb, "--%s is given more than %d times", option->name, CLI_MAX_TEXTS);
-    texts->items[texts->count++] = argument;
-    return CLI_GO_ON;
-}
-
-static int take_real(cli_command *command, const cli_option *option, const char *argument)
-{
-    char *end;
-    double number = strtod(argument, &end);
-    if (end == argument || *end || !(number > 0 && number < 1e300))
-        return cli_misuse(command->verb, "--%s \"%.60s\": it is a number above 0", option->name, argument);
-    memcpy((char *)command + option->offset, &number, sizeof number);
-    return CLI_GO_ON;
-}
-
-static int take_number(cli_command *command, const cli_option *option, const char *argument)
-{
-    char *end;
-    errno = 0;
-    long number = strtol(argument, &end, 10);
-    if (end == argument || *end || errno || number < 1 || number > option->max)
-        return cli_misuse(command->verb, "--%s \"%.60s\": it is an integer, 1 to %d", option->name, argument,
-                          option->max);
-    *(int *)(void *)((char *)command + option->offset) = (int)number;
-    return CLI_GO_ON;
-}
-
-static int take_value(cli_command *command, const cli_option *option, const char *argument)
-{
-    return add_setting(command, option, option->pointer, argument, NULL);
-}
-
-static int take_set(cli_command *command, const cli_option *option, const char *argument)
+static int add_pointer_and_value(cli_command *command, const cli_option *option, const char *argument)
 {
     const char *equals = strchr(argument, '=');
     if (*argument != '/' || !equals)
         return cli_misuse(command->verb, "--%s \"%.60s\": it is /pointer=value, as /integrator/dt=0.001",
                           option->name, argument);
-    char *pointer = malloc((size_t)(equals - argument) + 1);
-    if (!pointer)
-        return no_memory(command);
-    memcpy(pointer, argument, (size_t)(equals - argument));
-    pointer[equals - argument] = 0;
-    return add_setting(command, option, pointer, equals + 1, pointer);
+    char *pointer = drape_arena_text(command->arena, argument);
+    if (pointer)
+        pointer[equals - argument] = 0;
+    return add_setting(command, option, pointer, equals + 1);
 }
 
 /* "a,b" -> ["a","b"]; "" -> [] */
-static int take_list(cli_command *command, const cli_option *option, const char *argument)
+static int add_list(cli_command *command, const cli_option *option, const char *argument)
 {
     json_t *array = json_array();
     bool good = array != NULL, more = *argument != 0;
@@ -194,60 +141,96 @@ static int take_list(cli_command *command, const cli_option *option, const char 
     }
     char *text = good ? json_dumps(array, JSON_COMPACT) : NULL;
     json_decref(array);
-    return text ? add_setting(command, option, option->pointer, text, text)
-                : cli_misuse(command->verb, "--%s \"%.60s\": it is words between commas, in UTF-8",
-                             option->name, argument);
+    if (!text)
+        return cli_misuse(command->verb, "--%s \"%.60s\": it is names separated by commas, in UTF-8",
+                          option->name, argument);
+    int code = add_setting(command, option, option->pointer, drape_arena_text(command->arena, text));
+    free(text);
+    return code;
 }
 
-static int take(cli_command *command, const cli_option *option, const char *argument)
+static int set_number(const cli_command *command, const cli_option *option, const char *argument, int *value)
 {
-    static int (*const takers[])(cli_command *, const cli_option *, const char *) = {
-        [CLI_FLAG] = take_flag, [CLI_TEXT] = take_text, [CLI_NUMBER] = take_number, [CLI_VALUE] = take_value,
-        [CLI_LIST] = take_list, [CLI_SET] = take_set,   [CLI_TEXTS] = take_texts,   [CLI_REAL] = take_real,
-    };
-    return takers[option->kind](command, option, argument);
+    char *end;
+    errno = 0;
+    long number = strtol(argument, &end, 10);
+    if (end == argument || *end || errno || number < 1 || number > option->max)
+        return cli_misuse(command->verb, "--%s \"%.60s\": it is an integer, 1 to %d", option->name, argument,
+                          option->max);
+    *value = (int)number;
+    return CLI_GO_ON;
 }
 
-/* Of two values the first would be lost without a word. */
-static bool may_repeat(const cli_option *option)
+static int set_real(const cli_command *command, const cli_option *option, const char *argument, double *value)
 {
-    return option->kind == CLI_SET || option->kind == CLI_TEXTS;
+    char *end;
+    double number = strtod(argument, &end);
+    if (end == argument || *end || !(number > 0 && number < 1e300))
+        return cli_misuse(command->verb, "--%s \"%.60s\": it is a number above 0", option->name, argument);
+    *value = number;
+    return CLI_GO_ON;
 }
 
-static int take_once(cli_command *command, option_list *list, size_t index, const char *argument)
+static int add_text(const cli_command *command, const cli_option *option, const char *argument,
+                    cli_texts *texts)
 {
-    const cli_option *option = list->options[index];
-    if (list->given[index] && !may_repeat(option))
-        return cli_misuse(command->verb, "--%s is given twice", option->name);
-    list->given[index] = true;
-    return take(command, option, argument);
+    if (texts->count == CLI_MAX_TEXTS)
+        return cli_misuse(command->verb, "--%s is given more than %d times", option->name, CLI_MAX_TEXTS);
+    texts->items[texts->count++] = argument;
+    return CLI_GO_ON;
 }
 
-/* ---- The line ---- */
-
-static void make_table(const option_list *list, struct option *table)
+static int set_option(cli_command *command, const cli_option *option, const char *argument)
 {
-    for (size_t i = 0; i < list->count; i++)
-        table[i] = (struct option){.name = list->options[i]->name,
-                                   .has_arg = list->options[i]->argument ? required_argument : no_argument,
-                                   .val = FIRST_VALUE + (int)i};
-    table[list->count] = (struct option){.name = "help", .has_arg = no_argument, .val = HELP_VALUE};
+    void *value = (char *)command + option->offset;
+    switch (option->kind) {
+    case CLI_FLAG:
+        *(bool *)value = true;
+        return CLI_GO_ON;
+    case CLI_TEXT:
+        *(const char **)value = argument;
+        return *argument ? CLI_GO_ON
+                         : cli_misuse(command->verb, "--%s \"\": a name of at least one letter is needed",
+                                      option->name);
+    case CLI_TEXTS:
+        return add_text(command, option, argument, value);
+    case CLI_NUMBER:
+        return set_number(command, option, argument, value);
+    case CLI_REAL:
+        return set_real(command, option, argument, value);
+    case CLI_VALUE:
+        return add_setting(command, option, option->pointer, argument);
+    case CLI_LIST:
+        return add_list(command, option, argument);
+    case CLI_SET:
+        return add_pointer_and_value(command, option, argument);
+    }
+    return CLI_BAD_INPUT;
 }
 
-/* code: what getopt_long returned. */
+/* ---- Command lines ---- */
+
+/* Handles what getopt_long returned. Only a repeatable option may be given twice: else the first value would be lost
+ * silently. */
 static int handle(const drape_verb *verb, option_list *list, int code, char **argv, cli_command *request)
 {
     if (code == HELP_VALUE) {
         cli_print_help(verb);
         return CLI_DONE;
     }
-    if (code >= FIRST_VALUE)
-        return take_once(request, list, (size_t)(code - FIRST_VALUE), optarg);
+    if (code >= FIRST_VALUE) {
+        const size_t index = (size_t)(code - FIRST_VALUE);
+        const cli_option *option = list->options[index];
+        if (list->given[index] && option->kind != CLI_SET && option->kind != CLI_TEXTS)
+            return cli_misuse(verb->entry.name, "--%s is given twice", option->name);
+        list->given[index] = true;
+        return set_option(request, option, optarg);
+    }
     if (code == ':')
-        return cli_misuse(verb->name, "%s needs an argument; `drape %s --help` shows all", argv[optind - 1],
-                          verb->name);
+        return cli_misuse(verb->entry.name, "%s needs an argument; `drape %s --help` shows all",
+                          argv[optind - 1], verb->entry.name);
     if (optopt >= FIRST_VALUE || optopt == HELP_VALUE)
-        return cli_misuse(verb->name, "\"%.60s\": this option takes no argument", argv[optind - 1]);
+        return cli_misuse(verb->entry.name, "\"%.60s\": this option takes no argument", argv[optind - 1]);
     if (optopt) {
         const char letter[] = {'-', (char)optopt, 0};
         return unknown_option(verb, list, letter);
@@ -255,17 +238,17 @@ static int handle(const drape_verb *verb, option_list *list, int code, char **ar
     return unknown_option(verb, list, argv[optind - 1]);
 }
 
-static int take_operand(const drape_verb *verb, int argc, char **argv, cli_command *request)
+static int take_operands(const drape_verb *verb, int argc, char **argv, cli_command *request)
 {
-    int count = argc - optind, most = verb->operands_most ? verb->operands_most : 1;
-    if (count > most && most > 1)
-        return cli_misuse(verb->name, "at most %d operands are taken, %d are given", most, count);
-    if (count > most)
-        return cli_misuse(verb->name, "one %s is taken, %d are given: \"%.60s\", \"%.60s\"%s", verb->operand,
-                          count, argv[optind], argv[optind + 1], count > 2 ? " ..." : "");
+    int count = argc - optind, max = verb->max_operands ? verb->max_operands : 1;
+    if (count > max && max > 1)
+        return cli_misuse(verb->entry.name, "at most %d operands are taken, %d are given", max, count);
+    if (count > max)
+        return cli_misuse(verb->entry.name, "one %s is taken, %d are given: \"%.60s\", \"%.60s\"%s",
+                          verb->operand, count, argv[optind], argv[optind + 1], count > 2 ? " ..." : "");
     if (count < 1 && !verb->operand_optional)
-        return cli_misuse(verb->name, "%s is missing; `drape %s --help` shows all", verb->operand,
-                          verb->name);
+        return cli_misuse(verb->entry.name, "%s is missing; `drape %s --help` shows all", verb->operand,
+                          verb->entry.name);
     request->operand = count ? argv[optind] : NULL;
     request->operands = argv + optind;
     request->operand_count = count;
@@ -277,23 +260,20 @@ int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *reques
     struct option table[MAX_OPTIONS + 2] = {{0}};
     option_list list = list_options(verb);
     int code, result = CLI_GO_ON;
-    request->verb = verb->name;
-    request->settings = calloc((size_t)argc, sizeof *request->settings);
+    request->verb = verb->entry.name;
+    if (verb->missing && !(argc > 1 && (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0)))
+        return cli_misuse(verb->entry.name, "%s", verb->missing);
+    request->settings = drape_arena_take(request->arena, (size_t)argc, sizeof *request->settings);
     if (!request->settings)
-        return no_memory(request);
-    make_table(&list, table);
+        return cli_misuse(verb->entry.name, "out of memory for the command line");
+    for (size_t i = 0; i < list.count; i++)
+        table[i] = (struct option){.name = list.options[i]->name,
+                                   .has_arg = list.options[i]->argument ? required_argument : no_argument,
+                                   .val = FIRST_VALUE + (int)i};
+    table[list.count] = (struct option){.name = "help", .has_arg = no_argument, .val = HELP_VALUE};
     opterr = 0;
     optind = 1;
     while (result == CLI_GO_ON && (code = getopt_long(argc, argv, ":h", table, NULL)) != -1)
         result = handle(verb, &list, code, argv, request);
-    return result == CLI_GO_ON ? take_operand(verb, argc, argv, request) : result;
-}
-
-void cli_command_free(cli_command *command)
-{
-    for (size_t i = 0; i < command->setting_count; i++)
-        free(command->settings[i].memory);
-    free(command->settings);
-    command->settings = NULL;
-    command->setting_count = 0;
+    return result == CLI_GO_ON ? take_operands(verb, argc, argv, request) : result;
 }

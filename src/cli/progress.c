@@ -1,5 +1,5 @@
-/* progress.c: see progress.h. Carriage returns and blanks only: no colours, no control sequences, so that
- * NO_COLOR and dumb terminals need no exception. */
+/* progress.c: see progress.h. It only uses carriage returns and blanks, no colours or control sequences, so NO_COLOR and
+ * dumb terminals need no special case. */
 #include "cli/progress.h"
 
 #include "base/clock.h"
@@ -10,18 +10,10 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#define PERIOD        0.1 /* [s] between two drawings */
+#define PERIOD        0.1 /* least time between two updates [s] */
 #define DEFAULT_WIDTH 80
 #define MAX_WIDTH     120
 #define BAR           24 /* cells */
-
-static int terminal_width(void)
-{
-    struct winsize size;
-    int columns =
-        ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : DEFAULT_WIDTH;
-    return columns > MAX_WIDTH ? MAX_WIDTH : columns - 1; /* in the last column a terminal may wrap */
-}
 
 /* 59 -> "0:59", 3725 -> "1:02:05" */
 static void time_text(double seconds, char *text, size_t size)
@@ -49,8 +41,11 @@ void cli_progress_begin(cli_progress *p, double from, double end)
     *p = (cli_progress){.on = isatty(STDERR_FILENO), .from = from, .end = end, .shown = -INFINITY};
     if (!p->on)
         return;
+    struct winsize size;
+    int columns =
+        ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : DEFAULT_WIDTH;
+    p->width = columns > MAX_WIDTH ? MAX_WIDTH : columns - 1; /* a terminal may wrap after its last column */
     p->start = drape_clock_seconds();
-    p->width = terminal_width();
     if (end > 0)
         cli_progress_show(p, from, 0);
 }
@@ -63,7 +58,7 @@ static void fill_bar(double share, char bar[BAR + 1])
     bar[BAR] = 0;
 }
 
-/* At most ten times a second. */
+/* Whether PERIOD has passed since the last update. */
 static bool is_due(cli_progress *p, double *now)
 {
     *now = p->on ? drape_clock_seconds() : 0;

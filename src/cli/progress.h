@@ -1,4 +1,4 @@
-/* progress.h: a line on the terminal that says how far a run is. Nothing where stderr is no terminal. */
+/* progress.h: a line on the terminal that shows the progress of a run. Nothing is shown if stderr is not a terminal. */
 #ifndef DRAPE_CLI_PROGRESS_H
 #define DRAPE_CLI_PROGRESS_H
 
@@ -7,17 +7,18 @@
 
 typedef struct cli_progress {
     bool on;
-    double from, end;    /* [s] simulated: where the run goes on, and to */
-    double start, shown; /* [s] of the clock: begin of the run, last time that the line was drawn */
-    int width;           /* columns that the line may take */
+    double from, end;    /* simulated time at the beginning and the end [s] */
+    double start, shown; /* clock at the beginning and at the last update [s] */
+    int width;           /* columns of the line */
 } cli_progress;
 
-void cli_progress_begin(cli_progress *progress, double from, double end); /* end 0: of cases, not of a time */
-void cli_progress_show(cli_progress *progress, double time,
-                       int64_t rejected); /* at most ten times a second */
-/* Cases of a sweep; total 0: what they are compared with is made. */
+/* end: 0 for a sweep, whose progress is a number of cases. */
+void cli_progress_begin(cli_progress *progress, double from, double end);
+/* Shows the simulated time; updates at most ten times a second, as cli_progress_count does. */
+void cli_progress_show(cli_progress *progress, double time, int64_t rejected);
+/* Shows the number of cases; total 0: their reference is being computed. */
 void cli_progress_count(cli_progress *progress, int64_t done, int64_t total, double seconds_left);
-/* Takes the line away, until it is shown again: for output on the same terminal; for good. */
+/* Erases the line until it is shown again, for other output on the terminal; or for good. */
 void cli_progress_hide(cli_progress *progress);
 void cli_progress_clear(cli_progress *progress);
 

@@ -6,15 +6,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-static drape_status keep(cli_realtime *r, drape_context *ctx, double seconds)
+static drape_status add_time(cli_realtime *r, drape_arena *arena, double seconds)
 {
-    if (r->count == r->room) {
-        size_t room = r->room ? 2 * r->room : 256;
-        double *more = realloc(r->seconds, room * sizeof *more);
+    if (r->count == r->capacity) {
+        size_t capacity = r->capacity ? 2 * r->capacity : 256;
+        double *more = drape_arena_resize(arena, r->seconds, capacity, sizeof *more);
         if (!more)
-            return drape_fail_memory(ctx, room * sizeof *more);
+            return DRAPE_E_MEMORY;
         r->seconds = more;
-        r->room = room;
+        r->capacity = capacity;
     }
     r->seconds[r->count++] = seconds;
     return DRAPE_OK;
@@ -22,7 +22,7 @@ static drape_status keep(cli_realtime *r, drape_context *ctx, double seconds)
 
 static void count(drape_summary_realtime *s, const drape_realtime *frame)
 {
-    bool full = strcmp(frame->rung, "full") == 0, fewer = strcmp(frame->rung, "fewer iterations") == 0;
+    bool full = strcmp(frame->level, "full") == 0, fewer = strcmp(frame->level, "fewer iterations") == 0;
     s->frames++;
     s->missed += !frame->kept;
     s->full += full;
@@ -39,24 +39,14 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Nearest rank. */
+/* By the nearest rank; of sorted times. */
 static double percentile(const cli_realtime *r, double share)
 {
     size_t rank = (size_t)ceil(share * (double)r->count);
     return r->count ? r->seconds[rank > 0 ? rank - 1 : 0] : 0;
 }
 
-static void summarise(cli_realtime *r)
-{
-    if (r->count > 0)
-        qsort(r->seconds, r->count, sizeof *r->seconds, compare);
-    r->result.p50 = percentile(r, 0.5);
-    r->result.p95 = percentile(r, 0.95);
-    r->result.p99 = percentile(r, 0.99);
-    r->result.worst = percentile(r, 1);
-}
-
-drape_status cli_realtime_run(cli_realtime *r, const cli_scene *scene)
+drape_status cli_realtime_run(cli_realtime *r, const cli_command *command, const cli_scene *scene)
 {
     double end = drape_model_duration(scene->model), frame = 1 / drape_model_frame_rate(scene->model);
     drape_status status = DRAPE_OK;
@@ -66,12 +56,17 @@ drape_status cli_realtime_run(cli_realtime *r, const cli_scene *scene)
         double left = end - drape_sim_time(scene->sim) - r->result.debt;
         status = drape_sim_advance_realtime(scene->sim, fmin(frame, left), frame, &report);
         count(&r->result, &report);
-        drape_status kept = keep(r, scene->ctx, report.seconds);
+        drape_status kept = add_time(r, command->arena, report.seconds);
         status = status ? status : kept;
     }
-    if (!status) /* what is still owed has no deadline any more */
+    if (!status) /* the debt of the last frames, without a deadline */
         status = drape_sim_advance(scene->sim, end);
-    summarise(r);
+    if (r->count > 0)
+        qsort(r->seconds, r->count, sizeof *r->seconds, compare);
+    r->result.p50 = percentile(r, 0.5);
+    r->result.p95 = percentile(r, 0.95);
+    r->result.p99 = percentile(r, 0.99);
+    r->result.worst = percentile(r, 1);
     return status;
 }
 
@@ -81,14 +76,8 @@ void cli_realtime_print(const cli_realtime *r)
     printf("realtime  %lld frames of %.4g ms: p50 %.4g, p95 %.4g, p99 %.4g, worst %.4g ms; %lld missed\n",
            (long long)s->frames, 1e3 * s->budget, 1e3 * s->p50, 1e3 * s->p95, 1e3 * s->p99, 1e3 * s->worst,
            (long long)s->missed);
-    printf("rungs     full %lld, fewer iterations %lld, larger steps %lld; %lld without a new state; "
-           "%.4g s owed after the last frame, then made up, %.4g s dropped\n",
+    printf("levels    full %lld, fewer iterations %lld, larger steps %lld; %lld without a new state; "
+           "%.4g s behind after the last frame, then caught up, %.4g s dropped\n",
            (long long)s->full, (long long)s->fewer, (long long)s->larger, (long long)s->still, s->debt,
            s->dropped);
-}
-
-void cli_realtime_free(cli_realtime *r)
-{
-    free(r->seconds);
-    r->seconds = NULL;
 }

@@ -1,5 +1,4 @@
-/* scene.c: from a command line to a sim. All that can be wrong with the input is found here, before any verb
- * writes a file. */
+/* scene.c: from a command line to a sim. All errors of the input are found here, before any verb writes a file. */
 #include "cli/cli.h"
 #include "cli/signals.h"
 
@@ -8,15 +7,7 @@
 
 #include <stdio.h>
 
-static drape_status apply_settings(const cli_command *command, drape_scene *scene)
-{
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < command->setting_count; i++)
-        status = drape_scene_set(scene, command->settings[i].pointer, command->settings[i].value);
-    return status;
-}
-
-/* The library leaves the formats of a model to whoever writes frames. */
+/* Compiling a scene does not check the formats: only writers of frames know them. */
 static drape_status check_formats(const cli_scene *s)
 {
     for (size_t i = 0; i < s->model->format_count; i++) {
@@ -37,8 +28,8 @@ static drape_status load(const cli_command *command, const char *path, cli_scene
     drape_sim_def_init(&def, sizeof def);
     def.threads = command->threads ? command->threads : 1;
     drape_status status = drape_scene_load(s->ctx, path, &s->scene);
-    if (!status)
-        status = apply_settings(command, s->scene);
+    for (size_t i = 0; !status && i < command->setting_count; i++)
+        status = drape_scene_set(s->scene, command->settings[i].pointer, command->settings[i].value);
     if (!status)
         status = drape_scene_compile(s->scene, &s->model);
     if (!status)
@@ -60,25 +51,15 @@ drape_status cli_context_create(drape_context **out)
     return drape_context_create(&def, out);
 }
 
-int cli_scene_load_from(const cli_command *command, const char *path, cli_scene *out)
+int cli_scene_load(const cli_command *command, const char *path, cli_scene *out)
 {
-    *out = (cli_scene){.ctx = NULL};
-    if (cli_context_create(&out->ctx))
-        return cli_misuse(command->verb, "out of memory");
+    *out = (cli_scene){.ctx = command->ctx};
     cli_signals_end_waits(true);
     drape_status status = load(command, path, out);
     cli_signals_end_waits(false);
-    if (cli_interrupted()) /* whatever that made of the scene */
-        return cli_tell_interrupted(command->verb);
-    if (!status)
-        return CLI_GO_ON;
-    fprintf(stderr, "%s\n", drape_context_message(out->ctx));
-    return CLI_BAD_INPUT;
-}
-
-int cli_scene_load(const cli_command *command, cli_scene *out)
-{
-    return cli_scene_load_from(command, command->operand, out);
+    if (cli_interrupted()) /* whether or not loading noticed */
+        return cli_report_interrupted(command->verb);
+    return status ? cli_report(command->ctx, CLI_BAD_INPUT) : CLI_GO_ON;
 }
 
 void cli_scene_free(cli_scene *scene)
@@ -86,5 +67,4 @@ void cli_scene_free(cli_scene *scene)
     drape_sim_destroy(&scene->sim);
     drape_model_destroy(&scene->model);
     drape_scene_destroy(&scene->scene);
-    drape_context_destroy(&scene->ctx);
 }

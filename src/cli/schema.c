@@ -8,9 +8,12 @@
  */
 #include "cli/schema.h"
 
-#include "cli/tables.h"
+#include "colliders/colliders.h"
 #include "compile/compile.h"
+#include "control/control.h"
+#include "io/export.h"
 #include "model/scene.h"
+#include "terms/terms.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -69,20 +72,17 @@ static json_t *word(void)
     return with(typed("string"), "minLength", json_integer(1));
 }
 
-static json_t *one_of_words(const char *const *words)
-{
-    json_t *array = json_array();
-    for (int i = 0; words[i]; i++)
-        array = and_also(array, json_string(words[i]));
-    return with(json_object(), "enum", array);
-}
-
 static json_t *words(const char *const *names)
 {
     json_t *array = json_array();
     for (int i = 0; names[i]; i++)
         array = and_also(array, json_string(names[i]));
     return array;
+}
+
+static json_t *one_of_words(const char *const *names)
+{
+    return with(json_object(), "enum", words(names));
 }
 
 static json_t *that_requires(json_t *names)
@@ -110,7 +110,7 @@ static json_t *at_most_one(json_t *object, const char *const *names)
     return with(object, "oneOf", and_also(each_required(names), none));
 }
 
-/* Of several keys all or none. */
+/* All of the keys, or none. */
 static json_t *all_or_none(json_t *object, const char *const *names)
 {
     json_t *dependents = json_object();
@@ -119,40 +119,40 @@ static json_t *all_or_none(json_t *object, const char *const *names)
     return with(object, "dependentRequired", dependents);
 }
 
-/* ---- Parameters of rows ---- */
+/* ---- Parameters and keys ---- */
 
-static bool is_required(const drape_param *p)
+static json_t *three(const double *values)
 {
-    return isnan(p->default_value) && !p->derived;
+    return and_also(and_also(and_also(json_array(), number(values[0])), number(values[1])),
+                    number(values[2]));
 }
 
-static json_t *three(double value)
-{
-    return and_also(and_also(and_also(json_array(), number(value)), number(value)), number(value));
-}
-
-static json_t *default_of(const drape_param *p)
+static json_t *default_of(const drape_param *p, const double *values)
 {
     switch (p->kind) {
     case DRAPE_PARAM_BOOLEAN:
-        return json_boolean(p->default_value != 0);
+        return json_boolean(*values != 0);
     case DRAPE_PARAM_CHOICE:
-        return json_string(p->choices[(int)p->default_value]);
+        return json_string(p->choices[(int)*values]);
     case DRAPE_PARAM_VECTOR:
     case DRAPE_PARAM_TURN:
-        return three(p->default_value);
+        return three(values);
+    case DRAPE_PARAM_TEXT:
+        return json_string(p->derived);
     case DRAPE_PARAM_NUMBER:
     case DRAPE_PARAM_INTEGER:
-    case DRAPE_PARAM_TEXT: /* always required */
         break;
     }
-    return number(p->default_value);
+    return number(*values);
 }
 
 static json_t *bounded(const char *type, const drape_param *p)
 {
-    json_t *value = with(typed(type), p->open_min ? "exclusiveMinimum" : "minimum", number(p->min));
-    return with(value, p->open_max ? "exclusiveMaximum" : "maximum", number(p->max));
+    json_t *value = typed(type);
+    if (isfinite(p->min))
+        value = with(value, p->open_min ? "exclusiveMinimum" : "minimum", number(p->min));
+    return isfinite(p->max) ? with(value, p->open_max ? "exclusiveMaximum" : "maximum", number(p->max))
+                            : value;
 }
 
 static json_t *vector_of(const drape_param *p)
@@ -181,22 +181,30 @@ static json_t *value_of(const drape_param *p)
     return bounded(p->kind == DRAPE_PARAM_INTEGER ? "integer" : "number", p);
 }
 
-static json_t *described(json_t *value, const char *help, const char *unit)
+/* Adds the help and the default of a key to the schema of its value. */
+static json_t *described(json_t *value, const drape_scene_key *key)
 {
     char text[512];
-    bool has_unit = unit && strcmp(unit, "1") != 0;
-    snprintf(text, sizeof text, "%s%s%s%s", help, has_unit ? " [" : "", has_unit ? unit : "",
+    double defaults[DRAPE_PARAM_WIDEST];
+    const drape_param *p = &key->param;
+    const bool has_unit = strcmp(p->unit, "1") != 0;
+    snprintf(text, sizeof text, "%s%s%s%s", p->help, has_unit ? " [" : "", has_unit ? p->unit : "",
              has_unit ? "]" : "");
-    return with(value, "description", json_string(text));
+    value = with(value, "description", json_string(text));
+    drape_param_default(p, defaults);
+    if (isnan(*defaults) && !key->literal)
+        return value;
+    json_t *one = default_of(p, key->vector ? key->vector : defaults);
+    return with(value, "default", key->shape == DRAPE_SCENE_LIST ? and_also(json_array(), one) : one);
 }
 
 static json_t *param(const drape_param *p)
 {
-    json_t *value = described(value_of(p), p->help, p->unit);
-    return isnan(p->default_value) ? value : with(value, "default", default_of(p));
+    return described(value_of(p), &(drape_scene_key){.param = *p});
 }
 
-/* A parameter of several rows with different bounds must be right for each of them, as the reader has it. */
+/* A value of a parameter that several entries have with different bounds must be right for each of them, as for
+ * the reader. */
 static json_t *with_param(json_t *properties, const drape_param *p)
 {
     json_t *schema = param(p), *before = json_object_get(properties, p->name);
@@ -210,63 +218,70 @@ static json_t *with_param(json_t *properties, const drape_param *p)
     return with(properties, p->name, with(json_object(), "allOf", both));
 }
 
-static json_t *with_params(json_t *properties, const cli_row *row)
+static json_t *with_params(json_t *properties, const drape_entry *entry)
 {
-    for (int i = 0; i < row->param_count; i++)
-        properties = with_param(properties, &row->params[i]);
+    for (int i = 0; i < entry->param_count; i++)
+        properties = with_param(properties, &entry->params[i]);
     return properties;
 }
 
-static bool needs_params(const cli_row *row)
+static bool needs_params(const drape_entry *entry)
 {
-    for (int i = 0; i < row->param_count; i++)
-        if (is_required(&row->params[i]))
+    for (int i = 0; i < entry->param_count; i++)
+        if (drape_param_is_required(&entry->params[i]))
             return true;
     return false;
 }
 
-static json_t *with_required(json_t *required, const cli_row *row)
+static json_t *with_required(json_t *required, const drape_entry *entry)
 {
-    for (int i = 0; i < row->param_count; i++)
-        if (is_required(&row->params[i]))
-            required = and_also(required, json_string(row->params[i].name));
+    for (int i = 0; i < entry->param_count; i++)
+        if (drape_param_is_required(&entry->params[i]))
+            required = and_also(required, json_string(entry->params[i].name));
     return required;
 }
 
-/* Rows that a scene may name: those that need no parameters where only a name is given. */
-static json_t *row_names(const cli_table *table, bool alone)
+/* Gravity is a term where the scene's gravity is not zero: scenes do not name it. */
+static bool is_implied(const drape_registry *table, int index)
+{
+    return table == &drape_term_registry && drape_terms[index]->potential_of_gravity;
+}
+
+/* The entries that a scene may name; `alone`: without parameters beside the name. */
+static json_t *entry_names(const drape_registry *table, bool alone)
 {
     json_t *names = json_array();
-    cli_row row;
-    for (int i = 0; table->row(i, &row); i++)
-        if (!row.implied && !(alone && needs_params(&row)))
-            names = and_also(names, json_string(row.name));
+    const drape_entry *entry;
+    for (int i = 0; (entry = table->entries[i]) != NULL; i++)
+        if (!is_implied(table, i) && !(alone && needs_params(entry)))
+            names = and_also(names, json_string(entry->name));
     return with(json_object(), "enum", names);
 }
 
 /* ---- Which tables stand where in a scene ---- */
 
 typedef enum opening_kind {
-    ROW_PARAMS,  /* the parameters of the named row, and no others */
-    TABLE_PARAMS /* parameters of any row of the table, whichever is named */
+    ENTRY_PARAMS, /* the parameters of the named entry, and no others */
+    TABLE_PARAMS  /* parameters of any entry of the table, whichever is named */
 } opening_kind;
 
 /* The open objects of scene_keys.c. */
 static const struct opening {
-    const char *object, *key; /* the key that names the row; NULL: there is but one */
+    const char *object, *key; /* the key that names the entry; NULL: the table has only one */
     opening_kind kind;
-    const cli_table *table;
-    const char *const *one_of, *const *all_of; /* but where `preset` says them: at most one, all or none */
+    const drape_registry *table;
+    const char *const *one_of, *const
+                                   *all_of; /* where `preset` gives their values: at most one, all or none */
     const char *preset;
 } openings[] = {
-    {"term", "type", ROW_PARAMS, &cli_terms, NULL, NULL, NULL},
-    {"mesh", "grid", ROW_PARAMS, &cli_grids, NULL, NULL, NULL},
-    {"collider", "type", ROW_PARAMS, &cli_colliders, NULL, NULL, NULL},
-    {"self_contact", NULL, ROW_PARAMS, &cli_self_contacts, NULL, NULL, NULL},
-    {"contact", NULL, ROW_PARAMS, &cli_contacts, NULL, NULL, NULL},
-    {"integrator", "method", TABLE_PARAMS, &cli_integrators, NULL, NULL, NULL},
-    {"controller", "type", TABLE_PARAMS, &cli_controllers, NULL, NULL, NULL},
-    {"material", NULL, ROW_PARAMS, &cli_materials,
+    {"term", "type", ENTRY_PARAMS, &drape_term_registry, NULL, NULL, NULL},
+    {"mesh", "grid", ENTRY_PARAMS, &drape_grid_registry, NULL, NULL, NULL},
+    {"collider", "type", ENTRY_PARAMS, &drape_collider_registry, NULL, NULL, NULL},
+    {"self_contact", NULL, ENTRY_PARAMS, &drape_self_contact_registry, NULL, NULL, NULL},
+    {"contact", NULL, ENTRY_PARAMS, &drape_contact_registry, NULL, NULL, NULL},
+    {"integrator", "method", TABLE_PARAMS, &drape_integrator_registry, NULL, NULL, NULL},
+    {"controller", "type", TABLE_PARAMS, &drape_controller_registry, NULL, NULL, NULL},
+    {"material", NULL, ENTRY_PARAMS, &drape_material_registry,
      (const char *const[]){"density", "areal_density", "total_mass", NULL},
      (const char *const[]){"young_modulus", "thickness", NULL}, "fabric"},
 };
@@ -279,69 +294,50 @@ static const struct opening *opening_of(const drape_scene_object *object)
     return NULL;
 }
 
-/* Words that name rows. */
-static json_t *words_of(const drape_scene_object *object, const drape_scene_key *key)
+/* Texts that name entries of a table. */
+static json_t *names_of(const drape_scene_object *object, const drape_scene_key *key)
 {
     const struct opening *opening = object->open ? opening_of(object) : NULL;
-    if (opening && opening->key && strcmp(opening->key, key->name) == 0)
-        return row_names(opening->table, false);
-    if (strcmp(object->name, "output") == 0 && strcmp(key->name, "formats") == 0)
-        return row_names(&cli_exporters, false);
-    return key->words ? one_of_words(key->words) : word();
+    if (opening && opening->key && strcmp(opening->key, key->param.name) == 0)
+        return entry_names(opening->table, false);
+    if (object == &drape_form_output && key->param.kind == DRAPE_PARAM_TEXT)
+        return entry_names(&drape_exporter_registry, false);
+    return value_of(&key->param);
 }
 
 /* ---- Keys ---- */
 
 static json_t *object_schema(const drape_scene_object *object);
 
-static json_t *ranged(const drape_scene_key *key, const char *type, const char *least)
+static json_t *entry_or_name(const drape_scene_key *key)
 {
-    return with(with(typed(type), least, number(key->min)), "maximum", number(key->max));
-}
-
-static json_t *row_or_name(const drape_scene_key *key)
-{
-    return any_of(row_names(opening_of(key->child)->table, true), object_schema(key->child));
+    return any_of(entry_names(opening_of(key->child)->table, true), object_schema(key->child));
 }
 
 static json_t *key_value(const drape_scene_object *object, const drape_scene_key *key)
 {
-    switch (key->kind) {
+    switch (key->shape) {
+    case DRAPE_SCENE_VALUE:
+        return names_of(object, key);
+    case DRAPE_SCENE_LIST:
+        return array_of(names_of(object, key), key->at_least, key->at_most);
     case DRAPE_SCENE_VERSION:
         return with(json_object(), "const", json_integer(DRAPE_SCENE_FORM));
-    case DRAPE_SCENE_TEXT:
+    case DRAPE_SCENE_REMARK:
         return typed("string");
-    case DRAPE_SCENE_WORD:
-        return words_of(object, key);
-    case DRAPE_SCENE_WORDS:
-        return array_of(words_of(object, key), key->at_least, 0);
-    case DRAPE_SCENE_BOOLEAN:
-        return typed("boolean");
-    case DRAPE_SCENE_NUMBER:
-        return ranged(key, "number", key->closed ? "minimum" : "exclusiveMinimum");
-    case DRAPE_SCENE_INTEGER:
-        return ranged(key, "integer", "minimum");
-    case DRAPE_SCENE_INTEGERS:
-        return array_of(ranged(key, "integer", "minimum"), key->at_least, 0);
-    case DRAPE_SCENE_VECTOR:
-        return numbers(3, 3);
-    case DRAPE_SCENE_SCALE:
-        return any_of(typed("number"), numbers(3, 3));
-    case DRAPE_SCENE_ROTATION:
-        return numbers(3, 4);
     case DRAPE_SCENE_BOX:
         return array_of(numbers(3, 3), 2, 2);
     case DRAPE_SCENE_TRACK: {
         json_t *pair = and_also(and_also(json_array(), typed("number")), numbers(3, 3));
         json_t *item = with(with(typed("array"), "prefixItems", pair), "minItems", json_integer(2));
-        return array_of(with(item, "maxItems", json_integer(2)), key->at_least, 0);
+        return array_of(with(item, "maxItems", json_integer(2)), key->at_least, key->at_most);
     }
     case DRAPE_SCENE_OBJECT:
         return object_schema(key->child);
     case DRAPE_SCENE_OBJECTS:
-        return array_of(object_schema(key->child), key->at_least, 0);
-    case DRAPE_SCENE_ROWS:
-        return array_of(row_or_name(key), key->at_least, 0);
+        return array_of(object_schema(key->child), key->at_least, key->at_most);
+    case DRAPE_SCENE_ENTRIES:
+        return array_of(entry_or_name(key), key->at_least, key->at_most);
     }
     return NULL;
 }
@@ -349,12 +345,11 @@ static json_t *key_value(const drape_scene_object *object, const drape_scene_key
 /* An object that itself may be left out cannot be left out if something in it is required. */
 static bool key_is_required(const drape_scene_key *key)
 {
-    const struct opening *opening = key->kind == DRAPE_SCENE_OBJECT ? opening_of(key->child) : NULL;
-    cli_row row;
+    const struct opening *opening = key->shape == DRAPE_SCENE_OBJECT ? opening_of(key->child) : NULL;
     if (key->optional)
         return false;
-    return key->required || (opening && !opening->key && opening->table->row(0, &row) &&
-                             (needs_params(&row) || opening->all_of));
+    return drape_param_is_required(&key->param) ||
+           (opening && !opening->key && (needs_params(opening->table->entries[0]) || opening->all_of));
 }
 
 /* ---- Objects ---- */
@@ -373,8 +368,8 @@ static json_t *properties_of(const drape_scene_object *object, const char *chose
     json_t *properties = json_object();
     for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
-        if (!is_excluded(object, key->name, chosen))
-            properties = with(properties, key->name, described(key_value(object, key), key->help, key->unit));
+        if (!is_excluded(object, key->param.name, chosen))
+            properties = with(properties, key->param.name, described(key_value(object, key), key));
     }
     return properties;
 }
@@ -384,7 +379,7 @@ static json_t *required_of(const drape_scene_object *object)
     json_t *required = json_array();
     for (size_t i = 0; i < object->key_count; i++)
         if (key_is_required(&object->keys[i]))
-            required = and_also(required, json_string(object->keys[i].name));
+            required = and_also(required, json_string(object->keys[i].param.name));
     return required;
 }
 
@@ -398,11 +393,11 @@ static json_t *closed(json_t *properties, json_t *required)
     return with(object, "additionalProperties", json_false());
 }
 
-/* An object in which `key` names the row. */
-static json_t *row_schema(const drape_scene_object *object, const char *key, const cli_row *row)
+/* An object in which `key` names the entry. */
+static json_t *entry_schema(const drape_scene_object *object, const char *key, const drape_entry *entry)
 {
-    json_t *name =
-        with(with(json_object(), "const", json_string(row->name)), "description", json_string(row->summary));
+    json_t *name = with(with(json_object(), "const", json_string(entry->name)), "description",
+                        json_string(entry->summary));
     json_t *properties = with(properties_of(object, key), key, name);
     json_t *required = required_of(object);
     bool named = false;
@@ -410,7 +405,7 @@ static json_t *row_schema(const drape_scene_object *object, const char *key, con
         named = named || strcmp(json_string_value(json_array_get(required, i)), key) == 0;
     if (!named)
         required = and_also(required, json_string(key));
-    return closed(with_params(properties, row), with_required(required, row));
+    return closed(with_params(properties, entry), with_required(required, entry));
 }
 
 /* Without the key that opens the object: one of its alternatives. */
@@ -425,30 +420,30 @@ static json_t *with_closed_forms(json_t *forms, const drape_scene_object *object
     return forms;
 }
 
-static json_t *rows_schema(const drape_scene_object *object, const struct opening *opening)
+static json_t *entries_schema(const drape_scene_object *object, const struct opening *opening)
 {
     json_t *forms = json_array();
-    cli_row row;
-    for (int i = 0; opening->table->row(i, &row); i++)
-        if (!row.implied)
-            forms = and_also(forms, row_schema(object, opening->key, &row));
+    const drape_entry *entry;
+    for (int i = 0; (entry = opening->table->entries[i]) != NULL; i++)
+        if (!is_implied(opening->table, i))
+            forms = and_also(forms, entry_schema(object, opening->key, entry));
     return with(json_object(), "anyOf", with_closed_forms(forms, object));
 }
 
-/* Parameters of all rows of the table; for a table of one row that has no name, they are its own. */
+/* Parameters of all entries of the table; for a table of one entry without a name, its own. */
 static json_t *table_schema(const drape_scene_object *object, const struct opening *opening)
 {
     json_t *properties = properties_of(object, NULL), *required = required_of(object);
-    cli_row row;
-    for (int i = 0; opening->table->row(i, &row); i++) {
-        properties = with_params(properties, &row);
-        if (opening->kind == ROW_PARAMS)
-            required = with_required(required, &row);
+    const drape_entry *entry;
+    for (int i = 0; (entry = opening->table->entries[i]) != NULL; i++) {
+        properties = with_params(properties, entry);
+        if (opening->kind == ENTRY_PARAMS)
+            required = with_required(required, entry);
     }
     return closed(properties, required);
 }
 
-/* Its first word is that there is none. */
+/* The first choice of the preset says that there is none. */
 static json_t *with_preset(json_t *schema, const struct opening *opening)
 {
     json_t *none = with(json_object(), "const", json_string("none"));
@@ -463,8 +458,8 @@ static json_t *with_preset(json_t *schema, const struct opening *opening)
 static json_t *object_schema(const drape_scene_object *object)
 {
     const struct opening *opening = object->open ? opening_of(object) : NULL;
-    if (opening && opening->kind == ROW_PARAMS && opening->key)
-        return rows_schema(object, opening);
+    if (opening && opening->kind == ENTRY_PARAMS && opening->key)
+        return entries_schema(object, opening);
     json_t *schema =
         opening ? table_schema(object, opening) : closed(properties_of(object, NULL), required_of(object));
     const char *const *one_of = opening && opening->one_of ? opening->one_of : object->one_of;
@@ -478,7 +473,7 @@ json_t *cli_schema(void)
     json_t *schema = json_object();
     schema = with(schema, "$schema", json_string("https://json-schema.org/draft/2020-12/schema"));
     schema = with(schema, "title", json_string("A scene of Drape"));
-    json_t *form = object_schema(&drape_scene_form);
+    json_t *form = object_schema(&drape_form_scene);
     if (form && schema)
         json_object_update(schema, form);
     else

@@ -7,13 +7,13 @@
 #include <stdatomic.h>
 #include <stdio.h>
 
-static volatile sig_atomic_t interrupted; /* a handler has no other place to leave a word */
+static volatile sig_atomic_t interrupted; /* set by the handler */
 static const int caught[] = {SIGINT, SIGTERM, SIGHUP};
 
 static _Atomic(drape_sim *) cancelled;
-_Static_assert(ATOMIC_POINTER_LOCK_FREE == 2, "a handler reads it");
+_Static_assert(ATOMIC_POINTER_LOCK_FREE == 2, "a signal handler reads it");
 
-static void remember(int signal)
+static void on_signal(int signal)
 {
     (void)signal;
     interrupted = 1;
@@ -27,21 +27,21 @@ void cli_signals_cancel(drape_sim *sim)
         drape_sim_cancel(sim);
 }
 
-/* Also where they were ignored: a shell starts the background jobs of a script so, and a signal that is
- * sent to such a job is meant. */
+/* Also catches signals that were ignored: shells start background jobs of scripts so, and a signal sent to such a job is
+ * intended. */
 void cli_catch_signals(void)
 {
-    const struct sigaction action = {.sa_handler = remember, .sa_flags = (int)SA_RESETHAND | SA_RESTART};
+    const struct sigaction action = {.sa_handler = on_signal, .sa_flags = (int)SA_RESETHAND | SA_RESTART};
     for (size_t i = 0; i < sizeof caught / sizeof *caught; i++)
         sigaction(caught[i], &action, NULL);
 }
 
-/* What was reset by a first signal stays so. */
+/* A handler that the first signal has reset is not installed again. */
 void cli_signals_end_waits(bool end)
 {
     struct sigaction action;
     for (size_t i = 0; i < sizeof caught / sizeof *caught; i++) {
-        if (sigaction(caught[i], NULL, &action) || action.sa_handler != remember)
+        if (sigaction(caught[i], NULL, &action) || action.sa_handler != on_signal)
             continue;
         action.sa_flags = end ? action.sa_flags & ~SA_RESTART : action.sa_flags | SA_RESTART;
         sigaction(caught[i], &action, NULL);
@@ -53,7 +53,7 @@ bool cli_interrupted(void)
     return interrupted != 0;
 }
 
-int cli_tell_interrupted(const char *verb)
+int cli_report_interrupted(const char *verb)
 {
     fflush(stdout);
     fprintf(stderr, "drape %s: interrupted\n", verb);

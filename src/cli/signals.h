@@ -1,4 +1,4 @@
-/* signals.h: Ctrl-C, SIGTERM and SIGHUP as a wish to stop, which all stages of a verb look at. */
+/* signals.h: Ctrl-C, SIGTERM and SIGHUP as a request to stop, which all stages of a verb check. */
 #ifndef DRAPE_CLI_SIGNALS_H
 #define DRAPE_CLI_SIGNALS_H
 
@@ -6,18 +6,18 @@
 
 #include <stdbool.h>
 
-/* From here on the first signal is remembered; a second one ends the program at once. */
+/* After this call the first signal is recorded; a second one ends the program at once. */
 void cli_catch_signals(void);
 
 bool cli_interrupted(void);
 
-/* The sim whose step a signal cancels, where that step is all there is to do; NULL: none, and a step in progress is ended. */
+/* Sets the sim whose step a signal cancels, for runs of a single long step. NULL: none; a step in progress completes. */
 void cli_signals_cancel(drape_sim *sim);
 
-/* Whether a signal ends a read or an open that waits, of a scene from a pipe; writes must not be cut by it. */
+/* Whether a signal interrupts a waiting open or read, as of a scene from a pipe. Writes must not be interrupted. */
 void cli_signals_end_waits(bool end);
 
-/* One line "drape run: interrupted" on stderr, for what has nothing more to tell. Returns CLI_INTERRUPTED. */
-int cli_tell_interrupted(const char *verb);
+/* Prints the line "drape run: interrupted" on stderr. Returns CLI_INTERRUPTED. */
+int cli_report_interrupted(const char *verb);
 
 #endif

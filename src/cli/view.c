@@ -1,6 +1,6 @@
 /*
- * view.c: see view.h. A model does not change: a change is a value of the scene, a new model of it, and a sim that is
- * put into the state that was there.
+ * view.c: see view.h. Models are constant: a change sets a value of the scene, compiles a new model, and sets a new sim
+ * to the former state.
  */
 #include "cli/view.h"
 
@@ -13,11 +13,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MOVE_TIME  0.1  /* [s] that a step of a movable takes */
-#define PULL_RATE  60.0 /* [1/s] frequency of the dragged node's own mass on the spring, many times over */
-#define PULL_NODES 40.0 /* masses of a node that the spring is meant for */
+#define MOVE_TIME  0.1  /* duration of a displacement by a key [s] */
+#define PULL_RATE  60.0 /* angular frequency of PULL_NODES nodes on the drag spring [1/s] */
+#define PULL_NODES 40.0 /* number of nodes that the drag spring is meant to move */
 
-/* ---- Making ---- */
+/* ---- Opening ---- */
 
 static void note(cli_view *v, const char *text)
 {
@@ -58,22 +58,12 @@ static void list_movables(cli_view *v)
 
 int view_open(const cli_command *command, cli_view *v)
 {
-    *v = (cli_view){.command = command,
-                    .stiffness = 1,
-                    .damping = 1,
-                    .gravity = 1,
-                    .integrator = -1,
-                    .pulled = -1,
-                    .paused = true};
-    int code = cli_scene_load(command, &v->in);
+    *v = (cli_view){
+        .command = command, .stiffness = 1, .damping = 1, .gravity = 1, .pulled = -1, .paused = true};
+    int code = cli_scene_load(command, command->operand, &v->in);
     if (code == CLI_GO_ON)
         list_movables(v);
     return code;
-}
-
-void view_free(cli_view *v)
-{
-    cli_scene_free(&v->in);
 }
 
 /* ---- Running ---- */
@@ -99,10 +89,11 @@ static drape_status set_pull(cli_view *v, drape_sim *sim)
     const drape_model *m = v->in.model;
     double mass = v->pulled >= 0 ? m->mass[v->pulled] : 0;
     return v->pulled < 0 ? DRAPE_OK
-                         : drape_sim_pull(sim, v->pulled, PULL_NODES * mass * PULL_RATE * PULL_RATE, v->pull);
+                         : drape_sim_set_drag_spring(sim, v->pulled,
+                                                     PULL_NODES * mass * PULL_RATE * PULL_RATE, v->pull);
 }
 
-/* A model of the scene as it is now, and a sim in the state that was there, or at the start. */
+/* Compiles the scene as it is now and makes a sim, in the former state or at the start. */
 static drape_status rebuild(cli_view *v, bool keep_state)
 {
     drape_model *model = NULL;
@@ -145,7 +136,8 @@ static drape_status set_number(cli_view *v, const char *pointer, double value)
     return drape_scene_set(v->in.scene, pointer, text);
 }
 
-/* The parameters of this name of all terms, each term at its place in the scene: gravity's comes last and has none. */
+/* Scales the parameters of this name of all terms, each term at its place in the scene. Gravity, which is not listed there,
+ * comes last and has no parameters. */
 static drape_status scale_terms(cli_view *v, const char *name, double factor, int *changed)
 {
     const drape_model *m = v->in.model;
@@ -154,10 +146,10 @@ static drape_status scale_terms(cli_view *v, const char *name, double factor, in
     for (int32_t i = 0; i < m->term_count && !status; i++) {
         const drape_term *term = &m->terms[i];
         place = i > 0 && m->terms[i - 1].cloth == term->cloth ? place + 1 : 0;
-        for (int p = 0; p < term->ops->param_count && !status; p++) {
+        for (int p = 0; p < term->ops->entry.param_count && !status; p++) {
             char pointer[120];
-            if (strcmp(term->ops->params[p].name, name) != 0 ||
-                term->ops->params[p].kind != DRAPE_PARAM_NUMBER || isnan(term->params[p]))
+            if (strcmp(term->ops->entry.params[p].name, name) != 0 ||
+                term->ops->entry.params[p].kind != DRAPE_PARAM_NUMBER || isnan(term->params[p]))
                 continue;
             snprintf(pointer, sizeof pointer, "/cloth/%d/terms/%d/%s", (int)term->cloth, place, name);
             status = set_number(v, pointer, factor * term->params[p]);
@@ -167,8 +159,8 @@ static drape_status scale_terms(cli_view *v, const char *name, double factor, in
     return status;
 }
 
-/* After values were set: the model of them. A refusal is undone by setting what was there: the factor's inverse on
- * the model that stayed. */
+/* After values were set: makes the model with them. If it is refused, the caller sets the former values again, which the
+ * former model still has. */
 static bool commit(cli_view *v, drape_status status, int changed, const char *what)
 {
     v->message[0] = 0;
@@ -196,17 +188,6 @@ static drape_status set_stiffness(cli_view *v, double factor, int *changed)
     return status;
 }
 
-bool view_scale_stiffness(cli_view *v, double factor)
-{
-    int changed = 0;
-    drape_status set = set_stiffness(v, factor, &changed);
-    bool good = commit(v, set, changed, "stiffness");
-    if (!good)
-        set_stiffness(v, 1, &changed);
-    v->stiffness *= good ? factor : 1;
-    return good;
-}
-
 static drape_status set_damping(cli_view *v, double factor, int *changed)
 {
     static const char *const names[] = {"beta", "damping", "coefficient"};
@@ -216,34 +197,41 @@ static drape_status set_damping(cli_view *v, double factor, int *changed)
     return status;
 }
 
-bool view_scale_damping(cli_view *v, double factor)
-{
-    int changed = 0;
-    drape_status set = set_damping(v, factor, &changed);
-    bool good = commit(v, set, changed, "damping");
-    if (!good)
-        set_damping(v, 1, &changed);
-    v->damping *= good ? factor : 1;
-    return good;
-}
-
-static drape_status set_gravity(cli_view *v, double factor)
+static drape_status set_gravity(cli_view *v, double factor, int *changed)
 {
     const double *g = v->in.model->gravity;
     char text[120];
+    *changed += g[0] != 0 || g[1] != 0 || g[2] != 0;
     snprintf(text, sizeof text, "[%.17g, %.17g, %.17g]", factor * g[0], factor * g[1], factor * g[2]);
     return drape_scene_set(v->in.scene, "/gravity", text);
 }
 
+/* Multiplies values of the present model by a factor; product is that of all factors so far. */
+static bool scale(cli_view *v, drape_status (*set)(cli_view *v, double factor, int *changed), double factor,
+                  const char *what, double *product)
+{
+    int changed = 0;
+    drape_status status = set(v, factor, &changed);
+    bool good = commit(v, status, changed, what);
+    if (!good)
+        set(v, 1, &changed);
+    *product *= good ? factor : 1;
+    return good;
+}
+
+bool view_scale_stiffness(cli_view *v, double factor)
+{
+    return scale(v, set_stiffness, factor, "stiffness", &v->stiffness);
+}
+
+bool view_scale_damping(cli_view *v, double factor)
+{
+    return scale(v, set_damping, factor, "damping", &v->damping);
+}
+
 bool view_scale_gravity(cli_view *v, double factor)
 {
-    const double *g = v->in.model->gravity;
-    bool any = g[0] != 0 || g[1] != 0 || g[2] != 0;
-    bool good = commit(v, set_gravity(v, factor), any, "gravity");
-    if (!good)
-        set_gravity(v, 1);
-    v->gravity *= good ? factor : 1;
-    return good;
+    return scale(v, set_gravity, factor, "gravity", &v->gravity);
 }
 
 double view_dt(const cli_view *v)
@@ -253,7 +241,7 @@ double view_dt(const cli_view *v)
 
 const char *view_integrator(const cli_view *v)
 {
-    return v->in.sim->chosen.integrator->name;
+    return v->in.sim->chosen.integrator->entry.name;
 }
 
 bool view_scale_dt(cli_view *v, double factor)
@@ -265,21 +253,18 @@ bool view_scale_dt(cli_view *v, double factor)
     return good;
 }
 
-/* Rows without motion in time have nothing to show. */
+/* Skips integrators that only find a steady state. */
 bool view_next_integrator(cli_view *v, int step)
 {
-    const char *now = view_integrator(v);
-    int count = 0, at = 0;
-    for (; drape_integrators[count]; count++)
-        if (strcmp(drape_integrators[count]->name, now) == 0)
-            at = count;
+    const char *before = view_integrator(v);
+    const int count = drape_registry_count(&drape_integrator_registry);
+    int at = drape_registry_find(&drape_integrator_registry, NULL, before);
     do
         at = (at + step + count) % count;
-    while (drape_integrators[at]->timeless);
-    char before[64];
-    snprintf(before, sizeof before, "%s", now);
-    bool good = commit(v, drape_scene_set(v->in.scene, "/integrator/method", drape_integrators[at]->name), 1,
-                       "integrator");
+    while (drape_integrators[at]->steady_state);
+    bool good =
+        commit(v, drape_scene_set(v->in.scene, "/integrator/method", drape_integrators[at]->entry.name), 1,
+               "integrator");
     if (!good)
         drape_scene_set(v->in.scene, "/integrator/method", before);
     return good;
@@ -295,31 +280,18 @@ static drape_status set_track(cli_view *v, const view_movable *m, const double *
     return drape_scene_set(v->in.scene, m->pointer, text);
 }
 
-/* Where the track has it now: it may be on its way. */
-static void find_displacement(cli_view *v, view_movable *m, int index)
+bool view_move(cli_view *v, const double by[3])
 {
-    int saved = v->moved;
-    list_movables(v);
-    v->moved = saved;
-    *m = v->movables[index];
-}
-
-bool view_move(cli_view *v, const double way[3])
-{
-    view_movable m;
     double to[3];
     if (v->movable_count == 0)
         return commit(v, DRAPE_OK, 0, "colliders and pins");
-    find_displacement(v, &m, v->moved);
+    list_movables(v); /* where their tracks have them now: they may be moving */
+    const view_movable m = v->movables[v->moved];
     for (int k = 0; k < 3; k++)
-        to[k] = m.displacement[k] + way[k];
+        to[k] = m.displacement[k] + by[k];
     bool good = commit(v, set_track(v, &m, to), 1, "track");
-    if (!good) {
-        char message[sizeof v->message];
-        snprintf(message, sizeof message, "%s", v->message);
+    if (!good)
         set_track(v, &m, m.displacement);
-        note(v, message);
-    }
     return good;
 }
 
@@ -327,7 +299,7 @@ void view_pull(cli_view *v, int32_t node, const double target[3])
 {
     const double nowhere[3] = {0};
     if (v->pulled >= 0 && v->pulled != node)
-        drape_sim_pull(v->in.sim, v->pulled, 0, nowhere);
+        drape_sim_set_drag_spring(v->in.sim, v->pulled, 0, nowhere);
     v->pulled = node;
     if (node < 0)
         return;

@@ -7,15 +7,15 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Whether triangle t goes from a to b, not from b to a. */
+/* Whether triangle t runs along its edge from a to b, not from b to a. */
 static bool runs_along(const drape_mesh *mesh, int32_t t, int32_t a, int32_t b)
 {
     const int32_t *n = mesh->triangle + 3 * (size_t)t;
     return (n[0] == a && n[1] == b) || (n[1] == a && n[2] == b) || (n[2] == a && n[0] == b);
 }
 
-/* Six times the volume: the sum of the tetrahedra from the first node, which is near where the origin need
- * not be. */
+/* Six times the volume: the sum of the tetrahedra with the first node as apex, which is near to all others,
+ * as the origin need not be. */
 static double six_volumes(const drape_mesh *mesh)
 {
     double sum = 0, side[3][3], cross[3];
@@ -108,6 +108,6 @@ drape_status drape_shape_read_mesh(drape_collider_shape *shape, const char *para
         status = check_mesh(builder->ctx, &source, &mesh);
     if (!status)
         status = copy_mesh(&mesh, shape);
-    drape_mesh_free(builder->ctx, &mesh);
+    drape_mesh_free(&mesh);
     return status;
 }

@@ -31,14 +31,14 @@ drape_status drape_collider_build(drape_context *ctx, drape_arena *arena, const 
     struct drape_shape_builder builder = {
         .ctx = ctx, .arena = arena, .pointer = pointer, .folder = folder, .choice = &collider->choice};
     drape_status status =
-        drape_params_resolve(ctx, pointer, ops->params, ops->param_count, collider->choice.settings,
-                             collider->choice.setting_count, collider->values);
+        drape_params_resolve(ctx, pointer, ops->entry.params, ops->entry.param_count,
+                             collider->choice.settings, collider->choice.setting_count, collider->values);
     if (status)
         return status;
     collider->shape = (drape_collider_shape){.builder = &builder};
     ctx->message[0] = 0;
     status = ops->shape(collider->values, tolerance, &collider->shape);
     collider->shape.builder = NULL;
-    return drape_fail_unsaid(ctx, status, pointer, "shape() of \"%s\" returned %s", ops->name,
+    return drape_fail_unsaid(ctx, status, pointer, "shape() of \"%s\" returned %s", ops->entry.name,
                              drape_status_name(status));
 }

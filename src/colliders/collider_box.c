@@ -8,35 +8,14 @@
 enum { CENTER = 0, SIZE = 3, ROTATE = 6, ROUNDING = 9, PARAM_COUNT = 4 }; /* places of the values */
 
 static const drape_param params[PARAM_COUNT] = {
-    {.name = "center",
-     .kind = DRAPE_PARAM_VECTOR,
-     .unit = "m",
-     .default_value = NAN,
-     .min = -1e9,
-     .max = 1e9,
-     .help = "center of the box"},
-    {.name = "size",
-     .kind = DRAPE_PARAM_VECTOR,
-     .unit = "m",
-     .default_value = NAN,
-     .min = 0,
-     .max = 1e9,
-     .open_min = true,
-     .help = "whole lengths of its edges along x, y, z before it is turned; one number: a cube",
-     .uniform = true},
-    {.name = "rotate",
-     .kind = DRAPE_PARAM_TURN,
-     .unit = "degrees",
-     .default_value = 0,
-     .min = -1e6,
-     .max = 1e6,
-     .help = "turn about the center: axis and angle, or a vector along the axis as long as the angle"},
-    {.name = "rounding",
-     .unit = "m",
-     .default_value = 0,
-     .min = 0,
-     .max = 1e9,
-     .help = "radius of its edges and corners, below half of its least size; the size stays"},
+    DRAPE_VECTOR("center", "m", DRAPE_REQUIRED, -1e9, 1e9, "center of the box"),
+    DRAPE_VECTOR("size", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9,
+                 "whole lengths of its edges along x, y, z before it is turned; one number: a cube",
+                 .uniform = true),
+    DRAPE_TURN("rotate", 0, -1e6, 1e6,
+               "turn about the center: axis and angle, or a vector along the axis as long as the angle"),
+    DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
+                 "radius of its edges and corners, below half of its least size; the size stays"),
 };
 
 /* Rows are the axes of the box: y = frame (x - center). */
@@ -104,7 +83,7 @@ static void turn_back(const frame *f, const double *g, double *out)
         out[i] = g[0] * f->axis[0][i] + g[1] * f->axis[1][i] + g[2] * f->axis[2][i];
 }
 
-/* Outside of the core: d = |q+|; only directions in which q > 0 bend it. */
+/* Outside of the core d = |max(q, 0)|: only directions in which q > 0 have curvature. */
 static void bend(const frame *f, const double *q, const double *g, double length, double *curvature)
 {
     for (int i = 0; i < 9; i++) {
@@ -144,11 +123,10 @@ static double distance(const double *values, const drape_collider_shape *shape, 
 
 const drape_collider_ops drape_collider_box = {
     .struct_size = sizeof(drape_collider_ops),
-    .name = "box",
-    .summary = "a box, its edges rounded where wanted",
-    .reference = "d = |max(q, 0)| + min(max q, 0) - rounding, q = |y| - (size / 2 - rounding)",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "box",
+              .summary = "a box, its edges rounded where wanted",
+              .reference = "d = |max(q, 0)| + min(max q, 0) - rounding, q = |y| - (size / 2 - rounding)",
+              DRAPE_PARAMS(params)},
     .shape = make_shape,
     .distance = distance,
     .smooth = true,

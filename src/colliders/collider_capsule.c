@@ -2,28 +2,18 @@
  * (Ericson 2005, Real-Time Collision Detection, section 5.1.2). */
 #include "colliders/colliders.h"
 
-#include "colliders/round.h"
+#include "geometry/round.h"
 
 #include <string.h>
 
 enum { A = 0, B = 3, RADIUS = 6, PARAM_COUNT = 3 }; /* places of the values */
 
-#define END(name_, help_)                                                                                    \
-    {                                                                                                        \
-        .name = name_, .kind = DRAPE_PARAM_VECTOR, .unit = "m", .default_value = NAN, .min = -1e9,           \
-        .max = 1e9, .help = help_                                                                            \
-    }
+#define END(name, help) DRAPE_VECTOR(name, "m", DRAPE_REQUIRED, -1e9, 1e9, help)
 
 static const drape_param params[PARAM_COUNT] = {
     END("a", "center of one of the half balls at the ends"),
     END("b", "center of the other one"),
-    {.name = "radius",
-     .unit = "m",
-     .default_value = NAN,
-     .min = 0,
-     .max = 1e9,
-     .open_min = true,
-     .help = "radius around the segment from a to b"},
+    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "radius around the segment from a to b"),
 };
 
 static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)
@@ -60,11 +50,10 @@ static double distance(const double *values, const drape_collider_shape *shape, 
 
 const drape_collider_ops drape_collider_capsule = {
     .struct_size = sizeof(drape_collider_ops),
-    .name = "capsule",
-    .summary = "a cylinder with half balls at its ends",
-    .reference = "Ericson 2005, section 5.1.2: the nearest point of a segment",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "capsule",
+              .summary = "a cylinder with half balls at its ends",
+              .reference = "Ericson 2005, section 5.1.2: the nearest point of a segment",
+              DRAPE_PARAMS(params)},
     .shape = make_shape,
     .distance = distance,
     .smooth = true,

@@ -4,35 +4,21 @@
  * f_rr e e + f_rz (e u + u e) + f_zz u u + f_r / rho (I - e e - u u), u along the axis, e away from it. */
 #include "colliders/colliders.h"
 
-#include "colliders/round.h"
+#include "geometry/round.h"
 
 enum { A = 0, B = 3, RADIUS = 6, ROUNDING = 7, PARAM_COUNT = 4 }; /* places of the values */
 
-#define LEAST_SIDES 12
-#define MOST_SIDES  512
+#define MIN_SIDES 12
+#define MAX_SIDES 512
 
-#define END(name_, help_)                                                                                    \
-    {                                                                                                        \
-        .name = name_, .kind = DRAPE_PARAM_VECTOR, .unit = "m", .default_value = NAN, .min = -1e9,           \
-        .max = 1e9, .help = help_                                                                            \
-    }
+#define END(name, help) DRAPE_VECTOR(name, "m", DRAPE_REQUIRED, -1e9, 1e9, help)
 
 static const drape_param params[PARAM_COUNT] = {
     END("a", "center of one of the flat ends"),
     END("b", "center of the other one"),
-    {.name = "radius",
-     .unit = "m",
-     .default_value = NAN,
-     .min = 0,
-     .max = 1e9,
-     .open_min = true,
-     .help = "radius around the axis from a to b"},
-    {.name = "rounding",
-     .unit = "m",
-     .default_value = 0,
-     .min = 0,
-     .max = 1e9,
-     .help = "radius of its rims, below its radius and half of its length; length and radius stay"},
+    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "radius around the axis from a to b"),
+    DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
+                 "radius of its rims, below its radius and half of its length; length and radius stay"),
 };
 
 typedef struct axis {
@@ -66,8 +52,8 @@ static drape_status keep_axis(const double *values, drape_collider_shape *shape)
 static int32_t sides_of(double radius, double tolerance)
 {
     const double pi = 3.14159265358979323846;
-    double cosine = 1 - tolerance / radius, sides = cosine > 0 ? ceil(pi / acos(cosine)) : LEAST_SIDES;
-    return (int32_t)fmin(fmax(sides, LEAST_SIDES), MOST_SIDES); /* infinite for a tolerance of 0 */
+    double cosine = 1 - tolerance / radius, sides = cosine > 0 ? ceil(pi / acos(cosine)) : MIN_SIDES;
+    return (int32_t)fmin(fmax(sides, MIN_SIDES), MAX_SIDES); /* infinite for a tolerance of 0 */
 }
 
 /* Points 2 s and 2 s + 1 are the ends of ridge s. */
@@ -165,12 +151,12 @@ static double distance(const double *values, const drape_collider_shape *shape, 
 
 const drape_collider_ops drape_collider_cylinder = {
     .struct_size = sizeof(drape_collider_ops),
-    .name = "cylinder",
-    .summary = "a cylinder with flat ends, its rims rounded where wanted",
-    .reference =
-        "d = |max(q, 0)| + min(max q, 0) - rounding, q = (rho, |z|) - (radius, length / 2) + rounding",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry =
+        {.name = "cylinder",
+         .summary = "a cylinder with flat ends, its rims rounded where wanted",
+         .reference =
+             "d = |max(q, 0)| + min(max q, 0) - rounding, q = (rho, |z|) - (radius, length / 2) + rounding",
+         DRAPE_PARAMS(params)},
     .shape = make_shape,
     .distance = distance,
     .smooth = true,

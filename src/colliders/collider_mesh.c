@@ -1,6 +1,8 @@
-/* collider_mesh.c: the solid inside of a closed triangle mesh. Its distance bends in jumps, so that nodes of
- * the cloth meet its triangles. */
-#include "colliders/tree.h"
+/* collider_mesh.c: the solid inside of a closed triangle mesh. The normal of its distance jumps at edges, so
+ * cloth nodes are in contact with its triangles instead of its distance function. */
+#include "colliders/colliders.h"
+
+#include "geometry/mesh_distance.h"
 
 #include <math.h>
 
@@ -8,34 +10,12 @@
 enum { FILE_NAME = 0, TRANSLATE = 1, ROTATE = 4, SCALE = 7, PARAM_COUNT = 4 };
 
 static const drape_param params[PARAM_COUNT] = {
-    {.name = "file",
-     .kind = DRAPE_PARAM_TEXT,
-     .unit = "1",
-     .default_value = NAN,
-     .help = "an OBJ or PLY file relative to the scene, closed and counterclockwise from outside"},
-    {.name = "translate",
-     .kind = DRAPE_PARAM_VECTOR,
-     .unit = "m",
-     .default_value = 0,
-     .min = -1e9,
-     .max = 1e9,
-     .help = "applied last"},
-    {.name = "rotate",
-     .kind = DRAPE_PARAM_TURN,
-     .unit = "degrees",
-     .default_value = 0,
-     .min = -1e6,
-     .max = 1e6,
-     .help = "axis and angle, or a vector along the axis as long as the angle; about the origin"},
-    {.name = "scale",
-     .kind = DRAPE_PARAM_VECTOR,
-     .unit = "1",
-     .default_value = 1,
-     .min = 0,
-     .max = 1e9,
-     .open_min = true,
-     .help = "applied first; one number: in all directions",
-     .uniform = true},
+    DRAPE_TEXT("file", "an OBJ or PLY file relative to the scene, closed and counterclockwise from outside"),
+    DRAPE_VECTOR("translate", "m", 0, -1e9, 1e9, "applied last"),
+    DRAPE_TURN("rotate", 0, -1e6, 1e6,
+               "axis and angle, or a vector along the axis as long as the angle; about the origin"),
+    DRAPE_VECTOR("scale", "1", 1, DRAPE_ABOVE(0), 1e9, "applied first; one number: in all directions",
+                 .uniform = true),
 };
 
 static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)
@@ -45,7 +25,7 @@ static drape_status make_shape(const double *values, double tolerance, drape_col
         drape_shape_read_mesh(shape, "file", values + SCALE, values + ROTATE, values + TRANSLATE);
     if (status)
         return status;
-    shape->kept = drape_tree_make(shape);
+    shape->kept = drape_mesh_distance_create(shape->builder->arena, shape);
     return shape->kept ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
@@ -53,16 +33,15 @@ static double distance(const double *values, const drape_collider_shape *shape, 
                        double *normal, double *curvature)
 {
     (void)values;
-    return drape_tree_distance(shape->kept, shape, x, normal, curvature);
+    return drape_mesh_distance_at(shape->kept, shape, x, normal, curvature);
 }
 
 const drape_collider_ops drape_collider_mesh = {
     .struct_size = sizeof(drape_collider_ops),
-    .name = "mesh",
-    .summary = "the solid inside of a closed triangle mesh",
-    .reference = "Baerentzen and Aanaes 2005: signed distance by angle-weighted pseudo-normals",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "mesh",
+              .summary = "the solid inside of a closed triangle mesh",
+              .reference = "Baerentzen and Aanaes 2005: signed distance by angle-weighted pseudo-normals",
+              DRAPE_PARAMS(params)},
     .shape = make_shape,
     .distance = distance,
 };

@@ -9,20 +9,9 @@
 enum { POINT = 0, NORMAL = 3, PARAM_COUNT = 2 }; /* places of the values */
 
 static const drape_param params[PARAM_COUNT] = {
-    {.name = "point",
-     .kind = DRAPE_PARAM_VECTOR,
-     .unit = "m",
-     .default_value = NAN,
-     .min = -1e9,
-     .max = 1e9,
-     .help = "a point on the plane"},
-    {.name = "normal",
-     .kind = DRAPE_PARAM_VECTOR,
-     .unit = "1",
-     .default_value = NAN,
-     .min = -1e9,
-     .max = 1e9,
-     .help = "direction of the side that cloth is on, of any length but 0"},
+    DRAPE_VECTOR("point", "m", DRAPE_REQUIRED, -1e9, 1e9, "a point on the plane"),
+    DRAPE_VECTOR("normal", "1", DRAPE_REQUIRED, -1e9, 1e9,
+                 "direction of the side that cloth is on, of any length but 0"),
 };
 
 static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)
@@ -60,11 +49,10 @@ static double distance(const double *values, const drape_collider_shape *shape, 
 
 const drape_collider_ops drape_collider_plane = {
     .struct_size = sizeof(drape_collider_ops),
-    .name = "plane",
-    .summary = "the half space below a plane",
-    .reference = "d = n . (x - p)",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "plane",
+              .summary = "the half space below a plane",
+              .reference = "d = n . (x - p)",
+              DRAPE_PARAMS(params)},
     .shape = make_shape,
     .distance = distance,
     .smooth = true,

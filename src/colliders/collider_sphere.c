@@ -1,27 +1,15 @@
 /* collider_sphere.c: d = |x - c| - r. */
 #include "colliders/colliders.h"
 
-#include "colliders/round.h"
+#include "geometry/round.h"
 
 #include <string.h>
 
 enum { CENTER = 0, RADIUS = 3, PARAM_COUNT = 2 }; /* places of the values */
 
 static const drape_param params[PARAM_COUNT] = {
-    {.name = "center",
-     .kind = DRAPE_PARAM_VECTOR,
-     .unit = "m",
-     .default_value = NAN,
-     .min = -1e9,
-     .max = 1e9,
-     .help = "center of the sphere"},
-    {.name = "radius",
-     .unit = "m",
-     .default_value = NAN,
-     .min = 0,
-     .max = 1e9,
-     .open_min = true,
-     .help = "radius of the sphere"},
+    DRAPE_VECTOR("center", "m", DRAPE_REQUIRED, -1e9, 1e9, "center of the sphere"),
+    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "radius of the sphere"),
 };
 
 static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)
@@ -46,11 +34,7 @@ static double distance(const double *values, const drape_collider_shape *shape, 
 
 const drape_collider_ops drape_collider_sphere = {
     .struct_size = sizeof(drape_collider_ops),
-    .name = "sphere",
-    .summary = "a ball",
-    .reference = "d = |x - c| - r",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "sphere", .summary = "a ball", .reference = "d = |x - c| - r", DRAPE_PARAMS(params)},
     .shape = make_shape,
     .distance = distance,
     .smooth = true,

@@ -1,29 +1,30 @@
-/* colliders.h: the table of colliders, and what their users need: where one is, how far a point is from it.
+/* colliders.h: the table of colliders, the pose of a collider and the distance of a point from it.
  *
- * A row is the constant drape_collider_<word> of collider_<word>.c; its interface is drape/extend.h. */
+ * A collider is the constant drape_collider_<name> of collider_<name>.c; its interface is drape/extend.h. */
 #ifndef DRAPE_COLLIDERS_COLLIDERS_H
 #define DRAPE_COLLIDERS_COLLIDERS_H
 
 #include "model/model.h"
 
 extern const drape_collider_ops *const drape_colliders[]; /* NULL-ended */
+extern const drape_registry drape_collider_registry;
 
-/* ---- For those who meet colliders ---- */
+/* ---- Pose and distance ---- */
 
-/* Where a collider is: x in space is x - displacement in its own coordinates. */
+/* The pose of a collider: x in space is x - displacement in its own coordinates. */
 typedef struct drape_collider_pose {
     double displacement[3]; /* [m] */
-    double velocity[3];     /* [m/s] of the whole body; at a key of the track, that of the piece after it */
+    double velocity[3];     /* [m/s] of the whole body; at a key of the track, that of the segment after it */
 } drape_collider_pose;
 
 drape_collider_pose drape_collider_pose_at(const drape_collider *collider, double t);
 
 /* Signed distance [m] of a point of space; normal (3) and curvature (3 x 3 [1/m]) as in drape_collider_ops,
- * NULL where they are not wanted. */
+ * NULL if they are not needed. */
 double drape_collider_distance(const drape_collider *collider, const drape_collider_pose *pose,
                                const double *x, double *normal, double *curvature);
 
-/* ---- For whoever compiles one ---- */
+/* ---- Compiling a scene ---- */
 
 struct drape_shape_builder {
     drape_context *ctx;
@@ -31,11 +32,11 @@ struct drape_shape_builder {
     const char *pointer; /* of the collider: "/colliders/0" */
     const char *folder;  /* of relative files; NULL: the working directory */
     const drape_choice *choice;
-    bool reserved; /* the arrays of the shape are taken */
+    bool reserved; /* the arrays of the shape have been taken */
 };
 
 /* Resolves the parameters and makes the shape of a collider whose ops and choice are set; tolerance as in
- * drape_collider_ops. Faults are reported at pointer or below it. */
+ * drape_collider_ops. Errors are reported at pointer or below it. */
 drape_status drape_collider_build(drape_context *ctx, drape_arena *arena, const char *pointer,
                                   const char *folder, double tolerance, drape_collider *collider);
 

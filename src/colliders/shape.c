@@ -1,4 +1,4 @@
-/* shape.c: what a row of the colliders may ask for while it makes its shape. */
+/* shape.c: the functions for making the shape of a collider: refusing values, and taking memory. */
 #include "colliders/colliders.h"
 
 #include <stdarg.h>

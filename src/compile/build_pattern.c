@@ -22,11 +22,13 @@ drape_status drape_compile_pattern(drape_model *model)
     for (int32_t i = 0; i < model->term_count; i++)
         if (drape_term_couples(&model->terms[i]))
             couplings[count++] = drape_term_coupling(&model->terms[i]);
-    drape_status status = drape_pattern_build(model->ctx, model->free_count, model->free_of_node, couplings,
-                                              count, &model->pattern);
+    const size_t before = model->arena.bytes;
+    drape_status status = drape_pattern_build(&model->arena, model->free_count, model->free_of_node,
+                                              couplings, count, &model->pattern);
+    model->pattern_bytes = model->arena.bytes - before;
     drape_free(model->ctx, couplings);
     for (int32_t i = 0; !status && i < model->term_count; i++) {
-        status = drape_heed(model->ctx);
+        status = drape_check_cancel(model->ctx);
         if (!status && drape_term_couples(&model->terms[i]))
             status = place_term(model, &model->terms[i]);
     }

@@ -1,4 +1,4 @@
-/* build_terms.c: rows by name, their parameters, their elements; laws are tied to the measures of their
+/* build_terms.c: terms by name, their parameters, their elements; laws are tied to the measures of their
  * cloth. */
 #include "compile/stages.h"
 #include "terms/terms.h"
@@ -6,8 +6,6 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-
-#define MAX_NAMES 128
 
 struct drape_term_builder {
     drape_model *model;
@@ -43,7 +41,7 @@ drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t eleme
         drape_arena_take(arena, (size_t)element_count * (size_t)rest_count, sizeof *builder->rest);
     for (size_t i = 0; builder->node && i < (size_t)element_count * (size_t)el->nodes; i++)
         builder->node[i] = -1;
-    return builder->node && builder->rest ? DRAPE_OK : DRAPE_E_MEMORY;
+    return drape_arena_status(arena);
 }
 
 void drape_term_anchor(drape_term_builder *builder)
@@ -74,32 +72,15 @@ drape_status drape_term_refuse(drape_term_builder *builder, const char *format, 
     return drape_fail_at(builder->model->ctx, DRAPE_E_ARGUMENT, builder->pointer, "%s", text);
 }
 
-/* Row i of the built-in rows followed by the host's; NULL past the last. */
-static const drape_term_ops *row(const drape_context *ctx, int i)
+static drape_status find_term(drape_context *ctx, const char *pointer, const char *name,
+                              const drape_term_ops **out)
 {
-    int built_in = 0;
-    while (drape_terms[built_in])
-        built_in++;
-    if (i < built_in)
-        return drape_terms[i];
-    return i - built_in < ctx->host_term_count ? &ctx->host_terms[i - built_in] : NULL;
-}
-
-static drape_status find_row(drape_context *ctx, const char *pointer, const char *name,
-                             const drape_term_ops **out)
-{
-    const char *names[MAX_NAMES];
-    size_t count = 0;
-    for (int i = 0; (*out = row(ctx, i)) != NULL; i++) {
-        if (strcmp((*out)->name, name) == 0)
-            return DRAPE_OK;
-        if (count < MAX_NAMES)
-            names[count++] = (*out)->name;
-    }
-    const char *meant = drape_did_you_mean(name, names, count);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
-                         "there is no term \"%.60s\"%s%s%s; `drape list` shows all", name,
-                         DRAPE_MEANT(meant));
+    const int built_in = drape_registry_count(&drape_term_registry);
+    int i;
+    drape_status status = drape_registry_choose(ctx, &drape_term_registry, pointer, name, &i);
+    if (!status)
+        *out = i < built_in ? drape_terms[i] : &ctx->host_terms[i - built_in];
+    return status;
 }
 
 static drape_cloth_view view_of(const drape_model *model, const drape_cloth *cloth)
@@ -137,37 +118,38 @@ static drape_status check_elements(drape_term_builder *builder)
     const int needed = ops->measure ? 2 + ops->damped : 0;
     if (el->rest_count < needed)
         return drape_term_refuse(builder, "%s has %d numbers of rest data an element; its kind needs %d",
-                                 ops->name, el->rest_count, needed);
+                                 ops->entry.name, el->rest_count, needed);
     int32_t first = builder->first_node, last = first + builder->node_count - 1;
     if (builder->beyond)
-        return drape_term_refuse(builder, "%s set an element beyond the %d that it announced", ops->name,
-                                 (int)el->count);
+        return drape_term_refuse(builder, "%s set an element beyond the %d that it announced",
+                                 ops->entry.name, (int)el->count);
     for (size_t i = 0; i < (size_t)el->count; i++)
         if (el->node[i * (size_t)el->nodes] == -1)
             return drape_term_refuse(builder, "%s announced %d elements and did not set element %zu",
-                                     ops->name, (int)el->count, i);
+                                     ops->entry.name, (int)el->count, i);
     for (size_t i = 0; i < (size_t)el->count * (size_t)el->nodes; i++)
         if (el->node[i] < first || el->node[i] > last)
             return drape_term_refuse(builder, "element %zu of %s has node %d; the cloth's are 0 to %d",
-                                     i / (size_t)el->nodes, builder->term->ops->name,
+                                     i / (size_t)el->nodes, builder->term->ops->entry.name,
                                      (int)(el->node[i] - first), (int)(last - first));
     return DRAPE_OK;
 }
 
-static drape_status build_term(drape_model *model, int32_t c, const char *pointer, const drape_row_def *def)
+static drape_status build_term(drape_model *model, int32_t c, const char *pointer, const drape_entry_def *def)
 {
     drape_term *term = &model->terms[model->term_count];
     drape_cloth *cloth = &model->cloths[c];
-    drape_status status = drape_heed(model->ctx);
+    drape_status status = drape_check_cancel(model->ctx);
     if (!status)
-        status = find_row(model->ctx, pointer, def->type, &term->ops);
+        status = find_term(model->ctx, pointer, def->type, &term->ops);
     for (int32_t i = 0; !status && i < model->term_count; i++)
         if (model->terms[i].cloth == c && model->terms[i].ops == term->ops)
             status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "the term \"%s\" is named twice",
                                    def->type);
     if (!status)
-        status = drape_params_resolve(model->ctx, pointer, term->ops->params, term->ops->param_count,
-                                      def->settings, def->setting_count, term->params);
+        status =
+            drape_params_resolve(model->ctx, pointer, term->ops->entry.params, term->ops->entry.param_count,
+                                 def->settings, def->setting_count, term->params);
     if (status)
         return status;
     term->cloth = c;
@@ -186,8 +168,8 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
     drape_cloth_view view = view_of(model, cloth);
     model->ctx->message[0] = 0;
     status = term->ops->build(&view, term->params, &builder);
-    status = drape_fail_unsaid(model->ctx, status, pointer, "build() of \"%s\" returned %s", term->ops->name,
-                               drape_status_name(status));
+    status = drape_fail_unsaid(model->ctx, status, pointer, "build() of \"%s\" returned %s",
+                               term->ops->entry.name, drape_status_name(status));
     return status ? status : check_elements(&builder);
 }
 
@@ -210,11 +192,11 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
             status = build_term(model, c, pointer, &def->terms[i]);
     }
     if (!status && (g[0] != 0 || g[1] != 0 || g[2] != 0))
-        status = build_term(model, c, "/gravity", &(drape_row_def){.type = "gravity"});
+        status = build_term(model, c, "/gravity", &(drape_entry_def){.type = "gravity"});
     return status;
 }
 
-/* A row that can damp need not: where all its dashpots are 0 nothing asks for their rates. */
+/* A term that can damp need not: where all its dashpots are 0 nothing asks for their rates. */
 static const double *own_damping(const drape_term *term)
 {
     const drape_elements *el = &term->elements;
@@ -255,7 +237,7 @@ static drape_status tie(drape_model *model, int32_t c)
     if (cloth->law_count > 0 && !measured)
         return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
                              "\"%s\" has nothing to act on: no other term here has a strain measure",
-                             cloth->laws[0]->ops->name);
+                             cloth->laws[0]->ops->entry.name);
     return DRAPE_OK;
 }
 
@@ -283,13 +265,13 @@ static bool well_formed(const drape_term_ops *ops)
     bool sized =
         ops->law ? ops->nodes == 0 : ops->nodes >= 1 && ops->nodes <= DRAPE_MAX_ELEMENT_NODES && ops->build;
     bool internal = !ops->has_internal || (ops->commit && ops->initial);
-    return ops->name && ops->summary && ops->reference && ops->element_name && kinds == 1 && sized &&
-           internal && (!ops->damped || ops->measure) && (!ops->in_medium || ops->dissipation) &&
-           drape_params_are_well_formed(ops->params, ops->param_count);
+    return ops->entry.name && ops->entry.summary && ops->entry.reference && ops->element_name && kinds == 1 &&
+           sized && internal && (!ops->damped || ops->measure) && (!ops->in_medium || ops->dissipation) &&
+           drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
 }
 
 /* The first version's ops ended here. */
-#define LEAST_SIZE offsetof(drape_term_ops, in_medium)
+#define MIN_SIZE offsetof(drape_term_ops, in_medium)
 
 drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *given)
 {
@@ -298,11 +280,11 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *gi
         return DRAPE_E_ARGUMENT;
     if (!given)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_context_add_term: there are no ops");
-    if (given->struct_size < LEAST_SIZE || given->struct_size > sizeof own)
+    if (given->struct_size < MIN_SIZE || given->struct_size > sizeof own)
         return drape_fail(
             ctx, DRAPE_E_VERSION,
             "the ops of a term have %zu bytes; this library's have %zu, an older one's %zu or more",
-            given->struct_size, sizeof own, LEAST_SIZE);
+            given->struct_size, sizeof own, MIN_SIZE);
     memcpy(&own, given, given->struct_size);
     if (!well_formed(ops))
         return drape_fail(
@@ -312,14 +294,12 @@ drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *gi
             "energy, dissipation, law; nodes 1 to %d and build but for a law; commit and "
             "initial with has_internal; damped with a measure alone, in_medium with a dissipation; "
             "at most %d values of parameters, each with name and unit, a choice with choices",
-            ops->name ? ops->name : "?", DRAPE_MAX_ELEMENT_NODES, DRAPE_MAX_PARAMS);
-    const drape_term_ops *other = NULL;
-    for (int i = 0; (other = row(ctx, i)) != NULL; i++)
-        if (strcmp(other->name, ops->name) == 0)
-            return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a term \"%s\" already", ops->name);
+            ops->entry.name ? ops->entry.name : "?", DRAPE_MAX_ELEMENT_NODES, DRAPE_MAX_PARAMS);
+    if (drape_registry_find(&drape_term_registry, ctx, ops->entry.name) >= 0)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a term \"%s\" already", ops->entry.name);
     if (ctx->host_term_count == DRAPE_MAX_HOST_TERMS)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "term \"%s\": a context holds at most %d terms of the host",
-                          ops->name, DRAPE_MAX_HOST_TERMS);
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "term \"%s\": a context holds at most %d user-defined terms",
+                          ops->entry.name, DRAPE_MAX_HOST_TERMS);
     ctx->host_terms[ctx->host_term_count++] = own;
     return DRAPE_OK;
 }

@@ -1,119 +1,118 @@
-/* check_def.c: a scene def that a host filled may have NULL where something should be: found here, so that
- * nobody else has to look. */
+/* check_def.c: a scene def that a host filled may have NULL where something should be, or values that no scene
+ * could have: found here along the keys of a scene, so that nobody else has to look. */
 #include "compile/stages.h"
 
+#include <math.h>
 #include <stdio.h>
+#include <string.h>
 
-/* count of what, but no array, or an array with a hole. */
-static drape_status refuse(drape_context *ctx, const char *pointer, const char *what)
+#include "model/scene.h"
+#include "model/scene_text.h"
+
+typedef struct checker {
+    drape_context *ctx;
+    drape_pointer at; /* of what is being checked */
+} checker;
+
+static drape_status refuse_null(checker *c, const char *what)
 {
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s is NULL", what);
+    return drape_fail_at(c->ctx, DRAPE_E_ARGUMENT, c->at.text, "%s is NULL", what);
 }
 
-static drape_status check_settings(drape_context *ctx, const char *pointer, const drape_setting *settings,
-                                   size_t count)
+static drape_status check_settings(checker *c, const drape_scene_object *object, const char *def)
 {
+    const drape_setting *settings;
+    size_t count;
+    memcpy(&settings, def + object->settings_offset, sizeof settings);
+    memcpy(&count, def + object->settings_count_offset, sizeof count);
     if (count > 0 && !settings)
-        return refuse(ctx, pointer, "the array of settings");
+        return refuse_null(c, "the array of settings");
     for (size_t i = 0; i < count; i++)
         if (!settings[i].name)
-            return refuse(ctx, pointer, "the name of a setting");
+            return refuse_null(c, "the name of a setting");
     return DRAPE_OK;
 }
 
-static drape_status check_row(drape_context *ctx, const char *pointer, const drape_row_def *row)
+static drape_status check_value(checker *c, const drape_scene_key *key, const char *def)
 {
-    return check_settings(ctx, pointer, row->settings, row->setting_count);
+    drape_setting setting;
+    double values[DRAPE_PARAM_WIDEST];
+    if (drape_scene_value(key, def, &setting))
+        return drape_param_value(c->ctx, c->at.text, &key->param, &setting, values);
+    return drape_param_is_required(&key->param) ? drape_param_missing(c->ctx, c->at.text, &key->param)
+                                                : DRAPE_OK;
 }
 
-static drape_status check_terms(drape_context *ctx, const char *pointer, const drape_cloth_def *cloth)
+static drape_status check_object(checker *c, const drape_scene_object *object, const char *def);
+
+/* Integers of a list, and the keys of a track, are checked by those who take them. */
+static drape_status check_array(checker *c, const drape_scene_key *key, const char *def)
 {
-    char at[96];
-    if (cloth->term_count > 0 && !cloth->terms)
-        return refuse(ctx, pointer, "the array of terms");
-    for (size_t i = 0; i < cloth->term_count; i++) {
-        snprintf(at, sizeof at, "%s/terms/%zu", pointer, i);
-        drape_status status = cloth->terms[i].type ? check_row(ctx, at, &cloth->terms[i])
-                                                   : refuse(ctx, at, "the type of a term");
-        if (status)
-            return status;
+    const size_t mark = c->at.length;
+    const char *array;
+    size_t count, size = key->child ? key->child->def_size : sizeof(const char *);
+    memcpy(&array, def + key->offset, sizeof array);
+    memcpy(&count, def + key->count_offset, sizeof count);
+    if (count > 0 && !array)
+        return refuse_null(c, "the array");
+    if (key->at_most && count > key->at_most) {
+        char takes[128];
+        drape_scene_takes_text(key, takes, sizeof takes);
+        return drape_fail_at(c->ctx, DRAPE_E_ARGUMENT, c->at.text, "an array of %zu is not allowed; %s is %s",
+                             count, key->param.name, takes);
     }
-    return DRAPE_OK;
-}
-
-static drape_status check_pins(drape_context *ctx, const char *pointer, const drape_cloth_def *cloth)
-{
-    char at[96];
-    if (cloth->pin_count > 0 && !cloth->pins)
-        return refuse(ctx, pointer, "the array of pins");
-    for (size_t i = 0; i < cloth->pin_count; i++) {
-        snprintf(at, sizeof at, "%s/pins/%zu", pointer, i);
-        if (cloth->pins[i].node_count > 0 && !cloth->pins[i].nodes)
-            return refuse(ctx, at, "the array of nodes");
-        if (cloth->pins[i].key_count > 0 && !cloth->pins[i].track)
-            return refuse(ctx, at, "the track");
+    const bool has_texts = key->shape == DRAPE_SCENE_LIST && key->param.kind == DRAPE_PARAM_TEXT;
+    const drape_scene_key text = {.param = {.name = "an element",
+                                            .kind = DRAPE_PARAM_TEXT,
+                                            .unit = "1",
+                                            .default_value = NAN,
+                                            .help = key->param.help}};
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && (key->child || has_texts) && i < count; i++) {
+        drape_pointer_push_index(&c->at, i);
+        status = key->child ? check_object(c, key->child, array + i * size)
+                            : check_value(c, &text, array + i * size);
+        if (!status)
+            drape_pointer_cut(&c->at, mark);
     }
-    return DRAPE_OK;
-}
-
-static drape_status check_collider(drape_context *ctx, size_t i, const drape_collider_def *collider)
-{
-    char pointer[64];
-    snprintf(pointer, sizeof pointer, "/colliders/%zu", i);
-    if (!collider->row.type)
-        return refuse(ctx, pointer, "the type of a collider");
-    if (collider->key_count > 0 && !collider->track)
-        return refuse(ctx, pointer, "the track");
-    return check_row(ctx, pointer, &collider->row);
-}
-
-static drape_status check_contact(drape_context *ctx, const drape_scene_def *def)
-{
-    if (def->collider_count > 0 && !def->colliders)
-        return refuse(ctx, "/colliders", "the array of colliders");
-    if (def->collider_count > DRAPE_MOST_COLLIDERS)
-        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/colliders",
-                             "the scene has %zu colliders; it has at most %d", def->collider_count,
-                             DRAPE_MOST_COLLIDERS);
-    drape_status status = check_settings(ctx, "/contact", def->contact, def->contact_count);
-    if (!status)
-        status = check_settings(ctx, "/self_contact", def->self_contact, def->self_contact_count);
-    for (size_t i = 0; !status && i < def->collider_count; i++)
-        status = check_collider(ctx, i, &def->colliders[i]);
     return status;
 }
 
-static drape_status check_cloth(drape_context *ctx, size_t c, const drape_cloth_def *cloth)
+static drape_status check_key(checker *c, const drape_scene_key *key, const char *def)
 {
-    char pointer[64], at[96];
-    snprintf(pointer, sizeof pointer, "/cloth/%zu", c);
-    snprintf(at, sizeof at, "%s/mesh", pointer);
-    drape_status status = check_row(ctx, at, &cloth->mesh.grid);
-    if (!status && cloth->mesh.positions && cloth->mesh.triangle_count > 0 && !cloth->mesh.triangles)
-        status = refuse(ctx, at, "the array of triangles");
-    snprintf(at, sizeof at, "%s/material", pointer);
-    if (!status)
-        status = check_settings(ctx, at, cloth->material, cloth->material_count);
-    if (!status)
-        status = check_terms(ctx, pointer, cloth);
-    return status ? status : check_pins(ctx, pointer, cloth);
+    switch (key->shape) {
+    case DRAPE_SCENE_VALUE:
+        return check_value(c, key, def);
+    case DRAPE_SCENE_OBJECT:
+        return check_object(c, key->child, def + key->offset);
+    case DRAPE_SCENE_LIST:
+    case DRAPE_SCENE_TRACK:
+    case DRAPE_SCENE_OBJECTS:
+    case DRAPE_SCENE_ENTRIES:
+        return check_array(c, key, def);
+    case DRAPE_SCENE_VERSION:
+    case DRAPE_SCENE_REMARK:
+    case DRAPE_SCENE_BOX:
+        break;
+    }
+    return DRAPE_OK;
+}
+
+static drape_status check_object(checker *c, const drape_scene_object *object, const char *def)
+{
+    const size_t mark = c->at.length;
+    drape_status status = object->open ? check_settings(c, object, def) : DRAPE_OK;
+    for (size_t i = 0; !status && i < object->key_count; i++) {
+        drape_pointer_push(&c->at, object->keys[i].param.name);
+        status = check_key(c, &object->keys[i], def);
+        if (!status)
+            drape_pointer_cut(&c->at, mark);
+    }
+    return status;
 }
 
 drape_status drape_compile_check_def(drape_context *ctx, const drape_scene_def *def)
 {
-    if (def->cloth_count > 0 && !def->cloths)
-        return refuse(ctx, "/cloth", "the array of cloths");
-    if (def->format_count > 0 && !def->formats)
-        return refuse(ctx, "/output/formats", "the array of formats");
-    for (size_t i = 0; i < def->format_count; i++)
-        if (!def->formats[i])
-            return refuse(ctx, "/output/formats", "a format");
-    drape_status status = check_row(ctx, "/integrator", &def->integrator);
-    if (!status)
-        status = check_row(ctx, "/controller", &def->controller);
-    if (!status)
-        status = check_contact(ctx, def);
-    for (size_t c = 0; !status && c < def->cloth_count; c++)
-        status = check_cloth(ctx, c, &def->cloths[c]);
-    return status;
+    checker c = {.ctx = ctx};
+    return check_object(&c, &drape_form_scene, (const char *)def);
 }

@@ -1,45 +1,25 @@
-/* colliders.c: rows by name, their parameters, shapes and tracks. */
+/* colliders.c: colliders by name, their parameters, shapes and tracks. */
 #include "colliders/colliders.h"
 #include "compile/stages.h"
 
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_NAMES     128
-#define MOST_FRICTION 1e3
-
 /* How far a polygon may stay inside a curved surface, of the activation distance: an edge of the cloth that
  * rests on a polygon then is pushed off nearly as if it were the surface. */
 #define SHARE_OF_DISTANCE 0.1
 
-/* Row i of the built-in rows followed by the host's; NULL past the last. */
-static const drape_collider_ops *row(const drape_context *ctx, int i)
+static drape_status find_collider(drape_context *ctx, const char *pointer, const char *name,
+                                  const drape_collider_ops **out)
 {
-    int built_in = 0;
-    while (drape_colliders[built_in])
-        built_in++;
-    if (i < built_in)
-        return drape_colliders[i];
-    return i - built_in < ctx->host_collider_count ? &ctx->host_colliders[i - built_in] : NULL;
-}
-
-static drape_status find_row(drape_context *ctx, const char *pointer, const char *name,
-                             const drape_collider_ops **out)
-{
-    const char *names[MAX_NAMES];
+    const int built_in = drape_registry_count(&drape_collider_registry);
     char at[96];
-    size_t count = 0;
-    for (int i = 0; (*out = row(ctx, i)) != NULL; i++) {
-        if (strcmp((*out)->name, name) == 0)
-            return DRAPE_OK;
-        if (count < MAX_NAMES)
-            names[count++] = (*out)->name;
-    }
-    const char *meant = drape_did_you_mean(name, names, count);
+    int i;
     snprintf(at, sizeof at, "%s/type", pointer);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at,
-                         "there is no collider \"%.60s\"%s%s%s; `drape list` shows all", name,
-                         DRAPE_MEANT(meant));
+    drape_status status = drape_registry_choose(ctx, &drape_collider_registry, at, name, &i);
+    if (!status)
+        *out = i < built_in ? drape_colliders[i] : &ctx->host_colliders[i - built_in];
+    return status;
 }
 
 static drape_status name_collider(drape_model *model, const char *pointer, const char *given,
@@ -55,19 +35,7 @@ static drape_status name_collider(drape_model *model, const char *pointer, const
             return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "two colliders have the name \"%.60s\"",
                                  wanted);
     to->name = drape_arena_text(&model->arena, wanted);
-    return to->name ? DRAPE_OK : DRAPE_E_MEMORY;
-}
-
-static drape_status take_friction(drape_model *model, const char *pointer, double friction,
-                                  drape_collider *to)
-{
-    char at[96];
-    snprintf(at, sizeof at, "%s/friction", pointer);
-    to->friction = friction;
-    if (friction >= 0 && friction <= MOST_FRICTION)
-        return DRAPE_OK;
-    return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, at, "%.10g is not allowed; it is in [0, %g]", friction,
-                         MOST_FRICTION);
+    return drape_arena_status(&model->arena);
 }
 
 static drape_status compile_collider(drape_model *model, size_t i, const drape_scene_def *scene)
@@ -77,12 +45,11 @@ static drape_status compile_collider(drape_model *model, size_t i, const drape_s
     char pointer[64];
     snprintf(pointer, sizeof pointer, "/colliders/%zu", i);
     drape_status status = name_collider(model, pointer, def->name, to);
+    to->friction = def->friction;
     if (!status)
-        status = find_row(model->ctx, pointer, def->row.type, &to->ops);
+        status = find_collider(model->ctx, pointer, def->entry.type, &to->ops);
     if (!status)
-        status = take_friction(model, pointer, def->friction, to);
-    if (!status)
-        status = drape_compile_choice(model, &def->row, "", &to->choice);
+        status = drape_compile_choice(model, &def->entry, "", &to->choice);
     if (!status && def->key_count > 0)
         status = drape_compile_track(model, pointer, def->track, def->key_count, &to->track);
     return status ? status
@@ -99,7 +66,7 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
     if (!model->colliders)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; !status && i < def->collider_count; i++) {
-        status = drape_heed(model->ctx);
+        status = drape_check_cancel(model->ctx);
         if (!status)
             status = compile_collider(model, i, def);
     }
@@ -111,40 +78,39 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
 
 static bool well_formed(const drape_collider_ops *ops)
 {
-    bool named = ops->name && ops->summary && ops->reference && ops->shape && ops->distance;
-    return named && drape_params_are_well_formed(ops->params, ops->param_count);
+    bool named = ops->entry.name && ops->entry.summary && ops->entry.reference && ops->shape && ops->distance;
+    return named && drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
 }
 
-/* The first version's ops ended here: `smooth` may be missing, and a collider without it is met by its triangles. */
-#define LEAST_SIZE offsetof(drape_collider_ops, smooth)
+/* The first version's ops ended here: `smooth` may be missing, and a collider without it is met by its
+ * triangles. */
+#define MIN_SIZE offsetof(drape_collider_ops, smooth)
 
 drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *given)
 {
     drape_collider_ops own = {0}, *ops = &own;
-    const drape_collider_ops *other = NULL;
     if (!ctx)
         return DRAPE_E_ARGUMENT;
     if (!given)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_context_add_collider: there are no ops");
-    if (given->struct_size < LEAST_SIZE || given->struct_size > sizeof own)
+    if (given->struct_size < MIN_SIZE || given->struct_size > sizeof own)
         return drape_fail(
             ctx, DRAPE_E_VERSION,
             "the ops of a collider have %zu bytes; this library's have %zu, an older one's %zu or more",
-            given->struct_size, sizeof own, LEAST_SIZE);
+            given->struct_size, sizeof own, MIN_SIZE);
     memcpy(&own, given, given->struct_size);
     if (!well_formed(ops))
         return drape_fail(
             ctx, DRAPE_E_ARGUMENT,
             "the ops of collider \"%s\" are not well formed: name, summary, reference, shape, "
             "distance; at most %d values of parameters, each with name and unit, a choice with choices",
-            ops->name ? ops->name : "?", DRAPE_MAX_PARAMS);
-    for (int i = 0; (other = row(ctx, i)) != NULL; i++)
-        if (strcmp(other->name, ops->name) == 0)
-            return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a collider \"%s\" already", ops->name);
+            ops->entry.name ? ops->entry.name : "?", DRAPE_MAX_PARAMS);
+    if (drape_registry_find(&drape_collider_registry, ctx, ops->entry.name) >= 0)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "there is a collider \"%s\" already", ops->entry.name);
     if (ctx->host_collider_count == DRAPE_MAX_HOST_COLLIDERS)
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
-                          "collider \"%s\": a context holds at most %d colliders of the host", ops->name,
-                          DRAPE_MAX_HOST_COLLIDERS);
+                          "collider \"%s\": a context holds at most %d user-defined colliders",
+                          ops->entry.name, DRAPE_MAX_HOST_COLLIDERS);
     ctx->host_colliders[ctx->host_collider_count++] = own;
     return DRAPE_OK;
 }

@@ -1,22 +1,11 @@
-/* compile.h: scene + rows -> model. The only place that looks rows up while a model is built. */
+/* compile.h: scene -> model. The only place that looks up names while a model is built. */
 #ifndef DRAPE_COMPILE_COMPILE_H
 #define DRAPE_COMPILE_COMPILE_H
 
+#include "base/registry.h"
 #include "model/model.h"
 
-/* The parameters of a material, in this order. */
-enum {
-    DRAPE_MATERIAL_YOUNG_MODULUS,
-    DRAPE_MATERIAL_POISSON_RATIO,
-    DRAPE_MATERIAL_THICKNESS,
-    DRAPE_MATERIAL_DENSITY,
-    DRAPE_MATERIAL_AREAL_DENSITY,
-    DRAPE_MATERIAL_TOTAL_MASS,
-    DRAPE_MATERIAL_MASS,
-    DRAPE_MATERIAL_FABRIC,
-    DRAPE_MATERIAL_PARAM_COUNT
-};
-extern const drape_param drape_material_params[DRAPE_MATERIAL_PARAM_COUNT];
+extern const drape_entry drape_material_entry; /* its parameters are those of a material */
 
 /* The parameters of contact and of self-contact, in this order, and their values in a model. */
 enum {
@@ -29,11 +18,15 @@ enum {
 enum { DRAPE_SELF_THICKNESS, DRAPE_SELF_FRICTION, DRAPE_SELF_PARAM_COUNT };
 extern const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT];
 extern const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT];
+
+/* What has parameters and no kinds: a table of one entry each. */
+extern const drape_registry drape_material_registry, drape_contact_registry, drape_self_contact_registry;
+
 void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_CONTACT_PARAM_COUNT]);
 void drape_self_contact_values(const drape_contact_def *contact, double values[DRAPE_SELF_PARAM_COUNT]);
 
-/* A host's def, of this version or an older one, as one of this version: what it points to and is not the host's still
- * lives in the arena. Errors: DRAPE_E_VERSION, DRAPE_E_MEMORY. */
+/* A host's def, of this version or an older one, as one of this version: what it points to and is not the
+ * host's still lives in the arena. Errors: DRAPE_E_VERSION, DRAPE_E_MEMORY. */
 drape_status drape_compile_read_def(drape_context *ctx, drape_arena *arena, const drape_scene_def *given,
                                     drape_scene_def *out);
 

@@ -9,55 +9,25 @@ static const char *const frictions[] = {"implicit", "lagged", NULL};
 
 const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
     [DRAPE_CONTACT_DISTANCE] =
-        {.name = "distance",
-         .unit = "m",
-         .default_value = NAN,
-         .derived = "the largest thickness of the cloths",
-         .min = 0,
-         .max = 1e3,
-         .open_min = true,
-         .help = "activation distance: nearer to a collider than this, cloth is pushed off"},
-    [DRAPE_CONTACT_STIFFNESS] =
-        {.name = "stiffness",
-         .unit = "Pa",
-         .default_value = NAN,
-         .derived =
-             "areal density (2 gravity L + v^2) / distance, L the diagonal of the rest bounding box, v the "
-             "greatest speed of cloth at the start and of colliders, together",
-         .min = 0,
-         .max = 1e15,
-         .open_min = true,
-         .help = "scale of the contact pressure at that distance"},
-    [DRAPE_CONTACT_FRICTION_VELOCITY] = {.name = "friction_velocity",
-                                         .unit = "m/s",
-                                         .default_value = 1e-3,
-                                         .min = 0,
-                                         .max = 1e3,
-                                         .open_min = true,
-                                         .help = "sliding slower than this, friction falls to zero smoothly"},
+        DRAPE_NUMBER("distance", "m", DRAPE_DERIVED("the largest thickness of the cloths"), DRAPE_ABOVE(0),
+                     1e3, "activation distance: nearer to a collider than this, cloth is pushed off"),
+    [DRAPE_CONTACT_STIFFNESS] = DRAPE_NUMBER(
+        "stiffness", "Pa",
+        DRAPE_DERIVED("areal density (2 gravity L + v^2) / distance, L the diagonal of the rest bounding "
+                      "box, v the greatest speed of cloth at the start and of colliders, together"),
+        DRAPE_ABOVE(0), 1e15, "scale of the contact pressure at that distance"),
+    [DRAPE_CONTACT_FRICTION_VELOCITY] =
+        DRAPE_NUMBER("friction_velocity", "m/s", 1e-3, DRAPE_ABOVE(0), 1e3,
+                     "sliding slower than this, friction falls to zero smoothly"),
     [DRAPE_CONTACT_FRICTION] =
-        {.name = "friction",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = IMPLICIT,
-         .choices = frictions,
-         .help = "implicit: of the normal force at the end of the step; lagged: at its start"},
+        DRAPE_CHOICE("friction", IMPLICIT, frictions,
+                     "implicit: of the normal force at the end of the step; lagged: at its start"),
 };
 
 const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT] = {
-    [DRAPE_SELF_THICKNESS] = {.name = "thickness",
-                              .unit = "m",
-                              .default_value = NAN,
-                              .min = 0,
-                              .max = 1e3,
-                              .open_min = true,
-                              .help = "half the distance that layers of cloth are kept apart"},
-    [DRAPE_SELF_FRICTION] = {.name = "friction",
-                             .unit = "1",
-                             .default_value = 0,
-                             .min = 0,
-                             .max = 1e3,
-                             .help = "Coulomb's mu between layers of cloth"},
+    [DRAPE_SELF_THICKNESS] = DRAPE_NUMBER("thickness", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e3,
+                                          "half the distance that layers of cloth are kept apart"),
+    [DRAPE_SELF_FRICTION] = DRAPE_NUMBER("friction", "1", 0, 0, 1e3, "Coulomb's mu between layers of cloth"),
 };
 
 void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_CONTACT_PARAM_COUNT])
@@ -112,9 +82,9 @@ static double scene_speed(const drape_model *model)
 }
 
 /* sigma (2 |g| L + v^2) / d, sigma the largest areal density, L the scene's size: up to where it touches, the
- * barrier takes up 6 d of it an area (contact/barrier.h), 12 times the energy of that speed and of a fall over
- * L; what has more cannot be stopped. The cloth's own weight is at most d / (2 L) of the stiffness, so that at
- * rest it lies nearly d off. Without gravity L / s^2 stands for |g|. */
+ * barrier takes up 6 d of it an area (contact/barrier.h), 12 times the energy of that speed and of a fall
+ * over L; what has more cannot be stopped. The cloth's own weight is at most d / (2 L) of the stiffness, so
+ * that at rest it lies nearly d off. Without gravity L / s^2 stands for |g|. */
 static double stiffness_of_fall(const drape_model *model)
 {
     double sigma = 0, g = norm(model->gravity), v = scene_speed(model);
@@ -159,8 +129,8 @@ static drape_status resolve_self_contact(drape_model *model, const drape_scene_d
 
 drape_status drape_compile_contact(drape_model *model, const drape_scene_def *def)
 {
-    const drape_row_def contact = {.settings = def->contact, .setting_count = def->contact_count};
-    const drape_row_def self = {.settings = def->self_contact, .setting_count = def->self_contact_count};
+    const drape_entry_def contact = {.settings = def->contact, .setting_count = def->contact_count};
+    const drape_entry_def self = {.settings = def->self_contact, .setting_count = def->self_contact_count};
     drape_status status = resolve_contact(model, def);
     if (!status)
         status = resolve_self_contact(model, def);

@@ -1,24 +1,25 @@
 /*
- * fabrics.c: measured fabrics. A new one is a line of fabrics_table.h.
+ * fabrics.c: measured fabrics. A new one is a line in fabrics_table.h.
  *
  * Wang, O'Brien & Ramamoorthi 2011, Data-driven elastic models for cloth (ACM TOG 30, 4): areal density, tension, shear and
- * bending of ten fabrics, all of the same specimens; their data base, as it comes with ARCSim, read by the forces that ARCSim,
- * of the same group, makes of it: stress C (F'F - I), so K = 2 c of Green's strain and c33 of the shear angle, at rest (the
- * first line of a file; they stiffen at 17 %), and k |e|^2/(8 (A1 + A2)) theta^2 for a hinge, so a rigidity k/4, along what
- * the hinge bends. Warp is the direction v, in which none of the elastic yarns of the jeans run. A negative coupling, which no
- * elastic sheet of theirs has after ARCSim read it, is 0. That both stiff wovens have c = 2 000 within a per cent may be the
- * end of what their fit allowed.
+ * bending of ten fabrics, measured on the same specimens. The values are from their data base, which comes with ARCSim,
+ * interpreted as the forces of ARCSim, by the same group, do: stress C (F'F - I), so K = 2 c of Green's strain and c33 of
+ * the shear angle, at rest (the first line of a file; they stiffen at 17 %), and k |e|^2/(8 (A1 + A2)) theta^2 for a hinge,
+ * so a rigidity k/4 in the direction that the hinge bends. Warp is the direction v, in which the jeans have no elastic
+ * yarns. Negative couplings are set to 0, as ARCSim does. Both stiff wovens have c = 2 000 within one per cent, which may
+ * be a bound of their fit.
  *
  * Feng, Huang, Xu & Wang 2022, Learning-based bending stiffness parameter estimation by a drape tester (ACM TOG 41, 6):
- * areal density and, by cantilever tests, rigidities of strips of 618 fabrics along warp, weft and the diagonal; lines of
- * their data set, by number, the linear coefficient. Tension and shear were not measured.
+ * areal density and, by cantilever tests, rigidities of strips of 618 fabrics along warp, weft and the diagonal. The values
+ * are the linear coefficients of lines of their data set, by number. Tension and shear were not measured.
  *
  * Matsudaira, Masuda, Wada & Yokura 2015, Shape factor of flared skirts compared with that of circular fabrics (J. Textile
- * Eng. 61, 69): areal density, bending (KES-FB2: B, one value for both directions) and drape coefficient. Their tables, at second
- * hand, without G; 2HB, the moment that rubbing yarns keep, has no place in an elastic term: docs/validate.md.
+ * Eng. 61, 69): areal density, bending (KES-FB2: B, one value for both directions) and drape coefficient. Their tables are
+ * quoted from another paper, without G; 2HB, the moment of friction between yarns, has no place in an elastic term:
+ * docs/validate.md.
  *
- * What was not published is derived. Tension: 500 gf/cm (490 N/m), the load of a KES test, at 5 %, a few per cent being what
- * wovens give under it. Shear: the median of the ten fabrics of Wang et al. Twist: that of an isotropic sheet.
+ * Values that were not published are derived. Tension: that of 500 gf/cm (490 N/m), the load of a KES test, at 5 %, as wovens
+ * stretch by a few per cent under it. Shear: the median of the ten fabrics of Wang et al. Twist: that of an isotropic sheet.
  */
 #include "compile/fabrics.h"
 
@@ -31,12 +32,12 @@
 #define SHEAR   34.4 /* [N/m] */
 
 /* clang-format off */
-#define ROW(name, what, source, density, warp, weft, coupling, shear, bend_warp, bend_weft, bend_diagonal, drape)      \
-    {name, what, source, density, {warp, weft, coupling, shear}, {bend_warp, bend_weft, bend_diagonal}, drape},
+#define ROW(name, what, source, density, warp, weft, coupling, shear, bend_warp, bend_weft, diagonal, drape) \
+    {name, what, source, density, {warp, weft, coupling, shear}, {bend_warp, bend_weft, diagonal}, drape},
 const drape_fabric drape_fabrics[] = {DRAPE_FABRICS(ROW) {NULL, NULL, NULL, 0, {0, 0, 0, 0}, {0, 0, 0}, 0}};
 #undef ROW
 
-#define ROW(name, what, source, density, warp, weft, coupling, shear, bend_warp, bend_weft, bend_diagonal, drape) name,
+#define ROW(name, ...) name,
 const char *const drape_fabric_names[] = {DRAPE_FABRICS(ROW) NULL};
 #undef ROW
 
@@ -47,7 +48,7 @@ static double or_else(double published, double derived)
     return isnan(published) ? derived : published;
 }
 
-/* Of strips with free sides: C11 (1 - nu^2), nu^2 = C12^2/(C11 C22). */
+/* Stiffnesses of strips with free sides: C11 (1 - nu^2) with nu^2 = C12^2/(C11 C22). */
 void drape_fabric_tension(const drape_fabric *fabric, drape_woven *tension)
 {
     const double warp = or_else(fabric->tension.warp, TENSION), weft = or_else(fabric->tension.weft, TENSION);
@@ -55,8 +56,8 @@ void drape_fabric_tension(const drape_fabric *fabric, drape_woven *tension)
     *tension = (drape_woven){warp * free, weft * free, or_else(fabric->tension.shear, SHEAR), nu};
 }
 
-/* A strip at 45 degrees of an orthotropic plate has 4/B45 = 1/B1 + 1/B2 - 2 nu/sqrt(B1 B2) + 1/twist; nu = 0, as it was
- * not measured either. */
+/* A strip at 45 degrees of an orthotropic plate has 4/B45 = 1/B1 + 1/B2 - 2 nu/sqrt(B1 B2) + 1/twist; nu was not measured
+ * and is taken as 0. */
 void drape_fabric_bending(const drape_fabric *fabric, drape_woven *bending)
 {
     const double warp = fabric->bending.warp, weft = fabric->bending.weft;

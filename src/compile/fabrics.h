@@ -4,7 +4,7 @@
 
 #include "drape/extend.h"
 
-/* What was published of a fabric; NaN: it was not. */
+/* The published data of a fabric; NaN: not published. */
 typedef struct drape_fabric {
     const char *name, *what, *source;
     double areal_density; /* [kg/m2] */
@@ -17,11 +17,11 @@ typedef struct drape_fabric {
     double drape; /* drape coefficient of the tester [1] */
 } drape_fabric;
 
-extern const drape_fabric drape_fabrics[]; /* the first is none, the last has no name */
+extern const drape_fabric drape_fabrics[]; /* the first is "none"; ended by one whose name is NULL */
 extern const char *const drape_fabric_names[];
 
-/* What terms take, with what was not published derived: tension 1e4 N/m, shear 34.4 N/m, no coupling; a twist as that
- * of an isotropic sheet. */
+/* The values that terms use. Those not published are derived: tension 1e4 N/m, shear 34.4 N/m, no coupling, and the twist of
+ * an isotropic sheet. */
 void drape_fabric_tension(const drape_fabric *fabric, drape_woven *tension);
 void drape_fabric_bending(const drape_fabric *fabric, drape_woven *bending);
 

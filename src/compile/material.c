@@ -9,80 +9,54 @@
 #include <stdio.h>
 #include <string.h>
 
-_Static_assert(sizeof(((drape_cloth *)0)->material_values) >= DRAPE_MATERIAL_PARAM_COUNT * sizeof(double),
-               "room for all values of a material");
+enum {
+    YOUNG_MODULUS,
+    POISSON_RATIO,
+    THICKNESS,
+    DENSITY,
+    AREAL_DENSITY,
+    TOTAL_MASS,
+    MASS,
+    FABRIC,
+    PARAM_COUNT
+};
 
 enum { MASS_AREA, MASS_UNIFORM };
 static const char *const mass_choices[] = {"area", "uniform", NULL};
 
-const drape_param drape_material_params[DRAPE_MATERIAL_PARAM_COUNT] = {
-    [DRAPE_MATERIAL_YOUNG_MODULUS] = {.name = "young_modulus",
-                                      .unit = "Pa",
-                                      .default_value = NAN,
-                                      .derived = "required without a fabric",
-                                      .min = 0,
-                                      .max = 1e15,
-                                      .open_min = true,
-                                      .help = "Young's modulus E of the sheet"},
-    [DRAPE_MATERIAL_POISSON_RATIO] = {.name = "poisson_ratio",
-                                      .unit = "1",
-                                      .default_value = 1.0 / 3.0,
-                                      .min = -1,
-                                      .max = 0.5,
-                                      .open_min = true,
-                                      .help =
-                                          "Poisson's ratio nu; stretch.edge has 1/3 whatever is said here"},
-    [DRAPE_MATERIAL_THICKNESS] = {.name = "thickness",
-                                  .unit = "m",
-                                  .default_value = NAN,
-                                  .derived = "required without a fabric",
-                                  .min = 0,
-                                  .max = 10,
-                                  .open_min = true,
-                                  .help = "thickness h of the sheet"},
-    [DRAPE_MATERIAL_DENSITY] = {.name = "density",
-                                .unit = "kg/m3",
-                                .default_value = NAN,
-                                .derived = "from areal_density or total_mass",
-                                .min = 0,
-                                .max = 1e9,
-                                .open_min = true,
-                                .help = "mass per volume; times thickness is the areal density"},
-    [DRAPE_MATERIAL_AREAL_DENSITY] = {.name = "areal_density",
-                                      .unit = "kg/m2",
-                                      .default_value = NAN,
-                                      .derived = "from density or total_mass",
-                                      .min = 0,
-                                      .max = 1e9,
-                                      .open_min = true,
-                                      .help = "mass per area, in place of density"},
-    [DRAPE_MATERIAL_TOTAL_MASS] = {.name = "total_mass",
-                                   .unit = "kg",
-                                   .default_value = NAN,
-                                   .derived = "from density or areal_density",
-                                   .min = 0,
-                                   .max = 1e12,
-                                   .open_min = true,
-                                   .help = "mass of the whole cloth, in place of density"},
-    [DRAPE_MATERIAL_MASS] =
-        {.name = "mass",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = MASS_AREA,
-         .choices = mass_choices,
-         .help = "area: lumped, a third of each triangle to each node; uniform: the same on every node"},
-    [DRAPE_MATERIAL_FABRIC] =
-        {.name = "fabric",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = 0,
-         .choices = drape_fabric_names,
-         .help =
-             "a measured one (`drape list fabrics`): its areal density where none is given; its bending is "
-             "that of bend.midedge, and without young_modulus and thickness its tension and shear are those "
-             "of "
-             "stretch.cst"},
+static const drape_param params[] = {
+    [YOUNG_MODULUS] = DRAPE_NUMBER("young_modulus", "Pa", DRAPE_DERIVED("required without a fabric"),
+                                   DRAPE_ABOVE(0), 1e15, "Young's modulus E of the sheet"),
+    [POISSON_RATIO] = DRAPE_NUMBER("poisson_ratio", "1", 1.0 / 3.0, DRAPE_ABOVE(-1), 0.5,
+                                   "Poisson's ratio nu; stretch.edge has 1/3 whatever is said here"),
+    [THICKNESS] = DRAPE_NUMBER("thickness", "m", DRAPE_DERIVED("required without a fabric"), DRAPE_ABOVE(0),
+                               10, "thickness h of the sheet"),
+    [DENSITY] = DRAPE_NUMBER("density", "kg/m3", DRAPE_DERIVED("from areal_density or total_mass"),
+                             DRAPE_ABOVE(0), 1e9, "mass per volume; times thickness is the areal density"),
+    [AREAL_DENSITY] = DRAPE_NUMBER("areal_density", "kg/m2", DRAPE_DERIVED("from density or total_mass"),
+                                   DRAPE_ABOVE(0), 1e9, "mass per area, in place of density"),
+    [TOTAL_MASS] = DRAPE_NUMBER("total_mass", "kg", DRAPE_DERIVED("from density or areal_density"),
+                                DRAPE_ABOVE(0), 1e12, "mass of the whole cloth, in place of density"),
+    [MASS] =
+        DRAPE_CHOICE("mass", MASS_AREA, mass_choices,
+                     "area: lumped, a third of each triangle to each node; uniform: the same on every node"),
+    [FABRIC] =
+        DRAPE_CHOICE("fabric", 0, drape_fabric_names,
+                     "a measured one (`drape list fabrics`): its areal density where none is given; its "
+                     "bending is that of bend.midedge, and without young_modulus and thickness its tension "
+                     "and shear are those of stretch.cst"),
 };
+
+const drape_entry drape_material_entry = {
+    .name = "material",
+    .summary = "a sheet; exactly one of density, areal_density, total_mass is given",
+    DRAPE_PARAMS(params)};
+const drape_registry drape_material_registry = {"material",
+                                                "materials",
+                                                "Material",
+                                                "\"material\" of a cloth",
+                                                (const drape_entry *[]){&drape_material_entry, NULL},
+                                                NULL};
 
 static double total_area(const drape_mesh *mesh)
 {
@@ -95,10 +69,10 @@ static double total_area(const drape_mesh *mesh)
 static drape_status total_mass(drape_context *ctx, const char *pointer, const double *values, double area,
                                double *mass)
 {
-    double density = values[DRAPE_MATERIAL_DENSITY], areal = values[DRAPE_MATERIAL_AREAL_DENSITY];
-    double total = values[DRAPE_MATERIAL_TOTAL_MASS];
+    double density = values[DENSITY], areal = values[AREAL_DENSITY];
+    double total = values[TOTAL_MASS];
     int given = !isnan(density) + !isnan(areal) + !isnan(total);
-    const drape_fabric *fabric = &drape_fabrics[(int)values[DRAPE_MATERIAL_FABRIC]];
+    const drape_fabric *fabric = &drape_fabrics[(int)values[FABRIC]];
     if (given == 0 && fabric->areal_density > 0) {
         *mass = area * fabric->areal_density;
         return DRAPE_OK;
@@ -107,31 +81,30 @@ static drape_status total_mass(drape_context *ctx, const char *pointer, const do
         return drape_fail_at(
             ctx, DRAPE_E_ARGUMENT, pointer,
             "%d of \"density\", \"areal_density\", \"total_mass\" are given; exactly one is needed", given);
-    *mass =
-        !isnan(total) ? total : area * (!isnan(areal) ? areal : density * values[DRAPE_MATERIAL_THICKNESS]);
+    *mass = !isnan(total) ? total : area * (!isnan(areal) ? areal : density * values[THICKNESS]);
     return DRAPE_OK;
 }
 
-/* Without a fabric, and with half of it said, all is. */
+/* Young's modulus and thickness: both are required without a fabric, and both or none with one. */
 static drape_status check_stiffness(drape_context *ctx, const char *pointer, const double *values)
 {
-    static const int needed[] = {DRAPE_MATERIAL_YOUNG_MODULUS, DRAPE_MATERIAL_THICKNESS};
+    static const int needed[] = {YOUNG_MODULUS, THICKNESS};
     const bool none = isnan(values[needed[0]]) && isnan(values[needed[1]]);
-    if (none && values[DRAPE_MATERIAL_FABRIC] > 0)
+    if (none && values[FABRIC] > 0)
         return DRAPE_OK;
     for (size_t i = 0; i < sizeof needed / sizeof *needed; i++)
         if (isnan(values[needed[i]]))
-            return drape_param_missing(ctx, pointer, &drape_material_params[needed[i]]);
+            return drape_param_missing(ctx, pointer, &params[needed[i]]);
     return DRAPE_OK;
 }
 
-/* Of the isotropic sheet whose strips have the mean tension K and bending B of the fabric: h = sqrt(12 B/K), E = K/h. So
- * hinges and edges, which know no fabrics, come as near as they can. */
+/* Thickness and modulus of the isotropic sheet whose strips have the mean tension K and bending B of the fabric,
+ * h = sqrt(12 B/K), E = K/h, for terms that know no fabrics, such as hinges and edges. */
 static void fill_in(const drape_woven *tension, const drape_woven *bending, double *values)
 {
     const double k = sqrt(tension->warp * tension->weft), b = sqrt(bending->warp * bending->weft);
-    values[DRAPE_MATERIAL_THICKNESS] = sqrt(12 * b / k);
-    values[DRAPE_MATERIAL_YOUNG_MODULUS] = k / values[DRAPE_MATERIAL_THICKNESS];
+    values[THICKNESS] = sqrt(12 * b / k);
+    values[YOUNG_MODULUS] = k / values[THICKNESS];
 }
 
 static bool is_given(const drape_cloth_def *def, const char *name)
@@ -142,18 +115,18 @@ static bool is_given(const drape_cloth_def *def, const char *name)
     return false;
 }
 
-/* What the scene says of itself goes before what was measured. */
+/* Values that the scene gives go before measured ones. */
 static void take_fabric(const drape_cloth_def *def, double *values, drape_cloth *cloth)
 {
-    const drape_fabric *fabric = &drape_fabrics[(int)values[DRAPE_MATERIAL_FABRIC]];
+    const drape_fabric *fabric = &drape_fabrics[(int)values[FABRIC]];
     drape_woven tension, *bending = &cloth->bending;
     if (!(fabric->areal_density > 0))
         return;
     drape_fabric_tension(fabric, &tension);
     drape_fabric_bending(fabric, bending);
-    if (is_given(def, drape_material_params[DRAPE_MATERIAL_POISSON_RATIO].name))
-        tension.poisson = bending->poisson = values[DRAPE_MATERIAL_POISSON_RATIO];
-    if (!isnan(values[DRAPE_MATERIAL_THICKNESS]))
+    if (is_given(def, params[POISSON_RATIO].name))
+        tension.poisson = bending->poisson = values[POISSON_RATIO];
+    if (!isnan(values[THICKNESS]))
         return;
     cloth->tension = tension;
     fill_in(&tension, bending, values);
@@ -165,9 +138,9 @@ static drape_material resolve(const double *values, const drape_woven *bending, 
     drape_material m = {.bending_warp = measured ? bending->warp : NAN,
                         .bending_weft = measured ? bending->weft : NAN,
                         .bending_twist = measured ? bending->shear : NAN,
-                        .young_modulus = values[DRAPE_MATERIAL_YOUNG_MODULUS],
-                        .poisson_ratio = values[DRAPE_MATERIAL_POISSON_RATIO],
-                        .thickness = values[DRAPE_MATERIAL_THICKNESS],
+                        .young_modulus = values[YOUNG_MODULUS],
+                        .poisson_ratio = values[POISSON_RATIO],
+                        .thickness = values[THICKNESS],
                         .areal_density = mass / area};
     m.membrane_stiffness = m.young_modulus * m.thickness;
     m.flexural_rigidity =
@@ -179,11 +152,10 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
                                     drape_cloth *cloth)
 {
     char at[256];
-    double values[DRAPE_MATERIAL_PARAM_COUNT], mass = 0;
+    double values[PARAM_COUNT], mass = 0;
     snprintf(at, sizeof at, "%s/material", pointer);
     drape_status status =
-        drape_params_resolve(model->ctx, at, drape_material_params, DRAPE_MATERIAL_PARAM_COUNT, def->material,
-                             def->material_count, values);
+        drape_params_resolve(model->ctx, at, params, PARAM_COUNT, def->material, def->material_count, values);
     double area = total_area(&cloth->mesh);
     if (!status)
         status = check_stiffness(model->ctx, at, values);
@@ -199,7 +171,7 @@ drape_status drape_compile_material(drape_model *model, const char *pointer, con
     memcpy(cloth->material_values, values, sizeof values);
     cloth->material = resolve(values, &cloth->bending, mass, area);
     for (int32_t i = 0; i < count; i++)
-        cloth->node_mass[i] = values[DRAPE_MATERIAL_MASS] == MASS_UNIFORM
+        cloth->node_mass[i] = values[MASS] == MASS_UNIFORM
                                   ? mass / count
                                   : cloth->material.areal_density * cloth->mesh.node_area[i];
     return DRAPE_OK;

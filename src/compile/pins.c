@@ -68,58 +68,27 @@ static drape_status take_range(pin_place *pin, const char *key, int32_t first_ro
     return status;
 }
 
-/* Where a word such as "top" or "top-left" puts a pin: sets the range of rows or columns that it names. */
-static bool apply_word(const char *word, size_t length, const drape_mesh *mesh, int32_t range[4])
+/* Narrows first and last row, first and last column to the side that the text begins with. */
+static void narrow(const char *side, const drape_mesh *mesh, int32_t range[4])
 {
     static const struct {
         const char *name;
-        int side; /* index in range: first row, last row, first column, last column */
-    } words[] = {{"top", 1}, {"bottom", 0}, {"left", 3}, {"right", 2}};
-    const int32_t pinned_to[4] = {mesh->rows - 1, 0, mesh->columns - 1, 0};
-    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-        if (strlen(words[i].name) == length && strncmp(words[i].name, word, length) == 0) {
-            range[words[i].side] = pinned_to[words[i].side];
-            return true;
-        }
-    return false;
+        int bound; /* that moves to the opposite one */
+    } sides[] = {{"top", 1}, {"bottom", 0}, {"left", 3}, {"right", 2}};
+    const int32_t opposite[4] = {mesh->rows - 1, 0, mesh->columns - 1, 0};
+    for (size_t i = 0; i < sizeof sides / sizeof *sides; i++)
+        if (strncmp(sides[i].name, side, strlen(sides[i].name)) == 0)
+            range[sides[i].bound] = opposite[sides[i].bound];
 }
 
-static drape_status refuse_word(const pin_place *pin, const char *key, const char *word,
-                                const char *const *choices)
+/* first, second: the sides that meet in a corner; both the same for a whole side. */
+static drape_status take_sides(pin_place *pin, const char *key, const char *first, const char *second)
 {
-    size_t count = 0;
-    while (choices[count])
-        count++;
-    char text[256];
-    const char *meant = drape_did_you_mean(word, choices, count);
-    snprintf(text, sizeof text, "\"%.60s\" is not allowed; one of: %s, %s, %s, %s%s%s%s", word, choices[0],
-             choices[1], choices[2], choices[3], DRAPE_MEANT(meant));
-    return refuse(pin, key, text);
-}
-
-static drape_status take_corner(pin_place *pin)
-{
-    static const char *const choices[] = {"top-left", "top-right", "bottom-left", "bottom-right", NULL};
     const drape_mesh *mesh = &pin->cloth->mesh;
     int32_t range[4] = {0, mesh->rows - 1, 0, mesh->columns - 1};
-    const char *word = pin->def->corner, *dash = strchr(word, '-');
-    bool known = false;
-    for (int i = 0; choices[i]; i++)
-        known = known || strcmp(choices[i], word) == 0;
-    if (!known || !apply_word(word, (size_t)(dash - word), mesh, range) ||
-        !apply_word(dash + 1, strlen(dash + 1), mesh, range))
-        return refuse_word(pin, "/corner", word, choices);
-    return take_range(pin, "/corner", range[0], range[1], range[2], range[3]);
-}
-
-static drape_status take_edge(pin_place *pin)
-{
-    static const char *const choices[] = {"top", "bottom", "left", "right", NULL};
-    const drape_mesh *mesh = &pin->cloth->mesh;
-    int32_t range[4] = {0, mesh->rows - 1, 0, mesh->columns - 1};
-    if (!apply_word(pin->def->edge, strlen(pin->def->edge), mesh, range))
-        return refuse_word(pin, "/edge", pin->def->edge, choices);
-    return take_range(pin, "/edge", range[0], range[1], range[2], range[3]);
+    narrow(first, mesh, range);
+    narrow(second, mesh, range);
+    return take_range(pin, key, range[0], range[1], range[2], range[3]);
 }
 
 static drape_status take_row(pin_place *pin)
@@ -170,9 +139,9 @@ static drape_status take_selection(pin_place *pin)
     if (def->nodes)
         return take_list(pin);
     if (def->corner)
-        return take_corner(pin);
+        return take_sides(pin, "/corner", def->corner, strchr(def->corner, '-') + 1);
     if (def->edge)
-        return take_edge(pin);
+        return take_sides(pin, "/edge", def->edge, def->edge);
     return def->has_box ? take_box(pin) : take_row(pin);
 }
 
@@ -237,7 +206,7 @@ static drape_status number_nodes(drape_model *model, const int32_t *track_of_nod
         drape_arena_take(&model->arena, (size_t)model->moved_count, sizeof *model->moved_node);
     model->moved_track =
         drape_arena_take(&model->arena, (size_t)model->moved_count, sizeof *model->moved_track);
-    if (!model->node_of_free || !model->moved_node || !model->moved_track)
+    if (drape_arena_status(&model->arena))
         return DRAPE_E_MEMORY;
     int32_t moved = 0;
     for (int32_t i = 0; i < model->node_count; i++) {
@@ -259,10 +228,11 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
     model->tracks = drape_arena_take(&model->arena, pin_count, sizeof *model->tracks);
     model->pinned = drape_arena_take(&model->arena, nodes, sizeof *model->pinned);
     model->free_of_node = drape_arena_take(&model->arena, nodes, sizeof *model->free_of_node);
-    int32_t *track_of_node = drape_alloc(model->ctx, nodes, sizeof *track_of_node);
-    uint8_t *clamped = drape_alloc(model->ctx, nodes, sizeof *clamped);
-    drape_status status = DRAPE_E_MEMORY;
-    if (model->tracks && model->pinned && model->free_of_node && track_of_node && clamped) {
+    drape_arena scratch = drape_arena_of(model->ctx);
+    int32_t *track_of_node = drape_arena_take(&scratch, nodes, sizeof *track_of_node);
+    uint8_t *clamped = drape_arena_take(&scratch, nodes, sizeof *clamped);
+    drape_status status = drape_arena_status(&model->arena) ? DRAPE_E_MEMORY : drape_arena_status(&scratch);
+    if (!status) {
         memset(track_of_node, 0xff, nodes * sizeof *track_of_node); /* all -1 */
         status = pin_cloths(model, def, track_of_node, clamped);
         if (!status)
@@ -270,7 +240,6 @@ drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def)
         if (!status)
             status = number_nodes(model, track_of_node);
     }
-    drape_free(model->ctx, clamped);
-    drape_free(model->ctx, track_of_node);
+    drape_arena_free(&scratch);
     return status;
 }

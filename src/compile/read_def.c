@@ -1,84 +1,67 @@
 /*
- * read_def.c: the defs of a host that was built against an older header, whose structs ended earlier. Each def begins with its
- * size as the host knew it, which in an array is the way to the next; what the host did not know has its default.
+ * read_def.c: the defs of a host that was built against an older header, whose structs ended earlier. Each def
+ * begins with its size as the host knew it, which in an array leads to the next; members that the host did not
+ * know have their defaults.
  */
 #include "compile/stages.h"
 
 #include <stddef.h>
 #include <string.h>
 
-/* One kind of def: its size here, one that is all defaults, who makes those, and how many there may be. */
-typedef struct kind {
-    const char *init;
-    size_t size, most;
-    const void *defaults;
-} kind;
+#include "model/scene.h"
 
-static size_t size_at(const void *def)
+/* The size that all defs of an array begin with; 0 if they differ. */
+static size_t stride_of(const char *array, size_t count, size_t size)
 {
-    size_t size;
-    memcpy(&size, def, sizeof size);
-    return size;
-}
-
-/* *out: count defs as they are here, in the arena. NULL, or more than there may be, is not read: drape_compile_check_def
- * finds what is missing, and refuses such a count. */
-static drape_status widen(drape_context *ctx, drape_arena *arena, const kind *k, const void *given,
-                          size_t count, const void **out)
-{
-    *out = given;
-    if (!given || count == 0 || count > k->most)
-        return DRAPE_OK;
-    size_t stride = size_at(given);
-    const char *from = given;
-    for (size_t i = 0; i < count && stride > 0 && stride <= k->size; i++)
-        if (size_at(from + i * stride) != stride)
-            stride = 0;
-    if (stride < sizeof(size_t) || stride > k->size)
-        return drape_fail(ctx, DRAPE_E_VERSION, "a def was not initialised by %s of this version", k->init);
-    char *to = drape_arena_take(arena, count, k->size);
-    *out = to;
-    for (size_t i = 0; to && i < count; i++) {
-        memcpy(to + i * k->size, k->defaults, k->size);
-        memcpy(to + i * k->size, from + i * stride, stride);
-        memcpy(to + i * k->size, &k->size, sizeof k->size);
+    size_t stride, other;
+    memcpy(&stride, array, sizeof stride);
+    for (size_t i = 1; i < count && stride > 0 && stride <= size; i++) {
+        memcpy(&other, array + i * stride, sizeof other);
+        if (other != stride)
+            return 0;
     }
-    return to ? DRAPE_OK : DRAPE_E_MEMORY;
+    return stride;
 }
 
-static drape_status read_pins(drape_context *ctx, drape_arena *arena, drape_cloth_def *cloth)
+static drape_status widen_arrays(drape_context *ctx, drape_arena *arena, const drape_scene_object *object,
+                                 char *def);
+
+/* Replaces the array of a key by defs as they are here, in the arena. NULL, or more than there may be, is not
+ * read: drape_compile_check_def finds what is missing, and refuses such a count. */
+static drape_status widen_array(drape_context *ctx, drape_arena *arena, const drape_scene_key *key, char *def)
 {
-    drape_pin_def defaults;
-    const void *pins;
-    drape_pin_def_init(&defaults, sizeof defaults);
-    const kind k = {"drape_pin_def_init", sizeof defaults, SIZE_MAX, &defaults};
-    drape_status status = widen(ctx, arena, &k, cloth->pins, cloth->pin_count, &pins);
-    cloth->pins = pins;
+    const size_t size = key->child->def_size;
+    const char *from;
+    size_t count;
+    memcpy(&from, def + key->offset, sizeof from);
+    memcpy(&count, def + key->count_offset, sizeof count);
+    if (!from || count == 0 || (key->at_most && count > key->at_most))
+        return DRAPE_OK;
+    const size_t stride = stride_of(from, count, size);
+    if (stride < sizeof(size_t) || stride > size)
+        return drape_fail(ctx, DRAPE_E_VERSION,
+                          "a def was not initialised by drape_%s_def_init of this version", key->child->name);
+    char *to = drape_arena_take(arena, count, size);
+    if (!to)
+        return DRAPE_E_MEMORY;
+    memcpy(def + key->offset, &to, sizeof to);
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < count; i++) {
+        drape_scene_set_defaults(key->child, to + i * size);
+        memcpy(to + i * size, from + i * stride, stride);
+        memcpy(to + i * size, &size, sizeof size);
+        status = widen_arrays(ctx, arena, key->child, to + i * size);
+    }
     return status;
 }
 
-static drape_status read_cloths(drape_context *ctx, drape_arena *arena, drape_scene_def *def)
+static drape_status widen_arrays(drape_context *ctx, drape_arena *arena, const drape_scene_object *object,
+                                 char *def)
 {
-    drape_cloth_def defaults;
-    const void *list;
-    drape_cloth_def_init(&defaults, sizeof defaults);
-    const kind k = {"drape_cloth_def_init", sizeof defaults, DRAPE_MOST_CLOTHS, &defaults};
-    drape_status status = widen(ctx, arena, &k, def->cloths, def->cloth_count, &list);
-    drape_cloth_def *own = (drape_cloth_def *)(list == def->cloths ? NULL : list);
-    def->cloths = list;
-    for (size_t c = 0; !status && own && c < def->cloth_count; c++)
-        status = read_pins(ctx, arena, &own[c]);
-    return status;
-}
-
-static drape_status read_colliders(drape_context *ctx, drape_arena *arena, drape_scene_def *def)
-{
-    drape_collider_def defaults;
-    const void *list;
-    drape_collider_def_init(&defaults, sizeof defaults);
-    const kind k = {"drape_collider_def_init", sizeof defaults, DRAPE_MOST_COLLIDERS, &defaults};
-    drape_status status = widen(ctx, arena, &k, def->colliders, def->collider_count, &list);
-    def->colliders = list;
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < object->key_count; i++)
+        if (object->keys[i].shape == DRAPE_SCENE_OBJECTS && object->keys[i].child->sized)
+            status = widen_array(ctx, arena, &object->keys[i], def);
     return status;
 }
 
@@ -91,6 +74,5 @@ drape_status drape_compile_read_def(drape_context *ctx, drape_arena *arena, cons
     drape_scene_def_init(out, sizeof *out);
     memcpy(out, given, given->struct_size);
     out->struct_size = sizeof *out;
-    drape_status status = read_cloths(ctx, arena, out);
-    return status ? status : read_colliders(ctx, arena, out);
+    return widen_arrays(ctx, arena, &drape_form_scene, (char *)out);
 }

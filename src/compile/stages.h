@@ -6,15 +6,12 @@
 #include "base/param.h"
 #include "compile/compile.h"
 
-/* Nothing that a count promises is NULL. */
+/* Checks a def along the keys of a scene: no array is NULL, all values are in range. */
 drape_status drape_compile_check_def(drape_context *ctx, const drape_scene_def *def);
 
 /* Resolves the material of a cloth whose mesh stands, and lumps its mass. pointer: "/cloth/0". */
 drape_status drape_compile_material(drape_model *model, const char *pointer, const drape_cloth_def *def,
                                     drape_cloth *cloth);
-
-#define DRAPE_MOST_CLOTHS    (1 << 20)
-#define DRAPE_MOST_COLLIDERS 4096
 
 /* Marks the pinned nodes of all cloths, numbers the free ones, keeps the tracks. */
 drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def);
@@ -24,7 +21,7 @@ drape_status drape_compile_track(drape_model *model, const char *pointer, const 
                                  size_t key_count, drape_track *track);
 
 /* What the scene chose, copied; a type that is NULL is the fallback. */
-drape_status drape_compile_choice(drape_model *model, const drape_row_def *def, const char *fallback,
+drape_status drape_compile_choice(drape_model *model, const drape_entry_def *def, const char *fallback,
                                   drape_choice *choice);
 
 /* Resolves contact and self-contact; the materials stand. */

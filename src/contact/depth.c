@@ -6,12 +6,12 @@
 #include <math.h>
 #include <string.h>
 
-#define ENOUGH    1e-12 /* [m] between the least value and what it is known to be above */
-#define MOST_CUTS 60
-#define SECTIONS  40               /* of a face: 0.618^40 of its height are left */
-#define GOLDEN    0.61803398874989 /* (sqrt 5 - 1)/2 */
+#define ENOUGH   1e-12 /* [m] between the least value and its lower bound */
+#define MAX_CUTS 60
+#define SECTIONS 40               /* of a face: 0.618^40 of its height are left */
+#define GOLDEN   0.61803398874989 /* (sqrt 5 - 1)/2 */
 
-/* The distance at a point of a way, and how it changes along. */
+/* The distance at a point of a segment, and its derivative along it. */
 typedef struct tangent {
     double t, d, slope;
 } tangent;
@@ -33,7 +33,7 @@ double drape_depth_edge(const drape_collider *collider, const drape_collider_pos
     vec3_sub(b, a, u);
     tangent low = tangent_at(collider, pose, a, u, 0), high = tangent_at(collider, pose, a, u, 1);
     double least = fmin(low.d, high.d);
-    for (int i = 0; low.slope < 0 && high.slope > 0 && i < MOST_CUTS; i++) {
+    for (int i = 0; low.slope < 0 && high.slope > 0 && i < MAX_CUTS; i++) {
         double t = (high.d - high.slope * high.t - low.d + low.slope * low.t) / (low.slope - high.slope);
         double bound = low.d + low.slope * (t - low.t);
         if (bound > enough)
@@ -47,7 +47,7 @@ double drape_depth_edge(const drape_collider *collider, const drape_collider_pos
     return least;
 }
 
-/* On the triangle's line from side 0 1 to side 0 2 at s of their length. */
+/* The least distance on the line from side 0 1 to side 0 2, at the share s of their lengths. */
 static double depth_across(const drape_collider *collider, const drape_collider_pose *pose,
                            const double *const corner[3], double s)
 {
@@ -60,7 +60,7 @@ static double depth_across(const drape_collider *collider, const drape_collider_
     return drape_depth_edge(collider, pose, end[0], end[1], INFINITY);
 }
 
-/* No tangent plane at a corner is above `enough` on the whole triangle. */
+/* False if a tangent plane at some corner is above `enough` on the whole triangle. */
 static bool may_be_deep(const drape_collider *collider, const drape_collider_pose *pose,
                         const double *const corner[3], double enough)
 {
@@ -76,7 +76,7 @@ static bool may_be_deep(const drape_collider *collider, const drape_collider_pos
     return true;
 }
 
-/* Least values of parallel lines are convex from line to line: golden section (Kiefer 1953). */
+/* The least value on a line parallel to side 1 2 is a convex function of s: golden section (Kiefer 1953). */
 double drape_depth_face(const drape_collider *collider, const drape_collider_pose *pose,
                         const double *const corner[3], double enough)
 {
@@ -85,7 +85,7 @@ double drape_depth_face(const drape_collider *collider, const drape_collider_pos
         return INFINITY;
     for (int i = 1; i < 3; i++) {
         vec3_sub(corner[i], corner[0], sides);
-        length = fmax(length, vec3_norm(sides)); /* how fast the distance can change with s */
+        length = fmax(length, vec3_norm(sides)); /* bounds the change of the distance with s */
     }
     for (int i = 0; i < 2; i++)
         d[i] = depth_across(collider, pose, corner, i ? GOLDEN : 1 - GOLDEN);

@@ -1,13 +1,13 @@
 /*
- * pair.h: two pieces that may touch: a node and the smooth surface of a collider, a point and a triangle, or
- * two segments. Points are nodes of the cloth and, from node_count on, points of colliders.
+ * pair.h: two pieces that may come into contact, and the narrow phase: a node and the smooth surface of a
+ * collider, a point and a triangle, or two segments. Points are nodes of the cloth and, from node_count on,
+ * points of colliders.
  */
 #ifndef DRAPE_CONTACT_PAIR_H
 #define DRAPE_CONTACT_PAIR_H
 
 #include "colliders/colliders.h"
-#include "contact/closest.h"
-#include "contact/force.h"
+#include "contact/gap.h"
 
 typedef enum drape_pair_kind {
     DRAPE_PAIR_SURFACE,  /* node 0 and the signed distance of the collider */
@@ -22,52 +22,38 @@ typedef struct drape_pair {
     double radius;    /* the gap is the distance less this [m] */
     double area;      /* that its force acts on [m2] */
     double distance;  /* activation distance [m] */
-    double found;     /* the gap where it was found [m] */
+    double found;     /* a candidate: the gap where it was found [m] */
 } drape_pair;
 
 /* All points at one instant. */
-typedef struct drape_placed {
+typedef struct drape_configuration {
     const drape_model *model;
     const double *x;                 /* (points x 3) */
     const drape_collider_pose *pose; /* (collider_count) */
-} drape_placed;
+} drape_configuration;
 
 int drape_pair_points(const drape_pair *pair);
-void drape_pair_gather(const drape_pair *pair, const double *from, double local[4][3]);
-double drape_pair_gap_value(const drape_pair *pair, const drape_placed *at);
+double drape_pair_gap_value(const drape_pair *pair, const drape_configuration *at);
 
-/* Whether the gap is seen at once to be above `gap`, from boxes around the pieces; most candidates are so. False says
- * nothing. */
-bool drape_pair_is_apart(const drape_pair *pair, const drape_placed *at, double gap);
+/* Whether boxes around the pieces already show that the gap is larger than `gap`, as for most candidates. */
+bool drape_pair_is_apart(const drape_pair *pair, const drape_configuration *at, double gap);
 
-/* A pair at an instant at which it acts. */
-typedef struct drape_touch {
-    drape_pair pair; /* its first closest.points nodes have a part in it */
-    double gap;      /* [m] */
-    drape_closest closest;
-    bool mollified;
-    bool sharp; /* a feature of a collider that touches: normals do not turn there */
-} drape_touch;
-
-/* False where the gap is not below the activation distance. rest: (points x 3), for the width of the mollifier. */
-bool drape_pair_touch(const drape_pair *pair, const drape_placed *at, const double *rest, drape_touch *touch);
-
-/* Leaves out the nodes that have no part in it: pairs of large pieces are often those of smaller ones. */
-void drape_touch_reduce(drape_touch *touch);
-
-/* derivatives: dc, dn and ddm too. at: as in drape_pair_touch. */
-void drape_touch_gap(const drape_touch *touch, const drape_placed *at, const double *rest, bool derivatives,
-                     drape_gap *gap);
-
-/* Both, of all four nodes; false as of drape_pair_touch, and then only the value is known. */
-bool drape_pair_gap(const drape_pair *pair, const drape_placed *at, const double *rest, bool derivatives,
+/* The geometry of the pair, with all four points. False if it is not below the activation distance: then only
+ * the value of the gap is set, INFINITY if the pieces are apart. rest: (points x 3), for the width of the
+ * mollifier. */
+bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const double *rest,
                     drape_gap *gap);
 
-/* The largest fraction of the way from x to y, straight and for all points together, that a pair may go
- * without touching: additive continuous collision detection (Li et al. 2021, Codimensional IPC, algorithm
- * 1). It stops where keep of the gap at the start is left. At most `most`, which is looked no further than, and
- * which is given where the pair touches at the start (a collider: is within 1e-9 m of it). core: the radius counts as 0. */
-double drape_pair_way(const drape_pair *pair, const double *x, const double *y, double keep, bool core,
-                      double most);
+/* How it changes with the points. The nodes of the pair are those of the points of the gap. */
+void drape_pair_slopes(const drape_pair *pair, const drape_gap *gap, const drape_configuration *at,
+                       const double *rest, drape_gap_slopes *slopes);
+
+/* Continuous collision detection: the largest step fraction from x to y, straight and for all points
+ * together, without contact of the pair (additive continuous collision detection, Li et al. 2021,
+ * Codimensional IPC, algorithm 1). It stops where `keep` of the gap at the start is left. At most `limit`,
+ * beyond which it does not search, and which it returns for a pair in contact at the start (with a collider:
+ * within 1e-9 m of it). core: the radius counts as 0. */
+double drape_pair_step_fraction(const drape_pair *pair, const double *x, const double *y, double keep,
+                                bool core, double limit);
 
 #endif

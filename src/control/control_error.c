@@ -34,7 +34,7 @@ enum { SCRATCH_LAST_ERROR };
 #define MAX_GROWTH   2.0 /* bdf2 is zero-stable below 1 + sqrt(2) */
 #define MAX_CUT      0.2
 #define FIRST_SHARE  10.0 /* see first_error */
-#define LEAST_ERROR  1e-4 /* smaller ones are round-off and say nothing of the next step */
+#define MIN_ERROR    1e-4 /* smaller ones are round-off and say nothing of the next step */
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
@@ -42,20 +42,8 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_RTOL] = DRAPE_RTOL_PARAM,
     [PARAM_ATOL_X] = DRAPE_ATOL_X_PARAM,
     [PARAM_ATOL_V] = DRAPE_ATOL_V_PARAM,
-    [PARAM_DT_MAX] = {.name = "dt_max",
-                      .unit = "s",
-                      .default_value = NAN,
-                      .derived = "none",
-                      .min = 0,
-                      .max = 1e9,
-                      .open_min = true,
-                      .help = "largest step"},
-    [PARAM_SAFETY] = {.name = "safety",
-                      .unit = "1",
-                      .default_value = 0.9,
-                      .min = 0.1,
-                      .max = 1,
-                      .help = "share of the step that the estimate allows"},
+    [PARAM_DT_MAX] = DRAPE_NUMBER("dt_max", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),
+    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1, "share of the step that the estimate allows"),
 };
 
 /* A prediction: weights of the states in, past[0], past[1], and the factor from its difference to the
@@ -88,10 +76,10 @@ static double difference(const prediction *p, double solution, double y0, double
     return p->factor * (solution - (p->weight[0] * y0 + p->weight[1] * y1 + p->weight[2] * y2));
 }
 
-/* The first step has no past, so that its velocities have no estimate: what they change by, g h, is none, and at
- * tight tolerances would allow no step at all. Positions have one, h^2 a/2 beyond flight. So the step may also be a
- * share 1/FIRST_SHARE of that at which the whole of it is atol_x, as in Hairer, Norsett & Wanner 1993, II.4: its
- * square is as small as the tolerance is, and with it the error h^2 v''/2 of velocities. */
+/* The first step has no past, so that its velocities have no estimate: what they change by, g h, is none, and
+ * at tight tolerances would allow no step at all. Positions have one, h^2 a/2 beyond flight. So the step may
+ * also be a share 1/FIRST_SHARE of that at which the whole of it is atol_x, as in Hairer, Norsett & Wanner
+ * 1993, II.4: its square is as small as the tolerance is, and with it the error h^2 v''/2 of velocities. */
 static double first_error(double by_both, double by_positions)
 {
     return by_both <= 1 ? by_both : fmin(by_both, FIRST_SHARE * sqrt(by_positions));
@@ -138,13 +126,14 @@ static drape_verdict reject(const double *values, drape_trial *trial, double err
         isnan(error) ? 0.5 : fmin(0.9, bounded(values[PARAM_SAFETY] * pow(error, -1.0 / (trial->order + 1))));
     trial->status = DRAPE_RETRY_REJECTED;
     trial->info->reason = "error_test";
-    trial->info->worst = (drape_worst){.what = "local error / tolerance",
-                                       .term = "",
-                                       .element = -1,
-                                       .node = {node, -1, -1, -1},
-                                       .cloth = node >= 0 ? drape_model_cloth_of(trial->model, node) : -1,
-                                       .value = error,
-                                       .limit = 1};
+    trial->info->diagnostic =
+        (drape_diagnostic){.what = "local error / tolerance",
+                           .term = "",
+                           .element = -1,
+                           .node = {node, -1, -1, -1},
+                           .cloth = node >= 0 ? drape_model_cloth_of(trial->model, node) : -1,
+                           .value = error,
+                           .limit = 1};
     drape_verdict verdict = drape_halve(values[PARAM_DT_MIN], trial);
     double proposed = fmax(values[PARAM_DT_MIN], factor * trial->h);
     if (verdict == DRAPE_RETRY && trial->in->t + proposed > trial->in->t) /* else the half, which does */
@@ -160,7 +149,7 @@ static drape_verdict judge(const double *values, drape_trial *trial)
     double error = local_error(values, trial, &node), last = trial->scratch[SCRATCH_LAST_ERROR];
     if (!(error <= 1)) /* a NaN is rejected */
         return reject(values, trial, error, node);
-    double e = fmax(error, LEAST_ERROR), before = last > 0 ? last : e, p = trial->order + 1;
+    double e = fmax(error, MIN_ERROR), before = last > 0 ? last : e, p = trial->order + 1;
     trial->scratch[SCRATCH_LAST_ERROR] = e;
     trial->h_next =
         trial->h * bounded(values[PARAM_SAFETY] * pow(e, -INTEGRAL / p) * pow(before, PROPORTIONAL / p));
@@ -171,12 +160,11 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 }
 
 const drape_controller_ops drape_controller_error = {
-    .name = "error",
-    .summary = "step size by the local error: predictor against solution, PI rule",
-    .reference = "Gustafsson 1991; Hairer & Wanner 1996, IV.2",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "error",
+              .summary = "step size by the local error: predictor against solution, PI rule",
+              .reference = "Gustafsson 1991; Hairer & Wanner 1996, IV.2",
+              DRAPE_PARAMS(params)},
     .own_steps = true,
-    .pasts = 2,
+    .history_depth = 2,
     .judge = judge,
 };

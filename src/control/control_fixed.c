@@ -12,8 +12,8 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 }
 
 const drape_controller_ops drape_controller_fixed = {
-    .name = "fixed",
-    .summary = "steps of the nominal size only; a failed step ends the run with e_solver",
-    .reference = "-",
+    .entry = {.name = "fixed",
+              .summary = "steps of the nominal size only; a failed step ends the run with e_solver",
+              .reference = "-"},
     .judge = judge,
 };

@@ -20,10 +20,9 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 }
 
 const drape_controller_ops drape_controller_halving = {
-    .name = "halving",
-    .summary = "a failed step is rolled back and halved; the size grows back after successes",
-    .reference = "as DisMech halves unconverged steps, with rollback and filled intervals",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "halving",
+              .summary = "a failed step is rolled back and halved; the size grows back after successes",
+              .reference = "as DisMech halves unconverged steps, with rollback and filled intervals",
+              DRAPE_PARAMS(params)},
     .judge = judge,
 };

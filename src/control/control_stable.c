@@ -1,8 +1,8 @@
 /*
- * stable: steps of the nominal size where they are stable, else as large as the stability limit of an explicit
- * row allows, times a safety. The limit is found again every few steps, as the stiffness of a stretched or folded
- * sheet is another, and where a step failed: one that was above it is forgotten. Rows without a limit take nominal
- * steps. A step that fails below the limit is halved.
+ * stable: steps of the nominal size where they are stable, else as large as the stability limit of an
+ * explicit row allows, times a safety. The limit is found again every few steps, as the stiffness of a
+ * stretched or folded sheet is another, and where a step failed: one that was above it is forgotten. Rows
+ * without a limit take nominal steps. A step that fails below the limit is halved.
  *
  * A step of verlet is as many substeps as the scene says, so that it is the substeps that keep below 2/omega.
  */
@@ -18,19 +18,9 @@ enum { SCRATCH_LIMIT, SCRATCH_LEFT };
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
     [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(1000000),
-    [PARAM_SAFETY] = {.name = "safety",
-                      .unit = "1",
-                      .default_value = 0.9,
-                      .min = 0.1,
-                      .max = 1,
-                      .help = "share of the step that the estimate allows"},
-    [PARAM_EVERY] = {.name = "every",
-                     .kind = DRAPE_PARAM_INTEGER,
-                     .unit = "1",
-                     .default_value = 10,
-                     .min = 1,
-                     .max = 1e6,
-                     .help = "steps between two estimates of the stability limit"},
+    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1, "share of the step that the estimate allows"),
+    [PARAM_EVERY] =
+        DRAPE_INTEGER("every", "1", 10, 1, 1e6, "steps between two estimates of the stability limit"),
 };
 
 static double stable_step(const drape_trial *trial, const drape_state *at)
@@ -60,13 +50,13 @@ static drape_verdict reject(const double *values, drape_trial *trial, double lim
 {
     trial->status = DRAPE_RETRY_REJECTED;
     trial->info->reason = "unstable";
-    trial->info->worst = (drape_worst){.what = "step / stable step",
-                                       .term = "",
-                                       .element = -1,
-                                       .node = {-1, -1, -1, -1},
-                                       .cloth = -1,
-                                       .value = trial->h / limit,
-                                       .limit = 1};
+    trial->info->diagnostic = (drape_diagnostic){.what = "step / stable step",
+                                                 .term = "",
+                                                 .element = -1,
+                                                 .node = {-1, -1, -1, -1},
+                                                 .cloth = -1,
+                                                 .value = trial->h / limit,
+                                                 .limit = 1};
     drape_verdict verdict = drape_halve(values[PARAM_DT_MIN], trial);
     if (verdict == DRAPE_RETRY)
         trial->h_next = fmin(0.9 * trial->h, fmax(values[PARAM_DT_MIN], values[PARAM_SAFETY] * limit));
@@ -88,11 +78,10 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 }
 
 const drape_controller_ops drape_controller_stable = {
-    .name = "stable",
-    .summary = "nominal steps, smaller where an explicit integrator's stability limit asks for it",
-    .reference = "2/omega: Courant, Friedrichs & Lewy 1928; Hairer, Lubich & Wanner 2003",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "stable",
+              .summary = "nominal steps, smaller where an explicit integrator's stability limit asks for it",
+              .reference = "2/omega: Courant, Friedrichs & Lewy 1928; Hairer, Lubich & Wanner 2003",
+              DRAPE_PARAMS(params)},
     .own_steps = true,
     .judge = judge,
 };

@@ -13,21 +13,12 @@ enum { PARAM_DT_MIN, PARAM_MAX_ATTEMPTS, PARAM_MAX_STRETCH, PARAM_MAX_MOVE, PARA
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
     [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(10000),
-    [PARAM_MAX_STRETCH] = {.name = "max_stretch",
-                           .unit = "1",
-                           .default_value = 0.1,
-                           .min = 0,
-                           .max = 1e6,
-                           .open_min = true,
-                           .help = "largest change of an edge's length in one step, over its rest length"},
+    [PARAM_MAX_STRETCH] =
+        DRAPE_NUMBER("max_stretch", "1", 0.1, DRAPE_ABOVE(0), 1e6,
+                     "largest change of an edge's length in one step, over its rest length"),
     [PARAM_MAX_MOVE] =
-        {.name = "max_move",
-         .unit = "1",
-         .default_value = 10,
-         .min = 0,
-         .max = 1e9,
-         .open_min = true,
-         .help = "largest way of a node in one step, over the length of the shortest of its edges"},
+        DRAPE_NUMBER("max_move", "1", 10, DRAPE_ABOVE(0), 1e9,
+                     "largest way of a node in one step, over the length of the shortest of its edges"),
 };
 
 static double length_between(const double *x, const int32_t *node)
@@ -45,21 +36,21 @@ static double way(const drape_trial *trial, int32_t node)
 }
 
 /* Keeps the worst of one kind; limit and what are set by the caller. */
-static void keep(drape_worst *worst, const int32_t *node, int count, double value)
+static void keep(drape_diagnostic *diagnostic, const int32_t *node, int count, double value)
 {
-    if (value <= worst->value)
+    if (value <= diagnostic->value)
         return;
-    worst->value = value;
+    diagnostic->value = value;
     for (int a = 0; a < count; a++)
-        worst->node[a] = node[a];
+        diagnostic->node[a] = node[a];
 }
 
 static bool too_far(const double *values, drape_trial *trial)
 {
     const drape_model *m = trial->model;
-    drape_worst stretch = {
+    drape_diagnostic stretch = {
         .what = "change of edge length / rest length", .term = "", .element = -1, .node = {-1, -1, -1, -1}};
-    drape_worst move = {
+    drape_diagnostic move = {
         .what = "way of a node / edge length", .term = "", .element = -1, .node = {-1, -1, -1, -1}};
     stretch.limit = values[PARAM_MAX_STRETCH];
     move.limit = values[PARAM_MAX_MOVE];
@@ -75,8 +66,8 @@ static bool too_far(const double *values, drape_trial *trial)
     if (!stretched && !moved)
         return false;
     trial->info->reason = stretched ? "stretch" : "move";
-    trial->info->worst = stretched ? stretch : move;
-    trial->info->worst.cloth = drape_model_cloth_of(m, trial->info->worst.node[0]);
+    trial->info->diagnostic = stretched ? stretch : move;
+    trial->info->diagnostic.cloth = drape_model_cloth_of(m, trial->info->diagnostic.node[0]);
     return true;
 }
 
@@ -91,10 +82,9 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 }
 
 const drape_controller_ops drape_controller_strain = {
-    .name = "strain",
-    .summary = "halving that also rejects steps in which an edge or a node moves too far",
-    .reference = "-",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "strain",
+              .summary = "halving that also rejects steps in which an edge or a node moves too far",
+              .reference = "-",
+              DRAPE_PARAMS(params)},
     .judge = judge,
 };

@@ -14,7 +14,7 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
     if (sim->chosen.integrator->projects_contact && (m->collider_count || m->contact.self))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "contact: the integrator \"%s\" moves nodes out of what they meet and has no force",
-                          sim->chosen.integrator->name);
+                          sim->chosen.integrator->entry.name);
     if (!drape_system_contact(sim->system))
         return DRAPE_OK;
     drape_status status =
@@ -34,9 +34,8 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
 }
 
 const drape_field_ops drape_field_contact = {
-    .name = "contact",
+    .entry = {.name = "contact", .summary = "force of contact and friction on a node"},
     .unit = "N",
-    .summary = "force of contact and friction on a node",
     .shown = 1,
     .shown_unit = "N",
     .measure = measure,

@@ -8,9 +8,8 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
 }
 
 const drape_field_ops drape_field_energy = {
-    .name = "energy",
+    .entry = {.name = "energy", .summary = "elastic energy of the sheet by its area"},
     .unit = "J/m2",
-    .summary = "elastic energy of the sheet by its area",
     .shown = 1,
     .shown_unit = "J/m²",
     .measure = measure,

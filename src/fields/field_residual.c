@@ -14,7 +14,7 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
     if (!ops->residual)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "residual: the integrator \"%s\" solves no equations of a step by Newton",
-                          ops->name);
+                          ops->entry.name);
     const double *f = ops->residual(sim->integrator);
     for (int32_t i = 0; sim->statistics.steps_accepted > 0 && i < m->free_count; i++)
         values[m->node_of_free[i]] = vec3_norm(f + 3 * (size_t)i);
@@ -22,9 +22,9 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
 }
 
 const drape_field_ops drape_field_residual = {
-    .name = "residual",
+    .entry = {.name = "residual",
+              .summary = "what the last step's solver left of a node's equation of motion"},
     .unit = "N",
-    .summary = "what the last step's solver left of a node's equation of motion",
     .shown = 1,
     .shown_unit = "N",
     .of_steps = true,

@@ -1,5 +1,5 @@
-/* field_strain.c: the largest principal strain of the sheet. A node has the mean of its triangles, by their area at
- * rest. */
+/* field_strain.c: the largest principal strain of the sheet. A node has the mean of its triangles, by their
+ * area at rest. */
 #include "fields/fields.h"
 
 #include <string.h>
@@ -27,9 +27,8 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
 }
 
 const drape_field_ops drape_field_strain = {
-    .name = "strain",
+    .entry = {.name = "strain", .summary = "largest principal strain of the sheet"},
     .unit = "1",
-    .summary = "largest principal strain of the sheet",
     .shown = 100,
     .shown_unit = "%",
     .measure = measure,

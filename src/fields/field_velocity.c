@@ -13,9 +13,8 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
 }
 
 const drape_field_ops drape_field_velocity = {
-    .name = "velocity",
+    .entry = {.name = "velocity", .summary = "speed"},
     .unit = "m/s",
-    .summary = "speed",
     .shown = 1,
     .shown_unit = "m/s",
     .measure = measure,

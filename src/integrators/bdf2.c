@@ -7,13 +7,13 @@
  *     M w^2 (d - p) + g(x0 + d, w (d - c)) = 0,  p = c + (v0 + a (v0 - v_))/w
  * A- and L-stable at constant steps, zero-stable for r < 1 + sqrt(2), which halving and doubling keep.
  * Hairer, Norsett & Wanner 1993, III.5. The first step and the one after a discontinuity are backward
- * Euler: r = 0 makes it of the same formulas.
+ * Euler, which the same formulas give for r = 0.
  */
 #include "integrators/implicit.h"
 
 #include <string.h>
 
-/* What the formula wants to know of the past of a state: differences to the state before it. */
+/* What the formula needs of the past of a state: differences to the state before it. */
 typedef struct past {
     double t, h;          /* of the state, and of the step that led to it */
     double *dx, *dv, *dq; /* x0 - x_, v0 - v_ (nodes), q0 - q_ (measures) */
@@ -26,49 +26,26 @@ typedef struct bdf2_state {
     double *q0;            /* measures */
 } bdf2_state;
 
-static void destroy(void **state)
+static void create_past(drape_arena *arena, const drape_implicit *common, past *p)
 {
-    bdf2_state *s = *state;
-    if (!s)
-        return;
-    drape_context *ctx = s->common.ctx;
-    past *both[] = {&s->past, &s->made};
-    for (int i = 0; i < 2; i++) {
-        drape_free(ctx, both[i]->dx);
-        drape_free(ctx, both[i]->dv);
-        drape_free(ctx, both[i]->dq);
-    }
-    drape_free(ctx, s->q0);
-    drape_implicit_free(&s->common);
-    drape_free(ctx, s);
-    *state = NULL;
-}
-
-static bool create_past(const drape_implicit *common, past *p)
-{
-    size_t nodes = 3 * (size_t)common->model->node_count;
-    p->dx = drape_alloc(common->ctx, nodes, sizeof(double));
-    p->dv = drape_alloc(common->ctx, nodes, sizeof(double));
+    const drape_step_equation *e = &common->equation;
+    p->dx = drape_arena_take(arena, e->nodes, sizeof *p->dx);
+    p->dv = drape_arena_take(arena, e->nodes, sizeof *p->dv);
     if (common->history)
-        p->dq = drape_alloc(common->ctx, (size_t)common->model->measure_count, sizeof(double));
-    return p->dx && p->dv && (p->dq || !common->history);
+        p->dq = drape_arena_take(arena, (size_t)e->model->measure_count, sizeof *p->dq);
 }
 
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
-    bdf2_state *s = drape_alloc(ctx, 1, sizeof *s);
-    *state = s;
+    bdf2_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    drape_status status = drape_implicit_init(ctx, system, values, &s->common);
-    if (!status && s->common.history)
-        s->q0 = drape_alloc(ctx, (size_t)s->common.model->measure_count, sizeof(double));
-    if (!status && (!create_past(&s->common, &s->past) || !create_past(&s->common, &s->made) ||
-                    (s->common.history && !s->q0)))
-        status = DRAPE_E_MEMORY;
-    if (status)
-        destroy(state);
-    return status;
+    drape_status status = drape_implicit_init_newton(arena, system, values, &s->common);
+    if (s->common.history)
+        s->q0 = drape_arena_take(arena, (size_t)s->common.equation.model->measure_count, sizeof *s->q0);
+    create_past(arena, &s->common, &s->past);
+    create_past(arena, &s->common, &s->made);
+    return status ? status : drape_arena_status(arena);
 }
 
 /* The attempt before was accepted if it made the state that this one starts from. */
@@ -83,46 +60,41 @@ static void settle_past(bdf2_state *s, const drape_state *in)
     s->past.known = s->past.known && s->past.t == in->t;
 }
 
-static void set_problem(bdf2_state *s, const drape_state *in, double a, double w)
+static void set_equation(bdf2_state *s, const drape_state *in, double a, double w)
 {
     drape_implicit *c = &s->common;
-    for (size_t i = 0; i < 3 * (size_t)c->model->free_count; i++) {
-        size_t at = drape_implicit_at(c, i);
+    drape_step_equation *e = &c->equation;
+    e->point.weight = w;
+    e->mass_weight = w * w;
+    for (size_t i = 0; i < e->dofs; i++) {
+        size_t at = drape_step_equation_at(e, i);
         double dx = a > 0 ? a * s->past.dx[at] : 0, dv = a > 0 ? a * s->past.dv[at] : 0;
-        c->v_base[at] = -w * dx;
-        c->inertia[i] = dx + (in->v[at] + dv) / w;
+        e->v_base[at] = -w * dx;
+        e->inertia[i] = dx + (in->v[at] + dv) / w;
     }
+    e->point.history = c->history;
+    if (!c->history)
+        return;
     drape_implicit_measure(c, in, s->q0);
-    for (int64_t i = 0; c->history && i < c->model->measure_count; i++)
+    for (int64_t i = 0; i < e->model->measure_count; i++)
         c->history[i] = -w * (s->q0[i] + (a > 0 ? a * s->past.dq[i] : 0));
 }
 
-static void write_state(const drape_implicit *s, double w, drape_state *out)
-{
-    size_t nodes = 3 * (size_t)s->model->node_count;
-    memcpy(out->x, s->x_base, nodes * sizeof *out->x);
-    memcpy(out->v, s->v_base, nodes * sizeof *out->v);
-    for (size_t i = 0; i < 3 * (size_t)s->model->free_count; i++) {
-        out->x[drape_implicit_at(s, i)] += s->d[i];
-        out->v[drape_implicit_at(s, i)] += w * s->d[i];
-    }
-}
-
-/* What the next step will want to know, should this one be accepted. */
+/* What the next step needs if this one is accepted. */
 static void remember(bdf2_state *s, const drape_state *in, const drape_state *out, double h)
 {
     drape_implicit *c = &s->common;
     s->made.t = out->t;
     s->made.h = h;
     s->made.known = true;
-    for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++) {
+    for (size_t i = 0; i < c->equation.nodes; i++) {
         s->made.dx[i] = out->x[i] - in->x[i];
         s->made.dv[i] = out->v[i] - in->v[i];
     }
     if (!c->history)
         return;
     drape_implicit_measure(c, &(drape_state){.x = out->x, .internal = in->internal}, s->made.dq);
-    for (int64_t i = 0; i < c->model->measure_count; i++)
+    for (int64_t i = 0; i < c->equation.model->measure_count; i++)
         s->made.dq[i] -= s->q0[i];
 }
 
@@ -130,15 +102,17 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
                          drape_step_info *info)
 {
     bdf2_state *s = state;
+    const drape_step_equation *e = &s->common.equation;
     settle_past(s, in);
     double r = s->past.known ? h / s->past.h : 0;
     double a = r * r / (1 + 2 * r), w = (1 + 2 * r) / (1 + r) / h;
     drape_implicit_base(&s->common, in, out->t, h);
-    set_problem(s, in, a, w);
-    drape_status status = drape_implicit_solve(&s->common, in->internal, s->common.history, w, w * w, info);
+    set_equation(s, in, a, w);
+    drape_status status = drape_implicit_solve(&s->common, info);
     if (status && !info->usable)
         return status;
-    write_state(&s->common, w, out);
+    memcpy(out->x, e->x, e->nodes * sizeof *out->x);
+    memcpy(out->v, e->v, e->nodes * sizeof *out->v);
     remember(s, in, out, h);
     drape_implicit_audit(&s->common, in, out, info);
     return status;
@@ -153,17 +127,16 @@ static void restart(void *state, const drape_state *from)
 
 static void archive_past(const bdf2_state *s, past *p, drape_archive *a)
 {
-    const drape_model *m = s->common.model;
-    size_t nodes = 3 * (size_t)m->node_count;
+    const drape_step_equation *e = &s->common.equation;
     drape_archive_bool(a, &p->known);
     if (!p->known)
         return;
     drape_archive_double(a, &p->t);
     drape_archive_double(a, &p->h);
-    drape_archive_doubles(a, p->dx, nodes);
-    drape_archive_doubles(a, p->dv, nodes);
+    drape_archive_doubles(a, p->dx, e->nodes);
+    drape_archive_doubles(a, p->dv, e->nodes);
     if (p->dq)
-        drape_archive_doubles(a, p->dq, (size_t)m->measure_count);
+        drape_archive_doubles(a, p->dq, (size_t)e->model->measure_count);
 }
 
 static void archive(void *state, drape_archive *a)
@@ -174,28 +147,21 @@ static void archive(void *state, drape_archive *a)
     drape_implicit_archive(state, a);
 }
 
-static size_t bytes(const void *state)
-{
-    const bdf2_state *s = state;
-    size_t nodes = 3 * (size_t)s->common.model->node_count;
-    size_t measures = s->q0 ? (size_t)s->common.model->measure_count : 0;
-    return drape_implicit_bytes(state) + (4 * nodes + 3 * measures) * sizeof(double);
-}
-
 const drape_integrator_ops drape_integrator_bdf2 = {
-    .name = "bdf2",
-    .summary = "two-step backward differentiation by Newton: fixed step, second order, damps what h does not "
-               "resolve",
-    .reference = "Hairer, Norsett & Wanner 1993, Solving Ordinary Differential Equations I, III.5",
+    .entry =
+        {.name = "bdf2",
+         .summary =
+             "two-step backward differentiation by Newton: fixed step, second order, damps what h does not "
+             "resolve",
+         .reference = "Hairer, Norsett & Wanner 1993, Solving Ordinary Differential Equations I, III.5",
+         DRAPE_PARAMS(drape_newton_params)},
     .order = 2,
-    .params = drape_newton_params,
-    .param_count = DRAPE_NEWTON_PARAM_COUNT,
     .create = create,
     .step = step,
     .restart = restart,
     .residual = drape_implicit_residual,
     .work = drape_implicit_work,
     .archive = archive,
-    .bytes = bytes,
-    .destroy = destroy,
+    .bytes = drape_implicit_bytes,
+    .destroy = drape_implicit_destroy,
 };

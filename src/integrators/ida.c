@@ -8,20 +8,24 @@
  *     (K + c_j D + c_j^2 M) dx = r2 + (D + c_j M) r1:
  * the matrix of a backward Euler step of size 1/c_j, with the same pattern and the same linear solvers.
  * IDA keeps Jacobian and factors while c_j stays near theirs; that is most of its advantage over one
- * factorisation an iteration. When the iteration with old factors has converged is ida_newton.h's to say.
+ * factorisation an iteration. ida_newton.h decides when the iteration with old factors has converged.
  *
- * That iteration needs no exact matrix either. What makes it not symmetric is friction, whose force follows the normal
- * force, and dashpots of strains that turn: small beside c_j^2 M and c_j D at the steps that both ask for. Half of it goes
- * to each side, so that Cholesky factors serve: half of the time or less in most scenes of contact, for as many iterations.
- * Where much slides, those may fail: then some matrices are exact.
+ * That iteration needs no exact matrix either. What makes it nonsymmetric is friction, whose force follows
+ * the normal force, and dashpots of strains that rotate: small beside c_j^2 M and c_j D at the steps that
+ * both ask for. With half of it on each side Cholesky factors serve: half of the time or less in most scenes
+ * of contact, for as many iterations. Where much slides, the iteration may fail with them: then some matrices
+ * are exact.
  *
  * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative
  * part would make the error depend on where the scene lies. The maximum order is 2 at loose tolerances,
  * because BDF 3 to 5 are not A-stable and feed energy into undamped waves; it is 5 when the tolerance
  * resolves them.
  *
- * Pins that move have kinks at the keys of their tracks, and where a host sends them elsewhere: IDA stops there and
- * starts again.
+ * Pins that move have kinks at the keys of their tracks, and where a host sends them elsewhere: IDA stops
+ * there and starts anew.
+ *
+ * IDA chooses order and step, predicts, tests errors and iterates. Its callbacks are below in the order in
+ * which it calls them, then the stages of our step around IDASolve.
  */
 #include "base/finite.h"
 #include "integrators/ida_newton.h"
@@ -48,15 +52,16 @@ enum {
 };
 enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
 
-#define TIGHT        1e-4 /* rtol below which order 5 pays */
-#define LOOSE_ORDER  2
-#define TIGHT_ORDER  5
-#define NEWTON_SHARE 0.33 /* of the error tolerance that is left to the Newton iteration */
+#define TIGHT          1e-4 /* rtol below which order 5 pays */
+#define LOOSE_ORDER    2
+#define TIGHT_ORDER    5
+#define NEWTON_SHARE   0.33 /* of the error tolerance that is left to the Newton iteration */
+#define MAX_EXACT_SPAN 64   /* exact matrices in a row, where symmetric ones keep failing */
 /* New factors past a change of c_j by (1 - d)/(1 + d). IDA's own 0.25 takes a quarter more residuals for
  * as many factors. */
-#define CJ_CHANGE  0.1
-#define MOST_EXACT 64 /* matrices in a row, where the symmetric part keeps failing */
-/* Of the energy of a scene. At rtol 1e-3 a smooth fall swings by half a percent: more is of waves that are fed. */
+#define CJ_CHANGE 0.1
+/* Of the energy of a scene. At rtol 1e-3 a smooth fall swings by half a percent: a larger gain comes from
+ * waves that are amplified. */
 #define GAIN             0.02
 #define MAX_ERROR_FAILS  10 /* error test failures in one step */
 #define MAX_SOLVER_FAILS 10 /* convergence failures in one step */
@@ -67,48 +72,22 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_RTOL] = DRAPE_RTOL_PARAM,
     [PARAM_ATOL_X] = DRAPE_ATOL_X_PARAM,
     [PARAM_ATOL_V] = DRAPE_ATOL_V_PARAM,
-    [PARAM_MAX_ORDER] = {.name = "max_order",
-                         .kind = DRAPE_PARAM_INTEGER,
-                         .unit = "1",
-                         .default_value = NAN,
-                         .derived = "2 for rtol >= 1e-4, else 5",
-                         .min = 1,
-                         .max = 5,
-                         .help = "highest order of the BDF"},
-    [PARAM_MAX_STEP] = {.name = "max_step",
-                        .unit = "s",
-                        .default_value = NAN,
-                        .derived = "none",
-                        .min = 0,
-                        .max = 1e9,
-                        .open_min = true,
-                        .help = "largest step"},
-    [PARAM_MAX_STEPS] = {.name = "max_steps",
-                         .kind = DRAPE_PARAM_INTEGER,
-                         .unit = "1/s",
-                         .default_value = 100000,
-                         .min = 1,
-                         .max = 1e9,
-                         .help = "steps within one second of simulated time, those that end an advance "
-                                 "apart; one more ends the run"},
-    [PARAM_LINEAR_SOLVER] = {.name = "linear_solver",
-                             .kind = DRAPE_PARAM_CHOICE,
-                             .unit = "1",
-                             .default_value = 0,
-                             .choices = drape_linears_words,
-                             .help = "a row of the linear solvers"},
-    [PARAM_MATRIX] =
-        {.name = "matrix",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = MATRIX_AUTO,
-         .choices = matrix_choices,
-         .help = "of Newton's corrections; symmetric: the symmetric part of the exact one, which friction "
-                 "and dashpots make another; auto: that, and exact ones for a while where it fails"},
+    [PARAM_MAX_ORDER] = DRAPE_INTEGER("max_order", "1", DRAPE_DERIVED("2 for rtol >= 1e-4, else 5"), 1, 5,
+                                      "highest order of the BDF"),
+    [PARAM_MAX_STEP] =
+        DRAPE_NUMBER("max_step", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),
+    [PARAM_MAX_STEPS] = DRAPE_INTEGER(
+        "max_steps", "1/s", 100000, 1, 1e9,
+        "steps within one second of simulated time, those that end an advance apart; one more ends the run"),
+    [PARAM_LINEAR_SOLVER] = DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver"),
+    [PARAM_MATRIX] = DRAPE_CHOICE(
+        "matrix", MATRIX_AUTO, matrix_choices,
+        "of Newton's corrections; symmetric: the symmetric part of the exact one, which friction and "
+        "dashpots make another; auto: that, and exact ones for a while where it fails"),
 };
 
 typedef struct ida_state {
-    drape_context *ctx;
+    drape_arena *arena;
     drape_system *system;
     const drape_model *model;
     const drape_motion *motion;
@@ -119,26 +98,32 @@ typedef struct ida_state {
     N_Vector y, rate, weights, between; /* (x, v), (x', v'), absolute tolerances, dense output */
     drape_sun_linear *linear;
     drape_ida_newton newton;
-    double *x, *v, *g;      /* nodes: where the residual was evaluated last, and g there */
-    double *damping;        /* D (nonzeros); NULL where nothing dissipates */
-    double *reduced;        /* right-hand side of the reduced system (n) */
-    double *dissipated;     /* nodes; NULL where nothing dissipates */
-    double factored_cj;     /* c_j of the factors */
-    bool part;              /* they are of the symmetric part */
-    int64_t exact_left;     /* so many matrices before it is tried again, */
-    int64_t exact_span;     /* of so many */
-    int64_t failures;       /* of the iteration with a new matrix, as IDA had counted them at the last one */
+    double *x, *v, *g;  /* nodes: where the residual was evaluated last, and g there */
+    double *damping;    /* D (nonzeros); NULL where nothing dissipates */
+    double *reduced;    /* right-hand side of the reduced system (n) */
+    double *dissipated; /* nodes; NULL where nothing dissipates */
+
+    /* The matrix, kept from step to step. */
+    double factored_cj;      /* c_j of the factors */
+    bool symmetric;          /* they are of the symmetric part */
+    int64_t exact_remaining; /* matrices before the symmetric part is tried again, */
+    int64_t exact_span;      /* of so many */
+    int64_t failures; /* of the iteration with a new matrix, as IDA had counted them at the last matrix */
+
+    /* From step to step. */
     const double *internal; /* of the last accepted state */
     double span[2];         /* [s] no pin or collider has a kink inside */
-    double reached;         /* time of IDA's state; NaN: it must start anew */
-    double from;            /* time that the last good step began at; NaN: none */
+    double reached;         /* [s] time of IDA's state; NAN: it must start anew */
+    double from;            /* [s] time that the last good step began at; NAN: none */
     double powers[2];       /* [W] taken by dissipation and put in by pins, at the time reached */
-    bool nonfinite, crossing; /* why the last residual was refused */
-    drape_status fitted;      /* of the last change of the pattern: < 0 ends the run */
-    double second;            /* [s] the second of simulated time that steps are counted in */
-    int64_t steps;            /* attempted in it, but for those that end an advance */
-    long counted;             /* Newton iterations of IDA that work has already */
+    double second;          /* [s] the second of simulated time that steps are counted in */
+    int64_t steps;          /* attempted in it, but for those that end an advance */
+    long counted;           /* Newton iterations of IDA that `work` has already */
     drape_work work;
+
+    /* Why callbacks refused to go on in this step, of which IDA keeps only the sign. */
+    bool nonfinite, crossing; /* the last residual */
+    drape_status failure;     /* < 0: the pattern could not be extended */
 } ida_state;
 
 /* ---- Between vectors and nodes ---- */
@@ -148,7 +133,12 @@ static size_t node_at(const ida_state *s, int64_t i)
     return 3 * (size_t)s->model->node_of_free[i / 3] + (size_t)(i % 3);
 }
 
-/* Within a step no pin has a kink, so its velocity is that of the piece that any time inside is of. */
+static double mass_of(const ida_state *s, int64_t i)
+{
+    return s->model->mass[s->model->node_of_free[i / 3]];
+}
+
+/* Within a step no pin has a kink, so its velocity is the same at any time inside the span. */
 static void place_pins(ida_state *s, double t)
 {
     const drape_motion *m = s->motion;
@@ -169,7 +159,7 @@ static drape_point place(ida_state *s, double t, const double *y)
         .x = s->x, .v = s->v, .internal = s->internal, .t = t, .span = {s->span[0], s->span[1]}};
 }
 
-/* ---- The callbacks of IDA ---- */
+/* ---- Residual ---- */
 
 static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void *user)
 {
@@ -180,7 +170,7 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
     drape_system_force(s->system, &point, s->g);
     for (int64_t i = 0; i < s->n; i++) {
         f[i] = xp[i] - v[i];
-        f[s->n + i] = s->model->mass[s->model->node_of_free[i / 3]] * vp[i] + s->g[node_at(s, i)];
+        f[s->n + i] = mass_of(s, i) * vp[i] + s->g[node_at(s, i)];
     }
     s->nonfinite = !drape_all_finite(f, 2 * (size_t)s->n);
     s->crossing = !s->nonfinite && drape_system_crosses(s->system, s->x, t);
@@ -189,53 +179,55 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
     return drape_system_status(s->system) ? -1 : s->nonfinite || s->crossing ? 1 : 0;
 }
 
-/* The system has another pattern: the matrices are made anew. */
-static drape_status adopt_pattern(ida_state *s)
+/* ---- Jacobian ---- */
+
+/* The matrices for the system's present pattern. */
+static drape_status renew_matrices(ida_state *s)
 {
     const drape_pattern *pattern = drape_system_pattern(s->system);
     if (s->dissipated) {
-        drape_free(s->ctx, s->damping);
-        s->damping = drape_alloc(s->ctx, (size_t)pattern->nonzeros, sizeof *s->damping);
+        drape_arena_release(s->arena, s->damping);
+        s->damping = drape_arena_take(s->arena, (size_t)pattern->nonzeros, sizeof *s->damping);
         if (!s->damping)
             return DRAPE_E_MEMORY;
     }
-    return drape_sun_linear_adopt(s->linear, pattern);
+    return drape_sun_linear_extend_pattern(s->linear, pattern);
 }
 
 /* Contact may couple what it did not before. */
-static drape_status fit_pattern(ida_state *s, const drape_point *point)
+static drape_status extend_pattern(ida_state *s, const drape_point *point)
 {
     bool changed;
-    s->fitted = drape_system_fit(s->system, point, &changed);
+    drape_status status = drape_system_extend_pattern(s->system, point, &changed);
     s->linear->stale |= changed;
-    if (!s->fitted && s->linear->stale)
-        s->fitted = adopt_pattern(s);
-    return s->fitted;
+    return !status && s->linear->stale ? renew_matrices(s) : status;
 }
 
-/* Without contact, and without the solver's part of fit_pattern. */
+/* Excludes contact, and the new analysis in extend_pattern, which count elsewhere. */
 static double jacobian_clock(const ida_state *s)
 {
     return drape_system_clock(s->system) - s->linear->factor_seconds;
 }
 
-/* Where the iteration failed with a new matrix that was the symmetric part, exact ones follow for a while: twice as many
- * as the last time, half as many after each symmetric one that did. */
-static bool takes_part(ida_state *s)
+/* Whether the next matrix is to be the symmetric part. Where the iteration failed with a new one that was,
+ * exact ones follow for a while: twice as many as the last time, and half as many after each symmetric one
+ * that converged. */
+static bool choose_symmetric(ida_state *s)
 {
     long failures = 0;
     IDAGetNumNonlinSolvConvFails(s->ida, &failures);
-    const bool failed = s->part && failures > s->failures;
+    const bool failed = s->symmetric && failures > s->failures;
     s->failures = failures;
     if (s->values[PARAM_MATRIX] != MATRIX_AUTO)
         return s->values[PARAM_MATRIX] == MATRIX_SYMMETRIC;
     if (failed)
-        s->exact_left = s->exact_span = s->exact_span < MOST_EXACT ? 2 * s->exact_span : MOST_EXACT;
-    else if (s->exact_left > 0)
-        s->exact_left--;
+        s->exact_remaining = s->exact_span =
+            s->exact_span < MAX_EXACT_SPAN ? 2 * s->exact_span : MAX_EXACT_SPAN;
+    else if (s->exact_remaining > 0)
+        s->exact_remaining--;
     else if (s->exact_span > 1)
         s->exact_span /= 2;
-    return s->exact_left == 0;
+    return s->exact_remaining == 0;
 }
 
 static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_Vector r, SUNMatrix matrix,
@@ -246,11 +238,12 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
     double start = jacobian_clock(s);
     drape_point point = place(s, t, N_VGetArrayPointer(y));
     point.weight = cj;
-    if (fit_pattern(s, &point))
+    s->failure = extend_pattern(s, &point);
+    if (s->failure)
         return -1;
-    drape_system_jacobian(s->system, &point, cj * cj, false, s->linear->values);
-    s->part = takes_part(s);
-    if (s->part)
+    drape_system_jacobian(s->system, &point, cj * cj, 0, s->linear->values);
+    s->symmetric = choose_symmetric(s);
+    if (s->symmetric)
         drape_pattern_symmetrize(drape_system_pattern(s->system), s->linear->values);
     if (s->damping)
         drape_system_damping(s->system, &point, s->damping);
@@ -261,11 +254,15 @@ static int jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N_Vector rate, N_
     return 0;
 }
 
+/* ---- Solve ---- */
+
 /* reduced += D r */
 static void add_damping(const ida_state *s, const double *r)
 {
     const drape_pattern *p = drape_system_pattern(s->system);
-    for (int64_t j = 0; s->damping && j < p->n; j++)
+    if (!s->damping)
+        return;
+    for (int64_t j = 0; j < p->n; j++)
         for (int64_t k = p->column[j]; k < p->column[j + 1]; k++)
             s->reduced[p->row[k]] += s->damping[k] * r[j];
 }
@@ -279,7 +276,7 @@ static int solve_reduced(SUNLinearSolver solver, SUNMatrix matrix, N_Vector out,
     const double *r1 = N_VGetArrayPointer(in), *r2 = r1 + s->n;
     double *dx = N_VGetArrayPointer(out), *dv = dx + s->n;
     for (int64_t i = 0; i < s->n; i++)
-        s->reduced[i] = r2[i] + s->factored_cj * s->model->mass[s->model->node_of_free[i / 3]] * r1[i];
+        s->reduced[i] = r2[i] + s->factored_cj * mass_of(s, i) * r1[i];
     add_damping(s, r1);
     drape_status status = drape_sun_linear_solve(linear, s->reduced, dx);
     for (int64_t i = 0; i < s->n; i++)
@@ -287,200 +284,15 @@ static int solve_reduced(SUNLinearSolver solver, SUNMatrix matrix, N_Vector out,
     return status;
 }
 
-/* ---- Making and freeing ---- */
-
-static void destroy(void **state)
-{
-    ida_state *s = *state;
-    if (!s)
-        return;
-    if (s->ida)
-        IDAFree(&s->ida);
-    drape_ida_newton_free(&s->newton);
-    drape_sun_linear_destroy(&s->linear);
-    N_Vector vectors[] = {s->y, s->rate, s->weights, s->between};
-    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
-        if (vectors[i])
-            N_VDestroy(vectors[i]);
-    if (s->sun)
-        SUNContext_Free(&s->sun);
-    double *arrays[] = {s->x, s->v, s->g, s->damping, s->reduced, s->dissipated};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        drape_free(s->ctx, arrays[i]);
-    drape_free(s->ctx, s);
-    *state = NULL;
-}
-
-static bool create_arrays(ida_state *s)
-{
-    size_t nodes = 3 * (size_t)s->model->node_count;
-    bool dissipates = s->model->has_dissipation;
-    s->x = drape_alloc(s->ctx, nodes, sizeof(double));
-    s->v = drape_alloc(s->ctx, nodes, sizeof(double));
-    s->g = drape_alloc(s->ctx, nodes, sizeof(double));
-    s->reduced = drape_alloc(s->ctx, (size_t)s->n, sizeof(double));
-    if (dissipates) {
-        s->damping = drape_alloc(s->ctx, (size_t)drape_system_pattern(s->system)->nonzeros, sizeof(double));
-        s->dissipated = drape_alloc(s->ctx, nodes, sizeof(double));
-    }
-    return s->x && s->v && s->g && s->reduced && (!dissipates || (s->damping && s->dissipated));
-}
-
-/* Derived defaults, and the weights that follow. */
-static void set_tolerances(ida_state *s)
-{
-    double rtol = s->values[PARAM_RTOL];
-    drape_derive_tolerances(s->model, rtol, &s->values[PARAM_ATOL_X], &s->values[PARAM_ATOL_V]);
-    if (isnan(s->values[PARAM_MAX_ORDER]))
-        s->values[PARAM_MAX_ORDER] = rtol >= TIGHT ? LOOSE_ORDER : TIGHT_ORDER;
-    double *w = N_VGetArrayPointer(s->weights);
-    for (int64_t i = 0; i < s->n; i++) {
-        w[i] = s->values[PARAM_ATOL_X];
-        w[s->n + i] = s->values[PARAM_ATOL_V];
-    }
-}
-
-static drape_status create_vectors(ida_state *s)
-{
-    s->y = N_VNew_Serial(2 * s->n, s->sun);
-    s->rate = N_VNew_Serial(2 * s->n, s->sun);
-    s->weights = N_VNew_Serial(2 * s->n, s->sun);
-    s->between = N_VNew_Serial(2 * s->n, s->sun);
-    if (!s->y || !s->rate || !s->weights || !s->between)
-        return drape_fail_memory(s->ctx, 2 * (size_t)s->n * sizeof(double));
-    N_VConst(0, s->y);
-    N_VConst(0, s->rate);
-    set_tolerances(s);
-    return DRAPE_OK;
-}
-
-static bool configure(ida_state *s)
-{
-    DRAPE_IDA_QUIET(s->ida);
-    bool good = !IDAInit(s->ida, residual, 0, s->y, s->rate) && !IDASetUserData(s->ida, s) &&
-                !IDASVtolerances(s->ida, 0, s->weights) &&
-                !IDASetLinearSolver(s->ida, s->linear->solver, s->linear->matrix) &&
-                drape_ida_newton_attach(&s->newton, s->ida, s->y, s->sun) && !IDASetJacFn(s->ida, jacobian) &&
-                !IDASetMaxOrd(s->ida, (int)s->values[PARAM_MAX_ORDER]) &&
-                !IDASetMaxErrTestFails(s->ida, MAX_ERROR_FAILS) &&
-                !IDASetMaxConvFails(s->ida, MAX_SOLVER_FAILS) &&
-                !IDASetNonlinConvCoef(s->ida, NEWTON_SHARE) && !IDASetDeltaCjLSetup(s->ida, CJ_CHANGE);
-    if (good && !isnan(s->values[PARAM_MAX_STEP]))
-        good = !IDASetMaxStep(s->ida, s->values[PARAM_MAX_STEP]);
-    return good;
-}
-
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
-{
-    ida_state *s = drape_alloc(ctx, 1, sizeof *s);
-    *state = s;
-    if (!s)
-        return DRAPE_E_MEMORY;
-    *s = (ida_state){.ctx = ctx,
-                     .system = system,
-                     .model = drape_system_model(system),
-                     .motion = drape_system_motion(system),
-                     .exact_span = 1,
-                     .reached = NAN,
-                     .from = NAN};
-    s->n = 3 * (int64_t)s->model->free_count;
-    memcpy(s->values, values, sizeof s->values);
-    drape_status status = create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
-    if (!status && (drape_sundials_context(&s->sun) || !(s->ida = IDACreate(s->sun))))
-        status = drape_fail_memory(ctx, sizeof(void *));
-    if (!status && s->n > 0)
-        status = create_vectors(s);
-    if (!status && s->n > 0)
-        status = drape_sun_linear_create(ctx, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
-                                         drape_system_pattern(s->system), drape_system_crew(s->system),
-                                         &s->linear);
-    if (!status && s->n > 0) {
-        s->linear->owner = s;
-        s->linear->solver->ops->solve = solve_reduced;
-        if (!configure(s))
-            status = drape_fail(ctx, DRAPE_E_MEMORY, "IDA cannot be set up for %lld unknowns",
-                                (long long)(2 * s->n));
-        else
-            drape_ida_clear(s->ida);
-    }
-    if (status)
-        destroy(state);
-    return status;
-}
-
-/* ---- A step ---- */
-
-/* Every return code of IDASolve, as what it means for the step. */
-static drape_status status_of(int code, bool nonfinite, const char **reason)
-{
-    *reason = nonfinite ? "nonfinite" : "converged";
-    switch (code) {
-    case IDA_SUCCESS:
-    case IDA_TSTOP_RETURN:
-        *reason = "converged";
-        return DRAPE_OK;
-    case IDA_ERR_FAIL:
-        *reason = "error_test";
-        return DRAPE_RETRY_REJECTED;
-    case IDA_TOO_MUCH_ACC:
-        *reason = "round_off";
-        return DRAPE_RETRY_REJECTED;
-    case IDA_CONV_FAIL:
-    case IDA_NLS_FAIL:
-        *reason = nonfinite ? "nonfinite" : "newton";
-        return nonfinite ? DRAPE_RETRY_NONFINITE : DRAPE_RETRY_NONLINEAR;
-    case IDA_LSETUP_FAIL:
-    case IDA_LSOLVE_FAIL:
-        *reason = "singular";
-        return DRAPE_RETRY_LINEAR;
-    case IDA_RES_FAIL:
-    case IDA_REP_RES_ERR:
-    case IDA_FIRST_RES_FAIL:
-        *reason = "nonfinite";
-        return DRAPE_RETRY_NONFINITE;
-    default: /* IDA_MEM_NULL, IDA_ILL_INPUT, IDA_LINIT_FAIL, IDA_VECTOROP_ERR ...: no smaller step helps */
-        *reason = "solver";
-        return DRAPE_E_SOLVER;
-    }
-}
-
-/* Consistent initial values need no solve: x' = v, v' = -M^-1 g. */
-static drape_status start(ida_state *s, const drape_state *in, drape_step_info *info)
-{
-    double *y = N_VGetArrayPointer(s->y), *rate = N_VGetArrayPointer(s->rate);
-    for (int64_t i = 0; i < s->n; i++) {
-        y[i] = in->x[node_at(s, i)];
-        y[s->n + i] = rate[i] = in->v[node_at(s, i)];
-    }
-    drape_point point = place(s, in->t, y);
-    drape_system_force(s->system, &point, s->g);
-    s->work.residuals++;
-    for (int64_t i = 0; i < s->n; i++) {
-        rate[s->n + i] = -s->g[node_at(s, i)] / s->model->mass[s->model->node_of_free[i / 3]];
-    }
-    s->counted = 0;
-    s->failures = 0;
-    info->reason = "nonfinite";
-    if (!drape_all_finite(rate + s->n, (size_t)s->n)) /* IDA would cut its step ten times over it */
-        return DRAPE_RETRY_NONFINITE;
-    info->reason = "solver";
-    return IDAReInit(s->ida, in->t, s->y, s->rate) ? DRAPE_E_SOLVER : DRAPE_OK;
-}
-
-/* Pinned nodes that do not move keep their rest positions and no velocity in s->x and s->v for good. */
-static void begin(ida_state *s, const drape_state *in)
-{
-    size_t nodes = 3 * (size_t)s->model->node_count;
-    memcpy(s->x, in->x, nodes * sizeof *s->x);
-    memcpy(s->v, in->v, nodes * sizeof *s->v);
-    s->internal = in->internal;
-}
+/* ---- Work of dissipation, pins and colliders ---- */
 
 /* At time t, of forces on colliders (NULL: no contact) that move. */
 static double collider_power(const ida_state *s, double t, const double *force)
 {
     double power = 0;
-    for (int32_t c = 0; force && c < s->model->collider_count; c++) {
+    if (!force)
+        return 0;
+    for (int32_t c = 0; c < s->model->collider_count; c++) {
         double v[3];
         drape_motion_collider_velocity(s->motion, c, t, (s->span[0] + s->span[1]) / 2, v);
         for (int k = 0; k < 3; k++)
@@ -524,50 +336,19 @@ static void audit(ida_state *s, const drape_state *in, const drape_state *out, d
     memcpy(s->powers, after, sizeof after);
 }
 
-static void count_iterations(ida_state *s, drape_step_info *info)
-{
-    long iterations = 0;
-    IDAGetNumNonlinSolvIters(s->ida, &iterations);
-    info->iterations = (int)(iterations - s->counted);
-    s->work.newton_iterations += iterations - s->counted;
-    s->counted = iterations;
-}
+/* ---- A step ---- */
 
-/* Goes on from in if IDA is there, else starts anew, with a first step of at most h where an attempt
- * before was rejected. *first: the kink or the end, whichever comes first. */
-static drape_status prepare(ida_state *s, const drape_state *in, double end, double h, double *first,
-                            drape_step_info *info)
-{
-    double stop = drape_motion_next_kink(s->motion, in->t, end);
-    begin(s, in);
-    s->span[0] = in->t;
-    s->span[1] = stop;
-    if (s->n > 0 && (s->reached != in->t || drape_motion_at_kink(s->motion, in->t))) {
-        drape_status status = start(s, in, info);
-        if (status)
-            return status;
-        if (IDASetInitStep(s->ida, h < end - in->t ? h : 0))
-            return DRAPE_E_SOLVER;
-        measure_powers(s, in->t, s->powers);
-    } else if (s->n == 0) {
-        place_pins(s, in->t);
-        measure_powers(s, in->t, s->powers);
-    }
-    *first = h < end - in->t ? fmin(stop, in->t + h) : stop;
-    return s->n > 0 && IDASetStopTime(s->ida, stop) ? DRAPE_E_SOLVER : DRAPE_OK;
-}
-
-/* After a failure: the degenerate element or the node whose force is no number, else the node of the
- * largest weighted error. */
-static void name_worst(ida_state *s, drape_step_info *info)
+/* After a failure: the degenerate element or the node whose force is not finite, else the node of the largest
+ * weighted error. */
+static void diagnose(ida_state *s, drape_step_info *info)
 {
     if (s->n == 0)
         return;
     if (s->nonfinite) {
         for (int64_t i = 0; i < s->n; i++)
             s->reduced[i] = s->g[node_at(s, i)];
-        info->worst = drape_system_worst_dof(s->system, s->reduced, "force [N]", INFINITY);
-        drape_system_check(s->system, s->x, NULL, s->internal, &info->reason, &info->worst);
+        info->diagnostic = drape_system_diagnose_dof(s->system, s->reduced, "force [N]", INFINITY);
+        drape_system_check(s->system, s->x, NULL, s->internal, &info->reason, &info->diagnostic);
         return;
     }
     if (IDAGetEstLocalErrors(s->ida, s->between))
@@ -575,12 +356,13 @@ static void name_worst(ida_state *s, drape_step_info *info)
     const double *e = N_VGetArrayPointer(s->between), *w = N_VGetArrayPointer(s->weights);
     for (int64_t i = 0; i < s->n; i++)
         s->reduced[i] = fmax(fabs(e[i]) / w[i], fabs(e[s->n + i]) / w[s->n + i]);
-    info->worst = drape_system_worst_dof(s->system, s->reduced, "local error / tolerance", 1);
+    info->diagnostic = drape_system_diagnose_dof(s->system, s->reduced, "local error / tolerance", 1);
 }
 
 /* Work is bounded: an undamped sheet that has degenerated may be followed for ever with steps that all
- * succeed. The bound is a rate, so that it is the same however a host cuts its advances; steps that end one
- * are the host's wish and not counted. Whoever goes on after the failure is given as many steps again. */
+ * succeed. The bound is a rate, so that it is the same however a host divides its advances; steps that end
+ * one are the host's choice and not counted. A host that continues after the failure is given as many steps
+ * again. */
 static bool exhausted(ida_state *s, const drape_state *in, drape_step_info *info)
 {
     if (floor(in->t) != s->second)
@@ -591,52 +373,152 @@ static bool exhausted(ida_state *s, const drape_state *in, drape_step_info *info
     s->steps = 0;
     info->reason = "max_steps";
     IDAGetLastStep(s->ida, &info->h);
-    name_worst(s, info);
+    diagnose(s, info);
     return true;
+}
+
+/* Consistent initial values need no solve: x' = v, v' = -M^-1 g. */
+static drape_status start(ida_state *s, const drape_state *in, drape_step_info *info)
+{
+    double *y = N_VGetArrayPointer(s->y), *rate = N_VGetArrayPointer(s->rate);
+    for (int64_t i = 0; i < s->n; i++) {
+        y[i] = in->x[node_at(s, i)];
+        y[s->n + i] = rate[i] = in->v[node_at(s, i)];
+    }
+    drape_point point = place(s, in->t, y);
+    drape_system_force(s->system, &point, s->g);
+    s->work.residuals++;
+    for (int64_t i = 0; i < s->n; i++)
+        rate[s->n + i] = -s->g[node_at(s, i)] / mass_of(s, i);
+    s->counted = 0;
+    s->failures = 0;
+    info->reason = "nonfinite";
+    if (!drape_all_finite(rate + s->n, (size_t)s->n)) /* IDA would cut its step ten times over it */
+        return DRAPE_RETRY_NONFINITE;
+    info->reason = "solver";
+    return IDAReInit(s->ida, in->t, s->y, s->rate) ? DRAPE_E_SOLVER : DRAPE_OK;
+}
+
+/* Continues from `in` if IDA's state is there, else starts anew, with a first step of at most h where an
+ * attempt before was rejected. *t: the next kink or the end, whichever comes first: that is how far a scene
+ * without free nodes goes. Pinned nodes that do not move keep their positions, and no velocity, in s->x and
+ * s->v for the whole step. */
+static drape_status prepare(ida_state *s, const drape_state *in, double end, double h, double *t,
+                            drape_step_info *info)
+{
+    const size_t nodes = 3 * (size_t)s->model->node_count;
+    double stop = drape_motion_next_kink(s->motion, in->t, end);
+    memcpy(s->x, in->x, nodes * sizeof *s->x);
+    memcpy(s->v, in->v, nodes * sizeof *s->v);
+    s->internal = in->internal;
+    s->span[0] = in->t;
+    s->span[1] = stop;
+    *t = h < end - in->t ? fmin(stop, in->t + h) : stop;
+    if (s->n == 0) {
+        place_pins(s, in->t);
+        measure_powers(s, in->t, s->powers);
+        return DRAPE_OK;
+    }
+    if (s->reached != in->t || drape_motion_at_kink(s->motion, in->t)) {
+        drape_status status = start(s, in, info);
+        if (status)
+            return status;
+        if (IDASetInitStep(s->ida, h < end - in->t ? h : 0))
+            return DRAPE_E_SOLVER;
+        measure_powers(s, in->t, s->powers);
+    }
+    return IDASetStopTime(s->ida, stop) ? DRAPE_E_SOLVER : DRAPE_OK;
+}
+
+/* Every return code of IDASolve, as what it means for the step. */
+static drape_status status_of(int code, bool nonfinite, const char **reason)
+{
+    *reason = nonfinite ? "nonfinite" : "converged";
+    switch (code) {
+    case IDA_SUCCESS:
+    case IDA_TSTOP_RETURN:
+        *reason = "converged";
+        return DRAPE_OK;
+    case IDA_ERR_FAIL:
+        *reason = "error_test";
+        return DRAPE_RETRY_REJECTED;
+    case IDA_TOO_MUCH_ACC:
+        *reason = "round_off";
+        return DRAPE_RETRY_REJECTED;
+    case IDA_CONV_FAIL:
+    case IDA_NLS_FAIL:
+        *reason = nonfinite ? "nonfinite" : "newton";
+        return nonfinite ? DRAPE_RETRY_NONFINITE : DRAPE_RETRY_NONLINEAR;
+    case IDA_LSETUP_FAIL:
+    case IDA_LSOLVE_FAIL:
+        *reason = "singular";
+        return DRAPE_RETRY_LINEAR;
+    case IDA_RES_FAIL:
+    case IDA_REP_RES_ERR:
+    case IDA_FIRST_RES_FAIL:
+        *reason = "nonfinite";
+        return DRAPE_RETRY_NONFINITE;
+    default: /* IDA_MEM_NULL, IDA_ILL_INPUT, IDA_LINIT_FAIL, IDA_VECTOROP_ERR ...: no smaller step helps */
+        *reason = "solver";
+        return DRAPE_E_SOLVER;
+    }
+}
+
+/* One step of IDA, at most to `end`; *t: where it came to. */
+static drape_status solve(ida_state *s, double end, double h, double *t, drape_step_info *info)
+{
+    long iterations = 0;
+    s->crossing = s->nonfinite = false;
+    s->failure = DRAPE_OK;
+    int code = IDASolve(s->ida, end, t, s->y, s->rate, IDA_ONE_STEP);
+    drape_status status = status_of(code, s->nonfinite, &info->reason);
+    if (status > 0 && s->crossing)
+        info->reason = "collision";
+    if (drape_system_status(s->system))
+        status = drape_system_status(s->system);
+    if (s->failure < 0 || s->linear->status < 0)
+        status = s->failure < 0 ? s->failure : s->linear->status;
+    IDAGetNumNonlinSolvIters(s->ida, &iterations);
+    info->iterations = (int)(iterations - s->counted);
+    s->work.newton_iterations += iterations - s->counted;
+    s->counted = iterations;
+    if (status)
+        IDAGetCurrentStep(s->ida, &info->h);
+    info->h =
+        fmin(info->h, h); /* IDA's may be of an earlier attempt: half of that would be no smaller step */
+    return status;
 }
 
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {
     ida_state *s = state;
+    const size_t nodes = 3 * (size_t)s->model->node_count;
     double end = out->t, t = end;
     info->tolerance = info->residual = NAN; /* IDA bounds errors, not residuals */
     if (exhausted(s, in, info))
         return DRAPE_E_STEP_TOO_SMALL;
-    if (in->t == s->from) /* the sim did not take the last step, which IDA had: mostly for its energy */
+    if (in->t ==
+        s->from) /* the sim rejected the last step, with which IDA was content: mostly for its energy */
         s->newton.strict = true;
     s->from = NAN;
     info->reason = "solver";
-    drape_status status = prepare(s, in, end, h, &t, info); /* t is where all goes that has no free nodes */
-    if (!status && s->n > 0) {
-        s->crossing = s->nonfinite = false;
-        s->fitted = DRAPE_OK;
-        int code = IDASolve(s->ida, end, &t, s->y, s->rate, IDA_ONE_STEP);
-        status = status_of(code, s->nonfinite, &info->reason);
-        if (status > 0 && s->crossing)
-            info->reason = "collision";
-        if (drape_system_status(s->system))
-            status = drape_system_status(s->system);
-        if (s->fitted < 0 || s->linear->status < 0)
-            status = s->fitted < 0 ? s->fitted : s->linear->status;
-        count_iterations(s, info);
-        if (status)
-            IDAGetCurrentStep(s->ida, &info->h);
-        info->h = fmin(info->h, h); /* IDA's may be of an attempt before: half of it is no smaller step */
-    }
+    drape_status status = prepare(s, in, end, h, &t, info);
+    if (!status && s->n > 0)
+        status = solve(s, end, h, &t, info);
     s->reached = NAN;
     if (status) {
-        name_worst(s, info);
+        diagnose(s, info);
         return status;
     }
     place(s, t, s->n > 0 ? N_VGetArrayPointer(s->y) : NULL);
-    memcpy(out->x, s->x, 3 * (size_t)s->model->node_count * sizeof *out->x);
-    memcpy(out->v, s->v, 3 * (size_t)s->model->node_count * sizeof *out->v);
+    memcpy(out->x, s->x, nodes * sizeof *out->x);
+    memcpy(out->v, s->v, nodes * sizeof *out->v);
     out->t = t;
-    s->from = in->t;
     info->h = t - in->t;
     info->reason = "converged";
     audit(s, in, out, info);
+    s->from = in->t;
     s->reached = t;
     s->steps -= t == end;
     return DRAPE_OK;
@@ -658,11 +540,127 @@ static void restart(void *state, const drape_state *from)
     (void)from;
     ida_state *s = state;
     s->reached = s->from = NAN;
-    s->newton.strict = s->part = false;
-    s->exact_left = 0;
+    s->newton.strict = s->symmetric = false;
+    s->exact_remaining = 0;
     s->exact_span = 1;
     drape_ida_newton_forget(&s->newton);
 }
+
+/* ---- Making and freeing ---- */
+
+static void create_arrays(ida_state *s)
+{
+    size_t nodes = 3 * (size_t)s->model->node_count;
+    s->x = drape_arena_take(s->arena, nodes, sizeof *s->x);
+    s->v = drape_arena_take(s->arena, nodes, sizeof *s->v);
+    s->g = drape_arena_take(s->arena, nodes, sizeof *s->g);
+    s->reduced = drape_arena_take(s->arena, (size_t)s->n, sizeof *s->reduced);
+    if (!s->model->has_dissipation)
+        return;
+    s->damping =
+        drape_arena_take(s->arena, (size_t)drape_system_pattern(s->system)->nonzeros, sizeof *s->damping);
+    s->dissipated = drape_arena_take(s->arena, nodes, sizeof *s->dissipated);
+}
+
+/* Derived defaults, and the weights that follow from them. */
+static void set_tolerances(ida_state *s)
+{
+    double rtol = s->values[PARAM_RTOL];
+    drape_derive_tolerances(s->model, rtol, &s->values[PARAM_ATOL_X], &s->values[PARAM_ATOL_V]);
+    if (isnan(s->values[PARAM_MAX_ORDER]))
+        s->values[PARAM_MAX_ORDER] = rtol >= TIGHT ? LOOSE_ORDER : TIGHT_ORDER;
+    double *w = N_VGetArrayPointer(s->weights);
+    for (int64_t i = 0; i < s->n; i++) {
+        w[i] = s->values[PARAM_ATOL_X];
+        w[s->n + i] = s->values[PARAM_ATOL_V];
+    }
+}
+
+static drape_status create_vectors(ida_state *s)
+{
+    s->y = N_VNew_Serial(2 * s->n, s->sun);
+    s->rate = N_VNew_Serial(2 * s->n, s->sun);
+    s->weights = N_VNew_Serial(2 * s->n, s->sun);
+    s->between = N_VNew_Serial(2 * s->n, s->sun);
+    if (!s->y || !s->rate || !s->weights || !s->between)
+        return drape_fail_memory(s->arena->ctx, 2 * (size_t)s->n * sizeof(double));
+    N_VConst(0, s->y);
+    N_VConst(0, s->rate);
+    set_tolerances(s);
+    return DRAPE_OK;
+}
+
+static bool configure(ida_state *s)
+{
+    DRAPE_IDA_QUIET(s->ida);
+    bool good = !IDAInit(s->ida, residual, 0, s->y, s->rate) && !IDASetUserData(s->ida, s) &&
+                !IDASVtolerances(s->ida, 0, s->weights) &&
+                !IDASetLinearSolver(s->ida, s->linear->solver, s->linear->matrix) &&
+                drape_ida_newton_attach(&s->newton, s->ida, s->y, s->sun) && !IDASetJacFn(s->ida, jacobian) &&
+                !IDASetMaxOrd(s->ida, (int)s->values[PARAM_MAX_ORDER]) &&
+                !IDASetMaxErrTestFails(s->ida, MAX_ERROR_FAILS) &&
+                !IDASetMaxConvFails(s->ida, MAX_SOLVER_FAILS) &&
+                !IDASetNonlinConvCoef(s->ida, NEWTON_SHARE) && !IDASetDeltaCjLSetup(s->ida, CJ_CHANGE);
+    if (good && !isnan(s->values[PARAM_MAX_STEP]))
+        good = !IDASetMaxStep(s->ida, s->values[PARAM_MAX_STEP]);
+    return good;
+}
+
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
+{
+    drape_context *ctx = arena->ctx;
+    ida_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
+    if (!s)
+        return DRAPE_E_MEMORY;
+    *s = (ida_state){.arena = arena,
+                     .system = system,
+                     .model = drape_system_model(system),
+                     .motion = drape_system_motion(system),
+                     .exact_span = 1,
+                     .reached = NAN,
+                     .from = NAN};
+    s->n = 3 * (int64_t)s->model->free_count;
+    memcpy(s->values, values, sizeof s->values);
+    create_arrays(s);
+    drape_status status = drape_arena_status(arena);
+    if (!status && (drape_sundials_context(&s->sun) || !(s->ida = IDACreate(s->sun))))
+        status = drape_fail_memory(ctx, sizeof(void *));
+    if (!status && s->n > 0)
+        status = create_vectors(s);
+    if (!status && s->n > 0)
+        status = drape_sun_linear_create(arena, s->sun, drape_linears[(int)values[PARAM_LINEAR_SOLVER]],
+                                         drape_system_pattern(s->system), drape_system_pool(s->system),
+                                         &s->linear);
+    if (status || s->n == 0)
+        return status;
+    s->linear->owner = s;
+    s->linear->solver->ops->solve = solve_reduced;
+    if (!configure(s))
+        return drape_fail(ctx, DRAPE_E_MEMORY, "IDA cannot be set up for %lld unknowns",
+                          (long long)(2 * s->n));
+    drape_ida_clear(s->ida);
+    return DRAPE_OK;
+}
+
+static void destroy(void **state)
+{
+    ida_state *s = *state;
+    if (!s)
+        return;
+    if (s->ida)
+        IDAFree(&s->ida);
+    drape_ida_newton_free(&s->newton);
+    drape_sun_linear_destroy(&s->linear);
+    N_Vector vectors[] = {s->y, s->rate, s->weights, s->between};
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
+        if (vectors[i])
+            N_VDestroy(vectors[i]);
+    if (s->sun)
+        SUNContext_Free(&s->sun);
+    *state = NULL;
+}
+
+/* ---- For the table ---- */
 
 static drape_work work(const void *state)
 {
@@ -681,10 +679,10 @@ static drape_work work(const void *state)
 static void archive_factors(ida_state *s, drape_archive *a)
 {
     if (drape_archive_is_reading(a) && drape_system_pattern(s->system) != s->linear->pattern)
-        drape_archive_note(a, adopt_pattern(s));
+        drape_archive_note(a, renew_matrices(s));
     drape_archive_double(a, &s->factored_cj);
-    drape_archive_bool(a, &s->part);
-    drape_archive_int64(a, &s->exact_left);
+    drape_archive_bool(a, &s->symmetric);
+    drape_archive_int64(a, &s->exact_remaining);
     drape_archive_int64(a, &s->exact_span);
     drape_archive_int64(a, &s->failures);
     if (s->damping && drape_archive_good(a))
@@ -715,21 +713,18 @@ static void archive(void *state, drape_archive *a)
 static size_t bytes(const void *state)
 {
     const ida_state *s = state;
-    size_t nodes = 3 * (size_t)s->model->node_count, n = (size_t)s->n,
-           values = (size_t)s->model->pattern.nonzeros;
-    size_t order = isnan(s->values[PARAM_MAX_ORDER]) ? TIGHT_ORDER : (size_t)s->values[PARAM_MAX_ORDER];
+    double max_order = s->values[PARAM_MAX_ORDER];
+    size_t order = isnan(max_order) ? TIGHT_ORDER : (size_t)max_order;
     size_t vectors = 4 + order + 1 + 6; /* ours, the history of IDA, its scratch */
-    size_t doubles = (s->dissipated ? 4 : 3) * nodes + n + 2 * n * vectors + (s->damping ? 2 : 1) * values;
-    return doubles * sizeof(double) + (s->linear ? s->linear->ops->bytes(s->linear->state) : 0);
+    return 2 * (size_t)s->n * vectors * sizeof(double) + (s->linear ? drape_sun_linear_bytes(s->linear) : 0);
 }
 
 const drape_integrator_ops drape_integrator_ida = {
-    .name = "ida",
-    .summary = "variable order and step with local error control by IDA",
-    .reference = "Hindmarsh et al. 2005, SUNDIALS; Brenan, Campbell & Petzold 1996",
+    .entry = {.name = "ida",
+              .summary = "variable order and step with local error control by IDA",
+              .reference = "Hindmarsh et al. 2005, SUNDIALS; Brenan, Campbell & Petzold 1996",
+              DRAPE_PARAMS(params)},
     .order = 5,
-    .params = params,
-    .param_count = PARAM_COUNT,
     .create = create,
     .own_steps = true,
     .gain = GAIN,

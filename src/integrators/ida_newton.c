@@ -5,10 +5,10 @@
 #include <math.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 
-#define UNKNOWN  20.0 /* left of a correction by new factors: a rate of .95, as IDA takes it */
+#define UNKNOWN  20.0 /* error left after a correction with new factors: a rate of .95, as IDA assumes */
 #define AGEING   2.0
-#define SLOWEST  0.9  /* a rate above asks for new factors, or a smaller step; IDA's own */
-#define ROUNDING 1e-4 /* of the tolerance: a first correction below is no correction; IDA's own */
+#define SLOWEST  0.9  /* a larger rate asks for new factors, or a smaller step; IDA's own */
+#define ROUNDING 1e-4 /* of the tolerance: a smaller first correction is rounding; IDA's own */
 #define STRICT   0.1  /* of the tolerance */
 
 static int converged(SUNNonlinearSolver solver, N_Vector y, N_Vector correction, sunrealtype tolerance,
@@ -18,13 +18,13 @@ static int converged(SUNNonlinearSolver solver, N_Vector y, N_Vector correction,
     drape_ida_newton *newton = user;
     int done = 0;
     double norm = N_VWrmsNorm(correction, weights);
-    double most = newton->strict ? STRICT * tolerance : tolerance;
+    double max = newton->strict ? STRICT * tolerance : tolerance;
     if (SUNNonlinSolGetCurIter(solver, &done))
         return -1;
     if (done == 0) {
         newton->first = norm;
         newton->left *= AGEING;
-        if (norm <= ROUNDING * most)
+        if (norm <= ROUNDING * max)
             return 0;
     } else {
         double rate = pow(norm / newton->first, 1.0 / done);
@@ -32,7 +32,7 @@ static int converged(SUNNonlinearSolver solver, N_Vector y, N_Vector correction,
             return SUN_NLS_CONV_RECVR;
         newton->left = rate / (1 - rate);
     }
-    return newton->left * norm <= most ? 0 : SUN_NLS_CONTINUE;
+    return newton->left * norm <= max ? 0 : SUN_NLS_CONTINUE;
 }
 
 bool drape_ida_newton_attach(drape_ida_newton *newton, void *ida, N_Vector like, SUNContext sun)

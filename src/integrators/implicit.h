@@ -1,73 +1,69 @@
 /*
- * implicit.h: what the implicit fixed-step rows share. Each is a choice of the numbers of one Newton problem
- * (newton.h): weights, inertia, history; the arrays, the pins and the audit are the same.
+ * implicit.h: shared by the implicit integrators of fixed steps. Each of them is a choice of the step
+ * equation (nonlinear/step_equation.h), of its base, weights, inertia and history, and of the solver; arrays,
+ * pins and the audit of work are the same.
  */
 #ifndef DRAPE_INTEGRATORS_IMPLICIT_H
 #define DRAPE_INTEGRATORS_IMPLICIT_H
 
-#include "integrators/newton.h"
+#include "integrators/integrator.h"
+#include "nonlinear/newton.h"
 
 typedef struct drape_implicit {
-    drape_context *ctx;
-    drape_system *system;
-    const drape_model *model;
+    drape_step_equation equation;
     const drape_motion *motion;
-    drape_newton *newton;    /* NULL in rows that iterate by themselves */
-    double *x_base, *v_base; /* nodes: see drape_newton_problem */
-    double *inertia, *d;     /* free DOFs */
-    double *history;         /* measures; NULL where no law wants rates */
-    double *dissipated;      /* nodes; NULL where nothing dissipates */
-    bool inertial_guess;
-    const double *x_start; /* nodes: see drape_newton_problem */
-    double t, span[2];     /* [s] of the base: where colliders stand, and the way to there */
+    drape_newton *newton; /* NULL in integrators that have another solver */
+    double *d;            /* free DOFs: the unknown */
+    double *history;      /* measures; NULL where no law wants rates */
+    double *dissipated;   /* nodes; NULL where nothing dissipates */
+    bool inertial_guess;  /* d = p; else d = 0 */
 } drape_implicit;
 
-/* For rows that embed it, with a Newton solver or without one: on failure what was taken is freed by
- * drape_implicit_free. */
-drape_status drape_implicit_init_arrays(drape_context *ctx, drape_system *system, drape_implicit *implicit);
-drape_status drape_implicit_init(drape_context *ctx, drape_system *system, const double *values,
-                                 drape_implicit *implicit);
-void drape_implicit_free(drape_implicit *implicit);
+/* For integrators that embed it, without a solver or with Newton. Errors: as of drape_newton_create. */
+drape_status drape_implicit_init(drape_arena *arena, drape_system *system, drape_implicit *implicit);
+drape_status drape_implicit_init_newton(drape_arena *arena, drape_system *system, const double *values,
+                                        drape_implicit *implicit);
 
-/* For rows that need no state of their own, and work and bytes for those that have it first in theirs. */
-drape_status drape_implicit_create(drape_context *ctx, drape_system *system, const double *values,
+/* The functions of integrators that have it first in their state, or nothing else. */
+drape_status drape_implicit_create(drape_arena *arena, drape_system *system, const double *values,
                                    void **state);
-void drape_implicit_destroy(void **state);
 void drape_implicit_restart(void *state, const drape_state *from);
 const double *drape_implicit_residual(const void *state);
 drape_work drape_implicit_work(const void *state);
 void drape_implicit_archive(void *state, drape_archive *a);
 size_t drape_implicit_bytes(const void *state);
-size_t drape_implicit_array_bytes(const drape_implicit *implicit); /* without the Newton solver */
+void drape_implicit_destroy(void **state);
 
-/* Free nodes stand where they were, at rest; pinned ones where their tracks have them at time t, span after
- * in. */
+/* Nodes for a step or stage that begins at in: free ones where they are there, at rest; pinned ones where
+ * their tracks have them at time t, with their mean velocity over span, since in. */
+void drape_implicit_place(const drape_implicit *implicit, const drape_state *in, double t, double span,
+                          double *x, double *v);
+
+/* The same as the base of the equation, with colliders at time t. Rates of measures are q' = grad q . v until
+ * a history is set. */
 void drape_implicit_base(drape_implicit *implicit, const drape_state *in, double t, double span);
 
-/* The index of free DOF i among the nodes' coordinates. */
-static inline size_t drape_implicit_at(const drape_implicit *implicit, size_t i)
-{
-    return 3 * (size_t)implicit->model->node_of_free[i / 3] + i % 3;
-}
+/* The equation of backward Euler: base, v1 = (x1 - x0)/h, q' = (q1 - q0)/h. mass_weight: 1/h^2. */
+void drape_implicit_backward_euler(drape_implicit *implicit, const drape_state *in, double t, double h,
+                                   double mass_weight);
 
 /* q at the positions of a state, into q (measures); nothing where no law wants rates. */
 void drape_implicit_measure(drape_implicit *implicit, const drape_state *state, double *q);
 
-/* Solves for d with base and inertia as they stand. history: of the measures' rates, NULL: q' = grad q .
- * v. */
-drape_status drape_implicit_solve(drape_implicit *implicit, const double *internal, const double *history,
-                                  double weight, double mass_weight, drape_step_info *info);
+/* Solves for d by Newton: from the guess that the parameters ask for, or from d as it is. Iterations add up
+ * in info. */
+drape_status drape_implicit_solve(drape_implicit *implicit, drape_step_info *info);
+drape_status drape_implicit_solve_from(drape_implicit *implicit, drape_step_info *info);
 
-/* Work from t0 to t1 of what the system last put on moving colliders; 0 without contact. */
+/* The report of a solve into info. */
+void drape_implicit_report(const drape_solve_report *report, drape_step_info *info);
+
+/* Work from t0 to t1 of the forces that the system last put on moving colliders; 0 without contact. */
 double drape_implicit_collider_work(const drape_implicit *implicit, double t0, double t1);
 
-/* Work over a step: of dissipative forces on all nodes, and of the moved pins against g: it
- * is not theirs to speed up their own mass. */
+/* Work over a step: of dissipative forces on all nodes, and of moved pins against g, where the equation was
+ * evaluated last. What speeds up the pinned nodes' own mass is no work on the cloth. */
 void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out,
                           drape_step_info *info);
-
-/* The same where the last evaluation was at this point and gave g. */
-void drape_implicit_audit_at(drape_implicit *implicit, const drape_point *point, const double *g,
-                             const drape_state *in, const drape_state *out, drape_step_info *info);
 
 #endif

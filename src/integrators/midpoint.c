@@ -14,15 +14,13 @@
 
 #include <string.h>
 
-/* x1 = x0 + 2 d and v1 = 2 vm - v0; pinned nodes at the end of their way, with its mean velocity. */
-static void write_state(drape_implicit *s, const drape_state *in, double h, drape_state *out)
+/* x1 = x0 + 2 d and v1 = 2 vm - v0; pinned nodes at the end of the step, with their mean velocity in it. */
+static void write_state(const drape_implicit *s, const drape_state *in, double h, drape_state *out)
 {
-    drape_implicit_base(s, in, out->t, h);
-    size_t nodes = 3 * (size_t)s->model->node_count;
-    memcpy(out->x, s->x_base, nodes * sizeof *out->x);
-    memcpy(out->v, s->v_base, nodes * sizeof *out->v);
-    for (size_t i = 0; i < 3 * (size_t)s->model->free_count; i++) {
-        size_t at = drape_implicit_at(s, i);
+    const drape_step_equation *e = &s->equation;
+    drape_implicit_place(s, in, out->t, h, out->x, out->v);
+    for (size_t i = 0; i < e->dofs; i++) {
+        size_t at = drape_step_equation_at(e, i);
         out->x[at] += 2 * s->d[i];
         out->v[at] = 4 * s->d[i] / h - in->v[at];
     }
@@ -32,10 +30,13 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
                          drape_step_info *info)
 {
     drape_implicit *s = state;
+    drape_step_equation *e = &s->equation;
     drape_implicit_base(s, in, in->t + h / 2, h / 2);
-    for (size_t i = 0; i < 3 * (size_t)s->model->free_count; i++)
-        s->inertia[i] = h / 2 * in->v[drape_implicit_at(s, i)];
-    drape_status status = drape_implicit_solve(s, in->internal, NULL, 2 / h, 4 / (h * h), info);
+    e->point.weight = 2 / h;
+    e->mass_weight = 4 / (h * h);
+    for (size_t i = 0; i < e->dofs; i++)
+        e->inertia[i] = h / 2 * in->v[drape_step_equation_at(e, i)];
+    drape_status status = drape_implicit_solve(s, info);
     if (status && !info->usable)
         return status;
     write_state(s, in, h, out);
@@ -44,12 +45,11 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
 }
 
 const drape_integrator_ops drape_integrator_midpoint = {
-    .name = "midpoint",
-    .summary = "implicit midpoint by Newton: fixed step, second order, no damping of its own",
-    .reference = "Hairer, Lubich & Wanner 2006, Geometric Numerical Integration, II.1.3",
+    .entry = {.name = "midpoint",
+              .summary = "implicit midpoint by Newton: fixed step, second order, no damping of its own",
+              .reference = "Hairer, Lubich & Wanner 2006, Geometric Numerical Integration, II.1.3",
+              DRAPE_PARAMS(drape_newton_params)},
     .order = 2,
-    .params = drape_newton_params,
-    .param_count = DRAPE_NEWTON_PARAM_COUNT,
     .create = drape_implicit_create,
     .step = step,
     .restart = drape_implicit_restart,

@@ -1,6 +1,6 @@
 /*
- * stability.h: the fastest waves at a state, for rows that do not resolve what is faster than their step.
- * Matrix-free: a product with K or D is a difference of two forces.
+ * stability.h: the fastest waves at a state, for integrators that do not resolve what is faster than their
+ * step. Matrix-free: a product with K or D is a difference of two forces.
  */
 #ifndef DRAPE_INTEGRATORS_STABILITY_H
 #define DRAPE_INTEGRATORS_STABILITY_H
@@ -9,11 +9,9 @@
 
 typedef struct drape_spectrum drape_spectrum;
 
-/* Workspace; iterations: products with K, and with D where something dissipates. */
-drape_status drape_spectrum_create(drape_context *ctx, drape_system *system, int iterations,
+/* Workspace; iterations: products with K, and with D where something dissipates. Errors: DRAPE_E_MEMORY. */
+drape_status drape_spectrum_create(drape_arena *arena, drape_system *system, int iterations,
                                    drape_spectrum **out);
-void drape_spectrum_destroy(drape_spectrum **spectrum);
-size_t drape_spectrum_bytes(const drape_spectrum *spectrum);
 
 /* omega^2, the largest eigenvalue of M^-1 K [1/s2], and the largest of M^-1 D [1/s], on the free nodes; not
  * negative. From below: what is found after n products is off by a few times 1/n^2 of it. A state gives the

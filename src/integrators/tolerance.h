@@ -8,27 +8,20 @@
 
 #include "model/model.h"
 
-/* Parameters of the rows that bound a local error. */
+/* Parameters of integrators and controllers that bound a local error. */
 #define DRAPE_RTOL_PARAM                                                                                     \
-    {                                                                                                        \
-        .name = "rtol", .unit = "1", .default_value = 1e-3, .min = 1e-12, .max = 1,                          \
-        .help =                                                                                              \
-            "local error over the size of the scene; sets the defaults of atol_x and atol_v, nothing else"   \
-    }
+    DRAPE_NUMBER(                                                                                            \
+        "rtol", "1", 1e-3, 1e-12, 1,                                                                         \
+        "local error over the size of the scene; sets the defaults of atol_x and atol_v, nothing else")
 #define DRAPE_ATOL_X_PARAM                                                                                   \
-    {                                                                                                        \
-        .name = "atol_x", .unit = "m", .default_value = NAN,                                                 \
-        .derived = "rtol times the diagonal of the rest bounding box", .min = 0, .max = 1e9,                 \
-        .open_min = true, .help = "local error of positions"                                                 \
-    }
+    DRAPE_NUMBER("atol_x", "m", DRAPE_DERIVED("rtol times the diagonal of the rest bounding box"),           \
+                 DRAPE_ABOVE(0), 1e9, "local error of positions")
 #define DRAPE_ATOL_V_PARAM                                                                                   \
-    {                                                                                                        \
-        .name = "atol_v", .unit = "m/s", .default_value = NAN,                                               \
-        .derived = "rtol sqrt(g L), or rtol L/s without gravity, L the diagonal", .min = 0, .max = 1e9,      \
-        .open_min = true, .help = "local error of velocities"                                                \
-    }
+    DRAPE_NUMBER("atol_v", "m/s",                                                                            \
+                 DRAPE_DERIVED("rtol sqrt(g L), or rtol L/s without gravity, L the diagonal"),               \
+                 DRAPE_ABOVE(0), 1e9, "local error of velocities")
 
-/* Replaces what is NaN by what the parameters say is derived. */
+/* Replaces NaN by the value that the parameters say is derived. */
 void drape_derive_tolerances(const drape_model *model, double rtol, double *atol_x, double *atol_v);
 
 #endif

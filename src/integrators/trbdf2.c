@@ -1,7 +1,7 @@
 /*
  * trbdf2: a trapezoidal step to t0 + gamma h, then the backward differentiation formula of order 2 through
  * both its ends to t0 + h. gamma = 2 - sqrt(2) gives both stages the same matrix. Second order, A- and
- * L-stable, one step: it knows nothing of the past that a kink or a change of h could spoil. Bank et al.
+ * L-stable, one step: it has no history that a kink or a change of h could spoil. Bank et al.
  * 1985; Hosea & Shampine 1996. With w = 2/(gamma h), a1 = 1/(gamma (2 - gamma)), a0 = a1 - 1:
  *     xg = x0 + (v0 + vg)/w,         M w (vg - v0) + g0 + gg = 0
  *     x1 = a1 xg - a0 x0 + v1/w,     M w (v1 - a1 vg + a0 v0) + g1 = 0
@@ -21,84 +21,53 @@ typedef struct trbdf2_state {
     double *g0, *xg, *vg;  /* nodes */
 } trbdf2_state;
 
-static void destroy(void **state)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
-    trbdf2_state *s = *state;
-    if (!s)
-        return;
-    drape_context *ctx = s->common.ctx;
-    drape_free(ctx, s->g0);
-    drape_free(ctx, s->xg);
-    drape_free(ctx, s->vg);
-    drape_implicit_free(&s->common);
-    drape_free(ctx, s);
-    *state = NULL;
-}
-
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
-{
-    trbdf2_state *s = drape_alloc(ctx, 1, sizeof *s);
-    *state = s;
+    trbdf2_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    drape_status status = drape_implicit_init(ctx, system, values, &s->common);
-    size_t nodes = 3 * (size_t)s->common.model->node_count;
-    s->g0 = drape_alloc(ctx, nodes, sizeof(double));
-    s->xg = drape_alloc(ctx, nodes, sizeof(double));
-    s->vg = drape_alloc(ctx, nodes, sizeof(double));
-    if (!status && (!s->g0 || !s->xg || !s->vg))
-        status = DRAPE_E_MEMORY;
-    if (status)
-        destroy(state);
-    return status;
+    drape_status status = drape_implicit_init_newton(arena, system, values, &s->common);
+    size_t nodes = s->common.equation.nodes;
+    s->g0 = drape_arena_take(arena, nodes, sizeof *s->g0);
+    s->xg = drape_arena_take(arena, nodes, sizeof *s->xg);
+    s->vg = drape_arena_take(arena, nodes, sizeof *s->vg);
+    return status ? status : drape_arena_status(arena);
 }
 
-/* Newton on the stage that stands in base and inertia, from d. */
-static drape_status solve(trbdf2_state *s, const double *internal, double w, drape_step_info *info)
+/* Solves for the end x, v of a stage, whose base, inertia and guess are set. */
+static drape_status solve_stage(trbdf2_state *s, double w, double *x, double *v, drape_step_info *info)
 {
-    drape_implicit *c = &s->common;
-    const drape_newton_problem problem = {.x_base = c->x_base,
-                                          .v_base = c->v_base,
-                                          .x_start = c->x_start,
-                                          .weight = w,
-                                          .mass_weight = w * w,
-                                          .inertia = c->inertia,
-                                          .internal = internal,
-                                          .t = c->t,
-                                          .span = {c->span[0], c->span[1]}};
-    int before = info->iterations;
-    drape_status status = drape_newton_solve(c->newton, &problem, c->d, info);
-    info->iterations += before;
+    drape_step_equation *e = &s->common.equation;
+    e->point.weight = w;
+    e->mass_weight = w * w;
+    drape_status status = drape_implicit_solve_from(&s->common, info);
+    if (status && !info->usable)
+        return status;
+    memcpy(x, e->x, e->nodes * sizeof *x);
+    memcpy(v, e->v, e->nodes * sizeof *v);
     return status;
-}
-
-static void write_stage(trbdf2_state *s, double w, double *x, double *v)
-{
-    drape_implicit *c = &s->common;
-    size_t nodes = 3 * (size_t)c->model->node_count;
-    memcpy(x, c->x_base, nodes * sizeof *x);
-    memcpy(v, c->v_base, nodes * sizeof *v);
-    for (size_t i = 0; i < 3 * (size_t)c->model->free_count; i++) {
-        x[drape_implicit_at(c, i)] += c->d[i];
-        v[drape_implicit_at(c, i)] += w * c->d[i];
-    }
 }
 
 /* Adds the work over a stage, by the midpoint rule with the mean velocity: of dissipative forces, and of the
- * forces that hold moved pins and colliders on their way. Powers at the ends would count what a stiff dashpot has at the
- * jump of a pin's velocity for a good part of the step. Bases and g0 serve as scratch. */
+ * forces that move pins and colliders along their paths. With powers at the ends, the force of a stiff
+ * dashpot at a jump of a pin's velocity would count for a good part of the step. The base and g0 serve as
+ * scratch. */
 static void add_work(trbdf2_state *s, const double *from, const double *to, double t, double span,
-                     const double *internal, drape_step_info *info)
+                     drape_step_info *info)
 {
     drape_implicit *c = &s->common;
-    const drape_point point = {
-        .x = c->x_base, .v = c->v_base, .internal = internal, .t = t + span / 2, .span = {t, t + span}};
-    for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++) {
-        c->x_base[i] = (from[i] + to[i]) / 2;
-        c->v_base[i] = (to[i] - from[i]) / span;
+    drape_step_equation *e = &c->equation;
+    const drape_point middle = {.x = e->x_base,
+                                .v = e->v_base,
+                                .internal = e->point.internal,
+                                .t = t + span / 2,
+                                .span = {t, t + span}};
+    for (size_t i = 0; i < e->nodes; i++) {
+        e->x_base[i] = (from[i] + to[i]) / 2;
+        e->v_base[i] = (to[i] - from[i]) / span;
     }
-    if (c->motion->moved_count > 0 || c->model->collider_count > 0)
-        drape_system_force(c->system, &point, s->g0);
+    if (c->motion->moved_count > 0 || e->model->collider_count > 0)
+        drape_system_force(e->system, &middle, s->g0);
     info->pin_work += drape_implicit_collider_work(c, t, t + span);
     for (int32_t i = 0; i < c->motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
@@ -107,22 +76,25 @@ static void add_work(trbdf2_state *s, const double *from, const double *to, doub
         }
     if (!c->dissipated)
         return;
-    drape_system_dissipation(c->system, &point, c->dissipated);
-    for (size_t i = 0; i < 3 * (size_t)c->model->node_count; i++)
+    drape_system_dissipation(e->system, &middle, c->dissipated);
+    for (size_t i = 0; i < e->nodes; i++)
         info->dissipated += c->dissipated[i] * (to[i] - from[i]);
     info->dissipated += drape_implicit_collider_work(c, t, t + span);
 }
 
-/* g0, with the mean velocity of pins and colliders in the stage, into which they go. */
+/* g0, with the velocities that pins and colliders have in the stage on average. */
 static void evaluate_start(trbdf2_state *s, const drape_state *in)
 {
-    drape_implicit *c = &s->common;
-    memcpy(s->vg, c->v_base, 3 * (size_t)c->model->node_count * sizeof *s->vg);
-    for (size_t i = 0; i < 3 * (size_t)c->model->free_count; i++)
-        s->vg[drape_implicit_at(c, i)] = in->v[drape_implicit_at(c, i)];
-    const drape_point point = {
-        .x = in->x, .v = s->vg, .internal = in->internal, .t = in->t, .span = {c->span[0], c->span[1]}};
-    drape_system_force(c->system, &point, s->g0);
+    drape_step_equation *e = &s->common.equation;
+    memcpy(s->vg, e->v_base, e->nodes * sizeof *s->vg);
+    for (size_t i = 0; i < e->dofs; i++)
+        s->vg[drape_step_equation_at(e, i)] = in->v[drape_step_equation_at(e, i)];
+    const drape_point start = {.x = in->x,
+                               .v = s->vg,
+                               .internal = in->internal,
+                               .t = in->t,
+                               .span = {e->point.span[0], e->point.span[1]}};
+    drape_system_force(e->system, &start, s->g0);
 }
 
 /* To xg, vg. The guess is flight without g0, whose stiff part would throw it far off. */
@@ -130,20 +102,19 @@ static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, 
                               drape_step_info *info)
 {
     drape_implicit *c = &s->common;
+    drape_step_equation *e = &c->equation;
     drape_implicit_base(c, in, in->t + GAMMA * h, GAMMA * h);
     evaluate_start(s, in);
-    for (size_t i = 0; i < 3 * (size_t)c->model->free_count; i++) {
-        size_t at = drape_implicit_at(c, i);
+    for (size_t i = 0; i < e->dofs; i++) {
+        size_t at = drape_step_equation_at(e, i);
         double flight = 2 / w * in->v[at];
-        c->v_base[at] = -in->v[at];
-        c->inertia[i] = flight - s->g0[at] / (c->model->mass[at / 3] * w * w);
+        e->v_base[at] = -in->v[at];
+        e->inertia[i] = flight - s->g0[at] / (e->model->mass[at / 3] * w * w);
         c->d[i] = c->inertial_guess ? flight : 0;
     }
-    drape_status status = solve(s, in->internal, w, info);
-    if (status && !info->usable)
-        return status;
-    write_stage(s, w, s->xg, s->vg);
-    add_work(s, in->x, s->xg, in->t, GAMMA * h, in->internal, info);
+    drape_status status = solve_stage(s, w, s->xg, s->vg, info);
+    if (!status || info->usable)
+        add_work(s, in->x, s->xg, in->t, GAMMA * h, info);
     return status;
 }
 
@@ -153,28 +124,27 @@ static drape_status differentiate(trbdf2_state *s, const drape_state *in, double
                                   drape_state *out, drape_step_info *info)
 {
     drape_implicit *c = &s->common;
+    drape_step_equation *e = &c->equation;
     drape_implicit_base(c, in, out->t, h);
-    c->x_start = s->xg;
+    e->x_start = s->xg;
     for (int32_t i = 0; i < c->motion->moved_count; i++)
         for (size_t k = 0; k < 3; k++) {
             size_t at = 3 * (size_t)c->motion->moved_node[i] + k;
-            c->v_base[at] = w * (c->x_base[at] - s->xg[at] - A0 * (s->xg[at] - in->x[at]));
+            e->v_base[at] = w * (e->x_base[at] - s->xg[at] - A0 * (s->xg[at] - in->x[at]));
         }
-    for (size_t i = 0; i < 3 * (size_t)c->model->free_count; i++) {
-        size_t at = drape_implicit_at(c, i);
-        c->x_base[at] = A1 * s->xg[at] - A0 * in->x[at];
-        c->inertia[i] = (A1 * s->vg[at] - A0 * in->v[at]) / w;
-        c->d[i] = c->inertial_guess ? c->inertia[i] : 0;
+    for (size_t i = 0; i < e->dofs; i++) {
+        size_t at = drape_step_equation_at(e, i);
+        e->x_base[at] = A1 * s->xg[at] - A0 * in->x[at];
+        e->inertia[i] = (A1 * s->vg[at] - A0 * in->v[at]) / w;
+        c->d[i] = c->inertial_guess ? e->inertia[i] : 0;
     }
-    drape_status status = solve(s, in->internal, w, info);
-    if (status && !info->usable)
-        return status;
-    write_stage(s, w, out->x, out->v);
-    add_work(s, s->xg, out->x, in->t + GAMMA * h, (1 - GAMMA) * h, in->internal, info);
+    drape_status status = solve_stage(s, w, out->x, out->v, info);
+    if (!status || info->usable)
+        add_work(s, s->xg, out->x, in->t + GAMMA * h, (1 - GAMMA) * h, info);
     return status;
 }
 
-/* Under on_failure accept an unconverged first stage is told where the second converges. */
+/* With on_failure accept, an unconverged first stage is reported even if the second converges. */
 static drape_status step(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info)
 {
@@ -189,30 +159,24 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         return second;
     info->reason = before.reason;
     info->residual = before.residual;
-    info->worst = before.worst;
+    info->usable = before.usable;
+    info->diagnostic = before.diagnostic;
     return first;
 }
 
-static size_t bytes(const void *state)
-{
-    const trbdf2_state *s = state;
-    return drape_implicit_bytes(state) + 9 * (size_t)s->common.model->node_count * sizeof(double);
-}
-
 const drape_integrator_ops drape_integrator_trbdf2 = {
-    .name = "trbdf2",
-    .summary =
-        "trapezoid, then backward differentiation, in one step by Newton: fixed step, second order, L-stable",
-    .reference = "Bank et al. 1985; Hosea & Shampine 1996",
+    .entry = {.name = "trbdf2",
+              .summary = "trapezoid, then backward differentiation, in one step by Newton: fixed step, "
+                         "second order, L-stable",
+              .reference = "Bank et al. 1985; Hosea & Shampine 1996",
+              DRAPE_PARAMS(drape_newton_params)},
     .order = 2,
-    .params = drape_newton_params,
-    .param_count = DRAPE_NEWTON_PARAM_COUNT,
     .create = create,
     .step = step,
     .restart = drape_implicit_restart,
     .residual = drape_implicit_residual,
     .work = drape_implicit_work,
     .archive = drape_implicit_archive,
-    .bytes = bytes,
-    .destroy = destroy,
+    .bytes = drape_implicit_bytes,
+    .destroy = drape_implicit_destroy,
 };

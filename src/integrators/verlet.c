@@ -1,25 +1,26 @@
 /*
- * verlet: explicit steps, each split in substeps of h. With a = -M^-1 g(x, v) and c = 1 - damping/100:
+ * verlet.c: explicit steps, each split into substeps of h. With a = -M^-1 g(x, v) and c = 1 - damping/100:
  *
  * velocity   v <- c v, x' = x + h v + h^2/2 a(x, v), v' = v + h/2 (a(x, v) + a(x', v + h a(x, v)))
  *            velocity Verlet: second order, also with forces that depend on v.
  * position   v' = c v + h a(x, v), x' = x + h v'
- *            x' = x + c (x - x_before) + h^2 a of CS184 and Boson, with v = (x - x_before)/h: the same numbers
- *            up to rounding, but (x, v) is all of the state. v is that of half a substep ago: first order.
+ *            x' = x + c (x - x_before) + h^2 a of CS184 and Boson, with v = (x - x_before)/h: the same
+ *            numbers up to rounding, but with the state (x, v). v is the velocity half a substep ago: first
+ *            order.
  *
- * Then nodes are moved: apart where cloth is too near to cloth, out of colliders, and to where springs are not
- * too long; the order is that of CS184. What moved a node by d changed its velocity by d/h: Verlet's velocity
- * is a difference of positions.
+ * Then nodes are moved: cloth that is too near to cloth apart, out of colliders, and to where springs are not
+ * too long (verlet.h). A move by d changes the velocity of a node by d/h: Verlet's velocity is a difference
+ * of positions.
  *
  * Stable for
  *     h < (sqrt(mu^2 + 2 (1 + c) omega^2) - mu)/omega^2
  * with omega^2 the largest eigenvalue of M^-1 K and mu of M^-1 D: from z^2 - (1 + c - h^2 omega^2 - h mu) z
- * + c - h mu, whose roots are the growth of one wave in a substep of the position form, where omega and mu are
- * of the same wave. For mu = 0, c = 1 it is 2/omega. Damping lowers it, as its forces lag. The velocity form
- * bears a little more. What moves nodes is not in it.
+ * + c - h mu, whose roots are the growth of one wave in a substep of the position form if omega and mu belong
+ * to the same wave. For mu = 0, c = 1 it is 2/omega. Damping lowers it because its forces lag. The limit of
+ * the velocity form is a little higher. The moves of nodes are not considered.
  *
- * Energy: `dissipated` has the work of the dissipative terms and what c takes. What moving nodes gives or takes
- * has no force and no law behind it; it is left in `numerical`, with the error of the substeps.
+ * Energy: `dissipated` has the work of the dissipative terms and what c takes. The energy of the moves of
+ * nodes has no force and no law; it is left in `numerical`, with the error of the substeps.
  */
 #include "integrators/verlet.h"
 
@@ -58,135 +59,65 @@ static const char *const contact_choices[] = {
     [DRAPE_VERLET_CS184] = "cs184", [DRAPE_VERLET_BOSON] = "boson", NULL};
 static const char *const boxes_choices[] = {[BOXES_ALL] = "all", [BOXES_OWN] = "own", NULL};
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_DT] = {.name = "dt",
-                  .unit = "s",
-                  .default_value = 1.0 / 60,
-                  .min = 0,
-                  .max = 1e6,
-                  .open_min = true,
-                  .help = "nominal step"},
-    [PARAM_SUBSTEPS] = {.name = "substeps",
-                        .kind = DRAPE_PARAM_INTEGER,
-                        .unit = "1",
-                        .default_value = 0,
-                        .min = 0,
-                        .max = 1e6,
-                        .help = "of a step; 0: as many as the stability limit at its start asks for"},
+    [PARAM_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),
+    [PARAM_SUBSTEPS] = DRAPE_INTEGER("substeps", "1", 0, 0, 1e6,
+                                     "of a step; 0: as many as the stability limit at its start asks for"),
     [PARAM_FORM] =
-        {.name = "form",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = FORM_VELOCITY,
-         .choices = form_choices,
-         .help = "velocity: second order; position: x' = x + (x - x_before) + a h^2 as CS184 and Boson"},
-    [PARAM_DAMPING] = {.name = "damping",
-                       .unit = "%",
-                       .default_value = 0,
-                       .min = 0,
-                       .max = 100,
-                       .help = "velocity that every substep takes: more substeps damp more, as in CS184"},
+        DRAPE_CHOICE("form", FORM_VELOCITY, form_choices,
+                     "velocity: second order; position: x' = x + (x - x_before) + a h^2 as CS184 and Boson"),
+    [PARAM_DAMPING] = DRAPE_NUMBER("damping", "%", 0, 0, 100,
+                                   "velocity that every substep takes: more substeps damp more, as in CS184"),
     [PARAM_CONTACT] =
-        {.name = "contact",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = DRAPE_VERLET_CS184,
-         .choices = contact_choices,
-         .help = "how nodes leave colliders; cs184: friction is the share of a correction that is not made; "
-                 "boson: nodes stop on flat surfaces, friction changes forces"},
-    [PARAM_SURFACE_OFFSET] = {.name = "surface_offset",
-                              .unit = "m",
-                              .default_value = 1e-4,
-                              .min = 0,
-                              .max = 1e9,
-                              .help = "cs184: how far outside of a flat surface a node is put"},
-    [PARAM_FRICTION_RANGE] = {.name = "friction_range",
-                              .unit = "m",
-                              .default_value = 0.5,
-                              .min = 0,
-                              .max = 1e9,
-                              .help = "boson: nodes this near to a surface rub on it"},
-    [PARAM_FRICTION_DRAG] = {.name = "friction_drag",
-                             .unit = "N s/m",
-                             .default_value = 0.5,
-                             .min = 0,
-                             .max = 1e9,
-                             .help = "boson: drag of a node that rubs"},
+        DRAPE_CHOICE("contact", DRAPE_VERLET_CS184, contact_choices,
+                     "how nodes leave colliders; cs184: friction is the share of a correction that is not "
+                     "made; boson: nodes stop on flat surfaces, friction changes forces"),
+    [PARAM_SURFACE_OFFSET] = DRAPE_NUMBER("surface_offset", "m", 1e-4, 0, 1e9,
+                                          "cs184: how far outside of a flat surface a node is put"),
+    [PARAM_FRICTION_RANGE] =
+        DRAPE_NUMBER("friction_range", "m", 0.5, 0, 1e9, "boson: nodes this near to a surface rub on it"),
+    [PARAM_FRICTION_DRAG] =
+        DRAPE_NUMBER("friction_drag", "N s/m", 0.5, 0, 1e9, "boson: drag of a node that rubs"),
     [PARAM_SELF_BOXES] =
-        {.name = "self_boxes",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = BOXES_ALL,
-         .choices = boxes_choices,
-         .help = "where cloth is looked for near a point of cloth; own: in its own box alone, as CS184"},
-    [PARAM_STRAIN_LIMIT] = {.name = "strain_limit",
-                            .unit = "1",
-                            .default_value = NAN,
-                            .derived = "none",
-                            .min = 0,
-                            .max = 1e6,
-                            .help = "no spring is longer than 1 + this times its rest length; 0.1 in CS184"},
+        DRAPE_CHOICE("self_boxes", BOXES_ALL, boxes_choices,
+                     "where cloth is looked for near a point of cloth; own: in its own box alone, as CS184"),
+    [PARAM_STRAIN_LIMIT] =
+        DRAPE_NUMBER("strain_limit", "1", DRAPE_DERIVED("none"), 0, 1e6,
+                     "no spring is longer than 1 + this times its rest length; 0.1 in CS184"),
     [PARAM_STRAIN_LIMIT_ITERATIONS] =
-        {.name = "strain_limit_iterations",
-         .kind = DRAPE_PARAM_INTEGER,
-         .unit = "1",
-         .default_value = 1,
-         .min = 1,
-         .max = 1e6,
-         .help = "most passes over all springs; one does not reach the limit, as in CS184"},
-    [PARAM_STRAIN_LIMIT_TOLERANCE] = {.name = "strain_limit_tolerance",
-                                      .unit = "1",
-                                      .default_value = 1e-3,
-                                      .min = 0,
-                                      .max = 1,
-                                      .help = "passes end where no spring is longer than 1 + this allows"},
-    [PARAM_SAFETY] = {.name = "safety",
-                      .unit = "1",
-                      .default_value = 0.8,
-                      .min = 0.01,
-                      .max = 1,
-                      .help = "substeps 0: share of the stability limit that a substep takes"},
-    [PARAM_MAX_SUBSTEPS] = {.name = "max_substeps",
-                            .kind = DRAPE_PARAM_INTEGER,
-                            .unit = "1",
-                            .default_value = 10000,
-                            .min = 1,
-                            .max = 1e6,
-                            .help = "substeps 0: a step that needs more is rejected"},
-    [PARAM_MAX_SPEED] = {.name = "max_speed",
-                         .unit = "m/s",
-                         .default_value = 1e6,
-                         .min = 0,
-                         .max = 1e100,
-                         .open_min = true,
-                         .help = "a step in which a node is faster has blown up and is rejected"},
-    [PARAM_GUARD] = {.name = "guard",
-                     .kind = DRAPE_PARAM_BOOLEAN,
-                     .unit = "1",
-                     .default_value = 1,
-                     .help =
-                         "energy from nowhere and collapsed elements reject a step; false, as in CS184 and "
-                         "Boson: only max_speed does"},
+        DRAPE_INTEGER("strain_limit_iterations", "1", 1, 1, 1e6,
+                      "most passes over all springs; one does not reach the limit, as in CS184"),
+    [PARAM_STRAIN_LIMIT_TOLERANCE] =
+        DRAPE_NUMBER("strain_limit_tolerance", "1", 1e-3, 0, 1,
+                     "passes end where no spring is longer than 1 + this allows"),
+    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.8, 0.01, 1,
+                                  "substeps 0: share of the stability limit that a substep takes"),
+    [PARAM_MAX_SUBSTEPS] =
+        DRAPE_INTEGER("max_substeps", "1", 10000, 1, 1e6, "substeps 0: a step that needs more is rejected"),
+    [PARAM_MAX_SPEED] = DRAPE_NUMBER("max_speed", "m/s", 1e6, DRAPE_ABOVE(0), 1e100,
+                                     "a step in which a node is faster has blown up and is rejected"),
+    [PARAM_GUARD] = DRAPE_BOOLEAN("guard", true,
+                                  "energy from nowhere and collapsed elements reject a step; false, as in "
+                                  "CS184 and Boson: only max_speed does"),
 };
 
 #define STABILITY_ITERATIONS 30 /* finds omega of a sheet to 1 % */
 
 typedef struct verlet_state {
-    drape_context *ctx;
     drape_system *system;
     const drape_model *model;
     const drape_motion *motion;
     double values[PARAM_COUNT];
     double keep;        /* c */
-    double *g, *g1;     /* nodes: forces with their sign turned */
+    double *g, *g1;     /* nodes: negative forces */
     double *x0;         /* nodes: at the start of the substep */
-    double *pins;       /* nodes: where those that move are at its end */
-    double *inverse;    /* nodes: 1/mass [1/kg], three times each; 0 where pinned */
+    double *pins;       /* nodes: positions of moving pins at its end */
+    double *inverse;    /* nodes: 1/mass [1/kg], three times each; 0 if pinned */
     double *v_ahead;    /* nodes: velocity form with forces that depend on v */
-    double *dissipated; /* nodes; NULL where nothing dissipates */
+    double *dissipated; /* nodes; NULL if nothing dissipates */
     drape_verlet_force *force;
     drape_verlet_contact contact;
     drape_verlet_limit limit;
-    drape_verlet_self *self; /* NULL: cloth does not meet cloth */
+    drape_verlet_self self;
     drape_spectrum *spectrum;
     drape_work work;
 } verlet_state;
@@ -194,7 +125,7 @@ typedef struct verlet_state {
 /* One substep. */
 typedef struct substep {
     double t0, t, h;
-    double share; /* of self-contact: one over the substeps */
+    double share; /* of the correction of self-contact: one over the substeps */
     double *x, *v;
     const double *internal;
     drape_step_info *info;
@@ -202,78 +133,57 @@ typedef struct substep {
 
 /* ---- Making ---- */
 
-static void destroy(void **state)
+static drape_status create_arrays(drape_arena *arena, verlet_state *s)
 {
-    verlet_state *s = *state;
-    if (!s)
-        return;
-    double *const all[] = {s->g, s->g1, s->x0, s->pins, s->inverse, s->v_ahead, s->dissipated};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        drape_free(s->ctx, all[i]);
-    drape_verlet_force_destroy(&s->force);
-    drape_verlet_limit_free(s->ctx, &s->limit);
-    drape_verlet_self_destroy(&s->self);
-    drape_spectrum_destroy(&s->spectrum);
-    drape_free(s->ctx, s);
-    *state = NULL;
-}
-
-static bool create_arrays(verlet_state *s)
-{
-    size_t nodes = 3 * (size_t)s->model->node_count;
+    const drape_model *m = s->model;
+    const size_t nodes = 3 * (size_t)m->node_count;
     double **const always[] = {&s->g, &s->g1, &s->x0, &s->pins, &s->inverse};
     for (size_t i = 0; i < sizeof always / sizeof *always; i++)
-        if (!(*always[i] = drape_alloc(s->ctx, nodes, sizeof(double))))
-            return false;
-    for (int32_t f = 0; f < s->model->free_count; f++)
-        for (size_t k = 0, i = (size_t)s->model->node_of_free[f]; k < 3; k++)
-            s->inverse[3 * i + k] = 1 / s->model->mass[i];
-    if (!s->model->has_dissipation)
-        return true;
-    s->v_ahead = drape_alloc(s->ctx, nodes, sizeof(double));
-    s->dissipated = drape_alloc(s->ctx, nodes, sizeof(double));
-    return s->v_ahead && s->dissipated;
+        *always[i] = drape_arena_take(arena, nodes, sizeof(double));
+    if (m->has_dissipation) {
+        s->v_ahead = drape_arena_take(arena, nodes, sizeof(double));
+        s->dissipated = drape_arena_take(arena, nodes, sizeof(double));
+    }
+    for (int32_t f = 0; s->inverse && f < m->free_count; f++)
+        for (size_t k = 0, i = (size_t)m->node_of_free[f]; k < 3; k++)
+            s->inverse[3 * i + k] = 1 / m->mass[i];
+    return drape_arena_status(arena);
 }
 
-static drape_status create_parts(verlet_state *s)
+static drape_status create_parts(drape_arena *arena, verlet_state *s)
 {
     const double *values = s->values;
-    drape_status status = create_arrays(s) ? DRAPE_OK : DRAPE_E_MEMORY;
+    drape_status status = create_arrays(arena, s);
     if (!status)
-        status = drape_verlet_force_create(s->ctx, s->system, &s->force);
+        status = drape_verlet_force_create(arena, s->system, &s->force);
     if (!status && !isnan(values[PARAM_STRAIN_LIMIT]))
-        status = drape_verlet_limit_create(s->ctx, s->model, values[PARAM_STRAIN_LIMIT],
+        status = drape_verlet_limit_create(arena, s->model, values[PARAM_STRAIN_LIMIT],
                                            (int)values[PARAM_STRAIN_LIMIT_ITERATIONS],
                                            values[PARAM_STRAIN_LIMIT_TOLERANCE], &s->limit);
     if (!status && s->model->contact.self)
-        status = drape_verlet_self_create(s->ctx, s->model, values[PARAM_SELF_BOXES] == BOXES_OWN, &s->self);
+        status = drape_verlet_self_create(arena, s->model, values[PARAM_SELF_BOXES] == BOXES_OWN, &s->self);
     if (!status)
-        status = drape_spectrum_create(s->ctx, s->system, STABILITY_ITERATIONS, &s->spectrum);
+        status = drape_spectrum_create(arena, s->system, STABILITY_ITERATIONS, &s->spectrum);
     return status;
 }
 
-static drape_status create(drape_context *ctx, drape_system *system, const double *values, void **state)
+static drape_status create(drape_arena *arena, drape_system *system, const double *values, void **state)
 {
-    verlet_state *s = drape_alloc(ctx, 1, sizeof *s);
-    *state = s;
+    verlet_state *s = *state = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (verlet_state){.ctx = ctx,
-                        .system = system,
+    *s = (verlet_state){.system = system,
                         .model = drape_system_model(system),
-                        .motion = drape_system_motion(system)};
+                        .motion = drape_system_motion(system),
+                        .keep = 1 - values[PARAM_DAMPING] / 100};
     memcpy(s->values, values, sizeof s->values);
-    s->keep = 1 - values[PARAM_DAMPING] / 100;
     s->contact = (drape_verlet_contact){.model = s->model,
                                         .motion = s->motion,
                                         .rule = (int)values[PARAM_CONTACT],
                                         .offset = values[PARAM_SURFACE_OFFSET],
                                         .friction_range = values[PARAM_FRICTION_RANGE],
                                         .friction_drag = values[PARAM_FRICTION_DRAG]};
-    drape_status status = create_parts(s);
-    if (status)
-        destroy(state);
-    return status;
+    return create_parts(arena, s);
 }
 
 /* ---- Forces ---- */
@@ -285,10 +195,10 @@ static void evaluate(verlet_state *s, const substep *sub, double t, const double
         s->force, &(drape_point){.x = sub->x, .v = v, .internal = sub->internal, .t = t, .span = {t, t}}, g);
     s->work.residual_seconds += drape_clock_seconds() - start;
     s->work.residuals++;
-    drape_verlet_rub(&s->contact, t, sub->x, v, g);
+    drape_verlet_friction(&s->contact, t, sub->x, v, g);
 }
 
-/* Adds a share of the power of the dissipative forces at x, v and t over the substep. */
+/* Adds the work of the dissipative forces at x, v and t over a share of the substep. */
 static void audit_dissipation(verlet_state *s, const substep *sub, double share, double t, const double *v)
 {
     double power = 0;
@@ -304,7 +214,7 @@ static void audit_dissipation(verlet_state *s, const substep *sub, double share,
 
 /* ---- The stages of a substep ---- */
 
-/* Velocities of pins that move: their mean over the substep. */
+/* Moving pins get their mean velocity over the substep. */
 static void start_pins(verlet_state *s, const substep *sub)
 {
     const drape_motion *m = s->motion;
@@ -318,7 +228,7 @@ static void start_pins(verlet_state *s, const substep *sub)
         }
 }
 
-/* Work of the pins that move, against g. */
+/* Adds the work of moving pins against g over a share of the substep. */
 static void audit_pins(verlet_state *s, const substep *sub, const double *g, double share)
 {
     const drape_motion *m = s->motion;
@@ -344,7 +254,7 @@ static void damp(verlet_state *s, const substep *sub)
     sub->info->dissipated += 0.5 * (1 - s->keep * s->keep) * taken;
 }
 
-/* v -= w g/m, x0 = x, x += h v of all numbers; inverse is 0 where x stays. */
+/* v -= w g/m, x0 = x, x += h v of all coordinates; inverse is 0 where x is pinned. */
 LANES_DISPATCH static void move_all(size_t n, double w, double h, const double *restrict inverse,
                                     const double *restrict g, double *restrict v, double *restrict x,
                                     double *restrict x0)
@@ -356,14 +266,14 @@ LANES_DISPATCH static void move_all(size_t n, double w, double h, const double *
     }
 }
 
-/* Pins go to where they are at the end. */
+/* Moving pins go to their positions at the end of the substep. */
 static void move(const verlet_state *s, const substep *sub, double w)
 {
     move_all(3 * (size_t)s->model->node_count, w, sub->h, s->inverse, s->g, sub->v, sub->x, s->x0);
     drape_motion_place_pins(s->motion, sub->t, sub->x);
 }
 
-/* v = (x - x0)/h of what is not pinned. */
+/* v = (x - x0)/h of all coordinates that are not pinned. */
 LANES_DISPATCH static void take_velocities(size_t n, double h, const double *restrict inverse,
                                            const double *restrict x, const double *restrict x0,
                                            double *restrict v)
@@ -373,15 +283,15 @@ LANES_DISPATCH static void take_velocities(size_t n, double h, const double *res
         v[i] = inverse[i] > 0 ? (x[i] - x0[i]) * per : v[i];
 }
 
-/* Whatever moves nodes beside the forces, and what it does to their velocities. */
+/* Moves nodes by the rules of contact and of the strain limit, and updates their velocities. */
 static void project(verlet_state *s, const substep *sub)
 {
     const drape_model *m = s->model;
-    if (!s->self && m->collider_count == 0 && s->limit.count == 0)
+    if (!m->contact.self && m->collider_count == 0 && s->limit.count == 0)
         return;
     double start = drape_clock_seconds();
-    if (s->self)
-        drape_verlet_self_push(s->self, sub->share, sub->x);
+    if (m->contact.self)
+        drape_verlet_self_push(&s->self, sub->share, sub->x);
     drape_verlet_project(&s->contact, sub->t0, sub->t, s->x0, sub->x);
     if (s->limit.count > 0)
         drape_verlet_limit_lengths(&s->limit, sub->x);
@@ -400,7 +310,7 @@ static void substep_position(verlet_state *s, const substep *sub)
     project(s, sub);
 }
 
-/* v_ahead = v + h/2 a more than the half that move() has added: the velocity at the end, to first order. */
+/* v + h/2 a, with the other half already added by move(): the velocity at the end, to first order. */
 static const double *velocity_ahead(const verlet_state *s, const substep *sub)
 {
     const drape_model *m = s->model;
@@ -413,7 +323,7 @@ static const double *velocity_ahead(const verlet_state *s, const substep *sub)
     return s->v_ahead;
 }
 
-/* Forces that depend on positions alone are known from the end of the substep before. */
+/* Forces that depend on positions alone are those of the end of the previous substep. */
 static void substep_velocity(verlet_state *s, const substep *sub, bool first)
 {
     const drape_model *m = s->model;
@@ -444,11 +354,11 @@ static void substep_velocity(verlet_state *s, const substep *sub, bool first)
 static int64_t substeps_for(const verlet_state *s, double h, double limit)
 {
     int64_t given = (int64_t)s->values[PARAM_SUBSTEPS];
-    double most = s->values[PARAM_MAX_SUBSTEPS];
+    double max = s->values[PARAM_MAX_SUBSTEPS];
     if (given > 0)
         return given;
     double needed = ceil(h / (s->values[PARAM_SAFETY] * limit));
-    return needed <= most ? (int64_t)fmax(needed, 1) : (int64_t)most + 1;
+    return needed <= max ? (int64_t)fmax(needed, 1) : (int64_t)max + 1;
 }
 
 static void stability(void *state, const drape_state *at, double h, drape_stability *out)
@@ -456,14 +366,14 @@ static void stability(void *state, const drape_state *at, double h, drape_stabil
     verlet_state *s = state;
     drape_spectrum_largest(s->spectrum, at, &out->omega, &out->damping);
     double w = out->omega, mu = out->damping, c = s->keep;
-    /* The formula multiplied by its conjugate, which does not cancel. */
+    /* the formula times its conjugate, which has no cancellation */
     double sum = mu + sqrt(mu * mu + 2 * (1 + c) * w * w);
     out->limit = sum > 0 ? 2 * (1 + c) / sum : INFINITY;
     out->substep = h / (double)substeps_for(s, h, out->limit);
     out->step = s->values[PARAM_SUBSTEPS] > 0 ? s->values[PARAM_SUBSTEPS] * out->limit : INFINITY;
 }
 
-/* How many substeps this step takes; more than are allowed: none is. */
+/* The number of substeps of this step; more than max_substeps: the step is rejected. */
 static int64_t count_substeps(verlet_state *s, const drape_state *in, double h)
 {
     drape_stability known = {.limit = INFINITY};
@@ -474,48 +384,48 @@ static int64_t count_substeps(verlet_state *s, const drape_state *in, double h)
 
 /* ---- The step ---- */
 
-/* The first node whose numbers are none, else the fastest. */
-static int32_t worst_node(const drape_model *m, const drape_state *out)
+/* The first node that is not finite, or else the fastest. */
+static int32_t fastest_node(const drape_model *m, const drape_state *out)
 {
-    int32_t worst = -1;
-    double most = -1;
+    int32_t fastest = -1;
+    double largest = -1;
     for (int32_t i = 0; i < m->node_count; i++) {
         const double *v = out->v + 3 * (size_t)i;
         double square = vec3_dot(v, v);
         if (!isfinite(square) || !drape_all_finite(out->x + 3 * (size_t)i, 3))
             return i;
-        if (square > most) {
-            most = square;
-            worst = i;
+        if (square > largest) {
+            largest = square;
+            fastest = i;
         }
     }
-    return worst;
+    return fastest;
 }
 
 static bool blew_up(const verlet_state *s, const drape_state *out, drape_step_info *info)
 {
     const drape_model *m = s->model;
-    int32_t node = worst_node(m, out);
+    int32_t node = fastest_node(m, out);
     double speed = vec3_norm(out->v + 3 * (size_t)node);
     if (speed <= s->values[PARAM_MAX_SPEED] && drape_all_finite(out->x + 3 * (size_t)node, 3))
         return false;
     info->reason = "blow_up";
-    info->worst = (drape_worst){.what = "speed [m/s]",
-                                .term = "",
-                                .element = -1,
-                                .node = {node, -1, -1, -1},
-                                .cloth = drape_model_cloth_of(m, node),
-                                .value = speed,
-                                .limit = s->values[PARAM_MAX_SPEED]};
+    info->diagnostic = (drape_diagnostic){.what = "speed [m/s]",
+                                          .term = "",
+                                          .element = -1,
+                                          .node = {node, -1, -1, -1},
+                                          .cloth = drape_model_cloth_of(m, node),
+                                          .value = speed,
+                                          .limit = s->values[PARAM_MAX_SPEED]};
     return true;
 }
 
-static drape_status refuse(drape_step_info *info, int64_t most)
+static drape_status refuse(drape_step_info *info, int64_t max)
 {
     info->reason = "max_substeps";
-    info->worst.what = "substeps";
-    info->worst.value = (double)most + 1;
-    info->worst.limit = (double)most;
+    info->diagnostic.what = "substeps";
+    info->diagnostic.value = (double)max + 1;
+    info->diagnostic.limit = (double)max;
     return DRAPE_RETRY_REJECTED;
 }
 
@@ -553,7 +463,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     return blew_up(s, out, info) ? DRAPE_RETRY_NONFINITE : DRAPE_OK;
 }
 
-/* The state is all there is. */
+/* A step depends on the state alone. */
 static void restart(void *state, const drape_state *from)
 {
     (void)state;
@@ -565,29 +475,21 @@ static drape_work work(const void *state)
     return ((const verlet_state *)state)->work;
 }
 
-/* Lists of near points give the same bits whenever they were made. */
+/* Lists of neighbours are left out: steps have the same bits whenever the lists were made. */
 static void archive(void *state, drape_archive *a)
 {
     drape_work_archive(&((verlet_state *)state)->work, a);
 }
 
-static size_t bytes(const void *state)
-{
-    const verlet_state *s = state;
-    size_t nodes = 3 * (size_t)s->model->node_count;
-    return sizeof *s + (s->dissipated ? 7 : 5) * nodes * sizeof(double) +
-           drape_verlet_limit_bytes(&s->limit) + drape_verlet_force_bytes(s->force) +
-           (s->self ? drape_verlet_self_bytes(s->self) : 0) + drape_spectrum_bytes(s->spectrum);
-}
-
 const drape_integrator_ops drape_integrator_verlet = {
-    .name = "verlet",
-    .summary = "explicit Verlet steps in substeps, with the contact rules and the strain limit of CS184 and "
-               "Boson; stable below 2/omega",
-    .reference = "Verlet 1967; Provot 1995; CS184 clothsim; Hairer, Lubich & Wanner 2003",
+    .entry =
+        {.name = "verlet",
+         .summary =
+             "explicit Verlet steps in substeps, with the contact rules and the strain limit of CS184 and "
+             "Boson; stable below 2/omega",
+         .reference = "Verlet 1967; Provot 1995; CS184 clothsim; Hairer, Lubich & Wanner 2003",
+         DRAPE_PARAMS(params)},
     .order = 2,
-    .params = params,
-    .param_count = PARAM_COUNT,
     .create = create,
     .projects_contact = true,
     .step = step,
@@ -595,6 +497,4 @@ const drape_integrator_ops drape_integrator_verlet = {
     .stability = stability,
     .work = work,
     .archive = archive,
-    .bytes = bytes,
-    .destroy = destroy,
 };

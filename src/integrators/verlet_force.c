@@ -1,9 +1,9 @@
 /*
- * verlet_force.c: the forces of a substep. Springs without dashpots and laws are summed here, in runs: elements
- * that follow one another join nodes that follow one another, as along the rows of a grid,
+ * verlet_force.c: the forces of a substep. Springs without dashpots and laws are summed here, in runs:
+ * consecutive elements that join consecutive nodes, as along the rows of a grid,
  *     g(b + i) += p, g(a + i) -= p with p = k (1 - L/l) (x(b + i) - x(a + i)), l = |x(b + i) - x(a + i)|
- * so that a run is a loop over arrays without indices, of which compilers make vectors. Linear terms have the
- * same forces at every x: they are taken once. The system sums what is left.
+ * so that a run is a loop over arrays without indices, which compilers vectorise. The forces of linear terms
+ * do not depend on x and are computed once. The system sums all other terms.
  */
 #include "base/lanes.h"
 #include "integrators/planes.h"
@@ -12,8 +12,8 @@
 #include <math.h>
 #include <string.h>
 
-#define LONGEST  128 /* elements of a run: its forces stay in the cache */
-#define SHORTEST 8   /* on the average: below it the system's way is as good */
+#define MAX_RUN  128 /* elements of a run: its forces stay in the cache */
+#define MEAN_RUN 8   /* the mean length from which runs are faster than the system's sum */
 
 typedef struct run {
     int32_t a, b, count;
@@ -21,11 +21,10 @@ typedef struct run {
 } run;
 
 struct drape_verlet_force {
-    drape_context *ctx;
     drape_system *system;
     const drape_model *model;
-    bool *taken; /* (term_count) */
-    bool rest;   /* there are others */
+    bool *summed;  /* (term_count) here */
+    bool has_rest; /* some are summed by the system */
     int32_t run_count;
     run *runs;
     double *x, *g, *constant; /* planes (3 x node_count) */
@@ -38,13 +37,13 @@ static int32_t run_end(const drape_elements *el, int32_t first)
 {
     int32_t last = first;
     const int32_t *node = el->node;
-    while (last + 1 < el->count && last + 1 - first < LONGEST && node[2 * last + 2] == node[2 * last] + 1 &&
+    while (last + 1 < el->count && last + 1 - first < MAX_RUN && node[2 * last + 2] == node[2 * last] + 1 &&
            node[2 * last + 3] == node[2 * last + 1] + 1)
         last++;
     return last + 1;
 }
 
-/* Writes the runs of a term where there is a place for them. */
+/* Returns the number of runs of a term; writes them if out is not NULL. */
 static int32_t find_runs(const drape_elements *el, run *out)
 {
     int32_t count = 0;
@@ -63,104 +62,76 @@ static int32_t find_runs(const drape_elements *el, run *out)
 static bool has_runs(const drape_term *term)
 {
     return term->ops->distance && term->law_count == 0 && !term->damping &&
-           find_runs(&term->elements, NULL) <= term->elements.count / SHORTEST;
+           find_runs(&term->elements, NULL) <= term->elements.count / MEAN_RUN;
 }
 
-/* A law sums nothing of its own, and a constraint is kept by moving nodes. */
-static bool is_summed(const drape_term *term)
+/* A law adds no forces of its own, and constraints are kept by moving nodes. */
+static bool has_forces(const drape_term *term)
 {
     return !term->ops->law && !term->ops->constraint;
 }
 
-static drape_status create_runs(drape_verlet_force *f)
+static drape_status create_runs(drape_arena *arena, drape_verlet_force *f)
 {
     const drape_model *m = f->model;
-    for (int32_t i = 0; i < m->term_count; i++)
-        if (has_runs(&m->terms[i])) {
-            f->taken[i] = true;
-            f->run_count += find_runs(&m->terms[i].elements, NULL);
-        }
-    f->runs = drape_alloc(f->ctx, (size_t)f->run_count, sizeof *f->runs);
+    for (int32_t i = 0; i < m->term_count; i++) {
+        f->summed[i] = has_runs(&m->terms[i]);
+        f->run_count += f->summed[i] ? find_runs(&m->terms[i].elements, NULL) : 0;
+    }
+    f->runs = drape_arena_take(arena, (size_t)f->run_count, sizeof *f->runs);
     if (!f->runs)
         return DRAPE_E_MEMORY;
     int32_t count = 0;
     for (int32_t i = 0; i < m->term_count; i++)
-        if (f->taken[i])
+        if (f->summed[i])
             count += find_runs(&m->terms[i].elements, f->runs + count);
     return DRAPE_OK;
 }
 
-/* The forces of the linear terms, which are taken then. The rest positions serve as well as any. */
-static drape_status take_linear(drape_verlet_force *f)
+/* The forces of the linear terms, at the rest positions: any others would do. */
+static drape_status sum_linear(drape_context *ctx, drape_verlet_force *f)
 {
     const drape_model *m = f->model;
-    size_t nodes = 3 * (size_t)m->node_count;
-    double *g = drape_alloc(f->ctx, nodes, sizeof *g), *v = drape_alloc(f->ctx, nodes, sizeof *v);
-    bool *others = drape_alloc(f->ctx, (size_t)m->term_count, sizeof *others);
-    bool enough = g && v && others;
-    for (int32_t i = 0; enough && i < m->term_count; i++) {
-        bool linear = m->terms[i].ops->linear;
-        others[i] = !linear;
-        f->taken[i] = f->taken[i] || linear;
-        f->rest = f->rest || (is_summed(&m->terms[i]) && !f->taken[i]);
+    const size_t nodes = 3 * (size_t)m->node_count;
+    drape_arena arena = drape_arena_of(ctx);
+    double *g = drape_arena_take(&arena, nodes, sizeof *g), *v = drape_arena_take(&arena, nodes, sizeof *v);
+    bool *others = drape_arena_take(&arena, (size_t)m->term_count, sizeof *others);
+    const drape_status status = drape_arena_status(&arena);
+    for (int32_t i = 0; !status && i < m->term_count; i++) {
+        others[i] = !m->terms[i].ops->linear;
+        f->summed[i] = f->summed[i] || m->terms[i].ops->linear;
+        f->has_rest = f->has_rest || (has_forces(&m->terms[i]) && !f->summed[i]);
     }
-    if (enough) {
+    if (!status) {
         drape_system_force_without(f->system, &(drape_point){.x = m->rest, .v = v}, others, g);
         planes_from((size_t)m->node_count, g, f->constant);
     }
-    drape_free(f->ctx, g);
-    drape_free(f->ctx, v);
-    drape_free(f->ctx, others);
-    return enough ? DRAPE_OK : DRAPE_E_MEMORY;
-}
-
-drape_status drape_verlet_force_create(drape_context *ctx, drape_system *system, drape_verlet_force **out)
-{
-    const drape_model *m = drape_system_model(system);
-    size_t nodes = 3 * (size_t)m->node_count;
-    drape_verlet_force *f = drape_alloc(ctx, 1, sizeof *f);
-    *out = f;
-    if (!f)
-        return DRAPE_E_MEMORY;
-    *f = (drape_verlet_force){.ctx = ctx, .system = system, .model = m};
-    f->taken = drape_alloc(ctx, (size_t)m->term_count, sizeof *f->taken);
-    f->x = drape_alloc(ctx, nodes, sizeof *f->x);
-    f->g = drape_alloc(ctx, nodes, sizeof *f->g);
-    f->constant = drape_alloc(ctx, nodes, sizeof *f->constant);
-    drape_status status = f->taken && f->x && f->g && f->constant ? DRAPE_OK : DRAPE_E_MEMORY;
-    if (!status)
-        status = create_runs(f);
-    if (!status)
-        status = take_linear(f);
-    if (status)
-        drape_verlet_force_destroy(out);
+    drape_arena_free(&arena);
     return status;
 }
 
-void drape_verlet_force_destroy(drape_verlet_force **force)
+drape_status drape_verlet_force_create(drape_arena *arena, drape_system *system, drape_verlet_force **out)
 {
-    drape_verlet_force *f = *force;
+    const drape_model *m = drape_system_model(system);
+    const size_t nodes = 3 * (size_t)m->node_count;
+    drape_verlet_force *f = *out = drape_arena_take(arena, 1, sizeof *f);
     if (!f)
-        return;
-    drape_free(f->ctx, f->taken);
-    drape_free(f->ctx, f->runs);
-    drape_free(f->ctx, f->x);
-    drape_free(f->ctx, f->g);
-    drape_free(f->ctx, f->constant);
-    drape_free(f->ctx, f);
-    *force = NULL;
-}
-
-size_t drape_verlet_force_bytes(const drape_verlet_force *f)
-{
-    return sizeof *f + (size_t)f->model->term_count * sizeof *f->taken +
-           (size_t)f->run_count * sizeof *f->runs + 9 * (size_t)f->model->node_count * sizeof(double);
+        return DRAPE_E_MEMORY;
+    *f = (drape_verlet_force){.system = system, .model = m};
+    f->summed = drape_arena_take(arena, (size_t)m->term_count, sizeof *f->summed);
+    f->x = drape_arena_take(arena, nodes, sizeof *f->x);
+    f->g = drape_arena_take(arena, nodes, sizeof *f->g);
+    f->constant = drape_arena_take(arena, nodes, sizeof *f->constant);
+    drape_status status = drape_arena_status(arena);
+    if (!status)
+        status = create_runs(arena, f);
+    return status ? status : sum_linear(arena->ctx, f);
 }
 
 /* ---- Summing ---- */
 
-static inline void pull(const run *r, const double *restrict x, size_t n, double *restrict px,
-                        double *restrict py, double *restrict pz)
+static inline void spring_forces(const run *r, const double *restrict x, size_t n, double *restrict px,
+                                 double *restrict py, double *restrict pz)
 {
     const double *ax = x + r->a, *ay = ax + n, *az = ay + n, *bx = x + r->b, *by = bx + n, *bz = by + n;
     for (int32_t i = 0; i < r->count; i++) {
@@ -172,7 +143,7 @@ static inline void pull(const run *r, const double *restrict x, size_t n, double
     }
 }
 
-/* In two loops: a run's second nodes may be first nodes of the same run. */
+/* In two loops: the second nodes of a run may be first nodes of the same run. */
 static inline void add_opposite(const run *r, const double *restrict p, double *g)
 {
     double *restrict a = g + r->a;
@@ -185,9 +156,9 @@ static inline void add_opposite(const run *r, const double *restrict p, double *
 
 LANES_DISPATCH static void sum_runs(const run *runs, int32_t count, const double *x, size_t n, double *g)
 {
-    double p[3][LONGEST];
+    double p[3][MAX_RUN];
     for (int32_t k = 0; k < count; k++) {
-        pull(&runs[k], x, n, p[0], p[1], p[2]);
+        spring_forces(&runs[k], x, n, p[0], p[1], p[2]);
         for (size_t c = 0; c < 3; c++)
             add_opposite(&runs[k], p[c], g + c * n);
     }
@@ -201,8 +172,8 @@ void drape_verlet_force_sum(drape_verlet_force *f, const drape_point *point, dou
         planes_from(n, point->x, f->x);
         sum_runs(f->runs, f->run_count, f->x, n, f->g);
     }
-    if (f->rest) {
-        drape_system_force_without(f->system, point, f->taken, g);
+    if (f->has_rest) {
+        drape_system_force_without(f->system, point, f->summed, g);
         planes_add_to(n, f->g, g);
     } else {
         planes_to(n, f->g, g);

@@ -1,16 +1,17 @@
 /*
- * verlet_limit.c: the limit of strains as CS184 and Provot (1995) have it: one spring after the other, one
- * that is longer than it may be gets its longest length, by half at each end, or all of it at the end that is
- * free. A pass moves springs that it has already dealt with, so that after one the limit is not met: CS184
- * leaves it at that. Passes are repeated until no spring is longer than the slack allows, or there were
- * enough of them.
+ * verlet_limit.c: the limit of strains of CS184 and Provot (1995): one spring after the other, a spring that
+ * is too long is shortened to its longest length, by half at each end, or all of it at the end that is free.
+ * A pass moves springs that it has already shortened, so that the limit is not met after one pass: CS184
+ * makes only one. Passes are repeated until no spring is longer than the slack allows, or their number is
+ * reached.
  *
  * All springs take part, of any stiffness, in the order in which CS184 makes them: by their later node.
  *
- * Most of them are not too long. They are looked at in patches: some nodes in a row whose springs reach back by
- * the same steps, as inside of a grid, so that the springs of one step are a loop over arrays without indices. A
- * node of which no spring is too long is done, as long as none of its nodes is moved before its turn: one after the
- * other none would have moved. The springs of others, and those that are in no patch, are taken one after the other.
+ * Most springs are not too long. They are checked in patches: consecutive nodes whose springs lead to the
+ * same differences of node numbers, as inside of a grid, so that the springs of one difference are a loop
+ * over arrays without indices. A node without a spring that is too long is done unless one of its springs'
+ * nodes moves before its turn, as it would be in the sequence of springs. The springs of other nodes, and
+ * those in no patch, are taken one after the other.
  */
 #include "base/lanes.h"
 #include "base/vec3.h"
@@ -18,19 +19,18 @@
 #include "integrators/verlet.h"
 
 #include <math.h>
-
 #include <string.h>
 
-#define PATCH_NODES 16 /* at most: few enough that most patches have no spring that is too long */
-#define FEWEST      4  /* nodes of a patch that is looked at at once */
-#define MOST_STEPS  8  /* springs a node */
+#define MAX_PATCH_NODES 16 /* few enough that most patches have no spring that is too long */
+#define MIN_PATCH_NODES 4  /* smaller patches are not worth it */
+#define MAX_STEPS       8  /* springs of a node */
 
-/* Springs first ... first + steps x nodes - 1: of each node the same number, spring `step` of node `from` + i joins
- * it with from + i - back[step]. steps 0: any springs, `nodes` of them. */
+/* Springs first ... first + steps x nodes - 1, as many of each node: spring s of node `from` + i joins it
+ * with from + i - back[s]. steps 0: any springs, `nodes` of them. */
 struct drape_verlet_patch {
     int32_t first, nodes, steps, from;
-    int32_t back[MOST_STEPS];
-    int32_t reach; /* springs of a node and of one this much later, or less, may have a node in common */
+    int32_t back[MAX_STEPS];
+    int32_t reach; /* springs of a node and of one up to this many nodes later may share a node */
 };
 
 static bool is_spring(const drape_term *term)
@@ -43,7 +43,7 @@ static int32_t later(const int32_t *node)
     return node[0] > node[1] ? node[0] : node[1];
 }
 
-/* Numbers of the springs of each node that is the later of a pair, as starts of a list. */
+/* start: of the springs of each node that is their later one. */
 static void count_springs(const drape_model *m, int32_t *start)
 {
     for (int32_t i = 0; i < m->term_count; i++) {
@@ -83,7 +83,7 @@ static int32_t step_of(const drape_verlet_limit *l, int32_t spring)
     return node[0] > node[1] ? node[0] - node[1] : node[1] - node[0];
 }
 
-/* Springs of the node whose first is `first`. */
+/* The number of springs of the node whose first spring is `first`. */
 static int32_t count_steps(const drape_verlet_limit *l, int32_t first)
 {
     int32_t end = first, node = later(l->node + 2 * (size_t)first);
@@ -103,15 +103,15 @@ static bool has_same_steps(const drape_verlet_limit *l, const drape_verlet_patch
     return true;
 }
 
-/* Node i of a patch touches i and i - back[s]: what is in common with node j before it needs i - j to be a step or
- * the difference of two. */
+/* The springs of node i of a patch have the nodes i and i - back[s]: to share one with those of an earlier
+ * node j, i - j has to be a step or the difference of two. */
 static int32_t reach_of(const drape_verlet_patch *p)
 {
     int32_t reach = 0;
     for (int32_t s = 0; s < p->steps; s++)
         for (int32_t t = -1; t < p->steps; t++) {
             int32_t apart = p->back[s] - (t < 0 ? 0 : p->back[t]);
-            if (apart < PATCH_NODES && apart > reach)
+            if (apart < MAX_PATCH_NODES && apart > reach)
                 reach = apart;
         }
     return reach;
@@ -121,19 +121,20 @@ static drape_verlet_patch patch_at(const drape_verlet_limit *l, int32_t first)
 {
     drape_verlet_patch p = {.first = first, .steps = count_steps(l, first), .nodes = 1};
     p.from = later(l->node + 2 * (size_t)first);
-    if (p.steps > MOST_STEPS)
+    if (p.steps > MAX_STEPS)
         return (drape_verlet_patch){.first = first, .nodes = p.steps};
     for (int32_t s = 0; s < p.steps; s++)
         p.back[s] = step_of(l, first + s);
-    while (p.nodes < PATCH_NODES && has_same_steps(l, &p, first + p.steps * p.nodes))
+    while (p.nodes < MAX_PATCH_NODES && has_same_steps(l, &p, first + p.steps * p.nodes))
         p.nodes++;
-    if (p.nodes < FEWEST)
+    if (p.nodes < MIN_PATCH_NODES)
         return (drape_verlet_patch){.first = first, .nodes = p.steps * p.nodes};
     p.reach = reach_of(&p);
     return p;
 }
 
-/* Springs that are looked at at once, where those of a patch are in the order of steps, not of nodes. */
+/* Squares of a patch are in the order of steps, not of nodes: those that are compared in one loop are
+ * neighbours. */
 static void place_squares(drape_verlet_limit *l, const drape_verlet_patch *p)
 {
     for (int32_t s = 0; s < p->steps; s++)
@@ -143,7 +144,8 @@ static void place_squares(drape_verlet_limit *l, const drape_verlet_patch *p)
         }
 }
 
-/* Neighbours without steps are one patch. */
+/* Returns the number of patches; writes them if out is not NULL. Adjacent ones without steps are one
+ * patch. */
 static int32_t find_patches(drape_verlet_limit *l, drape_verlet_patch *out)
 {
     int32_t count = 0;
@@ -168,60 +170,38 @@ static int32_t find_patches(drape_verlet_limit *l, drape_verlet_patch *out)
 
 /* ---- Making ---- */
 
-static bool create_arrays(drape_context *ctx, const drape_model *m, drape_verlet_limit *out)
-{
-    out->node = drape_alloc(ctx, 2 * (size_t)out->count, sizeof *out->node);
-    out->longest = drape_alloc(ctx, (size_t)out->count, sizeof *out->longest);
-    out->square = drape_alloc(ctx, (size_t)out->count, sizeof *out->square);
-    out->x = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *out->x);
-    return out->node && out->longest && out->square && out->x;
-}
-
-drape_status drape_verlet_limit_create(drape_context *ctx, const drape_model *m, double limit, int passes,
+drape_status drape_verlet_limit_create(drape_arena *arena, const drape_model *m, double limit, int passes,
                                        double tolerance, drape_verlet_limit *out)
 {
-    int32_t *start = drape_alloc(ctx, (size_t)m->node_count + 1, sizeof *start);
+    int32_t *start = drape_arena_take(arena, (size_t)m->node_count + 1, sizeof *start);
     *out = (drape_verlet_limit){
         .pinned = m->pinned, .node_count = m->node_count, .passes = passes, .slack = 1 + tolerance};
     if (!start)
         return DRAPE_E_MEMORY;
     count_springs(m, start);
     out->count = start[m->node_count];
-    bool taken = create_arrays(ctx, m, out);
-    if (taken) {
-        place_springs(m, limit, start, out);
-        out->patch_count = find_patches(out, NULL);
-        out->patch = drape_alloc(ctx, (size_t)out->patch_count, sizeof *out->patch);
-        taken = out->patch;
-    }
-    if (taken)
-        find_patches(out, out->patch);
-    drape_free(ctx, start);
-    return taken ? DRAPE_OK : DRAPE_E_MEMORY;
-}
-
-void drape_verlet_limit_free(drape_context *ctx, drape_verlet_limit *limit)
-{
-    drape_free(ctx, limit->node);
-    drape_free(ctx, limit->longest);
-    drape_free(ctx, limit->square);
-    drape_free(ctx, limit->patch);
-    drape_free(ctx, limit->x);
-}
-
-size_t drape_verlet_limit_bytes(const drape_verlet_limit *l)
-{
-    return (size_t)l->count * (2 * sizeof *l->node + sizeof *l->longest + sizeof *l->square) +
-           (size_t)l->patch_count * sizeof *l->patch +
-           (l->count > 0 ? 3 * (size_t)l->node_count * sizeof *l->x : 0);
+    out->node = drape_arena_take(arena, 2 * (size_t)out->count, sizeof *out->node);
+    out->longest = drape_arena_take(arena, (size_t)out->count, sizeof *out->longest);
+    out->square = drape_arena_take(arena, (size_t)out->count, sizeof *out->square);
+    out->x = drape_arena_take(arena, 3 * (size_t)m->node_count, sizeof *out->x);
+    if (drape_arena_status(arena))
+        return DRAPE_E_MEMORY;
+    place_springs(m, limit, start, out);
+    drape_arena_release(arena, start);
+    out->patch_count = find_patches(out, NULL);
+    out->patch = drape_arena_take(arena, (size_t)out->patch_count, sizeof *out->patch);
+    if (!out->patch)
+        return DRAPE_E_MEMORY;
+    find_patches(out, out->patch);
+    return DRAPE_OK;
 }
 
 /* ---- Passes ---- */
 
 static void shorten(const drape_verlet_limit *l, const int32_t *node, double by, const double d[3])
 {
-    bool held0 = l->pinned[node[0]], held1 = l->pinned[node[1]];
-    double share0 = held0 ? 0 : held1 ? 1 : 0.5, share1 = held1 ? 0 : held0 ? 1 : 0.5;
+    bool pinned0 = l->pinned[node[0]], pinned1 = l->pinned[node[1]];
+    double share0 = pinned0 ? 0 : pinned1 ? 1 : 0.5, share1 = pinned1 ? 0 : pinned0 ? 1 : 0.5;
     for (size_t k = 0; k < 3; k++) {
         double *x = l->x + k * (size_t)l->node_count;
         x[node[0]] += share0 * by * d[k];
@@ -229,8 +209,8 @@ static void shorten(const drape_verlet_limit *l, const int32_t *node, double by,
     }
 }
 
-/* One after the other; worst: the largest square of a length over the longest so far. *moved is set where a spring
- * was too long. */
+/* One spring after the other. worst: the largest square of length/longest so far; returns the new one. *moved
+ * is set if a spring was too long. */
 static double limit_each(const drape_verlet_limit *l, int32_t first, int32_t count, double worst, bool *moved)
 {
     const double *x = l->x, *y = x + l->node_count, *z = y + l->node_count;
@@ -247,14 +227,14 @@ static double limit_each(const drape_verlet_limit *l, int32_t first, int32_t cou
     return worst;
 }
 
-/* By how much the squares of the lengths of each node's springs are above what they may be, at most; 0 where none
- * is. True: it is some node. */
+/* excess: for each node, by how much the square of the length of a spring is above its limit at most; 0 if
+ * none is. Returns whether some excess is positive. */
 LANES_DISPATCH static bool find_excess(const drape_verlet_limit *l, const drape_verlet_patch *p,
-                                       double excess[PATCH_NODES])
+                                       double excess[MAX_PATCH_NODES])
 {
     const double *x = l->x + p->from, *y = x + l->node_count, *z = y + l->node_count;
-    double most = 0;
-    memset(excess, 0, PATCH_NODES * sizeof *excess);
+    double largest = 0;
+    memset(excess, 0, MAX_PATCH_NODES * sizeof *excess);
     for (int32_t s = 0; s < p->steps; s++) {
         const double *bx = x - p->back[s], *by = y - p->back[s], *bz = z - p->back[s];
         const double *square = l->square + p->first + s * p->nodes;
@@ -264,16 +244,15 @@ LANES_DISPATCH static bool find_excess(const drape_verlet_limit *l, const drape_
             excess[i] = over > excess[i] ? over : excess[i];
         }
     }
-    for (int32_t i = 0; i < PATCH_NODES; i++)
-        most = excess[i] > most ? excess[i] : most;
-    return most > 0;
+    for (int32_t i = 0; i < MAX_PATCH_NODES; i++)
+        largest = excess[i] > largest ? excess[i] : largest;
+    return largest > 0;
 }
 
 static double limit_patch(const drape_verlet_limit *l, const drape_verlet_patch *p, double worst)
 {
-    double excess[PATCH_NODES];
-    int32_t unknown =
-        0; /* of nodes before this one it is not known any more whether they may be left as they are */
+    double excess[MAX_PATCH_NODES];
+    int32_t unknown = 0; /* the excess of nodes before this one is outdated: a spring was shortened */
     if (!find_excess(l, p, excess))
         return worst;
     for (int32_t i = 0; i < p->nodes; i++) {
@@ -286,7 +265,7 @@ static double limit_patch(const drape_verlet_limit *l, const drape_verlet_patch 
     return worst;
 }
 
-/* The largest square of a length over the longest that it met. */
+/* Returns the largest square of length/longest that it met. */
 static double pass(const drape_verlet_limit *l)
 {
     double worst = 0;

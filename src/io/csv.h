@@ -11,9 +11,9 @@ void drape_csv_put_number(drape_file *file, double value);
 /* Quoted where it must be; NULL is an empty field. */
 void drape_csv_put_text(drape_file *file, const char *text);
 
-/* Takes the memory for the table folder/NAME. kept < 0: puts a file with the line of column names in the place of any that
- * is there; else goes on behind the first `kept` bytes of the one that is there, after drape_file_trim. Destroy the file also after a failure.
- * Errors: DRAPE_E_MEMORY, DRAPE_E_FILE. */
+/* Takes the memory for the table folder/NAME. kept < 0: puts a file with the line of column names in the
+ * place of any that is there; else goes on behind the first `kept` bytes of the one that is there, after
+ * drape_file_trim. Destroy the file also after a failure. Errors: DRAPE_E_MEMORY, DRAPE_E_FILE. */
 drape_status drape_csv_open(drape_context *ctx, const char *folder, const char *name, const char *columns,
                             off_t kept, drape_file *file);
 

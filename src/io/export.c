@@ -11,37 +11,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/param.h"
-
-#define MAX_NAMES  32 /* that a message lists */
 #define NAME_ROOM  64 /* longest name of a frame's file */
 #define FRAME_WORD "frame_"
-
-static drape_status unknown_format(drape_context *ctx, const char *pointer, const char *name)
-{
-    const char *names[MAX_NAMES];
-    char list[512] = "";
-    size_t count = 0, used = 0;
-    for (; count < MAX_NAMES && drape_exporters[count] && used < sizeof list; count++) {
-        names[count] = drape_exporters[count]->name;
-        used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", count ? ", " : "", names[count]);
-    }
-    const char *meant = drape_did_you_mean(name, names, count);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown format \"%.60s\"; formats are %s%s%s%s",
-                         name, list, DRAPE_MEANT(meant));
-}
-
-drape_status drape_exporter_find(drape_context *ctx, const char *pointer, const char *name,
-                                 const drape_exporter_ops **out)
-{
-    *out = NULL;
-    for (int i = 0; drape_exporters[i]; i++)
-        if (strcmp(drape_exporters[i]->name, name) == 0) {
-            *out = drape_exporters[i];
-            return DRAPE_OK;
-        }
-    return unknown_format(ctx, pointer, name);
-}
 
 /* ---- One file ---- */
 
@@ -88,8 +59,8 @@ void drape_export_archive_size(drape_archive *a, off_t *size)
 
 /* ---- A file a frame ---- */
 
-/* frame_, so many digits or more, a dot, the ending; or that with ".part", which a killed run left. *frame: its number;
- * of the latter none is kept. */
+/* frame_, so many digits or more, a dot, the ending; or that with ".part", which a killed run left. *frame:
+ * its number; of the latter none is kept. */
 static bool is_frame_file(const char *name, size_t least, const char *ending, int64_t *frame)
 {
     size_t word = strlen(FRAME_WORD);

@@ -3,10 +3,13 @@
 #define DRAPE_IO_EXPORT_H
 
 #include "base/archive.h"
+#include "base/arena.h"
+#include "base/registry.h"
 #include "io/file.h"
 
 /* What is written where, known before the first frame. All of it lives until close. */
 typedef struct drape_export_def {
+    drape_arena *arena; /* for the memory that open takes */
     const drape_model *model;
     const char *folder;  /* without a slash at its end */
     double frame_rate;   /* [1/s] */
@@ -27,19 +30,17 @@ typedef struct drape_frame {
 
 /*
  * A format. The recorder zeroes state_size bytes, calls open once, write for each frame, close once, also
- * after an open or a write that failed. All are called in the C locale. Only open may take memory. After a failure
- * the frames before it are whole and readable.
+ * after an open or a write that failed. All are called in the C locale. Only open may take memory. After a
+ * failure the frames before it are whole and readable.
  */
 typedef struct drape_exporter_ops {
-    const char *name;      /* "npy" */
-    const char *summary;   /* what it writes where */
-    const char *reference; /* the format's definition */
+    drape_entry entry; /* summary: what it writes where; reference: the format's definition */
     size_t state_size;
     bool wants_fields;
     bool y_up; /* always: its frames are never turned */
 
-    /* Optional: refuses at pointer what is more than the format can hold, before anything is written; folder is NULL.
-     * Errors: DRAPE_E_ARGUMENT. */
+    /* Optional: refuses at pointer what is more than the format can hold, before anything is written; folder
+     * is NULL. Errors: DRAPE_E_ARGUMENT. */
     drape_status (*check)(drape_context *ctx, const char *pointer, const drape_export_def *def);
 
     /* Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
@@ -51,10 +52,11 @@ typedef struct drape_exporter_ops {
     /* Errors: DRAPE_E_FILE. */
     drape_status (*write)(drape_context *ctx, void *state, const drape_frame *frame);
 
-    /* For checkpoints. archive: what it knows of the frames so far, between frames. resume: in place of open, of a run
-     * that was left: takes the memory, reads what archive wrote, checks that the `frames` frames are there, and changes
-     * nothing; then cut: takes away what is after them, to go on behind them. sync: waits until the disk has all that was
-     * written; NULL: it has, with durable. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+    /* For checkpoints. archive: what it knows of the frames so far, between frames. resume: in place of open,
+     * of a run that was left: takes the memory, reads what archive wrote, checks that the `frames` frames are
+     * there, and changes nothing; then cut: takes away what is after them, to go on behind them. sync: waits
+     * until the disk has all that was written; NULL: it has, with durable. Errors: DRAPE_E_FILE,
+     * DRAPE_E_MEMORY. */
     void (*archive)(void *state, drape_archive *a);
     drape_status (*resume)(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
                            drape_archive *a);
@@ -65,11 +67,7 @@ typedef struct drape_exporter_ops {
     drape_status (*close)(drape_context *ctx, void *state);
 } drape_exporter_ops;
 extern const drape_exporter_ops *const drape_exporters[]; /* NULL-ended */
-
-/* The row of a name. Errors: DRAPE_E_ARGUMENT at pointer ("/output/formats/0", or "" for none), with the
- * names that there are. */
-drape_status drape_exporter_find(drape_context *ctx, const char *pointer, const char *name,
-                                 const drape_exporter_ops **out);
+extern const drape_registry drape_exporter_registry;
 
 /* ---- For formats with one file, folder/NAME ---- */
 
@@ -80,8 +78,8 @@ drape_status drape_export_clean(drape_context *ctx, const char *folder, const ch
  * DRAPE_E_MEMORY. */
 drape_status drape_export_begin(drape_context *ctx, const char *folder, const char *name, drape_file *file);
 
-/* Takes the memory and opens the file again that an earlier run left, to go on behind its first size bytes, as
- * drape_file_reopen. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Takes the memory and opens the file again that an earlier run left, to go on behind its first size bytes,
+ * as drape_file_reopen. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_export_reopen(drape_context *ctx, const char *folder, const char *name, off_t size,
                                  drape_file *file);
 
@@ -107,11 +105,12 @@ drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, siz
 /* Takes the memory. Errors: DRAPE_E_MEMORY. */
 drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *def, const char *ending,
                                     drape_frame_files *frames);
-/* The same where `count` frames are there already. Errors: DRAPE_E_FILE (one is not there), DRAPE_E_MEMORY. */
+/* The same where `count` frames are there already. Errors: DRAPE_E_FILE (one is not there),
+ * DRAPE_E_MEMORY. */
 drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def *def, const char *ending,
                                       int64_t count, drape_frame_files *frames);
-/* Of a state that begins with a drape_frame_files: nothing, as the number of frames says it all; and the removal of those
- * after so many. */
+/* Of a state that begins with a drape_frame_files: nothing, as the number of frames says it all; and the
+ * removal of those after so many. */
 void drape_frame_files_archive(void *state, drape_archive *a);
 drape_status drape_frame_files_cut(drape_context *ctx, void *state, int64_t frames);
 /* Begins the file of one frame, to be filled and ended by drape_frame_files_end. Errors: DRAPE_E_FILE. */

@@ -1,16 +1,17 @@
 /*
- * export_glb.c: folder/positions.glb: binary glTF 2.0. The mesh, all cloths in one, is the first frame; each later
- * one is a morph target, its displacements in float32, with normals, and an animation of the targets' weights plays them: at the
- * time of frame k weight k - 1 is 1 and the others are 0, and between two times they mix linearly, as positions do.
+ * export_glb.c: folder/positions.glb: binary glTF 2.0. The mesh, all cloths in one, is the first frame; each
+ * later one is a morph target, its displacements in float32, with normals, and an animation of the targets'
+ * weights plays them: at the time of frame k weight k - 1 is 1 and the others are 0, and between two times
+ * they mix linearly, as positions do.
  *
  *     header                  12 bytes
  *     JSON chunk              8 bytes and JSON of a fixed length, with blanks for what is not there yet
- *     binary chunk            8 bytes, triangles, positions and normals of the first frame, what the others differ by
- *                             from them, and at the end, when all frames are known, times and weights
+ *     binary chunk            8 bytes, triangles, positions and normals of the first frame, the differences
+ *                             of the others, and at the end, when all frames are known, times and weights
  *
- * After each frame its displacements are complete in the file before its few numbers are written into their blanks:
- * a run that is killed leaves a valid file with all frames as morph targets, without the animation. That comes
- * last because the weights are a matrix, frames x targets.
+ * After each frame its displacements are complete in the file before its few numbers are written into their
+ * blanks: a run that is killed leaves a valid file with all frames as morph targets, without the animation.
+ * That comes last because the weights are a matrix, frames x targets.
  *
  * glTF has y up and metres, as Drape has. Specification: Khronos, glTF 2.0, 3.6.2 (accessors), 3.7.2.2 (morph
  * targets), 3.11 (animations), 4.4 (GLB).
@@ -27,8 +28,8 @@
 
 #define FILE_NAME    "positions.glb"
 #define JSON_OFFSET  20
-#define MOST_FRAMES  16384                  /* their weights take 1 GiB */
-#define MOST_BYTES   (UINT32_MAX - 65535.0) /* lengths are 32 bits */
+#define MAX_FRAMES   16384                  /* their weights take 1 GiB */
+#define MAX_BYTES    (UINT32_MAX - 65535.0) /* lengths are 32 bits */
 #define FIXED_ROOM   4096                   /* JSON without the parts of a frame */
 #define TARGET_WIDTH 36                     /* ,{"POSITION":32769,"NORMAL":32770} */
 #define WEIGHT_WIDTH 2                      /* ,0 */
@@ -245,27 +246,28 @@ static drape_status glb_check(drape_context *ctx, const char *pointer, const dra
     double frames = (double)def->most_frames, nodes = drape_model_node_count(def->model);
     double bytes = 12.0 * drape_model_triangle_count(def->model) + 24 * nodes * frames + 4 * frames * frames +
                    frames * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
-    if (frames <= MOST_FRAMES && bytes <= MOST_BYTES)
+    if (frames <= MAX_FRAMES && bytes <= MAX_BYTES)
         return DRAPE_OK;
     return drape_fail_at(
         ctx, DRAPE_E_ARGUMENT, pointer,
         "glb: %.0f frames of %.0f nodes take %.3g bytes; a file has at most %d frames and 4 GiB: "
         "lower the frame rate or take another format",
-        frames, nodes, bytes, MOST_FRAMES);
+        frames, nodes, bytes, MAX_FRAMES);
 }
 
-static drape_status take_rooms(drape_context *ctx, const drape_export_def *def, glb_state *glb)
+static drape_status take_rooms(const drape_export_def *def, glb_state *glb)
 {
+    drape_arena *arena = def->arena;
     glb->def = def;
     glb->room = (uint32_t)def->most_frames;
     glb->json_size = FIXED_ROOM + (size_t)glb->room * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
-    glb->json = drape_alloc(ctx, glb->json_size, 1);
+    glb->json = drape_arena_take(arena, glb->json_size, 1);
     size_t count = 3 * (size_t)drape_model_node_count(def->model);
-    glb->base = drape_alloc(ctx, count, sizeof *glb->base);
-    glb->upright = drape_alloc(ctx, count, sizeof *glb->upright);
-    glb->normal = drape_alloc(ctx, count, sizeof *glb->normal);
-    glb->times = drape_alloc(ctx, glb->room, sizeof *glb->times);
-    if (!glb->json || !glb->base || !glb->upright || !glb->normal || !glb->times)
+    glb->base = drape_arena_take(arena, count, sizeof *glb->base);
+    glb->upright = drape_arena_take(arena, count, sizeof *glb->upright);
+    glb->normal = drape_arena_take(arena, count, sizeof *glb->normal);
+    glb->times = drape_arena_take(arena, glb->room, sizeof *glb->times);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     make_json(glb);
     return DRAPE_OK;
@@ -273,7 +275,7 @@ static drape_status take_rooms(drape_context *ctx, const drape_export_def *def, 
 
 static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
 {
-    drape_status status = take_rooms(ctx, def, state);
+    drape_status status = take_rooms(def, state);
     return status ? status : drape_export_begin(ctx, def->folder, FILE_NAME, &((glb_state *)state)->file);
 }
 
@@ -506,7 +508,7 @@ static drape_status glb_resume(drape_context *ctx, const drape_export_def *def, 
 {
     glb_state *glb = state;
     (void)frames;
-    drape_status status = take_rooms(ctx, def, glb);
+    drape_status status = take_rooms(def, glb);
     if (status)
         return status;
     glb_archive(glb, a);
@@ -540,22 +542,19 @@ static drape_status glb_sync(void *state)
 static drape_status glb_close(drape_context *ctx, void *state)
 {
     glb_state *glb = state;
+    (void)ctx;
     drape_status status = glb->frames > 1 && glb->live ? write_animation(glb) : DRAPE_OK;
     drape_status closing = drape_file_close(&glb->file);
     drape_file_destroy(&glb->file);
-    drape_free(ctx, glb->json);
-    drape_free(ctx, glb->base);
-    drape_free(ctx, glb->upright);
-    drape_free(ctx, glb->normal);
-    drape_free(ctx, glb->times);
     return status ? status : closing;
 }
 
 const drape_exporter_ops drape_exporter_glb = {
-    .name = "glb",
-    .summary =
-        "positions.glb: glTF 2.0 with a morph target a frame, float32, normals, and an animation; y up",
-    .reference = "Khronos, glTF 2.0 specification, 2021 (ISO/IEC 12113)",
+    .entry =
+        {.name = "glb",
+         .summary =
+             "positions.glb: glTF 2.0 with a morph target a frame, float32, normals, and an animation; y up",
+         .reference = "Khronos, glTF 2.0 specification, 2021 (ISO/IEC 12113)"},
     .state_size = sizeof(glb_state),
     .y_up = true,
     .check = glb_check,

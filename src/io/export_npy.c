@@ -124,9 +124,9 @@ static drape_status npy_close(drape_context *ctx, void *state)
 }
 
 const drape_exporter_ops drape_exporter_npy = {
-    .name = "npy",
-    .summary = "positions.npy: one array, frames x nodes x 3, float64; valid after every frame",
-    .reference = "NPY format version 1.0, numpy.lib.format",
+    .entry = {.name = "npy",
+              .summary = "positions.npy: one array, frames x nodes x 3, float64; valid after every frame",
+              .reference = "NPY format version 1.0, numpy.lib.format"},
     .state_size = sizeof(npy_state),
     .y_up = true,
     .open = npy_open,

@@ -1,10 +1,10 @@
 /*
- * export_pc2.c: folder/positions.pc2 and positions.obj: a point cache and the mesh that it moves, for the Mesh Cache
- * of Blender and its like. The mesh is the first frame, all cloths as one object.
+ * export_pc2.c: folder/positions.pc2 and positions.obj: a point cache and the mesh that it moves, for the
+ * Mesh Cache of Blender and its like. The mesh is the first frame, all cloths as one object.
  *
- * PC2, version 1, little endian: "POINTCACHE2\0", int32 version, int32 points, float32 first frame, float32 step
- * in frames, int32 samples; then for each sample float32 x y z of each point. The number of samples is raised after
- * a sample is written: at any moment the file holds what its header says.
+ * PC2, version 1, little endian: "POINTCACHE2\0", int32 version, int32 points, float32 first frame, float32
+ * step in frames, int32 samples; then for each sample float32 x y z of each point. The number of samples is
+ * raised after a sample is written: at any moment the file holds what its header says.
  */
 #include <inttypes.h>
 #include <string.h>
@@ -143,11 +143,13 @@ static drape_status pc2_close(drape_context *ctx, void *state)
 }
 
 const drape_exporter_ops drape_exporter_pc2 = {
-    .name = "pc2",
-    .summary = "positions.pc2 and positions.obj: a point cache, float32, and its mesh, for Blender's Mesh "
-               "Cache; valid "
-               "after every frame",
-    .reference = "PC2 format version 1, Autodesk 3ds Max SDK, Point Cache; Blender, MOD_meshcache_pc2.c",
+    .entry = {.name = "pc2",
+              .summary =
+                  "positions.pc2 and positions.obj: a point cache, float32, and its mesh, for Blender's Mesh "
+                  "Cache; valid "
+                  "after every frame",
+              .reference =
+                  "PC2 format version 1, Autodesk 3ds Max SDK, Point Cache; Blender, MOD_meshcache_pc2.c"},
     .state_size = sizeof(pc2_state),
     .open = pc2_open,
     .clean = pc2_clean,

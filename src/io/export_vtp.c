@@ -1,10 +1,11 @@
 /*
- * export_vtp.c: folder/frame_000000.vtp, ...: a VTK XML file of PolyData a frame, and folder/frames.pvd, which
- * gives each its time. Positions are float64, fields float32, appended raw, little endian. All cloths are in one
- * mesh; the cells say which they belong to. Formats: VTK XML file formats (VTK User's Guide, 11th ed., section
- * 19.3), ParaView's collections of them.
+ * export_vtp.c: folder/frame_000000.vtp, ...: a VTK XML file of PolyData a frame, and folder/frames.pvd,
+ * which gives each its time. Positions are float64, fields float32, appended raw, little endian. All cloths
+ * are in one mesh; the cells say which they belong to. Formats: VTK XML file formats (VTK User's Guide, 11th
+ * ed., section 19.3), ParaView's collections of them.
  *
- * The collection ends with the same line always: a frame is written over it, with the line after it, in one write.
+ * The collection ends with the same line always: a frame is written over it, with the line after it, in one
+ * write.
  */
 #include <inttypes.h>
 #include <stdio.h>
@@ -163,7 +164,8 @@ static void list_arrays(const drape_model *model, array list[ARRAY_COUNT])
     memcpy(list, all, sizeof all);
 }
 
-/* Declares arrays first ... end - 1. Each is in the data after those before it, behind its size in 8 bytes. */
+/* Declares arrays first ... end - 1. Each is in the data after those before it, behind its size in 8
+ * bytes. */
 static void put_declarations(drape_file *file, const array *list, int first, int end)
 {
     uint64_t offset = 0;
@@ -284,11 +286,12 @@ static drape_status vtp_close(drape_context *ctx, void *state)
 }
 
 const drape_exporter_ops drape_exporter_vtp = {
-    .name = "vtp",
-    .summary = "frame_000000.vtp ... and frames.pvd: VTK PolyData a frame, float64, with velocity, energy "
-               "density and "
-               "strain, and their times",
-    .reference = "VTK User's Guide, 11th edition, section 19.3, XML file formats",
+    .entry = {.name = "vtp",
+              .summary =
+                  "frame_000000.vtp ... and frames.pvd: VTK PolyData a frame, float64, with velocity, energy "
+                  "density and "
+                  "strain, and their times",
+              .reference = "VTK User's Guide, 11th edition, section 19.3, XML file formats"},
     .state_size = sizeof(vtp_state),
     .wants_fields = true,
     .open = vtp_open,

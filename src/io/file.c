@@ -9,8 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define BUFFER_SIZE   65536
-#define LONGEST_PRINT 1024
+#define BUFFER_SIZE 65536
+#define MAX_PRINT   1024
 
 drape_status drape_file_fail(drape_context *ctx, const char *deed, const char *path, int error)
 {
@@ -158,7 +158,7 @@ void drape_file_put_doubles(drape_file *file, const double *values, size_t count
 
 void drape_file_print(drape_file *file, const char *format, ...)
 {
-    char text[LONGEST_PRINT];
+    char text[MAX_PRINT];
     va_list args;
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);

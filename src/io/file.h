@@ -3,9 +3,9 @@
  *
  * A file is begun under a temporary name beside its own, filled through a buffer, and gets its own by a
  * rename. Some files then grow by records: a record that does not fit on the disk is cut off again. A killed
- * process leaves whole files and whole records; a power failure is guarded against where a file is durable, for what
- * there was when drape_file_sync or drape_file_finish returned and the folder was synced.
- * Plain write(2) instead of stdio: no heap per file, and errno belongs to the call that failed.
+ * process leaves whole files and whole records; a power failure is guarded against where a file is durable,
+ * for what there was when drape_file_sync or drape_file_finish returned and the folder was synced. Plain
+ * write(2) instead of stdio: no heap per file, and errno belongs to the call that failed.
  */
 #ifndef DRAPE_IO_FILE_H
 #define DRAPE_IO_FILE_H
@@ -67,23 +67,23 @@ drape_status drape_file_keep(drape_file *file);
 /* Writes over bytes that are already kept. Errors: DRAPE_E_FILE. */
 drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size);
 
-/* Puts bytes back after a drape_file_overwrite that failed, where there was room for as many before, and ends the
- * file with them, as far as it can. */
+/* Puts bytes back after a drape_file_overwrite that failed, where there was room for as many before, and ends
+ * the file with them, as far as it can. */
 void drape_file_restore(drape_file *file, off_t offset, const void *data, size_t size);
 
 /* Cuts a published file to its first size bytes, as far as it can. */
 void drape_file_cut(drape_file *file, off_t size);
 
-/* Opens a published file again that an earlier process left, to go on behind its first size bytes; it has at least so
- * many. Overwrite what must be before drape_file_trim ends it there. Errors: DRAPE_E_FILE. */
+/* Opens a published file again that an earlier process left, to go on behind its first size bytes; it has at
+ * least so many. Overwrite what must be before drape_file_trim ends it there. Errors: DRAPE_E_FILE. */
 drape_status drape_file_reopen(drape_file *file, off_t size);
 drape_status drape_file_trim(drape_file *file);
 
 /* Waits until the disk has all that a growing file keeps. Errors: DRAPE_E_FILE. */
 drape_status drape_file_sync(drape_file *file);
 
-/* Waits until the disk has the names of the files that lie beside path. path is changed during the call. Errors:
- * DRAPE_E_FILE. */
+/* Waits until the disk has the names of the files that lie beside path. path is changed during the call.
+ * Errors: DRAPE_E_FILE. */
 drape_status drape_folder_sync(drape_context *ctx, char *path);
 
 /* Closes a file that grew; does nothing to one that is not open. Errors: DRAPE_E_FILE. */

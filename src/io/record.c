@@ -135,7 +135,7 @@ static size_t split(char *line, char **cells, size_t room)
     return count;
 }
 
-#define MOST_CELLS 64 /* of a line */
+#define MAX_CELLS 64 /* of a line */
 
 typedef struct table {
     const char *const *columns;
@@ -145,8 +145,8 @@ typedef struct table {
 
 static const char *find_columns(table *t, char *header)
 {
-    char *names[MOST_CELLS];
-    size_t found = split(header, names, MOST_CELLS);
+    char *names[MAX_CELLS];
+    size_t found = split(header, names, MAX_CELLS);
     for (size_t i = 0; i < t->count; i++) {
         size_t k = 0;
         while (k < found && strcmp(names[k], t->columns[i]) != 0)
@@ -173,8 +173,8 @@ static int64_t read_rows(FILE *file, const table *t, char **line, size_t *room, 
 {
     int64_t rows = 0;
     while (next_line(file, line, room)) {
-        char *cells[MOST_CELLS], *wanted[DRAPE_MOST_COLUMNS], none[] = "";
-        size_t found = split(*line, cells, MOST_CELLS);
+        char *cells[MAX_CELLS], *wanted[DRAPE_MOST_COLUMNS], none[] = "";
+        size_t found = split(*line, cells, MAX_CELLS);
         for (size_t i = 0; i < t->count; i++)
             wanted[i] = t->place[i] < found ? cells[t->place[i]] : none;
         reader(user, rows++, wanted);

@@ -1,5 +1,5 @@
-/* record.h: a finished run, read from the folder that `drape run --out` wrote: where its scene is, its frames one at a
- * time, the rows of its tables. */
+/* record.h: a finished run, read from the folder that `drape run --out` wrote: where its scene is, its frames
+ * one at a time, the rows of its tables. */
 #ifndef DRAPE_IO_RECORD_H
 #define DRAPE_IO_RECORD_H
 
@@ -15,15 +15,16 @@ typedef struct drape_record {
     double *times; /* (frames) [s] */
 } drape_record;
 
-/* The name of the scene in a folder, to be freed by drape_free; *path is NULL on failure. Errors: DRAPE_E_FILE (there is
- * none: the folder is not that of a run), DRAPE_E_MEMORY. */
+/* The name of the scene in a folder, to be freed by drape_free; *path is NULL on failure. Errors:
+ * DRAPE_E_FILE (there is none: the folder is not that of a run), DRAPE_E_MEMORY. */
 drape_status drape_record_scene(drape_context *ctx, const char *folder, char **path);
 
 /* folder/name, to be freed by drape_free; NULL: no memory. */
 char *drape_record_path(drape_context *ctx, const char *folder, const char *name);
 
-/* Opens the frames of a run of a scene with so many nodes, and reads their times. drape_record_close in any case.
- * Errors: DRAPE_E_FILE, DRAPE_E_PARSE (no array as drape run writes it, other nodes, cut off), DRAPE_E_MEMORY. */
+/* Opens the frames of a run of a scene with so many nodes, and reads their times. drape_record_close in any
+ * case. Errors: DRAPE_E_FILE, DRAPE_E_PARSE (no array as drape run writes it, other nodes, cut off),
+ * DRAPE_E_MEMORY. */
 drape_status drape_record_open(drape_context *ctx, const char *folder, int32_t nodes, drape_record *run);
 void drape_record_close(drape_record *run); /* an empty one is fine */
 
@@ -35,9 +36,9 @@ typedef void drape_row_reader(void *user, int64_t row, char *const *cells);
 
 #define DRAPE_MOST_COLUMNS 16
 
-/* Calls reader for each row of folder/name with the columns of those names, in their order; how many rows in *rows.
- * A last line that is not whole is left out. Errors: DRAPE_E_FILE, DRAPE_E_PARSE (a column is not there),
- * DRAPE_E_MEMORY. */
+/* Calls reader for each row of folder/name with the columns of those names, in their order; how many rows in
+ * *rows. A last line that is not whole is left out. Errors: DRAPE_E_FILE, DRAPE_E_PARSE (a column is not
+ * there), DRAPE_E_MEMORY. */
 drape_status drape_record_rows(const drape_record *run, const char *name, const char *const *columns,
                                size_t count, drape_row_reader *reader, void *user, int64_t *rows);
 

@@ -15,7 +15,7 @@
 /* Times that differ by rounding only: k / frame_rate against a sum of steps. Steps are longer than this. */
 #define SAME_TIME 1e-12
 
-#define MOST_FRAMES INT64_C(1000000000000000)
+#define MAX_FRAMES INT64_C(1000000000000000)
 
 typedef struct output {
     const drape_exporter_ops *ops;
@@ -25,17 +25,18 @@ typedef struct output {
 
 struct drape_recorder {
     drape_context *ctx;
+    drape_arena arena;
     drape_sim *sim;
     char *folder;         /* without a slash at its end */
     drape_export_def def; /* of the formats */
     output *outputs;
     size_t output_count;
-    double *fields; /* room for those of a frame; NULL where no format wants any */
-    double *turned; /* room for positions and velocities with z up; NULL where no format wants these */
+    double *fields; /* of a frame; NULL if no format wants any */
+    double *turned; /* positions and velocities with z up; NULL if no format wants these */
     drape_file steps, energies;
-    drape_file checkpoint; /* where checkpoints are written; without memory: none are */
-    int64_t every;         /* frames; 0: none by itself */
-    double start, wall;    /* [s] of the clock when the run began; that it had taken at the last checkpoint */
+    drape_file checkpoint; /* where checkpoints are written; without a path: no checkpoints are */
+    int64_t every;         /* frames between checkpoints; 0: only drape_recorder_checkpoint makes them */
+    double start, wall; /* [s] of the clock when the run began; wall time of the run at the last checkpoint */
     int64_t frames;
     double last_time; /* [s] of the last frame */
     bool moved;       /* a step was accepted after the last frame */
@@ -63,7 +64,7 @@ static void scope_leave(drape_recorder *r, scope s)
     r->seconds += r->finished ? 0 : drape_clock_seconds() - s.start;
 }
 
-/* The first failure stands for all after it. */
+/* Keeps the first failure, which is returned for all later ones. */
 static void note(drape_recorder *r, drape_status status)
 {
     if (!status || r->failure)
@@ -77,7 +78,7 @@ static drape_status report(drape_recorder *r)
     return r->failure ? drape_fail(r->ctx, r->failure, "%s", r->message) : DRAPE_OK;
 }
 
-/* ---- Frames and rows */
+/* ---- Frames and lines of tables ---- */
 
 /* (x, y, z) to (x, -z, y): a quarter turn about x. */
 static const double *turn(const double *from, size_t count, double *to)
@@ -141,18 +142,18 @@ static void write_frame(drape_recorder *r, double time, const double *positions,
 
 /* ---- Checkpoints ---- */
 
-/* The name of each format, so that the order of a scene's list is part of it. */
+/* The names of the formats in their order, which is that of the scene's list. */
 static void archive_formats(drape_recorder *r, drape_archive *a)
 {
     drape_archive_same(a, "the number of formats", (int64_t)r->output_count);
     for (size_t i = 0; i < r->output_count && drape_archive_good(a); i++) {
         char there[32];
-        snprintf(there, sizeof there, "%s", r->outputs[i].ops->name);
+        snprintf(there, sizeof there, "%s", r->outputs[i].ops->entry.name);
         drape_archive_text(a, there, sizeof there);
-        if (drape_archive_good(a) && strcmp(there, r->outputs[i].ops->name) != 0)
+        if (drape_archive_good(a) && strcmp(there, r->outputs[i].ops->entry.name) != 0)
             drape_archive_fail(a, DRAPE_E_ARGUMENT,
                                "the checkpoint has frames in \"%s\"; here they are in \"%s\"", there,
-                               r->outputs[i].ops->name);
+                               r->outputs[i].ops->entry.name);
     }
 }
 
@@ -165,7 +166,7 @@ static void archive_duration(drape_recorder *r, drape_archive *a)
                            there, here);
 }
 
-/* All but the outputs' own. */
+/* All but what the formats archive themselves. */
 static void archive_progress(drape_recorder *r, drape_archive *a)
 {
     drape_archive_mark(a, "recorder");
@@ -182,7 +183,7 @@ static void archive_progress(drape_recorder *r, drape_archive *a)
     drape_export_archive_size(a, &r->energies.kept);
 }
 
-/* A checkpoint must not say of a frame that it is there before the disk has it. */
+/* The disk must have all frames that a checkpoint counts before it has the checkpoint. */
 static drape_status sync_files(drape_recorder *r)
 {
     drape_status status = drape_file_sync(&r->steps);
@@ -244,7 +245,7 @@ static drape_status observe(void *user, const drape_event *event)
     return report(r);
 }
 
-/* ---- Opening */
+/* ---- Opening ---- */
 
 static drape_status check_def(drape_context *ctx, const drape_sim *sim, const drape_recorder_def *def)
 {
@@ -260,24 +261,22 @@ static drape_status check_def(drape_context *ctx, const drape_sim *sim, const dr
 static int64_t most_frames(const drape_sim *sim)
 {
     const double counted = drape_model_duration(sim->model) * sim->frame_rate;
-    return counted < MOST_FRAMES ? (int64_t)counted + 3 : MOST_FRAMES;
+    return counted < MAX_FRAMES ? (int64_t)counted + 3 : MAX_FRAMES;
 }
 
-static drape_export_def def_of(const drape_sim *sim, const char *folder)
+static drape_export_def def_of(const drape_sim *sim)
 {
-    return (drape_export_def){.model = sim->model,
-                              .folder = folder,
-                              .frame_rate = sim->frame_rate,
-                              .most_frames = most_frames(sim)};
+    return (drape_export_def){
+        .model = sim->model, .frame_rate = sim->frame_rate, .most_frames = most_frames(sim)};
 }
 
 drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, const char *pointer,
                                   const char *format)
 {
-    const drape_exporter_ops *ops;
-    const drape_export_def def = def_of(sim, NULL);
-    drape_status status = drape_exporter_find(ctx, pointer, format, &ops);
-    return status || !ops->check ? status : ops->check(ctx, pointer, &def);
+    const drape_export_def def = def_of(sim);
+    int i;
+    drape_status status = drape_registry_choose(ctx, &drape_exporter_registry, pointer, format, &i);
+    return status || !drape_exporters[i]->check ? status : drape_exporters[i]->check(ctx, pointer, &def);
 }
 
 static bool is_chosen(const drape_recorder *r, const drape_exporter_ops *ops)
@@ -290,21 +289,20 @@ static bool is_chosen(const drape_recorder *r, const drape_exporter_ops *ops)
 
 static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *def)
 {
-    r->outputs = drape_alloc(r->ctx, def->format_count, sizeof *r->outputs);
+    r->outputs = drape_arena_take(&r->arena, def->format_count, sizeof *r->outputs);
     if (!r->outputs)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < def->format_count; i++) {
-        const drape_exporter_ops *ops;
         drape_status status = drape_recorder_check(r->ctx, r->sim, "", def->formats[i]);
-        if (!status)
-            status = drape_exporter_find(r->ctx, "", def->formats[i], &ops);
         if (status)
             return status;
+        const drape_exporter_ops *ops =
+            drape_exporters[drape_registry_find(&drape_exporter_registry, NULL, def->formats[i])];
         if (is_chosen(r, ops))
             continue;
         output *o = &r->outputs[r->output_count++];
         o->ops = ops;
-        o->state = drape_alloc(r->ctx, 1, ops->state_size);
+        o->state = drape_arena_take(&r->arena, 1, ops->state_size);
         if (!o->state)
             return DRAPE_E_MEMORY;
     }
@@ -320,16 +318,16 @@ static drape_status take_rooms(drape_recorder *r)
         fields = fields || r->outputs[i].ops->wants_fields;
         turns = turns || (model->z_up && !r->outputs[i].ops->y_up);
     }
-    if (fields && !(r->fields = drape_alloc(r->ctx, nodes + 2 * triangles, sizeof *r->fields)))
-        return DRAPE_E_MEMORY;
-    if (turns && !(r->turned = drape_alloc(r->ctx, 6 * nodes, sizeof *r->turned)))
-        return DRAPE_E_MEMORY;
-    return DRAPE_OK;
+    if (fields)
+        r->fields = drape_arena_take(&r->arena, nodes + 2 * triangles, sizeof *r->fields);
+    if (turns)
+        r->turned = drape_arena_take(&r->arena, 6 * nodes, sizeof *r->turned);
+    return drape_arena_status(&r->arena);
 }
 
 static drape_status make_folder(drape_recorder *r, const char *folder)
 {
-    r->folder = drape_copy_text(r->ctx, folder);
+    r->folder = drape_arena_text(&r->arena, folder);
     if (!r->folder)
         return DRAPE_E_MEMORY;
     for (size_t n = strlen(r->folder); n > 1 && r->folder[n - 1] == '/'; n--)
@@ -337,7 +335,7 @@ static drape_status make_folder(drape_recorder *r, const char *folder)
     return drape_folder_make(r->ctx, r->folder);
 }
 
-/* Of all formats, not of those alone that are written now. */
+/* Of all formats, not only of those that are written now. */
 static drape_status clean_folder(drape_recorder *r)
 {
     drape_status status = DRAPE_OK;
@@ -346,7 +344,7 @@ static drape_status clean_folder(drape_recorder *r)
     return status;
 }
 
-/* A checkpoint of an earlier run goes first: its frames are about to. */
+/* Removes a checkpoint of an earlier run first, as its frames are removed next. */
 static drape_status open_files(drape_recorder *r)
 {
     drape_status status = drape_export_clean(r->ctx, r->folder, DRAPE_CHECKPOINT_NAME);
@@ -364,7 +362,7 @@ static drape_status open_files(drape_recorder *r)
     return status ? status : drape_energy_open(r->ctx, r->folder, -1, &r->energies);
 }
 
-/* All that is after the frames of the checkpoint; not before all files were found to have these. */
+/* Removes what follows the frames of the checkpoint, once all files were found to have these. */
 static drape_status cut_files(drape_recorder *r)
 {
     drape_status status = drape_file_trim(&r->steps);
@@ -375,7 +373,7 @@ static drape_status cut_files(drape_recorder *r)
     return status;
 }
 
-/* Those of formats that are not written now are no part of the run; nothing else has changed them. */
+/* Files of formats that are not written now belong to another run and stay as they are. */
 static drape_status resume_files(drape_recorder *r, drape_archive *a)
 {
     archive_progress(r, a);
@@ -401,7 +399,9 @@ static drape_status prepare_checkpoints(drape_recorder *r, const drape_recorder_
 {
     r->every = def->checkpoint_every;
     r->start = def->start;
-    r->def = def_of(r->sim, r->folder);
+    r->def = def_of(r->sim);
+    r->def.arena = &r->arena;
+    r->def.folder = r->folder;
     r->def.durable = def->checkpoints;
     if (!def->checkpoints)
         return DRAPE_OK;
@@ -425,7 +425,7 @@ static drape_status set_up(drape_recorder *r, const drape_recorder_def *def, dra
     if (!status)
         status = a ? resume_files(r, a) : open_files(r);
     r->start -= r->wall;
-    if (!status) /* last: a sim cannot be left */
+    if (!status) /* last: an observer cannot be removed from a sim */
         status = drape_sim_observe(r->sim, observe, r);
     return status;
 }
@@ -455,6 +455,7 @@ static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recor
     if (!r)
         return DRAPE_E_MEMORY;
     r->ctx = ctx;
+    r->arena = drape_arena_of(ctx);
     r->sim = sim;
     scope s = scope_enter();
     note(r, set_up(r, def, a));
@@ -480,7 +481,7 @@ drape_status drape_recorder_resume(drape_context *ctx, drape_sim *sim, const dra
     return create(ctx, sim, def, a, out);
 }
 
-/* ---- Closing */
+/* ---- Closing ---- */
 
 static bool last_frame_is_due(const drape_recorder *r)
 {
@@ -529,15 +530,10 @@ void drape_recorder_destroy(drape_recorder **recorder)
         return;
     drape_recorder *r = *recorder;
     close_files(r);
-    for (size_t i = 0; i < r->output_count; i++)
-        drape_free(r->ctx, r->outputs[i].state);
-    drape_free(r->ctx, r->outputs);
-    drape_free(r->ctx, r->fields);
-    drape_free(r->ctx, r->turned);
     drape_file_destroy(&r->steps);
     drape_file_destroy(&r->energies);
     drape_file_destroy(&r->checkpoint);
-    drape_free(r->ctx, r->folder);
+    drape_arena_free(&r->arena);
     drape_free(r->ctx, r);
     *recorder = NULL;
 }

@@ -18,8 +18,8 @@ typedef struct drape_recorder_def {
 
 typedef struct drape_recorder drape_recorder;
 
-/* Whether a format can hold a run of the sim's scene; faults at pointer ("/output/formats/0", or "" for none).
- * Errors: DRAPE_E_ARGUMENT (there is no such format, it cannot). */
+/* Whether a format can hold a run of the sim's scene; faults at pointer ("/output/formats/0", or "" for
+ * none). Errors: DRAPE_E_ARGUMENT (there is no such format, it cannot). */
 drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, const char *pointer,
                                   const char *format);
 
@@ -31,16 +31,17 @@ drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, cons
 drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
                                    drape_recorder **out);
 
-/* Goes on with a run that was left, in its folder: reads the frames' part of a checkpoint, behind the sim's, which was
- * read; checks that the files have what they had then, and takes away what came later. Where the run had finished
- * (drape_recorder_is_finished) no file is touched. Errors: those of create; the archive's, such as other formats. */
+/* Goes on with a run that was left, in its folder: reads the frames' part of a checkpoint, behind the sim's,
+ * which was read; checks that the files have what they had then, and takes away what came later. Where the
+ * run had finished (drape_recorder_is_finished) no file is touched. Errors: those of create; the archive's,
+ * such as other formats. */
 drape_status drape_recorder_resume(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
                                    drape_archive *a, drape_recorder **out);
 bool drape_recorder_is_finished(const drape_recorder *recorder);
 
-/* Saves sim and recorder as they are now, also after drape_recorder_finish, which then is told to whoever resumes. What
- * the checkpoint says of files is on the disk before. Nothing is allocated. Errors: DRAPE_E_FILE; the checkpoint before
- * is untouched then. */
+/* Saves sim and recorder as they are now, also after drape_recorder_finish, which then is told to whoever
+ * resumes. What the checkpoint says of files is on the disk before. Nothing is allocated. Errors:
+ * DRAPE_E_FILE; the checkpoint before is untouched then. */
 drape_status drape_recorder_checkpoint(drape_recorder *recorder);
 
 /* [s] of wall clock that the run had taken at the last checkpoint, written or read; 0: there was none. */

@@ -94,9 +94,9 @@ static drape_status keep_file(copier *c, const char *file, const char *pointer)
 
 static bool is_text(const drape_collider *collider, const char *name)
 {
-    for (int i = 0; i < collider->ops->param_count; i++)
-        if (strcmp(collider->ops->params[i].name, name) == 0)
-            return collider->ops->params[i].kind == DRAPE_PARAM_TEXT;
+    for (int i = 0; i < collider->ops->entry.param_count; i++)
+        if (strcmp(collider->ops->entry.params[i].name, name) == 0)
+            return collider->ops->entry.params[i].kind == DRAPE_PARAM_TEXT;
     return false;
 }
 

@@ -10,10 +10,10 @@
 /* Whether the scene file at path is itself folder/scene.json: then it must not be written over. */
 bool drape_scene_copy_is(const char *path, const char *folder);
 
-/* Writes folder/scene.json, the scene as it was compiled, with copies of its meshes beside it, scene_mesh_0.obj
- * and so on, so that the folder can be moved and its scene compiled again. path is the scene's own file: the
- * meshes are relative to it. A mesh that is no regular file stays where it is. The scene then names the copies.
- * Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Writes folder/scene.json, the scene as it was compiled, with copies of its meshes beside it,
+ * scene_mesh_0.obj and so on, so that the folder can be moved and its scene compiled again. path is the
+ * scene's own file: the meshes are relative to it. A mesh that is no regular file stays where it is. The
+ * scene then names the copies. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_scene_copy(drape_context *ctx, drape_scene *scene, const drape_model *model,
                               const char *path, const char *folder);
 

@@ -36,21 +36,21 @@ static void put_nodes(drape_file *file, const int32_t node[4])
         drape_file_print(file, "%s%" PRId32, i ? " " : "", node[i]);
 }
 
-static void put_worst(drape_file *file, const drape_worst *worst)
+static void put_worst(drape_file *file, const drape_diagnostic *diagnostic)
 {
-    if (!worst->what || !*worst->what) {
+    if (!diagnostic->what || !*diagnostic->what) {
         drape_file_put_text(file, ",,,,,,");
         return;
     }
-    drape_csv_put_text(file, worst->what);
-    drape_csv_put_text(file, worst->term);
-    if (worst->element >= 0)
-        drape_csv_put_integer(file, worst->element);
+    drape_csv_put_text(file, diagnostic->what);
+    drape_csv_put_text(file, diagnostic->term);
+    if (diagnostic->element >= 0)
+        drape_csv_put_integer(file, diagnostic->element);
     else
         drape_file_put_text(file, ",");
-    put_nodes(file, worst->node);
-    drape_csv_put_number(file, worst->value);
-    drape_csv_put_number(file, worst->limit);
+    put_nodes(file, diagnostic->node);
+    drape_csv_put_number(file, diagnostic->value);
+    drape_csv_put_number(file, diagnostic->limit);
 }
 
 drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, const drape_energy *energy)
@@ -65,7 +65,7 @@ drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, c
     drape_csv_put_number(file, attempt->residual);
     drape_csv_put_number(file, attempt->tolerance);
     put_energy(file, energy);
-    put_worst(file, &attempt->worst);
+    put_worst(file, &attempt->diagnostic);
     drape_file_put_text(file, "\n");
     return drape_file_keep(file);
 }

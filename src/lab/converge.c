@@ -1,28 +1,26 @@
 /*
  * converge: orders of convergence without a reference. A setting is halved again and again; the distances between the
  * ends of successive runs fall like a power of it, whose exponent is the order: straight lines in logarithms.
- * In time dt is halved (rows with own steps: rtol is cut to a tenth), in space the edges of every grid, with
- * positions compared at the nodes of the coarsest mesh.
+ * In time dt is halved (integrators that choose their steps: rtol is cut to a tenth), in space the edges of every grid,
+ * with positions compared at the nodes of the coarsest mesh.
  */
-#include "lab/grid.h"
+#include "base/param.h"
 #include "lab/run.h"
 #include "lab/statistics.h"
 #include "lab/text.h"
-
 #include "model/scene.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#define FIRST_DT   (1.0 / 60)
-#define FIRST_RTOL 1e-2
-#define SPACE      "space"
-#define SPACE_ROW  "bdf2" /* whose error in time is small beside that of the mesh, at the scene's dt */
-#define LEAST      3
-#define MOST       12
-#define OWN        "dt, with own substeps" /* the knob of a row that dt does not refine */
-#define ROUNDING   1e-12                   /* m: distances below are not of the method */
+#define FIRST_DT     (1.0 / 60)
+#define FIRST_RTOL   1e-2
+#define SPACE        "space"
+#define SPACE_METHOD "bdf2" /* whose error in time is small beside that of the mesh, at the scene's dt */
+#define MIN_LEVELS   3
+#define MAX_LEVELS   12
+#define OWN          "dt, with own substeps" /* the knob of an integrator that dt does not refine */
+#define ROUNDING     1e-12                   /* [m]: smaller distances are rounding */
 
 /* ---- The cases ---- */
 
@@ -32,29 +30,31 @@ static drape_status add(lab *l, const char *series, const char *knob, double val
     return lab_add_case(l, tags, settings, -1);
 }
 
-/* A row whose limit says how many substeps it takes goes on at its limit, whatever dt is, unless the scene fixes them. */
-static bool has_own_substeps(const drape_integrator_ops *row, const drape_row_def *said)
+/* An integrator that takes as many substeps as its stability limit asks for stays at that limit, whatever dt is, unless the
+ * scene fixes the number of substeps. */
+static bool has_own_substeps(const drape_integrator_ops *integrator, const drape_entry_def *given)
 {
-    for (size_t i = 0; i < said->setting_count; i++)
-        if (strcmp(said->settings[i].name, "substeps") == 0 && said->settings[i].number > 0)
+    for (size_t i = 0; i < given->setting_count; i++)
+        if (strcmp(given->settings[i].name, "substeps") == 0 && given->settings[i].number > 0)
             return false;
-    return row->stability && lab_has_param(row->params, row->param_count, "substeps");
+    return integrator->stability &&
+           drape_param_find(integrator->entry.params, integrator->entry.param_count, "substeps") >= 0;
 }
 
-static drape_status add_time(lab *l, const drape_integrator_ops *row, const drape_row_def *said)
+static drape_status add_time(lab *l, const drape_integrator_ops *integrator, const drape_entry_def *given)
 {
     drape_status status = DRAPE_OK;
-    const char *knob = row->own_steps ? "rtol" : has_own_substeps(row, said) ? OWN : "dt";
-    const char *pointer = row->own_steps ? "/integrator/rtol" : "/integrator/dt";
-    double value = row->own_steps ? FIRST_RTOL : FIRST_DT, ratio = row->own_steps ? 0.1 : 0.5;
+    const char *knob = integrator->own_steps ? "rtol" : has_own_substeps(integrator, given) ? OWN : "dt";
+    const char *pointer = integrator->own_steps ? "/integrator/rtol" : "/integrator/dt";
+    double value = integrator->own_steps ? FIRST_RTOL : FIRST_DT, ratio = integrator->own_steps ? 0.1 : 0.5;
     for (int k = 0; k < l->def->levels && !status; k++, value *= ratio)
-        status = add(l, row->name, knob, value,
-                     json_pack("{s:s, s:f}", "/integrator/method", row->name, pointer, value));
+        status = add(l, integrator->entry.name, knob, value,
+                     json_pack("{s:s, s:f}", "/integrator/method", integrator->entry.name, pointer, value));
     return status;
 }
 
 /* A grid with its edges cut into so many parts: counts of nodes n become (n - 1) f + 1, of edges n f. */
-static void refine(const drape_row_def *grid, size_t cloth, int factor, json_t *settings)
+static void refine(const drape_entry_def *grid, size_t cloth, int factor, json_t *settings)
 {
     for (size_t i = 0; i < grid->setting_count; i++) {
         const char *key = grid->settings[i].name;
@@ -72,49 +72,41 @@ static void refine(const drape_row_def *grid, size_t cloth, int factor, json_t *
 
 static drape_status add_level(lab *l, const drape_scene_def *def, int level)
 {
-    json_t *settings = json_pack("{s:s}", "/integrator/method", SPACE_ROW);
+    json_t *settings = json_pack("{s:s}", "/integrator/method", SPACE_METHOD);
     for (size_t c = 0; c < def->cloth_count; c++) {
         if (!def->cloths[c].mesh.grid.type) {
             json_decref(settings);
             return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
-                              "/cloth/%zu/mesh: convergence in space refines grids, and this is none", c);
+                              "/cloth/%zu/mesh: convergence in space refines grids, and this is not one", c);
         }
         refine(&def->cloths[c].mesh.grid, c, 1 << level, settings);
     }
     return add(l, SPACE, "edge", ldexp(1, -level), settings);
 }
 
-static drape_status add_all(lab *l, const drape_scene_def *def)
-{
-    drape_status status = DRAPE_OK;
-    for (int i = 0; !status && drape_integrators[i]; i++)
-        if (lab_wants_integrator(l, drape_integrators[i]->name, true) && !drape_integrators[i]->timeless)
-            status = add_time(l, drape_integrators[i], &def->integrator);
-    for (int k = 0; l->def->space && k < l->def->levels && !status; k++)
-        status = add_level(l, def, k);
-    return status;
-}
-
 static drape_status add_cases(lab *l)
 {
-    const lab_request request = {.def = l->def};
     drape_scene *scene = NULL;
     drape_scene_def def;
-    drape_status status = lab_load_scene(l->ctx, &request, &scene);
+    drape_status status = lab_load_scene(l->ctx, &(lab_request){.def = l->def}, &scene);
     drape_scene_def_init(&def, sizeof def);
     if (!status)
         status = drape_scene_to_def(scene, &def);
-    if (!status)
-        status = add_all(l, &def);
+    for (int i = 0; !status && drape_integrators[i]; i++)
+        if (lab_wants_integrator(l, drape_integrators[i]->entry.name, true) &&
+            !drape_integrators[i]->steady_state)
+            status = add_time(l, drape_integrators[i], &def.integrator);
+    for (int k = 0; l->def->space && k < l->def->levels && !status; k++)
+        status = add_level(l, &def, k);
     drape_scene_destroy(&scene);
     return status;
 }
 
 static drape_status plan(lab *l)
 {
-    if (l->def->levels < LEAST || l->def->levels > MOST)
-        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "levels = %d; it is %d to %d", l->def->levels, LEAST,
-                          MOST);
+    if (l->def->levels < MIN_LEVELS || l->def->levels > MAX_LEVELS)
+        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "levels = %d; it is %d to %d", l->def->levels, MIN_LEVELS,
+                          MAX_LEVELS);
     drape_status status = lab_check_integrators(l);
     if (!status)
         status = add_cases(l);
@@ -125,25 +117,24 @@ static drape_status plan(lab *l)
 /* All runs are compared at the nodes of the scene's own mesh. */
 static drape_status prepare(lab *l)
 {
-    const lab_request request = {.def = l->def};
     drape_model *model = NULL;
-    drape_status status = lab_load(l->ctx, &request, &model);
+    drape_status status = lab_load(l->ctx, &(lab_request){.def = l->def}, &model);
     if (!status)
-        status = lab_probe_create(l->ctx, model, &l->probe);
+        status = lab_probe_create(&l->arena, model, &l->probe);
     drape_model_destroy(&model);
     return status;
 }
 
 /* ---- Reading the results ---- */
 
-/* One row's refinements: from each to the next, how far the end moved. */
+/* The refinements of one series: how far the end moved from each to the next. */
 typedef struct sequence {
     const char *series, *knob;
-    double value[MOST], moved[MOST]; /* of the coarser of two, [m] */
+    double value[MAX_LEVELS], moved[MAX_LEVELS]; /* of the coarser of two, [m] */
     size_t count;
     int failed;
-    int64_t rejected; /* steps that the controller cut: there dt was not what the case says */
-    bool unrefined;   /* by its knob: there is no order */
+    int64_t rejected; /* steps that the controller cut: there dt was not that of the case */
+    bool unrefined;   /* the knob does not refine it: there is no order */
     lab_line line;
 } sequence;
 
@@ -162,16 +153,16 @@ static double distance(const json_t *a, const json_t *b)
 static void read_sequence(const lab *l, size_t first, sequence *s)
 {
     const json_t *before = NULL;
-    *s = (sequence){.series = lab_tag_word(l->results[first], "series"),
-                    .knob = lab_tag_word(l->results[first], "knob")};
-    for (size_t i = first; i < l->count && strcmp(lab_tag_word(l->results[i], "series"), s->series) == 0;
+    *s = (sequence){.series = lab_tag_text(l->results[first], "series"),
+                    .knob = lab_tag_text(l->results[first], "knob")};
+    for (size_t i = first; i < l->count && strcmp(lab_tag_text(l->results[i], "series"), s->series) == 0;
          i++) {
         const json_t *r = l->results[i];
         bool good = lab_is_good(r);
         double moved = before && good ? distance(before, r) : NAN;
         s->failed += !good;
         s->rejected += (int64_t)lab_number(r, "rejected");
-        if (moved > ROUNDING && s->count < MOST) {
+        if (moved > ROUNDING && s->count < MAX_LEVELS) {
             s->value[s->count] = lab_tag_number(before, "value");
             s->moved[s->count++] = moved;
         }
@@ -181,81 +172,65 @@ static void read_sequence(const lab *l, size_t first, sequence *s)
     s->line = lab_fit_power(s->value, s->moved, s->count);
 }
 
-static void say_order(lab *l, const sequence *s)
+/* The order between a refinement and the one before. */
+static double local_order(const sequence *s, size_t i)
 {
-    double last = NAN;
-    if (s->count >= 2)
-        last = log(s->moved[s->count - 2] / s->moved[s->count - 1]) /
-               log(s->value[s->count - 2] / s->value[s->count - 1]);
-    fprintf(l->words, "order %.3g in %s", s->line.slope, s->knob);
-    if (!isnan(s->line.low))
-        fprintf(l->words, " (95 %% confidence %.3g to %.3g)", s->line.low, s->line.high);
-    fprintf(l->words, ", %.3g at the last refinement", last);
-    if (s->line.low <= 0)
-        fprintf(l->words,
-                ": that is not all above 0, so these do not tell the order; more --levels may, or a "
-                "shorter --duration, "
-                "before small differences grow");
+    return log(s->moved[i - 1] / s->moved[i]) / log(s->value[i - 1] / s->value[i]);
 }
 
-static void say(lab *l, const sequence *s)
+static void report_order(const sequence *s, FILE *out)
 {
-    fprintf(l->words, "%s: ", s->series);
+    fprintf(out, "%s: ", s->series);
     if (s->unrefined)
-        fprintf(l->words, "no order, as it chooses its own substeps and dt does not refine them; "
-                          "--set /integrator/substeps=N fixes them");
+        fprintf(out, "no order, as it chooses its own substeps and dt does not refine them; "
+                     "--set /integrator/substeps=N fixes them");
     else if (isnan(s->line.slope))
-        fprintf(l->words, "no order, as too few of its refinements moved the end");
-    else
-        say_order(l, s);
+        fprintf(out, "no order, as too few of its refinements moved the end");
+    else {
+        fprintf(out, "order %.3g in %s", s->line.slope, s->knob);
+        if (!isnan(s->line.low))
+            fprintf(out, " (95 %% confidence %.3g to %.3g)", s->line.low, s->line.high);
+        fprintf(out, ", %.3g at the last refinement", local_order(s, s->count - 1));
+        if (s->line.low <= 0)
+            fprintf(out, ": that is not all above 0, so these do not tell the order; more --levels may, or a "
+                         "shorter --duration, before small differences grow");
+    }
     if (s->rejected && strcmp(s->knob, "dt") == 0)
-        fprintf(l->words, "; %lld of its steps were rejected and cut, so dt was not halved everywhere",
+        fprintf(out, "; %lld of its steps were rejected and cut, so dt was not halved everywhere",
                 (long long)s->rejected);
     if (s->failed)
-        fprintf(l->words, "; %d of its runs did not come to the end", s->failed);
-    fprintf(l->words, "\n");
+        fprintf(out, "; %d of its runs did not complete", s->failed);
+    fprintf(out, "\n");
 }
 
 /* ---- The picture and the table ---- */
 
 static drape_status draw(lab *l, const sequence *sequences, size_t count)
 {
-    char *script = NULL;
-    size_t size = 0;
-    bool drawn = false, any = false;
-    drape_status status = DRAPE_OK;
-    FILE *out = open_memstream(&script, &size);
-    if (!out)
-        return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for a picture");
-    fprintf(
-        out,
-        "set terminal svg size 900,560 dynamic font 'sans-serif,13' background '#ffffff' name 'converge'\n"
-        "cd '%s'\nset output 'converge.svg'\nset logscale xy\nset format '10^{%%T}'\n"
-        "set grid lc rgb '#dddddd'\nset key outside right top noenhanced\n"
-        "set xlabel 'dt [s], rtol, or edge over that of the coarsest mesh'\n"
-        "set ylabel 'way of the end to the next refinement, RMS [m]'\n",
-        l->folder);
+    lab_plot plot;
+    bool any = false;
+    drape_status status = lab_plot_begin(l, &plot, "converge", 900, 560);
+    if (status)
+        return status;
+    fprintf(plot.script, "set logscale xy\nset format '10^{%%T}'\n"
+                         "set grid lc rgb '#dddddd'\nset key outside right top noenhanced\n"
+                         "set xlabel 'dt [s], rtol, or edge over that of the coarsest mesh'\n"
+                         "set ylabel 'distance of the end from that of the next refinement, RMS [m]'\n");
     for (size_t k = 0; k < count; k++) {
-        fprintf(out, "$s%zu << EOD\n", k);
+        fprintf(plot.script, "$s%zu << EOD\n", k);
         for (size_t i = 0; i < sequences[k].count; i++)
-            fprintf(out, "%.9g %.9g\n", sequences[k].value[i], sequences[k].moved[i]);
-        fprintf(out, "EOD\n");
+            fprintf(plot.script, "%.9g %.9g\n", sequences[k].value[i], sequences[k].moved[i]);
+        fprintf(plot.script, "EOD\n");
     }
     for (size_t k = 0; k < count; k++)
         if (sequences[k].count > 0 && !sequences[k].unrefined) {
-            fprintf(out, "%s $s%zu with linespoints lw 1.6 pt %zu ps .6 title \"%s (%.3g)\"",
+            fprintf(plot.script, "%s $s%zu with linespoints lw 1.6 pt %zu ps .6 title \"%s (%.3g)\"",
                     any ? "," : "plot", k, 4 + k % 10, sequences[k].series, sequences[k].line.slope);
             any = true;
         }
-    fprintf(out, "\n");
-    fclose(out);
-    if (any) /* without a point there are no axes in logarithms */
-        status = lab_plot(l, "converge", script, size, &drawn);
-    free(script);
-    return status || !drawn
-               ? status
-               : lab_page_picture(l, "converge.svg",
-                                  "How far the end moves with each refinement; in brackets the order");
+    fprintf(plot.script, "\n");
+    return lab_plot_end(l, &plot, any, /* logarithmic axes need a point */
+                        "How far the end moves with each refinement; in brackets the order");
 }
 
 static void write_table(lab *l, const sequence *s)
@@ -265,7 +240,7 @@ static void write_table(lab *l, const sequence *s)
     for (size_t i = 0; i < s->count; i++) {
         fprintf(l->page, "<tr><td>%.6g</td><td>%.4g</td><td>", s->value[i], s->moved[i]);
         if (i > 0 && !s->unrefined)
-            fprintf(l->page, "%.3f", log(s->moved[i - 1] / s->moved[i]) / log(s->value[i - 1] / s->value[i]));
+            fprintf(l->page, "%.3f", local_order(s, i));
         fputs("</td></tr>\n", l->page);
     }
     fputs("</table>\n", l->page);
@@ -274,25 +249,23 @@ static void write_table(lab *l, const sequence *s)
 static drape_status report(lab *l)
 {
     size_t count = 0;
-    sequence *sequences = drape_alloc(l->ctx, l->count, sizeof *sequences);
+    sequence *sequences = drape_arena_take(&l->arena, l->count, sizeof *sequences);
     if (!sequences)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < l->count; i++)
         if (i == 0 ||
-            strcmp(lab_tag_word(l->results[i], "series"), lab_tag_word(l->results[i - 1], "series")) != 0)
+            strcmp(lab_tag_text(l->results[i], "series"), lab_tag_text(l->results[i - 1], "series")) != 0)
             read_sequence(l, i, &sequences[count++]);
     for (size_t k = 0; k < count; k++)
-        say(l, &sequences[k]);
+        report_order(&sequences[k], l->summary);
     drape_status status = draw(l, sequences, count);
     for (size_t k = 0; k < count; k++)
         write_table(l, &sequences[k]);
-    drape_free(l->ctx, sequences);
     return status;
 }
 
 const lab_experiment_ops lab_experiment_converge = {
-    .name = "converge",
-    .summary = "orders of convergence in time, and in space",
+    .entry = {.name = "converge", .summary = "orders of convergence in time, and in space"},
     .plan = plan,
     .prepare = prepare,
     .report = report,

@@ -1,18 +1,21 @@
 /*
- * lab.h: what the experiments share. An experiment is a row: it plans cases, prepares what all of them are
- * compared with, and reports. Cases and results are JSON from the start, as they are in the files: a report
- * is a function of experiment.json and of the lines, so what was run elsewhere or before needs no exception.
+ * lab.h: what the experiments share. An experiment plans cases, prepares what all of them are compared with, and
+ * reports. Cases and results are JSON from the start, as in the files: a report is a function of experiment.json and of
+ * the lines, so results of other machines or earlier runs need no exception.
  *
  *     experiment.json   {"experiment", "drape", "scene", "scene_hash", "settings", "arguments", "cases": [case...]}
- *     case              {"tags": {what it is called}, "settings": {pointer: value}}, and "same_as": N where a
- *                       row ignores what distinguishes it from case N
+ *     case              {"tags": {what it is called}, "settings": {pointer: value}}, and "same_as": N where the
+ *                       integrator ignores what distinguishes it from case N
  *     cases.jsonl       a result a line: {"case": N, "tags": {...}, "status": ..., what was measured}
  */
 #ifndef DRAPE_LAB_LAB_H
 #define DRAPE_LAB_LAB_H
 
-#include "base/context.h"
+#include "base/arena.h"
+#include "base/registry.h"
 #include "drape/lab.h"
+#include "integrators/integrator.h"
+#include "io/file.h"
 #include "lab/trace.h"
 
 #include <jansson.h>
@@ -21,59 +24,68 @@
 typedef struct lab lab;
 
 typedef struct lab_experiment_ops {
-    const char *name, *summary;
+    drape_entry entry;
     bool compares_costs; /* short cases are run several times, of which the cheapest counts */
     /* Adds cases (lab_add_case) and what else distinguishes the experiment to l->arguments. Errors:
      * DRAPE_E_ARGUMENT, DRAPE_E_MEMORY and those of loading the scene. */
     drape_status (*plan)(lab *l);
-    /* Faults of what prepare will run, found before there is a folder. NULL: it runs nothing. */
+    /* Faults in what prepare will run, found before there is a folder. NULL: it runs nothing. */
     drape_status (*check)(lab *l);
     /* Makes l->reference or l->probe. NULL: there is nothing to prepare. */
     drape_status (*prepare)(lab *l);
-    /* All cases have results: writes the CSV, pictures, and words (l->words) and figures (lab_page_*). */
+    /* All cases have results: writes the CSV, pictures, sentences (l->summary) and figures (lab_page_*). */
     drape_status (*report)(lab *l);
 } lab_experiment_ops;
 
 extern const lab_experiment_ops *const lab_experiments[]; /* NULL-ended */
+extern const drape_registry lab_experiment_registry;
 
 struct lab {
     drape_context *ctx;
+    drape_arena arena; /* of folder, the array of results, reference, probe */
     const drape_lab_def *def;
+    drape_lab_outcome *outcome; /* the caller's */
     const lab_experiment_ops *experiment;
     char *folder;
-    bool writing;              /* all that was given is read and good: a failure now is of the folder */
-    bool claimed;              /* it had no experiment before */
-    json_t *about;             /* experiment.json; owns: */
+    bool input_is_good; /* all input has been read and checked: a failure now is of the output folder */
+    bool claimed;       /* the folder had no experiment before */
+    json_t *about;      /* experiment.json; owned, and owns: */
     json_t *cases, *arguments; /* borrowed from it */
-    json_t **results;          /* one a case, NULL: not there yet */
+    json_t **results;          /* one a case, owned; NULL: not there yet */
     size_t count;              /* of cases */
     lab_trace reference;       /* what cases are compared with; no frames: nothing */
-    double reference_error;    /* [m] RMS at the end, between it and a tighter one */
+    double reference_error;    /* [m] RMS at the end: its distance from the next less accurate one */
     lab_probe probe;           /* where final positions are taken; no points: nowhere */
-    char *words_text;          /* of words, once it is closed */
-    size_t words_size;
-    FILE *words; /* lines for the terminal and the head of the page */
+    FILE *summary;             /* sentences for the terminal and the head of the page, one a line */
+    char *summary_text;        /* valid when summary is flushed or closed */
+    size_t summary_size;
+    FILE *page; /* the body of the page */
     char *page_text;
     size_t page_size;
-    FILE *page; /* the body of the page */
 };
 
 /* Takes the references of tags and settings. same_as < 0: none. */
 drape_status lab_add_case(lab *l, json_t *tags, json_t *settings, int64_t same_as);
 
-/* A number or text of a case's result; NaN and "" where there is none. */
-double lab_number(const json_t *result, const char *key);
-const char *lab_word(const json_t *result, const char *key);
+/* A number or text of an object; NaN and "" where there is none. */
+double lab_number(const json_t *object, const char *key);
+const char *lab_text(const json_t *object, const char *key);
 /* The same of its tags. */
 double lab_tag_number(const json_t *result, const char *key);
-const char *lab_tag_word(const json_t *result, const char *key);
+const char *lab_tag_text(const json_t *result, const char *key);
+json_t *lab_real(double value); /* null where it is not finite: JSON has no NaN and no infinity */
 
-bool lab_is_good(const json_t *result); /* it came to the end */
+bool lab_is_good(const json_t *result); /* it completed */
 
-/* Whether the rows asked for contain it; where none were asked for, fallback. */
+const drape_integrator_ops *lab_find_integrator(const char *name); /* NULL: there is none */
+
+/* Whether the integrators that the def names contain it; where it names none, fallback. */
 bool lab_wants_integrator(const lab *l, const char *name, bool fallback);
 
-/* Faults of the def: an integrator that there is not, or that has no steps in time. */
+/* Faults of the def: an integrator that does not exist, or that has no steps in time. */
 drape_status lab_check_integrators(const lab *l);
+
+/* Whether an integrator ignores the value at a pointer: "/integrator/..." that is not one of its parameters. */
+bool lab_ignores(const drape_integrator_ops *integrator, const char *pointer);
 
 #endif

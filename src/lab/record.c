@@ -2,10 +2,10 @@
 #include "lab/record.h"
 
 #include "base/hash.h"
+#include "io/export.h"
+#include "lab/sweep.h"
 #include "lab/text.h"
 
-#include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #define NAME "cases.jsonl"
@@ -24,19 +24,14 @@ lab_record *lab_records_make(drape_context *ctx, const drape_reference *only, si
     return records;
 }
 
-/* Of the scene at load 1, which is all that a line does not say of a case. */
+/* The hash of the scene at load 1: the line has everything else about the case. */
 static void hash_of(const lab_record *record, char digits[17])
 {
     char text[DRAPE_LAB_TEXT];
-    const double parameter = record->reference->parameters[record->index];
-    record->reference->scene(parameter, 1, text, sizeof text);
+    const drape_reference *r = record->reference;
+    r->scene(&(drape_reference_case){r, r->parameters[record->index], 1}, text);
     snprintf(digits, 17, "%016llx",
              (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, text, strlen(text)));
-}
-
-static json_t *number(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
 }
 
 json_t *lab_record_json(const lab_record *record)
@@ -45,11 +40,12 @@ json_t *lab_record_json(const lab_record *record)
     const drape_reference *r = record->reference;
     const drape_validation *v = &record->v;
     return json_pack("{s:s, s:s, s:s, s:s*, s:s, s:s, s:f, s:o, s:o, s:o, s:o, s:f, s:s, s:s, s:f}", "name",
-                     r->name, "quantity", r->quantity, "unit", r->unit, "parameter", r->parameter, "model",
-                     r->model, "source", r->source, "value", v->parameter, "expected", number(v->expected),
-                     "documented", number(v->documented), "obtained", number(v->obtained), "error",
-                     number(v->obtained / v->expected - 1), "tolerance", r->tolerance, "verdict",
-                     verdicts[v->verdict], "message", v->message, "cpu_s", v->seconds);
+                     r->entry.name, "quantity", r->entry.summary, "unit", r->unit, "parameter", r->parameter,
+                     "model", r->model, "source", r->entry.reference, "value", v->parameter, "expected",
+                     lab_real(v->expected), "documented", lab_real(v->documented), "obtained",
+                     lab_real(v->obtained), "error", lab_real(v->obtained / v->expected - 1), "tolerance",
+                     r->tolerance, "verdict", verdicts[v->verdict], "message", v->message, "cpu_s",
+                     v->seconds);
 }
 
 static void put_line(drape_file *file, const lab_record *record)
@@ -59,89 +55,60 @@ static void put_line(drape_file *file, const lab_record *record)
     hash_of(record, digits);
     json_object_set_new(line, "scene_hash", json_string(digits));
     json_object_set_new(line, "drape", json_string(drape_version()));
-    char *text = json_dumps(line, JSON_COMPACT | JSON_REAL_PRECISION(17));
-    drape_file_put_text(file, text ? text : "");
-    drape_file_put_text(file, "\n");
-    free(text);
+    lab_put_line(file, line);
     json_decref(line);
 }
 
-static bool says(const json_t *line, const char *key, const char *word)
-{
-    const char *text = json_string_value(json_object_get(line, key));
-    return text && strcmp(text, word) == 0;
-}
-
-static double value_of(const json_t *line, const char *key)
-{
-    const json_t *value = json_object_get(line, key);
-    return json_is_number(value) ? json_number_value(value) : NAN;
-}
-
-static bool is_of(const json_t *line, const lab_record *record)
+static bool belongs_to(const json_t *line, const lab_record *record)
 {
     char digits[17];
     const drape_reference *r = record->reference;
-    if (!says(line, "name", r->name) || value_of(line, "value") != r->parameters[record->index] ||
-        !says(line, "drape", drape_version()))
+    if (strcmp(lab_text(line, "name"), r->entry.name) != 0 ||
+        lab_number(line, "value") != r->parameters[record->index] ||
+        strcmp(lab_text(line, "drape"), drape_version()) != 0)
         return false;
     hash_of(record, digits);
-    return says(line, "scene_hash", digits);
+    return strcmp(lab_text(line, "scene_hash"), digits) == 0;
 }
 
-static void take(const json_t *line, lab_record *record)
-{
-    const char *message = json_string_value(json_object_get(line, "message"));
-    drape_validation *v = &record->v;
-    *v = (drape_validation){.parameter = record->reference->parameters[record->index],
-                            .obtained = value_of(line, "obtained"),
-                            .seconds = value_of(line, "cpu_s")};
-    snprintf(v->message, sizeof v->message, "%s", message ? message : "");
-    drape_validate_judge(record->reference, v);
-    record->done = true;
-}
-
-/* A line that is none, as a kill may leave the last, counts for nothing. */
+/* A line that is not JSON, as a kill may leave the last, is ignored. */
 static void take_lines(char *text, lab_record *records, size_t count)
 {
     char *rest = NULL;
     for (char *word = strtok_r(text, "\n", &rest); word; word = strtok_r(NULL, "\n", &rest)) {
         json_t *line = json_loads(word, JSON_REJECT_DUPLICATES, NULL);
-        for (size_t i = 0; line && i < count; i++)
-            if (!records[i].done && is_of(line, &records[i]))
-                take(line, &records[i]);
+        for (size_t i = 0; line && i < count; i++) {
+            lab_record *record = &records[i];
+            drape_validation *v = &record->v;
+            if (record->done || !belongs_to(line, record))
+                continue;
+            *v = (drape_validation){.parameter = record->reference->parameters[record->index],
+                                    .obtained = lab_number(line, "obtained"),
+                                    .seconds = lab_number(line, "cpu_s")};
+            snprintf(v->message, sizeof v->message, "%s", lab_text(line, "message"));
+            drape_validate_judge(record->reference, v);
+            record->done = true;
+        }
         json_decref(line);
     }
 }
 
-static drape_status begin(drape_context *ctx, const char *folder, const lab_record *records, size_t count,
-                          drape_file *file)
+drape_status lab_records_open(drape_context *ctx, const char *folder, lab_record *records, size_t count,
+                              drape_file *file)
 {
-    drape_status status = drape_file_create(ctx, strlen(folder) + sizeof "/" NAME, file);
-    if (status)
-        return status;
-    drape_file_name(file, "%s/" NAME, folder);
-    status = drape_file_begin(file);
+    drape_arena arena = drape_arena_of(ctx);
+    char *text, *path = drape_arena_text(&arena, folder);
+    size_t size;
+    drape_status status = path ? drape_folder_make(ctx, path) : DRAPE_E_MEMORY;
+    if (!status && !lab_read_text(&arena, folder, NAME, &text, &size))
+        take_lines(text, records, count);
+    drape_arena_free(&arena);
+    if (!status)
+        status = drape_export_begin(ctx, folder, NAME, file);
     for (size_t i = 0; !status && i < count; i++)
         if (records[i].done)
             put_line(file, &records[i]);
     return status ? status : drape_file_publish(file);
-}
-
-drape_status lab_records_open(drape_context *ctx, const char *folder, lab_record *records, size_t count,
-                              drape_file *file, size_t *found)
-{
-    char *text = NULL, *path = drape_copy_text(ctx, folder);
-    size_t size;
-    drape_status status = path ? drape_folder_make(ctx, path) : DRAPE_E_MEMORY;
-    drape_free(ctx, path);
-    if (!status && !lab_read_text(ctx, folder, NAME, &text, &size))
-        take_lines(text, records, count);
-    free(text);
-    *found = 0;
-    for (size_t i = 0; i < count; i++)
-        *found += records[i].done;
-    return status ? status : begin(ctx, folder, records, count, file);
 }
 
 drape_status lab_record_keep(drape_file *file, const lab_record *record)

@@ -2,7 +2,6 @@
 #include "lab/reference.h"
 
 #include "base/clock.h"
-#include "io/file.h"
 #include "lab/run.h"
 #include "lab/text.h"
 #include "model/model.h"
@@ -11,253 +10,205 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define RUNGS       6
-#define BUDGET      20.0 /* case_seconds that each ladder may take */
-#define BEST        1e-8 /* of the scene's size: a ladder ends there */
-#define GOOD_ENOUGH 1e-5 /* of the scene's size: no second ladder is tried */
-#define GROWTH      2.5  /* a rung costs so much more than the one before, until measured */
-#define ENDIAN      "little endian doubles: frames x nodes x 3, the last one the end"
-#define FINAL       "reference"
+#define MAX_LEVELS  6
+#define BUDGET      20.0 /* case_seconds that each sequence may take */
+#define BEST        1e-8 /* of the scene's size: no further level is needed */
+#define GOOD_ENOUGH 1e-5 /* of the scene's size: no second sequence is tried */
+#define GROWTH      2.5  /* expected cost of a level over that of the one before */
+#define FORMAT      "little endian doubles: frames x nodes x 3, the last one the end"
 
-typedef struct ladder {
-    const char *method, *knob; /* pointer of what changes */
-    double first, ratio;
-    const char *also; /* pointer that is set too; NULL: none */
+/* A sequence of refinements. */
+typedef struct sequence {
+    const char *method, *knob; /* knob: pointer of the value that changes */
+    double first, ratio;       /* its values */
+    const char *also;          /* pointer that is set too; NULL: none */
     double also_value;
-} ladder;
+} sequence;
 
-static const ladder ladders[] = {
+static const sequence sequences[] = {
     {"ida", "/integrator/rtol", 1e-5, 0.1, "/integrator/max_order", 5},
     {"trbdf2", "/integrator/dt", 1.0 / 960, 0.5, NULL, 0},
 };
+#define SEQUENCES ((int)(sizeof sequences / sizeof *sequences))
 
-/* How far a ladder was climbed. Kept in the folder after each rung, so that an interrupted climb goes on. */
-typedef struct climb {
-    lab_trace best; /* of the last rung */
-    double error;   /* distance of its end to that of the rung before; INFINITY: there is none */
+/* The last refinement level of a sequence. Every level is saved in the folder; interrupted runs resume. */
+typedef struct level {
+    lab_trace trace;
+    double error; /* distance of its end from that of the level before; INFINITY: there is none */
     double knob;
-    int rungs;          /* climbed */
-    double took, spent; /* CPU [s] of the last rung, of all */
-} climb;
+    int count;          /* levels so far; 0: none */
+    double took, spent; /* CPU [s] of this level, of all */
+} level;
 
-static json_t *settings_of(const ladder *one, double knob)
+static json_t *settings_of(const sequence *s, double knob)
 {
-    json_t *settings = json_pack("{s:s, s:f}", "/integrator/method", one->method, one->knob, knob);
-    if (one->also)
-        json_object_set_new(settings, one->also, json_real(one->also_value));
+    json_t *settings = json_pack("{s:s, s:f}", "/integrator/method", s->method, s->knob, knob);
+    if (s->also)
+        json_object_set_new(settings, s->also, json_real(s->also_value));
     return settings;
-}
-
-static drape_status run_rung(lab *l, const ladder *one, double knob, double seconds, lab_trace *trace,
-                             bool *good)
-{
-    json_t *settings = settings_of(one, knob), *result = NULL;
-    const lab_request request = {
-        .def = l->def, .settings = settings, .record = trace, .seconds = seconds, .repeats = 1};
-    drape_status status = lab_run(l->ctx, &request, &result);
-    *good = !status && lab_is_good(result);
-    json_decref(settings);
-    json_decref(result);
-    return status;
-}
-
-static const double *end_of(const lab_trace *trace)
-{
-    return trace->x + trace->size * (size_t)(trace->frames - 1);
 }
 
 drape_status lab_check_reference(lab *l)
 {
     drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < sizeof ladders / sizeof *ladders; i++) {
-        json_t *settings = settings_of(&ladders[i], ladders[i].first);
+    for (int i = 0; !status && i < SEQUENCES; i++) {
+        json_t *settings = settings_of(&sequences[i], sequences[i].first);
         status = lab_try(l->ctx, l->def, settings);
         json_decref(settings);
     }
     return status;
 }
 
-/* ---- Keeping it ---- */
+/* ---- Files ---- */
 
-static drape_status keep(lab *l, const char *name, const ladder *one, const climb *c)
+/* The name of a file of a sequence; NULL: of the reference that was chosen. Shards in one folder each make their own. */
+static void name_file(const lab *l, const sequence *s, const char *ending, char name[64])
 {
-    char file[64];
-    size_t bytes = c->best.size * (size_t)c->best.frames * sizeof(double);
-    snprintf(file, sizeof file, "%s.f64", name);
-    drape_status status = lab_write_text(l, file, (const char *)c->best.x, bytes);
-    json_t *about = json_pack("{s:s, s:s, s:f, s:o, s:I, s:I, s:s, s:i, s:f, s:f}", "method", one->method,
-                              "knob", one->knob, "value", c->knob, "error_m", lab_real(c->error), "frames",
-                              (json_int_t)c->best.frames, "size", (json_int_t)c->best.size, "format", ENDIAN,
-                              "rungs", c->rungs, "took_s", c->took, "spent_s", c->spent);
+    char shard[32] = "";
+    if (l->def->shards > 1)
+        snprintf(shard, sizeof shard, "-%d-of-%d", l->def->shard, l->def->shards);
+    snprintf(name, 64, "reference%s%s%s.%s", s ? "-" : "", s ? s->method : "", shard, ending);
+}
+
+/* Saves a level of a sequence; chosen: as the reference. */
+static drape_status save(lab *l, const sequence *s, bool chosen, const level *last)
+{
+    char name[64];
+    const lab_trace *trace = &last->trace;
+    name_file(l, chosen ? NULL : s, "f64", name);
+    drape_status status = lab_write_text(l, name, (const char *)trace->x,
+                                         trace->size * (size_t)trace->frames * sizeof *trace->x);
+    json_t *about = json_pack("{s:s, s:s, s:f, s:o, s:I, s:I, s:s, s:i, s:f, s:f}", "method", s->method,
+                              "knob", s->knob, "value", last->knob, "error_m", lab_real(last->error),
+                              "frames", (json_int_t)trace->frames, "size", (json_int_t)trace->size, "format",
+                              FORMAT, "rungs", last->count, "took_s", last->took, "spent_s", last->spent);
     char *text = about ? json_dumps(about, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
-    snprintf(file, sizeof file, "%s.json", name);
+    name_file(l, chosen ? NULL : s, "json", name);
     if (!status)
-        status = text ? lab_write_text(l, file, text, strlen(text))
+        status = text ? lab_write_text(l, name, text, strlen(text))
                       : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for the reference");
     free(text);
     json_decref(about);
     return status;
 }
 
-/* Both files are there and fit each other: an earlier run's. */
-static bool read_back(lab *l, const char *name, climb *c)
+/* Whether both files are there and belong together: an earlier run's. s: as of name_file. */
+static bool read_saved(lab *l, const sequence *s, level *last)
 {
-    char file[64], *text = NULL, *data = NULL;
+    char name[64], *text = NULL, *data = NULL;
     size_t length = 0, bytes = 0;
-    snprintf(file, sizeof file, "%s.json", name);
-    bool read = !lab_read_text(l->ctx, l->folder, file, &text, &length);
-    snprintf(file, sizeof file, "%s.f64", name);
-    read = read && !lab_read_text(l->ctx, l->folder, file, &data, &bytes);
+    name_file(l, s, "json", name);
+    bool read = !lab_read_text(&l->arena, l->folder, name, &text, &length);
+    name_file(l, s, "f64", name);
+    read = read && !lab_read_text(&l->arena, l->folder, name, &data, &bytes);
     json_t *about = read ? json_loadb(text, length, 0, NULL) : NULL;
-    int64_t frames = json_integer_value(json_object_get(about, "frames"));
-    size_t size = (size_t)json_integer_value(json_object_get(about, "size"));
-    bool fits = about && frames > 0 && bytes == size * (size_t)frames * sizeof(double) &&
-                !lab_trace_create(l->ctx, size, frames, &c->best);
+    const int64_t frames = json_integer_value(json_object_get(about, "frames"));
+    const size_t size = (size_t)json_integer_value(json_object_get(about, "size"));
+    const bool fits = about && frames > 0 && bytes == size * (size_t)frames * sizeof(double);
     if (fits) {
         const double error = lab_number(about, "error_m");
-        memcpy(c->best.x, data, bytes);
-        c->best.frames = frames;
-        c->error = isnan(error) ? INFINITY : error;
-        c->knob = lab_number(about, "value");
-        c->rungs = (int)json_integer_value(json_object_get(about, "rungs"));
-        c->took = lab_number(about, "took_s");
-        c->spent = lab_number(about, "spent_s");
+        *last = (level){.trace = {size, frames, frames, (double *)(void *)data},
+                        .error = isnan(error) ? INFINITY : error,
+                        .knob = lab_number(about, "value"),
+                        .count = (int)json_integer_value(json_object_get(about, "rungs")),
+                        .took = lab_number(about, "took_s"),
+                        .spent = lab_number(about, "spent_s")};
     }
-    free(text);
-    free(data);
     json_decref(about);
     return fits;
 }
 
-static void forget(const lab *l, const char *name)
+static void remove_sequences(const lab *l)
 {
     static const char *const endings[] = {"json", "f64"};
-    for (int i = 0; i < 2; i++) {
-        char path[4096];
-        snprintf(path, sizeof path, "%s/%s.%s", l->folder, name, endings[i]);
+    for (int i = 0; i < 2 * SEQUENCES; i++) {
+        char name[64], path[4200];
+        name_file(l, &sequences[i / 2], endings[i % 2], name);
+        snprintf(path, sizeof path, "%s/%s", l->folder, name);
         remove(path);
     }
 }
 
-/* ---- Climbing ---- */
+/* ---- Runs ---- */
 
-/* Without a ladder that of what was chosen. Shards in one folder climb each by itself. */
-static void name_file(const lab *l, const ladder *one, char *name, size_t size)
+/* Runs and saves the next level. *good: it completed; otherwise *last keeps the level before. */
+static drape_status refine(lab *l, const drape_model *model, const sequence *s, level *last, bool *good)
 {
-    char shard[32] = "";
-    if (l->def->shards > 1)
-        snprintf(shard, sizeof shard, "-%d-of-%d", l->def->shard, l->def->shards);
-    snprintf(name, size, FINAL "%s%s%s", one ? "-" : "", one ? one->method : "", shard);
-}
-
-static void forget_ladders(const lab *l)
-{
-    char name[64];
-    for (size_t i = 0; i < sizeof ladders / sizeof *ladders; i++) {
-        name_file(l, &ladders[i], name, sizeof name);
-        forget(l, name);
-    }
-}
-
-/* One rung. *good: it ended; else the climb is where it was. */
-static drape_status step_up(lab *l, const drape_model *model, const ladder *one, climb *c, bool *good)
-{
-    lab_trace trace = {.ctx = NULL};
-    const double knob = c->rungs ? c->knob * one->ratio : one->first, start = drape_clock_thread_seconds();
-    drape_status status = run_rung(l, one, knob, BUDGET * l->def->case_seconds - c->spent, &trace, good);
-    c->took = drape_clock_thread_seconds() - start;
-    c->spent += c->took;
+    const double knob = last->count ? last->knob * s->ratio : s->first, start = drape_clock_thread_seconds();
+    lab_trace trace = {0};
+    json_t *settings = settings_of(s, knob), *result = NULL;
+    const lab_request request = {.def = l->def,
+                                 .settings = settings,
+                                 .record = &trace,
+                                 .arena = &l->arena,
+                                 .seconds = BUDGET * l->def->case_seconds - last->spent,
+                                 .repeats = 1};
+    drape_status status = lab_run(l->ctx, &request, &result);
+    *good = !status && lab_is_good(result);
+    json_decref(settings);
+    json_decref(result);
+    last->took = drape_clock_thread_seconds() - start;
+    last->spent += last->took;
     if (!*good) {
-        lab_trace_free(&trace);
+        drape_arena_release(&l->arena, trace.x);
         return status;
     }
-    c->error = c->best.frames ? lab_distance(model, end_of(&trace), end_of(&c->best)) : INFINITY;
-    c->knob = knob;
-    c->rungs++;
-    lab_trace_free(&c->best);
-    c->best = trace;
-    return status;
+    last->error =
+        last->count ? lab_distance(model, lab_trace_end(&trace), lab_trace_end(&last->trace)) : INFINITY;
+    drape_arena_release(&l->arena, last->trace.x);
+    last->trace = trace;
+    last->knob = knob;
+    last->count++;
+    return save(l, s, false, last);
 }
 
-static drape_status climb_ladder(lab *l, const drape_model *model, const ladder *one, climb *c)
+/* Refines each sequence as far as is useful and takes the better one. */
+static drape_status choose(lab *l, const drape_model *model, level *best)
 {
-    char name[64];
-    bool good = true;
+    const sequence *chosen = NULL;
+    const double budget = BUDGET * l->def->case_seconds;
     drape_status status = DRAPE_OK;
-    *c = (climb){.error = INFINITY};
-    name_file(l, one, name, sizeof name);
-    read_back(l, name, c);
-    while (!status && good && c->rungs < RUNGS && c->error > BEST * model->length &&
-           GROWTH * c->took < BUDGET * l->def->case_seconds - c->spent) {
-        status = step_up(l, model, one, c, &good);
-        if (!status && good)
-            status = keep(l, name, one, c);
-    }
-    return status;
-}
-
-/* *which: of the ladders; -1: none ended twice. */
-static drape_status climb_all(lab *l, const drape_model *model, climb *best, int *which)
-{
-    const int count = sizeof ladders / sizeof *ladders;
-    drape_status status = DRAPE_OK;
-    *best = (climb){.error = INFINITY};
-    *which = -1;
-    for (int i = 0; !status && i < count && !(best->error < GOOD_ENOUGH * model->length); i++) {
-        climb c;
-        status = climb_ladder(l, model, &ladders[i], &c);
-        if (!status && c.error < best->error) {
-            lab_trace_free(&best->best);
-            *best = c;
-            *which = i;
-        } else {
-            lab_trace_free(&c.best);
+    *best = (level){.error = INFINITY};
+    for (int i = 0; !status && i < SEQUENCES && !(best->error < GOOD_ENOUGH * model->length); i++) {
+        level last = {.error = INFINITY};
+        bool good = true;
+        read_saved(l, &sequences[i], &last);
+        while (!status && good && last.count < MAX_LEVELS && last.error > BEST * model->length &&
+               GROWTH * last.took < budget - last.spent)
+            status = refine(l, model, &sequences[i], &last, &good);
+        if (!status && last.error < best->error) {
+            *best = last;
+            chosen = &sequences[i];
         }
     }
-    return status;
-}
-
-static drape_status choose(lab *l, const drape_model *model, climb *best)
-{
-    char name[64];
-    int which;
-    drape_status status = climb_all(l, model, best, &which);
-    if (!status && which < 0) {
-        forget_ladders(l);
-        return drape_fail(l->ctx, DRAPE_E_SOLVER,
-                          "no reference: neither ida nor trbdf2 ends twice within %g s; give more by "
-                          "--case-seconds, or a shorter duration",
-                          BUDGET * l->def->case_seconds);
-    }
-    name_file(l, NULL, name, sizeof name);
-    if (!status)
-        status = keep(l, name, &ladders[which], best);
-    if (!status)
-        forget_ladders(l);
+    if (!status && !chosen)
+        status = drape_fail(l->ctx, DRAPE_E_SOLVER,
+                            "no reference: neither ida nor trbdf2 completes twice within %g s; give more by "
+                            "--case-seconds, or a shorter duration",
+                            budget);
+    else if (!status)
+        status = save(l, chosen, true, best);
+    if (!status || status == DRAPE_E_SOLVER)
+        remove_sequences(l);
     return status;
 }
 
 drape_status lab_make_reference(lab *l)
 {
     drape_model *model = NULL;
-    climb best = {.error = INFINITY};
+    level best;
     drape_status status = DRAPE_OK;
-    char name[64];
-    name_file(l, NULL, name, sizeof name);
-    if (!read_back(l, name, &best)) {
-        const lab_request request = {.def = l->def};
+    if (!read_saved(l, NULL, &best)) {
         if (l->def->progress)
             l->def->progress(l->def->user, 0, 0, NAN);
-        status = lab_load(l->ctx, &request, &model);
+        status = lab_load(l->ctx, &(lab_request){.def = l->def}, &model);
         if (!status)
             status = choose(l, model, &best);
         drape_model_destroy(&model);
     }
-    if (status) {
-        lab_trace_free(&best.best);
-        return status;
+    if (!status) {
+        l->reference = best.trace;
+        l->reference_error = best.error;
     }
-    l->reference = best.best;
-    l->reference_error = best.error;
-    return DRAPE_OK;
+    return status;
 }

@@ -2,7 +2,7 @@
  * rod.c: see rod.h. With t from the free end and psi the angle from the vertical,
  *     psi'' = (G t + P) sin psi,  psi'(0) = 0,  psi(1) = pi/2,  drop = int cos psi,  reach = int sin psi.
  * psi(0) is as small as exp(-G^(1/2)); it is sought by its logarithm, on which psi(1) depends smoothly, so
- * that shooting from the free end loses no digits.
+ * shooting from the free end loses no digits.
  */
 #include "lab/rod.h"
 
@@ -11,7 +11,9 @@
 #include <gsl/gsl_roots.h>
 #include <math.h>
 
-#define TOLERANCE 1e-12
+#define TOLERANCE 1e-12 /* relative */
+#define STEP      1e-4  /* the first */
+#define DEGREES   (180 / 3.14159265358979323846)
 #define HALF_PI   1.57079632679489661923
 
 double drape_root(double (*f)(double x, void *context), void *context, double low, double high)
@@ -32,26 +34,27 @@ double drape_root(double (*f)(double x, void *context), void *context, double lo
     return root;
 }
 
-/* y from t = 0 to 1; NaN where GSL gave up. */
-static void integrate(int (*rate)(double t, const double y[], double dy[], void *context), void *context,
-                      size_t n, double *y)
+int drape_ode(int (*rate)(double t, const double y[], double dy[], void *context), void *context, size_t n,
+              double step, double tolerance, double *y)
 {
     gsl_odeiv2_system system = {rate, NULL, n, context};
     gsl_odeiv2_driver *driver =
-        gsl_odeiv2_driver_alloc_y_new(&system, gsl_odeiv2_step_rk8pd, 1e-4, TOLERANCE * 1e-12, TOLERANCE);
+        gsl_odeiv2_driver_alloc_y_new(&system, gsl_odeiv2_step_rk8pd, step, tolerance, TOLERANCE);
     double t = 0;
-    if (!driver || gsl_odeiv2_driver_apply(driver, &t, 1, y))
+    const int status = driver ? gsl_odeiv2_driver_apply(driver, &t, 1, y) : GSL_ENOMEM;
+    if (status)
         y[0] = NAN;
     if (driver)
         gsl_odeiv2_driver_free(driver);
+    return status;
 }
 
 typedef struct rod {
     double weight, force;
 } rod;
 
-/* y: psi, psi', drop, reach. Past the level the rod goes straight on, so that psi(1) rises with psi(0): else
- * it would turn over, and there would be more than one root. */
+/* y: psi, psi', drop, reach. Beyond the horizontal the rod is continued straight, so that psi(1) rises with psi(0):
+ * otherwise it would turn over, and there would be more than one root. */
 static int rod_rate(double t, const double y[], double dy[], void *context)
 {
     const rod *r = context;
@@ -65,7 +68,7 @@ static int rod_rate(double t, const double y[], double dy[], void *context)
 static double overshoot(double log_tip, void *context)
 {
     double y[4] = {exp(log_tip), 0, 0, 0};
-    integrate(rod_rate, context, 4, y);
+    drape_ode(rod_rate, context, 4, STEP, TOLERANCE * 1e-12, y);
     return y[0] - HALF_PI;
 }
 
@@ -75,9 +78,16 @@ void drape_rod_tip(double weight, double force, double *drop, double *reach)
     /* psi(1) >= psi(0), and <= psi(0) cosh sqrt(G + P). */
     const double growth = sqrt(weight + force), least = log(HALF_PI) - growth - 1;
     double y[4] = {exp(drape_root(overshoot, &r, least, log(HALF_PI) + 0.1)), 0, 0, 0};
-    integrate(rod_rate, &r, 4, y);
+    drape_ode(rod_rate, &r, 4, STEP, TOLERANCE * 1e-12, y);
     *drop = y[2];
     *reach = y[3];
+}
+
+double drape_rod_chord(double weight)
+{
+    double drop, reach;
+    drape_rod_tip(weight, 0, &drop, &reach);
+    return atan2(drop, reach) * DEGREES;
 }
 
 typedef struct string {
@@ -97,7 +107,7 @@ static double end_of(double k, void *context)
     string *s = context;
     double y[2] = {1, 0};
     s->k = k;
-    integrate(string_rate, s, 2, y);
+    drape_ode(string_rate, s, 2, STEP, TOLERANCE * 1e-12, y);
     return y[0];
 }
 

@@ -8,16 +8,17 @@
 #include <jansson.h>
 #include <stdatomic.h>
 
-/* What is simulated, and what of it is wanted. */
+/* What is simulated, and what is measured. */
 typedef struct lab_request {
-    const drape_lab_def *def;    /* scene, settings of all cases, who may cancel */
-    const json_t *settings;      /* {pointer: value} of the case */
+    const drape_lab_def *def;    /* scene, settings of all cases, cancel */
+    const json_t *settings;      /* {pointer: value} of the case; NULL: none */
     const lab_trace *reference;  /* NULL or no frames: nothing to compare with */
     const lab_probe *probe;      /* NULL or no points: nowhere */
-    lab_trace *record;           /* its frames and, last, its end; NULL: not kept. Made here. */
+    lab_trace *record;           /* its frames and, last, its end; NULL: not recorded. Made here, in: */
+    drape_arena *arena;          /* of the record */
     double seconds;              /* CPU: a run that takes more is stopped */
     int repeats;                 /* the least CPU time of so many counts */
-    const atomic_bool *given_up; /* NULL: nobody else gives the case up */
+    const atomic_bool *given_up; /* another thread failed; NULL: there is none */
 } lab_request;
 
 /* The scene with its settings, and its model. Errors: as of drape_scene_load and drape_scene_compile; *scene is
@@ -25,14 +26,11 @@ typedef struct lab_request {
 drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drape_scene **scene);
 drape_status lab_load(drape_context *ctx, const lab_request *request, drape_model **model);
 
-/* Whether it compiles: loads it and lets it go. settings: of a case; NULL: the scene itself. */
+/* Whether it compiles. settings: of a case; NULL: the scene itself. */
 drape_status lab_try(drape_context *ctx, const drape_lab_def *def, const json_t *settings);
 
 /* Runs it. *result: what was measured, to be freed by the caller; a simulation that stops is a result.
  * Errors: those of loading, DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
 drape_status lab_run(drape_context *ctx, const lab_request *request, json_t **result);
-
-/* JSON has no NaN and no infinity: null. */
-json_t *lab_real(double value);
 
 #endif

@@ -5,14 +5,14 @@
 #include <gsl/gsl_fit.h>
 #include <math.h>
 
-#define MOST       64
+#define MAX_POINTS 64
 #define CONFIDENCE 0.975 /* two-sided 95 % */
 
 lab_line lab_fit_power(const double *x, const double *y, size_t count)
 {
-    double u[MOST], v[MOST], cov00, cov01, cov11, squares;
+    double u[MAX_POINTS], v[MAX_POINTS], cov00, cov01, cov11, squares;
     lab_line line = {NAN, NAN, NAN, NAN};
-    size_t n = count < MOST ? count : MOST;
+    size_t n = count < MAX_POINTS ? count : MAX_POINTS;
     if (n < 2)
         return line;
     for (size_t i = 0; i < n; i++) {

@@ -1,4 +1,4 @@
-/* strip.h: what references on strips and plates share: scenes, and where ends are. */
+/* strip.h: what several references share: scenes of strips, and measurements. */
 #ifndef DRAPE_LAB_STRIP_H
 #define DRAPE_LAB_STRIP_H
 
@@ -11,13 +11,13 @@
 typedef struct strip {
     int columns, rows;
     double width, thickness, poisson, tolerance;
-    const char *orientation; /* "horizontal", or "vertical": its width stands upright */
-    double gravity[3];       /* [m/s2] */
-    const char *terms;       /* after stretch.cst and bend.midedge, each after a comma */
-    const char *bend;        /* bend.midedge with settings; NULL: without */
+    bool upright;      /* its width is vertical */
+    double gravity[3]; /* [m/s2] */
+    const char *terms; /* besides stretch.cst; NULL: bend.midedge */
 } strip;
 
-int strip_scene(const strip *s, char *text, size_t size);
+int strip_scene(const strip *s, char text[DRAPE_LAB_TEXT]);
+#define STRIP_SCENE(text, ...) strip_scene(&(strip){__VA_ARGS__}, text)
 
 /* The gravity that makes G = rho g L^3/B. */
 double strip_gravity(double weight);
@@ -25,16 +25,16 @@ double strip_gravity(double weight);
 /* Advances to the end of the scene. */
 drape_status lab_advance(drape_reference_run *run);
 
-/* The equilibrium that is near the state of the sim, by "static", into x (node_count x 3). */
-drape_status lab_settle(drape_reference_run *run, double *x);
+/* The same, and the mean position of the nodes that had the largest x at rest; its -y; its angle [degree] below the x
+ * axis. */
+drape_status lab_tip(drape_reference_run *run, double tip[3]);
+drape_status lab_sinking(drape_reference_run *run, double *value);
+drape_status lab_chord(drape_reference_run *run, double *value);
 
-/* The mean position of the nodes that had the largest x at rest. */
-void lab_tip(const drape_reference_run *run, double tip[3]);
+/* Sets the sim to the equilibrium near its state, found by "static", with velocities v (node_count x 3). */
+drape_status lab_settle(drape_reference_run *run, const double *v);
 
-/* Of the equilibrium that was found: how many modes are unstable; DRAPE_E_SOLVER if it is not known. */
+/* Advances, and counts the unstable modes of the equilibrium that was found; DRAPE_E_SOLVER if that is not known. */
 drape_status lab_unstable_modes(drape_reference_run *run, double *value);
-
-/* The deflection along -y in the middle (x, z) of a plate: of the quadratic through the nodes around. */
-double lab_deflection(const drape_reference_run *run, double x, double z);
 
 #endif

@@ -2,7 +2,7 @@
 #include "lab/sweep.h"
 
 #include "base/clock.h"
-#include "io/file.h"
+#include "io/export.h"
 #include "lab/run.h"
 
 #include <dirent.h>
@@ -14,37 +14,23 @@
 
 /* ---- Lines ---- */
 
-static bool is_line_file(const char *name)
-{
-    size_t length = strlen(name), ending = strlen(".jsonl");
-    return strncmp(name, "cases", 5) == 0 && length > ending && strcmp(name + length - ending, ".jsonl") == 0;
-}
-
-/* The case that a line is of; NULL: it is none of this experiment. */
-static json_t **place_of(lab *l, const json_t *line)
-{
-    json_t *number = json_object_get(line, "case");
-    json_int_t i = json_is_integer(number) ? json_integer_value(number) : -1;
-    if (i < 0 || (size_t)i >= l->count)
-        return NULL;
-    json_t *tags = json_object_get(json_array_get(l->cases, (size_t)i), "tags");
-    return json_equal(json_object_get(line, "tags"), tags) ? &l->results[i] : NULL;
-}
-
 static drape_status take_line(lab *l, const char *path, int64_t number, const char *text, int64_t *found)
 {
-    json_t *line = json_loads(text, JSON_REJECT_DUPLICATES, NULL);
-    json_t **place = line ? place_of(l, line) : NULL;
-    if (!place) {
+    json_t *line = json_loads(text, JSON_REJECT_DUPLICATES, NULL), *index = json_object_get(line, "case");
+    const json_int_t i = json_is_integer(index) ? json_integer_value(index) : -1;
+    if (i < 0 || (size_t)i >= l->count ||
+        !json_equal(json_object_get(line, "tags"),
+                    json_object_get(json_array_get(l->cases, (size_t)i), "tags"))) {
         json_decref(line);
         return drape_fail(l->ctx, DRAPE_E_PARSE, "%.500s:%lld: no result of a case of this experiment", path,
                           (long long)number);
     }
-    *found += !*place;
-    if (*place)
+    if (l->results[i]) {
         json_decref(line);
-    else
-        *place = line;
+    } else {
+        l->results[i] = line;
+        ++*found;
+    }
     return DRAPE_OK;
 }
 
@@ -76,7 +62,9 @@ drape_status lab_read_lines(lab *l, const char *folder, int64_t *found)
     drape_status status = DRAPE_OK;
     for (struct dirent *e = readdir(entries); e && !status; e = readdir(entries)) {
         char path[4096];
-        if (!is_line_file(e->d_name))
+        const size_t length = strlen(e->d_name), ending = strlen(".jsonl");
+        if (strncmp(e->d_name, "cases", 5) != 0 || length < ending ||
+            strcmp(e->d_name + length - ending, ".jsonl") != 0)
             continue;
         snprintf(path, sizeof path, "%s/%s", folder, e->d_name);
         status = read_file(l, path, found);
@@ -85,35 +73,20 @@ drape_status lab_read_lines(lab *l, const char *folder, int64_t *found)
     return status;
 }
 
-static void put_line(drape_file *file, const json_t *result)
+void lab_put_line(drape_file *file, const json_t *object)
 {
-    char *text = json_dumps(result, JSON_COMPACT | JSON_REAL_PRECISION(17));
+    char *text = json_dumps(object, JSON_COMPACT | JSON_REAL_PRECISION(17));
     drape_file_put_text(file, text ? text : "");
     drape_file_put_text(file, "\n");
     free(text);
 }
 
-/* A file with the lines of what this shard has, not yet under its name. */
-static drape_status begin_lines(lab *l, const char *name, int shard, int shards, drape_file *file)
+drape_status lab_begin_lines(lab *l, const char *name, int shard, int shards, drape_file *file)
 {
-    drape_status status = drape_file_create(l->ctx, strlen(l->folder) + strlen(name) + 1, file);
-    if (status)
-        return status;
-    drape_file_name(file, "%s/%s", l->folder, name);
-    status = drape_file_begin(file);
+    drape_status status = drape_export_begin(l->ctx, l->folder, name, file);
     for (size_t i = 0; !status && i < l->count; i++)
         if (l->results[i] && i % (size_t)shards == (size_t)(shard - 1))
-            put_line(file, l->results[i]);
-    return status;
-}
-
-drape_status lab_write_lines(lab *l, const char *name)
-{
-    drape_file file = {0};
-    drape_status status = begin_lines(l, name, 1, 1, &file);
-    if (!status)
-        status = drape_file_finish(&file);
-    drape_file_destroy(&file);
+            lab_put_line(file, l->results[i]);
     return status;
 }
 
@@ -125,7 +98,7 @@ typedef struct sweep {
     drape_file file;
     pthread_mutex_t lock;
     atomic_bool given_up;
-    size_t next;         /* case that nobody has yet */
+    size_t next;         /* the first case that no thread has taken yet */
     int64_t done, total; /* of this shard */
     int64_t before;      /* done when it began */
     double start;        /* [s] wall */
@@ -138,6 +111,7 @@ static bool is_ours(const lab *l, size_t i)
            !json_object_get(json_array_get(l->cases, i), "same_as");
 }
 
+/* Under the lock. */
 static void stop(sweep *s, drape_status status)
 {
     if (!s->status)
@@ -145,57 +119,40 @@ static void stop(sweep *s, drape_status status)
     atomic_store(&s->given_up, true);
 }
 
-/* The next case that wants running, or l->count. */
-static size_t draw_case(sweep *s)
+/* Takes the next case that has no result. Returns l->count if there is none, or a thread failed. */
+static size_t take_case(sweep *s)
 {
     lab *l = s->l;
     pthread_mutex_lock(&s->lock);
     while (s->next < l->count && (!is_ours(l, s->next) || l->results[s->next]))
         s->next++;
-    size_t mine = s->status ? l->count : s->next++;
+    const size_t mine = s->status ? l->count : s->next++;
     pthread_mutex_unlock(&s->lock);
     return mine < l->count ? mine : l->count;
 }
 
-static void tell_progress(sweep *s)
-{
-    const drape_lab_def *def = s->l->def;
-    double wall = drape_clock_seconds() - s->start;
-    int64_t fresh = s->done - s->before;
-    double left = fresh > 0 ? wall / (double)fresh * (double)(s->total - s->done) : NAN;
-    if (def->progress)
-        def->progress(def->user, s->done, s->total, left);
-}
-
-/* Numbers a result, and keeps it as a line. */
+/* Completes a result, saves it as a line and reports progress. Under the lock. */
 static void keep(sweep *s, size_t i, json_t *result)
 {
     lab *l = s->l;
-    json_t *tags = json_object_get(json_array_get(l->cases, i), "tags");
+    const drape_lab_def *def = l->def;
     json_object_set_new(result, "case", json_integer((json_int_t)i));
-    json_object_set_new(result, "tags", json_deep_copy(tags));
+    json_object_set_new(result, "tags", json_deep_copy(json_object_get(json_array_get(l->cases, i), "tags")));
     if (l->reference.frames)
         json_object_set_new(result, "reference_error_m", lab_real(l->reference_error));
     l->results[i] = result;
     s->done++;
-    put_line(&s->file, result);
+    lab_put_line(&s->file, result);
     drape_status status = drape_file_keep(&s->file);
     if (status)
         stop(s, status);
-    tell_progress(s);
+    const double wall = drape_clock_seconds() - s->start;
+    const int64_t fresh = s->done - s->before;
+    if (def->progress)
+        def->progress(def->user, s->done, s->total, wall / (double)fresh * (double)(s->total - s->done));
 }
 
-static void settle(sweep *s, drape_context *ctx, size_t i, drape_status status, json_t *result)
-{
-    pthread_mutex_lock(&s->lock);
-    if (status)
-        stop(s, status == DRAPE_E_STOPPED && s->status ? status : /* given up for an earlier failure */
-                    drape_fail(s->l->ctx, status, "%s", drape_context_message(ctx)));
-    else
-        keep(s, i, result);
-    pthread_mutex_unlock(&s->lock);
-}
-
+/* A thread: runs cases until there is none left. */
 static void *work(void *user)
 {
     sweep *s = user;
@@ -208,7 +165,7 @@ static void *work(void *user)
         stop(s, drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for a context"));
         pthread_mutex_unlock(&s->lock);
     }
-    for (size_t i = ctx ? draw_case(s) : l->count; i < l->count; i = draw_case(s)) {
+    for (size_t i = ctx ? take_case(s) : l->count; i < l->count; i = take_case(s)) {
         json_t *result = NULL;
         const lab_request request = {.def = def,
                                      .settings = json_object_get(json_array_get(l->cases, i), "settings"),
@@ -218,66 +175,47 @@ static void *work(void *user)
                                      .repeats = l->experiment->compares_costs ? def->repeats : 1,
                                      .given_up = &s->given_up};
         drape_status status = lab_run(ctx, &request, &result);
-        settle(s, ctx, i, status, result);
+        pthread_mutex_lock(&s->lock);
+        if (!status)
+            keep(s, i, result);
+        else if (status != DRAPE_E_STOPPED || !s->status) /* else given up for an earlier failure */
+            stop(s, drape_fail(l->ctx, status, "%s", drape_context_message(ctx)));
+        pthread_mutex_unlock(&s->lock);
     }
     drape_context_destroy(&ctx);
     drape_locale_leave(old);
     return NULL;
 }
 
-static void run_threads(sweep *s)
-{
-    pthread_t threads[256];
-    int started = 0;
-    while (started < s->l->def->jobs && !pthread_create(&threads[started], NULL, work, s))
-        started++;
-    if (started == 0) {
-        stop(s, drape_fail(s->l->ctx, DRAPE_E_MEMORY, "no thread can be started"));
-        return;
-    }
-    for (int i = 0; i < started; i++)
-        pthread_join(threads[i], NULL);
-}
-
-static void count(sweep *s)
-{
-    for (size_t i = 0; i < s->l->count; i++)
-        if (is_ours(s->l, i)) {
-            s->total++;
-            s->done += s->l->results[i] != NULL;
-        }
-    s->before = s->done;
-}
-
 drape_status lab_sweep(lab *l)
 {
     char name[64] = "cases.jsonl";
+    pthread_t threads[256];
+    int started = 0;
     sweep s = {.l = l, .start = drape_clock_seconds()};
     if (l->def->shards > 1)
         snprintf(name, sizeof name, "cases-%d-of-%d.jsonl", l->def->shard, l->def->shards);
     pthread_mutex_init(&s.lock, NULL);
     atomic_init(&s.given_up, false);
-    count(&s);
-    s.status = begin_lines(l, name, l->def->shard, l->def->shards, &s.file);
+    for (size_t i = 0; i < l->count; i++)
+        if (is_ours(l, i)) {
+            s.total++;
+            s.before += l->results[i] != NULL;
+        }
+    s.done = s.before;
+    s.status = lab_begin_lines(l, name, l->def->shard, l->def->shards, &s.file);
     if (!s.status)
         s.status = drape_file_publish(&s.file);
-    if (!s.status && s.done < s.total)
-        run_threads(&s);
+    if (!s.status && s.done < s.total) {
+        while (started < l->def->jobs && !pthread_create(&threads[started], NULL, work, &s))
+            started++;
+        if (started == 0)
+            s.status = drape_fail(l->ctx, DRAPE_E_MEMORY, "no thread can be started");
+        for (int i = 0; i < started; i++)
+            pthread_join(threads[i], NULL);
+    }
     drape_status closed = drape_file_close(&s.file);
     drape_file_destroy(&s.file);
     pthread_mutex_destroy(&s.lock);
     return s.status ? s.status : closed;
-}
-
-void lab_copy_same(lab *l)
-{
-    for (size_t i = 0; i < l->count; i++) {
-        json_t *one = json_array_get(l->cases, i), *same = json_object_get(one, "same_as");
-        json_t *source = same ? l->results[json_integer_value(same)] : NULL;
-        if (!source || l->results[i])
-            continue;
-        l->results[i] = json_copy(source);
-        json_object_set_new(l->results[i], "case", json_integer((json_int_t)i));
-        json_object_set(l->results[i], "tags", json_object_get(one, "tags"));
-    }
 }

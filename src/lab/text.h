@@ -1,31 +1,44 @@
-/* text.h: files and pages of a report. */
+/* text.h: the files, pictures and page of a report. */
 #ifndef DRAPE_LAB_TEXT_H
 #define DRAPE_LAB_TEXT_H
 
 #include "lab/lab.h"
 
-/* Writes a text as a file of l->folder, whole or not at all. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Writes a text as a file of l->folder, atomically. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_write_text(lab *l, const char *name, const char *text, size_t size);
 
-/* Reads a file of a folder, or of none; *text is freed by the caller, with a 0 at its end. Errors: DRAPE_E_FILE,
- * DRAPE_E_MEMORY. */
-drape_status lab_read_text(drape_context *ctx, const char *folder, const char *name, char **text,
+/* Reads a file of a folder, or of none (NULL) into an arena; *text ends with a 0 that *size does not count. Errors:
+ * DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status lab_read_text(drape_arena *arena, const char *folder, const char *name, char **text,
                            size_t *size);
 
 /* results.csv: the columns that any result has, tags first. */
 drape_status lab_write_csv(lab *l);
 
-/* Runs gnuplot on a script, kept as name.gp in the folder, which writes pictures there. DRAPE_OK with
- * *drawn false, and a line in the words, where there is no gnuplot or it fails: figures and lines are there
- * all the same. */
-drape_status lab_plot(lab *l, const char *name, const char *script, size_t size, bool *drawn);
+/* A script for gnuplot while it is written. */
+typedef struct lab_plot {
+    char name[96];
+    FILE *script;
+    char *text;
+    size_t size;
+} lab_plot;
 
-/* Adds to the page: a heading, a picture of the folder with its caption, a table row. */
+/* Begins the script of a picture in SVG of that size [pixel]; its commands are printed to plot->script. Errors:
+ * DRAPE_E_MEMORY. */
+drape_status lab_plot_begin(lab *l, lab_plot *plot, const char *name, int width, int height);
+
+/* Ends the script. draws: keeps it as name.gp in the folder, runs gnuplot on it and adds the picture name.svg with its
+ * caption to the page. Where gnuplot is missing or fails, only the summary says so. */
+drape_status lab_plot_end(lab *l, lab_plot *plot, bool draws, const char *caption);
+
+/* The unit of a scene's value at a JSON pointer, as "Pa"; "" where it has none, or where it depends on what else the scene
+ * says (units.c). */
+const char *lab_unit(const char *pointer);
+
 void lab_page_heading(lab *l, const char *text);
-drape_status lab_page_picture(lab *l, const char *name, const char *caption);
 void lab_page_text(lab *l, const char *text); /* escaped */
 
-/* report.html of the words and the body. */
+/* report.html of the summary and the body. */
 drape_status lab_write_page(lab *l, const char *title);
 
 #endif

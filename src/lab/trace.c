@@ -6,24 +6,22 @@
 #include <math.h>
 #include <string.h>
 
-drape_status lab_trace_create(drape_context *ctx, size_t size, int64_t room, lab_trace *trace)
+drape_status lab_trace_create(drape_arena *arena, size_t size, int64_t room, lab_trace *trace)
 {
-    *trace = (lab_trace){.ctx = ctx, .size = size, .room = room};
-    trace->x = drape_alloc(ctx, size * (size_t)room, sizeof *trace->x);
+    *trace = (lab_trace){.size = size, .room = room};
+    trace->x = drape_arena_take(arena, size * (size_t)room, sizeof *trace->x);
     return trace->x ? DRAPE_OK : DRAPE_E_MEMORY;
-}
-
-void lab_trace_free(lab_trace *trace)
-{
-    if (trace->ctx)
-        drape_free(trace->ctx, trace->x);
-    *trace = (lab_trace){.ctx = NULL};
 }
 
 void lab_trace_add(lab_trace *trace, const double *x)
 {
     if (trace->frames < trace->room)
         memcpy(trace->x + trace->size * (size_t)trace->frames++, x, trace->size * sizeof *x);
+}
+
+const double *lab_trace_end(const lab_trace *trace)
+{
+    return trace->x + trace->size * (size_t)(trace->frames - 1);
 }
 
 double lab_distance(const drape_model *model, const double *a, const double *b)
@@ -42,25 +40,17 @@ double lab_distance(const drape_model *model, const double *a, const double *b)
     return nodes ? sqrt(sum / (double)nodes) : 0;
 }
 
-drape_status lab_probe_create(drape_context *ctx, const drape_model *model, lab_probe *probe)
+drape_status lab_probe_create(drape_arena *arena, const drape_model *model, lab_probe *probe)
 {
-    size_t count = (size_t)drape_model_node_count(model);
-    *probe = (lab_probe){.ctx = ctx, .count = count};
-    probe->rest = drape_alloc(ctx, 3 * count, sizeof *probe->rest);
+    const size_t count = (size_t)drape_model_node_count(model);
+    *probe = (lab_probe){.count = count, .rest = drape_arena_take(arena, 3 * count, sizeof *probe->rest)};
     if (!probe->rest)
         return DRAPE_E_MEMORY;
     memcpy(probe->rest, drape_model_rest_positions(model), 3 * count * sizeof *probe->rest);
     return DRAPE_OK;
 }
 
-void lab_probe_free(lab_probe *probe)
-{
-    if (probe->ctx)
-        drape_free(probe->ctx, probe->rest);
-    *probe = (lab_probe){.ctx = NULL};
-}
-
-/* Barycentric coordinates of the point of a triangle's plane below p, and the square of how far p is from the
+/* The barycentric coordinates of the projection of p on a triangle's plane. Returns the square of p's distance from the
  * triangle if they are all positive, more otherwise. */
 static double place_in(const double *rest, const int32_t *triangle, const double *p, double *weights)
 {
@@ -81,25 +71,22 @@ static double place_in(const double *rest, const int32_t *triangle, const double
     return vec3_dot(off, off) + outside * outside * (uu + vv);
 }
 
-void lab_probe_take(const lab_probe *probe, const drape_model *model, const double *x, double *out)
+void lab_probe_take(const lab_probe *probe, size_t i, const drape_model *model, const double *x,
+                    double out[3])
 {
     const double *rest = drape_model_rest_positions(model);
-    const int32_t *triangles = drape_model_triangles(model);
-    int32_t count = drape_model_triangle_count(model);
-    for (size_t i = 0; i < probe->count; i++) {
-        double best = INFINITY, weights[3], chosen[3] = {0};
-        const int32_t *home = triangles;
-        for (int32_t t = 0; t < count && best > 0; t++) {
-            double miss = place_in(rest, triangles + 3 * (size_t)t, probe->rest + 3 * i, weights);
-            if (!(miss < best))
-                continue;
-            best = miss;
-            home = triangles + 3 * (size_t)t;
-            memcpy(chosen, weights, sizeof chosen);
-        }
-        for (int k = 0; k < 3; k++)
-            out[3 * i + (size_t)k] = chosen[0] * x[3 * (size_t)home[0] + (size_t)k] +
-                                     chosen[1] * x[3 * (size_t)home[1] + (size_t)k] +
-                                     chosen[2] * x[3 * (size_t)home[2] + (size_t)k];
+    const int32_t *triangles = drape_model_triangles(model), *home = triangles;
+    double best = INFINITY, weights[3], chosen[3] = {0};
+    for (int32_t t = 0; t < drape_model_triangle_count(model) && best > 0; t++) {
+        const int32_t *triangle = triangles + 3 * (size_t)t;
+        const double miss = place_in(rest, triangle, probe->rest + 3 * i, weights);
+        if (!(miss < best))
+            continue;
+        best = miss;
+        home = triangle;
+        memcpy(chosen, weights, sizeof chosen);
     }
+    for (size_t k = 0; k < 3; k++)
+        out[k] = chosen[0] * x[3 * (size_t)home[0] + k] + chosen[1] * x[3 * (size_t)home[1] + k] +
+                 chosen[2] * x[3 * (size_t)home[2] + k];
 }

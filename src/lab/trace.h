@@ -2,36 +2,33 @@
 #ifndef DRAPE_LAB_TRACE_H
 #define DRAPE_LAB_TRACE_H
 
-#include "base/context.h"
+#include "base/arena.h"
 
 /* Frames of positions; all zero: none. */
 typedef struct lab_trace {
-    drape_context *ctx;
     size_t size; /* doubles a frame */
     int64_t frames, room;
-    double *x;
+    double *x; /* in an arena */
 } lab_trace;
 
-drape_status lab_trace_create(drape_context *ctx, size_t size, int64_t room, lab_trace *trace);
-void lab_trace_free(lab_trace *trace);
-void lab_trace_add(lab_trace *trace, const double *x); /* nothing where there is no room */
+drape_status lab_trace_create(drape_arena *arena, size_t size, int64_t room, lab_trace *trace);
+void lab_trace_add(lab_trace *trace, const double *x); /* ignored where there is no room */
+const double *lab_trace_end(const lab_trace *trace);   /* the last frame; there is one */
 
 /* Root of the mean, over the free nodes, of the square of the distance between two arrays of positions. */
 double lab_distance(const drape_model *model, const double *a, const double *b);
 
 /* Material points: where the nodes of one mesh lie in the rest shape of another, finer one of the same cloth. */
 typedef struct lab_probe {
-    drape_context *ctx;
     size_t count;
-    double *rest; /* (count x 3) [m] */
+    double *rest; /* (count x 3) [m], in an arena */
 } lab_probe;
 
 /* At the nodes of a model. Errors: DRAPE_E_MEMORY. */
-drape_status lab_probe_create(drape_context *ctx, const drape_model *model, lab_probe *probe);
-void lab_probe_free(lab_probe *probe);
+drape_status lab_probe_create(drape_arena *arena, const drape_model *model, lab_probe *probe);
 
-/* Positions at the points (count x 3): linear in the triangle that the point lies in, or is nearest to, at
- * rest. */
-void lab_probe_take(const lab_probe *probe, const drape_model *model, const double *x, double *out);
+/* The position of point i: linear in the triangle that it lies in, or is nearest to, at rest. */
+void lab_probe_take(const lab_probe *probe, size_t i, const drape_model *model, const double *x,
+                    double out[3]);
 
 #endif

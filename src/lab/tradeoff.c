@@ -1,26 +1,24 @@
 /*
- * tradeoff: work against accuracy. Every row of the integrators over its dt or rtol, under the scene's controller and
- * under those that bound an error; every linear solver at one dt. Errors are distances to a reference whose own
- * error is estimated; what comes within 100 times that estimate is listed, but not judged.
+ * tradeoff: work against accuracy. Every integrator over its dt or rtol, under the scene's controller and under those
+ * that bound an error; every linear solver at one dt. Errors are distances from a reference solution whose own error is
+ * estimated; an error below 100 times that estimate is listed, but not plotted.
  */
+#include "base/param.h"
 #include "control/control.h"
-#include "lab/grid.h"
 #include "lab/reference.h"
 #include "lab/text.h"
 #include "solvers/linear.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#define RESOLVED    100.0 /* times the reference's error: what is below is not told apart from it */
-#define BASE_METHOD "be"  /* what everybody else has: others are compared with it */
+#define RESOLVED    100.0 /* times the reference's error: smaller errors cannot be distinguished from it */
+#define BASE_METHOD "be"  /* the usual integrator: others are compared with it */
 #define BASE_DT     (1.0 / 60)
 
 static const double rates[] = {30, 60, 120, 240, 480, 960, 1920}; /* [1/s] */
 static const double rtols[] = {3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6};
 static const double controlled[] = {1e-2, 1e-3, 1e-4};
-static const int orders[] = {2, 5};
 
 /* ---- The cases ---- */
 
@@ -37,46 +35,42 @@ static drape_status add(lab *l, const char *series, const char *method, const ch
     return lab_add_case(l, tags, settings, -1);
 }
 
-static drape_status add_own_steps(lab *l, const drape_integrator_ops *row)
+/* Integrators that choose their steps, at every order that they are limited to. */
+static drape_status add_own_steps(lab *l, const drape_integrator_ops *integrator)
 {
+    static const int orders[] = {2, 5};
     drape_status status = DRAPE_OK;
-    bool ordered = lab_has_param(row->params, row->param_count, "max_order");
+    const bool ordered =
+        drape_param_find(integrator->entry.params, integrator->entry.param_count, "max_order") >= 0;
     for (size_t k = 0; k < (ordered ? sizeof orders / sizeof *orders : 1); k++) {
         char series[96];
-        if (ordered)
-            snprintf(series, sizeof series, "%s, order %d", row->name, orders[k]);
-        else
-            snprintf(series, sizeof series, "%s", row->name);
+        snprintf(series, sizeof series, ordered ? "%s, order %d" : "%s", integrator->entry.name, orders[k]);
         for (size_t i = 0; !status && i < sizeof rtols / sizeof *rtols; i++)
-            status = add(l, series, row->name, "integrator/rtol", rtols[i],
+            status = add(l, series, integrator->entry.name, "integrator/rtol", rtols[i],
                          ordered ? json_pack("{s:i}", "/integrator/max_order", orders[k]) : json_object());
     }
     return status;
 }
 
-static drape_status add_controlled(lab *l, const drape_integrator_ops *row)
-{
-    drape_status status = DRAPE_OK;
-    for (int c = 0; drape_controllers[c]; c++) {
-        const drape_controller_ops *controller = drape_controllers[c];
-        char series[96];
-        if (!lab_has_param(controller->params, controller->param_count, "rtol"))
-            continue;
-        snprintf(series, sizeof series, "%s, %s control", row->name, controller->name);
-        for (size_t i = 0; !status && i < sizeof controlled / sizeof *controlled; i++)
-            status = add(
-                l, series, row->name, "controller/rtol", controlled[i],
-                json_pack("{s:s, s:f}", "/controller/type", controller->name, "/integrator/dt", 1.0 / 480));
-    }
-    return status;
-}
-
-static drape_status add_fixed(lab *l, const drape_integrator_ops *row)
+/* Others: over dt, and under each controller that bounds an error. */
+static drape_status add_fixed(lab *l, const drape_integrator_ops *integrator)
 {
     drape_status status = DRAPE_OK;
     for (size_t i = 0; !status && i < sizeof rates / sizeof *rates; i++)
-        status = add(l, row->name, row->name, "integrator/dt", 1 / rates[i], json_object());
-    return status ? status : add_controlled(l, row);
+        status = add(l, integrator->entry.name, integrator->entry.name, "integrator/dt", 1 / rates[i],
+                     json_object());
+    for (int c = 0; drape_controllers[c]; c++) {
+        const drape_controller_ops *controller = drape_controllers[c];
+        char series[96];
+        if (drape_param_find(controller->entry.params, controller->entry.param_count, "rtol") < 0)
+            continue;
+        snprintf(series, sizeof series, "%s, %s control", integrator->entry.name, controller->entry.name);
+        for (size_t i = 0; !status && i < sizeof controlled / sizeof *controlled; i++)
+            status = add(l, series, integrator->entry.name, "controller/rtol", controlled[i],
+                         json_pack("{s:s, s:f}", "/controller/type", controller->entry.name, "/integrator/dt",
+                                   1.0 / 480));
+    }
+    return status;
 }
 
 /* They solve the same equations: only the cost differs. */
@@ -85,9 +79,9 @@ static drape_status add_linear_solvers(lab *l)
     drape_status status = DRAPE_OK;
     for (int i = 0; !status && drape_linears[i]; i++) {
         char series[96];
-        snprintf(series, sizeof series, BASE_METHOD ", linear solver %s", drape_linears[i]->name);
+        snprintf(series, sizeof series, BASE_METHOD ", linear solver %s", drape_linears[i]->entry.name);
         status = add(l, series, BASE_METHOD, "integrator/dt", BASE_DT,
-                     json_pack("{s:s}", "/integrator/linear_solver", drape_linears[i]->name));
+                     json_pack("{s:s}", "/integrator/linear_solver", drape_linears[i]->entry.name));
     }
     return status;
 }
@@ -96,10 +90,10 @@ static drape_status plan(lab *l)
 {
     drape_status status = lab_check_integrators(l);
     for (int i = 0; !status && drape_integrators[i]; i++) {
-        const drape_integrator_ops *row = drape_integrators[i];
-        if (!lab_wants_integrator(l, row->name, !row->timeless))
+        const drape_integrator_ops *integrator = drape_integrators[i];
+        if (!lab_wants_integrator(l, integrator->entry.name, !integrator->steady_state))
             continue;
-        status = row->own_steps ? add_own_steps(l, row) : add_fixed(l, row);
+        status = integrator->own_steps ? add_own_steps(l, integrator) : add_fixed(l, integrator);
     }
     if (!status && lab_wants_integrator(l, BASE_METHOD, true))
         status = add_linear_solvers(l);
@@ -112,10 +106,10 @@ static drape_status plan(lab *l)
 
 static bool is_linear_case(const json_t *result)
 {
-    return strstr(lab_tag_word(result, "series"), "linear solver") != NULL;
+    return strstr(lab_tag_text(result, "series"), "linear solver") != NULL;
 }
 
-/* The error of a case that is told apart from the reference's; NaN for others. */
+/* The error of a case where it can be distinguished from the reference's; otherwise NaN. */
 static double resolved_error(const json_t *result)
 {
     double error = lab_number(result, "error_end_m");
@@ -129,7 +123,7 @@ static const json_t *cheapest(const lab *l, double error, const char *integrator
     for (size_t i = 0; i < l->count; i++) {
         const json_t *r = l->results[i];
         if (is_linear_case(r) || !(resolved_error(r) <= error) ||
-            (integrator && strcmp(lab_tag_word(r, "series"), integrator) != 0))
+            (integrator && strcmp(lab_tag_text(r, "series"), integrator) != 0))
             continue;
         if (!best || lab_number(r, "cpu_s") < lab_number(best, "cpu_s"))
             best = r;
@@ -150,24 +144,17 @@ static void length_text(double metres, char *text, size_t size)
 static void knob_text(const json_t *result, char *text, size_t size)
 {
     double value = lab_tag_number(result, "value");
-    const char *knob = lab_tag_word(result, "knob");
+    const char *knob = lab_tag_text(result, "knob");
     if (strcmp(knob, "dt") == 0 && value > 0)
         snprintf(text, size, "dt 1/%.4g s", 1 / value);
     else
         snprintf(text, size, "%s %.3g", knob, value);
 }
 
-static bool has_series(const lab *l, const char *series)
-{
-    for (size_t i = 0; i < l->count; i++)
-        if (strcmp(lab_tag_word(l->results[i], "series"), series) == 0)
-            return true;
-    return false;
-}
-
 /* "At 1 mm error the cheapest is ida, order 2, rtol 0.0003 (0.21 s of CPU); be needs 0.86 s, 4.1 times as much". */
-static void say_cheapest(lab *l, double error)
+static void report_cheapest(lab *l, double error)
 {
+    bool has_base = false;
     const json_t *best = cheapest(l, error, NULL), *base = cheapest(l, error, BASE_METHOD);
     char length[32], knob[64];
     if (!best)
@@ -175,39 +162,41 @@ static void say_cheapest(lab *l, double error)
     length_text(error, length, sizeof length);
     knob_text(best, knob, sizeof knob);
     double cost = lab_number(best, "cpu_s");
-    fprintf(l->words, "At %s error the cheapest is %s, %s (%.3g s of CPU)", length,
-            lab_tag_word(best, "series"), knob, cost);
-    if (best == base || !has_series(l, BASE_METHOD))
-        fprintf(l->words, ".\n");
+    fprintf(l->summary, "At %s error the cheapest is %s, %s (%.3g s of CPU)", length,
+            lab_tag_text(best, "series"), knob, cost);
+    for (size_t i = 0; i < l->count; i++)
+        has_base |= strcmp(lab_tag_text(l->results[i], "series"), BASE_METHOD) == 0;
+    if (best == base || !has_base)
+        fprintf(l->summary, ".\n");
     else if (base)
-        fprintf(l->words, ", %.2g times cheaper than " BASE_METHOD ".\n", lab_number(base, "cpu_s") / cost);
+        fprintf(l->summary, ", %.2g times cheaper than " BASE_METHOD ".\n", lab_number(base, "cpu_s") / cost);
     else
-        fprintf(l->words, "; " BASE_METHOD " does not come so close in this grid.\n");
+        fprintf(l->summary, "; " BASE_METHOD " does not come so close in this grid.\n");
 }
 
-/* How far the step size that programs take by habit is from the truth. */
-static void say_headline(lab *l)
+/* How far the step sizes that programs usually take are from the converged motion. */
+static void report_headline(lab *l)
 {
-    const double habits[] = {BASE_DT, BASE_DT / 16};
+    const double usual[] = {BASE_DT, BASE_DT / 16};
     char errors[2][32];
     for (int k = 0; k < 2; k++) {
         const json_t *found = NULL;
         for (size_t i = 0; i < l->count && !found; i++)
-            if (strcmp(lab_tag_word(l->results[i], "series"), BASE_METHOD) == 0 &&
-                fabs(lab_tag_number(l->results[i], "value") / habits[k] - 1) < 1e-9 &&
+            if (strcmp(lab_tag_text(l->results[i], "series"), BASE_METHOD) == 0 &&
+                fabs(lab_tag_number(l->results[i], "value") / usual[k] - 1) < 1e-9 &&
                 lab_is_good(l->results[i]))
                 found = l->results[i];
         if (!found)
             return;
         length_text(lab_number(found, "error_end_m"), errors[k], sizeof errors[k]);
     }
-    fprintf(l->words,
+    fprintf(l->summary,
             BASE_METHOD " with steps of 1/60 s ends %s (root mean square over the nodes) from the converged "
                         "motion, with steps of 1/960 s %s.\n",
             errors[0], errors[1]);
 }
 
-static void say_reference(lab *l)
+static void report_reference(lab *l)
 {
     double smallest = INFINITY, reference = NAN;
     int unresolved = 0, late = 0;
@@ -217,17 +206,17 @@ static void say_reference(lab *l)
         reference = lab_number(r, "reference_error_m");
         smallest = error < smallest ? error : smallest;
         unresolved += lab_is_good(r) && isnan(error);
-        late += strcmp(lab_word(r, "status"), "over_budget") == 0;
+        late += strcmp(lab_text(r, "status"), "over_budget") == 0;
     }
-    fprintf(l->words, "The reference's error is estimated as %.2g m; ", reference);
+    fprintf(l->summary, "The reference's error is estimated as %.2g m; ", reference);
     if (!isfinite(smallest))
-        fprintf(l->words, "no error is plotted. ");
+        fprintf(l->summary, "no error is plotted. ");
     else if (reference > 0)
-        fprintf(l->words, "the smallest error plotted is %.2g m, %.3g times that. ", smallest,
+        fprintf(l->summary, "the smallest error plotted is %.2g m, %.3g times that. ", smallest,
                 smallest / reference);
     else
-        fprintf(l->words, "the smallest error plotted is %.2g m. ", smallest);
-    fprintf(l->words,
+        fprintf(l->summary, "the smallest error plotted is %.2g m. ", smallest);
+    fprintf(l->summary,
             "%d cases closer than 100 times are listed and not plotted; %d took more than their CPU time "
             "and were stopped.\n",
             unresolved, late);
@@ -246,113 +235,79 @@ static const chart charts[] = {
     {"error_jacobians", "Jacobians", "jacobians", "error at the end, RMS [m]", "error_end_m"},
 };
 
-/* The index of the first case of each series, in order. */
-static size_t list_series(const lab *l, size_t *first, size_t room)
-{
-    size_t count = 0;
-    for (size_t i = 0; i < l->count && count < room; i++) {
-        bool known = is_linear_case(l->results[i]);
-        for (size_t k = 0; k < count && !known; k++)
-            known = strcmp(lab_tag_word(l->results[first[k]], "series"),
-                           lab_tag_word(l->results[i], "series")) == 0;
-        if (!known)
-            first[count++] = i;
-    }
-    return count;
-}
-
-static int write_points(const lab *l, FILE *out, size_t k, const char *series, const chart *c)
-{
-    int points = 0;
-    fprintf(out, "$s%zu << EOD\n", k);
-    for (size_t i = 0; i < l->count; i++) {
-        const json_t *r = l->results[i];
-        double x = lab_number(r, c->x_key), y = lab_number(r, c->y_key);
-        if (strcmp(lab_tag_word(r, "series"), series) != 0 || isnan(resolved_error(r)) || !(x > 0) ||
-            !(y > 0))
-            continue;
-        fprintf(out, "%.9g %.9g\n", x, y);
-        points++;
-    }
-    fprintf(out, "EOD\n");
-    return points;
-}
-
 /* A colour for each integrator, dashes and points for its variants. Okabe & Ito 2008, Color Universal Design. */
 static const char *const colours[] = {"0072B2", "D55E00", "009E73", "CC79A7",
                                       "E69F00", "56B4E9", "000000", "7F7F7F"};
 
-typedef struct look {
-    size_t colour, variant;
-} look;
+/* A series of a chart. */
+typedef struct curve {
+    const char *series, *integrator;
+    size_t colour, variant; /* colours run on; variant: of its integrator */
+} curve;
 
-static look look_of(const lab *l, const size_t *first, size_t k)
+/* The series but those of linear solvers, in order. */
+static size_t list_curves(const lab *l, curve *curves, size_t room)
 {
-    look one = {.colour = 0};
-    const char *mine = lab_tag_word(l->results[first[k]], "integrator"), *before = "";
-    for (size_t i = 0; i <= k; i++) {
-        const char *row = lab_tag_word(l->results[first[i]], "integrator");
-        one.colour += i > 0 && strcmp(row, before) != 0;
-        one.variant += i < k && strcmp(row, mine) == 0;
-        before = row;
-    }
-    one.colour %= sizeof colours / sizeof *colours;
-    return one;
-}
-
-/* false: there is no point to draw, and on axes in logarithms not even the axes. */
-static bool write_script(const lab *l, FILE *out, const chart *c)
-{
-    size_t first[128], count = list_series(l, first, 128);
-    bool drawn[128], any = false;
-    fprintf(
-        out,
-        "set terminal svg size 900,560 dynamic font 'sans-serif,13' background '#ffffff' name '%s'\n"
-        "cd '%s'\nset output '%s.svg'\nset logscale xy\nset format '10^{%%T}'\n"
-        "set grid lc rgb '#dddddd'\nset key outside right top noenhanced\nset xlabel '%s'\nset ylabel '%s'\n",
-        c->file, l->folder, c->file, c->x_label, c->y_label);
-    for (size_t k = 0; k < count; k++)
-        drawn[k] = write_points(l, out, k, lab_tag_word(l->results[first[k]], "series"), c) > 0;
-    for (size_t k = 0; k < count; k++) {
-        if (!drawn[k])
+    size_t count = 0;
+    for (size_t i = 0; i < l->count && count < room; i++) {
+        curve one = {.series = lab_tag_text(l->results[i], "series"),
+                     .integrator = lab_tag_text(l->results[i], "integrator")};
+        bool known = is_linear_case(l->results[i]);
+        for (size_t k = 0; k < count && !known; k++) {
+            known = strcmp(curves[k].series, one.series) == 0;
+            one.variant += strcmp(curves[k].integrator, one.integrator) == 0;
+        }
+        if (known)
             continue;
-        const look one = look_of(l, first, k);
-        fprintf(out, "%s $s%zu with linespoints lw 1.8 lc rgb '#%s' dt %zu pt %zu ps .6 title \"%s\"",
-                any ? "," : "plot", k, colours[one.colour], one.variant + 1, 7 - 2 * (one.variant % 3),
-                lab_tag_word(l->results[first[k]], "series"));
-        any = true;
+        if (count > 0)
+            one.colour =
+                curves[count - 1].colour + (strcmp(curves[count - 1].integrator, one.integrator) != 0);
+        curves[count++] = one;
     }
-    fprintf(out, "\n");
-    return any;
+    return count;
 }
 
 static drape_status draw(lab *l, const chart *c)
 {
-    char *script = NULL, picture[64];
-    size_t size = 0;
-    bool drawn = false;
-    drape_status status = DRAPE_OK;
-    FILE *out = open_memstream(&script, &size);
-    if (!out)
-        return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for a picture");
-    bool any = write_script(l, out, c);
-    fclose(out);
-    if (any)
-        status = lab_plot(l, c->file, script, size, &drawn);
-    free(script);
-    snprintf(picture, sizeof picture, "%s.svg", c->file);
-    return status || !drawn ? status : lab_page_picture(l, picture, c->y_label);
+    curve curves[128];
+    bool drawn[128], any = false;
+    lab_plot plot;
+    const size_t count = list_curves(l, curves, 128);
+    drape_status status = lab_plot_begin(l, &plot, c->file, 900, 560);
+    if (status)
+        return status;
+    fprintf(plot.script,
+            "set logscale xy\nset format '10^{%%T}'\nset grid lc rgb '#dddddd'\n"
+            "set key outside right top noenhanced\nset xlabel '%s'\nset ylabel '%s'\n",
+            c->x_label, c->y_label);
+    for (size_t k = 0; k < count; k++) {
+        drawn[k] = false;
+        fprintf(plot.script, "$s%zu << EOD\n", k);
+        for (size_t i = 0; i < l->count; i++) {
+            const json_t *r = l->results[i];
+            const double x = lab_number(r, c->x_key), y = lab_number(r, c->y_key);
+            if (strcmp(lab_tag_text(r, "series"), curves[k].series) != 0 || isnan(resolved_error(r)) ||
+                !(x > 0) || !(y > 0))
+                continue;
+            fprintf(plot.script, "%.9g %.9g\n", x, y);
+            drawn[k] = true;
+        }
+        fprintf(plot.script, "EOD\n");
+    }
+    for (size_t k = 0; k < count; k++) {
+        const curve *one = &curves[k];
+        if (!drawn[k])
+            continue;
+        fprintf(plot.script, "%s $s%zu with linespoints lw 1.8 lc rgb '#%s' dt %zu pt %zu ps .6 title \"%s\"",
+                any ? "," : "plot", k, colours[one->colour % (sizeof colours / sizeof *colours)],
+                one->variant + 1, 7 - 2 * (one->variant % 3), one->series);
+        any = true;
+    }
+    fprintf(plot.script, "\n");
+    return lab_plot_end(l, &plot, any, c->y_label); /* logarithmic axes need a point */
 }
 
 /* ---- The table ---- */
-
-static void put_cell(FILE *out, double value)
-{
-    if (isnan(value))
-        fputs("<td></td>", out);
-    else
-        fprintf(out, "<td>%.4g</td>", value);
-}
 
 static void write_table(lab *l)
 {
@@ -361,20 +316,23 @@ static void write_table(lab *l)
                                        "jacobians",   "factorizations", "linear_iterations"};
     const size_t columns = sizeof keys / sizeof *keys;
     lab_page_heading(l, "All cases");
-    fputs("<table><tr><th>row</th><th>setting</th><th>status</th>", l->page);
+    fputs("<table><tr><th>integrator</th><th>setting</th><th>status</th>", l->page);
     for (size_t k = 0; k < columns; k++)
         fprintf(l->page, "<th>%s</th>", keys[k]);
     fputs("</tr>\n", l->page);
     for (size_t i = 0; i < l->count; i++) {
+        const json_t *r = l->results[i];
         char knob[64];
-        knob_text(l->results[i], knob, sizeof knob);
+        knob_text(r, knob, sizeof knob);
         fputs("<tr><td>", l->page);
-        lab_page_text(l, lab_tag_word(l->results[i], "series"));
+        lab_page_text(l, lab_tag_text(r, "series"));
         fprintf(l->page, "</td><td>%s</td><td>", knob);
-        lab_page_text(l, lab_word(l->results[i], "status"));
+        lab_page_text(l, lab_text(r, "status"));
         fputs("</td>", l->page);
-        for (size_t k = 0; k < columns; k++)
-            put_cell(l->page, lab_is_good(l->results[i]) || k > 2 ? lab_number(l->results[i], keys[k]) : NAN);
+        for (size_t k = 0; k < columns; k++) {
+            const double value = lab_is_good(r) || k > 2 ? lab_number(r, keys[k]) : NAN;
+            fprintf(l->page, isnan(value) ? "<td></td>" : "<td>%.4g</td>", value);
+        }
         fputs("</tr>\n", l->page);
     }
     fputs("</table>\n", l->page);
@@ -383,12 +341,12 @@ static void write_table(lab *l)
 static drape_status report(lab *l)
 {
     drape_status status = DRAPE_OK;
-    say_headline(l);
+    report_headline(l);
     for (int decade = 0; decade >= -7; decade--)
         if (cheapest(l, pow(10, decade), NULL) &&
             cheapest(l, pow(10, decade), NULL) != cheapest(l, pow(10, decade + 1), NULL))
-            say_cheapest(l, pow(10, decade));
-    say_reference(l);
+            report_cheapest(l, pow(10, decade));
+    report_reference(l);
     for (size_t i = 0; !status && i < sizeof charts / sizeof *charts; i++)
         status = draw(l, &charts[i]);
     write_table(l);
@@ -396,8 +354,7 @@ static drape_status report(lab *l)
 }
 
 const lab_experiment_ops lab_experiment_tradeoff = {
-    .name = "tradeoff",
-    .summary = "work against accuracy of every integrator over its settings",
+    .entry = {.name = "tradeoff", .summary = "work against accuracy of every integrator over its settings"},
     .compares_costs = true,
     .plan = plan,
     .check = lab_check_reference,

@@ -1,13 +1,20 @@
 /* validate.c: runs the cases of a reference. */
 #include "lab/validate.h"
 
+#include "base/clock.h"
+
 #include <gsl/gsl_errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 #define BISECTIONS 9 /* of a threshold: 1/512 of the interval that it is sought in */
+
+void drape_reference_quote(char *text)
+{
+    for (char *c = strchr(text, '\''); c; c = strchr(c, '\''))
+        *c = '"';
+}
 
 static drape_status watch(void *user, const drape_event *event)
 {
@@ -16,13 +23,14 @@ static drape_status watch(void *user, const drape_event *event)
     return run->cancel && run->cancel(run->user) ? DRAPE_RETRY_REJECTED : DRAPE_OK;
 }
 
-drape_status drape_reference_open(drape_reference_run *run, const char *text)
+/* Runs the scene of a load and measures. */
+static drape_status measure_at(drape_reference_run *run, const drape_reference *reference, double load,
+                               double *value)
 {
     char json[DRAPE_LAB_TEXT];
     drape_scene *scene = NULL;
-    snprintf(json, sizeof json, "%s", text);
-    for (char *c = json; *c; c++)
-        *c = *c == '\'' ? '"' : *c;
+    reference->scene(&(drape_reference_case){reference, run->parameter, load}, json);
+    drape_reference_quote(json);
     drape_status status = drape_scene_parse(run->ctx, json, "reference", &scene);
     if (!status)
         status = drape_scene_compile(scene, &run->model);
@@ -30,46 +38,24 @@ drape_status drape_reference_open(drape_reference_run *run, const char *text)
         status = drape_sim_create(run->ctx, run->model, NULL, &run->sim);
     if (!status)
         status = drape_sim_observe(run->sim, watch, run);
+    if (!status)
+        status = reference->measure(run, value);
     drape_scene_destroy(&scene);
-    return status;
-}
-
-void drape_reference_close(drape_reference_run *run)
-{
     drape_sim_destroy(&run->sim);
     drape_model_destroy(&run->model);
-}
-
-/* What all simulations of a case share. */
-typedef struct job {
-    drape_context *ctx;
-    const drape_reference *reference;
-    double parameter;
-    drape_validate_cancel *cancel;
-    void *user;
-} job;
-
-static drape_status measure_at(const job *j, double load, double *value)
-{
-    char text[DRAPE_LAB_TEXT];
-    drape_reference_run run = {
-        .ctx = j->ctx, .parameter = j->parameter, .cancel = j->cancel, .user = j->user};
-    j->reference->scene(j->parameter, load, text, sizeof text);
-    drape_status status = drape_reference_open(&run, text);
-    if (!status)
-        status = j->reference->measure(&run, value);
-    drape_reference_close(&run);
+    drape_arena_free(&run->arena);
     return status;
 }
 
-/* Between a load at which the measure is 0 and one at which it is not. */
-static drape_status search(const job *j, double expected, double *load)
+/* Bisects between a load at which the measure is 0 and one at which it is not. */
+static drape_status search(drape_reference_run *run, const drape_reference *reference, double expected,
+                           double *load)
 {
-    double low = j->reference->low * expected, high = j->reference->high * expected, value = 0;
+    double low = reference->low * expected, high = reference->high * expected, value = 0;
     drape_status status = DRAPE_OK;
     for (int k = 0; !status && k < BISECTIONS; k++) {
         *load = (low + high) / 2;
-        status = measure_at(j, *load, &value);
+        status = measure_at(run, reference, *load, &value);
         if (value > 0)
             high = *load;
         else
@@ -84,24 +70,12 @@ int drape_validate_runs(const drape_reference *reference)
     return reference->high > 0 ? BISECTIONS : 1;
 }
 
-static double cpu_seconds(void)
-{
-    struct timespec now;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-static double held_to(const drape_reference *reference, const drape_validation *v)
-{
-    return reference->documented ? v->documented : v->expected;
-}
-
 void drape_validate_judge(const drape_reference *reference, drape_validation *v)
 {
-    gsl_set_error_handler_off(); /* its default ends the process */
+    gsl_set_error_handler_off(); /* the default handler ends the process */
     v->expected = reference->expected(v->parameter);
     v->documented = reference->documented ? reference->documented(v->parameter) : NAN;
-    v->error = v->obtained / held_to(reference, v) - 1;
+    v->error = v->obtained / (reference->documented ? v->documented : v->expected) - 1;
     v->verdict = *v->message                                 ? DRAPE_OUTCOME_STOPPED
                  : !(fabs(v->error) <= reference->tolerance) ? DRAPE_OUTCOME_FAIL
                  : reference->documented                     ? DRAPE_OUTCOME_DOCUMENTED
@@ -111,13 +85,18 @@ void drape_validate_judge(const drape_reference *reference, drape_validation *v)
 drape_status drape_validate(drape_context *ctx, const drape_reference *reference, int index,
                             drape_validate_cancel *cancel, void *user, drape_validation *out)
 {
-    const double start = cpu_seconds();
-    const job j = {ctx, reference, reference->parameters[index], cancel, user};
-    *out = (drape_validation){.parameter = j.parameter, .obtained = NAN};
+    const double start = drape_clock_cpu_seconds();
+    drape_reference_run run = {ctx, drape_arena_of(ctx), NULL, NULL, reference->parameters[index], cancel,
+                               user};
+    drape_status status;
+    *out = (drape_validation){.parameter = run.parameter, .obtained = NAN};
     drape_validate_judge(reference, out);
-    drape_status status = reference->high > 0 ? search(&j, held_to(reference, out), &out->obtained)
-                                              : measure_at(&j, 0, &out->obtained);
-    out->seconds = cpu_seconds() - start;
+    if (reference->high > 0)
+        status =
+            search(&run, reference, reference->documented ? out->documented : out->expected, &out->obtained);
+    else
+        status = measure_at(&run, reference, 0, &out->obtained);
+    out->seconds = drape_clock_cpu_seconds() - start;
     if (status && cancel && cancel(user))
         return drape_fail(ctx, DRAPE_E_STOPPED, "interrupted");
     if (status) {

@@ -1,77 +1,97 @@
-/* validate.h: references of physics: what a scene gives against what is known. */
+/* validate.h: physics references: scenes whose outcome is known, and what Drape makes of them. */
 #ifndef DRAPE_LAB_VALIDATE_H
 #define DRAPE_LAB_VALIDATE_H
 
+#include "base/arena.h"
+#include "base/registry.h"
 #include "sim/sim.h"
 
-/* Whether to stop. Called after every step: it must only look. */
+#define DRAPE_LAB_TEXT 4096 /* bytes of a scene's text, at most */
+
+/* Whether to stop. Called after every step; it must not use the sim. */
 typedef bool drape_validate_cancel(void *user);
 
-/* A scene while a reference is measured in it. */
+/* A simulation while a reference is measured in it. */
 typedef struct drape_reference_run {
     drape_context *ctx;
+    drape_arena arena; /* freed after the measurement */
     drape_model *model;
     drape_sim *sim;
     double parameter;              /* of the case */
-    drape_validate_cancel *cancel; /* whether to stop; NULL: never */
+    drape_validate_cancel *cancel; /* NULL: never */
     void *user;                    /* of cancel */
 } drape_reference_run;
-
-/* Fills the model and the sim from a scene's text, in which ' stands for "; the other members are set before.
- * drape_reference_close in any case. */
-drape_status drape_reference_open(drape_reference_run *run, const char *text);
-void drape_reference_close(drape_reference_run *run);
 
 /* How a case ended. */
 typedef enum drape_outcome {
     DRAPE_OUTCOME_PASS,
     DRAPE_OUTCOME_FAIL,
-    DRAPE_OUTCOME_DOCUMENTED, /* not the reference, but what this model is known to give instead */
-    DRAPE_OUTCOME_STOPPED     /* the simulation did */
+    DRAPE_OUTCOME_DOCUMENTED, /* differs from the reference as this model is known to */
+    DRAPE_OUTCOME_STOPPED     /* the simulation failed */
 } drape_outcome;
 
-/* One reference: a row. Its cases differ in one parameter. */
+/* What a scene is made for. */
+typedef struct drape_reference_case {
+    const struct drape_reference *reference;
+    double parameter;
+    double load; /* trial value of a threshold; 0 in other references */
+} drape_reference_case;
+
+/* A reference. Its cases differ in one parameter. */
 typedef struct drape_reference {
-    const char *name, *quantity, *unit;
-    const char *parameter; /* what the cases differ in; NULL: nothing */
-    const char *model;     /* the terms and the mesh */
-    const char *source;
+    drape_entry entry;        /* summary: the quantity; reference: the source of what is expected */
+    const char *unit;         /* of the quantity */
+    const char *parameter;    /* what the cases differ in; NULL: there is one case */
+    const char *model;        /* the terms and the mesh */
     double tolerance;         /* relative; of the documented value where there is one */
-    const double *parameters; /* (case_count) */
+    const double *parameters; /* (case_count), see DRAPE_CASES */
     int case_count;
     double (*expected)(double parameter);
-    double (*documented)(
-        double parameter); /* what the model converges to instead; NULL: it has no such error */
-    /* The text of the scene; load: what is searched, else 0. As snprintf. */
-    int (*scene)(double parameter, double load, char *text, size_t size);
+    double (*documented)(double parameter); /* what the model converges to instead; NULL: no model error */
+    /* Writes the text of the scene, in which ' stands for "; returns its length, as snprintf. */
+    int (*scene)(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]);
+    const char *members; /* of the scene, where entries share the function scene */
     /* Advances the sim and measures. */
     drape_status (*measure)(drape_reference_run *run, double *value);
-    /* Thresholds: the quantity is the load, between these shares of the expected one, above which measure is
-     * > 0. */
+    /* For thresholds: the quantity is the load above which measure is > 0, sought between these multiples of the
+     * expected value. */
     double low, high;
 } drape_reference;
+
 extern const drape_reference *const drape_references[]; /* NULL-ended */
+extern const drape_registry drape_reference_registry;
+extern const char *const drape_references_words[]; /* their names */
+
+/* The parameters of the cases, in an initialiser of drape_reference. */
+#define DRAPE_CASES(...)                                                                                     \
+    .parameters = (const double[]){__VA_ARGS__},                                                             \
+    .case_count = sizeof((const double[]){__VA_ARGS__}) / sizeof(double)
+
+/* Defines the reference of that name; meson.build puts it into the table. */
+#define DRAPE_REFERENCE(word, ...)                                                                           \
+    const drape_reference drape_reference_##word = {.entry.name = #word, __VA_ARGS__}
 
 typedef struct drape_validation {
-    double parameter, expected, documented, obtained, error; /* error: relative, of the one it is held to */
-    double seconds;                                          /* of CPU */
+    double parameter, expected, documented, obtained;
+    double error;   /* relative, of the value it is checked against */
+    double seconds; /* of CPU */
     drape_outcome verdict;
-    char message[512]; /* of a simulation that stopped */
+    char message[512]; /* of a simulation that failed */
 } drape_validation;
 
-/* Runs one case. cancel: see drape_reference_run. Errors: DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancel said so): all else is a
- * verdict. */
+/* Runs one case. Errors: DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled); all else is a verdict. */
 drape_status drape_validate(drape_context *ctx, const drape_reference *reference, int index,
                             drape_validate_cancel *cancel, void *user, drape_validation *out);
 
-/* Simulations that a case takes: those of a search are several. */
+/* Simulations that a case takes: the search of a threshold takes several. */
 int drape_validate_runs(const drape_reference *reference);
 
-/* What expected and documented are, and how far what was obtained is from them. */
+/* Fills all but parameter, obtained, seconds and message, which are given. */
 void drape_validate_judge(const drape_reference *reference, drape_validation *v);
 
-const char *drape_outcome_name(drape_outcome verdict);
+/* Turns ' into ". */
+void drape_reference_quote(char *text);
 
-#define DRAPE_LAB_TEXT 4096 /* of a scene, at most */
+const char *drape_outcome_name(drape_outcome verdict);
 
 #endif

@@ -1,12 +1,9 @@
-/* grid.c: see grid.h; and makes a mesh by the row of the grids that a def names. */
+/* grid.c: see grid.h; and makes the grid that a def names. */
 #include "mesh/grid.h"
 
 #include <stdio.h>
-#include <string.h>
 
 #include "base/param.h"
-
-#define MAX_GRID_NAMES 64
 
 const char *const drape_grid_orientations[] = {
     [GRID_HORIZONTAL] = "horizontal", [GRID_VERTICAL] = "vertical", NULL};
@@ -62,34 +59,19 @@ void drape_grid_triangulate(drape_mesh *mesh, const bool falling[2][2], bool fli
                                     falling[row % 2][column % 2], flip);
 }
 
-static drape_status unknown_grid(drape_context *ctx, const char *pointer, const char *type)
-{
-    const char *names[MAX_GRID_NAMES];
-    char place[sizeof ctx->pointer], known[256];
-    size_t count = 0, used = 0;
-    for (; drape_grids[count] && count < MAX_GRID_NAMES; count++) {
-        names[count] = drape_grids[count]->name;
-        if (used < sizeof known)
-            used +=
-                (size_t)snprintf(known + used, sizeof known - used, "%s%s", count ? ", " : "", names[count]);
-    }
-    const char *meant = drape_did_you_mean(type, names, count);
-    snprintf(place, sizeof place, "%s/grid", pointer);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "unknown grid \"%.60s\"; known are %s%s%s%s", type,
-                         known, DRAPE_MEANT(meant));
-}
-
-drape_status drape_mesh_from_grid(drape_context *ctx, const char *pointer, const drape_row_def *grid,
+drape_status drape_mesh_from_grid(drape_context *ctx, const char *pointer, const drape_entry_def *grid,
                                   drape_mesh *mesh)
 {
-    const drape_grid_ops *const *row = drape_grids;
-    while (*row && strcmp((*row)->name, grid->type) != 0)
-        row++;
-    if (!*row)
-        return unknown_grid(ctx, pointer, grid->type);
+    char place[sizeof ctx->pointer];
+    int i;
+    snprintf(place, sizeof place, "%s/grid", pointer);
+    drape_status status = drape_registry_choose(ctx, &drape_grid_registry, place, grid->type, &i);
+    if (status)
+        return status;
 
+    const drape_grid_ops *ops = drape_grids[i];
     double values[DRAPE_MAX_PARAMS];
-    const drape_status status = drape_params_resolve(ctx, pointer, (*row)->params, (*row)->param_count,
-                                                     grid->settings, grid->setting_count, values);
-    return status ? status : (*row)->generate(ctx, pointer, values, mesh);
+    status = drape_params_resolve(ctx, pointer, ops->entry.params, ops->entry.param_count, grid->settings,
+                                  grid->setting_count, values);
+    return status ? status : ops->generate(ctx, pointer, values, mesh);
 }

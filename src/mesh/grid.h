@@ -22,23 +22,16 @@ drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_
  *
  * falling[r % 2][c % 2]: the cell is split from A to D into A B D and A D C, else from B to C into A B C and
  * B D C. Seen as drawn the triangles turn counterclockwise; with flip they turn clockwise. The triangles of a
- * cell follow each other, cells in the order of their A. drape_grid_split does one cell, of corner A = a, and returns
- * where the next goes.
+ * cell follow each other, cells in the order of their A. drape_grid_split does one cell, of corner A = a, and
+ * returns where the next goes.
  */
 int32_t *drape_grid_split(int32_t *triangle, int32_t a, int32_t columns, bool falling, bool flip);
 void drape_grid_triangulate(drape_mesh *mesh, const bool falling[2][2], bool flip);
 
 /* Parameters: a number of nodes, of which the grid has at most 2^28 / share; a length. */
-#define GRID_NODES(name_, least_, share_, help_)                                                             \
-    {                                                                                                        \
-        .name = name_, .kind = DRAPE_PARAM_INTEGER, .unit = "1", .default_value = NAN, .min = least_,        \
-        .max = DRAPE_MAX_NODES / (share_), .help = help_                                                     \
-    }
-#define GRID_LENGTH(name_, help_)                                                                            \
-    {                                                                                                        \
-        .name = name_, .kind = DRAPE_PARAM_NUMBER, .unit = "m", .default_value = NAN, .min = 0, .max = 1e9,  \
-        .open_min = true, .help = help_                                                                      \
-    }
+#define GRID_NODES(name, min, share, help)                                                                   \
+    DRAPE_INTEGER(name, "1", DRAPE_REQUIRED, min, DRAPE_MAX_NODES / (share), help)
+#define GRID_LENGTH(name, help) DRAPE_NUMBER(name, "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, help)
 
 /* Those of rectangles: the first ones of such a grid, and in which plane it lies. */
 enum { GRID_COLUMNS, GRID_ROWS, GRID_WIDTH, GRID_HEIGHT, GRID_RECTANGLE_COUNT };
@@ -50,9 +43,7 @@ extern const char *const drape_grid_orientations[];
     [GRID_WIDTH] = GRID_LENGTH("width", "size along x"),                                                     \
     [GRID_HEIGHT] = GRID_LENGTH("height", "size along -z, or along -y if vertical")
 #define GRID_ORIENTATION                                                                                     \
-    {                                                                                                        \
-        .name = "orientation", .kind = DRAPE_PARAM_CHOICE, .unit = "1", .default_value = GRID_HORIZONTAL,    \
-        .choices = drape_grid_orientations, .help = "the plane of the sheet: y = 0 or z = 0"                 \
-    }
+    DRAPE_CHOICE("orientation", GRID_HORIZONTAL, drape_grid_orientations,                                    \
+                 "the plane of the sheet: y = 0 or z = 0")
 
 #endif

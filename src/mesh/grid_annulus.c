@@ -1,7 +1,8 @@
 /*
- * grid_annulus.c: a ring between two circles about the y axis, in the plane y = 0, normal +y. Rows are circles from the
- * inner to the outer one, so that pins of row 0, or of the edge "top", hold the inner rim, and "bottom" is the outer;
- * columns are spokes, and the last is beside the first. Every second circle is turned by half a spoke. Node (r, c):
+ * grid_annulus.c: a ring between two circles about the y axis, in the plane y = 0, normal +y. Rows are
+ * circles from the inner to the outer one, so that pins of row 0, or of the edge "top", hold the inner rim,
+ * and "bottom" is the outer; columns are spokes, and the last is beside the first. Every second circle is
+ * turned by half a spoke. Node (r, c):
  *
  *     R = inner + r (outer - inner)/(circles - 1),  a = 2 pi (c + (r odd ? 1/2 : 0))/spokes,
  *     x = R cos a,  z = -R sin a
@@ -84,9 +85,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 }
 
 const drape_grid_ops drape_grid_annulus = {
-    .name = "annulus",
-    .summary = "a ring between two circles: what overhangs the disc of a drape tester",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "annulus",
+              .summary = "a ring between two circles: what overhangs the disc of a drape tester",
+              DRAPE_PARAMS(params)},
     .generate = generate,
 };

@@ -15,23 +15,15 @@
 
 enum { EDGES, EDGE_LENGTH, STRIPS, PARAM_COUNT };
 
+/* MAX_EDGES + 1 nodes a side are DRAPE_MAX_NODES. */
+#define MAX_EDGES 16383
+
 static const drape_param params[PARAM_COUNT] = {
-    [EDGES] = {.name = "edges",
-               .kind = DRAPE_PARAM_INTEGER,
-               .unit = "1",
-               .default_value = NAN,
-               .min = 1,
-               .max = 16383, /* (max + 1)^2 = DRAPE_MAX_NODES */
-               .help = "edges along each side; the sheet has (edges + 1)^2 nodes, at most 2^28"},
+    [EDGES] = DRAPE_INTEGER("edges", "1", DRAPE_REQUIRED, 1, MAX_EDGES,
+                            "edges along each side; the sheet has (edges + 1)^2 nodes, at most 2^28"),
     [EDGE_LENGTH] = GRID_LENGTH("edge_length", "length of every edge"),
-    [STRIPS] = {.name = "strips",
-                .kind = DRAPE_PARAM_INTEGER,
-                .unit = "1",
-                .default_value = NAN,
-                .derived = "as many as edges",
-                .min = 1,
-                .max = 16383,
-                .help = "strips of triangles, one less than rows of nodes"},
+    [STRIPS] = DRAPE_INTEGER("strips", "1", DRAPE_DERIVED("as many as edges"), 1, MAX_EDGES,
+                             "strips of triangles, one less than rows of nodes"),
 };
 
 static drape_status generate(drape_context *ctx, const char *pointer, const double *values, drape_mesh *mesh)
@@ -56,9 +48,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 }
 
 const drape_grid_ops drape_grid_equilateral = {
-    .name = "equilateral",
-    .summary = "equilateral triangles in rows, every second row shifted by half an edge",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "equilateral",
+              .summary = "equilateral triangles in rows, every second row shifted by half an edge",
+              DRAPE_PARAMS(params)},
     .generate = generate,
 };

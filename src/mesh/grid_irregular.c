@@ -12,20 +12,9 @@ enum { JITTER = GRID_RECTANGLE_COUNT, SEED, ORIENTATION, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
     GRID_RECTANGLE,
-    [JITTER] = {.name = "jitter",
-                .kind = DRAPE_PARAM_NUMBER,
-                .unit = "1",
-                .default_value = 0.25,
-                .min = 0,
-                .max = 0.4,
-                .help = "how far nodes are out of line, as a share of a cell"},
-    [SEED] = {.name = "seed",
-              .kind = DRAPE_PARAM_INTEGER,
-              .unit = "1",
-              .default_value = 1,
-              .min = 0,
-              .max = 1e9,
-              .help = "another mesh of the same kind"},
+    [JITTER] =
+        DRAPE_NUMBER("jitter", "1", 0.25, 0, 0.4, "how far nodes are out of line, as a share of a cell"),
+    [SEED] = DRAPE_INTEGER("seed", "1", 1, 0, 1e9, "another mesh of the same kind"),
     [ORIENTATION] = GRID_ORIENTATION,
 };
 
@@ -78,9 +67,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 }
 
 const drape_grid_ops drape_grid_irregular = {
-    .name = "irregular",
-    .summary = "a rectangle of columns x rows nodes out of line, to show what depends on the mesh",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "irregular",
+              .summary = "a rectangle of columns x rows nodes out of line, to show what depends on the mesh",
+              DRAPE_PARAMS(params)},
     .generate = generate,
 };

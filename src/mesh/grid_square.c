@@ -4,7 +4,8 @@
  *
  *     horizontal: (u, 0, -w), normal +y        vertical: (u, -w, 0), normal +z.
  *
- * With noise a node is up to that far off the plane: it lets a sheet fall that would stand on its edge for ever.
+ * With noise a node is up to that far off the plane: it lets a sheet fall that would stand on its edge for
+ * ever.
  *
  * The diagonals of its cells are parallel, from (r, c) to (r+1, c+1), or alternate with r + c, beginning with
  * that one: alternating ones do not make the sheet stiffer along one diagonal than along the other.
@@ -20,21 +21,11 @@ static const char *const diagonals[] = {[ALTERNATING] = "alternating", [PARALLEL
 
 static const drape_param params[PARAM_COUNT] = {
     GRID_RECTANGLE,
-    [DIAGONALS] = {.name = "diagonals",
-                   .kind = DRAPE_PARAM_CHOICE,
-                   .unit = "1",
-                   .default_value = ALTERNATING,
-                   .choices = diagonals,
-                   .help = "how the cells are split into triangles"},
+    [DIAGONALS] = DRAPE_CHOICE("diagonals", ALTERNATING, diagonals, "how the cells are split into triangles"),
     [ORIENTATION] = GRID_ORIENTATION,
-    [NOISE] = {.name = "noise",
-               .kind = DRAPE_PARAM_NUMBER,
-               .unit = "m",
-               .default_value = 0,
-               .min = 0,
-               .max = 1e9,
-               .help =
-                   "nodes are off the plane by up to this, at random and always the same: breaks symmetry"},
+    [NOISE] =
+        DRAPE_NUMBER("noise", "m", 0, 0, 1e9,
+                     "nodes are off the plane by up to this, at random and always the same: breaks symmetry"),
 };
 
 static void place_nodes(drape_mesh *mesh, double width, double height, bool vertical)
@@ -77,9 +68,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 }
 
 const drape_grid_ops drape_grid_square = {
-    .name = "square",
-    .summary = "a rectangle of columns x rows nodes, horizontal or vertical",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "square",
+              .summary = "a rectangle of columns x rows nodes, horizontal or vertical",
+              DRAPE_PARAMS(params)},
     .generate = generate,
 };

@@ -1,4 +1,4 @@
-/* import.c: reads a mesh file whole into memory and hands it to the row of the imports that its ending names.
+/* import.c: reads a mesh file whole into memory and hands it to the format that its ending names.
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -10,7 +10,7 @@
 
 #include "mesh/mesh.h"
 
-#define LARGEST_FILE INT32_MAX /* [bytes] */
+#define MAX_FILE_SIZE INT32_MAX /* [bytes] */
 
 typedef struct contents {
     char *data; /* size bytes and a 0 byte */
@@ -39,12 +39,12 @@ static const drape_import_ops *find_import(const char *file)
 }
 
 /* folder/file, or file alone where it is absolute or there is no folder; NULL with a message. */
-static char *join(drape_context *ctx, const char *folder, const char *file)
+static char *join(drape_arena *arena, const char *folder, const char *file)
 {
     if (!folder || !*folder || *file == '/')
-        return drape_copy_text(ctx, file);
+        return drape_arena_text(arena, file);
     const size_t size = strlen(folder) + strlen(file) + 2;
-    char *path = drape_alloc(ctx, size, 1);
+    char *path = drape_arena_take(arena, size, 1);
     if (path)
         snprintf(path, size, "%s/%s", folder, file);
     return path;
@@ -75,9 +75,10 @@ static drape_status read_descriptor(drape_context *ctx, const char *pointer, con
     return DRAPE_OK;
 }
 
-static drape_status read_open_file(drape_context *ctx, const char *pointer, const char *path, int descriptor,
+static drape_status read_open_file(drape_arena *arena, const char *pointer, const char *path, int descriptor,
                                    contents *file)
 {
+    drape_context *ctx = arena->ctx;
     struct stat about;
     if (fstat(descriptor, &about) != 0)
         return fail_file(ctx, pointer, path, strerror(errno));
@@ -85,21 +86,21 @@ static drape_status read_open_file(drape_context *ctx, const char *pointer, cons
         return fail_file(ctx, pointer, path, strerror(EISDIR));
     if (!S_ISREG(about.st_mode))
         return fail_file(ctx, pointer, path, "Not a regular file");
-    if (about.st_size > LARGEST_FILE)
+    if (about.st_size > MAX_FILE_SIZE)
         return drape_fail_at(ctx, DRAPE_E_FILE, pointer, "%s: has %lld bytes; at most %lld can be read", path,
-                             (long long)about.st_size, (long long)LARGEST_FILE);
+                             (long long)about.st_size, (long long)MAX_FILE_SIZE);
     file->size = (size_t)about.st_size;
-    file->data = drape_alloc(ctx, file->size + 1, 1);
+    file->data = drape_arena_take(arena, file->size + 1, 1);
     return file->data ? read_descriptor(ctx, pointer, path, descriptor, file) : DRAPE_E_MEMORY;
 }
 
 /* O_NONBLOCK: to open a pipe that nobody writes to would wait for ever. */
-static drape_status read_whole_file(drape_context *ctx, const char *pointer, const char *path, contents *file)
+static drape_status read_whole_file(drape_arena *arena, const char *pointer, const char *path, contents *file)
 {
     const int descriptor = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
     if (descriptor < 0)
-        return fail_file(ctx, pointer, path, strerror(errno));
-    const drape_status status = read_open_file(ctx, pointer, path, descriptor, file);
+        return fail_file(arena->ctx, pointer, path, strerror(errno));
+    const drape_status status = read_open_file(arena, pointer, path, descriptor, file);
     close(descriptor);
     return status;
 }
@@ -115,13 +116,13 @@ drape_status drape_mesh_from_file(drape_context *ctx, const char *pointer, const
 
     const locale_t old = drape_locale_enter();
     const drape_mesh_source source = {.pointer = place, .file = file};
+    drape_arena arena = drape_arena_of(ctx);
     contents whole = {0};
-    char *path = join(ctx, folder, file);
-    drape_status status = path ? read_whole_file(ctx, place, path, &whole) : DRAPE_E_MEMORY;
+    char *path = join(&arena, folder, file);
+    drape_status status = path ? read_whole_file(&arena, place, path, &whole) : DRAPE_E_MEMORY;
     if (!status)
         status = import->read(ctx, &source, whole.data, whole.size, mesh);
-    drape_free(ctx, whole.data);
-    drape_free(ctx, path);
+    drape_arena_free(&arena);
     drape_locale_leave(old);
     return status;
 }

@@ -152,8 +152,9 @@ static drape_status read_obj(drape_context *ctx, const drape_mesh_source *source
 }
 
 const drape_import_ops drape_import_obj = {
-    .name = "obj",
+    .entry = {.name = "obj",
+              .summary =
+                  "Wavefront OBJ; polygons become fans of triangles, all but nodes and faces is passed over"},
     .ending = ".obj",
-    .summary = "Wavefront OBJ; polygons become fans of triangles, all but nodes and faces is passed over",
     .read = read_obj,
 };

@@ -486,8 +486,9 @@ static drape_status read_ply(drape_context *ctx, const drape_mesh_source *source
 }
 
 const drape_import_ops drape_import_ply = {
-    .name = "ply",
+    .entry = {.name = "ply",
+              .summary =
+                  "Stanford PLY, ascii or binary of either byte order; polygons become fans of triangles"},
     .ending = ".ply",
-    .summary = "Stanford PLY, ascii or binary of either byte order; polygons become fans of triangles",
     .read = read_ply,
 };

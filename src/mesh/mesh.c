@@ -33,13 +33,12 @@ drape_status drape_mesh_allocate(drape_context *ctx, const drape_mesh_source *so
     if (triangle_count > DRAPE_MAX_TRIANGLES)
         return drape_mesh_fail(ctx, source, 0, "%zu triangles; at most %d are allowed", triangle_count,
                                DRAPE_MAX_TRIANGLES);
-    mesh->x = drape_alloc(ctx, node_count, 3 * sizeof *mesh->x);
-    mesh->triangle = drape_alloc(ctx, triangle_count, 3 * sizeof *mesh->triangle);
-    if (!mesh->x || !mesh->triangle)
-        return DRAPE_E_MEMORY;
+    mesh->arena = drape_arena_of(ctx);
+    mesh->x = drape_arena_take(&mesh->arena, node_count, 3 * sizeof *mesh->x);
+    mesh->triangle = drape_arena_take(&mesh->arena, triangle_count, 3 * sizeof *mesh->triangle);
     mesh->node_count = (int32_t)node_count;
     mesh->triangle_count = (int32_t)triangle_count;
-    return DRAPE_OK;
+    return drape_arena_status(&mesh->arena);
 }
 
 drape_status drape_mesh_from_arrays(drape_context *ctx, const char *pointer, const double *x,
@@ -99,15 +98,15 @@ static drape_status complete(drape_context *ctx, const drape_mesh_source *source
 {
     drape_status status = drape_mesh_validate_triangles(ctx, source, mesh);
     if (!status)
-        status = drape_heed(ctx);
+        status = drape_check_cancel(ctx);
     if (!status)
         status = drape_mesh_connect(ctx, source, mesh);
     if (!status)
-        status = drape_heed(ctx);
+        status = drape_check_cancel(ctx);
     if (!status)
         status = drape_mesh_validate_nodes(ctx, source, mesh);
     if (!status)
-        status = drape_mesh_measure(ctx, mesh);
+        status = drape_mesh_measure(mesh);
     return status;
 }
 
@@ -125,36 +124,27 @@ drape_status drape_mesh_make(drape_context *ctx, const char *pointer, const drap
     if (!status)
         status = take_from_source(ctx, pointer, def, folder, mesh);
     if (!status)
-        status = drape_heed(ctx);
+        status = drape_check_cancel(ctx);
     if (!status)
         status = place_nodes(ctx, pointer, &source, def, mesh);
     if (!status)
         status = complete(ctx, &source, mesh);
     if (status)
-        drape_mesh_free(ctx, mesh);
+        drape_mesh_free(mesh);
     return status;
 }
 
-void drape_mesh_drop_topology(drape_context *ctx, drape_mesh *mesh)
+void drape_mesh_drop_topology(drape_mesh *mesh)
 {
-    drape_free(ctx, mesh->edge_triangle);
-    drape_free(ctx, mesh->triangle_edge);
-    drape_free(ctx, mesh->hinge);
-    drape_free(ctx, mesh->hinge_edge);
+    drape_arena_release(&mesh->arena, mesh->edge_triangle);
+    drape_arena_release(&mesh->arena, mesh->triangle_edge);
+    drape_arena_release(&mesh->arena, mesh->hinge);
+    drape_arena_release(&mesh->arena, mesh->hinge_edge);
     mesh->edge_triangle = mesh->triangle_edge = mesh->hinge = mesh->hinge_edge = NULL;
 }
 
-void drape_mesh_free(drape_context *ctx, drape_mesh *mesh)
+void drape_mesh_free(drape_mesh *mesh)
 {
-    drape_free(ctx, mesh->x);
-    drape_free(ctx, mesh->triangle);
-    drape_free(ctx, mesh->edge);
-    drape_free(ctx, mesh->edge_triangle);
-    drape_free(ctx, mesh->triangle_edge);
-    drape_free(ctx, mesh->hinge);
-    drape_free(ctx, mesh->hinge_edge);
-    drape_free(ctx, mesh->triangle_area);
-    drape_free(ctx, mesh->edge_length);
-    drape_free(ctx, mesh->node_area);
+    drape_arena_free(&mesh->arena);
     *mesh = (drape_mesh){0};
 }

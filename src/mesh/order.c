@@ -16,26 +16,20 @@ static void sort_by_part(const int32_t *key, int parts, int part, int32_t count,
         to[start[key[(size_t)from[i] * (size_t)parts + (size_t)part]]++] = from[i];
 }
 
-int32_t *drape_order_by_keys(drape_context *ctx, const int32_t *key, int parts, int32_t count, int32_t limit)
+int32_t *drape_order_by_keys(drape_arena *arena, const int32_t *key, int parts, int32_t count, int32_t limit)
 {
-    int32_t *order = drape_alloc(ctx, (size_t)count, sizeof *order);
-    int32_t *other = drape_alloc(ctx, (size_t)count, sizeof *other);
-    int32_t *start = drape_alloc(ctx, (size_t)limit + 1, sizeof *start);
-    const bool complete = order && other && start;
-    if (complete) {
-        for (int32_t i = 0; i < count; i++)
-            order[i] = i;
-        for (int part = parts - 1; part >= 0; part--) {
-            sort_by_part(key, parts, part, count, limit, order, other, start);
-            int32_t *sorted = other;
-            other = order;
-            order = sorted;
-        }
+    int32_t *order = drape_arena_take(arena, (size_t)count, sizeof *order);
+    int32_t *other = drape_arena_take(arena, (size_t)count, sizeof *other);
+    int32_t *start = drape_arena_take(arena, (size_t)limit + 1, sizeof *start);
+    if (drape_arena_status(arena))
+        return NULL;
+    for (int32_t i = 0; i < count; i++)
+        order[i] = i;
+    for (int part = parts - 1; part >= 0; part--) {
+        sort_by_part(key, parts, part, count, limit, order, other, start);
+        int32_t *sorted = other;
+        other = order;
+        order = sorted;
     }
-    drape_free(ctx, start);
-    drape_free(ctx, other);
-    if (complete)
-        return order;
-    drape_free(ctx, order);
-    return NULL;
+    return order;
 }

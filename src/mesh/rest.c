@@ -32,12 +32,13 @@ static void measure_edges(drape_mesh *mesh)
     }
 }
 
-drape_status drape_mesh_measure(drape_context *ctx, drape_mesh *mesh)
+drape_status drape_mesh_measure(drape_mesh *mesh)
 {
-    mesh->triangle_area = drape_alloc(ctx, (size_t)mesh->triangle_count, sizeof *mesh->triangle_area);
-    mesh->edge_length = drape_alloc(ctx, (size_t)mesh->edge_count, sizeof *mesh->edge_length);
-    mesh->node_area = drape_alloc(ctx, (size_t)mesh->node_count, sizeof *mesh->node_area);
-    if (!mesh->triangle_area || !mesh->edge_length || !mesh->node_area)
+    drape_arena *arena = &mesh->arena;
+    mesh->triangle_area = drape_arena_take(arena, (size_t)mesh->triangle_count, sizeof *mesh->triangle_area);
+    mesh->edge_length = drape_arena_take(arena, (size_t)mesh->edge_count, sizeof *mesh->edge_length);
+    mesh->node_area = drape_arena_take(arena, (size_t)mesh->node_count, sizeof *mesh->node_area);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     measure_triangles(mesh);
     measure_edges(mesh);

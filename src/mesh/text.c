@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define LONGEST_SHOWN_WORD 40
+#define MAX_SHOWN_WORD 40
 
 drape_text drape_text_open(const char *data, size_t size)
 {
@@ -108,5 +108,5 @@ bool drape_word_integer(drape_word word, int64_t *value)
 
 int drape_word_shown(drape_word word)
 {
-    return word.length < LONGEST_SHOWN_WORD ? (int)word.length : LONGEST_SHOWN_WORD;
+    return word.length < MAX_SHOWN_WORD ? (int)word.length : MAX_SHOWN_WORD;
 }

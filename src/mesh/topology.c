@@ -5,10 +5,10 @@
 #include "mesh/order.h"
 
 /* Side s = 3 t + k of triangle t lies between its nodes k and k + 1: lower node first. (3 T x 2) */
-static int32_t *list_sides(drape_context *ctx, const drape_mesh *mesh)
+static int32_t *list_sides(drape_arena *scratch, const drape_mesh *mesh)
 {
     const size_t count = 3 * (size_t)mesh->triangle_count;
-    int32_t *side = drape_alloc(ctx, count, 2 * sizeof *side);
+    int32_t *side = drape_arena_take(scratch, count, 2 * sizeof *side);
     if (!side)
         return NULL;
     for (size_t s = 0; s < count; s++) {
@@ -50,16 +50,16 @@ static drape_status count_edges(drape_context *ctx, const drape_mesh_source *sou
     return DRAPE_OK;
 }
 
-static drape_status allocate_edges(drape_context *ctx, drape_mesh *mesh)
+static drape_status allocate_edges(drape_mesh *mesh)
 {
-    mesh->edge = drape_alloc(ctx, (size_t)mesh->edge_count, 2 * sizeof *mesh->edge);
-    mesh->edge_triangle = drape_alloc(ctx, (size_t)mesh->edge_count, 2 * sizeof *mesh->edge_triangle);
-    mesh->triangle_edge = drape_alloc(ctx, (size_t)mesh->triangle_count, 3 * sizeof *mesh->triangle_edge);
-    mesh->hinge = drape_alloc(ctx, (size_t)mesh->hinge_count, 4 * sizeof *mesh->hinge);
-    mesh->hinge_edge = drape_alloc(ctx, (size_t)mesh->hinge_count, sizeof *mesh->hinge_edge);
-    const bool complete =
-        mesh->edge && mesh->edge_triangle && mesh->triangle_edge && mesh->hinge && mesh->hinge_edge;
-    return complete ? DRAPE_OK : DRAPE_E_MEMORY;
+    drape_arena *arena = &mesh->arena;
+    mesh->edge = drape_arena_take(arena, (size_t)mesh->edge_count, 2 * sizeof *mesh->edge);
+    mesh->edge_triangle = drape_arena_take(arena, (size_t)mesh->edge_count, 2 * sizeof *mesh->edge_triangle);
+    mesh->triangle_edge =
+        drape_arena_take(arena, (size_t)mesh->triangle_count, 3 * sizeof *mesh->triangle_edge);
+    mesh->hinge = drape_arena_take(arena, (size_t)mesh->hinge_count, 4 * sizeof *mesh->hinge);
+    mesh->hinge_edge = drape_arena_take(arena, (size_t)mesh->hinge_count, sizeof *mesh->hinge_edge);
+    return drape_arena_status(arena);
 }
 
 /* The node of its triangle that side s does not touch. */
@@ -95,16 +95,16 @@ static void fill_edges(const int32_t *side, const int32_t *order, drape_mesh *me
 drape_status drape_mesh_connect(drape_context *ctx, const drape_mesh_source *source, drape_mesh *mesh)
 {
     drape_status status = DRAPE_E_MEMORY;
-    int32_t *side = list_sides(ctx, mesh), *order = NULL;
+    drape_arena scratch = drape_arena_of(ctx);
+    const int32_t *side = list_sides(&scratch, mesh), *order = NULL;
     if (side)
-        order = drape_order_by_keys(ctx, side, 2, 3 * mesh->triangle_count, mesh->node_count);
+        order = drape_order_by_keys(&scratch, side, 2, 3 * mesh->triangle_count, mesh->node_count);
     if (order)
         status = count_edges(ctx, source, side, order, mesh);
     if (!status)
-        status = allocate_edges(ctx, mesh);
+        status = allocate_edges(mesh);
     if (!status)
         fill_edges(side, order, mesh);
-    drape_free(ctx, order);
-    drape_free(ctx, side);
+    drape_arena_free(&scratch);
     return status;
 }

@@ -6,18 +6,18 @@
 #include "mesh/mesh.h"
 #include "mesh/order.h"
 
-#define FARTHEST          1e9   /* [m]: beyond, neighbouring doubles lie more than 1e-7 m apart */
-#define THINNEST_TRIANGLE 1e-12 /* altitude / longest edge: rounding of positions is 1e-16 of it */
+#define MAX_COORDINATE 1e9   /* [m]: beyond, neighbouring doubles lie more than 1e-7 m apart */
+#define MIN_THINNESS   1e-12 /* altitude / longest edge: rounding of positions is 1e-16 of it */
 
 drape_status drape_mesh_validate_positions(drape_context *ctx, const drape_mesh_source *source,
                                            const drape_mesh *mesh)
 {
     for (int32_t node = 0; node < mesh->node_count; node++) {
         const double *x = mesh->x + 3 * (size_t)node;
-        if (!(fabs(x[0]) <= FARTHEST && fabs(x[1]) <= FARTHEST && fabs(x[2]) <= FARTHEST))
+        if (!(fabs(x[0]) <= MAX_COORDINATE && fabs(x[1]) <= MAX_COORDINATE && fabs(x[2]) <= MAX_COORDINATE))
             return drape_mesh_fail(ctx, source, 0,
                                    "node %d is at (%g, %g, %g) m; coordinates must be finite and within %g m",
-                                   node, x[0], x[1], x[2], FARTHEST);
+                                   node, x[0], x[1], x[2], MAX_COORDINATE);
     }
     return DRAPE_OK;
 }
@@ -55,19 +55,19 @@ static drape_status check_shapes(drape_context *ctx, const drape_mesh_source *so
     for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
         const int32_t *n = mesh->triangle + 3 * (size_t)triangle;
         const double ratio = thinness(mesh, n);
-        if (!(ratio >= THINNEST_TRIANGLE))
+        if (!(ratio >= MIN_THINNESS))
             return drape_mesh_fail(ctx, source, 0,
                                    "triangle %d (nodes %d %d %d) is degenerate: altitude / longest "
                                    "edge is %g, at least %g is needed",
-                                   triangle, n[0], n[1], n[2], ratio, THINNEST_TRIANGLE);
+                                   triangle, n[0], n[1], n[2], ratio, MIN_THINNESS);
     }
     return DRAPE_OK;
 }
 
 /* The nodes of each triangle in ascending order. (triangle_count x 3) */
-static int32_t *sort_corners(drape_context *ctx, const drape_mesh *mesh)
+static int32_t *sort_corners(drape_arena *scratch, const drape_mesh *mesh)
 {
-    int32_t *sorted = drape_alloc(ctx, (size_t)mesh->triangle_count, 3 * sizeof *sorted);
+    int32_t *sorted = drape_arena_take(scratch, (size_t)mesh->triangle_count, 3 * sizeof *sorted);
     if (!sorted)
         return NULL;
     for (int32_t triangle = 0; triangle < mesh->triangle_count; triangle++) {
@@ -98,13 +98,13 @@ static drape_status check_duplicates(drape_context *ctx, const drape_mesh_source
                                      const drape_mesh *mesh)
 {
     drape_status status = DRAPE_E_MEMORY;
-    int32_t *corners = sort_corners(ctx, mesh), *order = NULL;
+    drape_arena scratch = drape_arena_of(ctx);
+    const int32_t *corners = sort_corners(&scratch, mesh), *order = NULL;
     if (corners)
-        order = drape_order_by_keys(ctx, corners, 3, mesh->triangle_count, mesh->node_count);
+        order = drape_order_by_keys(&scratch, corners, 3, mesh->triangle_count, mesh->node_count);
     if (order)
         status = compare_neighbours(ctx, source, corners, order, mesh->triangle_count);
-    drape_free(ctx, order);
-    drape_free(ctx, corners);
+    drape_arena_free(&scratch);
     return status;
 }
 
@@ -190,13 +190,13 @@ drape_status drape_mesh_validate_nodes(drape_context *ctx, const drape_mesh_sour
                                        const drape_mesh *mesh)
 {
     drape_status status = DRAPE_E_MEMORY;
-    int32_t *parent = drape_alloc(ctx, 3 * (size_t)mesh->triangle_count, sizeof *parent);
-    int32_t *fan = drape_alloc(ctx, (size_t)mesh->node_count, sizeof *fan);
-    if (parent && fan) {
+    drape_arena scratch = drape_arena_of(ctx);
+    int32_t *parent = drape_arena_take(&scratch, 3 * (size_t)mesh->triangle_count, sizeof *parent);
+    int32_t *fan = drape_arena_take(&scratch, (size_t)mesh->node_count, sizeof *fan);
+    if (!drape_arena_status(&scratch)) {
         join_fans(mesh, parent);
         status = check_fans(ctx, source, mesh, parent, fan);
     }
-    drape_free(ctx, fan);
-    drape_free(ctx, parent);
+    drape_arena_free(&scratch);
     return status;
 }

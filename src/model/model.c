@@ -10,8 +10,7 @@ void drape_model_destroy(drape_model **model)
     drape_model *m = *model;
     drape_context *ctx = m->ctx;
     for (int32_t c = 0; c < m->cloth_count; c++)
-        drape_mesh_free(ctx, &m->cloths[c].mesh);
-    drape_pattern_free(ctx, &m->pattern);
+        drape_mesh_free(&m->cloths[c].mesh);
     drape_arena_free(&m->arena);
     drape_free(ctx, m);
     *model = NULL;
@@ -84,7 +83,7 @@ drape_collider_motion drape_model_collider(const drape_model *model, int32_t ind
     if (!model || index < 0 || index >= model->collider_count)
         return (drape_collider_motion){.name = "", .type = ""};
     const drape_collider *collider = &model->colliders[index];
-    drape_collider_motion motion = {.name = collider->name, .type = collider->ops->name};
+    drape_collider_motion motion = {.name = collider->name, .type = collider->ops->entry.name};
     if (collider->track.key_count > 0) {
         drape_track_displacement(collider->track.keys, collider->track.key_count, t, motion.displacement);
         drape_track_velocity(collider->track.keys, collider->track.key_count, t, motion.velocity);

@@ -55,7 +55,7 @@ typedef struct drape_cloth {
     drape_choice grid; /* type "" where the mesh is no grid */
     char *file;        /* NULL where it is from no file */
     double scale[3], rotate[4], translate[3];
-    double material_values[8]; /* in the order of drape_material_params */
+    double material_values[DRAPE_MAX_PARAMS]; /* in the order of the parameters of drape_material_entry */
     drape_material material;
     drape_woven tension, bending; /* of a measured fabric; warp 0: it is none */
     double *node_mass;            /* (mesh.node_count) [kg] */
@@ -94,7 +94,7 @@ typedef struct drape_contact_def {
 } drape_contact_def;
 
 struct drape_model {
-    drape_arena arena; /* holds all that is below but the meshes and the pattern */
+    drape_arena arena; /* holds all that is below but the meshes */
     drape_context *ctx;
     int32_t cloth_count, term_count, node_count, triangle_count, edge_count;
     drape_cloth *cloths;
@@ -121,8 +121,9 @@ struct drape_model {
     bool has_laws;        /* some term needs the rates of measures */
     bool has_dissipation; /* some term takes energy out */
     drape_pattern pattern;
-    double length;     /* diagonal of the rest bounding box [m], > 0 */
-    double gravity[3]; /* [m/s2] */
+    size_t pattern_bytes; /* of the arena's */
+    double length;        /* diagonal of the rest bounding box [m], > 0 */
+    double gravity[3];    /* [m/s2] */
     drape_choice integrator, controller;
     double duration, frame_rate;
     char **formats;

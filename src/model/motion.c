@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-/* ---- Making and freeing ---- */
+/* ---- Making ---- */
 
 static size_t pinned_count(const drape_model *m)
 {
@@ -27,54 +27,29 @@ static void take_tracks(drape_motion *motion)
     }
 }
 
-drape_status drape_motion_create(drape_context *ctx, const drape_model *model, drape_motion **out)
+drape_status drape_motion_create(drape_arena *arena, const drape_model *model, drape_motion **out)
 {
-    drape_motion *motion = drape_alloc(ctx, 1, sizeof *motion);
-    *out = motion;
+    const size_t pins = pinned_count(model);
+    drape_motion *motion = *out = drape_arena_take(arena, 1, sizeof *motion);
     if (!motion)
         return DRAPE_E_MEMORY;
-    *motion = (drape_motion){.ctx = ctx, .model = model};
-    motion->moved_node = drape_alloc(ctx, pinned_count(model), sizeof *motion->moved_node);
-    motion->moved_track = drape_alloc(ctx, pinned_count(model), sizeof *motion->moved_track);
-    motion->place = drape_alloc(ctx, (size_t)model->node_count, sizeof *motion->place);
-    motion->pin_way = drape_alloc(ctx, pinned_count(model), sizeof *motion->pin_way);
-    motion->collider_way = drape_alloc(ctx, (size_t)model->collider_count, sizeof *motion->collider_way);
-    if (!motion->moved_node || !motion->moved_track || !motion->place || !motion->pin_way ||
-        !motion->collider_way) {
-        drape_motion_destroy(out);
+    motion->model = model;
+    motion->moved_node = drape_arena_take(arena, pins, sizeof *motion->moved_node);
+    motion->moved_track = drape_arena_take(arena, pins, sizeof *motion->moved_track);
+    motion->place = drape_arena_take(arena, (size_t)model->node_count, sizeof *motion->place);
+    motion->pin_path = drape_arena_take(arena, pins, sizeof *motion->pin_path);
+    motion->collider_path =
+        drape_arena_take(arena, (size_t)model->collider_count, sizeof *motion->collider_path);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    }
     take_tracks(motion);
     return DRAPE_OK;
 }
 
-void drape_motion_destroy(drape_motion **motion)
-{
-    drape_motion *m = *motion;
-    if (!m)
-        return;
-    drape_free(m->ctx, m->moved_node);
-    drape_free(m->ctx, m->moved_track);
-    drape_free(m->ctx, m->place);
-    drape_free(m->ctx, m->pin_way);
-    drape_free(m->ctx, m->collider_way);
-    drape_free(m->ctx, m);
-    *motion = NULL;
-}
+/* ---- A path ---- */
 
-size_t drape_motion_bytes(const drape_motion *motion)
-{
-    const drape_model *m = motion->model;
-    return sizeof *motion + (size_t)m->node_count * sizeof *motion->place +
-           pinned_count(m) *
-               (sizeof *motion->moved_node + sizeof *motion->moved_track + sizeof *motion->pin_way) +
-           (size_t)m->collider_count * sizeof *motion->collider_way;
-}
-
-/* ---- A way ---- */
-
-/* Hermite's cubic, at s = (t - t0)/(t1 - t0) of the way. */
-static void way_displacement(const drape_way *w, double t, double x[3])
+/* Hermite's cubic, at s = (t - t0)/(t1 - t0) of the path. */
+static void path_displacement(const drape_path *w, double t, double x[3])
 {
     if (t <= w->t[0] || t >= w->t[1]) {
         memcpy(x, w->x[t >= w->t[1]], 3 * sizeof *x);
@@ -86,7 +61,7 @@ static void way_displacement(const drape_way *w, double t, double x[3])
         x[k] = w->x[0][k] + rise * (w->x[1][k] - w->x[0][k]) + h * (leave * w->v[0][k] + arrive * w->v[1][k]);
 }
 
-static void way_velocity(const drape_way *w, double t, double within, double v[3])
+static void path_velocity(const drape_path *w, double t, double within, double v[3])
 {
     memset(v, 0, 3 * sizeof *v);
     if (within < w->t[0] || within >= w->t[1])
@@ -102,22 +77,23 @@ static bool rests(const double v[3])
     return v[0] == 0 && v[1] == 0 && v[2] == 0;
 }
 
-/* ---- A track or a way ---- */
+/* ---- A track or a path ---- */
 
-static void displacement_of(const drape_track *track, const drape_way *way, double t, double x[3])
+static void displacement_of(const drape_track *track, const drape_path *path, double t, double x[3])
 {
-    if (way->given)
-        way_displacement(way, t, x);
+    if (path->given)
+        path_displacement(path, t, x);
     else if (track && track->key_count > 0)
         drape_track_displacement(track->keys, track->key_count, t, x);
     else
         memset(x, 0, 3 * sizeof *x);
 }
 
-static void velocity_of(const drape_track *track, const drape_way *way, double t, double within, double v[3])
+static void velocity_of(const drape_track *track, const drape_path *path, double t, double within,
+                        double v[3])
 {
-    if (way->given)
-        way_velocity(way, t, within, v);
+    if (path->given)
+        path_velocity(path, t, within, v);
     else if (track && track->key_count > 0)
         drape_track_velocity(track->keys, track->key_count, within, v);
     else
@@ -125,51 +101,51 @@ static void velocity_of(const drape_track *track, const drape_way *way, double t
 }
 
 /* Its end is one unless it comes to rest there; its beginning unless it goes on as before. */
-static double next_kink_of(const drape_track *track, const drape_way *way, double t, double end)
+static double next_kink_of(const drape_track *track, const drape_path *path, double t, double end)
 {
-    for (int i = 0; way->given && i < 2; i++)
-        if (way->t[i] > t && way->t[i] < end && !(i == 0 ? way->smooth : rests(way->v[1])))
-            end = way->t[i];
-    for (size_t i = 0; !way->given && track && i < track->key_count; i++)
+    for (int i = 0; path->given && i < 2; i++)
+        if (path->t[i] > t && path->t[i] < end && !(i == 0 ? path->smooth : rests(path->v[1])))
+            end = path->t[i];
+    for (size_t i = 0; !path->given && track && i < track->key_count; i++)
         if (track->keys[i].time > t && track->keys[i].time < end)
             end = track->keys[i].time;
     return end;
 }
 
-static bool at_kink_of(const drape_track *track, const drape_way *way, double t)
+static bool at_kink_of(const drape_track *track, const drape_path *path, double t)
 {
-    if (way->given)
-        return (t == way->t[0] && !way->smooth) || (t == way->t[1] && !rests(way->v[1]));
+    if (path->given)
+        return (t == path->t[0] && !path->smooth) || (t == path->t[1] && !rests(path->v[1]));
     for (size_t i = 0; track && i < track->key_count; i++)
         if (track->keys[i].time == t)
             return true;
     return false;
 }
 
-/* The velocity that leads to where it is at t, and whether it is known: not at the key of a track, nor where the host
- * has changed its mind about the same moment. */
-static bool leading_velocity(const drape_track *track, const drape_way *way, double t, double v[3])
+/* The velocity that leads to where it is at t, and whether it is known: not at the key of a track, nor where
+ * the host has changed its mind about the same moment. */
+static bool leading_velocity(const drape_track *track, const drape_path *path, double t, double v[3])
 {
-    if (way->given && (t == way->t[0] || t == way->t[1])) {
-        memcpy(v, way->v[t == way->t[1]], 3 * sizeof *v);
-        return t == way->t[1] || way->smooth;
+    if (path->given && (t == path->t[0] || t == path->t[1])) {
+        memcpy(v, path->v[t == path->t[1]], 3 * sizeof *v);
+        return t == path->t[1] || path->smooth;
     }
-    velocity_of(track, way, t, t, v);
-    return way->given || !track || track->key_count == 0;
+    velocity_of(track, path, t, t, v);
+    return path->given || !track || track->key_count == 0;
 }
 
-static void send(const drape_track *track, drape_way *way, double t, double span, const double from[3],
+static void send(const drape_track *track, drape_path *path, double t, double span, const double from[3],
                  const double to[3], const double *v)
 {
-    drape_way next = {.given = true, .t = {t, t + span}};
+    drape_path next = {.given = true, .t = {t, t + span}};
     memcpy(next.x[0], from, sizeof next.x[0]);
     memcpy(next.x[1], to, sizeof next.x[1]);
-    next.smooth = leading_velocity(track, way, t, next.v[0]) && v;
+    next.smooth = leading_velocity(track, path, t, next.v[0]) && v;
     if (v)
         memcpy(next.v[1], v, sizeof next.v[1]);
     for (int k = 0; !v && k < 3; k++)
         next.v[0][k] = next.v[1][k] = (to[k] - from[k]) / span;
-    *way = next;
+    *path = next;
 }
 
 /* ---- Pins ---- */
@@ -179,12 +155,13 @@ static const drape_track *pin_track(const drape_motion *motion, int32_t i)
     return motion->moved_track[i] >= 0 ? &motion->model->tracks[motion->moved_track[i]] : NULL;
 }
 
-/* Ways of pins are positions, so that one comes to exactly where the host wants it. */
+/* Paths of pins are positions, not displacements, so that a pin reaches exactly the position that the host
+ * gave. */
 static void place_pin(const drape_motion *motion, int32_t i, double t, double x[3])
 {
     const double *rest = motion->model->rest + 3 * (size_t)motion->moved_node[i];
-    displacement_of(pin_track(motion, i), &motion->pin_way[i], t, x);
-    for (int k = 0; !motion->pin_way[i].given && k < 3; k++)
+    displacement_of(pin_track(motion, i), &motion->pin_path[i], t, x);
+    for (int k = 0; !motion->pin_path[i].given && k < 3; k++)
         x[k] = rest[k] + x[k];
 }
 
@@ -196,7 +173,7 @@ void drape_motion_place_pins(const drape_motion *motion, double t, double *x)
 
 void drape_motion_pin_velocity(const drape_motion *motion, int32_t i, double t, double within, double v[3])
 {
-    velocity_of(pin_track(motion, i), &motion->pin_way[i], t, within, v);
+    velocity_of(pin_track(motion, i), &motion->pin_path[i], t, within, v);
 }
 
 /* The number of a pin among the moved ones, of which it is one from now on. */
@@ -217,18 +194,18 @@ void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double 
     int32_t i = find_place(motion, node);
     double from[3];
     place_pin(motion, i, t, from);
-    send(pin_track(motion, i), &motion->pin_way[i], t, span, from, x, v);
+    send(pin_track(motion, i), &motion->pin_path[i], t, span, from, x, v);
 }
 
 void drape_motion_hold_pins(drape_motion *motion, const double *x)
 {
     for (int32_t i = 0; i < motion->moved_count; i++) {
-        drape_way *way = &motion->pin_way[i];
-        if (!way->given)
+        drape_path *path = &motion->pin_path[i];
+        if (!path->given)
             continue;
-        *way = (drape_way){.given = true, .smooth = true};
-        memcpy(way->x[0], x + 3 * (size_t)motion->moved_node[i], sizeof way->x[0]);
-        memcpy(way->x[1], way->x[0], sizeof way->x[1]);
+        *path = (drape_path){.given = true, .smooth = true};
+        memcpy(path->x[0], x + 3 * (size_t)motion->moved_node[i], sizeof path->x[0]);
+        memcpy(path->x[1], path->x[0], sizeof path->x[1]);
     }
 }
 
@@ -236,19 +213,19 @@ void drape_motion_hold_pins(drape_motion *motion, const double *x)
 
 bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider)
 {
-    return motion->collider_way[collider].given || motion->model->colliders[collider].track.key_count > 0;
+    return motion->collider_path[collider].given || motion->model->colliders[collider].track.key_count > 0;
 }
 
 void drape_motion_collider(const drape_motion *motion, int32_t collider, double t, double displacement[3])
 {
-    displacement_of(&motion->model->colliders[collider].track, &motion->collider_way[collider], t,
+    displacement_of(&motion->model->colliders[collider].track, &motion->collider_path[collider], t,
                     displacement);
 }
 
 void drape_motion_collider_velocity(const drape_motion *motion, int32_t collider, double t, double within,
                                     double v[3])
 {
-    velocity_of(&motion->model->colliders[collider].track, &motion->collider_way[collider], t, within, v);
+    velocity_of(&motion->model->colliders[collider].track, &motion->collider_path[collider], t, within, v);
 }
 
 void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t, double span,
@@ -256,31 +233,31 @@ void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t
 {
     double from[3];
     drape_motion_collider(motion, collider, t, from);
-    send(&motion->model->colliders[collider].track, &motion->collider_way[collider], t, span, from, x, v);
+    send(&motion->model->colliders[collider].track, &motion->collider_path[collider], t, span, from, x, v);
 }
 
 /* ---- In a checkpoint ---- */
 
-static bool is_way(const drape_way *way)
+static bool is_path(const drape_path *path)
 {
-    bool good = isfinite(way->t[0]) && isfinite(way->t[1]) && way->t[0] <= way->t[1];
+    bool good = isfinite(path->t[0]) && isfinite(path->t[1]) && path->t[0] <= path->t[1];
     for (int i = 0; i < 2; i++)
-        good = good && drape_all_finite(way->x[i], 3) && drape_all_finite(way->v[i], 3);
+        good = good && drape_all_finite(path->x[i], 3) && drape_all_finite(path->v[i], 3);
     return good;
 }
 
-static void archive_way(drape_way *way, drape_archive *a)
+static void archive_path(drape_path *path, drape_archive *a)
 {
-    drape_archive_bool(a, &way->given);
-    if (!way->given || !drape_archive_good(a))
+    drape_archive_bool(a, &path->given);
+    if (!path->given || !drape_archive_good(a))
         return;
-    drape_archive_bool(a, &way->smooth);
-    drape_archive_doubles(a, way->t, 2);
+    drape_archive_bool(a, &path->smooth);
+    drape_archive_doubles(a, path->t, 2);
     for (int i = 0; i < 2; i++) {
-        drape_archive_doubles(a, way->x[i], 3);
-        drape_archive_doubles(a, way->v[i], 3);
+        drape_archive_doubles(a, path->x[i], 3);
+        drape_archive_doubles(a, path->v[i], 3);
     }
-    if (drape_archive_is_reading(a) && !is_way(way))
+    if (drape_archive_is_reading(a) && !is_path(path))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves something along no way");
 }
 
@@ -310,10 +287,10 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
     for (int32_t i = 0; i < count && drape_archive_good(a); i++) {
         archive_place(motion, i, a);
         if (drape_archive_good(a))
-            archive_way(&motion->pin_way[i], a);
+            archive_path(&motion->pin_path[i], a);
     }
     for (int32_t c = 0; c < motion->model->collider_count && drape_archive_good(a); c++)
-        archive_way(&motion->collider_way[c], a);
+        archive_path(&motion->collider_path[c], a);
 }
 
 /* ---- All of them ---- */
@@ -321,9 +298,9 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
 double drape_motion_next_kink(const drape_motion *motion, double t, double end)
 {
     for (int32_t i = 0; i < motion->moved_count; i++)
-        end = next_kink_of(pin_track(motion, i), &motion->pin_way[i], t, end);
+        end = next_kink_of(pin_track(motion, i), &motion->pin_path[i], t, end);
     for (int32_t c = 0; c < motion->model->collider_count; c++)
-        end = next_kink_of(&motion->model->colliders[c].track, &motion->collider_way[c], t, end);
+        end = next_kink_of(&motion->model->colliders[c].track, &motion->collider_path[c], t, end);
     return end;
 }
 
@@ -331,8 +308,8 @@ bool drape_motion_at_kink(const drape_motion *motion, double t)
 {
     bool found = false;
     for (int32_t i = 0; !found && i < motion->moved_count; i++)
-        found = at_kink_of(pin_track(motion, i), &motion->pin_way[i], t);
+        found = at_kink_of(pin_track(motion, i), &motion->pin_path[i], t);
     for (int32_t c = 0; !found && c < motion->model->collider_count; c++)
-        found = at_kink_of(&motion->model->colliders[c].track, &motion->collider_way[c], t);
+        found = at_kink_of(&motion->model->colliders[c].track, &motion->collider_path[c], t);
     return found;
 }

@@ -12,13 +12,11 @@
 #include "model/scene_print.h"
 #include "model/scene_text.h"
 
-#define LARGEST_FILE                                                                                         \
-    ((size_t)1                                                                                               \
-     << 30) /* jansson counts in int, and its tree takes some ten times the text                   \
-                       */
-#define FIRST_READ   ((size_t)1 << 16)
-#define LONGEST_NAME 300 /* of a file in messages */
-#define LONGEST_SET  80  /* of a value in messages, in "--set /pointer=value" */
+/* jansson counts in int, and its tree takes some ten times the text. */
+#define MAX_FILE   ((size_t)1 << 30)
+#define FIRST_READ ((size_t)1 << 16)
+#define MAX_NAME   300 /* of a file in messages */
+#define MAX_SET    80  /* of a value in messages, in "--set /pointer=value" */
 #define LOAD_FLAGS                                                                                           \
     (JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL) /* integers beyond int64 are numbers too */
 
@@ -67,8 +65,8 @@ drape_context *drape_scene_context(drape_scene *scene)
 static char *shown_name(drape_scene *scene, const char *name)
 {
     size_t length = strlen(name);
-    char text[LONGEST_NAME + 4];
-    const char *end = length > LONGEST_NAME ? name + length - LONGEST_NAME : name;
+    char text[MAX_NAME + 4];
+    const char *end = length > MAX_NAME ? name + length - MAX_NAME : name;
     while (end > name && ((unsigned char)*end & 0xC0) == 0x80)
         end++;
     snprintf(text, sizeof text, "%s%s", end > name ? "..." : "", end);
@@ -147,10 +145,10 @@ static drape_status read_all(drape_scene *scene, FILE *file, size_t room, size_t
         *size += fread(scene->text + *size, 1, room - *size, file);
         if (ferror(file))
             status = cannot_read(scene, strerror(errno));
-        else if (*size > LARGEST_FILE)
+        else if (*size > MAX_FILE)
             status = cannot_read(scene, "it is larger than 1 GiB");
         else
-            status = drape_heed(scene->ctx);
+            status = drape_check_cancel(scene->ctx);
     }
     if (!status)
         scene->text[*size] = 0;
@@ -168,7 +166,7 @@ static drape_status read_file(drape_scene *scene, const char *path, size_t *size
     if (fstat(fileno(file), &info) == 0) {
         if (S_ISDIR(info.st_mode))
             status = cannot_read(scene, "it is a folder");
-        else if (S_ISREG(info.st_mode) && info.st_size > (off_t)LARGEST_FILE)
+        else if (S_ISREG(info.st_mode) && info.st_size > (off_t)MAX_FILE)
             status = cannot_read(scene, "it is larger than 1 GiB");
         else if (S_ISREG(info.st_mode))
             room = (size_t)info.st_size + 1; /* one more, so that its end is seen without growing */
@@ -239,7 +237,7 @@ static drape_status parse_text(drape_scene *scene, size_t size)
     const char *zero = memchr(scene->text, 0, size);
     if (zero)
         return parse_fault(scene, (size_t)(zero - scene->text), "byte 0x00 is not allowed in a scene");
-    if (size > LARGEST_FILE)
+    if (size > MAX_FILE)
         return drape_fail(scene->ctx, DRAPE_E_PARSE, "%s: the scene is larger than 1 GiB", scene->name);
     char *blanked = drape_copy_text(scene->ctx, scene->text);
     if (!blanked)
@@ -347,12 +345,12 @@ static drape_status check_pointer(drape_scene *scene, const char *pointer)
     return DRAPE_OK;
 }
 
-/* A number as people write it and JSON does not: ".5", "-.5", "+5", "5." and these with an exponent. NULL: it is none. */
+/* A number as people write it and JSON does not: ".5", "-.5", "+5", "5." and these with an exponent. NULL: not a number. */
 static json_t *loose_number(const char *text)
 {
-    char number[LONGEST_SET + 3];
+    char number[MAX_SET + 3];
     const size_t digits = strspn(text, "+-"), length = strlen(text);
-    if (length > LONGEST_SET || digits > 1 || strspn(text + digits, "0123456789.eE+-") + digits != length)
+    if (length > MAX_SET || digits > 1 || strspn(text + digits, "0123456789.eE+-") + digits != length)
         return NULL;
     const char *point = strchr(text, '.');
     size_t n = 0;
@@ -428,7 +426,7 @@ static void extend_path(landing *at)
         drape_pointer_push(&at->path, at->key);
 }
 
-/* Follows a pointer, which is not empty, as far as it leads; changes nothing. */
+/* Follows a pointer, which is not empty, as far as the tree has it; changes nothing. */
 static drape_status land(drape_scene *scene, const char *pointer, landing *at)
 {
     json_t *child = scene->root;
@@ -478,7 +476,7 @@ static json_t *wrap(const char *rest, json_t *value)
 static drape_status new_override(drape_scene *scene, const char *path, const char *pointer, const char *text,
                                  override **out)
 {
-    char some[LONGEST_SET + 1], shown[LONGEST_SET + DRAPE_POINTER_SIZE + 16];
+    char some[MAX_SET + 1], shown[MAX_SET + DRAPE_POINTER_SIZE + 16];
     snprintf(some, sizeof some, "%s", text);
     drape_text_mend_end(some);
     snprintf(shown, sizeof shown, "--set %s=%s%s", pointer, some, strlen(some) < strlen(text) ? "..." : "");
@@ -513,7 +511,7 @@ static drape_status insert(drape_scene *scene, landing *at, json_t *value)
     return value && put(at->container, at->key, value) == 0 ? DRAPE_OK : drape_fail_memory(scene->ctx, 1);
 }
 
-/* All that can fail but for memory comes before the first change. */
+/* Whatever can fail, except for memory, comes before the first change. */
 static drape_status set_value(drape_scene *scene, const char *pointer, const char *text)
 {
     landing at = {.container = NULL};
@@ -523,7 +521,7 @@ static drape_status set_value(drape_scene *scene, const char *pointer, const cha
     if (!status && *pointer)
         status = land(scene, pointer, &at);
     for (const char *rest = at.rest;
-         !status && rest && *rest;) { /* what is not there yet belongs to its place */
+         !status && rest && *rest;) { /* keys that do not exist yet are part of the place */
         char key[DRAPE_POINTER_SIZE];
         rest = drape_pointer_next(rest, key);
         drape_pointer_push(&at.path, strcmp(key, "-") == 0 ? "0" : key);
@@ -546,7 +544,7 @@ drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char
     if (!pointer || !value)
         return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "drape_scene_set: pointer and value are needed");
     locale_t old = drape_locale_enter();
-    drape_arena_free(&scene->defs); /* the defs of before point into values that may go */
+    drape_arena_free(&scene->defs); /* earlier defs point into values that may be freed */
     drape_status status = set_value(scene, pointer, value);
     drape_locale_leave(old);
     return status;

@@ -1,11 +1,12 @@
 /* scene.h: the text of a scene as defs, and the keys that a scene may have.
  *
- * The keys are tables. They drive the reader (scene_json.c), its "did you mean", and whatever describes the
- * form of a scene. A new key is a line in scene_keys.c. */
+ * A key is a parameter and the place in a def where its value goes. The tables of scene_keys.c drive the reader
+ * (scene_json.c), the defaults of the defs, the checks of a host's defs, and all that describes a scene: `drape
+ * list`, the schema, `drape info`. A new key is one entry there. */
 #ifndef DRAPE_MODEL_SCENE_H
 #define DRAPE_MODEL_SCENE_H
 
-#include "base/context.h"
+#include "base/param.h"
 
 /* ---- The scene object -------------------------------------------------------------------------------- */
 
@@ -25,69 +26,91 @@ drape_context *drape_scene_context(drape_scene *scene);
 /* Receives a piece of a text. */
 typedef void drape_text_sink(void *user, const char *text, size_t size);
 
-/* The scene as it is by now, what was set in it included, as JSON without comments: the text of a scene of our
- * form also where the scene is of another one, after a drape_scene_to_def or a compilation that was good. */
+/* Prints the scene with all values that were set, as JSON without comments. A scene of another form is printed in
+ * ours, once drape_scene_to_def or a compilation succeeded. */
 void drape_scene_print(drape_scene *scene, drape_text_sink *sink, void *user);
 
 /* ---- The form of a scene ----------------------------------------------------------------------------- */
 
-typedef enum drape_scene_kind {
-    DRAPE_SCENE_VERSION,  /* the number DRAPE_SCENE_FORM */
-    DRAPE_SCENE_TEXT,     /* a string for people */
-    DRAPE_SCENE_WORD,     /* a string that is not empty */
-    DRAPE_SCENE_WORDS,    /* an array of them */
-    DRAPE_SCENE_BOOLEAN,  /* true or false */
-    DRAPE_SCENE_NUMBER,   /* from min to max, min excluded unless closed */
-    DRAPE_SCENE_INTEGER,  /* from min to max */
-    DRAPE_SCENE_INTEGERS, /* an array of them */
-    DRAPE_SCENE_VECTOR,   /* [x, y, z] */
-    DRAPE_SCENE_SCALE,    /* a number or [x, y, z] */
-    DRAPE_SCENE_ROTATION, /* [x, y, z, angle] or [x, y, z], in degrees */
-    DRAPE_SCENE_BOX,      /* [[x, y, z], [x, y, z]] */
-    DRAPE_SCENE_TRACK,    /* an array of [time, [x, y, z]], times increasing */
-    DRAPE_SCENE_OBJECT,   /* a child */
-    DRAPE_SCENE_OBJECTS,  /* an array of children */
-    DRAPE_SCENE_ROWS      /* an array of children, or strings for children with a "type" alone */
-} drape_scene_kind;
+/* How the text of a scene writes what a key has. */
+typedef enum drape_scene_shape {
+    DRAPE_SCENE_VALUE,   /* a value of the parameter */
+    DRAPE_SCENE_LIST,    /* an array of such values, integers or texts */
+    DRAPE_SCENE_VERSION, /* the number DRAPE_SCENE_FORM; not in the def */
+    DRAPE_SCENE_REMARK,  /* a string for people; not in the def */
+    DRAPE_SCENE_BOX,     /* two corners of the box of a pin */
+    DRAPE_SCENE_TRACK,   /* an array of [time, [x, y, z]], times increasing */
+    DRAPE_SCENE_OBJECT,  /* a child */
+    DRAPE_SCENE_OBJECTS, /* an array of children */
+    DRAPE_SCENE_ENTRIES  /* an array of children, or of names for children with a "type" alone */
+} drape_scene_shape;
 
 #define DRAPE_SCENE_FORM 1 /* of "drape": 1 */
 
+/*
+ * In a def a number is a double, an integer an int32_t (-1: not given, where it has no default), a boolean a
+ * bool, a choice or a text a const char * (NULL: not given), a vector double[3], a rotation double[4]: axis and
+ * angle [degrees].
+ */
 typedef struct drape_scene_key {
-    const char *name;
-    drape_scene_kind kind;
-    bool required;
-    size_t offset;       /* in the def of its object */
-    size_t count_offset; /* arrays: of their size_t count */
-    double min, max;     /* NUMBER, INTEGER, INTEGERS */
-    bool closed;         /* NUMBER: min is allowed */
-    bool optional;       /* OBJECT: may be left out although something in it is required */
-    size_t at_least;     /* elements of an array */
-    const char *unit;    /* NULL for none */
-    const char *const
-        *words; /* WORD: the NULL-ended list of words that are right; the compiler checks them */
-    const struct drape_scene_object *child; /* OBJECT, OBJECTS, ROWS */
-    const char *help;                       /* what it is, its default: one line */
+    drape_param param; /* without a kind and a range where the shape has no values */
+    drape_scene_shape shape;
+    bool literal;                           /* TEXT: what param.derived says is the default itself */
+    bool optional;                          /* OBJECT: may be left out although something in it is required */
+    const double *vector;                   /* VECTOR: the default where its three numbers differ */
+    size_t offset;                          /* in the def of its object */
+    size_t count_offset;                    /* arrays: of their size_t count */
+    size_t at_least;                        /* elements of an array in a text */
+    size_t at_most;                         /* elements of an array; 0: no limit */
+    const struct drape_scene_object *child; /* OBJECT, OBJECTS, ENTRIES */
 } drape_scene_key;
+
+#define DRAPE_MAX_CLOTHS    (1 << 20)
+#define DRAPE_MAX_COLLIDERS 4096
 
 typedef struct drape_scene_object {
     const char *name;
     const drape_scene_key *keys;
     size_t key_count;
     const char *const *one_of; /* NULL-ended: exactly one of these keys is given; NULL: no such rule */
-    bool open;                 /* other members are settings of a row, which the compiler checks */
+    bool open;                 /* other members are settings, which the compiler checks */
     const char *open_with;     /* only where this key is given; NULL: always */
     size_t settings_offset, settings_count_offset; /* open: in the def */
-    size_t def_size;                               /* OBJECTS, ROWS: of one element */
-    void (*init)(void *def);                       /* OBJECTS: its defaults; NULL: zero */
+    size_t def_size;                               /* of a def of its own; 0: it lies in that of its parent */
+    bool sized;                                    /* the def begins with its size */
 } drape_scene_object;
 
-/* The object at the top; the others hang below it. */
-extern const drape_scene_object drape_scene_form;
+/* The object at the top, and some of those below it. */
+extern const drape_scene_object drape_form_scene, drape_form_output, drape_form_cloth, drape_form_mesh,
+    drape_form_transform, drape_form_pin, drape_form_collider;
 
-/* The words of a pin's corner and edge, NULL-ended. */
-extern const char *const drape_pin_corners[], *const drape_pin_edges[];
+/* The key of an object by its name; NULL: it has none of that name. */
+const drape_scene_key *drape_scene_key_of(const drape_scene_object *object, const char *name);
 
-/* Those of the axis of frames that points up. */
-extern const char *const drape_up_axes[];
+/* The key that a JSON pointer leads to, or into the value of; NULL: it leads to no key. */
+const drape_scene_key *drape_scene_key_at(const char *pointer);
+
+/* The value of a key as a setting, which points into the def. False: none is given. */
+bool drape_scene_value(const drape_scene_key *key, const void *def, drape_setting *out);
+
+/* The texts of a LIST of them, and how many there are. */
+size_t drape_scene_texts(const drape_scene_key *key, const void *def, const char *const **texts);
+
+/* Puts a value that is good for the parameter into the def: of a setting, and as drape_param_value made numbers
+ * of it. */
+void drape_scene_store(const drape_scene_key *key, const drape_setting *setting, const double *values,
+                       void *def);
+
+/* Gives the def of an object all defaults, those of children inside it included; def begins as zeros. */
+void drape_scene_set_defaults(const drape_scene_object *object, void *def);
+
+/* What a key takes, in words: "a number in (0, 1e6] s", "an array of objects, at least one". */
+void drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size);
+
+/* Its value in a def in words, of a list of texts too: "[0, 1, 0]", "npy, glb"; "" where none is given. */
+void drape_scene_value_text(const drape_scene_key *key, const void *def, char *text, size_t size);
+
+/* Its default in words: "60", "required", "" where there is nothing to say. */
+void drape_scene_default_text(const drape_scene_key *key, char *text, size_t size);
 
 #endif

@@ -1,18 +1,18 @@
 /*
- * scene_cs184.c: see scene_cs184.h. A scene of theirs is an object of at most "cloth", "sphere" and "plane",
- * whose members are checked here, those that they do not know ignored, as there. What their program has in its
- * windows and constants is what it begins with: gravity -9.8, 90 frames a second of 30 substeps, bend springs of
- * 0.2 ks, strains limited to 10 % in one pass, cloth that never passes through cloth.
+ * scene_cs184.c: see scene_cs184.h. Such a scene is an object of at most "cloth", "sphere" and "plane", whose
+ * members are checked here; members that CS184 does not know are ignored, as there. Settings that its program
+ * keeps in windows and constants have the values it starts with: gravity -9.8, 90 frames a second of 30 substeps,
+ * bend springs of 0.2 ks, strains limited to 10 % in one pass, self-contact.
  *
- * Beside their keys a scene may have our own of the whole scene, so that a command line can set the integrator,
- * the duration, the output: they stand as they are. An integrator without a method is verlet.
+ * Beside these a scene may have keys of our form for the whole scene, so that a command line can set the
+ * integrator, the duration, the output; they are copied. An integrator without a method is verlet.
  *
- * Their sheets lie at y = 1, rows along +z, or stand, rows along +y, with a random z of at most 1 mm that breaks
- * the symmetry. Ours begin at row 0 and go along -z or -y: half a turn about x makes one of the other. Mass is
- * the same on all points.
+ * Sheets of CS184 lie at y = 1 with rows along +z, or stand with rows along +y and a random z of at most 1 mm that
+ * breaks the symmetry. Rows of our grids go along -z or -y: a rotation by 180 degrees about x maps one to the other.
+ * All points have the same mass.
  *
- * For methods that do not move nodes there are limit.strain and contact; Verlet leaves them out. friction is
- * taken as mu there.
+ * Methods that do not move nodes use limit.strain and contact, which Verlet leaves out; friction is Coulomb's mu
+ * for them.
  */
 #include "model/scene_cs184.h"
 
@@ -30,59 +30,46 @@
 #define SUBSTEPS   30
 #define NOISE      1e-3 /* [m] */
 
-typedef enum kind { NUMBER, INTEGER, BOOLEAN, VECTOR, PINS } kind;
-
-typedef struct key {
-    const char *name;
-    kind kind;
-    bool required;
-    double min, max; /* NUMBER, INTEGER */
-    bool open_min;
-    const char *expected;
-} key;
-
-#define ANY -1e9, 1e9
-
-static const key cloth_keys[] = {
-    {"width", NUMBER, true, 0, 1e9, true, "a number in (0, 1e9] m"},
-    {"height", NUMBER, true, 0, 1e9, true, "a number in (0, 1e9] m"},
-    {"num_width_points", INTEGER, true, 2, 1 << 27, false, "an integer from 2"},
-    {"num_height_points", INTEGER, true, 2, 1 << 27, false, "an integer from 2"},
-    {"thickness", NUMBER, true, 0, 10, false, "a number in [0, 10] m"},
-    {"orientation", INTEGER, true, 0, 1, false, "0 (horizontal) or 1 (vertical)"},
-    {"pinned", PINS, false, 0, 0, false, "an array of [x, y], numbers of points of the grid from 0"},
-    {"damping", NUMBER, true, 0, 100, false, "a number in [0, 100] %"},
-    {"density", NUMBER, true, 0, 1e9, true, "a number in (0, 1e9] kg/m2"},
-    {"ks", NUMBER, true, 0, 1e15, false, "a number in [0, 1e15] N/m"},
-    {"enable_structural", BOOLEAN, true, 0, 0, false, "true or false"},
-    {"enable_shearing", BOOLEAN, true, 0, 0, false, "true or false"},
-    {"enable_bending", BOOLEAN, true, 0, 0, false, "true or false"},
+/* All are required, but for "pinned" of a cloth. */
+static const drape_param cloth_params[] = {
+    DRAPE_NUMBER("width", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, NULL),
+    DRAPE_NUMBER("height", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, NULL),
+    DRAPE_INTEGER("num_width_points", "1", DRAPE_REQUIRED, 2, 1 << 27, NULL),
+    DRAPE_INTEGER("num_height_points", "1", DRAPE_REQUIRED, 2, 1 << 27, NULL),
+    DRAPE_NUMBER("thickness", "m", DRAPE_REQUIRED, 0, 10, NULL),
+    DRAPE_INTEGER("orientation", "1", DRAPE_REQUIRED, 0, 1, NULL), /* horizontal, vertical */
+    DRAPE_NUMBER("damping", "%", DRAPE_REQUIRED, 0, 100, NULL),
+    DRAPE_NUMBER("density", "kg/m2", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, NULL),
+    DRAPE_NUMBER("ks", "N/m", DRAPE_REQUIRED, 0, 1e15, NULL),
+    DRAPE_BOOLEAN("enable_structural", true, NULL),
+    DRAPE_BOOLEAN("enable_shearing", true, NULL),
+    DRAPE_BOOLEAN("enable_bending", true, NULL),
 };
-static const key sphere_keys[] = {
-    {"origin", VECTOR, true, ANY, false, "three numbers, [x, y, z], in m"},
-    {"radius", NUMBER, true, 0, 1e9, true, "a number in (0, 1e9] m"},
-    {"friction", NUMBER, true, 0, 1, false, "a number in [0, 1]"},
+static const drape_param sphere_params[] = {
+    DRAPE_VECTOR("origin", "m", DRAPE_REQUIRED, -1e9, 1e9, NULL),
+    DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, NULL),
+    DRAPE_NUMBER("friction", "1", DRAPE_REQUIRED, 0, 1, NULL),
 };
-static const key plane_keys[] = {
-    {"point", VECTOR, true, ANY, false, "three numbers, [x, y, z], in m"},
-    {"normal", VECTOR, true, ANY, false, "three numbers, [x, y, z]"},
-    {"friction", NUMBER, true, 0, 1, false, "a number in [0, 1]"},
+static const drape_param plane_params[] = {
+    DRAPE_VECTOR("point", "m", DRAPE_REQUIRED, -1e9, 1e9, NULL),
+    DRAPE_VECTOR("normal", "1", DRAPE_REQUIRED, -1e9, 1e9, NULL),
+    DRAPE_NUMBER("friction", "1", DRAPE_REQUIRED, 0, 1, NULL),
 };
 
 typedef struct object {
     const char *name;
     bool required;
-    const key *keys;
-    size_t key_count;
+    const drape_param *params;
+    size_t param_count;
 } object;
 
-#define KEYS(array) array, sizeof array / sizeof *array
-static const object objects[] = {{"cloth", true, KEYS(cloth_keys)},
-                                 {"sphere", false, KEYS(sphere_keys)},
-                                 {"plane", false, KEYS(plane_keys)}};
+#define PARAMS(array) array, sizeof array / sizeof *array
+static const object objects[] = {{"cloth", true, PARAMS(cloth_params)},
+                                 {"sphere", false, PARAMS(sphere_params)},
+                                 {"plane", false, PARAMS(plane_params)}};
 #define OBJECTS (sizeof objects / sizeof *objects)
 
-/* Of our form, and taken as they are. */
+/* Keys of our form that are copied. */
 static const char *const ours[] = {"description", "gravity", "integrator", "controller", "duration",
                                    "frame_rate",  "output",  "contact",    NULL};
 
@@ -102,35 +89,6 @@ static drape_status refuse(drape_context *ctx, const drape_pointer *at, json_t *
                          expected);
 }
 
-static bool is_vector(json_t *value)
-{
-    bool good = json_array_size(value) == 3; /* 0 if it is no array */
-    for (size_t i = 0; good && i < 3; i++)
-        good = json_is_number(json_array_get(value, i)) &&
-               fabs(json_number_value(json_array_get(value, i))) <= 1e9;
-    return good;
-}
-
-static bool fits(const key *k, json_t *value)
-{
-    double number = json_number_value(value);
-    bool inside =
-        json_is_number(value) && number >= k->min && number <= k->max && (!k->open_min || number > k->min);
-    switch (k->kind) {
-    case NUMBER:
-        return inside;
-    case INTEGER:
-        return inside && number == floor(number);
-    case BOOLEAN:
-        return json_is_boolean(value);
-    case VECTOR:
-        return is_vector(value);
-    case PINS:
-        return json_is_array(value);
-    }
-    return false;
-}
-
 static drape_status check_object(drape_context *ctx, const object *o, json_t *value)
 {
     drape_pointer at = {.length = 0};
@@ -138,15 +96,19 @@ static drape_status check_object(drape_context *ctx, const object *o, json_t *va
     if (!json_is_object(value))
         return refuse(ctx, &at, value, o->name, "an object");
     size_t mark = at.length;
-    for (size_t i = 0; i < o->key_count; i++) {
-        const key *k = &o->keys[i];
-        json_t *member = json_object_get(value, k->name);
-        drape_pointer_push(&at, k->name);
-        if (!member && k->required)
+    for (size_t i = 0; i < o->param_count; i++) {
+        const drape_param *param = &o->params[i];
+        json_t *member = json_object_get(value, param->name);
+        drape_pointer_push(&at, param->name);
+        if (!member) {
+            char takes[100];
+            drape_param_takes_text(param, takes, sizeof takes);
             return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at.text, "\"%s\" is missing from a CS184 scene: %s",
-                                 k->name, k->expected);
-        if (member && !fits(k, member))
-            return refuse(ctx, &at, member, k->name, k->expected);
+                                 param->name, takes);
+        }
+        drape_status status = drape_json_check(ctx, &at, param, member);
+        if (status)
+            return status;
         drape_pointer_cut(&at, mark);
     }
     return DRAPE_OK;
@@ -186,7 +148,7 @@ static double number_of(json_t *object_value, const char *name)
     return json_number_value(json_object_get(object_value, name));
 }
 
-/* One pin, at its pointer. */
+/* Checks one pin, at its pointer. */
 static drape_status check_pin(drape_context *ctx, drape_pointer *at, json_t *pin, const double points[2])
 {
     if (json_array_size(pin) != 2)
@@ -212,6 +174,8 @@ static drape_status check_pins(drape_context *ctx, json_t *cloth)
     drape_pointer_push(&at, "cloth");
     drape_pointer_push(&at, "pinned");
     size_t mark = at.length;
+    if (pins && !json_is_array(pins))
+        return refuse(ctx, &at, pins, "pinned", "an array of [x, y], numbers of points of the grid from 0");
     for (size_t i = 0; i < json_array_size(pins); i++) {
         drape_pointer_push_index(&at, i);
         drape_status status = check_pin(ctx, &at, json_array_get(pins, i), points);
@@ -269,10 +233,11 @@ static json_t *pins_of(json_t *cloth)
 
 static double stiffness_of(json_t *cloth, const char *enabled)
 {
-    return json_is_true(json_object_get(cloth, enabled)) ? number_of(cloth, "ks") : 0;
+    const bool on = json_is_true(json_object_get(cloth, enabled)) || number_of(cloth, enabled) != 0;
+    return on ? number_of(cloth, "ks") : 0;
 }
 
-/* Springs that are switched off have no stiffness: theirs still obey the limit. */
+/* Springs that are switched off have no stiffness, but still obey the strain limit, as in CS184. */
 static json_t *terms_of(json_t *cloth)
 {
     return json_pack("[{s:s,s:f},{s:s,s:f},{s:s,s:f,s:f},{s:s,s:f,s:s}]", "type", "spring.structural",
@@ -292,7 +257,7 @@ static json_t *mesh_of(json_t *cloth)
                      "translate", 0.0, vertical ? 0.0 : 1.0, 0.0, "rotate", 1.0, 0.0, 0.0, 180.0);
 }
 
-/* E h = ks, what a row of these springs has; no term here asks for it. */
+/* E h = ks, the membrane stiffness of a sheet of these springs; no term here asks for it. */
 static json_t *material_of(json_t *cloth)
 {
     double thickness = fmax(number_of(cloth, "thickness"), 1e-4);
@@ -328,7 +293,7 @@ static json_t *colliders_of(json_t *root)
     return array;
 }
 
-/* Their program's, changed by what the scene says of ours. */
+/* That of the CS184 program, with the settings that the scene gives of our form. */
 static json_t *integrator_of(json_t *root)
 {
     json_t *cloth = json_object_get(root, "cloth");

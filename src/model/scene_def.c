@@ -1,53 +1,261 @@
-/* scene_def.c: the defaults of the defs of a scene.
- *
- * struct_size is the caller's sizeof: a caller built against an older header has a shorter struct, whose
- * members are the first ones of ours; of a longer one, the members that we do not know become zero. */
+/* scene_def.c: the values of keys in defs: their defaults, how they are stored and looked up; and keys in words. */
+#include "model/scene.h"
+
+#include <math.h>
+#include <stdio.h>
 #include <string.h>
 
-#include "drape/drape.h"
+#include "base/vec3.h"
+#include "model/scene_text.h"
 
-static void give(void *def, size_t struct_size, const void *defaults, size_t size)
+/* ---- Keys by name and place ---- */
+
+const drape_scene_key *drape_scene_key_of(const drape_scene_object *object, const char *name)
+{
+    for (size_t i = 0; i < object->key_count; i++)
+        if (strcmp(object->keys[i].param.name, name) == 0)
+            return &object->keys[i];
+    return NULL;
+}
+
+const drape_scene_key *drape_scene_key_at(const char *pointer)
+{
+    const drape_scene_object *object = &drape_form_scene;
+    const drape_scene_key *key = NULL;
+    char name[DRAPE_POINTER_SIZE];
+    while (object && *pointer) {
+        pointer = drape_pointer_next(pointer, name);
+        key = pointer ? drape_scene_key_of(object, name) : NULL;
+        if (!key)
+            return NULL;
+        object = key->child;
+        if (object && key->shape != DRAPE_SCENE_OBJECT && *pointer) /* the index of an element */
+            pointer = drape_pointer_next(pointer, name);
+        if (!pointer)
+            return NULL;
+    }
+    return key;
+}
+
+/* ---- Values ---- */
+
+bool drape_scene_value(const drape_scene_key *key, const void *def, drape_setting *out)
+{
+    const char *at = (const char *)def + key->offset;
+    int32_t integer = 0;
+    bool boolean = false;
+    *out = (drape_setting){.name = key->param.name};
+    switch (key->param.kind) {
+    case DRAPE_PARAM_NUMBER:
+        memcpy(&out->number, at, sizeof out->number);
+        return true;
+    case DRAPE_PARAM_INTEGER:
+        memcpy(&integer, at, sizeof integer);
+        out->number = integer;
+        return integer >= key->param.min || !isnan(key->param.default_value);
+    case DRAPE_PARAM_BOOLEAN:
+        memcpy(&boolean, at, sizeof boolean);
+        out->number = boolean;
+        return true;
+    case DRAPE_PARAM_VECTOR:
+    case DRAPE_PARAM_TURN:
+        out->vector = (const double *)(const void *)at;
+        out->vector_count = key->param.kind == DRAPE_PARAM_TURN ? 4 : 3;
+        return true;
+    case DRAPE_PARAM_CHOICE:
+    case DRAPE_PARAM_TEXT:
+        memcpy(&out->text, at, sizeof out->text);
+    }
+    return out->text;
+}
+
+size_t drape_scene_texts(const drape_scene_key *key, const void *def, const char *const **texts)
+{
+    size_t count;
+    memcpy(texts, (const char *)def + key->offset, sizeof *texts);
+    memcpy(&count, (const char *)def + key->count_offset, sizeof count);
+    return count;
+}
+
+void drape_scene_store(const drape_scene_key *key, const drape_setting *setting, const double *values,
+                       void *def)
+{
+    char *at = (char *)def + key->offset;
+    const bool given = !isnan(*values);
+    const int32_t integer = given ? (int32_t)*values : -1;
+    const bool boolean = *values != 0;
+    const char *word = NULL;
+    double rotation[4] = {0};
+    switch (key->param.kind) {
+    case DRAPE_PARAM_NUMBER:
+        memcpy(at, values, sizeof *values);
+        return;
+    case DRAPE_PARAM_INTEGER:
+        memcpy(at, &integer, sizeof integer);
+        return;
+    case DRAPE_PARAM_BOOLEAN:
+        memcpy(at, &boolean, sizeof boolean);
+        return;
+    case DRAPE_PARAM_VECTOR:
+        memcpy(at, values, 3 * sizeof *values);
+        return;
+    case DRAPE_PARAM_TURN: /* axis and angle exactly as given, not converted as in `values` */
+        memcpy(rotation, setting->vector, setting->vector_count * sizeof *rotation);
+        if (setting->vector_count == 3)
+            rotation[3] = vec3_norm(rotation);
+        memcpy(at, rotation, sizeof rotation);
+        return;
+    case DRAPE_PARAM_CHOICE:
+        word = given ? key->param.choices[(int)*values] : NULL;
+        break;
+    case DRAPE_PARAM_TEXT:
+        word = setting->text;
+    }
+    memcpy(at, &word, sizeof word);
+}
+
+/* ---- Defaults ---- */
+
+/* Arrays without a default stay empty, as the zeros of the def have them; a list has a default of one text or none. */
+static void set_default(const drape_scene_key *key, void *def)
+{
+    static const double no_rotation[4] = {0};
+    const char *const *text = &key->param.derived;
+    const size_t one = 1;
+    double values[DRAPE_PARAM_WIDEST];
+    const drape_setting setting = {
+        .text = key->literal ? *text : NULL, .vector = no_rotation, .vector_count = 4};
+    if (key->shape == DRAPE_SCENE_OBJECT && key->child->key_count > 0)
+        drape_scene_set_defaults(key->child, (char *)def + key->offset);
+    if (key->shape == DRAPE_SCENE_LIST && key->literal) {
+        memcpy((char *)def + key->offset, &text, sizeof text);
+        memcpy((char *)def + key->count_offset, &one, sizeof one);
+    }
+    if (key->shape != DRAPE_SCENE_VALUE)
+        return;
+    drape_param_default(&key->param, values);
+    drape_scene_store(key, &setting, key->vector ? key->vector : values, def);
+}
+
+void drape_scene_set_defaults(const drape_scene_object *object, void *def)
+{
+    if (object->sized)
+        memcpy(def, &object->def_size, sizeof object->def_size);
+    for (size_t i = 0; i < object->key_count; i++)
+        set_default(&object->keys[i], def);
+}
+
+/* struct_size is the caller's sizeof: a caller built against an older header has a shorter struct, whose
+ * members are the first ones of ours; of a longer one, the members that we do not know become zero. */
+static void give(void *def, size_t struct_size, bool sized, const void *defaults, size_t size)
 {
     if (!def)
         return;
     memset(def, 0, struct_size);
     memcpy(def, defaults, struct_size < size ? struct_size : size);
+    if (sized)
+        memcpy(def, &struct_size, struct_size < sizeof struct_size ? struct_size : sizeof struct_size);
 }
 
+/* Two defaults are those of hosts only: the text of a scene must give a duration, and has frames written. */
 void drape_scene_def_init(drape_scene_def *def, size_t struct_size)
 {
-    const drape_scene_def defaults = {
-        .struct_size = struct_size,
-        .gravity = {0, -9.81, 0},
-        .integrator = {.type = "be"},
-        .controller = {.type = "halving"},
-        .duration = 1,
-        .frame_rate = 60,
-    };
-    give(def, struct_size, &defaults, sizeof defaults);
+    drape_scene_def defaults = {.struct_size = struct_size};
+    drape_scene_set_defaults(&drape_form_scene, &defaults);
+    defaults.duration = 1;
+    defaults.formats = NULL;
+    defaults.format_count = 0;
+    give(def, struct_size, true, &defaults, sizeof defaults);
 }
 
 void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size)
 {
-    const drape_mesh_def defaults = {.scale = {1, 1, 1}};
-    give(def, struct_size, &defaults, sizeof defaults);
+    drape_mesh_def defaults = {.file = NULL};
+    drape_scene_set_defaults(&drape_form_mesh, &defaults);
+    give(def, struct_size, false, &defaults, sizeof defaults);
 }
 
 void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size)
 {
-    drape_cloth_def defaults = {.struct_size = struct_size};
-    drape_mesh_def_init(&defaults.mesh, sizeof defaults.mesh);
-    give(def, struct_size, &defaults, sizeof defaults);
+    drape_cloth_def defaults = {.name = NULL};
+    drape_scene_set_defaults(&drape_form_cloth, &defaults);
+    give(def, struct_size, true, &defaults, sizeof defaults);
 }
 
 void drape_collider_def_init(drape_collider_def *def, size_t struct_size)
 {
-    const drape_collider_def defaults = {.struct_size = struct_size};
-    give(def, struct_size, &defaults, sizeof defaults);
+    drape_collider_def defaults = {.name = NULL};
+    drape_scene_set_defaults(&drape_form_collider, &defaults);
+    give(def, struct_size, true, &defaults, sizeof defaults);
 }
 
 void drape_pin_def_init(drape_pin_def *def, size_t struct_size)
 {
-    const drape_pin_def defaults = {.struct_size = struct_size, .row = -1};
-    give(def, struct_size, &defaults, sizeof defaults);
+    drape_pin_def defaults = {.nodes = NULL};
+    drape_scene_set_defaults(&drape_form_pin, &defaults);
+    give(def, struct_size, true, &defaults, sizeof defaults);
+}
+
+/* ---- Keys in words ---- */
+
+void drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size)
+{
+    static const char *const shapes[] = {[DRAPE_SCENE_VALUE] = "",
+                                         [DRAPE_SCENE_LIST] = "an array, each ",
+                                         [DRAPE_SCENE_VERSION] = "the number 1",
+                                         [DRAPE_SCENE_REMARK] = "a string",
+                                         [DRAPE_SCENE_BOX] = "two corners, [[x, y, z], [x, y, z]]",
+                                         [DRAPE_SCENE_TRACK] = "an array of [time, [x, y, z]]",
+                                         [DRAPE_SCENE_OBJECT] = "an object",
+                                         [DRAPE_SCENE_OBJECTS] = "an array of objects",
+                                         [DRAPE_SCENE_ENTRIES] =
+                                             "an array of names, or objects with a \"type\""};
+    const bool has_values = key->shape == DRAPE_SCENE_VALUE || key->shape == DRAPE_SCENE_LIST;
+    const bool has_unit = !has_values && strcmp(key->param.unit, "1") != 0;
+    char value[512] = "", most[32] = "";
+    if (has_values)
+        drape_param_takes_text(&key->param, value, sizeof value);
+    if (key->at_most)
+        snprintf(most, sizeof most, ", at most %zu", key->at_most);
+    snprintf(text, size, "%s%s%s%s%s%s", shapes[key->shape], value, has_unit ? ", in " : "",
+             has_unit ? key->param.unit : "", key->at_least ? ", at least one" : "", most);
+}
+
+static size_t append(char *text, size_t size, size_t used, const char *separator, const char *word)
+{
+    return used < size ? used + (size_t)snprintf(text + used, size - used, "%s%s", separator, word) : used;
+}
+
+void drape_scene_value_text(const drape_scene_key *key, const void *def, char *text, size_t size)
+{
+    const bool is_list = key->shape == DRAPE_SCENE_LIST;
+    const char *const *texts;
+    drape_setting value = {.text = NULL};
+    size_t used = 0, count = is_list ? drape_scene_texts(key, def, &texts) : 0;
+    char number[40];
+    *text = 0;
+    for (size_t i = 0; i < count; i++)
+        used = append(text, size, used, i ? ", " : "", texts[i]);
+    if (is_list || !drape_scene_value(key, def, &value))
+        return;
+    for (size_t i = 0; i < value.vector_count; i++) {
+        snprintf(number, sizeof number, "%.10g", value.vector[i]);
+        used = append(text, size, used, i ? ", " : "[", number);
+    }
+    if (value.vector)
+        append(text, size, used, "]", "");
+    else if (value.text)
+        snprintf(text, size, "%s", value.text);
+    else
+        drape_param_value_text(&key->param, &value.number, text, size);
+}
+
+void drape_scene_default_text(const drape_scene_key *key, char *text, size_t size)
+{
+    double values[DRAPE_PARAM_WIDEST];
+    drape_param_default(&key->param, values);
+    if (key->literal)
+        snprintf(text, size, "\"%s\"", key->param.derived);
+    else
+        drape_param_value_text(&key->param, key->vector ? key->vector : values, text, size);
 }

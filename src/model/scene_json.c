@@ -1,4 +1,4 @@
-/* scene_json.c: walks the tree of a scene along the tables of scene_keys.c: one reader a kind of key. */
+/* scene_json.c: walks the tree of a scene along the tables of scene_keys.c: one reader a shape of key. */
 #include "model/scene_json.h"
 
 #include <math.h>
@@ -6,12 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/param.h"
-#include "base/vec3.h"
 #include "model/scene.h"
-#include "model/scene_text.h"
 
-#define MOST_KEYS 16 /* of one object, for the lists in messages */
+#define MAX_KEYS  16  /* of one object, for the lists in messages */
+#define MAX_TAKES 600 /* bytes of what a key takes, in words */
 
 typedef struct reader {
     drape_context *ctx;
@@ -24,16 +22,6 @@ typedef drape_status read_function(reader *r, const drape_scene_key *key, json_t
 static read_function read_value;
 
 /* ---- Words for messages ---- */
-
-/* The shortest text that reads back as the number. */
-static void describe_number(double number, char *text, size_t size)
-{
-    for (int digits = 6; digits <= 17; digits++) {
-        snprintf(text, size, "%.*g", digits, number);
-        if (strtod(text, NULL) == number)
-            return;
-    }
-}
 
 /* In quotes, shortened if it is long. */
 static void quote(const char *string, char *text, size_t size)
@@ -61,7 +49,7 @@ void drape_json_describe(json_t *value, char *text, size_t size)
         break;
     case JSON_INTEGER:
     case JSON_REAL:
-        describe_number(json_number_value(value), text, size);
+        drape_number_text(json_number_value(value), text, size);
         break;
     case JSON_TRUE:
     case JSON_FALSE:
@@ -70,64 +58,6 @@ void drape_json_describe(json_t *value, char *text, size_t size)
     case JSON_NULL:
         snprintf(text, size, "null");
     }
-}
-
-static const char *kind_text(drape_scene_kind kind)
-{
-    switch (kind) {
-    case DRAPE_SCENE_VERSION:
-        return "the number 1";
-    case DRAPE_SCENE_TEXT:
-        return "a string";
-    case DRAPE_SCENE_WORD:
-        return "a string, not empty";
-    case DRAPE_SCENE_WORDS:
-        return "an array of strings, none empty";
-    case DRAPE_SCENE_BOOLEAN:
-        return "true or false";
-    case DRAPE_SCENE_NUMBER:
-        return "a number";
-    case DRAPE_SCENE_INTEGER:
-        return "an integer";
-    case DRAPE_SCENE_INTEGERS:
-        return "an array of integers";
-    case DRAPE_SCENE_VECTOR:
-        return "three numbers, [x, y, z]";
-    case DRAPE_SCENE_SCALE:
-        return "a number, or three, [x, y, z]";
-    case DRAPE_SCENE_ROTATION:
-        return "axis and angle, [x, y, z, angle], or a rotation vector, [x, y, z]";
-    case DRAPE_SCENE_BOX:
-        return "two corners, [[x, y, z], [x, y, z]]";
-    case DRAPE_SCENE_TRACK:
-        return "an array of [time, [x, y, z]]";
-    case DRAPE_SCENE_OBJECT:
-        return "an object";
-    case DRAPE_SCENE_OBJECTS:
-        return "an array of objects";
-    case DRAPE_SCENE_ROWS:
-        return "an array of names, or objects with a \"type\"";
-    }
-    return "";
-}
-
-/* "a number in (0, 1000000000] s", "three numbers, [x, y, z], in m": what a key may be. */
-static void expectation(const drape_scene_key *key, char *text, size_t size)
-{
-    char range[100] = "";
-    const char *unit = key->unit ? key->unit : "1";
-    bool ranged = key->max > 0;
-    if (ranged) {
-        const drape_param param = {.kind = DRAPE_PARAM_NUMBER,
-                                   .unit = unit,
-                                   .min = key->min,
-                                   .max = key->max,
-                                   .open_min = key->kind == DRAPE_SCENE_NUMBER && !key->closed};
-        drape_param_range_text(&param, range, sizeof range);
-    }
-    snprintf(text, size, "%s%s%s%s%s%s", kind_text(key->kind), ranged ? " in " : "", range,
-             !ranged && key->unit ? ", in " : "", !ranged && key->unit ? key->unit : "",
-             key->at_least ? ", at least one" : "");
 }
 
 /* ---- Faults ---- */
@@ -142,9 +72,9 @@ static drape_status refuse_as(reader *r, json_t *value, const char *what, const 
 
 static drape_status refuse(reader *r, const drape_scene_key *key, json_t *value)
 {
-    char expected[200];
-    expectation(key, expected, sizeof expected);
-    return refuse_as(r, value, key->name, expected);
+    char expected[MAX_TAKES];
+    drape_scene_takes_text(key, expected, sizeof expected);
+    return refuse_as(r, value, key->param.name, expected);
 }
 
 static drape_status refuse_element(reader *r, size_t index, json_t *value, const char *what,
@@ -156,31 +86,31 @@ static drape_status refuse_element(reader *r, size_t index, json_t *value, const
 
 static drape_status missing(reader *r, const drape_scene_key *key)
 {
-    char expected[200];
-    expectation(key, expected, sizeof expected);
-    drape_pointer_push(&r->at, key->name);
-    return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "\"%s\" is missing: %s; %s", key->name,
-                         key->help, expected);
+    char expected[MAX_TAKES];
+    drape_scene_takes_text(key, expected, sizeof expected);
+    drape_pointer_push(&r->at, key->param.name);
+    return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "\"%s\" is missing: %s; %s", key->param.name,
+                         key->param.help, expected);
 }
 
 /* "a, b, c" */
-static void list_words(const char *const *words, size_t count, char *text, size_t size)
+static void list_names(const char *const *names, size_t count, char *text, size_t size)
 {
     size_t used = 0;
     *text = 0;
     for (size_t i = 0; i < count && used < size; i++)
-        used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", words[i]);
+        used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", names[i]);
 }
 
 static drape_status unknown_key(reader *r, const drape_scene_object *object, const char *name)
 {
-    const char *known[MOST_KEYS];
+    const char *known[MAX_KEYS];
     size_t count = 0;
-    for (; count < object->key_count && count < MOST_KEYS; count++)
-        known[count] = object->keys[count].name;
+    for (; count < object->key_count && count < MAX_KEYS; count++)
+        known[count] = object->keys[count].param.name;
     char given[80], list[300];
     quote(name, given, sizeof given);
-    list_words(known, count, list, sizeof list);
+    list_names(known, count, list, sizeof list);
     const char *meant = drape_did_you_mean(name, known, count);
     drape_pointer_push(&r->at, name);
     if (meant)
@@ -192,7 +122,7 @@ static drape_status unknown_key(reader *r, const drape_scene_object *object, con
     return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "unknown key %s; known: %s", given, list);
 }
 
-/* ---- Numbers ---- */
+/* ---- Values ---- */
 
 static drape_status read_version(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
@@ -202,48 +132,15 @@ static drape_status read_version(reader *r, const drape_scene_key *key, json_t *
     if (json_number_value(value) == DRAPE_SCENE_FORM)
         return DRAPE_OK;
     char given[40];
-    describe_number(json_number_value(value), given, sizeof given);
+    drape_number_text(json_number_value(value), given, sizeof given);
     return drape_fail_at(r->ctx, DRAPE_E_VERSION, r->at.text,
                          "a scene of version %s; this library reads version %d", given, DRAPE_SCENE_FORM);
 }
 
-static drape_status read_boolean(reader *r, const drape_scene_key *key, json_t *value, char *def)
+static drape_status read_remark(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
-    bool given = json_is_true(value);
-    if (!json_is_boolean(value))
-        return refuse(r, key, value);
-    memcpy(def + key->offset, &given, sizeof given);
-    return DRAPE_OK;
-}
-
-static drape_status read_number(reader *r, const drape_scene_key *key, json_t *value, char *def)
-{
-    double number = json_number_value(value);
-    bool high_enough = key->closed ? number >= key->min : number > key->min;
-    if (!json_is_number(value) || !high_enough || !(number <= key->max))
-        return refuse(r, key, value);
-    memcpy(def + key->offset, &number, sizeof number);
-    return DRAPE_OK;
-}
-
-/* Every number of the tree is a double: 3.0 is an integer as much as 3, and 2^53 + 1 is out of range anyway.
- */
-static bool integer_of(const drape_scene_key *key, json_t *value, int32_t *integer)
-{
-    double number = json_number_value(value);
-    if (!json_is_number(value) || !(number >= key->min && number <= key->max) || number != floor(number))
-        return false;
-    *integer = (int32_t)number;
-    return true;
-}
-
-static drape_status read_integer(reader *r, const drape_scene_key *key, json_t *value, char *def)
-{
-    int32_t integer;
-    if (!integer_of(key, value, &integer))
-        return refuse(r, key, value);
-    memcpy(def + key->offset, &integer, sizeof integer);
-    return DRAPE_OK;
+    (void)def;
+    return json_is_string(value) ? DRAPE_OK : refuse(r, key, value);
 }
 
 /* The elements of an array, which has as many as out. */
@@ -258,48 +155,75 @@ static drape_status read_numbers(reader *r, json_t *array, double *out)
     return DRAPE_OK;
 }
 
-/* Three numbers inside of another array, whose key would say too much. */
+/* Three numbers inside another array; `what` is their name in messages. */
 static drape_status read_three(reader *r, json_t *value, const char *what, double *out)
 {
     return json_array_size(value) == 3 ? read_numbers(r, value, out)
-                                       : refuse_as(r, value, what, kind_text(DRAPE_SCENE_VECTOR));
+                                       : refuse_as(r, value, what, "three numbers, [x, y, z]");
 }
 
-static drape_status read_vector(reader *r, const drape_scene_key *key, json_t *value, char *def)
+/* Booleans become texts, so that no parameter takes them for a number. */
+static drape_status read_setting(reader *r, const char *name, json_t *value, drape_setting *out)
 {
-    double vector[3];
-    if (json_array_size(value) != 3) /* 0 if it is no array */
-        return refuse(r, key, value);
-    drape_status status = read_numbers(r, value, vector);
-    if (!status)
-        memcpy(def + key->offset, vector, sizeof vector);
+    *out = (drape_setting){.name = name};
+    if (json_is_boolean(value))
+        out->text = json_is_true(value) ? "true" : "false";
+    if (json_is_number(value))
+        out->number = json_number_value(value);
+    if (json_is_string(value))
+        out->text = json_string_value(value);
+    if (!json_is_array(value))
+        return DRAPE_OK;
+    double *numbers = drape_arena_take(r->arena, json_array_size(value), sizeof *numbers);
+    out->vector = numbers;
+    out->vector_count = json_array_size(value);
+    return numbers ? read_numbers(r, value, numbers) : DRAPE_E_MEMORY;
+}
+
+/* Whether a parameter of this kind may be written as a JSON value of this type; drape_param_value checks the rest. */
+static bool is_writable(const drape_param *param, json_t *value)
+{
+    if (json_is_array(value))
+        return drape_param_width(param) > 1;
+    if (json_is_boolean(value))
+        return param->kind == DRAPE_PARAM_BOOLEAN;
+    if (json_is_string(value))
+        return param->kind != DRAPE_PARAM_BOOLEAN;
+    return json_is_number(value);
+}
+
+static drape_status read_param(reader *r, const drape_param *param, json_t *value, drape_setting *setting,
+                               double *values)
+{
+    char given[80];
+    if (!is_writable(param, value)) {
+        drape_json_describe(value, given, sizeof given);
+        return drape_param_refuse(r->ctx, r->at.text, param, given);
+    }
+    drape_status status = read_setting(r, param->name, value, setting);
+    return status ? status : drape_param_value(r->ctx, r->at.text, param, setting, values);
+}
+
+drape_status drape_json_check(drape_context *ctx, const drape_pointer *at, const drape_param *param,
+                              json_t *value)
+{
+    drape_arena arena = drape_arena_of(ctx);
+    reader r = {.ctx = ctx, .arena = &arena, .at = *at};
+    drape_setting setting;
+    double values[DRAPE_PARAM_WIDEST];
+    drape_status status = read_param(&r, param, value, &setting, values);
+    drape_arena_free(&arena);
     return status;
 }
 
-static drape_status read_scale(reader *r, const drape_scene_key *key, json_t *value, char *def)
+static drape_status read_one(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
-    if (!json_is_number(value))
-        return read_vector(r, key, value, def);
-    double number = json_number_value(value), vector[3] = {number, number, number};
-    memcpy(def + key->offset, vector, sizeof vector);
-    return DRAPE_OK;
-}
-
-static drape_status read_rotation(reader *r, const drape_scene_key *key, json_t *value, char *def)
-{
-    double rotation[4] = {0};
-    size_t count = json_array_size(value); /* 0 if it is none */
-    if (count != 3 && count != 4)
-        return refuse(r, key, value);
-    drape_status status = read_numbers(r, value, rotation);
-    if (status)
-        return status;
-    if (count == 3)
-        rotation[3] = vec3_norm(rotation);
-    if (!isfinite(rotation[3]))
-        return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "the rotation vector is too long");
-    memcpy(def + key->offset, rotation, sizeof rotation);
-    return DRAPE_OK;
+    drape_setting setting;
+    double values[DRAPE_PARAM_WIDEST];
+    drape_status status = read_param(r, &key->param, value, &setting, values);
+    if (!status)
+        drape_scene_store(key, &setting, values, def);
+    return status;
 }
 
 static drape_status read_box(reader *r, const drape_scene_key *key, json_t *value, char *def)
@@ -323,12 +247,12 @@ static drape_status read_box(reader *r, const drape_scene_key *key, json_t *valu
 /* ---- Arrays ---- */
 
 /* Takes the memory of an array with as many elements as value and puts it into the def; refuses what is no
- * array, or too short. */
+ * array, too short or too long. */
 static drape_status take_array(reader *r, const drape_scene_key *key, json_t *value, size_t size, char *def,
                                void *array)
 {
     size_t count = json_array_size(value);
-    if (!json_is_array(value) || count < key->at_least)
+    if (!json_is_array(value) || count < key->at_least || (key->at_most && count > key->at_most))
         return refuse(r, key, value);
     void *memory = count ? drape_arena_take(r->arena, count, size) : NULL;
     if (count && !memory)
@@ -339,39 +263,20 @@ static drape_status take_array(reader *r, const drape_scene_key *key, json_t *va
     return DRAPE_OK;
 }
 
-static drape_status read_integers(reader *r, const drape_scene_key *key, json_t *value, char *def)
+/* Each element is stored as a key of its own would be. */
+static drape_status read_list(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
-    int32_t *integers = NULL;
-    drape_status status = take_array(r, key, value, sizeof *integers, def, &integers);
-    if (status)
-        return status;
-    for (size_t i = 0; i < json_array_size(value); i++)
-        if (!integer_of(key, json_array_get(value, i), &integers[i])) {
-            drape_scene_key one = *key;
-            one.kind = DRAPE_SCENE_INTEGER;
-            one.at_least = 0;
-            drape_pointer_push_index(&r->at, i);
-            char expected[100];
-            expectation(&one, expected, sizeof expected);
-            return refuse_as(r, json_array_get(value, i), "an element", expected);
-        }
-    return DRAPE_OK;
-}
-
-static bool is_word(json_t *value)
-{
-    return json_is_string(value) && json_string_length(value) > 0;
-}
-
-static drape_status read_words(reader *r, const drape_scene_key *key, json_t *value, char *def)
-{
-    const char **words = NULL;
-    drape_status status = take_array(r, key, value, sizeof *words, def, &words);
+    const size_t size = key->param.kind == DRAPE_PARAM_INTEGER ? sizeof(int32_t) : sizeof(const char *);
+    const size_t mark = r->at.length;
+    drape_scene_key element = {.param = key->param};
+    element.param.name = "an element";
+    char *elements = NULL;
+    drape_status status = take_array(r, key, value, size, def, &elements);
     for (size_t i = 0; !status && i < json_array_size(value); i++) {
-        json_t *one = json_array_get(value, i);
-        words[i] = json_string_value(one);
-        if (!is_word(one))
-            status = refuse_element(r, i, one, "an element", kind_text(DRAPE_SCENE_WORD));
+        drape_pointer_push_index(&r->at, i);
+        status = read_one(r, &element, json_array_get(value, i), elements + i * size);
+        if (!status)
+            drape_pointer_cut(&r->at, mark);
     }
     return status;
 }
@@ -387,7 +292,7 @@ static drape_status read_track_key(reader *r, json_t *value, const drape_track_k
     out->time = json_number_value(time);
     if (before && !(out->time > before->time)) {
         char expected[100] = "greater than that of the key before, ";
-        describe_number(before->time, expected + strlen(expected), 40);
+        drape_number_text(before->time, expected + strlen(expected), 40);
         return refuse_element(r, 0, time, "the time of a key", expected);
     }
     drape_pointer_push_index(&r->at, 1);
@@ -408,67 +313,23 @@ static drape_status read_track(reader *r, const drape_scene_key *key, json_t *va
     return status;
 }
 
-/* ---- Strings ---- */
-
-static drape_status read_text(reader *r, const drape_scene_key *key, json_t *value, char *def)
-{
-    (void)def;
-    return json_is_string(value) ? DRAPE_OK : refuse(r, key, value);
-}
-
-static drape_status read_word(reader *r, const drape_scene_key *key, json_t *value, char *def)
-{
-    const char *word = json_string_value(value);
-    if (!is_word(value))
-        return refuse(r, key, value);
-    memcpy(def + key->offset, &word, sizeof word);
-    return DRAPE_OK;
-}
-
 /* ---- Objects ---- */
 
-static bool has_key(const drape_scene_object *object, const char *name)
-{
-    for (size_t i = 0; i < object->key_count; i++)
-        if (strcmp(object->keys[i].name, name) == 0)
-            return true;
-    return false;
-}
-
-static drape_status read_vector_setting(reader *r, json_t *value, drape_setting *out)
-{
-    double *numbers = drape_arena_take(r->arena, json_array_size(value), sizeof *numbers);
-    if (!numbers)
-        return DRAPE_E_MEMORY;
-    out->vector = numbers;
-    out->vector_count = json_array_size(value);
-    return read_numbers(r, value, numbers);
-}
-
-static drape_status read_setting(reader *r, const char *name, json_t *value, drape_setting *out)
+/* A setting, whose parameter only the compiler knows. */
+static drape_status read_member(reader *r, const char *name, json_t *value, drape_setting *out)
 {
     size_t mark = r->at.length;
-    *out = (drape_setting){.name = name};
-    if (json_is_boolean(value)) {
-        out->text = json_is_true(value) ? "true" : "false"; /* so that no number takes it */
-    } else if (json_is_number(value)) {
-        out->number = json_number_value(value);
-    } else if (json_is_string(value)) {
-        out->text = json_string_value(value);
-    } else {
-        drape_pointer_push(&r->at, name);
-        drape_status status =
-            json_is_array(value)
-                ? read_vector_setting(r, value, out)
-                : refuse_as(r, value, "a setting", "a number, true, false, a string or an array of numbers");
-        if (status)
-            return status;
+    drape_pointer_push(&r->at, name);
+    drape_status status =
+        json_is_object(value) || json_is_null(value)
+            ? refuse_as(r, value, "a setting", "a number, true, false, a string or an array of numbers")
+            : read_setting(r, name, value, out);
+    if (!status)
         drape_pointer_cut(&r->at, mark);
-    }
-    return DRAPE_OK;
+    return status;
 }
 
-/* The members that are no keys: settings in an open object, faults in others. */
+/* Members that are not keys are settings in an open object, and faults in others. */
 static drape_status read_others(reader *r, const drape_scene_object *object, json_t *value, char *def)
 {
     drape_setting *settings = NULL;
@@ -481,15 +342,15 @@ static drape_status read_others(reader *r, const drape_scene_object *object, jso
     }
     for (void *it = json_object_iter(value); it; it = json_object_iter_next(value, it)) {
         const char *name = json_object_iter_key(it);
-        if (has_key(object, name))
+        if (drape_scene_key_of(object, name))
             continue;
-        drape_status status = open ? read_setting(r, name, json_object_iter_value(it), &settings[count])
+        drape_status status = open ? read_member(r, name, json_object_iter_value(it), &settings[count])
                                    : unknown_key(r, object, name);
         if (status)
             return status;
         count++;
     }
-    if (open) { /* none is not the same as no object */
+    if (open) { /* an object without settings differs from no object */
         memcpy(def + object->settings_offset, &settings, sizeof settings);
         memcpy(def + object->settings_count_offset, &count, sizeof count);
     }
@@ -498,7 +359,7 @@ static drape_status read_others(reader *r, const drape_scene_object *object, jso
 
 static drape_status check_one_of(reader *r, const drape_scene_object *object, json_t *value)
 {
-    const char *given[MOST_KEYS];
+    const char *given[MAX_KEYS];
     size_t count = 0, given_count = 0;
     for (; object->one_of && object->one_of[count]; count++)
         if (json_object_get(value, object->one_of[count]))
@@ -506,9 +367,9 @@ static drape_status check_one_of(reader *r, const drape_scene_object *object, js
     if (count == 0 || given_count == 1)
         return DRAPE_OK;
     char wanted[200], found[200] = "none";
-    list_words(object->one_of, count, wanted, sizeof wanted);
+    list_names(object->one_of, count, wanted, sizeof wanted);
     if (given_count)
-        list_words(given, given_count, found, sizeof found);
+        list_names(given, given_count, found, sizeof found);
     return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "exactly one of %s is needed; given: %s",
                          wanted, found);
 }
@@ -518,12 +379,12 @@ static drape_status read_members(reader *r, const drape_scene_object *object, js
     size_t mark = r->at.length;
     for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
-        json_t *member = json_object_get(value, key->name);
-        if (!member && key->required)
+        json_t *member = json_object_get(value, key->param.name);
+        if (!member && drape_param_is_required(&key->param))
             return missing(r, key);
         if (!member)
             continue;
-        drape_pointer_push(&r->at, key->name);
+        drape_pointer_push(&r->at, key->param.name);
         drape_status status = read_value(r, key, member, def);
         if (status)
             return status;
@@ -551,14 +412,13 @@ static drape_status read_child(reader *r, const drape_scene_key *key, json_t *va
 
 static drape_status read_element(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
-    if (key->child->init)
-        key->child->init(def);
-    if (key->kind == DRAPE_SCENE_ROWS && is_word(value))
+    drape_scene_set_defaults(key->child, def);
+    if (key->shape == DRAPE_SCENE_ENTRIES && json_string_length(value) > 0)
         return read_value(r, &key->child->keys[0], value, def); /* its "type" */
     if (!json_is_object(value))
         return refuse_as(r, value, "an element",
-                         key->kind == DRAPE_SCENE_ROWS ? "a name, or an object with a \"type\""
-                                                       : "an object");
+                         key->shape == DRAPE_SCENE_ENTRIES ? "a name, or an object with a \"type\""
+                                                           : "an object");
     return read_object(r, key->child, value, def);
 }
 
@@ -579,35 +439,32 @@ static drape_status read_children(reader *r, const drape_scene_key *key, json_t 
 static drape_status read_value(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
     static read_function *const readers[] = {
-        [DRAPE_SCENE_VERSION] = read_version,   [DRAPE_SCENE_TEXT] = read_text,
-        [DRAPE_SCENE_WORD] = read_word,         [DRAPE_SCENE_WORDS] = read_words,
-        [DRAPE_SCENE_NUMBER] = read_number,     [DRAPE_SCENE_INTEGER] = read_integer,
-        [DRAPE_SCENE_INTEGERS] = read_integers, [DRAPE_SCENE_VECTOR] = read_vector,
-        [DRAPE_SCENE_SCALE] = read_scale,       [DRAPE_SCENE_ROTATION] = read_rotation,
-        [DRAPE_SCENE_BOX] = read_box,           [DRAPE_SCENE_TRACK] = read_track,
-        [DRAPE_SCENE_OBJECT] = read_child,      [DRAPE_SCENE_OBJECTS] = read_children,
-        [DRAPE_SCENE_ROWS] = read_children,     [DRAPE_SCENE_BOOLEAN] = read_boolean,
+        [DRAPE_SCENE_VALUE] = read_one,        [DRAPE_SCENE_LIST] = read_list,
+        [DRAPE_SCENE_VERSION] = read_version,  [DRAPE_SCENE_REMARK] = read_remark,
+        [DRAPE_SCENE_BOX] = read_box,          [DRAPE_SCENE_TRACK] = read_track,
+        [DRAPE_SCENE_OBJECT] = read_child,     [DRAPE_SCENE_OBJECTS] = read_children,
+        [DRAPE_SCENE_ENTRIES] = read_children,
     };
-    return readers[key->kind](r, key, value, def);
+    return readers[key->shape](r, key, value, def);
 }
 
 /* ---- The scene ---- */
 
-/* The version before all else: in another version other keys would be right. */
+/* The version is checked first, as another version has other keys. */
 static drape_status check_version(reader *r, json_t *root)
 {
-    const drape_scene_key *key = &drape_scene_form.keys[0];
-    json_t *version = json_object_get(root, key->name);
+    const drape_scene_key *key = &drape_form_scene.keys[0];
+    json_t *version = json_object_get(root, key->param.name);
     if (!version)
         return missing(r, key);
-    drape_pointer_push(&r->at, key->name);
+    drape_pointer_push(&r->at, key->param.name);
     drape_status status = read_value(r, key, version, NULL);
     if (!status)
         drape_pointer_cut(&r->at, 0);
     return status;
 }
 
-/* Names of cloths are their own, those that the library gives to nameless ones included. */
+/* No two cloths have the same name, with the names that the library gives included. */
 static drape_status check_names(reader *r, const drape_scene_def *def)
 {
     json_t *names = json_object(); /* used as a set */
@@ -635,13 +492,11 @@ static drape_status check_names(reader *r, const drape_scene_def *def)
 drape_status drape_scene_read(drape_context *ctx, drape_arena *arena, json_t *root, drape_scene_def *def)
 {
     reader r = {.ctx = ctx, .arena = arena};
-    static const char *const default_formats[] = {"npy"};
-    drape_scene_def_init(def, sizeof *def);
-    def->formats = default_formats;
-    def->format_count = 1;
+    memset(def, 0, sizeof *def);
+    drape_scene_set_defaults(&drape_form_scene, def);
     drape_status status = check_version(&r, root);
     if (!status)
-        status = read_object(&r, &drape_scene_form, root, (char *)def);
+        status = read_object(&r, &drape_form_scene, root, (char *)def);
     if (!status)
         status = check_names(&r, def);
     return status;

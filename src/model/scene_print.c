@@ -39,7 +39,7 @@ static void new_line(printer *p, size_t indent)
         put_text(p, " ");
 }
 
-/* Infinite and NaN are in no JSON tree. */
+/* JSON has neither infinity nor NaN. */
 static void print_number(printer *p, double number)
 {
     char text[40];
@@ -94,7 +94,7 @@ static bool has_scalars_alone(json_t *value)
     return json_is_array(value);
 }
 
-/* Long lists of numbers stay on one line: a number a line is no better to read. */
+/* Long lists of numbers stay on one line: one number a line would not read better. */
 static bool is_one_line(const printer *p, json_t *value)
 {
     if (is_scalar(value) || has_scalars_alone(value))

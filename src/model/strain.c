@@ -1,7 +1,7 @@
 /*
- * strain.c: principal strains of triangles. With the edge vectors D = (x1 - x0, x2 - x0), R the same at rest, in
- * a frame of the triangle's own that its first edge begins, the deformation gradient is F = D R^-1 (3 x 2). The
- * principal stretches are the roots of the eigenvalues of F'F, those of a symmetric 2 x 2 matrix.
+ * strain.c: principal strains of triangles. With the edge vectors D = (x1 - x0, x2 - x0), R the same at rest,
+ * in a frame of the triangle's own that its first edge begins, the deformation gradient is F = D R^-1 (3 x
+ * 2). The principal stretches are the roots of the eigenvalues of F'F, those of a symmetric 2 x 2 matrix.
  */
 #include <math.h>
 

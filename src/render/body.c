@@ -6,23 +6,24 @@
 #include <math.h>
 #include <string.h>
 
-#define CELLS      32   /* along the longest side of the box */
-#define FLAT_CELLS 12   /* of an endless body */
-#define FAR        1e4  /* reaches: from so far away the distance tells where a body ends */
-#define ENDLESS    2.0  /* reaches */
-#define TOUCH      0.15 /* of the way to a face's middle: where its own normal is taken */
-#define CUT_STEPS  24   /* halvings: where an edge is cut */
-#define PLANE_PULL 1e-2 /* weight of the mean where the planes leave a point free */
-#define SETTLE     4    /* steps onto the surface */
+#define CELLS        32   /* along the longest side of the box */
+#define FLAT_CELLS   12   /* the same for an endless body */
+#define FAR          1e4  /* distance in reaches from which the extent along an axis is measured */
+#define ENDLESS      2.0  /* half the side of the box of an endless body, in reaches */
+#define NORMAL_SHIFT 0.15 /* shift of a corner to the middle of its face, for the normal */
+#define CUT_STEPS    24   /* bisections that find where the surface cuts an edge of the grid */
+#define MEAN_WEIGHT  1e-2 /* of the mean, for directions that the planes leave free */
+#define NEWTON_STEPS 4    /* that move a point onto the surface */
 
 typedef struct grid {
     const drape_collider *collider;
+    drape_arena arena;
     double low[3], cell;
     int n[3];       /* corners */
     double *value;  /* (corners) signed distance */
     int32_t *point; /* (cells) number of the cell's point; -1 for none */
     double *points; /* (point_count x 3) */
-    size_t point_count, point_room;
+    size_t point_count, point_capacity;
 } grid;
 
 static double distance(const drape_collider *c, const double *x, double *normal)
@@ -30,24 +31,17 @@ static double distance(const drape_collider *c, const double *x, double *normal)
     return c->ops->distance(c->values, &c->shape, x, normal, NULL);
 }
 
-/* ---- The box ---- */
-
-/* How far the body reaches along an axis: from very far away the surface is nearly a plane. */
-static double support(const drape_collider *c, const double *center, double reach, int axis, double sign)
-{
-    double x[3] = {center[0], center[1], center[2]};
-    x[axis] += sign * FAR * reach;
-    return FAR * reach - distance(c, x, NULL);
-}
-
+/* The extent along each axis: from very far away the surface is nearly a plane across that axis. */
 static void find_box(const drape_collider *c, const double *center, double reach, drape_body *body)
 {
-    for (int k = 0; k < 3; k++) {
-        double up = support(c, center, reach, k, 1), down = support(c, center, reach, k, -1);
-        body->endless |= up > FAR * reach / 2 || down > FAR * reach / 2;
-        body->high[k] = center[k] + up;
-        body->low[k] = center[k] - down;
-    }
+    for (int k = 0; k < 3; k++)
+        for (int sign = -1; sign <= 1; sign += 2) {
+            double x[3] = {center[0], center[1], center[2]};
+            x[k] += sign * FAR * reach;
+            double extent = FAR * reach - distance(c, x, NULL);
+            body->endless |= extent > FAR * reach / 2;
+            *(sign > 0 ? &body->high[k] : &body->low[k]) = center[k] + sign * extent;
+        }
     for (int k = 0; body->endless && k < 3; k++) {
         body->low[k] = center[k] - ENDLESS * reach;
         body->high[k] = center[k] + ENDLESS * reach;
@@ -68,10 +62,10 @@ static void corner_at(const grid *g, int i, int j, int k, double *x)
     x[2] = g->low[2] + k * g->cell;
 }
 
-/* The box with a cell and a bit around it, so that no face of a body lies in a plane of the grid. */
-static drape_status make_grid(drape_context *ctx, const drape_body *body, grid *g)
+/* The box with a margin of somewhat more than a cell, so that no face of a body lies in a plane of the grid. */
+static drape_status make_grid(const drape_body *body, grid *g)
 {
-    double longest = 0;
+    double longest = 0, x[3];
     for (int k = 0; k < 3; k++)
         longest = fmax(longest, body->high[k] - body->low[k]);
     g->cell = longest / (body->endless ? FLAT_CELLS : CELLS);
@@ -81,25 +75,20 @@ static drape_status make_grid(drape_context *ctx, const drape_body *body, grid *
         g->low[k] = body->low[k] - (1.37 + (ceil(size) - size) / 2) * g->cell;
     }
     size_t corners = (size_t)g->n[0] * (size_t)g->n[1] * (size_t)g->n[2];
-    g->value = drape_alloc(ctx, corners, sizeof *g->value);
-    g->point = drape_alloc(ctx, corners, sizeof *g->point);
-    return g->value && g->point ? DRAPE_OK : DRAPE_E_MEMORY;
-}
-
-static void measure_grid(grid *g)
-{
-    double x[3];
-    for (int k = 0; k < g->n[2]; k++)
+    g->value = drape_arena_take(&g->arena, corners, sizeof *g->value);
+    g->point = drape_arena_take(&g->arena, corners, sizeof *g->point);
+    for (int k = 0; k < g->n[2] && !g->arena.failed; k++)
         for (int j = 0; j < g->n[1]; j++)
             for (int i = 0; i < g->n[0]; i++) {
                 corner_at(g, i, j, k, x);
                 g->value[corner_number(g, i, j, k)] = distance(g->collider, x, NULL);
             }
+    return drape_arena_status(&g->arena);
 }
 
-/* ---- A point in each cell that the surface passes ---- */
+/* ---- A point in each cell that the surface passes through ---- */
 
-/* Where the surface cuts the way from a, inside or outside, to b. */
+/* Finds the point where the surface cuts the segment from a to b, by bisection. */
 static void cut(const drape_collider *c, const double *a, const double *b, double *x)
 {
     double low = 0, high = 1, at_a = distance(c, a, NULL);
@@ -114,7 +103,7 @@ static void cut(const drape_collider *c, const double *a, const double *b, doubl
     }
 }
 
-/* Solves the symmetric a x = b, 3 x 3, positive definite, by Cramer's rule. */
+/* Solves a x = b for a symmetric positive definite 3 x 3 matrix, by Cramer's rule. */
 static void solve3(double a[3][3], const double *b, double *x)
 {
     double cofactor[3][3], determinant = 0;
@@ -132,18 +121,18 @@ static void solve3(double a[3][3], const double *b, double *x)
     }
 }
 
-/* Least squares of the distances from the planes at the cuts, drawn to their mean. */
+/* The point with the least squared distances from the planes at the cuts, regularized towards the mean of the cuts. */
 static void fit_point(const double (*cuts)[3], const double (*normals)[3], int count, double *x)
 {
     double mean[3] = {0}, a[3][3] = {{0}}, b[3] = {0}, move[3];
     for (int i = 0; i < count; i++)
         vec3_add_scaled(1.0 / count, cuts[i], mean);
     for (int k = 0; k < 3; k++)
-        a[k][k] = PLANE_PULL;
+        a[k][k] = MEAN_WEIGHT;
     for (int i = 0; i < count; i++) {
-        double way[3];
-        vec3_sub(cuts[i], mean, way);
-        double d = vec3_dot(way, normals[i]);
+        double offset[3];
+        vec3_sub(cuts[i], mean, offset);
+        double d = vec3_dot(offset, normals[i]);
         for (int r = 0; r < 3; r++) {
             b[r] += d * normals[i][r];
             for (int s = 0; s < 3; s++)
@@ -155,35 +144,8 @@ static void fit_point(const double (*cuts)[3], const double (*normals)[3], int c
         x[k] = mean[k] + move[k];
 }
 
-/* Newton on the distance: exact but for the pull to the mean. */
-static void settle(const drape_collider *c, double *x)
-{
-    double normal[3];
-    for (int step = 0; step < SETTLE; step++) {
-        double d = distance(c, x, normal);
-        vec3_add_scaled(-d, normal, x);
-    }
-}
-
-static drape_status keep_point(drape_context *ctx, grid *g, const double *x)
-{
-    if (g->point_count == g->point_room) {
-        size_t room = g->point_room ? 2 * g->point_room : 1024;
-        double *more = drape_alloc(ctx, 3 * room, sizeof *more);
-        if (!more)
-            return DRAPE_E_MEMORY;
-        if (g->points)
-            memcpy(more, g->points, 3 * g->point_count * sizeof *more);
-        drape_free(ctx, g->points);
-        g->points = more;
-        g->point_room = room;
-    }
-    memcpy(g->points + 3 * g->point_count++, x, 3 * sizeof *x);
-    return DRAPE_OK;
-}
-
-/* A plane of the surface for each corner of the cell whose nearest point of it is in the cell: an edge of the body may
- * pass through a cell of which no edge meets both of its sides. */
+/* Adds the tangent plane at the surface point nearest to each corner of the cell, if that point is in the cell: an edge
+ * of the body may pass through a cell none of whose edges meets both of the edge's sides. */
 static int add_nearest(const grid *g, const int *at, double (*cuts)[3], double (*normals)[3], int count)
 {
     for (int corner = 0; corner < 8; corner++) {
@@ -203,7 +165,7 @@ static int add_nearest(const grid *g, const int *at, double (*cuts)[3], double (
     return count;
 }
 
-/* Where the surface cuts the edges of the cell. */
+/* Adds the tangent planes where the surface cuts the edges of the cell; returns their number. */
 static int add_cuts(const grid *g, const int *at, double (*cuts)[3], double (*normals)[3])
 {
     int count = 0;
@@ -227,35 +189,36 @@ static int add_cuts(const grid *g, const int *at, double (*cuts)[3], double (*no
     return count;
 }
 
-static drape_status make_point(drape_context *ctx, grid *g, int i, int j, int k)
+/* The point that fits the planes, moved onto the surface by Newton steps on the distance: the least squares alone are
+ * inexact because of the regularization. */
+static drape_status make_point(grid *g, int i, int j, int k)
 {
-    double cuts[20][3], normals[20][3], x[3];
+    double cuts[20][3], normals[20][3], x[3], normal[3];
     const int at[3] = {i, j, k};
     int count = add_cuts(g, at, cuts, normals);
-    size_t cell = corner_number(g, i, j, k);
-    g->point[cell] = count ? (int32_t)g->point_count : -1;
+    g->point[corner_number(g, i, j, k)] = count ? (int32_t)g->point_count : -1;
     if (!count)
         return DRAPE_OK;
     count = add_nearest(g, at, cuts, normals, count);
     fit_point((const double(*)[3])cuts, (const double(*)[3])normals, count, x);
-    settle(g->collider, x);
-    return keep_point(ctx, g, x);
-}
-
-static drape_status make_points(drape_context *ctx, grid *g)
-{
-    drape_status status = DRAPE_OK;
-    for (int k = 0; k + 1 < g->n[2]; k++)
-        for (int j = 0; j + 1 < g->n[1]; j++)
-            for (int i = 0; i + 1 < g->n[0] && !status; i++)
-                status = make_point(ctx, g, i, j, k);
-    return status;
+    for (int step = 0; step < NEWTON_STEPS; step++) {
+        double d = distance(g->collider, x, normal);
+        vec3_add_scaled(-d, normal, x);
+    }
+    if (g->point_count == g->point_capacity) {
+        g->point_capacity = g->point_capacity ? 2 * g->point_capacity : 1024;
+        g->points = drape_arena_resize(&g->arena, g->points, g->point_capacity, sizeof x);
+        if (!g->points)
+            return DRAPE_E_MEMORY;
+    }
+    memcpy(g->points + 3 * g->point_count++, x, sizeof x);
+    return DRAPE_OK;
 }
 
 /* ---- Faces: one for each edge of the grid that is cut ---- */
 
-/* The normal of a corner is the surface's a little way towards the middle of its face: at an edge of the body, that
- * of the side which the face is on. */
+/* The normal of a corner is taken a little towards the middle of its face, so that at an edge of the body it is the
+ * normal of the side on which the face lies. */
 static void put_triangle(const grid *g, const int32_t *corner, drape_body *body)
 {
     double middle[3] = {0}, normal[3], x[3];
@@ -265,7 +228,7 @@ static void put_triangle(const grid *g, const int32_t *corner, drape_body *body)
         const double *p = g->points + 3 * (size_t)corner[c];
         float *to = body->vertex + 6 * body->vertex_count++;
         for (int k = 0; k < 3; k++)
-            x[k] = p[k] + TOUCH * (middle[k] - p[k]);
+            x[k] = p[k] + NORMAL_SHIFT * (middle[k] - p[k]);
         distance(g->collider, x, normal);
         for (int k = 0; k < 3; k++) {
             to[k] = (float)p[k];
@@ -274,18 +237,19 @@ static void put_triangle(const grid *g, const int32_t *corner, drape_body *body)
     }
 }
 
-/* The edge from corner (i, j, k) along axis: the four cells around it, counterclockwise from outside. */
+/* Puts the face of the edge from corner (i, j, k) along axis: it joins the points of the four cells around the edge,
+ * counterclockwise seen from outside. */
 static void put_face(const grid *g, int i, int j, int k, int axis, drape_body *body)
 {
     static const int around[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-    int at[3] = {i, j, k}, next[3] = {i, j, k};
+    int next[3] = {i, j, k};
     int32_t corner[4];
     next[axis]++;
     bool leaves = g->value[corner_number(g, i, j, k)] < 0;
     if (leaves == (g->value[corner_number(g, next[0], next[1], next[2])] < 0))
         return;
     for (int c = 0; c < 4; c++) {
-        int cell[3] = {at[0], at[1], at[2]};
+        int cell[3] = {i, j, k};
         const int *back = around[leaves ? c : 3 - c];
         cell[(axis + 1) % 3] -= 1 - back[0];
         cell[(axis + 2) % 3] -= 1 - back[1];
@@ -299,26 +263,33 @@ static void put_face(const grid *g, int i, int j, int k, int axis, drape_body *b
     put_triangle(g, (const int32_t[]){corner[0], corner[2], corner[3]}, body);
 }
 
-static drape_status put_faces(drape_context *ctx, const grid *g, drape_body *body)
+static drape_status contour(drape_arena *arena, const drape_collider *collider, drape_body *body)
 {
+    grid g = {.collider = collider, .arena = drape_arena_of(arena->ctx)};
+    drape_status status = make_grid(body, &g);
+    for (int k = 0; k + 1 < g.n[2]; k++)
+        for (int j = 0; j + 1 < g.n[1]; j++)
+            for (int i = 0; i + 1 < g.n[0] && !status; i++)
+                status = make_point(&g, i, j, k);
     /* a point has at most 12 faces around it, and a face 4 points: 3 faces, 6 triangles a point */
-    body->vertex = drape_alloc(ctx, 6 * 18 * (g->point_count + 1), sizeof *body->vertex);
-    if (!body->vertex)
-        return DRAPE_E_MEMORY;
-    for (int k = 0; k + 1 < g->n[2]; k++)
-        for (int j = 0; j + 1 < g->n[1]; j++)
-            for (int i = 0; i + 1 < g->n[0]; i++)
-                for (int axis = 0; axis < 3; axis++)
-                    put_face(g, i, j, k, axis, body);
-    return DRAPE_OK;
+    if (!status &&
+        !(body->vertex = drape_arena_take(arena, 6 * 18 * (g.point_count + 1), sizeof *body->vertex)))
+        status = DRAPE_E_MEMORY;
+    for (int k = 0; k + 1 < g.n[2]; k++)
+        for (int j = 0; j + 1 < g.n[1]; j++)
+            for (int i = 0; i + 1 < g.n[0]; i++)
+                for (int axis = 0; axis < 3 && !status; axis++)
+                    put_face(&g, i, j, k, axis, body);
+    drape_arena_free(&g.arena);
+    return status;
 }
 
-/* ---- Bodies that have triangles ---- */
+/* ---- Colliders that have triangles ---- */
 
-static drape_status take_triangles(drape_context *ctx, const drape_collider_shape *shape, drape_body *body)
+static drape_status copy_triangles(drape_arena *arena, const drape_collider_shape *shape, drape_body *body)
 {
     size_t count = 3 * (size_t)shape->triangle_count;
-    body->vertex = drape_alloc(ctx, 6 * count, sizeof *body->vertex);
+    body->vertex = drape_arena_take(arena, 6 * count, sizeof *body->vertex);
     if (!body->vertex)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < count; i += 3) {
@@ -340,36 +311,11 @@ static drape_status take_triangles(drape_context *ctx, const drape_collider_shap
     return DRAPE_OK;
 }
 
-static drape_status contour(drape_context *ctx, const drape_collider *collider, drape_body *body)
-{
-    grid g = {.collider = collider};
-    drape_status status = make_grid(ctx, body, &g);
-    if (!status) {
-        measure_grid(&g);
-        status = make_points(ctx, &g);
-    }
-    if (!status)
-        status = put_faces(ctx, &g, body);
-    drape_free(ctx, g.value);
-    drape_free(ctx, g.point);
-    drape_free(ctx, g.points);
-    return status;
-}
-
-drape_status drape_body_create(drape_context *ctx, const drape_collider *collider, const double center[3],
+drape_status drape_body_create(drape_arena *arena, const drape_collider *collider, const double center[3],
                                double reach, drape_body *body)
 {
     *body = (drape_body){.endless = false};
     find_box(collider, center, reach, body);
-    drape_status status = collider->shape.triangle_count > 0 ? take_triangles(ctx, &collider->shape, body)
-                                                             : contour(ctx, collider, body);
-    if (status)
-        drape_body_free(ctx, body);
-    return status;
-}
-
-void drape_body_free(drape_context *ctx, drape_body *body)
-{
-    drape_free(ctx, body->vertex);
-    *body = (drape_body){.endless = false};
+    return collider->shape.triangle_count > 0 ? copy_triangles(arena, &collider->shape, body)
+                                              : contour(arena, collider, body);
 }

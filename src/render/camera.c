@@ -1,15 +1,14 @@
 /* camera.c: see camera.h. */
 #include "render/camera.h"
 
-#define HALF_ANGLE                                                                                           \
-    0.26f /* tangent of half of the smaller angle of view, 29 degrees in all: that of a portrait */
-#define MARGIN   1.12f
-#define RADIANS  0.017453292519943295f
-#define STEEPEST 89.9f
+#define HALF_ANGLE    0.26f /* tangent of half the smaller angle of view, 29 degrees, as of a portrait lens */
+#define MARGIN        1.12f
+#define RADIANS       0.017453292519943295f
+#define MAX_ELEVATION 89.9f
 
 static void set_axes(float azimuth, float elevation, float axes[3][3])
 {
-    float a = azimuth * RADIANS, e = fminf(fmaxf(elevation, -STEEPEST), STEEPEST) * RADIANS;
+    float a = azimuth * RADIANS, e = fminf(fmaxf(elevation, -MAX_ELEVATION), MAX_ELEVATION) * RADIANS;
     const float back[3] = {cosf(e) * sinf(a), sinf(e), cosf(e) * cosf(a)}, up[3] = {0, 1, 0};
     memcpy(axes[2], back, sizeof back);
     drape_cross(up, back, axes[0]);
@@ -47,7 +46,7 @@ void drape_framing_add(drape_framing *f, const float *points, size_t count, cons
     }
 }
 
-/* The eye at (x, y, z): a point is inside of the right side where z - z_p >= (x_p - x) / tx, and so on. */
+/* With the eye at (x, y, z), a point p is inside the right side if z - z_p >= (p_x - x) / tx, and so on. */
 drape_camera drape_framing_end(const drape_framing *f, float azimuth, float elevation, float zoom)
 {
     drape_camera camera = {.azimuth = azimuth, .elevation = elevation, .distance = 1};
@@ -57,7 +56,7 @@ drape_camera drape_framing_end(const drape_framing *f, float azimuth, float elev
     float x = (f->side[0] - f->side[1]) / 2 * f->tx, y = (f->side[2] - f->side[3]) / 2 * f->ty;
     float eye = fmaxf(across, upright);
     float size = fmaxf(eye - f->near, 1e-6f);
-    /* the target lies behind the nearest point by about half of what is seen */
+    /* the target lies behind the nearest point by about half the size of the view */
     float target = f->near - 0.5f * size * f->ty;
     camera.distance = fmaxf((eye - target) / zoom, 1e-6f);
     for (int k = 0; k < 3; k++)

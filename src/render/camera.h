@@ -1,5 +1,5 @@
-/* camera.h: an eye that orbits a point. Angles in degrees: azimuth about the vertical, 0 looks along -z, positive
- * moves the eye to +x; elevation above the horizon. */
+/* camera.h: an eye that orbits a point. Angles in degrees: the azimuth turns about the vertical, 0 looks along -z,
+ * and positive values move the eye towards +x; the elevation is above the horizon. */
 #ifndef DRAPE_RENDER_CAMERA_H
 #define DRAPE_RENDER_CAMERA_H
 
@@ -13,18 +13,18 @@
 
 typedef struct drape_camera {
     float azimuth, elevation; /* [degrees] */
-    float target[3];          /* what it looks at [m] */
-    float distance;           /* of the eye from it [m] */
+    float target[3];          /* point that it looks at [m] */
+    float distance;           /* from the eye to the target [m] */
 } drape_camera;
 
 typedef struct drape_view {
     drape_matrix matrix;      /* from space to the picture */
     float eye[3], axes[3][3]; /* right, up, back */
-    float tx, ty;             /* tangents of half of the angles of view */
-    float center[2];          /* of the lens in the picture, whose sides are at -1 and 1 */
+    float tx, ty;             /* tangents of half the angles of view */
+    float center[2];          /* of projection in the picture, whose sides are at -1 and 1 */
 } drape_view;
 
-/* Points that are to be seen, as they come: the extremes along the four sides of the view. */
+/* Collects points that have to be in the picture: their extremes along the four sides of the view. */
 typedef struct drape_framing {
     float axes[3][3], tx, ty;
     float side[4]; /* largest of z + x/tx, z - x/tx, z + y/ty, z - y/ty, in the eye's axes */
@@ -36,13 +36,14 @@ typedef struct drape_framing {
 drape_framing drape_framing_begin(float azimuth, float elevation, float aspect);
 void drape_framing_add(drape_framing *framing, const float *points, size_t count, const float *offset);
 
-/* The nearest camera that has all of them in the picture, with a margin; zoom > 1 goes nearer. */
+/* The nearest camera that shows all points, with a margin; zoom > 1 goes nearer. */
 drape_camera drape_framing_end(const drape_framing *framing, float azimuth, float elevation, float zoom);
 
-/* radius: of what is to be seen around the target, for near and far. */
+/* radius: of the scene around the target, for the near and far planes. */
 drape_view drape_camera_view(const drape_camera *camera, float aspect, float radius);
 
-/* Makes it the view of a larger picture, of which it is the part from low to high, in that one's sides -1 and 1. */
+/* Makes it the view of a larger picture that contains the former one from low to high, where the sides of the larger one
+ * are at -1 and 1. */
 void drape_view_widen(drape_view *view, const float low[2], const float high[2]);
 
 #endif

@@ -1,5 +1,5 @@
-/* canvas.c: see canvas.h. Shaders write sRGB, once a pixel: a framebuffer that did it would turn each sample into it
- * and back, which costs a processor that draws as much as all else. */
+/* canvas.c: see canvas.h. Shaders convert to sRGB once per pixel. A framebuffer that did it would convert each sample, and
+ * back, which takes a software renderer as long as everything else. */
 #include "render/canvas.h"
 
 #include <string.h>
@@ -18,22 +18,23 @@ static GLuint buffer(int samples, GLenum format, int width, int height, GLenum a
 
 drape_status drape_canvas_create(drape_context *ctx, int width, int height, drape_canvas *canvas)
 {
-    GLint most = 0;
+    GLint max_samples = 0;
     *canvas = (drape_canvas){.width = width, .height = height};
-    glGetIntegerv(GL_MAX_SAMPLES, &most);
-    int samples = most < SAMPLES ? most : SAMPLES;
+    glGetIntegerv(GL_MAX_SAMPLES, &max_samples);
+    int samples = max_samples < SAMPLES ? max_samples : SAMPLES;
     glGenFramebuffers(1, &canvas->many);
     glBindFramebuffer(GL_FRAMEBUFFER, canvas->many);
     canvas->colour = buffer(samples, GL_RGBA8, width, height, GL_COLOR_ATTACHMENT0);
     canvas->depth = buffer(samples, GL_DEPTH_COMPONENT24, width, height, GL_DEPTH_ATTACHMENT);
-    bool whole = glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+    bool complete = glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
     glGenFramebuffers(1, &canvas->one);
     glBindFramebuffer(GL_FRAMEBUFFER, canvas->one);
     canvas->resolved = buffer(0, GL_RGBA8, width, height, GL_COLOR_ATTACHMENT0);
-    whole = whole && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
+    complete = complete && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
     drape_status status = drape_gl_check(ctx, "make the buffers of a picture");
-    if (!status && !whole)
-        status = drape_fail(ctx, DRAPE_E_FILE, "OpenGL has no picture of %d x %d pixels", width, height);
+    if (!status && !complete)
+        status =
+            drape_fail(ctx, DRAPE_E_FILE, "OpenGL cannot draw a picture of %d x %d pixels", width, height);
     if (status)
         drape_canvas_free(canvas);
     return status;
@@ -62,7 +63,7 @@ void drape_canvas_begin(const drape_canvas *canvas)
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
 }
 
-/* One sample a pixel, into another framebuffer. */
+/* Averages the samples of each pixel into another framebuffer. */
 static void resolve(const drape_canvas *canvas, GLuint to)
 {
     glBindFramebuffer(GL_READ_FRAMEBUFFER, canvas->many);
@@ -71,31 +72,27 @@ static void resolve(const drape_canvas *canvas, GLuint to)
                       GL_COLOR_BUFFER_BIT, GL_NEAREST);
 }
 
-static void make_copy(drape_canvas *canvas)
-{
-    glGenTextures(1, &canvas->copied);
-    glBindTexture(GL_TEXTURE_2D, canvas->copied);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, canvas->width, canvas->height, 0, GL_RGBA, GL_UNSIGNED_BYTE,
-                 NULL);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-    glGenFramebuffers(1, &canvas->aside);
-    glBindFramebuffer(GL_FRAMEBUFFER, canvas->aside);
-    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, canvas->copied, 0);
-}
-
 GLuint drape_canvas_copy(drape_canvas *canvas)
 {
-    if (!canvas->copied)
-        make_copy(canvas);
+    if (!canvas->copied) {
+        glGenTextures(1, &canvas->copied);
+        glBindTexture(GL_TEXTURE_2D, canvas->copied);
+        glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, canvas->width, canvas->height, 0, GL_RGBA, GL_UNSIGNED_BYTE,
+                     NULL);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+        glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+        glGenFramebuffers(1, &canvas->aside);
+        glBindFramebuffer(GL_FRAMEBUFFER, canvas->aside);
+        glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, canvas->copied, 0);
+    }
     resolve(canvas, canvas->aside);
     glBindFramebuffer(GL_FRAMEBUFFER, canvas->many);
     return canvas->copied;
 }
 
-/* OpenGL's rows go up. */
+/* OpenGL has the bottom row first. */
 static void flip(uint8_t *pixels, size_t row, int height)
 {
     uint8_t kept[4096];

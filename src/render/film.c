@@ -13,15 +13,15 @@
 #include <unistd.h>
 
 #define PROGRAM   "ffmpeg"
-#define MAX_WORDS 48
+#define MAX_ARGS  48
 #define LAST_LINE 240
-#define PROTOCOL  "file:" /* so that no name is taken for an option or a network's */
+#define PROTOCOL  "file:" /* so that no name is taken for an option or a URL */
 
 extern char **environ;
 
-/* What ffmpeg is told of each kind: its words, parted by blanks. Sides of films are even. */
+/* ffmpeg's arguments for each kind of film, separated by blanks. The sides of a film have to be even. */
 typedef struct kind {
-    const char *ending, *words;
+    const char *ending, *args;
 } kind;
 
 #define EVEN "crop=trunc(iw/2)*2:trunc(ih/2)*2"
@@ -37,9 +37,10 @@ static const kind kinds[] = {
 
 struct drape_film {
     drape_context *ctx;
-    char *path, *part; /* the film's name, and, after file:, the one it has until it is whole */
+    drape_arena arena;
+    char *path, *part; /* the film's name, and "file:" with the name that it has until it is complete */
     pid_t child;
-    int pipe, errors; /* to ffmpeg; a file without a name that it complains into */
+    int pipe, errors; /* to ffmpeg; a file without a name for its output */
     size_t bytes;     /* of a picture */
 };
 
@@ -80,20 +81,20 @@ drape_status drape_film_check(drape_context *ctx)
                       " to make a film with: install it, or name a folder for pictures");
 }
 
-/* Splits text at blanks into words, in place. */
-static int add_words(char *text, char **words, int count)
+/* Splits text at blanks into arguments, in place. */
+static int add_args(char *text, char **args, int count)
 {
-    for (char *word = text; *word && count < MAX_WORDS - 2;) {
-        words[count++] = word;
-        word += strcspn(word, " ");
-        if (*word)
-            *word++ = 0;
+    for (char *arg = text; *arg && count < MAX_ARGS - 2;) {
+        args[count++] = arg;
+        arg += strcspn(arg, " ");
+        if (*arg)
+            *arg++ = 0;
     }
     return count;
 }
 
-/* The child has the pipe as its standard input, and both outputs in the file of errors. */
-static drape_status spawn(drape_film *film, char **words, int reading)
+/* The child reads the pipe as its standard input and writes both outputs into the file of errors. */
+static drape_status spawn(drape_film *film, char **args, int reading)
 {
     posix_spawn_file_actions_t actions;
     int error = posix_spawn_file_actions_init(&actions);
@@ -104,7 +105,7 @@ static drape_status spawn(drape_film *film, char **words, int reading)
     if (!error)
         error = posix_spawn_file_actions_adddup2(&actions, film->errors, STDERR_FILENO);
     if (!error)
-        error = posix_spawnp(&film->child, PROGRAM, &actions, NULL, words, environ);
+        error = posix_spawnp(&film->child, PROGRAM, &actions, NULL, args, environ);
     posix_spawn_file_actions_destroy(&actions);
     if (!error)
         return DRAPE_OK;
@@ -112,35 +113,26 @@ static drape_status spawn(drape_film *film, char **words, int reading)
     return drape_fail(film->ctx, DRAPE_E_FILE, "cannot start " PROGRAM ": %s", strerror(error));
 }
 
-/* A file without a name: what the program has to say. */
-static int open_errors(void)
-{
-    FILE *file = tmpfile();
-    int fd = file ? fcntl(fileno(file), F_DUPFD_CLOEXEC, 3) : -1;
-    if (file)
-        fclose(file);
-    return fd;
-}
-
 static drape_status start(drape_film *film, int width, int height, double rate)
 {
-    char input[200], words[600], *all[MAX_WORDS] = {PROGRAM};
+    char input[200], output[600], *args[MAX_ARGS] = {PROGRAM};
     int ends[2];
     snprintf(
         input, sizeof input,
         "-hide_banner -loglevel error -nostdin -y -f rawvideo -pix_fmt rgba -s %dx%d -r %.10g -i pipe:0 -an",
         width, height, rate);
-    snprintf(words, sizeof words, "%s", kind_of(film->path)->words);
-    int count = add_words(input, all, 1);
-    count = add_words(words, all, count);
-    all[count++] = film->part;
-    film->errors = open_errors();
+    snprintf(output, sizeof output, "%s", kind_of(film->path)->args);
+    args[add_args(output, args, add_args(input, args, 1))] = film->part;
+    FILE *file = tmpfile();
+    film->errors = file ? fcntl(fileno(file), F_DUPFD_CLOEXEC, 3) : -1;
+    if (file)
+        fclose(file);
     if (film->errors < 0 || pipe(ends) != 0)
         return drape_fail(film->ctx, DRAPE_E_FILE, "cannot make a pipe to " PROGRAM ": %s", strerror(errno));
     film->pipe = fcntl(ends[1], F_DUPFD_CLOEXEC, 3);
     close(ends[1]);
     fcntl(ends[0], F_SETFD, FD_CLOEXEC);
-    drape_status status = spawn(film, all, ends[0]);
+    drape_status status = spawn(film, args, ends[0]);
     close(ends[0]);
     return status;
 }
@@ -152,10 +144,14 @@ drape_status drape_film_begin(drape_context *ctx, const char *path, int width, i
     drape_film *film = *out = drape_alloc(ctx, 1, sizeof *film);
     if (!film)
         return DRAPE_E_MEMORY;
-    *film = (drape_film){.ctx = ctx, .pipe = -1, .errors = -1, .bytes = 4 * (size_t)width * (size_t)height};
-    film->path = drape_copy_text(ctx, path);
-    film->part = drape_alloc(ctx, size, 1);
-    drape_status status = film->path && film->part ? DRAPE_OK : DRAPE_E_MEMORY;
+    *film = (drape_film){.ctx = ctx,
+                         .arena = drape_arena_of(ctx),
+                         .pipe = -1,
+                         .errors = -1,
+                         .bytes = 4 * (size_t)width * (size_t)height};
+    film->path = drape_arena_text(&film->arena, path);
+    film->part = drape_arena_take(&film->arena, size, 1);
+    drape_status status = drape_arena_status(&film->arena);
     if (!status) {
         snprintf(film->part, size, PROTOCOL "%s.part", path);
         status = start(film, width, height, rate);
@@ -165,8 +161,8 @@ drape_status drape_film_begin(drape_context *ctx, const char *path, int width, i
     return status;
 }
 
-/* The last line that ffmpeg left, or what became of it. */
-static void last_words(const drape_film *film, int result, char *text, size_t size)
+/* The last line that ffmpeg wrote, or how it ended. */
+static void last_line(const drape_film *film, int result, char *text, size_t size)
 {
     char tail[LAST_LINE + 1] = "";
     off_t length = lseek(film->errors, 0, SEEK_END), from = length > LAST_LINE ? length - LAST_LINE : 0;
@@ -195,19 +191,15 @@ static int wait_for(drape_film *film)
     return result;
 }
 
-static drape_status died(drape_film *film)
-{
-    char text[LAST_LINE + 40];
-    last_words(film, wait_for(film), text, sizeof text);
-    return drape_fail(film->ctx, DRAPE_E_FILE, "%s: " PROGRAM " gave up: %s", film->path, text);
-}
-
 drape_status drape_film_add(drape_film *film, const uint8_t *pixels)
 {
     for (size_t done = 0; done < film->bytes;) {
         ssize_t wrote = write(film->pipe, pixels + done, film->bytes - done);
-        if (wrote < 0 && errno != EINTR)
-            return died(film);
+        if (wrote < 0 && errno != EINTR) {
+            char text[LAST_LINE + 40];
+            last_line(film, wait_for(film), text, sizeof text);
+            return drape_fail(film->ctx, DRAPE_E_FILE, "%s: " PROGRAM " gave up: %s", film->path, text);
+        }
         done += wrote > 0 ? (size_t)wrote : 0;
     }
     return DRAPE_OK;
@@ -223,8 +215,7 @@ static void release(drape_film **out)
     drape_film *film = *out;
     if (film->errors >= 0)
         close(film->errors);
-    drape_free(film->ctx, film->path);
-    drape_free(film->ctx, film->part);
+    drape_arena_free(&film->arena);
     drape_free(film->ctx, film);
     *out = NULL;
 }
@@ -236,7 +227,7 @@ drape_status drape_film_end(drape_film **out)
     int result = wait_for(film);
     drape_status status = DRAPE_OK;
     if (!WIFEXITED(result) || WEXITSTATUS(result) != 0) {
-        last_words(film, result, text, sizeof text);
+        last_line(film, result, text, sizeof text);
         status = drape_fail(film->ctx, DRAPE_E_FILE, "%s: " PROGRAM " failed: %s", film->path, text);
     } else if (rename(part_of(film), film->path) != 0) {
         status = drape_fail(film->ctx, DRAPE_E_FILE, "cannot name the film \"%s\": %s", film->path,

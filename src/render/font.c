@@ -1,7 +1,7 @@
 /*
- * font.c: see font.h. A glyph is its width and its strokes, a list of points x y in the digits 0 ... 9 a ... d: the
- * base line is at y = 3, small letters end at 9, capitals at 12, tails at 0. A stroke that begins with ~ is a smooth
- * curve through its points (Catmull & Rom 1974).
+ * font.c: see font.h. A glyph is its width and its strokes, each a list of points x y written as the digits 0 ... 9
+ * a ... d: the base line is at y = 3, small letters end at 9, capitals at 12, descenders at 0. A stroke that begins with
+ * ~ is a smooth curve through its points (Catmull & Rom 1974).
  */
 #include "render/font.h"
 
@@ -9,11 +9,11 @@
 #include <string.h>
 
 #define CAPITAL  9.0f /* grid units above the base line */
-#define TAIL     3.5f /* below it */
+#define TAIL     3.5f /* of a descender, below the base line */
 #define HEAD     1.5f /* above a capital */
 #define WIDEST   9.0f
 #define GAP      2.4f  /* between letters */
-#define PEN      0.62f /* half of a stroke's width */
+#define PEN      0.62f /* half the width of a stroke */
 #define PIECES   6     /* of a curve between two points */
 #define MAX_LINE 200   /* points of a glyph */
 
@@ -26,7 +26,7 @@ typedef struct glyph {
 #define ROUND "~395866543314061839"
 #define LARGE "~3c5b696654331406091b3c"
 
-/* Found by its code; the first stands for all that are missing. */
+/* Found by code; the first stands for all missing ones. */
 static const glyph glyphs[] = {
     {0, 6, "030c6c6303"},
     {' ', 3, ""},
@@ -125,7 +125,7 @@ static const glyph glyphs[] = {
     {0xb7, 2, "1717"},
     {0xd7, 6, "1955 1559"},
 };
-_Static_assert(sizeof glyphs / sizeof *glyphs <= DRAPE_FONT_CELLS, "an atlas has a cell for each glyph");
+_Static_assert(sizeof glyphs / sizeof *glyphs <= DRAPE_FONT_CELLS, "the atlas has a cell for each glyph");
 
 /* The pieces of a glyph's strokes, two points each. */
 typedef struct lines {
@@ -146,7 +146,7 @@ static void add_line(lines *to, const float *a, const float *b)
     memcpy(to->at[to->count++][1], b, 2 * sizeof *b);
 }
 
-/* Between b and c on the curve through a, b, c, d. */
+/* The point between b and c on the curve through a, b, c, d. */
 static void curve(const float *a, const float *b, const float *c, const float *d, float s, float *out)
 {
     for (int k = 0; k < 2; k++)
@@ -170,7 +170,7 @@ static void add_stroke(lines *to, const float (*p)[2], int count, bool smooth)
     }
 }
 
-static void read_strokes(const char *text, lines *to)
+static void parse_strokes(const char *text, lines *to)
 {
     while (*text) {
         float p[MAX_LINE][2];
@@ -198,7 +198,7 @@ static void draw_glyph(drape_font *font, int index)
 {
     float scale = font->height / CAPITAL, pen = fmaxf(PEN * scale, 0.55f);
     lines all = {.count = 0};
-    read_strokes(glyphs[index].strokes, &all);
+    parse_strokes(glyphs[index].strokes, &all);
     for (int j = 0; j < font->cell_height; j++)
         for (int i = 0; i < font->cell_width; i++) {
             float x = ((float)i + 0.5f - font->origin[0]) / scale,
@@ -212,7 +212,7 @@ static void draw_glyph(drape_font *font, int index)
         }
 }
 
-drape_status drape_font_create(drape_context *ctx, float height, drape_font *font)
+drape_status drape_font_create(drape_arena *arena, float height, drape_font *font)
 {
     float scale = height / CAPITAL, margin = 1.5f;
     *font = (drape_font){.height = height};
@@ -220,7 +220,8 @@ drape_status drape_font_create(drape_context *ctx, float height, drape_font *fon
     font->cell_height = (int)ceilf((CAPITAL + TAIL + HEAD) * scale + 2 * margin);
     font->origin[0] = margin;
     font->origin[1] = ceilf((CAPITAL + HEAD) * scale + margin);
-    font->alpha = drape_alloc(ctx, (size_t)font->cell_width * DRAPE_FONT_CELLS, (size_t)font->cell_height);
+    font->alpha =
+        drape_arena_take(arena, (size_t)font->cell_width * DRAPE_FONT_CELLS, (size_t)font->cell_height);
     if (!font->alpha)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; i < sizeof glyphs / sizeof *glyphs; i++)
@@ -228,13 +229,7 @@ drape_status drape_font_create(drape_context *ctx, float height, drape_font *fon
     return DRAPE_OK;
 }
 
-void drape_font_free(drape_context *ctx, drape_font *font)
-{
-    drape_free(ctx, font->alpha);
-    *font = (drape_font){.height = 0};
-}
-
-/* One character of UTF-8; a byte that belongs to none stands for itself. */
+/* One character of UTF-8; a byte that belongs to no character stands for itself. */
 static unsigned next_code(const char **text)
 {
     const unsigned char *c = (const unsigned char *)*text;

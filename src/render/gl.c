@@ -6,11 +6,11 @@
 #define MAX_PIECES 12
 #define LOG_SIZE   400
 
-/* The first line of what the driver says. */
+/* Reports the first line of the driver's log. */
 static GLuint fail(drape_context *ctx, const char *name, const char *stage, char *log)
 {
     log[strcspn(log, "\n")] = 0;
-    drape_fail(ctx, DRAPE_E_FILE, "the OpenGL driver refuses the %s shader of \"%s\": %s", stage, name, log);
+    drape_fail(ctx, DRAPE_E_FILE, "the OpenGL driver rejects the %s shader of \"%s\": %s", stage, name, log);
     return 0;
 }
 
@@ -131,12 +131,12 @@ void drape_gl_set_matrix(GLuint program, const char *name, const float *value)
     glUniformMatrix4fv(glGetUniformLocation(program, name), 1, GL_FALSE, value);
 }
 
-drape_status drape_gl_check(drape_context *ctx, const char *deed)
+drape_status drape_gl_check(drape_context *ctx, const char *action)
 {
     GLenum error = glGetError();
     if (error == GL_NO_ERROR)
         return DRAPE_OK;
     return drape_fail(ctx, error == GL_OUT_OF_MEMORY ? DRAPE_E_MEMORY : DRAPE_E_FILE,
-                      "OpenGL cannot %s: error 0x%04x%s", deed, (unsigned)error,
+                      "OpenGL cannot %s: error 0x%04x%s", action, (unsigned)error,
                       error == GL_OUT_OF_MEMORY ? ", out of memory" : "");
 }

@@ -1,6 +1,7 @@
 /* images.c: see images.h. */
 #include "render/images.h"
 
+#include "base/arena.h"
 #include "io/file.h"
 
 #include <math.h>
@@ -8,8 +9,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define PATTERN  1024 /* pixels of a side */
-#define SKY      1024 /* and half as many high */
+#define PATTERN  1024 /* pixels along a side */
+#define SKY      1024 /* pixels wide, and half as many high */
 #define RAMP     256
 #define CHECKS   8  /* along a side of the pattern */
 #define WEAVES   64 /* threads along a side of the relief */
@@ -17,22 +18,6 @@
 #define PI       3.14159265358979323846
 
 /* ---- Files ---- */
-
-static drape_status put_file(drape_context *ctx, const char *path, const void *data, size_t size)
-{
-    drape_file file;
-    drape_status status = drape_file_create(ctx, strlen(path), &file);
-    if (status)
-        return status;
-    drape_file_name(&file, "%s", path);
-    status = drape_file_begin(&file);
-    if (!status) {
-        drape_file_put(&file, data, size);
-        status = drape_file_finish(&file);
-    }
-    drape_file_destroy(&file);
-    return status;
-}
 
 drape_status drape_png_write(drape_context *ctx, const char *path, const uint8_t *pixels, int width,
                              int height, bool small)
@@ -44,16 +29,26 @@ drape_status drape_png_write(drape_context *ctx, const char *path, const uint8_t
                        .flags = small ? 0 : PNG_IMAGE_FLAG_FAST};
     size_t count = (size_t)width * (size_t)height;
     png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
-    uint8_t *rgb = drape_alloc(ctx, count, 3), *data = rgb ? drape_alloc(ctx, size, 1) : NULL;
-    drape_status status = data ? DRAPE_OK : DRAPE_E_MEMORY;
-    for (size_t i = 0; data && i < count; i++)
+    drape_arena arena = drape_arena_of(ctx);
+    drape_file file = {0};
+    uint8_t *rgb = drape_arena_take(&arena, count, 3), *data = drape_arena_take(&arena, size, 1);
+    drape_status status = drape_arena_status(&arena);
+    for (size_t i = 0; !status && i < count; i++)
         memcpy(rgb + 3 * i, pixels + 4 * i, 3);
-    if (data && !png_image_write_to_memory(&image, data, &size, 0, rgb, 0, NULL))
+    if (!status && !png_image_write_to_memory(&image, data, &size, 0, rgb, 0, NULL))
         status = drape_fail(ctx, DRAPE_E_FILE, "cannot write \"%s\": %s", path, image.message);
     if (!status)
-        status = put_file(ctx, path, data, size);
-    drape_free(ctx, data);
-    drape_free(ctx, rgb);
+        status = drape_file_create(ctx, strlen(path), &file);
+    if (!status) {
+        drape_file_name(&file, "%s", path);
+        status = drape_file_begin(&file);
+    }
+    if (!status) {
+        drape_file_put(&file, data, size);
+        status = drape_file_finish(&file);
+    }
+    drape_file_destroy(&file);
+    drape_arena_free(&arena);
     return status;
 }
 
@@ -66,8 +61,9 @@ drape_status drape_png_read(drape_context *ctx, const char *path, uint8_t **pixe
     image.format = PNG_FORMAT_RGBA;
     drape_status status = DRAPE_OK;
     if (image.width > 16384 || image.height > 16384)
-        status = drape_fail(ctx, DRAPE_E_FILE, "\"%s\" has %u x %u pixels; at most 16384 a side", path,
-                            (unsigned)image.width, (unsigned)image.height);
+        status =
+            drape_fail(ctx, DRAPE_E_FILE, "\"%s\" has %u x %u pixels; at most 16384 x 16384 are possible",
+                       path, (unsigned)image.width, (unsigned)image.height);
     if (!status && !(*pixels = drape_alloc(ctx, PNG_IMAGE_SIZE(image), 1)))
         status = DRAPE_E_MEMORY;
     if (!status && !png_image_finish_read(&image, NULL, *pixels, 0, NULL))
@@ -97,7 +93,7 @@ static GLuint upload(GLint kind, int width, int height, GLenum type, const void 
     return name;
 }
 
-/* Of a file, its rows turned so that v goes up. */
+/* A texture of a file, with the bottom row first, as v grows upwards. */
 static drape_status upload_file(drape_context *ctx, const char *path, GLint kind, GLuint *out)
 {
     uint8_t *pixels;
@@ -136,14 +132,14 @@ static bool in_box(double x, double y, double x0, double y0, double x1, double y
     return x >= x0 && x <= x1 && y >= y0 && y <= y1;
 }
 
-/* A letter that tells left from right and up from down, in a unit square. */
+/* The letter F in the unit square: it shows left, right, up and down. */
 static bool in_letter(double x, double y)
 {
     return in_box(x, y, 0.28, 0.16, 0.42, 0.84) || in_box(x, y, 0.28, 0.70, 0.74, 0.84) ||
            in_box(x, y, 0.28, 0.44, 0.64, 0.57);
 }
 
-/* Checks in two blues with fine lines between, and in each fourth light one the letter. */
+/* Checks with fine lines between them, and the letter in every second light check. */
 static void paint_pattern(double u, double v, uint8_t *to)
 {
     static const uint8_t dark[] = {38, 70, 118}, light[] = {232, 226, 212}, red[] = {198, 68, 52},
@@ -161,12 +157,12 @@ static void paint_pattern(double u, double v, uint8_t *to)
     to[3] = 255;
 }
 
-/* Diamonds of raised thread, metal, each with a knot in it, over a fine weave. */
+/* Diamonds of raised metal thread, each with a knot in its middle, over a fine weave. */
 static void paint_heights(double u, double v, uint8_t *to)
 {
     double warp = sin(PI * 2 * WEAVES * u) * cos(PI * 2 * WEAVES * v);
     double x = fabs(fmod(u * DIAMONDS, 1) - 0.5), y = fabs(fmod(v * DIAMONDS, 1) - 0.5);
-    double across = x + y, corner = 1 - across; /* from a diamond's middle, and from the next one's */
+    double across = x + y, corner = 1 - across; /* from the middle of this diamond and of the next */
     double band = exp(-pow((across - 0.36) / 0.045, 2)), knot = 1 / (1 + exp((across - 0.14) / 0.015)),
            dot = 1 / (1 + exp((corner - 0.10) / 0.012));
     double metal = fmin(1, band + knot + dot);
@@ -194,14 +190,14 @@ static double smooth(double from, double to, double x)
     return s * s * (3 - 2 * s);
 }
 
-/* A lamp with soft edges: how much of it is seen in a direction. */
+/* Brightness of a lamp with soft edges in a direction. */
 static double lamp(double longitude, double latitude, double at, double high, double wide, double tall)
 {
     double along = remainder(longitude - at, 2 * PI);
     return smooth(wide, 0.86 * wide, fabs(along)) * smooth(tall, 0.86 * tall, fabs(latitude - high));
 }
 
-/* A floor of tiles that fades with distance, walls that lighten upwards, and three lamps. */
+/* A tiled floor that fades with distance, walls that get lighter upwards, and three lamps. */
 static void paint_sky(double u, double v, float *to)
 {
     double longitude = 2 * PI * (u - 0.5), latitude = PI * (v - 0.5), up = sin(latitude);
@@ -261,7 +257,7 @@ static bool is_colour(const double *rgb)
     return true;
 }
 
-/* The hue runs from violet, 310 degrees, down to yellow, 105; the chroma is what the screen has there, at most. */
+/* The hue runs from violet, 310 degrees, down to yellow, 105; the chroma is the largest that the screen can show. */
 void drape_ramp(double s, float rgb[3])
 {
     double hue = (310 - 205 * pow(s, 1.1)) * PI / 180, chroma = 0.15, colour[3];

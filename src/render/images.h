@@ -1,28 +1,28 @@
-/* images.h: pictures as files and as textures; those that the program makes itself. */
+/* images.h: PNG files, textures of files, and the built-in textures. */
 #ifndef DRAPE_RENDER_IMAGES_H
 #define DRAPE_RENDER_IMAGES_H
 
 #include "render/gl.h"
 
-/* Writes pixels (width x height x 4, upper row first) to a PNG, whole or not at all. small: as small as zlib makes
- * it, else fast. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Writes pixels (width x height x 4, top row first) to a PNG, completely or not at all. small: compresses as well as
+ * zlib can instead of fast. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_png_write(drape_context *ctx, const char *path, const uint8_t *pixels, int width,
                              int height, bool small);
 
-/* Reads a PNG of any kind as RGBA; *pixels is freed by drape_free. Errors: DRAPE_E_FILE (also of what is no
+/* Reads a PNG of any kind as RGBA; *pixels is freed with drape_free. Errors: DRAPE_E_FILE (also if the file is not a
  * PNG), DRAPE_E_MEMORY. */
 drape_status drape_png_read(drape_context *ctx, const char *path, uint8_t **pixels, int *width, int *height);
 
-/* Textures with mipmaps that repeat, of a file, or where path is NULL the program's own. *out is 0 on failure.
- *   pattern      colour of cloth, with an F in it to read: its foot is at v = 0
- *   heights      red is the height, 0 to 1: a woven relief; alpha is 1 where the thread is metal
- *   environment  the world around as longitude and latitude, linear: a room with lamps */
+/* Repeating textures with mipmaps, of a file, or the built-in ones if path is NULL. *out is unchanged on failure.
+ *   pattern      colour of the cloth; built-in: checks with the letter F, upright in the direction of v
+ *   heights      red is the height, 0 to 1, alpha is 1 where the thread is metal; built-in: a woven relief
+ *   environment  the surroundings by longitude and latitude, linear; built-in: a room with lamps */
 drape_status drape_texture_pattern(drape_context *ctx, const char *path, GLuint *out);
 drape_status drape_texture_heights(drape_context *ctx, const char *path, GLuint *out);
 drape_status drape_texture_environment(drape_context *ctx, const char *path, GLuint *out);
 
-/* The colours of fields, from low to high: even steps of lightness in OKLab (Ottosson 2020), from a dark violet over
- * blue and green to a light yellow, so that they can be told apart without seeing colours. s: 0 to 1; linear RGB. */
+/* The colours of fields, for s from 0 (low) to 1 (high), in linear RGB: even steps of lightness in OKLab (Ottosson 2020)
+ * from a dark violet over blue and green to a light yellow, which can be told apart without seeing colours. */
 void drape_ramp(double s, float rgb[3]);
 GLuint drape_texture_ramp(void);
 

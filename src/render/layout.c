@@ -5,22 +5,22 @@
 #include <stdio.h>
 #include <string.h>
 
-#define STRIP  0.25f /* of the picture, at most: for the legend */
-#define MARGIN 20    /* pixels at 720 rows, as all here */
-#define LINE   21
-#define LEGEND 120 /* from its low to its high end, at least */
-#define TAB    112 /* from the beginning of a line to what stands behind its tab */
+#define STRIP  0.25f /* largest share of the picture's width for the legend */
+#define MARGIN 20    /* [pixels at 720 rows], as all below */
+#define LINE   21    /* height of a line */
+#define LEGEND 120   /* least height of the legend's ramp */
+#define TAB    112   /* from the beginning of a line to the text after its tab */
 
 static const float veil[4] = {1, 1, 1, 0.62f};
 
-/* ---- Where panels are ---- */
+/* ---- Panels ---- */
 
 static void legend_title(const drape_shading *shading, char *title, size_t size)
 {
-    snprintf(title, size, "%s [%s]", shading->field->name, shading->field->shown_unit);
+    snprintf(title, size, "%s [%s]", shading->field->entry.name, shading->field->shown_unit);
 }
 
-/* Pixels at the right that belong to the legend. */
+/* Width of the strip at the right for the legend [pixels]. */
 static int strip_of(const drape_overlay *o, const drape_picture *picture)
 {
     char title[80];
@@ -59,7 +59,7 @@ drape_rectangle drape_layout_whole(const drape_overlay *overlay, const drape_pic
     return b;
 }
 
-/* ---- What lies flat ---- */
+/* ---- Overlay ---- */
 
 static void put_legend(drape_overlay *o, const drape_picture *picture)
 {
@@ -90,8 +90,8 @@ static void put_labels(drape_overlay *o, const drape_picture *picture)
     }
 }
 
-/* Text from x on, broken at blanks so that it ends before right; how many lines it took. Without a colour it is not
- * put. */
+/* Puts text from x on, broken at blanks to end before `right`; returns the number of lines. A colour of NULL only
+ * counts them. */
 static int put_wrapped(drape_overlay *o, float x, float y, float right, const float *colour, const char *text)
 {
     int lines = 0;
@@ -117,7 +117,7 @@ static int put_wrapped(drape_overlay *o, float x, float y, float right, const fl
     return lines;
 }
 
-/* What stands before a tab is the name of what stands behind it. */
+/* The text before a tab is a name, put in a fainter colour, of the value after it. */
 static int put_line(drape_overlay *o, float x, float y, float right, bool put, const char *text)
 {
     const char *tab = strchr(text, '\t');
@@ -139,7 +139,7 @@ static int put_all(drape_overlay *o, const drape_picture *picture, bool put)
     return count;
 }
 
-/* Over a veil, so that they are read over cloth, too. */
+/* On a translucent ground, to be readable over cloth too. */
 static void put_lines(drape_overlay *o, const drape_picture *picture)
 {
     if (!picture->lines || !picture->lines[0])

@@ -1,5 +1,5 @@
-/* matrix.h: what a camera needs of linear algebra: vectors of three floats, 4 x 4 matrices by columns, as OpenGL
- * takes them. */
+/* matrix.h: linear algebra for the camera: vectors of three floats, and 4 x 4 matrices by columns, as OpenGL takes
+ * them. */
 #ifndef DRAPE_RENDER_MATRIX_H
 #define DRAPE_RENDER_MATRIX_H
 
@@ -23,7 +23,7 @@ static inline void drape_cross(const float *a, const float *b, float *out)
     out[2] = z;
 }
 
-/* Zero stays zero. */
+/* A zero vector stays zero. */
 static inline void drape_normalize(float *a)
 {
     float length = sqrtf(drape_dot(a, a)), scale = length > 0 ? 1 / length : 0;
@@ -44,7 +44,7 @@ static inline drape_matrix drape_multiply(const drape_matrix *a, const drape_mat
     return out;
 }
 
-/* From space to an eye: axes are right, up and back (3 x 3, each of length 1). */
+/* From space to the coordinates of an eye: axes are right, up and back (3 x 3, each of length 1). */
 static inline drape_matrix drape_look(const float axes[3][3], const float *eye)
 {
     drape_matrix out = {{0}};
@@ -57,7 +57,7 @@ static inline drape_matrix drape_look(const float axes[3][3], const float *eye)
     return out;
 }
 
-/* tx, ty: tangents of half of the angles of view. */
+/* tx, ty: tangents of half the angles of view. */
 static inline drape_matrix drape_perspective(float tx, float ty, float near, float far)
 {
     drape_matrix out = {{0}};

@@ -1,5 +1,5 @@
-/* offscreen.c: see offscreen.h. libepoxy ends the process where a library is not there: so it is looked for
- * here before epoxy is asked for anything. */
+/* offscreen.c: see offscreen.h. libepoxy ends the process if a library is missing, so the libraries are looked for here
+ * before any call of epoxy. */
 #include "render/offscreen.h"
 
 #include <dlfcn.h>
@@ -16,7 +16,7 @@ struct drape_offscreen {
     EGLContext context;
 };
 
-/* Loads for good: epoxy will want it, too. */
+/* Stays loaded: epoxy will need it. */
 static bool have_library(const char *name)
 {
     return dlopen(name, RTLD_LAZY | RTLD_GLOBAL) != NULL;
@@ -57,7 +57,7 @@ static EGLContext open_context(EGLDisplay display)
                                      EGL_CONTEXT_OPENGL_PROFILE_MASK,
                                      EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
                                      EGL_NONE};
-    EGLConfig config = NULL; /* EGL_NO_CONFIG_KHR: the context draws into buffers of its own alone */
+    EGLConfig config = NULL; /* EGL_NO_CONFIG_KHR: the context only draws into its own buffers */
     EGLint count = 0;
     if (!eglBindAPI(EGL_OPENGL_API))
         return EGL_NO_CONTEXT;
@@ -67,7 +67,7 @@ static EGLContext open_context(EGLDisplay display)
 
 static drape_status open_all(drape_offscreen *o)
 {
-    setenv("EGL_LOG_LEVEL", "fatal", 0); /* Mesa would tell on stderr of the drivers that it tries */
+    setenv("EGL_LOG_LEVEL", "fatal", 0); /* Mesa would report the drivers that it tries on stderr */
     drape_status status = check_libraries(o->ctx);
     if (status)
         return status;

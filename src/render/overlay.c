@@ -10,8 +10,8 @@
 #define VERTEX    9     /* floats: x y, u v, kind, r g b a */
 #define TEXT_SIZE 11.5f /* pixels of a capital at 720 rows */
 #define TICKS     7
-#define NUMBER    40 /* pixels at 720 rows: a number of the legend, as %.4g has them */
-#define LEGEND    11 /* around it */
+#define NUMBER    40 /* width of a number of the legend as %.4g prints it, in pixels at 720 rows */
+#define LEGEND    11 /* margin around the legend, in pixels at 720 rows */
 
 enum { KIND_BOX, KIND_TEXT, KIND_RAMP };
 
@@ -59,21 +59,19 @@ static GLuint upload_font(const drape_font *font)
     return name;
 }
 
-drape_status drape_overlay_create(drape_context *ctx, int width, int height, drape_overlay *overlay)
+drape_status drape_overlay_create(drape_arena *arena, int width, int height, drape_overlay *overlay)
 {
     static const int sizes[] = {2, 2, 1, 4, 0};
-    *overlay = (drape_overlay){.ctx = ctx, .width = width, .height = height};
+    *overlay = (drape_overlay){.width = width, .height = height};
     overlay->unit = fmaxf(0.75f, fminf((float)height / 720, (float)width / 960));
-    overlay->quads = drape_alloc(ctx, (size_t)DRAPE_OVERLAY_QUADS * 6 * VERTEX, sizeof *overlay->quads);
-    drape_status status = overlay->quads ? DRAPE_OK : DRAPE_E_MEMORY;
-    if (!status)
-        status = drape_font_create(ctx, roundf(TEXT_SIZE * overlay->unit), &overlay->font);
-    if (!status && !(overlay->program = drape_gl_program(ctx, "overlay", vertex_source, fragment_source)))
-        status = DRAPE_E_FILE;
-    if (status) {
-        drape_overlay_free(overlay);
-        return status;
-    }
+    overlay->quads =
+        drape_arena_take(arena, (size_t)DRAPE_OVERLAY_QUADS * 6 * VERTEX, sizeof *overlay->quads);
+    drape_status status = drape_font_create(arena, roundf(TEXT_SIZE * overlay->unit), &overlay->font);
+    if (status || drape_arena_status(arena))
+        return DRAPE_E_MEMORY;
+    overlay->program = drape_gl_program(arena->ctx, "overlay", vertex_source, fragment_source);
+    if (!overlay->program)
+        return DRAPE_E_FILE;
     drape_gl_mesh_create(&overlay->mesh, sizes, false);
     overlay->ramp = drape_texture_ramp();
     overlay->letters = upload_font(&overlay->font);
@@ -82,20 +80,16 @@ drape_status drape_overlay_create(drape_context *ctx, int width, int height, dra
 
 void drape_overlay_free(drape_overlay *overlay)
 {
-    if (!overlay->ctx)
-        return;
-    drape_gl_mesh_free(&overlay->mesh);
     if (overlay->program) {
+        drape_gl_mesh_free(&overlay->mesh);
         glDeleteProgram(overlay->program);
         glDeleteTextures(1, &overlay->ramp);
         glDeleteTextures(1, &overlay->letters);
     }
-    drape_font_free(overlay->ctx, &overlay->font);
-    drape_free(overlay->ctx, overlay->quads);
     *overlay = (drape_overlay){.width = 0};
 }
 
-/* corners: left, top, right, bottom, in pixels and in texture. */
+/* at and uv: left, top, right and bottom, in pixels and in texture coordinates. */
 static void put_quad(drape_overlay *o, int kind, const float *at, const float *uv, const float *colour)
 {
     static const int corner[6][2] = {{0, 1}, {2, 1}, {2, 3}, {0, 1}, {2, 3}, {0, 3}};
@@ -133,7 +127,7 @@ void drape_overlay_text(drape_overlay *o, float x, float y, drape_align align, c
     }
 }
 
-/* 1, 2 or 5 times a power of ten, so that at most `ticks` of it fill the range. */
+/* 1, 2 or 5 times a power of ten, such that at most `ticks` steps fill the range. */
 static double round_step(double range, double ticks)
 {
     double rough = range / ticks, power = pow(10, floor(log10(rough))), s = rough / power;
@@ -146,16 +140,16 @@ void drape_overlay_legend(drape_overlay *o, float right, float bottom, float tal
     float u = o->unit, wide = roundf(16 * u), gap = 7 * u;
     double step = round_step(high - low, fmin(TICKS, tall / (2.2 * o->font.height)));
     char text[40];
-    float most = 0;
+    float widest = 0;
     for (double value = ceil(low / step) * step; value <= high + 1e-9 * step; value += step) {
         snprintf(text, sizeof text, "%.4g", fabs(value) < 1e-9 * step ? 0 : value);
-        most = fmaxf(most, drape_font_width(&o->font, text));
+        widest = fmaxf(widest, drape_font_width(&o->font, text));
     }
-    float left = roundf(right - wide - gap - most), top = roundf(bottom - tall), margin = LEGEND * u;
+    float left = roundf(right - wide - gap - widest), top = roundf(bottom - tall), margin = LEGEND * u;
     float panel = fminf(left, right - drape_font_width(&o->font, title)) - margin;
     drape_overlay_box(o, panel, top - 32 * u - margin / 2, right + margin - panel,
                       tall + 32 * u + 1.5f * margin, (const float[]){1, 1, 1, 0.62f});
-    for (int i = 0; i < 64; i++) { /* upwards; the ramp is not of even steps in linear light */
+    for (int i = 0; i < 64; i++) { /* from below; each piece has one colour of the ramp */
         float s0 = (float)i / 64, s1 = (float)(i + 1) / 64;
         const float at[] = {left, bottom - s1 * tall, left + wide, bottom - s0 * tall};
         const float middle = (s0 + s1) / 2, uv[] = {middle, 0, middle, 1};

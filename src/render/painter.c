@@ -8,18 +8,17 @@
 #include <stdio.h>
 #include <string.h>
 
-#define SHADOW 1024 /* texels of a side */
-#define SOFT   1.5f /* texels between the comparisons with it */
-#define LAMP_AZIMUTH                                                                                         \
-    -16.0f /* [degrees], as a camera's: the lamp stands in the room, whoever looks from where */
+#define SHADOW       1024   /* texels along a side of the shadow map */
+#define SOFT         1.5f   /* texels between the samples of the shadow map */
+#define LAMP_AZIMUTH -16.0f /* [degrees], as a camera's; it does not move with the camera */
 #define LAMP_HEIGHT  54.0f  /* [degrees] */
-#define SHADOW_REACH 1.3f   /* radii around what was framed */
-#define DEEP         5.0f   /* radii along the light */
-#define RELIEF       0.016f /* of the longer side of the largest cloth */
-#define WIRE         1.25f  /* pixels at 720 rows */
-#define WIRE_SHARE   0.16f  /* of the mean edge as it is seen, at most */
-#define PIN          11.0f  /* pixels at 720 rows */
-#define REFRACTED    0.45f  /* radii that a bent ray goes on */
+#define SHADOW_REACH 1.3f   /* half the width of the shadow map, in radii of the stage */
+#define DEEP         5.0f   /* distance of the lamp, in radii of the stage */
+#define RELIEF       0.016f /* height of displacements over the longer side of the largest cloth */
+#define WIRE         1.25f  /* width of edges in pixels at 720 rows */
+#define WIRE_SHARE   0.16f  /* largest width of edges over the mean edge as it appears */
+#define PIN          11.0f  /* size of pinned nodes in pixels at 720 rows */
+#define REFRACTED    0.45f  /* length of a refracted ray, in radii of the stage */
 #define MAX_SHADINGS 64
 #define RADIANS      0.017453292519943295f
 
@@ -53,7 +52,7 @@ static const char surface_vertex[] =
     "    gl_Position = view * vec4(place, 1.0);\n"
     "}\n";
 
-/* What is known of the point, then its colour. */
+/* Gathers what is known of the point, then computes its colour. */
 static const char surface_main[] =
     "void main() {\n"
     "    Surface s;\n"
@@ -69,8 +68,8 @@ static const char surface_main[] =
     "    s.piece = piece;\n"
     "    vec3 flat_n = normalize(cross(dFdx(place), dFdy(place)));\n"
     "    float facing = dot(flat_n, light) * sign(dot(flat_n, s.v));\n"
-    "    if (relief > 0.0) facing = dot(s.n, light); // the slopes of a relief are those of its map, not of "
-    "its mesh\n"
+    "    if (relief > 0.0) facing = dot(s.n, light); // the slopes of a relief come from its map, not its "
+    "mesh\n"
     "    s.sun = sunlight(shadow_at, facing) * smoothstep(0.0, 0.16, facing);\n"
     "    colour = vec4(encoded(shade(s)), 1.0);\n"
     "}\n";
@@ -81,8 +80,7 @@ static const char body_source[] =
     "    return vec3(0.42, 0.45, 0.50) * arriving(s) / PI * 1.5 + 0.06 * power(dot(s.n, h), 24.0) * s.sun;\n"
     "}\n";
 
-/* Most pixels of a picture are ground: it has no more than it needs, and its light is mixed as it is seen, in
- * sRGB. */
+/* Most pixels of a picture are ground, so its shader is cheap: it mixes light directly in sRGB. */
 static const char ground_source[] =
     "uniform vec3 center;\n"
     "uniform float radius, spacing, solid;\n"
@@ -94,7 +92,7 @@ static const char ground_source[] =
     "    return line * clamp(0.5 / max(w.x, w.y) - 1.0, 0.0, 1.0);\n"
     "}\n"
     "\n"
-    "// Fades into the wall. Without a ground in the scene only the shadow is seen.\n"
+    "// Fades into the wall. Without a ground in the scene only the shadow is drawn.\n"
     "void main() {\n"
     "    vec3 u = abs(normal.y) > 0.7 ? vec3(normal.y, -normal.x, 0.0) : vec3(normal.z, 0.0, -normal.x);\n"
     "    u *= inversesqrt(dot(u, u)) / spacing;\n"
@@ -118,7 +116,7 @@ static const char wall_vertex[] =
     "}\n";
 static const char wall_source[] =
     "uniform vec4 box;\n"
-    "// A wall that is lit from above, sRGB; noise of half a step keeps it from banding.\n"
+    "// A wall lit from above, in sRGB; noise of half a level avoids banding.\n"
     "vec3 wall() {\n"
     "    vec2 at = (gl_FragCoord.xy - box.xy) / box.zw * 2.0 - 1.0;\n"
     "    float up = 0.5 + 0.5 * at.y;\n"
@@ -129,7 +127,7 @@ static const char wall_source[] =
 static const char wall_main[] = "out vec4 colour;\n"
                                 "void main() { colour = vec4(wall(), 1.0); }\n";
 
-/* A ribbon between two points, as wide as it is to look. */
+/* A ribbon between two points, of constant width on the screen. */
 static const char wire_vertex[] =
     "layout(location = 0) in vec3 from;\n"
     "layout(location = 1) in vec3 to;\n"
@@ -140,8 +138,8 @@ static const char wire_vertex[] =
     "void main() {\n"
     "    vec4 a = view * vec4(from + 0.003 * (eye - from), 1.0), b = view * vec4(to + 0.003 * (eye - to), "
     "1.0);\n"
-    "    vec2 way = (b.xy / b.w - a.xy / a.w) * size;\n"
-    "    vec2 side = length(way) > 1e-6 ? normalize(vec2(-way.y, way.x)) : vec2(0.0);\n"
+    "    vec2 along = (b.xy / b.w - a.xy / a.w) * size;\n"
+    "    vec2 side = length(along) > 1e-6 ? normalize(vec2(-along.y, along.x)) : vec2(0.0);\n"
     "    vec4 p = gl_VertexID < 2 ? a : b;\n"
     "    p.xy += (gl_VertexID % 2 == 0 ? 1.0 : -1.0) * width * side / size * p.w;\n"
     "    gl_Position = p;\n"
@@ -171,17 +169,18 @@ static const char depth_fragment[] = "void main() {}\n";
 
 struct drape_painter {
     drape_context *ctx;
+    drape_arena arena; /* of the overlay */
     drape_canvas canvas;
     drape_overlay overlay;
-    GLuint textures[3], ramp; /* of the shadings, in the order of DRAPE_READS_*; 0: not made yet */
+    GLuint textures[3], ramp; /* that shadings read, in the order of DRAPE_READS_*; 0: not made yet */
     GLuint shadow, shadow_buffer;
-    GLuint empty; /* vertex array of what has no attributes */
+    GLuint empty; /* vertex array without attributes */
     GLuint depth, body, ground, wall, wire, pin;
     GLuint shadings[MAX_SHADINGS]; /* 0: not made yet */
-    drape_gl_mesh floor;
+    drape_gl_mesh floor;           /* a horizontal square with sides of 2 */
 };
 
-/* ---- Making and freeing ---- */
+/* ---- Creation ---- */
 
 static GLuint surface_program(drape_context *ctx, const char *name, const char *const *source)
 {
@@ -199,16 +198,14 @@ static GLuint program(drape_context *ctx, const char *name, const char *vertex, 
 
 static bool create_programs(drape_painter *p)
 {
-    static const char *const body[] = {body_source, surface_main, NULL}, *const ground[] = {wall_source,
-                                                                                            ground_source,
-                                                                                            NULL};
-    p->depth = program(p->ctx, "depth", surface_vertex, depth_fragment, NULL);
-    p->body = p->depth ? surface_program(p->ctx, "body", body) : 0;
-    p->ground = p->body ? surface_program(p->ctx, "ground", ground) : 0;
-    p->wall = p->ground ? program(p->ctx, "wall", wall_vertex, wall_source, wall_main) : 0;
-    p->wire = p->wall ? program(p->ctx, "wire", wire_vertex, wire_fragment, NULL) : 0;
-    p->pin = p->wire ? program(p->ctx, "pin", pin_vertex, pin_fragment, NULL) : 0;
-    return p->pin;
+    static const char *const body[] = {body_source, surface_main, NULL};
+    static const char *const ground[] = {wall_source, ground_source, NULL};
+    return (p->depth = program(p->ctx, "depth", surface_vertex, depth_fragment, NULL)) &&
+           (p->body = surface_program(p->ctx, "body", body)) &&
+           (p->ground = surface_program(p->ctx, "ground", ground)) &&
+           (p->wall = program(p->ctx, "wall", wall_vertex, wall_source, wall_main)) &&
+           (p->wire = program(p->ctx, "wire", wire_vertex, wire_fragment, NULL)) &&
+           (p->pin = program(p->ctx, "pin", pin_vertex, pin_fragment, NULL));
 }
 
 static void create_shadow(drape_painter *p)
@@ -232,16 +229,6 @@ static void create_shadow(drape_painter *p)
     glReadBuffer(GL_NONE);
 }
 
-/* A square of two units, level. */
-static void create_floor(drape_painter *p)
-{
-    static const int sizes[] = {3, 3, 0};
-    static const float square[] = {-1, 0, 1, 0, 1, 0, 1, 0, 1,  0, 1, 0, 1,  0, -1, 0, 1, 0,
-                                   -1, 0, 1, 0, 1, 0, 1, 0, -1, 0, 1, 0, -1, 0, -1, 0, 1, 0};
-    drape_gl_mesh_create(&p->floor, sizes, false);
-    drape_gl_mesh_fill(&p->floor, square, 6, false);
-}
-
 static drape_status make_texture(drape_painter *p, int which, const char *path)
 {
     static drape_status (*const makers[])(drape_context *, const char *, GLuint *) = {
@@ -249,23 +236,18 @@ static drape_status make_texture(drape_painter *p, int which, const char *path)
     return p->textures[which] ? DRAPE_OK : makers[which](p->ctx, path, &p->textures[which]);
 }
 
-static drape_status read_files(drape_painter *p, const drape_painter_def *def)
+static drape_status create_all(drape_painter *p, const drape_painter_def *def)
 {
+    static const int sizes[] = {3, 3, 0};
+    static const float square[] = {-1, 0, 1, 0, 1, 0, 1, 0, 1,  0, 1, 0, 1,  0, -1, 0, 1, 0,
+                                   -1, 0, 1, 0, 1, 0, 1, 0, -1, 0, 1, 0, -1, 0, -1, 0, 1, 0};
     const char *const paths[] = {def->pattern, def->heights, def->environment};
-    drape_status status = DRAPE_OK;
+    drape_status status = drape_canvas_create(p->ctx, def->width, def->height, &p->canvas);
+    if (!status)
+        status = drape_overlay_create(&p->arena, def->width, def->height, &p->overlay);
     for (int i = 0; i < 3 && !status; i++)
         if (paths[i])
             status = make_texture(p, i, paths[i]);
-    return status;
-}
-
-static drape_status create_all(drape_painter *p, const drape_painter_def *def)
-{
-    drape_status status = drape_canvas_create(p->ctx, def->width, def->height, &p->canvas);
-    if (!status)
-        status = drape_overlay_create(p->ctx, def->width, def->height, &p->overlay);
-    if (!status)
-        status = read_files(p, def);
     if (!status && !create_programs(p))
         status = DRAPE_E_FILE;
     if (status)
@@ -273,8 +255,9 @@ static drape_status create_all(drape_painter *p, const drape_painter_def *def)
     p->ramp = drape_texture_ramp();
     glGenVertexArrays(1, &p->empty);
     create_shadow(p);
-    create_floor(p);
-    return drape_gl_check(p->ctx, "make ready to draw");
+    drape_gl_mesh_create(&p->floor, sizes, false);
+    drape_gl_mesh_fill(&p->floor, square, 6, false);
+    return drape_gl_check(p->ctx, "set up drawing");
 }
 
 drape_status drape_painter_create(drape_context *ctx, const drape_painter_def *def, drape_painter **out)
@@ -283,6 +266,7 @@ drape_status drape_painter_create(drape_context *ctx, const drape_painter_def *d
     if (!*out)
         return DRAPE_E_MEMORY;
     (*out)->ctx = ctx;
+    (*out)->arena = drape_arena_of(ctx);
     drape_status status = create_all(*out, def);
     if (status)
         drape_painter_destroy(out);
@@ -305,6 +289,7 @@ void drape_painter_destroy(drape_painter **painter)
     glDeleteVertexArrays(1, &p->empty);
     drape_gl_mesh_free(&p->floor);
     drape_overlay_free(&p->overlay);
+    drape_arena_free(&p->arena);
     drape_canvas_free(&p->canvas);
     drape_free(p->ctx, p);
     *painter = NULL;
@@ -320,23 +305,14 @@ drape_overlay *drape_painter_overlay(drape_painter *painter)
     return &painter->overlay;
 }
 
-static drape_status make_textures(drape_painter *p, int reads)
-{
-    drape_status status = DRAPE_OK;
-    for (int i = 0; i < 3 && !status; i++)
-        if (reads & 1 << i)
-            status = make_texture(p, i, NULL);
-    return status;
-}
-
-/* Made when it is first asked for: a driver takes its time for each. */
+/* Compiled when it is first used, as drivers are slow at it. */
 static GLuint shading_program(drape_painter *p, const drape_shading *shading)
 {
     int i = 0;
     while (i + 1 < MAX_SHADINGS && drape_shadings[i] && drape_shadings[i] != shading)
         i++;
     if (!p->shadings[i])
-        p->shadings[i] = surface_program(p->ctx, shading->name,
+        p->shadings[i] = surface_program(p->ctx, shading->entry.name,
                                          (const char *const[]){shading->source, surface_main, NULL});
     return p->shadings[i];
 }
@@ -362,14 +338,14 @@ drape_view drape_painter_view(const drape_painter *painter, const drape_picture 
     return view;
 }
 
-/* What is the same for all that is drawn in a panel. */
+/* The quantities common to everything drawn in a panel. */
 typedef struct panel_view {
     drape_view view;
-    drape_matrix lamp;               /* from space to the lamp's map */
-    float light[3], window[3];       /* towards the lamp, and towards a window across from it */
+    drape_matrix lamp;               /* from space to the shadow map */
+    float light[3], window[3];       /* directions to the lamp and to a window opposite it */
     int left, bottom, width, height; /* pixels */
-    float clear, reach;              /* of the shading; [m] that a bent ray goes on */
-    GLuint behind;                   /* texture; 0: none */
+    float clear, reach;              /* of the shading; length of a refracted ray [m] */
+    GLuint behind;                   /* texture of the picture without cloth; 0: none */
 } panel_view;
 
 static void set_lamp(const drape_stage *stage, panel_view *v)
@@ -393,7 +369,7 @@ static void set_box(GLuint program, const char *name, const panel_view *v)
                 (float)v->height);
 }
 
-/* For programs of surfaces, which take their textures at these units. */
+/* Sets the uniforms and textures that all programs of surfaces share. */
 static void use_surface(drape_painter *p, GLuint program, const panel_view *v, const drape_matrix *view)
 {
     static const float nowhere[3] = {0}, front[3] = {0.50f, 0.062f, 0.048f}, back[3] = {0.40f, 0.29f, 0.18f};
@@ -419,7 +395,7 @@ static void use_surface(drape_painter *p, GLuint program, const panel_view *v, c
     drape_gl_set_vec3(program, "back", back);
     drape_gl_set_float(program, "soft", SOFT / SHADOW);
     drape_gl_set_float(program, "texel_depth",
-                       2 * SHADOW_REACH / SHADOW / (4 * DEEP - 0.1f)); /* a texel's width as depth */
+                       2 * SHADOW_REACH / SHADOW / (4 * DEEP - 0.1f)); /* the width of a texel as depth */
     drape_gl_set_float(program, "clear", v->clear);
     drape_gl_set_float(program, "reach", v->reach);
     drape_gl_set_vec2(program, "pixels", (float)p->canvas.width, (float)p->canvas.height);
@@ -436,18 +412,6 @@ static float mean_edge(const drape_model *m)
     return (float)(sum / m->edge_count);
 }
 
-static void draw_vertices(const drape_gl_mesh *mesh, size_t count)
-{
-    glBindVertexArray(mesh->array);
-    glDrawArrays(GL_TRIANGLES, 0, (GLsizei)count);
-}
-
-static void draw_cloth(const drape_stage *stage)
-{
-    glBindVertexArray(stage->cloth.array);
-    glDrawElements(GL_TRIANGLES, stage->cloth.index_count, GL_UNSIGNED_INT, NULL);
-}
-
 static void draw_bodies(const drape_stage *stage, GLuint program, bool endless)
 {
     for (int32_t c = 0; c < stage->body_count; c++) {
@@ -455,19 +419,22 @@ static void draw_bodies(const drape_stage *stage, GLuint program, bool endless)
         if (body->shape.endless != endless)
             continue;
         drape_gl_set_vec3(program, "offset", body->offset);
-        draw_vertices(&body->mesh, body->shape.vertex_count);
+        glBindVertexArray(body->mesh.array);
+        glDrawArrays(GL_TRIANGLES, 0, (GLsizei)body->shape.vertex_count);
     }
 }
 
-/* The points of the mesh cannot show what is finer than they lie. */
-static void set_relief(GLuint program, const drape_stage *stage, const drape_shading *shading)
+/* The height map is filtered to the distance of the vertices: the mesh cannot show anything finer. */
+static void draw_cloth(GLuint program, const drape_stage *stage, const drape_shading *shading)
 {
     float side = (float)stage->model->length / 1.4142f;
     drape_gl_set_float(program, "relief", shading->displaced ? RELIEF * side : 0);
     drape_gl_set_float(program, "grain", mean_edge(stage->model) / (float)stage->skin.level / side);
+    glBindVertexArray(stage->cloth.array);
+    glDrawElements(GL_TRIANGLES, stage->cloth.index_count, GL_UNSIGNED_INT, NULL);
 }
 
-/* What the lamp sees. */
+/* The shadow map: depths seen from the lamp. */
 static void draw_shadows(drape_painter *p, const drape_stage *stage, const drape_shading *shading,
                          const panel_view *v)
 {
@@ -482,12 +449,11 @@ static void draw_shadows(drape_painter *p, const drape_stage *stage, const drape
     use_surface(p, p->depth, v, &v->lamp);
     draw_bodies(stage, p->depth, false);
     drape_gl_set_vec3(p->depth, "offset", (const float[3]){0});
-    set_relief(p->depth, stage, shading);
-    draw_cloth(stage);
+    draw_cloth(p->depth, stage, shading);
     glDisable(GL_POLYGON_OFFSET_FILL);
 }
 
-/* Where nothing else is. */
+/* The background, wherever nothing else was drawn. */
 static void draw_wall(const drape_painter *p, const panel_view *v)
 {
     glUseProgram(p->wall);
@@ -503,7 +469,7 @@ static float round_length(float rough)
     return power * (s < 1.5f ? 1.0f : s < 3.5f ? 2.0f : s < 7.5f ? 5.0f : 10.0f);
 }
 
-/* Endless colliders, and where there are none a floor for the shadow. */
+/* Endless colliders; if there are none, a floor that shows the shadow. */
 static void draw_ground(drape_painter *p, const drape_stage *stage, const panel_view *v)
 {
     use_surface(p, p->ground, v, &v->view.matrix);
@@ -518,22 +484,19 @@ static void draw_ground(drape_painter *p, const drape_stage *stage, const panel_
         drape_gl_set_float(p->ground, "spread", 3.5f * stage->radius);
         drape_gl_set_vec3(p->ground, "offset",
                           (const float[]){stage->center[0], stage->floor, stage->center[2]});
-        draw_vertices(&p->floor, 6);
+        glBindVertexArray(p->floor.array);
+        glDrawArrays(GL_TRIANGLES, 0, 6);
     }
     glDisable(GL_CULL_FACE);
-}
-
-/* The mean edge, in pixels, at the camera's distance. */
-static float seen_edge(const drape_stage *stage, const drape_camera *camera, const panel_view *v)
-{
-    return mean_edge(stage->model) / (2 * camera->distance * v->view.ty) * (float)v->height;
 }
 
 static void draw_wires(const drape_painter *p, const drape_stage *stage, const drape_camera *camera,
                        const panel_view *v)
 {
-    float width = fminf(WIRE * p->overlay.unit, WIRE_SHARE * seen_edge(stage, camera, v));
-    const float thin = fminf(1, width); /* below a pixel a line is fainter, not thinner */
+    /* the mean edge in pixels at the camera's distance */
+    float edge = mean_edge(stage->model) / (2 * camera->distance * v->view.ty) * (float)v->height;
+    float width = fminf(WIRE * p->overlay.unit, WIRE_SHARE * edge);
+    const float thin = fminf(1, width); /* lines thinner than a pixel are drawn fainter */
     glEnable(GL_BLEND);
     glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
     glUseProgram(p->wire);
@@ -559,29 +522,23 @@ static void draw_shaded(drape_painter *p, const drape_picture *picture, const dr
 {
     use_surface(p, program, v, &v->view.matrix);
     drape_gl_set_vec2(program, "range", (float)picture->low, (float)picture->high);
-    set_relief(program, stage, picture->shading);
-    draw_cloth(stage);
+    draw_cloth(program, stage, picture->shading);
 }
 
-static void draw_around(drape_painter *p, const drape_stage *stage, const panel_view *v)
+/* Cloth first, as what it hides is not shaded then; unless it is transparent. */
+static void draw_scene(drape_painter *p, const drape_picture *picture, const drape_stage *stage,
+                       GLuint program, panel_view *v)
 {
+    bool transparent = picture->shading->reads & DRAPE_READS_BEHIND;
+    if (!transparent)
+        draw_shaded(p, picture, stage, program, v);
     use_surface(p, p->body, v, &v->view.matrix);
     glEnable(GL_CULL_FACE);
     draw_bodies(stage, p->body, false);
     glDisable(GL_CULL_FACE);
     draw_ground(p, stage, v);
     draw_wall(p, v);
-}
-
-/* Cloth first, as what it hides is not drawn then, unless it is seen through. */
-static void draw_scene(drape_painter *p, const drape_picture *picture, const drape_stage *stage,
-                       GLuint program, panel_view *v)
-{
-    bool through = picture->shading->reads & DRAPE_READS_BEHIND;
-    if (!through)
-        draw_shaded(p, picture, stage, program, v);
-    draw_around(p, stage, v);
-    if (!through)
+    if (!transparent)
         return;
     v->behind = drape_canvas_copy(&p->canvas);
     draw_shaded(p, picture, stage, program, v);
@@ -600,14 +557,17 @@ static drape_status draw_panel(drape_painter *p, const drape_picture *picture, i
                     .height = whole.height,
                     .clear = shading->clear,
                     .reach = REFRACTED * stage->radius};
-    drape_status status = program ? make_textures(p, shading->reads) : DRAPE_E_FILE;
+    drape_status status = program ? DRAPE_OK : DRAPE_E_FILE;
+    for (int i = 0; i < 3 && !status; i++)
+        if (shading->reads & 1 << i)
+            status = make_texture(p, i, NULL);
     if (status)
         return status;
     v.view = drape_painter_view(p, picture, index);
     set_lamp(stage, &v);
     drape_stage_set(stage, &panel->moment, shading->wires);
     draw_shadows(p, stage, shading, &v);
-    if (index == 0) /* not before the map: a canvas that is cleared and left is stored and loaded again */
+    if (index == 0) /* after the shadow map: leaving a cleared canvas would store and load it */
         drape_canvas_begin(&p->canvas);
     glBindFramebuffer(GL_FRAMEBUFFER, p->canvas.many);
     glViewport(v.left, v.bottom, v.width, v.height);
@@ -630,6 +590,6 @@ drape_status drape_painter_draw(drape_painter *painter, const drape_picture *pic
     glViewport(0, 0, painter->canvas.width, painter->canvas.height);
     drape_layout_put(&painter->overlay, picture);
     drape_overlay_draw(&painter->overlay);
-    glFlush(); /* the driver draws while the caller does something else */
+    glFlush(); /* the driver draws while the caller goes on */
     return drape_gl_check(painter->ctx, "draw a picture");
 }

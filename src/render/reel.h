@@ -1,33 +1,35 @@
-/* reel.h: the frames of a run that are to be drawn, kept as they come from a sim or from a run's folder. */
+/* reel.h: the frames of a run that will be drawn, as they come from a sim or from the folder of a run. */
 #ifndef DRAPE_RENDER_REEL_H
 #define DRAPE_RENDER_REEL_H
 
+#include "base/arena.h"
 #include "fields/fields.h"
 
 typedef struct drape_reel {
-    drape_context *ctx;
-    size_t nodes, count, room;
+    drape_arena arena;
+    size_t nodes, count, capacity;
     bool with_values;
     double *times;    /* (count) [s] */
     float *positions; /* (count x nodes x 3) [m] */
     float *values;    /* (count x nodes) */
     double *scratch;  /* (nodes) */
-    double low, high; /* of all values */
+    double low, high; /* range of all values */
 } drape_reel;
 
-/* with_values: a field is kept, too. Errors: DRAPE_E_MEMORY. */
+/* with_values: whether frames have values of a field. Errors: DRAPE_E_MEMORY. */
 drape_status drape_reel_create(drape_context *ctx, size_t nodes, bool with_values, drape_reel *reel);
-void drape_reel_free(drape_reel *reel); /* an empty one is fine */
+void drape_reel_free(drape_reel *reel); /* may be empty */
 void drape_reel_clear(drape_reel *reel);
 
-/* Keeps a frame; field NULL: positions alone, else it is measured in sim. Errors: of the field, DRAPE_E_MEMORY. */
+/* Adds a frame, with the values of a field in the state of sim unless field is NULL. Errors: those of the field,
+ * DRAPE_E_MEMORY. */
 drape_status drape_reel_add(drape_reel *reel, double t, const double *x, drape_sim *sim,
                             const drape_field_ops *field);
 
 const float *drape_reel_positions(const drape_reel *reel, size_t frame);
 const float *drape_reel_values(const drape_reel *reel, size_t frame); /* NULL without a field */
 
-/* The last frame at or before t, to rounding; the first where there is none. */
+/* The last frame at or before t, up to rounding; the first if there is none. */
 size_t drape_reel_at(const drape_reel *reel, double t);
 
 #endif

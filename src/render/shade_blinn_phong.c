@@ -2,9 +2,7 @@
 #include "render/shading.h"
 
 const drape_shading drape_shading_blinn_phong = {
-    .name = "blinn_phong",
-    .summary = "matt with a highlight",
-    .reference = "Blinn 1977",
+    .entry = {.name = "blinn_phong", .summary = "matt with a highlight", .reference = "Blinn 1977"},
     .source =
         "vec3 shade(Surface s) {\n"
         "    vec3 h = normalize(light + s.v);\n"

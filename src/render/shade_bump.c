@@ -2,9 +2,9 @@
 #include "render/shading.h"
 
 const drape_shading drape_shading_bump = {
-    .name = "bump",
-    .summary = "matt, with the slopes of the height map: --height, or a woven relief",
-    .reference = "Blinn 1978",
+    .entry = {.name = "bump",
+              .summary = "matt, with the slopes of the height map: --height, or a woven relief",
+              .reference = "Blinn 1978"},
     .reads = DRAPE_READS_HEIGHTS,
     .source =
         "vec3 shade(Surface s) {\n"

@@ -2,9 +2,9 @@
 #include "render/shading.h"
 
 const drape_shading drape_shading_displacement = {
-    .name = "displacement",
-    .summary = "matt, its points moved out by the height map: --height, or a woven relief",
-    .reference = "Cook 1984",
+    .entry = {.name = "displacement",
+              .summary = "matt, its points moved out by the height map: --height, or a woven relief",
+              .reference = "Cook 1984"},
     .reads = DRAPE_READS_HEIGHTS,
     .source = "vec3 shade(Surface s) {\n"
               "    vec3 n = bumped(s, 0.016);\n"

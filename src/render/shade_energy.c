@@ -1,11 +1,4 @@
-/* shade_energy.c: the field of that name in colours. */
+/* shade_energy.c: the field energy in colours. */
 #include "render/shading.h"
 
-extern const drape_field_ops drape_field_energy;
-
-const drape_shading drape_shading_energy = {
-    .name = "energy",
-    .summary = "in colours with a legend: elastic energy stored in the sheet",
-    .source = drape_shading_field_source,
-    .field = &drape_field_energy,
-};
+DRAPE_FIELD_SHADING(energy, "elastic energy stored in the sheet");

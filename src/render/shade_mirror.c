@@ -1,10 +1,10 @@
-/* shade_mirror.c: a mirror of the world around. */
+/* shade_mirror.c: a mirror of the surroundings. */
 #include "render/shading.h"
 
 const drape_shading drape_shading_mirror = {
-    .name = "mirror",
-    .summary = "a mirror of the world around: --environment, or a room with lamps",
-    .reference = "Blinn & Newell 1976",
+    .entry = {.name = "mirror",
+              .summary = "a mirror of the world around: --environment, or a room with lamps",
+              .reference = "Blinn & Newell 1976"},
     .reads = DRAPE_READS_ENVIRONMENT,
     .source = "vec3 shade(Surface s) {\n"
               "    vec3 c = world(reflect(-s.v, s.n), 0.0);\n"

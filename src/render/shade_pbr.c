@@ -2,9 +2,9 @@
 #include "render/shading.h"
 
 const drape_shading drape_shading_pbr = {
-    .name = "pbr",
-    .summary = "metallic-roughness: silk with threads of gold where the height map has metal",
-    .reference = "Cook & Torrance 1982; GGX, Walter et al. 2007",
+    .entry = {.name = "pbr",
+              .summary = "metallic-roughness: silk with threads of gold where the height map has metal",
+              .reference = "Cook & Torrance 1982; GGX, Walter et al. 2007"},
     .reads = DRAPE_READS_HEIGHTS | DRAPE_READS_ENVIRONMENT,
     .source =
         "// Trowbridge and Reitz's distribution of facets, Smith's joint shadowing, Schlick's Fresnel term.\n"

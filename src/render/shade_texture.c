@@ -2,8 +2,8 @@
 #include "render/shading.h"
 
 const drape_shading drape_shading_texture = {
-    .name = "texture",
-    .summary = "a picture on the cloth: --texture, or checks with a letter to read",
+    .entry = {.name = "texture",
+              .summary = "a picture on the cloth: --texture, or checks with a letter to read"},
     .reads = DRAPE_READS_PATTERN,
     .source = "vec3 shade(Surface s) { return texture(picture, s.at).rgb * arriving(s) / PI * 1.75; }\n",
 };

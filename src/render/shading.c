@@ -9,7 +9,7 @@ static const char inputs[] =
     "in float value, piece;\n"
     "in vec4 shadow_at;\n"
     "out vec4 colour;\n"
-    "uniform vec3 eye, light, window, front, back; // light, window: towards them\n"
+    "uniform vec3 eye, light, window, front, back; // light, window: directions to them\n"
     "uniform vec2 range;\n"
     "uniform float relief, soft, texel_depth, clear, reach;\n"
     "uniform mat4 view;\n"
@@ -20,7 +20,7 @@ static const char inputs[] =
     "const float PI = 3.14159265;\n"
     "\n"
     "struct Surface {\n"
-    "    vec3 p, n, t, v;    // point, normal to the eye, tangent along u, direction of the eye\n"
+    "    vec3 p, n, t, v;    // point, normal on the eye's side, tangent along u, direction to the eye\n"
     "    vec2 at;            // texture coordinates\n"
     "    float value, piece; // of the field; number of the cloth\n"
     "    float sun;          // how much of the lamp reaches it\n"
@@ -28,8 +28,7 @@ static const char inputs[] =
     "};\n";
 
 static const char lights[] =
-    "// The part of the lamp that is seen from here: four comparisons around the point, each between four "
-    "texels.\n"
+    "// The visible part of the lamp: four samples around the point, each interpolated between four texels.\n"
     "float sunlight(vec4 q, float facing) {\n"
     "    vec3 s = q.xyz * 0.5 + 0.5;\n"
     "    if (facing <= 0.0) return 0.0;\n"
@@ -48,17 +47,17 @@ static const char lights[] =
     "    return mix(vec3(0.40, 0.37, 0.35), vec3(0.74, 0.80, 0.90), 0.5 + 0.5 * n.y) * 0.56;\n"
     "}\n"
     "\n"
-    "// The room, and a window across from the lamp. Lamp and window stand still: from every side some cloth "
+    "// Light of the room and of a window opposite the lamp. Both stand still, so from every side some cloth "
     "is lit.\n"
     "vec3 room(vec3 n) { return ambient(n) + vec3(0.72, 0.80, 0.92) * max(0.0, dot(n, window)); }\n"
     "\n"
-    "// Light that arrives, for a matt surface: the lamp, the room, and a little from where we stand.\n"
+    "// Light that arrives at a matt surface: from the lamp, the room, and a little from the eye.\n"
     "vec3 arriving(Surface s, vec3 n) {\n"
     "    return LAMP * s.sun * max(0.0, dot(n, light)) + room(n) + 0.16 * max(0.0, dot(n, s.v));\n"
     "}\n"
     "vec3 arriving(Surface s) { return arriving(s, s.n); }\n"
     "\n"
-    "// Colours of several pieces of cloth differ.\n"
+    "// The base colour, different for each cloth.\n"
     "vec3 tint(Surface s) {\n"
     "    vec3 c = s.side > 0.0 ? front : back;\n"
     "    float k = mod(s.piece, 3.0);\n"
@@ -66,13 +65,13 @@ static const char lights[] =
     "}\n";
 
 static const char surroundings[] =
-    "// The world around in a direction; blur: 0 to 1.\n"
+    "// The surroundings in a direction; blur: 0 to 1.\n"
     "vec3 world(vec3 d, float blur) {\n"
     "    vec2 u = vec2(atan(d.x, d.z) / (2.0 * PI) + 0.5, asin(clamp(d.y, -1.0, 1.0)) / PI + 0.5);\n"
     "    return textureLod(environment, u, blur * 6.5).rgb;\n"
     "}\n"
     "\n"
-    "// What is behind a point that lies in front of all but the cloth.\n"
+    "// The picture without cloth where a point is seen.\n"
     "vec3 seen_at(vec3 p) {\n"
     "    vec4 q = view * vec4(p, 1.0);\n"
     "    vec2 at = panel.xy + clamp(q.xy / q.w * 0.5 + 0.5, 0.002, 0.998) * panel.zw;\n"
@@ -80,9 +79,9 @@ static const char surroundings[] =
     "    return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), step(0.04045, c));\n"
     "}\n"
     "\n"
-    "// The normal of the relief in the height map: its slopes along the tangents, over no less than a "
-    "pixel, as what is\n"
-    "// finer than that would flicker.\n"
+    "// The normal of the relief in the height map, from its slopes along the tangents. They are taken over "
+    "at least\n"
+    "// a pixel: finer details would flicker.\n"
     "vec3 bumped(Surface s, float height) {\n"
     "    vec2 d = vec2(max(1.0 / 1024.0, 0.6 * max(length(dFdx(s.at)), length(dFdy(s.at)))), 0.0);\n"
     "    float du = texture(heights, s.at + d).r - texture(heights, s.at - d).r;\n"
@@ -91,14 +90,14 @@ static const char surroundings[] =
     "    return normalize(s.n - s.side * height / (2.0 * d.x) * (du * s.t + dv * across));\n"
     "}\n"
     "\n"
-    "// The square of a roughness with the spread of normals within a pixel in it (Tokuyoshi & Kaplanyan "
+    "// The square of a roughness, increased by the spread of normals within a pixel (Tokuyoshi & Kaplanyan "
     "2019).\n"
     "float widened(float a2, vec3 n) {\n"
     "    vec3 x = dFdx(n), y = dFdy(n);\n"
     "    return min(1.0, a2 + min(0.5 * (dot(x, x) + dot(y, y)), 0.36));\n"
     "}\n"
     "\n"
-    "// From linear light to what a screen is told (IEC 61966-2-1).\n"
+    "// From linear RGB to sRGB (IEC 61966-2-1).\n"
     "vec3 encoded(vec3 c) {\n"
     "    c = clamp(c, 0.0, 1.0);\n"
     "    return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, c));\n"
@@ -109,7 +108,7 @@ static const char surroundings[] =
 
 const char *const drape_shading_prelude[] = {inputs, lights, surroundings, NULL};
 
-/* Colours are to be read, so light changes them little. */
+/* The colours have to be readable, so light changes them little. */
 const char drape_shading_field_source[] =
     "vec3 shade(Surface s) {\n"
     "    float x = clamp((s.value - range.x) / (range.y - range.x), 0.0, 1.0);\n"
@@ -117,11 +116,3 @@ const char drape_shading_field_source[] =
     "    float form = 0.70 + 0.22 * max(0.0, dot(s.n, s.v)) + 0.16 * s.sun * max(0.0, dot(s.n, light));\n"
     "    return c * min(form, 1.06);\n"
     "}\n";
-
-const drape_shading *drape_shading_find(const char *name)
-{
-    for (int i = 0; drape_shadings[i]; i++)
-        if (strcmp(drape_shadings[i]->name, name) == 0)
-            return drape_shadings[i];
-    return NULL;
-}

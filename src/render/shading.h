@@ -1,14 +1,14 @@
 /*
- * shading.h: the ways to colour cloth, rows of one table. A row is the constant drape_shading_<word> of
- * shade_<word>.c: a function `vec3 shade(Surface s)` in GLSL, in linear RGB, over what shading.c gives to all.
+ * shading.h: the shadings, ways to colour cloth. A shading is the constant drape_shading_<name> of shade_<name>.c with a
+ * function `vec3 shade(Surface s)` in GLSL that returns linear RGB; shading.c has the functions that all of them share.
  */
 #ifndef DRAPE_RENDER_SHADING_H
 #define DRAPE_RENDER_SHADING_H
 
 #include "fields/fields.h"
 
-/* Textures that a shading reads: made when the first that does is drawn. Behind is the picture without cloth: cloth is
- * drawn last then. */
+/* Textures that a shading reads; they are made when a shading that reads them is first drawn. BEHIND is the picture
+ * without cloth: cloth is then drawn last. */
 enum {
     DRAPE_READS_PATTERN = 1,
     DRAPE_READS_HEIGHTS = 2,
@@ -17,26 +17,31 @@ enum {
 };
 
 typedef struct drape_shading {
-    const char *name, *summary;
-    const char *reference;        /* NULL: none */
+    drape_entry entry;
     const char *source;           /* GLSL */
-    const drape_field_ops *field; /* what is shown in colours; NULL: none */
+    const drape_field_ops *field; /* shown in colours; NULL: none */
     int reads;                    /* sum of DRAPE_READS_* */
-    bool wires;                   /* the mesh's edges and the pinned nodes are drawn, too */
-    bool displaced;               /* points are moved along their normals by the height map */
-    float clear;                  /* share of the lamp's light that goes through: shadows are lighter */
+    bool wires;                   /* the edges of the mesh and the pinned nodes are drawn as well */
+    bool displaced;               /* vertices are moved along their normals by the height map */
+    float clear; /* share of the lamp's light that passes through, which lightens the shadow */
 } drape_shading;
 
 extern const drape_shading *const drape_shadings[]; /* NULL-ended */
-extern const char *const drape_shadings_words[];
+extern const drape_registry drape_shading_registry;
 
-/* NULL: there is none of that name. */
-const drape_shading *drape_shading_find(const char *name);
-
-/* GLSL that all surfaces share: what is known of a point, light, shadow, the world around. NULL-ended. */
+/* GLSL that all surfaces share: the data of a point, light, shadow and surroundings. NULL-ended. */
 extern const char *const drape_shading_prelude[];
 
-/* How fields are coloured. */
+/* The GLSL that colours fields. */
 extern const char drape_shading_field_source[];
+
+/* Defines the shading of the same name as a field. */
+#define DRAPE_FIELD_SHADING(id, shown)                                                                       \
+    extern const drape_field_ops drape_field_##id;                                                           \
+    const drape_shading drape_shading_##id = {                                                               \
+        .entry = {.name = #id, .summary = "in colours with a legend: " shown},                               \
+        .source = drape_shading_field_source,                                                                \
+        .field = &drape_field_##id,                                                                          \
+    }
 
 #endif

@@ -1,4 +1,4 @@
-/* skin.c: see skin.h. A point of an edge depends on that edge's ends alone, so the triangles beside it share it
+/* skin.c: see skin.h. A point on an edge depends on the ends of that edge alone, so the triangles beside it share it
  * and no gap opens. */
 #include "render/skin.h"
 
@@ -8,11 +8,11 @@
 #include <math.h>
 #include <string.h>
 
-#define DRAWN_TRIANGLES 36000 /* about as many are drawn where the mesh is coarser */
-#define MOST_PIECES     8
-#define BULGE           0.35f /* sine of the angle from edge to plane at which a curve is half as round */
+#define DRAWN_TRIANGLES 36000 /* about as many are drawn of a mesh that has fewer */
+#define MAX_LEVEL       8
+#define BULGE           0.35f /* sine of the angle between edge and tangent plane at which a curve is half as round */
 
-/* ---- Numbers ---- */
+/* ---- Numbering of edges and points ---- */
 
 /* Edges are ordered by (lower, higher) node over the whole model. */
 static int32_t find_edge(const drape_model *m, int32_t a, int32_t b)
@@ -27,16 +27,6 @@ static int32_t find_edge(const drape_model *m, int32_t a, int32_t b)
             last = middle;
     }
     return first;
-}
-
-static void number_edges(drape_skin *s)
-{
-    const drape_model *m = s->model;
-    for (size_t i = 0; i < 3 * (size_t)m->triangle_count; i++) {
-        int32_t a = m->triangle[i], b = m->triangle[i - i % 3 + (i + 1) % 3];
-        int32_t e = find_edge(m, a, b);
-        s->triangle_edge[i] = a < b ? e : -1 - e;
-    }
 }
 
 static size_t inner_points(int level)
@@ -63,14 +53,15 @@ static uint32_t point_number(const drape_skin *s, int32_t t, int i, int j)
         along = edge[side] >= 0 ? along : n - along;
         return (uint32_t)((size_t)m->node_count + (size_t)e * (size_t)(n - 1) + (size_t)(along - 1));
     }
-    size_t before = 0; /* inner points of the rows j' < j */
+    size_t before = 0; /* inner points of the rows below j */
     for (int row = 1; row < j; row++)
         before += (size_t)(n - 1 - row);
     return (uint32_t)((size_t)m->node_count + (size_t)m->edge_count * (size_t)(n - 1) +
                       (size_t)t * inner_points(n) + before + (size_t)(i - 1));
 }
 
-static void number_triangles(drape_skin *s)
+/* The corners of the level^2 triangles that each triangle of the mesh is drawn as. */
+static void make_indices(drape_skin *s)
 {
     uint32_t *to = s->index;
     for (int32_t t = 0; t < s->model->triangle_count; t++)
@@ -90,7 +81,7 @@ static void number_triangles(drape_skin *s)
 
 /* ---- Texture coordinates ---- */
 
-/* Of a grid: along its first row and across, as far as nodes lie there at rest. */
+/* Texture coordinates of a grid: rest distances along its first row, and across it. */
 static void unroll_grid(const drape_cloth *cloth, float *uv)
 {
     const drape_mesh *mesh = &cloth->mesh;
@@ -116,7 +107,7 @@ static void unroll_grid(const drape_cloth *cloth, float *uv)
     }
 }
 
-/* Of other meshes: seen along the shortest side of their box. */
+/* Texture coordinates of other meshes: a projection along the shortest side of their bounding box. */
 static void flatten(const drape_cloth *cloth, float *uv)
 {
     const drape_mesh *mesh = &cloth->mesh;
@@ -137,7 +128,7 @@ static void flatten(const drape_cloth *cloth, float *uv)
     }
 }
 
-/* Seen from the front, where triangles run counterclockwise, so must their texture: else it is read mirrored. */
+/* Triangles run counterclockwise seen from the front. Unless they do so in the texture, it appears mirrored. */
 static bool is_mirrored(const drape_mesh *mesh, const float *uv)
 {
     double area = 0;
@@ -149,7 +140,7 @@ static bool is_mirrored(const drape_mesh *mesh, const float *uv)
     return area < 0;
 }
 
-/* Of cloth that hangs at rest: its texture must not stand on its head. The slope of a line fitted to height over v. */
+/* Whether v falls with height at rest, by linear regression: the texture would stand on its head. */
 static bool is_upside_down(const drape_mesh *mesh, const float *uv)
 {
     double n = mesh->node_count, y = 0, v = 0, product = 0, square = 0;
@@ -165,7 +156,7 @@ static bool is_upside_down(const drape_mesh *mesh, const float *uv)
     return product < 0 && product * product > 1e-6 * square;
 }
 
-/* u (k 0) or v (k 1) runs the other way. */
+/* Reverses u (k = 0) or v (k = 1). */
 static void reverse(const drape_mesh *mesh, float *uv, int k)
 {
     float highest = 0;
@@ -190,42 +181,31 @@ static void unroll(const drape_cloth *cloth, float *uv)
     reverse(mesh, uv, 1);
 }
 
-/* ---- Making and freeing ---- */
-
-static int choose_level(const drape_model *m)
+drape_status drape_skin_create(drape_arena *arena, const drape_model *model, drape_skin *skin)
 {
-    double pieces = sqrt(DRAWN_TRIANGLES / fmax(1, m->triangle_count));
-    return pieces < 1 ? 1 : pieces > MOST_PIECES ? MOST_PIECES : (int)lround(pieces);
-}
-
-static bool allocate(drape_skin *s)
-{
-    const drape_model *m = s->model;
-    drape_context *ctx = s->ctx;
-    size_t nodes = (size_t)m->node_count, triangles = (size_t)m->triangle_count, level = (size_t)s->level;
-    s->vertex_count = nodes + (size_t)m->edge_count * (level - 1) + triangles * inner_points(s->level);
-    s->segment_count = (size_t)m->edge_count * level;
-    s->triangle_edge = drape_alloc(ctx, 3 * triangles, sizeof *s->triangle_edge);
-    s->uv = drape_alloc(ctx, 2 * nodes, sizeof *s->uv);
-    s->normal = drape_alloc(ctx, 3 * nodes, sizeof *s->normal);
-    s->tangent = drape_alloc(ctx, 3 * nodes, sizeof *s->tangent);
-    s->cloth = drape_alloc(ctx, nodes, sizeof *s->cloth);
-    s->vertex = drape_alloc(ctx, s->vertex_count, sizeof *s->vertex);
-    s->index = drape_alloc(ctx, 3 * triangles * level * level, sizeof *s->index);
-    s->segment = drape_alloc(ctx, 6 * s->segment_count, sizeof *s->segment);
-    return s->triangle_edge && s->uv && s->normal && s->tangent && s->cloth && s->vertex && s->index &&
-           s->segment;
-}
-
-drape_status drape_skin_create(drape_context *ctx, const drape_model *model, drape_skin *skin)
-{
-    *skin = (drape_skin){.ctx = ctx, .model = model, .level = choose_level(model)};
-    if (!allocate(skin)) {
-        drape_skin_free(skin);
+    const size_t nodes = (size_t)model->node_count, triangles = (size_t)model->triangle_count;
+    const double pieces = sqrt(DRAWN_TRIANGLES / fmax(1, model->triangle_count));
+    const int level = (int)lround(fmin(fmax(pieces, 1), MAX_LEVEL));
+    *skin = (drape_skin){.model = model, .level = level};
+    skin->vertex_count =
+        nodes + (size_t)model->edge_count * (size_t)(level - 1) + triangles * inner_points(level);
+    skin->segment_count = (size_t)model->edge_count * (size_t)level;
+    skin->triangle_edge = drape_arena_take(arena, 3 * triangles, sizeof *skin->triangle_edge);
+    skin->uv = drape_arena_take(arena, 2 * nodes, sizeof *skin->uv);
+    skin->normal = drape_arena_take(arena, 3 * nodes, sizeof *skin->normal);
+    skin->tangent = drape_arena_take(arena, 3 * nodes, sizeof *skin->tangent);
+    skin->cloth = drape_arena_take(arena, nodes, sizeof *skin->cloth);
+    skin->vertex = drape_arena_take(arena, skin->vertex_count, sizeof *skin->vertex);
+    skin->index = drape_arena_take(arena, 3 * triangles * (size_t)(level * level), sizeof *skin->index);
+    skin->segment = drape_arena_take(arena, 6 * skin->segment_count, sizeof *skin->segment);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
+    for (size_t i = 0; i < 3 * triangles; i++) {
+        int32_t a = model->triangle[i], b = model->triangle[i - i % 3 + (i + 1) % 3];
+        int32_t e = find_edge(model, a, b);
+        skin->triangle_edge[i] = a < b ? e : -1 - e;
     }
-    number_edges(skin);
-    number_triangles(skin);
+    make_indices(skin);
     for (int32_t c = 0; c < model->cloth_count; c++) {
         const drape_cloth *cloth = &model->cloths[c];
         unroll(cloth, skin->uv + 2 * (size_t)cloth->first_node);
@@ -233,15 +213,6 @@ drape_status drape_skin_create(drape_context *ctx, const drape_model *model, dra
             skin->cloth[cloth->first_node + i] = (float)c;
     }
     return DRAPE_OK;
-}
-
-void drape_skin_free(drape_skin *skin)
-{
-    void *const all[] = {skin->triangle_edge, skin->uv,    skin->normal, skin->tangent,
-                         skin->cloth,         skin->index, skin->vertex, skin->segment};
-    for (size_t i = 0; skin->ctx && i < sizeof all / sizeof *all; i++)
-        drape_free(skin->ctx, all[i]);
-    *skin = (drape_skin){.level = 0};
 }
 
 /* ---- Normals and tangents of the nodes ---- */
@@ -252,8 +223,9 @@ static void subtract(const float *a, const float *b, float *out)
         out[k] = a[k] - b[k];
 }
 
-/* The cross product of two sides is twice the area long: the sum is weighted by area. So is the direction in which
- * u grows, e1 dv2 - e2 dv1 over the determinant of the uv, whose sign alone counts. */
+/* Adds a triangle to the normals and tangents of its corners, weighted by area: the cross product of two sides has
+ * twice the area as its length. The tangent is the direction in which u grows, e1 dv2 - e2 dv1 over the determinant of
+ * the texture coordinates, of which only the sign matters. */
 static void add_triangle(drape_skin *s, const float *x, const int32_t *corner)
 {
     const float *uv[3];
@@ -276,8 +248,8 @@ static void add_triangle(drape_skin *s, const float *x, const int32_t *corner)
         }
 }
 
-/* Across the normal. */
-static void straighten(const float *normal, float *tangent)
+/* Makes a unit tangent orthogonal to the normal. */
+static void orthogonalize(const float *normal, float *tangent)
 {
     float along = drape_dot(normal, tangent);
     for (int k = 0; k < 3; k++)
@@ -285,7 +257,7 @@ static void straighten(const float *normal, float *tangent)
     drape_normalize(tangent);
 }
 
-static void fit_nodes(drape_skin *s, const float *x, const float *values)
+static void update_nodes(drape_skin *s, const float *x, const float *values)
 {
     const drape_model *m = s->model;
     memset(s->normal, 0, 3 * (size_t)m->node_count * sizeof *s->normal);
@@ -295,7 +267,7 @@ static void fit_nodes(drape_skin *s, const float *x, const float *values)
     for (size_t i = 0; i < (size_t)m->node_count; i++) {
         drape_skin_vertex *v = &s->vertex[i];
         drape_normalize(s->normal + 3 * i);
-        straighten(s->normal + 3 * i, s->tangent + 3 * i);
+        orthogonalize(s->normal + 3 * i, s->tangent + 3 * i);
         memcpy(v->p, x + 3 * i, sizeof v->p);
         memcpy(v->n, s->normal + 3 * i, sizeof v->n);
         memcpy(v->t, s->tangent + 3 * i, sizeof v->t);
@@ -305,12 +277,12 @@ static void fit_nodes(drape_skin *s, const float *x, const float *values)
     }
 }
 
-/* ---- Points between ---- */
+/* ---- Points on edges and in triangles ---- */
 
-/* The inner control point of a curve from a to b that leaves a across its normal, less a: the way there projected
- * into a's plane, a third of it. Where the mesh is folded more sharply than it resolves, the curve would bulge into
- * the next layer: there it stays straight. */
-static void leave(const drape_skin_vertex *a, const drape_skin_vertex *b, float *out)
+/* The inner control point, relative to a, of a curve from a to b that is orthogonal to the normal at a: a third of
+ * b - a projected into the tangent plane. Where the mesh is folded more sharply than it resolves, the curve would bulge
+ * into the next layer, so there it stays straight. */
+static void control_point(const drape_skin_vertex *a, const drape_skin_vertex *b, float *out)
 {
     subtract(b->p, a->p, out);
     float w = drape_dot(out, a->n), length = drape_dot(out, out),
@@ -320,20 +292,20 @@ static void leave(const drape_skin_vertex *a, const drape_skin_vertex *b, float 
         out[k] = (out[k] - w * a->n[k]) / 3;
 }
 
-/* The normal in the middle of a curve: the mean of its ends' reflected at the plane between them. */
+/* The normal in the middle of a curve: the mean of the normals at its ends, reflected at the plane between them. */
 static void middle_normal(const drape_skin_vertex *a, const drape_skin_vertex *b, float *out)
 {
-    float way[3], sum[3];
-    subtract(b->p, a->p, way);
+    float chord[3], sum[3];
+    subtract(b->p, a->p, chord);
     for (int k = 0; k < 3; k++)
         sum[k] = a->n[k] + b->n[k];
-    float length = drape_dot(way, way), w = length > 0 ? 2 * drape_dot(way, sum) / length : 0;
+    float length = drape_dot(chord, chord), w = length > 0 ? 2 * drape_dot(chord, sum) / length : 0;
     for (int k = 0; k < 3; k++)
-        out[k] = sum[k] - w * way[k];
+        out[k] = sum[k] - w * chord[k];
     drape_normalize(out);
 }
 
-/* What is linear: w of the corners. */
+/* Interpolates tangent, texture coordinates and value linearly, with the weights w of the corners. */
 static void blend(const drape_skin_vertex *const *corner, const float *w, int count, drape_skin_vertex *out)
 {
     memset(out, 0, sizeof *out);
@@ -347,21 +319,21 @@ static void blend(const drape_skin_vertex *const *corner, const float *w, int co
     out->cloth = corner[0]->cloth;
 }
 
-static void finish(drape_skin_vertex *v)
+static void normalize(drape_skin_vertex *v)
 {
     drape_normalize(v->n);
-    straighten(v->n, v->t);
+    orthogonalize(v->n, v->t);
 }
 
-static void fit_edge(drape_skin *s, int32_t e)
+static void update_edge(drape_skin *s, int32_t e)
 {
     const drape_model *m = s->model;
     const drape_skin_vertex *const ends[2] = {&s->vertex[m->edge[2 * (size_t)e]],
                                               &s->vertex[m->edge[2 * (size_t)e + 1]]};
     drape_skin_vertex *to = &s->vertex[(size_t)m->node_count + (size_t)e * (size_t)(s->level - 1)];
     float from_a[3], from_b[3], normal[3];
-    leave(ends[0], ends[1], from_a);
-    leave(ends[1], ends[0], from_b);
+    control_point(ends[0], ends[1], from_a);
+    control_point(ends[1], ends[0], from_b);
     middle_normal(ends[0], ends[1], normal);
     for (int i = 1; i < s->level; i++, to++) {
         float u = (float)i / (float)s->level, w = 1 - u;
@@ -371,11 +343,11 @@ static void fit_edge(drape_skin *s, int32_t e)
                        3 * w * u * u * (ends[1]->p[k] + from_b[k]) + u * u * u * ends[1]->p[k];
             to->n[k] = w * w * ends[0]->n[k] + u * u * ends[1]->n[k] + w * u * normal[k];
         }
-        finish(to);
+        normalize(to);
     }
 }
 
-/* The control net of a triangle: two points on each side, one inside; and the normals of its sides' middles. */
+/* The control net of a triangle: two points on each side, one inside, and the normals at the middles of its sides. */
 typedef struct patch {
     const drape_skin_vertex *corner[3];
     float side[3][2][3]; /* from corner k towards k + 1: near k, near k + 1 */
@@ -388,8 +360,8 @@ static void make_patch(const drape_skin *s, int32_t t, patch *p)
         p->corner[k] = &s->vertex[s->model->triangle[3 * (size_t)t + (size_t)k]];
     for (int k = 0; k < 3; k++) {
         const drape_skin_vertex *a = p->corner[k], *b = p->corner[(k + 1) % 3];
-        leave(a, b, p->side[k][0]);
-        leave(b, a, p->side[k][1]);
+        control_point(a, b, p->side[k][0]);
+        control_point(b, a, p->side[k][1]);
         for (int i = 0; i < 3; i++) {
             p->side[k][0][i] += a->p[i];
             p->side[k][1][i] += b->p[i];
@@ -406,8 +378,8 @@ static void make_patch(const drape_skin *s, int32_t t, patch *p)
     }
 }
 
-/* At the weights w of the corners. */
-static void fit_inner(const patch *p, const float *w, drape_skin_vertex *to)
+/* The point with the weights w of the corners. */
+static void update_inner(const patch *p, const float *w, drape_skin_vertex *to)
 {
     blend(p->corner, w, 3, to);
     for (int i = 0; i < 3; i++) {
@@ -421,30 +393,30 @@ static void fit_inner(const patch *p, const float *w, drape_skin_vertex *to)
         to->p[i] = x;
         to->n[i] = n;
     }
-    finish(to);
+    normalize(to);
 }
 
-static void fit_triangle(drape_skin *s, int32_t t)
+static void update_triangle(drape_skin *s, int32_t t)
 {
     patch p;
     float n = (float)s->level;
     make_patch(s, t, &p);
     for (int j = 1; j < s->level; j++)
         for (int i = 1; i + j < s->level; i++)
-            fit_inner(&p, (float[]){(n - (float)i - (float)j) / n, (float)i / n, (float)j / n},
-                      &s->vertex[point_number(s, t, i, j)]);
+            update_inner(&p, (float[]){(n - (float)i - (float)j) / n, (float)i / n, (float)j / n},
+                         &s->vertex[point_number(s, t, i, j)]);
 }
 
-void drape_skin_fit(drape_skin *skin, const float *positions, const float *values)
+void drape_skin_update(drape_skin *skin, const float *positions, const float *values)
 {
-    fit_nodes(skin, positions, values);
+    update_nodes(skin, positions, values);
     for (int32_t e = 0; skin->level > 1 && e < skin->model->edge_count; e++)
-        fit_edge(skin, e);
+        update_edge(skin, e);
     for (int32_t t = 0; skin->level > 2 && t < skin->model->triangle_count; t++)
-        fit_triangle(skin, t);
+        update_triangle(skin, t);
 }
 
-void drape_skin_wire(drape_skin *skin)
+void drape_skin_update_segments(drape_skin *skin)
 {
     const drape_model *m = skin->model;
     float *to = skin->segment;

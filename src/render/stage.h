@@ -1,5 +1,5 @@
-/* stage.h: a model as it is drawn: its cloth, its colliders, the floor. What is drawn of a moment is given each
- * time. */
+/* stage.h: a model as it is drawn: its cloth, its colliders and the floor. Positions and values are set for each
+ * picture. */
 #ifndef DRAPE_RENDER_STAGE_H
 #define DRAPE_RENDER_STAGE_H
 
@@ -8,46 +8,47 @@
 #include "render/gl.h"
 #include "render/skin.h"
 
-/* A moment of a run. */
+/* The state of a run at one time. */
 typedef struct drape_moment {
     double t;               /* [s] */
     const float *positions; /* (node_count x 3) [m] */
-    const float *values;    /* (node_count) of a field; NULL: none */
+    const float *values;    /* (node_count) of the field shown; NULL: none */
 } drape_moment;
 
 typedef struct drape_stage_body {
     drape_body shape;
     drape_gl_mesh mesh;
-    float offset[3]; /* [m] where it is now */
+    float offset[3]; /* [m] its displacement now */
 } drape_stage_body;
 
 typedef struct drape_stage {
-    drape_context *ctx;
+    drape_arena arena; /* holds skin, bodies and pins */
     const drape_model *model;
     drape_skin skin;
     drape_gl_mesh cloth, wires, pins;
-    drape_stage_body *bodies; /* (body_count): the model's colliders */
+    drape_stage_body *bodies; /* (body_count) the model's colliders */
     int32_t body_count;
     size_t wire_count, pin_count;
     float *pin;              /* (pinned nodes x 3) */
-    float center[3], radius; /* [m] of what was framed: cloth over all moments, colliders that end */
-    float floor;             /* height that shadows fall to [m] */
-    bool has_ground;         /* an endless collider takes the shadows */
-    float low[3], high[3];   /* box of what was seen so far */
+    float center[3], radius; /* [m] of the box of the cloth at all times and of the bounded colliders */
+    float floor;             /* height of the floor that receives shadows [m] */
+    bool has_ground;         /* an endless collider receives the shadows instead */
+    float low[3], high[3];   /* that box [m], extended by drape_stage_add and drape_stage_finish */
 } drape_stage;
 
-/* Errors: DRAPE_E_MEMORY. An OpenGL context is current. */
+/* Errors: DRAPE_E_MEMORY. An OpenGL context has to be current. */
 drape_status drape_stage_create(drape_context *ctx, const drape_model *model, drape_stage *stage);
-void drape_stage_free(drape_stage *stage); /* an empty one is fine; so is one whose model is gone */
+void drape_stage_free(drape_stage *stage); /* may be empty; the model may be gone */
 
-/* These positions will be in the picture. After the last of them drape_stage_settle finds where shadows fall. */
-void drape_stage_see(drape_stage *stage, const float *positions);
-void drape_stage_settle(drape_stage *stage);
+/* Extends the box by positions that will be drawn. After the last of them drape_stage_finish adds the colliders and
+ * places the floor. */
+void drape_stage_add(drape_stage *stage, const float *positions);
+void drape_stage_finish(drape_stage *stage);
 
-/* Adds what is drawn at a time, but for endless colliders, to what the camera is to see. */
+/* Adds the cloth and the bounded colliders at a time to what the camera has to show. */
 void drape_stage_frame(drape_stage *stage, drape_framing *framing, double t, const float *positions);
 
-/* Puts cloth and colliders where they are. */
+/* Sets cloth and colliders to a moment. */
 void drape_stage_set(drape_stage *stage, const drape_moment *moment, bool wires);
 
 #endif

@@ -5,15 +5,15 @@
 #include <GLFW/glfw3.h>
 #include <string.h>
 
-#define MAX_INPUTS 256 /* between two polls; more are forgotten */
+#define MAX_INPUTS 256 /* between two polls; more are dropped */
 
 struct drape_window {
     drape_context *ctx;
     GLFWwindow *handle;
     drape_input inputs[MAX_INPUTS];
     int count, taken;
-    bool ready;  /* GLFW is */
-    double x, y; /* of the pointer, as the events tell: asked for, it is where it went since */
+    bool ready;  /* GLFW is initialized */
+    double x, y; /* of the pointer, from events: a query would give where it has moved since */
 };
 
 static void put(GLFWwindow *handle, drape_input input)
@@ -49,7 +49,7 @@ static int key_of(int key)
     return key < 128 ? key : 0;
 }
 
-/* Letters by what is printed on the key, whatever the keyboard's layout. */
+/* Letters are those printed on the key, for any keyboard layout. */
 static void on_key(GLFWwindow *handle, int key, int scancode, int action, int mods)
 {
     const char *name = glfwGetKeyName(key, scancode);

@@ -1,4 +1,4 @@
-/* window.h: a window of the desktop, by GLFW, and what its user does. One at a time. */
+/* window.h: a desktop window, by GLFW, and the input of its user. There can be one at a time. */
 #ifndef DRAPE_RENDER_WINDOW_H
 #define DRAPE_RENDER_WINDOW_H
 
@@ -7,9 +7,9 @@
 typedef enum drape_input_kind {
     DRAPE_INPUT_KEY,     /* letter, or one of the keys below */
     DRAPE_INPUT_PRESS,   /* a button went down at x, y */
-    DRAPE_INPUT_RELEASE, /* and up */
+    DRAPE_INPUT_RELEASE, /* a button went up */
     DRAPE_INPUT_MOVE,    /* the pointer is at x, y */
-    DRAPE_INPUT_SCROLL   /* by y notches */
+    DRAPE_INPUT_SCROLL   /* the wheel turned by y notches */
 } drape_input_kind;
 
 enum {
@@ -26,7 +26,7 @@ enum { DRAPE_BUTTON_LEFT, DRAPE_BUTTON_RIGHT, DRAPE_BUTTON_MIDDLE };
 
 typedef struct drape_input {
     drape_input_kind kind;
-    int key;          /* KEY: an ASCII letter as it stands on the key, in capitals, or DRAPE_KEY_* */
+    int key;          /* KEY: the ASCII character printed on the key, letters in capitals, or DRAPE_KEY_* */
     int button;       /* PRESS, RELEASE */
     bool shift, ctrl; /* held */
     double x, y;      /* pixels of the picture from its upper left */
@@ -40,11 +40,11 @@ drape_status drape_window_create(drape_context *ctx, const char *title, int widt
                                  drape_window **out);
 void drape_window_destroy(drape_window **window);
 
-/* Takes what happened; waits for it up to seconds. */
+/* Collects the input since the last poll; if there is none, waits for up to `seconds`. */
 void drape_window_poll(drape_window *window, double seconds);
-bool drape_window_next(drape_window *window, drape_input *input); /* false: no more */
+bool drape_window_next(drape_window *window, drape_input *input); /* false: there is no more */
 bool drape_window_closed(const drape_window *window);
-void drape_window_size(const drape_window *window, int *width, int *height); /* pixels of its picture */
+void drape_window_size(const drape_window *window, int *width, int *height); /* of its picture [pixels] */
 void drape_window_swap(drape_window *window);
 
 #endif

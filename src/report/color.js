@@ -1,5 +1,5 @@
-// color.js: the colour map: a way through OKLCH (B. Ottosson, A perceptual color space for image processing, 2020), its
-// lightness linear and its hue turning evenly, so that equal steps of the value look equal.
+// color.js: the colour map: a curve in OKLCH (B. Ottosson, A perceptual color space for image processing, 2020) with
+// linear lightness and evenly changing hue, so that equal steps of the value look equal.
 
 function fromOklch(lightness, chroma, hue) {
   const a = chroma * Math.cos(hue), b = chroma * Math.sin(hue);
@@ -14,7 +14,7 @@ function fromOklch(lightness, chroma, hue) {
 
 const encode = (x) => 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
 
-// sRGB in bytes of a value from 0 to 1; as much chroma as sRGB has there, up to that of the map.
+// sRGB in bytes for a value from 0 to 1, with as much chroma as sRGB can show, up to that of the map.
 function colorOf(value) {
   const lightness = 0.29 + 0.64 * value, hue = (300 - 200 * value) * Math.PI / 180;
   for (let chroma = 0.15; ; chroma -= 0.005) {

@@ -1,13 +1,13 @@
-/* data.h: what the page shows of a run: numbers and texts as JSON, frames as 16 bit integers in base64. */
+/* data.h: what the page shows of a run: numbers and texts as JSON, frames as 16-bit integers in base64. */
 #ifndef DRAPE_REPORT_DATA_H
 #define DRAPE_REPORT_DATA_H
 
 #include "report/source.h"
 
-/* A field of the nodes over all kept frames: number i stands for low + i step. */
+/* A field at the nodes in all kept frames: the integer i stands for low + i step. */
 typedef struct drape_report_field {
     const char *name, *unit;
-    int width; /* numbers a node */
+    int width; /* numbers per node */
     double low[3], step[3];
 } drape_report_field;
 
@@ -15,23 +15,23 @@ typedef struct drape_report_field {
 
 typedef struct drape_report_data {
     const drape_report_source *run;
+    drape_arena arena;           /* of all arrays */
     int64_t kept;                /* frames in the page */
     int64_t *frame;              /* (kept) their numbers */
-    double *x, *v;               /* (node_count x 3) of the frame in work */
-    double *other;               /* (node_count x 3) of one beside it */
+    double *x;                   /* (node_count x 3) positions in the loaded frame */
+    double *before, *after;      /* (node_count x 3) positions in its neighbours */
     double *strain;              /* (triangle_count x 2) */
-    double *weight;              /* (node_count) area of the triangles around [m2] */
+    double *weight;              /* (node_count) a third of the area of the triangles around [m2] */
     double *node_strain, *speed; /* (node_count) */
     drape_report_field fields[DRAPE_REPORT_FIELDS];
 } drape_report_data;
 
-/* Chooses frames that take at most most_bytes in the page, evenly, the first and the last among them, and finds the
- * ranges of the fields. drape_report_data_free in any case. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
-drape_status drape_report_data_make(const drape_report_source *run, size_t most_bytes,
+/* Chooses frames that take at most max_bytes in the page, evenly, the first and the last among them, and finds the
+ * ranges of the fields. drape_arena_free(&data->arena) in any case. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status drape_report_data_make(const drape_report_source *run, size_t max_bytes,
                                     drape_report_data *data);
-void drape_report_data_free(drape_report_data *data);
 
-/* Add to the page: the JSON, in which no < stands; the kept frames of one field, and the triangles. */
+/* Write parts of the page: the JSON, which contains no <; the kept frames of one field; the triangles. */
 drape_status drape_report_put_json(const drape_report_data *data, drape_file *file);
 drape_status drape_report_put_field(const drape_report_data *data, int field, drape_file *file);
 void drape_report_put_triangles(const drape_report_data *data, drape_file *file);

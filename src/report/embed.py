@@ -1,4 +1,4 @@
-"""embed.py OUT.c PAGE.html STYLE.css SCRIPT.js...: a page with its style and scripts in it as arrays of C, cut where its data go.
+"""embed.py OUT.c PAGE.html STYLE.css SCRIPT.js...: a page with its style and scripts as two C arrays, split where its data go.
 
 PAGE.html has the lines <!-- style -->, <!-- data --> and <!-- scripts -->.
 """

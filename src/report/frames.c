@@ -1,4 +1,4 @@
-/* frames.c: the frames of a page: which are kept, and their fields in 16 bits. */
+/* frames.c: the frames of a page: which are kept, and their fields as 16-bit integers. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -10,7 +10,7 @@
 
 /* ---- Fields of one frame ---- */
 
-/* The mean of the larger principal strain of the triangles around a node, weighted by their areas at rest. */
+/* At each node the mean of the larger principal strain of the triangles around it, weighted by their rest areas. */
 static void find_strain(const drape_report_data *d)
 {
     const drape_model *model = d->run->model;
@@ -29,19 +29,19 @@ static void find_strain(const drape_report_data *d)
         d->node_strain[i] /= d->weight[i];
 }
 
-/* Centred differences of positions; one-sided at the ends of the run. */
+/* Speeds by central differences of positions; one-sided at the ends of the run. */
 static drape_status find_speed(const drape_report_data *d, int64_t frame)
 {
     const drape_report_source *run = d->run;
     int64_t before = frame > 0 ? frame - 1 : 0, after = frame + 1 < run->record.frames ? frame + 1 : frame;
     double h = run->record.times[after] - run->record.times[before];
-    drape_status status = drape_record_read(&run->record, before, d->other);
+    drape_status status = drape_record_read(&run->record, before, d->before);
     if (!status)
-        status = drape_record_read(&run->record, after, d->v);
+        status = drape_record_read(&run->record, after, d->after);
     for (int32_t i = 0; !status && i < run->model->node_count; i++) {
-        double way[3];
-        vec3_sub(d->v + 3 * (size_t)i, d->other + 3 * (size_t)i, way);
-        d->speed[i] = h > 0 ? vec3_norm(way) / h : 0;
+        double difference[3];
+        vec3_sub(d->after + 3 * (size_t)i, d->before + 3 * (size_t)i, difference);
+        d->speed[i] = h > 0 ? vec3_norm(difference) / h : 0;
     }
     return status;
 }
@@ -53,7 +53,7 @@ static const double *values_of(const drape_report_data *d, int field)
 
 static drape_status load(const drape_report_data *d, int64_t frame)
 {
-    drape_status status = drape_heed(d->run->ctx);
+    drape_status status = drape_check_cancel(d->run->ctx);
     if (!status)
         status = drape_record_read(&d->run->record, frame, d->x);
     if (status)
@@ -64,19 +64,12 @@ static drape_status load(const drape_report_data *d, int64_t frame)
 
 /* ---- Which frames, and ranges ---- */
 
-/* 16 bits a number, and in base64 four thirds of that. */
-static double bytes_a_frame(const drape_report_source *run)
-{
-    return 5 * 2 * 4.0 / 3 * run->model->node_count;
-}
-
-static drape_status choose_frames(drape_report_data *d, size_t most_bytes)
+static drape_status choose_frames(drape_report_data *d, size_t max_bytes)
 {
     int64_t all = d->run->record.frames;
-    double room = floor((double)most_bytes / bytes_a_frame(d->run));
-    d->kept = room < 2 ? 2 : room < (double)all ? (int64_t)room : all;
-    d->kept = d->kept < all ? d->kept : all;
-    d->frame = drape_alloc(d->run->ctx, (size_t)d->kept, sizeof *d->frame);
+    double bytes = 5 * 2 * 4.0 / 3 * d->run->model->node_count; /* of a frame: 16 bits a number, in base64 */
+    d->kept = (int64_t)fmin(fmax(floor((double)max_bytes / bytes), 2), (double)all);
+    d->frame = drape_arena_take(&d->arena, (size_t)d->kept, sizeof *d->frame);
     if (!d->frame)
         return DRAPE_E_MEMORY;
     for (int64_t k = 0; k < d->kept; k++)
@@ -85,7 +78,7 @@ static drape_status choose_frames(drape_report_data *d, size_t most_bytes)
     return DRAPE_OK;
 }
 
-static void widen(drape_report_field *field, const double *values, size_t count, double high[3])
+static void extend_range(drape_report_field *field, const double *values, size_t count, double high[3])
 {
     for (size_t i = 0; i < count; i++) {
         size_t k = i % (size_t)field->width;
@@ -113,7 +106,7 @@ static drape_status find_ranges(drape_report_data *d)
         if (status)
             return status;
         for (int f = 0; f < DRAPE_REPORT_FIELDS; f++)
-            widen(&d->fields[f], values_of(d, f), nodes * (size_t)d->fields[f].width, high[f]);
+            extend_range(&d->fields[f], values_of(d, f), nodes * (size_t)d->fields[f].width, high[f]);
     }
     for (int f = 0; f < DRAPE_REPORT_FIELDS; f++)
         for (int k = 0; k < d->fields[f].width; k++)
@@ -121,44 +114,27 @@ static drape_status find_ranges(drape_report_data *d)
     return DRAPE_OK;
 }
 
-static drape_status take_room(drape_report_data *d)
+drape_status drape_report_data_make(const drape_report_source *run, size_t max_bytes, drape_report_data *data)
 {
-    drape_context *ctx = d->run->ctx;
-    const drape_model *model = d->run->model;
-    size_t nodes = (size_t)model->node_count;
-    d->x = drape_alloc(ctx, 3 * nodes, sizeof *d->x);
-    d->v = drape_alloc(ctx, 3 * nodes, sizeof *d->v);
-    d->other = drape_alloc(ctx, 3 * nodes, sizeof *d->other);
-    d->strain = drape_alloc(ctx, 2 * (size_t)model->triangle_count, sizeof *d->strain);
-    d->weight = drape_alloc(ctx, nodes, sizeof *d->weight);
-    d->node_strain = drape_alloc(ctx, nodes, sizeof *d->node_strain);
-    d->speed = drape_alloc(ctx, nodes, sizeof *d->speed);
-    if (!d->x || !d->v || !d->other || !d->strain || !d->weight || !d->node_strain || !d->speed)
-        return DRAPE_E_MEMORY;
-    for (int32_t c = 0; c < model->cloth_count; c++)
-        memcpy(d->weight + model->cloths[c].first_node, model->cloths[c].mesh.node_area,
-               (size_t)model->cloths[c].mesh.node_count * sizeof *d->weight);
-    return DRAPE_OK;
-}
-
-drape_status drape_report_data_make(const drape_report_source *run, size_t most_bytes,
-                                    drape_report_data *data)
-{
-    *data = (drape_report_data){.run = run};
-    drape_status status = take_room(data);
+    const drape_model *model = run->model;
+    const size_t nodes = (size_t)model->node_count;
+    *data = (drape_report_data){.run = run, .arena = drape_arena_of(run->ctx)};
+    data->x = drape_arena_take(&data->arena, 3 * nodes, sizeof *data->x);
+    data->before = drape_arena_take(&data->arena, 3 * nodes, sizeof *data->before);
+    data->after = drape_arena_take(&data->arena, 3 * nodes, sizeof *data->after);
+    data->strain = drape_arena_take(&data->arena, 2 * (size_t)model->triangle_count, sizeof *data->strain);
+    data->weight = drape_arena_take(&data->arena, nodes, sizeof *data->weight);
+    data->node_strain = drape_arena_take(&data->arena, nodes, sizeof *data->node_strain);
+    data->speed = drape_arena_take(&data->arena, nodes, sizeof *data->speed);
+    drape_status status = drape_arena_status(&data->arena);
     if (!status)
-        status = choose_frames(data, most_bytes);
-    return status ? status : find_ranges(data);
-}
-
-void drape_report_data_free(drape_report_data *data)
-{
-    drape_context *ctx = data->run ? data->run->ctx : NULL;
-    void *const rooms[] = {data->frame,  data->x,      data->v,           data->other,
-                           data->strain, data->weight, data->node_strain, data->speed};
-    for (size_t i = 0; ctx && i < sizeof rooms / sizeof *rooms; i++)
-        drape_free(ctx, rooms[i]);
-    *data = (drape_report_data){.run = NULL};
+        status = choose_frames(data, max_bytes);
+    if (status)
+        return status;
+    for (int32_t c = 0; c < model->cloth_count; c++)
+        memcpy(data->weight + model->cloths[c].first_node, model->cloths[c].mesh.node_area,
+               (size_t)model->cloths[c].mesh.node_count * sizeof *data->weight);
+    return find_ranges(data);
 }
 
 /* ---- Base64 (RFC 4648, section 4) ---- */
@@ -188,12 +164,6 @@ static void put_byte(encoder *e, unsigned byte)
         put_group(e);
 }
 
-static void end_group(encoder *e)
-{
-    if (e->count > 0)
-        put_group(e);
-}
-
 /* ---- Into the page ---- */
 
 static unsigned level_of(const drape_report_field *field, int k, double value)
@@ -217,7 +187,8 @@ drape_status drape_report_put_field(const drape_report_data *data, int field, dr
             put_byte(&e, level >> 8);
         }
     }
-    end_group(&e);
+    if (e.count > 0)
+        put_group(&e);
     return DRAPE_OK;
 }
 
@@ -228,5 +199,6 @@ void drape_report_put_triangles(const drape_report_data *data, drape_file *file)
     for (size_t i = 0; i < 3 * (size_t)model->triangle_count; i++)
         for (int b = 0; b < 4; b++)
             put_byte(&e, (uint32_t)model->triangle[i] >> 8 * b);
-    end_group(&e);
+    if (e.count > 0)
+        put_group(&e);
 }

@@ -1,5 +1,4 @@
-/* json.c: what the page shows of a run in numbers and texts. jansson passes NULL on: a failed allocation anywhere
- * ends as a NULL at the top. */
+/* json.c: numbers and texts of the page. jansson passes NULL on: a failed allocation anywhere makes the whole NULL. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +7,7 @@
 #include "colliders/colliders.h"
 #include "report/data.h"
 
-#define MOST_ROWS 20000 /* of a table in the page */
+#define MAX_ROWS 20000 /* of a table in the page */
 
 static json_t *with(json_t *object, const char *key, json_t *value)
 {
@@ -18,7 +17,7 @@ static json_t *with(json_t *object, const char *key, json_t *value)
     return NULL;
 }
 
-static json_t *and_also(json_t *array, json_t *value)
+static json_t *append(json_t *array, json_t *value)
 {
     if (json_array_append_new(array, value) == 0)
         return array;
@@ -35,11 +34,11 @@ static json_t *numbers(const double *values, size_t count)
 {
     json_t *array = json_array();
     for (size_t i = 0; i < count; i++)
-        array = and_also(array, number(values[i]));
+        array = append(array, number(values[i]));
     return array;
 }
 
-/* A name may be in any encoding: what is not UTF-8 becomes a question mark. */
+/* A name may be in any encoding: if it is not UTF-8, bytes beyond ASCII become question marks. */
 static json_t *text(const char *bytes)
 {
     json_t *string = json_string(bytes);
@@ -58,12 +57,12 @@ static json_t *text(const char *bytes)
 
 /* ---- Tables ---- */
 
-/* Columns of a table: numbers, or texts where a column is none. */
+/* Columns of a table. */
 typedef struct columns {
     const char *const *names;
     size_t count;
-    size_t text_from; /* columns from here on are texts */
-    int64_t every;    /* so many rows, one is taken; and each row whose column `keep` is "0" */
+    size_t text_from; /* columns from here on are texts, the others numbers */
+    int64_t every;    /* every n-th row is taken, and each row whose column `keep` is "0" */
     int keep;         /* -1: none */
     json_t *arrays[DRAPE_MOST_COLUMNS];
 } columns;
@@ -80,26 +79,25 @@ static void take_row(void *user, int64_t row, char *const *cells)
         return;
     for (size_t i = 0; i < c->count; i++)
         c->arrays[i] =
-            and_also(c->arrays[i], i < c->text_from ? number(strtod(cells[i], NULL)) : text(cells[i]));
+            append(c->arrays[i], i < c->text_from ? number(strtod(cells[i], NULL)) : text(cells[i]));
 }
 
-/* {"rows": all of them, "every": n, "columns": {name: [...]}} */
+/* {"rows": number in the file, "every": n, "columns": {name: [...]}} */
 static drape_status read_columns(const drape_report_source *run, const char *name, columns *c, json_t **out)
 {
     int64_t rows = 0;
     drape_status status = drape_record_rows(&run->record, name, c->names, c->count, count_row, NULL, &rows);
     if (status)
         return status;
-    c->every = rows / MOST_ROWS + 1;
+    c->every = rows / MAX_ROWS + 1;
     for (size_t i = 0; i < c->count; i++)
         c->arrays[i] = json_array();
     status = drape_record_rows(&run->record, name, c->names, c->count, take_row, c, &rows);
     json_t *object = json_object();
     for (size_t i = 0; i < c->count; i++)
         object = with(object, c->names[i], c->arrays[i]);
-    *out = with(with(with(json_object(), "rows", json_integer((json_int_t)rows)), "every",
-                     json_integer((json_int_t)c->every)),
-                "columns", object);
+    *out = json_pack("{s:I, s:I, s:o}", "rows", (json_int_t)rows, "every", (json_int_t)c->every, "columns",
+                     object);
     return status;
 }
 
@@ -124,9 +122,9 @@ static drape_status read_energies(const drape_report_source *run, json_t **out)
 static json_t *parameters(const drape_collider *collider)
 {
     json_t *object = json_object();
-    for (int i = 0; i < collider->ops->param_count; i++) {
-        const drape_param *param = &collider->ops->params[i];
-        const double *value = collider->values + drape_param_place(collider->ops->params, i);
+    for (int i = 0; i < collider->ops->entry.param_count; i++) {
+        const drape_param *param = &collider->ops->entry.params[i];
+        const double *value = collider->values + drape_param_place(collider->ops->entry.params, i);
         object = with(object, param->name,
                       drape_param_width(param) > 1 ? numbers(value, (size_t)drape_param_width(param))
                                                    : number(*value));
@@ -134,38 +132,37 @@ static json_t *parameters(const drape_collider *collider)
     return object;
 }
 
-/* Where a collider has triangles of its own they are drawn, else what its type and parameters say. */
+/* The triangles of a collider, if it has some; the page draws other types by their parameters. */
 static json_t *shape(const drape_collider_shape *shape)
 {
     json_t *corners = json_array();
     for (size_t i = 0; i < 3 * (size_t)shape->triangle_count; i++)
-        corners = and_also(corners, json_integer(shape->triangle[i]));
-    return with(with(json_object(), "points", numbers(shape->point, 3 * (size_t)shape->point_count)),
-                "triangles", corners);
+        corners = append(corners, json_integer(shape->triangle[i]));
+    return json_pack("{s:o, s:o}", "points", numbers(shape->point, 3 * (size_t)shape->point_count),
+                     "triangles", corners);
 }
 
 static json_t *collider(const drape_report_data *data, const drape_collider *c)
 {
-    json_t *object = with(json_object(), "type", text(c->ops->name));
-    object = with(object, "name", text(c->name));
-    object = with(object, "parameters", parameters(c));
+    json_t *object = json_pack("{s:o, s:o, s:o}", "type", text(c->ops->entry.name), "name", text(c->name),
+                               "parameters", parameters(c));
     if (c->shape.triangle_count > 0)
         object = with(object, "shape", shape(&c->shape));
     if (c->track.key_count == 0)
         return object;
-    json_t *way = json_array();
+    json_t *displacements = json_array();
     for (int64_t k = 0; k < data->kept; k++) {
         drape_collider_pose pose = drape_collider_pose_at(c, data->run->record.times[data->frame[k]]);
-        way = and_also(way, numbers(pose.displacement, 3));
+        displacements = append(displacements, numbers(pose.displacement, 3));
     }
-    return with(object, "displacements", way);
+    return with(object, "displacements", displacements);
 }
 
 static json_t *colliders(const drape_report_data *data)
 {
     json_t *array = json_array();
     for (int32_t i = 0; i < data->run->model->collider_count; i++)
-        array = and_also(array, collider(data, &data->run->model->colliders[i]));
+        array = append(array, collider(data, &data->run->model->colliders[i]));
     return array;
 }
 
@@ -174,7 +171,7 @@ static json_t *pinned(const drape_model *model)
     json_t *array = json_array();
     for (int32_t i = 0; i < model->node_count; i++)
         if (model->pinned[i])
-            array = and_also(array, json_integer(i));
+            array = append(array, json_integer(i));
     return array;
 }
 
@@ -183,10 +180,9 @@ static json_t *fields(const drape_report_data *data)
     json_t *array = json_array();
     for (int f = 0; f < DRAPE_REPORT_FIELDS; f++) {
         const drape_report_field *field = &data->fields[f];
-        json_t *object = with(json_object(), "name", json_string(field->name));
-        object = with(object, "unit", json_string(field->unit));
-        object = with(object, "low", numbers(field->low, (size_t)field->width));
-        array = and_also(array, with(object, "step", numbers(field->step, (size_t)field->width)));
+        array = append(array, json_pack("{s:s, s:s, s:o, s:o}", "name", field->name, "unit", field->unit,
+                                        "low", numbers(field->low, (size_t)field->width), "step",
+                                        numbers(field->step, (size_t)field->width)));
     }
     return array;
 }
@@ -195,17 +191,17 @@ static json_t *frames(const drape_report_data *data)
 {
     json_t *times = json_array(), *kept = json_array();
     for (int64_t k = 0; k < data->kept; k++) {
-        times = and_also(times, number(data->run->record.times[data->frame[k]]));
-        kept = and_also(kept, json_integer((json_int_t)data->frame[k]));
+        times = append(times, number(data->run->record.times[data->frame[k]]));
+        kept = append(kept, json_integer((json_int_t)data->frame[k]));
     }
-    json_t *object = with(json_object(), "all", json_integer((json_int_t)data->run->record.frames));
-    return with(with(object, "times", times), "numbers", kept);
+    return json_pack("{s:I, s:o, s:o}", "all", (json_int_t)data->run->record.frames, "times", times,
+                     "numbers", kept);
 }
 
 /* ---- All of it ---- */
 
-/* In a page the end of a script must not be in its text; < is in JSON within strings alone. */
-static int put_safe(const char *bytes, size_t size, void *file)
+/* Escapes <, which JSON only has within strings: the text must not contain the end of its script element. */
+static int put_escaped(const char *bytes, size_t size, void *file)
 {
     size_t from = 0;
     for (size_t i = 0; i < size; i++)
@@ -225,21 +221,16 @@ drape_status drape_report_put_json(const drape_report_data *data, drape_file *fi
     drape_status status = read_steps(run, &steps);
     if (!status)
         status = read_energies(run, &energies);
-    json_t *json = with(json_object(), "version", json_string(drape_version()));
     const char *slash = strrchr(run->record.folder, '/');
-    json = with(json, "name", text(slash && slash[1] ? slash + 1 : run->record.folder));
-    json = with(json, "scene", text(run->scene_text));
-    json = with(json, "summary", run->summary ? json_incref(run->summary) : json_null());
-    json = with(json, "nodes", json_integer(run->model->node_count));
-    json = with(json, "triangles", json_integer(run->model->triangle_count));
-    json = with(json, "length", number(run->model->length));
-    json = with(json, "pinned", pinned(run->model));
-    json = with(json, "colliders", colliders(data));
-    json = with(json, "frames", frames(data));
-    json = with(json, "fields", fields(data));
-    json = with(json, "steps", steps);
-    json = with(json, "energies", energies);
-    if (!status && (!json || json_dump_callback(json, put_safe, file, JSON_COMPACT | JSON_REAL_PRECISION(9))))
+    json_t *json = json_pack(
+        "{s:s, s:o, s:o, s:o, s:i, s:i, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "version", drape_version(),
+        "name", text(slash && slash[1] ? slash + 1 : run->record.folder), "scene", text(run->scene_text),
+        "summary", run->summary ? json_incref(run->summary) : json_null(), "nodes",
+        (int)run->model->node_count, "triangles", (int)run->model->triangle_count, "length",
+        number(run->model->length), "pinned", pinned(run->model), "colliders", colliders(data), "frames",
+        frames(data), "fields", fields(data), "steps", steps, "energies", energies);
+    if (!status &&
+        (!json || json_dump_callback(json, put_escaped, file, JSON_COMPACT | JSON_REAL_PRECISION(9))))
         status = drape_fail_memory(run->ctx, 1);
     json_decref(json);
     return status;

@@ -1,4 +1,4 @@
-// page.js: the time, what moves it, and the texts.
+// page.js: the time, its controls, and the texts.
 
 const state = { time: run.begin, playing: false, rate: 1, shade: 'plain', edges: false };
 const dark = window.matchMedia('(prefers-color-scheme: dark)');
@@ -92,7 +92,7 @@ function lines(title, pairs) {
   return group;
 }
 
-// Parts that add up to the whole: what steps take beside theirs, and what is in no step, are named, too.
+// Parts that add up to the whole, including the rest of the steps and the time outside steps.
 function shares(wall) {
   const inner = ['residual', 'jacobian', 'factor', 'solve', 'contact'].map((name) => [name, wall[name] || 0]);
   const sum = (pairs) => pairs.reduce((total, [, x]) => total + x, 0);
@@ -119,7 +119,7 @@ function summarize(s) {
 function describe() {
   const s = run.summary, notes = [];
   let scene = {};
-  try { scene = JSON.parse(run.scene.replace(/^\uFEFF/, '')); } catch { /* with comments: its text is shown below */ }
+  try { scene = JSON.parse(run.scene.replace(/^\uFEFF/, '')); } catch { /* it has comments: its text is shown below */ }
   element('title').textContent = run.name;
   document.title = `${run.name}: Drape report`;
   element('description').textContent = scene.description || '';
@@ -219,7 +219,7 @@ function bindControls() {
   new ResizeObserver(() => { stale = true; }).observe(element('view'));
 }
 
-// #t=0.5&shade=strain&edges=1&play=1: a link to a moment.
+// #t=0.5&shade=strain&edges=1&play=1: a link to a time.
 function takeAddress() {
   const wish = new URLSearchParams(location.hash.slice(1));
   if (wish.has('t')) seek(Number(wish.get('t')) || run.begin);

@@ -1,4 +1,4 @@
-// player.js: the view: cloth, colliders, and the shadow that they cast on planes, by WebGL 2.
+// player.js: the view: cloth, colliders and their shadows on planes, by WebGL 2.
 
 const VERTEX = `#version 300 es
 layout(location = 0) in vec3 position;
@@ -6,7 +6,7 @@ layout(location = 1) in vec3 normal;
 layout(location = 2) in float value;
 uniform mat4 camera;
 uniform vec3 offset;
-uniform vec4 flatten;    // a plane n.x = d to press everything onto, along the light; n = 0: none
+uniform vec4 flatten;    // a plane n.x = d to project everything onto, along the light; n = 0: none
 uniform vec3 light;
 uniform float point_size;
 out vec3 at, n;
@@ -26,12 +26,12 @@ precision highp float;
 in vec3 at, n;
 in float v;
 uniform vec3 eye, light, front, back;
-uniform int kind;        // 0 a lit surface, 1 one coloured by its value, 2 one colour, 3 a round point, 4 a ground
+uniform int kind;        // 0 lit surface, 1 surface coloured by value, 2 uniform colour, 3 round point, 4 ground
 uniform float alpha;
-uniform vec4 disk;       // of a ground: center and reach
+uniform vec4 disk;       // center and reach of a ground
 uniform vec2 range;
 uniform sampler2D colors;
-out vec4 result;         // with its alpha in it, over the background of the page
+out vec4 result;         // premultiplied by alpha, over the background of the page
 vec3 linear(vec3 c) { return c * c * (0.3 + 0.7 * c); }
 vec3 encoded(vec3 c) { return pow(clamp(c, 0.0, 1.0), vec3(1.0 / 2.2)); }
 vec4 shaded() {
@@ -89,7 +89,7 @@ function lookAt(eye, target) {
   return new Float32Array([x[0], y[0], z[0], 0, x[1], y[1], z[1], 0, x[2], y[2], z[2], 0, -dot(x, eye), -dot(y, eye), -dot(z, eye), 1]);
 }
 
-// Every edge once.
+// Each edge once.
 function edgesOf(corners) {
   const seen = new Set(), edges = [];
   for (let i = 0; i < corners.length; i += 3) {
@@ -104,13 +104,13 @@ function edgesOf(corners) {
   return new Uint32Array(edges);
 }
 
-// Of all frames, and of those colliders that have an end.
+// The box of all frames and of the bounded colliders.
 function boundsOf(lows, highs) {
   const center = lows.map((low, k) => (low + highs[k]) / 2);
   return { center, radius: Math.hypot(...sub(highs, lows)) / 2 || 1 };
 }
 
-// The lamp stands in the room, whoever looks from where: that of drape render, 54 degrees up and at -16 of the azimuth.
+// The lamp does not move with the camera; it is that of drape render, at elevation 54 and azimuth -16 degrees.
 const LIGHT = unit([Math.tan(Math.PI / 5) * Math.sin(-0.279), 1, Math.tan(Math.PI / 5) * Math.cos(-0.279)]);
 
 class Player {
@@ -156,7 +156,7 @@ class Player {
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   }
 
-  // Buffers by name: arrays of numbers a vertex.
+  // Buffers by name, with the numbers of each vertex.
   makeMesh(arrays, corners) {
     const gl = this.gl, mesh = { vertices: gl.createVertexArray(), buffers: [], count: corners.length };
     gl.bindVertexArray(mesh.vertices);
@@ -197,7 +197,7 @@ class Player {
       const values = new Float32Array(shape.positions.length / 3);
       this.colliders.push({ ...this.makeMesh([[3, shape.positions], [3, shape.normals], [1, values]], shape.corners), plane: shape.plane, displacements: collider.displacements });
       for (let i = 0; shape.bounded && i < shape.positions.length; i++) {
-        const reach = 1.6 * cloth.radius, k = i % 3; // one that goes far beyond the cloth is seen in part
+        const reach = 1.6 * cloth.radius, k = i % 3; // of a large one only a part is shown
         lows[k] = Math.min(lows[k], Math.max(shape.positions[i], cloth.center[k] - reach));
         highs[k] = Math.max(highs[k], Math.min(shape.positions[i], cloth.center[k] + reach));
       }
@@ -277,7 +277,7 @@ class Player {
     gl.drawElements(mode, list.count, gl.UNSIGNED_INT, 0);
   }
 
-  // What lies above a plane darkens it, each pixel once.
+  // Shadows: everything above a plane darkens it, each pixel once.
   drawShadow(plane, offset, time) {
     const gl = this.gl, n = plane.normal, d = dot(n, along(plane.point, 1, offset)) + 1e-3 * this.bounds.radius;
     if (dot(n, this.light) < 0.2) return;
@@ -303,7 +303,7 @@ class Player {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
     this.load(time, shade);
     const eye = this.eye(), reach = this.distance + 6 * this.bounds.radius;
-    const wide = 2 * Math.atan(Math.tan(0.28) * Math.max(1, 1.2 * height / width)); // a narrow view keeps the cloth whole
+    const wide = 2 * Math.atan(Math.tan(0.28) * Math.max(1, 1.2 * height / width)); // a narrow view still shows all of the cloth
     const camera = multiply(perspective(wide, width / height, 0.004 * reach, reach), lookAt(eye, this.target));
     gl.uniformMatrix4fv(this.at.camera, false, camera);
     gl.uniform3fv(this.at.eye, eye);
@@ -327,7 +327,7 @@ class Player {
     if (shade !== 'plain') gl.uniform2fv(this.at.range, this.ranges[shade]);
     this.draw(this.cloth, shade === 'plain' ? { kind: 0, front: [0.72, 0.2, 0.17], back: [0.86, 0.62, 0.4] } : { kind: 1 });
     gl.disable(gl.POLYGON_OFFSET_FILL);
-    if (edges) this.edges ??= this.elements(edgesOf(run.corners)); // a large mesh has many
+    if (edges) this.edges ??= this.elements(edgesOf(run.corners)); // made when needed: a large mesh has many
     if (edges) this.drawElements(this.edges, gl.LINES, 2, [0.05, 0.05, 0.08], 0.45);
     if (this.pins.count) this.drawElements(this.pins, gl.POINTS, 3, [0.1, 0.75, 0.85], 1);
   }

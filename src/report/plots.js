@@ -1,4 +1,4 @@
-// plots.js: plots over the time of the run, as SVG, all with one cursor.
+// plots.js: plots over the time of the run, as SVG, with a common cursor.
 
 const SVG = 'http://www.w3.org/2000/svg';
 const HEIGHT = { tall: 190, low: 130 };
@@ -11,7 +11,7 @@ function svg(name, attributes, text) {
   return node;
 }
 
-// Round numbers that divide a range, about `count` of them.
+// About `count` round numbers that divide a range.
 function ticksOf(low, high, count) {
   const raw = (high - low) / count || 1, size = 10 ** Math.floor(Math.log10(raw));
   const step = size * ([1, 2, 5, 10].find((k) => k * size >= raw * 0.75) || 10), ticks = [];
@@ -19,7 +19,8 @@ function ticksOf(low, high, count) {
   return ticks;
 }
 
-// Logarithms of powers of ten in a range of logarithms; of a few numbers between where there are not two; else of its middle.
+// Ticks of a logarithmic axis: the logarithms of the powers of ten in its range; if there are fewer than two, of a few
+// numbers between them; else of its middle.
 function decades(low, high) {
   const first = Math.ceil(low - 1e-9), last = Math.floor(high + 1e-9), stride = Math.max(1, Math.ceil((last - first) / 4)), ticks = [];
   for (let k = first; k <= last; k += stride) ticks.push(k);
@@ -32,7 +33,7 @@ function decades(low, high) {
   return shown.length > 1 ? shown : [(low + high) / 2];
 }
 
-// A series: {name, color, t: [], y: [], steps: y holds from t to the next one, on, unit}. Values that are null are gaps.
+// A series: {name, color, t: [], y: [], steps: y is constant from t to the next t, on, unit}. Null values are gaps.
 class Plot {
   constructor({ title, unit, series, marks = [], log = false, size = 'tall', zero = false, note = '' }) {
     Object.assign(this, { title, unit, series, marks, log, size, zero });
@@ -95,7 +96,7 @@ class Plot {
     return MARGIN.top + height * (1 - (this.scale(value) - this.low) / (this.high - this.low));
   }
 
-  // Of many points in one column of pixels the lowest and the highest are drawn.
+  // If many points lie in one column of pixels, only the lowest and the highest are drawn.
   path(one) {
     const parts = [];
     let pen = false, column = null, least, most, last;
@@ -160,7 +161,7 @@ class Plot {
     this.point(this.time ?? run.begin);
   }
 
-  // Moves the cursor, and tells the values there.
+  // Moves the cursor and shows the values there.
   point(time) {
     this.time = time;
     if (!this.cursor) return;
@@ -191,7 +192,7 @@ function valueAt({ t, y, steps }, time) {
 
 // ---- The plots of a run
 
-// At the times of the states that the energies are of.
+// At the times of the states.
 function energyPlot() {
   const c = run.energies.columns;
   const change = (values) => values.map((x) => (x === null || values[0] === null ? null : x - values[0]));

@@ -1,5 +1,5 @@
-/* report.c: see report.h. The page is that of page.html, with style and scripts in it, made by embed.py when Drape
- * is built; the data of the run stand between its two parts. */
+/* report.c: see report.h. The page is page.html with its style and scripts, which embed.py puts together when Drape is
+ * built; the data of the run go between its two parts. */
 #include "report/report.h"
 
 #include <stdio.h>
@@ -38,39 +38,32 @@ static drape_status put_page(const drape_report_data *data, drape_file *file)
     return status;
 }
 
-/* The page is not begun before the run was read once. */
-static drape_status write_page(const drape_report_data *data, const char *path, bool *input, int64_t *bytes)
-{
-    drape_file file = {0};
-    drape_context *ctx = data->run->ctx;
-    *input = false;
-    drape_status status = drape_file_create(ctx, strlen(path), &file);
-    if (status)
-        return status;
-    drape_file_name(&file, "%s", path);
-    status = drape_file_begin(&file);
-    if (!status) {
-        status = put_page(data, &file);
-        *input = status == DRAPE_E_PARSE || status == DRAPE_E_FILE;
-    }
-    if (!status) {
-        status = drape_file_finish(&file);
-        *bytes = (int64_t)file.size;
-    }
-    drape_file_destroy(&file);
-    return status;
-}
-
-static drape_status write_run(const drape_report_source *run, const drape_report_def *def,
-                              drape_report_result *result, bool *input)
+/* Reads all of the run before the file is created. */
+static drape_status write_page(const drape_report_source *run, const drape_report_def *def,
+                               drape_report_result *result, bool *input)
 {
     drape_report_data data;
-    drape_status status = drape_report_data_make(run, def->most_bytes, &data);
+    drape_file file = {0};
+    drape_status status = drape_report_data_make(run, def->max_bytes, &data);
     result->frames = run->record.frames;
     result->kept = data.kept;
+    if (!status) {
+        *input = false;
+        status = drape_file_create(run->ctx, strlen(result->path), &file);
+    }
+    if (!status) {
+        drape_file_name(&file, "%s", result->path);
+        status = drape_file_begin(&file);
+    }
+    if (!status) {
+        status = put_page(&data, &file);
+        *input = status == DRAPE_E_PARSE || status == DRAPE_E_FILE;
+    }
     if (!status)
-        status = write_page(&data, result->path, input, &result->bytes);
-    drape_report_data_free(&data);
+        status = drape_file_finish(&file);
+    result->bytes = (int64_t)file.size;
+    drape_file_destroy(&file);
+    drape_arena_free(&data.arena);
     return status;
 }
 
@@ -78,21 +71,18 @@ drape_status drape_report_write(drape_context *ctx, const drape_report_def *def,
                                 bool *input)
 {
     drape_report_source run;
-    locale_t old = drape_locale_enter();
     *input = true;
     *result = (drape_report_result){.frames = 0};
     int length = def->out ? snprintf(result->path, sizeof result->path, "%s", def->out)
                           : snprintf(result->path, sizeof result->path, "%s/" DEFAULT_NAME, def->run);
-    drape_status status =
-        length < (int)sizeof result->path
-            ? drape_report_source_open(ctx, def->run, &run)
-            : drape_fail(ctx, DRAPE_E_ARGUMENT, "the name of the page is longer than %zu bytes",
-                         sizeof result->path - 1);
-    if (length < (int)sizeof result->path) {
-        if (!status)
-            status = write_run(&run, def, result, input);
-        drape_report_source_close(&run);
-    }
+    if (length >= (int)sizeof result->path)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "the name of the page is longer than %zu bytes",
+                          sizeof result->path - 1);
+    locale_t old = drape_locale_enter();
+    drape_status status = drape_report_source_open(ctx, def->run, &run);
+    if (!status)
+        status = write_page(&run, def, result, input);
+    drape_report_source_close(&run);
     drape_locale_leave(old);
     return status;
 }

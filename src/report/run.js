@@ -1,4 +1,4 @@
-// run.js: the data of the page: JSON, and arrays in base64, little endian.
+// run.js: the data of the page: JSON, and little-endian arrays in base64.
 
 const element = (id) => document.getElementById(id);
 
@@ -19,7 +19,7 @@ for (const field of run.fields) {
 run.end = run.times[run.times.length - 1];
 run.begin = run.times[0];
 
-// The kept frame at or before a time, and how far the time is on the way to the next one.
+// The kept frame at or before a time, and the share of the interval to the next one.
 function frameAt(time) {
   const times = run.times;
   let low = 0, high = times.length - 1;
@@ -33,7 +33,7 @@ function frameAt(time) {
   return { frame: low, next, part: span > 0 ? Math.min(Math.max((time - times[low]) / span, 0), 1) : 0 };
 }
 
-// A field of all nodes at a time, into an array: linear between two frames.
+// Writes the field of all nodes at a time into an array, linear between two frames.
 function fieldAt(name, time, out) {
   const { levels, low, step, width } = run.field[name];
   const { frame, next, part } = frameAt(time);
@@ -45,7 +45,7 @@ function fieldAt(name, time, out) {
   return out;
 }
 
-// The values below which the shares a and b of all numbers of a field lie: a colour scale that no single node spoils.
+// The quantiles a and b of all numbers of a field, for a colour scale that single nodes do not distort.
 function quantiles(name, a, b) {
   const { levels, low, step } = run.field[name];
   const counts = new Uint32Array(65536), stride = Math.max(1, Math.floor(levels.length / 2e6));

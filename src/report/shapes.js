@@ -1,5 +1,5 @@
-// shapes.js: colliders as triangles: {positions, normals, corners}, and whether they are bounded. A row of the table makes the
-// shape of one type from its parameters; a type that is not in it is drawn where it has triangles of its own.
+// shapes.js: colliders as triangles, {positions, normals, corners}, and whether they are bounded. An entry of the table makes
+// the shape of one type from its parameters; a type that is not in the table is drawn if it has triangles of its own.
 
 const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const along = (a, s, b) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
@@ -12,7 +12,7 @@ function solid(positions, normals, corners, bounded = true) {
   return { positions: new Float32Array(positions.flat()), normals: new Float32Array(normals.flat()), corners: new Uint32Array(corners), bounded };
 }
 
-// Turned about an axis: the profile is a list of [distance from the axis, place along it, and the normal's parts of both].
+// A surface of revolution; the profile is a list of [distance from the axis, place along it, normal in these directions].
 function turned(base, axis, profile) {
   const sides = 64, u = across(axis), v = cross(axis, u), positions = [], normals = [], corners = [];
   for (let i = 0; i <= sides; i++) {
@@ -33,7 +33,7 @@ function turned(base, axis, profile) {
   return solid(positions, normals, corners);
 }
 
-// A quarter circle and more, from one angle to another, 0 pointing away from the axis.
+// An arc from one angle to another; 0 points away from the axis.
 function arc(radius, r, z, from, to, steps) {
   const points = [];
   for (let i = 0; i <= steps; i++) {
@@ -43,7 +43,7 @@ function arc(radius, r, z, from, to, steps) {
   return points;
 }
 
-// A matrix by rows, of a turn given as a vector along the axis as long as the angle in degrees.
+// The rotation matrix, by rows, of a vector along the axis whose length is the angle in degrees.
 function rotation(turn) {
   const degrees = Math.hypot(...turn), a = unit(turn), angle = degrees * Math.PI / 180, c = Math.cos(angle), s = Math.sin(angle);
   return [0, 1, 2].map((i) => [0, 1, 2].map((j) => {
@@ -73,7 +73,7 @@ const shapes = {
   },
 };
 
-// Each face a grid, drawn out to the core and from there by the rounding along the normal.
+// Each face is a grid on the core, moved along its normals by the rounding.
 function roundBox(center, size, matrix, rounding) {
   const positions = [], normals = [], corners = [], steps = rounding > 0 ? 12 : 1;
   const core = size.map((s) => s / 2 - rounding);
@@ -106,7 +106,7 @@ function roundBox(center, size, matrix, rounding) {
   return solid(positions, normals, corners);
 }
 
-// Flat triangles, three corners each of their own.
+// Flat triangles with separate corners.
 function ownShape({ points, triangles }) {
   const at = (i) => points.slice(3 * i, 3 * i + 3), positions = [], normals = [];
   for (let i = 0; i < triangles.length; i += 3) {

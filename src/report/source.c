@@ -10,7 +10,7 @@
 
 #define SCENE_LIMIT ((off_t)64 << 20)
 
-/* A whole file with a 0 behind it. */
+/* Reads a whole file as a 0-terminated text. */
 static drape_status read_text(drape_context *ctx, const char *path, char **out)
 {
     struct stat info;
@@ -43,23 +43,18 @@ static drape_status read_scene(drape_report_source *source, const char *folder)
     return status;
 }
 
-static drape_status read_summary(drape_report_source *source)
-{
-    char *path = drape_record_path(source->ctx, source->record.folder, "summary.json");
-    if (!path)
-        return DRAPE_E_MEMORY;
-    source->summary = json_load_file(path, 0, NULL);
-    drape_free(source->ctx, path);
-    return DRAPE_OK;
-}
-
 drape_status drape_report_source_open(drape_context *ctx, const char *folder, drape_report_source *source)
 {
     *source = (drape_report_source){.ctx = ctx};
     drape_status status = read_scene(source, folder);
     if (!status)
         status = drape_record_open(ctx, folder, source->model->node_count, &source->record);
-    return status ? status : read_summary(source);
+    char *path = status ? NULL : drape_record_path(ctx, folder, "summary.json");
+    if (status || !path)
+        return status ? status : DRAPE_E_MEMORY;
+    source->summary = json_load_file(path, 0, NULL);
+    drape_free(ctx, path);
+    return DRAPE_OK;
 }
 
 void drape_report_source_close(drape_report_source *source)

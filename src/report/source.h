@@ -1,9 +1,10 @@
-/* source.h: what a page is made of: the frames and tables of a run, its scene, compiled again, and its summary. */
+/* source.h: what a page is made from: the frames and tables of a run, its scene, compiled again, and its summary. */
 #ifndef DRAPE_REPORT_SOURCE_H
 #define DRAPE_REPORT_SOURCE_H
 
 #include <jansson.h>
 
+#include "base/arena.h"
 #include "io/record.h"
 #include "model/model.h"
 
@@ -12,7 +13,7 @@ typedef struct drape_report_source {
     drape_record record;
     drape_model *model;
     char *scene_text;
-    json_t *summary; /* NULL: there is none, the run did not end */
+    json_t *summary; /* NULL: the run did not end */
 } drape_report_source;
 
 /* drape_report_source_close in any case. Errors: DRAPE_E_FILE, DRAPE_E_PARSE, DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. */

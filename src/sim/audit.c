@@ -12,17 +12,18 @@
 
 #include <math.h>
 
-#define JUMP      4.0  /* a kinetic energy that grew by less is no explosion */
-#define SHARE     0.5  /* nor one of which less than this came from nowhere */
-#define UNNOTICED 1e-6 /* of the energies that are compared: less is below what adaptive rows resolve */
+#define JUMP      4.0  /* explosions are kinetic energies that grew by more */
+#define SHARE     0.5  /* and of which more than this share came from nowhere */
+#define UNNOTICED 1e-6 /* of the compared energies: less is below what adaptive integrators resolve */
 #define ROUNDED                                                                                              \
-    1e-12 /* of the same: no gain at all. Small steps gain little each: a share of a step's size would let them */
-#define QUIET 1e-16 /* of the scene's own energy: motion at 1e-8 of its speed is rounding */
+    1e-12 /* of the same energies: below it there is no gain. Not a share of the step size: small steps gain
+             little each */
+#define QUIET 1e-16 /* of the scene's own energy: motion at 1e-8 of the scene's speed is rounding */
 
-/* Of the energy that a scene had to offer so far. Rows that conserve energy, or bound an error, let it swing by
- * some per cent. */
+/* Limits relative to the energy available so far. Integrators that conserve energy, or bound an error, let it
+ * oscillate by some per cent. */
 #define STEP_GAIN 0.25 /* gained in one step */
-#define RUN_GAIN  0.1  /* gained since numerical dissipation was at its largest, if the row does not say */
+#define RUN_GAIN  0.1  /* gained since numerical dissipation was largest, if the integrator does not set it */
 
 static double kinetic(const drape_model *model, const double *v)
 {
@@ -35,7 +36,7 @@ static double kinetic(const drape_model *model, const double *v)
     return 0.5 * sum;
 }
 
-/* Of a state with the internal variables of the one before, after so much work. */
+/* The energy of a state with the internal variables of the state before, after this much work. */
 static drape_energy measure(const drape_sim *sim, const drape_state *state, const double *internal,
                             double dissipated, double pin_work)
 {
@@ -98,7 +99,7 @@ static double scene_energy(const drape_model *m)
     return 0.5 * mass * atol_v * atol_v;
 }
 
-/* The node that moves with the most energy. */
+/* The node with the largest kinetic energy. */
 static int32_t hottest(const drape_model *m, const double *v)
 {
     int32_t node = 0;
@@ -114,20 +115,20 @@ static int32_t hottest(const drape_model *m, const double *v)
     return node;
 }
 
-static drape_worst gain_at(const drape_model *m, const double *v, const char *what, double value,
-                           double limit)
+static drape_diagnostic gain_at(const drape_model *m, const double *v, const char *what, double value,
+                                double limit)
 {
     int32_t node = hottest(m, v);
-    return (drape_worst){.what = what,
-                         .term = "",
-                         .element = -1,
-                         .node = {node, -1, -1, -1},
-                         .cloth = drape_model_cloth_of(m, node),
-                         .value = value,
-                         .limit = limit};
+    return (drape_diagnostic){.what = what,
+                              .term = "",
+                              .element = -1,
+                              .node = {node, -1, -1, -1},
+                              .cloth = drape_model_cloth_of(m, node),
+                              .value = value,
+                              .limit = limit};
 }
 
-/* What the step sets loose at once: e is the state's that it began with. */
+/* A sudden gain of kinetic energy in one step; e is the energy at its beginning. */
 static bool exploded(const drape_energy *e, const drape_energy *made, double gain, double quiet)
 {
     if (!(made->kinetic > JUMP * e->kinetic && gain > SHARE * made->kinetic))
@@ -137,9 +138,9 @@ static bool exploded(const drape_energy *e, const drape_energy *made, double gai
     return gain > UNNOTICED * size + QUIET * quiet;
 }
 
-/* All that the run could live on so far: what it started with, the largest fall in gravity, the work of pins
- * and damping (whose sums have errors of their own), and the energy of the scene's mass at the scene's speed, for
- * starts at rest. */
+/* The energy available to the run so far: what it started with, the largest fall in gravity, the work of pins
+ * and damping (whose sums have errors of their own), and the energy of the scene's mass at the scene's speed,
+ * for starts at rest. */
 static double offered(const drape_audit *audit, const drape_energy *made, const drape_step_info *info,
                       double quiet)
 {
@@ -159,27 +160,30 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
            scale = offered(audit, &made, info, quiet), run = audit->best - made.numerical;
     sim->made = made;
     sim->made_known = true;
-    if (m->free_count == 0) /* all is prescribed: what is from nowhere is of the sums of pins' work */
+    if (m->free_count == 0) /* all motion is prescribed: only the sums of pins' work have errors */
         return false;
     if (exploded(&e, &made, gain, quiet))
-        info->worst = gain_at(m, out->v, "energy from nowhere / kinetic energy", gain / made.kinetic, SHARE);
+        info->diagnostic =
+            gain_at(m, out->v, "energy from nowhere / kinetic energy", gain / made.kinetic, SHARE);
     else if (gain > STEP_GAIN * scale)
-        info->worst = gain_at(m, out->v, "energy from nowhere / energy of the run", gain / scale, STEP_GAIN);
+        info->diagnostic =
+            gain_at(m, out->v, "energy from nowhere / energy of the run", gain / scale, STEP_GAIN);
     else if (gain > ROUNDED * scale && run > most * scale)
-        info->worst =
+        info->diagnostic =
             gain_at(m, out->v, "energy from nowhere since its least / energy of the run", run / scale, most);
     else
         return false;
     return true;
 }
 
-void drape_sim_book(drape_sim *sim, const drape_step_info *info)
+void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
 {
     drape_audit *audit = &sim->audit;
     audit->dissipated += info->dissipated;
     audit->pin_work += info->pin_work;
     audit->offered += fabs(info->pin_work) + fabs(info->dissipated);
-    sim->energy_known = sim->made_known && sim->model->internal_count == 0; /* else the step commits them */
+    /* otherwise the step commits internal variables */
+    sim->energy_known = sim->made_known && sim->model->internal_count == 0;
     if (!sim->made_known)
         return;
     sim->energy = sim->made;

@@ -1,9 +1,10 @@
 /*
- * checkpoint.c: a sim as bytes, from which another sim of the same model goes on with the same bits. What is archived is
- * what the next steps depend on; all else follows from it, or from the model.
+ * checkpoint.c: a sim as bytes, from which another sim of the same model goes on with the same bits. What is
+ * archived is what the next steps depend on; all else follows from it, or from the model.
  *
- * A sim that is restored is made anew beside the present one and takes its place when all went well: nothing of what the
- * present one kept can have a part in it, and a failure at any moment leaves the present one as it is.
+ * A sim that is restored is made anew beside the present one and takes its place when all went well: nothing
+ * of what the present one kept can have a part in it, and a failure at any moment leaves the present one as
+ * it is.
  */
 #include "base/finite.h"
 #include "sim/sim.h"
@@ -13,8 +14,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MOST_LEVELS 60
-#define LONGEST     1e9 /* [s] as the duration of a scene */
+#define MAX_LEVELS  60
+#define MAX_SECONDS 1e9 /* [s] as the duration of a scene */
 #define REASON_ROOM 64
 #define MEMORY_NAME "checkpoint in memory"
 
@@ -37,10 +38,11 @@ static bool is_place(int index, int least, int count)
     return index >= least && index < count;
 }
 
-/* The present one, and those before it that are still asked for; what the next attempt writes to is left out. */
+/* The present one, and those before it that are still asked for; what the next attempt writes to is left
+ * out. */
 static void archive_states(drape_sim *sim, drape_archive *a)
 {
-    const int count = 2 + sim->chosen.controller->pasts;
+    const int count = 2 + sim->chosen.controller->history_depth;
     int *const places[] = {&sim->now, &sim->next, &sim->before, &sim->past[0], &sim->past[1]};
     drape_archive_mark(a, "states");
     for (int i = 0; i < 5; i++) {
@@ -61,7 +63,7 @@ static void archive_states(drape_sim *sim, drape_archive *a)
 /* Of what ends a loop over steps or frames. */
 static bool is_schedule(const drape_schedule *s)
 {
-    return s->level >= 0 && s->level <= MOST_LEVELS && s->part >= 0 && s->part < (int64_t)1 << s->level &&
+    return s->level >= 0 && s->level <= MAX_LEVELS && s->part >= 0 && s->part < (int64_t)1 << s->level &&
            s->count >= 0 && !(s->dt < 0) && !isnan(s->dt);
 }
 
@@ -111,7 +113,7 @@ static void archive_reason(drape_sim *sim, drape_reason *reason, drape_archive *
     drape_archive_int64(a, &reason->count);
     if (!a->reading)
         return;
-    reason->reason = drape_arena_text(&sim->arena, text);
+    reason->reason = drape_arena_text(sim->arena, text);
     if (!reason->reason)
         drape_archive_note(a, DRAPE_E_MEMORY);
 }
@@ -134,7 +136,7 @@ static bool is_next_frame(const drape_sim *sim)
     const drape_state *before = &sim->states[sim->before >= 0 ? sim->before : sim->now];
     double least = before->t * sim->frame_rate - 2, most = drape_sim_state(sim)->t * sim->frame_rate + 2,
            next = (double)sim->next_frame;
-    return next >= 0 && next <= most && (next >= least || sim->chosen.integrator->timeless);
+    return next >= 0 && next <= most && (next >= least || sim->chosen.integrator->steady_state);
 }
 
 static void archive_statistics(drape_sim *sim, drape_archive *a)
@@ -169,7 +171,7 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
     if (drape_archive_good(a) && !is_place(m->effort, 0, efforts))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an effort %d of %d", m->effort, efforts);
     if (drape_archive_good(a) && m->active &&
-        !(m->dt > 0 && m->longest >= m->dt && m->longest <= LONGEST && m->debt >= 0 &&
+        !(m->dt > 0 && m->longest >= m->dt && m->longest <= MAX_SECONDS && m->debt >= 0 &&
           m->debt <= m->longest && m->cap > 0))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step for a budget");
     if (drape_archive_is_reading(a) && sim->chosen.integrator->set_effort)
@@ -202,7 +204,7 @@ static void take_place(drape_sim *sim, drape_sim *made)
     memcpy(made, &old, size);
     drape_system_watch(sim->system, &sim->cancel);
     drape_system_watch(made->system, &made->cancel);
-    drape_system_swap_winds(sim->system, made->system);
+    drape_system_copy_wind(sim->system, made->system);
 }
 
 drape_status drape_sim_read(drape_sim *sim, drape_archive *a)

@@ -1,5 +1,4 @@
-/* choose.c: see choose.h. Both tables are walked through the same view, so that the rules are written once.
- */
+/* choose.c: see choose.h. Both tables are walked in the same way, so that the rules are written once. */
 #include "sim/choose.h"
 
 #include <stdio.h>
@@ -7,119 +6,90 @@
 
 #define MAX_KEYS 256
 
-/* A table of rows, seen as names and parameter lists. */
-typedef struct table {
+/* An object of the scene that chooses from a table. */
+typedef struct choice {
     const char *pointer, *key; /* "/integrator", "method" */
-    int count;
-    const char *names[32];
-    const drape_param *params[32];
-    int param_counts[32];
-} table;
+    const drape_registry *registry;
+} choice;
 
-static table integrator_table(void)
-{
-    table t = {.pointer = "/integrator", .key = "method"};
-    for (; drape_integrators[t.count]; t.count++) {
-        t.names[t.count] = drape_integrators[t.count]->name;
-        t.params[t.count] = drape_integrators[t.count]->params;
-        t.param_counts[t.count] = drape_integrators[t.count]->param_count;
-    }
-    return t;
-}
+static const choice integrators = {"/integrator", "method", &drape_integrator_registry};
+static const choice controllers = {"/controller", "type", &drape_controller_registry};
 
-static table controller_table(void)
-{
-    table t = {.pointer = "/controller", .key = "type"};
-    for (; drape_controllers[t.count]; t.count++) {
-        t.names[t.count] = drape_controllers[t.count]->name;
-        t.params[t.count] = drape_controllers[t.count]->params;
-        t.param_counts[t.count] = drape_controllers[t.count]->param_count;
-    }
-    return t;
-}
-
-static drape_status find_row(drape_context *ctx, const table *t, const char *name, int *row)
-{
-    char at[64];
-    for (*row = 0; *row < t->count; (*row)++)
-        if (strcmp(t->names[*row], name) == 0)
-            return DRAPE_OK;
-    const char *meant = drape_did_you_mean(name, t->names, (size_t)t->count);
-    snprintf(at, sizeof at, "%s/%s", t->pointer, t->key);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "there is no %s \"%.60s\"%s%s%s; `drape list` shows all",
-                         t->pointer + 1, name, DRAPE_MEANT(meant));
-}
-
-static drape_status unknown_key(drape_context *ctx, const table *t, const char *at, const char *name)
+static drape_status unknown_key(drape_context *ctx, const choice *c, const char *at, const char *name)
 {
     const char *keys[MAX_KEYS];
+    const drape_entry *entry;
     size_t count = 0;
-    for (int r = 0; r < t->count; r++)
-        for (int p = 0; p < t->param_counts[r] && count < MAX_KEYS; p++)
-            keys[count++] = t->params[r][p].name;
+    for (int i = 0; (entry = c->registry->entries[i]) != NULL; i++)
+        for (int p = 0; p < entry->param_count && count < MAX_KEYS; p++)
+            keys[count++] = entry->params[p].name;
     const char *meant = drape_did_you_mean(name, keys, count);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "unknown key \"%.60s\"%s%s%s", name, DRAPE_MEANT(meant));
 }
 
-/* Checks a setting against every row that has a parameter of its name; keeps the value for the chosen row. */
-static drape_status apply(drape_context *ctx, const table *t, int row, const drape_setting *setting,
+/* Checks a setting against every entry that has a parameter of its name; keeps the value for the chosen one. */
+static drape_status apply(drape_context *ctx, const choice *c, int chosen, const drape_setting *setting,
                           double *values)
 {
+    const drape_entry *entry;
     char at[128];
     bool known = false;
-    snprintf(at, sizeof at, "%s/%.80s", t->pointer, setting->name);
-    for (int r = 0; r < t->count; r++) {
+    snprintf(at, sizeof at, "%s/%.80s", c->pointer, setting->name);
+    for (int i = 0; (entry = c->registry->entries[i]) != NULL; i++) {
         double value[DRAPE_PARAM_WIDEST];
-        int p = drape_param_find(t->params[r], t->param_counts[r], setting->name);
+        int p = drape_param_find(entry->params, entry->param_count, setting->name);
         if (p < 0)
             continue;
         known = true;
-        drape_status status = drape_param_value(ctx, at, &t->params[r][p], setting, value);
+        drape_status status = drape_param_value(ctx, at, &entry->params[p], setting, value);
         if (status)
             return status;
-        if (r == row)
-            memcpy(values + drape_param_place(t->params[r], p), value,
-                   (size_t)drape_param_width(&t->params[r][p]) * sizeof *value);
+        if (i == chosen)
+            memcpy(values + drape_param_place(entry->params, p), value,
+                   (size_t)drape_param_width(&entry->params[p]) * sizeof *value);
     }
-    return known ? DRAPE_OK : unknown_key(ctx, t, at, setting->name);
+    return known ? DRAPE_OK : unknown_key(ctx, c, at, setting->name);
 }
 
-static drape_status apply_all(drape_context *ctx, const table *t, int row, const drape_setting *settings,
+static drape_status apply_all(drape_context *ctx, const choice *c, int chosen, const drape_setting *settings,
                               size_t count, double *values)
 {
     drape_status status = DRAPE_OK;
     for (size_t i = 0; !status && i < count; i++)
         status = settings && settings[i].name
-                     ? apply(ctx, t, row, &settings[i], values)
-                     : drape_fail_at(ctx, DRAPE_E_ARGUMENT, t->pointer, "the name of a setting is NULL");
+                     ? apply(ctx, c, chosen, &settings[i], values)
+                     : drape_fail_at(ctx, DRAPE_E_ARGUMENT, c->pointer, "the name of a setting is NULL");
     return status;
 }
 
-static drape_status choose(drape_context *ctx, const table *t, const char *name, const drape_choice *scene,
-                           const drape_setting *settings, size_t setting_count, double *values, int *row)
+/* name, settings: of the def; they override the scene's. */
+static drape_status choose(drape_context *ctx, const choice *c, const char *name, const drape_choice *scene,
+                           const drape_setting *settings, size_t setting_count, double *values, int *chosen)
 {
-    drape_status status = find_row(ctx, t, name ? name : scene->type, row);
+    char at[64];
+    snprintf(at, sizeof at, "%s/%s", c->pointer, c->key);
+    drape_status status = drape_registry_choose(ctx, c->registry, at, name ? name : scene->type, chosen);
     if (status)
         return status;
-    for (int p = 0; p < t->param_counts[*row]; p++)
-        drape_param_default(&t->params[*row][p], values + drape_param_place(t->params[*row], p));
-    status = apply_all(ctx, t, *row, scene->settings, scene->setting_count, values);
-    return status ? status : apply_all(ctx, t, *row, settings, setting_count, values);
+    const drape_entry *entry = c->registry->entries[*chosen];
+    for (int p = 0; p < entry->param_count; p++)
+        drape_param_default(&entry->params[p], values + drape_param_place(entry->params, p));
+    status = apply_all(ctx, c, *chosen, scene->settings, scene->setting_count, values);
+    return status ? status : apply_all(ctx, c, *chosen, settings, setting_count, values);
 }
 
 /* A positive number of the def itself, such as dt, is one more setting. */
-static drape_status apply_number(drape_context *ctx, const table *t, int row, const char *name, double number,
-                                 double *values)
+static drape_status apply_number(drape_context *ctx, const choice *c, int chosen, const char *name,
+                                 double number, double *values)
 {
     if (number == 0)
         return DRAPE_OK;
-    return apply(ctx, t, row, &(drape_setting){.name = name, .number = number}, values);
+    return apply(ctx, c, chosen, &(drape_setting){.name = name, .number = number}, values);
 }
 
 drape_status drape_choose(drape_context *ctx, const drape_model *model, const drape_sim_def *def,
                           drape_chosen *chosen)
 {
-    const table integrators = integrator_table(), controllers = controller_table();
     drape_sim_def none;
     drape_sim_def_init(&none, sizeof none);
     const drape_sim_def *d = def ? def : &none;
@@ -138,28 +108,30 @@ drape_status drape_choose(drape_context *ctx, const drape_model *model, const dr
     if (!status && chosen->integrator->own_steps && chosen->controller->own_steps)
         status = drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/controller/type",
                                "\"%s\" chooses steps, and so does the integrator \"%s\"; take \"halving\"",
-                               chosen->controller->name, chosen->integrator->name);
+                               chosen->controller->entry.name, chosen->integrator->entry.name);
     return status;
 }
 
 double drape_chosen_integrator_value(const drape_chosen *chosen, const char *name, double fallback)
 {
-    int p = drape_param_find(chosen->integrator->params, chosen->integrator->param_count, name);
+    int p = drape_param_find(chosen->integrator->entry.params, chosen->integrator->entry.param_count, name);
     return p < 0 ? fallback : chosen->integrator_values[p];
 }
 
 double drape_chosen_controller_value(const drape_chosen *chosen, const char *name, double fallback)
 {
-    int p = drape_param_find(chosen->controller->params, chosen->controller->param_count, name);
+    int p = drape_param_find(chosen->controller->entry.params, chosen->controller->entry.param_count, name);
     return p < 0 ? fallback : chosen->controller_values[p];
 }
 
 bool drape_chosen_ignores_integrator(const drape_chosen *chosen, const char *name)
 {
-    return drape_param_find(chosen->integrator->params, chosen->integrator->param_count, name) < 0;
+    return drape_param_find(chosen->integrator->entry.params, chosen->integrator->entry.param_count, name) <
+           0;
 }
 
 bool drape_chosen_ignores_controller(const drape_chosen *chosen, const char *name)
 {
-    return drape_param_find(chosen->controller->params, chosen->controller->param_count, name) < 0;
+    return drape_param_find(chosen->controller->entry.params, chosen->controller->entry.param_count, name) <
+           0;
 }

@@ -1,5 +1,5 @@
-/* choose.h: integrator and controller by name, with their parameters. Keys of any row of the table are
- * accepted; those of others are ignored. */
+/* choose.h: integrator and controller by name, with their parameters. Keys of any entry of the table are
+ * accepted; those that the chosen one does not have are ignored. */
 #ifndef DRAPE_SIM_CHOOSE_H
 #define DRAPE_SIM_CHOOSE_H
 
@@ -17,7 +17,7 @@ typedef struct drape_chosen {
 drape_status drape_choose(drape_context *ctx, const drape_model *model, const drape_sim_def *def,
                           drape_chosen *chosen);
 
-/* The value of the parameter of that name; fallback if the row has none. */
+/* The value of the parameter of that name; fallback if there is none. */
 double drape_chosen_integrator_value(const drape_chosen *chosen, const char *name, double fallback);
 double drape_chosen_controller_value(const drape_chosen *chosen, const char *name, double fallback);
 

@@ -1,8 +1,8 @@
 /*
  * frames.c: frame times are k / frame_rate. No step is shortened for a frame: between the states of a step,
  * positions are the cubic Hermite interpolant of both positions and velocities, of fourth order in h for
- * smooth motion. Where that leads through a collider or through cloth, the straight way is taken, and where that
- * does, too, the nearer of the two states.
+ * smooth motion. Where that leads through a collider or through cloth, the straight way is taken, and where
+ * that does, too, the nearer of the two states.
  */
 #include "sim/sim.h"
 
@@ -45,8 +45,8 @@ static void interpolate(drape_sim *sim, const drape_state *before, double t)
 static drape_status check(drape_sim *sim, double t)
 {
     const char *reason;
-    drape_worst worst;
-    return drape_system_check_contact(sim->system, sim->frame, t, &reason, &worst);
+    drape_diagnostic diagnostic;
+    return drape_system_check_contact(sim->system, sim->frame, t, &reason, &diagnostic);
 }
 
 /* Into sim->frame, past all obstacles. */
@@ -84,7 +84,7 @@ static drape_status emit(drape_sim *sim, double time, const double *x, const dou
                          .positions = x,
                          .velocities = v};
     sim->next_frame++;
-    return drape_sim_tell(sim, &event);
+    return drape_sim_notify(sim, &event);
 }
 
 drape_status drape_sim_emit_frames(drape_sim *sim)
@@ -93,7 +93,7 @@ drape_status drape_sim_emit_frames(drape_sim *sim)
     const drape_state *now = drape_sim_state(sim);
     double near = before ? SAME_TIME * (now->t - before->t) : 0;
     drape_status status = DRAPE_OK;
-    if (before && sim->chosen.integrator->timeless)
+    if (before && sim->chosen.integrator->steady_state)
         return DRAPE_OK;
     if (sim->observer_count == 0) { /* nobody looks: count them, but make none */
         sim->next_frame = (int64_t)floor((now->t + near) * sim->frame_rate) + 1;

@@ -4,24 +4,24 @@
 
 #include <math.h>
 
-#define LONGEST  1e9 /* [s] as the duration of a scene */
-#define FARTHEST 1e9 /* [m], [m/s], as the keys of a track */
+#define MAX_SECONDS  1e9 /* [s] as the duration of a scene */
+#define MAX_DISTANCE 1e9 /* [m], [m/s], as the keys of a track */
 
 static bool is_way(const double *x, const double *v)
 {
     bool good = x != NULL;
     for (int k = 0; good && k < 3; k++)
-        good = fabs(x[k]) <= FARTHEST && (!v || fabs(v[k]) <= FARTHEST);
+        good = fabs(x[k]) <= MAX_DISTANCE && (!v || fabs(v[k]) <= MAX_DISTANCE);
     return good;
 }
 
 static drape_status check_seconds(const drape_sim *sim, const char *function, double seconds)
 {
     double t = drape_sim_state(sim)->t;
-    if (seconds > 0 && seconds <= LONGEST && t + seconds > t)
+    if (seconds > 0 && seconds <= MAX_SECONDS && t + seconds > t)
         return DRAPE_OK;
     return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: seconds = %g; it is in (0, %g], and moves the time",
-                      function, seconds, LONGEST);
+                      function, seconds, MAX_SECONDS);
 }
 
 /* ---- Pins ---- */
@@ -38,7 +38,7 @@ static drape_status check_pin(const drape_sim *sim, int32_t node, const double *
     if (!is_way(x, v))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_move_pins: position and velocity of node %d must be within %g m and m/s",
-                          (int)node, FARTHEST);
+                          (int)node, MAX_DISTANCE);
     return DRAPE_OK;
 }
 
@@ -83,7 +83,7 @@ drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double se
     if (!status && !is_way(displacement, velocity))
         status = drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                             "drape_sim_move_collider: displacement and velocity must be within %g m and m/s",
-                            FARTHEST);
+                            MAX_DISTANCE);
     if (!status)
         drape_motion_send_collider(drape_system_steer(sim->system), collider, drape_sim_state(sim)->t,
                                    seconds, displacement, velocity);
@@ -131,10 +131,9 @@ drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *field, void *u
     if (field && !drape_wind_is_felt(sim->model))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_set_wind: no term of the model is in a medium, as drag.wind is");
-    drape_status status = drape_system_set_wind(sim->system, field, user);
-    if (!status)
-        forces_jump(sim);
-    return status;
+    drape_system_set_wind(sim->system, field, user);
+    forces_jump(sim);
+    return DRAPE_OK;
 }
 
 /* ---- Reading forces ---- */
@@ -180,7 +179,7 @@ static drape_status check_has_contact(const drape_sim *sim, const char *function
         return DRAPE_OK;
     return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                       "%s: the integrator \"%s\" moves nodes out of what they meet and has no force",
-                      function, sim->chosen.integrator->name);
+                      function, sim->chosen.integrator->entry.name);
 }
 
 drape_status drape_sim_contact_forces(drape_sim *sim, double *forces)

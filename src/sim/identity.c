@@ -1,6 +1,7 @@
 /*
- * identity.c: what a checkpoint is of. The same model is the same numbers after compile, however the scene was written:
- * names, comments, files and the run's duration have no part. The same build has the same solvers: bits depend on them.
+ * identity.c: what a checkpoint is of. The same model is the same numbers after compile, however the scene
+ * was written: names, comments, files and the run's duration have no part. The same build has the same
+ * solvers: bits depend on them.
  */
 #include "base/hash.h"
 #include "sim/sim.h"
@@ -58,7 +59,7 @@ static uint64_t add_term(uint64_t hash, const drape_term *term)
     const drape_elements *el = &term->elements;
     const int64_t sizes[] = {term->cloth, el->count, el->nodes, el->rest_count, term->law_count};
     size_t count = (size_t)el->count;
-    hash = add_text(hash, term->ops->name);
+    hash = add_text(hash, term->ops->entry.name);
     hash = add(hash, sizes, sizeof sizes);
     hash = add_doubles(hash, term->params, DRAPE_MAX_PARAMS);
     hash = add(hash, el->node, count * (size_t)el->nodes * sizeof *el->node);
@@ -70,7 +71,7 @@ static uint64_t add_collider(uint64_t hash, const drape_collider *collider)
 {
     const drape_collider_shape *s = &collider->shape;
     const int64_t sizes[] = {s->point_count, s->segment_count, s->triangle_count, s->inscribed};
-    hash = add_text(hash, collider->ops->name);
+    hash = add_text(hash, collider->ops->entry.name);
     hash = add_doubles(hash, collider->values, DRAPE_MAX_PARAMS);
     hash = add(hash, sizes, sizeof sizes);
     hash = add_doubles(hash, s->point, 3 * (size_t)s->point_count);
@@ -122,12 +123,13 @@ static uint64_t model_hash(const drape_model *m)
 static uint64_t choices_hash(const drape_sim *sim)
 {
     const drape_chosen *c = &sim->chosen;
-    const drape_param *of_integrator = c->integrator->params, *of_controller = c->controller->params;
+    const drape_param *of_integrator = c->integrator->entry.params,
+                      *of_controller = c->controller->entry.params;
     uint64_t hash = add_doubles(DRAPE_HASH_START, &sim->frame_rate, 1);
     hash = add_doubles(hash, c->integrator_values,
-                       (size_t)drape_param_place(of_integrator, c->integrator->param_count));
+                       (size_t)drape_param_place(of_integrator, c->integrator->entry.param_count));
     return add_doubles(hash, c->controller_values,
-                       (size_t)drape_param_place(of_controller, c->controller->param_count));
+                       (size_t)drape_param_place(of_controller, c->controller->entry.param_count));
 }
 
 /* ---- The build ---- */
@@ -137,8 +139,8 @@ void drape_sim_describe_build(char *text, size_t size)
     size_t used = (size_t)snprintf(text, size, "Drape %s, compiler %s, SUNDIALS %s, KLU %d.%d.%d%s, solvers",
                                    drape_version(), __VERSION__, SUNDIALS_VERSION, KLU_MAIN_VERSION,
                                    KLU_SUB_VERSION, KLU_SUBSUB_VERSION, METIS);
-    for (int i = 0; drape_linears_words[i] && used < size; i++)
-        used += (size_t)snprintf(text + used, size - used, " %s", drape_linears_words[i]);
+    for (int i = 0; drape_linears_names[i] && used < size; i++)
+        used += (size_t)snprintf(text + used, size - used, " %s", drape_linears_names[i]);
 }
 
 static void archive_build(drape_archive *a)
@@ -182,8 +184,8 @@ void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
     }
     drape_archive_mark(a, "identity");
     archive_build(a);
-    archive_row(a, "integrator", sim->chosen.integrator->name);
-    archive_row(a, "controller", sim->chosen.controller->name);
+    archive_row(a, "integrator", sim->chosen.integrator->entry.name);
+    archive_row(a, "controller", sim->chosen.controller->entry.name);
     drape_archive_same(a, "the number of nodes", m->node_count);
     drape_archive_same(a, "the number of free nodes", m->free_count);
     archive_hash(a, "another model", sim->model_hash);

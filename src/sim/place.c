@@ -8,8 +8,8 @@
 #include <math.h>
 #include <string.h>
 
-#define LONGEST  1e9  /* [s] as the duration of a scene */
-#define PIN_SLIP 1e-9 /* of the scene's size: the host's rounding of where a pin has its node */
+#define MAX_SECONDS 1e9  /* [s] as the duration of a scene */
+#define PIN_SLIP    1e-9 /* of the scene's size: the host's rounding of where a pin has its node */
 
 static drape_status check_given(const drape_sim *sim, double t, const double *x, const double *v)
 {
@@ -17,9 +17,9 @@ static drape_status check_given(const drape_sim *sim, double t, const double *x,
     if (!x || !v)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_state: there are no %s",
                           x ? "velocities" : "positions");
-    if (!(t >= 0 && t <= LONGEST))
+    if (!(t >= 0 && t <= MAX_SECONDS))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_set_state: t = %g s; it is 0 to %g s", t,
-                          LONGEST);
+                          MAX_SECONDS);
     for (size_t i = 0; i < 2 * n; i++) {
         double value = i < n ? x[i] : v[i - n];
         int32_t node = (int32_t)(i % n / 3), c = drape_model_cloth_of(sim->model, node);
@@ -33,8 +33,8 @@ static drape_status check_given(const drape_sim *sim, double t, const double *x,
     return DRAPE_OK;
 }
 
-/* Pinned nodes where their pins have them at the time of the state; those that a host has moved where it has them
- * now. */
+/* Pinned nodes where their pins have them at the time of the state; those that a host has moved where it has
+ * them now. */
 static void place_pinned(const drape_sim *sim, const double *given, drape_state *state)
 {
     const drape_model *m = sim->model;
@@ -45,13 +45,13 @@ static void place_pinned(const drape_sim *sim, const double *given, drape_state 
     drape_motion_place_pins(motion, state->t, state->x);
     for (int32_t i = 0; i < motion->moved_count; i++) {
         size_t at = 3 * (size_t)motion->moved_node[i];
-        if (motion->pin_way[i].given)
+        if (motion->pin_path[i].given)
             memcpy(state->x + at, given + at, 3 * sizeof *state->x);
     }
 }
 
-/* Fixed nodes have no velocity, nor have those that rest where the host put them; others that move keep what was
- * given, until a step gives them the mean of their way. */
+/* Fixed nodes have no velocity, nor have those that rest where the host put them; others that move keep what
+ * was given, until a step gives them the mean of their way. */
 static void stop_fixed(const drape_sim *sim, const double *given, drape_state *state)
 {
     const drape_model *m = sim->model;
@@ -61,7 +61,7 @@ static void stop_fixed(const drape_sim *sim, const double *given, drape_state *s
             memset(state->v + 3 * (size_t)i, 0, 3 * sizeof *state->v);
     for (int32_t i = 0; i < motion->moved_count; i++) {
         size_t at = 3 * (size_t)motion->moved_node[i];
-        if (!motion->pin_way[i].given)
+        if (!motion->pin_path[i].given)
             memcpy(state->v + at, given + at, 3 * sizeof *state->v);
     }
 }

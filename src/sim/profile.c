@@ -7,10 +7,11 @@
 #include <math.h>
 #include <string.h>
 
-#define BUDGET       0.02 /* [s] for the repeats of one measurement */
-#define MOST_REPEATS 200
-/* Displacement of the nodes, as a share of the scene's mean edge. Edges that are 1e-3 shorter than at rest make
- * the matrix of a common scene indefinite, which a step seldom meets and for which solvers take other ways. */
+#define BUDGET      0.02 /* [s] for the repeats of one measurement */
+#define MAX_REPEATS 200
+/* Displacement of the nodes, as a share of the scene's mean edge. Edges that are 1e-3 shorter than at rest
+ * make the matrix of a common scene indefinite, which a step seldom meets and for which solvers take other
+ * ways. */
 #define DEFORMATION 1e-5
 
 /* Where everything is evaluated, and room for the results. */
@@ -87,15 +88,11 @@ static drape_status create(bench *s, bool implicit)
     s->g = drape_arena_take(&s->arena, nodes, sizeof *s->g);
     s->b = drape_arena_take(&s->arena, dofs, sizeof *s->b);
     s->d = drape_arena_take(&s->arena, dofs, sizeof *s->d);
-    if (!s->x || !s->v || !s->g || !s->b || !s->d)
-        return DRAPE_E_MEMORY;
-    if (model->has_laws &&
-        !(s->history = drape_arena_take(&s->arena, (size_t)model->measure_count, sizeof(double))))
-        return DRAPE_E_MEMORY;
-    if (implicit &&
-        !(s->values = drape_arena_take(&s->arena, (size_t)model->pattern.nonzeros, sizeof *s->values)))
-        return DRAPE_E_MEMORY;
-    return DRAPE_OK;
+    if (model->has_laws)
+        s->history = drape_arena_take(&s->arena, (size_t)model->measure_count, sizeof *s->history);
+    if (implicit)
+        s->values = drape_arena_take(&s->arena, (size_t)model->pattern.nonzeros, sizeof *s->values);
+    return drape_arena_status(&s->arena);
 }
 
 /* ---- Measuring ---- */
@@ -117,7 +114,7 @@ static void whole_residual(bench *s)
 
 static void whole_jacobian(bench *s)
 {
-    drape_system_jacobian(s->sim->system, &s->point, s->mass_weight, false, s->values);
+    drape_system_jacobian(s->sim->system, &s->point, s->mass_weight, 0, s->values);
 }
 
 static void factor(bench *s)
@@ -134,7 +131,7 @@ static void solve(bench *s)
 static double shortest(bench *s, void (*call)(bench *s))
 {
     double begin = drape_clock_seconds(), best = INFINITY, now = begin;
-    for (int i = 0; i < MOST_REPEATS && (i == 0 || now - begin < BUDGET); i++) {
+    for (int i = 0; i < MAX_REPEATS && (i == 0 || now - begin < BUDGET); i++) {
         double start = drape_clock_seconds();
         call(s);
         now = drape_clock_seconds();
@@ -190,7 +187,7 @@ static drape_status measure_terms(bench *s, bool implicit, drape_profile_term *t
     if (!seen)
         return DRAPE_E_MEMORY;
     for (s->term = 0; s->term < model->term_count; s->term++) {
-        drape_status status = drape_heed(s->ctx);
+        drape_status status = drape_check_cancel(s->ctx);
         if (status)
             return status;
         const drape_term *term = &model->terms[s->term];
@@ -208,35 +205,29 @@ static drape_status measure_terms(bench *s, bool implicit, drape_profile_term *t
 
 /* ---- The whole ---- */
 
-static size_t mesh_bytes(const drape_model *model)
-{
-    size_t sum = 0;
-    for (int32_t c = 0; c < model->cloth_count; c++) {
-        const drape_mesh *m = &model->cloths[c].mesh;
-        sum += (size_t)m->node_count * (3 * sizeof *m->x + sizeof *m->node_area);
-        sum += (size_t)m->triangle_count * (3 * sizeof *m->triangle + sizeof *m->triangle_area);
-        sum += (size_t)m->edge_count * (2 * sizeof *m->edge + sizeof *m->edge_length);
-    }
-    return sum;
-}
-
+/* The parts add up to all memory that the model and the sim have. */
 static void count_bytes(const drape_sim *sim, drape_profile *out)
 {
-    out->model_bytes = sim->model->arena.bytes;
-    out->mesh_bytes = mesh_bytes(sim->model);
-    out->pattern_bytes = drape_pattern_bytes(&sim->model->pattern);
-    out->system_bytes = drape_system_bytes(sim->system);
-    out->integrator_bytes = sim->chosen.integrator->bytes(sim->integrator);
-    out->state_bytes = sizeof *sim + sim->arena.bytes;
+    const drape_model *model = sim->model;
+    for (int32_t c = 0; c < model->cloth_count; c++)
+        out->mesh_bytes += model->cloths[c].mesh.arena.bytes;
+    out->pattern_bytes = model->pattern_bytes;
+    out->model_bytes = sizeof *model + model->arena.bytes - model->pattern_bytes;
+    out->state_bytes = sim->state_bytes;
+    out->integrator_bytes = sim->integrator_bytes;
+    if (sim->chosen.integrator->bytes)
+        out->integrator_bytes += sim->chosen.integrator->bytes(sim->integrator);
+    out->system_bytes =
+        sizeof *sim + sizeof *sim->arena + sim->arena->bytes - sim->state_bytes - sim->integrator_bytes;
 }
 
-static void tell_solver(const bench *s, drape_profile *out)
+static void report_solver(const bench *s, drape_profile *out)
 {
     drape_linear_report report = {.row = s->linear};
     if (s->linear->report)
         s->linear->report(s->solver, &report);
-    out->linear_picked = report.row->name;
-    out->linear_fallback = report.fallback ? report.fallback->name : "";
+    out->linear_picked = report.row->entry.name;
+    out->linear_fallback = report.fallback ? report.fallback->entry.name : "";
     memcpy(out->linear_why, report.why, sizeof out->linear_why);
 }
 
@@ -244,18 +235,18 @@ static void tell_solver(const bench *s, drape_profile *out)
  * will take. */
 static drape_status measure_solver(bench *s, drape_profile *out)
 {
-    drape_status status = s->linear->create(s->ctx, &s->sim->model->pattern, &s->solver);
+    drape_status status = s->linear->create(&s->arena, &s->sim->model->pattern, &s->solver);
     if (status)
         return status;
-    size_t before = s->linear->bytes(s->solver);
+    size_t before = s->arena.bytes + drape_linear_bytes(s->linear, s->solver);
     out->factor_seconds = shortest(s, factor);
     out->factor_status = s->status;
     if (!s->status) {
-        out->integrator_bytes += s->linear->bytes(s->solver) - before;
+        out->integrator_bytes += s->arena.bytes + drape_linear_bytes(s->linear, s->solver) - before;
         out->solve_seconds = shortest(s, solve);
     }
-    tell_solver(s, out);
-    s->linear->destroy(&s->solver);
+    report_solver(s, out);
+    drape_linear_destroy(s->linear, &s->solver);
     return DRAPE_OK;
 }
 
@@ -278,7 +269,7 @@ static drape_status measure(bench *s, drape_profile *out)
     if (!out->implicit)
         return DRAPE_OK;
     out->jacobian_seconds = shortest(s, whole_jacobian);
-    status = drape_heed(s->ctx);
+    status = drape_check_cancel(s->ctx);
     if (status)
         return status;
     return s->sim->model->free_count > 0 ? measure_solver(s, out) : DRAPE_OK;
@@ -290,8 +281,8 @@ drape_status drape_profile_measure(drape_context *ctx, const drape_sim *sim, dra
     bench s = {.ctx = ctx, .arena = drape_arena_of(ctx), .sim = sim, .linear = linear_of(&sim->chosen)};
     *out = (drape_profile){.terms = terms,
                            .implicit = s.linear != NULL,
-                           .linear_solver = s.linear ? s.linear->name : "",
-                           .linear_picked = s.linear ? s.linear->name : "",
+                           .linear_solver = s.linear ? s.linear->entry.name : "",
+                           .linear_picked = s.linear ? s.linear->entry.name : "",
                            .linear_fallback = "",
                            .dt = drape_chosen_integrator_value(&sim->chosen, "dt", 1.0 / 60)};
     count_bytes(sim, out);

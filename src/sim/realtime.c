@@ -1,23 +1,24 @@
 /*
- * realtime.c: an advance with a budget. What is owed, the frame and what earlier frames left over, is made in equal
- * steps no longer than dt, so that at any frame rate a step is the same equations at its own h. Where that does not
- * fit into the budget, by what steps cost lately, the integrator tries less hard (efforts), then steps are longer
- * than dt, then time is left over. Left-over time above one longest step is dropped: late frames must not
- * make later ones later.
+ * realtime.c: an advance with a budget. What is owed, the frame and what earlier frames left over, is made in
+ * equal steps no longer than dt, so that at any frame rate a step is the same equations at its own h. If that
+ * does not fit into the budget, judged by what steps cost lately, the integrator takes a cheaper level of
+ * effort, then steps become longer than dt, then time is left over. Left-over time above one longest step is
+ * dropped: late frames must not make later ones later.
  *
- * The work of a call is bounded: after its first accepted step it begins no other that it does not expect to end in
- * time. A step that takes longer than a frame is made once in several frames: those between show the state before.
+ * The work of a call is bounded: after its first accepted step it begins a step only if that is expected to
+ * end in time. A step that takes longer than a frame is made once in several frames: those between show the
+ * state before.
  */
 #include "base/clock.h"
 #include "sim/sim.h"
 
 #include <math.h>
 
-#define KEEP    0.9  /* of the budget: a rung that is expected to take more is left */
-#define RECOVER 0.6  /* of the budget: a better one is returned to where it is expected to take less */
-#define LEARN   0.3  /* weight of the last attempt in what one is expected to cost */
-#define CHEAPER 0.7  /* of the cost of the effort above, before it was measured */
-#define STRETCH 4    /* longest step, in dt, where the def does not say */
+#define KEEP    0.9  /* of the budget: a level of effort that is expected to take more is left */
+#define RECOVER 0.6  /* of the budget: a better level is taken again if it is expected to take less */
+#define LEARN   0.3  /* weight of the last attempt in the expected cost */
+#define CHEAPER 0.7  /* of the cost of the next better level, before it was measured */
+#define STRETCH 4    /* longest step, in dt, if the def does not set it */
 #define SAME    1e-9 /* of dt: rounding of the host's sum of frames */
 
 static int effort_count(const drape_sim *sim)
@@ -56,7 +57,7 @@ static void learn(drape_sim *sim, double seconds)
             cost[e] *= *own / before;
 }
 
-/* ---- The rung ---- */
+/* ---- The level of effort ---- */
 
 typedef struct plan {
     int effort;
@@ -69,7 +70,8 @@ static int64_t steps_of(double owed, double h)
     return (int64_t)fmax(1, ceil(owed / h - SAME));
 }
 
-/* The hardest effort whose steps fit; a better one than now is returned to one at a time. */
+/* The best level whose steps fit into the budget; better levels than the present one are returned to one at a
+ * time. */
 static bool plan_effort(const drape_sim *sim, double owed, double budget, plan *out)
 {
     int now = sim->realtime.effort;
@@ -84,8 +86,8 @@ static bool plan_effort(const drape_sim *sim, double owed, double budget, plan *
     return false;
 }
 
-/* Steps at the least effort, longer than dt: as many as fit; where not even one does, one for so many frames that it
- * costs no more than their budgets, and none before that many are owed. */
+/* Steps at the least effort, longer than dt: as many as fit; where not even one does, one for so many frames
+ * that it costs no more than their budgets, and none before that many are owed. */
 static plan plan_stretched(const drape_sim *sim, double owed, double frame, double budget)
 {
     int effort = effort_count(sim) - 1;
@@ -106,7 +108,8 @@ static plan make_plan(const drape_sim *sim, double owed, double frame, double bu
 
 /* ---- A call ---- */
 
-/* Steps of h from now on where the sim counts them; rows and controllers that choose their own do that here, too. */
+/* Steps of h from now on where the sim counts them; rows and controllers that choose their own do that here,
+ * too. */
 static void aim(drape_sim *sim, const plan *p, double end)
 {
     drape_schedule *s = &sim->schedule;
@@ -124,9 +127,9 @@ static drape_status take_steps(drape_sim *sim, double deadline, drape_realtime *
         double start = drape_clock_seconds();
         if (report->h > 0 && start + expected(sim, sim->realtime.effort) > deadline)
             break;
-        status = drape_sim_bound(sim, &attempt);
+        status = drape_sim_check_attempts(sim, &attempt);
         if (!status)
-            status = drape_sim_heed(sim);
+            status = drape_sim_check_cancel(sim);
         if (status)
             break;
         status = drape_sim_step(sim, t1, h, &attempt);
@@ -163,7 +166,7 @@ static void settle(drape_sim *sim, double goal, drape_realtime *report)
     report->dropped_total = m->dropped;
 }
 
-static const char *rung_name(const drape_sim *sim)
+static const char *level_name(const drape_sim *sim)
 {
     if (sim->realtime.stretched)
         return "larger steps";
@@ -178,10 +181,10 @@ static drape_status check_arguments(drape_sim *sim, double frame_dt, double budg
     if (!(budget >= 0 && budget <= 1e9))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_advance_realtime: budget = %g s; it is 0 to 1e9", budget);
-    if (sim->chosen.integrator->timeless)
+    if (sim->chosen.integrator->steady_state)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_advance_realtime: the integrator \"%s\" has no time",
-                          sim->chosen.integrator->name);
+                          sim->chosen.integrator->entry.name);
     return DRAPE_OK;
 }
 
@@ -198,7 +201,7 @@ static void enter(drape_sim *sim)
 
 drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double budget, drape_realtime *out)
 {
-    drape_realtime report = {.rung = "full"};
+    drape_realtime report = {.level = "full"};
     double start = drape_clock_seconds();
     drape_status guarded = drape_sim_guard(sim, "drape_sim_advance_realtime");
     if (guarded)
@@ -215,7 +218,7 @@ drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double 
             status = take_steps(sim, start + budget, &report);
         }
         settle(sim, goal, &report);
-        report.rung = rung_name(sim);
+        report.level = level_name(sim);
         report.effort = sim->realtime.effort;
         report.seconds = drape_clock_seconds() - start;
         report.kept = report.seconds <= budget;

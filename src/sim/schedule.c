@@ -4,9 +4,10 @@
 #include <float.h>
 #include <math.h>
 
-#define MOST_LEVELS 60                  /* parts are counted in 64 bits */
-#define JOIN        1e-9                /* of dt: a shorter remainder joins the interval before */
-#define ROUNDING    (1e3 * DBL_EPSILON) /* of the time: a shorter way is rounding of the host's own sum */
+#define MAX_LEVELS 60   /* parts are counted in 64 bits */
+#define JOIN       1e-9 /* of dt: a shorter remainder joins the interval before */
+/* of the time: a shorter remainder is rounding of the host's own sum */
+#define ROUNDING (1e3 * DBL_EPSILON)
 
 void drape_schedule_init(drape_schedule *s, drape_stepping stepping, double dt, double start)
 {
@@ -31,28 +32,28 @@ static double interval_time(const drape_schedule *s, int64_t k)
     return s->start + (double)k * s->dt;
 }
 
-/* By what k dt and the caller's own sum to the time t may differ and count as one time. */
+/* The difference up to which k dt and the caller's own sum to the time t count as the same time. */
 static double rounding(double t)
 {
     return 4 * DBL_EPSILON * fabs(t);
 }
 
-/* The remainder that joins, more than a frame can add to what counts as one time. */
-static double least_remainder(const drape_schedule *s)
+/* Remainders up to this join the interval before; it is above the rounding that a frame can add. */
+static double min_remainder(const drape_schedule *s)
 {
     return fmax(JOIN * s->dt, 2 * rounding(s->end));
 }
 
 /*
- * The interval after count: a whole one, one that the end cuts, or one that takes a tiny remainder along. After the latter
- * two counting starts anew at the end: a host that adds up its frames leaves the counted times ever further behind,
- * and would come to a remainder that is just too large to join, a step of 1e-9 dt.
+ * The interval after count: a whole one, one that the end cuts, or one that takes a tiny remainder along.
+ * After the latter two counting starts anew at the end: a host that adds up its frames leaves the counted
+ * times ever further behind, and would come to a remainder that is just too large to join, a step of 1e-9 dt.
  */
 static void open_interval(drape_schedule *s)
 {
     double t0 = interval_time(s, s->count), t1 = interval_time(s, s->count + 1);
     double beyond = s->end - t1;
-    bool same = fabs(beyond) <= rounding(t1), joined = !same && fabs(beyond) <= least_remainder(s),
+    bool same = fabs(beyond) <= rounding(t1), joined = !same && fabs(beyond) <= min_remainder(s),
          cut = !same && !joined && beyond < 0;
     s->anew = joined || cut;
     s->interval_start = t0;
@@ -82,7 +83,7 @@ static bool next_counted(drape_schedule *s, double *t1, double *h)
     if (s->part == 0) {
         double left = s->end - interval_time(s, s->count);
         double least =
-            s->stepped ? least_remainder(s) : ROUNDING * fabs(s->end); /* the first step has none to join */
+            s->stepped ? min_remainder(s) : ROUNDING * fabs(s->end); /* the first step has none to join */
         if (!(left > least))
             return false;
         open_interval(s);
@@ -125,7 +126,7 @@ static void close_interval(drape_schedule *s)
     }
 }
 
-/* A level is left as soon as the parts done make whole parts of the level below. */
+/* A level is left as soon as the finished parts make whole parts of the level below. */
 static void accept_part(drape_schedule *s)
 {
     s->part++;
@@ -158,7 +159,7 @@ bool drape_schedule_retry(drape_schedule *s, double h_next)
     s->tries++;
     if (s->stepping != DRAPE_STEPS_COUNTED)
         return h_next > 0 && h_next < s->tried;
-    if (s->level == MOST_LEVELS)
+    if (s->level == MAX_LEVELS)
         return false;
     s->level++;
     s->part *= 2;

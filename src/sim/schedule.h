@@ -1,13 +1,13 @@
 /*
- * schedule.h: which steps a sim takes.
+ * schedule.h: the steps that a sim takes.
  *
  * Counted: steps end at start + k dt, counted and never summed. An interval between two such times may be
  * split in 2^level equal parts after a rejection; the parts end at exact fractions of it. Only the end of
  * an advance cuts an interval, and a remainder below 1e-9 dt joins the interval before.
  *
- * Proposed: the controller says how large the next step is; only the end of an advance cuts it.
+ * Proposed: the controller sets the size of the next step; only the end of an advance cuts it.
  *
- * Free: the integrator chooses. It is told where the end is, and after a rejection a bound on its next step.
+ * Free: the integrator chooses. It is given the end and, after a rejection, a bound on its next step.
  */
 #ifndef DRAPE_SIM_SCHEDULE_H
 #define DRAPE_SIM_SCHEDULE_H
@@ -20,37 +20,38 @@ typedef enum drape_stepping { DRAPE_STEPS_COUNTED, DRAPE_STEPS_PROPOSED, DRAPE_S
 typedef struct drape_schedule {
     drape_stepping stepping;
     double end;    /* [s] of this advance */
-    double now;    /* [s] where it came */
+    double now;    /* [s] the end of the last accepted step */
     double dt;     /* [s] counted: the interval; proposed: the first step */
     double limit;  /* [s] proposed: the next step; free: an upper bound */
-    double tried;  /* [s] the step that was handed out last */
+    double tried;  /* [s] the size of the step that was returned last */
     double start;  /* [s] counted: intervals are counted from here */
     int64_t count; /* intervals done since start */
     int level;     /* the interval has 2^level parts */
     int64_t part;  /* parts of it done */
     double interval_start, interval_end, interval_size;
     bool stepped; /* a step was accepted: a remainder has a step to join */
-    bool anew;    /* the interval ends at no counted time: the next count starts at its end */
-    /* Steps tried within one dt; of an advance, so that it begins anew in the next one, and is in no checkpoint. */
+    bool anew;    /* the interval does not end at a counted time: counting restarts at its end */
+    /* Attempts within one dt. They belong to an advance, so that the next one begins again; checkpoints do
+     * not have them. */
     int64_t tries;
     double tries_from; /* [s] */
 } drape_schedule;
 
 void drape_schedule_init(drape_schedule *schedule, drape_stepping stepping, double dt, double start);
 
-/* Sets the end of an advance. An interval that was left half done goes on where the end is the same, else it is
- * given up: counting starts where it came. */
+/* Sets the end of an advance. An interval that was left half done is continued if the end is the same;
+ * otherwise it is given up, and counting restarts at the present time. */
 void drape_schedule_aim(drape_schedule *schedule, double end);
 
 /* The next step: its end and its size. False when the end is reached. */
 bool drape_schedule_next(drape_schedule *schedule, double *t1, double *h);
 
-/* A step to t1 was accepted; h_next counts where steps are proposed. */
+/* A step to t1 was accepted; h_next is used where steps are proposed. */
 void drape_schedule_accept(drape_schedule *schedule, double t1, double h_next);
 
-/* A step was rejected: h_next next, which is half of it where steps are counted. False where no step is left
- * to try: an interval cannot be split further (2^60 parts), or h_next is no smaller than what was rejected.
- * So whatever a controller says, a step is never tried again at its size. */
+/* A step was rejected: h_next next, which is half of it where steps are counted. False if no step is left to
+ * try: an interval cannot be split further (2^60 parts), or h_next is not smaller than the rejected step. So
+ * a step is never tried again at its size, whatever a controller returns. */
 bool drape_schedule_retry(drape_schedule *schedule, double h_next);
 
 #endif

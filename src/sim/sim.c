@@ -43,34 +43,34 @@ static drape_status read_def(drape_context *ctx, const drape_sim_def *given, dra
 static drape_status create_states(drape_sim *sim)
 {
     drape_status status = DRAPE_OK;
-    for (int i = 0; !status && i < 2 + sim->chosen.controller->pasts; i++)
-        status = drape_state_create(&sim->arena, sim->model, &sim->states[i]);
+    for (int i = 0; !status && i < 2 + sim->chosen.controller->history_depth; i++)
+        status = drape_state_create(sim->arena, sim->model, &sim->states[i]);
     size_t n = 3 * (size_t)sim->model->node_count;
-    sim->frame = drape_arena_take(&sim->arena, n, sizeof *sim->frame);
-    sim->frame_velocity = drape_arena_take(&sim->arena, n, sizeof *sim->frame_velocity);
-    sim->read = drape_arena_take(&sim->arena, n, sizeof *sim->read);
-    return status ? status : sim->frame && sim->frame_velocity && sim->read ? DRAPE_OK : DRAPE_E_MEMORY;
+    sim->frame = drape_arena_take(sim->arena, n, sizeof *sim->frame);
+    sim->frame_velocity = drape_arena_take(sim->arena, n, sizeof *sim->frame_velocity);
+    sim->read = drape_arena_take(sim->arena, n, sizeof *sim->read);
+    sim->state_bytes = sizeof *sim + sim->arena->bytes;
+    return drape_arena_status(sim->arena);
 }
 
-static drape_status create_parts(drape_sim *sim, int threads)
+static drape_status create_system(drape_sim *sim, int threads)
 {
-    drape_status status = create_states(sim);
-    if (!status)
-        status = drape_heed(sim->ctx);
-    if (!status)
-        status = drape_system_create(sim->ctx, sim->model, threads, &sim->system);
-    if (!status)
-        drape_system_watch(sim->system, &sim->cancel);
-    bool projects = !status && sim->chosen.integrator->projects_contact;
-    if (!status && projects)
-        drape_system_leave_constraints(sim->system);
-    if (!status && !projects)
-        status = drape_system_add_contact(sim->system);
-    if (!status)
-        status = drape_heed(sim->ctx);
-    if (!status)
-        status = sim->chosen.integrator->create(sim->ctx, sim->system, sim->chosen.integrator_values,
-                                                &sim->integrator);
+    drape_status status = drape_system_create(sim->arena, sim->model, threads, &sim->system);
+    if (status)
+        return status;
+    drape_system_watch(sim->system, &sim->cancel);
+    if (!sim->chosen.integrator->projects_contact)
+        return drape_system_add_contact(sim->system);
+    drape_system_leave_constraints(sim->system);
+    return DRAPE_OK;
+}
+
+static drape_status create_integrator(drape_sim *sim)
+{
+    const size_t before = sim->arena->bytes;
+    drape_status status = sim->chosen.integrator->create(sim->arena, sim->system,
+                                                         sim->chosen.integrator_values, &sim->integrator);
+    sim->integrator_bytes = sim->arena->bytes - before;
     return status;
 }
 
@@ -81,42 +81,55 @@ static drape_stepping stepping_of(const drape_chosen *chosen)
     return chosen->controller->own_steps ? DRAPE_STEPS_PROPOSED : DRAPE_STEPS_COUNTED;
 }
 
-static drape_sim empty_sim(drape_context *ctx, const drape_model *model, double frame_rate,
-                           double longest_asked)
+/* A sim with nothing but its arena. */
+static drape_status open_sim(drape_context *ctx, const drape_model *model, double frame_rate,
+                             double longest_asked, drape_sim **out)
 {
-    return (drape_sim){.next = 1,
+    drape_sim *sim = *out = drape_alloc(ctx, 1, sizeof *sim);
+    if (!sim)
+        return DRAPE_E_MEMORY;
+    *sim = (drape_sim){.next = 1,
                        .before = -1,
                        .past = {-1, -1},
                        .ctx = ctx,
-                       .arena = drape_arena_of(ctx),
+                       .arena = drape_arena_create(ctx),
                        .model = model,
                        .realtime = {.longest_asked = longest_asked},
                        .frame_rate = frame_rate};
+    return sim->arena ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
 /* Makes all that a sim with its choices needs. */
 static drape_status start_sim(drape_sim *sim, int threads)
 {
-    drape_status status = create_parts(sim, threads);
+    drape_status status = create_states(sim);
     if (!status)
-        status = drape_heed(sim->ctx);
+        status = drape_check_cancel(sim->ctx);
+    if (!status)
+        status = create_system(sim, threads);
+    if (!status)
+        status = drape_check_cancel(sim->ctx);
+    if (!status)
+        status = create_integrator(sim);
+    if (!status)
+        status = drape_check_cancel(sim->ctx);
     if (status)
         return status;
     drape_schedule_init(&sim->schedule, stepping_of(&sim->chosen),
                         drape_chosen_integrator_value(&sim->chosen, "dt", 0), 0);
-    sim->most_attempts = drape_chosen_controller_value(&sim->chosen, "max_attempts", INFINITY);
+    sim->max_attempts = drape_chosen_controller_value(&sim->chosen, "max_attempts", INFINITY);
     drape_sim_reset_energy(sim);
     return DRAPE_OK;
 }
 
 drape_status drape_sim_create_like(const drape_sim *like, drape_sim **out)
 {
-    drape_sim *sim = *out = drape_alloc(like->ctx, 1, sizeof *sim);
-    if (!sim)
-        return DRAPE_E_MEMORY;
-    *sim = empty_sim(like->ctx, like->model, like->frame_rate, like->realtime.longest_asked);
-    sim->chosen = like->chosen;
-    drape_status status = start_sim(sim, drape_crew_threads(drape_system_crew(like->system)));
+    drape_status status =
+        open_sim(like->ctx, like->model, like->frame_rate, like->realtime.longest_asked, out);
+    if (!status) {
+        (*out)->chosen = like->chosen;
+        status = start_sim(*out, drape_pool_threads(drape_system_pool(like->system)));
+    }
     if (status)
         drape_sim_destroy(out);
     return status;
@@ -135,22 +148,18 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
     if (!model)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_sim_create: there is no model");
     drape_status status = read_def(ctx, given, &def);
-    if (status)
-        return status;
-    drape_sim *sim = drape_alloc(ctx, 1, sizeof *sim);
-    if (!sim)
-        return DRAPE_E_MEMORY;
-    *sim = empty_sim(ctx, model, def.frame_rate > 0 ? def.frame_rate : model->frame_rate, def.realtime_step);
-    status = drape_choose(ctx, model, &def, &sim->chosen);
     if (!status)
-        status = start_sim(sim, def.threads);
-    if (status) {
-        drape_sim_destroy(&sim);
-        return status;
-    }
-    sim->statistics.wall_setup = drape_clock_seconds() - start;
-    *out = sim;
-    return DRAPE_OK;
+        status = open_sim(ctx, model, def.frame_rate > 0 ? def.frame_rate : model->frame_rate,
+                          def.realtime_step, out);
+    if (!status)
+        status = drape_choose(ctx, model, &def, &(*out)->chosen);
+    if (!status)
+        status = start_sim(*out, def.threads);
+    if (status)
+        drape_sim_destroy(out);
+    else
+        (*out)->statistics.wall_setup = drape_clock_seconds() - start;
+    return status;
 }
 
 void drape_sim_destroy(drape_sim **out)
@@ -158,10 +167,10 @@ void drape_sim_destroy(drape_sim **out)
     if (!out || !*out)
         return;
     drape_sim *sim = *out;
-    if (sim->integrator)
+    if (sim->integrator && sim->chosen.integrator->destroy)
         sim->chosen.integrator->destroy(&sim->integrator);
     drape_system_destroy(&sim->system);
-    drape_arena_free(&sim->arena);
+    drape_arena_destroy(&sim->arena);
     drape_free(sim->ctx, sim);
     *out = NULL;
 }
@@ -194,7 +203,7 @@ void drape_sim_cancel(drape_sim *sim)
         atomic_store(&sim->cancel, true);
 }
 
-drape_status drape_sim_heed(drape_sim *sim)
+drape_status drape_sim_check_cancel(drape_sim *sim)
 {
     if (!atomic_exchange(&sim->cancel, false))
         return DRAPE_OK;
@@ -256,18 +265,18 @@ drape_status drape_sim_guard(drape_sim *sim, const char *function)
 {
     if (!sim)
         return DRAPE_E_ARGUMENT;
-    if (sim->telling)
+    if (sim->notifying)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: not from an observer, while the sim advances",
                           function);
     return DRAPE_OK;
 }
 
-drape_status drape_sim_tell(drape_sim *sim, const drape_event *event)
+drape_status drape_sim_notify(drape_sim *sim, const drape_event *event)
 {
     for (int i = 0; i < sim->observer_count; i++) {
-        sim->telling = true;
+        sim->notifying = true;
         drape_status status = sim->observers[i](sim->observer_users[i], event);
-        sim->telling = false;
+        sim->notifying = false;
         if (status > 0)
             return drape_fail(sim->ctx, DRAPE_E_STOPPED, "t=%.9g: an observer asked to stop",
                               drape_sim_state(sim)->t);

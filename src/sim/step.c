@@ -35,10 +35,11 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
     }
     const drape_state *before = drape_sim_state(sim);
     drape_status status =
-        drape_system_check_contact(sim->system, next->x, next->t, &info->reason, &info->worst);
+        drape_system_check_contact(sim->system, next->x, next->t, &info->reason, &info->diagnostic);
     if (status || info->lenient)
         return status;
-    return drape_system_check(sim->system, next->x, before->x, before->internal, &info->reason, &info->worst);
+    return drape_system_check(sim->system, next->x, before->x, before->internal, &info->reason,
+                              &info->diagnostic);
 }
 
 /* ---- Attempt ---- */
@@ -48,7 +49,8 @@ static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info
     drape_state *next = next_state(sim);
     next->t = t1;
     sim->made_known = false;
-    info->worst = (drape_worst){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
+    info->diagnostic =
+        (drape_diagnostic){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));
     if (!status)
         status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
@@ -83,18 +85,18 @@ static void measure_strain(drape_sim *sim, const double *x)
     s->strain_max = high;
 }
 
-/* The new state counts. What was now becomes past, as far back as the controller looks; the oldest is
- * written over next. */
+/* Makes the new state the present one. The present one becomes past, as many as the controller wants; the
+ * oldest is overwritten next. */
 static void turn_states(drape_sim *sim)
 {
-    int pasts = sim->chosen.controller->pasts, spare = sim->now;
-    for (int k = 0; k < pasts; k++) {
+    int history_depth = sim->chosen.controller->history_depth, spare = sim->now;
+    for (int k = 0; k < history_depth; k++) {
         int older = sim->past[k];
         sim->past[k] = spare;
         spare = older;
     }
     while (spare < 0 || spare == sim->next || spare == sim->past[0] || spare == sim->past[1])
-        spare++; /* not all places are filled yet: the first free one */
+        spare++; /* not all states are used yet: take the first free one */
     sim->before = sim->now;
     sim->now = sim->next;
     sim->next = spare;
@@ -106,7 +108,7 @@ static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
     if (!info->committed)
         drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
     turn_states(sim);
-    drape_sim_book(sim, info);
+    drape_sim_add_work(sim, info);
     measure_strain(sim, drape_sim_state(sim)->x);
     s->h_min = s->steps_accepted == 0 ? info->h : fmin(info->h, s->h_min);
     s->h_max = fmax(info->h, s->h_max);
@@ -129,11 +131,12 @@ static void count_reason(drape_sim *sim, const char *reason)
     sim->reasons[i].count++;
 }
 
-/* Where the attempt was made over the state that the last step began with, that one is gone: the sim is as at a start. A row
- * without time tells no frames after its first step, and needs to know that there was one. */
+/* If the attempt overwrote the state that the last step began with, the sim has no state before, as at a
+ * start. A steady-state integrator keeps `before`: it has no frames after its first step, and needs to know
+ * that there was one. */
 static void reject(drape_sim *sim, const drape_step_info *info)
 {
-    if (sim->before == sim->next && !sim->chosen.integrator->timeless)
+    if (sim->before == sim->next && !sim->chosen.integrator->steady_state)
         sim->before = -1;
     sim->statistics.steps_rejected++;
     count_reason(sim, info->reason);
@@ -163,83 +166,87 @@ static drape_verdict judge(drape_sim *sim, drape_step_info *info, drape_status s
     return sim->chosen.controller->judge(sim->chosen.controller_values, trial);
 }
 
-/* ---- Telling ---- */
+/* ---- Reporting ---- */
 
 /* "bend.hinge 37 (nodes 4 5 9 10 of sheet): altitude / rest altitude = 3e-09, limit 1e-06" */
-static void describe_worst(const drape_model *model, const drape_worst *worst, char *text, size_t size)
+static void describe_worst(const drape_model *model, const drape_diagnostic *diagnostic, char *text,
+                           size_t size)
 {
     size_t used = 0;
     text[0] = 0;
-    if (worst->node[0] < 0) {
-        if (*worst->what)
-            snprintf(text, size, "; %s = %.4g, limit %.4g", worst->what, worst->value, worst->limit);
+    if (diagnostic->node[0] < 0) {
+        if (*diagnostic->what)
+            snprintf(text, size, "; %s = %.4g, limit %.4g", diagnostic->what, diagnostic->value,
+                     diagnostic->limit);
         return;
     }
-    if (worst->element >= 0)
-        used = (size_t)snprintf(text, size, "; %s %d (nodes", worst->term, (int)worst->element);
+    if (diagnostic->element >= 0)
+        used = (size_t)snprintf(text, size, "; %s %d (nodes", diagnostic->term, (int)diagnostic->element);
     else
         used = (size_t)snprintf(text, size, "; worst at (node");
-    const drape_cloth *cloth = &model->cloths[worst->cloth];
-    for (int a = 0; a < 4 && worst->node[a] >= 0 && used < size; a++)
-        used += (size_t)snprintf(text + used, size - used, " %d", (int)(worst->node[a] - cloth->first_node));
+    const drape_cloth *cloth = &model->cloths[diagnostic->cloth];
+    for (int a = 0; a < 4 && diagnostic->node[a] >= 0 && used < size; a++)
+        used +=
+            (size_t)snprintf(text + used, size - used, " %d", (int)(diagnostic->node[a] - cloth->first_node));
     if (used < size)
-        snprintf(text + used, size - used, " of %s): %s = %.4g, limit %.4g", cloth->name, worst->what,
-                 worst->value, worst->limit);
+        snprintf(text + used, size - used, " of %s): %s = %.4g, limit %.4g", cloth->name, diagnostic->what,
+                 diagnostic->value, diagnostic->limit);
 }
 
-/* For the host's log: what was rejected, and why. */
+/* Logs what was rejected, and why. */
 static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
 {
-    char worst[400];
+    char diagnostic[400];
     if (attempt->accepted || !sim->ctx->def.log)
         return;
-    describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
+    describe_worst(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
     drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g h=%.4g: step rejected, %s (%s)%s", attempt->t, attempt->h,
-              attempt->reason, drape_status_name(attempt->status), worst);
+              attempt->reason, drape_status_name(attempt->status), diagnostic);
 }
 
 static drape_status explain(drape_sim *sim, drape_status stop, const drape_attempt *attempt)
 {
-    char worst[400], residual[100] = "", distortion[200] = "";
-    if (stop == DRAPE_E_MEMORY) /* the allocator said it */
+    char diagnostic[400], residual[100] = "", distortion[200] = "";
+    if (stop == DRAPE_E_MEMORY) /* the allocator set the message */
         return stop;
     if (stop == DRAPE_E_STOPPED)
-        return drape_sim_heed(sim);
-    describe_worst(sim->model, &attempt->worst, worst, sizeof worst);
-    if (attempt->worst.element < 0) /* a node says where, an element may say why */
+        return drape_sim_check_cancel(sim);
+    describe_worst(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
+    if (attempt->diagnostic.element < 0) /* the diagnostic names a node; the distortion may say why */
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
-    if (!isnan(attempt->tolerance) && !isnan(attempt->residual)) /* rows that bound errors have none */
+    if (!isnan(attempt->tolerance) && !isnan(attempt->residual)) /* integrators that bound errors have no
+                                                                    residual */
         snprintf(residual, sizeof residual, ", residual %.4g N for a tolerance of %.4g N", attempt->residual,
                  attempt->tolerance);
     return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s", attempt->t,
                       attempt->h, attempt->reason, drape_status_name(attempt->status), attempt->iterations,
-                      residual, worst, distortion);
+                      residual, diagnostic, distortion);
 }
 
-/* A row that chooses its own steps has no dt, and a bound of its own. */
-drape_status drape_sim_bound(drape_sim *sim, const drape_attempt *last)
+/* An integrator that chooses its own steps has no dt, and a bound of its own. */
+drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
 {
-    char worst[400];
+    char diagnostic[400];
     const drape_schedule *s = &sim->schedule;
-    if (!(s->dt > 0) || (double)s->tries < sim->most_attempts)
+    if (!(s->dt > 0) || (double)s->tries < sim->max_attempts)
         return DRAPE_OK;
-    describe_worst(sim->model, &last->worst, worst, sizeof worst);
+    describe_worst(sim->model, &last->diagnostic, diagnostic, sizeof diagnostic);
     return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
                       "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64 " attempts since t=%.9g did not "
                       "come as far as one dt, %.4g s, and the controller's max_attempts is %.15g%s",
                       drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status),
-                      last->iterations, s->tries, s->tries_from, s->dt, sim->most_attempts, worst);
+                      last->iterations, s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic);
 }
 
-static drape_status tell_attempt(drape_sim *sim, const drape_attempt *attempt)
+static drape_status notify_attempt(drape_sim *sim, const drape_attempt *attempt)
 {
     drape_event event = {.kind = DRAPE_EVENT_ATTEMPT, .sim = sim, .attempt = attempt};
-    return drape_sim_tell(sim, &event);
+    return drape_sim_notify(sim, &event);
 }
 
 /* ---- One step, and all of them ---- */
 
-/* What an attempt was, for the observers. */
+/* The description of an attempt for the observers. */
 static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *info, drape_status status,
                                bool accepted)
 {
@@ -252,7 +259,7 @@ static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *
                            .iterations = info->iterations,
                            .residual = info->residual,
                            .tolerance = info->tolerance,
-                           .worst = info->worst};
+                           .diagnostic = info->diagnostic};
 }
 
 /* One attempt from proposal to verdict. *stop: the negative status that ends the advance, 0 to go on. */
@@ -274,14 +281,14 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     return record_of(sim, t, &info, refused ? DRAPE_RETRY_REJECTED : status, verdict == DRAPE_ACCEPT);
 }
 
-/* Of this step and all else that asked for contact, energies that are told for example. */
+/* Contact time so far, including queries outside steps such as energies for observers. */
 static double contact_seconds(const drape_sim *sim)
 {
     return sim->chosen.integrator->work(sim->integrator).contact_seconds +
            drape_contact_seconds(drape_system_contact(sim->system));
 }
 
-/* The frames inside an accepted step belong to it even if an observer stops the run there. */
+/* The frames inside an accepted step are passed on even if an observer stops the run at the attempt. */
 drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *attempt)
 {
     drape_status stop = DRAPE_OK;
@@ -291,7 +298,7 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     sim->statistics.wall_contact += contact_seconds(sim) - contact;
     log_rejection(sim, attempt);
-    drape_status told = tell_attempt(sim, attempt);
+    drape_status told = notify_attempt(sim, attempt);
     drape_status framed = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
     if (stop)
         return explain(sim, stop, attempt);
@@ -305,17 +312,17 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
     drape_status guarded = drape_sim_guard(sim, "drape_sim_advance");
     if (guarded)
         return guarded;
-    sim->ctx->message[0] = 0; /* what it says after a failure is of this advance */
+    sim->ctx->message[0] = 0; /* after a failure the message is of this advance */
     if (!isfinite(t_end))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_advance: t_end is not finite");
     drape_status status =
-        drape_sim_emit_frames(sim); /* the first, and those that an observer's stop left over */
+        drape_sim_emit_frames(sim); /* the first frame, and those that a stop by an observer left */
     drape_sim_leave_realtime(sim);
     drape_schedule_aim(&sim->schedule, t_end);
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {
-        status = drape_sim_bound(sim, &attempt);
+        status = drape_sim_check_attempts(sim, &attempt);
         if (!status)
-            status = drape_sim_heed(sim);
+            status = drape_sim_check_cancel(sim);
         if (!status)
             status = drape_sim_step(sim, t1, h, &attempt);
     }

@@ -1,12 +1,12 @@
 /*
- * elimination.c: see elimination.h. Order by minimum degree (AMD) or, for larger ones where METIS is there, nested
- * dissection; elimination tree with path compression (Liu 1990, The role of elimination trees in sparse
- * factorization); postorder; rows of the columns from those of their children. Then a front is merged with its last
- * child where the two take longer than the one, zeros included.
+ * elimination.c: see elimination.h. Order by minimum degree (AMD) or, for larger ones where METIS is there,
+ * nested dissection; elimination tree with path compression (Liu 1990, The role of elimination trees in
+ * sparse factorization); postorder; rows of the columns from those of their children. Then a front is merged
+ * with its last child where the two take longer than the one, zeros included.
  */
 #define _XOPEN_SOURCE 700 /* initstate */
 #include "solvers/elimination.h"
-#include "solvers/alone.h"
+#include "solvers/library_lock.h"
 
 #include <amd.h>
 #include <stdlib.h>
@@ -17,9 +17,9 @@
 
 #define DISSECTED 1500 /* blocks; below, nested dissection fills no less than minimum degree */
 
-/* What only the making needs. */
+/* Workspace of the construction. */
 typedef struct maker {
-    drape_context *ctx;
+    drape_arena *arena, scratch;
     const drape_pattern *pattern;
     drape_elimination *e;
     int32_t *parent, *post, *head, *next, *mark, *stack; /* (n) of columns; head, next: lists of children */
@@ -33,19 +33,20 @@ typedef struct maker {
 #define RAND_STATE 128 /* [bytes] as much as rand() begins with, so that it gives the same numbers */
 
 /*
- * METIS draws its cuts from rand(), which it seeds. That is one for the whole process: two at once would have each other's
- * numbers and another order, so other bits, and a host's own sequence would begin anew. So one at a time does it, with a state of
- * rand() that is its own. What is left is a host that calls rand() from another thread meanwhile.
+ * METIS seeds rand() and draws its cuts from it. rand() belongs to the whole process: two calls at once would
+ * take each other's numbers and give another order, and so other bits, and a host's own sequence would begin
+ * again. So only one thread at a time calls METIS, with a state of rand() of its own. A host that calls
+ * rand() from another thread meanwhile still disturbs it.
  */
-static int dissect_alone(idx_t *n, idx_t *start, idx_t *other, idx_t *options, maker *m)
+static int dissect_locked(idx_t *n, idx_t *start, idx_t *other, idx_t *options, maker *m)
 {
     char own[RAND_STATE];
-    drape_alone_begin();
+    drape_library_lock();
     char *before = initstate(1, own, sizeof own);
     const int code = METIS_NodeND(n, start, other, NULL, options, m->e->order, m->e->place);
     if (before)
         setstate(before);
-    drape_alone_end();
+    drape_library_unlock();
     return code;
 }
 
@@ -53,19 +54,18 @@ static bool dissect(maker *m)
 {
     const drape_pattern *p = m->pattern;
     idx_t n = p->block_count, at = 0, options[METIS_NOPTIONS];
-    idx_t *start = drape_alloc(m->ctx, (size_t)n + 1, sizeof *start);
-    idx_t *other = drape_alloc(m->ctx, (size_t)p->block_start[n] + 1, sizeof *other);
-    for (idx_t j = 0; start && other && j < n; j++) {
+    idx_t *start = drape_arena_take(&m->scratch, (size_t)n + 1, sizeof *start);
+    idx_t *other = drape_arena_take(&m->scratch, (size_t)p->block_start[n] + 1, sizeof *other);
+    if (drape_arena_status(&m->scratch))
+        return false;
+    for (idx_t j = 0; j < n; j++) {
         for (int32_t k = p->block_start[j]; k < p->block_start[j + 1]; k++)
             if (p->block_row[k] != j)
                 other[at++] = p->block_row[k];
         start[j + 1] = at;
     }
     METIS_SetDefaultOptions(options);
-    bool done = start && other && dissect_alone(&n, start, other, options, m) == METIS_OK;
-    drape_free(m->ctx, start);
-    drape_free(m->ctx, other);
-    return done;
+    return dissect_locked(&n, start, other, options, m) == METIS_OK;
 }
 _Static_assert(sizeof(idx_t) == sizeof(int32_t), "METIS orders with the pattern's integers");
 #endif
@@ -149,7 +149,8 @@ static void reorder(maker *m)
 
 /* ---- Fronts ---- */
 
-/* Time of a front in arbitrary units: its arithmetic in tiles of 4 x 4 blocks, its memory, its administration. */
+/* Time of a front in arbitrary units: its arithmetic in tiles of 4 x 4 blocks, its memory, its
+ * administration. */
 static double cost_of(int32_t columns, int32_t rows)
 {
     const double w = 3.0 * columns, r = 12.0 * ((rows + 3) / 4), d = 12.0 * ((columns + 3) / 4);
@@ -162,7 +163,7 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Rows below j of the columns j of the matrix and of the fronts that end in its children, into m->stack. */
+/* Rows below j of column j of the matrix and of the fronts that end in children of j, into m->stack. */
 static int32_t gather_rows(maker *m, int32_t j)
 {
     const drape_pattern *p = m->pattern;
@@ -186,7 +187,8 @@ static int32_t gather_rows(maker *m, int32_t j)
     return count;
 }
 
-/* Front f ends: its rows are those of its first column that lie beyond its last; it waits for its parent's. */
+/* Front f ends: its rows are those of its first column that lie beyond its last column. It is listed as a
+ * child of the column above. */
 static void close_front(maker *m, int32_t f)
 {
     drape_elimination *e = m->e;
@@ -203,7 +205,7 @@ static void close_front(maker *m, int32_t f)
     }
 }
 
-/* Columns with the same rows below them, one after another, are one front. */
+/* Consecutive columns with the same rows below them are one front. */
 static bool find_fronts(maker *m)
 {
     drape_elimination *e = m->e;
@@ -212,7 +214,7 @@ static bool find_fronts(maker *m)
         m->head[j] = m->mark[j] = -1;
     for (int32_t j = 0; j < e->n; j++) {
         const bool linked = j > 0 && m->parent[j - 1] == j;
-        if (f >= 0) { /* so that its rows are seen by j, or by who is above it */
+        if (f >= 0) { /* so that j, or a column above it, sees its rows */
             e->first[f + 1] = j;
             if (!linked)
                 close_front(m, f);
@@ -232,7 +234,7 @@ static bool find_fronts(maker *m)
         if (linked)
             close_front(m, f);
         e->first[++f] = j;
-        m->rows[f] = drape_alloc(m->ctx, (size_t)count, sizeof **m->rows);
+        m->rows[f] = drape_arena_take(&m->scratch, (size_t)count, sizeof **m->rows);
         if (!m->rows[f])
             return false;
         qsort(m->stack, (size_t)count, sizeof *m->stack, compare);
@@ -247,7 +249,7 @@ static bool find_fronts(maker *m)
     return true;
 }
 
-/* Whether front f takes less time with its last child, g, as one. */
+/* Whether front f takes less time when merged with its last child g. */
 static bool is_better_merged(const maker *m, int32_t first, int32_t middle, int32_t last, int32_t g,
                              int32_t f)
 {
@@ -256,8 +258,8 @@ static bool is_better_merged(const maker *m, int32_t first, int32_t middle, int3
            cost_of(middle - first, m->length[g]) + cost_of(last - middle, m->length[f]);
 }
 
-/* Fronts are pushed on a stack that is written over the list of them; the last child of the one on top lies below
- * it. */
+/* Fronts are pushed on a stack that overwrites their list; the last child of a front is on top when it is
+ * pushed. */
 static void merge_fronts(maker *m)
 {
     drape_elimination *e = m->e;
@@ -267,22 +269,18 @@ static void merge_fronts(maker *m)
         int32_t first = e->first[f];
         while (top >= 0 && m->length[top] > 0 && m->rows[top][0] < last &&
                is_better_merged(m, e->first[top], first, last, top, f)) {
-            first = e->first[top];
-            drape_free(m->ctx, m->rows[top]);
-            m->rows[top--] = NULL;
+            first = e->first[top--];
         }
         top++;
-        int32_t *rows = m->rows[f], length = m->length[f];
-        m->rows[f] = NULL;
-        m->rows[top] = rows;
-        m->length[top] = length;
+        m->rows[top] = m->rows[f];
+        m->length[top] = m->length[f];
         e->first[top] = first;
     }
     e->count = top + 1;
     e->first[e->count] = e->n;
 }
 
-/* ---- What stays ---- */
+/* ---- The result ---- */
 
 int32_t drape_front_find(const drape_elimination *e, int32_t front, int32_t row)
 {
@@ -304,19 +302,19 @@ static drape_status keep(maker *m)
 {
     drape_elimination *e = m->e;
     int32_t *front_of = m->mark;
-    e->parent = drape_alloc(m->ctx, (size_t)e->count, sizeof *e->parent);
-    e->work = drape_alloc(m->ctx, (size_t)e->count, sizeof *e->work);
-    e->row_start = drape_alloc(m->ctx, (size_t)e->count + 1, sizeof *e->row_start);
-    if (!e->parent || !e->work || !e->row_start)
+    e->parent = drape_arena_take(m->arena, (size_t)e->count, sizeof *e->parent);
+    e->work = drape_arena_take(m->arena, (size_t)e->count, sizeof *e->work);
+    e->row_start = drape_arena_take(m->arena, (size_t)e->count + 1, sizeof *e->row_start);
+    if (drape_arena_status(m->arena))
         return DRAPE_E_MEMORY;
     for (int32_t f = 0; f < e->count; f++) {
         e->row_start[f + 1] = e->row_start[f] + m->length[f];
         for (int32_t j = e->first[f]; j < e->first[f + 1]; j++)
             front_of[j] = f;
     }
-    e->row = drape_alloc(m->ctx, (size_t)e->row_start[e->count], sizeof *e->row);
-    e->in_parent = drape_alloc(m->ctx, (size_t)e->row_start[e->count], sizeof *e->in_parent);
-    if (!e->row || !e->in_parent)
+    e->row = drape_arena_take(m->arena, (size_t)e->row_start[e->count], sizeof *e->row);
+    e->in_parent = drape_arena_take(m->arena, (size_t)e->row_start[e->count], sizeof *e->in_parent);
+    if (drape_arena_status(m->arena))
         return DRAPE_E_MEMORY;
     for (int32_t f = 0; f < e->count; f++) {
         memcpy(e->row + e->row_start[f], m->rows[f], (size_t)m->length[f] * sizeof *e->row);
@@ -331,48 +329,37 @@ static drape_status keep(maker *m)
 
 static bool allocate(maker *m)
 {
-    const size_t n = (size_t)m->e->n;
-    int32_t **arrays[] = {&m->e->order, &m->e->place, &m->parent, &m->post,  &m->head,
-                          &m->next,     &m->mark,     &m->stack,  &m->length};
+    drape_elimination *e = m->e;
+    const size_t n = (size_t)e->n;
+    int32_t **arrays[] = {&m->parent, &m->post, &m->head, &m->next, &m->mark, &m->stack, &m->length};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        if (!(*arrays[i] = drape_alloc(m->ctx, n, sizeof(int32_t))))
-            return false;
-    m->e->first = drape_alloc(m->ctx, n + 1, sizeof *m->e->first);
-    m->rows = drape_alloc(m->ctx, n, sizeof *m->rows);
-    return m->e->first && m->rows;
+        *arrays[i] = drape_arena_take(&m->scratch, n, sizeof(int32_t));
+    m->rows = drape_arena_take(&m->scratch, n, sizeof *m->rows);
+    e->order = drape_arena_take(m->arena, n, sizeof *e->order);
+    e->place = drape_arena_take(m->arena, n, sizeof *e->place);
+    e->first = drape_arena_take(m->arena, n + 1, sizeof *e->first);
+    return !drape_arena_status(&m->scratch) && !drape_arena_status(m->arena);
 }
 
-drape_status drape_elimination_create(drape_context *ctx, const drape_pattern *pattern, drape_elimination *e)
+static drape_status make(maker *m)
 {
-    maker m = {.ctx = ctx, .pattern = pattern, .e = e};
+    if (!allocate(m) || !order(m))
+        return DRAPE_E_MEMORY;
+    invert(m);
+    find_parents(m);
+    find_postorder(m);
+    reorder(m);
+    if (!find_fronts(m))
+        return DRAPE_E_MEMORY;
+    merge_fronts(m);
+    return keep(m);
+}
+
+drape_status drape_elimination_create(drape_arena *arena, const drape_pattern *pattern, drape_elimination *e)
+{
+    maker m = {.arena = arena, .scratch = drape_arena_of(arena->ctx), .pattern = pattern, .e = e};
     *e = (drape_elimination){.n = pattern->block_count};
-    bool good = allocate(&m) && order(&m);
-    if (good) {
-        invert(&m);
-        find_parents(&m);
-        find_postorder(&m);
-        reorder(&m);
-        good = find_fronts(&m);
-    }
-    drape_status status = good ? DRAPE_OK : DRAPE_E_MEMORY;
-    if (good) {
-        merge_fronts(&m);
-        status = keep(&m);
-    }
-    for (int32_t f = 0; m.rows && f < e->n; f++)
-        drape_free(ctx, m.rows[f]);
-    void *all[] = {m.parent, m.post, m.head, m.next, m.mark, m.stack, m.length, m.rows};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        drape_free(ctx, all[i]);
-    if (status)
-        drape_elimination_free(ctx, e);
+    drape_status status = make(&m);
+    drape_arena_free(&m.scratch);
     return status;
-}
-
-void drape_elimination_free(drape_context *ctx, drape_elimination *e)
-{
-    void *all[] = {e->order, e->place, e->first, e->parent, e->row_start, e->row, e->in_parent, e->work};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        drape_free(ctx, all[i]);
-    memset(e, 0, sizeof *e);
 }

@@ -1,7 +1,8 @@
 /*
- * elimination.h: in which order a symmetric matrix of 3 x 3 blocks is eliminated, and what fills in. Columns of
- * blocks with the same rows below them are taken together as a front (a supernode); the fronts form a tree: what a
- * front's elimination leaves on its rows is added to its parent, whose columns and rows hold them all.
+ * elimination.h: the order in which a symmetric matrix of 3 x 3 blocks is eliminated, and the fill-in.
+ * Columns of blocks with the same rows below them are taken together as a front (a supernode); the fronts
+ * form a tree: what a front's elimination leaves on its rows is added to its parent, whose columns and rows
+ * contain all of them.
  */
 #ifndef DRAPE_SOLVERS_ELIMINATION_H
 #define DRAPE_SOLVERS_ELIMINATION_H
@@ -22,8 +23,7 @@ typedef struct drape_elimination {
 } drape_elimination;
 
 /* Errors: DRAPE_E_MEMORY. */
-drape_status drape_elimination_create(drape_context *ctx, const drape_pattern *pattern, drape_elimination *e);
-void drape_elimination_free(drape_context *ctx, drape_elimination *e);
+drape_status drape_elimination_create(drape_arena *arena, const drape_pattern *pattern, drape_elimination *e);
 
 static inline int32_t drape_front_columns(const drape_elimination *e, int32_t front)
 {

@@ -1,6 +1,8 @@
 /* inertia.c: see inertia.h. AMD orders, LDL (Davis 2005, Algorithm 849) factors without pivoting. */
 #include "solvers/inertia.h"
 
+#include "base/arena.h"
+
 #include <amd.h>
 #include <ldl.h>
 
@@ -19,46 +21,34 @@ static index_t *indices(const int64_t *array)
     return (index_t *)(uintptr_t)array;
 }
 
-static void free_work(drape_context *ctx, ldl_work *w)
+static drape_status analyse(drape_arena *arena, const drape_pattern *p, ldl_work *w)
 {
-    void *all[] = {w->order,  w->inverse, w->parent, w->column_count, w->flag, w->pattern,
-                   w->column, w->d,       w->y,      w->row,          w->value};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        drape_free(ctx, all[i]);
-}
-
-static bool allocate(drape_context *ctx, size_t n, ldl_work *w)
-{
+    const size_t n = (size_t)p->n;
     index_t **arrays[] = {&w->order, &w->inverse, &w->parent, &w->column_count,
                           &w->flag,  &w->pattern, &w->column};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        if (!(*arrays[i] = drape_alloc(ctx, n + 1, sizeof(index_t))))
-            return false;
-    w->d = drape_alloc(ctx, n, sizeof *w->d);
-    w->y = drape_alloc(ctx, n, sizeof *w->y);
-    return w->d && w->y;
-}
-
-static drape_status analyse(drape_context *ctx, const drape_pattern *p, ldl_work *w)
-{
-    if (!allocate(ctx, (size_t)p->n, w))
+        *arrays[i] = drape_arena_take(arena, n + 1, sizeof(index_t));
+    w->d = drape_arena_take(arena, n, sizeof *w->d);
+    w->y = drape_arena_take(arena, n, sizeof *w->y);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     if (amd_l_order(p->n, indices(p->column), indices(p->row), w->order, NULL, NULL) < AMD_OK)
-        return drape_fail_memory(ctx, (size_t)p->nonzeros * sizeof(index_t));
+        return drape_fail_memory(arena->ctx, (size_t)p->nonzeros * sizeof(index_t));
     ldl_l_symbolic(p->n, indices(p->column), indices(p->row), w->column, w->parent, w->column_count, w->flag,
                    w->order, w->inverse);
-    w->row = drape_alloc(ctx, (size_t)w->column[p->n], sizeof *w->row);
-    w->value = drape_alloc(ctx, (size_t)w->column[p->n], sizeof *w->value);
-    return w->row && w->value ? DRAPE_OK : DRAPE_E_MEMORY;
+    w->row = drape_arena_take(arena, (size_t)w->column[p->n], sizeof *w->row);
+    w->value = drape_arena_take(arena, (size_t)w->column[p->n], sizeof *w->value);
+    return drape_arena_status(arena);
 }
 
 drape_status drape_inertia(drape_context *ctx, const drape_pattern *p, const double *values,
                            int64_t *negative, bool *known)
 {
     ldl_work w = {0};
+    drape_arena arena = drape_arena_of(ctx);
     *negative = 0;
     *known = false;
-    drape_status status = analyse(ctx, p, &w);
+    drape_status status = analyse(&arena, p, &w);
     if (!status) {
         index_t done = ldl_l_numeric(p->n, indices(p->column), indices(p->row), (double *)(uintptr_t)values,
                                      w.column, w.parent, w.column_count, w.row, w.value, w.d, w.y, w.pattern,
@@ -69,6 +59,6 @@ drape_status drape_inertia(drape_context *ctx, const drape_pattern *p, const dou
             *known = *known && w.d[i] == w.d[i];
         }
     }
-    free_work(ctx, &w);
+    drape_arena_free(&arena);
     return status;
 }

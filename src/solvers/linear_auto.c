@@ -1,6 +1,6 @@
 /*
- * auto: the row that was measured to be the fastest at this number of unknowns (bench/linears) among those
- * in this build: each row says from how many unknowns on it is.
+ * auto: the solver that was measured to be the fastest at this number of unknowns (bench/linears) among those
+ * in this build: each has the number from which on it is (best_from).
  */
 #include "solvers/linear.h"
 
@@ -8,13 +8,12 @@
 #include <stdio.h>
 
 typedef struct auto_state {
-    drape_context *ctx;
     const drape_linear_ops *row;
     int64_t n;
     void *solver;
 } auto_state;
 
-/* The row that takes over at some larger size; NULL: none. */
+/* The solver that is picked from the next larger size on; NULL: none. */
 static const drape_linear_ops *next_row(int64_t from)
 {
     const drape_linear_ops *next = NULL;
@@ -27,31 +26,26 @@ static const drape_linear_ops *next_row(int64_t from)
 static void destroy(void **state)
 {
     auto_state *s = *state;
-    if (!s)
-        return;
-    s->row->destroy(&s->solver);
-    drape_free(s->ctx, s);
-    *state = NULL;
+    drape_linear_destroy(s->row, &s->solver);
 }
 
-static drape_status create(drape_context *ctx, const drape_pattern *pattern, void **state)
+static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
 {
-    auto_state *s = drape_alloc(ctx, 1, sizeof *s);
-    *state = s;
+    auto_state *s = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (auto_state){.ctx = ctx, .row = drape_linear_best(pattern->n), .n = pattern->n};
-    drape_status status = s->row->create(ctx, pattern, &s->solver);
-    if (status)
-        destroy(state);
+    *s = (auto_state){.row = drape_linear_best(pattern->n), .n = pattern->n};
+    drape_status status = s->row->create(arena, pattern, &s->solver);
+    if (!status)
+        *state = s;
     return status;
 }
 
-static void use_threads(void *state, drape_crew *crew)
+static void use_threads(void *state, drape_pool *pool)
 {
     auto_state *s = state;
     if (s->row->use_threads)
-        s->row->use_threads(s->solver, crew);
+        s->row->use_threads(s->solver, pool);
 }
 
 static drape_status factor(void *state, const double *values)
@@ -81,7 +75,7 @@ static void archive(void *state, drape_archive *a, const double *values)
 static size_t bytes(const void *state)
 {
     const auto_state *s = state;
-    return sizeof *s + s->row->bytes(s->solver);
+    return drape_linear_bytes(s->row, s->solver);
 }
 
 static void report(const void *state, drape_linear_report *out)
@@ -91,7 +85,7 @@ static void report(const void *state, drape_linear_report *out)
     *out = (drape_linear_report){.row = s->row};
     if (s->row->report)
         s->row->report(s->solver, out);
-    const char *name = next ? next->name : s->row->name;
+    const char *name = next ? next->entry.name : s->row->entry.name;
     int64_t from = next ? next->best_from : s->row->best_from;
     if (from > 1)
         snprintf(out->why, sizeof out->why, "%" PRId64 " unknowns; %s from %" PRId64 " on", s->n, name, from);
@@ -100,9 +94,10 @@ static void report(const void *state, drape_linear_report *out)
 }
 
 const drape_linear_ops drape_linear_auto = {
-    .name = "auto",
-    .summary = "the fastest direct solver of this build for the number of unknowns; drape info says which",
-    .reference = "bench/linears",
+    .entry = {.name = "auto",
+              .summary =
+                  "the fastest direct solver of this build for the number of unknowns; drape info says which",
+              .reference = "bench/linears"},
     .create = create,
     .use_threads = use_threads,
     .factor = factor,

@@ -4,15 +4,13 @@
  * of the scalars; the factors' memory is taken there too. Nested dissection by METIS, which Debian has shared
  * only, saves a quarter of a factorisation at 10 000 nodes and nothing up to 529, for 1.6 times the analysis.
  *
- * Whether a matrix is symmetric is not asked of the caller but seen: each entry of the lower triangle is
- * compared with its mirror while it is copied. A matrix that is not symmetric (internal damping in continuous
- * time and friction have such a part), not positive definite, or singular to working precision goes to the
- * row that is the fastest for general matrices of this size, which solves it as it stands or tells that it
- * cannot; nothing is made symmetric that is not. That row's solver is made for the first such matrix: most
- * scenes have none, and its analysis would be up to half of create.
+ * Callers do not say whether a matrix is symmetric: each entry of the lower triangle is compared with its
+ * mirror while it is copied. A matrix that is not symmetric (internal damping in continuous time and friction
+ * have such a part), not positive definite, or singular to working precision goes to the fallback
+ * (fallback.h); no matrix is made symmetric that is not.
  */
-#include "solvers/alone.h"
-#include "solvers/linear.h"
+#include "solvers/fallback.h"
+#include "solvers/library_lock.h"
 
 #include "base/finite.h"
 
@@ -27,7 +25,7 @@ typedef SuiteSparse_long index_t;
 /* Round-off in a_ij, whose elements' parts are at most about sqrt(a_ii a_jj) each. Below it, a difference
  * between mirrored entries moves the solution as rounding the entries does. */
 #define SYMMETRY  1e-13
-#define MIN_RCOND 1e-15 /* below: singular to working precision; the general row decides */
+#define MIN_RCOND 1e-15 /* below: singular to working precision; the fallback decides */
 
 extern const drape_linear_ops drape_linear_cholmod;
 
@@ -37,10 +35,9 @@ typedef struct triangle {
 } triangle;
 
 typedef struct cholmod_state {
-    drape_context *ctx;
+    drape_arena *arena;
     const drape_pattern *pattern;
     cholmod_common common;
-    bool started;               /* common is */
     index_t *order;             /* (blocks) the block column of the pattern that is eliminated k-th */
     triangle blocks;            /* lower, rows ascending */
     int32_t *source, *mirror;   /* (lower blocks) the pattern's block that each is, and the transposed one */
@@ -49,32 +46,11 @@ typedef struct cholmod_state {
     double *diagonal;           /* (n) in the pattern's order */
     double *solution, *scratch; /* (n), (largest supernode) for solve */
     cholmod_factor *factor;
-    const drape_linear_ops *general_row; /* for what has no Cholesky factors */
-    void *general;                       /* its state; NULL before the first such matrix */
-    bool by_general, factored;
-    int64_t fallbacks;
+    drape_fallback fallback;
+    bool factored; /* here or by the fallback */
 } cholmod_state;
 
 _Static_assert(sizeof(index_t) == sizeof(int64_t), "the pattern's indices are passed to CHOLMOD as they are");
-
-static void destroy(void **state)
-{
-    cholmod_state *s = *state;
-    if (!s)
-        return;
-    if (s->started) {
-        cholmod_l_free_factor(&s->factor, &s->common);
-        cholmod_l_finish(&s->common);
-    }
-    if (s->general)
-        s->general_row->destroy(&s->general);
-    void *all[] = {s->order,       s->blocks.column, s->blocks.row, s->source,   s->mirror, s->scalars.column,
-                   s->scalars.row, s->values,        s->diagonal,   s->solution, s->scratch};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        drape_free(s->ctx, all[i]);
-    drape_free(s->ctx, s);
-    *state = NULL;
-}
 
 /* ---- Analysis ---- */
 
@@ -86,70 +62,39 @@ typedef struct analysis {
     index_t *scalar_parent;
 } analysis;
 
-static void free_analysis(drape_context *ctx, analysis *a)
+static index_t *take_indices(drape_arena *arena, size_t count)
 {
-    void *all[] = {a->column,
-                   a->row,
-                   a->inverse,
-                   a->parent,
-                   a->post,
-                   a->count,
-                   a->first,
-                   a->level,
-                   a->upper.column,
-                   a->upper.row,
-                   a->scalar_upper.column,
-                   a->scalar_upper.row,
-                   a->scalar_parent};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        drape_free(ctx, all[i]);
+    return drape_arena_take(arena, count, sizeof(index_t));
 }
 
-/* Blocks and scalars of one triangle, the diagonal in it. */
-static size_t lower_blocks(const drape_pattern *p)
-{
-    return ((size_t)p->block_start[p->block_count] + (size_t)p->block_count) / 2;
-}
-
-static size_t lower_scalars(const drape_pattern *p)
-{
-    return ((size_t)p->nonzeros + (size_t)p->n) / 2;
-}
-
-static bool allocate(cholmod_state *s, analysis *a)
+static drape_status allocate(cholmod_state *s, analysis *a, drape_arena *scratch)
 {
     const drape_pattern *p = s->pattern;
-    size_t blocks = (size_t)p->block_count, n = (size_t)p->n;
-    struct {
-        index_t **array;
-        size_t count;
-    } arrays[] = {{&s->order, blocks},
-                  {&s->blocks.column, blocks + 1},
-                  {&s->blocks.row, lower_blocks(p)},
-                  {&s->scalars.column, n + 1},
-                  {&s->scalars.row, lower_scalars(p)},
-                  {&a->column, blocks + 1},
-                  {&a->row, (size_t)p->block_start[blocks]},
-                  {&a->inverse, blocks},
-                  {&a->parent, blocks},
-                  {&a->post, blocks},
-                  {&a->count, blocks},
-                  {&a->first, blocks},
-                  {&a->level, blocks},
-                  {&a->upper.column, blocks + 1},
-                  {&a->upper.row, lower_blocks(p)},
-                  {&a->scalar_upper.column, n + 1},
-                  {&a->scalar_upper.row, lower_scalars(p)},
-                  {&a->scalar_parent, n}};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++)
-        if (!(*arrays[i].array = drape_alloc(s->ctx, arrays[i].count, sizeof(index_t))))
-            return false;
-    s->source = drape_alloc(s->ctx, lower_blocks(p), sizeof *s->source);
-    s->mirror = drape_alloc(s->ctx, lower_blocks(p), sizeof *s->mirror);
-    s->values = drape_alloc(s->ctx, lower_scalars(p), sizeof *s->values);
-    s->diagonal = drape_alloc(s->ctx, n, sizeof *s->diagonal);
-    s->solution = drape_alloc(s->ctx, n, sizeof *s->solution);
-    return s->source && s->mirror && s->values && s->diagonal && s->solution;
+    const size_t blocks = (size_t)p->block_count, n = (size_t)p->n;
+    /* of one triangle, the diagonal in it */
+    const size_t lower_blocks = ((size_t)p->block_start[blocks] + blocks) / 2,
+                 lower_scalars = ((size_t)p->nonzeros + n) / 2;
+    s->order = take_indices(s->arena, blocks);
+    s->blocks.column = take_indices(s->arena, blocks + 1);
+    s->blocks.row = take_indices(s->arena, lower_blocks);
+    s->scalars.column = take_indices(s->arena, n + 1);
+    s->scalars.row = take_indices(s->arena, lower_scalars);
+    s->source = drape_arena_take(s->arena, lower_blocks, sizeof *s->source);
+    s->mirror = drape_arena_take(s->arena, lower_blocks, sizeof *s->mirror);
+    s->values = drape_arena_take(s->arena, lower_scalars, sizeof *s->values);
+    s->diagonal = drape_arena_take(s->arena, n, sizeof *s->diagonal);
+    s->solution = drape_arena_take(s->arena, n, sizeof *s->solution);
+    a->column = take_indices(scratch, blocks + 1);
+    a->row = take_indices(scratch, (size_t)p->block_start[blocks]);
+    a->upper.column = take_indices(scratch, blocks + 1);
+    a->upper.row = take_indices(scratch, lower_blocks);
+    a->scalar_upper.column = take_indices(scratch, n + 1);
+    a->scalar_upper.row = take_indices(scratch, lower_scalars);
+    a->scalar_parent = take_indices(scratch, n);
+    index_t **const of_blocks[] = {&a->inverse, &a->parent, &a->post, &a->count, &a->first, &a->level};
+    for (size_t i = 0; i < sizeof of_blocks / sizeof *of_blocks; i++)
+        *of_blocks[i] = take_indices(scratch, blocks);
+    return drape_arena_status(s->arena) ? DRAPE_E_MEMORY : drape_arena_status(scratch);
 }
 
 /* A triangle with this many entries as CHOLMOD's matrix; stype -1: lower, 1: upper. */
@@ -225,29 +170,15 @@ static bool permute(cholmod_state *s, analysis *a)
     return cholmod_l_etree(&upper, a->parent, &s->common);
 }
 
-/* Where the blocks below the diagonal lie in the pattern. */
-static void find_sources(cholmod_state *s)
-{
-    for (index_t c = 0; c < s->pattern->block_count; c++)
-        for (index_t k = s->blocks.column[c]; k < s->blocks.column[c + 1]; k++)
-            s->source[k] =
-                drape_pattern_find(s->pattern, (int32_t)s->order[s->blocks.row[k]], (int32_t)s->order[c]);
-}
-
-/* The pattern's blocks in CHOLMOD's indices. */
-static void copy_pattern(const drape_pattern *p, analysis *a)
-{
-    for (index_t i = 0; i <= p->block_count; i++)
-        a->column[i] = p->block_start[i];
-    for (index_t i = 0; i < p->block_start[p->block_count]; i++)
-        a->row[i] = p->block_row[i];
-}
-
 /* Minimum degree, then the elimination tree's own order, in which supernodes are contiguous. */
 static bool order_blocks(cholmod_state *s, analysis *a)
 {
-    index_t n = s->pattern->block_count, *order = a->level;
-    copy_pattern(s->pattern, a);
+    const drape_pattern *p = s->pattern;
+    index_t n = p->block_count, *order = a->level;
+    for (index_t i = 0; i <= n; i++)
+        a->column[i] = p->block_start[i];
+    for (index_t i = 0; i < p->block_start[n]; i++)
+        a->row[i] = p->block_row[i];
     if (amd_l_order(n, a->column, a->row, s->order, NULL, NULL) < AMD_OK || !permute(s, a) ||
         cholmod_l_postorder(a->parent, (size_t)n, NULL, a->post, &s->common) != n)
         return false;
@@ -302,44 +233,53 @@ static bool find_supernodes(cholmod_state *s, analysis *a)
     if (!cholmod_l_super_symbolic(&upper, NULL, a->scalar_parent, s->factor, &s->common) ||
         !cholmod_l_change_factor(CHOLMOD_REAL, 1, 1, 1, 1, s->factor, &s->common))
         return false;
-    s->scratch = drape_alloc(s->ctx, s->factor->maxesize, sizeof *s->scratch);
+    s->scratch = drape_arena_take(s->arena, s->factor->maxesize, sizeof *s->scratch);
     return s->scratch;
 }
 
-static drape_status analyse(cholmod_state *s, analysis *a)
+static bool analyse(cholmod_state *s, analysis *a)
 {
-    if (!allocate(s, a))
-        return DRAPE_E_MEMORY;
-    if (!cholmod_l_start(&s->common))
-        return DRAPE_E_MEMORY;
-    s->started = true;
-    s->common.print = 0;
-    s->common.quick_return_if_not_posdef = 1;
     if (!order_blocks(s, a) || !count_columns(s, a))
-        return DRAPE_E_MEMORY;
-    find_sources(s);
+        return false;
+    for (index_t c = 0; c < s->pattern->block_count; c++)
+        for (index_t k = s->blocks.column[c]; k < s->blocks.column[c + 1]; k++)
+            s->source[k] =
+                drape_pattern_find(s->pattern, (int32_t)s->order[s->blocks.row[k]], (int32_t)s->order[c]);
     expand(s, a);
-    return find_supernodes(s, a) ? DRAPE_OK : DRAPE_E_MEMORY;
+    return find_supernodes(s, a);
 }
 
-static drape_status create(drape_context *ctx, const drape_pattern *pattern, void **state)
+static void destroy(void **state)
 {
-    cholmod_state *s = drape_alloc(ctx, 1, sizeof *s);
-    *state = s;
-    if (!s)
+    cholmod_state *s = *state;
+    cholmod_l_free_factor(&s->factor, &s->common);
+    cholmod_l_finish(&s->common);
+    drape_fallback_destroy(&s->fallback);
+}
+
+static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
+{
+    cholmod_state *s = drape_arena_take(arena, 1, sizeof *s);
+    if (!s || !cholmod_l_start(&s->common))
         return DRAPE_E_MEMORY;
-    s->ctx = ctx;
+    s->arena = arena;
     s->pattern = pattern;
-    s->general_row = drape_linear_general(pattern->n);
+    s->fallback = drape_fallback_of(arena, pattern);
+    s->common.print = 0;
+    s->common.quick_return_if_not_posdef = 1;
     analysis a = {0};
-    drape_status status = analyse(s, &a);
-    free_analysis(ctx, &a);
-    if (status) {
-        drape_fail(ctx, status, "out of memory: CHOLMOD cannot analyse the %lld x %lld Jacobian: status %d",
-                   (long long)pattern->n, (long long)pattern->n, s->common.status);
-        destroy(state);
+    drape_arena scratch = drape_arena_of(arena->ctx);
+    const bool good = !allocate(s, &a, &scratch) && analyse(s, &a);
+    drape_arena_free(&scratch);
+    if (good) {
+        *state = s;
+        return DRAPE_OK;
     }
-    return status;
+    const int code = s->common.status;
+    destroy(&(void *){s});
+    return drape_fail(arena->ctx, DRAPE_E_MEMORY,
+                      "out of memory: CHOLMOD cannot analyse the %lld x %lld Jacobian: status %d",
+                      (long long)pattern->n, (long long)pattern->n, code);
 }
 
 /* ---- Factors ---- */
@@ -401,38 +341,31 @@ static bool factor_lower(cholmod_state *s)
     double shift[2] = {0, 0};
     int levels = omp_get_max_active_levels();
     omp_set_max_active_levels(0);
-    drape_alone_begin();
+    drape_library_lock();
     bool done = cholmod_l_super_numeric(&lower, NULL, shift, s->factor, &s->common);
-    drape_alone_end();
+    drape_library_unlock();
     omp_set_max_active_levels(levels);
     return done && s->common.status == CHOLMOD_OK && s->factor->minor == s->factor->n &&
            cholmod_l_rcond(s->factor, &s->common) > MIN_RCOND;
 }
 
-/* Cholesky factors are tried for each symmetric matrix: leaving attempts out after failures saved 2 or 3 of the
- * 52 that failed in the 512 matrices of a folding sheet, and gave definite matrices to the slower row. */
-static drape_status factor_general(cholmod_state *s, const double *values)
-{
-    drape_status status = DRAPE_OK;
-    s->fallbacks++;
-    if (!s->general)
-        status = s->general_row->create(s->ctx, s->pattern, &s->general);
-    if (!status)
-        status = s->general_row->factor(s->general, values);
-    s->factored = s->by_general = !status;
-    return status;
-}
-
+/* Cholesky factors are tried for each symmetric matrix: leaving attempts out after failures saved 2 or 3 of
+ * the 52 that failed in the 512 matrices of a folding sheet, and gave definite matrices to the slower
+ * fallback. */
 static drape_status factor_any(cholmod_state *s, const double *values, bool definite)
 {
-    s->factored = s->by_general = false;
+    s->fallback.active = s->factored = false;
     if (!drape_all_finite(values, (size_t)s->pattern->nonzeros))
         return DRAPE_RETRY_LINEAR;
     bool positive = read_diagonal(s, values), symmetric = positive && copy_values(s, values);
     s->factored = symmetric && factor_lower(s);
     if (s->factored)
         return DRAPE_OK;
-    return definite && (symmetric || !positive) ? DRAPE_RETRY_LINEAR : factor_general(s, values);
+    if (definite && (symmetric || !positive))
+        return DRAPE_RETRY_LINEAR;
+    drape_status status = drape_fallback_factor(&s->fallback, values);
+    s->factored = !status;
+    return status;
 }
 
 static drape_status factor(void *state, const double *values)
@@ -464,15 +397,15 @@ static drape_status solve(void *state, const double *b, double *x)
     size_t n = (size_t)s->pattern->n;
     if (!s->factored)
         return DRAPE_RETRY_LINEAR;
-    if (s->by_general)
-        return s->general_row->solve(s->general, b, x);
+    if (s->fallback.active)
+        return s->fallback.ops->solve(s->fallback.solver, b, x);
     for (size_t j = 0; j < n; j++)
         s->solution[j] = b[3 * s->order[j / 3] + (index_t)(j % 3)];
     cholmod_dense solution = as_vector(s->solution, n), scratch = as_vector(s->scratch, s->factor->maxesize);
-    drape_alone_begin();
+    drape_library_lock();
     bool done = cholmod_l_super_lsolve(s->factor, &solution, &scratch, &s->common) &&
                 cholmod_l_super_ltsolve(s->factor, &solution, &scratch, &s->common);
-    drape_alone_end();
+    drape_library_unlock();
     if (!done)
         return DRAPE_RETRY_LINEAR;
     for (size_t j = 0; j < n; j++)
@@ -483,12 +416,8 @@ static drape_status solve(void *state, const double *b, double *x)
 static void archive(void *state, drape_archive *a, const double *values)
 {
     cholmod_state *s = state;
-    drape_archive_int64(a, &s->fallbacks);
-    drape_archive_bool(a, &s->by_general);
-    drape_archive_bool(a, &s->factored);
-    drape_linear_archive_general(s->general_row, s->ctx, s->pattern, &s->general, a,
-                                 s->by_general ? values : NULL);
-    if (drape_archive_is_reading(a) && values && s->factored && !s->by_general &&
+    drape_fallback_archive(&s->fallback, &s->factored, a, values);
+    if (drape_archive_is_reading(a) && values && s->factored && !s->fallback.active &&
         factor_any(s, values, false))
         drape_archive_fail(a, DRAPE_E_SOLVER, "a matrix of the checkpoint has no Cholesky factors here");
 }
@@ -496,28 +425,20 @@ static void archive(void *state, drape_archive *a, const double *values)
 static size_t bytes(const void *state)
 {
     const cholmod_state *s = state;
-    const drape_pattern *p = s->pattern;
-    size_t blocks = (size_t)p->block_count, n = (size_t)p->n;
-    size_t indices = 2 * blocks + 1 + lower_blocks(p) + n + 1 + lower_scalars(p);
-    size_t doubles = lower_scalars(p) + 2 * n + s->factor->maxesize;
-    return sizeof *s + indices * sizeof(index_t) + doubles * sizeof(double) +
-           2 * lower_blocks(p) * sizeof(int32_t) + s->common.memory_inuse +
-           (s->general ? s->general_row->bytes(s->general) : 0);
+    return s->common.memory_inuse + drape_fallback_bytes(&s->fallback);
 }
 
 static void report(const void *state, drape_linear_report *out)
 {
-    const cholmod_state *s = state;
-    *out = (drape_linear_report){.row = &drape_linear_cholmod,
-                                 .fallbacks = s->fallbacks,
-                                 .fallback = s->general ? s->general_row : NULL};
+    *out = drape_fallback_report(&((const cholmod_state *)state)->fallback, &drape_linear_cholmod);
 }
 
 const drape_linear_ops drape_linear_cholmod = {
-    .name = "cholmod",
-    .summary = "supernodal Cholesky with a symbolic factor kept for good; what is not symmetric positive "
-               "definite goes to umfpack or klu, by size",
-    .reference = "Chen, Davis, Hager & Rajamanickam 2008, Algorithm 887: CHOLMOD",
+    .entry = {.name = "cholmod",
+              .summary =
+                  "supernodal Cholesky with a symbolic factor kept for good; what is not symmetric positive "
+                  "definite goes to umfpack or klu, by size",
+              .reference = "Chen, Davis, Hager & Rajamanickam 2008, Algorithm 887: CHOLMOD"},
     .borrows_heap = true, /* the update of the largest supernode, and what OpenMP needs for a loop */
     .create = create,
     .factor = factor,

@@ -8,7 +8,6 @@
 #include <sundials/sundials_dense.h>
 
 typedef struct dense_state {
-    drape_context *ctx;
     const drape_pattern *pattern;
     double **column; /* (n) pointers to columns, as SUNDIALS has its dense matrices */
     double *values;  /* (n x n) column-major */
@@ -16,38 +15,23 @@ typedef struct dense_state {
     bool factored;
 } dense_state;
 
-static void destroy(void **state)
+static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
 {
-    dense_state *s = *state;
-    if (!s)
-        return;
-    drape_free(s->ctx, s->column);
-    drape_free(s->ctx, s->values);
-    drape_free(s->ctx, s->pivot);
-    drape_free(s->ctx, s);
-    *state = NULL;
-}
-
-static drape_status create(drape_context *ctx, const drape_pattern *pattern, void **state)
-{
-    size_t n = (size_t)pattern->n;
-    dense_state *s = drape_alloc(ctx, 1, sizeof *s);
-    *state = s;
+    const size_t n = (size_t)pattern->n;
+    dense_state *s = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    s->ctx = ctx;
     s->pattern = pattern;
-    s->column = drape_alloc(ctx, n, sizeof *s->column);
-    s->values = n <= UINT32_MAX ? drape_alloc(ctx, n * n, sizeof *s->values) : NULL;
-    s->pivot = drape_alloc(ctx, n, sizeof *s->pivot);
-    if (!s->column || !s->values || !s->pivot) {
-        destroy(state);
-        return drape_fail(ctx, DRAPE_E_MEMORY,
+    s->column = drape_arena_take(arena, n, sizeof *s->column);
+    s->values = n <= UINT32_MAX ? drape_arena_take(arena, n * n, sizeof *s->values) : NULL;
+    s->pivot = drape_arena_take(arena, n, sizeof *s->pivot);
+    if (!s->column || !s->values || !s->pivot)
+        return drape_fail(arena->ctx, DRAPE_E_MEMORY,
                           "out of memory: the dense solver needs %.3g bytes for %zu unknowns; use klu",
                           8.0 * (double)n * (double)n, n);
-    }
     for (size_t j = 0; j < n; j++)
         s->column[j] = s->values + n * j;
+    *state = s;
     return DRAPE_OK;
 }
 
@@ -74,19 +58,11 @@ static drape_status solve(void *state, const double *b, double *x)
     return drape_all_finite(x, (size_t)s->pattern->n) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
-static size_t bytes(const void *state)
-{
-    size_t n = (size_t)((const dense_state *)state)->pattern->n;
-    return n * n * sizeof(double);
-}
-
 const drape_linear_ops drape_linear_dense = {
-    .name = "dense",
-    .summary = "full LU with partial pivoting: the baseline, for small scenes",
-    .reference = "SUNDIALS dense solver",
+    .entry = {.name = "dense",
+              .summary = "full LU with partial pivoting: the baseline, for small scenes",
+              .reference = "SUNDIALS dense solver"},
     .create = create,
     .factor = factor,
     .solve = solve,
-    .destroy = destroy,
-    .bytes = bytes,
 };

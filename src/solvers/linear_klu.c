@@ -2,8 +2,8 @@
  * klu: sparse LU by KLU (Davis & Palamadai Natarajan 2010), the reference solver. AMD ordering, because the
  * pattern is symmetric; no block triangular form, because the mesh is connected. The first factorisation
  * chooses pivots; later ones keep them (refactor), which takes no heap, and are done afresh where the kept
- * pivots turn out to be too small. The factors of a matrix depend on the one that its pivots were chosen for: its
- * values are kept, so that a checkpoint can choose them again.
+ * pivots turn out to be too small. The factors of a matrix depend on the one that its pivots were chosen for:
+ * its values are kept, so that a checkpoint can choose them again.
  */
 #include "solvers/linear.h"
 
@@ -16,7 +16,6 @@
 #define MIN_RCOND 1e-15 /* below: singular to working precision; a fresh choice of pivots is tried first */
 
 typedef struct klu_state {
-    drape_context *ctx;
     const drape_pattern *pattern;
     klu_l_common common;
     klu_l_symbolic *symbolic;
@@ -37,39 +36,29 @@ static SuiteSparse_long *indices(const int64_t *array)
 static void destroy(void **state)
 {
     klu_state *s = *state;
-    if (!s)
-        return;
     klu_l_free_numeric(&s->numeric, &s->common);
     klu_l_free_symbolic(&s->symbolic, &s->common);
-    drape_free(s->ctx, s->chosen_for);
-    drape_free(s->ctx, s);
-    *state = NULL;
 }
 
-static drape_status create(drape_context *ctx, const drape_pattern *pattern, void **state)
+static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
 {
-    klu_state *s = drape_alloc(ctx, 1, sizeof *s);
-    *state = s;
+    klu_state *s = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    s->ctx = ctx;
     s->pattern = pattern;
     klu_l_defaults(&s->common);
     s->common.ordering = ORDER_AMD;
     s->common.btf = 0;
-    s->chosen_for = drape_alloc(ctx, (size_t)pattern->nonzeros, sizeof *s->chosen_for);
-    if (!s->chosen_for) {
-        destroy(state);
+    s->chosen_for = drape_arena_take(arena, (size_t)pattern->nonzeros, sizeof *s->chosen_for);
+    if (!s->chosen_for)
         return DRAPE_E_MEMORY;
-    }
     s->symbolic = klu_l_analyze(pattern->n, indices(pattern->column), indices(pattern->row), &s->common);
-    if (s->symbolic)
-        return DRAPE_OK;
-    drape_status status = s->common.status == KLU_OUT_OF_MEMORY ? DRAPE_E_MEMORY : DRAPE_E_SOLVER;
-    int code = (int)s->common.status;
-    destroy(state);
-    return drape_fail(ctx, status, "KLU cannot analyse the %lld x %lld Jacobian: status %d",
-                      (long long)pattern->n, (long long)pattern->n, code);
+    if (!s->symbolic)
+        return drape_fail(arena->ctx, s->common.status == KLU_OUT_OF_MEMORY ? DRAPE_E_MEMORY : DRAPE_E_SOLVER,
+                          "KLU cannot analyse the %lld x %lld Jacobian: status %d", (long long)pattern->n,
+                          (long long)pattern->n, (int)s->common.status);
+    *state = s;
+    return DRAPE_OK;
 }
 
 /* A NaN anywhere in the factors makes rcond NaN or 0, so the comparison is false. */
@@ -140,14 +129,13 @@ static void archive(void *state, drape_archive *a, const double *values)
 
 static size_t bytes(const void *state)
 {
-    const klu_state *s = state;
-    return s->common.memusage + (size_t)s->pattern->nonzeros * sizeof *s->chosen_for;
+    return ((const klu_state *)state)->common.memusage;
 }
 
 const drape_linear_ops drape_linear_klu = {
-    .name = "klu",
-    .summary = "sparse LU with AMD ordering; pivots are kept from step to step",
-    .reference = "Davis & Palamadai Natarajan 2010, Algorithm 907: KLU",
+    .entry = {.name = "klu",
+              .summary = "sparse LU with AMD ordering; pivots are kept from step to step",
+              .reference = "Davis & Palamadai Natarajan 2010, Algorithm 907: KLU"},
     .best_from = 1,
     .general_from = 1,
     .create = create,

@@ -1,19 +1,21 @@
 /*
- * multifrontal: Cholesky factors of a symmetric positive definite matrix, front by front (Duff & Reid 1983; Liu
- * 1992, The multifrontal method for sparse matrix solution). A front is a dense matrix: the entries of its columns
- * and what its children left on them are added up, its columns are factored, and what that leaves on its rows goes
- * to its parent. Fronts in different branches do not know of each other: branches go to threads, and the few large
- * fronts that join them are shared by all. Every sum runs in an order that the pattern alone decides: the bits do not
- * depend on the number of threads. All memory is taken in create.
+ * multifrontal: Cholesky factors of a symmetric positive definite matrix, front by front (Duff & Reid 1983;
+ * Liu 1992, The multifrontal method for sparse matrix solution). A front is a dense matrix of a few columns
+ * of the matrix and all rows that fill in below them. It is assembled from the entries of its columns and
+ * from what its children's eliminations left on its columns and rows; its columns are factored; what that
+ * leaves on its rows, the update, goes to its parent in the elimination tree.
  *
- * What is not symmetric positive definite goes to the row that is the fastest for general matrices of this size, as it
- * stands; that row's solver is made for the first such matrix.
+ * Fronts of different branches of the tree do not depend on each other: each branch is a task for one thread,
+ * and the few large fronts at the top, which join the branches, are shared by all threads. Every sum runs in
+ * an order that the pattern alone decides, so the bits do not depend on the number of threads. All memory is
+ * taken in create.
+ *
+ * A matrix that is not symmetric positive definite goes to the fallback (fallback.h).
  */
-#include "solvers/linear.h"
-
 #include "base/finite.h"
 #include "base/lanes.h"
 #include "solvers/elimination.h"
+#include "solvers/fallback.h"
 #include "solvers/tiles.h"
 
 #include <math.h>
@@ -22,68 +24,54 @@
 /* Round-off in a_ij, whose elements' parts are at most about sqrt(a_ii a_jj) each. Below it, a difference
  * between mirrored entries moves the solution as rounding the entries does. */
 #define SYMMETRY  1e-13
-#define MIN_RCOND 1e-15 /* below: singular to working precision; the general row decides */
-#define BRANCHES  24    /* no branch for one thread is more than this part of all work */
+#define MIN_RCOND 1e-15 /* below: singular to working precision; the fallback decides */
+#define BRANCHES  24    /* a branch is at most this part of all work */
 #define S         DRAPE_STRIP
-#define A_STRIP   (DRAPE_STRIP / 3) /* blocks */
-#define CHUNK     (10 * DRAPE_STRIP) /* columns multiplied at once: two strips of it fit into the nearest cache */
+#define A_STRIP   (DRAPE_STRIP / 3) /* blocks in a strip */
+/* columns multiplied at once: two strips of it fit into the nearest cache */
+#define CHUNK     (10 * DRAPE_STRIP)
 #define ALIGNMENT 64
 
 extern const drape_linear_ops drape_linear_multifrontal;
 
-/* One front's place. */
+/* The size of a front, and where it is stored. Its panel holds its columns, its update what it leaves to its
+ * parent. */
 typedef struct front {
     int32_t columns, rows; /* scalars: factored, and below them */
     int32_t column_strips, row_strips;
-    int64_t panel, update;        /* where its columns, and what it leaves, begin */
+    int64_t panel, update;        /* where they begin in panels and updates */
     int32_t first_child, sibling; /* -1: none */
     int32_t branch;               /* -1: at the top */
-    bool odd;                     /* its depth is */
+    bool odd;                     /* its depth in the tree is odd */
 } front;
 
 typedef struct multifrontal {
-    drape_context *ctx;
+    drape_arena *arena;
     const drape_pattern *pattern;
     drape_elimination e;
     front *fronts;                 /* (e.count) */
-    int32_t *branch, branch_count; /* first and last front of each, for one thread; the most work first */
+    int32_t *branch, branch_count; /* first and last front of each branch; children come before parents */
     int32_t *top, top_count;       /* the other fronts, children first */
-    int32_t *mirror;               /* (lower blocks, as the pattern has them) the transposed one of each */
+    int32_t *mirror;               /* (lower blocks, as the pattern has them) the transposed block of each */
     int32_t *source, *target; /* (lower blocks, in the order of elimination) the pattern's block that each is,
-                                       and where it goes, from the begin of its front's panel */
-    int32_t *target_start;    /* (e.n + 1) of each column */
+                                 and where it goes, counted from the beginning of its front's panel */
+    int32_t *target_start;    /* (e.n + 1) the first of each column in source and target */
     int32_t *in_panel,
         *in_update; /* (rows of all fronts) where a row lies in its front's parent; see place_rows */
-    double *panels, *updates, *inverse, *work, *scratch, *left; /* left: (rows of all fronts, 3) see part */
-    void *memory[2];                                            /* of panels and updates, before alignment */
+    double *panels, *updates; /* aligned for the tiles */
+    double *inverse;          /* (n) of the diagonal of the factors */
+    double *work;             /* (n) the solution, in the order of elimination */
+    double *left;             /* (rows of all fronts x 3) see part */
+    double *scratch;          /* (branches + 1, scratch_size) */
     int64_t panel_size, update_size;
     int32_t widest, tallest; /* scalars, of all fronts, in whole strips */
     double *diagonal;        /* (n) in the pattern's order */
-    drape_crew *crew;        /* NULL: one thread */
-    const double *values;    /* while it factors */
-    bool *failed;            /* (e.count) */
-    const drape_linear_ops *general_row;
-    void *general; /* its state; NULL before the first matrix that it gets */
-    bool by_general, factored;
-    int64_t fallbacks;
+    drape_pool *pool;        /* NULL: one thread */
+    bool *failed;            /* (e.count) the front is not positive definite */
+    const double *values;    /* of the matrix that is being factored */
+    drape_fallback fallback;
+    bool factored; /* here or by the fallback */
 } multifrontal;
-
-static void destroy(void **state)
-{
-    multifrontal *s = *state;
-    if (!s)
-        return;
-    if (s->general)
-        s->general_row->destroy(&s->general);
-    drape_elimination_free(s->ctx, &s->e);
-    void *all[] = {s->fronts,       s->branch,    s->top,       s->source,   s->mirror, s->target,
-                   s->target_start, s->in_panel,  s->in_update, s->inverse,  s->work,   s->scratch,
-                   s->left,         s->memory[0], s->memory[1], s->diagonal, s->failed};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        drape_free(s->ctx, all[i]);
-    drape_free(s->ctx, s);
-    *state = NULL;
-}
 
 /* ---- Where fronts lie ---- */
 
@@ -123,23 +111,20 @@ static void measure_fronts(multifrontal *s)
     }
 }
 
-/* Branches: the largest subtrees whose work is no more than a share of all. The rest is the top. */
-static drape_status find_branches(multifrontal *s)
+/* Branches are the largest subtrees whose work is at most a BRANCHES-th of all; the other fronts are the
+ * top. */
+static void find_branches(multifrontal *s, double *work, int32_t *begin)
 {
     const int32_t count = s->e.count;
-    double total = 0, *work = drape_alloc(s->ctx, (size_t)count, sizeof *work); /* of subtrees */
-    int32_t *begin = drape_alloc(s->ctx, (size_t)count, sizeof *begin);         /* their first fronts */
-    s->branch = drape_alloc(s->ctx, (size_t)count, 2 * sizeof *s->branch);
-    s->top = drape_alloc(s->ctx, (size_t)count, sizeof *s->top);
-    const bool good = work && begin && s->branch && s->top;
-    for (int32_t i = 0; good && i < count; i++) {
+    double total = 0;
+    for (int32_t i = 0; i < count; i++) { /* work: of a subtree; begin: its first front */
         work[i] += s->e.work[i];
         total += s->e.work[i];
         begin[i] = s->fronts[i].first_child >= 0 ? begin[s->fronts[i].first_child] : i;
         if (s->e.parent[i] >= 0)
             work[s->e.parent[i]] += work[i];
     }
-    for (int32_t i = 0; good && i < count; i++) {
+    for (int32_t i = 0; i < count; i++) {
         const int32_t up = s->e.parent[i];
         const bool small = work[i] <= total / BRANCHES;
         s->fronts[i].branch = -1;
@@ -151,13 +136,11 @@ static drape_status find_branches(multifrontal *s)
         } else if (!small)
             s->top[s->top_count++] = i;
     }
-    drape_free(s->ctx, work);
-    drape_free(s->ctx, begin);
-    return good ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-/* What fronts of even depth leave lies on one stack, of odd depth on another: when a front is made, its children's
- * is on top of the other one. Each branch has two stacks, and the top has. */
+/* Updates of fronts of even depth lie on one stack, those of odd depth on another: while a front writes its
+ * own update, those of its children are at the end of the other stack. Each branch has two stacks, and so has
+ * the top. */
 typedef struct stacks {
     int64_t end[2], peak[2];
 } stacks;
@@ -194,7 +177,8 @@ static void place_updates(multifrontal *s)
 
 /* ---- Where entries go ---- */
 
-/* The place of block (row, column), counted in the order of elimination, from the begin of its front's panel. */
+/* The place of block (row, column), both in the order of elimination, from the beginning of the panel of
+ * front i. */
 static int64_t place_in_panel(const multifrontal *s, int32_t i, int32_t row, int32_t column)
 {
     const front *f = &s->fronts[i];
@@ -204,20 +188,14 @@ static int64_t place_in_panel(const multifrontal *s, int32_t i, int32_t row, int
     return ((int64_t)strip * f->columns + 3 * (int64_t)(column - s->e.first[i])) * S + 3 * within;
 }
 
-static void find_mirrors(multifrontal *s)
-{
-    const drape_pattern *p = s->pattern;
-    int32_t *mirror = s->mirror;
-    for (int32_t j = 0; j < p->block_count; j++)
-        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++)
-            *mirror++ = drape_pattern_find(p, j, p->block_row[k]);
-}
-
+/* False where a panel is too large for 32-bit places. */
 static bool place_entries(multifrontal *s)
 {
     const drape_pattern *p = s->pattern;
-    int32_t at = 0;
-    find_mirrors(s);
+    int32_t at = 0, *mirror = s->mirror;
+    for (int32_t j = 0; j < p->block_count; j++)
+        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++)
+            *mirror++ = drape_pattern_find(p, j, p->block_row[k]);
     for (int32_t i = 0; i < s->e.count; i++)
         for (int32_t column = s->e.first[i]; column < s->e.first[i + 1]; column++) {
             const int32_t j = s->e.order[column];
@@ -237,8 +215,9 @@ static bool place_entries(multifrontal *s)
     return true;
 }
 
-/* Rows of strips, from the begin of a column: of panels, and of what fronts leave, the latter from where the tile
- * of the first strip would be. -1: the row is factored in the parent. */
+/* Where each row of a front lies in its parent, counted from the beginning of a column: in the parent's
+ * panel, and in its update, there from where the tile of the first strip would be. in_update -1: the parent
+ * factors the row. False where a panel is too large for 32-bit places. */
 static bool place_rows(multifrontal *s)
 {
     for (int32_t i = 0; i < s->e.count; i++) {
@@ -258,11 +237,11 @@ static bool place_rows(multifrontal *s)
 
 /* ---- Making ---- */
 
-static double *take_aligned(multifrontal *s, int which, int64_t count)
+static double *take_aligned(drape_arena *arena, int64_t count)
 {
-    s->memory[which] = drape_alloc(s->ctx, (size_t)count + ALIGNMENT / sizeof(double), sizeof(double));
-    const uintptr_t at = (uintptr_t)s->memory[which];
-    return at ? (double *)((at + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT) : NULL;
+    const uintptr_t at =
+        (uintptr_t)drape_arena_take(arena, (size_t)count + ALIGNMENT / sizeof(double), sizeof(double));
+    return (double *)((at + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT);
 }
 
 /* Doubles of scratch of one branch, or the top. */
@@ -271,66 +250,72 @@ static int64_t scratch_size(const multifrontal *s)
     return 5 * (int64_t)s->widest + s->tallest;
 }
 
-static bool allocate(multifrontal *s)
+static drape_status place_fronts(multifrontal *s)
 {
-    const drape_pattern *p = s->pattern;
-    const size_t n = (size_t)p->n, lower = ((size_t)p->nonzeros / 9 + n / 3) / 2;
-    s->source = drape_alloc(s->ctx, lower, sizeof *s->source);
-    s->mirror = drape_alloc(s->ctx, lower, sizeof *s->mirror);
-    s->target = drape_alloc(s->ctx, lower, sizeof *s->target);
-    s->target_start = drape_alloc(s->ctx, n / 3 + 1, sizeof *s->target_start);
-    s->diagonal = drape_alloc(s->ctx, n, sizeof *s->diagonal);
-    s->inverse = drape_alloc(s->ctx, n, sizeof *s->inverse);
-    s->work = drape_alloc(s->ctx, n, sizeof *s->work);
-    s->failed = drape_alloc(s->ctx, (size_t)s->e.count, sizeof *s->failed);
-    s->scratch =
-        drape_alloc(s->ctx, (size_t)(s->branch_count + 1), (size_t)scratch_size(s) * sizeof *s->scratch);
-    s->left = drape_alloc(s->ctx, (size_t)s->e.row_start[s->e.count], 3 * sizeof *s->left);
-    s->in_panel = drape_alloc(s->ctx, (size_t)s->e.row_start[s->e.count], sizeof *s->in_panel);
-    s->in_update = drape_alloc(s->ctx, (size_t)s->e.row_start[s->e.count], sizeof *s->in_update);
-    s->panels = take_aligned(s, 0, s->panel_size);
-    s->updates = take_aligned(s, 1, s->update_size);
-    return s->source && s->mirror && s->target && s->target_start && s->diagonal && s->inverse && s->work &&
-           s->failed && s->scratch && s->left && s->in_panel && s->in_update && s->panels && s->updates;
+    drape_arena scratch = drape_arena_of(s->arena->ctx);
+    const size_t count = (size_t)s->e.count;
+    double *work = drape_arena_take(&scratch, count, sizeof *work);
+    int32_t *begin = drape_arena_take(&scratch, count, sizeof *begin);
+    s->fronts = drape_arena_take(s->arena, count, sizeof *s->fronts);
+    s->branch = drape_arena_take(s->arena, count, 2 * sizeof *s->branch);
+    s->top = drape_arena_take(s->arena, count, sizeof *s->top);
+    const bool good = !drape_arena_status(&scratch) && !drape_arena_status(s->arena);
+    if (good) {
+        measure_fronts(s);
+        find_branches(s, work, begin);
+        place_updates(s);
+    }
+    drape_arena_free(&scratch);
+    return good ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-static drape_status analyse(multifrontal *s)
+static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
 {
-    drape_status status = drape_elimination_create(s->ctx, s->pattern, &s->e);
-    if (status)
-        return status;
-    s->fronts = drape_alloc(s->ctx, (size_t)s->e.count, sizeof *s->fronts);
-    if (!s->fronts)
-        return DRAPE_E_MEMORY;
-    measure_fronts(s);
-    status = find_branches(s);
-    if (status)
-        return status;
-    place_updates(s);
-    if (!allocate(s))
-        return DRAPE_E_MEMORY;
-    return place_entries(s) && place_rows(s)
-               ? DRAPE_OK
-               : drape_fail(s->ctx, DRAPE_E_SOLVER, "the factors have a front of more than 2^31 entries");
-}
-
-static drape_status create(drape_context *ctx, const drape_pattern *pattern, void **state)
-{
-    multifrontal *s = drape_alloc(ctx, 1, sizeof *s);
-    *state = s;
+    multifrontal *s = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (multifrontal){.ctx = ctx, .pattern = pattern};
-    s->general_row = drape_linear_general(pattern->n);
-    drape_status status = analyse(s);
+    s->arena = arena;
+    s->pattern = pattern;
+    s->fallback = drape_fallback_of(arena, pattern);
+    drape_status status = drape_elimination_create(arena, pattern, &s->e);
+    if (!status)
+        status = place_fronts(s);
     if (status)
-        destroy(state);
-    return status;
+        return status;
+    const size_t n = (size_t)pattern->n, lower = ((size_t)pattern->nonzeros / 9 + n / 3) / 2,
+                 rows = (size_t)s->e.row_start[s->e.count];
+    s->source = drape_arena_take(arena, lower, sizeof *s->source);
+    s->mirror = drape_arena_take(arena, lower, sizeof *s->mirror);
+    s->target = drape_arena_take(arena, lower, sizeof *s->target);
+    s->target_start = drape_arena_take(arena, n / 3 + 1, sizeof *s->target_start);
+    s->diagonal = drape_arena_take(arena, n, sizeof *s->diagonal);
+    s->inverse = drape_arena_take(arena, n, sizeof *s->inverse);
+    s->work = drape_arena_take(arena, n, sizeof *s->work);
+    s->failed = drape_arena_take(arena, (size_t)s->e.count, sizeof *s->failed);
+    s->scratch =
+        drape_arena_take(arena, (size_t)(s->branch_count + 1), (size_t)scratch_size(s) * sizeof *s->scratch);
+    s->left = drape_arena_take(arena, rows, 3 * sizeof *s->left);
+    s->in_panel = drape_arena_take(arena, rows, sizeof *s->in_panel);
+    s->in_update = drape_arena_take(arena, rows, sizeof *s->in_update);
+    s->panels = take_aligned(arena, s->panel_size);
+    s->updates = take_aligned(arena, s->update_size);
+    if (drape_arena_status(arena))
+        return DRAPE_E_MEMORY;
+    if (!place_entries(s) || !place_rows(s))
+        return drape_fail(arena->ctx, DRAPE_E_SOLVER, "the factors have a front of more than 2^31 entries");
+    *state = s;
+    return DRAPE_OK;
 }
 
-static void use_threads(void *state, drape_crew *crew)
+static void destroy(void **state)
 {
-    ((multifrontal *)state)->crew = crew;
+    multifrontal *s = *state;
+    drape_fallback_destroy(&s->fallback);
+}
+
+static void use_threads(void *state, drape_pool *pool)
+{
+    ((multifrontal *)state)->pool = pool;
 }
 
 /* ---- One front ---- */
@@ -348,7 +333,7 @@ static void copy_block(const multifrontal *s, int32_t at, int32_t column, double
 
 typedef double couple __attribute__((vector_size(2 * sizeof(double))));
 
-/* Adds a block of what a child left; both lie in strips. */
+/* Adds a block of a child's update; both lie in strips. */
 static inline void add_block(const double *from, double *to)
 {
     for (int c = 0; c < 3; c++, from += S, to += S) {
@@ -361,25 +346,36 @@ static inline void add_block(const double *from, double *to)
     }
 }
 
-/* What a front is made of, for rounds dealt out to threads. */
+/* A front that is being made, as the tasks dealt out to threads see it. */
 typedef struct job {
     multifrontal *s;
     int32_t index;
     const front *f;
     double *panel, *update;
-    int32_t first, width; /* of the columns that are factored now; the first that is added of a child */
-    int32_t child;
-    drape_crew *crew; /* NULL: this thread alone, in a branch */
+    drape_pool *pool; /* NULL: this thread alone, in a branch */
 } job;
 
-/* A column of blocks of what a child left, into its front. */
-static void add_child_column(void *user, int64_t round)
+/* The update of a child, from its block column `first` on, for add_child_column. */
+typedef struct child_job {
+    const job *to;
+    int32_t child, first;
+} child_job;
+
+/* The columns that are factored now, for finish_strip. */
+typedef struct strip_job {
+    const job *of;
+    int32_t first, width;
+} strip_job;
+
+/* Adds a column of blocks of a child's update to its front. */
+static void add_child_column(void *user, int64_t task)
 {
-    const job *w = user;
+    const child_job *from_child = user;
+    const job *w = from_child->to;
     const multifrontal *s = w->s;
-    const front *f = w->f, *c = &s->fronts[w->child];
-    const int64_t start = s->e.row_start[w->child];
-    const int32_t k = w->first + (int32_t)round, blocks = c->rows / 3;
+    const front *f = w->f, *c = &s->fronts[from_child->child];
+    const int64_t start = s->e.row_start[from_child->child];
+    const int32_t k = from_child->first + (int32_t)task, blocks = c->rows / 3;
     const int32_t column = s->e.in_parent[start + k], below = column - f->columns / 3;
     const int32_t *place = (below < 0 ? s->in_panel : s->in_update) + start;
     const double *from = s->updates + c->update + tile_at(c, 0, k / A_STRIP) + 3 * (k % A_STRIP) * S;
@@ -389,7 +385,7 @@ static void add_child_column(void *user, int64_t round)
         add_block(from + r / A_STRIP * DRAPE_TILE + 3 * (r % A_STRIP), to + place[r]);
 }
 
-/* The first of a child's rows that is not factored in its parent. */
+/* The first block row of a child's update that its parent does not factor. */
 static int32_t first_row_left(const multifrontal *s, int32_t child)
 {
     const int32_t *place = s->in_update + s->e.row_start[child];
@@ -404,17 +400,18 @@ static int32_t first_row_left(const multifrontal *s, int32_t child)
     return low;
 }
 
-/* What children left on the columns that are factored here, or on the rows. */
-static void add_children(job *w, bool on_rows)
+/* Adds what the children's updates have in the columns that are factored here, or in the others. */
+static void add_children(const job *w, bool factored)
 {
-    for (w->child = w->f->first_child; w->child >= 0; w->child = w->s->fronts[w->child].sibling) {
-        const int32_t middle = first_row_left(w->s, w->child), all = w->s->fronts[w->child].rows / 3;
-        w->first = on_rows ? middle : 0;
-        drape_parallel(w->crew, on_rows ? all - middle : middle, add_child_column, w);
+    const multifrontal *s = w->s;
+    for (int32_t child = w->f->first_child; child >= 0; child = s->fronts[child].sibling) {
+        const int32_t middle = first_row_left(s, child), all = s->fronts[child].rows / 3;
+        child_job columns = {.to = w, .child = child, .first = factored ? 0 : middle};
+        drape_parallel(w->pool, factored ? middle : all - middle, add_child_column, &columns);
     }
 }
 
-static void assemble(job *w)
+static void assemble(const job *w)
 {
     const multifrontal *s = w->s;
     const front *f = w->f;
@@ -423,7 +420,7 @@ static void assemble(job *w)
     for (int32_t column = s->e.first[w->index]; column < s->e.first[w->index + 1]; column++)
         for (int32_t at = s->target_start[column]; at < s->target_start[column + 1]; at++)
             copy_block(s, at, column, w->panel);
-    add_children(w, false);
+    add_children(w, true);
 }
 
 static double *strip_of(const job *w, int64_t strip)
@@ -431,40 +428,41 @@ static double *strip_of(const job *w, int64_t strip)
     return w->panel + strip * S * w->f->columns;
 }
 
-/* The columns that are factored now, of one strip below their diagonal: products with those before them, then
- * division. */
-static void finish_strip(void *user, int64_t round)
+/* The columns that are factored now, in one strip below their diagonal: products with the columns before them
+ * are subtracted, then it is divided by the diagonal tile. */
+static void finish_strip(void *user, int64_t task)
 {
-    const job *w = user;
-    const int32_t diagonal = w->first / S;
-    const int64_t strip = diagonal + 1 + round;
-    double *to = strip_of(w, strip) + S * w->first;
-    drape_tile_multiply(strip_of(w, strip), strip_of(w, diagonal), w->first, w->width, false, to);
-    drape_tile_divide(w->width, strip_of(w, diagonal) + S * w->first,
-                      w->s->inverse + 3 * w->s->e.first[w->index] + w->first, to);
+    const strip_job *strips = user;
+    const job *w = strips->of;
+    const int32_t diagonal = strips->first / S;
+    const int64_t strip = diagonal + 1 + task;
+    double *to = strip_of(w, strip) + S * strips->first;
+    drape_tile_multiply(strip_of(w, strip), strip_of(w, diagonal), strips->first, strips->width, false, to);
+    drape_tile_divide(strips->width, strip_of(w, diagonal) + S * strips->first,
+                      w->s->inverse + 3 * w->s->e.first[w->index] + strips->first, to);
 }
 
-static bool factor_columns(job *w)
+static bool factor_columns(const job *w)
 {
     const front *f = w->f;
-    for (w->first = 0; w->first < f->columns; w->first += S) {
-        const int32_t diagonal = w->first / S;
-        double *tile = strip_of(w, diagonal) + S * w->first;
-        w->width = f->columns - w->first < S ? f->columns - w->first : S;
-        drape_tile_multiply(strip_of(w, diagonal), strip_of(w, diagonal), w->first, w->width, false, tile);
-        if (!drape_tile_factor(w->width, tile, w->s->inverse + 3 * w->s->e.first[w->index] + w->first))
+    for (int32_t first = 0; first < f->columns; first += S) {
+        const int32_t diagonal = first / S, width = f->columns - first < S ? f->columns - first : S;
+        double *tile = strip_of(w, diagonal) + S * first;
+        drape_tile_multiply(strip_of(w, diagonal), strip_of(w, diagonal), first, width, false, tile);
+        if (!drape_tile_factor(width, tile, w->s->inverse + 3 * w->s->e.first[w->index] + first))
             return false;
-        drape_parallel(w->crew, f->column_strips + f->row_strips - diagonal - 1, finish_strip, w);
+        strip_job strips = {.of = w, .first = first, .width = width};
+        drape_parallel(w->pool, f->column_strips + f->row_strips - diagonal - 1, finish_strip, &strips);
     }
     return true;
 }
 
-/* The tiles of one column of strips of what the front leaves, a chunk of columns at a time. */
-static void leave_column(void *user, int64_t round)
+/* The tiles of one column of strips of the update, a chunk of factored columns at a time. */
+static void make_update_column(void *user, int64_t task)
 {
     const job *w = user;
     const front *f = w->f;
-    const int32_t c = (int32_t)round;
+    const int32_t c = (int32_t)task;
     for (int32_t p = 0; p < f->columns; p += CHUNK) {
         const int depth = f->columns - p < CHUNK ? f->columns - p : CHUNK;
         for (int32_t r = c; r < f->row_strips; r++)
@@ -474,7 +472,7 @@ static void leave_column(void *user, int64_t round)
     }
 }
 
-static void make_front(multifrontal *s, int32_t i, drape_crew *crew)
+static void make_front(multifrontal *s, int32_t i, drape_pool *pool)
 {
     const front *f = &s->fronts[i];
     job w = {.s = s,
@@ -482,46 +480,48 @@ static void make_front(multifrontal *s, int32_t i, drape_crew *crew)
              .f = f,
              .panel = s->panels + f->panel,
              .update = s->updates + f->update,
-             .crew = crew};
+             .pool = pool};
     assemble(&w);
     s->failed[i] = !factor_columns(&w);
     if (s->failed[i])
         return;
-    drape_parallel(crew, f->row_strips, leave_column, &w);
-    add_children(&w, true);
+    drape_parallel(pool, f->row_strips, make_update_column, &w);
+    add_children(&w, false);
 }
 
 /* ---- Factors ---- */
 
-static void make_branch(void *user, int64_t round)
+static void make_branch(void *user, int64_t task)
 {
     multifrontal *s = user;
-    for (int32_t i = s->branch[2 * round]; i <= s->branch[2 * round + 1]; i++) {
+    for (int32_t i = s->branch[2 * task]; i <= s->branch[2 * task + 1]; i++) {
         make_front(s, i, NULL);
         if (s->failed[i])
             return;
     }
 }
 
-/* What is seen of a matrix before it is factored. */
-typedef struct looks {
-    bool finite, positive, symmetric; /* positive: its diagonal is */
-} looks;
+/* What is known of a matrix before it is factored. */
+typedef struct properties {
+    bool finite, positive, symmetric; /* positive: the diagonal is */
+} properties;
 
-static void look_at_diagonal(multifrontal *s, looks *seen)
+static bool copy_diagonal(multifrontal *s)
 {
     const drape_pattern *p = s->pattern;
+    bool positive = true;
     for (int32_t j = 0; j < p->block_count; j++) {
         int64_t stride;
         const double *at = drape_pattern_at(p, (double *)(uintptr_t)s->values, j, p->diagonal[j], &stride);
         for (int c = 0; c < 3; c++) {
             s->diagonal[3 * j + c] = at[c * stride + c];
-            seen->positive &= s->diagonal[3 * j + c] > 0;
+            positive &= s->diagonal[3 * j + c] > 0;
         }
     }
+    return positive;
 }
 
-/* Whether block k, at row i of column j, is what its mirror is. */
+/* Whether block k of column j is the transpose of the block `mirrored`, up to round-off. */
 static bool is_mirrored(const multifrontal *s, int32_t j, int32_t k, int32_t mirrored)
 {
     const drape_pattern *p = s->pattern;
@@ -543,19 +543,18 @@ static bool is_mirrored(const multifrontal *s, int32_t j, int32_t k, int32_t mir
     return symmetric;
 }
 
-/* Column by column, as the values lie: a mirror is never far from its block in a mesh that is numbered well. */
-static looks look_at(multifrontal *s)
+/* Column by column, as the values lie: in a well-numbered mesh a mirrored block is never far from its
+ * block. */
+static properties inspect(multifrontal *s)
 {
     const drape_pattern *p = s->pattern;
-    looks seen = {
-        .finite = drape_all_finite(s->values, (size_t)p->nonzeros), .positive = true, .symmetric = true};
     const int32_t *mirror = s->mirror;
-    if (seen.finite)
-        look_at_diagonal(s, &seen);
-    for (int32_t j = 0; seen.finite && seen.positive && j < p->block_count; j++)
+    properties of = {.finite = drape_all_finite(s->values, (size_t)p->nonzeros), .symmetric = true};
+    of.positive = of.finite && copy_diagonal(s);
+    for (int32_t j = 0; of.positive && j < p->block_count; j++)
         for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++)
-            seen.symmetric &= is_mirrored(s, j, k, *mirror++);
-    return seen;
+            of.symmetric &= is_mirrored(s, j, k, *mirror++);
+    return of;
 }
 
 /* The ratio of the extreme pivots bounds the condition from below. */
@@ -572,41 +571,33 @@ static bool is_well_conditioned(const multifrontal *s)
 static bool factor_cholesky(multifrontal *s)
 {
     memset(s->failed, 0, (size_t)s->e.count * sizeof *s->failed);
-    drape_parallel(s->crew, s->branch_count, make_branch, s);
+    drape_parallel(s->pool, s->branch_count, make_branch, s);
     for (int32_t i = 0; i < s->e.count; i++)
         if (s->failed[i])
             return false;
     for (int32_t k = 0; k < s->top_count; k++) {
-        make_front(s, s->top[k], s->crew);
+        make_front(s, s->top[k], s->pool);
         if (s->failed[s->top[k]])
             return false;
     }
     return is_well_conditioned(s);
 }
 
-static drape_status factor_general(multifrontal *s, const double *values)
-{
-    drape_status status = DRAPE_OK;
-    s->fallbacks++;
-    if (!s->general)
-        status = s->general_row->create(s->ctx, s->pattern, &s->general);
-    if (!status)
-        status = s->general_row->factor(s->general, values);
-    s->factored = s->by_general = !status;
-    return status;
-}
-
 static drape_status factor_any(multifrontal *s, const double *values, bool definite)
 {
-    s->factored = s->by_general = false;
+    s->fallback.active = s->factored = false;
     s->values = values;
-    const looks seen = look_at(s);
-    if (!seen.finite)
+    const properties of = inspect(s);
+    if (!of.finite)
         return DRAPE_RETRY_LINEAR;
-    s->factored = seen.positive && seen.symmetric && factor_cholesky(s);
+    s->factored = of.positive && of.symmetric && factor_cholesky(s);
     if (s->factored)
         return DRAPE_OK;
-    return definite && seen.symmetric ? DRAPE_RETRY_LINEAR : factor_general(s, values);
+    if (definite && of.symmetric)
+        return DRAPE_RETRY_LINEAR;
+    drape_status status = drape_fallback_factor(&s->fallback, values);
+    s->factored = !status;
+    return status;
 }
 
 static drape_status factor(void *state, const double *values)
@@ -718,17 +709,17 @@ static void solve_backward(multifrontal *s, int32_t i)
     memcpy(s->work + 3 * s->e.first[i], w.x, (size_t)f->columns * sizeof *w.x);
 }
 
-static void forward_branch(void *user, int64_t round)
+static void forward_branch(void *user, int64_t task)
 {
     multifrontal *s = user;
-    for (int32_t i = s->branch[2 * round]; i <= s->branch[2 * round + 1]; i++)
+    for (int32_t i = s->branch[2 * task]; i <= s->branch[2 * task + 1]; i++)
         solve_forward(s, i);
 }
 
-static void backward_branch(void *user, int64_t round)
+static void backward_branch(void *user, int64_t task)
 {
     multifrontal *s = user;
-    for (int32_t i = s->branch[2 * round + 1]; i >= s->branch[2 * round]; i--)
+    for (int32_t i = s->branch[2 * task + 1]; i >= s->branch[2 * task]; i--)
         solve_backward(s, i);
 }
 
@@ -738,16 +729,16 @@ static drape_status solve(void *state, const double *b, double *x)
     const size_t n = (size_t)s->pattern->n;
     if (!s->factored)
         return DRAPE_RETRY_LINEAR;
-    if (s->by_general)
-        return s->general_row->solve(s->general, b, x);
+    if (s->fallback.active)
+        return s->fallback.ops->solve(s->fallback.solver, b, x);
     for (int32_t k = 0; k < s->e.n; k++)
         memcpy(s->work + 3 * (size_t)k, b + 3 * (size_t)s->e.order[k], 3 * sizeof *b);
-    drape_parallel(s->crew, s->branch_count, forward_branch, s);
+    drape_parallel(s->pool, s->branch_count, forward_branch, s);
     for (int32_t k = 0; k < s->top_count; k++)
         solve_forward(s, s->top[k]);
     for (int32_t k = s->top_count - 1; k >= 0; k--)
         solve_backward(s, s->top[k]);
-    drape_parallel(s->crew, s->branch_count, backward_branch, s);
+    drape_parallel(s->pool, s->branch_count, backward_branch, s);
     for (int32_t k = 0; k < s->e.n; k++)
         memcpy(x + 3 * (size_t)s->e.order[k], s->work + 3 * (size_t)k, 3 * sizeof *x);
     return drape_all_finite(x, n) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
@@ -756,45 +747,30 @@ static drape_status solve(void *state, const double *b, double *x)
 static void archive(void *state, drape_archive *a, const double *values)
 {
     multifrontal *s = state;
-    drape_archive_int64(a, &s->fallbacks);
-    drape_archive_bool(a, &s->by_general);
-    drape_archive_bool(a, &s->factored);
-    drape_linear_archive_general(s->general_row, s->ctx, s->pattern, &s->general, a,
-                                 s->by_general ? values : NULL);
-    if (drape_archive_is_reading(a) && values && s->factored && !s->by_general &&
+    drape_fallback_archive(&s->fallback, &s->factored, a, values);
+    if (drape_archive_is_reading(a) && values && s->factored && !s->fallback.active &&
         factor_any(s, values, false))
         drape_archive_fail(a, DRAPE_E_SOLVER, "a matrix of the checkpoint has no Cholesky factors here");
 }
 
 static size_t bytes(const void *state)
 {
-    const multifrontal *s = state;
-    const size_t n = (size_t)s->pattern->n, blocks = n / 3,
-                 lower = ((size_t)s->pattern->nonzeros / 9 + blocks) / 2;
-    const size_t rows = (size_t)s->e.row_start[s->e.count];
-    size_t doubles = (size_t)s->panel_size + (size_t)s->update_size + 3 * n + 3 * rows +
-                     (size_t)((s->branch_count + 1) * scratch_size(s));
-    return sizeof *s + doubles * sizeof(double) + (size_t)s->e.count * (sizeof(front) + 40) +
-           (3 * lower + 4 * blocks + 4 * rows) * sizeof(int32_t) +
-           (s->general ? s->general_row->bytes(s->general) : 0);
+    return drape_fallback_bytes(&((const multifrontal *)state)->fallback);
 }
 
 static void report(const void *state, drape_linear_report *out)
 {
-    const multifrontal *s = state;
-    *out = (drape_linear_report){.row = &drape_linear_multifrontal,
-                                 .fallbacks = s->fallbacks,
-                                 .fallback = s->general ? s->general_row : NULL};
+    *out = drape_fallback_report(&((const multifrontal *)state)->fallback, &drape_linear_multifrontal);
 }
 
 const drape_linear_ops drape_linear_multifrontal = {
-    .name = "multifrontal",
-    .summary =
-        "multifrontal Cholesky of our own, the same bits with any number of threads; what is not symmetric "
-        "positive definite goes to umfpack or klu, by size",
-    .reference = "Duff & Reid 1983; Liu 1992, The multifrontal method for sparse matrix solution",
+    .entry = {.name = "multifrontal",
+              .summary = "multifrontal Cholesky of our own, the same bits with any number of threads; what "
+                         "is not symmetric "
+                         "positive definite goes to umfpack or klu, by size",
+              .reference = "Duff & Reid 1983; Liu 1992, The multifrontal method for sparse matrix solution"},
     .best_from = 100,     /* a third of klu's time at 400 unknowns */
-    .borrows_heap = true, /* that of the general row, at the first matrix for it */
+    .borrows_heap = true, /* that of the fallback, at the first matrix for it */
     .create = create,
     .use_threads = use_threads,
     .factor = factor,

@@ -1,30 +1,31 @@
 /*
- * pcg: conjugate gradients for a symmetric positive definite matrix, preconditioned by two parts that are added: the
- * inverses of its diagonal blocks, and the inverse of the matrix on a coarse space (prolong.h), P (P'AP)^-1 P'. It
- * takes no factors of the matrix itself: memory and the time of an iteration grow with the nonzeros, and
- * the number of iterations hardly grows. Callers that need no exact solution ask for fewer digits.
+ * pcg: conjugate gradients for a symmetric positive definite matrix, preconditioned by two parts that are
+ * added: the inverses of its diagonal blocks, and the inverse of the matrix on a coarse space (prolong.h), P
+ * (P'AP)^-1 P'. It takes no factors of the matrix itself: memory and the time of an iteration grow with the
+ * nonzeros, and the number of iterations hardly grows. Callers that need no exact solution ask for fewer
+ * digits.
  *
- * A matrix that is not symmetric or not positive definite, which the iteration notices at the latest, goes to the row
- * that is the fastest for general matrices of this size, whose solver is made for the first such matrix.
+ * A matrix that is not symmetric or not positive definite, which the iteration notices at the latest, goes to
+ * the fallback (fallback.h).
  */
-#include "solvers/linear.h"
-
 #include "base/finite.h"
+#include "solvers/fallback.h"
 #include "solvers/pcg.h"
 #include "solvers/prolong.h"
 
 #include <math.h>
 #include <string.h>
 
-#define EXACT    1e-14 /* of the residual, for callers that want all digits */
-#define MOST     2000  /* iterations; what needs more goes to the general row */
-#define SYMMETRY 1e-13 /* as in linear_cholmod.c: round-off in mirrored entries */
-#define HOP      0.67 /* the pattern's graph joins nodes across an edge, too: its paths are so much shorter */
+#define EXACT          1e-14 /* of the residual, for callers that want all digits */
+#define MAX_ITERATIONS 2000  /* a matrix that needs more goes to the fallback */
+#define SYMMETRY       1e-13 /* as in linear_cholmod.c: round-off in mirrored entries */
+/* the pattern's graph joins nodes across an edge, too: its paths are so much shorter */
+#define HOP 0.67
 
 extern const drape_linear_ops drape_linear_pcg;
 
 typedef struct pcg_state {
-    drape_context *ctx;
+    drape_arena *arena;
     const drape_pattern *pattern;
     double *values;  /* (nonzeros) of the last factor */
     double *inverse; /* (9 x blocks) of the diagonal blocks, row by row */
@@ -32,31 +33,12 @@ typedef struct pcg_state {
     drape_pattern coarse;
     int32_t *slot; /* the coarse block that each product of weights goes to, in the order of add_galerkin */
     double *coarse_values, *coarse_b, *coarse_x;
-    const drape_linear_ops *coarse_row, *general_row;
-    void *coarse_solver, *general; /* general NULL: before the first such matrix */
+    const drape_linear_ops *coarse_ops;
+    void *coarse_solver;
     drape_pcg pcg;
-    bool by_general, factored;
-    int64_t fallbacks;
+    drape_fallback fallback;
+    bool factored; /* here or by the fallback */
 } pcg_state;
-
-static void destroy(void **state)
-{
-    pcg_state *s = *state;
-    if (!s)
-        return;
-    if (s->coarse_solver)
-        s->coarse_row->destroy(&s->coarse_solver);
-    if (s->general)
-        s->general_row->destroy(&s->general);
-    drape_prolong_free(s->ctx, &s->prolong);
-    drape_pattern_free(s->ctx, &s->coarse);
-    void *all[] = {s->values,   s->inverse, s->slot,  s->coarse_values, s->coarse_b,
-                   s->coarse_x, s->pcg.r,   s->pcg.z, s->pcg.p,         s->pcg.q};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        drape_free(s->ctx, all[i]);
-    drape_free(s->ctx, s);
-    *state = NULL;
-}
 
 /* ---- The coarse space ---- */
 
@@ -74,7 +56,7 @@ static drape_status find_slots(pcg_state *s)
     for (int32_t j = 0; j < fine->block_count; j++)
         for (int32_t k = fine->block_start[j]; k < fine->block_start[j + 1]; k++)
             total += products(p, fine->block_row[k], j);
-    s->slot = drape_alloc(s->ctx, (size_t)total, sizeof *s->slot);
+    s->slot = drape_arena_take(s->arena, (size_t)total, sizeof *s->slot);
     if (!s->slot)
         return DRAPE_E_MEMORY;
     for (int32_t j = 0; j < fine->block_count; j++)
@@ -85,16 +67,18 @@ static drape_status find_slots(pcg_state *s)
     return DRAPE_OK;
 }
 
-static drape_status build_coarse_pattern(pcg_state *s, const drape_graph *graph)
+/* Coarse functions that meet are coupled. */
+static drape_status build_coarse_pattern(pcg_state *s, const drape_graph *graph, drape_arena *scratch)
 {
-    int32_t *start = NULL, *neighbor = NULL, *pairs = NULL, *own = NULL, count = s->prolong.coarse, used = 0;
-    drape_status status = drape_prolong_meet(s->ctx, &s->prolong, graph, &start, &neighbor);
-    if (!status) {
-        pairs = drape_alloc(s->ctx, 2 * (size_t)start[count], sizeof *pairs);
-        own = drape_alloc(s->ctx, (size_t)count, sizeof *own);
-        status = pairs && own ? DRAPE_OK : DRAPE_E_MEMORY;
-    }
-    for (int32_t a = 0; !status && a < count; a++) {
+    int32_t *start, *neighbor, count = s->prolong.coarse, used = 0;
+    drape_status status = drape_prolong_meet(scratch, &s->prolong, graph, &start, &neighbor);
+    if (status)
+        return status;
+    int32_t *pairs = drape_arena_take(scratch, 2 * (size_t)start[count], sizeof *pairs);
+    int32_t *own = drape_arena_take(scratch, (size_t)count, sizeof *own);
+    if (drape_arena_status(scratch))
+        return DRAPE_E_MEMORY;
+    for (int32_t a = 0; a < count; a++) {
         own[a] = a;
         for (int32_t k = start[a]; k < start[a + 1]; k++)
             if (neighbor[k] < a) {
@@ -103,34 +87,30 @@ static drape_status build_coarse_pattern(pcg_state *s, const drape_graph *graph)
             }
     }
     const drape_coupling coupling = {.count = used, .nodes = 2, .node = pairs};
-    if (!status)
-        status = drape_pattern_build(s->ctx, count, own, &coupling, 1, &s->coarse);
-    drape_free(s->ctx, start);
-    drape_free(s->ctx, neighbor);
-    drape_free(s->ctx, pairs);
-    drape_free(s->ctx, own);
-    return status;
+    return drape_pattern_build(s->arena, count, own, &coupling, 1, &s->coarse);
 }
 
 static drape_status build_coarse(pcg_state *s)
 {
     const drape_pattern *p = s->pattern;
     const drape_graph graph = {.count = p->block_count, .start = p->block_start, .neighbor = p->block_row};
+    drape_arena scratch = drape_arena_of(s->arena->ctx);
     int spacing = (int)lround(HOP * drape_prolong_spacing(p->block_count));
-    drape_status status = drape_prolong_build(s->ctx, &graph, spacing < 2 ? 2 : spacing, &s->prolong);
+    drape_status status = drape_prolong_build(s->arena, &graph, spacing < 2 ? 2 : spacing, &s->prolong);
     if (!status)
-        status = build_coarse_pattern(s, &graph);
+        status = build_coarse_pattern(s, &graph, &scratch);
+    drape_arena_free(&scratch);
     if (!status)
         status = find_slots(s);
     if (status)
         return status;
-    s->coarse_values = drape_alloc(s->ctx, (size_t)s->coarse.nonzeros, sizeof *s->coarse_values);
-    s->coarse_b = drape_alloc(s->ctx, (size_t)s->coarse.n, sizeof *s->coarse_b);
-    s->coarse_x = drape_alloc(s->ctx, (size_t)s->coarse.n, sizeof *s->coarse_x);
-    s->coarse_row = drape_linear_best(s->coarse.n);
-    return s->coarse_values && s->coarse_b && s->coarse_x
-               ? s->coarse_row->create(s->ctx, &s->coarse, &s->coarse_solver)
-               : DRAPE_E_MEMORY;
+    s->coarse_values = drape_arena_take(s->arena, (size_t)s->coarse.nonzeros, sizeof *s->coarse_values);
+    s->coarse_b = drape_arena_take(s->arena, (size_t)s->coarse.n, sizeof *s->coarse_b);
+    s->coarse_x = drape_arena_take(s->arena, (size_t)s->coarse.n, sizeof *s->coarse_x);
+    s->coarse_ops = drape_linear_best(s->coarse.n);
+    if (drape_arena_status(s->arena))
+        return DRAPE_E_MEMORY;
+    return s->coarse_ops->create(s->arena, &s->coarse, &s->coarse_solver);
 }
 
 /* P' A P */
@@ -185,37 +165,42 @@ static void precondition(const void *owner, const double *r, double *z)
                 a[3 * i] * from[0] + a[3 * i + 1] * from[1] + a[3 * i + 2] * from[2];
     }
     drape_prolong_restrict(&s->prolong, r, s->coarse_b);
-    if (s->coarse_row->solve(s->coarse_solver, s->coarse_b, s->coarse_x) == DRAPE_OK)
+    if (s->coarse_ops->solve(s->coarse_solver, s->coarse_b, s->coarse_x) == DRAPE_OK)
         drape_prolong_add(&s->prolong, s->coarse_x, z);
 }
 
-static drape_status create(drape_context *ctx, const drape_pattern *pattern, void **state)
+static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
 {
-    pcg_state *s = drape_alloc(ctx, 1, sizeof *s);
-    size_t n = (size_t)pattern->n;
-    *state = s;
+    const size_t n = (size_t)pattern->n;
+    pcg_state *s = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    s->ctx = ctx;
+    s->arena = arena;
     s->pattern = pattern;
-    s->general_row = drape_linear_general(pattern->n);
-    s->values = drape_alloc(ctx, (size_t)pattern->nonzeros, sizeof *s->values);
-    s->inverse = drape_alloc(ctx, 3 * n, sizeof *s->inverse);
+    s->fallback = drape_fallback_of(arena, pattern);
+    s->values = drape_arena_take(arena, (size_t)pattern->nonzeros, sizeof *s->values);
+    s->inverse = drape_arena_take(arena, 3 * n, sizeof *s->inverse);
     s->pcg = (drape_pcg){.n = pattern->n,
                          .owner = s,
                          .multiply = multiply,
                          .precondition = precondition,
-                         .max_iterations = MOST,
-                         .r = drape_alloc(ctx, n, sizeof(double)),
-                         .z = drape_alloc(ctx, n, sizeof(double)),
-                         .p = drape_alloc(ctx, n, sizeof(double)),
-                         .q = drape_alloc(ctx, n, sizeof(double))};
-    drape_status status = s->values && s->inverse && s->pcg.r && s->pcg.z && s->pcg.p && s->pcg.q
-                              ? build_coarse(s)
-                              : DRAPE_E_MEMORY;
-    if (status)
-        destroy(state);
+                         .r = drape_arena_take(arena, n, sizeof(double)),
+                         .z = drape_arena_take(arena, n, sizeof(double)),
+                         .p = drape_arena_take(arena, n, sizeof(double)),
+                         .q = drape_arena_take(arena, n, sizeof(double))};
+    drape_status status = drape_arena_status(arena);
+    if (!status)
+        status = build_coarse(s);
+    if (!status)
+        *state = s;
     return status;
+}
+
+static void destroy(void **state)
+{
+    pcg_state *s = *state;
+    drape_linear_destroy(s->coarse_ops, &s->coarse_solver);
+    drape_fallback_destroy(&s->fallback);
 }
 
 /* ---- Values ---- */
@@ -273,26 +258,21 @@ static bool invert_diagonal(pcg_state *s)
 static drape_status factor_coarse(pcg_state *s)
 {
     add_galerkin(s);
-    const drape_linear_ops *row = s->coarse_row;
-    return (row->factor_definite ? row->factor_definite : row->factor)(s->coarse_solver, s->coarse_values);
+    const drape_linear_ops *ops = s->coarse_ops;
+    return (ops->factor_definite ? ops->factor_definite : ops->factor)(s->coarse_solver, s->coarse_values);
 }
 
 static drape_status factor_general(pcg_state *s)
 {
-    drape_status status = DRAPE_OK;
-    s->fallbacks++;
-    if (!s->general)
-        status = s->general_row->create(s->ctx, s->pattern, &s->general);
-    if (!status)
-        status = s->general_row->factor(s->general, s->values);
-    s->by_general = s->factored = !status;
+    drape_status status = drape_fallback_factor(&s->fallback, s->values);
+    s->factored = !status;
     return status;
 }
 
 static drape_status factor(void *state, const double *values)
 {
     pcg_state *s = state;
-    s->by_general = s->factored = false;
+    s->fallback.active = s->factored = false;
     if (!drape_all_finite(values, (size_t)s->pattern->nonzeros))
         return DRAPE_RETRY_LINEAR;
     memcpy(s->values, values, (size_t)s->pattern->nonzeros * sizeof *values);
@@ -310,9 +290,8 @@ static drape_status solve_inexact(void *state, const double *b, double *x, doubl
     *iterations = 0;
     if (!s->factored)
         return DRAPE_RETRY_LINEAR;
-    if (!s->by_general) {
-        s->pcg.tolerance = tolerance;
-        drape_pcg_solve(&s->pcg, b, x);
+    if (!s->fallback.active) {
+        drape_pcg_solve(&s->pcg, b, x, tolerance, MAX_ITERATIONS);
         *iterations = s->pcg.iterations;
         if (s->pcg.definite && s->pcg.converged && drape_all_finite(x, (size_t)s->pattern->n))
             return DRAPE_OK;
@@ -320,7 +299,7 @@ static drape_status solve_inexact(void *state, const double *b, double *x, doubl
         if (status)
             return status;
     }
-    return s->general_row->solve(s->general, b, x);
+    return s->fallback.ops->solve(s->fallback.solver, b, x);
 }
 
 static drape_status solve(void *state, const double *b, double *x)
@@ -329,20 +308,16 @@ static drape_status solve(void *state, const double *b, double *x)
     return solve_inexact(state, b, x, EXACT, &iterations);
 }
 
-/* The coarse matrix is kept as it was: it may be of an earlier matrix than that of the general row. */
+/* The coarse matrix is archived as it is: it may belong to an earlier matrix than that of the fallback. */
 static void archive(void *state, drape_archive *a, const double *values)
 {
     pcg_state *s = state;
-    const bool coarse = s->coarse_row->archive != NULL || values;
-    drape_archive_int64(a, &s->fallbacks);
-    drape_archive_bool(a, &s->by_general);
-    drape_archive_bool(a, &s->factored);
-    drape_linear_archive_general(s->general_row, s->ctx, s->pattern, &s->general, a,
-                                 s->by_general ? values : NULL);
+    const bool coarse = s->coarse_ops->archive != NULL || values;
+    drape_fallback_archive(&s->fallback, &s->factored, a, values);
     if (coarse)
         drape_archive_doubles(a, s->coarse_values, (size_t)s->coarse.nonzeros);
-    bool stands = values && s->factored && !s->by_general;
-    drape_linear_archive(s->coarse_row, s->coarse_solver, a, stands ? s->coarse_values : NULL);
+    bool stands = values && s->factored && !s->fallback.active;
+    drape_linear_archive(s->coarse_ops, s->coarse_solver, a, stands ? s->coarse_values : NULL);
     if (!drape_archive_is_reading(a) || !values)
         return;
     memcpy(s->values, values, (size_t)s->pattern->nonzeros * sizeof *values);
@@ -353,32 +328,22 @@ static void archive(void *state, drape_archive *a, const double *values)
 static size_t bytes(const void *state)
 {
     const pcg_state *s = state;
-    const drape_prolong *p = &s->prolong;
-    const drape_pattern *fine = s->pattern;
-    size_t products_total = 0, entries = (size_t)p->start[p->fine], n = (size_t)fine->n;
-    for (int32_t j = 0; j < fine->block_count; j++)
-        for (int32_t k = fine->block_start[j]; k < fine->block_start[j + 1]; k++)
-            products_total += (size_t)products(p, fine->block_row[k], j);
-    size_t doubles =
-        (size_t)fine->nonzeros + 7 * n + entries + 2 * (size_t)s->coarse.nonzeros + 3 * (size_t)s->coarse.n;
-    return sizeof *s + doubles * sizeof(double) + (products_total + entries + n / 3) * sizeof(int32_t) +
-           s->coarse_row->bytes(s->coarse_solver) + (s->general ? s->general_row->bytes(s->general) : 0);
+    return drape_linear_bytes(s->coarse_ops, s->coarse_solver) + drape_fallback_bytes(&s->fallback);
 }
 
 static void report(const void *state, drape_linear_report *out)
 {
-    const pcg_state *s = state;
-    *out = (drape_linear_report){
-        .row = &drape_linear_pcg, .fallbacks = s->fallbacks, .fallback = s->general ? s->general_row : NULL};
+    *out = drape_fallback_report(&((const pcg_state *)state)->fallback, &drape_linear_pcg);
 }
 
 const drape_linear_ops drape_linear_pcg = {
-    .name = "pcg",
-    .summary =
-        "conjugate gradients with diagonal blocks and a coarse space, no factors of the matrix; what is "
-        "not symmetric positive definite goes to umfpack or klu, by size",
-    .reference = "Hestenes & Stiefel 1952; Vanek, Mandel & Brezina 1996",
-    .borrows_heap = true, /* of the rows that it has for the coarse space and for general matrices */
+    .entry =
+        {.name = "pcg",
+         .summary =
+             "conjugate gradients with diagonal blocks and a coarse space, no factors of the matrix; what is "
+             "not symmetric positive definite goes to umfpack or klu, by size",
+         .reference = "Hestenes & Stiefel 1952; Vanek, Mandel & Brezina 1996"},
+    .borrows_heap = true, /* by the solver of the coarse space, and by the fallback */
     .create = create,
     .factor = factor,
     .solve = solve,

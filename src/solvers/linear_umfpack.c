@@ -4,7 +4,7 @@
  * thousandth of what is below. Ordering and analysis are done once, in create; each factorisation chooses its
  * pivots afresh and takes its factors from the heap anew.
  */
-#include "solvers/alone.h"
+#include "solvers/library_lock.h"
 #include "solvers/linear.h"
 
 #include "base/finite.h"
@@ -18,7 +18,6 @@
 typedef SuiteSparse_long index_t;
 
 typedef struct umfpack_state {
-    drape_context *ctx;
     const drape_pattern *pattern;
     double control[UMFPACK_CONTROL], info[UMFPACK_INFO];
     void *symbolic;
@@ -38,14 +37,8 @@ static const index_t *indices(const int64_t *array)
 static void destroy(void **state)
 {
     umfpack_state *s = *state;
-    if (!s)
-        return;
     umfpack_dl_free_numeric(&s->numeric);
     umfpack_dl_free_symbolic(&s->symbolic);
-    drape_free(s->ctx, s->index);
-    drape_free(s->ctx, s->work);
-    drape_free(s->ctx, s);
-    *state = NULL;
 }
 
 static void set_control(double *control)
@@ -56,30 +49,27 @@ static void set_control(double *control)
     control[UMFPACK_IRSTEP] = 0;
 }
 
-static drape_status create(drape_context *ctx, const drape_pattern *pattern, void **state)
+static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
 {
-    umfpack_state *s = drape_alloc(ctx, 1, sizeof *s);
-    *state = s;
+    umfpack_state *s = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    s->ctx = ctx;
     s->pattern = pattern;
     set_control(s->control);
-    s->index = drape_alloc(ctx, (size_t)pattern->n, sizeof *s->index);
-    s->work = drape_alloc(ctx, (size_t)pattern->n, sizeof *s->work);
-    if (!s->index || !s->work) {
-        destroy(state);
+    s->index = drape_arena_take(arena, (size_t)pattern->n, sizeof *s->index);
+    s->work = drape_arena_take(arena, (size_t)pattern->n, sizeof *s->work);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    }
     index_t code = umfpack_dl_symbolic(pattern->n, pattern->n, indices(pattern->column),
                                        indices(pattern->row), NULL, &s->symbolic, s->control, s->info);
-    if (code == UMFPACK_OK)
-        return DRAPE_OK;
-    drape_status status = code == UMFPACK_ERROR_out_of_memory ? DRAPE_E_MEMORY : DRAPE_E_SOLVER;
-    destroy(state);
-    return drape_fail(ctx, status, "%sUMFPACK cannot analyse the %lld x %lld Jacobian: status %d",
-                      status == DRAPE_E_MEMORY ? "out of memory: " : "", (long long)pattern->n,
-                      (long long)pattern->n, (int)code);
+    const bool no_memory = code == UMFPACK_ERROR_out_of_memory;
+    if (code != UMFPACK_OK)
+        return drape_fail(arena->ctx, no_memory ? DRAPE_E_MEMORY : DRAPE_E_SOLVER,
+                          "%sUMFPACK cannot analyse the %lld x %lld Jacobian: status %d",
+                          no_memory ? "out of memory: " : "", (long long)pattern->n, (long long)pattern->n,
+                          (int)code);
+    *state = s;
+    return DRAPE_OK;
 }
 
 static drape_status factor(void *state, const double *values)
@@ -89,10 +79,10 @@ static drape_status factor(void *state, const double *values)
     umfpack_dl_free_numeric(&s->numeric);
     if (!drape_all_finite(values, (size_t)p->nonzeros))
         return DRAPE_RETRY_LINEAR;
-    drape_alone_begin();
+    drape_library_lock();
     index_t code = umfpack_dl_numeric(indices(p->column), indices(p->row), values, s->symbolic, &s->numeric,
                                       s->control, s->info);
-    drape_alone_end();
+    drape_library_unlock();
     if (code == UMFPACK_OK && s->info[UMFPACK_RCOND] > MIN_RCOND)
         return DRAPE_OK;
     umfpack_dl_free_numeric(&s->numeric);
@@ -105,10 +95,10 @@ static drape_status solve(void *state, const double *b, double *x)
     const drape_pattern *p = s->pattern;
     if (!s->numeric)
         return DRAPE_RETRY_LINEAR;
-    drape_alone_begin();
+    drape_library_lock();
     index_t code = umfpack_dl_wsolve(UMFPACK_A, indices(p->column), indices(p->row), NULL, x, b, s->numeric,
                                      s->control, NULL, s->index, s->work);
-    drape_alone_end();
+    drape_library_unlock();
     if (code != UMFPACK_OK)
         return DRAPE_RETRY_LINEAR;
     return drape_all_finite(x, (size_t)p->n) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
@@ -118,14 +108,13 @@ static size_t bytes(const void *state)
 {
     const umfpack_state *s = state;
     double units = s->info[UMFPACK_SYMBOLIC_SIZE] + (s->numeric ? s->info[UMFPACK_NUMERIC_SIZE] : 0);
-    return sizeof *s + (size_t)s->pattern->n * (sizeof *s->index + sizeof *s->work) +
-           (size_t)(units * s->info[UMFPACK_SIZE_OF_UNIT]);
+    return (size_t)(units * s->info[UMFPACK_SIZE_OF_UNIT]);
 }
 
 const drape_linear_ops drape_linear_umfpack = {
-    .name = "umfpack",
-    .summary = "multifrontal LU with AMD ordering; pivots are chosen at each factorisation",
-    .reference = "Davis 2004, Algorithm 832: UMFPACK V4.3",
+    .entry = {.name = "umfpack",
+              .summary = "multifrontal LU with AMD ordering; pivots are chosen at each factorisation",
+              .reference = "Davis 2004, Algorithm 832: UMFPACK V4.3"},
     .general_from = 1000, /* with OpenBLAS 0.8 of klu's time at 1 200, half at 2 300, a quarter at 7 500 */
     .borrows_heap = true, /* fronts, and the factors anew */
     .create = create,

@@ -11,8 +11,8 @@ static double dot(const double *a, const double *b, int64_t n)
     return sum;
 }
 
-/* A direction of no positive curvature before the first step: the preconditioned residual itself is taken, which
- * descends. */
+/* A direction of no positive curvature before the first step: the preconditioned residual itself is taken,
+ * which descends. */
 static void stop_indefinite(drape_pcg *s, double *x)
 {
     s->definite = false;
@@ -35,7 +35,7 @@ static void turn(drape_pcg *s, double b)
         s->p[i] = s->z[i] + b * s->p[i];
 }
 
-void drape_pcg_solve(drape_pcg *s, const double *b, double *x)
+void drape_pcg_solve(drape_pcg *s, const double *b, double *x, double tolerance, int max_iterations)
 {
     size_t bytes = (size_t)s->n * sizeof *x;
     s->iterations = 0;
@@ -44,9 +44,9 @@ void drape_pcg_solve(drape_pcg *s, const double *b, double *x)
     memcpy(s->r, b, bytes);
     s->precondition(s->owner, s->r, s->z);
     memcpy(s->p, s->z, bytes);
-    double size = dot(s->r, s->z, s->n), goal = s->tolerance * s->tolerance * size;
+    double size = dot(s->r, s->z, s->n), goal = tolerance * tolerance * size;
     s->converged = size == 0;
-    while (!s->converged && s->iterations < s->max_iterations) {
+    while (!s->converged && s->iterations < max_iterations) {
         s->multiply(s->owner, s->p, s->q);
         double curvature = dot(s->p, s->q, s->n);
         if (!(curvature > 0)) {

@@ -1,5 +1,5 @@
-/* pick.c: which row is the fastest of this build for a number of unknowns, by what each row says of itself; and what all
- * rows archive in the same way. */
+/* pick.c: which solver of this build is the fastest for a number of unknowns, by their best_from and
+ * general_from; and what all solvers archive, destroy and count in the same way. */
 #include "solvers/linear.h"
 
 static int64_t best_from(const drape_linear_ops *row)
@@ -12,7 +12,7 @@ static int64_t general_from(const drape_linear_ops *row)
     return row->general_from;
 }
 
-/* Below the smallest size of all rows, the row with that. */
+/* Below the smallest size of all solvers, the solver with that size. */
 static const drape_linear_ops *pick(int64_t n, int64_t (*from_of)(const drape_linear_ops *row))
 {
     const drape_linear_ops *best = NULL;
@@ -42,17 +42,17 @@ void drape_linear_archive(const drape_linear_ops *row, void *state, drape_archiv
         row->archive(state, a, values);
     else if (drape_archive_is_reading(a) && values && row->factor(state, values))
         drape_archive_fail(a, DRAPE_E_SOLVER, "a matrix of the checkpoint has no factors by \"%s\" here",
-                           row->name);
+                           row->entry.name);
 }
 
-void drape_linear_archive_general(const drape_linear_ops *row, drape_context *ctx,
-                                  const drape_pattern *pattern, void **solver, drape_archive *a,
-                                  const double *values)
+void drape_linear_destroy(const drape_linear_ops *ops, void **state)
 {
-    bool there = *solver != NULL;
-    drape_archive_bool(a, &there);
-    if (drape_archive_is_reading(a) && there && !*solver)
-        drape_archive_note(a, row->create(ctx, pattern, solver));
-    if (drape_archive_good(a) && there)
-        drape_linear_archive(row, *solver, a, values);
+    if (*state && ops->destroy)
+        ops->destroy(state);
+    *state = NULL;
+}
+
+size_t drape_linear_bytes(const drape_linear_ops *ops, const void *state)
+{
+    return ops->bytes ? ops->bytes(state) : 0;
 }

@@ -5,8 +5,8 @@
 #include <math.h>
 #include <string.h>
 
-#define WIDEST 16        /* functions at a node; the smallest of more are left out */
-#define SMOOTH (2.0 / 3) /* share of a node's value that comes from its neighbours, in each averaging */
+#define MAX_FUNCTIONS 16        /* functions at a node; if there are more, the smallest are left out */
+#define SMOOTH        (2.0 / 3) /* share of a node's value that comes from its neighbours, in each averaging */
 #define DROP                                                                                                 \
     0.08 /* of the largest at a node: smaller values are left out, the others scaled to add up to 1 */
 #define WIDENING 1.1 /* of the spacing: measured best at 2 500 and 10 000 nodes (bench/speed rungs) */
@@ -61,29 +61,29 @@ static int32_t aggregate(const drape_graph *g, int spacing, front *f)
 
 /* The values at each node while they are smoothed. */
 typedef struct table {
-    int32_t *count, *column; /* (nodes), (nodes x WIDEST) */
+    int32_t *count, *column; /* (nodes), (nodes x MAX_FUNCTIONS) */
     double *value;
 } table;
 
 static void add_value(table *t, int32_t node, int32_t column, double value)
 {
-    int32_t *columns = t->column + (size_t)node * WIDEST, k = 0;
+    int32_t *columns = t->column + (size_t)node * MAX_FUNCTIONS, k = 0;
     while (k < t->count[node] && columns[k] != column)
         k++;
-    if (k == WIDEST)
+    if (k == MAX_FUNCTIONS)
         return;
     if (k == t->count[node]) {
         t->count[node]++;
         columns[k] = column;
-        t->value[(size_t)node * WIDEST + (size_t)k] = 0;
+        t->value[(size_t)node * MAX_FUNCTIONS + (size_t)k] = 0;
     }
-    t->value[(size_t)node * WIDEST + (size_t)k] += value;
+    t->value[(size_t)node * MAX_FUNCTIONS + (size_t)k] += value;
 }
 
 static void add_row(table *to, int32_t node, const table *from, int32_t other, double factor)
 {
     for (int32_t k = 0; k < from->count[other]; k++) {
-        size_t at = (size_t)other * WIDEST + (size_t)k;
+        size_t at = (size_t)other * MAX_FUNCTIONS + (size_t)k;
         add_value(to, node, from->column[at], factor * from->value[at]);
     }
 }
@@ -103,7 +103,7 @@ static double threshold(const table *t, int32_t node)
 {
     double largest = 0;
     for (int32_t k = 0; k < t->count[node]; k++)
-        largest = fmax(largest, t->value[(size_t)node * WIDEST + (size_t)k]);
+        largest = fmax(largest, t->value[(size_t)node * MAX_FUNCTIONS + (size_t)k]);
     return DROP * largest;
 }
 
@@ -113,30 +113,30 @@ static int32_t kept(const table *t, int32_t node, double *sum)
     int32_t count = 0;
     *sum = 0;
     for (int32_t k = 0; k < t->count[node]; k++) {
-        double value = t->value[(size_t)node * WIDEST + (size_t)k];
+        double value = t->value[(size_t)node * MAX_FUNCTIONS + (size_t)k];
         count += value > least;
         *sum += value > least ? value : 0;
     }
     return count;
 }
 
-static drape_status pack(drape_context *ctx, const table *t, drape_prolong *out)
+static drape_status pack(drape_arena *arena, const table *t, drape_prolong *out)
 {
     int32_t total = 0, at = 0;
     double sum;
     for (int32_t i = 0; i < out->fine; i++)
         total += kept(t, i, &sum);
-    out->start = drape_alloc(ctx, (size_t)out->fine + 1, sizeof *out->start);
-    out->column = drape_alloc(ctx, (size_t)total, sizeof *out->column);
-    out->weight = drape_alloc(ctx, (size_t)total, sizeof *out->weight);
-    if (!out->start || !out->column || !out->weight)
+    out->start = drape_arena_take(arena, (size_t)out->fine + 1, sizeof *out->start);
+    out->column = drape_arena_take(arena, (size_t)total, sizeof *out->column);
+    out->weight = drape_arena_take(arena, (size_t)total, sizeof *out->weight);
+    if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
     for (int32_t i = 0; i < out->fine; i++) {
         out->start[i] = at;
         kept(t, i, &sum);
         double least = threshold(t, i);
         for (int32_t k = 0; k < t->count[i]; k++) {
-            size_t from = (size_t)i * WIDEST + (size_t)k;
+            size_t from = (size_t)i * MAX_FUNCTIONS + (size_t)k;
             if (t->value[from] <= least)
                 continue;
             out->column[at] = t->column[from];
@@ -145,21 +145,6 @@ static drape_status pack(drape_context *ctx, const table *t, drape_prolong *out)
     }
     out->start[out->fine] = at;
     return DRAPE_OK;
-}
-
-static bool open_table(drape_context *ctx, int32_t nodes, table *t)
-{
-    t->count = drape_alloc(ctx, (size_t)nodes, sizeof *t->count);
-    t->column = drape_alloc(ctx, (size_t)nodes * WIDEST, sizeof *t->column);
-    t->value = drape_alloc(ctx, (size_t)nodes * WIDEST, sizeof *t->value);
-    return t->count && t->column && t->value;
-}
-
-static void close_table(drape_context *ctx, table *t)
-{
-    drape_free(ctx, t->count);
-    drape_free(ctx, t->column);
-    drape_free(ctx, t->value);
 }
 
 /* Aggregates of radius r overlap well after r averagings. */
@@ -178,37 +163,27 @@ static void make_functions(const drape_graph *g, int spacing, const front *f, ta
     }
 }
 
-drape_status drape_prolong_build(drape_context *ctx, const drape_graph *g, int spacing, drape_prolong *out)
+drape_status drape_prolong_build(drape_arena *arena, const drape_graph *g, int spacing, drape_prolong *out)
 {
-    size_t nodes = (size_t)g->count;
-    front f = {.distance = drape_alloc(ctx, nodes, sizeof *f.distance),
-               .queue = drape_alloc(ctx, nodes, sizeof *f.queue),
-               .aggregate = drape_alloc(ctx, nodes, sizeof *f.aggregate)};
-    table t[2] = {{0}};
+    const size_t nodes = (size_t)g->count;
+    drape_arena scratch = drape_arena_of(arena->ctx);
+    front f = {.distance = drape_arena_take(&scratch, nodes, sizeof *f.distance),
+               .queue = drape_arena_take(&scratch, nodes, sizeof *f.queue),
+               .aggregate = drape_arena_take(&scratch, nodes, sizeof *f.aggregate)};
+    table t[2];
+    for (int i = 0; i < 2; i++)
+        t[i] = (table){.count = drape_arena_take(&scratch, nodes, sizeof *t->count),
+                       .column = drape_arena_take(&scratch, nodes * MAX_FUNCTIONS, sizeof *t->column),
+                       .value = drape_arena_take(&scratch, nodes * MAX_FUNCTIONS, sizeof *t->value)};
     *out = (drape_prolong){.fine = g->count};
-    drape_status status = DRAPE_E_MEMORY;
-    if (f.distance && f.queue && f.aggregate && open_table(ctx, g->count, &t[0]) &&
-        open_table(ctx, g->count, &t[1])) {
+    drape_status status = drape_arena_status(&scratch);
+    if (!status) {
         out->coarse = aggregate(g, spacing, &f);
         make_functions(g, spacing, &f, t);
-        status = pack(ctx, &t[0], out);
+        status = pack(arena, &t[0], out);
     }
-    close_table(ctx, &t[0]);
-    close_table(ctx, &t[1]);
-    drape_free(ctx, f.distance);
-    drape_free(ctx, f.queue);
-    drape_free(ctx, f.aggregate);
-    if (status)
-        drape_prolong_free(ctx, out);
+    drape_arena_free(&scratch);
     return status;
-}
-
-void drape_prolong_free(drape_context *ctx, drape_prolong *p)
-{
-    drape_free(ctx, p->start);
-    drape_free(ctx, p->column);
-    drape_free(ctx, p->weight);
-    *p = (drape_prolong){0};
 }
 
 /* ---- Use ---- */
@@ -235,12 +210,12 @@ void drape_prolong_add(const drape_prolong *p, const double *coarse, double *fin
 /* ---- What meets what ---- */
 
 /* The nodes at which each coarse function is not zero: node[start[a]] ... */
-static bool transpose(drape_context *ctx, const drape_prolong *p, int32_t **start, int32_t **node)
+static bool transpose(drape_arena *arena, const drape_prolong *p, int32_t **start, int32_t **node)
 {
     size_t total = (size_t)p->start[p->fine];
-    *start = drape_alloc(ctx, (size_t)p->coarse + 2, sizeof **start);
-    *node = drape_alloc(ctx, total, sizeof **node);
-    if (!*start || !*node)
+    *start = drape_arena_take(arena, (size_t)p->coarse + 2, sizeof **start);
+    *node = drape_arena_take(arena, total, sizeof **node);
+    if (drape_arena_status(arena))
         return false;
     for (size_t k = 0; k < total; k++)
         (*start)[p->column[k] + 2]++;
@@ -287,31 +262,23 @@ static void unmark(int32_t *mark, int32_t count)
         mark[i] = -1;
 }
 
-drape_status drape_prolong_meet(drape_context *ctx, const drape_prolong *p, const drape_graph *g,
+drape_status drape_prolong_meet(drape_arena *arena, const drape_prolong *p, const drape_graph *g,
                                 int32_t **out_start, int32_t **out_neighbor)
 {
-    int32_t *start = NULL, *node = NULL, *mark = drape_alloc(ctx, (size_t)p->coarse, sizeof *mark);
-    int32_t *rows = drape_alloc(ctx, (size_t)p->coarse + 1, sizeof *rows), *columns = NULL;
-    bool good = mark && rows && transpose(ctx, p, &start, &node);
-    if (good) {
-        unmark(mark, p->coarse);
-        for (int32_t a = 0; a < p->coarse; a++)
-            rows[a + 1] = rows[a] + meet_row(p, g, start, node, a, mark, NULL);
-        columns = drape_alloc(ctx, (size_t)rows[p->coarse], sizeof *columns);
-        good = columns;
-    }
-    if (good) {
-        unmark(mark, p->coarse);
-        for (int32_t a = 0; a < p->coarse; a++)
-            meet_row(p, g, start, node, a, mark, columns + rows[a]);
-    } else {
-        drape_free(ctx, rows);
-        rows = NULL;
-    }
-    drape_free(ctx, start);
-    drape_free(ctx, node);
-    drape_free(ctx, mark);
+    int32_t *start, *node, *mark = drape_arena_take(arena, (size_t)p->coarse, sizeof *mark);
+    int32_t *rows = drape_arena_take(arena, (size_t)p->coarse + 1, sizeof *rows);
+    if (!transpose(arena, p, &start, &node))
+        return DRAPE_E_MEMORY;
+    unmark(mark, p->coarse);
+    for (int32_t a = 0; a < p->coarse; a++)
+        rows[a + 1] = rows[a] + meet_row(p, g, start, node, a, mark, NULL);
+    int32_t *columns = drape_arena_take(arena, (size_t)rows[p->coarse], sizeof *columns);
+    if (!columns)
+        return DRAPE_E_MEMORY;
+    unmark(mark, p->coarse);
+    for (int32_t a = 0; a < p->coarse; a++)
+        meet_row(p, g, start, node, a, mark, columns + rows[a]);
     *out_start = rows;
     *out_neighbor = columns;
-    return good ? DRAPE_OK : DRAPE_E_MEMORY;
+    return DRAPE_OK;
 }

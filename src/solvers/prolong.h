@@ -1,14 +1,14 @@
 /*
  * prolong.h: a coarse space on a graph of nodes, by smoothed aggregation (Vanek, Mandel & Brezina 1996,
- * Algebraic multigrid by smoothed aggregation): seeds some edges apart, each node to its nearest seed, and the
- * indicator functions of these aggregates averaged over neighbours until they overlap. The functions add up to
- * 1 at each node, so a translation of everything is in the space. It depends on the graph alone: any mesh has
- * one, and it is made once.
+ * Algebraic multigrid by smoothed aggregation): seeds some edges apart, each node to its nearest seed, and
+ * the indicator functions of these aggregates averaged over neighbours until they overlap. The functions add
+ * up to 1 at each node, so a translation of everything is in the space. It depends on the graph alone: any
+ * mesh has one, and it is made once.
  */
 #ifndef DRAPE_SOLVERS_PROLONG_H
 #define DRAPE_SOLVERS_PROLONG_H
 
-#include "base/context.h"
+#include "base/arena.h"
 
 /* Neighbours of each node, in both directions: neighbor[start[i]] ... neighbor[start[i + 1] - 1]. */
 typedef struct drape_graph {
@@ -23,22 +23,22 @@ typedef struct drape_prolong {
     double *weight;  /* their values there */
 } drape_prolong;
 
-/* The edges between seeds that suit so many nodes: the more nodes, the wider, so that the coarse matrix costs no
- * more than the fine one. */
+/* The edges between seeds that suit so many nodes: the more nodes, the wider, so that the coarse matrix costs
+ * no more than the fine one. */
 int drape_prolong_spacing(int32_t nodes);
 
-/* Errors: DRAPE_E_MEMORY; then there is nothing to free. */
-drape_status drape_prolong_build(drape_context *ctx, const drape_graph *graph, int spacing,
+/* Errors: DRAPE_E_MEMORY. */
+drape_status drape_prolong_build(drape_arena *arena, const drape_graph *graph, int spacing,
                                  drape_prolong *out);
-void drape_prolong_free(drape_context *ctx, drape_prolong *prolong);
 
 /* coarse (coarse x 3) = P' fine; fine (fine x 3) += P coarse. */
 void drape_prolong_restrict(const drape_prolong *prolong, const double *fine, double *coarse);
 void drape_prolong_add(const drape_prolong *prolong, const double *coarse, double *fine);
 
 /* Which coarse functions meet through a symmetric graph of the nodes, as one that has them on its diagonal:
- * start (coarse + 1) and neighbor, rows not sorted, are taken by drape_alloc. Errors: DRAPE_E_MEMORY. */
-drape_status drape_prolong_meet(drape_context *ctx, const drape_prolong *prolong, const drape_graph *graph,
+ * start (coarse + 1) and neighbor, rows not sorted. Workspace is taken from the arena, too: let it be one for
+ * the moment. Errors: DRAPE_E_MEMORY. */
+drape_status drape_prolong_meet(drape_arena *arena, const drape_prolong *prolong, const drape_graph *graph,
                                 int32_t **start, int32_t **neighbor);
 
 #endif

@@ -35,12 +35,13 @@ static int keep_solver(SUNLinearSolver solver)
     return 0;
 }
 
-drape_status drape_sun_linear_factor(drape_sun_linear *linear)
+drape_status drape_sun_linear_factor(drape_sun_linear *linear, bool definite)
 {
     double start = drape_clock_seconds();
-    bool refuses = linear->definite && linear->ops->factor_definite;
-    linear->status =
-        (refuses ? linear->ops->factor_definite : linear->ops->factor)(linear->state, linear->values);
+    if (definite && linear->ops->factor_definite)
+        linear->status = linear->ops->factor_definite(linear->state, linear->values);
+    else
+        linear->status = linear->ops->factor(linear->state, linear->values);
     linear->factor_seconds += drape_clock_seconds() - start;
     linear->factorizations++;
     return linear->status;
@@ -50,7 +51,7 @@ drape_status drape_sun_linear_factor(drape_sun_linear *linear)
 static int setup(SUNLinearSolver solver, SUNMatrix matrix)
 {
     (void)matrix;
-    return drape_sun_linear_factor(solver->content);
+    return drape_sun_linear_factor(solver->content, false);
 }
 
 drape_status drape_sun_linear_solve(drape_sun_linear *linear, const double *b, double *x)
@@ -72,34 +73,34 @@ static int solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector 
     return drape_sun_linear_solve(solver->content, N_VGetArrayPointer(b), N_VGetArrayPointer(x));
 }
 
+/* Values of the pattern, and the solver's state for it; both empty before. */
 static drape_status create_state(drape_sun_linear *linear, const drape_pattern *pattern)
 {
-    drape_status status = linear->ops->create(linear->ctx, pattern, &linear->state);
+    linear->pattern = pattern;
+    linear->nonzeros = pattern->nonzeros;
+    linear->values = drape_arena_take(&linear->arena, (size_t)pattern->nonzeros, sizeof *linear->values);
+    if (!linear->values)
+        return DRAPE_E_MEMORY;
+    drape_status status = linear->ops->create(&linear->arena, pattern, &linear->state);
     if (!status && linear->ops->use_threads)
-        linear->ops->use_threads(linear->state, linear->crew);
+        linear->ops->use_threads(linear->state, linear->pool);
     return status;
 }
 
-drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const drape_linear_ops *ops,
-                                     const drape_pattern *pattern, drape_crew *crew, drape_sun_linear **out)
+drape_status drape_sun_linear_create(drape_arena *arena, SUNContext sun, const drape_linear_ops *ops,
+                                     const drape_pattern *pattern, drape_pool *pool, drape_sun_linear **out)
 {
-    drape_sun_linear *linear = drape_alloc(ctx, 1, sizeof *linear);
-    *out = linear;
+    drape_sun_linear *linear = *out = drape_arena_take(arena, 1, sizeof *linear);
     if (!linear)
         return DRAPE_E_MEMORY;
-    linear->ctx = ctx;
+    linear->arena = drape_arena_within(arena);
     linear->ops = ops;
-    linear->crew = crew;
-    linear->pattern = pattern;
-    linear->nonzeros = pattern->nonzeros;
-    linear->values = drape_alloc(ctx, (size_t)pattern->nonzeros, sizeof *linear->values);
+    linear->pool = pool;
     linear->solver = SUNLinSolNewEmpty(sun);
     linear->matrix = SUNMatNewEmpty(sun);
-    drape_status status = linear->values ? DRAPE_OK : DRAPE_E_MEMORY;
-    if (!status && (!linear->solver || !linear->matrix))
-        status = drape_fail_memory(ctx, sizeof *linear->solver);
-    if (!status)
-        status = create_state(linear, pattern);
+    drape_status status = linear->solver && linear->matrix
+                              ? create_state(linear, pattern)
+                              : drape_fail_memory(arena->ctx, sizeof *linear->solver);
     if (status) {
         drape_sun_linear_destroy(out);
         return status;
@@ -115,33 +116,27 @@ drape_status drape_sun_linear_create(drape_context *ctx, SUNContext sun, const d
     return DRAPE_OK;
 }
 
-drape_status drape_sun_linear_adopt(drape_sun_linear *linear, const drape_pattern *pattern)
+drape_status drape_sun_linear_extend_pattern(drape_sun_linear *linear, const drape_pattern *pattern)
 {
     double start = drape_clock_seconds();
     linear->stale = true;
-    if (linear->state)
-        linear->ops->destroy(&linear->state);
-    drape_free(linear->ctx, linear->values);
-    linear->pattern = pattern;
-    linear->nonzeros = pattern->nonzeros;
-    linear->values = drape_alloc(linear->ctx, (size_t)pattern->nonzeros, sizeof *linear->values);
-    if (!linear->values)
-        return DRAPE_E_MEMORY;
+    drape_linear_destroy(linear->ops, &linear->state);
+    drape_arena_free(&linear->arena);
     drape_status status = create_state(linear, pattern);
     linear->stale = status != DRAPE_OK;
     linear->factor_seconds += drape_clock_seconds() - start;
     return status;
 }
 
-drape_status drape_sun_linear_adopt_other(drape_sun_linear *linear, const drape_pattern *pattern)
+drape_status drape_sun_linear_ensure_pattern(drape_sun_linear *linear, const drape_pattern *pattern)
 {
-    return linear->pattern == pattern ? DRAPE_OK : drape_sun_linear_adopt(linear, pattern);
+    return linear->pattern == pattern ? DRAPE_OK : drape_sun_linear_extend_pattern(linear, pattern);
 }
 
 void drape_sun_linear_archive(drape_sun_linear *linear, drape_archive *a, bool factors)
 {
     bool there = linear->state && !linear->stale;
-    drape_archive_mark(a, linear->ops->name);
+    drape_archive_mark(a, linear->ops->entry.name);
     drape_archive_int64(a, &linear->factorizations);
     drape_archive_int64(a, &linear->iterations);
     drape_archive_double(a, &linear->factor_seconds);
@@ -160,13 +155,16 @@ void drape_sun_linear_destroy(drape_sun_linear **out)
     drape_sun_linear *linear = *out;
     if (!linear)
         return;
-    if (linear->state)
-        linear->ops->destroy(&linear->state);
+    drape_linear_destroy(linear->ops, &linear->state);
+    drape_arena_free(&linear->arena);
     if (linear->solver)
         SUNLinSolFreeEmpty(linear->solver);
     if (linear->matrix)
         SUNMatFreeEmpty(linear->matrix);
-    drape_free(linear->ctx, linear->values);
-    drape_free(linear->ctx, linear);
     *out = NULL;
+}
+
+size_t drape_sun_linear_bytes(const drape_sun_linear *linear)
+{
+    return drape_linear_bytes(linear->ops, linear->state);
 }

@@ -11,13 +11,6 @@ typedef struct neighbours {
     int32_t *row;
 } neighbours;
 
-static void free_neighbours(drape_context *ctx, neighbours *list)
-{
-    drape_free(ctx, list->start);
-    drape_free(ctx, list->next);
-    drape_free(ctx, list->row);
-}
-
 /* Calls visit for every (row, column) of every coupling, in order. */
 typedef void visit_pair(neighbours *list, int32_t row, int32_t column);
 
@@ -45,20 +38,20 @@ static void store_pair(neighbours *list, int32_t row, int32_t column)
     list->row[list->next[column]++] = row;
 }
 
-static drape_status list_neighbours(drape_context *ctx, int32_t block_count, const int32_t *block_of_node,
+static drape_status list_neighbours(drape_arena *scratch, int32_t block_count, const int32_t *block_of_node,
                                     const drape_coupling *couplings, int coupling_count, neighbours *list)
 {
     size_t count = (size_t)block_count;
-    list->start = drape_alloc(ctx, count + 1, sizeof *list->start);
-    list->next = drape_alloc(ctx, count, sizeof *list->next);
-    if (!list->start || !list->next)
+    list->start = drape_arena_take(scratch, count + 1, sizeof *list->start);
+    list->next = drape_arena_take(scratch, count, sizeof *list->next);
+    if (drape_arena_status(scratch))
         return DRAPE_E_MEMORY;
     visit_couplings(couplings, coupling_count, block_of_node, list, count_pair);
     for (size_t j = 0; j < count; j++) {
         list->start[j + 1] += list->start[j] + 1; /* + 1: the diagonal */
         list->next[j] = list->start[j];
     }
-    list->row = drape_alloc(ctx, (size_t)list->start[count], sizeof *list->row);
+    list->row = drape_arena_take(scratch, (size_t)list->start[count], sizeof *list->row);
     if (!list->row)
         return DRAPE_E_MEMORY;
     for (int32_t j = 0; j < block_count; j++)
@@ -90,23 +83,21 @@ static int64_t make_unique(neighbours *list, int32_t block_count)
     return total;
 }
 
-static drape_status allocate(drape_context *ctx, drape_pattern *pattern, int32_t block_count, int64_t blocks)
+static drape_status allocate(drape_arena *arena, drape_pattern *pattern, int32_t block_count, int64_t blocks)
 {
     if (blocks > INT32_MAX)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT,
+        return drape_fail(arena->ctx, DRAPE_E_ARGUMENT,
                           "the Jacobian has %lld blocks of 3 x 3, at most 2147483647 are allowed",
                           (long long)blocks);
     pattern->block_count = block_count;
     pattern->n = 3 * (int64_t)block_count;
     pattern->nonzeros = 9 * blocks;
-    pattern->block_start = drape_alloc(ctx, (size_t)block_count + 1, sizeof *pattern->block_start);
-    pattern->block_row = drape_alloc(ctx, (size_t)blocks, sizeof *pattern->block_row);
-    pattern->diagonal = drape_alloc(ctx, (size_t)block_count, sizeof *pattern->diagonal);
-    pattern->column = drape_alloc(ctx, (size_t)pattern->n + 1, sizeof *pattern->column);
-    pattern->row = drape_alloc(ctx, (size_t)pattern->nonzeros, sizeof *pattern->row);
-    bool good =
-        pattern->block_start && pattern->block_row && pattern->diagonal && pattern->column && pattern->row;
-    return good ? DRAPE_OK : DRAPE_E_MEMORY;
+    pattern->block_start = drape_arena_take(arena, (size_t)block_count + 1, sizeof *pattern->block_start);
+    pattern->block_row = drape_arena_take(arena, (size_t)blocks, sizeof *pattern->block_row);
+    pattern->diagonal = drape_arena_take(arena, (size_t)block_count, sizeof *pattern->diagonal);
+    pattern->column = drape_arena_take(arena, (size_t)pattern->n + 1, sizeof *pattern->column);
+    pattern->row = drape_arena_take(arena, (size_t)pattern->nonzeros, sizeof *pattern->row);
+    return drape_arena_status(arena);
 }
 
 static void fill_blocks(drape_pattern *pattern, const neighbours *list)
@@ -132,41 +123,22 @@ static void fill_scalars(drape_pattern *pattern)
     pattern->column[pattern->n] = next;
 }
 
-drape_status drape_pattern_build(drape_context *ctx, int32_t block_count, const int32_t *block_of_node,
+drape_status drape_pattern_build(drape_arena *arena, int32_t block_count, const int32_t *block_of_node,
                                  const drape_coupling *couplings, int coupling_count, drape_pattern *pattern)
 {
     neighbours list = {0};
+    drape_arena scratch = drape_arena_of(arena->ctx);
     memset(pattern, 0, sizeof *pattern);
-    drape_status status = list_neighbours(ctx, block_count, block_of_node, couplings, coupling_count, &list);
+    drape_status status =
+        list_neighbours(&scratch, block_count, block_of_node, couplings, coupling_count, &list);
     if (!status)
-        status = allocate(ctx, pattern, block_count, make_unique(&list, block_count));
+        status = allocate(arena, pattern, block_count, make_unique(&list, block_count));
     if (!status) {
         fill_blocks(pattern, &list);
         fill_scalars(pattern);
     }
-    free_neighbours(ctx, &list);
-    if (status)
-        drape_pattern_free(ctx, pattern);
+    drape_arena_free(&scratch);
     return status;
-}
-
-void drape_pattern_free(drape_context *ctx, drape_pattern *pattern)
-{
-    drape_free(ctx, pattern->block_start);
-    drape_free(ctx, pattern->block_row);
-    drape_free(ctx, pattern->diagonal);
-    drape_free(ctx, pattern->column);
-    drape_free(ctx, pattern->row);
-    memset(pattern, 0, sizeof *pattern);
-}
-
-size_t drape_pattern_bytes(const drape_pattern *p)
-{
-    size_t blocks = p->block_start ? (size_t)p->block_start[p->block_count] : 0,
-           columns = (size_t)p->block_count;
-    return (columns + 1) * sizeof *p->block_start + blocks * sizeof *p->block_row +
-           columns * sizeof *p->diagonal + ((size_t)p->n + 1) * sizeof *p->column +
-           (size_t)p->nonzeros * sizeof *p->row;
 }
 
 int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t column)

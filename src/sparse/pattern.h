@@ -9,7 +9,7 @@
 #ifndef DRAPE_SPARSE_PATTERN_H
 #define DRAPE_SPARSE_PATTERN_H
 
-#include "base/context.h"
+#include "base/arena.h"
 
 typedef struct drape_pattern {
     int32_t block_count;  /* block columns */
@@ -31,10 +31,8 @@ typedef struct drape_coupling {
 
 /* The union of the diagonal and all couplings. Errors: DRAPE_E_MEMORY, DRAPE_E_ARGUMENT (more than 2^31 - 1
  * blocks). */
-drape_status drape_pattern_build(drape_context *ctx, int32_t block_count, const int32_t *block_of_node,
+drape_status drape_pattern_build(drape_arena *arena, int32_t block_count, const int32_t *block_of_node,
                                  const drape_coupling *couplings, int coupling_count, drape_pattern *pattern);
-void drape_pattern_free(drape_context *ctx, drape_pattern *pattern);
-size_t drape_pattern_bytes(const drape_pattern *pattern);
 
 /* The block at (row, column); -1 if either is -1. It must be in the pattern. */
 int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t column);

@@ -1,7 +1,7 @@
 /* dihedral.c: see dihedral.h. */
 #include "terms/dihedral.h"
 
-/* Number k of the hinge in lane l is at [LANES k + l]. */
+/* Coordinate k of the hinge in lane l is x[LANES k + l]. */
 LANES_DISPATCH static void evaluate(const double *x, double *theta, double *g, double *h)
 {
     lanes corner[4][3];
@@ -16,7 +16,7 @@ LANES_DISPATCH static void evaluate(const double *x, double *theta, double *g, d
         drape_dihedral_hessian(&d, h);
 }
 
-/* h of one lane, with the blocks above the diagonal. */
+/* Copies h from one lane and fills in the blocks above the diagonal. */
 static void take_hessian(const double *from, double *h)
 {
     for (int i = 0; i < 12; i++)
@@ -55,7 +55,7 @@ void drape_dihedral_tie(double *g, double *h)
 double drape_nearest_branch(double angle, double reference)
 {
     static const double two_pi = 6.28318530717958647693;
-    if (!isfinite(reference)) /* of a collapsed state that a host gave */
+    if (!isfinite(reference)) /* from a collapsed state set by the user */
         return angle;
     return angle + two_pi * round((reference - angle) / two_pi);
 }

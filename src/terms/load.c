@@ -7,7 +7,7 @@ enum { ALL, TOP, BOTTOM, LEFT, RIGHT };
 const char *const drape_load_edges[] = {
     [ALL] = "all", [TOP] = "top", [BOTTOM] = "bottom", [LEFT] = "left", [RIGHT] = "right", NULL};
 
-/* As a pin's: a coordinate that is meant to lie on the side of the box lies in it. */
+/* Slack as for pins, so that coordinates meant to be on a side of the box are in it. */
 #define ROUND_OFF 1e-14
 
 static bool in_box(const double *x, const double *low, const double *high)

@@ -1,4 +1,4 @@
-/* load.h: which edges of the boundary a load is on. */
+/* load.h: the boundary edges that a load acts on. */
 #ifndef DRAPE_TERMS_LOAD_H
 #define DRAPE_TERMS_LOAD_H
 
@@ -16,8 +16,7 @@ enum {
 
 extern const char *const drape_load_edges[];
 
-/* How many edges; the status of a refusal where the mesh has none such, or is no grid and a side is asked
- * for. */
+/* The number of edges. Refuses a mesh that has none, and one that is not a grid if a side of the grid is given. */
 drape_status drape_load_count(const drape_cloth_view *cloth, const double *values,
                               drape_term_builder *builder, int32_t *count);
 
@@ -25,25 +24,10 @@ drape_status drape_load_count(const drape_cloth_view *cloth, const double *value
 bool drape_load_takes(const drape_cloth_view *cloth, const double *values, int32_t e);
 
 #define DRAPE_LOAD_PARAMS                                                                                    \
-    [DRAPE_LOAD_LIST_EDGE] = {.name = "edge",                                                                \
-                              .kind = DRAPE_PARAM_CHOICE,                                                    \
-                              .unit = "1",                                                                   \
-                              .default_value = 0,                                                            \
-                              .choices = drape_load_edges,                                                   \
-                              .help = "a side of a grid, or all of the boundary"},                           \
-    [DRAPE_LOAD_LIST_BOX_MIN] = {.name = "box_min",                                                          \
-                                 .kind = DRAPE_PARAM_VECTOR,                                                 \
-                                 .unit = "m",                                                                \
-                                 .default_value = -1e9,                                                      \
-                                 .min = -1e9,                                                                \
-                                 .max = 1e9,                                                                 \
-                                 .help = "only edges with both ends in this box, at rest"},                  \
-    [DRAPE_LOAD_LIST_BOX_MAX] = {.name = "box_max",                                                          \
-                                 .kind = DRAPE_PARAM_VECTOR,                                                 \
-                                 .unit = "m",                                                                \
-                                 .default_value = 1e9,                                                       \
-                                 .min = -1e9,                                                                \
-                                 .max = 1e9,                                                                 \
-                                 .help = "its other corner"}
+    [DRAPE_LOAD_LIST_EDGE] =                                                                                 \
+        DRAPE_CHOICE("edge", 0, drape_load_edges, "a side of a grid, or all of the boundary"),               \
+    [DRAPE_LOAD_LIST_BOX_MIN] =                                                                              \
+        DRAPE_VECTOR("box_min", "m", -1e9, -1e9, 1e9, "only edges with both ends in this box, at rest"),     \
+    [DRAPE_LOAD_LIST_BOX_MAX] = DRAPE_VECTOR("box_max", "m", 1e9, -1e9, 1e9, "its other corner")
 
 #endif

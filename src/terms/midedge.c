@@ -1,23 +1,22 @@
 /*
  * midedge.c: the shape operator of a triangle with normals at the middles of its edges,
  *     K = 1/A sum_i L_i (theta_i/2 + phi_i) nu_i nu_i'
- * over its edges: L length, nu the outward normal in the plane, theta the hinge's angle, phi by how much the
- * normal of the edge turns from the mean of its two triangles' (Grinspun, Gingold, Reisman & Zorin 2006,
+ * over its edges: L length, nu the outward normal in the plane, theta the angle of the hinge, phi the angle from the
+ * mean normal of the two triangles to the normal of the edge (Grinspun, Gingold, Reisman & Zorin 2006,
  * Computing discrete shape operators on general meshes, section 4). Since K A = sum L (slope across the edge)
  * nu, and the slope is one number for both triangles, sums of K over triangles telescope: a constant moment
  * is in equilibrium on any mesh.
  *
- * The normals are usually unknowns of their own, or phi is 0. With phi = 0 K is exact where the two triangles
- * of every edge are images of each other in a point; elsewhere it is not, and plates on irregular meshes
- * converge to 5 to 15 % too stiff. Here phi is the linear function of the angles of the five hinges of the
- * two triangles that makes K exact for every quadratic deflection, the smallest such: phi_i = sum c_ij
- * theta_j. It sees the same from both sides. So there are no further unknowns, and deflections converge with
- * the square of the mesh size on any mesh. On symmetric meshes c = 0.
+ * Usually the edge normals are additional unknowns, or phi is 0. With phi = 0, K is exact if the two triangles of every
+ * edge are point reflections of each other; otherwise plates converge to results 5 to 15 % too stiff. Here phi is a linear
+ * function phi_i = sum c_ij theta_j of the angles of the five hinges of the two triangles: the one with the smallest c
+ * that makes K exact for every quadratic deflection. It is the same from both sides of the edge. So there are no further
+ * unknowns, and deflections converge with the square of the mesh size on any mesh. On symmetric meshes c = 0.
  *
- * The slope across a free edge has nothing that holds it: it is where the energy is least, M_nn = 0. Across a
- * clamped one the normal keeps its direction, and theta_i/2 + phi_i is the angle of the triangle to it.
+ * The slope across a free edge is unconstrained: it takes the value of least energy, M_nn = 0. Across a clamped edge the
+ * normal keeps its direction, and theta_i/2 + phi_i is the angle of the triangle to it.
  *
- * No bending is lost: K = 0 on both sides of an edge makes theta/2 + phi = theta/2 - phi = 0.
+ * Every bending has energy: K = 0 on both sides of an edge implies theta/2 + phi = theta/2 - phi = 0.
  */
 #include "terms/midedge.h"
 
@@ -27,34 +26,31 @@
 #include <math.h>
 #include <string.h>
 
-/* Of eigenvalues: below, the hinges hardly tell this curvature, and phi leaves it. */
-#define SMALLEST_RATIO 1e-4
-
-/* A coefficient that is rounding [1]. */
-#define NOTHING 1e-9
+#define MIN_EIGENVALUE 1e-4 /* over the largest; phi ignores curvatures below */
+#define MIN_C          1e-9 /* smaller coefficients c are rounding errors */
 
 const int drape_midedge_hinge[MIDEDGE_HINGES][4] = {{0, 1, 2, 3}, {1, 2, 0, 4},  {2, 0, 1, 5},
                                                     {0, 3, 1, 6}, {3, 1, 0, 7},  {1, 4, 2, 8},
                                                     {4, 2, 1, 9}, {2, 5, 0, 10}, {5, 0, 2, 11}};
 
-/* A patch while it is made: flat is the patch unfolded into the plane of its triangle. */
+/* A patch during construction. */
 typedef struct patch {
     const drape_cloth_view *cloth;
     drape_midedge *out;
-    int32_t triangle, beyond[3]; /* the triangles beside it, -1: none */
-    bool open[MIDEDGE_HINGES];   /* the hinge is there and no clamp */
-    double flat[2 * MIDEDGE_NODES];
-    double c[3][MIDEDGE_HINGES]; /* phi_i = sum c theta */
+    int32_t triangle, beyond[3];    /* the triangles beside it, -1: none */
+    bool open[MIDEDGE_HINGES];      /* the hinge exists and is not clamped */
+    double flat[2 * MIDEDGE_NODES]; /* the nodes unfolded into the plane of the triangle */
+    double c[3][MIDEDGE_HINGES];    /* phi_i = sum c theta */
 } patch;
 
-/* ---- What lies around ---- */
+/* ---- Neighbours ---- */
 
 static int corner_of(const int32_t *nodes, int32_t node)
 {
     return nodes[0] == node ? 0 : nodes[1] == node ? 1 : 2;
 }
 
-/* The triangle beyond the side of `triangle` from node a to node b, and its apex; -1: there is none. */
+/* The triangle beyond the edge of `triangle` between nodes a and b, that edge, and the apex; -1: none. */
 static int32_t beyond(const drape_cloth_view *cloth, int32_t triangle, int32_t a, int32_t b, int32_t *edge,
                       int32_t *apex)
 {
@@ -72,7 +68,7 @@ static int32_t beyond(const drape_cloth_view *cloth, int32_t triangle, int32_t a
     return other;
 }
 
-/* Sets the place beyond hinge h: its node, where it lies in the plane, and whether the hinge is open. */
+/* Adds the apex beyond hinge h: its node, its place in the plane, and whether the hinge is open. */
 static int32_t add_beyond(patch *p, int32_t triangle, int h, int32_t *edge)
 {
     const int *local = drape_midedge_hinge[h];
@@ -95,7 +91,7 @@ static int32_t add_beyond(patch *p, int32_t triangle, int h, int32_t *edge)
     return other;
 }
 
-static void look_around(patch *p)
+static void find_neighbours(patch *p)
 {
     for (int i = 0; i < 3; i++) {
         int32_t edge, outer;
@@ -119,7 +115,7 @@ static double outward(const patch *p, int h, double nu[2])
     return length;
 }
 
-/* Slope along nu of the deflection that is w at three corners and linear between. */
+/* Slope along nu of the linear deflection that is w at three corners. */
 static double slope(const patch *p, const int corner[3], const double w[3], const double nu[2])
 {
     const double *a = p->flat + 2 * corner[0], *b = p->flat + 2 * corner[1], *c = p->flat + 2 * corner[2];
@@ -128,7 +124,7 @@ static double slope(const patch *p, const int corner[3], const double w[3], cons
     return ((wu * v[1] - wv * u[1]) * nu[0] + (wv * u[0] - wu * v[0]) * nu[1]) / area2;
 }
 
-/* Of x^2/2, y^2/2 and xy about a point, in units of a length, at a corner. */
+/* x^2/2, y^2/2 or xy (kind 0, 1, 2) at a node, about a point and in units of a length. */
 static double quadratic(const patch *p, int kind, int node, const double about[2], double unit)
 {
     const double x = (p->flat[2 * node] - about[0]) / unit, y = (p->flat[2 * node + 1] - about[1]) / unit;
@@ -150,8 +146,8 @@ static void slopes(const patch *p, int h, int kind, const double about[2], doubl
 
 /* ---- phi ---- */
 
-/* Eigenvalues on the diagonal of a (3 x 3), eigenvectors in the columns of v: cyclic Jacobi rotations. */
-static void diagonalise(double a[9], double v[9])
+/* Cyclic Jacobi rotations: leaves the eigenvalues on the diagonal of a (3 x 3), eigenvectors in the columns of v. */
+static void diagonalize(double a[9], double v[9])
 {
     for (int i = 0; i < 9; i++)
         v[i] = i % 4 == 0;
@@ -180,10 +176,10 @@ static void least_solution(const double *m, int n, const double target[3], doubl
     for (int i = 0; i < 9; i++)
         for (int j = 0; j < n; j++)
             a[i] += m[n * (i / 3) + j] * m[n * (i % 3) + j];
-    diagonalise(a, v);
+    diagonalize(a, v);
     const double largest = fmax(a[0], fmax(a[4], a[8]));
     for (int k = 0; k < 3; k++) {
-        if (!(a[4 * k] > SMALLEST_RATIO * largest))
+        if (!(a[4 * k] > MIN_EIGENVALUE * largest))
             continue;
         const double along = v[k] * target[0] + v[3 + k] * target[1] + v[6 + k] * target[2];
         for (int i = 0; i < 3; i++)
@@ -193,8 +189,8 @@ static void least_solution(const double *m, int n, const double target[3], doubl
         c[j] = m[j] * y[0] + m[n + j] * y[1] + m[2 * n + j] * y[2];
 }
 
-/* phi of own edge i from the open hinges of its two triangles: a quadratic about the middle of the edge has
- * no slope there. */
+/* phi of own edge i from the open hinges of its two triangles. It is exact for quadratic deflections about the middle of
+ * the edge, whose slope there is 0. */
 static void find_phi(patch *p, int i)
 {
     const int near[5] = {i, (i + 1) % 3, (i + 2) % 3, 3 + 2 * i, 4 + 2 * i};
@@ -218,13 +214,13 @@ static void find_phi(patch *p, int i)
     }
     least_solution(m, n, target, c);
     for (int j = 0; j < n; j++)
-        p->c[i][hinge[j]] = fabs(c[j]) > NOTHING ? c[j] : 0;
+        p->c[i][hinge[j]] = fabs(c[j]) > MIN_C ? c[j] : 0;
 }
 
 /* ---- K ---- */
 
-/* How K = (K11, K22, 2 K12) depends on the angle of each hinge: b (9 x 3); f: on the slopes of the free
- * edges. */
+/* The derivatives of K = (K11, K22, 2 K12) by the angle of each hinge, b (9 x 3), and by the slopes of the free edges, f.
+ * Returns the number of free edges. */
 static int gather_columns(const patch *p, double area, double b[3 * MIDEDGE_HINGES], double f[9])
 {
     int count = 0;
@@ -281,7 +277,7 @@ bool drape_midedge_of(const drape_cloth_view *cloth, int32_t triangle, const dou
         corner[k] = cloth->rest + 3 * (size_t)out->node[k];
     if (!drape_orthotropic_frame(values, corner, law, axes, p.flat))
         return false;
-    look_around(&p);
+    find_neighbours(&p);
     for (int i = 0; i < 3; i++)
         if (p.open[i])
             find_phi(&p, i);

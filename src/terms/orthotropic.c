@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#define STEEP 1e-6 /* share of the warp that must lie in the plane of a triangle */
+#define STEEP 1e-6 /* least projection of the warp into a triangle, over its length */
 
 void drape_orthotropic_law(const double *values, const drape_woven *measured, double strip, double poisson,
                            double c[9])
@@ -34,8 +34,8 @@ static bool is_isotropic(const double c[9])
     return c[0] == c[4] && fabs(2 * c[8] - (c[0] - c[1])) <= 1e-12 * c[0];
 }
 
-/* a, less its part along the unit vector n, of length 1; false where little is left. */
-static bool flatten(const double a[3], const double n[3], double out[3])
+/* The unit vector along the projection of a into the plane with unit normal n; false if it is too short. */
+static bool project(const double a[3], const double n[3], double out[3])
 {
     const double along = vec3_dot(a, n);
     for (int i = 0; i < 3; i++)
@@ -60,10 +60,10 @@ bool drape_orthotropic_frame(const double *values, const double *const corner[3]
     const double twice_area = vec3_norm(n);
     for (int i = 0; i < 3; i++)
         n[i] /= twice_area;
-    if (!flatten(vec3_norm(warp) > 0 ? warp : x_axis, n, axes)) {
+    if (!project(vec3_norm(warp) > 0 ? warp : x_axis, n, axes)) {
         if (!is_isotropic(c))
             return false;
-        flatten(a, n, axes);
+        project(a, n, axes);
     }
     vec3_cross(n, axes, axes + 3);
     for (int k = 0; k < 2; k++) {
@@ -74,7 +74,15 @@ bool drape_orthotropic_frame(const double *values, const double *const corner[3]
     return true;
 }
 
-/* Cholesky's decomposition with the largest pivot next. */
+drape_status drape_orthotropic_refuse(drape_term_builder *builder, int32_t triangle)
+{
+    return drape_term_refuse(builder,
+                             "the warp stands upright on triangle %d of the mesh; \"warp_direction\" is a "
+                             "direction that lies in the sheet",
+                             (int)triangle);
+}
+
+/* Cholesky decomposition with pivoting. */
 void drape_orthotropic_squares(const double c[9], int rank, double k[3], double l[9])
 {
     double rest[9];
@@ -92,7 +100,7 @@ void drape_orthotropic_squares(const double c[9], int rank, double k[3], double 
     }
 }
 
-/* One column after another: C - C f f' C/(f' C f). */
+/* For one column after another: C - C f f' C/(f' C f). */
 void drape_orthotropic_release(double c[9], const double *f, int count)
 {
     for (int n = 0; n < count; n++) {

@@ -1,4 +1,4 @@
-/* range.c: makes a range of elements out of a function for one, or for some at once (extend.h). */
+/* range.c: evaluates ranges of elements by functions for one element, or for several at once (extend.h). */
 #include "terms/terms.h"
 
 #include <math.h>
@@ -17,7 +17,7 @@ void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, 
     }
 }
 
-/* The blocks above the diagonal mirror those below. */
+/* The blocks above the diagonal are copies of those below. */
 static void take_hessian(int d, const double *from, double *to)
 {
     for (int i = 0; i < d; i++)
@@ -48,7 +48,7 @@ void drape_measure_range(const drape_elements *el, int32_t first, int32_t count,
     }
 }
 
-/* In two loops: the second has no gather, and compilers make vectors of it. */
+/* Two loops, as compilers vectorize the second, which does not gather. */
 void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count, const double *x, double *l,
                          double *d)
 {

@@ -15,60 +15,29 @@ const drape_spring_offset drape_spring_offsets[DRAPE_SPRING_OFFSETS] = {
     [DRAPE_SPRING_BEND] = {0, 2},       {2, 0}};
 
 const drape_param drape_spring_params[DRAPE_SPRING_PARAM_COUNT] = {
-    [DRAPE_SPRING_STIFFNESS] = {.name = "stiffness",
-                                .kind = DRAPE_PARAM_NUMBER,
-                                .unit = "N/m",
-                                .default_value = NAN,
-                                .min = 0,
-                                .max = 1e15,
-                                .help = "spring constant of each spring, whatever its length and the mesh"},
-    [DRAPE_SPRING_FACTOR] =
-        {.name = "factor",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 1,
-         .min = 0,
-         .max = 1e6,
-         .help = "multiplies stiffness, so that all kinds may share one: 0.2 for the bend springs of CS184"},
+    [DRAPE_SPRING_STIFFNESS] =
+        DRAPE_NUMBER("stiffness", "N/m", DRAPE_REQUIRED, 0, 1e15,
+                     "spring constant of each spring, whatever its length and the mesh"),
+    [DRAPE_SPRING_FACTOR] = DRAPE_NUMBER(
+        "factor", "1", 1, 0, 1e6,
+        "multiplies stiffness, so that all kinds may share one: 0.2 for the bend springs of CS184"),
     [DRAPE_SPRING_DAMPING] =
-        {.name = "damping",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "N s/m",
-         .default_value = 0,
-         .min = 0,
-         .max = 1e12,
-         .help = "dashpot beside each spring: force on the rate of its length, none on rigid motion"},
+        DRAPE_NUMBER("damping", "N s/m", 0, 0, 1e12,
+                     "dashpot beside each spring: force on the rate of its length, none on rigid motion"),
     [DRAPE_SPRING_GRADIENT] =
-        {.name = "gradient",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 0,
-         .min = -1,
-         .max = 1e6,
-         .help = "stiffness times 1 + gradient (1 - row/rows), the mean of both ends: stiffer at row 0"},
+        DRAPE_NUMBER("gradient", "1", 0, -1, 1e6,
+                     "stiffness times 1 + gradient (1 - row/rows), the mean of both ends: stiffer at row 0"),
     [DRAPE_SPRING_REST_SCALE] =
-        {.name = "rest_scale",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 1,
-         .min = 0,
-         .max = 1e3,
-         .open_min = true,
-         .help = "rest length over the distance in the mesh: below 1 the springs begin stretched"},
+        DRAPE_NUMBER("rest_scale", "1", 1, DRAPE_ABOVE(0), 1e3,
+                     "rest length over the distance in the mesh: below 1 the springs begin stretched"),
     [DRAPE_SPRING_MIN_LENGTH] =
-        {.name = "min_length",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 1e-6,
-         .min = 0,
-         .max = 1,
-         .open_max = true,
-         .help = "a step that leaves a spring shorter than this share of its rest length is rejected"},
+        DRAPE_NUMBER("min_length", "1", 1e-6, 0, DRAPE_BELOW(1),
+                     "a step that leaves a spring shorter than this share of its rest length is rejected"),
 };
 
-/* ---- Which nodes ---- */
+/* ---- Pairs of nodes ---- */
 
-/* Springs of one offset: one for each node whose partner is on the grid. */
+/* The number of nodes in a row whose partner is on the grid. */
 static int32_t columns_of(const drape_cloth_view *cloth, const drape_spring_offset *offset)
 {
     int32_t columns = cloth->columns - abs(offset->columns);
@@ -113,8 +82,8 @@ double drape_spring_rest_length(const drape_cloth_view *cloth, const int32_t pai
 
 /* ---- Building ---- */
 
-/* The mean over both ends, so that a spring is the same seen from either: with the row of the neighbour, as
- * Boson has it, the two forces differ and the net force of a sheet is not zero. */
+/* The mean of both ends, so that the forces at both are equal: with the row of the neighbour, as in Boson, they differ,
+ * and the net force of a sheet is not zero. */
 static double gradient_factor(const drape_cloth_view *cloth, const int32_t pair[2], double gradient)
 {
     if (gradient == 0)
@@ -158,15 +127,6 @@ drape_status drape_spring_build_kind(const drape_cloth_view *cloth, int kind, co
 
 /* ---- The spring ---- */
 
-/* dq = (-n, n) */
-static void gradient(const double n[3], double *dq)
-{
-    for (int i = 0; i < 3; i++) {
-        dq[3 + i] = n[i];
-        dq[i] = -n[i];
-    }
-}
-
 /* ddq = [P -P; -P P] with P = (I - n n')/l */
 static void hessian(const double n[3], double length, double *ddq)
 {
@@ -189,8 +149,10 @@ void drape_spring_measure(const drape_elements *el, int32_t first, int32_t count
         q[i] = vec3_norm(n);
         for (int k = 0; k < 3; k++)
             n[k] /= q[i];
-        if (dq)
-            gradient(n, dq + 6 * (size_t)i);
+        for (int k = 0; dq && k < 3; k++) {
+            dq[6 * i + 3 + k] = n[k];
+            dq[6 * i + k] = -n[k];
+        }
         if (ddq)
             hessian(n, q[i], ddq + 36 * (size_t)i);
     }
@@ -207,9 +169,7 @@ void drape_spring_pairs(const drape_elements *el, int32_t first, int32_t count, 
 
 static double ratio_of(const drape_elements *el, int32_t e, const double *x)
 {
-    double d[3];
-    vec3_sub(x + 3 * (size_t)el->node[2 * (size_t)e + 1], x + 3 * (size_t)el->node[2 * (size_t)e], d);
-    return vec3_norm(d) / el->rest[(size_t)REST_LENGTH * (size_t)el->count + (size_t)e];
+    return drape_pair_length(el, e, x) / drape_rest_of(el, REST_LENGTH, e);
 }
 
 drape_status drape_spring_check(const drape_elements *el, const double *x, const double *before,

@@ -1,8 +1,8 @@
 /*
- * spring.h: what the rows of springs share: which pairs of nodes they join, and the spring itself. With
+ * spring.h: what the spring terms share: the pairs of nodes that they join, and the spring itself. With
  * l = |x1 - x0| and n = (x1 - x0)/l
  *     q = l,  E = 1/2 k (l - L)^2,  dashpot c l' = c (v1 - v0).n along n
- * A row is a choice of pairs; the parameters are the same.
+ * The terms differ in their pairs only; they have the same parameters.
  */
 #ifndef DRAPE_TERMS_SPRING_H
 #define DRAPE_TERMS_SPRING_H
@@ -20,18 +20,18 @@ enum {
 };
 extern const drape_param drape_spring_params[DRAPE_SPRING_PARAM_COUNT];
 
-/* From a node to one that a spring joins it with, in rows (>= 0) and columns of a grid. */
+/* The offset from one node of a spring to the other, in rows (>= 0) and columns of a grid. */
 typedef struct drape_spring_offset {
     int32_t rows, columns;
 } drape_spring_offset;
 
-/* All offsets, two a kind: neighbours along rows and columns, across cells, and two steps along. A kind is
- * the place of its first. */
+/* All offsets, two for each kind: neighbours along rows and columns, diagonals of cells, and two steps along rows and
+ * columns. A kind is the index of its first offset. */
 enum { DRAPE_SPRING_STRUCTURAL = 0, DRAPE_SPRING_SHEAR = 2, DRAPE_SPRING_BEND = 4, DRAPE_SPRING_OFFSETS = 6 };
 extern const drape_spring_offset drape_spring_offsets[DRAPE_SPRING_OFFSETS];
 
-/* Pairs of nodes of one cloth: of a rectangular grid by offsets, each offset in the order of nodes; or with
- * none the edges of any mesh. */
+/* Pairs of nodes of one cloth: on a rectangular grid by offsets, for each offset in the order of nodes; without offsets
+ * the edges of any mesh. */
 typedef struct drape_spring_set {
     const drape_cloth_view *cloth;
     const drape_spring_offset *offset; /* (offset_count) */
@@ -44,14 +44,13 @@ void drape_spring_pair(const drape_spring_set *set, int32_t spring, int32_t pair
 /* Distance of two nodes at rest [m]. */
 double drape_spring_rest_length(const drape_cloth_view *cloth, const int32_t pair[2]);
 
-/* The springs of a set, with the parameters above; and of one kind of offsets, refusing what is no grid of
- * rectangles. */
+/* Builds the springs of a set, or of one kind of offsets; that one refuses meshes other than grids of rectangles. */
 drape_status drape_spring_build(const drape_spring_set *set, const double *values,
                                 drape_term_builder *builder);
 drape_status drape_spring_build_kind(const drape_cloth_view *cloth, int kind, const double *values,
                                      drape_term_builder *builder);
 
-/* Of the row: see drape_term_ops. */
+/* Functions of the terms: see drape_term_ops. */
 void drape_spring_measure(const drape_elements *el, int32_t first, int32_t count, const double *x,
                           const double *internal, double *q, double *dq, double *ddq);
 void drape_spring_pairs(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,

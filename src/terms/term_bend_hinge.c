@@ -4,12 +4,11 @@
  * E = 1/2 k (theta - theta0)^2.
  * consistent: k = D |e|^2/(A1 + A2), D = E h^3/(12 (1 - nu^2)). Its bending Poisson ratio is -1/3 on the
  *     equilateral lattice.
- * report: k = 2/sqrt(3) E h^3/12 on every hinge, as the DEP report and DisMech have it: no (1 - nu^2), right
- *     on equilateral meshes only.
+ * report: k = 2/sqrt(3) E h^3/12 on every hinge, as in the DEP report and in DisMech: without (1 - nu^2), and correct on
+ *     equilateral meshes only.
  *
- * theta jumps by 2 pi where the hinge is folded onto itself. The internal variable is the angle of the last
- * accepted state; the angle is taken on the branch nearest to it, so energy and force go on smoothly through
- * pi.
+ * theta jumps by 2 pi where the hinge is folded onto itself. The internal variable is the angle in the last accepted
+ * state; the angle is taken on the branch nearest to it, so that energy and force are smooth through pi.
  */
 #include "base/lanes.h"
 #include "terms/dihedral.h"
@@ -27,39 +26,18 @@ static const char *const rest_choices[] = {"mesh", "flat", NULL};
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_STIFFNESS] =
-        {.name = "stiffness",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = STIFFNESS_CONSISTENT,
-         .choices = stiffness_choices,
-         .help = "consistent: k = D |e|^2/(A1 + A2); report: k = 2/sqrt(3) E h^3/12 on every hinge"},
-    [PARAM_REST] = {.name = "rest",
-                    .kind = DRAPE_PARAM_CHOICE,
-                    .unit = "1",
-                    .default_value = REST_MESH,
-                    .choices = rest_choices,
-                    .help = "rest angles: those of the mesh, or flat"},
-    [PARAM_MIN_ALTITUDE] =
-        {.name = "min_altitude",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 1e-6,
-         .min = 0,
-         .max = 1,
-         .open_max = true,
-         .help = "a step that takes an altitude over a hinge below this share of its rest value is rejected"},
-    [PARAM_MAX_TURN] =
-        {.name = "max_turn",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "rad",
-         .default_value = 2.8,
-         .min = 0,
-         .max = 3.14159265358979,
-         .open_min = true,
-         .help = "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"},
+        DRAPE_CHOICE("stiffness", STIFFNESS_CONSISTENT, stiffness_choices,
+                     "consistent: k = D |e|^2/(A1 + A2); report: k = 2/sqrt(3) E h^3/12 on every hinge"),
+    [PARAM_REST] = DRAPE_CHOICE("rest", REST_MESH, rest_choices, "rest angles: those of the mesh, or flat"),
+    [PARAM_MIN_ALTITUDE] = DRAPE_NUMBER(
+        "min_altitude", "1", 1e-6, 0, DRAPE_BELOW(1),
+        "a step that takes an altitude over a hinge below this share of its rest value is rejected"),
+    [PARAM_MAX_TURN] = DRAPE_NUMBER(
+        "max_turn", "rad", 2.8, DRAPE_ABOVE(0), 3.14159265358979,
+        "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"),
 };
 
-/* Four hinges, of elements by their numbers. */
+/* The hinges of LANES elements. */
 LANES_INLINE void measure_hinges(const drape_elements *el, const int32_t element[LANES], const double *x,
                                  drape_dihedral_lanes *h)
 {
@@ -104,7 +82,7 @@ static double element_stiffness(const drape_cloth_view *cloth, int32_t hinge_num
            (cloth->triangle_area[beside[0]] + cloth->triangle_area[beside[1]]);
 }
 
-/* Altitudes and angles of the hinges from `first` on; lanes beyond the last repeat it. */
+/* Altitudes and angles of LANES hinges from `first` on; lanes beyond the end repeat the last one. */
 typedef struct shapes {
     double altitude[2][LANES], theta[LANES];
 } shapes;
@@ -138,8 +116,8 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     return status;
 }
 
-/* after = the angle at x, on the branch nearest to that of before. */
-static void follow(const drape_elements *el, int32_t first, int32_t count, const double *x,
+/* after: the angle at x, on the branch nearest to before. */
+static void commit(const drape_elements *el, int32_t first, int32_t count, const double *x,
                    const double *before, double *after)
 {
     shapes s;
@@ -151,24 +129,16 @@ static void follow(const drape_elements *el, int32_t first, int32_t count, const
     }
 }
 
-/* The angle of the mesh at rest: theta0 unless the rest is flat, and then the branch nearest to flat. */
+/* The angle on the branch nearest to theta0. */
 static void initial(const drape_elements *el, int32_t first, int32_t count, const double *x, double *after)
 {
-    follow(el, first, count, x, el->rest + (size_t)REST_THETA0 * (size_t)el->count, after);
+    commit(el, first, count, x, el->rest + (size_t)REST_THETA0 * (size_t)el->count, after);
 }
 
-static void keep_worst(drape_fault *worst, const char *reason, const char *what, int32_t element,
-                       double value, double limit)
-{
-    *worst =
-        (drape_fault){.reason = reason, .what = what, .element = element, .value = value, .limit = limit};
-}
-
-/* Altitude over that at rest, of the hinge in a lane. */
+/* Altitude k over its rest value, of the hinge in a lane. */
 static double ratio_of(const drape_elements *el, int32_t element, const shapes *s, int lane, int k)
 {
-    return s->altitude[k][lane] /
-           el->rest[(size_t)(REST_ALTITUDE1 + k) * (size_t)el->count + (size_t)element];
+    return s->altitude[k][lane] / drape_rest_of(el, REST_ALTITUDE1 + k, element);
 }
 
 static bool altitude_fell(const drape_elements *el, int32_t element, double ratio, int k,
@@ -181,12 +151,14 @@ static bool altitude_fell(const drape_elements *el, int32_t element, double rati
     return drape_fell(ratio, ratio_of(el, element, &was, 0, k));
 }
 
-/* The lowest altitude counts first: where a triangle has collapsed its angle means nothing. */
+/* A collapsed altitude is reported first: the angle of a collapsed triangle is meaningless. */
 static drape_status check(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault)
 {
-    drape_fault altitude = {.element = -1, .value = INFINITY}, turned = {.element = -1, .value = -INFINITY};
-    double min_altitude = el->params[PARAM_MIN_ALTITUDE], max_turn = el->params[PARAM_MAX_TURN];
+    drape_fault low = {"altitude_collapse", "altitude / rest altitude", -1, INFINITY,
+                       el->params[PARAM_MIN_ALTITUDE]};
+    drape_fault turned = {"hinge_branch", "turn of a hinge in one step [rad]", -1, -INFINITY,
+                          el->params[PARAM_MAX_TURN]};
     shapes s;
     for (int32_t i = 0; i < el->count; i++) {
         int l = i % LANES;
@@ -194,36 +166,34 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
             measure_shapes(el, i, x, &s);
         for (int k = 0; k < 2; k++) {
             double ratio = ratio_of(el, i, &s, l, k);
-            if (ratio < altitude.value && (ratio >= min_altitude || altitude_fell(el, i, ratio, k, before)))
-                keep_worst(&altitude, "altitude_collapse", "altitude / rest altitude", i, ratio,
-                           min_altitude);
+            if (ratio < low.value && (ratio >= low.limit || altitude_fell(el, i, ratio, k, before))) {
+                low.value = ratio;
+                low.element = i;
+            }
         }
         double angle = fabs(drape_nearest_branch(s.theta[l], internal[i]) - internal[i]);
-        if (angle > turned.value)
-            keep_worst(&turned, "hinge_branch", "turn of a hinge in one step [rad]", i, angle, max_turn);
+        if (angle > turned.value) {
+            turned.value = angle;
+            turned.element = i;
+        }
     }
-    if (altitude.value < min_altitude || el->count == 0) {
-        *fault = altitude;
-        return el->count == 0 ? DRAPE_OK : DRAPE_RETRY_DEGENERATE;
-    }
-    *fault = turned;
-    return turned.value > max_turn ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
+    *fault = low.value < low.limit ? low : turned;
+    return low.value < low.limit || turned.value > turned.limit ? DRAPE_RETRY_DEGENERATE : DRAPE_OK;
 }
 
 const drape_term_ops drape_term_bend_hinge = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "bend.hinge",
-    .summary = "bending of every inner edge: E = 1/2 k (theta - theta0)^2",
-    .reference = "Grinspun et al. 2003; Tamstorf & Grinspun 2013",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "bend.hinge",
+              .summary = "bending of every inner edge: E = 1/2 k (theta - theta0)^2",
+              .reference = "Grinspun et al. 2003; Tamstorf & Grinspun 2013",
+              DRAPE_PARAMS(params)},
     .element_name = "hinge",
     .nodes = 4,
     .has_internal = true,
     .build = build,
     .measure = measure,
     .lanes = measure_lanes,
-    .commit = follow,
+    .commit = commit,
     .initial = initial,
     .check = check,
 };

@@ -2,15 +2,13 @@
  * bend.midedge: bending of every triangle, E = A/2 (K - K0)' C (K - K0), K = (K11, K22, 2 K12) its shape
  * operator with normals at the middles of its edges (midedge.h), C the law of orthotropic.h.
  *
- * C = sum k l l', so E = 1/2 sum k (q - q0)^2 with q = l . K = sum c theta over nine hinges at most: each
- * square is an element, three a triangle and one less for each free edge. Where no triangle needs hinges
- * beyond its own (lattices) elements have 6 nodes, else 12; a hinge whose c is 0 is not there, and its nodes
- * are the first again.
+ * C = sum k l l', so E = 1/2 sum k (q - q0)^2 with q = l . K = sum c theta over at most nine hinges. Each square is an
+ * element: three per triangle, less one for each free edge. Elements have 12 nodes, or 6 if no triangle needs hinges
+ * other than its own, as on lattices. A hinge whose c is 0 is left out, and its nodes are replaced by the first node.
  *
- * A clamped edge has no second triangle but a direction in space: x3 = (x0 + x1)/2 + r, r at rest.
+ * A clamped edge has a direction in space instead of a second triangle: x3 = (x0 + x1)/2 + r with r as at rest.
  *
- * The internal variables are the nine angles of the last accepted state: each is taken on the branch nearest
- * to it.
+ * The internal variables are the nine angles in the last accepted state: each angle is taken on the branch nearest to it.
  */
 #include "base/vec3.h"
 #include "terms/dihedral.h"
@@ -38,11 +36,11 @@ enum { REST_MESH, REST_FLAT };
 enum {
     REST_K,
     REST_Q0,
-    REST_ALTITUDE, /* least of the triangle [m] */
+    REST_ALTITUDE, /* smallest of the triangle [m] */
     REST_C,
     REST_COUNT = REST_C + MIDEDGE_HINGES,
     REST_CLAMP =
-        REST_COUNT, /* of edges: three numbers each, 0 where it is none; only if some edge is clamped */
+        REST_COUNT, /* r of each own edge, 0 if it is not clamped; only if some edge of the cloth is */
     REST_COUNT_CLAMPED = REST_CLAMP + 9
 };
 
@@ -52,65 +50,37 @@ static const char *const rest_choices[] = {"mesh", "flat", NULL};
 static const drape_param params[LIST_COUNT] = {
     DRAPE_ORTHOTROPIC_PARAMS("N m", "of the material: its fabric, or E h^3/12", "twist",
                              "torsional rigidity: a twist of curvature K12 takes 2 twist K12^2 per area"),
-    [LIST_REST] = {.name = "rest",
-                   .kind = DRAPE_PARAM_CHOICE,
-                   .unit = "1",
-                   .default_value = REST_MESH,
-                   .choices = rest_choices,
-                   .help = "rest curvature: that of the mesh, or flat"},
-    [LIST_CURVATURE] =
-        {.name = "curvature",
-         .kind = DRAPE_PARAM_VECTOR,
-         .unit = "1/m",
-         .default_value = 0,
-         .min = -1e9,
-         .max = 1e9,
-         .numbers = "[k11, k22, k12]",
-         .help = "added to the rest curvature: along the warp, along the weft, twist; positive towards "
-                 "the side from which triangles turn counterclockwise"},
-    [LIST_MIN_ALTITUDE] = {.name = "min_altitude",
-                           .kind = DRAPE_PARAM_NUMBER,
-                           .unit = "1",
-                           .default_value = 1e-6,
-                           .min = 0,
-                           .max = 1,
-                           .open_max = true,
-                           .help = "a step that takes an altitude of a triangle below this share of its "
-                                   "least one at rest is rejected"},
-    [LIST_MAX_TURN] =
-        {.name = "max_turn",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "rad",
-         .default_value = 2.8,
-         .min = 0,
-         .max = 3.14159265358979,
-         .open_min = true,
-         .help = "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"},
+    [LIST_REST] = DRAPE_CHOICE("rest", REST_MESH, rest_choices, "rest curvature: that of the mesh, or flat"),
+    [LIST_CURVATURE] = DRAPE_VECTOR("curvature", "1/m", 0, -1e9, 1e9,
+                                    "added to the rest curvature: along the warp, along the weft, twist; "
+                                    "positive towards the side from which triangles turn counterclockwise",
+                                    .numbers = "[k11, k22, k12]"),
+    [LIST_MIN_ALTITUDE] = DRAPE_NUMBER(
+        "min_altitude", "1", 1e-6, 0, DRAPE_BELOW(1),
+        "a step that takes an altitude of a triangle below this share of its least one at rest is rejected"),
+    [LIST_MAX_TURN] = DRAPE_NUMBER(
+        "max_turn", "rad", 2.8, DRAPE_ABOVE(0), 3.14159265358979,
+        "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"),
 };
 
-static double rest_of(const drape_elements *el, int item, int32_t element)
-{
-    return el->rest[(size_t)item * (size_t)el->count + (size_t)element];
-}
-
-/* The direction r of an own edge; false where it is not clamped. */
+/* r of an own edge; false if it is not clamped. */
 static bool clamp_of(const drape_elements *el, int32_t element, int hinge, double r[3])
 {
     if (el->rest_count == REST_COUNT || hinge > 2)
         return false;
     for (int i = 0; i < 3; i++)
-        r[i] = rest_of(el, REST_CLAMP + 3 * hinge + i, element);
+        r[i] = drape_rest_of(el, REST_CLAMP + 3 * hinge + i, element);
     return vec3_dot(r, r) > 0;
 }
 
-/* As many hinges of an element as fill the lanes: which they are, of how many nodes (3 where it is clamped, else 4), and
- * their angles, with derivatives by these nodes. */
+/* Up to LANES hinges of an element: their numbers, their nodes (3 if clamped, else 4), and their angles with derivatives
+ * by these nodes. */
 typedef struct hinges {
     int count, number[LANES], nodes[LANES];
     double theta[LANES], g[12 * LANES], h[144 * LANES];
 } hinges;
 
-/* The corners of a hinge; returns of how many nodes they are. */
+/* Gathers the corners of a hinge; returns the number of its nodes. */
 static int corners_of(const drape_elements *el, int32_t element, int hinge, const double *x, double at[12])
 {
     const int32_t *node = el->node + (size_t)element * (size_t)el->nodes;
@@ -124,14 +94,15 @@ static int corners_of(const drape_elements *el, int32_t element, int hinge, cons
     return nodes;
 }
 
-/* Those from number `from` on; returns the number to go on with. Those whose c is 0 are not there. */
+/* Measures hinges from number `from` on, leaving out those whose c is 0, with first and second derivatives if wanted;
+ * returns the number to continue with. */
 static int measure_hinges(const drape_elements *el, int32_t element, int from, const double *x, bool first,
                           bool second, hinges *s)
 {
     double at[12 * LANES];
     s->count = 0;
     for (; from < MIDEDGE_HINGES && s->count < LANES; from++) {
-        if (rest_of(el, REST_C + from, element) == 0)
+        if (drape_rest_of(el, REST_C + from, element) == 0)
             continue;
         s->number[s->count] = from;
         s->nodes[s->count] = corners_of(el, element, from, x, at + 12 * s->count);
@@ -145,7 +116,7 @@ static int measure_hinges(const drape_elements *el, int32_t element, int from, c
     return from;
 }
 
-/* c times the derivatives of hinge i. d: numbers of a gradient. */
+/* Adds c times the derivatives of hinge i. d: length of a gradient. */
 static void add_hinge(const hinges *s, int i, double c, int d, double *dq, double *ddq)
 {
     const int *local = drape_midedge_hinge[s->number[i]];
@@ -167,9 +138,9 @@ static void measure_one(const drape_elements *el, int32_t element, const double 
     if (ddq)
         memset(ddq, 0, (size_t)(d * d) * sizeof *ddq);
     for (int from = 0; from < MIDEDGE_HINGES;) {
-        from = measure_hinges(el, element, from, x, dq, ddq, &s);
+        from = measure_hinges(el, element, from, x, dq != NULL, ddq != NULL, &s);
         for (int i = 0; i < s.count; i++) {
-            const double c = rest_of(el, REST_C + s.number[i], element);
+            const double c = drape_rest_of(el, REST_C + s.number[i], element);
             *q += c * drape_nearest_branch(s.theta[i], before[s.number[i]]);
             add_hinge(&s, i, c, d, dq, ddq);
         }
@@ -187,25 +158,16 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
 
 /* ---- Building ---- */
 
-static drape_status refuse_plane(drape_term_builder *builder, int32_t triangle)
-{
-    return drape_term_refuse(
-        builder,
-        "the warp stands upright on triangle %d of the mesh; \"warp_direction\" is a direction "
-        "that lies in the sheet",
-        (int)triangle);
-}
-
-/* How many elements, of how many nodes, with how many numbers. */
-static drape_status announce(const drape_cloth_view *cloth, const double *values, const double law[9],
-                             drape_term_builder *builder)
+/* Counts elements, their nodes and rest values, and reserves them. */
+static drape_status reserve(const drape_cloth_view *cloth, const double *values, const double law[9],
+                            drape_term_builder *builder)
 {
     int64_t count = 0;
     bool wide = false, clamped = false;
     drape_midedge patch;
     for (int32_t t = 0; t < cloth->triangle_count; t++) {
         if (!drape_midedge_of(cloth, t, values, law, &patch))
-            return refuse_plane(builder, t);
+            return drape_orthotropic_refuse(builder, t);
         count += patch.rank;
         wide = wide || patch.wide;
         clamped = clamped || patch.clamped[0] || patch.clamped[1] || patch.clamped[2];
@@ -219,7 +181,7 @@ static drape_status announce(const drape_cloth_view *cloth, const double *values
                                     clamped ? REST_COUNT_CLAMPED : REST_COUNT);
 }
 
-static double least_altitude(const double *x0, const double *x1, const double *x2)
+static double min_altitude(const double *x0, const double *x1, const double *x2)
 {
     double a[3], b[3], c[3], n[3];
     vec3_sub(x1, x0, a);
@@ -229,8 +191,8 @@ static double least_altitude(const double *x0, const double *x1, const double *x
     return vec3_norm(n) / sqrt(fmax(vec3_dot(a, a), fmax(vec3_dot(b, b), vec3_dot(c, c))));
 }
 
-/* From the middle of a clamped edge away from the triangle, in its plane. */
-static void take_clamps(const drape_cloth_view *cloth, const drape_midedge *patch, double *rest)
+/* r of clamped edges: in the plane of the triangle, from the middle of the edge away from it. */
+static void set_clamps(const drape_cloth_view *cloth, const drape_midedge *patch, double *rest)
 {
     for (int i = 0; i < 3; i++) {
         const double *a = cloth->rest + 3 * (size_t)patch->node[i],
@@ -241,8 +203,8 @@ static void take_clamps(const drape_cloth_view *cloth, const drape_midedge *patc
     }
 }
 
-/* The nodes of the hinges that square r has; in the places of others the first node. */
-static void take_nodes(const drape_midedge *patch, int r, int32_t node[MIDEDGE_NODES])
+/* The nodes of the hinges of square r; for the others the first node. */
+static void set_nodes(const drape_midedge *patch, int r, int32_t node[MIDEDGE_NODES])
 {
     for (int a = 0; a < MIDEDGE_NODES; a++)
         node[a] = patch->node[a < 3 ? a : 0];
@@ -252,7 +214,7 @@ static void take_nodes(const drape_midedge *patch, int r, int32_t node[MIDEDGE_N
                 node[drape_midedge_hinge[h][a]] = patch->node[drape_midedge_hinge[h][a]];
 }
 
-/* q at rest, by the function that steps take it from: rest is rest to the last bit. */
+/* q at rest, by the function that steps use, so that a cloth at rest has no force to the last bit. */
 static double rest_measure(const drape_cloth_view *cloth, const int32_t *node, const double *rest,
                            int rest_count)
 {
@@ -272,7 +234,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     drape_orthotropic_law(values, cloth->bending,
                           m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio), m->poisson_ratio,
                           law);
-    drape_status status = announce(cloth, values, law, builder);
+    drape_status status = reserve(cloth, values, law, builder);
     int32_t element = 0;
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {
         drape_midedge patch;
@@ -283,12 +245,11 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
             double rest[REST_COUNT_CLAMPED] = {0};
             int32_t node[MIDEDGE_NODES];
             rest[REST_K] = patch.k[r];
-            rest[REST_ALTITUDE] =
-                least_altitude(cloth->rest + 3 * (size_t)n[0], cloth->rest + 3 * (size_t)n[1],
-                               cloth->rest + 3 * (size_t)n[2]);
+            rest[REST_ALTITUDE] = min_altitude(cloth->rest + 3 * (size_t)n[0], cloth->rest + 3 * (size_t)n[1],
+                                               cloth->rest + 3 * (size_t)n[2]);
             memcpy(rest + REST_C, patch.c[r], sizeof patch.c[r]);
-            take_clamps(cloth, &patch, rest + REST_CLAMP);
-            take_nodes(&patch, r, node);
+            set_clamps(cloth, &patch, rest + REST_CLAMP);
+            set_nodes(&patch, r, node);
             if (values[PARAM_REST] == REST_MESH)
                 rest[REST_Q0] = rest_measure(cloth, node, rest, REST_COUNT_CLAMPED);
             rest[REST_Q0] += l[0] * bend[0] + l[1] * bend[1] + 2 * l[2] * bend[2];
@@ -300,9 +261,9 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
 
 /* ---- Internal variables ---- */
 
-/* 0 for hinges that are not there. */
-static void turn_angles(const drape_elements *el, int32_t element, const double *x, const double *before,
-                        double *after)
+/* The angles on the branches nearest to before; 0 for hinges that are left out. */
+static void update_angles(const drape_elements *el, int32_t element, const double *x, const double *before,
+                          double *after)
 {
     hinges s;
     memset(after, 0, MIDEDGE_HINGES * sizeof *after);
@@ -317,14 +278,14 @@ static void initial(const drape_elements *el, int32_t first, int32_t count, cons
 {
     static const double flat[MIDEDGE_HINGES] = {0};
     for (int32_t e = first; e < first + count; e++)
-        turn_angles(el, e, x, flat, after + MIDEDGE_HINGES * (size_t)e);
+        update_angles(el, e, x, flat, after + MIDEDGE_HINGES * (size_t)e);
 }
 
 static void commit(const drape_elements *el, int32_t first, int32_t count, const double *x,
                    const double *before, double *after)
 {
     for (int32_t e = first; e < first + count; e++)
-        turn_angles(el, e, x, before + MIDEDGE_HINGES * (size_t)e, after + MIDEDGE_HINGES * (size_t)e);
+        update_angles(el, e, x, before + MIDEDGE_HINGES * (size_t)e, after + MIDEDGE_HINGES * (size_t)e);
 }
 
 /* ---- Checking ---- */
@@ -332,21 +293,21 @@ static void commit(const drape_elements *el, int32_t first, int32_t count, const
 static double altitude_ratio(const drape_elements *el, int32_t element, const double *x)
 {
     const int32_t *n = el->node + (size_t)element * (size_t)el->nodes;
-    return least_altitude(x + 3 * (size_t)n[0], x + 3 * (size_t)n[1], x + 3 * (size_t)n[2]) /
-           rest_of(el, REST_ALTITUDE, element);
+    return min_altitude(x + 3 * (size_t)n[0], x + 3 * (size_t)n[1], x + 3 * (size_t)n[2]) /
+           drape_rest_of(el, REST_ALTITUDE, element);
 }
 
 static double largest_turn(const drape_elements *el, int32_t element, const double *x, const double *before)
 {
     double after[MIDEDGE_HINGES], turn = 0;
-    turn_angles(el, element, x, before, after);
+    update_angles(el, element, x, before, after);
     for (int k = 0; k < MIDEDGE_HINGES; k++)
         if (after[k] != 0)
             turn = fmax(turn, fabs(after[k] - before[k]));
     return turn;
 }
 
-/* The lowest altitude counts first: where a triangle has collapsed its angles mean nothing. */
+/* A collapsed altitude is reported first: the angles of a collapsed triangle are meaningless. */
 static drape_status check(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault)
 {
@@ -373,13 +334,14 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
 
 const drape_term_ops drape_term_bend_midedge = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "bend.midedge",
-    .summary = "bending of every triangle, a plate with the true Poisson ratio on any mesh: E = A/2 (K - "
-               "K0)'C(K - K0)",
-    .reference =
-        "Grinspun, Gingold, Reisman & Zorin 2006, section 4, the turns of the normals from the nodes",
-    .params = params,
-    .param_count = LIST_COUNT,
+    .entry =
+        {.name = "bend.midedge",
+         .summary =
+             "bending of every triangle, a plate with the true Poisson ratio on any mesh: E = A/2 (K - "
+             "K0)'C(K - K0)",
+         .reference =
+             "Grinspun, Gingold, Reisman & Zorin 2006, section 4, the turns of the normals from the nodes",
+         DRAPE_PARAMS(params)},
     .element_name = "square",
     .nodes = MIDEDGE_NODES,
     .has_internal = true,

@@ -1,7 +1,7 @@
 /*
- * damp.kelvin_voigt: a dashpot beside the spring of every strain measure of its cloth: generalised force beta
- * k q', so that the force on the nodes is beta k q' grad q(x). It vanishes exactly on rigid motion, on which
- * q' = 0. Step methods take q' as a difference of q, IDA as grad q . v
+ * damp.kelvin_voigt: a dashpot parallel to the spring of every strain measure of its cloth: the generalized force is
+ * beta k q', and so the force on the nodes beta k q' grad q(x). It vanishes exactly in rigid motion, where q' = 0.
+ * Fixed-step methods take q' as a difference of q, IDA as grad q . v.
  */
 #include "terms/terms.h"
 
@@ -10,14 +10,9 @@
 enum { PARAM_BETA, PARAM_COUNT };
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_BETA] = {.name = "beta",
-                    .kind = DRAPE_PARAM_NUMBER,
-                    .unit = "s",
-                    .default_value = NAN,
-                    .min = 0,
-                    .max = 1e6,
-                    .help =
-                        "retardation time: damping stiffness over elastic stiffness of every strain measure"},
+    [PARAM_BETA] =
+        DRAPE_NUMBER("beta", "s", DRAPE_REQUIRED, 0, 1e6,
+                     "retardation time: damping stiffness over elastic stiffness of every strain measure"),
 };
 
 static void law(const double *values, int32_t count, const double *k, const double *strain,
@@ -34,12 +29,12 @@ static void law(const double *values, int32_t count, const double *k, const doub
 
 const drape_term_ops drape_term_damp_kelvin_voigt = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "damp.kelvin_voigt",
-    .summary =
-        "internal damping: force beta k q' grad q on every strain measure q of the cloth's other terms",
-    .reference = "Kelvin-Voigt solid: spring and dashpot side by side",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry =
+        {.name = "damp.kelvin_voigt",
+         .summary =
+             "internal damping: force beta k q' grad q on every strain measure q of the cloth's other terms",
+         .reference = "Kelvin-Voigt solid: spring and dashpot side by side",
+         DRAPE_PARAMS(params)},
     .element_name = "measure",
     .law = law,
     .dissipative = true,

@@ -1,6 +1,6 @@
 /*
- * drag.viscous: a medium at rest that slows every node: g = c A v with the node's share A of the area. It
- * acts on rigid motion by design; for damping that does not, see damp.kelvin_voigt. dg/dv = c A I, dg/dx = 0.
+ * drag.viscous: linear drag of a medium at rest on every node: g = c A v with the node's share A of the area. It acts on
+ * rigid motion by design; damp.kelvin_voigt does not. dg/dv = c A I, dg/dx = 0.
  */
 #include "terms/terms.h"
 
@@ -14,21 +14,11 @@ static const char *const area_choices[] = {[AREA_LUMPED] = "lumped", [AREA_UNIFO
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_COEFFICIENT] =
-        {.name = "coefficient",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "kg/(m2 s)",
-         .default_value = NAN,
-         .min = 0,
-         .max = 1e9,
-         .help = "drag per area and speed: a node loses speed at the rate coefficient / areal density"},
-    [PARAM_AREA] = {.name = "area",
-                    .kind = DRAPE_PARAM_CHOICE,
-                    .unit = "1",
-                    .default_value = AREA_LUMPED,
-                    .choices = area_choices,
-                    .help =
-                        "a node's share; lumped: a third of each triangle; uniform: the same for every node, "
-                        "as Boson's drag"},
+        DRAPE_NUMBER("coefficient", "kg/(m2 s)", DRAPE_REQUIRED, 0, 1e9,
+                     "drag per area and speed: a node loses speed at the rate coefficient / areal density"),
+    [PARAM_AREA] = DRAPE_CHOICE("area", AREA_LUMPED, area_choices,
+                                "a node's share; lumped: a third of each triangle; uniform: the same for "
+                                "every node, as Boson's drag"),
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
@@ -63,11 +53,10 @@ static void dissipation(const drape_elements *el, int32_t first, int32_t count, 
 
 const drape_term_ops drape_term_drag_viscous = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "drag.viscous",
-    .summary = "viscous drag of a medium at rest on every node: force -c A v",
-    .reference = "linear drag; Boson's air drag is this with c A = 0.3 kg/s a node",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "drag.viscous",
+              .summary = "viscous drag of a medium at rest on every node: force -c A v",
+              .reference = "linear drag; Boson's air drag is this with c A = 0.3 kg/s a node",
+              DRAPE_PARAMS(params)},
     .element_name = "node",
     .nodes = 1,
     .build = build,

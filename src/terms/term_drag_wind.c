@@ -1,13 +1,14 @@
 /*
  * drag.wind: the pressure of a steady wind on every triangle. With m = (x1 - x0) x (x2 - x0), twice the
- * area along the normal n, and u = w - (v0 + v1 + v2)/3 the wind as the triangle meets it,
+ * area times the normal n, and u = w - (v0 + v1 + v2)/3, the wind relative to the triangle,
  *     F = 1/2 rho C A |u.n| (u.n) n = rho C/4 |q| q m / |m|^2,   q = u . m,
- * a third of it on each node. So the wind acts along the normal alone (Provot 1995, section 3.2, there linear in
- * u.n) and as the square of its speed, as on a flat plate (Hoerner 1965, Fluid-Dynamic Drag, 3: C = 1.17 for a
- * square one across the wind). No friction along the sheet, no lee: a layer behind another feels the wind too.
+ * a third of it on each node. So the wind acts along the normal only (Provot 1995, section 3.2, there linear in
+ * u.n) and with the square of its speed, as on a flat plate (Hoerner 1965, Fluid-Dynamic Drag, 3: C = 1.17 for a
+ * square plate across the wind). There is no friction along the sheet and no lee: the wind also acts on a layer behind
+ * another.
  *
  *     dF = rho C/4 [2 |q| m dq + |q| q dm - |q| q m d(|m|^2)/|m|^2] / |m|^2,  dq = u . dm + m . du
- * F is C1 in x and v; a triangle without area has no force. In air at rest it takes power: -F . v = |q|^3 ... >= 0.
+ * F is C1 in x and v; a triangle without area has no force. In air at rest F dissipates: -F . v = |q|^3 ... >= 0.
  */
 #include "base/vec3.h"
 #include "terms/terms.h"
@@ -20,27 +21,11 @@ enum { REST_FACTOR, REST_WIND, REST_COUNT = REST_WIND + 3 };
 enum { D = 9 };
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_DENSITY] = {.name = "density",
-                       .kind = DRAPE_PARAM_NUMBER,
-                       .unit = "kg/m3",
-                       .default_value = 1.225,
-                       .min = 0,
-                       .max = 1e6,
-                       .help = "density of the medium: 1.225 is air at sea level and 15 degrees"},
-    [PARAM_COEFFICIENT] = {.name = "coefficient",
-                           .kind = DRAPE_PARAM_NUMBER,
-                           .unit = "1",
-                           .default_value = 1.17,
-                           .min = 0,
-                           .max = 1e6,
-                           .help = "drag coefficient across the sheet: 1.17 is a square plate"},
-    [PARAM_WIND] = {.name = "wind",
-                    .kind = DRAPE_PARAM_VECTOR,
-                    .unit = "m/s",
-                    .default_value = 0,
-                    .min = -1e6,
-                    .max = 1e6,
-                    .help = "velocity of the medium"},
+    [PARAM_DENSITY] = DRAPE_NUMBER("density", "kg/m3", 1.225, 0, 1e6,
+                                   "density of the medium: 1.225 is air at sea level and 15 degrees"),
+    [PARAM_COEFFICIENT] = DRAPE_NUMBER("coefficient", "1", 1.17, 0, 1e6,
+                                       "drag coefficient across the sheet: 1.17 is a square plate"),
+    [PARAM_WIND] = DRAPE_VECTOR("wind", "m/s", 0, -1e6, 1e6, "velocity of the medium"),
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
@@ -79,8 +64,8 @@ static flow flow_of(const drape_elements *el, int32_t element, const double *x, 
     return f;
 }
 
-/* dm for a unit change of coordinate k of node i: x0 enters by both edges. */
-static void turn_of(const flow *f, int i, int k, double *dm)
+/* The derivative of m by coordinate k of node i; x0 enters through both edges. */
+static void normal_derivative(const flow *f, int i, int k, double *dm)
 {
     double unit[3] = {0}, edge[3];
     unit[k] = 1;
@@ -94,7 +79,7 @@ static void turn_of(const flow *f, int i, int k, double *dm)
         vec3_cross(edge, unit, dm);
 }
 
-/* Every node has the same third: a column of the 9 x 9 matrix is three times the same three numbers, less dF/3. */
+/* Every node has a third of the force: a column of the 9 x 9 matrix is three times -dF/3. */
 static void set_column(double *matrix, int column, const double *dforce)
 {
     for (int row = 0; row < D; row++)
@@ -106,7 +91,7 @@ static void derive(const flow *f, double factor, double *dg_dx, double *dg_dv)
     double scale = factor * fabs(f->q) / f->area2;
     for (int column = 0; column < D; column++) {
         double dm[3], dforce[3];
-        turn_of(f, column / 3, column % 3, dm);
+        normal_derivative(f, column / 3, column % 3, dm);
         double dq = vec3_dot(f->u, dm), darea2 = 2 * vec3_dot(f->m, dm);
         for (int k = 0; k < 3; k++)
             dforce[k] = scale * (2 * f->m[k] * dq + f->q * (dm[k] - f->m[k] * darea2 / f->area2));
@@ -126,11 +111,11 @@ static void dissipation(const drape_elements *el, int32_t first, int32_t count, 
         const flow f = flow_of(el, first + i, x, v);
         double factor = el->rest[first + i], *hx = dg_dx ? dg_dx + (size_t)(D * D) * (size_t)i : NULL,
                *hv = dg_dv ? dg_dv + (size_t)(D * D) * (size_t)i : NULL;
-        bool flat = f.area2 > 0;
-        double pressure = flat ? factor * fabs(f.q) * f.q / f.area2 : 0;
+        bool has_area = f.area2 > 0;
+        double pressure = has_area ? factor * fabs(f.q) * f.q / f.area2 : 0;
         for (int k = 0; k < D; k++)
             g[D * (size_t)i + (size_t)k] = -pressure * f.m[k % 3] / 3;
-        if (flat && (hx || hv)) {
+        if (has_area && (hx || hv)) {
             derive(&f, factor, hx, hv);
             continue;
         }
@@ -143,11 +128,12 @@ static void dissipation(const drape_elements *el, int32_t first, int32_t count, 
 
 const drape_term_ops drape_term_drag_wind = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "drag.wind",
-    .summary = "pressure of wind across every triangle: 1/2 rho C A |u.n| (u.n) n, u the wind relative to it",
-    .reference = "Provot 1995, section 3.2; Hoerner 1965, Fluid-Dynamic Drag, chapter 3",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry =
+        {.name = "drag.wind",
+         .summary =
+             "pressure of wind across every triangle: 1/2 rho C A |u.n| (u.n) n, u the wind relative to it",
+         .reference = "Provot 1995, section 3.2; Hoerner 1965, Fluid-Dynamic Drag, chapter 3",
+         DRAPE_PARAMS(params)},
     .element_name = "triangle",
     .nodes = 3,
     .build = build,

@@ -1,5 +1,5 @@
-/* gravity: E = -m g . x of every node, with its lumped mass m. Linear: no Hessian, no sparsity. Modelled when
- * the scene's vector is not zero. */
+/* gravity: E = -m g . x of every node, with its lumped mass m. Linear: it has no Hessian. It is modelled if the gravity
+ * of the scene is not zero. */
 #include "terms/terms.h"
 
 enum { REST_FORCE_X, REST_FORCE_Y, REST_FORCE_Z, REST_COUNT };
@@ -35,9 +35,9 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
 
 const drape_term_ops drape_term_gravity = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "gravity",
-    .summary = "weight of every node: E = -m g . x; modelled when the scene's gravity is not zero",
-    .reference = "lumped masses: a third of each triangle to each of its nodes",
+    .entry = {.name = "gravity",
+              .summary = "weight of every node: E = -m g . x; modelled when the scene's gravity is not zero",
+              .reference = "lumped masses: a third of each triangle to each of its nodes"},
     .element_name = "node",
     .nodes = 1,
     .linear = true,

@@ -1,19 +1,19 @@
 /*
- * limit.strain: keeps edges, or springs, from stretching beyond a limit. With s = l/L - 1 and the window
- * y = (s - onset)/w, w = limit - onset, each has the energy
+ * limit.strain: keeps edges, or springs, from stretching beyond a limit. With s = l/L - 1,
+ * y = (s - onset)/w and w = limit - onset, each has the energy
  *     E = K (L w)^2 b(y),  b = 0 for y <= 0,  -y^2 ln(1 - y) for 0 < y <= 1 - cap
  *     dE/dl = K L w b',    b' = -2 y ln(1 - y) + y^2/(1 - y)
  *     d2E/dl2 = K b'',     b'' = -2 ln(1 - y) + 4 y/(1 - y) + y^2/(1 - y)^2
- * which is the barrier of Li et al. 2020 (Incremental Potential Contact, eq. 6), its gap limit - s: zero
- * below the onset, C2 there since b ~ y^3, and it has no end below the limit. b'' >= 0 and b' >= 0, so the
- * Hessian b'' grad l grad l' + b' hess l is positive semidefinite.
+ * which is the barrier of Li et al. 2020 (Incremental Potential Contact, eq. 6) with the gap limit - s: zero below the
+ * onset, C2 there since b ~ y^3, and unbounded towards the limit. b'' >= 0 and b' >= 0, so the Hessian
+ * b'' grad l grad l' + b' hess l is positive semidefinite.
  *
- * A barrier that is infinite beyond the limit would leave Newton nowhere to come from: fast nodes' first
- * guess lies beyond it, and so does any sheet whose pins were moved. So b goes on above y = 1 - cap as the
- * parabola that is C2 there. Iterates may be beyond the limit; states may not: the check rejects them.
- * The forces at the limit are some 2/cap K L w; a load beyond it needs a larger stiffness, or smaller cap.
+ * If the barrier were infinite beyond the limit, Newton could not start there, but the first guess of fast nodes is
+ * beyond it, and so is a sheet whose pins were moved. Therefore b continues above y = 1 - cap as the parabola that is C2
+ * there. Iterates may be beyond the limit; states may not: the check rejects them. The forces at the limit are about
+ * 2/cap K L w; a larger load needs a larger stiffness or a smaller cap.
  *
- * Pressed together springs are not limited, nor does CS184's pass limit them.
+ * Compressed springs are not limited, as in CS184.
  */
 #include "base/vec3.h"
 #include "terms/spring.h"
@@ -27,50 +27,23 @@ enum { REST_K, REST_LENGTH, REST_COUNT };
 static const char *const over_choices[] = {[OVER_EDGES] = "edges", [OVER_SPRINGS] = "springs", NULL};
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_LIMIT] = {.name = "limit",
-                     .kind = DRAPE_PARAM_NUMBER,
-                     .unit = "1",
-                     .default_value = 0.1,
-                     .min = 0,
-                     .max = 100,
-                     .open_min = true,
-                     .help = "strain |e|/L - 1 that no accepted state of an implicit row exceeds; verlet "
-                             "leaves it out, and has strain_limit"},
-    [PARAM_ONSET] = {.name = "onset",
-                     .kind = DRAPE_PARAM_NUMBER,
-                     .unit = "1",
-                     .default_value = NAN,
-                     .derived = "half of limit",
-                     .min = 0,
-                     .max = 100,
-                     .help = "strain below limit from which it is resisted; none is below"},
-    [PARAM_STIFFNESS] =
-        {.name = "stiffness",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "N/m",
-         .default_value = NAN,
-         .derived = "the larger of E h and the cloth's weight over its mean rest length times limit - onset",
-         .min = 0,
-         .max = 1e15,
-         .open_min = true,
-         .help = "scale of the resistance: a spring of this constant, 6.4 times it halfway from onset to "
-                 "limit"},
-    [PARAM_OVER] = {.name = "over",
-                    .kind = DRAPE_PARAM_CHOICE,
-                    .unit = "1",
-                    .default_value = OVER_EDGES,
-                    .choices = over_choices,
-                    .help =
-                        "edges: of the mesh; springs: all structural, shear and bend pairs of a square grid"},
-    [PARAM_CAP] = {.name = "cap",
-                   .kind = DRAPE_PARAM_NUMBER,
-                   .unit = "1",
-                   .default_value = 0.01,
-                   .min = 1e-9,
-                   .max = 0.5,
-                   .help =
-                       "share of limit - onset, next to the limit, where the barrier goes on as a parabola: "
-                       "forces at the limit are some 2/cap stiffness L (limit - onset)"},
+    [PARAM_LIMIT] = DRAPE_NUMBER("limit", "1", 0.1, DRAPE_ABOVE(0), 100,
+                                 "strain |e|/L - 1 that no accepted state of an implicit row exceeds; verlet "
+                                 "leaves it out, and has strain_limit"),
+    [PARAM_ONSET] = DRAPE_NUMBER("onset", "1", DRAPE_DERIVED("half of limit"), 0, 100,
+                                 "strain below limit from which it is resisted; none is below"),
+    [PARAM_STIFFNESS] = DRAPE_NUMBER(
+        "stiffness", "N/m",
+        DRAPE_DERIVED(
+            "the larger of E h and the cloth's weight over its mean rest length times limit - onset"),
+        DRAPE_ABOVE(0), 1e15,
+        "scale of the resistance: a spring of this constant, 6.4 times it halfway from onset to limit"),
+    [PARAM_OVER] =
+        DRAPE_CHOICE("over", OVER_EDGES, over_choices,
+                     "edges: of the mesh; springs: all structural, shear and bend pairs of a square grid"),
+    [PARAM_CAP] = DRAPE_NUMBER("cap", "1", 0.01, 1e-9, 0.5,
+                               "share of limit - onset, next to the limit, where the barrier goes on as a "
+                               "parabola: forces at the limit are some 2/cap stiffness L (limit - onset)"),
 };
 
 static double onset_of(const double *values)
@@ -91,7 +64,7 @@ static double mean_length(const drape_spring_set *set, int32_t count)
     return sum / count;
 }
 
-/* One edge alone can carry the sheet's weight, with b' = 1, at y = 0.46. */
+/* Such that a single edge can carry the weight of the sheet at y = 0.46, where b' = 1. */
 static double stiffness_of(const drape_spring_set *set, int32_t count, const double *values)
 {
     const drape_cloth_view *cloth = set->cloth;
@@ -149,7 +122,7 @@ static barrier barrier_at(double y, double cap)
     if (y <= 1 - cap)
         return barrier_below_cap(y);
     barrier b = barrier_below_cap(1 - cap);
-    double beyond = y - (1 - cap); /* NaN, too, comes here and stays one */
+    double beyond = y - (1 - cap); /* NaN gets here too and stays NaN */
     b.value += beyond * (b.slope + 0.5 * b.curve * beyond);
     b.slope += b.curve * beyond;
     return b;
@@ -167,7 +140,7 @@ static void one(const drape_elements *el, int32_t element, const double *x, doub
     barrier b = barrier_at((length / rest_length - 1 - onset) / width, el->params[PARAM_CAP]);
     double force = k * scale * b.slope, across = b.slope > 0 ? force / length : 0;
     for (int i = 0; i < 3; i++)
-        n[i] = b.slope > 0 ? n[i] / length : 0; /* a collapsed edge is not stretched */
+        n[i] = b.slope > 0 ? n[i] / length : 0; /* a collapsed edge has no direction, and is not stretched */
     if (e)
         *e = k * scale * scale * b.value;
     for (int i = 0; g && i < 3; i++) {
@@ -191,12 +164,10 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
 
 static double strain_of(const drape_elements *el, int32_t e, const double *x)
 {
-    double d[3];
-    vec3_sub(x + 3 * (size_t)el->node[2 * (size_t)e + 1], x + 3 * (size_t)el->node[2 * (size_t)e], d);
-    return vec3_norm(d) / el->rest[(size_t)REST_LENGTH * (size_t)el->count + (size_t)e] - 1;
+    return drape_pair_length(el, e, x) / drape_rest_of(el, REST_LENGTH, e) - 1;
 }
 
-/* Beyond the limit a step may only lead back. */
+/* A step that starts beyond the limit may only reduce the strain. */
 static drape_status check(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault)
 {
@@ -220,13 +191,13 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
 
 const drape_term_ops drape_term_limit_strain = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "limit.strain",
-    .summary = "keeps edges or springs from stretching beyond a limit, by a barrier that is zero below an "
-               "onset",
-    .reference =
-        "barrier of Li et al. 2020, Incremental Potential Contact, eq. 6; CS184 clothsim's limit of 10 %",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "limit.strain",
+              .summary =
+                  "keeps edges or springs from stretching beyond a limit, by a barrier that is zero below an "
+                  "onset",
+              .reference = "barrier of Li et al. 2020, Incremental Potential Contact, eq. 6; CS184 "
+                           "clothsim's limit of 10 %",
+              DRAPE_PARAMS(params)},
     .element_name = "edge",
     .nodes = 2,
     .constraint = true,

@@ -1,21 +1,16 @@
-/* load.line: a dead force per length on edges of the boundary: E = -f . (x0 + x1) L/2, L the length at rest.
- * Linear: no Hessian. */
+/* load.line: a dead force per length on boundary edges: E = -f . (x0 + x1) L/2 with the rest length L. Linear: it has
+ * no Hessian. */
 #include "terms/load.h"
 #include "terms/terms.h"
 
 enum { LIST_FORCE = DRAPE_LOAD_LIST_COUNT, LIST_COUNT };
 enum { PARAM_FORCE = DRAPE_LOAD_COUNT };
-enum { REST_HALF_X, REST_HALF_Y, REST_HALF_Z, REST_COUNT }; /* of the force on an edge [N] */
+enum { REST_HALF_X, REST_HALF_Y, REST_HALF_Z, REST_COUNT }; /* half the force on an edge [N] */
 
 static const drape_param params[LIST_COUNT] = {
     DRAPE_LOAD_PARAMS,
-    [LIST_FORCE] = {.name = "force",
-                    .kind = DRAPE_PARAM_VECTOR,
-                    .unit = "N/m",
-                    .default_value = 0,
-                    .min = -1e12,
-                    .max = 1e12,
-                    .help = "force per length of the edge at rest; it keeps its direction"},
+    [LIST_FORCE] = DRAPE_VECTOR("force", "N/m", 0, -1e12, 1e12,
+                                "force per length of the edge at rest; it keeps its direction"),
 };
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
@@ -56,11 +51,10 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
 
 const drape_term_ops drape_term_load_line = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "load.line",
-    .summary = "a force per length on edges of the boundary, that keeps its direction",
-    .reference = "work of a dead load, lumped by halves",
-    .params = params,
-    .param_count = LIST_COUNT,
+    .entry = {.name = "load.line",
+              .summary = "a force per length on edges of the boundary, that keeps its direction",
+              .reference = "work of a dead load, lumped by halves",
+              DRAPE_PARAMS(params)},
     .element_name = "edge",
     .nodes = 2,
     .linear = true,

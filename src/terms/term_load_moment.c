@@ -1,16 +1,16 @@
 /*
- * load.moment: a moment per length on edges of the boundary, about each edge as it was at rest: E = M L psi, L the
- * length at rest and psi the twist of the edge's triangle about that direction e0: with q the unit quaternion of the
- * triangle's rotation psi = 2 atan2(q . e0, q_w). By the triangle's unit vectors t, in its plane from the edge to the
- * apex, and n, its normal, and by those at rest,
+ * load.moment: a moment per length on boundary edges, about each edge as it was at rest: E = M L psi with the rest length
+ * L and the twist psi of the edge's triangle about the direction e0 of the edge at rest. With q the unit quaternion of the
+ * triangle's rotation, psi = 2 atan2(q . e0, q_w). By the unit vectors t, in the triangle's plane from the edge to the
+ * apex, and n, the normal, and their values t0 and n0 at rest,
  *     S = n0.t - t0.n = 4 q_w (q . e0),  C = t0.t + n0.n = 2 (q_w^2 - (q . e0)^2),  psi = atan2(S, C).
- * It bends a strip to the curvature M/D, however far. Where the edge is tilted besides by a small angle, the moment
- * turns by half of it: a semitangential moment (Argyris, Dunne & Scharpf 1978, On large displacement - small strain
- * analysis of structures with rotational degrees of freedom), whose potential does not change with the tilt at second
- * order. The work on the angle about the edge where it is does, by M sin(2 psi) w^2/4, and tips a strip over that it
- * winds up by more than 3.7. psi has no value where the triangle has turned by pi about a direction across e0.
+ * It bends a strip to the curvature M/D at any angle. If the edge is also tilted by a small angle, the moment turns by
+ * half that angle: a semitangential moment (Argyris, Dunne & Scharpf 1978, On large displacement - small strain
+ * analysis of structures with rotational degrees of freedom), whose potential is unchanged by the tilt to second order.
+ * A moment about the present edge is not: its work changes by M sin(2 psi) w^2/4 with a tilt w, which tips over a strip
+ * wound up by more than 3.7. psi is undefined if the triangle has turned by pi about a direction across e0.
  *
- * The internal variable is the angle of the last accepted state: the next is on the branch nearest to it.
+ * The internal variable is the angle in the last accepted state: angles are taken on the branch nearest to it.
  */
 #include "base/vec3.h"
 #include "terms/dihedral.h"
@@ -26,18 +26,12 @@ enum { REST_MOMENT, REST_TANGENT, REST_NORMAL = 4, REST_COUNT = 7 }; /* M L [N m
 
 static const drape_param params[LIST_COUNT] = {
     DRAPE_LOAD_PARAMS,
-    [LIST_MOMENT] =
-        {.name = "moment",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "N",
-         .default_value = NAN,
-         .min = -1e12,
-         .max = 1e12,
-         .help = "moment per length of the edge [N m/m]; positive: it bends towards the side from which "
-                 "triangles turn counterclockwise"},
+    [LIST_MOMENT] = DRAPE_NUMBER("moment", "N", DRAPE_REQUIRED, -1e12, 1e12,
+                                 "moment per length of the edge [N m/m]; positive: it bends towards the side "
+                                 "from which triangles turn counterclockwise"),
 };
 
-/* The edge as its triangle turns, then the apex. */
+/* The edge in the orientation of its triangle, then the apex. */
 static void corners(const drape_cloth_view *cloth, int32_t e, int32_t node[3])
 {
     const int32_t t = cloth->edge_triangle[2 * (size_t)e];
@@ -47,11 +41,6 @@ static void corners(const drape_cloth_view *cloth, int32_t e, int32_t node[3])
                 node[i] = cloth->triangle[3 * (size_t)t + (size_t)((k + i) % 3)];
 }
 
-static double rest_of(const drape_elements *el, int item, int32_t element)
-{
-    return el->rest[(size_t)item * (size_t)el->count + (size_t)element];
-}
-
 /* ---- Unit vectors of a triangle as functions of d = x1 - x0 and g = x2 - x0 ---- */
 
 /* A vector a(d, g), its norm, and its derivatives by d and by g. */
@@ -59,7 +48,7 @@ typedef struct direction {
     double unit[3], norm, by[3][6];
 } direction;
 
-static void measure(direction *v, const double a[3])
+static void normalize(direction *v, const double a[3])
 {
     v->norm = vec3_norm(a);
     for (int i = 0; i < 3; i++)
@@ -71,7 +60,7 @@ static void measure_normal(const double d[3], const double g[3], direction *n)
 {
     double a[3];
     vec3_cross(d, g, a);
-    measure(n, a);
+    normalize(n, a);
     for (int i = 0; i < 3; i++) {
         const int j = (i + 1) % 3, k = (i + 2) % 3; /* a_i = d_j g_k - d_k g_j */
         n->by[i][i] = n->by[i][3 + i] = 0;
@@ -89,7 +78,7 @@ static void measure_tangent(const double d[3], const double g[3], direction *t)
     double a[3];
     for (int i = 0; i < 3; i++)
         a[i] = g[i] * dd - d[i] * dg;
-    measure(t, a);
+    normalize(t, a);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             t->by[i][j] = 2 * g[i] * d[j] - d[i] * g[j] - (i == j) * dg;
@@ -97,7 +86,7 @@ static void measure_tangent(const double d[3], const double g[3], direction *t)
         }
 }
 
-/* v . the second derivatives of d x g, and those of g d.d - d d.g, into h, of (d, g). */
+/* Add to h the second derivatives by (d, g) of v . (d x g), and of v . (g d.d - d d.g). */
 static void add_normal_second(const double v[3], double h[6][6])
 {
     for (int i = 0; i < 3; i++) {
@@ -121,7 +110,7 @@ static void add_tangent_second(const double d[3], const double g[3], const doubl
         }
 }
 
-/* c less its part along the unit vector, over the norm: by it c . unit changes with a. */
+/* The derivative of c . unit by a: c without its component along the unit vector, over the norm. */
 static void across(const direction *v, const double c[3], double out[3])
 {
     const double along = vec3_dot(c, v->unit);
@@ -129,7 +118,7 @@ static void across(const direction *v, const double c[3], double out[3])
         out[i] = (c[i] - along * v->unit[i]) / v->norm;
 }
 
-/* g += the derivatives of c . unit. */
+/* Adds to g the derivatives of c . unit. */
 static void add_first(const direction *v, const double c[3], double g[6])
 {
     double b[3];
@@ -139,8 +128,8 @@ static void add_first(const direction *v, const double c[3], double g[6])
             g[j] += b[i] * v->by[i][j];
 }
 
-/* h += the second derivatives of c . unit but for b . those of a, with b as across() has it: by a they are -(u b' + b u' +
- * (c.u) (I - u u')/|a|)/|a|. */
+/* Adds to h the second derivatives of c . unit, without the part b . (second derivatives of a), where b is given by
+ * across(). The second derivatives by a are -(u b' + b u' + (c.u) (I - u u')/|a|)/|a|. */
 static void add_second(const direction *v, const double c[3], double h[6][6])
 {
     double b[3], curvature[3][3];
@@ -153,17 +142,17 @@ static void add_second(const direction *v, const double c[3], double h[6][6])
                 v->norm;
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 6; k++) {
-            double turned = 0;
+            double sum = 0;
             for (int j = 0; j < 3; j++)
-                turned += curvature[i][j] * v->by[j][k];
+                sum += curvature[i][j] * v->by[j][k];
             for (int l = 0; l < 6; l++)
-                h[l][k] += v->by[i][l] * turned;
+                h[l][k] += v->by[i][l] * sum;
         }
 }
 
 /* ---- The angle ---- */
 
-/* What psi is made of, of one element. */
+/* The quantities that psi of an element is computed from. */
 typedef struct twist {
     double d[3], g[3], t0[3], n0[3];
     direction t, n;
@@ -176,8 +165,8 @@ static double measure_twist(const drape_elements *el, int32_t element, const dou
     vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], w->d);
     vec3_sub(x + 3 * (size_t)node[2], x + 3 * (size_t)node[0], w->g);
     for (int i = 0; i < 3; i++) {
-        w->t0[i] = rest_of(el, REST_TANGENT + i, element);
-        w->n0[i] = rest_of(el, REST_NORMAL + i, element);
+        w->t0[i] = drape_rest_of(el, REST_TANGENT + i, element);
+        w->n0[i] = drape_rest_of(el, REST_NORMAL + i, element);
     }
     measure_normal(w->d, w->g, &w->n);
     measure_tangent(w->d, w->g, &w->t);
@@ -187,8 +176,8 @@ static double measure_twist(const drape_elements *el, int32_t element, const dou
     return atan2(w->sine, w->cosine);
 }
 
-/* p . t + q . n has the derivatives C S' - S C', p and q held. */
-static void hold(const twist *w, double p[3], double q[3])
+/* p and q such that p . t + q . n, with p and q constant, has the derivatives C S' - S C'. */
+static void find_factors(const twist *w, double p[3], double q[3])
 {
     for (int i = 0; i < 3; i++) {
         p[i] = w->cosine * w->n0[i] - w->sine * w->t0[i];
@@ -196,7 +185,7 @@ static void hold(const twist *w, double p[3], double q[3])
     }
 }
 
-/* Of nodes x0 x1 x2, from those by (d, g): scale times it. */
+/* Converts derivatives by (d, g) to derivatives by the nodes x0 x1 x2, times scale. */
 static void to_nodes(double scale, const double by[6], double g[9])
 {
     for (int i = 0; i < 3; i++) {
@@ -209,17 +198,17 @@ static void to_nodes(double scale, const double by[6], double g[9])
 static void put_gradient(const twist *w, double scale, double *g)
 {
     double p[3], q[3], by[6] = {0};
-    hold(w, p, q);
+    find_factors(w, p, q);
     add_first(&w->t, p, by);
     add_first(&w->n, q, by);
     to_nodes(scale / w->square, by, g);
 }
 
-/* C S'' - S C'', into h, of (d, g). */
+/* Adds C S'' - S C'' to h, by (d, g). */
 static void add_curvature(const twist *w, double h[6][6])
 {
     double p[3], q[3], b[3];
-    hold(w, p, q);
+    find_factors(w, p, q);
     add_second(&w->t, p, h);
     across(&w->t, p, b);
     add_tangent_second(w->d, w->g, b, h);
@@ -228,7 +217,7 @@ static void add_curvature(const twist *w, double h[6][6])
     add_normal_second(b, h);
 }
 
-/* (2 S C (C' C'^T - S' S'^T) + (S^2 - C^2) (S' C'^T + C' S'^T))/(S^2 + C^2), into h, of (d, g). */
+/* Adds (2 S C (C' C'^T - S' S'^T) + (S^2 - C^2) (S' C'^T + C' S'^T))/(S^2 + C^2) to h, by (d, g). */
 static void add_products(const twist *w, double h[6][6])
 {
     const double same = 2 * w->sine * w->cosine / w->square,
@@ -261,7 +250,7 @@ static void put_hessian(const twist *w, double scale, double *hess)
     }
 }
 
-/* ---- The row ---- */
+/* ---- The term ---- */
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
 {
@@ -291,7 +280,7 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
                    const double *internal, double *e, double *g, double *hess)
 {
     for (int32_t i = 0; i < count; i++) {
-        const double moment = rest_of(el, REST_MOMENT, first + i);
+        const double moment = drape_rest_of(el, REST_MOMENT, first + i);
         twist w;
         const double psi = measure_twist(el, first + i, x, &w);
         if (e)
@@ -320,12 +309,13 @@ static void commit(const drape_elements *el, int32_t first, int32_t count, const
 
 const drape_term_ops drape_term_load_moment = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "load.moment",
-    .summary = "a moment per length on edges of the boundary, about each edge at rest: bends a strip to M/D",
-    .reference =
-        "Argyris, Dunne & Scharpf 1978, semitangential moment: work on the twist of the triangle at the edge",
-    .params = params,
-    .param_count = LIST_COUNT,
+    .entry =
+        {.name = "load.moment",
+         .summary =
+             "a moment per length on edges of the boundary, about each edge at rest: bends a strip to M/D",
+         .reference = "Argyris, Dunne & Scharpf 1978, semitangential moment: work on the twist of the "
+                      "triangle at the edge",
+         DRAPE_PARAMS(params)},
     .element_name = "edge",
     .nodes = 3,
     .has_internal = true,

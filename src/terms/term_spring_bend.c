@@ -1,6 +1,6 @@
-/* spring.bend: springs from each node to the next but one along its row and its column, which resist bending
- * as they grow shorter. They grow shorter with the square of the curvature: their energy is of its fourth power, and a flat sheet
- * has no bending stiffness at all. */
+/* spring.bend: springs from each node to the second next along its row and its column, which resist bending as bending
+ * shortens them. They shorten with the square of the curvature, so their energy grows with its fourth power, and a flat
+ * sheet has no bending stiffness at all. */
 #include "terms/spring.h"
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
@@ -10,13 +10,13 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
 
 const drape_term_ops drape_term_spring_bend = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "spring.bend",
-    .summary = "springs to the next node but one along rows and columns of a square grid: E = 1/2 k "
-               "(l - L)^2",
-    .reference =
-        "Provot 1995, Deformation constraints in a mass-spring model to describe rigid cloth behavior",
-    .params = drape_spring_params,
-    .param_count = DRAPE_SPRING_PARAM_COUNT,
+    .entry =
+        {.name = "spring.bend",
+         .summary = "springs to the next node but one along rows and columns of a square grid: E = 1/2 k "
+                    "(l - L)^2",
+         .reference =
+             "Provot 1995, Deformation constraints in a mass-spring model to describe rigid cloth behavior",
+         DRAPE_PARAMS(drape_spring_params)},
     .element_name = "spring",
     .nodes = 2,
     .damped = true,

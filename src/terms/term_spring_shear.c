@@ -1,5 +1,5 @@
-/* spring.shear: springs along both diagonals of each cell of a square grid, which resist its shear. They are
- * the sheet's only resistance to shear beside springs along rows and columns. */
+/* spring.shear: springs along both diagonals of each cell of a square grid. Springs along rows and columns alone do not
+ * resist shear. */
 #include "terms/spring.h"
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)
@@ -9,12 +9,12 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
 
 const drape_term_ops drape_term_spring_shear = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "spring.shear",
-    .summary = "springs along both diagonals of each cell of a square grid: E = 1/2 k (l - L)^2",
-    .reference =
-        "Provot 1995, Deformation constraints in a mass-spring model to describe rigid cloth behavior",
-    .params = drape_spring_params,
-    .param_count = DRAPE_SPRING_PARAM_COUNT,
+    .entry =
+        {.name = "spring.shear",
+         .summary = "springs along both diagonals of each cell of a square grid: E = 1/2 k (l - L)^2",
+         .reference =
+             "Provot 1995, Deformation constraints in a mass-spring model to describe rigid cloth behavior",
+         DRAPE_PARAMS(drape_spring_params)},
     .element_name = "spring",
     .nodes = 2,
     .damped = true,

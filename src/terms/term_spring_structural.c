@@ -1,6 +1,6 @@
 /*
- * spring.structural: springs that resist stretching: from each node to the next along its row and its column
- * on a grid of rectangles; on any other mesh all edges, which on the equilateral lattice are the same thing.
+ * spring.structural: springs that resist stretching: from each node to the next along its row and its column on a grid of
+ * rectangles; along all edges of any other mesh.
  */
 #include "terms/spring.h"
 
@@ -13,13 +13,13 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
 
 const drape_term_ops drape_term_spring_structural = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "spring.structural",
-    .summary = "springs to the next node along rows and columns, on other meshes along edges: E = 1/2 k "
-               "(l - L)^2",
-    .reference =
-        "Provot 1995, Deformation constraints in a mass-spring model to describe rigid cloth behavior",
-    .params = drape_spring_params,
-    .param_count = DRAPE_SPRING_PARAM_COUNT,
+    .entry =
+        {.name = "spring.structural",
+         .summary = "springs to the next node along rows and columns, on other meshes along edges: E = 1/2 k "
+                    "(l - L)^2",
+         .reference =
+             "Provot 1995, Deformation constraints in a mass-spring model to describe rigid cloth behavior",
+         DRAPE_PARAMS(drape_spring_params)},
     .element_name = "spring",
     .nodes = 2,
     .damped = true,

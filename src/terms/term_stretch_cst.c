@@ -2,15 +2,15 @@
  * stretch.cst: a membrane of constant-strain triangles with the law of Saint Venant and Kirchhoff,
  *     E = A/2 e' C e,  e = (E11, E22, 2 E12),  Green's strain E = (F'F - I)/2,  F = sum x_a grad N_a,
  * C the law of orthotropic.h, grad N_a at rest. C = sum k l l', so E = A/2 sum k (q - q0)^2, and each square
- * is an element, three a triangle. With d1 = x1 - x0, d2 = x2 - x0 and the gradients B_a of N_a:
+ * is an element, three per triangle. With d1 = x1 - x0, d2 = x2 - x0 and the gradients B_a of N_a:
  *     q = 1/2 (W11 d1.d1 + W22 d2.d2) + W12 d1.d2,
  *     W_ab = l1 B_a1 B_b1 + l2 B_a2 B_b2 + l3 (B_a1 B_b2 + B_a2 B_b1)
- * so its Hessian is constant, W in each of the three directions. (Bonet & Wood 2008, Nonlinear Continuum
+ * so the Hessian of q is constant, W in each of the three directions. (Bonet & Wood 2008, Nonlinear Continuum
  * Mechanics for Finite Element Analysis, 6.3; Volino, Magnenat-Thalmann & Faure 2009.)
  *
- * f W is the stiffness that the stress f l gives: W = B' L B with L = (l1 l3; l3 l2), so its positive part is that of
- * f L, the tensions of the stress, found at rest: L = L+ + L-, by its eigenvalues. Without it a sheet under tension would
- * be as limp sideways in Newton's matrix as one without, and its steps too long by the ratio of the two.
+ * f W is the geometric stiffness of the stress f l: W = B' L B with L = (l1 l3; l3 l2). Its positive part is that of f L,
+ * the tension part of the stress, which is known at rest: L = L+ + L-, by the eigenvalues. Without it, Newton's matrix of
+ * a sheet under tension would be as soft sideways as without tension, and steps too long by the ratio of the two.
  */
 #include "base/vec3.h"
 #include "terms/orthotropic.h"
@@ -27,9 +27,9 @@ enum {
     REST_W11,
     REST_W12,
     REST_W22,
-    REST_PULL11,
-    REST_PULL12,
-    REST_PULL22,
+    REST_TENSION11, /* W of L+ */
+    REST_TENSION12,
+    REST_TENSION22,
     REST_AREA,
     REST_COUNT
 };
@@ -39,20 +39,9 @@ static const drape_param params[LIST_COUNT] = {
     DRAPE_ORTHOTROPIC_PARAMS("N/m", "of the material: its fabric, or E h", "shear",
                              "resistance to shear, force per length"),
     [LIST_MIN_AREA] =
-        {.name = "min_area",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 1e-6,
-         .min = 0,
-         .max = 1,
-         .open_max = true,
-         .help = "a step that takes the area of a triangle below this share of its rest is rejected"},
+        DRAPE_NUMBER("min_area", "1", 1e-6, 0, DRAPE_BELOW(1),
+                     "a step that takes the area of a triangle below this share of its rest is rejected"),
 };
-
-static double rest_of(const drape_elements *el, int item, int32_t element)
-{
-    return el->rest[(size_t)item * (size_t)el->count + (size_t)element];
-}
 
 static void sides(const drape_elements *el, int32_t element, const double *x, double d1[3], double d2[3])
 {
@@ -66,7 +55,7 @@ static double measure_of(const double w[3], const double d1[3], const double d2[
     return 0.5 * (w[0] * vec3_dot(d1, d1) + w[2] * vec3_dot(d2, d2)) + w[1] * vec3_dot(d1, d2);
 }
 
-/* The nodes' weights: those of x1 and x2, and of x0 what makes sums zero. */
+/* The blocks of x1 and x2 are multiples W of the identity; those of x0 make the sums zero. */
 static void hessian(const double w[3], double *ddq)
 {
     const double m[9] = {w[0] + 2 * w[1] + w[2], -w[0] - w[1], -w[1] - w[2], -w[0] - w[1], w[0], w[1],
@@ -83,8 +72,8 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
 {
     (void)internal;
     for (int32_t i = 0; i < count; i++) {
-        const double w[3] = {rest_of(el, REST_W11, first + i), rest_of(el, REST_W12, first + i),
-                             rest_of(el, REST_W22, first + i)};
+        const double w[3] = {drape_rest_of(el, REST_W11, first + i), drape_rest_of(el, REST_W12, first + i),
+                             drape_rest_of(el, REST_W22, first + i)};
         double d1[3], d2[3];
         sides(el, first + i, x, d1, d2);
         q[i] = measure_of(w, d1, d2);
@@ -99,7 +88,7 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
     }
 }
 
-/* W where the force pulls: of L+; where it pushes: of L- = L - L+. */
+/* W of L+ if the force is a tension, of L- = L - L+ if it is a compression. */
 static void positive(const drape_elements *el, int32_t first, int32_t count, const double *x,
                      const double *internal, const double *force, double *ddq)
 {
@@ -107,15 +96,15 @@ static void positive(const drape_elements *el, int32_t first, int32_t count, con
     for (int32_t i = 0; i < count; i++) {
         double w[3];
         for (int k = 0; k < 3; k++) {
-            const double pulls = rest_of(el, REST_PULL11 + k, first + i);
-            w[k] = force[i] > 0 ? pulls : rest_of(el, REST_W11 + k, first + i) - pulls;
+            const double tension = drape_rest_of(el, REST_TENSION11 + k, first + i);
+            w[k] = force[i] > 0 ? tension : drape_rest_of(el, REST_W11 + k, first + i) - tension;
         }
         hessian(w, ddq + 81 * (size_t)i);
     }
 }
 
-/* L+ of L, both as (L11, L22, L12): the eigenvalues are mean +- radius, and L+ is a share of L and one of the
- * identity where they differ in sign. */
+/* L+ of L, both as (L11, L22, L12). The eigenvalues are mean +- radius; L+ is a linear combination of L and the
+ * identity. */
 static void tension_part(const double l[3], double plus[3])
 {
     const double mean = (l[0] + l[1]) / 2, radius = hypot((l[0] - l[1]) / 2, l[2]);
@@ -126,7 +115,7 @@ static void tension_part(const double l[3], double plus[3])
     plus[2] = share * l[2];
 }
 
-/* W of one square from l and the rest triangle in the plane: the gradients of N1 and N2. */
+/* W of one square from l and the gradients of N1 and N2 in the plane of the rest triangle. */
 static void weights(const double l[3], const double flat[6], double w[3])
 {
     const double twice = flat[2] * flat[5] - flat[3] * flat[4];
@@ -150,35 +139,31 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         const int32_t *node = cloth->triangle + 3 * (size_t)t;
         const double *const corner[3] = {cloth->rest + 3 * (size_t)node[0], cloth->rest + 3 * (size_t)node[1],
                                          cloth->rest + 3 * (size_t)node[2]};
-        double axes[6], flat[6], w[3], plus[3], pull[3], d1[3], d2[3];
+        double axes[6], flat[6], w[3], plus[3], tension[3], d1[3], d2[3];
         if (!drape_orthotropic_frame(values, corner, law, axes, flat))
-            return drape_term_refuse(
-                builder,
-                "the warp stands upright on triangle %d of the mesh; \"warp_direction\" is a "
-                "direction that lies in the sheet",
-                (int)t);
+            return drape_orthotropic_refuse(builder, t);
         vec3_sub(corner[1], corner[0], d1);
         vec3_sub(corner[2], corner[0], d2);
         for (int r = 0; r < 3; r++) {
             const double area = cloth->triangle_area[t];
             weights(l + 3 * r, flat, w);
             tension_part(l + 3 * r, plus);
-            weights(plus, flat, pull);
+            weights(plus, flat, tension);
             drape_term_set(builder, 3 * t + r, node,
                            (const double[REST_COUNT]){k[r] * area, measure_of(w, d1, d2), w[0], w[1], w[2],
-                                                      pull[0], pull[1], pull[2], area});
+                                                      tension[0], tension[1], tension[2], area});
         }
     }
     return status;
 }
 
-/* Area over that at rest. */
+/* Area over rest area. */
 static double ratio_of(const drape_elements *el, int32_t element, const double *x)
 {
     double d1[3], d2[3], normal[3];
     sides(el, element, x, d1, d2);
     vec3_cross(d1, d2, normal);
-    return vec3_norm(normal) / 2 / rest_of(el, REST_AREA, element);
+    return vec3_norm(normal) / 2 / drape_rest_of(el, REST_AREA, element);
 }
 
 static drape_status check(const drape_elements *el, const double *x, const double *before,
@@ -192,11 +177,12 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
 
 const drape_term_ops drape_term_stretch_cst = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "stretch.cst",
-    .summary = "stretching and shear of every triangle, isotropic or woven: E = A/2 e'C e of Green's strain",
-    .reference = "Bonet & Wood 2008, 6.3; Volino, Magnenat-Thalmann & Faure 2009",
-    .params = params,
-    .param_count = LIST_COUNT,
+    .entry =
+        {.name = "stretch.cst",
+         .summary =
+             "stretching and shear of every triangle, isotropic or woven: E = A/2 e'C e of Green's strain",
+         .reference = "Bonet & Wood 2008, 6.3; Volino, Magnenat-Thalmann & Faure 2009",
+         DRAPE_PARAMS(params)},
     .element_name = "square",
     .nodes = 3,
     .build = build,

@@ -4,11 +4,11 @@
  *     E = 1/2 k q^2
  *
  * consistent: k = E h (A1 + A2), that is the spring constant K = k/L^2 = E h (A1 + A2)/L^2 of Van Gelder
- *     (1998); each triangle owns half a spring, so a boundary edge has K/2. On an equilateral mesh
- *     K = sqrt(3)/2 E h, and the lattice is the constant-strain triangle of a sheet with nu = 1/3 exactly.
- * report: the DEP report's code, whose number k_s = sqrt(3)/2 E h L^2 [J] is used as a force [N]:
- *     E = 1/2 k_s L q^2, too soft by one edge length, and boundary edges as stiff as the others. Kept so that
- *     its trajectories can be reproduced.
+ *     (1998); each triangle has half a spring, so a boundary edge has K/2. On an equilateral mesh
+ *     K = sqrt(3)/2 E h, and the lattice equals constant-strain triangles of a sheet with nu = 1/3.
+ * report: as the code of the DEP report, where k_s = sqrt(3)/2 E h L^2 [J] is used as a force [N]:
+ *     E = 1/2 k_s L q^2, too soft by a factor of the edge length, with boundary edges as stiff as the others. It is there
+ *     to reproduce the trajectories of the report.
  */
 #include "base/vec3.h"
 #include "terms/terms.h"
@@ -22,24 +22,12 @@ enum { REST_K, REST_Q0, REST_INVERSE_LENGTH, REST_COUNT };
 static const char *const stiffness_choices[] = {"consistent", "report", NULL};
 
 static const drape_param params[PARAM_COUNT] = {
-    [PARAM_STIFFNESS] =
-        {.name = "stiffness",
-         .kind = DRAPE_PARAM_CHOICE,
-         .unit = "1",
-         .default_value = STIFFNESS_CONSISTENT,
-         .choices = stiffness_choices,
-         .help =
-             "consistent: E h (A1 + A2)/L^2 as a spring constant; report: as the DEP report's code, one edge "
-             "length too soft"},
+    [PARAM_STIFFNESS] = DRAPE_CHOICE("stiffness", STIFFNESS_CONSISTENT, stiffness_choices,
+                                     "consistent: E h (A1 + A2)/L^2 as a spring constant; report: as the DEP "
+                                     "report's code, one edge length too soft"),
     [PARAM_COLLAPSE] =
-        {.name = "min_length",
-         .kind = DRAPE_PARAM_NUMBER,
-         .unit = "1",
-         .default_value = 1e-6,
-         .min = 0,
-         .max = 1,
-         .open_max = true,
-         .help = "a step that makes an edge shorter than this share of its rest length is rejected"},
+        DRAPE_NUMBER("min_length", "1", 1e-6, 0, DRAPE_BELOW(1),
+                     "a step that makes an edge shorter than this share of its rest length is rejected"),
 };
 
 static double element_stiffness(const drape_cloth_view *cloth, int32_t edge, double choice)
@@ -64,15 +52,6 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
         drape_term_set(builder, e, cloth->edge + 2 * (size_t)e, rest);
     }
     return status;
-}
-
-/* dq = (-u, u)/L */
-static void gradient(const double u[3], double inverse_length, double *dq)
-{
-    for (int i = 0; i < 3; i++) {
-        dq[3 + i] = u[i] * inverse_length;
-        dq[i] = -dq[3 + i];
-    }
 }
 
 /* ddq = [P -P; -P P] with P = (I - u u')/(L |e|) */
@@ -100,8 +79,10 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
         q[i] = length * inverse[i] - 1;
         for (int k = 0; k < 3; k++)
             u[k] /= length;
-        if (dq)
-            gradient(u, inverse[i], dq + 6 * (size_t)i);
+        for (int k = 0; dq && k < 3; k++) {
+            dq[6 * i + 3 + k] = u[k] * inverse[i];
+            dq[6 * i + k] = -dq[6 * i + 3 + k];
+        }
         if (ddq)
             hessian(u, inverse[i], length, ddq + 36 * (size_t)i);
     }
@@ -122,10 +103,7 @@ static void pair(const drape_elements *el, int32_t first, int32_t count, const d
 /* Length over rest length. */
 static double ratio_of(const drape_elements *el, int32_t e, const double *x)
 {
-    const int32_t *node = el->node + 2 * (size_t)e;
-    double d[3];
-    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], d);
-    return vec3_norm(d) * el->rest[(size_t)REST_INVERSE_LENGTH * (size_t)el->count + (size_t)e];
+    return drape_pair_length(el, e, x) * drape_rest_of(el, REST_INVERSE_LENGTH, e);
 }
 
 static drape_status check(const drape_elements *el, const double *x, const double *before,
@@ -139,11 +117,10 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
 
 const drape_term_ops drape_term_stretch_edge = {
     .struct_size = sizeof(drape_term_ops),
-    .name = "stretch.edge",
-    .summary = "stretching of every edge: E = 1/2 k (|e|/L - 1)^2",
-    .reference = "Van Gelder 1998; DEP report (Grinspun et al. 2003, Discrete Shells)",
-    .params = params,
-    .param_count = PARAM_COUNT,
+    .entry = {.name = "stretch.edge",
+              .summary = "stretching of every edge: E = 1/2 k (|e|/L - 1)^2",
+              .reference = "Van Gelder 1998; DEP report (Grinspun et al. 2003, Discrete Shells)",
+              DRAPE_PARAMS(params)},
     .element_name = "edge",
     .nodes = 2,
     .build = build,

@@ -1,28 +1,45 @@
-/* terms.h: the table of terms. A row is the constant drape_term_<word> of term_<word>.c; its interface is
- * drape/extend.h. */
+/* terms.h: the table of terms, and what their files share. A term is the constant drape_term_<name> of term_<name>.c;
+ * its interface is drape/extend.h. */
 #ifndef DRAPE_TERMS_TERMS_H
 #define DRAPE_TERMS_TERMS_H
 
-#include "drape/extend.h"
+#include "base/registry.h"
+#include "base/vec3.h"
 
 extern const drape_term_ops *const drape_terms[]; /* NULL-ended */
+extern const drape_registry drape_term_registry;
 
-/* DRAPE_LANES elements from `first` on; beyond the last of count it is repeated. */
+/* Rest value number `item` of an element. */
+static inline double drape_rest_of(const drape_elements *el, int item, int32_t element)
+{
+    return el->rest[(size_t)item * (size_t)el->count + (size_t)element];
+}
+
+/* Length of an element of two nodes [m]. */
+static inline double drape_pair_length(const drape_elements *el, int32_t element, const double *x)
+{
+    const int32_t *node = el->node + 2 * (size_t)element;
+    double d[3];
+    vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], d);
+    return vec3_norm(d);
+}
+
+/* The numbers of DRAPE_LANES elements from `first` on; beyond the end the last one is repeated. */
 static inline void drape_lanes_elements(int32_t first, int32_t count, int32_t element[DRAPE_LANES])
 {
     for (int32_t l = 0; l < DRAPE_LANES; l++)
         element[l] = first + l < count ? first + l : count - 1;
 }
 
-/* Whether a step is to blame for a ratio (of a length to that at rest) below its limit: it fell. The slack is
- * rounding: of coordinates up to a thousand lengths away. */
+/* Whether a step lowered a ratio (of a length to its rest length). The slack is the rounding of coordinates up to a
+ * thousand lengths from the origin. */
 static inline bool drape_fell(double ratio, double before)
 {
     return ratio < before - 1e-12;
 }
 
-/* For check of a row: finds the lowest ratio of all elements, or of every so manyth, that a step is to blame for.
- * fault has reason, what and limit on entry. before may be NULL: none is excused. */
+/* For the check of a term: finds the lowest ratio of the elements 0, every, 2 every ..., ignoring those below the limit
+ * that the step did not lower. fault has reason, what and limit on entry. before may be NULL: none is ignored. */
 typedef double drape_ratio(const drape_elements *el, int32_t element, const double *x);
 drape_status drape_check_ratios(const drape_elements *el, const double *x, const double *before,
                                 int32_t every, drape_ratio *ratio_of, drape_fault *fault);

@@ -32,8 +32,8 @@ def without_function(name):
 
 
 def parameter_of_pull(text):
-    """The type of the argument `node` of drape_sim_pull is another one."""
-    start = text.index("<function-decl name='drape_sim_pull'")
+    """The type of the argument `node` of drape_sim_set_drag_spring is another one."""
+    start = text.index("<function-decl name='drape_sim_set_drag_spring'")
     end = text.index("</function-decl>", start)
     kinds = re.findall(r"<parameter type-id='([^']+)'", text[start:end])
     return text[:start] + text[start:end].replace(f"'{kinds[1]}'", f"'{kinds[2]}'", 1) + text[end:]

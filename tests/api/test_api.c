@@ -73,7 +73,7 @@ static drape_sim *make_sim(drape_context *ctx, const drape_model *model)
 /* The scene above as a host says it. */
 typedef struct host_scene {
     drape_setting grid[2], material[4], stiffness, beta, integrator[2], controller;
-    drape_row_def terms[3];
+    drape_entry_def terms[3];
     drape_pin_def pins[2];
     drape_track_key track[2];
     drape_cloth_def cloth;
@@ -96,9 +96,9 @@ static void fill_scene(host_scene *s)
         .controller = {"dt_min", 1e-6, NULL},
         .track = {{0, {0, 0, 0}}, {1, {0, 0.5, 0}}},
     };
-    s->terms[0] = (drape_row_def){.type = "stretch.edge"};
-    s->terms[1] = (drape_row_def){"bend.hinge", &s->stiffness, 1};
-    s->terms[2] = (drape_row_def){"damp.kelvin_voigt", &s->beta, 1};
+    s->terms[0] = (drape_entry_def){.type = "stretch.edge"};
+    s->terms[1] = (drape_entry_def){"bend.hinge", &s->stiffness, 1};
+    s->terms[2] = (drape_entry_def){"damp.kelvin_voigt", &s->beta, 1};
     drape_scene_def_init(&s->scene, sizeof s->scene);
     drape_cloth_def_init(&s->cloth, sizeof s->cloth);
     drape_pin_def_init(&s->pins[0], sizeof s->pins[0]);
@@ -109,7 +109,7 @@ static void fill_scene(host_scene *s)
     s->pins[1].track = s->track;
     s->pins[1].key_count = 2;
     s->cloth.name = "sheet";
-    s->cloth.mesh.grid = (drape_row_def){"equilateral", s->grid, 2};
+    s->cloth.mesh.grid = (drape_entry_def){"equilateral", s->grid, 2};
     memcpy(s->cloth.mesh.rotate, (const double[]){1, 2, 3, 20}, sizeof s->cloth.mesh.rotate);
     s->cloth.material = s->material;
     s->cloth.material_count = 4;
@@ -121,8 +121,8 @@ static void fill_scene(host_scene *s)
     s->scene.cloths = &s->cloth;
     s->scene.cloth_count = 1;
     memcpy(s->scene.gravity, (const double[]){0, -9.5, 0.5}, sizeof s->scene.gravity);
-    s->scene.integrator = (drape_row_def){"be", s->integrator, 2};
-    s->scene.controller = (drape_row_def){"halving", &s->controller, 1};
+    s->scene.integrator = (drape_entry_def){"be", s->integrator, 2};
+    s->scene.controller = (drape_entry_def){"halving", &s->controller, 1};
     s->scene.frame_rate = 30;
 }
 
@@ -379,7 +379,7 @@ START_TEST(defs_in_arrays_are_checked)
     fill_scene(&s);
     for (int i = 0; i < 2; i++) {
         drape_collider_def_init(&colliders[i], sizeof colliders[i]);
-        colliders[i].row = (drape_row_def){"sphere", ball, 2};
+        colliders[i].entry = (drape_entry_def){"sphere", ball, 2};
     }
     void *older = as_older(colliders, 2, sizeof *colliders, offsetof(drape_collider_def, track));
     s.scene.colliders = older;
@@ -511,7 +511,7 @@ static int zeroed(int which)
         s.scene.collider_count = 1;
     }
     if (which == 0)
-        s.terms[1] = (drape_row_def){0};
+        s.terms[1] = (drape_entry_def){0};
     else if (which == 1)
         s.cloth.terms = NULL;
     else if (which == 2)
@@ -713,13 +713,9 @@ END_TEST
 
 /* E = 1/2 k |x - c|^2 of every node. */
 static const drape_param attract_params[] = {
-    {.name = "stiffness", .unit = "N/m", .default_value = NAN, .min = 0, .max = 1e6, .help = "k"},
-    {.name = "height", .unit = "m", .default_value = 1, .min = -100, .max = 100, .help = "y of the point"},
-    {.name = "refuse",
-     .kind = DRAPE_PARAM_BOOLEAN,
-     .unit = "1",
-     .default_value = 0,
-     .help = "for tests: build says no"},
+    DRAPE_NUMBER("stiffness", "N/m", DRAPE_REQUIRED, 0, 1e6, "k"),
+    DRAPE_NUMBER("height", "m", 1, -100, 100, "y of the point"),
+    DRAPE_BOOLEAN("refuse", false, "for tests: build says no"),
 };
 
 static drape_status attract_build(const drape_cloth_view *cloth, const double *params,
@@ -754,11 +750,11 @@ static void attract_energy(const drape_elements *el, int32_t first, int32_t coun
 }
 
 static const drape_term_ops attract = {.struct_size = sizeof(drape_term_ops),
-                                       .name = "host.attract",
-                                       .summary = "draws every node to a point",
-                                       .reference = "Hooke 1678",
-                                       .params = attract_params,
-                                       .param_count = 3,
+                                       .entry = {.name = "host.attract",
+                                                 .summary = "draws every node to a point",
+                                                 .reference = "Hooke 1678",
+                                                 .params = attract_params,
+                                                 .param_count = 3},
                                        .element_name = "node",
                                        .nodes = 1,
                                        .build = attract_build,
@@ -893,21 +889,9 @@ END_TEST
 
 /* A ball about the host's own center: of two vectors and a number, the values are 7. */
 static const drape_param blob_params[] = {
-    {.name = "tilt",
-     .kind = DRAPE_PARAM_TURN,
-     .unit = "degrees",
-     .default_value = 0,
-     .min = -360,
-     .max = 360,
-     .help = "what it is turned by"},
-    {.name = "middle",
-     .kind = DRAPE_PARAM_VECTOR,
-     .unit = "m",
-     .default_value = 0.25,
-     .min = -1,
-     .max = 1,
-     .help = "its center"},
-    {.name = "size", .unit = "m", .default_value = NAN, .min = 0, .max = 2, .help = "its radius"},
+    DRAPE_TURN("tilt", 0, -360, 360, "what it is turned by"),
+    DRAPE_VECTOR("middle", "m", 0.25, -1, 1, "its center"),
+    DRAPE_NUMBER("size", "m", DRAPE_REQUIRED, 0, 2, "its radius"),
 };
 
 static drape_status blob_shape(const double *values, double tolerance, drape_collider_shape *shape)
@@ -932,11 +916,11 @@ static double blob_distance(const double *values, const drape_collider_shape *sh
 }
 
 static const drape_collider_ops blob = {.struct_size = sizeof(drape_collider_ops),
-                                        .name = "host.blob",
-                                        .summary = "a ball of the host",
-                                        .reference = "none",
-                                        .params = blob_params,
-                                        .param_count = 3,
+                                        .entry = {.name = "host.blob",
+                                                  .summary = "a ball of the host",
+                                                  .reference = "none",
+                                                  .params = blob_params,
+                                                  .param_count = 3},
                                         .shape = blob_shape,
                                         .distance = blob_distance};
 
@@ -984,7 +968,7 @@ START_TEST(a_collider_in_memory_is_the_same_as_in_a_file)
     drape_collider_def def;
     fill_scene(&s);
     drape_collider_def_init(&def, sizeof def);
-    def.row = (drape_row_def){"box", box, 3};
+    def.entry = (drape_entry_def){"box", box, 3};
     def.track = keys;
     def.key_count = 2;
     s.scene.colliders = &def;
@@ -999,13 +983,14 @@ START_TEST(a_collider_in_memory_is_the_same_as_in_a_file)
 
     def.friction = -1;
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
-    check_message(ctx, "/colliders/0/friction: -1 is not allowed; it is in [0, 1000]");
+    check_message(ctx, "/colliders/0/friction: -1 is not allowed; friction is a number in [0, 1000]");
     def.friction = NAN;
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
     def.friction = 0;
     s.scene.collider_count = 4097;
     ck_assert_int_eq(drape_model_create(ctx, &s.scene, &model), DRAPE_E_ARGUMENT);
-    check_message(ctx, "/colliders: the scene has 4097 colliders; it has at most 4096");
+    check_message(
+        ctx, "/colliders: an array of 4097 is not allowed; colliders is an array of objects, at most 4096");
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -1015,7 +1000,8 @@ START_TEST(a_collider_of_the_host_works)
     static const struct {
         const char *scene, *says;
     } cases[] = {
-        {WITH_COLLIDERS("{'type': 'host.blob'}"), "/colliders/0: \"size\" is missing: its radius, [0, 2] m"},
+        {WITH_COLLIDERS("{'type': 'host.blob'}"),
+         "/colliders/0: \"size\" is missing: its radius; a number in [0, 2] m"},
         {WITH_COLLIDERS("{'type': 'host.blob', 'size': 2}"), "/colliders/0/size: 2 m is not?to its taste"},
         {WITH_COLLIDERS("{'type': 'host.blob', 'size': 1}"),
          "/colliders/0: the shape announced 1 points, 0 segments, 0 triangles, or twice"},
@@ -1075,19 +1061,19 @@ START_TEST(malformed_colliders_are_refused)
         if (i == 0)
             ops.struct_size = 0;
         else if (i == 1)
-            ops.name = NULL;
+            ops.entry.name = NULL;
         else if (i == 2)
-            ops.summary = NULL;
+            ops.entry.summary = NULL;
         else if (i == 3)
-            ops.reference = NULL;
+            ops.entry.reference = NULL;
         else if (i == 4)
             ops.shape = NULL;
         else if (i == 5)
             ops.distance = NULL;
         else if (i == 6)
-            ops.params = wide, ops.param_count = 9; /* 27 values */
+            ops.entry.params = wide, ops.entry.param_count = 9; /* 27 values */
         else
-            ops.name = "sphere", says = "there is a collider \"sphere\" already";
+            ops.entry.name = "sphere", says = "there is a collider \"sphere\" already";
         ck_assert_int_eq(drape_context_add_collider(ctx, &ops), i == 0 ? DRAPE_E_VERSION : DRAPE_E_ARGUMENT);
         check_message(ctx, says);
     }
@@ -1096,7 +1082,7 @@ START_TEST(malformed_colliders_are_refused)
     for (int i = 0; i < 33; i++) {
         snprintf(names[i], sizeof names[i], "host.n%d", i);
         many[i] = blob;
-        many[i].name = names[i];
+        many[i].entry.name = names[i];
         ck_assert_int_eq(drape_context_add_collider(ctx, &many[i]), i < 32 ? DRAPE_OK : DRAPE_E_ARGUMENT);
     }
     check_message(ctx, "at most 32");
@@ -1120,11 +1106,10 @@ START_TEST(malformed_parameters_are_refused)
     static const char *const none[] = {NULL};
     static drape_param wide[9];
     for (int i = 0; i < 9; i++)
-        wide[i] =
-            (drape_param){.name = "wide", .kind = DRAPE_PARAM_VECTOR, .unit = "m", .max = 1, .help = "three"};
+        wide[i] = (drape_param)DRAPE_VECTOR("wide", "m", 0, 0, 1, "three");
     drape_context *ctx = make_context();
     for (int i = 0; i < 12; i++) {
-        drape_param one = {.name = "one", .kind = DRAPE_PARAM_NUMBER, .unit = "m", .max = 1, .help = "one"};
+        drape_param one = DRAPE_NUMBER("one", "m", 0, 0, 1, "one");
         const drape_param *params = &one;
         int count = 1;
         switch (i / 2) {
@@ -1150,8 +1135,8 @@ START_TEST(malformed_parameters_are_refused)
         }
         drape_term_ops term = attract;
         drape_collider_ops collider = blob;
-        term.params = collider.params = params;
-        term.param_count = collider.param_count = count;
+        term.entry.params = collider.entry.params = params;
+        term.entry.param_count = collider.entry.param_count = count;
         ck_assert_int_eq(i % 2 ? drape_context_add_term(ctx, &term)
                                : drape_context_add_collider(ctx, &collider),
                          DRAPE_E_ARGUMENT);
@@ -1180,10 +1165,10 @@ START_TEST(malformed_ops_are_refused)
             says = "bytes";
             break;
         case 2:
-            ops.name = NULL;
+            ops.entry.name = NULL;
             break;
         case 3:
-            ops.summary = NULL;
+            ops.entry.summary = NULL;
             break;
         case 4:
             ops.element_name = NULL;
@@ -1207,10 +1192,10 @@ START_TEST(malformed_ops_are_refused)
             ops.has_internal = true;
             break;
         case 11:
-            ops.param_count = DRAPE_MAX_PARAMS + 1;
+            ops.entry.param_count = DRAPE_MAX_PARAMS + 1;
             break;
         case 12:
-            ops.name = "stretch.edge";
+            ops.entry.name = "stretch.edge";
             says = "there is a term \"stretch.edge\" already";
             break;
         case 13:
@@ -1243,7 +1228,7 @@ START_TEST(a_context_holds_32_terms)
     for (int i = 0; i < 33; i++) {
         snprintf(names[i], sizeof names[i], "host.n%d", i);
         ops[i] = attract;
-        ops[i].name = names[i];
+        ops[i].entry.name = names[i];
         ck_assert_int_eq(drape_context_add_term(ctx, &ops[i]), i < 32 ? DRAPE_OK : DRAPE_E_ARGUMENT);
     }
     check_message(ctx, "at most 32");
@@ -1453,7 +1438,7 @@ static drape_status meddle(void *user, const drape_event *event)
                                 drape_sim_set_state(sim, 0, x, x),
                                 drape_sim_restore(sim, "nowhere"),
                                 drape_sim_restore_from(sim, x, sizeof x),
-                                drape_sim_pull(sim, 3, 1, x),
+                                drape_sim_set_drag_spring(sim, 3, 1, x),
                                 drape_sim_push(sim, x),
                                 drape_sim_set_wind(sim, NULL, NULL),
                                 drape_sim_move_pins(sim, 0, NULL, 1, NULL, NULL),

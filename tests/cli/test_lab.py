@@ -40,7 +40,7 @@ def page_is_alone(path):
 
 
 def test_tradeoff():
-    """tradeoff runs every row, names its reference's error, and writes CSV, lines, pictures, a page"""
+    """tradeoff runs every integrator, names its reference's error, and writes CSV, lines, pictures, a page"""
     write_scene()
     out = good("tradeoff", "scene.json", "--out", "t", "--repeats", "1")
     results = lines("t")
@@ -63,7 +63,7 @@ def test_tradeoff():
     page_is_alone("t/report.html")
     for result in results.values():
         assert result["status"] == "ok" or result["tags"]["series"] in open("t/report.html", encoding="utf-8").read()
-    # An explicit row has no Jacobians: there is nothing to draw over them.
+    # An explicit integrator has no Jacobians: there is nothing to draw over them.
     out = good("tradeoff", "scene.json", "--integrators", "verlet", "--out", "v", "--repeats", "1")
     equal(sorted(glob.glob("v/error_jacobians*")), [], "pictures without a point")
     assert "error_jacobians" not in out and "inf times" not in out, out
@@ -89,7 +89,7 @@ def test_stability():
 
 
 def test_ignored_axis():
-    """a row that ignores an axis is run once along it"""
+    """an integrator that ignores an axis is run once along it"""
     write_scene()
     good("stability", "scene.json", *AXES, "--integrators", "ida", "--out", "s")
     equal(len(lines("s")), 2, "cases that were run")
@@ -98,7 +98,7 @@ def test_ignored_axis():
 
 
 def test_converge():
-    """converge finds the orders of the rows"""
+    """converge finds the orders of the integrators"""
     write_scene(duration=0.3)
     out = good("converge", "scene.json", "--integrators", "be,bdf2,trbdf2", "--levels", "7", "--out", "c")
     orders = dict(re.findall(r"^(\w+): order .*, ([\d.]+) at the last refinement", out, re.M))
@@ -187,7 +187,7 @@ def test_recipes():
 
 
 def test_validate_goes_on():
-    """validate --out keeps its cases and goes on after Ctrl-C"""
+    """validate --out keeps its cases and resumes after Ctrl-C"""
     good("validate", "--scenes", "scenes")
     cases = len(os.listdir("scenes"))
     with subprocess.Popen([PROGRAM, "validate", "--out", "v"], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as child:
@@ -213,7 +213,7 @@ def test_validate_goes_on():
 
 
 def test_reference_goes_on():
-    """the reference of tradeoff is kept rung by rung: a run that was killed does not climb them again"""
+    """the reference of tradeoff is saved level by level: a run that was killed does not repeat them"""
     write_scene(duration=0.3)
     command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
     with subprocess.Popen([PROGRAM, *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as child:
@@ -224,7 +224,7 @@ def test_reference_goes_on():
         child.kill()
     assert os.path.exists("t/reference-ida.json") or os.path.exists("t/reference.json"), os.listdir("t")
     if not os.path.exists("t/reference.json"):
-        # What is kept is taken as it is: with an error that ends the ladder there are no more rungs.
+        # A saved level is taken as it is: with an error that is small enough there are no further levels.
         about = read_json("t/reference-ida.json")
         about["error_m"] = 1e-12
         with open("t/reference-ida.json", "w", encoding="utf-8") as file:
@@ -233,11 +233,11 @@ def test_reference_goes_on():
         equal(read_json("t/reference.json"), about, "the reference")
     else:
         good(*command)
-    assert not glob.glob("t/reference-*"), "what is left of the climb"
+    assert not glob.glob("t/reference-*"), "what is left of the levels"
 
 
 def test_resume():
-    """a sweep that is killed or interrupted goes on where it was, and ends with the same results"""
+    """a sweep that is killed or interrupted resumes where it stopped, and ends with the same results"""
     write_scene(duration=1)
     command = ["stability", "scene.json", "--axis", "/integrator/dt=1e-3:1e-2:12log", "--axis",
                "/cloth/0/material/young_modulus=1e4:1e6:12log", "--integrators", "be", "--jobs", "1"]
@@ -267,7 +267,7 @@ def lines_there(folder):
 
 
 def test_torn_line():
-    """a line that was cut short is run anew; one that is no result is told"""
+    """a case whose line was cut short is run again; a line that is no result is reported"""
     write_scene()
     command = ["stability", "scene.json", *AXES, "--integrators", "be", "--out", "s"]
     good(*command)
@@ -299,7 +299,7 @@ def test_other_experiment():
 
 
 def test_wrong_words():
-    """wrong axes, rows, shards, folders: one line each, nothing written"""
+    """wrong axes, integrators, shards, folders: one line each, nothing written"""
     write_scene()
     two = ["--axis", "/integrator/dt=1e-3:1e-2:2log"]
     refused("stability", "scene.json", "--out", "s", says="2 or 3 axes")
@@ -363,7 +363,7 @@ def test_folder_that_cannot_be_made():
 
 
 def test_no_reference():
-    """a tradeoff whose reference does not come to its end leaves no folder to an experiment that has no case"""
+    """a tradeoff whose reference does not complete leaves no folder to an experiment that has no case"""
     write_scene()
     command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
     result = drape(*command, "--case-seconds", "1e-9")

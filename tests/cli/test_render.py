@@ -381,8 +381,8 @@ def test_refused():
              (["ball.json", "--out", "x.PNG", "--every", "2"], "--every is for films"),
              (["ball.json", "--out", "x.png", "--out", "y.png"], "--out is given twice"),
              (["ball.json", "--out", "x.png", "--dt", "0.01", "--dt", "0.02"], "--dt is given twice"),
-             (["ball", "--out", "x.png", "--dt", "0.01"], "--dt is of a simulation, and ball is a finished run"),
-             (["ball.json", "ball", "--compare", "--out", "x.png", "--set", "/duration=1"], "--set is of a simulation, and ball is a finished run"),
+             (["ball", "--out", "x.png", "--dt", "0.01"], "--dt changes a simulation, and ball is a finished run"),
+             (["ball.json", "ball", "--compare", "--out", "x.png", "--set", "/duration=1"], "--set changes a simulation, and ball is a finished run"),
              (["empty", "--out", "x.png"], "scene.json"),
              (["none.json", "--out", "x.png"], "none.json")]
     for args, says in cases:

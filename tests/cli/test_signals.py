@@ -180,7 +180,7 @@ def test_asking():
 
 def test_report():
     """report: the page is whole or not there"""
-    large(duration=0.5, integrator={"method": "projective", "dt": 0.01})
+    large(duration=0.5, integrator={"method": "newton_k", "dt": 0.01})
     good("run", "scene.json", "--out", "run", "--format", "npy", "--frame-rate", "100")
     strike(["report", "run", "--out", "page.html"])
 

@@ -334,7 +334,7 @@ static drape_status make_model(scene *s, const extreme *c, const sheet *mesh)
     const drape_setting material[] = {{"young_modulus", or_else(c->modulus, 1e6), NULL},
                                       {"thickness", or_else(c->thickness, 1e-3), NULL},
                                       {"density", 200, NULL}};
-    const drape_row_def terms[] = {{"stretch.edge", NULL, 0}, {"bend.hinge", NULL, 0}};
+    const drape_entry_def terms[] = {{"stretch.edge", NULL, 0}, {"bend.hinge", NULL, 0}};
     drape_pin_def pins[MAX_PINS];
     drape_cloth_def cloth;
     drape_scene_def def;
@@ -410,7 +410,7 @@ static bool message_is_true(const outcome *o)
     snprintf(start, sizeof start, "t=%.9g h=%.4g: %s (%s) after ", drape_sim_time(o->scene->sim), o->last.h,
              o->last.reason, drape_status_name(o->last.status));
     return strncmp(message, start, strlen(start)) == 0 && !strchr(message, '\n') &&
-           (o->last.worst.node[0] < 0 || strstr(message, " of cloth0): "));
+           (o->last.diagnostic.node[0] < 0 || strstr(message, " of cloth0): "));
 }
 
 static double duration_of(const extreme *c, unsigned bit)

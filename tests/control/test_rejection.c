@@ -431,9 +431,10 @@ static void run_strain(const char *settings, double max_stretch, double max_move
             continue;
         refused++;
         ck_assert_str_eq(a->reason, reason);
-        ck_assert(a->worst.value > a->worst.limit && a->worst.cloth == 0 && a->worst.element == -1);
+        ck_assert(a->diagnostic.value > a->diagnostic.limit && a->diagnostic.cloth == 0 &&
+                  a->diagnostic.element == -1);
         for (int n = 0; n < 4; n++)
-            ck_assert((a->worst.node[n] >= 0) == (n < nodes));
+            ck_assert((a->diagnostic.node[n] >= 0) == (n < nodes));
     }
     ck_assert_int_gt(refused, 0);
     scene_close(&s);
@@ -489,10 +490,7 @@ END_TEST
 
 static const drape_controller_ops *row(const char *name)
 {
-    int i = 0;
-    while (strcmp(drape_controllers[i]->name, name) != 0)
-        i++;
-    return drape_controllers[i];
+    return drape_controllers[drape_registry_find(&drape_controller_registry, NULL, name)];
 }
 
 /*
@@ -505,8 +503,8 @@ START_TEST(an_estimate_that_is_not_a_number_is_refused_until_it_ends)
     const drape_controller_ops *ops = row("error");
     scene s = swinging("be", "");
     double values[DRAPE_MAX_PARAMS];
-    for (int i = 0; i < ops->param_count; i++)
-        values[i] = ops->params[i].default_value;
+    for (int i = 0; i < ops->entry.param_count; i++)
+        values[i] = ops->entry.params[i].default_value;
     for (size_t k = 0; k < 3; k++) {
         drape_state *out = &s.sim->states[s.sim->next];
         double scratch[2] = {0, 0}, h = 1;
@@ -587,23 +585,21 @@ static void spur(const drape_elements *el, int32_t first, int32_t count, const d
     }
 }
 
-static const drape_term_ops liar = {.struct_size = sizeof(drape_term_ops),
-                                    .name = "host.lie",
-                                    .summary = "a force that is not the slope of its energy",
-                                    .reference = "-",
-                                    .element_name = "node",
-                                    .nodes = 1,
-                                    .linear = true,
-                                    .build = build,
-                                    .energy = lie};
-static const drape_term_ops spurs = {.struct_size = sizeof(drape_term_ops),
-                                     .name = "host.spur",
-                                     .summary = "drag of the wrong sign",
-                                     .reference = "-",
-                                     .element_name = "node",
-                                     .nodes = 1,
-                                     .build = build,
-                                     .dissipation = spur};
+static const drape_term_ops liar = {
+    .struct_size = sizeof(drape_term_ops),
+    .entry = {.name = "host.lie", .summary = "a force that is not the slope of its energy", .reference = "-"},
+    .element_name = "node",
+    .nodes = 1,
+    .linear = true,
+    .build = build,
+    .energy = lie};
+static const drape_term_ops spurs = {
+    .struct_size = sizeof(drape_term_ops),
+    .entry = {.name = "host.spur", .summary = "drag of the wrong sign", .reference = "-"},
+    .element_name = "node",
+    .nodes = 1,
+    .build = build,
+    .dissipation = spur};
 
 static scene flying(const drape_term_ops *term, const char *integrator, double speed)
 {
@@ -617,7 +613,7 @@ static scene flying(const drape_term_ops *term, const char *integrator, double s
              "\"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200},"
              "\"terms\": [\"%s\"], \"velocity\": [%g, 0, 0]}], \"gravity\": [0, 0, 0],"
              "\"integrator\": {\"method\": \"%s\", \"dt\": 0.0625}, \"duration\": 1}",
-             term->name, speed, integrator);
+             term->entry.name, speed, integrator);
     drape_status status = drape_scene_parse(s.ctx, text, "test", &parsed);
     if (!status)
         status = drape_scene_compile(parsed, &s.model);
@@ -644,7 +640,7 @@ START_TEST(kinetic_energy_from_nowhere_is_refused)
         for (int i = 0; i < r->count; i++) {
             ck_assert_str_eq(r->attempt[i].reason, "energy");
             ck_assert_int_eq(r->attempt[i].status, DRAPE_RETRY_REJECTED);
-            ck_assert_double_eq_tol(r->attempt[i].worst.value, 1, 1e-12); /* all of it */
+            ck_assert_double_eq_tol(r->attempt[i].diagnostic.value, 1, 1e-12); /* all of it */
         }
         ck_assert_msg(strstr(drape_context_message(s.ctx), ": energy (retry_rejected) after "), "%s",
                       drape_context_message(s.ctx));

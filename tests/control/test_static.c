@@ -78,7 +78,7 @@ static scene open_strip(const strip *mesh, const load *l)
                                       {"thickness", l->thickness, NULL},
                                       {"areal_density", DENSITY, NULL}};
     const drape_setting integrator[] = {{"dt", 1, NULL}, {"tolerance", l->tolerance, NULL}};
-    drape_row_def terms[3] = {{"stretch.edge", NULL, 0}};
+    drape_entry_def terms[3] = {{"stretch.edge", NULL, 0}};
     drape_pin_def pins[2];
     drape_cloth_def cloth;
     drape_scene_def def;
@@ -88,7 +88,7 @@ static scene open_strip(const strip *mesh, const load *l)
         terms[count++].type = "bend.hinge";
     if (l->host) {
         ck_assert_int_eq(drape_context_add_term(s.ctx, l->host), DRAPE_OK);
-        terms[count++].type = l->host->name;
+        terms[count++].type = l->host->entry.name;
     }
     drape_cloth_def_init(&cloth, sizeof cloth);
     drape_scene_def_init(&def, sizeof def);
@@ -113,7 +113,7 @@ static scene open_strip(const strip *mesh, const load *l)
     def.cloths = &cloth;
     def.cloth_count = 1;
     def.gravity[1] = -l->gravity;
-    def.integrator = (drape_row_def){"static", integrator, 2};
+    def.integrator = (drape_entry_def){"static", integrator, 2};
     ck_assert_msg(drape_model_create(s.ctx, &def, &s.model) == DRAPE_OK, "%s", drape_context_message(s.ctx));
     scene_start(&s, NULL);
     return s;
@@ -256,15 +256,14 @@ static void load_energy(const drape_elements *el, int32_t first, int32_t count, 
     drape_energy_range(el, first, count, x, e, g, hess, one_load);
 }
 
-static const drape_term_ops load_term = {.struct_size = sizeof(drape_term_ops),
-                                         .name = "host.load",
-                                         .summary = "a constant force on the last row",
-                                         .reference = "-",
-                                         .element_name = "node",
-                                         .nodes = 1,
-                                         .linear = true,
-                                         .build = build_load,
-                                         .energy = load_energy};
+static const drape_term_ops load_term = {
+    .struct_size = sizeof(drape_term_ops),
+    .entry = {.name = "host.load", .summary = "a constant force on the last row", .reference = "-"},
+    .element_name = "node",
+    .nodes = 1,
+    .linear = true,
+    .build = build_load,
+    .energy = load_energy};
 
 /*
  * physics.md: P L^2/EI = 1, 2, 4. The length is that to the last row, on which the load is. w/L grows at

@@ -329,7 +329,7 @@ def test_statuses():
     for path in glob.glob(SOURCES + "/src/*/*.c"):
         with open(path, encoding="utf-8") as file:
             text = file.read()
-        for said in re.findall(r"\breason = ([^;]*);|drape_rung_fail\(([^;]*);|\bkeep_worst\(([^;]*);|drape_fault \w+ = \{([^;]*);", text):
+        for said in re.findall(r"\breason = ([^;]*);|\bkeep_worst\(([^;]*);|drape_fault \w+ = \{([^;]*);", text):
             reasons |= set(re.findall(r'^[^"]*?"([a-z_]+)"|: "([a-z_]+)"', "".join(said)))
     reasons = {a or b for a, b in reasons}
     assert len(names) > 10 and len(reasons) > 15, (names, reasons)

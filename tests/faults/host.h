@@ -96,14 +96,13 @@ static inline void host_energy(const drape_elements *el, int32_t first, int32_t 
     }
 }
 
-static const drape_term_ops host_term = {.struct_size = sizeof(drape_term_ops),
-                                         .name = "host.break",
-                                         .summary = "breaks on demand",
-                                         .reference = "-",
-                                         .element_name = "node",
-                                         .nodes = 1,
-                                         .build = host_build,
-                                         .energy = host_energy};
+static const drape_term_ops host_term = {
+    .struct_size = sizeof(drape_term_ops),
+    .entry = {.name = "host.break", .summary = "breaks on demand", .reference = "-"},
+    .element_name = "node",
+    .nodes = 1,
+    .build = host_build,
+    .energy = host_energy};
 
 /* ---- The sim
  * ------------------------------------------------------------------------------------------------------ */

@@ -71,7 +71,7 @@ static drape_status live(drape_context *ctx, const char *path)
         ck_assert_int_eq(status != DRAPE_OK, sim == NULL);
     }
     if (!status) {
-        static drape_check_row row[DRAPE_MAX_CHECK_ROWS];
+        static drape_check_result row[DRAPE_MAX_CHECK_RESULTS];
         status = drape_check_derivatives(ctx, sim->system, 1, row, &rows);
     }
     if (!status) {

@@ -140,8 +140,8 @@ static void check_heap(const drape_linear_ops *linear, int i)
     char integrator[160];
     bool damped = i & 4, project = i & 8;
     snprintf(integrator, sizeof integrator,
-             "'linear_solver': '%s', 'newton': '%s', 'globalization': '%s', 'project': %s", linear->name,
-             newtons[i & 1], globals[(i >> 1) & 1], project ? "true" : "false");
+             "'linear_solver': '%s', 'newton': '%s', 'globalization': '%s', 'project': %s",
+             linear->entry.name, newtons[i & 1], globals[(i >> 1) & 1], project ? "true" : "false");
     scene s = open_scene(integrator, damped);
     long n = count_steps(&s);
     ck_assert_msg(live <= (linear->borrows_heap ? FALLBACK_PIECES : 0), "%s: %ld pieces kept in 49 steps",
@@ -149,7 +149,7 @@ static void check_heap(const drape_linear_ops *linear, int i)
     ck_assert_msg(n == 0 || linear->borrows_heap, "%s%s: %ld heap calls in 49 steps", integrator,
                   damped ? ", damped" : "", n);
     if (n > 0 && i == 0)
-        printf("# %s: %ld heap calls in %lld factorisations\n", linear->name, n,
+        printf("# %s: %ld heap calls in %lld factorisations\n", linear->entry.name, n,
                (long long)drape_sim_statistics(s.sim).factorizations);
     scene_close(&s);
 }
@@ -218,8 +218,7 @@ START_TEST(no_heap_call_in_contact)
         double *x = malloc(n * sizeof *x), *v = calloc(n, sizeof *v), gap;
         memcpy(x, drape_sim_positions(s.sim), n * sizeof *x);
         scene_advance(&s, 0.15);
-        ck_assert_int_gt(
-            drape_contact_active((drape_contact *)(uintptr_t)drape_system_contact(s.sim->system), &gap), 0);
+        ck_assert_int_gt(drape_contact_active(drape_system_contact(s.sim->system), &gap), 0);
         ck_assert_int_eq(drape_sim_set_state(s.sim, 0, x, v), DRAPE_OK);
         calls = live = 0;
         counting = true;

@@ -90,7 +90,7 @@ static drape_status steer(drape_sim *sim, const drape_model *model)
     if (!status)
         status = drape_sim_set_wind(sim, breeze, NULL);
     if (!status)
-        status = drape_sim_pull(sim, 1, 1, up);
+        status = drape_sim_set_drag_spring(sim, 1, 1, up);
     if (!status)
         status = drape_sim_reactions(sim, forces);
     if (!status)
@@ -193,7 +193,7 @@ START_TEST(every_allocation_fails_once)
 {
     make_files();
     for (int i = 0; drape_linears[i]; i++)
-        ck_assert_int_gt(sweep(drape_linears[i]->name, false), 100);
+        ck_assert_int_gt(sweep(drape_linears[i]->entry.name, false), 100);
     remove_files();
 }
 END_TEST
@@ -202,7 +202,7 @@ START_TEST(memory_ends_and_stays_away)
 {
     make_files();
     for (int i = 0; drape_linears[i]; i++)
-        ck_assert_int_gt(sweep(drape_linears[i]->name, true), 100);
+        ck_assert_int_gt(sweep(drape_linears[i]->entry.name, true), 100);
     remove_files();
 }
 END_TEST

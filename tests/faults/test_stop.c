@@ -232,15 +232,15 @@ START_TEST(every_row_stops_at_a_time_and_goes_on)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const drape_integrator_ops *row = drape_integrators[i];
-        if (row->timeless)
+        if (row->steady_state)
             continue;
-        check_time_stops(row->name, "halving", "");
+        check_time_stops(row->entry.name, "halving", "");
         if (row->own_steps)
             continue;
-        if (drape_param_find(row->params, row->param_count, "max_iterations") >=
+        if (drape_param_find(row->entry.params, row->entry.param_count, "max_iterations") >=
             0) /* so that steps are rejected */
-            check_time_stops(row->name, "halving", ", 'max_iterations': 3, 'globalization': 'none'");
-        check_time_stops(row->name, "error", "");
+            check_time_stops(row->entry.name, "halving", ", 'max_iterations': 3, 'globalization': 'none'");
+        check_time_stops(row->entry.name, "error", "");
     }
 }
 END_TEST
@@ -250,7 +250,7 @@ START_TEST(an_advance_ends_at_its_time_exactly)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         timer never = {.stop = NAN};
-        scene s = open_row(drape_integrators[i]->name, "halving", "", &never);
+        scene s = open_row(drape_integrators[i]->entry.name, "halving", "", &never);
         for (double t = 0.0123; t < 0.2; t *= 1.7) {
             scene_advance(&s, t);
             ck_assert_double_eq(drape_sim_time(s.sim), t);

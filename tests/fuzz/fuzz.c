@@ -268,10 +268,10 @@ drape_model *fuzz_scene(drape_context *ctx, const uint8_t *data, size_t size)
 
 static const drape_import_ops *find_import(const char *name)
 {
-    for (int i = 0; drape_imports[i]; i++)
-        if (strcmp(drape_imports[i]->name, name) == 0)
-            return drape_imports[i];
-    fuzz_die(__FILE__, __LINE__, "a row of the imports", "%s", name);
+    const int i = drape_registry_find(&drape_import_registry, NULL, name);
+    if (i < 0)
+        fuzz_die(__FILE__, __LINE__, "a mesh format", "%s", name);
+    return drape_imports[i];
 }
 
 static void check_corners(const drape_mesh *mesh)
@@ -310,11 +310,11 @@ void fuzz_mesh(const char *format, const uint8_t *data, size_t size)
     status = status ? status : drape_mesh_validate_triangles(ctx, &source, &mesh);
     status = status ? status : drape_mesh_connect(ctx, &source, &mesh);
     status = status ? status : drape_mesh_validate_nodes(ctx, &source, &mesh);
-    status = status ? status : drape_mesh_measure(ctx, &mesh);
+    status = status ? status : drape_mesh_measure(&mesh);
     fuzz_check(ctx, status, "a stage of the mesh");
     if (!status)
         check_measures(&mesh);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     free(ended);
     fuzz_close(&ctx);
 }

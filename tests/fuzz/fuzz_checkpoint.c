@@ -97,7 +97,7 @@ static drape_sim *open_sim(drape_context *ctx, unsigned integrator)
     drape_sim_def def;
     drape_sim *sim = NULL;
     drape_sim_def_init(&def, sizeof def);
-    def.integrator = drape_integrators[integrator]->name;
+    def.integrator = drape_integrators[integrator]->entry.name;
     FUZZ_REQUIRE(drape_sim_create(ctx, model_made, &def, &sim) == DRAPE_OK, "%s", drape_context_message(ctx));
     return sim;
 }

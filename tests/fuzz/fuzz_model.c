@@ -103,11 +103,11 @@ typedef struct mesh {
 
 typedef struct cloth {
     mesh mesh;
-    drape_row_def terms[MOST_TERMS];
+    drape_entry_def terms[MOST_TERMS];
     drape_pin_def pins[MOST_PINS];
     int32_t pinned[MOST_PINS];
     drape_track_key keys[MOST_PINS][2];
-    drape_setting material[DRAPE_MATERIAL_PARAM_COUNT];
+    drape_setting material[DRAPE_MAX_PARAMS];
 } cloth;
 
 typedef struct scene {
@@ -120,12 +120,12 @@ typedef struct scene {
     int row_count;
 } scene;
 
-static drape_row_def row(scene *s, fuzz_bytes *in, const char *name, const drape_param *params, int count)
+static drape_entry_def row(scene *s, fuzz_bytes *in, const char *name, const drape_param *params, int count)
 {
     FUZZ_REQUIRE(s->row_count < MOST_ROWS, "row %s", name);
     drawn *d = &s->rows[s->row_count++];
     draw(in, params, count, MOST_COUNT, d);
-    return (drape_row_def){.type = name, .settings = d->setting, .setting_count = d->count};
+    return (drape_entry_def){.type = name, .settings = d->setting, .setting_count = d->count};
 }
 
 static void draw_triangles(mesh *m, int columns, int rows, unsigned flips)
@@ -168,8 +168,9 @@ static void draw_grid(scene *s, drape_cloth_def *def, fuzz_bytes *in)
         count++;
     const drape_grid_ops *ops = drape_grids[fuzz_below(in, count)];
     drawn *d = &s->rows[s->row_count++];
-    draw(in, ops->params, ops->param_count, MOST_SIDE, d);
-    def->mesh.grid = (drape_row_def){.type = ops->name, .settings = d->setting, .setting_count = d->count};
+    draw(in, ops->entry.params, ops->entry.param_count, MOST_SIDE, d);
+    def->mesh.grid =
+        (drape_entry_def){.type = ops->entry.name, .settings = d->setting, .setting_count = d->count};
 }
 
 /* To where it goes, in a time that may be shorter than any step. */
@@ -206,7 +207,7 @@ static void draw_material(cloth *c, drape_cloth_def *def, fuzz_bytes *in)
     const double values[] = {fuzz_magnitude(in, 1e-3, 1e13), fuzz_between(in, 0, 0.5),
                              fuzz_magnitude(in, 1e-7, 1), fuzz_magnitude(in, 1e-3, 1e5)};
     for (int i = 0; i < 4; i++)
-        c->material[i] = (drape_setting){.name = drape_material_params[i].name, .number = values[i]};
+        c->material[i] = (drape_setting){.name = drape_material_entry.params[i].name, .number = values[i]};
     def->material = c->material;
     def->material_count = 4;
 }
@@ -221,7 +222,7 @@ static void draw_terms(scene *s, cloth *c, drape_cloth_def *def, fuzz_bytes *in)
     const unsigned first = fuzz_below(in, count);
     for (size_t i = 0; i < def->term_count; i++) {
         const drape_term_ops *ops = drape_terms[(first + i * (i + 1) / 2) % count];
-        c->terms[i] = row(s, in, ops->name, ops->params, ops->param_count);
+        c->terms[i] = row(s, in, ops->entry.name, ops->entry.params, ops->entry.param_count);
     }
 }
 
@@ -256,7 +257,7 @@ static void draw_colliders(scene *s, fuzz_bytes *in)
         const drape_collider_ops *ops = drape_colliders[fuzz_below(in, count)];
         drape_collider_def *def = &s->colliders[i];
         drape_collider_def_init(def, sizeof *def);
-        def->row = row(s, in, ops->name, ops->params, ops->param_count);
+        def->entry = row(s, in, ops->entry.name, ops->entry.params, ops->entry.param_count);
         def->friction = fuzz_below(in, 2) ? fuzz_magnitude(in, 1e-3, 1e3) : 0;
         if (fuzz_below(in, 2)) {
             draw_track(in, s->collider_keys[i]);
@@ -269,12 +270,13 @@ static void draw_colliders(scene *s, fuzz_bytes *in)
 static void draw_contact(scene *s, fuzz_bytes *in)
 {
     if (fuzz_below(in, 2)) {
-        const drape_row_def contact = row(s, in, "contact", drape_contact_params, DRAPE_CONTACT_PARAM_COUNT);
+        const drape_entry_def contact =
+            row(s, in, "contact", drape_contact_params, DRAPE_CONTACT_PARAM_COUNT);
         s->def.contact = contact.settings;
         s->def.contact_count = contact.setting_count;
     }
     if (fuzz_below(in, 2)) {
-        const drape_row_def self =
+        const drape_entry_def self =
             row(s, in, "self_contact", drape_self_contact_params, DRAPE_SELF_PARAM_COUNT);
         s->def.self_contact = self.settings;
         s->def.self_contact_count = self.setting_count;
@@ -346,12 +348,12 @@ static void run(drape_context *ctx, const drape_model *model, const drape_integr
         count++;
     const drape_controller_ops *controller = drape_controllers[fuzz_below(in, count)];
     drape_sim_def_init(&def, sizeof def);
-    draw(in, integrator->params, integrator->param_count, MOST_COUNT, &settings[0]);
-    draw(in, controller->params, controller->param_count, MOST_COUNT, &settings[1]);
-    def.integrator = integrator->name;
+    draw(in, integrator->entry.params, integrator->entry.param_count, MOST_COUNT, &settings[0]);
+    draw(in, controller->entry.params, controller->entry.param_count, MOST_COUNT, &settings[1]);
+    def.integrator = integrator->entry.name;
     def.integrator_settings = settings[0].setting;
     def.integrator_setting_count = settings[0].count;
-    def.controller = controller->name;
+    def.controller = controller->entry.name;
     def.controller_settings = settings[1].setting;
     def.controller_setting_count = settings[1].count;
     const double dt = fuzz_magnitude(in, 1e-6, 1);

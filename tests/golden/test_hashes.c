@@ -89,7 +89,8 @@ static const char *blas_kernels(void)
 {
     typedef char *describe(void);
     describe *corename;
-    void *program = dlopen(NULL, RTLD_NOW), *symbol = program ? dlsym(program, "openblas_get_corename") : NULL;
+    void *program = dlopen(NULL, RTLD_NOW),
+         *symbol = program ? dlsym(program, "openblas_get_corename") : NULL;
     if (!symbol)
         return "unnamed";
     memcpy(&corename, &symbol, sizeof corename);
@@ -289,10 +290,10 @@ static void start(driven *d, const drape_model *model, const moment *from, const
     *d = (driven){.left = ATTEMPTS, .each = each, .end = from->t + FRAMES / drape_model_frame_rate(model)};
     REQUIRE(!drape_context_create(NULL, &d->ctx), "no context");
     drape_sim_def_init(&def, sizeof def);
-    def.integrator = row->name;
+    def.integrator = row->entry.name;
     def.threads = threads;
     def.integrator_settings = &loose;
-    def.integrator_setting_count = row->timeless;
+    def.integrator_setting_count = row->steady_state;
     d->status = drape_sim_create(d->ctx, model, &def, &d->sim);
     REQUIRE(d->status || (!drape_sim_set_state(d->sim, from->t, from->x, from->v) &&
                           !drape_sim_observe(d->sim, look, d)),
@@ -370,7 +371,7 @@ static void fill(const ready *s, const drape_integrator_ops *row)
     REQUIRE(table_count < MOST_SCENES * MOST_ROWS, "more than %d rows", MOST_ROWS);
     start(&d, s->model, s->from, row, 1, false);
     go_on(&d);
-    table[table_count++] = finish(&d, s->scene, row->name);
+    table[table_count++] = finish(&d, s->scene, row->entry.name);
 }
 
 static const golden *find(const char *scene, const char *integrator)
@@ -486,8 +487,8 @@ static void *drive_two(void *user)
         other = go_on(&plain);
         more = more && go_on(&restored);
     }
-    p->plain = finish(&plain, s->scene, p->row->name);
-    p->restored = finish(&restored, s->scene, p->row->name);
+    p->plain = finish(&plain, s->scene, p->row->entry.name);
+    p->restored = finish(&restored, s->scene, p->row->entry.name);
     return NULL;
 }
 
@@ -503,13 +504,13 @@ static void compare_at_once(const ready *s, const drape_integrator_ops *row)
     pthread_t thread;
     driven beside;
     pair p = {.s = s, .row = row};
-    const golden *expected = find(s->scene, row->name);
+    const golden *expected = find(s->scene, row->entry.name);
     ck_assert_ptr_nonnull(expected);
     ck_assert_int_eq(pthread_create(&thread, NULL, drive_two, &p), 0);
     start(&beside, s->model, s->from, row, 1, false);
     go_on(&beside);
     ck_assert_int_eq(pthread_join(thread, NULL), 0);
-    const golden alone = finish(&beside, s->scene, row->name);
+    const golden alone = finish(&beside, s->scene, row->entry.name);
     check_same(&p.plain, expected, "two threads, stopped at each attempt");
     check_same(&p.restored, expected, "three threads, saved, and restored with one");
     check_same(&alone, expected, "while others run");

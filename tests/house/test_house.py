@@ -32,7 +32,7 @@ def sources(files, *tops):
 
 
 def folder_of(path):
-    """src/mesh/rest.c -> mesh; include/drape/drape.h -> drape; src/rows.c.in -> src"""
+    """src/mesh/rest.c -> mesh; include/drape/drape.h -> drape; src/entries.c.in -> src"""
     return path.split("/")[-2]
 
 
@@ -99,7 +99,7 @@ def all_is_built(files):
     complaints = []
     for path in files:
         folder, name = os.path.split(path)
-        if not name.endswith(".c") or not re.match(r"src/\w+/|tests/(unit|rows|physics|faults|api)/test_", path):
+        if not name.endswith(".c") or not re.match(r"src/\w+/|tests/(unit|entries|physics|faults|api)/test_", path):
             continue
         list_file = "tests/meson.build" if path.startswith("tests/") else f"{folder}/meson.build"
         if folder == "src/cli" and list_file not in files:
@@ -199,7 +199,7 @@ BROKEN = {
 }
 SOUND = {
     **MAP, "CONTRIBUTING.md": "\n### Words\n| `rung` | level |\n", "docs/a.md": "wrung by a level\n", "src/sim/b.c": '#include "base/a.h"\n#include "sim/a.h"\n#include "drape/drape.h"\n/* printf(x) */ snprintf(x, "exit(1)");\n',
-    "src/sim/meson.build": "sources = ['b.c']\nrows += {'r': ['halving']}\n", "src/sim/control_halving.c": "", "src/cli/main.c": "exit(1);\n",
+    "src/sim/meson.build": "sources = ['b.c']\nentries += {'r': ['halving']}\n", "src/sim/control_halving.c": "", "src/cli/main.c": "exit(1);\n",
     "src/cli/meson.build": "'main.c'\n", "src/README.md": "cli -> sim\nsim -> mesh\nmesh -> base\n", "include/drape/drape.h": '#include "export.h"\n',
     "include/drape/export.h": "__cplusplus visibility\n", "tests/unit/test_a.c": "", "tests/meson.build": "'a'\n"}
 

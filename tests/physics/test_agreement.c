@@ -51,9 +51,9 @@ static void agree(const char *one, const char *other)
 
 START_TEST(linear_solvers_agree)
 {
-    for (int i = 0; drape_linears_words[i]; i++) {
+    for (int i = 0; drape_linears_names[i]; i++) {
         char other[64];
-        snprintf(other, sizeof other, ", 'linear_solver': '%s'", drape_linears_words[i]);
+        snprintf(other, sizeof other, ", 'linear_solver': '%s'", drape_linears_names[i]);
         agree(", 'linear_solver': 'klu'", other);
     }
 }

@@ -109,7 +109,7 @@ static scene load_mesh(double thickness, double gravity, double dt, double toler
         {"young_modulus", modulus, NULL}, {"thickness", thickness, NULL}, {"areal_density", DENSITY, NULL}};
     const drape_setting integrator[] = {
         {"dt", dt, NULL}, {"tolerance", tolerance, NULL}, {"predictor", 0, "rest"}};
-    const drape_row_def terms[] = {{"stretch.edge", NULL, 0}, {"bend.hinge", NULL, 0}};
+    const drape_entry_def terms[] = {{"stretch.edge", NULL, 0}, {"bend.hinge", NULL, 0}};
     scene s = scene_empty();
     drape_cloth_def cloth;
     drape_scene_def def;
@@ -132,7 +132,7 @@ static scene load_mesh(double thickness, double gravity, double dt, double toler
     def.cloths = &cloth;
     def.cloth_count = 1;
     def.gravity[1] = -gravity;
-    def.integrator = (drape_row_def){"be", integrator, 3};
+    def.integrator = (drape_entry_def){"be", integrator, 3};
     def.frame_rate = 1e-9;
     ck_assert_msg(drape_model_create(s.ctx, &def, &s.model) == DRAPE_OK, "%s", drape_context_message(s.ctx));
     scene_start(&s, NULL);

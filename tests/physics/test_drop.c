@@ -3,7 +3,7 @@
  * face is ever inside, by a check of its own (support/solids.h), in states and in frames between them; cloth
  * that falls on itself never passes through itself.
  */
-#include "contact/intersect.h"
+#include "geometry/intersect.h"
 #include "support/scene.h"
 #include "support/solids.h"
 

@@ -101,7 +101,7 @@ START_TEST(patch_test_as_a_solve)
     static const drape_setting material[] = {
         {"young_modulus", MODULUS, NULL}, {"thickness", THICKNESS, NULL}, {"areal_density", 0.2, NULL}};
     static const drape_setting integrator[] = {{"dt", 1e6, NULL}, {"tolerance", 1e-11, NULL}};
-    static const drape_row_def terms[] = {{"stretch.edge", NULL, 0}};
+    static const drape_entry_def terms[] = {{"stretch.edge", NULL, 0}};
     scene rest = sheet("consistent"), s = scene_empty();
     drape_cloth_def cloth;
     drape_scene_def def;
@@ -123,7 +123,7 @@ START_TEST(patch_test_as_a_solve)
         pins[count].key_count = 1;
         count++;
     }
-    cloth.mesh.grid = (drape_row_def){"equilateral", grid, 2};
+    cloth.mesh.grid = (drape_entry_def){"equilateral", grid, 2};
     cloth.material = material;
     cloth.material_count = 3;
     cloth.terms = terms;
@@ -133,7 +133,7 @@ START_TEST(patch_test_as_a_solve)
     def.cloths = &cloth;
     def.cloth_count = 1;
     memset(def.gravity, 0, sizeof def.gravity);
-    def.integrator = (drape_row_def){"be", integrator, 2};
+    def.integrator = (drape_entry_def){"be", integrator, 2};
     def.frame_rate = 1e-6;
     ck_assert_msg(drape_model_create(s.ctx, &def, &s.model) == DRAPE_OK, "%s", drape_context_message(s.ctx));
     scene_start(&s, NULL);

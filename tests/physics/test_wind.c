@@ -40,7 +40,7 @@ END_TEST
 /* Its derivatives in a wind; the tests of the rows have it in air at rest. */
 START_TEST(derivatives_in_a_wind)
 {
-    static drape_check_row rows[DRAPE_MAX_CHECK_ROWS];
+    static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
     scene s = scene_open(SHEET, "", 3.0, -2.0, 1.5, -9.81);
     int count = 0;
     ck_assert_int_eq(drape_check_derivatives(s.ctx, s.sim->system, 3, rows, &count), DRAPE_OK);
@@ -69,7 +69,7 @@ static void swirl(void *user, double t, int32_t count, const double *x, double *
 /* dg/dx has what the wind changes as nodes move, dg/dv not: of both drags, of their sum in the system, and of D. */
 START_TEST(derivatives_in_the_wind_of_a_host)
 {
-    static drape_check_row rows[DRAPE_MAX_CHECK_ROWS];
+    static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
     scene s = scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 5, "
                          "'width': 0.5, 'height': 0.4}, 'material': {'young_modulus': 1e5, 'thickness': "
                          "1e-3, 'density': 200}, 'terms': ['stretch.edge', {'type': 'drag.wind', 'wind': "

@@ -9,7 +9,7 @@
 #include <math.h>
 
 #include "colliders/colliders.h"
-#include "contact/intersect.h"
+#include "geometry/intersect.h"
 #include "sim/sim.h"
 
 #define AUDIT_CUTS 6 /* points of a triangle's side: a face is sampled at 28, among them its corners */

@@ -89,7 +89,7 @@ static inline int ida_full_jacobian(sunrealtype t, sunrealtype cj, N_Vector y, N
     const drape_pattern *p = &f->model->pattern;
     const drape_point point = ida_full_place(f, y);
     double *to = SUNSparseMatrix_Data(matrix);
-    drape_system_jacobian(f->system, &point, 0, false, f->k);
+    drape_system_jacobian(f->system, &point, 0, 0, f->k);
     if (f->model->has_dissipation)
         drape_system_damping(f->system, &point, f->d);
     for (int64_t j = 0; j < p->n; j++) {
@@ -146,8 +146,8 @@ static inline void ida_full_close(ida_full *f)
     drape_free(f->ctx, f->g);
     drape_free(f->ctx, f->k);
     drape_free(f->ctx, f->d);
-    drape_arena_free(&f->arena);
     drape_system_destroy(&f->system);
+    drape_arena_free(&f->arena);
     *f = (ida_full){0};
 }
 
@@ -158,7 +158,7 @@ static inline bool ida_full_arrays(ida_full *f)
     f->g = drape_alloc(f->ctx, 3 * (size_t)f->model->node_count, sizeof(double));
     f->k = drape_alloc(f->ctx, nonzeros, sizeof(double));
     f->d = drape_alloc(f->ctx, nonzeros, sizeof(double));
-    return f->g && f->k && f->d && !drape_system_create(f->ctx, f->model, 1, &f->system) &&
+    return f->g && f->k && f->d && !drape_system_create(&f->arena, f->model, 1, &f->system) &&
            !drape_state_create(&f->arena, f->model, &f->now) &&
            !drape_state_create(&f->arena, f->model, &f->next);
 }

@@ -155,9 +155,9 @@ START_TEST(pins_that_lift_a_sheet_do_m_g_h)
     const double height = 0.1, speed = 0.05;
     for (int i = 0; drape_integrators[i]; i++) {
         const drape_integrator_ops *row = drape_integrators[i];
-        if (row->timeless)
+        if (row->steady_state)
             continue;
-        drape_sim_def def = def_of(row->name, 0.01, NULL);
+        drape_sim_def def = def_of(row->entry.name, 0.01, NULL);
         def.controller = "halving";
         scene s = scene_model(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, "
@@ -179,7 +179,7 @@ START_TEST(pins_that_lift_a_sheet_do_m_g_h)
         const drape_energy after = drape_sim_energy(s.sim);
         const double weight = mass * 9.81 * height, slack = 2 * mass * speed * speed;
         printf("# %s: m g h %.6g J, pins %.6g J, gravity %.6g J, dissipated %.3g J, numerical %.3g J\n",
-               row->name, weight, s.sim->audit.pin_work, after.gravity - before.gravity,
+               row->entry.name, weight, s.sim->audit.pin_work, after.gravity - before.gravity,
                after.dissipated - before.dissipated, after.numerical - before.numerical);
         assert_below(fabs(s.sim->audit.pin_work - weight), slack);
         assert_below(fabs(after.gravity - before.gravity - weight), slack);
@@ -219,9 +219,9 @@ START_TEST(no_row_that_ends_well_has_gained_energy_from_stiff_springs)
     int well = 0;
     for (int i = 0; drape_integrators[i]; i++) {
         const drape_integrator_ops *row = drape_integrators[i];
-        if (row->timeless)
+        if (row->steady_state)
             continue;
-        drape_sim_def def = def_of(row->name, 1.0 / 30, NULL);
+        drape_sim_def def = def_of(row->entry.name, 1.0 / 30, NULL);
         def.controller = "halving";
         scene s = scene_model(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 1, "
@@ -237,7 +237,7 @@ START_TEST(no_row_that_ends_well_has_gained_energy_from_stiff_springs)
         ck_assert_int_eq(drape_sim_observe(s.sim, note_swing, &w), DRAPE_OK);
         const bool ended = drape_sim_advance(s.sim, 3) == DRAPE_OK;
         const double quiet = 0.5 * 150 * 9.81 * sqrt(2.0), share = row->gain > 0 ? row->gain : 0.1;
-        printf("# %s: %s, %ld steps, %ld rejected, gain %.3g J of %.4g J\n", row->name,
+        printf("# %s: %s, %ld steps, %ld rejected, gain %.3g J of %.4g J\n", row->entry.name,
                ended ? "ok" : drape_context_message(s.ctx), s.accepted, s.rejected, w.gain, w.fall + quiet);
         if (ended)
             assert_below(w.gain / (w.fall + quiet), share + 0.0036);

@@ -69,8 +69,8 @@ static void compare_row(const char *linear, const char *terms, double rtol, int 
 
 static void compare(const char *terms, double rtol, int max_order, double duration)
 {
-    for (int i = 0; drape_linears_words[i]; i++)
-        compare_row(drape_linears_words[i], terms, rtol, max_order, duration);
+    for (int i = 0; drape_linears_names[i]; i++)
+        compare_row(drape_linears_names[i], terms, rtol, max_order, duration);
 }
 
 START_TEST(the_reduced_system_gives_the_trajectory_of_the_full_one)

@@ -120,14 +120,15 @@ static void check_slope(const char *row, const char *terms, const char *pins, st
 
 static bool has_fixed_steps(const drape_integrator_ops *row)
 {
-    return !row->own_steps && !row->timeless;
+    return !row->own_steps && !row->steady_state;
 }
 
 START_TEST(every_row_converges_with_the_order_it_declares)
 {
     for (int i = 0; drape_integrators[i]; i++)
         if (has_fixed_steps(drape_integrators[i]))
-            check_slope(drape_integrators[i]->name, DASHPOTS, HUNG, equal_steps, drape_integrators[i]->order);
+            check_slope(drape_integrators[i]->entry.name, DASHPOTS, HUNG, equal_steps,
+                        drape_integrators[i]->order);
 }
 END_TEST
 
@@ -136,7 +137,7 @@ START_TEST(so_it_does_with_steps_of_changing_size)
 {
     for (int i = 0; drape_integrators[i]; i++)
         if (has_fixed_steps(drape_integrators[i]))
-            check_slope(drape_integrators[i]->name, DASHPOTS, HUNG, uneven_steps,
+            check_slope(drape_integrators[i]->entry.name, DASHPOTS, HUNG, uneven_steps,
                         drape_integrators[i]->order);
 }
 END_TEST
@@ -153,7 +154,7 @@ START_TEST(kinks_at_ends_of_steps_leave_the_order)
 {
     for (int i = 0; drape_integrators[i]; i++)
         if (has_fixed_steps(drape_integrators[i]))
-            check_slope(drape_integrators[i]->name, DASHPOTS, MOVED, equal_steps,
+            check_slope(drape_integrators[i]->entry.name, DASHPOTS, MOVED, equal_steps,
                         drape_integrators[i]->order);
 }
 END_TEST
@@ -164,7 +165,8 @@ START_TEST(and_without_dashpots_as_well)
 {
     for (int i = 0; drape_integrators[i]; i++)
         if (has_fixed_steps(drape_integrators[i]))
-            check_slope(drape_integrators[i]->name, "", MOVED, equal_steps, drape_integrators[i]->order);
+            check_slope(drape_integrators[i]->entry.name, "", MOVED, equal_steps,
+                        drape_integrators[i]->order);
 }
 END_TEST
 
@@ -233,15 +235,15 @@ START_TEST(error_falls_with_the_controllers_rtol)
         const int from = row->stability ? 4 : 2;
         for (int k = 2; has_fixed_steps(row) && k <= 5; k++) {
             const drape_setting rtol = {"rtol", pow(10, -k), NULL};
-            const drape_sim_def def = controlled(row->name, &rtol, 1);
+            const drape_sim_def def = controlled(row->entry.name, &rtol, 1);
             scene s = sheet(DASHPOTS, HUNG, &def);
             scene_advance(&s, END);
             const double error = distance(&s, reference);
-            printf("# %s, rtol 1e-%d: error %.3g m, %lld steps, %lld rejected\n", row->name, k, error,
+            printf("# %s, rtol 1e-%d: error %.3g m, %lld steps, %lld rejected\n", row->entry.name, k, error,
                    (long long)drape_sim_statistics(s.sim).steps_accepted,
                    (long long)drape_sim_statistics(s.sim).steps_rejected);
-            ck_assert_msg(error <= 2 * before, "%s, rtol 1e-%d: error %g m, before %g m", row->name, k, error,
-                          before);
+            ck_assert_msg(error <= 2 * before, "%s, rtol 1e-%d: error %g m, before %g m", row->entry.name, k,
+                          error, before);
             first = k == from ? error : first;
             before = error;
             scene_close(&s);
@@ -264,7 +266,7 @@ START_TEST(steps_of_the_error_controller_change_gently)
         double most = 0, least = INFINITY;
         if (!has_fixed_steps(drape_integrators[i]))
             continue;
-        const drape_sim_def def = controlled(drape_integrators[i]->name, &rtol, 1);
+        const drape_sim_def def = controlled(drape_integrators[i]->entry.name, &rtol, 1);
         scene s = sheet(DASHPOTS, HUNG, &def);
         log = (step_log){.count = 0};
         ck_assert_int_eq(drape_sim_observe(s.sim, note_step, &log), DRAPE_OK);
@@ -273,8 +275,8 @@ START_TEST(steps_of_the_error_controller_change_gently)
             most = fmax(most, log.h[k] / log.h[k - 1]);
             least = fmin(least, log.h[k] / log.h[k - 1]);
         }
-        printf("# %s: %d steps, %d rejected, ratios %.3f to %.3f\n", drape_integrators[i]->name, log.count,
-               log.rejected, least, most);
+        printf("# %s: %d steps, %d rejected, ratios %.3f to %.3f\n", drape_integrators[i]->entry.name,
+               log.count, log.rejected, least, most);
         ck_assert_double_le(most, 2 * (1 + 1e-9)); /* times are rounded */
         ck_assert_int_le(10 * log.rejected, log.count);
         scene_close(&s);
@@ -308,14 +310,15 @@ static double estimate(const scene *s, bool velocity, double h, const double pas
         v[k][at] = given[k][1];
         state[k] = (drape_state){.t = (k - 1) * h, .x = x[k], .v = v[k]};
     }
-    const drape_controller_ops *error = drape_controllers[0];
-    for (int i = 0; strcmp(error->name, "error") != 0; i++)
-        error = drape_controllers[i];
-    for (int p = 0; p < error->param_count; p++)
-        values[p] = error->params[p].default_value;
-    values[drape_param_find(error->params, error->param_count, "dt_min")] = 1e-300;
-    values[drape_param_find(error->params, error->param_count, "atol_x")] = velocity ? 1e9 : 1e-15;
-    values[drape_param_find(error->params, error->param_count, "atol_v")] = velocity ? 1e-15 : 1e9;
+    const drape_controller_ops *error =
+        drape_controllers[drape_registry_find(&drape_controller_registry, NULL, "error")];
+    for (int p = 0; p < error->entry.param_count; p++)
+        values[p] = error->entry.params[p].default_value;
+    values[drape_param_find(error->entry.params, error->entry.param_count, "dt_min")] = 1e-300;
+    values[drape_param_find(error->entry.params, error->entry.param_count, "atol_x")] =
+        velocity ? 1e9 : 1e-15;
+    values[drape_param_find(error->entry.params, error->entry.param_count, "atol_v")] =
+        velocity ? 1e-15 : 1e9;
     drape_trial trial = {.model = s->model,
                          .past = {&state[0], NULL},
                          .in = &state[1],
@@ -327,7 +330,7 @@ static double estimate(const scene *s, bool velocity, double h, const double pas
                          .status = DRAPE_OK};
     ck_assert_int_eq(error->judge(values, &trial), DRAPE_RETRY);
     ck_assert_str_eq(info.reason, "error_test");
-    return info.worst.value * 1e-15 * sqrt(6);
+    return info.diagnostic.value * 1e-15 * sqrt(6);
 }
 
 /* Two steps of backward Euler on x'' = -w^2 x: x1 = (x0 + h v0)/(1 + (w h)^2), v1 = (x1 - x0)/h. The

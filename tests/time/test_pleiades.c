@@ -63,14 +63,13 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
     drape_energy_range(el, first, count, x, e, g, h, one);
 }
 
-static const drape_term_ops newton = {.struct_size = sizeof(drape_term_ops),
-                                      .name = "test.newton",
-                                      .summary = "stars that attract each other",
-                                      .reference = "Newton 1687",
-                                      .element_name = "pair",
-                                      .nodes = 2,
-                                      .build = build,
-                                      .energy = energy};
+static const drape_term_ops newton = {
+    .struct_size = sizeof(drape_term_ops),
+    .entry = {.name = "test.newton", .summary = "stars that attract each other", .reference = "Newton 1687"},
+    .element_name = "pair",
+    .nodes = 2,
+    .build = build,
+    .energy = energy};
 
 /* A fan of triangles around the fifth star, which nothing but the mesh needs. */
 static scene stars(const char *integrator, const drape_setting *settings, size_t count)
@@ -78,7 +77,7 @@ static scene stars(const char *integrator, const drape_setting *settings, size_t
     static const int32_t triangles[] = {0, 6, 4, 6, 2, 4, 2, 3, 4, 3, 5, 4, 5, 1, 4};
     static const drape_setting material[] = {
         {"young_modulus", 1, NULL}, {"density", 1, NULL}, {"thickness", 1, NULL}};
-    static const drape_row_def terms[] = {{"test.newton", NULL, 0}};
+    static const drape_entry_def terms[] = {{"test.newton", NULL, 0}};
     double x[3 * STARS] = {0}, v[3 * STARS] = {0};
     drape_cloth_def cloth;
     drape_scene_def def;

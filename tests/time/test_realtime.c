@@ -112,7 +112,7 @@ static scene at_rate(const char *terms, const char *more, double rate, double en
     scene s = scene_open(HUNG, terms, "newton_k", more);
     for (int k = 0; k < (int)lround(rate * end); k++) {
         drape_realtime r = advance(&s, 1 / rate, PLENTY);
-        ck_assert(r.kept && r.debt == 0 && strcmp(r.rung, "full") == 0 && r.effort == 0);
+        ck_assert(r.kept && r.debt == 0 && strcmp(r.level, "full") == 0 && r.effort == 0);
     }
     ck_assert_double_eq_tol(drape_sim_time(s.sim), end, 1e-9);
     return s;
@@ -168,7 +168,7 @@ START_TEST(it_degrades_and_recovers)
     const double frame = 1.0 / 60, longest = 4 * frame;
     double first = drape_sim_time(s.sim), dropped = 0;
     drape_realtime r = advance(&s, frame, PLENTY);
-    ck_assert_str_eq(r.rung, "full");
+    ck_assert_str_eq(r.level, "full");
     for (int k = 0; k < 40; k++) {
         r = advance(&s, frame, NOTHING);
         dropped += r.dropped;
@@ -176,14 +176,14 @@ START_TEST(it_degrades_and_recovers)
         ck_assert_double_le(r.debt, longest * (1 + 1e-9));
         ck_assert_double_eq_tol(r.dropped_total, dropped, 1e-12);
         ck_assert_double_le(r.h, longest * (1 + 1e-9));
-        ck_assert(k == 0 || strcmp(r.rung, "larger steps") == 0);
+        ck_assert(k == 0 || strcmp(r.level, "larger steps") == 0);
         ck_assert(r.attempts == 0 || !r.kept);
     }
     ck_assert_double_eq_tol(drape_sim_time(s.sim) + r.debt + dropped - first, 41 * frame, 1e-9);
     ck_assert_int_le(drape_sim_statistics(s.sim).steps_accepted, 22); /* a step for some frames each */
     for (int k = 0; k < 6; k++)
         r = advance(&s, frame, PLENTY);
-    ck_assert(strcmp(r.rung, "full") == 0 && r.effort == 0 && r.debt == 0 && r.kept);
+    ck_assert(strcmp(r.level, "full") == 0 && r.effort == 0 && r.debt == 0 && r.kept);
     ck_assert_double_le(r.h, frame * (1 + 1e-9));
     ck_assert_double_lt(drape_sim_statistics(s.sim).strain_max, 1);
     scene_close(&s);
@@ -213,10 +213,10 @@ START_TEST(every_row_with_a_time_takes_frames)
         scene s = scene_model(HUNG, "", "be", ", 'tolerance': 1e-4");
         drape_sim_def def;
         drape_sim_def_init(&def, sizeof def);
-        def.integrator = drape_integrators[i]->name;
+        def.integrator = drape_integrators[i]->entry.name;
         scene_start(&s, &def);
         drape_status status = drape_sim_advance_realtime(s.sim, 0.02, PLENTY, &r);
-        if (drape_integrators[i]->timeless) {
+        if (drape_integrators[i]->steady_state) {
             ck_assert_int_eq(status, DRAPE_E_ARGUMENT);
             ck_assert_ptr_nonnull(strstr(drape_context_message(s.ctx), "no time"));
         } else {

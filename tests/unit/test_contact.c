@@ -1,11 +1,12 @@
 /*
  * test_contact.c: contact of two pieces. Every derivative is compared with differences, in every region of
  * both kinds of pairs: energy and force, force and Hessian, friction by velocity and by position, the
- * mollifier where edges are nearly parallel. Ways that are called free are.
+ * mollifier where edges are nearly parallel. Step fractions that are called free are.
  */
-#include "colliders/bvh.h"
 #include "contact/barrier.h"
+#include "contact/friction.h"
 #include "contact/pair.h"
+#include "geometry/bvh.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -33,27 +34,29 @@ typedef struct setting {
     drape_contact_law law;
 } setting;
 
-static void gap_of(const setting *s, bool derivatives, drape_gap *gap)
+/* All weights are 0 unless the pair is active. */
+static drape_gap gap_of(const setting *s)
 {
-    const drape_placed at = {.x = s->x};
-    drape_pair_gap(&s->pair, &at, s->rest, derivatives, gap);
+    const drape_configuration at = {.x = s->x};
+    drape_gap gap = {0};
+    if (!drape_pair_gap(&s->pair, &at, s->rest, &gap))
+        gap = (drape_gap){.value = gap.value, .m = 1};
+    return gap;
 }
 
 static double energy_of(const setting *s)
 {
-    drape_gap gap;
-    gap_of(s, false, &gap);
+    const drape_gap gap = gap_of(s);
     return drape_contact_energy(&gap, &s->law);
 }
 
 static void forces_of(const setting *s, double *normal, double *friction)
 {
-    drape_gap gap;
+    const drape_gap gap = gap_of(s);
     double v[4][3];
-    gap_of(s, true, &gap);
     memcpy(v, s->v, sizeof v);
-    drape_contact_normal(&gap, &s->law, normal, NULL);
-    drape_contact_friction(&gap, &s->law, drape_contact_normal_force(&gap, &s->law), v, friction, NULL);
+    drape_contact_gradient(&gap, &s->law, normal);
+    drape_friction_force(&gap, &s->law, drape_contact_normal_force(&gap, &s->law), v, friction, NULL);
 }
 
 static double largest(const double *a, int count)
@@ -78,14 +81,17 @@ static void compare(const char *what, const double *exact, const double *differe
 
 static void check_derivatives(setting *s, double e, double limit)
 {
-    drape_gap gap;
+    const drape_gap gap = gap_of(s);
+    const drape_configuration at = {.x = s->x};
+    drape_gap_slopes slopes;
     double g[D], h[D * D], f[D], dgdv[D * D] = {0}, dgdx[D * D] = {0}, v[4][3];
     double by_x[D], h_by_x[D * D], f_by_x[D * D], f_by_v[D * D];
-    gap_of(s, true, &gap);
+    drape_pair_slopes(&s->pair, &gap, &at, s->rest, &slopes);
     memcpy(v, s->v, sizeof v);
-    drape_contact_normal(&gap, &s->law, g, h);
-    drape_contact_friction(&gap, &s->law, drape_contact_normal_force(&gap, &s->law), v, f, dgdv);
-    drape_contact_friction_slope(&gap, &s->law, v, dgdx);
+    drape_contact_gradient(&gap, &s->law, g);
+    drape_contact_hessian(&gap, &slopes, &s->law, h);
+    drape_friction_force(&gap, &s->law, drape_contact_normal_force(&gap, &s->law), v, f, dgdv);
+    drape_friction_slope(&gap, &slopes, &s->law, v, dgdx);
     for (int j = 0; j < D; j++) {
         double g_[2][D], f_[2][D], energy[2], w_[2][D], unused[D], x = s->x[j], u = s->v[j];
         for (int side = 0; side < 2; side++) {
@@ -116,11 +122,10 @@ static void check_derivatives(setting *s, double e, double limit)
 /* The signs of the weights say in which region the closest points lie. */
 static int region_of(const setting *s)
 {
-    drape_gap gap;
+    const drape_gap gap = gap_of(s);
     int region = 0;
-    gap_of(s, false, &gap);
     for (int a = 0; a < 4; a++)
-        region = 2 * region + (gap.c[a] != 0);
+        region = 2 * region + (gap.closest.c[a] != 0);
     return region;
 }
 
@@ -134,15 +139,15 @@ static void check_kind(drape_pair_kind kind, double speed)
         setting s = {
             .pair = {.kind = kind, .node = {0, 1, 2, 3}, .collider = -1, .radius = 0.01, .distance = 0.2},
             .law = {.distance = 0.2, .stiffness = 3, .friction = 0.4, .velocity = 0.05}};
-        drape_gap gap;
         fill(&seed, 0.1, s.x, D);
         fill(&seed, speed, s.v, D);
         fill(&seed, 0.1, s.rest, D);
-        gap_of(&s, false, &gap);
+        const drape_gap gap = gap_of(&s);
         double edge = 1;
         for (int a = 0; a < 4; a++)
-            if (gap.c[a] != 0)
-                edge = fmin(edge, fmin(fabs(gap.c[a]), fabs(gap.c[a]) == 1 ? 1 : 1 - fabs(gap.c[a])));
+            if (gap.closest.c[a] != 0)
+                edge = fmin(edge, fmin(fabs(gap.closest.c[a]),
+                                       fabs(gap.closest.c[a]) == 1 ? 1 : 1 - fabs(gap.closest.c[a])));
         if (!(gap.value > 0.01) || edge < 0.05 || gap.value > 0.19)
             continue;
         if (++met[region_of(&s)] > 40)
@@ -182,14 +187,14 @@ START_TEST(test_parallel)
             .x = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, -0.001, 0.1, 0.05, 0.001},
             .rest = {-0.1, 0, 0, 0.1, 0, 0, -0.1, 0.05, 0, 0.1, 0.05, 0}};
         double noise[D];
-        drape_gap gap;
         fill(&seed, 2e-4, noise, D);
         fill(&seed, 1, s.v, D);
         for (int i = 0; i < D; i++)
             s.x[i] += noise[i];
-        gap_of(&s, false, &gap);
+        const drape_gap gap = gap_of(&s);
         ck_assert(gap.mollified);
-        if (fabs(gap.c[0]) < 0.1 || fabs(gap.c[1]) < 0.1 || fabs(gap.c[2]) < 0.1 || fabs(gap.c[3]) < 0.1)
+        if (fabs(gap.closest.c[0]) < 0.1 || fabs(gap.closest.c[1]) < 0.1 || fabs(gap.closest.c[2]) < 0.1 ||
+            fabs(gap.closest.c[3]) < 0.1)
             continue; /* near an end, where the derivatives jump */
         check_derivatives(&s, 2e-9, 1e-4);
     }
@@ -228,9 +233,9 @@ START_TEST(test_barrier)
 }
 END_TEST
 
-/* On a way that is called free the gap never falls below what is to be kept; a way that is not is cut before
+/* On a path that is called free the gap never falls below what is to be kept; a path that is not free is cut before
  * the gap is gone and after most of it is. */
-START_TEST(test_way)
+START_TEST(test_step_fraction)
 {
     uint64_t seed = 11;
     int cut = 0, whole = 0;
@@ -240,25 +245,27 @@ START_TEST(test_way)
                            .collider = -1,
                            .radius = k % 3 ? 0 : 0.01};
         double x[D], y[D], at[D], least = INFINITY;
-        const drape_placed placed = {.x = at};
+        const drape_configuration placed = {.x = at};
         fill(&seed, 0.1, x, D);
         fill(&seed, 0.1, y, D);
         memcpy(at, x, sizeof at);
         double start = drape_pair_gap_value(&pair, &placed);
         if (!(start > 1e-3))
             continue;
-        double way = drape_pair_way(&pair, x, y, 0.1, false, 1);
-        ck_assert_double_eq(drape_pair_way(&pair, x, y, 0.1, false, 0.5 * way), 0.5 * way);
-        ck_assert_double_eq(drape_pair_way(&pair, x, y, 0.1, false, 0.5 + 0.5 * way), way < 1 ? way : 1);
+        double fraction = drape_pair_step_fraction(&pair, x, y, 0.1, false, 1);
+        ck_assert_double_eq(drape_pair_step_fraction(&pair, x, y, 0.1, false, 0.5 * fraction),
+                            0.5 * fraction);
+        ck_assert_double_eq(drape_pair_step_fraction(&pair, x, y, 0.1, false, 0.5 + 0.5 * fraction),
+                            fraction < 1 ? fraction : 1);
         for (int i = 0; i <= 200; i++) {
             for (int j = 0; j < D; j++)
-                at[j] = x[j] + way * i / 200 * (y[j] - x[j]);
+                at[j] = x[j] + fraction * i / 200 * (y[j] - x[j]);
             least = fmin(least, drape_pair_gap_value(&pair, &placed));
         }
         ck_assert_double_ge(least, (0.1 - 1e-9) * start);
-        cut += way < 1;
-        whole += way == 1;
-        if (way < 1)
+        cut += fraction < 1;
+        whole += fraction == 1;
+        if (fraction < 1)
             ck_assert_double_le(drape_pair_gap_value(&pair, &placed), 0.2 * start);
     }
     ck_assert_int_ge(cut, 50);
@@ -290,7 +297,8 @@ START_TEST(test_tree)
     for (int i = 0; i < 400; i++)
         edge[i] = (int32_t)(fabs(next_number(&seed)) * 99.9);
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    ck_assert_int_eq(drape_bvh_build(ctx, 200, 2, edge, x, &tree), DRAPE_OK);
+    drape_arena arena = drape_arena_of(ctx);
+    ck_assert_int_eq(drape_bvh_build(&arena, 200, 2, edge, x, &tree), DRAPE_OK);
     for (int k = 0; k < 100; k++) {
         int32_t node = k;
         found f = {.count = 0};
@@ -308,10 +316,10 @@ START_TEST(test_tree)
             ck_assert_int_eq(times, meets);
         }
     }
-    drape_bvh_free(ctx, &tree);
+    drape_arena_free(&arena);
     drape_context_destroy(&ctx);
 }
 END_TEST
 
-SUITE("contact", test_triangle, test_segments, test_parallel, test_mollified_away, test_barrier, test_way,
-      test_tree)
+SUITE("contact", test_triangle, test_segments, test_parallel, test_mollified_away, test_barrier,
+      test_step_fraction, test_tree)

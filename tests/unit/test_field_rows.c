@@ -19,11 +19,9 @@ static double values[NODES];
 
 static drape_status measure(scene *h, const char *name, const double *x)
 {
-    for (int i = 0; drape_fields[i]; i++)
-        if (strcmp(drape_fields[i]->name, name) == 0)
-            return drape_fields[i]->measure(h->sim, x, values);
-    ck_abort_msg("there is no field %s", name);
-    return DRAPE_OK;
+    const int i = drape_registry_find(&drape_field_registry, NULL, name);
+    ck_assert_msg(i >= 0, "there is no field %s", name);
+    return drape_fields[i]->measure(h->sim, x, values);
 }
 
 /* Under x -> (1.04 x, 0.97 z), sheared and turned, the largest principal strain is that of the matrix: for

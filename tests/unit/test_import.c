@@ -51,7 +51,7 @@ static void assert_read(const drape_import_ops *import, const void *data, size_t
         ck_assert_double_eq(mesh.x[i], x[i]);
     for (int32_t i = 0; i < 3 * triangles; i++)
         ck_assert_int_eq(mesh.triangle[i], triangle[i]);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 
@@ -61,7 +61,7 @@ static void assert_refused(const drape_import_ops *import, const void *data, siz
     drape_mesh mesh;
     ck_assert_int_eq(read_bytes(ctx, import, data, size, &mesh), DRAPE_E_PARSE);
     ck_assert_str_eq(drape_context_message(ctx), message);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 
@@ -477,7 +477,7 @@ static void truncate_everywhere(const drape_import_ops *import, const void *data
         const drape_status status = read_bytes(ctx, import, data, length, &mesh);
         ck_assert(status == DRAPE_OK || status == DRAPE_E_PARSE);
         ck_assert(status == DRAPE_OK || strlen(drape_context_message(ctx)) > 10);
-        drape_mesh_free(ctx, &mesh);
+        drape_mesh_free(&mesh);
         drape_context_destroy(&ctx);
     }
 }
@@ -499,7 +499,7 @@ START_TEST(truncated_at_every_byte)
         drape_context *ctx = new_context();
         drape_mesh mesh;
         ck_assert_int_eq(read_bytes(ctx, &drape_import_ply, small.data, length, &mesh), DRAPE_E_PARSE);
-        drape_mesh_free(ctx, &mesh);
+        drape_mesh_free(&mesh);
         drape_context_destroy(&ctx);
     }
 }
@@ -529,7 +529,7 @@ static void change_every_byte(const drape_import_ops *import, const void *data, 
                 status = drape_mesh_validate_nodes(ctx, source, &mesh);
             ck_assert(status == DRAPE_OK || status == DRAPE_E_PARSE);
             ck_assert_uint_lt(memory.largest, 100000);
-            drape_mesh_free(ctx, &mesh);
+            drape_mesh_free(&mesh);
             drape_context_destroy(&ctx);
             ck_assert_int_eq(memory.live, 0);
         }
@@ -603,12 +603,12 @@ START_TEST(files_by_ending_relative_and_absolute)
         ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(ctx));
         ck_assert_int_eq(mesh.hinge_count, 1);
         ck_assert_int_eq(mesh.rows, 0);
-        drape_mesh_free(ctx, &mesh);
+        drape_mesh_free(&mesh);
     }
     const drape_mesh_def def = file_def(absolute);
     drape_mesh mesh;
     ck_assert_int_eq(drape_mesh_make(ctx, "/m", &def, NULL, &mesh), DRAPE_OK);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     remove_file(&f, "a.obj");
     remove_file(&f, "b.x.PLY");
     rmdir(f.path);
@@ -694,7 +694,7 @@ START_TEST(numbers_do_not_depend_on_the_locale)
     write_file(&f, "a.obj", obj, strlen(obj));
     ck_assert_int_eq(make_file(ctx, &f, "a.obj", &mesh), DRAPE_OK);
     ck_assert_double_eq(mesh.x[3], 1.25);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
     comma_end();
     remove_file(&f, "a.obj");
@@ -713,7 +713,7 @@ static void fail_every_allocation(const folder *f, const char *name)
         status = make_file(ctx, f, name, &mesh);
         ck_assert(status == DRAPE_OK || status == DRAPE_E_MEMORY);
         ck_assert(status == DRAPE_OK || mesh.x == NULL);
-        drape_mesh_free(ctx, &mesh);
+        drape_mesh_free(&mesh);
         drape_context_destroy(&ctx);
         ck_assert_int_eq(memory.live, 0);
     }

@@ -1,6 +1,6 @@
 /* test_intersect.c: edges that pass through triangles are counted exactly, whatever cells the grid puts
  * them in. */
-#include "contact/intersect.h"
+#include "geometry/intersect.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -20,7 +20,7 @@ static drape_model *crossed_squares(drape_context *ctx, double shift)
     drape_scene_def_init(&scene, sizeof scene);
     for (int c = 0; c < 2; c++) {
         drape_cloth_def_init(&cloths[c], sizeof cloths[c]);
-        cloths[c].mesh.grid = (drape_row_def){"square", grid, 4};
+        cloths[c].mesh.grid = (drape_entry_def){"square", grid, 4};
         cloths[c].material = material;
         cloths[c].material_count = 3;
     }
@@ -126,7 +126,7 @@ START_TEST(a_flat_sheet_has_none)
         ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
         drape_cloth_def_init(&cloth, sizeof cloth);
         drape_scene_def_init(&scene, sizeof scene);
-        cloth.mesh.grid = (drape_row_def){"square", grid, 4};
+        cloth.mesh.grid = (drape_entry_def){"square", grid, 4};
         cloth.material = material;
         cloth.material_count = 3;
         const double turn[4] = {k % 2, k % 3, 1, 10.0 * k - 175};

@@ -1,7 +1,7 @@
 /* test_lab.c: what experiments measure with: lines through powers, material points on other meshes, distances. */
 #include "lab/statistics.h"
+#include "lab/text.h"
 #include "lab/trace.h"
-#include "lab/units.h"
 #include "support/suite.h"
 
 #include <math.h>
@@ -30,7 +30,7 @@ static drape_model *sheet(drape_context *ctx, double columns, double rows)
     drape_pin_def_init(&pin, sizeof pin);
     pin.nodes = pinned;
     pin.node_count = 1;
-    cloth.mesh.grid = (drape_row_def){"square", grid, 4};
+    cloth.mesh.grid = (drape_entry_def){"square", grid, 4};
     cloth.material = material;
     cloth.material_count = 3;
     cloth.pins = &pin;
@@ -76,23 +76,25 @@ START_TEST(a_linear_field_is_taken_exactly)
 {
     drape_context *ctx = new_context();
     drape_model *coarse = sheet(ctx, 6, 4), *fine = sheet(ctx, 8, 9);
+    drape_arena arena = drape_arena_of(ctx);
     lab_probe probe;
     size_t n = 3 * (size_t)drape_model_node_count(fine), points = (size_t)drape_model_node_count(coarse);
     double *x = drape_alloc(ctx, n, sizeof *x), *out = drape_alloc(ctx, 3 * points, sizeof *out);
     const double *rest = drape_model_rest_positions(fine), *at = drape_model_rest_positions(coarse);
-    ck_assert_int_eq(lab_probe_create(ctx, coarse, &probe), DRAPE_OK);
+    ck_assert_int_eq(lab_probe_create(&arena, coarse, &probe), DRAPE_OK);
     for (size_t i = 0; i < n; i += 3) {
         x[i] = 1 + 2 * rest[i] - rest[i + 2];
         x[i + 1] = 3 * rest[i + 2];
         x[i + 2] = -rest[i];
     }
-    lab_probe_take(&probe, fine, x, out);
+    for (size_t i = 0; i < points; i++)
+        lab_probe_take(&probe, i, fine, x, out + 3 * i);
     for (size_t i = 0; i < 3 * points; i += 3) {
         ck_assert_double_eq_tol(out[i], 1 + 2 * at[i] - at[i + 2], 1e-14);
         ck_assert_double_eq_tol(out[i + 1], 3 * at[i + 2], 1e-14);
         ck_assert_double_eq_tol(out[i + 2], -at[i], 1e-14);
     }
-    lab_probe_free(&probe);
+    drape_arena_free(&arena);
     drape_free(ctx, x);
     drape_free(ctx, out);
     drape_model_destroy(&coarse);

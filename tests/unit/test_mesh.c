@@ -22,7 +22,7 @@ static drape_mesh_def equilateral(drape_setting settings[2], int edges, double e
     drape_mesh_def def = empty_def();
     settings[0] = (drape_setting){"edges", edges, NULL};
     settings[1] = (drape_setting){"edge_length", edge_length, NULL};
-    def.grid = (drape_row_def){"equilateral", settings, 2};
+    def.grid = (drape_entry_def){"equilateral", settings, 2};
     return def;
 }
 
@@ -36,7 +36,7 @@ static drape_mesh_def square(drape_setting settings[6], int columns, int rows, c
     settings[3] = (drape_setting){"height", 0.75, NULL};
     settings[4] = (drape_setting){"diagonals", 0, diagonals};
     settings[5] = (drape_setting){"orientation", 0, orientation};
-    def.grid = (drape_row_def){"square", settings, 6};
+    def.grid = (drape_entry_def){"square", settings, 6};
     return def;
 }
 
@@ -177,7 +177,7 @@ START_TEST(equilateral_counts_and_positions)
                 ck_assert_double_eq(x[1], 0);
                 ck_assert_double_eq_tol(x[2], -r * sqrt(3.0) / 2 * l, 30 * ROUNDING);
             }
-        drape_mesh_free(ctx, &mesh);
+        drape_mesh_free(&mesh);
         assert_empty(&mesh);
     }
     drape_context_destroy(&ctx);
@@ -194,7 +194,7 @@ START_TEST(equilateral_triangles_are_equilateral)
         ck_assert_double_eq_tol(mesh.edge_length[e], 0.05, 4 * ROUNDING);
     for (int32_t t = 0; t < mesh.triangle_count; t++)
         ck_assert_double_eq_tol(mesh.triangle_area[t], sqrt(3.0) / 4 * 0.05 * 0.05, ROUNDING);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -234,7 +234,7 @@ static void check_square(drape_context *ctx, const char *diagonals, const char *
             ck_assert_int_eq(has_edge(&mesh, node, node + columns + 1), falling);
             ck_assert_int_eq(has_edge(&mesh, node + 1, node + columns), !falling);
         }
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
 }
 
 START_TEST(square_grids)
@@ -258,8 +258,8 @@ START_TEST(square_defaults)
     drape_mesh a = make(ctx, &given), b = make(ctx, &defaulted);
     ck_assert_int_eq(memcmp(a.x, b.x, (size_t)a.node_count * 3 * sizeof *a.x), 0);
     ck_assert_int_eq(memcmp(a.triangle, b.triangle, (size_t)a.triangle_count * 3 * sizeof *a.triangle), 0);
-    drape_mesh_free(ctx, &a);
-    drape_mesh_free(ctx, &b);
+    drape_mesh_free(&a);
+    drape_mesh_free(&b);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -270,13 +270,13 @@ START_TEST(equilateral_strips)
     const drape_setting settings[] = {{"edges", 2, NULL}, {"edge_length", 0.1, NULL}, {"strips", 5, NULL}};
     drape_mesh_def def;
     drape_mesh_def_init(&def, sizeof def);
-    def.grid = (drape_row_def){"equilateral", settings, 3};
+    def.grid = (drape_entry_def){"equilateral", settings, 3};
     drape_mesh mesh = make(ctx, &def);
     ck_assert_int_eq(mesh.rows, 6);
     ck_assert_int_eq(mesh.columns, 3);
     ck_assert_int_eq(mesh.triangle_count, 2 * 2 * 5);
     ck_assert_double_eq_tol(mesh.x[3 * 17 + 2], -5 * sqrt(3) / 2 * 0.1, 1e-15);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -301,7 +301,7 @@ START_TEST(annuli)
                                       {"outer_radius", 2, NULL}};
     drape_mesh_def def;
     drape_mesh_def_init(&def, sizeof def);
-    def.grid = (drape_row_def){"annulus", settings, 4};
+    def.grid = (drape_entry_def){"annulus", settings, 4};
     drape_mesh mesh = make(ctx, &def);
     double area = 0;
     ck_assert_int_eq(mesh.triangle_count, 2 * (ROWS - 1) * SPOKES);
@@ -318,7 +318,7 @@ START_TEST(annuli)
         for (int32_t b = a + 1; b < mesh.node_count; b++)
             edges += has_edge(&mesh, a, b);
     ck_assert_int_eq(mesh.node_count - edges + mesh.triangle_count, 0);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_setting wrong[4];
     memcpy(wrong, settings, sizeof wrong);
     wrong[3].number = 0.5;
@@ -336,21 +336,23 @@ START_TEST(grid_faults)
     def = equilateral(s, 16384, 1);
     assert_refused(&def, "/m/edges: 16384 is not allowed; edges is an integer in [1, 16383]");
     def = equilateral(s, 1, 0);
-    assert_refused(&def, "/m/edge_length: 0 is not allowed; edge_length is in (0, 1000000000] m");
+    assert_refused(&def, "/m/edge_length: 0 is not allowed; edge_length is a number in (0, 1000000000] m");
     def = equilateral(s, 1, NAN);
-    assert_refused(&def, "/m/edge_length: nan is not allowed; edge_length is in (0, 1000000000] m");
+    assert_refused(&def, "/m/edge_length: nan is not allowed; edge_length is a number in (0, 1000000000] m");
     def = equilateral(s, 1, 1);
     def.grid.setting_count = 1;
-    assert_refused(&def, "/m: \"edge_length\" is missing: length of every edge, (0, 1000000000] m");
+    assert_refused(&def,
+                   "/m: \"edge_length\" is missing: length of every edge; a number in (0, 1000000000] m");
     def = equilateral(s, 3, 5e8);
     assert_refused(&def, "/m: node 3 is at (1.5e+09, 0, 0) m; coordinates must be finite and within 1e+09 m");
     def.grid.type = "equilaterale";
-    assert_refused(&def, "/m/grid: unknown grid \"equilaterale\"; known are equilateral, square, irregular, "
-                         "annulus; did you mean "
-                         "\"equilateral\"?");
-    def.grid.type = "hexagons";
     assert_refused(&def,
-                   "/m/grid: unknown grid \"hexagons\"; known are equilateral, square, irregular, annulus");
+                   "/m/grid: there is no grid \"equilaterale\"; there are equilateral, square, irregular, "
+                   "annulus; did you mean "
+                   "\"equilateral\"?");
+    def.grid.type = "hexagons";
+    assert_refused(
+        &def, "/m/grid: there is no grid \"hexagons\"; there are equilateral, square, irregular, annulus");
     def = square(s, 1, 2, "parallel", "vertical");
     assert_refused(&def, "/m/columns: 1 is not allowed; columns is an integer in [2, 134217728]");
     def = square(s, 20000, 20000, "parallel", "vertical");
@@ -407,7 +409,7 @@ START_TEST(transform_scales_then_rotates_then_translates)
     static const double expected[] = {10, 22, 30, 7, 20, 30, 10, 20, 34};
     for (int i = 0; i < 9; i++)
         ck_assert_double_eq(mesh.x[i], expected[i]);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -582,7 +584,7 @@ START_TEST(closed_and_inconsistently_wound_meshes_are_fine)
     assert_consistent(&mesh, false);
     static const int32_t hinges[] = {0, 1, 3, 2, 0, 2, 3, 1, 0, 3, 2, 1, 1, 2, 3, 0, 1, 3, 2, 0, 2, 3, 1, 0};
     ck_assert_mem_eq(mesh.hinge, hinges, sizeof hinges);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -603,7 +605,7 @@ START_TEST(measures_of_a_known_triangle)
     for (int i = 0; i < 3; i++)
         ck_assert_double_eq(mesh.node_area[i], 2);
     ck_assert_int_eq(mesh.hinge_count, 0);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -627,7 +629,7 @@ START_TEST(a_node_of_high_degree)
     drape_mesh mesh = make(ctx, &def);
     ck_assert_int_eq(mesh.hinge_count, SPOKES);
     ck_assert_int_eq(mesh.edge_count, 2 * SPOKES);
-    drape_mesh_free(ctx, &mesh);
+    drape_mesh_free(&mesh);
     free(triangle);
     free(x);
     drape_context_destroy(&ctx);
@@ -648,7 +650,7 @@ START_TEST(every_failed_allocation_is_reported_and_none_leaks)
         ck_assert(status == DRAPE_OK || status == DRAPE_E_MEMORY);
         if (status)
             assert_empty(&mesh);
-        drape_mesh_free(ctx, &mesh);
+        drape_mesh_free(&mesh);
         drape_context_destroy(&ctx);
         ck_assert_int_eq(memory.live, 0);
     }

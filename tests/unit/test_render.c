@@ -32,12 +32,13 @@ START_TEST(bodies_lie_on_their_surface)
 {
     scene h = scene_model(CLOTH, "", colliders);
     const drape_model *model = h.model;
+    drape_arena arena = drape_arena_of(h.ctx);
     for (int32_t c = 0; c < model->collider_count; c++) {
         const drape_collider *collider = &model->colliders[c];
         drape_body body;
         double off = 0;
-        ck_assert_int_eq(drape_body_create(h.ctx, collider, (const double[3]){0}, 4, &body), DRAPE_OK);
-        ck_assert_int_eq(body.endless, strcmp(collider->ops->name, "plane") == 0);
+        ck_assert_int_eq(drape_body_create(&arena, collider, (const double[3]){0}, 4, &body), DRAPE_OK);
+        ck_assert_int_eq(body.endless, strcmp(collider->ops->entry.name, "plane") == 0);
         ck_assert(body.vertex_count > 100 && body.vertex_count % 3 == 0);
         for (size_t i = 0; i < body.vertex_count; i++) {
             const float *v = body.vertex + 6 * i;
@@ -47,8 +48,8 @@ START_TEST(bodies_lie_on_their_surface)
             ck_assert(fabsf(drape_dot(v + 3, v + 3) - 1) < 1e-5f);
         }
         assert_below(off, 5e-7);
-        drape_body_free(h.ctx, &body);
     }
+    drape_arena_free(&arena);
     scene_close(&h);
 }
 END_TEST
@@ -60,16 +61,17 @@ START_TEST(corners_of_a_box_are_sharp)
     scene h = scene_model(CLOTH, "",
                           ", 'colliders': [{'type': 'box', 'center': [0, 0, 0], 'size': [0.5, 0.3, 0.7]}]");
     const drape_model *model = h.model;
+    drape_arena arena = drape_arena_of(h.ctx);
     drape_body body;
     float nearest = 1;
-    ck_assert_int_eq(drape_body_create(h.ctx, &model->colliders[0], (const double[3]){0}, 2, &body),
+    ck_assert_int_eq(drape_body_create(&arena, &model->colliders[0], (const double[3]){0}, 2, &body),
                      DRAPE_OK);
     for (size_t i = 0; i < body.vertex_count; i++) {
         const float *v = body.vertex + 6 * i;
         nearest = fminf(nearest, hypotf(hypotf(v[0] - 0.25f, v[1] - 0.15f), v[2] - 0.35f));
     }
     assert_below((double)nearest, 0.01 * 0.7 / 56);
-    drape_body_free(h.ctx, &body);
+    drape_arena_free(&arena);
     scene_close(&h);
 }
 END_TEST
@@ -83,6 +85,7 @@ START_TEST(cloth_is_drawn_round_through_its_nodes)
 {
     drape_skin skin;
     scene h = scene_model(CLOTH, "", "");
+    drape_arena arena = drape_arena_of(h.ctx);
     const drape_model *model = h.model;
     float x[3 * 81];
     for (size_t i = 0; i < 81; i++) {
@@ -91,9 +94,9 @@ START_TEST(cloth_is_drawn_round_through_its_nodes)
         x[3 * i + 1] = (float)y;
         x[3 * i + 2] = (float)w;
     }
-    ck_assert_int_eq(drape_skin_create(h.ctx, model, &skin), DRAPE_OK);
+    ck_assert_int_eq(drape_skin_create(&arena, model, &skin), DRAPE_OK);
     ck_assert_int_ge(skin.level, 4);
-    drape_skin_fit(&skin, x, NULL);
+    drape_skin_update(&skin, x, NULL);
     double off_normal = 0, off_sphere = 0;
     for (size_t i = 0; i < skin.vertex_count; i++) {
         const drape_skin_vertex *v = &skin.vertex[i];
@@ -110,7 +113,7 @@ START_TEST(cloth_is_drawn_round_through_its_nodes)
     assert_below(off_sphere, 0.16 * 0.16 / 8 / 2);
     for (size_t i = 0; i < skin.index_count; i++)
         ck_assert(skin.index[i] < skin.vertex_count);
-    drape_skin_free(&skin);
+    drape_arena_free(&arena);
     scene_close(&h);
 }
 END_TEST
@@ -124,11 +127,12 @@ START_TEST(texture_is_not_mirrored)
         drape_skin skin;
         float x[3 * 81];
         scene h = scene_model(CLOTH, orientations[o], "");
+        drape_arena arena = drape_arena_of(h.ctx);
         const drape_model *model = h.model;
-        ck_assert_int_eq(drape_skin_create(h.ctx, model, &skin), DRAPE_OK);
+        ck_assert_int_eq(drape_skin_create(&arena, model, &skin), DRAPE_OK);
         for (size_t i = 0; i < 3 * 81; i++)
             x[i] = (float)model->rest[i];
-        drape_skin_fit(&skin, x, NULL);
+        drape_skin_update(&skin, x, NULL);
         for (size_t i = 0; i < skin.index_count; i += 3) {
             const drape_skin_vertex *a = &skin.vertex[skin.index[i]], *b = &skin.vertex[skin.index[i + 1]],
                                     *c = &skin.vertex[skin.index[i + 2]];
@@ -142,7 +146,7 @@ START_TEST(texture_is_not_mirrored)
             drape_cross(e1, e2, n);
             ck_assert(area > 0 && drape_dot(n, a->n) > 0);
         }
-        drape_skin_free(&skin);
+        drape_arena_free(&arena);
         scene_close(&h);
     }
 }
@@ -183,7 +187,8 @@ START_TEST(letters_are_all_there)
     const char *units = "²·°×", *unknown = "€";
     float advance;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
-    ck_assert_int_eq(drape_font_create(ctx, 12, &font), DRAPE_OK);
+    drape_arena arena = drape_arena_of(ctx);
+    ck_assert_int_eq(drape_font_create(&arena, 12, &font), DRAPE_OK);
     for (char c = 33; c < 127; c++) {
         if (strchr("$&@`", c))
             continue; /* no unit and no name of ours has these */
@@ -200,7 +205,7 @@ START_TEST(letters_are_all_there)
         ck_assert_int_gt(drape_font_next(&font, &units, &advance), 0);
     ck_assert_int_eq(drape_font_next(&font, &unknown, &advance), 0);
     ck_assert_int_eq(drape_font_next(&font, &unknown, &advance), -1);
-    drape_font_free(ctx, &font);
+    drape_arena_free(&arena);
     drape_context_destroy(&ctx);
 }
 END_TEST
@@ -237,10 +242,12 @@ END_TEST
 START_TEST(shadings_are_found_by_name)
 {
     for (int i = 0; drape_shadings[i]; i++) {
-        ck_assert_ptr_eq(drape_shading_find(drape_shadings[i]->name), drape_shadings[i]);
-        ck_assert(drape_shadings[i]->summary && strstr(drape_shadings[i]->source, "vec3 shade(Surface s)"));
+        ck_assert_int_eq(drape_registry_find(&drape_shading_registry, NULL, drape_shadings[i]->entry.name),
+                         i);
+        ck_assert(drape_shadings[i]->entry.summary &&
+                  strstr(drape_shadings[i]->source, "vec3 shade(Surface s)"));
     }
-    ck_assert_ptr_null(drape_shading_find("lambert"));
+    ck_assert_int_eq(drape_registry_find(&drape_shading_registry, NULL, "lambert"), -1);
 }
 END_TEST
 

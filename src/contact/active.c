@@ -1,0 +1,139 @@
+/* active.c: see active.h. */
+#include "contact/active.h"
+
+#include "contact/list.h"
+
+#include <string.h>
+
+#define SLOTS 4 /* of the hash table, for each contact that there is room for */
+
+/* Removes the nodes that have no weight. */
+static void reduce(drape_active_contact *contact)
+{
+    int which[4], points = contact->gap.closest.points;
+    if (points < 4 || contact->gap.mollified || contact->gap.fixed_normal)
+        return;
+    drape_closest_reduce(&contact->gap.closest, which);
+    for (int a = 0; a < contact->gap.closest.points; a++)
+        contact->pair.node[a] = contact->pair.node[which[a]];
+    for (int a = contact->gap.closest.points; a < 4; a++)
+        contact->pair.node[a] = -1;
+}
+
+/* Whether several pairs can be this contact: two points, or a point and an edge. A contact of four nodes is
+ * only that of its own pair, and so is one that depends on more than its nodes. */
+static bool is_shared(const drape_active_contact *contact)
+{
+    const int points = contact->gap.closest.points;
+    return points > 1 && points < 4 && !contact->gap.mollified && !contact->gap.fixed_normal;
+}
+
+static void sort_two(int32_t *a)
+{
+    int32_t lower = a[0] < a[1] ? a[0] : a[1];
+    a[1] += a[0] - lower;
+    a[0] = lower;
+}
+
+/* Two points, or a point and then the ends of an edge, ascending. */
+static void key_of(const drape_active_contact *contact, int32_t key[3])
+{
+    const int32_t *n = contact->pair.node;
+    const double *c = contact->gap.closest.c;
+    if (contact->gap.closest.points == 2) {
+        const int32_t points[3] = {n[0], n[1], -1};
+        memcpy(key, points, sizeof points);
+        sort_two(key);
+        return;
+    }
+    int positive = (c[0] > 0) + (c[1] > 0) + (c[2] > 0),
+        single = 0; /* the sign of one weight is unlike the others */
+    while (single < 2 && (c[single] > 0) != (positive == 1))
+        single++;
+    const int32_t nodes[3] = {n[single], n[single == 0], n[single == 2 ? 1 : 2]};
+    memcpy(key, nodes, sizeof nodes);
+    sort_two(key + 1);
+}
+
+static bool is_same(const drape_active_contact *a, const drape_active_contact *b)
+{
+    int32_t key[3], other[3];
+    if (a->pair.collider != b->pair.collider || a->pair.distance != b->pair.distance ||
+        a->gap.closest.points != b->gap.closest.points)
+        return false;
+    key_of(a, key);
+    key_of(b, other);
+    return memcmp(key, other, sizeof key) == 0;
+}
+
+/* The slot of a contact, or the free one for it. */
+static int32_t *slot_of(const drape_active_set *set, const drape_active_contact *contact)
+{
+    int32_t key[3];
+    key_of(contact, key);
+    uint64_t hash = 0;
+    for (int a = 0; a < 3; a++)
+        hash = (hash ^ (uint32_t)key[a]) * 0x9e3779b97f4a7c15u;
+    uint64_t size = SLOTS * (uint64_t)set->room, at = (hash >> 20) % size;
+    while (set->slots[at] > 0 && !is_same(contact, &set->contacts[set->slots[at] - 1]))
+        at = at + 1 < size ? at + 1 : 0;
+    return &set->slots[at];
+}
+
+/* Room for one more contact, in the table too. */
+static bool grow(drape_active_set *set)
+{
+    int32_t room = set->room;
+    drape_active_contact *contacts =
+        drape_list_grow(set->arena, set->contacts, set->count, &room, sizeof *contacts);
+    if (!contacts)
+        return false;
+    set->contacts = contacts;
+    if (room == set->room)
+        return true;
+    int32_t *slots = drape_arena_take(set->arena, SLOTS * (size_t)room, sizeof *slots);
+    if (!slots)
+        return false;
+    drape_arena_release(set->arena, set->slots);
+    set->slots = slots;
+    set->room = room;
+    for (int32_t i = 0; i < set->count; i++)
+        if (is_shared(&set->contacts[i]))
+            *slot_of(set, &set->contacts[i]) = i + 1;
+    return true;
+}
+
+static bool add(drape_active_set *set, const drape_active_contact *contact)
+{
+    if (!grow(set))
+        return false;
+    int32_t *slot = is_shared(contact) ? slot_of(set, contact) : NULL;
+    if (slot && *slot > 0) {
+        set->contacts[*slot - 1].pair.area += contact->pair.area;
+        return true;
+    }
+    if (slot)
+        *slot = set->count + 1;
+    set->contacts[set->count++] = *contact;
+    return true;
+}
+
+drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates, double moved,
+                                   const drape_configuration *at)
+{
+    set->count = 0;
+    if (set->slots)
+        memset(set->slots, 0, SLOTS * (size_t)set->room * sizeof *set->slots);
+    for (int32_t i = 0; i < candidates->count; i++) {
+        const drape_pair *pair = &candidates->pairs[i];
+        drape_active_contact contact;
+        if (!drape_candidate_may(pair, moved, pair->distance) ||
+            !drape_pair_gap(pair, at, candidates->broad->rest, &contact.gap))
+            continue;
+        contact.pair = *pair;
+        reduce(&contact);
+        if (!add(set, &contact))
+            return DRAPE_E_MEMORY;
+    }
+    return DRAPE_OK;
+}

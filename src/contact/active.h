@@ -1,0 +1,28 @@
+/*
+ * active.h: the active set: the candidates whose gap is below the activation distance, each with its
+ * geometry. Pairs of large pieces are often contacts of smaller ones (an edge that is closest at its end is
+ * that point): these are listed once, with the sum of their areas.
+ */
+#ifndef DRAPE_CONTACT_ACTIVE_H
+#define DRAPE_CONTACT_ACTIVE_H
+
+#include "contact/candidates.h"
+
+typedef struct drape_active_contact {
+    drape_pair pair; /* its nodes are the points of the gap, -1 beyond */
+    drape_gap gap;
+} drape_active_contact;
+
+typedef struct drape_active_set {
+    drape_arena *arena;
+    drape_active_contact *contacts; /* (count of room) */
+    int32_t count, room;
+    int32_t *slots; /* (several x room) hash table by nodes: 1 + a contact, 0: free */
+} drape_active_set;
+
+/* Lists the active contacts of a configuration in which no point has moved farther than `moved` from the
+ * search of the candidates. Errors: DRAPE_E_MEMORY. */
+drape_status drape_active_set_list(drape_active_set *set, const drape_candidates *candidates, double moved,
+                                   const drape_configuration *at);
+
+#endif

@@ -1,0 +1,122 @@
+/* ccd.c: continuous collision detection: the step fraction of a straight displacement without collisions. See
+ * contact.h. */
+#include "contact/parts.h"
+
+#include "base/clock.h"
+#include "base/vec3.h"
+
+#include <string.h>
+
+#define KEEP_ITERATE 0.5 /* of a gap, where an iterate of Newton is cut short */
+#define MARCH_SHARE  0.9
+#define MAX_MARCHES  10000 /* of a node along its path */
+
+/* A displacement of all points, and the first pair that limits it. */
+typedef struct path {
+    const double *x, *y; /* (points x 3) */
+    double keep, fraction;
+    bool core;
+    drape_pair limiting;
+} path;
+
+/* Not searched beyond the fraction that another pair leaves: if forces throw nodes very far, a pair
+ * approaches so slowly relative to its speed that searching each to its own end would take for ever. */
+static void follow(void *user, const drape_pair *pair)
+{
+    path *p = user;
+    const double fraction = drape_pair_step_fraction(pair, p->x, p->y, p->keep, p->core, p->fraction);
+    if (fraction < p->fraction) {
+        p->fraction = fraction;
+        p->limiting = *pair;
+    }
+}
+
+static double longest_move(const drape_contact *c, const path *p)
+{
+    double largest = 0, move[3];
+    for (size_t i = 0; i < (size_t)c->broad.points; i++) {
+        vec3_sub(p->y + 3 * i, p->x + 3 * i, move);
+        largest = fmax(largest, vec3_dot(move, move));
+    }
+    return sqrt(largest);
+}
+
+/* Paths are straight: if both ends are near the last search, all between them is. Two points approach each
+ * other by no more than the sum of their moves. */
+double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
+                                   const drape_collider_pose *pose, double keep, bool core,
+                                   drape_pair *limiting)
+{
+    const drape_configuration from = {.model = c->model, .x = x, .pose = pose},
+                              to = {.model = c->model, .x = y, .pose = pose};
+    path p = {.x = x, .y = y, .keep = keep, .fraction = 1, .core = core};
+    double moved;
+    const drape_candidates *candidates = drape_contact_covering(c, &from, &moved);
+    if (candidates && drape_candidates_moved(candidates, &to) <= candidates->margin) {
+        const double reach = 2 * longest_move(c, &p);
+        for (int32_t i = 0; i < candidates->count; i++)
+            if (drape_pair_points(&candidates->pairs[i]) > 1 &&
+                drape_candidate_may(&candidates->pairs[i], moved, reach))
+                follow(&p, &candidates->pairs[i]);
+    } else {
+        const double start = drape_clock_seconds();
+        drape_broad_phase_pairs(&c->broad, x, y, -c->broad.max_distance, follow, &p);
+        c->search_seconds += drape_clock_seconds() - start;
+    }
+    *limiting = p.limiting;
+    return p.fraction;
+}
+
+/* The same for a node and a surface: marching by the distance, which no path can outrun, until keep of the
+ * gap is left. 1 from inside. */
+static double march(const drape_collider *collider, const drape_collider_pose *pose, const double *x,
+                    const double *y, double keep)
+{
+    double gap = drape_collider_distance(collider, pose, x, NULL, NULL), least = keep * gap, t = 0, p[3],
+           at[3];
+    vec3_sub(y, x, p);
+    const double length = vec3_norm(p);
+    for (int i = 0; gap > least && length > gap - least && i < MAX_MARCHES; i++) {
+        t += MARCH_SHARE * (gap - least) / length;
+        if (t >= 1)
+            return 1;
+        memcpy(at, x, sizeof at);
+        vec3_add_scaled(t, p, at);
+        gap = drape_collider_distance(collider, pose, at, NULL, NULL);
+        if (gap < least + (1 - MARCH_SHARE) * least)
+            return t;
+    }
+    return 1;
+}
+
+double drape_contact_step_fraction(drape_contact *c, const double *x, const double *y, double t)
+{
+    const double start = drape_clock_seconds(), span[2] = {t, t};
+    drape_pair limiting;
+    drape_contact_poses(c, t, span, c->path_pose);
+    drape_contact_fill(c, x, c->path_pose, c->from);
+    drape_contact_fill(c, y, c->path_pose, c->to);
+    double fraction =
+        drape_contact_free_fraction(c, c->from, c->to, c->path_pose, KEEP_ITERATE, false, &limiting);
+    for (int32_t k = 0; k < c->model->collider_count; k++) {
+        const drape_collider *collider = &c->model->colliders[k];
+        for (int32_t i = 0; collider->ops->smooth && i < c->model->free_count; i++) {
+            const size_t at = 3 * (size_t)c->model->node_of_free[i];
+            fraction = fmin(fraction, march(collider, &c->path_pose[k], x + at, y + at, KEEP_ITERATE));
+        }
+    }
+    c->seconds += drape_clock_seconds() - start;
+    return fraction;
+}
+
+bool drape_contact_crosses(drape_contact *c, const double *y, double t)
+{
+    const double start = drape_clock_seconds(), span[2] = {t, t};
+    drape_pair limiting;
+    drape_contact_poses(c, t, span, c->path_pose);
+    drape_contact_fill(c, y, c->path_pose, c->to);
+    const double fraction =
+        drape_contact_free_fraction(c, c->start, c->to, c->path_pose, DRAPE_KEEP_STEP, true, &limiting);
+    c->seconds += drape_clock_seconds() - start;
+    return fraction < 1;
+}

@@ -1,0 +1,89 @@
+/* forces.c: forces and energy of the active set, summed. See contact.h. */
+#include "contact/parts.h"
+
+#include "base/clock.h"
+#include "base/vec3.h"
+
+#include <string.h>
+
+/* Pairs with a shorter activation distance take up the same energy. */
+drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_pair *pair)
+{
+    const drape_contact_def *def = &c->model->contact;
+    return (drape_contact_law){.distance = pair->distance,
+                               .stiffness = def->stiffness * pair->area * (def->distance / pair->distance),
+                               .friction = pair->collider >= 0 ? c->model->colliders[pair->collider].friction
+                                                               : def->self_friction,
+                               .velocity = def->friction_velocity};
+}
+
+void drape_contact_velocities(const drape_contact *c, const drape_active_contact *contact, double v[4][3])
+{
+    for (int a = 0; a < contact->gap.closest.points; a++)
+        memcpy(v[a], c->v + 3 * (size_t)contact->pair.node[a], sizeof v[a]);
+    if (contact->gap.closest.points == 1)
+        vec3_sub(v[0], c->pose[contact->pair.collider].velocity, v[0]);
+}
+
+static void scatter(drape_contact *c, const drape_active_contact *contact, const double *from, double *g)
+{
+    const int32_t *node = contact->pair.node, collider = contact->pair.collider;
+    for (int a = 0; a < contact->gap.closest.points; a++)
+        for (int k = 0; k < 3 && node[a] < c->model->node_count; k++) {
+            g[3 * (size_t)node[a] + (size_t)k] += from[3 * a + k];
+            if (collider >= 0)
+                c->on_collider[3 * (size_t)collider + (size_t)k] -= from[3 * a + k];
+        }
+}
+
+static void add_normal(drape_contact *c, const drape_active_contact *contact, const drape_contact_law *law,
+                       double *g)
+{
+    double local[12];
+    drape_contact_gradient(&contact->gap, law, local);
+    scatter(c, contact, local, g);
+}
+
+static void add_friction(drape_contact *c, const drape_active_contact *contact, const drape_contact_law *law,
+                         double lambda, double *g)
+{
+    double local[12], v[4][3];
+    drape_contact_velocities(c, contact, v);
+    drape_friction_force(&contact->gap, law, lambda, v, local, NULL);
+    scatter(c, contact, local, g);
+}
+
+void drape_contact_add_forces(drape_contact *c, bool normal, bool friction, double *g)
+{
+    const double start = drape_clock_seconds();
+    memset(c->on_collider, 0, 3 * (size_t)c->model->collider_count * sizeof *c->on_collider);
+    for (int32_t i = 0; i < c->active.count; i++) {
+        const drape_active_contact *contact = &c->active.contacts[i];
+        const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
+        if (normal)
+            add_normal(c, contact, &law, g);
+        if (friction && !c->model->contact.lagged && law.friction > 0)
+            add_friction(c, contact, &law, drape_contact_normal_force(&contact->gap, &law), g);
+    }
+    for (int32_t i = 0; friction && i < c->lagged_count; i++) {
+        const drape_lagged *lagged = &c->lagged[i];
+        const drape_contact_law law = drape_contact_law_of(c, &lagged->contact.pair);
+        add_friction(c, &lagged->contact, &law, lagged->lambda, g);
+    }
+    c->seconds += drape_clock_seconds() - start;
+}
+
+const double *drape_contact_on_colliders(const drape_contact *c)
+{
+    return c->on_collider;
+}
+
+double drape_contact_potential(const drape_contact *c)
+{
+    double sum = 0;
+    for (int32_t i = 0; i < c->active.count; i++) {
+        const drape_contact_law law = drape_contact_law_of(c, &c->active.contacts[i].pair);
+        sum += drape_contact_energy(&c->active.contacts[i].gap, &law);
+    }
+    return sum;
+}

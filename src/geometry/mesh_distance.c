@@ -1,0 +1,255 @@
+/*
+ * mesh_distance.c: see mesh_distance.h.
+ *
+ * The nearest point is searched depth first in a tree of boxes, the nearer child before the other (Ericson
+ * 2005, section 6.3; points of triangles: 5.1.5).
+ *
+ * x is outside if n . (x - c) > 0 for the angle-weighted pseudo-normal n of the face, edge or point that
+ * contains the nearest point c (Baerentzen and Aanaes 2005, "Signed distance computation using the angle
+ * weighted pseudonormal", theorem 1). This holds for every closed mesh without self-intersections.
+ */
+#include "geometry/mesh_distance.h"
+
+#include "geometry/bvh.h"
+#include "geometry/round.h"
+
+#include <string.h>
+
+struct drape_mesh_distance {
+    drape_bvh boxes;      /* of the shape's triangles */
+    int32_t *edge_of;     /* (triangle_count x 3) segment between corners k and k + 1 */
+    double *face_normal;  /* (triangle_count x 3) of length 1 */
+    double *edge_normal;  /* (segment_count x 3) of any length */
+    double *point_normal; /* (point_count x 3) of any length */
+};
+
+/* ---- Normals ---- */
+
+static const double *corner(const drape_collider_shape *s, int32_t t, int k)
+{
+    return s->point + 3 * (size_t)s->triangle[3 * (size_t)t + (size_t)(k % 3)];
+}
+
+static double angle_between(const double *a, const double *b)
+{
+    double cross[3];
+    vec3_cross(a, b, cross);
+    return atan2(vec3_norm(cross), vec3_dot(a, b));
+}
+
+static void add_normals(const drape_collider_shape *s, int32_t t, drape_mesh_distance *mesh)
+{
+    double *n = mesh->face_normal + 3 * (size_t)t, to_next[3], to_last[3];
+    vec3_sub(corner(s, t, 1), corner(s, t, 0), to_next);
+    vec3_sub(corner(s, t, 2), corner(s, t, 0), to_last);
+    vec3_cross(to_next, to_last, n);
+    double length = vec3_norm(n);
+    for (int k = 0; k < 3; k++)
+        n[k] /= length;
+    for (int k = 0; k < 3; k++) {
+        size_t at = 3 * (size_t)t + (size_t)k;
+        vec3_sub(corner(s, t, k + 1), corner(s, t, k), to_next);
+        vec3_sub(corner(s, t, k + 2), corner(s, t, k), to_last);
+        vec3_add_scaled(angle_between(to_next, to_last), n, mesh->point_normal + 3 * (size_t)s->triangle[at]);
+        vec3_add_scaled(1, n, mesh->edge_normal + 3 * (size_t)mesh->edge_of[at]);
+    }
+}
+
+/* The number of segment a b. */
+static int32_t find_segment(const drape_collider_shape *s, int32_t a, int32_t b)
+{
+    int32_t low = 0, high = s->segment_count - 1, least = a < b ? a : b, most = a < b ? b : a;
+    while (low < high) {
+        int32_t middle = low + (high - low) / 2;
+        const int32_t *ends = s->segment + 2 * (size_t)middle;
+        if (ends[0] < least || (ends[0] == least && ends[1] < most))
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+static void fill_normals(const drape_collider_shape *s, drape_mesh_distance *mesh)
+{
+    for (int32_t t = 0; t < s->triangle_count; t++) {
+        const int32_t *n = s->triangle + 3 * (size_t)t;
+        for (int k = 0; k < 3; k++)
+            mesh->edge_of[3 * (size_t)t + (size_t)k] = find_segment(s, n[k], n[(k + 1) % 3]);
+        add_normals(s, t, mesh);
+    }
+}
+
+const drape_mesh_distance *drape_mesh_distance_create(drape_arena *arena, const drape_collider_shape *shape)
+{
+    const size_t triangles = (size_t)shape->triangle_count;
+    drape_mesh_distance *mesh = drape_arena_take(arena, 1, sizeof *mesh);
+    if (!mesh ||
+        drape_bvh_build(arena, shape->triangle_count, 3, shape->triangle, shape->point, &mesh->boxes))
+        return NULL;
+    mesh->edge_of = drape_arena_take(arena, triangles, 3 * sizeof *mesh->edge_of);
+    mesh->face_normal = drape_arena_take(arena, triangles, 3 * sizeof *mesh->face_normal);
+    mesh->edge_normal = drape_arena_take(arena, (size_t)shape->segment_count, 3 * sizeof *mesh->edge_normal);
+    mesh->point_normal = drape_arena_take(arena, (size_t)shape->point_count, 3 * sizeof *mesh->point_normal);
+    if (drape_arena_status(arena))
+        return NULL;
+    drape_bvh_fit(&mesh->boxes, shape->point, NULL);
+    fill_normals(shape, mesh);
+    return mesh;
+}
+
+/* ---- The nearest point ---- */
+
+typedef enum feature_kind { FACE, EDGE, POINT } feature_kind;
+
+typedef struct nearest {
+    double squared; /* of the distance [m2] */
+    double at[3];
+    int32_t triangle;
+    feature_kind kind;
+    int which; /* EDGE: it runs from this corner to the next; POINT: this corner */
+} nearest;
+
+static void offer(nearest *best, const double *x, const double *at, int32_t t, feature_kind kind, int which)
+{
+    double from[3];
+    vec3_sub(x, at, from);
+    double squared = vec3_dot(from, from);
+    if (squared < best->squared) {
+        *best = (nearest){.squared = squared, .triangle = t, .kind = kind, .which = which};
+        memcpy(best->at, at, sizeof best->at);
+    }
+}
+
+/* Offers the point of the edge from corner k that is nearest to x. */
+static void offer_edge(const drape_collider_shape *s, int32_t t, int k, const double *x, nearest *best)
+{
+    double along[3], from[3], at[3];
+    const double *a = corner(s, t, k), *b = corner(s, t, k + 1);
+    vec3_sub(b, a, along);
+    vec3_sub(x, a, from);
+    double share = vec3_dot(from, along) / vec3_dot(along, along);
+    if (share <= 0) {
+        offer(best, x, a, t, POINT, k);
+    } else if (share >= 1) {
+        offer(best, x, b, t, POINT, (k + 1) % 3);
+    } else {
+        memcpy(at, a, sizeof at);
+        vec3_add_scaled(share, along, at);
+        offer(best, x, at, t, EDGE, k);
+    }
+}
+
+/* If x lies inside of all three edges, the nearest point is the foot of its perpendicular; otherwise it is on
+ * an edge that x lies outside of. */
+static void offer_triangle(const drape_collider_shape *s, const drape_mesh_distance *mesh, int32_t t,
+                           const double *x, nearest *best)
+{
+    const double *n = mesh->face_normal + 3 * (size_t)t;
+    double along[3], from[3], outward[3], at[3];
+    bool inside = true;
+    for (int k = 0; k < 3; k++) {
+        vec3_sub(corner(s, t, k + 1), corner(s, t, k), along);
+        vec3_sub(x, corner(s, t, k), from);
+        vec3_cross(along, n, outward);
+        if (vec3_dot(outward, from) >= 0) {
+            inside = false;
+            offer_edge(s, t, k, x, best);
+        }
+    }
+    if (inside) {
+        memcpy(at, x, sizeof at);
+        vec3_add_scaled(-vec3_dot(n, from), n, at);
+        offer(best, x, at, t, FACE, 0);
+    }
+}
+
+static double squared_distance(const drape_box *b, const double *x)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++) {
+        double beyond = fmax(fmax(b->low[k] - x[k], x[k] - b->high[k]), 0);
+        sum += beyond * beyond;
+    }
+    return sum;
+}
+
+/* A branch that has not been visited yet. */
+typedef struct pending {
+    int32_t index;
+    double squared; /* of the distance of its box */
+} pending;
+
+static pending pending_at(const drape_mesh_distance *mesh, int32_t index, const double *x)
+{
+    return (pending){index, squared_distance(&mesh->boxes.branches[index].box, x)};
+}
+
+static nearest find_nearest(const drape_mesh_distance *mesh, const drape_collider_shape *s, const double *x)
+{
+    nearest best = {.squared = INFINITY};
+    pending stack[DRAPE_BVH_DEPTH] = {{0, 0}};
+    int height = 1;
+    while (height > 0) {
+        const pending next = stack[--height];
+        const drape_bvh_branch *branch = &mesh->boxes.branches[next.index];
+        if (next.squared >= best.squared)
+            continue;
+        if (branch->second == 0) {
+            for (int32_t i = 0; i < branch->count; i++)
+                offer_triangle(s, mesh, mesh->boxes.order[branch->first + i], x, &best);
+            continue;
+        }
+        const pending one = pending_at(mesh, next.index + 1, x), other = pending_at(mesh, branch->second, x);
+        bool one_is_near = one.squared <= other.squared;
+        stack[height++] = one_is_near ? other : one;
+        stack[height++] = one_is_near ? one : other;
+    }
+    return best;
+}
+
+/* ---- The distance ---- */
+
+static double face_distance(const double *n, const double *from, double *normal, double *curvature)
+{
+    if (normal)
+        memcpy(normal, n, 3 * sizeof *normal);
+    if (curvature)
+        memset(curvature, 0, 9 * sizeof *curvature);
+    return vec3_dot(from, n);
+}
+
+/* The distance from an edge with the direction u, or from a point (u NULL). On it the normal is the
+ * pseudo-normal. */
+static double round_signed(const double *pseudo, const double *u, const double *from, double *normal,
+                           double *curvature)
+{
+    double sign = vec3_dot(pseudo, from) < 0 ? -1 : 1, length = round_distance(from, u, normal, curvature);
+    double pseudo_length = vec3_norm(pseudo);
+    for (int k = 0; normal && k < 3; k++)
+        normal[k] = length > 0 ? sign * normal[k] : pseudo[k] / pseudo_length;
+    for (int i = 0; curvature && i < 9; i++)
+        curvature[i] *= sign;
+    return sign * length;
+}
+
+double drape_mesh_distance_at(const drape_mesh_distance *mesh, const drape_collider_shape *shape,
+                              const double *x, double *normal, double *curvature)
+{
+    const nearest found = find_nearest(mesh, shape, x);
+    size_t place = 3 * (size_t)found.triangle + (size_t)found.which;
+    double from[3], u[3];
+    if (found.kind == FACE) {
+        vec3_sub(x, corner(shape, found.triangle, 0), from);
+        return face_distance(mesh->face_normal + 3 * (size_t)found.triangle, from, normal, curvature);
+    }
+    vec3_sub(x, found.at, from);
+    if (found.kind == POINT)
+        return round_signed(mesh->point_normal + 3 * (size_t)shape->triangle[place], NULL, from, normal,
+                            curvature);
+    vec3_sub(corner(shape, found.triangle, found.which + 1), corner(shape, found.triangle, found.which), u);
+    double length = vec3_norm(u);
+    for (int k = 0; k < 3; k++)
+        u[k] /= length;
+    return round_signed(mesh->edge_normal + 3 * (size_t)mesh->edge_of[place], u, from, normal, curvature);
+}

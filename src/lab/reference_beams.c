@@ -1,0 +1,126 @@
+/* reference_beams.c: strips clamped horizontally at one end, at rest under loads, against rods. Without lateral
+ * contraction (nu = 0) strip and rod are the same. */
+#include "lab/rod.h"
+#include "lab/strip.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#define BEAM .model = "stretch.cst, bend.midedge; irregular"
+
+/* ---- Under its own weight: a case is G = rho g L^3/B ---- */
+
+static double slope(double weight)
+{
+    double drop, reach;
+    drape_rod_tip(weight, 0, &drop, &reach);
+    return drop / reach;
+}
+
+/* At small G the membrane is soft, so that forces are far above the rounding of its own; at large G thin, so that its
+ * stretch stays below 1e-4. */
+static int heavy_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    const double tolerance = c->parameter * 1e-13; /* at most a thousandth of the weight of a node */
+    return STRIP_SCENE(text, .columns = c->parameter > 50 ? 201 : 81, .rows = 4, .width = 0.02,
+                       .thickness = c->parameter > 5 ? 0.004 : 0.02,
+                       .gravity = {0, -strip_gravity(c->parameter), 0}, .tolerance = tolerance);
+}
+
+static drape_status measure_slope(drape_reference_run *run, double *value)
+{
+    double tip[3];
+    drape_status status = lab_tip(run, tip);
+    *value = -tip[1] / tip[0];
+    return status;
+}
+
+DRAPE_REFERENCE(
+    cantilever, .entry.summary = "drop over reach of the end", .unit = "1", .parameter = "G = rho g L^3/B",
+    DRAPE_CASES(0.01, 0.1, 1, 10, 100, 1000), BEAM,
+    .entry.reference = "theta'' + G (1 - s) cos theta = 0; Romero et al. 2021, the cantilever test",
+    .tolerance = 0.01, .expected = slope, .scene = heavy_scene, .measure = measure_slope);
+
+/* ASTM D1388 pushes a strip over an edge until the chord to its end falls to 41.5 degrees, and takes the bending length
+ * as half of the overhang: there G = 8, within 0.04 %. The rod's own angle at G = 8 is 41.487 degrees. */
+static int chord_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return STRIP_SCENE(text, .columns = 81, .rows = 4, .width = 0.02, .thickness = 0.004,
+                       .gravity = {0, -strip_gravity(c->parameter), 0}, .tolerance = 1e-12);
+}
+
+DRAPE_REFERENCE(bending_length, .entry.summary = "angle of the chord to the end", .unit = "degree",
+                .parameter = "G = rho g L^3/B", DRAPE_CASES(8), BEAM,
+                .entry.reference = "ASTM D1388; Peirce 1930, The handle of cloth as a measurable quantity",
+                .tolerance = 0.005, .expected = drape_rod_chord, .scene = chord_scene, .measure = lab_chord);
+
+/* ---- A force at the end that stays vertical ---- */
+
+static double sinking(double force)
+{
+    double drop, reach;
+    drape_rod_tip(0, force, &drop, &reach);
+    return drop;
+}
+
+static int force_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    char terms[200];
+    snprintf(terms, sizeof terms,
+             "'bend.midedge', {'type': 'load.line', 'edge': 'right', 'force': [0, %.17g, 0]}",
+             -c->parameter * STRIP_RIGIDITY);
+    return STRIP_SCENE(text, .columns = 81, .rows = 4, .width = 0.02, .thickness = 0.004, .terms = terms,
+                       .tolerance = 1e-12);
+}
+
+DRAPE_REFERENCE(
+    end_load, .entry.summary = "sinking of the end w/L", .unit = "1", .parameter = "P L^2/B",
+    DRAPE_CASES(1, 2, 4), .model = "stretch.cst, bend.midedge, load.line; irregular",
+    .entry.reference =
+        "theta'' + P cos theta = 0; Bisshopp & Drucker 1945, Large deflection of cantilever beams",
+    .tolerance = 0.005, .expected = sinking, .scene = force_scene, .measure = lab_sinking);
+
+/* ---- Strips that become arcs: by a moment at the end, M/B, or since that is their shape at rest ---- */
+
+static double arc_rise(double curvature)
+{
+    return (1 - cos(curvature)) / curvature;
+}
+
+static drape_status measure_rise(drape_reference_run *run, double *value)
+{
+    double tip[3];
+    drape_status status = lab_tip(run, tip);
+    *value = tip[1];
+    return status;
+}
+
+static int moment_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    char terms[200];
+    snprintf(terms, sizeof terms, "'bend.midedge', {'type': 'load.moment', 'edge': 'right', 'moment': %.17g}",
+             c->parameter * STRIP_RIGIDITY);
+    return STRIP_SCENE(text, .columns = 81, .rows = 4, .width = 0.02, .thickness = 0.01, .terms = terms,
+                       .tolerance = 1e-11);
+}
+
+DRAPE_REFERENCE(end_moment, .entry.summary = "rise of the end w/L", .unit = "1", .parameter = "M L/B",
+                DRAPE_CASES(0.3, 1, 2, 3.1415926535897932,
+                            4.7123889803846899), /* to three quarters of a circle */
+                .model = "stretch.cst, bend.midedge, load.moment; irregular",
+                .entry.reference = "an arc of curvature M/B", .tolerance = 0.005, .expected = arc_rise,
+                .scene = moment_scene, .measure = measure_rise);
+
+/* It starts flat. */
+static int curved_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    char terms[100];
+    snprintf(terms, sizeof terms, "{'type': 'bend.midedge', 'curvature': [%.17g, 0, 0]}", c->parameter);
+    return STRIP_SCENE(text, .columns = 81, .rows = 4, .width = 0.02, .thickness = 0.02, .terms = terms,
+                       .tolerance = 1e-12);
+}
+
+DRAPE_REFERENCE(rest_curvature, .entry.summary = "rise of the end w/L", .unit = "1",
+                .parameter = "curvature L", DRAPE_CASES(1, 3.14159265358979323846), BEAM,
+                .entry.reference = "an arc", .tolerance = 0.005, .expected = arc_rise, .scene = curved_scene,
+                .measure = measure_rise);

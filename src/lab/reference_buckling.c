@@ -1,0 +1,216 @@
+/* reference_buckling.c: loads at which strips buckle. Where nothing disturbs them they stay straight, and the signs of the
+ * eigenvalues of the Hessian say whether that equilibrium is stable. */
+#include "lab/rod.h"
+#include "lab/strip.h"
+
+#include <gsl/gsl_errno.h>
+#include <gsl/gsl_multiroots.h>
+#include <math.h>
+#include <stdio.h>
+
+#define UNSTABLE .unit = "1", .measure = lab_unstable_modes
+
+/* ---- An upright strip, clamped at its foot, under its weight: here it lies along x, and gravity is along -x ---- */
+
+/* theta'' + G t theta = 0: Greenhill 1881. */
+static double greenhill(double unused)
+{
+    (void)unused;
+    return drape_rod_threshold(1, 5, 10);
+}
+
+static int upright_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return STRIP_SCENE(text, .columns = 41, .rows = 4, .width = 0.04, .thickness = 0.004,
+                       .gravity = {-strip_gravity(c->load), 0, 0}, .tolerance = 1e-11);
+}
+
+DRAPE_REFERENCE(self_buckling, .entry.summary = "G = rho g L^3/B at which an upright strip buckles", UNSTABLE,
+                DRAPE_CASES(0), .model = "stretch.cst, bend.midedge; irregular",
+                .entry.reference = "theta'' + G t theta = 0; Greenhill 1881", .tolerance = 0.02,
+                .expected = greenhill, .scene = upright_scene, .low = 0.9, .high = 1.1);
+
+/* ---- A strip clamped at one end with its width upright turns aside ---- */
+
+/* beta'' + q^2 t^4/(4 E I G J) beta = 0 (Prandtl 1899, Michell 1899): q L^3 = 12.8538 sqrt(E I G J). */
+static double prandtl(double bend, double twist)
+{
+    return 2 * sqrt(drape_rod_threshold(4, 20, 60)) * sqrt(bend * twist);
+}
+
+/* Over B w. The strip bends about its width with E I = B w and twists with
+ * G J = E h^3 w/(6 (1 + nu)) = 2 B w/(1 + nu). */
+static double lateral(double nu)
+{
+    return prandtl(1, 2 / (1 + nu));
+}
+
+/* The sag in the strip's own plane is (h/w)^2 of what it would be sideways. */
+static int lateral_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return STRIP_SCENE(text, .columns = 121, .rows = 5, .width = 0.03, .thickness = 0.001,
+                       .poisson = c->parameter, .upright = true, .gravity = {0, -strip_gravity(c->load), 0},
+                       .tolerance = 1e-10);
+}
+
+DRAPE_REFERENCE(
+    lateral_buckling, .entry.summary = "rho g L^3/B at which a strip on edge turns aside", UNSTABLE,
+    .parameter = "nu", DRAPE_CASES(0.35, 0), .model = "stretch.cst, bend.midedge; irregular",
+    .entry.reference = "q L^3 = 12.8538 sqrt(E I G J); Prandtl 1899, Michell 1899; Romero et al. 2021",
+    .tolerance = 0.05, .expected = lateral, .scene = lateral_scene, .low = 0.85, .high = 1.15);
+
+/* Hinges on the equilateral lattice are a plate with a bending Poisson ratio of -1/3, whatever the material's is:
+ * E I = (8/9) D w, G J = (8/3) D w, and q L^3 = 12.8538 sqrt(E I G J) is 19.79 D w; a plate of the membrane's own
+ * 1/3 has E I = (8/9) D w and G J = (4/3) D w. */
+static double lateral_plate(double unused)
+{
+    (void)unused;
+    return prandtl(8.0 / 9, 4.0 / 3);
+}
+
+static double lateral_hinges(double unused)
+{
+    (void)unused;
+    return prandtl(8.0 / 9, 8.0 / 3);
+}
+
+/* The strip runs along -z. load: rho g L^3/D. */
+static int hinges_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    enum { EDGES = 8, STRIPS = 240 }; /* across and along the strip */
+    const double edge = 0.035 / EDGES, thickness = 1e-3, poisson = 1.0 / 3, gravity = 9.81;
+    const double length = (STRIPS - 0.5) * sqrt(3) / 2 * edge; /* pins of two rows clamp in between */
+    const double modulus =
+        12 * (1 - poisson * poisson) * STRIP_RIGIDITY / (thickness * thickness * thickness);
+    return snprintf(
+        text, DRAPE_LAB_TEXT,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': %d, 'strips': %d, "
+        "'edge_length': %.17g,\n 'transform': {'rotate': [0, 0, 1, 90]}},\n "
+        "'material': {'young_modulus': %.17g, 'poisson_ratio': %.17g, 'thickness': %g, "
+        "'areal_density': %.17g},\n "
+        "'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'row': 0}, {'row': 1}]}],\n "
+        "'gravity': [0, %g, 0], 'integrator': {'method': 'static', 'tolerance': 1e-9}, 'duration': 1}",
+        EDGES, STRIPS, edge, modulus, poisson, thickness,
+        c->load * STRIP_RIGIDITY / (gravity * pow(length, 3)), -gravity);
+}
+
+DRAPE_REFERENCE(lateral_buckling_hinges, .entry.summary = "rho g L^3/D at which a strip on edge turns aside",
+                UNSTABLE, DRAPE_CASES(0), .model = "stretch.edge, bend.hinge; equilateral",
+                .entry.reference = "q L^3 = 12.8538 sqrt(E I G J); the hinges' limit: docs/validate.md",
+                .tolerance = 0.05, .expected = lateral_plate, .documented = lateral_hinges,
+                .scene = hinges_scene, .low = 0.85, .high = 1.15);
+
+/* ---- A pushed strip ----
+ * A strip clamped upright above a table is pushed down on it by a share of its length. It buckles; its end stays below the
+ * clamp as long as friction holds it there, and slips if the coefficient of friction is below the ratio of the forces at the
+ * end (Sano, Yamaguchi & Wada 2017, Slip morphology of elastic strips on frictional rigid substrates). With s from the
+ * clamp, the angle theta from the vertical, and N and f the forces of the table times L^2/B,
+ *     theta'' = -(N sin theta + f cos theta),  theta(0) = theta'(1) = 0,  int cos theta = 1 - share,  int sin theta = 0
+ * and the threshold is f/N. The strip has no weight and, except during the push, no inertia; a sideways pull of 1e-3 of the
+ * buckling load determines to which side it goes. */
+
+#define RIGIDITY  1.0 /* B [N m] */
+#define THICKNESS 0.02
+#define DENSITY   0.1          /* [kg/m2] */
+#define DISTANCE  2e-3         /* [m] of the table's barrier: the uncertainty of the push */
+#define STIFFNESS 1e4          /* [Pa] of it: 20 N/m on half a cell of 25 mm are 1600 Pa */
+#define ASIDE     0.2          /* [m/s2]: 0.02 of the 20.19 N/m that buckle it */
+#define SLIPPED   0.05         /* [m]: the end of a strip that slips moves 0.2 m or more */
+#define EULER     4.4934094579 /* tan k = k */
+
+static int elastica(double s, const double y[], double dy[], void *forces)
+{
+    (void)s;
+    const double *f = forces;
+    dy[0] = y[1];
+    dy[1] = -(f[0] * sin(y[0]) + f[1] * cos(y[0]));
+    dy[2] = cos(y[0]);
+    dy[3] = sin(y[0]);
+    return GSL_SUCCESS;
+}
+
+/* u: theta'(0), N, f. out: theta'(1), and how far the end is from its place. */
+static int miss(const gsl_vector *u, void *share, gsl_vector *out)
+{
+    double forces[] = {gsl_vector_get(u, 1), gsl_vector_get(u, 2)}, y[4] = {0, gsl_vector_get(u, 0), 0, 0};
+    const int status = drape_ode(elastica, forces, 4, 1e-2, 1e-12, y);
+    gsl_vector_set(out, 0, y[1]);
+    gsl_vector_set(out, 1, y[2] - 1 + *(const double *)share);
+    gsl_vector_set(out, 2, y[3]);
+    return status;
+}
+
+/* The mode in which a clamped and pinned column buckles, of that size: theta is -f (1 - cos k s)/k^2 + f sin(k s)/k, and
+ * the mean of theta^2/2 is the share. */
+static void guess(double share, double u[3])
+{
+    double mean = 0;
+    for (int i = 0; i < 1000; i++) {
+        const double a = EULER * (i + 0.5) / 1000, theta = sin(a) / EULER - (1 - cos(a)) / (EULER * EULER);
+        mean += theta * theta / 1000;
+    }
+    const double f = sqrt(2 * share / mean);
+    u[0] = u[2] = f;
+    u[1] = EULER * EULER;
+}
+
+/* f/N: the share grows in steps from a small one, where the guess is good. */
+static double slip_friction(double share)
+{
+    enum { STEPS = 10 };
+    gsl_multiroot_fsolver *solver = gsl_multiroot_fsolver_alloc(gsl_multiroot_fsolver_hybrids, 3);
+    double u[3]; /* theta'(0), N, f */
+    gsl_vector_view start = gsl_vector_view_array(u, 3);
+    int status = solver ? GSL_SUCCESS : GSL_ENOMEM;
+    guess(share / STEPS, u);
+    for (int k = 1; k <= STEPS && !status; k++) {
+        double pushed = share * k / STEPS;
+        gsl_multiroot_function function = {miss, 3, &pushed};
+        status = gsl_multiroot_fsolver_set(solver, &function, &start.vector);
+        for (int i = 0; i < 100 && !status; i++) {
+            status = gsl_multiroot_fsolver_iterate(solver);
+            if (gsl_multiroot_test_residual(solver->f, 1e-9) == GSL_SUCCESS)
+                break;
+        }
+        gsl_vector_memcpy(&start.vector, solver->x);
+        status = gsl_multiroot_test_residual(solver->f, 1e-9);
+    }
+    if (solver)
+        gsl_multiroot_fsolver_free(solver);
+    return status ? NAN : fabs(u[2]) / u[1];
+}
+
+/* The strip is in contact with the table from the start, so that the push is that of the track. */
+static int pushed_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return snprintf(
+        text, DRAPE_LAB_TEXT,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 3, 'rows': 41, 'width': 0.05, "
+        "'height': 1, 'orientation': 'vertical'},\n "
+        "'material': {'young_modulus': %.17g, 'poisson_ratio': 0, 'thickness': %g, 'areal_density': %g},\n "
+        "'terms': ['stretch.cst', 'bend.midedge'],\n "
+        "'pins': [{'edge': 'top', 'clamp': true, 'track': [[0, [0, 0, 0]], [1, [0, %.17g, 0]]]}]}],\n "
+        "'gravity': [0, 0, %g], 'colliders': [{'type': 'plane', 'point': [0, %.17g, 0], "
+        "'normal': [0, 1, 0], 'friction': %.17g}],\n "
+        "'contact': {'distance': %g, 'friction_velocity': 1e-4, 'stiffness': %g},\n "
+        "'integrator': {'method': 'be', 'dt': 0.01, 'tolerance': 1e-6}, 'duration': 1.5}",
+        12 * RIGIDITY / (THICKNESS * THICKNESS * THICKNESS), THICKNESS, DENSITY, -c->parameter, ASIDE,
+        -1 - DISTANCE / 2, c->load, DISTANCE, STIFFNESS);
+}
+
+/* 1 where the end stays. */
+static drape_status measure_stays(drape_reference_run *run, double *value)
+{
+    drape_status status = lab_advance(run);
+    const int32_t nodes = drape_model_node_count(run->model);
+    *value = fabs(drape_sim_positions(run->sim)[3 * (size_t)(nodes - 1) + 2]) < SLIPPED;
+    return status;
+}
+
+DRAPE_REFERENCE(
+    pushed_strip, .entry.summary = "friction above which the end of a pushed strip stays", .unit = "1",
+    .parameter = "push over length", DRAPE_CASES(0.1, 0.2),
+    .model = "stretch.cst, bend.midedge; irregular; plane; be",
+    .entry.reference = "theta'' + N sin theta + f cos theta = 0, mu = f/N; Sano, Yamaguchi & Wada 2017",
+    .tolerance = 0.03, .expected = slip_friction, .scene = pushed_scene, .measure = measure_stays,
+    .low = 0.85, .high = 1.15);

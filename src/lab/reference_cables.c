@@ -1,0 +1,132 @@
+/* reference_cables.c: heavy strips that hardly resist bending: a catenary, and a hanging chain. */
+#include "lab/rod.h"
+#include "lab/strip.h"
+
+#include <gsl/gsl_sf_bessel.h>
+#include <math.h>
+#include <stdio.h>
+
+#define GRAVITY 9.81
+#define PI      3.14159265358979323846
+
+/* ---- The sag of a strip of length 1.2 m between two ends 1 m apart; the right end is brought from 1.2 m ---- */
+
+#define SPAN   1.0
+#define LENGTH 1.2
+
+/* 2 a sinh(span/(2 a)) = length */
+static double excess(double a, void *unused)
+{
+    (void)unused;
+    return 2 * a * sinh(SPAN / (2 * a)) - LENGTH;
+}
+
+static double sag(double unused)
+{
+    (void)unused;
+    const double a = drape_root(excess, NULL, 0.1, 10);
+    return a * (cosh(SPAN / (2 * a)) - 1);
+}
+
+static int catenary_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    (void)c;
+    return snprintf(
+        text, DRAPE_LAB_TEXT,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 61, 'rows': 3, 'width': %g, "
+        "'height': 0.04},\n "
+        "'material': {'young_modulus': 1e7, 'poisson_ratio': 0, 'thickness': 1e-3, 'areal_density': 0.1},\n "
+        "'terms': ['stretch.cst', {'type': 'bend.midedge', 'warp': 1e-6, 'weft': 1e-6}],\n "
+        "'pins': [{'edge': 'left'}, {'edge': 'right', 'track': [[0, [0, 0, 0]], [1, [%g, 0, 0]]]}]}],\n "
+        "'gravity': [0, -9.81, 0], 'integrator': {'method': 'be', 'dt': 0.02, 'tolerance': 1e-5}, "
+        "'duration': 1.6}",
+        LENGTH, SPAN - LENGTH);
+}
+
+static drape_status measure_sag(drape_reference_run *run, double *value)
+{
+    const size_t nodes = (size_t)drape_model_node_count(run->model);
+    double *v = drape_arena_take(&run->arena, 3 * nodes, sizeof *v);
+    drape_status status = v ? lab_advance(run) : DRAPE_E_MEMORY;
+    if (!status)
+        status = lab_settle(run, v);
+    *value = 0;
+    for (size_t i = 0; i < nodes; i++)
+        *value = fmax(*value, -drape_sim_positions(run->sim)[3 * i + 1]);
+    return status;
+}
+
+DRAPE_REFERENCE(catenary, .entry.summary = "sag of 1.2 m over a span of 1 m", .unit = "m", DRAPE_CASES(0),
+                .model = "stretch.cst, bend.midedge; irregular",
+                .entry.reference = "2 a sinh(s/(2 a)) = L, sag a (cosh(s/(2 a)) - 1)", .tolerance = 0.001,
+                .expected = sag, .scene = catenary_scene, .measure = measure_sag);
+
+/* ---- Frequencies of a hanging chain of 1 m ----
+ * From equilibrium the strip is started with the velocity of a mode; how long two of its periods take is read off the
+ * crossings of the mode. Steps are 1/200 of a period: the implicit midpoint rule is slow by (2 pi/200)^2/12 = 8e-5; the
+ * strip is 0.05 % longer than at rest. */
+
+#define STEPS 200  /* of a period */
+#define SPEED 1e-2 /* [m/s] of the free end */
+
+/* omega [rad/s]: u = J0(2 omega sqrt(s/g)), s from the free end */
+static double frequency(double mode)
+{
+    return gsl_sf_bessel_zero_J0((unsigned)mode) / 2 * sqrt(GRAVITY);
+}
+
+static double step_size(double mode)
+{
+    return 2 * PI / frequency(mode) / STEPS;
+}
+
+static int chain_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return snprintf(
+        text, DRAPE_LAB_TEXT,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 3, 'rows': 81, 'width': 0.025, "
+        "'height': 1, 'orientation': 'vertical'},\n "
+        "'material': {'young_modulus': 1e6, 'poisson_ratio': 0, 'thickness': 1e-3, 'areal_density': 0.1},\n "
+        "'terms': ['stretch.cst'], 'pins': [{'edge': 'top'}]}],\n "
+        "'gravity': [0, %g, 0], 'integrator': {'method': 'midpoint', 'dt': %.17g, 'tolerance': 1e-10}, "
+        "'controller': {'type': 'fixed'}, 'duration': 1}",
+        -GRAVITY, step_size(c->parameter));
+}
+
+/* The amplitude of a mode: other modes are orthogonal to it in the mass matrix. */
+static double amplitude(const drape_reference_run *run, const double *mode)
+{
+    const double *mass = drape_model_masses(run->model), *x = drape_sim_positions(run->sim);
+    double sum = 0;
+    for (size_t i = 0; i < (size_t)drape_model_node_count(run->model); i++)
+        sum += mass[i] * mode[3 * i + 2] * x[3 * i + 2];
+    return sum;
+}
+
+static drape_status measure_frequency(drape_reference_run *run, double *value)
+{
+    const size_t n = 3 * (size_t)drape_model_node_count(run->model);
+    const double *rest = drape_model_rest_positions(run->model), dt = step_size(run->parameter);
+    const double zero = gsl_sf_bessel_zero_J0((unsigned)run->parameter);
+    double *v = drape_arena_take(&run->arena, n, sizeof *v), now = 0, crossing = 0;
+    int found = 0;
+    for (size_t i = 0; v && i < n; i += 3)
+        v[i + 2] = SPEED * (rest[i + 1] < 0 ? gsl_sf_bessel_J0(zero * sqrt(fmax(0, 1 + rest[i + 1]))) : 0);
+    drape_status status = v ? lab_settle(run, v) : DRAPE_E_MEMORY;
+    for (int k = 1; !status && found < 4 && k < 4 * STEPS; k++) {
+        const double before = now;
+        status = drape_sim_advance(run->sim, k * dt);
+        now = amplitude(run, v);
+        if (before * now < 0) {
+            crossing = (k - 1 + before / (before - now)) * dt;
+            found++;
+        }
+    }
+    *value = found == 4 ? 4 * PI / crossing : NAN; /* four crossings after the start: two periods */
+    return status;
+}
+
+DRAPE_REFERENCE(chain, .entry.summary = "frequency of a hanging chain", .unit = "rad/s", .parameter = "mode",
+                DRAPE_CASES(1, 2, 3), .model = "stretch.cst; irregular; midpoint",
+                .entry.reference = "omega_n = j_0n/2 sqrt(g/L); D. Bernoulli 1733", .tolerance = 0.005,
+                .expected = frequency, .scene = chain_scene, .measure = measure_frequency);

@@ -1,0 +1,203 @@
+/* reference_fabrics.c: virtual tests of measured fabrics: each uses one entry of their table, and must give back the
+ * published values. A case is a fabric, by its place in the table. */
+#include "compile/fabrics.h"
+#include "compile/fabrics_table.h"
+#include "lab/rod.h"
+#include "lab/strip.h"
+
+#include <gsl/gsl_integration.h>
+#include <math.h>
+#include <stdio.h>
+
+#define GRAVITY 9.81 /* [m/s2] */
+
+static const double places[] = {1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15, 16,
+                                17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32};
+_Static_assert(DRAPE_FABRIC_COUNT <= sizeof places / sizeof *places, "a place for every fabric");
+
+#define FABRIC .parameter = "fabric, by its place", .parameters = places, .case_count = DRAPE_FABRIC_COUNT
+
+static drape_woven tension_of(double place)
+{
+    drape_woven tension;
+    drape_fabric_tension(&drape_fabrics[(int)place], &tension);
+    return tension;
+}
+
+/* ---- ASTM D1388: the angle of the chord to the end of a strip pushed over an edge ----
+ * A strip of twice the bending length (B/(rho g))^(1/3), that is G = rho g L^3/B = 8, has its chord at 41.5 degrees; by the
+ * rod at 41.487. */
+
+static double chord(double unused)
+{
+    (void)unused;
+    return drape_rod_chord(8);
+}
+
+static int cantilever(const drape_fabric *f, double rigidity, const char *warp, char text[DRAPE_LAB_TEXT])
+{
+    const double weight = f->areal_density * GRAVITY, length = 2 * cbrt(rigidity / weight);
+    return snprintf(
+        text, DRAPE_LAB_TEXT,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 41, 'rows': 5, 'width': %.17g, "
+        "'height': %.17g},\n 'material': {'fabric': '%s'},\n "
+        "'terms': [{'type': 'stretch.cst', 'warp_direction': %s}, "
+        "{'type': 'bend.midedge', 'warp_direction': %s}],\n "
+        "'pins': [{'edge': 'left', 'clamp': true}]}],\n 'gravity': [0, %g, 0], "
+        "'integrator': {'method': 'static', 'tolerance': %.3g}, 'duration': 1}",
+        length, length / 10, f->name, warp, warp, -GRAVITY, weight * length * length / 10 / 205 * 1e-4);
+}
+
+static int warp_cantilever(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    const drape_fabric *f = &drape_fabrics[(int)c->parameter];
+    return cantilever(f, f->bending.warp, "[1, 0, 0]", text);
+}
+
+static int weft_cantilever(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    const drape_fabric *f = &drape_fabrics[(int)c->parameter];
+    return cantilever(f, f->bending.weft, "[0, 0, 1]", text);
+}
+
+#define CANTILEVER                                                                                           \
+    .unit = "degree", FABRIC, .model = "stretch.cst, bend.midedge; irregular",                               \
+    .entry.reference = "ASTM D1388; the fabric's own", .tolerance = 0.005, .expected = chord,                \
+    .measure = lab_chord
+
+DRAPE_REFERENCE(fabric, CANTILEVER, .entry.summary = "angle of the chord of a strip along the warp",
+                .scene = warp_cantilever);
+
+DRAPE_REFERENCE(fabric_weft, CANTILEVER, .entry.summary = "angle of the chord of a strip along the weft",
+                .scene = weft_cantilever);
+
+/* ---- The lengthening of a strip of 1 m that hangs from its upper edge, under its weight or a pull ----
+ * By stretch.cst a stretch l is S = K (l^2 - 1)/2, so the force per width is K l (l^2 - 1)/2. */
+
+#define WIDTH   0.02 /* [m]: the fixed edge keeps some widths of the strip from narrowing */
+#define STRETCH 1.02 /* by the pull */
+
+/* pull: force per width at the lower edge [N/m] */
+static int hung_scene(double place, const char *warp, double pull, double gravity, char text[DRAPE_LAB_TEXT])
+{
+    return snprintf(
+        text, DRAPE_LAB_TEXT,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 3, 'rows': 101, 'width': %g, "
+        "'height': 1, 'orientation': 'vertical'},\n 'material': {'fabric': '%s'},\n "
+        "'terms': [{'type': 'stretch.cst', 'warp_direction': %s}, "
+        "{'type': 'bend.midedge', 'warp_direction': %s}, "
+        "{'type': 'load.line', 'edge': 'bottom', 'force': [0, %.17g, 0]}],\n "
+        "'pins': [{'edge': 'top'}]}],\n 'gravity': [0, %g, 0], "
+        "'integrator': {'method': 'static', 'tolerance': 1e-9}, 'duration': 1}",
+        WIDTH, drape_fabrics[(int)place].name, warp, warp, -pull, -gravity);
+}
+
+/* The mean over the lower edge [m]. */
+static drape_status measure_lengthening(drape_reference_run *run, double *value)
+{
+    drape_status status = lab_advance(run);
+    const double *rest = drape_model_rest_positions(run->model), *x = drape_sim_positions(run->sim);
+    int count = 0;
+    *value = 0;
+    for (size_t i = 0; i < (size_t)drape_model_node_count(run->model); i++)
+        if (rest[3 * i + 1] < -1 + 1e-9) {
+            *value += rest[3 * i + 1] - x[3 * i + 1];
+            count++;
+        }
+    *value /= count;
+    return status;
+}
+
+#define HUNG                                                                                                 \
+    .unit = "m", FABRIC, .model = "stretch.cst, bend.midedge; irregular", .tolerance = 0.01,                 \
+    .measure = measure_lengthening
+
+static double pulled(double unused)
+{
+    (void)unused;
+    return STRETCH - 1;
+}
+
+static int pulled_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    const double pull = tension_of(c->parameter).weft * STRETCH * (STRETCH * STRETCH - 1) / 2;
+    return hung_scene(c->parameter, "[1, 0, 0]", pull, 0, text);
+}
+
+DRAPE_REFERENCE(fabric_tension, HUNG, .entry.summary = "lengthening of a strip of 1 m, pulled along the weft",
+                .entry.reference = "K l (l^2 - 1)/2; the fabric's own", .expected = pulled,
+                .scene = pulled_scene);
+
+typedef struct hung_strip {
+    double stiffness, weight; /* [N/m], [N/m2] */
+    double force;             /* [N/m] */
+} hung_strip;
+
+static double excess(double stretch, void *user)
+{
+    const hung_strip *s = user;
+    return s->stiffness * stretch * (stretch * stretch - 1) / 2 - s->force;
+}
+
+/* The stretch less 1 at s from the free end. */
+static double strain(double s, void *user)
+{
+    hung_strip hung = *(const hung_strip *)user;
+    hung.force = hung.weight * s;
+    return drape_root(excess, &hung, 1, 3) - 1;
+}
+
+/* K l (l^2 - 1)/2 = rho g s. Near the fixed edge the strip does not narrow, and is stiffer by 1/(1 - nu^2), 1.8 times at
+ * most, over some half width, a hundredth of its length. */
+static double hanging(double place)
+{
+    hung_strip hung = {tension_of(place).warp, drape_fabrics[(int)place].areal_density * GRAVITY, 0};
+    gsl_function f = {strain, &hung};
+    double value = NAN, error;
+    size_t count;
+    gsl_integration_qng(&f, 0, 1, 0, 1e-9, &value, &error, &count);
+    return value;
+}
+
+static int hanging_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return hung_scene(c->parameter, "[0, 1, 0]", 0, GRAVITY, text);
+}
+
+DRAPE_REFERENCE(hanging, HUNG, .entry.summary = "lengthening of a strip of 1 m, hung along the warp",
+                .entry.reference = "K l (l^2 - 1)/2 = rho g s; the fabric's own", .expected = hanging,
+                .scene = hanging_scene);
+
+/* ---- The shear stiffness of a square whose lower edge is moved along the upper one by gamma ----
+ * Its energy is A (shear gamma^2/2 + C22 gamma^4/8), C22 of the direction across, so 2 E/(A gamma^2) is the shear stiffness
+ * and C22 gamma^2/4, a quarter of 1e4 N/m times 1e-6 at most: 7e-5 of the softest shear beside it. */
+
+#define GAMMA 1e-3
+
+static double shear(double place)
+{
+    return tension_of(place).shear;
+}
+
+static int shear_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return snprintf(
+        text, DRAPE_LAB_TEXT,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 2, 'rows': 2, 'width': 1, "
+        "'height': 1},\n 'material': {'fabric': '%s'},\n "
+        "'terms': ['stretch.cst'], 'pins': [{'edge': 'top'}, "
+        "{'edge': 'bottom', 'track': [[0, [0, 0, 0]], [1, [%g, 0, 0]]]}]}],\n 'gravity': [0, 0, 0], "
+        "'integrator': {'method': 'be', 'dt': 0.5}, 'duration': 1}",
+        drape_fabrics[(int)c->parameter].name, GAMMA);
+}
+
+static drape_status measure_shear(drape_reference_run *run, double *value)
+{
+    drape_status status = lab_advance(run);
+    *value = 2 * drape_sim_energy(run->sim).elastic / (GAMMA * GAMMA);
+    return status;
+}
+
+DRAPE_REFERENCE(fabric_shear, .entry.summary = "shear stiffness of a square", .unit = "N/m", FABRIC,
+                .model = "stretch.cst; square", .entry.reference = "A shear gamma^2/2; the fabric's own",
+                .tolerance = 0.001, .expected = shear, .scene = shear_scene, .measure = measure_shear);

@@ -1,0 +1,214 @@
+/* reference_integrators.c: what time integrators make of free fall and of a linear oscillation, step by step. */
+#include "lab/strip.h"
+
+#include <complex.h>
+#include <math.h>
+#include <stdio.h>
+
+/* ---- Free fall ---- */
+
+#define GRAVITY 9.81
+#define TIME    0.5
+
+/* In n steps of backward Euler a sheet falls by g h^2 n (n + 1)/2, exactly. */
+static double fallen(double n)
+{
+    return GRAVITY * TIME * TIME * (n + 1) / n / 2;
+}
+
+static int fall_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return snprintf(
+        text, DRAPE_LAB_TEXT,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 4, 'rows': 4, 'width': 1, "
+        "'height': 1},\n "
+        "'material': {'young_modulus': 1e4, 'poisson_ratio': 0.3, 'thickness': 1e-3, "
+        "'areal_density': 0.1},\n "
+        "'terms': ['stretch.cst', 'bend.midedge']}],\n 'gravity': [0, %g, 0], "
+        "'integrator': {'method': 'be', 'dt': %.17g, 'tolerance': 1e-12}, 'duration': %g}",
+        -GRAVITY, TIME / c->parameter, TIME);
+}
+
+/* The tolerance is what Newton's tolerance and rounding leave. */
+DRAPE_REFERENCE(free_fall, .entry.summary = "way fallen in 0.5 s", .unit = "m", .parameter = "steps",
+                DRAPE_CASES(10, 100), .model = "stretch.cst, bend.midedge; irregular; be",
+                .entry.reference = "sum of backward Euler's steps", .tolerance = 1e-9, .expected = fallen,
+                .scene = fall_scene, .measure = lab_sinking);
+
+/* ---- An oscillator ----
+ * Two nodes on an elastic sheet whose other side is fixed: k = E h w/L = 1 N/m, half of 1 kg moves: omega^2 = 2. It starts
+ * at rest length; at strains of 1e-5 the sheet is linear to 1e-5. */
+
+#define SPEED           1e-5 /* [m/s] at the start */
+#define OMEGA           1.41421356237309504880
+#define PI              3.14159265358979323846
+#define AMPLITUDE_STEPS 20
+#define PHASE_STEPS     50
+
+static int oscillator(const drape_reference_case *c, double angle, char text[DRAPE_LAB_TEXT])
+{
+    return snprintf(
+        text, DRAPE_LAB_TEXT,
+        "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 2, 'rows': 2, 'width': 1, "
+        "'height': 1},\n "
+        "'material': {'young_modulus': 1, 'poisson_ratio': 0, 'thickness': 1, 'areal_density': 1, "
+        "'mass': 'uniform'},\n "
+        "'terms': ['stretch.cst'], 'pins': [{'edge': 'top'}], 'velocity': [0, 0, %g]}],\n "
+        "'gravity': [0, 0, 0], 'integrator': {%s, 'dt': %.17g, 'tolerance': 1e-15},\n "
+        "'controller': {'type': 'fixed'}, 'duration': 1000}",
+        -SPEED, c->reference->members, angle / OMEGA);
+}
+
+static int oscillator_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return oscillator(c, c->parameter, text);
+}
+
+static drape_status advance(drape_reference_run *run, int steps)
+{
+    return drape_sim_advance(run->sim, drape_sim_time(run->sim) + steps * run->parameter / OMEGA);
+}
+
+static double energy(const drape_reference_run *run)
+{
+    const drape_energy e = drape_sim_energy(run->sim);
+    return e.kinetic + e.elastic;
+}
+
+/* The factor of the amplitude in a step: from the energies after `from` and after `to` steps. */
+static drape_status measure_between(drape_reference_run *run, int from, int to, double *value)
+{
+    drape_status status = from ? advance(run, from) : DRAPE_OK;
+    const double before = energy(run);
+    if (!status)
+        status = advance(run, to - from);
+    *value = pow(energy(run) / before, 0.5 / (to - from));
+    return status;
+}
+
+static drape_status measure_amplitude(drape_reference_run *run, double *value)
+{
+    return measure_between(run, 0, AMPLITUDE_STEPS, value);
+}
+
+/* The angle of a step over omega h: every method that advances x and v by one matrix of determinant 1 has
+ * x(n+1) + x(n-1) = 2 cos(angle) x(n). */
+static drape_status measure_phase(drape_reference_run *run, double *value)
+{
+    const size_t at = 3 * 2 + 2; /* z of a free node */
+    double x[3] = {0}, product = 0, square = 0;
+    drape_status status = DRAPE_OK;
+    for (int k = 0; !status && k < PHASE_STEPS; k++) {
+        status = advance(run, 1);
+        x[0] = x[1], x[1] = x[2];
+        x[2] = drape_sim_positions(run->sim)[at] - drape_model_rest_positions(run->model)[at];
+        if (k < 2)
+            continue;
+        product += x[1] * (x[0] + x[2]);
+        square += x[1] * x[1];
+    }
+    *value = acos(product / (2 * square)) / run->parameter;
+    return status;
+}
+
+/* members: of the integrator, besides dt and tolerance. */
+#define OSCILLATOR .unit = "1", .parameter = "omega h", .tolerance = 1e-4, .scene = oscillator_scene
+#define AMPLITUDE  OSCILLATOR, .entry.summary = "share of the amplitude left by a step"
+#define PHASE      OSCILLATOR, .entry.summary = "angle of a step over omega h", .measure = measure_phase
+
+/* Backward Euler leaves this factor of the energy in each step. */
+static double euler(double angle)
+{
+    return 1 / (1 + angle * angle);
+}
+
+static drape_status measure_energy(drape_reference_run *run, double *value)
+{
+    drape_status status = measure_amplitude(run, value);
+    *value *= *value;
+    return status;
+}
+
+DRAPE_REFERENCE(oscillator, OSCILLATOR, .entry.summary = "share of energy left by a step",
+                DRAPE_CASES(0.1, 0.5, 2), .model = "stretch.cst; square; be",
+                .entry.reference = "1/(1 + omega^2 h^2), of 1/(1 - i omega h)", .members = "'method': 'be'",
+                .expected = euler, .measure = measure_energy);
+
+/* On z' = i omega z the formula 3/2 z1 - 2 z0 + 1/2 z_ = i omega h z1 has the roots
+ * (2 +- sqrt(1 + 2 i omega h))/(3 - 2 i omega h); the larger is what a step leaves of the amplitude once the other has
+ * died: below 0.35^15 after the steps that are not measured. */
+static double bdf2(double angle)
+{
+    const double complex z = I * angle;
+    return cabs((2 + csqrt(1 + 2 * z)) / (3 - 2 * z));
+}
+
+static drape_status measure_late(drape_reference_run *run, double *value)
+{
+    return measure_between(run, 15, 25, value);
+}
+
+DRAPE_REFERENCE(oscillator_bdf2, AMPLITUDE, DRAPE_CASES(0.1, 0.5, 2), .model = "stretch.cst; square; bdf2",
+                .entry.reference = "roots of (3/2 - i omega h) r^2 - 2 r + 1/2; .990401 at omega h = .5",
+                .members = "'method': 'bdf2'", .expected = bdf2, .measure = measure_late);
+
+/* The stability function on the imaginary axis: R = (a1 (1 + w)/(1 - w) - a0)/(1 - w) with w = gamma z/2,
+ * gamma = 2 - sqrt(2), a1 = 1/(gamma (2 - gamma)), a0 = a1 - 1. */
+static double trbdf2(double angle)
+{
+    const double gamma = 2 - sqrt(2), a1 = 1 / (gamma * (2 - gamma));
+    const double complex w = I * angle * gamma / 2;
+    return cabs((a1 * (1 + w) / (1 - w) - (a1 - 1)) / (1 - w));
+}
+
+DRAPE_REFERENCE(oscillator_trbdf2, AMPLITUDE, DRAPE_CASES(0.1, 0.5, 2),
+                .model = "stretch.cst; square; trbdf2",
+                .entry.reference = "stability function; Bank et al. 1985, Hosea & Shampine 1996",
+                .members = "'method': 'trbdf2'", .expected = trbdf2, .measure = measure_amplitude);
+
+/* The implicit midpoint rule keeps the amplitude, and is slow: (1 + i w/2)/(1 - i w/2), w = omega h, turns by
+ * 2 atan(w/2). */
+static double midpoint(double angle)
+{
+    return 2 * atan(angle / 2) / angle;
+}
+
+DRAPE_REFERENCE(oscillator_midpoint, PHASE, DRAPE_CASES(0.1, 0.5, 2),
+                .model = "stretch.cst; square; midpoint", .entry.reference = "2 atan(omega h/2)",
+                .members = "'method': 'midpoint'", .expected = midpoint);
+
+/* Leapfrog keeps the amplitude below omega h = 2, and is fast: sin(angle/2) = omega h/2. */
+static double verlet(double angle)
+{
+    return 2 * asin(angle / 2) / angle;
+}
+
+DRAPE_REFERENCE(oscillator_verlet, PHASE, DRAPE_CASES(0.1, 0.5, 1), .model = "stretch.cst; square; verlet",
+                .entry.reference = "2 asin(omega h/2)", .members = "'method': 'verlet', 'substeps': 1",
+                .expected = verlet);
+
+/* What variable order and steps leave after one, or ten, and an eighth oscillations: the velocity over that at the start,
+ * where errors of amplitude and of phase both show. Tolerances of 1e-8 a step, of what moves. */
+static double turned(double turns)
+{
+    return cos(2 * PI * turns);
+}
+
+static int turning_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
+{
+    return oscillator(c, 1, text);
+}
+
+static drape_status measure_velocity(drape_reference_run *run, double *value)
+{
+    drape_status status = drape_sim_advance(run->sim, 2 * PI * run->parameter / OMEGA);
+    *value = drape_sim_velocities(run->sim)[3 * 2 + 2] / -SPEED;
+    return status;
+}
+
+DRAPE_REFERENCE(oscillator_ida, .entry.summary = "velocity over that at the start", .unit = "1",
+                .parameter = "turns", DRAPE_CASES(1.125, 10.125),
+                .model = "stretch.cst; square; ida, order 5", .entry.reference = "cos(2 pi turns)",
+                .tolerance = 1e-3,
+                .members = "'method': 'ida', 'rtol': 1e-8, 'max_order': 5, 'atol_x': 1e-13, 'atol_v': 1e-13",
+                .expected = turned, .scene = turning_scene, .measure = measure_velocity);

@@ -1,0 +1,365 @@
+/* approx_jacobian.c: see approx_jacobian.h. */
+#include "nonlinear/approx_jacobian_parts.h"
+
+#include "base/clock.h"
+
+#include <string.h>
+
+/* ---- Symmetric 3 x 3 blocks: xx xy xz yy yz zz ---- */
+
+static void multiply_block(const double *a, const double *x, double *y)
+{
+    y[0] = a[0] * x[0] + a[1] * x[1] + a[2] * x[2];
+    y[1] = a[1] * x[0] + a[3] * x[1] + a[4] * x[2];
+    y[2] = a[2] * x[0] + a[4] * x[1] + a[5] * x[2];
+}
+
+static void invert_block(double a[6])
+{
+    double inverse[6], xx = a[3] * a[5] - a[4] * a[4], xy = a[4] * a[2] - a[1] * a[5],
+                       xz = a[1] * a[4] - a[3] * a[2];
+    double scale = 1 / (a[0] * xx + a[1] * xy + a[2] * xz);
+    inverse[0] = xx * scale;
+    inverse[1] = xy * scale;
+    inverse[2] = xz * scale;
+    inverse[3] = (a[0] * a[5] - a[2] * a[2]) * scale;
+    inverse[4] = (a[1] * a[2] - a[0] * a[4]) * scale;
+    inverse[5] = (a[0] * a[3] - a[1] * a[1]) * scale;
+    memcpy(a, inverse, sizeof inverse);
+}
+
+/* ---- y = A x ---- */
+
+static void multiply_scalars(const drape_approx_jacobian *s, const double *x, double *y)
+{
+    const drape_scalar_stiffness *c = &s->scalar;
+    for (int32_t i = 0; i < s->nodes; i++) {
+        double sum[3] = {0};
+        for (int32_t k = c->start[i]; k < c->start[i + 1]; k++) {
+            const double *from = x + 3 * (size_t)c->column[k];
+            for (int r = 0; r < 3; r++)
+                sum[r] += c->sum[k] * from[r];
+        }
+        memcpy(y + 3 * (size_t)i, sum, sizeof sum);
+    }
+}
+
+static void add_pairs(const drape_approx_jacobian *s, const double *x, double *y)
+{
+    static const double pinned[3] = {0, 0, 0};
+    for (int32_t p = 0; p < s->pairs; p++) {
+        int32_t i = s->pair[2 * (size_t)p], j = s->pair[2 * (size_t)p + 1];
+        const double *a = i < 0 ? pinned : x + 3 * (size_t)i, *b = j < 0 ? pinned : x + 3 * (size_t)j;
+        const double d[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+        double f[3];
+        multiply_block(s->h + 6 * (size_t)p, d, f);
+        if (i >= 0) {
+            double *to = y + 3 * (size_t)i;
+            to[0] += f[0], to[1] += f[1], to[2] += f[2];
+        }
+        if (j >= 0) {
+            double *to = y + 3 * (size_t)j;
+            to[0] -= f[0], to[1] -= f[1], to[2] -= f[2];
+        }
+    }
+}
+
+static void add_remainder(const drape_approx_jacobian *s, const double *x, double *y)
+{
+    const remainder_matrix *m = &s->remainder;
+    for (int32_t k = 0; k < m->count; k++) {
+        size_t i = 3 * (size_t)m->row[k], j = 3 * (size_t)m->column[k];
+        const double *b = m->block + 9 * (size_t)k;
+        for (size_t r = 0; r < 3; r++)
+            for (size_t c = 0; c < 3; c++) {
+                y[i + r] += b[3 * r + c] * x[j + c];
+                if (i != j)
+                    y[j + c] += b[3 * r + c] * x[i + r];
+            }
+    }
+}
+
+void drape_approx_jacobian_multiply(const drape_approx_jacobian *s, const double *x, double *y)
+{
+    multiply_scalars(s, x, y);
+    add_pairs(s, x, y);
+    add_remainder(s, x, y);
+}
+
+static void multiply(const void *owner, const double *x, double *y)
+{
+    drape_approx_jacobian_multiply(owner, x, y);
+}
+
+/* z = D^-1 r + P A_c^-1 P' r. The coarse solver has factors: its solve fails only if numbers are not finite,
+ * and then its part is left out. */
+static void precondition(const void *owner, const double *r, double *z)
+{
+    const drape_approx_jacobian *s = owner;
+    const coarse_matrix *c = &s->coarse;
+    for (int32_t i = 0; i < s->nodes; i++)
+        multiply_block(s->inverse + 6 * (size_t)i, r + 3 * (size_t)i, z + 3 * (size_t)i);
+    drape_prolong_restrict(&c->prolong, r, c->b);
+    if (c->linear->solve(c->solver, c->b, c->x) == DRAPE_OK)
+        drape_prolong_add(&c->prolong, c->x, z);
+}
+
+/* ---- Update ---- */
+
+static void evaluate_pairs(drape_approx_jacobian *s, const drape_point *point)
+{
+    double *to = s->h;
+    for (int32_t t = 0; t < s->model->term_count; t++) {
+        const drape_term *term = &s->model->terms[t];
+        if (!term->ops->pair)
+            continue;
+        drape_system_pairs(s->system, t, point, to);
+        to += 6 * (size_t)term->elements.count;
+    }
+}
+
+/* One block, row by row; false if it is zero. */
+static bool read_block(const drape_pattern *p, double *values, int32_t column, int32_t block, double *to)
+{
+    int64_t stride;
+    const double *a = drape_pattern_at(p, values, column, block, &stride);
+    bool any = false;
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++) {
+            to[3 * r + c] = a[c * stride + r];
+            any = any || to[3 * r + c] != 0;
+        }
+    return any;
+}
+
+/* b = (b + mirror')/2: friction makes blocks nonsymmetric. */
+static void symmetrize(double *b, const double *mirror)
+{
+    double t[9];
+    for (int r = 0; r < 3; r++)
+        for (int c = 0; c < 3; c++)
+            t[3 * r + c] = (b[3 * r + c] + mirror[3 * c + r]) / 2;
+    memcpy(b, t, sizeof t);
+}
+
+static void list_remainder(drape_approx_jacobian *s)
+{
+    const drape_pattern *p = drape_system_pattern(s->system);
+    remainder_matrix *m = &s->remainder;
+    m->count = 0;
+    for (int32_t j = 0; j < p->block_count; j++)
+        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
+            double *to = m->block + 9 * (size_t)m->count, mirror[9];
+            int32_t i = p->block_row[k];
+            if (!read_block(p, m->values, j, k, to))
+                continue;
+            read_block(p, m->values, i, i == j ? k : drape_pattern_find(p, j, i), mirror);
+            symmetrize(to, mirror);
+            m->row[m->count] = i;
+            m->column[m->count++] = j;
+        }
+}
+
+static drape_status evaluate_remainder(drape_approx_jacobian *s, const drape_point *point)
+{
+    bool changed;
+    if (!s->remainder.values)
+        return DRAPE_OK;
+    drape_status status = drape_system_extend_pattern(s->system, point, &changed);
+    if (!status && changed)
+        status = drape_approx_jacobian_extend(s);
+    if (status)
+        return status;
+    drape_system_remainder(s->system, point, s->remainder.values);
+    list_remainder(s);
+    return DRAPE_OK;
+}
+
+static void add_upper(drape_approx_jacobian *s, int32_t node, const double upper[6])
+{
+    for (size_t c = 0; c < 6; c++)
+        s->inverse[6 * (size_t)node + c] += upper[c];
+}
+
+/* The diagonal blocks, inverted. */
+static void invert_diagonal(drape_approx_jacobian *s)
+{
+    const remainder_matrix *m = &s->remainder;
+    for (int32_t i = 0; i < s->nodes; i++) {
+        double scalar = s->scalar.sum[s->scalar.diagonal[i]];
+        memcpy(s->inverse + 6 * (size_t)i, (double[6]){scalar, 0, 0, scalar, 0, scalar}, 6 * sizeof(double));
+    }
+    for (int32_t p = 0; p < 2 * s->pairs; p++)
+        if (s->pair[p] >= 0)
+            add_upper(s, s->pair[p], s->h + 6 * (size_t)(p / 2));
+    for (int32_t k = 0; k < m->count; k++) {
+        const double *b = m->block + 9 * (size_t)k;
+        if (m->row[k] == m->column[k])
+            add_upper(s, m->row[k], (double[6]){b[0], b[1], b[2], b[4], b[5], b[8]});
+    }
+    for (int32_t i = 0; i < s->nodes; i++)
+        invert_block(s->inverse + 6 * (size_t)i);
+}
+
+/* ---- The matrix on the coarse space ---- */
+
+static void sum_coarse_pairs(drape_approx_jacobian *s)
+{
+    coarse_matrix *c = &s->coarse;
+    size_t slots = (size_t)c->pattern.block_start[c->pattern.block_count];
+    for (size_t k = 0; k < slots; k++) {
+        double scalar = c->elastic[k] + s->scalar.weight * c->damping[k] + s->scalar.mass_weight * c->mass[k];
+        memcpy(c->sum + 6 * k, (double[6]){scalar, 0, 0, scalar, 0, scalar}, 6 * sizeof(double));
+    }
+    for (int32_t p = 0; p < s->pairs; p++) {
+        const double *h = s->h + 6 * (size_t)p;
+        for (int64_t k = c->pair_start[p]; k < c->pair_start[p + 1]; k++)
+            for (int i = 0; i < 6; i++)
+                c->sum[6 * (size_t)c->slot[k] + (size_t)i] += c->weight[k] * h[i];
+    }
+}
+
+/* The pattern's values from the blocks at and below its diagonal. */
+static void expand_coarse(drape_approx_jacobian *s)
+{
+    static const int place[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
+    coarse_matrix *c = &s->coarse;
+    const drape_pattern *p = &c->pattern;
+    for (int32_t j = 0; j < p->block_count; j++)
+        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++) {
+            int64_t stride, mirrored;
+            int32_t i = p->block_row[k];
+            double *to = drape_pattern_at(p, c->values, j, k, &stride),
+                   *mirror = drape_pattern_at(p, c->values, i, drape_pattern_find(p, j, i), &mirrored);
+            for (int q = 0; q < 9; q++)
+                to[q / 3 * stride + q % 3] = mirror[q / 3 * mirrored + q % 3] =
+                    c->sum[6 * (size_t)k + (size_t)place[q]];
+        }
+}
+
+static void add_coarse_block(drape_approx_jacobian *s, int32_t row, int32_t column, double w, const double *b,
+                             bool transposed)
+{
+    coarse_matrix *c = &s->coarse;
+    int64_t stride;
+    if (!drape_pattern_has(&c->pattern, row, column))
+        return; /* contact of distant cloth: a preconditioner can omit it */
+    int32_t slot = drape_pattern_find(&c->pattern, row, column);
+    double *to = drape_pattern_at(&c->pattern, c->values, column, slot, &stride);
+    for (int r = 0; r < 3; r++)
+        for (int q = 0; q < 3; q++)
+            to[q * stride + r] += w * (transposed ? b[3 * q + r] : b[3 * r + q]);
+}
+
+static void add_coarse_remainder(drape_approx_jacobian *s)
+{
+    const drape_prolong *p = &s->coarse.prolong;
+    const remainder_matrix *m = &s->remainder;
+    for (int32_t k = 0; k < m->count; k++) {
+        const double *b = m->block + 9 * (size_t)k;
+        for (int32_t u = p->start[m->row[k]]; u < p->start[m->row[k] + 1]; u++)
+            for (int32_t v = p->start[m->column[k]]; v < p->start[m->column[k] + 1]; v++) {
+                double w = p->weight[u] * p->weight[v];
+                add_coarse_block(s, p->column[u], p->column[v], w, b, false);
+                if (m->row[k] != m->column[k])
+                    add_coarse_block(s, p->column[v], p->column[u], w, b, true);
+            }
+    }
+}
+
+static drape_status factor_coarse(drape_approx_jacobian *s, drape_work *work)
+{
+    double start = drape_clock_seconds();
+    sum_coarse_pairs(s);
+    expand_coarse(s);
+    add_coarse_remainder(s);
+    drape_status status = s->coarse.linear->factor(s->coarse.solver, s->coarse.values);
+    work->factorizations++;
+    work->factor_seconds += drape_clock_seconds() - start;
+    return status;
+}
+
+static drape_status update(drape_approx_jacobian *s, const drape_point *point, double mass_weight,
+                           drape_work *work)
+{
+    drape_status status = evaluate_remainder(s, point);
+    if (status)
+        return status;
+    drape_scalar_stiffness_weigh(&s->scalar, point->weight, mass_weight);
+    evaluate_pairs(s, point);
+    invert_diagonal(s);
+    return factor_coarse(s, work);
+}
+
+drape_status drape_approx_jacobian_update(drape_approx_jacobian *s, const drape_point *point,
+                                          double mass_weight, drape_work *work)
+{
+    double start = drape_system_clock(s->system) - work->factor_seconds;
+    drape_status status = update(s, point, mass_weight, work);
+    work->jacobians++;
+    work->jacobian_seconds += drape_system_clock(s->system) - work->factor_seconds - start;
+    return status;
+}
+
+int drape_approx_jacobian_solve(drape_approx_jacobian *s, const double *b, double *x, double tolerance,
+                                int max_iterations)
+{
+    drape_pcg_solve(&s->pcg, b, x, tolerance, max_iterations);
+    return s->pcg.iterations;
+}
+
+/* ---- Making and freeing ---- */
+
+drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *system, int spacing,
+                                          drape_approx_jacobian **out)
+{
+    drape_approx_jacobian *s = *out = drape_arena_take(arena, 1, sizeof *s);
+    if (!s)
+        return DRAPE_E_MEMORY;
+    s->arena = arena;
+    s->remainder.arena = drape_arena_within(arena);
+    s->system = system;
+    s->model = drape_system_model(system);
+    s->nodes = s->model->free_count;
+    const size_t n = 3 * (size_t)s->nodes;
+    s->inverse = drape_arena_take(arena, 2 * n, sizeof *s->inverse);
+    s->pcg = (drape_pcg){.n = (int64_t)n,
+                         .owner = s,
+                         .multiply = multiply,
+                         .precondition = precondition,
+                         .r = drape_arena_take(arena, n, sizeof(double)),
+                         .z = drape_arena_take(arena, n, sizeof(double)),
+                         .p = drape_arena_take(arena, n, sizeof(double)),
+                         .q = drape_arena_take(arena, n, sizeof(double))};
+    drape_status status = drape_approx_jacobian_build(s, spacing);
+    return status ? status : drape_arena_status(arena);
+}
+
+void drape_approx_jacobian_destroy(drape_approx_jacobian **out)
+{
+    drape_approx_jacobian *s = *out;
+    if (!s)
+        return;
+    drape_linear_destroy(s->coarse.linear, &s->coarse.solver);
+    drape_arena_free(&s->remainder.arena);
+    *out = NULL;
+}
+
+/* A step begins with an update: of the factors only what later ones depend on is kept. */
+void drape_approx_jacobian_archive(drape_approx_jacobian *s, drape_archive *a)
+{
+    drape_archive_mark(a, "approximate jacobian");
+    if (drape_archive_is_reading(a))
+        drape_archive_note(a, drape_approx_jacobian_extend(s));
+    drape_linear_archive(s->coarse.linear, s->coarse.solver, a, NULL);
+}
+
+int32_t drape_approx_jacobian_coarse_nodes(const drape_approx_jacobian *s)
+{
+    return s->coarse.prolong.coarse;
+}
+
+size_t drape_approx_jacobian_bytes(const drape_approx_jacobian *s)
+{
+    return drape_linear_bytes(s->coarse.linear, s->coarse.solver);
+}

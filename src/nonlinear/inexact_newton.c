@@ -1,0 +1,133 @@
+/*
+ * inexact_newton.c: see inexact_newton.h. An iteration is
+ *   correct   A p = -F by conjugate gradients, A near J
+ *   feasible  p shortened to what passes through nothing
+ *   advance   d + a p, a = 1, 1/2, 1/4 ... until the work along p has not turned too far
+ */
+#include "nonlinear/inexact_newton.h"
+
+#include "base/clock.h"
+#include "nonlinear/approx_jacobian.h"
+
+#include <math.h>
+#include <string.h>
+
+#define WORK_FRACTION 0.5 /* of the work along a correction may be left beyond the minimum */
+#define MAX_HALVINGS  6   /* of a correction; the last is taken if F is finite there */
+
+struct drape_inexact_newton {
+    drape_step_equation *equation;
+    drape_approx_jacobian *matrix; /* NULL without free nodes */
+    double *p, *minus_f, *trial;   /* free DOFs */
+};
+
+drape_status drape_inexact_newton_create(drape_arena *arena, drape_step_equation *equation,
+                                         int coarse_spacing, drape_inexact_newton **out)
+{
+    drape_inexact_newton *s = *out = drape_arena_take(arena, 1, sizeof *s);
+    if (!s)
+        return DRAPE_E_MEMORY;
+    s->equation = equation;
+    s->p = drape_arena_take(arena, equation->dofs, sizeof *s->p);
+    s->minus_f = drape_arena_take(arena, equation->dofs, sizeof *s->minus_f);
+    s->trial = drape_arena_take(arena, equation->dofs, sizeof *s->trial);
+    if (drape_arena_status(arena) || equation->dofs == 0)
+        return drape_arena_status(arena);
+    return drape_approx_jacobian_create(arena, equation->system, coarse_spacing, &s->matrix);
+}
+
+void drape_inexact_newton_destroy(drape_inexact_newton **newton)
+{
+    if (*newton)
+        drape_approx_jacobian_destroy(&(*newton)->matrix);
+    *newton = NULL;
+}
+
+static drape_status correct(drape_inexact_newton *s, const drape_inexact_settings *settings)
+{
+    drape_step_equation *e = s->equation;
+    drape_status status = drape_approx_jacobian_update(s->matrix, &e->point, e->mass_weight, &e->work);
+    if (status)
+        return status;
+    double start = drape_clock_seconds();
+    for (size_t i = 0; i < e->dofs; i++)
+        s->minus_f[i] = -e->f[i];
+    e->work.linear_iterations += drape_approx_jacobian_solve(
+        s->matrix, s->minus_f, s->p, settings->linear_tolerance, settings->max_linear_iterations);
+    e->work.solve_seconds += drape_clock_seconds() - start;
+    return DRAPE_OK;
+}
+
+/* False if F is finite at none of the steps. */
+static bool advance(drape_inexact_newton *s, double *d)
+{
+    drape_step_equation *e = s->equation;
+    double start = drape_step_equation_dot(e, e->f, s->p), a = 1, work;
+    for (int k = 0; k <= MAX_HALVINGS; k++, a /= 2) {
+        bool finite = drape_step_equation_try(e, d, a, s->p, s->trial, &work);
+        if (finite && (k == MAX_HALVINGS || !(work > -WORK_FRACTION * start))) {
+            memcpy(d, s->trial, e->dofs * sizeof *d);
+            return true;
+        }
+    }
+    return false;
+}
+
+static drape_status iterate(drape_inexact_newton *s, const drape_inexact_settings *settings, double *d,
+                            drape_solve_report *report)
+{
+    drape_step_equation *e = s->equation;
+    drape_step_equation_begin(e);
+    drape_step_equation_make_feasible(e, d);
+    if (!drape_step_equation_evaluate(e, d))
+        return DRAPE_RETRY_NONFINITE;
+    const double first = drape_step_equation_dot(e, e->f, e->f);
+    for (;; report->iterations++) {
+        bool converged = drape_step_equation_norm(e, DRAPE_NORM_MAX) <= settings->tolerance;
+        report->reason = converged ? "converged" : "iterations";
+        if (converged ||
+            (report->iterations >= settings->iterations && drape_step_equation_dot(e, e->f, e->f) < first))
+            return DRAPE_OK;
+        if (report->iterations >= settings->iterations + settings->rescue_iterations) {
+            report->reason = "residual";
+            return DRAPE_RETRY_NONLINEAR;
+        }
+        drape_status status = correct(s, settings);
+        if (status) {
+            report->reason = status < 0 ? "memory" : "singular";
+            return status;
+        }
+        drape_step_equation_make_feasible(e, s->p);
+        if (!advance(s, d))
+            return DRAPE_RETRY_NONFINITE;
+        e->work.newton_iterations++;
+    }
+}
+
+drape_status drape_inexact_newton_solve(drape_inexact_newton *s, const drape_inexact_settings *settings,
+                                        double *d, drape_solve_report *report)
+{
+    drape_step_equation *e = s->equation;
+    *report = (drape_solve_report){.tolerance = NAN}; /* the residual is reported, not bounded */
+    drape_status status = iterate(s, settings, d, report);
+    report->residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
+    drape_step_equation_diagnose(e, settings->tolerance, report);
+    if (status == DRAPE_RETRY_NONFINITE) {
+        report->reason = "nonfinite";
+        return drape_step_equation_find_cause(e, status, report);
+    }
+    return status ? status : drape_system_status(e->system);
+}
+
+void drape_inexact_newton_archive(drape_inexact_newton *s, drape_archive *a)
+{
+    drape_archive_mark(a, "inexact newton");
+    drape_work_archive(&s->equation->work, a);
+    if (s->matrix)
+        drape_approx_jacobian_archive(s->matrix, a);
+}
+
+size_t drape_inexact_newton_bytes(const drape_inexact_newton *s)
+{
+    return s->matrix ? drape_approx_jacobian_bytes(s->matrix) : 0;
+}

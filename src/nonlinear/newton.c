@@ -1,0 +1,595 @@
+/*
+ * newton.c: see newton.h. A solve runs through these stages, which stand below in this order:
+ *
+ *   guess      the caller's d, shortened to its feasible fraction; d = 0 where it breaks a limit
+ *   residual   F(d)
+ *   jacobian   J(d), in the pattern that contact has there
+ *   factor     factors of J; an indefinite J is repaired by a share of the positive parts of its elements
+ *   correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress predicted
+ *              for the next J; p shortened or lengthened by line search, completed by chord steps
+ *   conclude   what KINSOL's return code means, and F at the d where it ended, in the norm that was asked for
+ *
+ * KINSOL calls those between guess and conclude in each iteration: residual as its system function, jacobian
+ * as its Jacobian function, factor and correct as setup and solve of its linear solver.
+ *
+ * KINSOL does the rest: it adds p to d, counts iterations, and ends the loop where the largest component of F
+ * is within its bound, where p moves nothing, where p is at its size limit five times in a row, or after
+ * max_iterations. With `newton: modified` it also decides when factors are too old, and with `globalization:
+ * line_search` it shortens p itself, by the sum of squares of F.
+ *
+ * Contact and the default globalization, `work`, are ours, and are inside `correct`: KINSOL is given a linear
+ * solver whose solution is the step to be taken. Its own line search can neither stop at contact nor ask for
+ * another matrix, and measures progress by the sum of squares of F, in which stiff stretching outweighs all
+ * other forces.
+ */
+#include "nonlinear/newton.h"
+
+#include "base/finite.h"
+#include "nonlinear/stress_predictor.h"
+#include "solvers/sun_linear.h"
+#include "solvers/sundials_memory.h"
+
+#include <kinsol/kinsol.h>
+#include <math.h>
+#include <nvector/nvector_serial.h>
+#include <string.h>
+
+/* KINSOL's settings that no user should need, all set, none left to a default. */
+#define SETUPS_EXACT    1     /* iterations between Jacobians: exact Newton */
+#define SETUPS_MODIFIED 10    /* and modified Newton */
+#define STEP_TOLERANCE  1e-15 /* of the scene's size: a shorter correction moves nothing */
+#define MAX_NEWTON_STEP 1e3   /* of the scene's size, a node: KINSOL's own limit is 1 for the guess d = 0 */
+#define MAX_BETA_FAIL   1000  /* failures of its line search's curvature condition: as many as it likes */
+
+#define WORK_FRACTION  0.5  /* of the work along a correction may be left when the line search ends */
+#define MAX_TRIALS     8    /* of the line search */
+#define SHORT_STEP     0.5  /* after a shorter step the next matrix is positive semidefinite */
+#define MIN_SHARE      1e-3 /* of the positive part, tried first on an indefinite matrix */
+#define SHARE_GROWTH   4    /* from one try to the next */
+#define MAX_PREDICTION 8    /* corrections of a solve after which stress is predicted no more */
+#define MAX_CHORDS     2    /* chord steps a correction */
+
+struct drape_newton {
+    drape_step_equation *equation;
+    double values[DRAPE_NEWTON_PARAM_COUNT];
+    bool searches; /* globalization `work` */
+    SUNContext sun;
+    void *kin;
+    N_Vector unknown, ones; /* unknown wraps the caller's d during a solve */
+    drape_sun_linear *linear;
+    drape_stress_predictor predictor; /* if it searches */
+    double *trial;                    /* free DOFs: where the line search was last; NULL unless it searches */
+    double *chord, *chord_minus_f;    /* free DOFs: a chord step and its right-hand side; the same */
+
+    /* From solve to solve. */
+    double repair_share;         /* the share that made the last indefinite matrix definite */
+    double factored_mass_weight; /* of the factors that modified Newton may keep; 0: none */
+
+    /* From iteration to iteration of one solve. */
+    int corrections;
+    double positive_share; /* of the positive parts in the matrix, or in the next one after a line search */
+    bool trial_evaluated;  /* the last evaluation was at `trial`, and F is finite there */
+    drape_status failure;  /* < 0: why a callback ended the solve, of which KINSOL keeps only the sign */
+};
+
+/* What a callback returns: KINSOL takes > 0 as recoverable, < 0 as fatal, as drape_status does. */
+static int return_status(drape_newton *s, drape_status status)
+{
+    if (status < 0)
+        s->failure = status;
+    return status;
+}
+
+/* KINSOL compares the largest component of F with this, which implies the tolerance in the norm that was
+ * asked for. */
+static double max_norm_bound(const drape_newton *s)
+{
+    double tolerance = s->values[DRAPE_NEWTON_TOLERANCE], n = (double)s->equation->dofs;
+    if (s->values[DRAPE_NEWTON_NORM] == DRAPE_NORM_L1)
+        return tolerance / n;
+    return s->values[DRAPE_NEWTON_NORM] == DRAPE_NORM_L2 ? tolerance / sqrt(n) : tolerance;
+}
+
+/* ---- Guess ---- */
+
+static void begin(drape_newton *s)
+{
+    drape_step_equation *e = s->equation;
+    drape_step_equation_begin(e);
+    s->corrections = 0;
+    s->positive_share = 0;
+    s->trial_evaluated = false;
+    s->failure = DRAPE_OK;
+    if (!s->searches)
+        return;
+    double clock = drape_system_clock(e->system);
+    drape_point start = e->point;
+    start.x = e->x_start;
+    drape_stress_predictor_begin(&s->predictor, start.x ? &start : NULL);
+    e->work.jacobian_seconds += drape_system_clock(e->system) - clock;
+}
+
+/* A guess beyond a limit is worse than none: springs that are too long pull with forces far above any that
+ * act. */
+static void improve_guess(drape_newton *s, double *d)
+{
+    drape_step_equation *e = s->equation;
+    drape_step_equation_make_feasible(e, d);
+    drape_step_equation_move(e, d);
+    if (drape_system_breaks_limit(e->system, e->x, e->x_base, e->point.internal))
+        memset(d, 0, e->dofs * sizeof *d);
+}
+
+/* ---- Residual ---- */
+
+/* KINSOL must not be shown a NaN: its norms ignore it, and it would pass for convergence. Where the line
+ * search ended, F is known already. */
+static int residual(N_Vector d_vector, N_Vector f, void *user)
+{
+    drape_newton *s = user;
+    drape_step_equation *e = s->equation;
+    const double *d = N_VGetArrayPointer(d_vector);
+    bool finite = true;
+    if (!s->trial_evaluated || memcmp(d, s->trial, e->dofs * sizeof *d) != 0) {
+        s->trial_evaluated = false;
+        finite = drape_step_equation_evaluate(e, d);
+    }
+    memcpy(N_VGetArrayPointer(f), e->f, e->dofs * sizeof *e->f);
+    return drape_system_status(e->system) ? -1 : finite ? 0 : 1;
+}
+
+/* ---- Jacobian ---- */
+
+/* Contact may couple what it did not before: then the linear solver is made anew. */
+static drape_status extend_pattern(drape_newton *s, const drape_point *point)
+{
+    bool changed;
+    drape_status status = drape_system_extend_pattern(s->equation->system, point, &changed);
+    s->linear->stale |= changed;
+    if (!status && s->linear->stale)
+        status = drape_sun_linear_extend_pattern(s->linear, drape_system_pattern(s->equation->system));
+    return status;
+}
+
+/* Excludes contact, and the new analysis in extend_pattern, which count elsewhere. */
+static double jacobian_clock(const drape_newton *s)
+{
+    return drape_system_clock(s->equation->system) - s->linear->factor_seconds;
+}
+
+/* J(d) with a share of the positive parts, into the values of the linear solver. */
+static drape_status assemble(drape_newton *s, const double *d, double positive_share)
+{
+    drape_step_equation *e = s->equation;
+    double start = jacobian_clock(s);
+    s->trial_evaluated = false;
+    s->positive_share = positive_share;
+    drape_step_equation_move(e, d);
+    drape_status status = extend_pattern(s, &e->point);
+    if (status)
+        return status;
+    drape_step_equation_jacobian(e, drape_stress_predictor_stress(&s->predictor),
+                                 s->values[DRAPE_NEWTON_PROJECT] != 0 ? 1 : positive_share,
+                                 s->linear->values);
+    s->factored_mass_weight = e->mass_weight;
+    e->work.jacobian_seconds += jacobian_clock(s) - start;
+    return DRAPE_OK;
+}
+
+static int jacobian(N_Vector d, N_Vector f, SUNMatrix matrix, void *user, N_Vector scratch1,
+                    N_Vector scratch2)
+{
+    (void)f, (void)matrix, (void)scratch1, (void)scratch2;
+    drape_newton *s = user;
+    return return_status(s, assemble(s, N_VGetArrayPointer(d), s->positive_share));
+}
+
+/* ---- Factor ---- */
+
+/* Assembles and factors J at the present iterate with a share of the positive parts: with 1 in any case, with
+ * less only if that is positive definite, else DRAPE_RETRY_LINEAR. */
+static drape_status factor_with_share(drape_newton *s, double share)
+{
+    drape_status status = assemble(s, N_VGetArrayPointer(s->unknown), share);
+    return status ? status : drape_sun_linear_factor(s->linear, share < 1);
+}
+
+/* An indefinite matrix gives directions that lead nowhere good. With the whole positive parts they lead down,
+ * but slowly: the smaller the share that makes the matrix definite, the nearer its direction is to Newton's.
+ * The share that was needed last is tried first, halved. */
+static int factor(SUNLinearSolver solver, SUNMatrix matrix)
+{
+    (void)matrix;
+    drape_newton *s = ((drape_sun_linear *)solver->content)->owner;
+    bool repairs = s->searches && s->positive_share == 0;
+    drape_status status = drape_sun_linear_factor(s->linear, repairs);
+    if (status != DRAPE_RETRY_LINEAR || !repairs)
+        return return_status(s, status);
+    double share = fmax(s->repair_share / 2, MIN_SHARE);
+    while ((status = factor_with_share(s, share)) == DRAPE_RETRY_LINEAR && share < 1)
+        share = fmin(1, SHARE_GROWTH * share);
+    s->repair_share = share;
+    return return_status(s, status);
+}
+
+/* ---- Correct ---- */
+
+/* A p that climbs is of an indefinite matrix, which the linear solver could not tell: the positive
+ * semidefinite one gives one that descends. */
+static drape_status ensure_descent(drape_newton *s, const double *minus_f, double *p)
+{
+    if (drape_step_equation_dot(s->equation, minus_f, p) > 0 || s->positive_share == 1)
+        return DRAPE_OK;
+    drape_status status = factor_with_share(s, 1);
+    return status ? status : drape_sun_linear_solve(s->linear, minus_f, p);
+}
+
+/* Where many corrections did not lead to an end, sheets buckle: there forces to first order in the last
+ * correction say little, and the iteration may go in circles. */
+static void predict_stress(drape_newton *s, const double *p)
+{
+    drape_step_equation *e = s->equation;
+    double start = drape_system_clock(e->system);
+    if (++s->corrections <= MAX_PREDICTION)
+        drape_stress_predictor_correct(&s->predictor, &e->point, p);
+    else
+        drape_stress_predictor_forget(&s->predictor);
+    e->work.jacobian_seconds += drape_system_clock(e->system) - start;
+}
+
+/* The a at which p is taken: the work of the residual along it, F(d + a p) . p, is to be at most a fraction
+ * of `start`, what it was at a = 0, of either sign; a positive one has passed the minimum. Found by doubling
+ * and bisection. This is the line search of Matthies & Strang 1979: it needs no energy, so it holds for
+ * friction and damping too. A matrix with positive parts is too stiff by far along what is unstable: its
+ * corrections are lengthened until the work is small enough, else a sheet that buckles takes a hundred of
+ * them. Others are taken whole if they stop short of the minimum. */
+static double search_along(drape_newton *s, const double *d, const double *p, double start)
+{
+    drape_step_equation *e = s->equation;
+    const bool lengthens = s->positive_share > 0 && !e->x_ahead;
+    double low = 0, high = INFINITY, a = 1;
+    for (int k = 0; k < MAX_TRIALS; k++) {
+        double work;
+        s->trial_evaluated = drape_step_equation_try(e, d, a, p, s->trial, &work);
+        if (fabs(work) <= -WORK_FRACTION * start || (work < 0 && a == 1 && !lengthens))
+            return a;
+        if (work < 0)
+            low = a;
+        else
+            high = a;
+        a = isinf(high) ? 2 * a : (low + high) / 2;
+    }
+    return low > 0 ? low : a;
+}
+
+static double largest(const double *f, size_t n)
+{
+    double max = 0;
+    for (size_t i = 0; i < n; i++)
+        max = fmax(max, fabs(f[i]));
+    return max;
+}
+
+/* Chord steps: where p brought the residual so far down that the same fall once or twice more ends the solve,
+ * the rest is corrected with the factors of p, at a tenth of the cost of an iteration. F is known at d + p;
+ * minus_f is what it was at d. A chord step that does not lower the residual is undone. */
+static drape_status add_chords(drape_newton *s, const double *d, double *p, const double *minus_f)
+{
+    drape_step_equation *e = s->equation;
+    double bound = max_norm_bound(s), before = largest(e->f, e->dofs),
+           rate = before / largest(minus_f, e->dofs);
+    for (int left = MAX_CHORDS; left > 0 && before > bound && before * pow(rate, left) <= bound; left--) {
+        for (size_t i = 0; i < e->dofs; i++)
+            s->chord_minus_f[i] = -e->f[i];
+        drape_status status = drape_sun_linear_solve(s->linear, s->chord_minus_f, s->chord);
+        if (status)
+            return status;
+        for (size_t i = 0; i < e->dofs; i++)
+            s->trial[i] = d[i] + (p[i] + s->chord[i]);
+        s->trial_evaluated = drape_step_equation_evaluate(e, s->trial);
+        double after = s->trial_evaluated ? largest(e->f, e->dofs) : INFINITY;
+        if (!(after < before)) {
+            s->trial_evaluated = false;
+            return DRAPE_OK;
+        }
+        for (size_t i = 0; i < e->dofs; i++)
+            p[i] += s->chord[i];
+        rate = after / before;
+        before = after;
+    }
+    return DRAPE_OK;
+}
+
+/* The step that is taken from the present iterate d. A p that is not finite is left for KINSOL to evaluate,
+ * and fail. */
+static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
+{
+    drape_step_equation *e = s->equation;
+    const double *d = N_VGetArrayPointer(s->unknown);
+    drape_status status = drape_sun_linear_solve(s->linear, minus_f, p);
+    if (!status && s->searches)
+        status = ensure_descent(s, minus_f, p);
+    if (status || !drape_all_finite(p, e->dofs))
+        return status;
+    drape_step_equation_make_feasible(e, p);
+    double start = -drape_step_equation_dot(e, minus_f, p);
+    if (!s->searches || start >= 0)
+        return DRAPE_OK;
+    predict_stress(s, p);
+    double a = search_along(s, d, p, start);
+    s->positive_share = a < SHORT_STEP ? 1 : 0; /* of the next matrix */
+    if (a == 1)
+        return s->trial_evaluated && !e->x_ahead && s->predictor.active ? add_chords(s, d, p, minus_f)
+                                                                        : DRAPE_OK;
+    for (size_t i = 0; i < e->dofs; i++)
+        p[i] *= a;
+    drape_stress_predictor_forget(&s->predictor);
+    return DRAPE_OK;
+}
+
+static int correct(SUNLinearSolver solver, SUNMatrix matrix, N_Vector p, N_Vector minus_f,
+                   sunrealtype tolerance)
+{
+    (void)matrix, (void)tolerance;
+    drape_newton *s = ((drape_sun_linear *)solver->content)->owner;
+    return return_status(s, make_step(s, N_VGetArrayPointer(minus_f), N_VGetArrayPointer(p)));
+}
+
+/* ---- Conclude ---- */
+
+/* Every return code of KINSol, as what it means for the step. */
+static drape_status status_of(int code, const char **reason)
+{
+    switch (code) {
+    case KIN_SUCCESS:
+    case KIN_INITIAL_GUESS_OK:
+        *reason = "converged";
+        return DRAPE_OK;
+    case KIN_STEP_LT_STPTOL: /* positive, but not converged */
+        *reason = "stagnation";
+        return DRAPE_RETRY_NONLINEAR;
+    case KIN_MAXITER_REACHED:
+        *reason = "max_iterations";
+        return DRAPE_RETRY_NONLINEAR;
+    case KIN_LINESEARCH_NONCONV:
+    case KIN_LINESEARCH_BCFAIL:
+        *reason = "line_search";
+        return DRAPE_RETRY_NONLINEAR;
+    case KIN_MXNEWT_5X_EXCEEDED:
+        *reason = "newton_step";
+        return DRAPE_RETRY_NONLINEAR;
+    case KIN_LINSOLV_NO_RECOVERY:
+    case KIN_LSETUP_FAIL:
+    case KIN_LSOLVE_FAIL:
+        *reason = "singular";
+        return DRAPE_RETRY_LINEAR;
+    case KIN_SYSFUNC_FAIL:
+    case KIN_FIRST_SYSFUNC_ERR:
+    case KIN_REPTD_SYSFUNC_ERR:
+        *reason = "nonfinite";
+        return DRAPE_RETRY_NONFINITE;
+    default: /* KIN_MEM_NULL, KIN_ILL_INPUT, KIN_NO_MALLOC, KIN_MEM_FAIL, KIN_LINIT_FAIL, KIN_VECTOROP_ERR
+                ...: no smaller step helps */
+        *reason = "solver";
+        return DRAPE_E_SOLVER;
+    }
+}
+
+/* Whether F at d is small enough. KINSOL's last evaluation was at d if it converged; else it may have been a
+ * trial. */
+static drape_status judge(drape_newton *s, drape_status status, const double *d, drape_solve_report *report)
+{
+    drape_step_equation *e = s->equation;
+    drape_norm norm = (drape_norm)s->values[DRAPE_NEWTON_NORM];
+    double tolerance = s->values[DRAPE_NEWTON_TOLERANCE];
+    bool finite = !status || drape_step_equation_evaluate(e, d);
+    report->tolerance = tolerance;
+    report->residual = finite ? drape_step_equation_norm(e, norm) : NAN;
+    drape_step_equation_diagnose(e, tolerance, report);
+    if (report->residual <= tolerance) {
+        report->reason = "converged";
+        return DRAPE_OK;
+    }
+    double rounding = finite ? drape_step_equation_rounding(e, d, norm) : NAN;
+    if (report->residual <= rounding) {
+        report->reason = "rounding";
+        report->tolerance = rounding;
+        return DRAPE_OK;
+    }
+    if (!status) { /* unreachable as long as KINSOL tests what its documentation says */
+        report->reason = "residual";
+        status = DRAPE_RETRY_NONLINEAR;
+    }
+    report->usable = report->lenient && finite && status > 0;
+    return finite ? status : drape_step_equation_find_cause(e, status, report);
+}
+
+static drape_status conclude(drape_newton *s, int code, const double *d, drape_solve_report *report)
+{
+    drape_step_equation *e = s->equation;
+    long iterations = 0;
+    drape_status status = status_of(code, &report->reason);
+    KINGetNumNonlinSolvIters(s->kin, &iterations); /* of this solve: KINSol clears its counters */
+    report->iterations = (int)iterations;
+    e->work.newton_iterations += iterations;
+    if (drape_system_status(e->system))
+        return drape_system_status(e->system);
+    if (s->failure) {
+        report->reason = "memory";
+        return s->failure;
+    }
+    if (status)
+        drape_newton_forget_factors(s);
+    return judge(s, status, d, report);
+}
+
+/* ---- A solve ---- */
+
+drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *report)
+{
+    drape_step_equation *e = s->equation;
+    *report = (drape_solve_report){
+        .reason = "converged", .lenient = s->values[DRAPE_NEWTON_ON_FAILURE] == DRAPE_NEWTON_FAILURE_ACCEPT};
+    begin(s);
+    if (e->dofs == 0) {
+        drape_step_equation_evaluate(e, d);
+        return DRAPE_OK;
+    }
+    improve_guess(s, d);
+    bool keeps_factors = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_MODIFIED &&
+                         s->factored_mass_weight == e->mass_weight;
+    KINSetNoInitSetup(s->kin, keeps_factors);
+    N_VSetArrayPointer(d, s->unknown);
+    int strategy =
+        s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_LINE_SEARCH ? KIN_LINESEARCH : KIN_NONE;
+    return conclude(s, KINSol(s->kin, s->unknown, strategy, s->ones, s->ones), d, report);
+}
+
+/* ---- Making and freeing ---- */
+
+static bool configure(drape_newton *s)
+{
+    const double length = s->equation->model->length, n = (double)s->equation->dofs;
+    bool exact = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_EXACT;
+    DRAPE_KINSOL_QUIET(s->kin);
+    return !KINInit(s->kin, residual, s->unknown) && !KINSetUserData(s->kin, s) &&
+           !KINSetLinearSolver(s->kin, s->linear->solver, s->linear->matrix) &&
+           !KINSetJacFn(s->kin, jacobian) && !KINSetFuncNormTol(s->kin, max_norm_bound(s)) &&
+           !KINSetScaledStepTol(s->kin, STEP_TOLERANCE * length) &&
+           !KINSetMaxNewtonStep(s->kin, MAX_NEWTON_STEP * length * sqrt(n)) &&
+           !KINSetNumMaxIters(s->kin, (long)s->values[DRAPE_NEWTON_MAX_ITERATIONS]) &&
+           !KINSetMaxSetupCalls(s->kin, exact ? SETUPS_EXACT : SETUPS_MODIFIED) &&
+           !KINSetNoResMon(s->kin, exact) && !KINSetMaxBetaFails(s->kin, MAX_BETA_FAIL);
+}
+
+static drape_status create_search(drape_arena *arena, drape_newton *s)
+{
+    const size_t n = s->equation->dofs;
+    s->trial = drape_arena_take(arena, n, sizeof *s->trial);
+    s->chord = drape_arena_take(arena, n, sizeof *s->chord);
+    s->chord_minus_f = drape_arena_take(arena, n, sizeof *s->chord_minus_f);
+    drape_status status = drape_stress_predictor_init(arena, s->equation->system, &s->predictor);
+    return status ? status : drape_arena_status(arena);
+}
+
+static drape_status create_solver(drape_arena *arena, drape_newton *s)
+{
+    drape_context *ctx = arena->ctx;
+    drape_system *system = s->equation->system;
+    const int64_t n = (int64_t)s->equation->dofs;
+    if (drape_sundials_context(&s->sun) || !(s->kin = KINCreate(s->sun)) ||
+        !(s->unknown = N_VMake_Serial(n, s->equation->f, s->sun)) || !(s->ones = N_VNew_Serial(n, s->sun)))
+        return drape_fail_memory(ctx, (size_t)n * sizeof(double));
+    N_VConst(1, s->ones);
+    if (n == 0)
+        return DRAPE_OK;
+    drape_status status =
+        drape_sun_linear_create(arena, s->sun, drape_linears[(int)s->values[DRAPE_NEWTON_LINEAR_SOLVER]],
+                                drape_system_pattern(system), drape_system_pool(system), &s->linear);
+    if (status)
+        return status;
+    s->linear->tolerance = s->values[DRAPE_NEWTON_LINEAR_TOLERANCE];
+    s->linear->owner = s;
+    s->linear->solver->ops->setup = factor;
+    s->linear->solver->ops->solve = correct;
+    return configure(s)
+               ? DRAPE_OK
+               : drape_fail(ctx, DRAPE_E_MEMORY, "KINSOL cannot be set up for %lld unknowns", (long long)n);
+}
+
+drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equation, const double *values,
+                                 drape_newton **out)
+{
+    drape_newton *s = *out = drape_arena_take(arena, 1, sizeof *s);
+    if (!s)
+        return DRAPE_E_MEMORY;
+    s->equation = equation;
+    s->repair_share = 1;
+    memcpy(s->values, values, sizeof s->values);
+    if (s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_AUTO)
+        s->values[DRAPE_NEWTON_GLOBALIZATION] = DRAPE_NEWTON_GLOBAL_WORK;
+    s->searches = s->values[DRAPE_NEWTON_GLOBALIZATION] == DRAPE_NEWTON_GLOBAL_WORK;
+    drape_status status = s->searches ? create_search(arena, s) : DRAPE_OK;
+    return status ? status : create_solver(arena, s);
+}
+
+void drape_newton_destroy(drape_newton **newton)
+{
+    drape_newton *s = *newton;
+    if (!s)
+        return;
+    if (s->kin)
+        KINFree(&s->kin);
+    drape_sun_linear_destroy(&s->linear);
+    if (s->unknown)
+        N_VDestroy(s->unknown);
+    if (s->ones)
+        N_VDestroy(s->ones);
+    if (s->sun)
+        SUNContext_Free(&s->sun);
+    *newton = NULL;
+}
+
+/* ---- For integrators ---- */
+
+drape_status drape_newton_matrix(drape_newton *s, const drape_point *point, double mass_weight,
+                                 const drape_pattern **pattern, const double **values)
+{
+    drape_newton_forget_factors(s);
+    drape_status status = extend_pattern(s, point);
+    if (status)
+        return status;
+    drape_system_jacobian(s->equation->system, point, mass_weight, 0, s->linear->values);
+    *pattern = drape_system_pattern(s->equation->system);
+    *values = s->linear->values;
+    return DRAPE_OK;
+}
+
+const double *drape_newton_values(const drape_newton *s)
+{
+    return s->values;
+}
+
+void drape_newton_forget_factors(drape_newton *s)
+{
+    s->factored_mass_weight = 0;
+}
+
+/* Modified Newton keeps its factors, and monitors the residual by what it was in the solve before. */
+void drape_newton_archive(drape_newton *s, drape_archive *a)
+{
+    drape_step_equation *e = s->equation;
+    const bool modified = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_MODIFIED;
+    drape_archive_mark(a, "newton");
+    drape_archive_doubles(a, e->f, e->dofs);
+    drape_archive_double(a, &s->repair_share);
+    drape_archive_double(a, &s->factored_mass_weight);
+    drape_work_archive(&e->work, a);
+    if (e->dofs == 0)
+        return;
+    if (drape_archive_is_reading(a))
+        drape_archive_note(a, drape_sun_linear_ensure_pattern(s->linear, drape_system_pattern(e->system)));
+    drape_sun_linear_archive(s->linear, a, modified && s->factored_mass_weight != 0);
+    if (modified && !drape_kinsol_archive(s->kin, a) && a->reading)
+        drape_newton_forget_factors(s);
+}
+
+drape_work drape_newton_work(const drape_newton *s)
+{
+    drape_work work = s->equation->work;
+    if (s->linear) {
+        work.factorizations = s->linear->factorizations;
+        work.linear_iterations = s->linear->iterations;
+        work.factor_seconds = s->linear->factor_seconds;
+        work.solve_seconds = s->linear->solve_seconds;
+    }
+    return work;
+}
+
+#define KINSOL_VECTORS 7 /* six of its own, and the weights */
+
+size_t drape_newton_bytes(const drape_newton *s)
+{
+    return KINSOL_VECTORS * s->equation->dofs * sizeof(double) +
+           (s->linear ? drape_sun_linear_bytes(s->linear) : 0);
+}

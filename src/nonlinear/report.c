@@ -1,0 +1,15 @@
+/* report.c: see report.h. */
+#include "nonlinear/report.h"
+
+void drape_work_archive(drape_work *work, drape_archive *a)
+{
+    int64_t *const counts[] = {&work->unstable_modes, &work->newton_iterations, &work->jacobians,
+                               &work->factorizations, &work->linear_iterations, &work->residuals};
+    double *const seconds[] = {&work->residual_seconds, &work->jacobian_seconds, &work->factor_seconds,
+                               &work->solve_seconds, &work->contact_seconds};
+    drape_archive_bool(a, &work->stability_known);
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
+        drape_archive_int64(a, counts[i]);
+    for (size_t i = 0; i < sizeof seconds / sizeof *seconds; i++)
+        drape_archive_double(a, seconds[i]);
+}

@@ -1,0 +1,30 @@
+/* report.h: what the solution of a nonlinear system reports, and the work that it took. */
+#ifndef DRAPE_NONLINEAR_REPORT_H
+#define DRAPE_NONLINEAR_REPORT_H
+
+#include "assemble/system.h"
+#include "base/archive.h"
+
+/* How one solve ended. */
+typedef struct drape_solve_report {
+    const char *reason; /* "converged", or why not; static text */
+    int iterations;
+    double residual, tolerance; /* [N] */
+    /* lenient: settings on_failure accept: states are only guarded against numbers that are not finite and
+     * against passing through something. usable: with a status > 0, they ask to continue with what there
+     * is. */
+    bool lenient, usable;
+    drape_diagnostic diagnostic;
+} drape_solve_report;
+
+/* Work done so far. */
+typedef struct drape_work {
+    bool stability_known;   /* of an equilibrium */
+    int64_t unstable_modes; /* negative eigenvalues of the Hessian there */
+    int64_t newton_iterations, jacobians, factorizations, linear_iterations, residuals;
+    double residual_seconds, jacobian_seconds, factor_seconds, solve_seconds, contact_seconds;
+} drape_work;
+
+void drape_work_archive(drape_work *work, drape_archive *a);
+
+#endif

@@ -1,0 +1,142 @@
+/* step_equation.c: see step_equation.h. */
+#include "nonlinear/step_equation.h"
+
+#include "base/finite.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#define ROUNDINGS 4 /* of each term of a residual: its own, that of its product, that of the sum */
+
+drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, drape_step_equation *s)
+{
+    const drape_model *model = drape_system_model(system);
+    *s = (drape_step_equation){.system = system,
+                               .model = model,
+                               .nodes = 3 * (size_t)model->node_count,
+                               .dofs = 3 * (size_t)model->free_count};
+    s->x_base = drape_arena_take(arena, s->nodes, sizeof *s->x_base);
+    s->v_base = drape_arena_take(arena, s->nodes, sizeof *s->v_base);
+    s->inertia = drape_arena_take(arena, s->dofs, sizeof *s->inertia);
+    s->x = drape_arena_take(arena, s->nodes, sizeof *s->x);
+    s->v = drape_arena_take(arena, s->nodes, sizeof *s->v);
+    s->g = drape_arena_take(arena, s->nodes, sizeof *s->g);
+    s->f = drape_arena_take(arena, s->dofs, sizeof *s->f);
+    if (drape_system_contact(system))
+        s->x_ahead = drape_arena_take(arena, s->nodes, sizeof *s->x_ahead);
+    s->point = (drape_point){.x = s->x, .v = s->v};
+    return drape_arena_status(arena);
+}
+
+void drape_step_equation_begin(drape_step_equation *s)
+{
+    memcpy(s->x, s->x_base, s->nodes * sizeof *s->x);
+    memcpy(s->v, s->v_base, s->nodes * sizeof *s->v);
+}
+
+void drape_step_equation_move(drape_step_equation *s, const double *d)
+{
+    for (size_t i = 0; i < s->dofs; i++) {
+        size_t at = drape_step_equation_at(s, i);
+        s->x[at] = s->x_base[at] + d[i];
+        s->v[at] = s->v_base[at] + s->point.weight * d[i];
+    }
+}
+
+bool drape_step_equation_evaluate(drape_step_equation *s, const double *d)
+{
+    double start = drape_system_clock(s->system);
+    drape_step_equation_move(s, d);
+    drape_system_force(s->system, &s->point, s->g);
+    for (size_t i = 0; i < s->dofs; i++) {
+        size_t at = drape_step_equation_at(s, i);
+        s->f[i] = s->mass_weight * s->model->mass[at / 3] * (d[i] - s->inertia[i]) + s->g[at];
+    }
+    s->work.residuals++;
+    s->work.residual_seconds += drape_system_clock(s->system) - start;
+    return drape_all_finite(s->f, s->dofs);
+}
+
+bool drape_step_equation_try(drape_step_equation *s, const double *d, double a, const double *p,
+                             double *trial, double *work)
+{
+    for (size_t i = 0; i < s->dofs; i++)
+        trial[i] = d[i] + a * p[i];
+    bool finite = drape_step_equation_evaluate(s, trial);
+    *work = finite ? drape_step_equation_dot(s, s->f, p) : INFINITY;
+    return finite;
+}
+
+void drape_step_equation_jacobian(drape_step_equation *s, const double *stress, double positive_share,
+                                  double *values)
+{
+    drape_point point = s->point;
+    point.stress = stress;
+    drape_system_jacobian(s->system, &point, s->mass_weight, positive_share, values);
+    s->work.jacobians++;
+}
+
+void drape_step_equation_make_feasible(drape_step_equation *s, double *p)
+{
+    if (!s->x_ahead)
+        return;
+    memcpy(s->x_ahead, s->x, s->nodes * sizeof *s->x_ahead);
+    for (size_t i = 0; i < s->dofs; i++)
+        s->x_ahead[drape_step_equation_at(s, i)] += p[i];
+    double fraction = drape_system_step_fraction(s->system, s->x, s->x_ahead, s->point.t);
+    if (fraction == 1)
+        return;
+    for (size_t i = 0; i < s->dofs; i++)
+        p[i] *= fraction;
+}
+
+typedef struct norms {
+    double max, l1, squares;
+} norms;
+
+static void add_entry(norms *sum, double f)
+{
+    sum->max = fabs(f) > sum->max ? fabs(f) : sum->max;
+    sum->l1 += fabs(f);
+    sum->squares += f * f;
+}
+
+static double choose(const norms *sum, drape_norm norm)
+{
+    return norm == DRAPE_NORM_MAX ? sum->max : norm == DRAPE_NORM_L1 ? sum->l1 : sqrt(sum->squares);
+}
+
+double drape_step_equation_norm(const drape_step_equation *s, drape_norm norm)
+{
+    norms sum = {0};
+    for (size_t i = 0; i < s->dofs; i++)
+        add_entry(&sum, s->f[i]);
+    return choose(&sum, norm);
+}
+
+/* Terms are rounded to some DBL_EPSILON of themselves. At small h the inertia of a node in flight, M |v|/h,
+ * is more than 1e16 times a tight tolerance, and halving h doubles it. */
+double drape_step_equation_rounding(const drape_step_equation *s, const double *d, drape_norm norm)
+{
+    norms sum = {0};
+    for (size_t i = 0; i < s->dofs; i++) {
+        size_t at = drape_step_equation_at(s, i);
+        double inertia = s->mass_weight * s->model->mass[at / 3] * (fabs(d[i]) + fabs(s->inertia[i]));
+        add_entry(&sum, ROUNDINGS * DBL_EPSILON * (inertia + fabs(s->g[at])));
+    }
+    return choose(&sum, norm);
+}
+
+void drape_step_equation_diagnose(const drape_step_equation *s, double tolerance, drape_solve_report *report)
+{
+    report->diagnostic = drape_system_diagnose_dof(s->system, s->f, "residual [N]", tolerance);
+}
+
+drape_status drape_step_equation_find_cause(const drape_step_equation *s, drape_status status,
+                                            drape_solve_report *report)
+{
+    drape_status degenerate =
+        drape_system_check(s->system, s->x, NULL, s->point.internal, &report->reason, &report->diagnostic);
+    return degenerate ? degenerate : status;
+}

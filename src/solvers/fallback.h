@@ -1,0 +1,34 @@
+/*
+ * fallback.h: the general solver to which a method for symmetric positive definite matrices hands all others,
+ * as they stand: the fastest one for the size. It is made for the first such matrix: most scenes have none,
+ * and its analysis would be up to half of create.
+ */
+#ifndef DRAPE_SOLVERS_FALLBACK_H
+#define DRAPE_SOLVERS_FALLBACK_H
+
+#include "solvers/linear.h"
+
+typedef struct drape_fallback {
+    const drape_linear_ops *ops;
+    const drape_pattern *pattern;
+    drape_arena arena; /* of the solver */
+    void *solver;      /* NULL before the first matrix */
+    bool active;       /* the last matrix was factored here */
+    int64_t count;     /* matrices it was given */
+} drape_fallback;
+
+/* arena keeps its address. Takes no memory. */
+drape_fallback drape_fallback_of(drape_arena *arena, const drape_pattern *pattern);
+void drape_fallback_destroy(drape_fallback *fallback);
+
+/* Errors: those of the solver's create and factor; then it is not active, and may be called again. */
+drape_status drape_fallback_factor(drape_fallback *fallback, const double *values);
+
+/* The state of the solver, and the owner's *factored; values as of drape_linear_ops.archive. */
+void drape_fallback_archive(drape_fallback *fallback, bool *factored, drape_archive *a, const double *values);
+
+/* What the owner reports, and the bytes of libraries. */
+drape_linear_report drape_fallback_report(const drape_fallback *fallback, const drape_linear_ops *owner);
+size_t drape_fallback_bytes(const drape_fallback *fallback);
+
+#endif

@@ -1,0 +1,417 @@
+/* test_integrators.c: every row of the integrators: form, step(in, out), free fall, a damped swinging sheet;
+ * and that a step is converged when it says so. */
+#include <stdio.h>
+
+#include "integrators/integrator.h"
+#include "models.h"
+#include "solvers/linear.h"
+#include "support/suite.h"
+
+static int param_of(const drape_integrator_ops *ops, const char *name)
+{
+    return drape_param_find(ops->entry.params, ops->entry.param_count, name);
+}
+
+START_TEST(entries_are_well_formed)
+{
+    int count = 0;
+    for (; drape_integrators[count]; count++) {
+        const drape_integrator_ops *ops = drape_integrators[count];
+        ck_assert_ptr_eq(drape_integrator_registry.entries[count], &ops->entry);
+        ck_assert_int_ge(ops->order, ops->steady_state ? 0 : 1);
+        ck_assert(ops->create && ops->step && ops->restart && ops->work);
+        int dt = param_of(ops, "dt");
+        ck_assert(dt >= 0 ? strcmp(ops->entry.params[dt].unit, "s") == 0 : ops->own_steps);
+    }
+    ck_assert_int_eq(drape_registry_count(&drape_integrator_registry), count);
+}
+END_TEST
+
+/* Keys of all rows are accepted by all: a name has one kind and one unit everywhere. */
+START_TEST(shared_names_mean_the_same)
+{
+    for (int i = 0; drape_integrators[i]; i++)
+        for (int j = 0; j < i; j++)
+            for (int p = 0; p < drape_integrators[i]->entry.param_count; p++) {
+                const drape_param *one = &drape_integrators[i]->entry.params[p];
+                int q = param_of(drape_integrators[j], one->name);
+                if (q < 0)
+                    continue;
+                ck_assert_int_eq(one->kind, drape_integrators[j]->entry.params[q].kind);
+                ck_assert_str_eq(one->unit, drape_integrators[j]->entry.params[q].unit);
+            }
+}
+END_TEST
+
+/* ---- One step ---- */
+
+typedef struct stepper {
+    drape_context *ctx;
+    const drape_integrator_ops *ops;
+    drape_model *model;
+    drape_system *system;
+    void *state;
+    size_t n;
+    drape_arena *arena;
+    drape_state in, out, kept;
+} stepper;
+
+/* An irregular sheet hung by two nodes, with every kind of term that there is: damping, drag, bending. */
+static stepper open_stepper(const drape_integrator_ops *ops, const double *values)
+{
+    const drape_setting beta = {"beta", 0.01, NULL}, drag = {"coefficient", 0.05, NULL};
+    const drape_entry_def terms[] = {{.type = "stretch.edge"},
+                                     {.type = "bend.hinge"},
+                                     {"damp.kelvin_voigt", &beta, 1},
+                                     {"drag.viscous", &drag, 1}};
+    stepper s = {.ctx = make_context(), .ops = ops};
+    s.model = make_model(
+        s.ctx,
+        &(model_def){.mesh = MESH_CURVED, .terms = terms, .term_count = 4, .gravity = true, .pinned = true});
+    s.arena = drape_arena_create(s.ctx);
+    s.system = make_system(s.arena, s.model, 1);
+    ck_assert_msg(ops->create(s.arena, s.system, values, &s.state) == DRAPE_OK, "%s",
+                  drape_context_message(s.ctx));
+    s.n = 3 * (size_t)s.model->node_count;
+    ck_assert_int_eq(drape_state_create(s.arena, s.model, &s.in), DRAPE_OK);
+    ck_assert_int_eq(drape_state_create(s.arena, s.model, &s.out), DRAPE_OK);
+    ck_assert_int_eq(drape_state_create(s.arena, s.model, &s.kept), DRAPE_OK);
+    return s;
+}
+
+static void close_stepper(stepper *s)
+{
+    if (s->ops->destroy)
+        s->ops->destroy(&s->state);
+    drape_system_destroy(&s->system);
+    drape_arena_destroy(&s->arena);
+    drape_model_destroy(&s->model);
+    drape_context_destroy(&s->ctx);
+}
+
+static void copy_state(const stepper *s, const drape_state *from, drape_state *to)
+{
+    to->t = from->t;
+    memcpy(to->x, from->x, s->n * sizeof *to->x);
+    memcpy(to->v, from->v, s->n * sizeof *to->v);
+    memcpy(to->internal, from->internal, (size_t)s->model->internal_count * sizeof *to->internal);
+}
+
+static bool same_bits(const stepper *s, const drape_state *a, const drape_state *b)
+{
+    return a->t == b->t && memcmp(a->x, b->x, s->n * sizeof *a->x) == 0 &&
+           memcmp(a->v, b->v, s->n * sizeof *a->v) == 0 &&
+           memcmp(a->internal, b->internal, (size_t)s->model->internal_count * sizeof *a->internal) == 0;
+}
+
+static drape_status take_step(stepper *s, double h, drape_step_info *info)
+{
+    *info = (drape_step_info){.reason = ""};
+    s->out.t = s->in.t + h;
+    return s->ops->step(s->state, &s->in, &s->out, h, info);
+}
+
+static void defaults(const drape_integrator_ops *ops, double *values)
+{
+    for (int i = 0; i < ops->entry.param_count; i++)
+        values[i] = generic_value(&ops->entry.params[i]);
+}
+
+/* Calls use for every row with each of its choices in turn, alone, the others at their defaults. */
+static void for_all_choices(void (*use)(const drape_integrator_ops *ops, const double *values,
+                                        const char *what))
+{
+    for (int i = 0; drape_integrators[i]; i++) {
+        const drape_integrator_ops *ops = drape_integrators[i];
+        double values[DRAPE_MAX_PARAMS];
+        if (ops->steady_state) /* an equilibrium is no step in time */
+            continue;
+        defaults(ops, values);
+        use(ops, values, "defaults");
+        for (int p = 0; p < ops->entry.param_count; p++) {
+            const drape_param *param = &ops->entry.params[p];
+            bool choice = param->kind == DRAPE_PARAM_CHOICE;
+            if (!choice && param->kind != DRAPE_PARAM_BOOLEAN)
+                continue;
+            for (int c = 0; choice ? param->choices[c] != NULL : c < 2; c++) {
+                char what[100];
+                snprintf(what, sizeof what, "%s %s", param->name,
+                         choice ? param->choices[c]
+                         : c    ? "on"
+                                : "off");
+                defaults(ops, values);
+                values[p] = c;
+                use(ops, values, what);
+            }
+        }
+    }
+}
+
+/* Good steps and steps that fail leave `in` as it is; after a restart the same `in` gives the same bits.
+ * But for modified Newton: KINSOL keeps a little of the solve before, and with inexact steps that shows;
+ * there two results are both within the tolerance. */
+static void check_steps(const drape_integrator_ops *ops, const double *values, const char *what)
+{
+    stepper s = open_stepper(ops, values);
+    drape_state first;
+    bool modified = strcmp(what, "newton modified") == 0;
+    ck_assert_int_eq(drape_state_create(s.arena, s.model, &first), DRAPE_OK);
+    for (int k = 0; k < 12; k++) {
+        drape_step_info info;
+        bool hopeless = k == 6;
+        double h = hopeless ? 1e5 : 1.0 / 60 / (1 + k % 3);
+        copy_state(&s, &s.in, &s.kept);
+        s.ops->restart(s.state, &s.in);
+        drape_status status = take_step(&s, h, &info);
+        ck_assert_msg(same_bits(&s, &s.in, &s.kept), "%s, %s: step %d wrote its input", ops->entry.name, what,
+                      k);
+        check_line(info.reason, "a reason");
+        if (hopeless)
+            continue;
+        ck_assert_msg(status == DRAPE_OK, "%s, %s: step %d: %s", ops->entry.name, what, k, info.reason);
+        copy_state(&s, &s.out, &first);
+        memset(s.out.x, 0xff, s.n * sizeof *s.out.x);
+        memset(s.out.v, 0xff, s.n * sizeof *s.out.v);
+        s.ops->restart(s.state, &s.in);
+        ck_assert_int_eq(take_step(&s, h, &info), DRAPE_OK);
+        ck_assert_msg(modified || same_bits(&s, &s.out, &first), "%s, %s: step %d has other bits",
+                      ops->entry.name, what, k);
+        drape_state_commit(s.model, &s.in, &s.out);
+        copy_state(&s, &s.out, &s.in);
+    }
+    close_stepper(&s);
+}
+
+START_TEST(steps_do_not_write_their_input_and_repeat)
+{
+    for_all_choices(check_steps);
+}
+END_TEST
+
+/* Two integrators, fresh, on the same path: the same bits without any restart. */
+static void check_twins(const drape_integrator_ops *ops, const double *values, const char *what)
+{
+    stepper a = open_stepper(ops, values), b = open_stepper(ops, values);
+    for (int k = 0; k < 10; k++) {
+        drape_step_info one, other;
+        ck_assert_int_eq(take_step(&a, 0.01, &one), DRAPE_OK);
+        ck_assert_int_eq(take_step(&b, 0.01, &other), DRAPE_OK);
+        ck_assert_msg(same_bits(&a, &a.out, &b.out), "%s, %s: step %d", ops->entry.name, what, k);
+        ck_assert_int_eq(one.iterations, other.iterations);
+        ck_assert(one.residual == other.residual || (isnan(one.residual) && isnan(other.residual)));
+        drape_state_commit(a.model, &a.in, &a.out);
+        drape_state_commit(b.model, &b.in, &b.out);
+        copy_state(&a, &a.out, &a.in);
+        copy_state(&b, &b.out, &b.in);
+    }
+    close_stepper(&a);
+    close_stepper(&b);
+}
+
+START_TEST(equal_runs_have_equal_bits)
+{
+    for_all_choices(check_twins);
+}
+END_TEST
+
+/* ---- What a step says of itself ---- */
+
+/* The residual of backward Euler at out, from the states alone: M (v1 - v0)/h + g(x1, v1) over free nodes. */
+static double residual_of(stepper *s, double h, double *history, double *g)
+{
+    double worst = 0;
+    drape_system_measures(s->system, &(drape_point){.x = s->in.x, .internal = s->in.internal}, history);
+    for (int64_t i = 0; i < s->model->measure_count; i++)
+        history[i] /= -h;
+    const drape_point point = {
+        .x = s->out.x, .v = s->out.v, .internal = s->in.internal, .weight = 1 / h, .history = history};
+    drape_system_force(s->system, &point, g);
+    for (size_t i = 0; i < s->n; i++) {
+        double f = s->model->mass[i / 3] * (s->out.v[i] - s->in.v[i]) / h + g[i];
+        worst = fmax(worst, s->model->pinned[i / 3] ? 0 : fabs(f));
+    }
+    return worst;
+}
+
+/* Rounding: forces of some 10 N in 1e-16 each, positions against displacements: 1e-16 m times stiffnesses of
+ * 1e3 N/m and 0.01 kg/h^2. */
+static void check_residual(const drape_integrator_ops *ops, const double *values, const char *what)
+{
+    if (strcmp(ops->entry.name, "be") != 0)
+        return;
+    stepper s = open_stepper(ops, values);
+    double *history = drape_arena_take(s.arena, (size_t)s.model->measure_count, sizeof *history);
+    double *g = drape_arena_take(s.arena, s.n, sizeof *g);
+    for (int k = 0; k < 30; k++) {
+        drape_step_info info;
+        double h = k % 10 == 9 ? 0.005 : 0.02;
+        drape_status status = take_step(&s, h, &info);
+        if (status) { /* without a controller to halve it a step may fail, but not in silence */
+            ck_assert_str_ne(info.reason, "converged");
+            ck_assert(!(info.residual <= info.tolerance));
+            ck_assert_msg(k > 2, "%s, %s: step %d: %s", ops->entry.name, what, k, info.reason);
+            break;
+        }
+        double actual = residual_of(&s, h, history, g);
+        ck_assert_str_eq(info.reason, "converged");
+        ck_assert_double_eq(info.tolerance, values[param_of(ops, "tolerance")]);
+        ck_assert_double_le(info.residual, info.tolerance);
+        ck_assert_msg(actual <= info.residual + 1e-11, "%s, %s: step %d has a residual of %g, not %g",
+                      ops->entry.name, what, k, actual, info.residual);
+        drape_state_commit(s.model, &s.in, &s.out);
+        copy_state(&s, &s.out, &s.in);
+    }
+    close_stepper(&s);
+}
+
+START_TEST(a_converged_step_is_converged)
+{
+    for_all_choices(check_residual);
+}
+END_TEST
+
+/* One iteration is not enough for a sheet that is let go: the step says so, or is taken and says so. */
+START_TEST(a_step_that_is_not_converged_says_so)
+{
+    for (int i = 0; drape_integrators[i]; i++)
+        for (int accept = 0; accept < 2; accept++) {
+            const drape_integrator_ops *ops = drape_integrators[i];
+            double values[DRAPE_MAX_PARAMS];
+            int most = param_of(ops, "max_iterations"), on_failure = param_of(ops, "on_failure");
+            if (most < 0 || on_failure < 0 || ops->steady_state)
+                continue;
+            defaults(ops, values);
+            values[most] = 1;
+            values[on_failure] = accept;
+            stepper s = open_stepper(ops, values);
+            drape_step_info info;
+            ck_assert_int_eq(take_step(&s, 0.05, &info), DRAPE_RETRY_NONLINEAR);
+            ck_assert_str_eq(info.reason, "max_iterations");
+            ck_assert_int_eq(info.usable, accept);
+            ck_assert(info.iterations == 1 || (accept && info.iterations == 2)); /* two stages */
+            ck_assert_double_gt(info.residual, info.tolerance);
+            ck_assert_double_eq(info.diagnostic.value, info.residual);
+            ck_assert_double_eq(info.diagnostic.limit, info.tolerance);
+            ck_assert(info.diagnostic.node[0] >= 0 && !s.model->pinned[info.diagnostic.node[0]]);
+            close_stepper(&s);
+        }
+}
+END_TEST
+
+/* ---- Sims
+ * ----------------------------------------------------------------------------------------------------------
+ */
+
+/* How far free fall may be off after a time t: order 1 is g h t/2 behind or ahead; higher ones are exact
+ * but for a start of order 1, of some g h^2; one that chooses its steps keeps to rtol 1e-3 of 0.5 m in
+ * each of a few. */
+static double fall_tolerance(const drape_integrator_ops *ops, double h, double t)
+{
+    if (ops->own_steps)
+        return 0.01;
+    return ops->order == 1 ? 9.81 * h * t / 2 * (1 + 1e-9) : 9.81 * h * h;
+}
+
+START_TEST(a_triangle_falls_freely)
+{
+    static const double x[] = {0.1, 0.2, 0.3, 0.4, 0.2, 0.3, 0.2, 0.2, 0.7};
+    static const int32_t triangle[] = {0, 1, 2};
+    const drape_setting material[] = {
+        {"young_modulus", 1e3, NULL}, {"thickness", 1e-3, NULL}, {"areal_density", 0.2, NULL}};
+    const drape_entry_def terms[] = {{.type = "stretch.edge"}, {.type = "bend.hinge"}};
+    drape_scene_def scene;
+    drape_cloth_def cloth = {.name = NULL};
+    drape_scene_def_init(&scene, sizeof scene);
+    drape_cloth_def_init(&cloth, sizeof cloth);
+    cloth.mesh.positions = x;
+    cloth.mesh.triangles = triangle;
+    cloth.mesh.node_count = 3;
+    cloth.mesh.triangle_count = 1;
+    cloth.material = material;
+    cloth.material_count = 3;
+    cloth.terms = terms;
+    cloth.term_count = 2;
+    cloth.velocity[0] = 0.5;
+    scene.cloths = &cloth;
+    scene.cloth_count = 1;
+    for (int i = 0; drape_integrators[i]; i++) {
+        if (drape_integrators[i]->steady_state)
+            continue;
+        const double h = 0.01, t = 0.5;
+        drape_context *ctx = make_context();
+        drape_model *model = NULL;
+        drape_sim *sim = NULL;
+        drape_sim_def def;
+        ck_assert_msg(drape_model_create(ctx, &scene, &model) == DRAPE_OK, "%s", drape_context_message(ctx));
+        drape_sim_def_init(&def, sizeof def);
+        def.integrator = drape_integrators[i]->entry.name;
+        def.dt = drape_integrators[i]->own_steps ? 0 : h;
+        ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_advance(sim, t), DRAPE_OK);
+        ck_assert(drape_integrators[i]->own_steps || drape_sim_statistics(sim).steps_accepted == 50);
+        for (int k = 0; k < 9; k++) {
+            double exact = x[k] + (k % 3 == 0 ? 0.5 * t : k % 3 == 1 ? -9.81 / 2 * t * t : 0);
+            double tolerance = k % 3 == 1 ? fall_tolerance(drape_integrators[i], h, t) : 1e-9;
+            ck_assert_double_eq_tol(drape_sim_positions(sim)[k], exact, tolerance);
+        }
+        drape_sim_destroy(&sim);
+        drape_model_destroy(&model);
+        drape_context_destroy(&ctx);
+    }
+}
+END_TEST
+
+static drape_status all_converged(void *user, const drape_event *event)
+{
+    if (event->kind == DRAPE_EVENT_ATTEMPT && event->attempt->accepted) {
+        ck_assert_int_eq(event->attempt->status, DRAPE_OK);
+        ck_assert(isnan(event->attempt->tolerance) || event->attempt->residual <= event->attempt->tolerance);
+        ++*(int *)user;
+    }
+    return DRAPE_OK;
+}
+
+/* One second of a curved sheet that swings on two nodes. Its energy only falls: nothing but gravity works on
+ * it. */
+START_TEST(a_damped_sheet_swings)
+{
+    const drape_setting beta = {"beta", 0.01, NULL};
+    const drape_entry_def terms[] = {
+        {.type = "stretch.edge"}, {.type = "bend.hinge"}, {"damp.kelvin_voigt", &beta, 1}};
+    for (int i = 0; drape_integrators[i]; i++) {
+        if (drape_integrators[i]->steady_state)
+            continue;
+        drape_context *ctx = make_context();
+        drape_model *model = make_model(
+            ctx, &(model_def){
+                     .mesh = MESH_CURVED, .terms = terms, .term_count = 3, .gravity = true, .pinned = true});
+        drape_sim *sim = NULL;
+        drape_sim_def def;
+        int accepted = 0;
+        drape_sim_def_init(&def, sizeof def);
+        def.integrator = drape_integrators[i]->entry.name;
+        ck_assert_int_eq(drape_sim_create(ctx, model, &def, &sim), DRAPE_OK);
+        ck_assert_int_eq(drape_sim_observe(sim, all_converged, &accepted), DRAPE_OK);
+        drape_energy start = drape_sim_energy(sim);
+        drape_status status = drape_sim_advance(sim, 1);
+        ck_assert_msg(status == DRAPE_OK, "%s: %s", drape_integrators[i]->entry.name,
+                      drape_context_message(ctx));
+        drape_energy end = drape_sim_energy(sim);
+        drape_statistics s = drape_sim_statistics(sim);
+        ck_assert_double_eq(drape_sim_time(sim), 1);
+        ck_assert_int_eq(s.steps_accepted, accepted);
+        ck_assert_msg(accepted > 10, "%s: %d steps", drape_integrators[i]->entry.name, accepted);
+        ck_assert_double_gt(end.dissipated, 0);
+        ck_assert_double_lt(end.kinetic + end.elastic + end.gravity, start.elastic + start.gravity);
+        ck_assert_double_lt(end.gravity, start.gravity);
+        ck_assert(s.strain_max > 0 && s.strain_max < 0.2 && s.strain_min > -0.2);
+        drape_sim_destroy(&sim);
+        drape_model_destroy(&model);
+        drape_context_destroy(&ctx);
+    }
+}
+END_TEST
+
+SUITE("integrators", entries_are_well_formed, shared_names_mean_the_same,
+      steps_do_not_write_their_input_and_repeat, equal_runs_have_equal_bits, a_converged_step_is_converged,
+      a_step_that_is_not_converged_says_so, a_triangle_falls_freely, a_damped_sheet_swings)

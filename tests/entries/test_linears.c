@@ -1,0 +1,666 @@
+/* test_linears.c: every row of the linear solvers on the pattern of a cloth, against Gaussian elimination in
+ * long double. */
+#include "solvers/linear.h"
+
+#include <float.h>
+
+#include "model/model.h"
+#include "models.h"
+#include "support/failing_allocator.h"
+#include "support/suite.h"
+
+/* ---- Matrices on the pattern of a cloth ---- */
+
+typedef struct problem {
+    drape_context *ctx;
+    drape_arena *arena; /* of solvers */
+    drape_model *model;
+    const drape_pattern *p;
+    size_t n;
+    double *values, *b, *kept, *x, *expected;
+    long double *dense;
+} problem;
+
+static void *take(size_t count, size_t size)
+{
+    void *memory = calloc(count, size);
+    ck_assert_ptr_nonnull(memory);
+    return memory;
+}
+
+static problem open_problem(void)
+{
+    const drape_entry_def terms[] = {{.type = "stretch.edge"}, {.type = "bend.hinge"}};
+    problem q = {.ctx = make_context()};
+    q.arena = drape_arena_create(q.ctx);
+    q.model = make_model(
+        q.ctx, &(model_def){.mesh = MESH_IRREGULAR, .terms = terms, .term_count = 2, .pinned = true});
+    q.p = &q.model->pattern;
+    q.n = (size_t)q.p->n;
+    ck_assert_uint_eq(q.n, 3 * (IRREGULAR_NODES - 2));
+    ck_assert_int_lt(q.p->nonzeros, (int64_t)(q.n * q.n));
+    q.values = take((size_t)q.p->nonzeros, sizeof *q.values);
+    q.b = take(q.n, sizeof *q.b);
+    q.kept = take(q.n, sizeof *q.kept);
+    q.x = take(q.n, sizeof *q.x);
+    q.expected = take(q.n, sizeof *q.expected);
+    q.dense = take(q.n * (q.n + 1), sizeof *q.dense);
+    return q;
+}
+
+static void close_problem(problem *q)
+{
+    free(q->values);
+    free(q->b);
+    free(q->kept);
+    free(q->x);
+    free(q->expected);
+    free(q->dense);
+    drape_arena_destroy(&q->arena);
+    drape_model_destroy(&q->model);
+    drape_context_destroy(&q->ctx);
+}
+
+typedef enum matrix_kind { SPD, INDEFINITE, UNSYMMETRIC, TINY, HUGE_ENTRIES, KIND_COUNT } matrix_kind;
+
+/* Random entries; a diagonal that dominates where the matrix is to be positive definite. */
+static void fill(problem *q, matrix_kind kind, uint64_t seed)
+{
+    const drape_pattern *p = q->p;
+    double scale = kind == TINY ? 1e-9 : kind == HUGE_ENTRIES ? 1e12 : 1;
+    for (int64_t c = 0; c < p->n; c++) {
+        double *diagonal = NULL, sum = 0;
+        for (int64_t k = p->column[c]; k < p->column[c + 1]; k++) {
+            int64_t r = p->row[k], low = r < c ? r : c, high = r < c ? c : r;
+            uint64_t own = seed * 1000003 + (uint64_t)(low * p->n + high) +
+                           (kind == UNSYMMETRIC && r < c ? 77777777 : 0);
+            random_number(&own);
+            q->values[k] = scale * random_number(&own);
+            sum += fabs(q->values[k]);
+            diagonal = r == c ? &q->values[k] : diagonal;
+        }
+        if (kind == SPD || kind == TINY || kind == HUGE_ENTRIES)
+            *diagonal = sum;
+    }
+    for (size_t i = 0; i < q->n; i++)
+        q->b[i] = random_number(&seed);
+}
+
+/* Partial pivoting. */
+static void solve_dense(problem *q)
+{
+    size_t n = q->n, w = n + 1;
+    long double *a = q->dense;
+    memset(a, 0, n * w * sizeof *a);
+    for (size_t c = 0; c < n; c++)
+        for (int64_t k = q->p->column[c]; k < q->p->column[c + 1]; k++)
+            a[w * (size_t)q->p->row[k] + c] = q->values[k];
+    for (size_t i = 0; i < n; i++)
+        a[w * i + n] = q->b[i];
+    for (size_t k = 0; k < n; k++) {
+        size_t pivot = k;
+        for (size_t i = k + 1; i < n; i++)
+            pivot = fabsl(a[w * i + k]) > fabsl(a[w * pivot + k]) ? i : pivot;
+        for (size_t j = 0; j < w; j++) {
+            long double kept = a[w * k + j];
+            a[w * k + j] = a[w * pivot + j];
+            a[w * pivot + j] = kept;
+        }
+        for (size_t i = k + 1; i < n; i++) {
+            long double factor = a[w * i + k] / a[w * k + k];
+            for (size_t j = k; j < w; j++)
+                a[w * i + j] -= factor * a[w * k + j];
+        }
+    }
+    for (size_t i = n; i-- > 0;) {
+        long double sum = a[w * i + n];
+        for (size_t j = i + 1; j < n; j++)
+            sum -= a[w * i + j] * a[w * j + n];
+        a[w * i + n] = sum / a[w * i + i];
+        q->expected[i] = (double)a[w * i + n];
+    }
+}
+
+/* Factors the values, solves, and compares: 1e-10 of the largest component. The conditions of these matrices
+ * are some 1e3, so 1e-13 is left to be lost. */
+static void check_solution(problem *q, const drape_linear_ops *ops, void *solver, const char *what)
+{
+    double size = 0, error = 0;
+    ck_assert_msg(ops->factor(solver, q->values) == DRAPE_OK, "%s: %s", ops->entry.name, what);
+    memcpy(q->kept, q->b, q->n * sizeof *q->b);
+    ck_assert_msg(ops->solve(solver, q->b, q->x) == DRAPE_OK, "%s: %s", ops->entry.name, what);
+    ck_assert_mem_eq(q->kept, q->b, q->n * sizeof *q->b);
+    solve_dense(q);
+    for (size_t i = 0; i < q->n; i++) {
+        size = fmax(size, fabs(q->expected[i]));
+        error = fmax(error, fabs(q->x[i] - q->expected[i]));
+    }
+    ck_assert_msg(error <= 1e-10 * size, "%s: %s is off by %g of %g", ops->entry.name, what, error, size);
+}
+
+static void *open_solver(problem *q, const drape_linear_ops *ops)
+{
+    void *solver = NULL;
+    ck_assert_msg(ops->create(q->arena, q->p, &solver) == DRAPE_OK, "%s", drape_context_message(q->ctx));
+    ck_assert_ptr_nonnull(solver);
+    return solver;
+}
+
+/* What a row says of itself, filled in for those that say nothing. */
+static drape_linear_report report_of(const drape_linear_ops *ops, const void *solver)
+{
+    drape_linear_report report = {.row = ops};
+    if (ops->report)
+        ops->report(solver, &report);
+    return report;
+}
+
+/* ---- Tests ---- */
+
+START_TEST(entries_are_well_formed)
+{
+    int count = 0;
+    for (; drape_linears[count]; count++) {
+        const drape_linear_ops *ops = drape_linears[count];
+        ck_assert_ptr_eq(drape_linear_registry.entries[count], &ops->entry);
+        ck_assert_str_eq(ops->entry.name, drape_linears_names[count]);
+        ck_assert(ops->create && ops->factor && ops->solve);
+    }
+    ck_assert_ptr_null(drape_linears_names[count]);
+    ck_assert_int_eq(drape_registry_count(&drape_linear_registry), count);
+}
+END_TEST
+
+START_TEST(random_systems_are_solved)
+{
+    static const char *const names[] = {"positive definite", "indefinite", "unsymmetric", "tiny", "huge"};
+    problem q = open_problem();
+    for (int i = 0; drape_linears[i]; i++) {
+        void *solver = open_solver(&q, drape_linears[i]);
+        for (uint64_t seed = 1; seed <= 20; seed++) { /* kinds mixed: kept pivots meet other matrices */
+            fill(&q, (matrix_kind)(seed * 3 % KIND_COUNT), seed);
+            check_solution(&q, drape_linears[i], solver, names[seed * 3 % KIND_COUNT]);
+        }
+        ck_assert_uint_gt(q.arena->bytes + drape_linear_bytes(drape_linears[i], solver),
+                          q.n * sizeof(double));
+        drape_linear_destroy(drape_linears[i], &solver);
+        ck_assert_ptr_null(solver);
+        drape_linear_destroy(drape_linears[i], &solver);
+    }
+    close_problem(&q);
+}
+END_TEST
+
+START_TEST(several_right_hand_sides_of_one_factorisation)
+{
+    problem q = open_problem();
+    for (int i = 0; drape_linears[i]; i++) {
+        const drape_linear_ops *ops = drape_linears[i];
+        void *solver = open_solver(&q, ops);
+        fill(&q, INDEFINITE, 3);
+        check_solution(&q, ops, solver, "first");
+        double first = q.x[0];
+        for (size_t k = 0; k < q.n; k++)
+            q.b[k] *= -2;
+        ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
+        ck_assert_double_eq(q.x[0], -2 * first);
+        drape_linear_destroy(ops, &solver);
+    }
+    close_problem(&q);
+}
+END_TEST
+
+static void clear_column(problem *q, int64_t c)
+{
+    for (int64_t k = q->p->column[c]; k < q->p->column[c + 1]; k++)
+        q->values[k] = 0;
+}
+
+static void clear_row(problem *q, int64_t r)
+{
+    for (int64_t k = 0; k < q->p->nonzeros; k++)
+        if (q->p->row[k] == r)
+            q->values[k] = 0;
+}
+
+static void break_matrix(problem *q, int how)
+{
+    int64_t middle = q->p->n / 2;
+    fill(q, how == 5 ? INDEFINITE : SPD, 8);
+    switch (how) {
+    case 0:
+        clear_column(q, middle);
+        break;
+    case 1:
+        clear_row(q, q->p->n - 1);
+        break;
+    case 2:
+        memset(q->values, 0, (size_t)q->p->nonzeros * sizeof *q->values);
+        break;
+    case 3:
+        for (int64_t k = 0; k < 3; k++)
+            clear_row(q, middle + k), clear_column(q, middle + k);
+        break;
+    case 4:
+        q->values[q->p->nonzeros - 1] = NAN;
+        break;
+    case 5:
+        q->values[q->p->column[middle] + 2] = NAN;
+        break;
+    case 6:
+        q->values[0] = INFINITY;
+        break;
+    default:
+        for (int64_t k = 0; k < q->p->nonzeros; k++)
+            q->values[k] = -INFINITY;
+    }
+}
+enum { WAYS = 8 };
+
+/* As the first matrix, which pivots are chosen for, and as a later one, for which they are kept. */
+START_TEST(broken_matrices_are_told_and_good_ones_work_again)
+{
+    problem q = open_problem();
+    for (int i = 0; drape_linears[i]; i++)
+        for (int how = 0; how < WAYS; how++)
+            for (int later = 0; later < 2; later++) {
+                const drape_linear_ops *ops = drape_linears[i];
+                void *solver = open_solver(&q, ops);
+                fill(&q, SPD, 1);
+                if (later)
+                    check_solution(&q, ops, solver, "before");
+                else
+                    ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_RETRY_LINEAR);
+                break_matrix(&q, how);
+                ck_assert_msg(ops->factor(solver, q.values) == DRAPE_RETRY_LINEAR,
+                              "%s takes the broken matrix %d, %s", ops->entry.name, how,
+                              later ? "later" : "first");
+                ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_RETRY_LINEAR);
+                for (uint64_t seed = 1; seed <= 3; seed++) {
+                    fill(&q, (matrix_kind)(seed % 2), seed);
+                    check_solution(&q, ops, solver, "after a broken one");
+                }
+                drape_linear_destroy(ops, &solver);
+            }
+    close_problem(&q);
+}
+END_TEST
+
+START_TEST(a_right_hand_side_that_is_not_finite_is_told)
+{
+    problem q = open_problem();
+    for (int i = 0; drape_linears[i]; i++) {
+        void *solver = open_solver(&q, drape_linears[i]);
+        fill(&q, SPD, 2);
+        check_solution(&q, drape_linears[i], solver, "before");
+        q.b[q.n / 2] = NAN;
+        ck_assert_int_eq(drape_linears[i]->solve(solver, q.b, q.x), DRAPE_RETRY_LINEAR);
+        fill(&q, SPD, 2);
+        check_solution(&q, drape_linears[i], solver, "after");
+        drape_linear_destroy(drape_linears[i], &solver);
+    }
+    close_problem(&q);
+}
+END_TEST
+
+/* The pivots that the first matrix chose are zero in the second, which is a good matrix: off-diagonal ones in
+ * each block of a node. */
+START_TEST(kept_pivots_that_become_zero_are_chosen_again)
+{
+    problem q = open_problem();
+    for (int i = 0; drape_linears[i]; i++) {
+        void *solver = open_solver(&q, drape_linears[i]);
+        fill(&q, SPD, 4);
+        check_solution(&q, drape_linears[i], solver, "diagonal pivots");
+        for (int64_t c = 0; c < q.p->n; c++)
+            for (int64_t k = q.p->column[c]; k < q.p->column[c + 1]; k++) {
+                bool own = q.p->row[k] / 3 == c / 3;
+                q.values[k] = own ? (q.p->row[k] % 3 == (c + 1) % 3 ? 2.385 : 0) : 1e-3 * q.values[k];
+            }
+        check_solution(&q, drape_linears[i], solver, "other pivots");
+        drape_linear_destroy(drape_linears[i], &solver);
+    }
+    close_problem(&q);
+}
+END_TEST
+
+/* A node's own 3 x 3 block is symmetric in the pattern whatever the mesh: a difference there is the least that
+ * can be overlooked. A solver that took one triangle for both would be off by about the difference. */
+START_TEST(a_small_part_that_is_not_symmetric_is_not_lost)
+{
+    problem q = open_problem();
+    for (int i = 0; drape_linears[i]; i++) {
+        void *solver = open_solver(&q, drape_linears[i]);
+        for (int upper = 0; upper < 2; upper++)
+            for (double size = 1; size > 1e-8; size /= 10) {
+                fill(&q, SPD, 5);
+                int64_t c = 3 * (q.p->n / 6) + upper; /* entry (1 - upper, upper) of that block */
+                for (int64_t k = q.p->column[c]; k < q.p->column[c + 1]; k++)
+                    if (q.p->row[k] == c + 1 - 2 * upper)
+                        q.values[k] *= 1 + size;
+                check_solution(&q, drape_linears[i], solver, "a little unsymmetric");
+            }
+        drape_linear_destroy(drape_linears[i], &solver);
+    }
+    close_problem(&q);
+}
+END_TEST
+
+/* Rows that give what is not positive definite to another one. */
+static bool falls_back(const drape_linear_ops *ops)
+{
+    static const char *const rows[] = {"cholmod", "multifrontal", "pcg"};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        if (strcmp(ops->entry.name, rows[i]) == 0)
+            return true;
+    return false;
+}
+
+/* Which matrices a row gives to another one: where there is one, all but the positive definite ones. */
+START_TEST(fallbacks_are_counted)
+{
+    problem q = open_problem();
+    for (int i = 0; drape_linears[i]; i++) {
+        const drape_linear_ops *ops = drape_linears[i];
+        void *solver = open_solver(&q, ops);
+        int64_t before = report_of(ops, solver).fallbacks, counts[KIND_COUNT];
+        ck_assert_int_eq(before, 0);
+        for (int kind = 0; kind < KIND_COUNT; kind++) {
+            fill(&q, (matrix_kind)kind, 6);
+            check_solution(&q, ops, solver, "counted");
+            counts[kind] = report_of(ops, solver).fallbacks - before;
+            before += counts[kind];
+        }
+        bool falls = falls_back(ops);
+        ck_assert_int_eq(counts[SPD] + counts[TINY] + counts[HUGE_ENTRIES], 0);
+        ck_assert_int_eq(counts[INDEFINITE], falls);
+        ck_assert_int_eq(counts[UNSYMMETRIC], falls);
+        drape_linear_destroy(ops, &solver);
+    }
+    close_problem(&q);
+}
+END_TEST
+
+/* ---- A sheet of many supernodes ---- */
+
+typedef struct sheet {
+    drape_context *ctx;
+    drape_arena *arena; /* of the pattern and solvers */
+    drape_pattern p;
+    double *values, *b, *x, *again;
+} sheet;
+
+/* side x side nodes, each coupled to those within two: the pattern of a cloth with hinges. */
+static sheet open_sheet(int32_t side)
+{
+    sheet q = {.ctx = make_context()};
+    q.arena = drape_arena_create(q.ctx);
+    int32_t count = side * side, patches = (side - 2) * (side - 2),
+            *block = take((size_t)count, sizeof *block), *node = take(9 * (size_t)patches, sizeof *node),
+            *next = node;
+    for (int32_t i = 0; i < count; i++)
+        block[i] = i;
+    for (int32_t r = 0; r + 2 < side; r++)
+        for (int32_t c = 0; c + 2 < side; c++)
+            for (int32_t k = 0; k < 9; k++)
+                *next++ = (r + k / 3) * side + c + k % 3;
+    const drape_coupling coupling = {.count = patches, .nodes = 9, .node = node};
+    ck_assert_int_eq(drape_pattern_build(q.arena, count, block, &coupling, 1, &q.p), DRAPE_OK);
+    free(block);
+    free(node);
+    q.values = take((size_t)q.p.nonzeros, sizeof *q.values);
+    q.b = take((size_t)q.p.n, sizeof *q.b);
+    q.x = take((size_t)q.p.n, sizeof *q.x);
+    q.again = take((size_t)q.p.n, sizeof *q.again);
+    return q;
+}
+
+static void close_sheet(sheet *q)
+{
+    free(q->values);
+    free(q->b);
+    free(q->x);
+    free(q->again);
+    drape_arena_destroy(&q->arena);
+    drape_context_destroy(&q->ctx);
+}
+
+/* Symmetric, random; shift 1: the diagonal dominates, weakly; below: the less the more indefinite. */
+static void fill_sheet(sheet *q, double shift, uint64_t seed)
+{
+    uint64_t side = seed;
+    for (int64_t c = 0; c < q->p.n; c++) {
+        double *diagonal = NULL, sum = 0;
+        for (int64_t k = q->p.column[c]; k < q->p.column[c + 1]; k++) {
+            int64_t r = q->p.row[k], low = r < c ? r : c, high = r < c ? c : r;
+            uint64_t own = seed * 1000003 + (uint64_t)(low * q->p.n + high);
+            random_number(&own);
+            q->values[k] = random_number(&own);
+            sum += fabs(q->values[k]);
+            diagonal = r == c ? &q->values[k] : diagonal;
+        }
+        *diagonal = shift * sum;
+        q->b[c] = random_number(&side);
+    }
+}
+
+/* Backward stability: |A x - b| <= c eps (|A| |x| + |b|) row by row, c = 1e4 for Cholesky factors of some 1e3
+ * unknowns. KLU takes a diagonal pivot that is a thousandth of the largest: a thousand times that where the
+ * matrix is indefinite. */
+static void check_residual(const sheet *q, bool definite, const char *name)
+{
+    double *r = take((size_t)q->p.n, sizeof *r), *size = take((size_t)q->p.n, sizeof *size), most = 0;
+    for (int64_t i = 0; i < q->p.n; i++) {
+        r[i] = -q->b[i];
+        size[i] = fabs(q->b[i]);
+    }
+    for (int64_t c = 0; c < q->p.n; c++)
+        for (int64_t k = q->p.column[c]; k < q->p.column[c + 1]; k++) {
+            r[q->p.row[k]] += q->values[k] * q->x[c];
+            size[q->p.row[k]] += fabs(q->values[k] * q->x[c]);
+        }
+    for (int64_t i = 0; i < q->p.n; i++)
+        most = fmax(most, fabs(r[i]) / size[i]);
+    ck_assert_msg(most <= (definite ? 1e4 : 1e7) * DBL_EPSILON, "%s: a row of A x - b is %g of its terms",
+                  name, most);
+    free(r);
+    free(size);
+}
+
+/* Who falls back does to the row with the largest general_from that is not above the size. */
+static void check_fallback(const drape_linear_report *report, int64_t n, int64_t count)
+{
+    const drape_linear_ops *expected = NULL;
+    bool falls = falls_back(report->row);
+    for (int i = 0; falls && drape_linears[i]; i++) {
+        int64_t from = drape_linears[i]->general_from;
+        if (from > 0 && from <= n && (!expected || from > expected->general_from))
+            expected = drape_linears[i];
+    }
+    ck_assert_int_eq(report->fallbacks, falls ? count : 0);
+    ck_assert_ptr_eq(report->fallback, expected);
+}
+
+/* Definite and indefinite in turn; a second solver that is given the same gives the same bits. */
+START_TEST(a_sheet_of_many_supernodes)
+{
+    static const double shifts[] = {1.01, 0.15, 1.5, 0.2, 1.01};
+    sheet q = open_sheet(24);
+    for (int i = 0; drape_linears[i]; i++) {
+        const drape_linear_ops *ops = drape_linears[i];
+        void *solver = NULL, *other = NULL;
+        ck_assert_int_eq(ops->create(q.arena, &q.p, &solver), DRAPE_OK);
+        ck_assert_int_eq(ops->create(q.arena, &q.p, &other), DRAPE_OK);
+        for (size_t k = 0; k < sizeof shifts / sizeof *shifts; k++) {
+            fill_sheet(&q, shifts[k], 7);
+            ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
+            ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
+            check_residual(&q, shifts[k] > 1, ops->entry.name);
+            ck_assert_int_eq(ops->factor(other, q.values), DRAPE_OK);
+            ck_assert_int_eq(ops->solve(other, q.b, q.again), DRAPE_OK);
+            ck_assert_mem_eq(q.again, q.x, (size_t)q.p.n * sizeof *q.x);
+        }
+        drape_linear_report report = report_of(ops, solver);
+        check_fallback(&report, q.p.n, 2);
+        drape_linear_destroy(ops, &solver);
+        drape_linear_destroy(ops, &other);
+    }
+    close_sheet(&q);
+}
+END_TEST
+
+/* Ordered by minimum degree and, where METIS is built, by nested dissection; with several branches for the threads and
+ * fronts that they share. */
+START_TEST(threads_give_the_same_bits)
+{
+    static const int32_t sides[] = {24, 40};
+    for (int i = 0; drape_linears[i]; i++)
+        for (size_t k = 0; drape_linears[i]->use_threads && k < sizeof sides / sizeof *sides; k++) {
+            const drape_linear_ops *ops = drape_linears[i];
+            sheet q = open_sheet(sides[k]);
+            void *solver = NULL;
+            ck_assert_int_eq(ops->create(q.arena, &q.p, &solver), DRAPE_OK);
+            fill_sheet(&q, 1.01, 7);
+            for (int threads = 1; threads <= 3; threads += 2) {
+                double *x = threads == 1 ? q.x : q.again;
+                drape_pool *pool = NULL;
+                ck_assert_int_eq(drape_pool_create(q.arena, threads, &pool), DRAPE_OK);
+                ops->use_threads(solver, pool);
+                ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
+                ck_assert_int_eq(ops->solve(solver, q.b, x), DRAPE_OK);
+                ck_assert_mem_eq(x, q.x, (size_t)q.p.n * sizeof *x);
+                ops->use_threads(solver, NULL);
+                drape_pool_destroy(&pool);
+            }
+            check_residual(&q, true, ops->entry.name);
+            drape_linear_destroy(ops, &solver);
+            close_sheet(&q);
+        }
+}
+END_TEST
+
+/* What a row falls back to is made when it is needed: definite matrices do not pay for it, and where there is no
+ * memory then, the row says so, has no factors, and does the work when asked again. */
+START_TEST(no_memory_for_the_fallback)
+{
+    static const int32_t sides[] = {8, 24}; /* klu, and umfpack where it is built */
+    for (int i = 0; drape_linears[i]; i++)
+        for (size_t k = 0; k < sizeof sides / sizeof *sides; k++) {
+            const drape_linear_ops *ops = drape_linears[i];
+            failing_allocator memory = {0};
+            drape_context *ctx = failing_context(&memory);
+            drape_arena arena = drape_arena_of(ctx);
+            sheet q = open_sheet(sides[k]);
+            void *solver = NULL;
+            ck_assert_int_eq(ops->create(&arena, &q.p, &solver), DRAPE_OK);
+            fill_sheet(&q, 1.5, 7);
+            ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
+            ck_assert_ptr_null(report_of(ops, solver).fallback);
+            size_t definite = arena.bytes + drape_linear_bytes(ops, solver);
+            long before = memory.calls, failed = 0;
+            fill_sheet(&q, 0.2, 7);
+            drape_status status = DRAPE_E_MEMORY;
+            for (memory.fail_at = before + 1; status == DRAPE_E_MEMORY;
+                 memory.fail_at = memory.calls + 1 + failed) {
+                status = ops->factor(solver, q.values);
+                if (status)
+                    ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_RETRY_LINEAR);
+                else /* pcg notices no earlier */
+                    status = ops->solve(solver, q.b, q.x);
+                failed += status == DRAPE_E_MEMORY;
+            }
+            ck_assert_int_eq(status, DRAPE_OK);
+            ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
+            check_residual(&q, false, ops->entry.name);
+            bool falls = report_of(ops, solver).fallback;
+            ck_assert_int_eq(failed > 0, falls);
+            if (falls)
+                ck_assert_uint_gt(arena.bytes + drape_linear_bytes(ops, solver), definite);
+            drape_linear_destroy(ops, &solver);
+            drape_arena_free(&arena);
+            close_sheet(&q);
+            drape_context_destroy(&ctx);
+            ck_assert_int_eq(memory.live, 0);
+        }
+}
+END_TEST
+
+/* As where contact changes the sparsity: destroyed and made again on patterns that grow and shrink. */
+START_TEST(made_again_on_other_patterns)
+{
+    static const int32_t sides[] = {3, 15, 4, 20, 3, 15};
+    for (int i = 0; drape_linears[i]; i++) {
+        const drape_linear_ops *ops = drape_linears[i];
+        for (size_t k = 0; k < sizeof sides / sizeof *sides; k++) {
+            sheet q = open_sheet(sides[k]);
+            void *solver = NULL;
+            ck_assert_int_eq(ops->create(q.arena, &q.p, &solver), DRAPE_OK);
+            if (k % 3 != 2) { /* and once without a factorisation */
+                fill_sheet(&q, k % 2 ? 0.2 : 1.01, 9);
+                ck_assert_int_eq(ops->factor(solver, q.values), DRAPE_OK);
+                ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_OK);
+                check_residual(&q, k % 2 == 0, ops->entry.name);
+            }
+            drape_linear_destroy(ops, &solver);
+            close_sheet(&q);
+        }
+    }
+}
+END_TEST
+
+/* The largest best_from that is not above the size; klu below all others. */
+START_TEST(auto_picks_by_size_and_says_so)
+{
+    static const int32_t sides[] = {3, 30};
+    const drape_linear_ops *chooser = drape_linears[0];
+    ck_assert_str_eq(chooser->entry.name, "auto");
+    ck_assert_int_eq(chooser->best_from, 0);
+    for (size_t k = 0; k < sizeof sides / sizeof *sides; k++) {
+        sheet q = open_sheet(sides[k]);
+        void *solver = NULL;
+        const drape_linear_ops *expected = NULL;
+        for (int i = 0; drape_linears[i]; i++)
+            if (drape_linears[i]->best_from > 0 && drape_linears[i]->best_from <= q.p.n &&
+                (!expected || drape_linears[i]->best_from > expected->best_from))
+                expected = drape_linears[i];
+        ck_assert_int_eq(chooser->create(q.arena, &q.p, &solver), DRAPE_OK);
+        drape_linear_report report = report_of(chooser, solver);
+        ck_assert_ptr_eq(report.row, expected);
+        ck_assert_ptr_nonnull(report.row);
+        ck_assert_str_ne(report.why, "");
+        if (k == 0)
+            ck_assert_str_eq(report.row->entry.name, "klu");
+        drape_linear_destroy(chooser, &solver);
+        close_sheet(&q);
+    }
+}
+END_TEST
+
+/* A + B with B' = -B has A as its symmetric part, to the rounding of the sum; A alone keeps its bits. */
+START_TEST(the_symmetric_part_is_that)
+{
+    sheet q = open_sheet(8);
+    fill_sheet(&q, 1, 7);
+    double *symmetric = take((size_t)q.p.nonzeros, sizeof *symmetric);
+    memcpy(symmetric, q.values, (size_t)q.p.nonzeros * sizeof *symmetric);
+    drape_pattern_symmetrize(&q.p, q.values);
+    ck_assert(memcmp(symmetric, q.values, (size_t)q.p.nonzeros * sizeof *symmetric) == 0);
+    for (int64_t c = 0; c < q.p.n; c++)
+        for (int64_t k = q.p.column[c]; k < q.p.column[c + 1]; k++) {
+            const int64_t r = q.p.row[k];
+            q.values[k] += sin((double)(r * r - c * c)); /* odd in (r, c) */
+        }
+    drape_pattern_symmetrize(&q.p, q.values);
+    for (int64_t k = 0; k < q.p.nonzeros; k++)
+        ck_assert_double_eq_tol(q.values[k], symmetric[k], 2 * DBL_EPSILON * (fabs(symmetric[k]) + 1));
+    free(symmetric);
+    close_sheet(&q);
+}
+END_TEST
+
+SUITE("linears", entries_are_well_formed, random_systems_are_solved,
+      several_right_hand_sides_of_one_factorisation, broken_matrices_are_told_and_good_ones_work_again,
+      a_right_hand_side_that_is_not_finite_is_told, kept_pivots_that_become_zero_are_chosen_again,
+      a_small_part_that_is_not_symmetric_is_not_lost, fallbacks_are_counted, a_sheet_of_many_supernodes,
+      threads_give_the_same_bits, no_memory_for_the_fallback, made_again_on_other_patterns,
+      auto_picks_by_size_and_says_so, the_symmetric_part_is_that)

@@ -1,0 +1,235 @@
+/*
+ * test_midedge.c: what bend.midedge promises of any mesh: it is exact for every quadratic deflection, in
+ * equilibrium under a constant moment, six nodes wide on symmetric ones, and its clamps have exact
+ * derivatives and hold.
+ */
+#include <stdio.h>
+
+#include "assemble/check.h"
+#include "models.h"
+#include "support/suite.h"
+#include "terms/midedge.h"
+
+#define SLOPE 1e-4 /* of the deflections: angles and their small ones differ by its square */
+
+static drape_model *sheet(drape_context *ctx, const drape_setting *settings, size_t count,
+                          enum model_mesh mesh)
+{
+    const drape_entry_def term = {"bend.midedge", settings, count};
+    return make_model(ctx, &(model_def){.mesh = mesh, .terms = &term, .term_count = 1});
+}
+
+/* Whether a node is on the boundary: inside there are as many edges as triangles around it. */
+static bool near_boundary(const drape_model *m, int32_t node)
+{
+    int32_t around = 0;
+    for (int32_t e = 0; e < m->edge_count; e++)
+        if (m->edge[2 * e] == node || m->edge[2 * e + 1] == node)
+            around++;
+    for (int32_t t = 0; t < 3 * m->triangle_count; t++)
+        around -= m->triangle[t] == node;
+    return around != 0;
+}
+
+static void deflect(const drape_model *m, const double bend[3], double *x)
+{
+    for (int32_t i = 0; i < m->node_count; i++) {
+        const double *X = m->rest + 3 * (size_t)i;
+        memcpy(x + 3 * (size_t)i, X, 3 * sizeof *x);
+        x[3 * (size_t)i + 1] +=
+            SLOPE * (bend[0] * X[0] * X[0] / 2 + bend[1] * X[2] * X[2] / 2 + bend[2] * X[0] * X[2]);
+    }
+}
+
+/* Triangles without a free edge have three squares in a row of the same first three nodes; their energy is
+ * A/2 b'Cb. The warp is x, the weft -z: b12 changes its sign, but stands alone in C. */
+static void check_energies(const drape_model *m, const double *x, const double law[4], const double bend[3])
+{
+    static const double flat[9 * 3000];
+    const drape_elements *el = &m->terms[0].elements;
+    const double density = 0.5 * SLOPE * SLOPE *
+                           (law[0] * bend[0] * bend[0] + law[1] * bend[1] * bend[1] +
+                            2 * law[2] * bend[0] * bend[1] + 4 * law[3] * bend[2] * bend[2]);
+    int whole = 0;
+    ck_assert_int_le(el->count, 3000);
+    for (int32_t e = 0; e + 2 < el->count; e++) {
+        const size_t n = (size_t)el->nodes;
+        const int32_t *node = el->node + (size_t)e * n;
+        if (memcmp(node, node + n, 3 * sizeof *node) != 0 ||
+            memcmp(node, node + 2 * n, 3 * sizeof *node) != 0)
+            continue;
+        double energy = 0, area2, u[3], v[3], w[3];
+        for (int32_t k = e; k < e + 3; k++) {
+            double q;
+            m->terms[0].ops->measure(el, k, 1, x, flat, &q, NULL, NULL);
+            energy += 0.5 * el->rest[k] * q * q;
+        }
+        for (int k = 0; k < 3; k++) {
+            u[k] = m->rest[3 * node[1] + k] - m->rest[3 * node[0] + k];
+            v[k] = m->rest[3 * node[2] + k] - m->rest[3 * node[0] + k];
+        }
+        w[0] = u[1] * v[2] - u[2] * v[1], w[1] = u[2] * v[0] - u[0] * v[2], w[2] = u[0] * v[1] - u[1] * v[0];
+        area2 = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
+        /* Slopes are below 2 SLOPE on a sheet of 0.5 m, their squares 4e-8; coefficients below 1e-9 were left
+         * out. */
+        ck_assert_double_eq_tol(energy / (density * area2 / 2), 1, 1e-6);
+        whole++;
+        e += 2;
+    }
+    ck_assert_int_ge(whole, 4);
+}
+
+START_TEST(quadratics_are_exact)
+{
+    static const double bends[][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.613, -0.241, 0.377}};
+    static const drape_setting woven[] = {
+        {"warp", 3e-4, NULL}, {"weft", 1e-4, NULL}, {"twist", 0.7e-4, NULL}, {"poisson", 0.2, NULL}};
+    const double c11 = 3e-4 / 0.96, c22 = 1e-4 / 0.96;
+    const double law[4] = {c11, c22, 0.2 * sqrt(c11 * c22), 0.7e-4};
+    drape_context *ctx = make_context();
+    double x[3 * 64];
+    for (int mesh = 0; mesh < MESH_CURVED; mesh++)
+        for (size_t k = 0; k < sizeof bends / sizeof *bends; k++) {
+            drape_model *m = sheet(ctx, woven, 4, (enum model_mesh)mesh);
+            ck_assert_int_le(m->node_count, 64);
+            deflect(m, bends[k], x);
+            check_energies(m, x, law, bends[k]);
+            drape_model_destroy(&m);
+        }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* Where the two triangles of every edge are images of each other in its middle the turns of the normals are
+ * 0, and elements have six nodes. Alternating diagonals are mirror images across sides of cells: they need
+ * twelve, as others do. */
+START_TEST(symmetric_grids_need_six_nodes)
+{
+    drape_context *ctx = make_context();
+    for (int mesh = 0; mesh < MESH_COUNT; mesh++) {
+        drape_model *m = sheet(ctx, NULL, 0, (enum model_mesh)mesh);
+        ck_assert_int_eq(m->terms[0].elements.nodes, mesh == MESH_EQUILATERAL ? MIDEDGE_NEAR : MIDEDGE_NODES);
+        drape_model_destroy(&m);
+    }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+static const char clamped_scene[] =
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 7, 'rows': 5, 'width': 0.6, 'height': "
+    "0.4},"
+    "'material': {'young_modulus': 1e5, 'poisson_ratio': 0.3, 'thickness': 1e-2, 'areal_density': 0.2},"
+    "'terms': ['stretch.cst', 'bend.midedge'], 'pins': [{'edge': 'left'%s}]}], 'gravity': [0, -0.1, 0],"
+    "'integrator': {'method': 'static', 'tolerance': 1e-9}, 'duration': 1}";
+
+static drape_model *clamped(drape_context *ctx, bool clamp)
+{
+    char text[1024];
+    drape_scene *scene = NULL;
+    drape_model *model = NULL;
+    snprintf(text, sizeof text, clamped_scene, clamp ? ", 'clamp': true" : "");
+    for (char *c = text; *c; c++)
+        *c = *c == '\'' ? '"' : *c;
+    ck_assert_int_eq(drape_scene_parse(ctx, text, "clamped", &scene), DRAPE_OK);
+    ck_assert_msg(drape_scene_compile(scene, &model) == DRAPE_OK, "%s", drape_context_message(ctx));
+    drape_scene_destroy(&scene);
+    return model;
+}
+
+START_TEST(clamps_have_exact_derivatives)
+{
+    static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
+    drape_context *ctx = make_context();
+    drape_model *model = clamped(ctx, true);
+    drape_arena memory = drape_arena_of(ctx);
+    drape_system *system = make_system(&memory, model, 1);
+    int count = 0;
+    ck_assert(model->terms[1].anchored);
+    ck_assert_int_eq(drape_check_derivatives(ctx, system, 3, rows, &count), DRAPE_OK);
+    for (int i = 0; i < count; i++)
+        ck_assert_msg(rows[i].pass, "%s of %s is off by %g", rows[i].what, rows[i].term, rows[i].error);
+    drape_system_destroy(&system);
+    drape_arena_free(&memory);
+    drape_model_destroy(&model);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* A sheet on one row of pins turns about it as on an axis: its Hessian at rest has one mode without
+ * stiffness. A clamp takes that away. */
+START_TEST(clamps_hold)
+{
+    drape_context *ctx = make_context();
+    for (int clamp = 0; clamp < 2; clamp++) {
+        drape_model *m = clamped(ctx, clamp);
+        drape_arena memory = drape_arena_of(ctx);
+        drape_system *system = make_system(&memory, m, 1);
+        double *x = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *x), elastic, gravity;
+        double *internal = drape_alloc(ctx, (size_t)m->internal_count, sizeof *internal);
+        for (int32_t i = 0; i < m->node_count; i++) { /* turned by 0.1 about the left side */
+            x[3 * i] = cos(0.1) * m->rest[3 * i];
+            x[3 * i + 1] = sin(0.1) * m->rest[3 * i];
+            x[3 * i + 2] = m->rest[3 * i + 2];
+        }
+        drape_system_energy(system, &(drape_point){.x = x, .internal = internal}, &elastic, &gravity);
+        /* Where it is clamped the turn of 0.1 is bent within a cell of 0.1 m: at least D/2 kappa^2 over a
+         * fourth of a cell. */
+        const double rigidity = m->cloths[0].material.flexural_rigidity, kappa = 0.1 / 0.1;
+        if (clamp)
+            ck_assert_double_ge(elastic, rigidity / 2 * kappa * kappa * 0.4 * 0.1 / 4);
+        else
+            ck_assert_double_le(elastic, 1e-20);
+        drape_free(ctx, x);
+        drape_free(ctx, internal);
+        drape_system_destroy(&system);
+        drape_arena_free(&memory);
+        drape_model_destroy(&m);
+    }
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+/* The sum of C K over triangles telescopes: under a constant moment forces stand on the boundary and next to
+ * it alone. */
+START_TEST(constant_moments_are_in_equilibrium)
+{
+    drape_context *ctx = make_context();
+    drape_scene *scene = NULL;
+    drape_model *m = NULL;
+    static const char text[] =
+        "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"irregular\", \"columns\": 12, \"rows\": 12, "
+        "\"width\": 1, "
+        "\"height\": 1}, \"material\": {\"young_modulus\": 1e5, \"poisson_ratio\": 0.3, \"thickness\": 1e-2, "
+        "\"areal_density\": 0.2}, \"terms\": [\"bend.midedge\"]}], \"gravity\": [0, 0, 0], \"duration\": 1}";
+    ck_assert_int_eq(drape_scene_parse(ctx, text, "moment", &scene), DRAPE_OK);
+    ck_assert_int_eq(drape_scene_compile(scene, &m), DRAPE_OK);
+    drape_arena memory = drape_arena_of(ctx);
+    drape_system *system = make_system(&memory, m, 1);
+    double *x = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *x);
+    double *g = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *g);
+    double *internal = drape_alloc(ctx, (size_t)m->internal_count, sizeof *internal);
+    deflect(m, (const double[]){0.613, -0.241, 0.377}, x);
+    drape_system_force(system, &(drape_point){.x = x, .internal = internal}, g);
+    double inside = 0, rim = 0;
+    for (int32_t i = 0; i < m->node_count; i++) {
+        const double *X = m->rest + 3 * i;
+        const double depth = fmin(fmin(X[0], 1 - X[0]), fmin(-X[2], 1 + X[2]));
+        double *most = depth > 0.35 ? &inside : &rim; /* a node is felt by triangles up to three cells away */
+        *most = fmax(*most, fabs(g[3 * i + 1]));
+        ck_assert(!(depth > 0.35) || !near_boundary(m, i));
+    }
+    ck_assert(rim > 0 &&
+              inside <= 1e-5 * rim); /* slopes squared, 1e-8, and coefficients left out, 1e-9, over 1/h^2 */
+    drape_free(ctx, internal);
+    drape_free(ctx, g);
+    drape_free(ctx, x);
+    drape_system_destroy(&system);
+    drape_arena_free(&memory);
+    drape_model_destroy(&m);
+    drape_scene_destroy(&scene);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+SUITE("midedge", quadratics_are_exact, symmetric_grids_need_six_nodes, clamps_have_exact_derivatives,
+      clamps_hold, constant_moments_are_in_equilibrium)

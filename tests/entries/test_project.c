@@ -1,0 +1,244 @@
+/* test_project.c: the nearest positive semidefinite matrix, by its properties and by closed forms. */
+#include "sparse/project.h"
+
+#include "models.h"
+#include "support/suite.h"
+
+enum { N = DRAPE_MAX_ELEMENT_DOFS, TRIALS = 20 };
+
+static void random_symmetric(int n, uint64_t *seed, double *a)
+{
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++)
+            a[n * i + j] = a[n * j + i] = random_number(seed);
+}
+
+static double norm(int n, const double *a)
+{
+    double sum = 0;
+    for (int i = 0; i < n * n; i++)
+        sum += a[i] * a[i];
+    return sqrt(sum);
+}
+
+/* Whether sign a + shift I has a Cholesky factor: all eigenvalues of sign a lie above -shift. */
+static bool is_above(int n, const double *a, double sign, double shift)
+{
+    double l[N * N];
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j <= i; j++) {
+            double sum = sign * a[n * i + j] + (i == j ? shift : 0);
+            for (int k = 0; k < j; k++)
+                sum -= l[n * i + k] * l[n * j + k];
+            if (i == j && !(sum > 0))
+                return false;
+            l[n * i + j] = i == j ? sqrt(sum) : sum / l[n * j + j];
+        }
+    return true;
+}
+
+/* P is the nearest of the cone of positive semidefinite matrices exactly if P is in it, P - A is in it (the
+ * cone is its own dual), and the two are orthogonal (Moreau). */
+static void check_projected(int n, const double *a, const double *p)
+{
+    double scale = norm(n, a), inner = 0, rest[N * N];
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            ck_assert_double_le(fabs(p[n * i + j] - p[n * j + i]), 1e-14 * scale);
+            rest[n * i + j] = p[n * i + j] - a[n * i + j];
+            inner += p[n * i + j] * rest[n * i + j];
+        }
+    ck_assert(is_above(n, p, 1, 1e-13 * scale));
+    ck_assert(is_above(n, rest, 1, 1e-13 * scale));
+    ck_assert_double_le(fabs(inner), 1e-13 * scale * scale);
+}
+
+START_TEST(it_is_the_nearest)
+{
+    uint64_t seed = 4711;
+    for (int n = 1; n <= N; n++)
+        for (int trial = 0; trial < TRIALS; trial++) {
+            double a[N * N], p[N * N], again[N * N];
+            random_symmetric(n, &seed, a);
+            memcpy(p, a, sizeof a);
+            drape_project(n, p);
+            check_projected(n, a, p);
+            memcpy(again, p, sizeof p);
+            drape_project(n, again);
+            for (int i = 0; i < n * n; i++)
+                ck_assert_double_le(fabs(again[i] - p[i]), 1e-14 * norm(n, a));
+        }
+}
+END_TEST
+
+/* Far from 1, as stiffnesses in N/m are. */
+START_TEST(it_does_not_depend_on_the_unit)
+{
+    uint64_t seed = 99;
+    for (double scale = 1e-60; scale < 1e70; scale *= 1e10) {
+        double a[N * N], p[N * N];
+        random_symmetric(N, &seed, a);
+        for (int i = 0; i < N * N; i++)
+            p[i] = a[i] * scale;
+        drape_project(N, p);
+        for (int i = 0; i < N * N; i++)
+            p[i] /= scale;
+        check_projected(N, a, p);
+    }
+}
+END_TEST
+
+START_TEST(a_positive_matrix_keeps_its_bits)
+{
+    uint64_t seed = 5;
+    for (int n = 1; n <= N; n++) {
+        double b[N * N], a[N * N], p[N * N];
+        random_symmetric(n, &seed, b);
+        for (int i = 0; i < n; i++)
+            for (int j = 0; j < n; j++) {
+                a[n * i + j] = i == j ? 0.1 : 0;
+                for (int k = 0; k < n; k++)
+                    a[n * i + j] += b[n * i + k] * b[n * j + k];
+            }
+        memcpy(p, a, sizeof a);
+        drape_project(n, p);
+        ck_assert_mem_eq(p, a, (size_t)(n * n) * sizeof *a);
+    }
+}
+END_TEST
+
+START_TEST(a_negative_matrix_becomes_zero)
+{
+    uint64_t seed = 6;
+    for (int n = 1; n <= N; n++) {
+        double b[N * N], a[N * N];
+        random_symmetric(n, &seed, b);
+        for (int i = 0; i < n; i++)
+            for (int j = 0; j < n; j++) {
+                a[n * i + j] = i == j ? -0.1 : 0;
+                for (int k = 0; k < n; k++)
+                    a[n * i + j] -= b[n * i + k] * b[n * j + k];
+            }
+        double scale = norm(n, a);
+        drape_project(n, a);
+        ck_assert_double_le(norm(n, a), 1e-13 * scale);
+    }
+    double zero[N * N] = {0};
+    drape_project(N, zero);
+    ck_assert_double_eq(norm(N, zero), 0);
+}
+END_TEST
+
+/* [[a b] [b c]] = sum of l v v'; with l1 > 0 > l2: P = l1 (A - l2 I)/(l1 - l2). */
+START_TEST(two_by_two)
+{
+    uint64_t seed = 7;
+    int mixed = 0;
+    for (int trial = 0; trial < 100; trial++) {
+        double a = random_number(&seed), b = random_number(&seed), c = random_number(&seed);
+        double mean = (a + c) / 2, radius = hypot((a - c) / 2, b), high = mean + radius, low = mean - radius;
+        double p[4] = {a, b, b, c};
+        drape_project(2, p);
+        double scale = low >= 0    ? 1
+                       : high <= 0 ? 0
+                                   : high / (high - low),
+               shift = low < 0 && high > 0 ? low : 0;
+        const double expected[4] = {scale * (a - shift), scale * b, scale * b, scale * (c - shift)};
+        for (int i = 0; i < 4; i++)
+            ck_assert_double_eq_tol(p[i], expected[i], 1e-15);
+        mixed += low < 0 && high > 0;
+    }
+    ck_assert_int_gt(mixed, 10);
+}
+END_TEST
+
+/* Q diag(3, -2, 1/2) Q' becomes Q diag(3, 0, 1/2) Q'. */
+START_TEST(three_by_three)
+{
+    const double lambda[3] = {3, -2, 0.5};
+    uint64_t seed = 8;
+    for (int trial = 0; trial < TRIALS; trial++) {
+        double q[9], a[9] = {0}, expected[9] = {0};
+        random_rotation(&seed, q);
+        for (int k = 0; k < 3; k++)
+            for (int i = 0; i < 9; i++) {
+                double dyad = q[3 * (i / 3) + k] * q[3 * (i % 3) + k];
+                a[i] += lambda[k] * dyad;
+                expected[i] += fmax(lambda[k], 0) * dyad;
+            }
+        drape_project(3, a);
+        for (int i = 0; i < 9; i++)
+            ck_assert_double_eq_tol(a[i], expected[i], 5e-15);
+    }
+}
+END_TEST
+
+/* A NaN must come out again, and must not keep the rotations going for ever. */
+START_TEST(nan_stays)
+{
+    uint64_t seed = 9;
+    double a[N * N];
+    random_symmetric(N, &seed, a);
+    a[N + 2] = a[2 * N + 1] = NAN;
+    drape_project(N, a);
+    bool finite = true;
+    for (int i = 0; i < N * N; i++)
+        finite = finite && isfinite(a[i]);
+    ck_assert(!finite);
+}
+END_TEST
+
+/* ---- The membrane ---- */
+
+static drape_model *membrane(drape_context *ctx)
+{
+    const drape_entry_def term = {"stretch.cst", NULL, 0};
+    return make_model(ctx, &(model_def){.mesh = MESH_IRREGULAR, .terms = &term, .term_count = 1});
+}
+
+/* The Jacobian of a sheet that is stretched by these factors along x and z, exact and projected. Returns the largest
+ * entry of their difference over that of the exact one. */
+static double projected_away(drape_context *ctx, const drape_model *m, double along, double across)
+{
+    const size_t values = (size_t)m->pattern.nonzeros;
+    double *x = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *x),
+           *v = drape_alloc(ctx, 3 * (size_t)m->node_count, sizeof *v),
+           *exact = drape_alloc(ctx, values, sizeof *exact), *projected = drape_alloc(ctx, values, sizeof *x);
+    drape_arena memory = drape_arena_of(ctx);
+    drape_system *system = NULL;
+    double most = 0, away = 0;
+    ck_assert(x && v && exact && projected);
+    ck_assert_int_eq(drape_system_create(&memory, m, 1, &system), DRAPE_OK);
+    for (int32_t i = 0; i < m->node_count; i++) {
+        const double *rest = m->rest + 3 * (size_t)i;
+        x[3 * i] = along * rest[0], x[3 * i + 1] = rest[1], x[3 * i + 2] = across * rest[2];
+    }
+    const drape_point point = {.x = x, .v = v};
+    drape_system_jacobian(system, &point, 0, 0, exact);
+    drape_system_jacobian(system, &point, 0, 1, projected);
+    for (size_t i = 0; i < values; i++) {
+        most = fmax(most, fabs(exact[i]));
+        away = fmax(away, fabs(projected[i] - exact[i]));
+    }
+    drape_system_destroy(&system);
+    drape_arena_free(&memory);
+    drape_free(ctx, x), drape_free(ctx, v), drape_free(ctx, exact), drape_free(ctx, projected);
+    return away / most;
+}
+
+/* Equal tension both ways: f1 L1 = (S, nu S), f2 L2 = (0, (1 - nu) S), f3 = 0: all of it pulls, and nothing is lost.
+ * Compressed as much, all of the stress is lost: S/E = .02 (1 + .01)/(1 - nu) of a stiffness of 1 or so. */
+START_TEST(the_membrane_keeps_its_tension)
+{
+    drape_context *ctx = NULL;
+    ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
+    drape_model *m = membrane(ctx);
+    ck_assert_double_le(projected_away(ctx, m, 1.02, 1.02), 1e-13);
+    ck_assert_double_ge(projected_away(ctx, m, 0.98, 0.98), 1e-3);
+    drape_model_destroy(&m);
+    drape_context_destroy(&ctx);
+}
+END_TEST
+
+SUITE("project", it_is_the_nearest, it_does_not_depend_on_the_unit, a_positive_matrix_keeps_its_bits,
+      a_negative_matrix_becomes_zero, two_by_two, three_by_three, nan_stays, the_membrane_keeps_its_tension)

@@ -1,0 +1,161 @@
+/* test_pull.c: the spring by which a host drags a node. */
+#include "sim/sim.h"
+#include "support/scene.h"
+#include "support/suite.h"
+
+#include <math.h>
+#include <string.h>
+
+#define STIFFNESS 37.5
+
+static const double target[3] = {0.4, 0.3, -0.2};
+
+/* 16 nodes without pins and gravity; method: of the integrator. */
+static const char sheet[] =
+    "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 3, 'edge_length': 0.1},"
+    " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
+    " 'terms': ['stretch.edge', 'bend.hinge']%s}],"
+    " 'gravity': [0, 0, 0], 'integrator': {'method': '%s', 'dt': 0.002, 'tolerance': 1e-10}, 'duration': 1}";
+
+/* The spring adds k (x - target) to g of its node and k to the diagonal of its block, and nothing elsewhere: both are
+ * differences of sums that are equal but for one addition, so to the rounding of the larger. */
+START_TEST(force_and_jacobian_are_those_of_a_spring)
+{
+    scene h = scene_open(sheet, "", "be");
+    const drape_pattern *pattern = drape_system_pattern(h.sim->system);
+    const drape_state *s = drape_sim_state(h.sim);
+    const drape_point point = {.x = s->x, .v = s->v, .internal = s->internal};
+    double *values[2], *g[2], largest = 0;
+    for (int i = 0; i < 2; i++) {
+        values[i] = calloc((size_t)pattern->nonzeros, sizeof **values);
+        g[i] = calloc(3 * 16, sizeof **g);
+        if (i)
+            ck_assert_int_eq(drape_sim_set_drag_spring(h.sim, 7, STIFFNESS, target), DRAPE_OK);
+        drape_system_jacobian(h.sim->system, &point, 1, 0, values[i]);
+        drape_system_force(h.sim->system, &point, g[i]);
+    }
+    int64_t stride;
+    int32_t j = h.model->free_of_node[7];
+    double *block = drape_pattern_at(pattern, values[1], j, pattern->diagonal[j], &stride);
+    for (int c = 0; c < 3; c++)
+        block[c * stride + c] -= STIFFNESS;
+    for (int64_t i = 0; i < pattern->nonzeros; i++) {
+        largest = fmax(largest, fabs(values[0][i]));
+        ck_assert(fabs(values[1][i] - values[0][i]) <= 4e-16 * (fabs(values[0][i]) + STIFFNESS));
+    }
+    ck_assert(largest > 0);
+    for (size_t i = 0; i < 48; i++) {
+        double want = i / 3 == 7 ? STIFFNESS * (s->x[i] - target[i % 3]) : 0;
+        ck_assert(fabs(g[1][i] - g[0][i] - want) <= 4e-16 * (fabs(g[0][i]) + fabs(want)));
+    }
+    for (int i = 0; i < 2; i++) {
+        free(values[i]);
+        free(g[i]);
+    }
+    scene_close(&h);
+}
+END_TEST
+
+/* Inner forces sum to nothing: after one step of backward Euler from rest the momentum is h times the spring's force
+ * at its end, to the residual that is left, at most 1e-10 N in each of 16 nodes. */
+START_TEST(a_free_sheet_takes_the_spring_s_momentum)
+{
+    scene h = scene_open(sheet, "", "be");
+    double momentum[3] = {0}, force[3];
+    ck_assert_int_eq(drape_sim_set_drag_spring(h.sim, 5, STIFFNESS, target), DRAPE_OK);
+    ck_assert_int_eq(drape_sim_advance(h.sim, 0.002), DRAPE_OK);
+    for (int i = 0; i < 16; i++)
+        for (int k = 0; k < 3; k++)
+            momentum[k] += h.model->mass[i] * drape_sim_velocities(h.sim)[3 * i + k];
+    drape_sim_drag_spring_force(h.sim, force);
+    for (int k = 0; k < 3; k++) {
+        ck_assert(fabs(force[k]) > 1);
+        assert_below(fabs(momentum[k] - 0.002 * force[k]), 0.002 * 16 * 1e-10);
+    }
+    scene_close(&h);
+}
+END_TEST
+
+/* What the spring is set to is the host's work: the energy that is missing does not change, and the elastic one is
+ * the spring's, to the rounding of a few joules. */
+START_TEST(its_work_is_booked)
+{
+    scene h = scene_open(sheet, "", "be");
+    const double nowhere[3] = {0};
+    double far = 0;
+    for (int k = 0; k < 3; k++)
+        far += pow(h.model->rest[3 * 5 + k] - target[k], 2);
+    drape_energy before = drape_sim_energy(h.sim);
+    ck_assert_int_eq(drape_sim_set_drag_spring(h.sim, 5, STIFFNESS, target), DRAPE_OK);
+    drape_energy set = drape_sim_energy(h.sim);
+    assert_below(fabs(set.elastic - before.elastic - STIFFNESS * far / 2), 1e-14);
+    assert_below(fabs(set.numerical - before.numerical), 1e-14);
+    ck_assert_int_eq(drape_sim_advance(h.sim, 0.02), DRAPE_OK);
+    drape_energy moved = drape_sim_energy(h.sim);
+    ck_assert_int_eq(drape_sim_set_drag_spring(h.sim, 5, 0, nowhere), DRAPE_OK);
+    drape_energy gone = drape_sim_energy(h.sim);
+    ck_assert(gone.elastic < moved.elastic);
+    assert_below(fabs(gone.numerical - moved.numerical), 1e-14);
+    scene_close(&h);
+}
+END_TEST
+
+/* Under every row that moves in time the node comes nearer; and a fixed corner, a wrong number and a wrong value are
+ * refused without a change. */
+START_TEST(every_integrator_follows)
+{
+    for (int i = 0; drape_integrators[i]; i++) {
+        scene h = scene_open(sheet, "", drape_integrators[i]->entry.name);
+        const double *x;
+        double before = 0, after = 0;
+        if (!drape_integrators[i]->steady_state) {
+            x = drape_sim_positions(h.sim);
+            for (int k = 0; k < 3; k++)
+                before += pow(x[3 * 5 + k] - target[k], 2);
+            ck_assert_int_eq(drape_sim_set_drag_spring(h.sim, 5, 1, target), DRAPE_OK);
+            ck_assert_msg(drape_sim_advance(h.sim, 0.05) == DRAPE_OK, "%s: %s",
+                          drape_integrators[i]->entry.name, drape_context_message(h.ctx));
+            x = drape_sim_positions(h.sim);
+            for (int k = 0; k < 3; k++)
+                after += pow(x[3 * 5 + k] - target[k], 2);
+            ck_assert_msg(after < before, "%s", drape_integrators[i]->entry.name);
+        }
+        scene_close(&h);
+    }
+}
+END_TEST
+
+START_TEST(wrong_arguments_change_nothing)
+{
+    scene h = scene_open(sheet, ", 'pins': [{'nodes': [0]}]", "be");
+    const double bad[3] = {0, NAN, 0};
+    const struct {
+        int32_t node;
+        double stiffness;
+        const double *target;
+        const char *says;
+    } wrong[] = {{0, 1, target, "node 0 is pinned"},
+                 {-1, 1, target, "node -1"},
+                 {16, 1, target, "0 to 15"},
+                 {5, -1, target, "stiffness = -1"},
+                 {5, INFINITY, target, "stiffness = inf"},
+                 {5, 1, bad, "target"},
+                 {5, 1, NULL, "target"}};
+    uint64_t hash = drape_sim_hash(h.sim);
+    double force[3];
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        ck_assert_int_eq(drape_sim_set_drag_spring(h.sim, wrong[i].node, wrong[i].stiffness, wrong[i].target),
+                         DRAPE_E_ARGUMENT);
+        ck_assert_msg(strstr(drape_context_message(h.ctx), wrong[i].says), "%s",
+                      drape_context_message(h.ctx));
+    }
+    drape_sim_drag_spring_force(h.sim, force);
+    ck_assert(force[0] == 0 && force[1] == 0 && force[2] == 0);
+    ck_assert(drape_sim_hash(h.sim) == hash);
+    ck_assert_int_eq(drape_sim_set_drag_spring(NULL, 0, 0, target), DRAPE_E_ARGUMENT);
+    scene_close(&h);
+}
+END_TEST
+
+SUITE("pull", force_and_jacobian_are_those_of_a_spring, a_free_sheet_takes_the_spring_s_momentum,
+      its_work_is_booked, every_integrator_follows, wrong_arguments_change_nothing)
