@@ -85,7 +85,8 @@ static inline drape_sim *bench_sim(drape_context *ctx, const drape_model *model,
     return sim;
 }
 
-/* --help is answered on stdout and is no failure; a wrong argument is told on stderr. The status to exit with. */
+/* --help is answered on stdout and is no failure; a wrong argument is told on stderr. The status to exit
+ * with. */
 static inline int bench_usage(const char *argument, const char *text)
 {
     bool asked = strcmp(argument, "--help") == 0;

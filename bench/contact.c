@@ -1,7 +1,7 @@
 /*
- * contact: what contact costs a step of backward Euler. A square sheet of 1 m lies in folds on a floor, above each
- * other like an accordion, and sinks together: after the first steps all layers touch. Wall time of a step by
- * stages, at CS184's thickness and at a tenth of it.
+ * contact: what contact costs a step of backward Euler. A square sheet of 1 m lies in folds on a floor, above
+ * each other like an accordion, and sinks together: after the first steps all layers touch. Wall time of a
+ * step by stages, at CS184's thickness and at a tenth of it.
  *
  *     contact [--csv FILE] [--steps WARM COUNT] [NODES A SIDE ...]      default 6 4, 20 50 100
  */

@@ -1,6 +1,6 @@
 /*
- * cs184.h: the CS184 cloth simulator, written anew for `verlet` to be measured against: bench/cs184.cpp says what of
- * the original was kept. C and C++.
+ * cs184.h: the CS184 cloth simulator, written anew for `verlet` to be measured against: bench/cs184.cpp says
+ * what of the original was kept. C and C++.
  */
 #ifndef DRAPE_BENCH_CS184_H
 #define DRAPE_BENCH_CS184_H

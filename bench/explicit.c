@@ -1,8 +1,8 @@
 /*
- * explicit: the corner of the stability map that explicit steps reach: the scenes of CS184 and Boson, stepped as
- * their programs step, over substeps, dt, stiffness and mass, beside what a build of each program did
- * (docs/seed_systems.md). A run has blown up in the frame in which a node is faster than 1e4 lengths of the scene
- * a second.
+ * explicit: the corner of the stability map that explicit steps reach: the scenes of CS184 and Boson, stepped
+ * as their programs step, over substeps, dt, stiffness and mass, beside what a build of each program did
+ * (docs/seed_systems.md). A run has blown up in the frame in which a node is faster than 1e4 lengths of the
+ * scene a second.
  *
  *     explicit [--csv FILE] [SCENES]      SCENES: the folder of cs184_pinned2.json and verlet_100.json
  */

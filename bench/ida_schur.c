@@ -1,10 +1,10 @@
 /*
- * ida_schur: what IDA gains from eliminating velocities: CPU time of the row "ida", whose linear solver
- * sees the n x n complement K + c_j D + c_j^2 M, over that of the same IDA with the unreduced system of 2
- * n unknowns in SUNDIALS' own sparse matrix and KLU, with the ordering that is faster there. The reduced
- * system is measured with the solver that `auto` picks and with KLU, which the unreduced one has too. A square
- * sheet hung by two corners, undamped, rtol 1e-3, max_order 2, as in `work`. Both take the same steps:
- * counts are printed so that it can be seen. The goal is a factor 3 at 2 500 nodes.
+ * ida_schur: what IDA gains from eliminating velocities: CPU time of the row "ida", whose linear solver sees
+ * the n x n complement K + c_j D + c_j^2 M, over that of the same IDA with the unreduced system of 2 n
+ * unknowns in SUNDIALS' own sparse matrix and KLU, with the ordering that is faster there. The reduced system
+ * is measured with the solver that `auto` picks and with KLU, which the unreduced one has too. A square sheet
+ * hung by two corners, undamped, rtol 1e-3, max_order 2, as in `work`. Both take the same steps: counts are
+ * printed so that it can be seen. The goal is a factor 3 at 2 500 nodes.
  */
 #include "bench.h"
 #include "support/ida_full.h"

@@ -1,7 +1,7 @@
 /*
- * implicit: the corner of the stability map beside that of `explicit`: the same scenes by implicit steps, at the steps
- * at which the explicit programs blow up, and far beyond: springs 200 times as stiff, a hundredth of the mass, both,
- * and 1/30 s. `limit` is what no spring may exceed; Boson's scene has none.
+ * implicit: the corner of the stability map beside that of `explicit`: the same scenes by implicit steps, at
+ * the steps at which the explicit programs blow up, and far beyond: springs 200 times as stiff, a hundredth
+ * of the mass, both, and 1/30 s. `limit` is what no spring may exceed; Boson's scene has none.
  *
  *     implicit [--csv FILE] [--side N] [--scene NAME] [SCENES]
  *         --side    nodes along each side of pinned2; 20

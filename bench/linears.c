@@ -1,9 +1,10 @@
 /*
- * linears: what each linear solver takes for the matrix of a backward Euler step, by size: create (ordering and
- * analysis, done once a sparsity), the first factorisation, a later one, a solve. Square sheets of 1 m hung
- * by two corners, dt 1/60 s, three matrices of each: of a sheet a little deformed, positive definite; the same
- * with friction on a plane under each node, not symmetric; of a sheet pressed together, indefinite. The least
- * of the repeats. From the first come the sizes of the row `auto`, from the others those of what falls back.
+ * linears: what each linear solver takes for the matrix of a backward Euler step, by size: create (ordering
+ * and analysis, done once a sparsity), the first factorisation, a later one, a solve. Square sheets of 1 m
+ * hung by two corners, dt 1/60 s, three matrices of each: of a sheet a little deformed, positive definite;
+ * the same with friction on a plane under each node, not symmetric; of a sheet pressed together, indefinite.
+ * The least of the repeats. From the first come the sizes of the row `auto`, from the others those of what
+ * falls back.
  */
 #include "bench.h"
 #include "solvers/linear.h"

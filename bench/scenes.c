@@ -1,7 +1,8 @@
 /*
- * scenes: what runs of scenes cost and how well contact is kept: steps, rejections, Newton iterations, CPU time, the
- * share of contact, the deepest node and the deepest point of a face in a collider, and the most edges through
- * triangles, at the ends of steps and at frames. What is looked at takes time of its own, which is not counted.
+ * scenes: what runs of scenes cost and how well contact is kept: steps, rejections, Newton iterations, CPU
+ * time, the share of contact, the deepest node and the deepest point of a face in a collider, and the most
+ * edges through triangles, at the ends of steps and at frames. What is looked at takes time of its own, which
+ * is not counted.
  */
 #include "bench.h"
 

@@ -1,15 +1,16 @@
 /*
- * speed: what a step costs on every rung, and what it is off by, as one table of cases: groups of sizes and rungs. Two
- * scenes:
+ * speed: what a step costs on every rung, and what it is off by, as one table of cases: groups of sizes and
+ * rungs. Two scenes:
  *     dep     the DEP report's setting: equilateral lattice, four inner pins, its stiffness, dt 0.01 s
  *     sheet   a square sheet of 1 m let go level from two corners, E h = 1 000 N/m, D = 1e-4 N m, 0.2 kg/m2, dt 1/60 s: the
  *             workload that other programs were measured on
- * The first step, which takes what is taken once, is left out. Milliseconds are a step's: CPU time of the process (mean,
- * median and worst), wall time, and of that the parts; the rest is what the framework takes. Small cases are repeated: a run
- * is the same each time, so each step's CPU time is the least that it took, and the wall times are those of the fastest run.
- * Work is counted beside time, because machines are noisy and counts are not. Equal hashes are equal bits: of one thread
- * and several. Errors are against backward Euler at the same step, solved to 1e-6 N: positions after 0.5 s, rms and largest,
- * and the rms strain of the edges beside that of the converged sheet; nan where there is nothing to compare with.
+ * The first step, which takes what is taken once, is left out. Milliseconds are a step's: CPU time of the
+ * process (mean, median and worst), wall time, and of that the parts; the rest is what the framework takes.
+ * Small cases are repeated: a run is the same each time, so each step's CPU time is the least that it took,
+ * and the wall times are those of the fastest run. Work is counted beside time, because machines are noisy
+ * and counts are not. Equal hashes are equal bits: of one thread and several. Errors are against backward
+ * Euler at the same step, solved to 1e-6 N: positions after 0.5 s, rms and largest, and the rms strain of the
+ * edges beside that of the converged sheet; nan where there is nothing to compare with.
  */
 #include "bench.h"
 #include "sim/profile.h"

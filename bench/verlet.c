@@ -1,8 +1,8 @@
 /*
- * verlet: a frame of pinned2 in CS184's mode, 30 substeps with cloth on cloth and the strain limit, against the same
- * frame by its own code (cs184.cpp), in turns, so that both meet the same machine. CPU time of a frame, and their
- * ratio; and how far the sheets are from each other, for both do the same. CS184 looks for near points in a point's
- * own box alone and misses pairs across its faces, we look in all:
+ * verlet: a frame of pinned2 in CS184's mode, 30 substeps with cloth on cloth and the strain limit, against
+ * the same frame by its own code (cs184.cpp), in turns, so that both meet the same machine. CPU time of a
+ * frame, and their ratio; and how far the sheets are from each other, for both do the same. CS184 looks for
+ * near points in a point's own box alone and misses pairs across its faces, we look in all:
  *
  *   all own   what each does by itself
  *   own own   both as CS184

@@ -1,5 +1,6 @@
-/* host.c: a sheet drapes over a ball that this program moves, in real time: 60 frames per second, with a time budget for
- * each. Build and run:  cc host.c $(pkg-config --cflags --libs drape) -lm -o host && ./host [FRAMES] */
+/* host.c: a sheet drapes over a ball that this program moves, in real time: 60 frames per second, with a time
+ * budget for each. Build and run: cc host.c $(pkg-config --cflags --libs drape) -lm -o host && ./host
+ * [FRAMES] */
 #include <drape/drape.h>
 #include <math.h>
 #include <stdio.h>

@@ -73,9 +73,10 @@ typedef struct drape_context_def {
     /* Receives log lines without a newline. Default NULL: nothing is logged. */
     void (*log)(void *user, drape_log_level level, const char *text);
     void *log_user;
-    /* Asked between the stages of reading and compiling a scene, of making a sim and of restoring one, in the thread of
-     * the call: whether to end it with DRAPE_E_STOPPED, as if it had not been made. It may be asked thousands of times
-     * and must only look. Default NULL: never. A sim that is there is ended by drape_sim_cancel. */
+    /* Asked between the stages of reading and compiling a scene, of making a sim and of restoring one, in the
+     * thread of the call: whether to end it with DRAPE_E_STOPPED, as if it had not been made. It may be asked
+     * thousands of times and must only look. Default NULL: never. A sim that is there is ended by
+     * drape_sim_cancel. */
     bool (*cancel)(void *user);
     void *cancel_user;
 } drape_context_def;
@@ -96,8 +97,8 @@ DRAPE_API const char *drape_context_message(const drape_context *ctx);
 
 /* ---- Scene in memory: what a host fills instead of a scene file ---- */
 
-/* Defs of this section begin with struct_size, set by their _init; those of an array are of one size. Settings, rows and
- * keys of tracks have none: they stay as they are. */
+/* Defs of this section begin with struct_size, set by their _init; those of an array are of one size.
+ * Settings, rows and keys of tracks have none: they stay as they are. */
 
 /* One parameter by name. Numbers and integers go into number with text and vector NULL; choices and file
  * names into text; booleans as text "true" or "false", or as number 0 or 1; vectors into vector. */
@@ -117,8 +118,8 @@ typedef struct drape_entry_def {
     size_t setting_count;          /* of settings */
 } drape_entry_def;
 
-/* A triangle mesh: one of three sources. Exactly one of grid.type, file, positions is set. It lies inside the def of a
- * cloth and grows into what is reserved. */
+/* A triangle mesh: one of three sources. Exactly one of grid.type, file, positions is set. It lies inside the
+ * def of a cloth and grows into what is reserved. */
 typedef struct drape_mesh_def {
     drape_entry_def grid;              /* a row of the grids: "equilateral", "square" */
     const char *file;                  /* an OBJ or PLY file, by its ending */
@@ -144,11 +145,11 @@ typedef struct drape_pin_def {
     size_t struct_size;   /* set by drape_pin_def_init */
     const int32_t *nodes; /* node_count node numbers of this cloth */
     size_t node_count;    /* of nodes */
-    const char
-        *corner; /* "top-left", "top-right", "bottom-left", "bottom-right"; top is row 0, left is column 0 */
-    const char *edge;              /* "top", "bottom", "left", "right" */
-    int32_t row;                   /* -1: not selected by row */
-    bool has_box;                  /* box_min and box_max are set */
+    const char *corner;   /* "top-left", "top-right", "bottom-left", "bottom-right"; top is row 0, left is
+                             column 0 */
+    const char *edge;     /* "top", "bottom", "left", "right" */
+    int32_t row;          /* -1: not selected by row */
+    bool has_box;         /* box_min and box_max are set */
     double box_min[3], box_max[3]; /* [m], rest coordinates after the transform; boundary included */
     const drape_track_key *track;  /* key_count keys; NULL: fixed */
     size_t key_count;              /* of track */
@@ -225,9 +226,9 @@ DRAPE_API drape_status drape_scene_parse(drape_context *ctx, const char *text, c
                                          drape_scene **out);
 
 /* Sets the value at a JSON pointer ("/integrator/dt") to a JSON text ("0.001", "\"ida\"", "[0,0,0]"; numbers
- * may be .5, +5 or 5. as well; a text that is not JSON is taken as a string, so ida may stand without quotes). Missing
- * objects on the way are made. "-" appends to an array. Errors: DRAPE_E_ARGUMENT (not a pointer, a step into a number or
- * past an array), DRAPE_E_MEMORY. */
+ * may be .5, +5 or 5. as well; a text that is not JSON is taken as a string, so ida may stand without
+ * quotes). Missing objects on the way are made. "-" appends to an array. Errors: DRAPE_E_ARGUMENT (not a
+ * pointer, a step into a number or past an array), DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char *value);
 
 /* Frees a scene; models made from it stay. */
@@ -283,17 +284,17 @@ typedef struct drape_collider_motion {
     const char *name;       /* as in the scene, or "collider0" ... */
     const char *type;       /* the row */
     double displacement[3]; /* [m] from where its parameters put it */
-    double velocity
-        [3]; /* [m/s]; at a key of the track that of the piece after it, at the end of a host's way 0 */
+    double velocity[3];     /* [m/s]; at a key of the track that of the piece after it, at the end of a host's
+                               way 0 */
 } drape_collider_motion;
 
 /* How many obstacles there are, and where one of them is by its track at time t [s]. */
 DRAPE_API int32_t drape_model_collider_count(const drape_model *model);
 DRAPE_API drape_collider_motion drape_model_collider(const drape_model *model, int32_t index, double t);
 
-/* How far each triangle is stretched at positions x (node_count x 3 [m]): strain (triangle_count x 2) gets its
- * principal engineering strains [1], lambda - 1 of the principal stretches lambda of the triangle against its rest
- * shape, the larger one first. Rest lengths that terms have of their own play no part. */
+/* How far each triangle is stretched at positions x (node_count x 3 [m]): strain (triangle_count x 2) gets
+ * its principal engineering strains [1], lambda - 1 of the principal stretches lambda of the triangle against
+ * its rest shape, the larger one first. Rest lengths that terms have of their own play no part. */
 DRAPE_API void drape_model_strain(const drape_model *model, const double *x, double *strain);
 
 /* The scene's own duration [s] and frame rate [1/s]. */
@@ -341,8 +342,8 @@ DRAPE_API void drape_sim_destroy(drape_sim **sim);
  * below 1e-9 dt joins the step before. A t_end not after the present time, but for rounding, does nothing. On
  * failure the state is that of the last accepted step. Errors: DRAPE_E_STEP_TOO_SMALL (halving gave up; "ida"
  * took max_steps; max_attempts in one dt), DRAPE_E_SOLVER (a step failed under the controller "fixed"),
- * DRAPE_E_STOPPED (an observer asked, or drape_sim_cancel), DRAPE_E_ARGUMENT (t_end not finite); the message names
- * time, step, reason and worst element. */
+ * DRAPE_E_STOPPED (an observer asked, or drape_sim_cancel), DRAPE_E_ARGUMENT (t_end not finite); the message
+ * names time, step, reason and worst element. */
 DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);
 
 /* What a call of drape_sim_advance_realtime did. */
@@ -360,57 +361,60 @@ typedef struct drape_realtime {
     double residual; /* [N] largest of the accepted steps, in the norm of the integrator; NaN: it has none */
 } drape_realtime;
 
-/* Advances by a frame in a given time: for games, previews, anything that must show a state when it is due. Makes
- * frame_dt [s] and what earlier calls left over, in equal steps no longer than dt. If that is not expected to fit into
- * budget_seconds of wall clock, by what steps took lately, then the integrator tries less hard (rows with efforts,
- * such as "newton_k"), then steps are longer, up to realtime_step of the def, and then time is left over. The rung is
- * chosen anew in each call, and a better one is returned to as soon as it fits.
+/* Advances by a frame in a given time: for games, previews, anything that must show a state when it is due.
+ * Makes frame_dt [s] and what earlier calls left over, in equal steps no longer than dt. If that is not
+ * expected to fit into budget_seconds of wall clock, by what steps took lately, then the integrator tries
+ * less hard (rows with efforts, such as "newton_k"), then steps are longer, up to realtime_step of the def,
+ * and then time is left over. The rung is chosen anew in each call, and a better one is returned to as soon
+ * as it fits.
  *
- * The work of a call is bounded: after its first accepted step none is begun that is not expected to end in time. Time owed is at most one longest step; what is more is dropped, simulated time then runs behind the
- * clock for good, and late frames do not make later ones later. Steps follow the frames, so at another frame rate
- * the state differs by the integrator's own error in h and nothing else. A later drape_sim_advance goes on with the
- * scene's own steps. Which rung is taken depends on the clock, so two runs may differ; with a budget that is never
- * reached they do not.
+ * The work of a call is bounded: after its first accepted step none is begun that is not expected to end in
+ * time. Time owed is at most one longest step; what is more is dropped, simulated time then runs behind the
+ * clock for good, and late frames do not make later ones later. Steps follow the frames, so at another frame
+ * rate the state differs by the integrator's own error in h and nothing else. A later drape_sim_advance goes
+ * on with the scene's own steps. Which rung is taken depends on the clock, so two runs may differ; with a
+ * budget that is never reached they do not.
  *
- * *report, unless NULL, is filled whatever the status. Integrators and controllers that choose their own steps keep
- * doing so, within the bound. Errors: as drape_sim_advance; DRAPE_E_ARGUMENT (frame_dt not in (0, 1e6], budget not in
- * [0, 1e9], an integrator without time). */
+ * *report, unless NULL, is filled whatever the status. Integrators and controllers that choose their own
+ * steps keep doing so, within the bound. Errors: as drape_sim_advance; DRAPE_E_ARGUMENT (frame_dt not in (0,
+ * 1e6], budget not in [0, 1e9], an integrator without time). */
 DRAPE_API drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double budget_seconds,
                                                   drape_realtime *report);
 
 /* Puts the sim into a state of the host's own, from which the next advance starts: time [s], 0 to 1e9, before
  * or after the present one; positions [m] and velocities [m/s], node_count x 3, copied. Pinned nodes must lie
  * where their pins have them at t, to 1e-9 of the scene's size, and are put there exactly; those that
- * drape_sim_move_pins has sent rest where x has them. The velocities of fixed ones become 0, those of moved ones are
- * taken until a step gives them the mean of their track. Internal variables follow from the positions: a hinge's angle
- * is taken on the branch nearest to its present one.
+ * drape_sim_move_pins has sent rest where x has them. The velocities of fixed ones become 0, those of moved
+ * ones are taken until a step gives them the mean of their track. Internal variables follow from the
+ * positions: a hinge's angle is taken on the branch nearest to its present one.
  *
  * The integrator and the controller start anew, as after a kink; steps are counted from t, and the energies
- * dissipated and numerical from 0. Frames go on with the first at or after t; where t is the present time, with
- * the next that was not told. Statistics go on. Positions and velocities that a sim of the same model had, at
- * the same time, are taken to the bit, so a one-step integrator goes on from them as that sim did where k dt
- * has no rounding.
+ * dissipated and numerical from 0. Frames go on with the first at or after t; where t is the present time,
+ * with the next that was not told. Statistics go on. Positions and velocities that a sim of the same model
+ * had, at the same time, are taken to the bit, so a one-step integrator goes on from them as that sim did
+ * where k dt has no rounding.
  *
  * Nothing is allocated, and no element checked: a state with one that is degenerate is a start that steps may
  * lead out of. Not for observers. Errors: DRAPE_E_ARGUMENT (NULL, not finite, a pinned node elsewhere), and
  * then nothing has changed. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, const double *v);
 
-/* Pulls a free node by a spring of stiffness [N/m] from it to target [m]: the force stiffness (target - x), in the
- * equations of every step from the next one on, implicit where the integrator is. It replaces the one before;
- * stiffness 0 lets go. The spring's energy is counted as elastic, and what moving its target takes as the work of a
- * pin. Integrators start anew. Nothing is allocated. Not for observers. Errors: DRAPE_E_ARGUMENT (no such node, a
- * pinned one, a stiffness below 0, not finite), and then nothing has changed. Thread-safety: as the sim. */
+/* Pulls a free node by a spring of stiffness [N/m] from it to target [m]: the force stiffness (target - x),
+ * in the equations of every step from the next one on, implicit where the integrator is. It replaces the one
+ * before; stiffness 0 lets go. The spring's energy is counted as elastic, and what moving its target takes as
+ * the work of a pin. Integrators start anew. Nothing is allocated. Not for observers. Errors:
+ * DRAPE_E_ARGUMENT (no such node, a pinned one, a stiffness below 0, not finite), and then nothing has
+ * changed. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_set_drag_spring(drape_sim *sim, int32_t node, double stiffness,
                                                  const double target[3]);
 
 /* The force of that spring on its node in the present state [N]; 0 without one. */
 DRAPE_API void drape_sim_drag_spring_force(const drape_sim *sim, double force[3]);
 
-/* Makes the advance that is running, or else the next one, return DRAPE_E_STOPPED with the last accepted state: before
- * its next step, or at the next evaluation of forces within one, which is then forgotten and counted as rejected
- * ("cancelled"). A later advance goes on from there. Thread-safety: may be called from any thread and from a signal
- * handler, as long as the sim lives. NULL is fine. */
+/* Makes the advance that is running, or else the next one, return DRAPE_E_STOPPED with the last accepted
+ * state: before its next step, or at the next evaluation of forces within one, which is then forgotten and
+ * counted as rejected ("cancelled"). A later advance goes on from there. Thread-safety: may be called from
+ * any thread and from a signal handler, as long as the sim lives. NULL is fine. */
 DRAPE_API void drape_sim_cancel(drape_sim *sim);
 
 /* ---- Sim: what a host moves ----
@@ -419,41 +423,43 @@ DRAPE_API void drape_sim_cancel(drape_sim *sim);
  * the end of the frame, advances by the frame, and says the next. Nothing here allocates;
  * none is for observers; after an error nothing has changed. Thread-safety: as the sim. */
 
-/* Sends pinned nodes, fixed ones and ones on tracks alike, on ways of the host's: node nodes[i] goes in the next
- * `seconds` of simulated time from where it is to positions[3 i ...] [m], where it then rests, or goes on by the next
- * call. velocities (count x 3 [m/s]): with how much it comes there, on a cubic from its present position and velocity,
- * so that calls from frame to frame make a smooth motion; NULL: straight, at one speed. A node that was sent once is
- * the host's for good: its track no longer counts. drape_sim_set_state leaves such nodes where the state has them, at
- * rest.
+/* Sends pinned nodes, fixed ones and ones on tracks alike, on ways of the host's: node nodes[i] goes in the
+ * next `seconds` of simulated time from where it is to positions[3 i ...] [m], where it then rests, or goes
+ * on by the next call. velocities (count x 3 [m/s]): with how much it comes there, on a cubic from its
+ * present position and velocity, so that calls from frame to frame make a smooth motion; NULL: straight, at
+ * one speed. A node that was sent once is the host's for good: its track no longer counts.
+ * drape_sim_set_state leaves such nodes where the state has them, at rest.
  *
  * Before drape_sim_advance_realtime, seconds is the frame and what is owed, frame_dt + drape_realtime.debt.
  *
- * The way is known to the integrator in full: any step inside it, and any frame, has pins where the way has them. A
- * jump of velocity is a kink, at which "ida" starts anew. Errors: DRAPE_E_ARGUMENT (no such node, one that is free, the
- * same one twice is not looked for; seconds not in (0, 1e9], not finite or beyond 1e9 m or m/s). */
+ * The way is known to the integrator in full: any step inside it, and any frame, has pins where the way has
+ * them. A jump of velocity is a kink, at which "ida" starts anew. Errors: DRAPE_E_ARGUMENT (no such node, one
+ * that is free, the same one twice is not looked for; seconds not in (0, 1e9], not finite or beyond 1e9 m or
+ * m/s). */
 DRAPE_API drape_status drape_sim_move_pins(drape_sim *sim, int32_t count, const int32_t *nodes,
                                            double seconds, const double *positions, const double *velocities);
 
-/* The same for a collider as a whole: to a displacement [m] from where its parameters put it. `drape_sim_collider` tells
- * where it is. */
+/* The same for a collider as a whole: to a displacement [m] from where its parameters put it.
+ * `drape_sim_collider` tells where it is. */
 DRAPE_API drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double seconds,
                                                const double displacement[3], const double *velocity);
 
-/* Pushes nodes: forces (node_count x 3 [N], copied) act from the next step on, the same whatever the nodes do, until
- * they are replaced; NULL: none. On a pinned node they are taken up by its pin. Their work counts as that of pins. "ida"
- * starts anew. Errors: DRAPE_E_ARGUMENT (not finite). */
+/* Pushes nodes: forces (node_count x 3 [N], copied) act from the next step on, the same whatever the nodes
+ * do, until they are replaced; NULL: none. On a pinned node they are taken up by its pin. Their work counts
+ * as that of pins. "ida" starts anew. Errors: DRAPE_E_ARGUMENT (not finite). */
 DRAPE_API drape_status drape_sim_push(drape_sim *sim, const double *forces);
 
-/* The velocity of the medium at time t [s] at count points: wind (count x 3 [m/s]) at x (count x 3 [m]). gradient,
- * unless NULL, gets dwind_i/dx_j at [9 p + 3 i + j] [1/s]; it comes filled with zeros, and a field that leaves them
- * loses convergence, not accuracy: Newton's matrix then lacks that part. wind comes filled with zeros, too. Called
- * several times a step within drape_sim_advance, in its thread, at states that are only tried: the same t and x must
- * give the same wind, and within one advance it is to be smooth in t. */
+/* The velocity of the medium at time t [s] at count points: wind (count x 3 [m/s]) at x (count x 3 [m]).
+ * gradient, unless NULL, gets dwind_i/dx_j at [9 p + 3 i + j] [1/s]; it comes filled with zeros, and a field
+ * that leaves them loses convergence, not accuracy: Newton's matrix then lacks that part. wind comes filled
+ * with zeros, too. Called several times a step within drape_sim_advance, in its thread, at states that are
+ * only tried: the same t and x must give the same wind, and within one advance it is to be smooth in t. */
 typedef void drape_wind_field(void *user, double t, int32_t count, const double *x, double *wind,
                               double *gradient);
 
-/* Moves the medium that drag terms are in ("drag.wind", added to its own steady wind, "drag.viscous", and a host's with
- * in_medium); field NULL: it rests again. Errors: DRAPE_E_ARGUMENT (no term of the model is in a medium). */
+/* Moves the medium that drag terms are in ("drag.wind", added to its own steady wind, "drag.viscous", and a
+ * host's with in_medium); field NULL: it rests again. Errors: DRAPE_E_ARGUMENT (no term of the model is in a
+ * medium). */
 DRAPE_API drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *field, void *user);
 
 /* ---- Sim: what can be read ---- */
@@ -469,28 +475,29 @@ DRAPE_API const drape_model *drape_sim_model(const drape_sim *sim);
  * else. */
 DRAPE_API uint64_t drape_sim_hash(const drape_sim *sim);
 
-/* How many triangles of the cloth reach into a collider of the scene, counted from 0, by more than 1e-9 m; by 28 points of
- * each. With implicit rows and `ida` none does that did not in the beginning (docs/contact.md). *deepest, if not NULL:
- * how deep [m]. -1: there is no such collider. */
+/* How many triangles of the cloth reach into a collider of the scene, counted from 0, by more than 1e-9 m; by
+ * 28 points of each. With implicit rows and `ida` none does that did not in the beginning (docs/contact.md).
+ * *deepest, if not NULL: how deep [m]. -1: there is no such collider. */
 DRAPE_API int32_t drape_sim_inside(const drape_sim *sim, int32_t collider, double *deepest);
 
-/* Normals of the last accepted state (node_count x 3 [1]): the mean of the triangles around a node weighted by their
- * areas, of length 1, counterclockwise outside; 0 where those add up to nothing. drape_model_normals: at other
- * positions x (node_count x 3 [m]). */
+/* Normals of the last accepted state (node_count x 3 [1]): the mean of the triangles around a node weighted
+ * by their areas, of length 1, counterclockwise outside; 0 where those add up to nothing.
+ * drape_model_normals: at other positions x (node_count x 3 [m]). */
 DRAPE_API void drape_sim_normals(const drape_sim *sim, double *normals);
 DRAPE_API void drape_model_normals(const drape_model *model, const double *x, double *normals);
 
 /* Forces in the last accepted state, into arrays of the host's (node_count x 3 [N]).
  *
- * drape_sim_reactions: what pins do to pinned nodes, 0 on free ones: the force that keeps a node on its way against
- * cloth, gravity, contact and push, without what it takes to speed up the node's own mass. Rates that damping laws take
- * from a step are those of the velocities here.
+ * drape_sim_reactions: what pins do to pinned nodes, 0 on free ones: the force that keeps a node on its way
+ * against cloth, gravity, contact and push, without what it takes to speed up the node's own mass. Rates that
+ * damping laws take from a step are those of the velocities here.
  *
  * drape_sim_contact_forces: of contact and friction, with colliders and between layers, on every node;
- * drape_sim_collider_force: of cloth on one collider, as a whole. Colliders have the mean velocity of the last step, so
- * ask before moving them on. Under "newton_k", which does not bring the residual of a step to zero, all
- * of these are far off (docs/choosing.md). An integrator that moves nodes out of what they meet ("verlet") has no such forces, and
- * says so. Errors: DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. Thread-safety: as the sim. Not for observers. */
+ * drape_sim_collider_force: of cloth on one collider, as a whole. Colliders have the mean velocity of the
+ * last step, so ask before moving them on. Under "newton_k", which does not bring the residual of a step to
+ * zero, all of these are far off (docs/choosing.md). An integrator that moves nodes out of what they meet
+ * ("verlet") has no such forces, and says so. Errors: DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. Thread-safety: as the
+ * sim. Not for observers. */
 DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_contact_forces(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3]);
@@ -505,17 +512,16 @@ typedef struct drape_energy {
     double gravity;    /* [J] the potential, zero at the origin */
     double contact;    /* [J] of pairs that are nearer than their activation distance */
     double dissipated; /* [J] the work that damping and drag terms took since t = 0 or drape_sim_set_state */
-    double
-        numerical; /* [J] what is missing otherwise, the integrator's own dissipation (negative: gain), after
-                          the work of pins and colliders that move and of drape_sim_push */
+    double numerical;  /* [J] what is missing otherwise, the integrator's own dissipation (negative: gain),
+                          after the work of pins and colliders that move and of drape_sim_push */
 } drape_energy;
 
 /* Adds up the energies of the last accepted state. */
 DRAPE_API drape_energy drape_sim_energy(drape_sim *sim);
 
-/* Where the elastic energy of the last accepted state is: density (node_count) [J/m2], that of each element in
- * equal parts on its nodes, over the area that is lumped to a node at rest. Its sum over nodes, each times its
- * area, is the elastic energy. */
+/* Where the elastic energy of the last accepted state is: density (node_count) [J/m2], that of each element
+ * in equal parts on its nodes, over the area that is lumped to a node at rest. Its sum over nodes, each times
+ * its area, is the elastic energy. */
 DRAPE_API void drape_sim_energy_density(drape_sim *sim, double *density);
 
 /* Work done since the sim was made. Times in seconds of wall clock; newton times are parts of steps. */
@@ -530,7 +536,8 @@ typedef struct drape_statistics {
     int64_t residuals;         /* evaluated */
     double wall_setup;         /* [s] of a clock on a wall, as what follows: making the sim */
     double wall_steps;         /* [s] all steps, with the parts below */
-    /* [s] Parts of wall_steps, none of them a part of another: residual and Jacobian are without their contact. */
+    /* [s] Parts of wall_steps, none of them a part of another: residual and Jacobian are without their
+     * contact. */
     double wall_residual;
     double wall_jacobian;
     double wall_factor;
@@ -545,39 +552,44 @@ typedef struct drape_statistics {
 DRAPE_API drape_statistics drape_sim_statistics(const drape_sim *sim);
 
 /* Reasons for which attempts were rejected, with their counts: "max_iterations", "line_search",
- * "edge_collapse" ..., "other" for all past the 31st. index runs from 0; *count is 0 and the result NULL past the last. */
+ * "edge_collapse" ..., "other" for all past the 31st. index runs from 0; *count is 0 and the result NULL past
+ * the last. */
 DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t *count);
 
 /* ---- Checkpoints ---- */
 
-/* Takes size bytes, in the order in which they come. DRAPE_OK to go on; a negative status to stop with, whose message it
- * may have set by drape_context_set_message. */
+/* Takes size bytes, in the order in which they come. DRAPE_OK to go on; a negative status to stop with, whose
+ * message it may have set by drape_context_set_message. */
 typedef drape_status drape_write(void *user, const void *bytes, size_t size);
 
-/* Saves a sim between two calls that advance it, so that a sim of the same model goes on from there with the same bits:
- * states, what integrator, controller, contact and linear solver know of the past, the energies and statistics so far, the
- * number of the next frame; where a host sent pins and colliders, what it pushes and pulls. Not saved are observers, the
- * field of drape_sim_set_wind, and what a host's own terms or colliders keep. May also be called by an observer of a
- * frame: the frames that are left of the step are told after drape_sim_restore, by the next advance.
+/* Saves a sim between two calls that advance it, so that a sim of the same model goes on from there with the
+ * same bits: states, what integrator, controller, contact and linear solver know of the past, the energies
+ * and statistics so far, the number of the next frame; where a host sent pins and colliders, what it pushes
+ * and pulls. Not saved are observers, the field of drape_sim_set_wind, and what a host's own terms or
+ * colliders keep. May also be called by an observer of a frame: the frames that are left of the step are told
+ * after drape_sim_restore, by the next advance.
  *
- * drape_sim_save writes a file: under another name first, then to the disk, then under its own, so that at any moment, a
- * crash of the machine too, there is the file before or the new one whole. It takes a buffer of 64 KiB and gives it back;
- * drape_sim_save_to takes no memory. Sizes: 100 to 400 bytes a node; for "ida" and modified Newton a matrix beside.
+ * drape_sim_save writes a file: under another name first, then to the disk, then under its own, so that at
+ * any moment, a crash of the machine too, there is the file before or the new one whole. It takes a buffer of
+ * 64 KiB and gives it back; drape_sim_save_to takes no memory. Sizes: 100 to 400 bytes a node; for "ida" and
+ * modified Newton a matrix beside.
  *
  * Errors: DRAPE_E_ARGUMENT (NULL), DRAPE_E_MEMORY, DRAPE_E_FILE; what `write` returned. The sim is as it was.
  * Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_save(drape_sim *sim, const char *path);
 DRAPE_API drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, void *user);
 
-/* Puts a sim, whatever it did before, where the saved one was; bytes (size) need only live during the call. The sim was
- * made with the model of the saved one, or one from the same scene, by the same build, with the same integrator,
- * controller, their settings and frame rate; threads may differ. Its observers and its wind stay, and it may be
- * cancelled as before; observers are told nothing. Arrays that the sim gave out before are no longer valid. A sim is made beside the present one for it: for the time of the call there are
- * both. With a SUNDIALS without its private headers (docs/checkpoints.md) "ida" starts anew from the state.
+/* Puts a sim, whatever it did before, where the saved one was; bytes (size) need only live during the call.
+ * The sim was made with the model of the saved one, or one from the same scene, by the same build, with the
+ * same integrator, controller, their settings and frame rate; threads may differ. Its observers and its wind
+ * stay, and it may be cancelled as before; observers are told nothing. Arrays that the sim gave out before
+ * are no longer valid. A sim is made beside the present one for it: for the time of the call there are both.
+ * With a SUNDIALS without its private headers (docs/checkpoints.md) "ida" starts anew from the state.
  *
- * A file of `drape run --checkpoint-every` is such a one, too. Errors, and then the sim is as it was: DRAPE_E_ARGUMENT
- * (NULL, another model, row or setting), DRAPE_E_VERSION (another build), DRAPE_E_PARSE (damaged, or no checkpoint),
- * DRAPE_E_FILE, DRAPE_E_MEMORY, DRAPE_E_SOLVER. Not for observers. Thread-safety: as the sim. */
+ * A file of `drape run --checkpoint-every` is such a one, too. Errors, and then the sim is as it was:
+ * DRAPE_E_ARGUMENT (NULL, another model, row or setting), DRAPE_E_VERSION (another build), DRAPE_E_PARSE
+ * (damaged, or no checkpoint), DRAPE_E_FILE, DRAPE_E_MEMORY, DRAPE_E_SOLVER. Not for observers.
+ * Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_restore(drape_sim *sim, const char *path);
 DRAPE_API drape_status drape_sim_restore_from(drape_sim *sim, const void *bytes, size_t size);
 
@@ -585,8 +597,8 @@ DRAPE_API drape_status drape_sim_restore_from(drape_sim *sim, const void *bytes,
 
 /* The element or node that an attempt has most to say about. */
 typedef struct drape_diagnostic {
-    const char
-        *what; /* "residual", "edge length / rest length", "altitude / rest altitude" ...; "" for none */
+    const char *what;    /* "residual", "edge length / rest length", "altitude / rest altitude" ...; "" for
+                            none */
     const char *term;    /* the row that found it, "" for a node */
     int32_t element;     /* element number in that term of that cloth; -1 for a node */
     int32_t node[4];     /* its first nodes, numbers of the whole model; -1 past the last */
@@ -603,9 +615,8 @@ typedef struct drape_attempt {
     bool accepted;       /* the sim went on from its end; else it was forgotten */
     int iterations;      /* Newton iterations */
     double residual;     /* of the free nodes at the end of the attempt, in the norm of the integrator [N] */
-    double
-        tolerance; /* that it was to reach [N]; with the reason "rounding" what rounding alone leaves; NaN: the
-                         row promises none */
+    double tolerance; /* that it was to reach [N]; with the reason "rounding" what rounding alone leaves; NaN:
+                         the row promises none */
     drape_diagnostic diagnostic; /* what the attempt has most to say about */
 } drape_attempt;
 
@@ -623,7 +634,7 @@ typedef struct drape_event {
     int64_t frame;                /* FRAME: its number from 0 */
     double time;                  /* FRAME [s] */
     const double *positions;  /* FRAME: node_count x 3 [m]; cubic Hermite between the steps around it, or the
-                                     straight way, or the nearer of them, where that leads through something */
+                                 straight way, or the nearer of them, where that leads through something */
     const double *velocities; /* FRAME: node_count x 3 [m/s]; linear between the steps around it */
 } drape_event;
 

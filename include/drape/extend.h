@@ -120,8 +120,9 @@ typedef struct drape_param {
 
 /* ---- Entries ---- */
 
-/* What every implementation that is chosen by name says of itself: a term, a collider, and all that `drape list` shows. The
- * struct of its functions begins with it, behind its size where it has one. Texts and parameters are static. */
+/* What every implementation that is chosen by name says of itself: a term, a collider, and all that `drape
+ * list` shows. The struct of its functions begins with it, behind its size where it has one. Texts and
+ * parameters are static. */
 typedef struct drape_entry {
     const char *name;          /* as in scenes: "bend.hinge" */
     const char *summary;       /* one line for `drape list` */
@@ -231,7 +232,8 @@ typedef struct drape_fault {
 #define DRAPE_LANES 4
 
 /*
- * A term. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first + count
+ * A term. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first +
+ * count
  * - 1; outputs are element-major: item i belongs to element first + i. d = 3 * nodes. Gradients have the sign
  * of dE/dx, so a force is minus that. x, v: (nodes of the model x 3). internal: (element_count) internal
  * variables of the last accepted state, of terms that have them, else NULL. An output pointer that is NULL is
@@ -344,8 +346,8 @@ DRAPE_API void drape_pair_distance(const drape_elements *el, int32_t first, int3
 
 /* What of a collider cloth can touch besides its smooth surface, in the collider's own coordinates, with the
  * surface `radius` outside of it: points against the faces of a cloth, segments against its edges, and
- * triangles (colliders without a smooth distance) against its nodes. No segment has the length 0. A shape begins
- * as all zeros; arrays are taken by drape_shape_reserve. */
+ * triangles (colliders without a smooth distance) against its nodes. No segment has the length 0. A shape
+ * begins as all zeros; arrays are taken by drape_shape_reserve. */
 typedef struct drape_collider_shape {
     int32_t point_count, segment_count, triangle_count; /* of the arrays below */
     double *point;                                      /* (point_count x 3) [m] */
@@ -361,7 +363,8 @@ typedef struct drape_collider_shape {
 DRAPE_API drape_status drape_shape_reserve(drape_collider_shape *shape, int32_t points, int32_t segments,
                                            int32_t triangles);
 
-/* Memory that lives as long as the model, zeroed, for what the collider keeps; NULL: return DRAPE_E_MEMORY. */
+/* Memory that lives as long as the model, zeroed, for what the collider keeps; NULL: return
+ * DRAPE_E_MEMORY. */
 DRAPE_API void *drape_shape_take(drape_collider_shape *shape, size_t count, size_t size);
 
 /* Refuses a value: the reason is reported at the parameter in the scene. Returns DRAPE_E_ARGUMENT. */

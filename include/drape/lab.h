@@ -1,13 +1,13 @@
 /*
- * lab.h: experiments on a scene: work against accuracy, maps of stability, orders of convergence. A library of
- * its own, libdrape_lab, since its statistics link GSL (GPL) and libdrape does not.
+ * lab.h: experiments on a scene: work against accuracy, maps of stability, orders of convergence. A library
+ * of its own, libdrape_lab, since its statistics link GSL (GPL) and libdrape does not.
  *
- * An experiment is a list of cases, each the scene with some values changed. The result of a case is a line of
- * JSON in the folder, so an interrupted run resumes where it stopped, and the shards of a sweep that ran
+ * An experiment is a list of cases, each the scene with some values changed. The result of a case is a line
+ * of JSON in the folder, so an interrupted run resumes where it stopped, and the shards of a sweep that ran
  * separately are merged: the report needs only the lines.
  *
- * Threads: a call uses `jobs` threads of its own, each with a context of its own. progress is called by one at a
- * time, not always by the same.
+ * Threads: a call uses `jobs` threads of its own, each with a context of its own. progress is called by one
+ * at a time, not always by the same.
  */
 #ifndef DRAPE_LAB_H
 #define DRAPE_LAB_H
@@ -21,12 +21,12 @@ typedef struct drape_lab_setting {
     const char *pointer, *value; /* "/integrator/dt", "0.01" */
 } drape_lab_setting;
 
-/* Progress of a sweep. done: cases that need no more work, of total in this shard; total 0: the reference solution is
- * being made. seconds_left: NaN while it is unknown. */
+/* Progress of a sweep. done: cases that need no more work, of total in this shard; total 0: the reference
+ * solution is being made. seconds_left: NaN while it is unknown. */
 typedef void drape_lab_progress(void *user, int64_t done, int64_t total, double seconds_left);
 
-/* Whether to stop: the cases in progress are abandoned, the lines of those done are kept. Called by all threads,
- * at any time: it must be thread-safe. */
+/* Whether to stop: the cases in progress are abandoned, the lines of those done are kept. Called by all
+ * threads, at any time: it must be thread-safe. */
 typedef bool drape_lab_cancel(void *user);
 
 /* What to run. Initialise with drape_lab_def_init. Strings live during the call. */
@@ -69,16 +69,18 @@ typedef struct drape_lab_outcome {
 /* Frees the text of an outcome; the struct is the caller's. */
 DRAPE_API void drape_lab_outcome_free(drape_lab_outcome *outcome);
 
-/* Runs "tradeoff", "stability" or "converge" into the folder: cases.jsonl, experiment.json, results.csv, pictures and
- * report.html; a shard, beside which others may write, only experiment.json and cases-1-of-4.jsonl: the merge writes
- * the rest. Earlier lines of the same experiment are kept as they are. Errors: DRAPE_E_ARGUMENT (no such experiment, a wrong
- * def, a setting that no case uses, a folder that holds another experiment), those of loading the scene, DRAPE_E_FILE,
- * DRAPE_E_SOLVER (no reference: the folder is left as it was before), DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
+/* Runs "tradeoff", "stability" or "converge" into the folder: cases.jsonl, experiment.json, results.csv,
+ * pictures and report.html; a shard, beside which others may write, only experiment.json and
+ * cases-1-of-4.jsonl: the merge writes the rest. Earlier lines of the same experiment are kept as they are.
+ * Errors: DRAPE_E_ARGUMENT (no such experiment, a wrong def, a setting that no case uses, a folder that holds
+ * another experiment), those of loading the scene, DRAPE_E_FILE, DRAPE_E_SOLVER (no reference: the folder is
+ * left as it was before), DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
 DRAPE_API drape_status drape_lab_run(drape_context *ctx, const char *experiment, const drape_lab_def *def,
                                      drape_lab_outcome *outcome);
 
 /* Brings the lines of several folders together in one, with the report over them. Errors: DRAPE_E_FILE,
- * DRAPE_E_PARSE (a line that is no result), DRAPE_E_ARGUMENT (folders of different experiments), DRAPE_E_MEMORY. */
+ * DRAPE_E_PARSE (a line that is no result), DRAPE_E_ARGUMENT (folders of different experiments),
+ * DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_lab_merge(drape_context *ctx, const char *const *folders, size_t count,
                                        const char *folder, drape_lab_outcome *outcome);
 

@@ -1,5 +1,5 @@
-/* context.h: allocator, last message, log, user-defined terms and colliders. Every function that can fail reports through
- * its context. */
+/* context.h: allocator, last message, log, user-defined terms and colliders. Every function that can fail
+ * reports through its context. */
 #ifndef DRAPE_BASE_CONTEXT_H
 #define DRAPE_BASE_CONTEXT_H
 

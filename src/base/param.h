@@ -1,5 +1,5 @@
-/* param.h: parameters and the values that settings give them: names, kinds, ranges, defaults, in numbers and in
- * words. The keys of a scene are parameters too (model/scene.h). */
+/* param.h: parameters and the values that settings give them: names, kinds, ranges, defaults, in numbers and
+ * in words. The keys of a scene are parameters too (model/scene.h). */
 #ifndef DRAPE_BASE_PARAM_H
 #define DRAPE_BASE_PARAM_H
 
@@ -28,8 +28,8 @@ drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const
 drape_status drape_param_value(drape_context *ctx, const char *pointer, const drape_param *param,
                                const drape_setting *setting, double *value);
 
-/* Sets the message of a value that is not allowed, or of a parameter that nothing gives, with what the parameter
- * takes, at the pointer. Returns DRAPE_E_ARGUMENT. */
+/* Sets the message of a value that is not allowed, or of a parameter that nothing gives, with what the
+ * parameter takes, at the pointer. Returns DRAPE_E_ARGUMENT. */
 drape_status drape_param_refuse(drape_context *ctx, const char *pointer, const drape_param *param,
                                 const char *given);
 drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param);

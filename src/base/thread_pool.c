@@ -1,8 +1,8 @@
 /*
- * thread_pool.c: see thread_pool.h. The number of open tasks and the number of the loop are in one atomic word. A thread
- * takes a task by decrementing it, if it is unchanged since it was read: so a thread that has read a loop
- * that is over takes no task of the next loop, which it would run with the function of the other. Which
- * thread runs a task is left to chance; what the task writes is not.
+ * thread_pool.c: see thread_pool.h. The number of open tasks and the number of the loop are in one atomic
+ * word. A thread takes a task by decrementing it, if it is unchanged since it was read: so a thread that has
+ * read a loop that is over takes no task of the next loop, which it would run with the function of the other.
+ * Which thread runs a task is left to chance; what the task writes is not.
  */
 #include "base/thread_pool.h"
 

@@ -1,8 +1,8 @@
 /*
- * thread_pool.h: threads that help with loops over independent tasks. Each thread that is free takes the next task;
- * the caller takes tasks too, and waits only for those that a helper has begun. A helper that another program
- * keeps from its core takes none, so the caller does its part; threads that meet at a barrier would wait for
- * it at every loop.
+ * thread_pool.h: threads that help with loops over independent tasks. Each thread that is free takes the next
+ * task; the caller takes tasks too, and waits only for those that a helper has begun. A helper that another
+ * program keeps from its core takes none, so the caller does its part; threads that meet at a barrier would
+ * wait for it at every loop.
  */
 #ifndef DRAPE_BASE_THREAD_POOL_H
 #define DRAPE_BASE_THREAD_POOL_H

@@ -1,7 +1,7 @@
 /* cli.h: what the verbs of the program share: the table of verbs, command lines, scenes, exit codes, output.
  *
- * A verb is one file, cmd_<verb>.c, and one name in meson.build. Results go to stdout, messages and progress to stderr.
- * The library never prints. */
+ * A verb is one file, cmd_<verb>.c, and one name in meson.build. Results go to stdout, messages and progress
+ * to stderr. The library never prints. */
 #ifndef DRAPE_CLI_CLI_H
 #define DRAPE_CLI_CLI_H
 
@@ -59,8 +59,8 @@ typedef struct cli_setting {
 
 /* The part of a command line that all verbs have. The request of a verb begins with it. */
 typedef struct cli_command {
-    drape_arena
-        *arena; /* memory until the verb returns; its context stops where the program is interrupted */
+    drape_arena *arena; /* memory until the verb returns; its context stops where the program is
+                           interrupted */
     drape_context *ctx; /* of the arena */
     const char *verb;
     const char *operand; /* the first; NULL: none was given */
@@ -93,8 +93,8 @@ void cli_print_help(const drape_verb *verb); /* on stdout */
 /* The operand as help shows it: in brackets if it is optional. */
 void cli_operand_text(const drape_verb *verb, char *text, size_t size);
 
-/* Reads a command line into a request, in which all but arena and ctx is zero. CLI_GO_ON, or the exit code after help or an
- * error was printed. */
+/* Reads a command line into a request, in which all but arena and ctx is zero. CLI_GO_ON, or the exit code
+ * after help or an error was printed. */
 int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *request);
 
 /* Prints one line "drape run: text" on stderr. Returns CLI_BAD_INPUT. */
@@ -116,8 +116,9 @@ typedef struct cli_scene {
     drape_sim *sim;
 } cli_scene;
 
-/* Loads a scene, applies the settings, compiles it, checks the formats of the output and makes a sim. Writes no file.
- * CLI_GO_ON, or CLI_BAD_INPUT or CLI_INTERRUPTED after a line was printed. cli_scene_free in any case. */
+/* Loads a scene, applies the settings, compiles it, checks the formats of the output and makes a sim. Writes
+ * no file. CLI_GO_ON, or CLI_BAD_INPUT or CLI_INTERRUPTED after a line was printed. cli_scene_free in any
+ * case. */
 int cli_scene_load(const cli_command *command, const char *path, cli_scene *out);
 void cli_scene_free(cli_scene *scene);
 

@@ -31,7 +31,8 @@ static int print_comparisons(const drape_check_result *rows, int count)
     return failed ? CLI_FAILED : CLI_DONE;
 }
 
-/* Prints where cloth passes through cloth at the start. It is not a failure, as a scene without self-contact may have it. */
+/* Prints where cloth passes through cloth at the start. It is not a failure, as a scene without self-contact
+ * may have it. */
 static drape_status print_intersections(const cli_scene *in)
 {
     drape_intersections found;

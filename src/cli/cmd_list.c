@@ -1,5 +1,5 @@
-/* cmd_list.c: `drape list`: the keys of a scene and the tables of the library, as text, as Markdown, and as the
- * schema of a scene. */
+/* cmd_list.c: `drape list`: the keys of a scene and the tables of the library, as text, as Markdown, and as
+ * the schema of a scene. */
 #include "cli/cli.h"
 #include "cli/keys.h"
 #include "cli/schema.h"
@@ -34,7 +34,8 @@ typedef struct list_style {
     bool params_apart; /* in a table of their own, after all entries */
 } list_style;
 
-/* What a parameter, or a key of a scene, takes and has by default, in words; the unit has a place of its own. */
+/* What a parameter, or a key of a scene, takes and has by default, in words; the unit has a place of its
+ * own. */
 typedef struct param_text {
     char takes[1024], value[256], unit[64];
 } param_text;

@@ -68,8 +68,9 @@ static drape_recorder_def recorder_def(const run *r)
                                 .start = r->start};
 }
 
-/* When a run is resumed, the recorder and the copy of the scene are there already. A killed run must not leave the summary
- * of the run before it; a summary that is not a regular file stays, as it will be written through. */
+/* When a run is resumed, the recorder and the copy of the scene are there already. A killed run must not
+ * leave the summary of the run before it; a summary that is not a regular file stays, as it will be written
+ * through. */
 static drape_status begin_output(run *r)
 {
     if (!r->request->out)
@@ -95,7 +96,8 @@ static drape_status begin_output(run *r)
 
 /* ---- Resuming ---- */
 
-/* Restores the sim and the recorder from the checkpoint in the folder. Without a checkpoint the run starts anew. */
+/* Restores the sim and the recorder from the checkpoint in the folder. Without a checkpoint the run starts
+ * anew. */
 static drape_status restore(run *r)
 {
     bool there;
@@ -265,8 +267,8 @@ static void advance(run *r)
     cli_progress_clear(&r->progress);
 }
 
-/* An interrupted run writes its checkpoint before its last frame, as a resumed run will not have that frame; a completed
- * run writes it afterwards. */
+/* An interrupted run writes its checkpoint before its last frame, as a resumed run will not have that frame;
+ * a completed run writes it afterwards. */
 static void finish(run *r)
 {
     const bool keeps = r->recorder && keeps_checkpoints(r);
@@ -306,8 +308,8 @@ static int conclude(const run *r)
     return r->status == DRAPE_E_STOPPED ? CLI_INTERRUPTED : CLI_FAILED;
 }
 
-/* The folder of a run gets a copy of the scene as it was run. If the scene itself lies there under that name, options that
- * change it would overwrite the user's file. */
+/* The folder of a run gets a copy of the scene as it was run. If the scene itself lies there under that name,
+ * options that change it would overwrite the user's file. */
 static int check_folder(const run_request *request)
 {
     const cli_command *command = &request->command;

@@ -74,8 +74,8 @@ static drape_status make_painter(window_view *w)
     return drape_painter_create(w->ctx, &def, &w->painter);
 }
 
-/* Puts the present state and the field of the shading into the reel. If the integrator does not have the field, a message
- * says so and its values are 0. */
+/* Puts the present state and the field of the shading into the reel. If the integrator does not have the
+ * field, a message says so and its values are 0. */
 static drape_status take_frame(window_view *w)
 {
     drape_sim *sim = w->v.in.sim;

@@ -78,7 +78,8 @@ void cli_source_free(cli_source *source)
 
 /* ---- From a run ---- */
 
-/* Sets the sim to a frame. Fields may need velocities: they are differences of the frames before and after it. */
+/* Sets the sim to a frame. Fields may need velocities: they are differences of the frames before and after
+ * it. */
 static drape_status set_state(cli_source *s, int64_t frame, double *x, double *v, double *other)
 {
     drape_record *run = &s->run;

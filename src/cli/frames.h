@@ -1,4 +1,5 @@
-/* frames.h: the frames to be drawn, from a scene, which is simulated, or from the folder of a finished run. */
+/* frames.h: the frames to be drawn, from a scene, which is simulated, or from the folder of a finished
+ * run. */
 #ifndef DRAPE_CLI_FRAMES_H
 #define DRAPE_CLI_FRAMES_H
 
@@ -27,13 +28,14 @@ typedef struct cli_source {
     bool incomplete;  /* the simulation stopped early: the reel has the frames up to then */
 } cli_source;
 
-/* Opens a scene or a run. CLI_GO_ON, or CLI_BAD_INPUT after the error was printed. cli_source_free in any case. */
+/* Opens a scene or a run. CLI_GO_ON, or CLI_BAD_INPUT after the error was printed. cli_source_free in any
+ * case. */
 int cli_source_open(const cli_command *command, const char *operand, const cli_frames_def *def,
                     cli_source *out);
 void cli_source_free(cli_source *source);
 
-/* Reads or simulates the frames. CLI_GO_ON, also if the simulation stopped after the first frame, which is reported on
- * stderr; or an exit code. */
+/* Reads or simulates the frames. CLI_GO_ON, also if the simulation stopped after the first frame, which is
+ * reported on stderr; or an exit code. */
 int cli_source_fill(const cli_frames_def *def, cli_source *source);
 
 #endif

@@ -1,4 +1,5 @@
-/* keys.h: the objects of a scene and where they lie, from the tables that the reader uses, for `drape list`. */
+/* keys.h: the objects of a scene and where they lie, from the tables that the reader uses, for `drape
+ * list`. */
 #ifndef DRAPE_CLI_KEYS_H
 #define DRAPE_CLI_KEYS_H
 

@@ -1,5 +1,5 @@
-/* main.c: the program `drape`: finds the verb, reads its command line, runs it, and checks that its output was
- * written. */
+/* main.c: the program `drape`: finds the verb, reads its command line, runs it, and checks that its output
+ * was written. */
 #include "cli/cli.h"
 #include "cli/signals.h"
 
@@ -9,8 +9,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* If the program is started with a standard descriptor closed, a file that is opened later would become the standard
- * output. The substitutes refuse what the descriptor is for, so that writing to it still fails. */
+/* If the program is started with a standard descriptor closed, a file that is opened later would become the
+ * standard output. The substitutes refuse what the descriptor is for, so that writing to it still fails. */
 static void fill_descriptors(void)
 {
     static const int modes[] = {O_WRONLY, O_RDONLY, O_RDONLY};

@@ -210,8 +210,8 @@ static int set_option(cli_command *command, const cli_option *option, const char
 
 /* ---- Command lines ---- */
 
-/* Handles what getopt_long returned. Only a repeatable option may be given twice: else the first value would be lost
- * silently. */
+/* Handles what getopt_long returned. Only a repeatable option may be given twice: else the first value would
+ * be lost silently. */
 static int handle(const drape_verb *verb, option_list *list, int code, char **argv, cli_command *request)
 {
     if (code == HELP_VALUE) {

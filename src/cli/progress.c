@@ -1,5 +1,5 @@
-/* progress.c: see progress.h. It only uses carriage returns and blanks, no colours or control sequences, so NO_COLOR and
- * dumb terminals need no special case. */
+/* progress.c: see progress.h. It only uses carriage returns and blanks, no colours or control sequences, so
+ * NO_COLOR and dumb terminals need no special case. */
 #include "cli/progress.h"
 
 #include "base/clock.h"

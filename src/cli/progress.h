@@ -1,4 +1,5 @@
-/* progress.h: a line on the terminal that shows the progress of a run. Nothing is shown if stderr is not a terminal. */
+/* progress.h: a line on the terminal that shows the progress of a run. Nothing is shown if stderr is not a
+ * terminal. */
 #ifndef DRAPE_CLI_PROGRESS_H
 #define DRAPE_CLI_PROGRESS_H
 

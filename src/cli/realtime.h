@@ -11,8 +11,8 @@ typedef struct cli_realtime {
     drape_summary_realtime result;
 } cli_realtime;
 
-/* Advances in frames of 1 / frame_rate up to the scene's duration, each with that time as its budget, without sleeping.
- * Late frames are not failures. The status is that of the advance. */
+/* Advances in frames of 1 / frame_rate up to the scene's duration, each with that time as its budget, without
+ * sleeping. Late frames are not failures. The status is that of the advance. */
 drape_status cli_realtime_run(cli_realtime *realtime, const cli_command *command, const cli_scene *scene);
 void cli_realtime_print(const cli_realtime *realtime); /* on stdout */
 

@@ -1,4 +1,5 @@
-/* scene.c: from a command line to a sim. All errors of the input are found here, before any verb writes a file. */
+/* scene.c: from a command line to a sim. All errors of the input are found here, before any verb writes a
+ * file. */
 #include "cli/cli.h"
 #include "cli/signals.h"
 

@@ -203,8 +203,8 @@ static json_t *param(const drape_param *p)
     return described(value_of(p), &(drape_scene_key){.param = *p});
 }
 
-/* A value of a parameter that several entries have with different bounds must be right for each of them, as for
- * the reader. */
+/* A value of a parameter that several entries have with different bounds must be right for each of them, as
+ * for the reader. */
 static json_t *with_param(json_t *properties, const drape_param *p)
 {
     json_t *schema = param(p), *before = json_object_get(properties, p->name);

@@ -27,8 +27,8 @@ void cli_signals_cancel(drape_sim *sim)
         drape_sim_cancel(sim);
 }
 
-/* Also catches signals that were ignored: shells start background jobs of scripts so, and a signal sent to such a job is
- * intended. */
+/* Also catches signals that were ignored: shells start background jobs of scripts so, and a signal sent to
+ * such a job is intended. */
 void cli_catch_signals(void)
 {
     const struct sigaction action = {.sa_handler = on_signal, .sa_flags = (int)SA_RESETHAND | SA_RESTART};

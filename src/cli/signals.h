@@ -11,10 +11,12 @@ void cli_catch_signals(void);
 
 bool cli_interrupted(void);
 
-/* Sets the sim whose step a signal cancels, for runs of a single long step. NULL: none; a step in progress completes. */
+/* Sets the sim whose step a signal cancels, for runs of a single long step. NULL: none; a step in progress
+ * completes. */
 void cli_signals_cancel(drape_sim *sim);
 
-/* Whether a signal interrupts a waiting open or read, as of a scene from a pipe. Writes must not be interrupted. */
+/* Whether a signal interrupts a waiting open or read, as of a scene from a pipe. Writes must not be
+ * interrupted. */
 void cli_signals_end_waits(bool end);
 
 /* Prints the line "drape run: interrupted" on stderr. Returns CLI_INTERRUPTED. */

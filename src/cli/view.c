@@ -1,6 +1,6 @@
 /*
- * view.c: see view.h. Models are constant: a change sets a value of the scene, compiles a new model, and sets a new sim
- * to the former state.
+ * view.c: see view.h. Models are constant: a change sets a value of the scene, compiles a new model, and sets
+ * a new sim to the former state.
  */
 #include "cli/view.h"
 
@@ -136,8 +136,8 @@ static drape_status set_number(cli_view *v, const char *pointer, double value)
     return drape_scene_set(v->in.scene, pointer, text);
 }
 
-/* Scales the parameters of this name of all terms, each term at its place in the scene. Gravity, which is not listed there,
- * comes last and has no parameters. */
+/* Scales the parameters of this name of all terms, each term at its place in the scene. Gravity, which is not
+ * listed there, comes last and has no parameters. */
 static drape_status scale_terms(cli_view *v, const char *name, double factor, int *changed)
 {
     const drape_model *m = v->in.model;
@@ -159,8 +159,8 @@ static drape_status scale_terms(cli_view *v, const char *name, double factor, in
     return status;
 }
 
-/* After values were set: makes the model with them. If it is refused, the caller sets the former values again, which the
- * former model still has. */
+/* After values were set: makes the model with them. If it is refused, the caller sets the former values
+ * again, which the former model still has. */
 static bool commit(cli_view *v, drape_status status, int changed, const char *what)
 {
     v->message[0] = 0;

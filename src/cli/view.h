@@ -1,4 +1,5 @@
-/* view.h: a scene that can be changed while it runs, as `drape view` shows it. No window and no OpenGL here. */
+/* view.h: a scene that can be changed while it runs, as `drape view` shows it. No window and no OpenGL
+ * here. */
 #ifndef DRAPE_CLI_VIEW_H
 #define DRAPE_CLI_VIEW_H
 
@@ -27,7 +28,8 @@ typedef struct cli_view {
     char message[200]; /* the last error, or "" */
 } cli_view;
 
-/* Loads the scene. CLI_GO_ON, or CLI_BAD_INPUT after the error was printed. cli_scene_free(&v->in) in any case. */
+/* Loads the scene. CLI_GO_ON, or CLI_BAD_INPUT after the error was printed. cli_scene_free(&v->in) in any
+ * case. */
 int view_open(const cli_command *command, cli_view *v);
 
 /* Advances by one frame, or one step. If the simulation fails it is paused, with a message. */
@@ -36,8 +38,8 @@ void view_advance(cli_view *v, bool one_step);
 /* Back to the start, with all changes. */
 void view_reset(cli_view *v);
 
-/* Change the scene: true if the model is now a new one, in the same state. A change that the scene refuses leaves
- * everything as it was, with a message. */
+/* Change the scene: true if the model is now a new one, in the same state. A change that the scene refuses
+ * leaves everything as it was, with a message. */
 bool view_scale_stiffness(cli_view *v, double factor);
 bool view_scale_damping(cli_view *v, double factor);
 bool view_scale_gravity(cli_view *v, double factor);

@@ -1,5 +1,5 @@
-/* check_def.c: a scene def that a host filled may have NULL where something should be, or values that no scene
- * could have: found here along the keys of a scene, so that nobody else has to look. */
+/* check_def.c: a scene def that a host filled may have NULL where something should be, or values that no
+ * scene could have: found here along the keys of a scene, so that nobody else has to look. */
 #include "compile/stages.h"
 
 #include <math.h>

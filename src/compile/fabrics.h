@@ -20,8 +20,8 @@ typedef struct drape_fabric {
 extern const drape_fabric drape_fabrics[]; /* the first is "none"; ended by one whose name is NULL */
 extern const char *const drape_fabric_names[];
 
-/* The values that terms use. Those not published are derived: tension 1e4 N/m, shear 34.4 N/m, no coupling, and the twist of
- * an isotropic sheet. */
+/* The values that terms use. Those not published are derived: tension 1e4 N/m, shear 34.4 N/m, no coupling,
+ * and the twist of an isotropic sheet. */
 void drape_fabric_tension(const drape_fabric *fabric, drape_woven *tension);
 void drape_fabric_bending(const drape_fabric *fabric, drape_woven *bending);
 

@@ -1,7 +1,7 @@
 /*
- * fabrics_table.h: the entries of drape_fabrics, for fabrics.c, which explains sources and units, and their number.
- * ROW(name, what it is, source, areal density, C11, C22, C12, C66 of tension, rigidities along warp, weft and
- * the diagonal, drape coefficient), in SI units; NAN: not published.
+ * fabrics_table.h: the entries of drape_fabrics, for fabrics.c, which explains sources and units, and their
+ * number. ROW(name, what it is, source, areal density, C11, C22, C12, C66 of tension, rigidities along warp,
+ * weft and the diagonal, drape coefficient), in SI units; NAN: not published.
  */
 #ifndef DRAPE_COMPILE_FABRICS_TABLE_H
 #define DRAPE_COMPILE_FABRICS_TABLE_H

@@ -98,8 +98,8 @@ static drape_status check_stiffness(drape_context *ctx, const char *pointer, con
     return DRAPE_OK;
 }
 
-/* Thickness and modulus of the isotropic sheet whose strips have the mean tension K and bending B of the fabric,
- * h = sqrt(12 B/K), E = K/h, for terms that know no fabrics, such as hinges and edges. */
+/* Thickness and modulus of the isotropic sheet whose strips have the mean tension K and bending B of the
+ * fabric, h = sqrt(12 B/K), E = K/h, for terms that know no fabrics, such as hinges and edges. */
 static void fill_in(const drape_woven *tension, const drape_woven *bending, double *values)
 {
     const double k = sqrt(tension->warp * tension->weft), b = sqrt(bending->warp * bending->weft);

@@ -1,7 +1,7 @@
 /*
- * read_def.c: the defs of a host that was built against an older header, whose structs ended earlier. Each def
- * begins with its size as the host knew it, which in an array leads to the next; members that the host did not
- * know have their defaults.
+ * read_def.c: the defs of a host that was built against an older header, whose structs ended earlier. Each
+ * def begins with its size as the host knew it, which in an array leads to the next; members that the host
+ * did not know have their defaults.
  */
 #include "compile/stages.h"
 

@@ -1,6 +1,6 @@
 /*
- * fields.h: what can be told of a moment at each node, for pictures and for files that have fields. A field is the
- * constant drape_field_<name> of field_<name>.c.
+ * fields.h: what can be told of a moment at each node, for pictures and for files that have fields. A field
+ * is the constant drape_field_<name> of field_<name>.c.
  */
 #ifndef DRAPE_FIELDS_FIELDS_H
 #define DRAPE_FIELDS_FIELDS_H

@@ -1,6 +1,6 @@
 /*
- * integrator.h: time integrators, the entries of one table. An integrator is the constant drape_integrator_<name> of
- * <name>.c. step(in, out) never writes in: rejecting a step is forgetting out.
+ * integrator.h: time integrators, the entries of one table. An integrator is the constant
+ * drape_integrator_<name> of <name>.c. step(in, out) never writes in: rejecting a step is forgetting out.
  */
 #ifndef DRAPE_INTEGRATORS_INTEGRATOR_H
 #define DRAPE_INTEGRATORS_INTEGRATOR_H

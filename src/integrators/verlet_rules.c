@@ -221,8 +221,8 @@ static int keep_box(const drape_verlet_self *s, int32_t i, const int32_t *near, 
     return number;
 }
 
-/* The near points of a point that push it; NULL: all points do, in a heap of cloth much thicker than its mesh is
- * fine, where a point has more near points than a list holds. */
+/* The near points of a point that push it; NULL: all points do, in a heap of cloth much thicker than its mesh
+ * is fine, where a point has more near points than a list holds. */
 static int find_near(const drape_verlet_self *s, int32_t i, const double *x,
                      int32_t room[DRAPE_MAX_NEIGHBOURS + 1], const int32_t **near)
 {

@@ -1,8 +1,8 @@
 /*
- * converge: orders of convergence without a reference. A setting is halved again and again; the distances between the
- * ends of successive runs fall like a power of it, whose exponent is the order: straight lines in logarithms.
- * In time dt is halved (integrators that choose their steps: rtol is cut to a tenth), in space the edges of every grid,
- * with positions compared at the nodes of the coarsest mesh.
+ * converge: orders of convergence without a reference. A setting is halved again and again; the distances
+ * between the ends of successive runs fall like a power of it, whose exponent is the order: straight lines in
+ * logarithms. In time dt is halved (integrators that choose their steps: rtol is cut to a tenth), in space
+ * the edges of every grid, with positions compared at the nodes of the coarsest mesh.
  */
 #include "base/param.h"
 #include "lab/run.h"
@@ -30,8 +30,8 @@ static drape_status add(lab *l, const char *series, const char *knob, double val
     return lab_add_case(l, tags, settings, -1);
 }
 
-/* An integrator that takes as many substeps as its stability limit asks for stays at that limit, whatever dt is, unless the
- * scene fixes the number of substeps. */
+/* An integrator that takes as many substeps as its stability limit asks for stays at that limit, whatever dt
+ * is, unless the scene fixes the number of substeps. */
 static bool has_own_substeps(const drape_integrator_ops *integrator, const drape_entry_def *given)
 {
     for (size_t i = 0; i < given->setting_count; i++)

@@ -124,7 +124,8 @@ static drape_status plan(lab *l)
     drape_status status = lab_read_text(&l->arena, NULL, l->def->scene, &text, &length);
     if (status)
         return status;
-    /* The hash of the scene's text: lines of a scene that was changed since do not belong to this experiment. */
+    /* The hash of the scene's text: lines of a scene that was changed since do not belong to this
+     * experiment. */
     snprintf(digits, sizeof digits, "%016llx",
              (unsigned long long)drape_hash_bytes(DRAPE_HASH_START, text, length));
     json_t *settings = json_array();
@@ -141,8 +142,9 @@ static drape_status plan(lab *l)
     return l->experiment->plan(l);
 }
 
-/* Refuses settings that no case takes from the scene: who sets dt for a tradeoff expects runs at that dt, and would get
- * a grid of dt. A case takes no setting that it has a value of its own for, or that its integrator ignores. */
+/* Refuses settings that no case takes from the scene: who sets dt for a tradeoff expects runs at that dt, and
+ * would get a grid of dt. A case takes no setting that it has a value of its own for, or that its integrator
+ * ignores. */
 static drape_status check_settings(lab *l)
 {
     for (size_t i = 0; i < l->def->setting_count; i++) {
@@ -161,8 +163,9 @@ static drape_status check_settings(lab *l)
     return DRAPE_OK;
 }
 
-/* Reports a scene that does not compile before there is a folder, which would then hold an unwanted experiment: the
- * scene itself where it is prepared, and the first case of every series. Maps try their own corners. */
+/* Reports a scene that does not compile before there is a folder, which would then hold an unwanted
+ * experiment: the scene itself where it is prepared, and the first case of every series. Maps try their own
+ * corners. */
 static drape_status try_scene(lab *l)
 {
     const char *before = "";
@@ -203,8 +206,8 @@ static drape_status parse_about(lab *l, const char *folder, json_t **about)
                                fault.column, fault.text);
 }
 
-/* Gives the folder this experiment, or goes on with it where the folder has it. Shards that begin at once in one folder
- * all write the same: each under a name of its own, renamed when it is complete. */
+/* Gives the folder this experiment, or goes on with it where the folder has it. Shards that begin at once in
+ * one folder all write the same: each under a name of its own, renamed when it is complete. */
 static drape_status claim_folder(lab *l)
 {
     char own[64], from[4200], to[4200];

@@ -1,7 +1,7 @@
 /*
- * lab.h: what the experiments share. An experiment plans cases, prepares what all of them are compared with, and
- * reports. Cases and results are JSON from the start, as in the files: a report is a function of experiment.json and of
- * the lines, so results of other machines or earlier runs need no exception.
+ * lab.h: what the experiments share. An experiment plans cases, prepares what all of them are compared with,
+ * and reports. Cases and results are JSON from the start, as in the files: a report is a function of
+ * experiment.json and of the lines, so results of other machines or earlier runs need no exception.
  *
  *     experiment.json   {"experiment", "drape", "scene", "scene_hash", "settings", "arguments", "cases": [case...]}
  *     case              {"tags": {what it is called}, "settings": {pointer: value}}, and "same_as": N where the
@@ -85,7 +85,8 @@ bool lab_wants_integrator(const lab *l, const char *name, bool fallback);
 /* Faults of the def: an integrator that does not exist, or that has no steps in time. */
 drape_status lab_check_integrators(const lab *l);
 
-/* Whether an integrator ignores the value at a pointer: "/integrator/..." that is not one of its parameters. */
+/* Whether an integrator ignores the value at a pointer: "/integrator/..." that is not one of its
+ * parameters. */
 bool lab_ignores(const drape_integrator_ops *integrator, const char *pointer);
 
 #endif

@@ -1,4 +1,5 @@
-/* record.h: cases of `drape validate` as lines of JSON, and a folder of them that an interrupted run resumes from. */
+/* record.h: cases of `drape validate` as lines of JSON, and a folder of them that an interrupted run resumes
+ * from. */
 #ifndef DRAPE_LAB_RECORD_H
 #define DRAPE_LAB_RECORD_H
 
@@ -15,16 +16,16 @@ typedef struct lab_record {
     drape_validation v;
 } lab_record;
 
-/* All cases of all references, or of one, in the order of the table. NULL, and a message, where there is no memory;
- * freed by drape_free. */
+/* All cases of all references, or of one, in the order of the table. NULL, and a message, where there is no
+ * memory; freed by drape_free. */
 lab_record *lab_records_make(drape_context *ctx, const drape_reference *only, size_t *count);
 
 /* What is reported of a case that is done; NULL: no memory. */
 json_t *lab_record_json(const lab_record *record);
 
-/* Takes the lines of folder/cases.jsonl that belong to these cases: of the same scene and this version of Drape; they are
- * judged again. The file is then written again with the lines taken, open for more; the caller closes and destroys it.
- * Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Takes the lines of folder/cases.jsonl that belong to these cases: of the same scene and this version of
+ * Drape; they are judged again. The file is then written again with the lines taken, open for more; the
+ * caller closes and destroys it. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_records_open(drape_context *ctx, const char *folder, lab_record *records, size_t count,
                               drape_file *file);
 

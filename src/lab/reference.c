@@ -61,7 +61,8 @@ drape_status lab_check_reference(lab *l)
 
 /* ---- Files ---- */
 
-/* The name of a file of a sequence; NULL: of the reference that was chosen. Shards in one folder each make their own. */
+/* The name of a file of a sequence; NULL: of the reference that was chosen. Shards in one folder each make
+ * their own. */
 static void name_file(const lab *l, const sequence *s, const char *ending, char name[64])
 {
     char shard[32] = "";

@@ -1,5 +1,5 @@
-/* reference_beams.c: strips clamped horizontally at one end, at rest under loads, against rods. Without lateral
- * contraction (nu = 0) strip and rod are the same. */
+/* reference_beams.c: strips clamped horizontally at one end, at rest under loads, against rods. Without
+ * lateral contraction (nu = 0) strip and rod are the same. */
 #include "lab/rod.h"
 #include "lab/strip.h"
 
@@ -17,8 +17,8 @@ static double slope(double weight)
     return drop / reach;
 }
 
-/* At small G the membrane is soft, so that forces are far above the rounding of its own; at large G thin, so that its
- * stretch stays below 1e-4. */
+/* At small G the membrane is soft, so that forces are far above the rounding of its own; at large G thin, so
+ * that its stretch stays below 1e-4. */
 static int heavy_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     const double tolerance = c->parameter * 1e-13; /* at most a thousandth of the weight of a node */
@@ -41,8 +41,9 @@ DRAPE_REFERENCE(
     .entry.reference = "theta'' + G (1 - s) cos theta = 0; Romero et al. 2021, the cantilever test",
     .tolerance = 0.01, .expected = slope, .scene = heavy_scene, .measure = measure_slope);
 
-/* ASTM D1388 pushes a strip over an edge until the chord to its end falls to 41.5 degrees, and takes the bending length
- * as half of the overhang: there G = 8, within 0.04 %. The rod's own angle at G = 8 is 41.487 degrees. */
+/* ASTM D1388 pushes a strip over an edge until the chord to its end falls to 41.5 degrees, and takes the
+ * bending length as half of the overhang: there G = 8, within 0.04 %. The rod's own angle at G = 8 is 41.487
+ * degrees. */
 static int chord_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     return STRIP_SCENE(text, .columns = 81, .rows = 4, .width = 0.02, .thickness = 0.004,

@@ -1,5 +1,5 @@
-/* reference_buckling.c: loads at which strips buckle. Where nothing disturbs them they stay straight, and the signs of the
- * eigenvalues of the Hessian say whether that equilibrium is stable. */
+/* reference_buckling.c: loads at which strips buckle. Where nothing disturbs them they stay straight, and the
+ * signs of the eigenvalues of the Hessian say whether that equilibrium is stable. */
 #include "lab/rod.h"
 #include "lab/strip.h"
 
@@ -59,9 +59,9 @@ DRAPE_REFERENCE(
     .entry.reference = "q L^3 = 12.8538 sqrt(E I G J); Prandtl 1899, Michell 1899; Romero et al. 2021",
     .tolerance = 0.05, .expected = lateral, .scene = lateral_scene, .low = 0.85, .high = 1.15);
 
-/* Hinges on the equilateral lattice are a plate with a bending Poisson ratio of -1/3, whatever the material's is:
- * E I = (8/9) D w, G J = (8/3) D w, and q L^3 = 12.8538 sqrt(E I G J) is 19.79 D w; a plate of the membrane's own
- * 1/3 has E I = (8/9) D w and G J = (4/3) D w. */
+/* Hinges on the equilateral lattice are a plate with a bending Poisson ratio of -1/3, whatever the material's
+ * is: E I = (8/9) D w, G J = (8/3) D w, and q L^3 = 12.8538 sqrt(E I G J) is 19.79 D w; a plate of the
+ * membrane's own 1/3 has E I = (8/9) D w and G J = (4/3) D w. */
 static double lateral_plate(double unused)
 {
     (void)unused;
@@ -140,8 +140,8 @@ static int miss(const gsl_vector *u, void *share, gsl_vector *out)
     return status;
 }
 
-/* The mode in which a clamped and pinned column buckles, of that size: theta is -f (1 - cos k s)/k^2 + f sin(k s)/k, and
- * the mean of theta^2/2 is the share. */
+/* The mode in which a clamped and pinned column buckles, of that size: theta is -f (1 - cos k s)/k^2 + f
+ * sin(k s)/k, and the mean of theta^2/2 is the share. */
 static void guess(double share, double u[3])
 {
     double mean = 0;

@@ -1,5 +1,6 @@
-/* reference_cusick.c: the drape tester of Cusick 1965, ISO 9073-9: a round specimen of 30 cm between discs of 18 cm; its
- * overhang drapes, and its shadow is measured. Here only the overhang is cloth, clamped along its inner rim. */
+/* reference_cusick.c: the drape tester of Cusick 1965, ISO 9073-9: a round specimen of 30 cm between discs of
+ * 18 cm; its overhang drapes, and its shadow is measured. Here only the overhang is cloth, clamped along its
+ * inner rim. */
 #include "compile/fabrics.h"
 #include "lab/strip.h"
 
@@ -103,8 +104,8 @@ static int drape_scene_of(const drape_reference_case *c, char text[DRAPE_LAB_TEX
         ROWS, SPOKES, INNER, OUTER, drape_fabrics[(int)c->parameter].name, TENSION / 1e-3);
 }
 
-/* The share of the overhang's area that its shadow has: the area inside the shadow of the outer rim, by its corners. Folds
- * that hang under others would count with their sign; specimens of 30 cm do not do that. */
+/* The share of the overhang's area that its shadow has: the area inside the shadow of the outer rim, by its
+ * corners. Folds that hang under others would count with their sign; specimens of 30 cm do not do that. */
 static drape_status measure_drape(drape_reference_run *run, double *value)
 {
     drape_status status = lab_advance(run);
@@ -119,15 +120,15 @@ static drape_status measure_drape(drape_reference_run *run, double *value)
     return status;
 }
 
-/* Cases are places in the table of fabrics. Folds that begin differently end differently: the tolerance covers the effect of
- * another order of the sums, or another processor. */
+/* Cases are places in the table of fabrics. Folds that begin differently end differently: the tolerance
+ * covers the effect of another order of the sums, or another processor. */
 #define DRAPED                                                                                               \
     .unit = "1", .parameter = "fabric, by its place", .model = "stretch.cst, bend.midedge; annulus; be",     \
     .tolerance = 0.05, .scene = drape_scene_of, .measure = measure_drape
 
-/* There is no closed form: this is what finer meshes converge to, 0.4464, 0.4784 and 0.4875 with 9, 13 and 17 circles of 80,
- * 112 and 144 nodes. The squares of the mesh sizes are in the ratio of 2.9, the steps in that of 3.5, so the remaining
- * difference is 0.008 to 0.012 (docs/validate.md). */
+/* There is no closed form: this is what finer meshes converge to, 0.4464, 0.4784 and 0.4875 with 9, 13 and 17
+ * circles of 80, 112 and 144 nodes. The squares of the mesh sizes are in the ratio of 2.9, the steps in that
+ * of 3.5, so the remaining difference is 0.008 to 0.012 (docs/validate.md). */
 static double mesh_limit(double unused)
 {
     (void)unused;
@@ -138,14 +139,16 @@ DRAPE_REFERENCE(cusick, DRAPED, .entry.summary = "drape coefficient", DRAPE_CASE
                 .entry.reference = "Cusick 1965, ISO 9073-9, on a fabric of Feng et al. 2022; finer meshes",
                 .expected = mesh_limit);
 
-/* Fabrics that were both bent (KES) and draped (Matsudaira et al. 2015), against an elastic sheet of their weight and B. They
- * do not agree: docs/validate.md says what such a sheet lacks, and what is unknown of the fabrics. */
+/* Fabrics that were both bent (KES) and draped (Matsudaira et al. 2015), against an elastic sheet of their
+ * weight and B. They do not agree: docs/validate.md says what such a sheet lacks, and what is unknown of the
+ * fabrics. */
 static double measured(double place)
 {
     return drape_fabrics[(int)place].drape;
 }
 
-/* What the model gives after 1 s, when the sheet no longer moves (0.7666, 0.7664 and 0.7664 after 1, 1.25 and 1.5 s). */
+/* What the model gives after 1 s, when the sheet no longer moves (0.7666, 0.7664 and 0.7664 after 1, 1.25 and
+ * 1.5 s). */
 static double elastic(double place)
 {
     static const double values[] = {0.7666, 0.5409, 0.6822, 0.3854};

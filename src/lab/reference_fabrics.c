@@ -1,5 +1,5 @@
-/* reference_fabrics.c: virtual tests of measured fabrics: each uses one entry of their table, and must give back the
- * published values. A case is a fabric, by its place in the table. */
+/* reference_fabrics.c: virtual tests of measured fabrics: each uses one entry of their table, and must give
+ * back the published values. A case is a fabric, by its place in the table. */
 #include "compile/fabrics.h"
 #include "compile/fabrics_table.h"
 #include "lab/rod.h"
@@ -147,8 +147,8 @@ static double strain(double s, void *user)
     return drape_root(excess, &hung, 1, 3) - 1;
 }
 
-/* K l (l^2 - 1)/2 = rho g s. Near the fixed edge the strip does not narrow, and is stiffer by 1/(1 - nu^2), 1.8 times at
- * most, over some half width, a hundredth of its length. */
+/* K l (l^2 - 1)/2 = rho g s. Near the fixed edge the strip does not narrow, and is stiffer by 1/(1 - nu^2),
+ * 1.8 times at most, over some half width, a hundredth of its length. */
 static double hanging(double place)
 {
     hung_strip hung = {tension_of(place).warp, drape_fabrics[(int)place].areal_density * GRAVITY, 0};

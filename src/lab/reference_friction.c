@@ -7,7 +7,8 @@
 #define GRAVITY 9.81
 #define DEGREE  (3.14159265358979323846 / 180)
 
-/* A sheet on a plane with normal y; gravity, distance and friction, velocity, integrator and duration follow. */
+/* A sheet on a plane with normal y; gravity, distance and friction, velocity, integrator and duration
+ * follow. */
 #define SHEET                                                                                                \
     "{'drape': 1, 'cloth': [{'mesh': {'grid': 'irregular', 'columns': 4, 'rows': 3, 'width': 0.3, "          \
     "'height': 0.2,\n 'transform': {'translate': [0, 0.0095, 0]}},\n "                                       \
@@ -34,7 +35,8 @@ static int slope_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
                     CREEP);
 }
 
-/* 1 where it stays. 1e-3 less friction than needed is a speed of 1e-3 g sin a after a second, 17 times CREEP or more. */
+/* 1 where it stays. 1e-3 less friction than needed is a speed of 1e-3 g sin a after a second, 17 times CREEP
+ * or more. */
 static drape_status measure_stays(drape_reference_run *run, double *value)
 {
     const int32_t nodes = drape_model_node_count(run->model);

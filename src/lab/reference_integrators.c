@@ -1,4 +1,5 @@
-/* reference_integrators.c: what time integrators make of free fall and of a linear oscillation, step by step. */
+/* reference_integrators.c: what time integrators make of free fall and of a linear oscillation, step by
+ * step. */
 #include "lab/strip.h"
 
 #include <complex.h>
@@ -134,9 +135,9 @@ DRAPE_REFERENCE(oscillator, OSCILLATOR, .entry.summary = "share of energy left b
                 .entry.reference = "1/(1 + omega^2 h^2), of 1/(1 - i omega h)", .members = "'method': 'be'",
                 .expected = euler, .measure = measure_energy);
 
-/* On z' = i omega z the formula 3/2 z1 - 2 z0 + 1/2 z_ = i omega h z1 has the roots
- * (2 +- sqrt(1 + 2 i omega h))/(3 - 2 i omega h); the larger is what a step leaves of the amplitude once the other has
- * died: below 0.35^15 after the steps that are not measured. */
+/* On z' = i omega z the formula 3/2 z1 - 2 z0 + 1/2 z_ = i omega h z1 has the roots (2 +- sqrt(1 + 2 i omega
+ * h))/(3 - 2 i omega h); the larger is what a step leaves of the amplitude once the other has died: below
+ * 0.35^15 after the steps that are not measured. */
 static double bdf2(double angle)
 {
     const double complex z = I * angle;
@@ -187,8 +188,9 @@ DRAPE_REFERENCE(oscillator_verlet, PHASE, DRAPE_CASES(0.1, 0.5, 1), .model = "st
                 .entry.reference = "2 asin(omega h/2)", .members = "'method': 'verlet', 'substeps': 1",
                 .expected = verlet);
 
-/* What variable order and steps leave after one, or ten, and an eighth oscillations: the velocity over that at the start,
- * where errors of amplitude and of phase both show. Tolerances of 1e-8 a step, of what moves. */
+/* What variable order and steps leave after one, or ten, and an eighth oscillations: the velocity over that
+ * at the start, where errors of amplitude and of phase both show. Tolerances of 1e-8 a step, of what
+ * moves. */
 static double turned(double turns)
 {
     return cos(2 * PI * turns);

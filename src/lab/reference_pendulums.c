@@ -1,5 +1,5 @@
-/* reference_pendulums.c: the period of two nodes on a stiff sheet that hangs from an axis and is released at an angle. Steps
- * are 1/400 of the period of small swings; the sheet stretches by less than 1e-4. */
+/* reference_pendulums.c: the period of two nodes on a stiff sheet that hangs from an axis and is released at
+ * an angle. Steps are 1/400 of the period of small swings; the sheet stretches by less than 1e-4. */
 #include "lab/validate.h"
 
 #include <gsl/gsl_sf_ellint.h>

@@ -1,5 +1,5 @@
-/* reference_plates.c: the deflection w D/(q a^4) in the middle of a square plate of side a = 1 m under its weight q, by
- * D = 1 N m. It is some 1e-4 thicknesses, so that the membrane adds its square. */
+/* reference_plates.c: the deflection w D/(q a^4) in the middle of a square plate of side a = 1 m under its
+ * weight q, by D = 1 N m. It is some 1e-4 thicknesses, so that the membrane adds its square. */
 #include "lab/strip.h"
 
 #include <gsl/gsl_multifit.h>
@@ -126,8 +126,8 @@ DRAPE_REFERENCE(plate_clamped, PLATE, .parameter = "nu", DRAPE_CASES(0.3),
                 .entry.reference = "Taylor & Govindjee 2004, Solution of clamped rectangular plate problems",
                 .tolerance = 0.005, .expected = clamped, .scene = clamped_scene);
 
-/* On grids of right triangles hinges do not converge to the plate: their energy is not that of an isotropic one. These
- * factors are those at 160 rows; they hold within 1 % from 40 on. */
+/* On grids of right triangles hinges do not converge to the plate: their energy is not that of an isotropic
+ * one. These factors are those at 160 rows; they hold within 1 % from 40 on. */
 static double hinges(double is_parallel)
 {
     return navier(0) * (is_parallel > 0 ? 0.555 : 0.744);

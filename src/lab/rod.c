@@ -53,8 +53,8 @@ typedef struct rod {
     double weight, force;
 } rod;
 
-/* y: psi, psi', drop, reach. Beyond the horizontal the rod is continued straight, so that psi(1) rises with psi(0):
- * otherwise it would turn over, and there would be more than one root. */
+/* y: psi, psi', drop, reach. Beyond the horizontal the rod is continued straight, so that psi(1) rises with
+ * psi(0): otherwise it would turn over, and there would be more than one root. */
 static int rod_rate(double t, const double y[], double dy[], void *context)
 {
     const rod *r = context;

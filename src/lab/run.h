@@ -21,8 +21,8 @@ typedef struct lab_request {
     const atomic_bool *given_up; /* another thread failed; NULL: there is none */
 } lab_request;
 
-/* The scene with its settings, and its model. Errors: as of drape_scene_load and drape_scene_compile; *scene is
- * to be destroyed in any case. */
+/* The scene with its settings, and its model. Errors: as of drape_scene_load and drape_scene_compile; *scene
+ * is to be destroyed in any case. */
 drape_status lab_load_scene(drape_context *ctx, const lab_request *request, drape_scene **scene);
 drape_status lab_load(drape_context *ctx, const lab_request *request, drape_model **model);
 

@@ -1,7 +1,7 @@
 /*
- * stability: maps. Values of the scene over two or three axes, every point with every integrator asked for: the outcome is
- * one of six, each with a colour. Where the first or second axis is the step of an explicit integrator, its stability limit,
- * as estimated at the start of each run, is drawn over the map.
+ * stability: maps. Values of the scene over two or three axes, every point with every integrator asked for:
+ * the outcome is one of six, each with a colour. Where the first or second axis is the step of an explicit
+ * integrator, its stability limit, as estimated at the start of each run, is drawn over the map.
  */
 #include "base/param.h"
 #include "lab/run.h"
@@ -92,7 +92,8 @@ static json_t *setting_value(const axis *a, int k)
     return is_integer_axis(a) ? json_integer((json_int_t)llround(value)) : json_real(value);
 }
 
-/* Refuses an axis of integers with other values: they would be rounded, and the map would show the wrong ones. */
+/* Refuses an axis of integers with other values: they would be rounded, and the map would show the wrong
+ * ones. */
 static drape_status check_integers(lab *l, const axis *a)
 {
     for (int k = 0; is_integer_axis(a) && k < a->count; k++) {
@@ -168,8 +169,8 @@ static bool is_set(const lab *l, const space *s, const char *pointer)
     return false;
 }
 
-/* Adds a cell of the map whose first case is `first`. Where the integrator ignores an axis, the cell has the result of the
- * first one along it. */
+/* Adds a cell of the map whose first case is `first`. Where the integrator ignores an axis, the cell has the
+ * result of the first one along it. */
 static drape_status add_cell(lab *l, const space *s, const drape_integrator_ops *integrator, size_t cell,
                              size_t first)
 {
@@ -178,8 +179,9 @@ static drape_status add_cell(lab *l, const space *s, const drape_integrator_ops 
     bool repeated = false;
     json_t *tags = json_pack("{s:s}", "integrator", integrator->entry.name),
            *settings = json_pack("{s:s}", "/integrator/method", integrator->entry.name);
-    /* By default an explicit integrator takes as many substeps as its limit asks for, and the controller retries steps that
-     * fail. A map is to show the limit: one substep a step and no retries, unless they are asked for. */
+    /* By default an explicit integrator takes as many substeps as its limit asks for, and the controller
+     * retries steps that fail. A map is to show the limit: one substep a step and no retries, unless they are
+     * asked for. */
     if (integrator->stability && !is_set(l, s, "/integrator/substeps") &&
         drape_param_find(integrator->entry.params, integrator->entry.param_count, "substeps") >= 0)
         json_object_set_new(settings, "/integrator/substeps", json_integer(1));
@@ -198,8 +200,8 @@ static drape_status add_cell(lab *l, const space *s, const drape_integrator_ops 
     return lab_add_case(l, tags, settings, repeated ? (int64_t)same : -1);
 }
 
-/* The scene must compile at both ends of every axis, before hours are spent, and one step inside: an axis with integer
- * ends may have other numbers between. */
+/* The scene must compile at both ends of every axis, before hours are spent, and one step inside: an axis
+ * with integer ends may have other numbers between. */
 static drape_status try_ends(lab *l, size_t first, const space *s)
 {
     size_t inside = 0, stride = 1;

@@ -25,8 +25,8 @@ double strip_gravity(double weight);
 /* Advances to the end of the scene. */
 drape_status lab_advance(drape_reference_run *run);
 
-/* The same, and the mean position of the nodes that had the largest x at rest; its -y; its angle [degree] below the x
- * axis. */
+/* The same, and the mean position of the nodes that had the largest x at rest; its -y; its angle [degree]
+ * below the x axis. */
 drape_status lab_tip(drape_reference_run *run, double tip[3]);
 drape_status lab_sinking(drape_reference_run *run, double *value);
 drape_status lab_chord(drape_reference_run *run, double *value);
@@ -34,7 +34,8 @@ drape_status lab_chord(drape_reference_run *run, double *value);
 /* Sets the sim to the equilibrium near its state, found by "static", with velocities v (node_count x 3). */
 drape_status lab_settle(drape_reference_run *run, const double *v);
 
-/* Advances, and counts the unstable modes of the equilibrium that was found; DRAPE_E_SOLVER if that is not known. */
+/* Advances, and counts the unstable modes of the equilibrium that was found; DRAPE_E_SOLVER if that is not
+ * known. */
 drape_status lab_unstable_modes(drape_reference_run *run, double *value);
 
 #endif

@@ -217,7 +217,8 @@ drape_status lab_write_page(lab *l, const char *title)
 
 /* ---- Pictures ---- */
 
-/* Runs a program and waits for it; returns its exit code, -1 where it did not run. Its output is discarded. */
+/* Runs a program and waits for it; returns its exit code, -1 where it did not run. Its output is
+ * discarded. */
 static int run_program(char *const *arguments)
 {
     posix_spawn_file_actions_t actions;

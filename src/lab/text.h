@@ -7,8 +7,8 @@
 /* Writes a text as a file of l->folder, atomically. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_write_text(lab *l, const char *name, const char *text, size_t size);
 
-/* Reads a file of a folder, or of none (NULL) into an arena; *text ends with a 0 that *size does not count. Errors:
- * DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Reads a file of a folder, or of none (NULL) into an arena; *text ends with a 0 that *size does not count.
+ * Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status lab_read_text(drape_arena *arena, const char *folder, const char *name, char **text,
                            size_t *size);
 
@@ -23,16 +23,16 @@ typedef struct lab_plot {
     size_t size;
 } lab_plot;
 
-/* Begins the script of a picture in SVG of that size [pixel]; its commands are printed to plot->script. Errors:
- * DRAPE_E_MEMORY. */
+/* Begins the script of a picture in SVG of that size [pixel]; its commands are printed to plot->script.
+ * Errors: DRAPE_E_MEMORY. */
 drape_status lab_plot_begin(lab *l, lab_plot *plot, const char *name, int width, int height);
 
-/* Ends the script. draws: keeps it as name.gp in the folder, runs gnuplot on it and adds the picture name.svg with its
- * caption to the page. Where gnuplot is missing or fails, only the summary says so. */
+/* Ends the script. draws: keeps it as name.gp in the folder, runs gnuplot on it and adds the picture name.svg
+ * with its caption to the page. Where gnuplot is missing or fails, only the summary says so. */
 drape_status lab_plot_end(lab *l, lab_plot *plot, bool draws, const char *caption);
 
-/* The unit of a scene's value at a JSON pointer, as "Pa"; "" where it has none, or where it depends on what else the scene
- * says (units.c). */
+/* The unit of a scene's value at a JSON pointer, as "Pa"; "" where it has none, or where it depends on what
+ * else the scene says (units.c). */
 const char *lab_unit(const char *pointer);
 
 void lab_page_heading(lab *l, const char *text);

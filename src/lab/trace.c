@@ -50,8 +50,8 @@ drape_status lab_probe_create(drape_arena *arena, const drape_model *model, lab_
     return DRAPE_OK;
 }
 
-/* The barycentric coordinates of the projection of p on a triangle's plane. Returns the square of p's distance from the
- * triangle if they are all positive, more otherwise. */
+/* The barycentric coordinates of the projection of p on a triangle's plane. Returns the square of p's
+ * distance from the triangle if they are all positive, more otherwise. */
 static double place_in(const double *rest, const int32_t *triangle, const double *p, double *weights)
 {
     const double *a = rest + 3 * (size_t)triangle[0];

@@ -18,7 +18,8 @@ const double *lab_trace_end(const lab_trace *trace);   /* the last frame; there 
 /* Root of the mean, over the free nodes, of the square of the distance between two arrays of positions. */
 double lab_distance(const drape_model *model, const double *a, const double *b);
 
-/* Material points: where the nodes of one mesh lie in the rest shape of another, finer one of the same cloth. */
+/* Material points: where the nodes of one mesh lie in the rest shape of another, finer one of the same
+ * cloth. */
 typedef struct lab_probe {
     size_t count;
     double *rest; /* (count x 3) [m], in an arena */

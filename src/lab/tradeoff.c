@@ -1,7 +1,7 @@
 /*
- * tradeoff: work against accuracy. Every integrator over its dt or rtol, under the scene's controller and under those
- * that bound an error; every linear solver at one dt. Errors are distances from a reference solution whose own error is
- * estimated; an error below 100 times that estimate is listed, but not plotted.
+ * tradeoff: work against accuracy. Every integrator over its dt or rtol, under the scene's controller and
+ * under those that bound an error; every linear solver at one dt. Errors are distances from a reference
+ * solution whose own error is estimated; an error below 100 times that estimate is listed, but not plotted.
  */
 #include "base/param.h"
 #include "control/control.h"
@@ -151,7 +151,8 @@ static void knob_text(const json_t *result, char *text, size_t size)
         snprintf(text, size, "%s %.3g", knob, value);
 }
 
-/* "At 1 mm error the cheapest is ida, order 2, rtol 0.0003 (0.21 s of CPU); be needs 0.86 s, 4.1 times as much". */
+/* "At 1 mm error the cheapest is ida, order 2, rtol 0.0003 (0.21 s of CPU); be needs 0.86 s, 4.1 times as
+ * much". */
 static void report_cheapest(lab *l, double error)
 {
     bool has_base = false;
@@ -235,7 +236,8 @@ static const chart charts[] = {
     {"error_jacobians", "Jacobians", "jacobians", "error at the end, RMS [m]", "error_end_m"},
 };
 
-/* A colour for each integrator, dashes and points for its variants. Okabe & Ito 2008, Color Universal Design. */
+/* A colour for each integrator, dashes and points for its variants. Okabe & Ito 2008, Color Universal
+ * Design. */
 static const char *const colours[] = {"0072B2", "D55E00", "009E73", "CC79A7",
                                       "E69F00", "56B4E9", "000000", "7F7F7F"};
 

@@ -53,8 +53,8 @@ typedef struct drape_reference {
     const char *members; /* of the scene, where entries share the function scene */
     /* Advances the sim and measures. */
     drape_status (*measure)(drape_reference_run *run, double *value);
-    /* For thresholds: the quantity is the load above which measure is > 0, sought between these multiples of the
-     * expected value. */
+    /* For thresholds: the quantity is the load above which measure is > 0, sought between these multiples of
+     * the expected value. */
     double low, high;
 } drape_reference;
 

@@ -345,7 +345,8 @@ static drape_status check_pointer(drape_scene *scene, const char *pointer)
     return DRAPE_OK;
 }
 
-/* A number as people write it and JSON does not: ".5", "-.5", "+5", "5." and these with an exponent. NULL: not a number. */
+/* A number as people write it and JSON does not: ".5", "-.5", "+5", "5." and these with an exponent. NULL:
+ * not a number. */
 static json_t *loose_number(const char *text)
 {
     char number[MAX_SET + 3];

@@ -1,8 +1,8 @@
 /* scene.h: the text of a scene as defs, and the keys that a scene may have.
  *
- * A key is a parameter and the place in a def where its value goes. The tables of scene_keys.c drive the reader
- * (scene_json.c), the defaults of the defs, the checks of a host's defs, and all that describes a scene: `drape
- * list`, the schema, `drape info`. A new key is one entry there. */
+ * A key is a parameter and the place in a def where its value goes. The tables of scene_keys.c drive the
+ * reader (scene_json.c), the defaults of the defs, the checks of a host's defs, and all that describes a
+ * scene: `drape list`, the schema, `drape info`. A new key is one entry there. */
 #ifndef DRAPE_MODEL_SCENE_H
 #define DRAPE_MODEL_SCENE_H
 
@@ -26,8 +26,8 @@ drape_context *drape_scene_context(drape_scene *scene);
 /* Receives a piece of a text. */
 typedef void drape_text_sink(void *user, const char *text, size_t size);
 
-/* Prints the scene with all values that were set, as JSON without comments. A scene of another form is printed in
- * ours, once drape_scene_to_def or a compilation succeeded. */
+/* Prints the scene with all values that were set, as JSON without comments. A scene of another form is
+ * printed in ours, once drape_scene_to_def or a compilation succeeded. */
 void drape_scene_print(drape_scene *scene, drape_text_sink *sink, void *user);
 
 /* ---- The form of a scene ----------------------------------------------------------------------------- */
@@ -49,8 +49,8 @@ typedef enum drape_scene_shape {
 
 /*
  * In a def a number is a double, an integer an int32_t (-1: not given, where it has no default), a boolean a
- * bool, a choice or a text a const char * (NULL: not given), a vector double[3], a rotation double[4]: axis and
- * angle [degrees].
+ * bool, a choice or a text a const char * (NULL: not given), a vector double[3], a rotation double[4]: axis
+ * and angle [degrees].
  */
 typedef struct drape_scene_key {
     drape_param param; /* without a kind and a range where the shape has no values */
@@ -96,8 +96,8 @@ bool drape_scene_value(const drape_scene_key *key, const void *def, drape_settin
 /* The texts of a LIST of them, and how many there are. */
 size_t drape_scene_texts(const drape_scene_key *key, const void *def, const char *const **texts);
 
-/* Puts a value that is good for the parameter into the def: of a setting, and as drape_param_value made numbers
- * of it. */
+/* Puts a value that is good for the parameter into the def: of a setting, and as drape_param_value made
+ * numbers of it. */
 void drape_scene_store(const drape_scene_key *key, const drape_setting *setting, const double *values,
                        void *def);
 

@@ -1,18 +1,18 @@
 /*
  * scene_cs184.c: see scene_cs184.h. Such a scene is an object of at most "cloth", "sphere" and "plane", whose
  * members are checked here; members that CS184 does not know are ignored, as there. Settings that its program
- * keeps in windows and constants have the values it starts with: gravity -9.8, 90 frames a second of 30 substeps,
- * bend springs of 0.2 ks, strains limited to 10 % in one pass, self-contact.
+ * keeps in windows and constants have the values it starts with: gravity -9.8, 90 frames a second of 30
+ * substeps, bend springs of 0.2 ks, strains limited to 10 % in one pass, self-contact.
  *
  * Beside these a scene may have keys of our form for the whole scene, so that a command line can set the
  * integrator, the duration, the output; they are copied. An integrator without a method is verlet.
  *
- * Sheets of CS184 lie at y = 1 with rows along +z, or stand with rows along +y and a random z of at most 1 mm that
- * breaks the symmetry. Rows of our grids go along -z or -y: a rotation by 180 degrees about x maps one to the other.
- * All points have the same mass.
+ * Sheets of CS184 lie at y = 1 with rows along +z, or stand with rows along +y and a random z of at most 1 mm
+ * that breaks the symmetry. Rows of our grids go along -z or -y: a rotation by 180 degrees about x maps one
+ * to the other. All points have the same mass.
  *
- * Methods that do not move nodes use limit.strain and contact, which Verlet leaves out; friction is Coulomb's mu
- * for them.
+ * Methods that do not move nodes use limit.strain and contact, which Verlet leaves out; friction is Coulomb's
+ * mu for them.
  */
 #include "model/scene_cs184.h"
 

@@ -6,7 +6,8 @@
 
 #include "base/context.h"
 
-/* Whether the tree of a scene has the shape of theirs: "cloth" is one object, and no "drape" says otherwise. */
+/* Whether the tree of a scene has the shape of theirs: "cloth" is one object, and no "drape" says
+ * otherwise. */
 bool drape_scene_is_cs184(json_t *root);
 
 /* The same scene in our form, a new reference in *out. Faults are at pointers into root. Errors:

@@ -1,4 +1,5 @@
-/* scene_def.c: the values of keys in defs: their defaults, how they are stored and looked up; and keys in words. */
+/* scene_def.c: the values of keys in defs: their defaults, how they are stored and looked up; and keys in
+ * words. */
 #include "model/scene.h"
 
 #include <math.h>
@@ -116,7 +117,8 @@ void drape_scene_store(const drape_scene_key *key, const drape_setting *setting,
 
 /* ---- Defaults ---- */
 
-/* Arrays without a default stay empty, as the zeros of the def have them; a list has a default of one text or none. */
+/* Arrays without a default stay empty, as the zeros of the def have them; a list has a default of one text or
+ * none. */
 static void set_default(const drape_scene_key *key, void *def)
 {
     static const double no_rotation[4] = {0};

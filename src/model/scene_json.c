@@ -180,7 +180,8 @@ static drape_status read_setting(reader *r, const char *name, json_t *value, dra
     return numbers ? read_numbers(r, value, numbers) : DRAPE_E_MEMORY;
 }
 
-/* Whether a parameter of this kind may be written as a JSON value of this type; drape_param_value checks the rest. */
+/* Whether a parameter of this kind may be written as a JSON value of this type; drape_param_value checks the
+ * rest. */
 static bool is_writable(const drape_param *param, json_t *value)
 {
     if (json_is_array(value))

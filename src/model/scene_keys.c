@@ -143,7 +143,7 @@ static const drape_scene_key collider_keys[] = {
 const drape_scene_object drape_form_collider = {
     .name = "collider",
     KEYS(collider_keys),
-    SETTINGS(drape_collider_def, row.settings, row.setting_count),
+    SETTINGS(drape_collider_def, entry.settings, entry.setting_count),
     .def_size = sizeof(drape_collider_def),
     .sized = true,
 };

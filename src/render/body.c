@@ -62,7 +62,8 @@ static void corner_at(const grid *g, int i, int j, int k, double *x)
     x[2] = g->low[2] + k * g->cell;
 }
 
-/* The box with a margin of somewhat more than a cell, so that no face of a body lies in a plane of the grid. */
+/* The box with a margin of somewhat more than a cell, so that no face of a body lies in a plane of the
+ * grid. */
 static drape_status make_grid(const drape_body *body, grid *g)
 {
     double longest = 0, x[3];
@@ -121,7 +122,8 @@ static void solve3(double a[3][3], const double *b, double *x)
     }
 }
 
-/* The point with the least squared distances from the planes at the cuts, regularized towards the mean of the cuts. */
+/* The point with the least squared distances from the planes at the cuts, regularized towards the mean of the
+ * cuts. */
 static void fit_point(const double (*cuts)[3], const double (*normals)[3], int count, double *x)
 {
     double mean[3] = {0}, a[3][3] = {{0}}, b[3] = {0}, move[3];
@@ -144,8 +146,8 @@ static void fit_point(const double (*cuts)[3], const double (*normals)[3], int c
         x[k] = mean[k] + move[k];
 }
 
-/* Adds the tangent plane at the surface point nearest to each corner of the cell, if that point is in the cell: an edge
- * of the body may pass through a cell none of whose edges meets both of the edge's sides. */
+/* Adds the tangent plane at the surface point nearest to each corner of the cell, if that point is in the
+ * cell: an edge of the body may pass through a cell none of whose edges meets both of the edge's sides. */
 static int add_nearest(const grid *g, const int *at, double (*cuts)[3], double (*normals)[3], int count)
 {
     for (int corner = 0; corner < 8; corner++) {
@@ -189,8 +191,8 @@ static int add_cuts(const grid *g, const int *at, double (*cuts)[3], double (*no
     return count;
 }
 
-/* The point that fits the planes, moved onto the surface by Newton steps on the distance: the least squares alone are
- * inexact because of the regularization. */
+/* The point that fits the planes, moved onto the surface by Newton steps on the distance: the least squares
+ * alone are inexact because of the regularization. */
 static drape_status make_point(grid *g, int i, int j, int k)
 {
     double cuts[20][3], normals[20][3], x[3], normal[3];
@@ -217,8 +219,8 @@ static drape_status make_point(grid *g, int i, int j, int k)
 
 /* ---- Faces: one for each edge of the grid that is cut ---- */
 
-/* The normal of a corner is taken a little towards the middle of its face, so that at an edge of the body it is the
- * normal of the side on which the face lies. */
+/* The normal of a corner is taken a little towards the middle of its face, so that at an edge of the body it
+ * is the normal of the side on which the face lies. */
 static void put_triangle(const grid *g, const int32_t *corner, drape_body *body)
 {
     double middle[3] = {0}, normal[3], x[3];
@@ -237,8 +239,8 @@ static void put_triangle(const grid *g, const int32_t *corner, drape_body *body)
     }
 }
 
-/* Puts the face of the edge from corner (i, j, k) along axis: it joins the points of the four cells around the edge,
- * counterclockwise seen from outside. */
+/* Puts the face of the edge from corner (i, j, k) along axis: it joins the points of the four cells around
+ * the edge, counterclockwise seen from outside. */
 static void put_face(const grid *g, int i, int j, int k, int axis, drape_body *body)
 {
     static const int around[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};

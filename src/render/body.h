@@ -1,8 +1,8 @@
 /*
- * body.h: the surface of a collider as it is drawn. It is found from the collider's signed distance alone, so every
- * collider has one, user-defined ones too: each cell of a grid in which the distance changes its sign gets the point
- * that fits the tangent planes of the surface there best (dual contouring: Ju, Losasso, Schaefer & Warren 2002). On
- * edges and corners of the collider that point lies on them.
+ * body.h: the surface of a collider as it is drawn. It is found from the collider's signed distance alone, so
+ * every collider has one, user-defined ones too: each cell of a grid in which the distance changes its sign
+ * gets the point that fits the tangent planes of the surface there best (dual contouring: Ju, Losasso,
+ * Schaefer & Warren 2002). On edges and corners of the collider that point lies on them.
  */
 #ifndef DRAPE_RENDER_BODY_H
 #define DRAPE_RENDER_BODY_H
@@ -17,7 +17,8 @@ typedef struct drape_body {
     double low[3], high[3]; /* bounding box [m]; of an endless body the box it is cut off at */
 } drape_body;
 
-/* Makes the body in an arena. An endless one is cut off at twice `reach` [m] from center. Errors: DRAPE_E_MEMORY. */
+/* Makes the body in an arena. An endless one is cut off at twice `reach` [m] from center. Errors:
+ * DRAPE_E_MEMORY. */
 drape_status drape_body_create(drape_arena *arena, const drape_collider *collider, const double center[3],
                                double reach, drape_body *body);
 

@@ -1,5 +1,5 @@
-/* camera.h: an eye that orbits a point. Angles in degrees: the azimuth turns about the vertical, 0 looks along -z,
- * and positive values move the eye towards +x; the elevation is above the horizon. */
+/* camera.h: an eye that orbits a point. Angles in degrees: the azimuth turns about the vertical, 0 looks
+ * along -z, and positive values move the eye towards +x; the elevation is above the horizon. */
 #ifndef DRAPE_RENDER_CAMERA_H
 #define DRAPE_RENDER_CAMERA_H
 
@@ -42,8 +42,8 @@ drape_camera drape_framing_end(const drape_framing *framing, float azimuth, floa
 /* radius: of the scene around the target, for the near and far planes. */
 drape_view drape_camera_view(const drape_camera *camera, float aspect, float radius);
 
-/* Makes it the view of a larger picture that contains the former one from low to high, where the sides of the larger one
- * are at -1 and 1. */
+/* Makes it the view of a larger picture that contains the former one from low to high, where the sides of the
+ * larger one are at -1 and 1. */
 void drape_view_widen(drape_view *view, const float low[2], const float high[2]);
 
 #endif

@@ -1,5 +1,5 @@
-/* canvas.c: see canvas.h. Shaders convert to sRGB once per pixel. A framebuffer that did it would convert each sample, and
- * back, which takes a software renderer as long as everything else. */
+/* canvas.c: see canvas.h. Shaders convert to sRGB once per pixel. A framebuffer that did it would convert
+ * each sample, and back, which takes a software renderer as long as everything else. */
 #include "render/canvas.h"
 
 #include <string.h>

@@ -1,5 +1,5 @@
-/* film.h: encodes pictures as a film, by ffmpeg as a child process that reads them from a pipe. The caller has to ignore
- * SIGPIPE: the death of ffmpeg is then reported as a failed write. */
+/* film.h: encodes pictures as a film, by ffmpeg as a child process that reads them from a pipe. The caller
+ * has to ignore SIGPIPE: the death of ffmpeg is then reported as a failed write. */
 #ifndef DRAPE_RENDER_FILM_H
 #define DRAPE_RENDER_FILM_H
 

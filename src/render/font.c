@@ -1,7 +1,7 @@
 /*
- * font.c: see font.h. A glyph is its width and its strokes, each a list of points x y written as the digits 0 ... 9
- * a ... d: the base line is at y = 3, small letters end at 9, capitals at 12, descenders at 0. A stroke that begins with
- * ~ is a smooth curve through its points (Catmull & Rom 1974).
+ * font.c: see font.h. A glyph is its width and its strokes, each a list of points x y written as the digits 0
+ * ... 9 a ... d: the base line is at y = 3, small letters end at 9, capitals at 12, descenders at 0. A stroke
+ * that begins with ~ is a smooth curve through its points (Catmull & Rom 1974).
  */
 #include "render/font.h"
 

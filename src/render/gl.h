@@ -6,8 +6,8 @@
 
 #include <epoxy/gl.h>
 
-/* Compiles and links; each source is a NULL-ended list of pieces, and name is for the message. Returns 0 on failure, with
- * a message set. */
+/* Compiles and links; each source is a NULL-ended list of pieces, and name is for the message. Returns 0 on
+ * failure, with a message set. */
 GLuint drape_gl_program(drape_context *ctx, const char *name, const char *const *vertex,
                         const char *const *fragment);
 
@@ -18,8 +18,8 @@ typedef struct drape_gl_mesh {
     GLsizei index_count;
 } drape_gl_mesh;
 
-/* sizes: components of each attribute, 0-ended. per_instance: attributes advance by instance. often: the buffer is
- * filled for every picture. */
+/* sizes: components of each attribute, 0-ended. per_instance: attributes advance by instance. often: the
+ * buffer is filled for every picture. */
 void drape_gl_mesh_create(drape_gl_mesh *mesh, const int *sizes, bool per_instance);
 void drape_gl_mesh_fill(drape_gl_mesh *mesh, const float *vertices, size_t vertex_count, bool often);
 void drape_gl_mesh_index(drape_gl_mesh *mesh, const uint32_t *indices, size_t count);

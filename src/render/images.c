@@ -257,7 +257,8 @@ static bool is_colour(const double *rgb)
     return true;
 }
 
-/* The hue runs from violet, 310 degrees, down to yellow, 105; the chroma is the largest that the screen can show. */
+/* The hue runs from violet, 310 degrees, down to yellow, 105; the chroma is the largest that the screen can
+ * show. */
 void drape_ramp(double s, float rgb[3])
 {
     double hue = (310 - 205 * pow(s, 1.1)) * PI / 180, chroma = 0.15, colour[3];

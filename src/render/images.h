@@ -4,16 +4,17 @@
 
 #include "render/gl.h"
 
-/* Writes pixels (width x height x 4, top row first) to a PNG, completely or not at all. small: compresses as well as
- * zlib can instead of fast. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Writes pixels (width x height x 4, top row first) to a PNG, completely or not at all. small: compresses as
+ * well as zlib can instead of fast. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_png_write(drape_context *ctx, const char *path, const uint8_t *pixels, int width,
                              int height, bool small);
 
-/* Reads a PNG of any kind as RGBA; *pixels is freed with drape_free. Errors: DRAPE_E_FILE (also if the file is not a
- * PNG), DRAPE_E_MEMORY. */
+/* Reads a PNG of any kind as RGBA; *pixels is freed with drape_free. Errors: DRAPE_E_FILE (also if the file
+ * is not a PNG), DRAPE_E_MEMORY. */
 drape_status drape_png_read(drape_context *ctx, const char *path, uint8_t **pixels, int *width, int *height);
 
-/* Repeating textures with mipmaps, of a file, or the built-in ones if path is NULL. *out is unchanged on failure.
+/* Repeating textures with mipmaps, of a file, or the built-in ones if path is NULL. *out is unchanged on
+ * failure.
  *   pattern      colour of the cloth; built-in: checks with the letter F, upright in the direction of v
  *   heights      red is the height, 0 to 1, alpha is 1 where the thread is metal; built-in: a woven relief
  *   environment  the surroundings by longitude and latitude, linear; built-in: a room with lamps */
@@ -21,8 +22,9 @@ drape_status drape_texture_pattern(drape_context *ctx, const char *path, GLuint 
 drape_status drape_texture_heights(drape_context *ctx, const char *path, GLuint *out);
 drape_status drape_texture_environment(drape_context *ctx, const char *path, GLuint *out);
 
-/* The colours of fields, for s from 0 (low) to 1 (high), in linear RGB: even steps of lightness in OKLab (Ottosson 2020)
- * from a dark violet over blue and green to a light yellow, which can be told apart without seeing colours. */
+/* The colours of fields, for s from 0 (low) to 1 (high), in linear RGB: even steps of lightness in OKLab
+ * (Ottosson 2020) from a dark violet over blue and green to a light yellow, which can be told apart without
+ * seeing colours. */
 void drape_ramp(double s, float rgb[3]);
 GLuint drape_texture_ramp(void);
 

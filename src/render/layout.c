@@ -90,8 +90,8 @@ static void put_labels(drape_overlay *o, const drape_picture *picture)
     }
 }
 
-/* Puts text from x on, broken at blanks to end before `right`; returns the number of lines. A colour of NULL only
- * counts them. */
+/* Puts text from x on, broken at blanks to end before `right`; returns the number of lines. A colour of NULL
+ * only counts them. */
 static int put_wrapped(drape_overlay *o, float x, float y, float right, const float *colour, const char *text)
 {
     int lines = 0;

@@ -1,5 +1,5 @@
-/* matrix.h: linear algebra for the camera: vectors of three floats, and 4 x 4 matrices by columns, as OpenGL takes
- * them. */
+/* matrix.h: linear algebra for the camera: vectors of three floats, and 4 x 4 matrices by columns, as OpenGL
+ * takes them. */
 #ifndef DRAPE_RENDER_MATRIX_H
 #define DRAPE_RENDER_MATRIX_H
 

@@ -1,5 +1,5 @@
-/* offscreen.c: see offscreen.h. libepoxy ends the process if a library is missing, so the libraries are looked for here
- * before any call of epoxy. */
+/* offscreen.c: see offscreen.h. libepoxy ends the process if a library is missing, so the libraries are
+ * looked for here before any call of epoxy. */
 #include "render/offscreen.h"
 
 #include <dlfcn.h>

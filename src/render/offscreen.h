@@ -1,4 +1,5 @@
-/* offscreen.h: an OpenGL 3.3 context without a display, by EGL. Mesa draws on the processor if there is no GPU. */
+/* offscreen.h: an OpenGL 3.3 context without a display, by EGL. Mesa draws on the processor if there is no
+ * GPU. */
 #ifndef DRAPE_RENDER_OFFSCREEN_H
 #define DRAPE_RENDER_OFFSCREEN_H
 

@@ -1,5 +1,5 @@
-/* overlay.h: what is drawn over a picture in two dimensions: text, boxes, the legend of a field. Coordinates are pixels
- * from the upper left. Items are collected and drawn at once. */
+/* overlay.h: what is drawn over a picture in two dimensions: text, boxes, the legend of a field. Coordinates
+ * are pixels from the upper left. Items are collected and drawn at once. */
 #ifndef DRAPE_RENDER_OVERLAY_H
 #define DRAPE_RENDER_OVERLAY_H
 
@@ -30,8 +30,8 @@ void drape_overlay_box(drape_overlay *overlay, float x, float y, float width, fl
 void drape_overlay_text(drape_overlay *overlay, float x, float y, drape_align align, const float *colour,
                         const char *text);
 
-/* The ramp from low to high with ticks at round numbers and a title above. Its right end is at `right`, its lower end
- * at `bottom`. */
+/* The ramp from low to high with ticks at round numbers and a title above. Its right end is at `right`, its
+ * lower end at `bottom`. */
 void drape_overlay_legend(drape_overlay *overlay, float right, float bottom, float tall, const char *title,
                           double low, double high);
 

@@ -1,6 +1,6 @@
 /*
- * painter.h: draws pictures: one panel for each run, side by side, with one camera and one shading. All functions here
- * need a current OpenGL 3.3 core context.
+ * painter.h: draws pictures: one panel for each run, side by side, with one camera and one shading. All
+ * functions here need a current OpenGL 3.3 core context.
  */
 #ifndef DRAPE_RENDER_PAINTER_H
 #define DRAPE_RENDER_PAINTER_H
@@ -41,14 +41,15 @@ typedef struct drape_picture {
     const char *const *lines; /* at the upper left, one below the other; NULL-ended; NULL: none */
 } drape_picture;
 
-/* Width over height of the part of a panel that the camera frames: without the column of lines and the strip of the
- * legend. Panels, camera and lines of the picture need not be set. */
+/* Width over height of the part of a panel that the camera frames: without the column of lines and the strip
+ * of the legend. Panels, camera and lines of the picture need not be set. */
 float drape_painter_aspect(const drape_painter *painter, const drape_picture *picture);
 
 /* The view of a panel. */
 drape_view drape_painter_view(const drape_painter *painter, const drape_picture *picture, int panel);
 
-/* Draws into the canvas, from which drape_canvas_read and drape_canvas_show take the picture. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Draws into the canvas, from which drape_canvas_read and drape_canvas_show take the picture. Errors:
+ * DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_painter_draw(drape_painter *painter, const drape_picture *picture);
 const drape_canvas *drape_painter_canvas(const drape_painter *painter);
 

@@ -21,8 +21,8 @@ drape_status drape_reel_create(drape_context *ctx, size_t nodes, bool with_value
 void drape_reel_free(drape_reel *reel); /* may be empty */
 void drape_reel_clear(drape_reel *reel);
 
-/* Adds a frame, with the values of a field in the state of sim unless field is NULL. Errors: those of the field,
- * DRAPE_E_MEMORY. */
+/* Adds a frame, with the values of a field in the state of sim unless field is NULL. Errors: those of the
+ * field, DRAPE_E_MEMORY. */
 drape_status drape_reel_add(drape_reel *reel, double t, const double *x, drape_sim *sim,
                             const drape_field_ops *field);
 

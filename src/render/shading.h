@@ -1,14 +1,15 @@
 /*
- * shading.h: the shadings, ways to colour cloth. A shading is the constant drape_shading_<name> of shade_<name>.c with a
- * function `vec3 shade(Surface s)` in GLSL that returns linear RGB; shading.c has the functions that all of them share.
+ * shading.h: the shadings, ways to colour cloth. A shading is the constant drape_shading_<name> of
+ * shade_<name>.c with a function `vec3 shade(Surface s)` in GLSL that returns linear RGB; shading.c has the
+ * functions that all of them share.
  */
 #ifndef DRAPE_RENDER_SHADING_H
 #define DRAPE_RENDER_SHADING_H
 
 #include "fields/fields.h"
 
-/* Textures that a shading reads; they are made when a shading that reads them is first drawn. BEHIND is the picture
- * without cloth: cloth is then drawn last. */
+/* Textures that a shading reads; they are made when a shading that reads them is first drawn. BEHIND is the
+ * picture without cloth: cloth is then drawn last. */
 enum {
     DRAPE_READS_PATTERN = 1,
     DRAPE_READS_HEIGHTS = 2,

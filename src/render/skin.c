@@ -1,5 +1,5 @@
-/* skin.c: see skin.h. A point on an edge depends on the ends of that edge alone, so the triangles beside it share it
- * and no gap opens. */
+/* skin.c: see skin.h. A point on an edge depends on the ends of that edge alone, so the triangles beside it
+ * share it and no gap opens. */
 #include "render/skin.h"
 
 #include "base/vec3.h"
@@ -10,7 +10,8 @@
 
 #define DRAWN_TRIANGLES 36000 /* about as many are drawn of a mesh that has fewer */
 #define MAX_LEVEL       8
-#define BULGE           0.35f /* sine of the angle between edge and tangent plane at which a curve is half as round */
+/* sine of the angle between edge and tangent plane at which a curve is half as round */
+#define BULGE 0.35f
 
 /* ---- Numbering of edges and points ---- */
 
@@ -128,7 +129,8 @@ static void flatten(const drape_cloth *cloth, float *uv)
     }
 }
 
-/* Triangles run counterclockwise seen from the front. Unless they do so in the texture, it appears mirrored. */
+/* Triangles run counterclockwise seen from the front. Unless they do so in the texture, it appears
+ * mirrored. */
 static bool is_mirrored(const drape_mesh *mesh, const float *uv)
 {
     double area = 0;
@@ -223,9 +225,9 @@ static void subtract(const float *a, const float *b, float *out)
         out[k] = a[k] - b[k];
 }
 
-/* Adds a triangle to the normals and tangents of its corners, weighted by area: the cross product of two sides has
- * twice the area as its length. The tangent is the direction in which u grows, e1 dv2 - e2 dv1 over the determinant of
- * the texture coordinates, of which only the sign matters. */
+/* Adds a triangle to the normals and tangents of its corners, weighted by area: the cross product of two
+ * sides has twice the area as its length. The tangent is the direction in which u grows, e1 dv2 - e2 dv1 over
+ * the determinant of the texture coordinates, of which only the sign matters. */
 static void add_triangle(drape_skin *s, const float *x, const int32_t *corner)
 {
     const float *uv[3];
@@ -279,9 +281,9 @@ static void update_nodes(drape_skin *s, const float *x, const float *values)
 
 /* ---- Points on edges and in triangles ---- */
 
-/* The inner control point, relative to a, of a curve from a to b that is orthogonal to the normal at a: a third of
- * b - a projected into the tangent plane. Where the mesh is folded more sharply than it resolves, the curve would bulge
- * into the next layer, so there it stays straight. */
+/* The inner control point, relative to a, of a curve from a to b that is orthogonal to the normal at a: a
+ * third of b - a projected into the tangent plane. Where the mesh is folded more sharply than it resolves,
+ * the curve would bulge into the next layer, so there it stays straight. */
 static void control_point(const drape_skin_vertex *a, const drape_skin_vertex *b, float *out)
 {
     subtract(b->p, a->p, out);
@@ -292,7 +294,8 @@ static void control_point(const drape_skin_vertex *a, const drape_skin_vertex *b
         out[k] = (out[k] - w * a->n[k]) / 3;
 }
 
-/* The normal in the middle of a curve: the mean of the normals at its ends, reflected at the plane between them. */
+/* The normal in the middle of a curve: the mean of the normals at its ends, reflected at the plane between
+ * them. */
 static void middle_normal(const drape_skin_vertex *a, const drape_skin_vertex *b, float *out)
 {
     float chord[3], sum[3];
@@ -347,7 +350,8 @@ static void update_edge(drape_skin *s, int32_t e)
     }
 }
 
-/* The control net of a triangle: two points on each side, one inside, and the normals at the middles of its sides. */
+/* The control net of a triangle: two points on each side, one inside, and the normals at the middles of its
+ * sides. */
 typedef struct patch {
     const drape_skin_vertex *corner[3];
     float side[3][2][3]; /* from corner k towards k + 1: near k, near k + 1 */

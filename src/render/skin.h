@@ -1,7 +1,8 @@
 /*
  * skin.h: the surface of all cloth of a model as it is drawn: smooth normals and tangents weighted by area,
- * texture coordinates, and curved point-normal triangles (Vlachos, Peters, Boyd & Mitchell 2001) through the nodes,
- * so that a coarse mesh has a smooth outline and enough points to be displaced. Nodes are drawn where they are.
+ * texture coordinates, and curved point-normal triangles (Vlachos, Peters, Boyd & Mitchell 2001) through the
+ * nodes, so that a coarse mesh has a smooth outline and enough points to be displaced. Nodes are drawn where
+ * they are.
  */
 #ifndef DRAPE_RENDER_SKIN_H
 #define DRAPE_RENDER_SKIN_H

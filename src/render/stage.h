@@ -1,5 +1,5 @@
-/* stage.h: a model as it is drawn: its cloth, its colliders and the floor. Positions and values are set for each
- * picture. */
+/* stage.h: a model as it is drawn: its cloth, its colliders and the floor. Positions and values are set for
+ * each picture. */
 #ifndef DRAPE_RENDER_STAGE_H
 #define DRAPE_RENDER_STAGE_H
 
@@ -40,8 +40,8 @@ typedef struct drape_stage {
 drape_status drape_stage_create(drape_context *ctx, const drape_model *model, drape_stage *stage);
 void drape_stage_free(drape_stage *stage); /* may be empty; the model may be gone */
 
-/* Extends the box by positions that will be drawn. After the last of them drape_stage_finish adds the colliders and
- * places the floor. */
+/* Extends the box by positions that will be drawn. After the last of them drape_stage_finish adds the
+ * colliders and places the floor. */
 void drape_stage_add(drape_stage *stage, const float *positions);
 void drape_stage_finish(drape_stage *stage);
 

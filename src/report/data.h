@@ -26,8 +26,9 @@ typedef struct drape_report_data {
     drape_report_field fields[DRAPE_REPORT_FIELDS];
 } drape_report_data;
 
-/* Chooses frames that take at most max_bytes in the page, evenly, the first and the last among them, and finds the
- * ranges of the fields. drape_arena_free(&data->arena) in any case. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Chooses frames that take at most max_bytes in the page, evenly, the first and the last among them, and
+ * finds the ranges of the fields. drape_arena_free(&data->arena) in any case. Errors: DRAPE_E_FILE,
+ * DRAPE_E_MEMORY. */
 drape_status drape_report_data_make(const drape_report_source *run, size_t max_bytes,
                                     drape_report_data *data);
 

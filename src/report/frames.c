@@ -10,7 +10,8 @@
 
 /* ---- Fields of one frame ---- */
 
-/* At each node the mean of the larger principal strain of the triangles around it, weighted by their rest areas. */
+/* At each node the mean of the larger principal strain of the triangles around it, weighted by their rest
+ * areas. */
 static void find_strain(const drape_report_data *d)
 {
     const drape_model *model = d->run->model;

@@ -1,4 +1,5 @@
-/* json.c: numbers and texts of the page. jansson passes NULL on: a failed allocation anywhere makes the whole NULL. */
+/* json.c: numbers and texts of the page. jansson passes NULL on: a failed allocation anywhere makes the whole
+ * NULL. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,5 @@
-/* page.h: the page without its data, in two parts; embed.py makes them from page.html, style.css and the scripts. */
+/* page.h: the page without its data, in two parts; embed.py makes them from page.html, style.css and the
+ * scripts. */
 #ifndef DRAPE_REPORT_PAGE_H
 #define DRAPE_REPORT_PAGE_H
 

@@ -1,5 +1,5 @@
-/* report.c: see report.h. The page is page.html with its style and scripts, which embed.py puts together when Drape is
- * built; the data of the run go between its two parts. */
+/* report.c: see report.h. The page is page.html with its style and scripts, which embed.py puts together when
+ * Drape is built; the data of the run go between its two parts. */
 #include "report/report.h"
 
 #include <stdio.h>

@@ -16,8 +16,8 @@ typedef struct drape_report_result {
     int64_t bytes;        /* of the page */
 } drape_report_result;
 
-/* Writes the page, completely or not at all. Errors: DRAPE_E_FILE, DRAPE_E_PARSE, DRAPE_E_ARGUMENT (the folder is not that
- * of a run), DRAPE_E_MEMORY. *input: whether the error lies in what was read. */
+/* Writes the page, completely or not at all. Errors: DRAPE_E_FILE, DRAPE_E_PARSE, DRAPE_E_ARGUMENT (the
+ * folder is not that of a run), DRAPE_E_MEMORY. *input: whether the error lies in what was read. */
 drape_status drape_report_write(drape_context *ctx, const drape_report_def *def, drape_report_result *result,
                                 bool *input);
 

@@ -27,7 +27,8 @@ static drape_status unknown_key(drape_context *ctx, const choice *c, const char 
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "unknown key \"%.60s\"%s%s%s", name, DRAPE_MEANT(meant));
 }
 
-/* Checks a setting against every entry that has a parameter of its name; keeps the value for the chosen one. */
+/* Checks a setting against every entry that has a parameter of its name; keeps the value for the chosen
+ * one. */
 static drape_status apply(drape_context *ctx, const choice *c, int chosen, const drape_setting *setting,
                           double *values)
 {

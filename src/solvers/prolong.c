@@ -5,8 +5,9 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_FUNCTIONS 16        /* functions at a node; if there are more, the smallest are left out */
-#define SMOOTH        (2.0 / 3) /* share of a node's value that comes from its neighbours, in each averaging */
+#define MAX_FUNCTIONS 16 /* functions at a node; if there are more, the smallest are left out */
+/* share of a node's value that comes from its neighbours, in each averaging */
+#define SMOOTH (2.0 / 3)
 #define DROP                                                                                                 \
     0.08 /* of the largest at a node: smaller values are left out, the others scaled to add up to 1 */
 #define WIDENING 1.1 /* of the spacing: measured best at 2 500 and 10 000 nodes (bench/speed rungs) */

@@ -1,9 +1,10 @@
 /*
- * dihedral.h: the angle between two triangles that share an edge, with its derivatives, for four hinges at once.
+ * dihedral.h: the angle between two triangles that share an edge, with its derivatives, for four hinges at
+ * once.
  *
- * Edge x0 x1, apices x2 x3, e = x1 - x0. For the triangle t with apex a: unit normal n, along n1 = e x (x2 - x0)
- * for one and n2 = (x3 - x0) x e for the other; altitude H over e; foot s = (a - x0).e/|e|^2; and m, the unit
- * vector in the plane from the edge to the apex.
+ * Edge x0 x1, apices x2 x3, e = x1 - x0. For the triangle t with apex a: unit normal n, along n1 = e x (x2 -
+ * x0) for one and n2 = (x3 - x0) x e for the other; altitude H over e; foot s = (a - x0).e/|e|^2; and m, the
+ * unit vector in the plane from the edge to the apex.
  *     theta = atan2(ehat . (n2 x n1), n1 . n2), never acos, which loses all digits near 0
  *     gradient: g_a = n/H,  g_0 = -sum (1 - s_t) g_t,  g_1 = -sum s_t g_t
  * The Hessian follows by differentiating these, with the gradients of the barycentric coordinates:
@@ -14,23 +15,25 @@
  *     ds/da = ehat/|e|,  ds/dx0 = -((1 - s) e + H m)/|e|^2,  ds/dx1 = (-s e + H m)/|e|^2
  * Tamstorf & Grinspun 2013, Discrete bending forces and their Jacobians, has the same in closed form.
  *
- * x2 is the apex on the left of the edge seen against the normal, x3 the one on its right. theta is in (-pi, pi] and
- * positive where x3 stands out along the normal: for a graph it is the jump of the slope across the edge.
+ * x2 is the apex on the left of the edge seen against the normal, x3 the one on its right. theta is in (-pi,
+ * pi] and positive where x3 stands out along the normal: for a graph it is the jump of the slope across the
+ * edge.
  */
 #ifndef DRAPE_TERMS_DIHEDRAL_H
 #define DRAPE_TERMS_DIHEDRAL_H
 
 #include "base/lanes.h"
 
-/* For hinges that are not in lanes: x (count x 12), theta (count), g (count x 12), h (count x 12 x 12, symmetric); g and
- * h may be NULL. count: 1 to LANES. */
+/* For hinges that are not in lanes: x (count x 12), theta (count), g (count x 12), h (count x 12 x 12,
+ * symmetric); g and h may be NULL. count: 1 to LANES. */
 void drape_dihedrals(int count, const double *x, double *theta, double *g, double *h);
 
-/* If x3 is (x0 + x1)/2 plus a constant: adds half of its derivatives to those by x0 and by x1. Afterwards the first 9
- * numbers of g and the first 9 x 9 of h (12 x 12) are the derivatives by x0, x1 and x2. */
+/* If x3 is (x0 + x1)/2 plus a constant: adds half of its derivatives to those by x0 and by x1. Afterwards the
+ * first 9 numbers of g and the first 9 x 9 of h (12 x 12) are the derivatives by x0, x1 and x2. */
 void drape_dihedral_tie(double *g, double *h);
 
-/* angle + 2 pi k for the integer k that brings it nearest to reference; the angle itself if reference is not finite. */
+/* angle + 2 pi k for the integer k that brings it nearest to reference; the angle itself if reference is not
+ * finite. */
 double drape_nearest_branch(double angle, double reference);
 
 /* ---- In lanes ---- */
@@ -103,8 +106,8 @@ LANES_INLINE lanes drape_dihedral_turn(const drape_dihedral_side *s, const lanes
     return s->gradient[i] * (w * along[j] - p[j]) - p[i] * s->gradient[j];
 }
 
-/* p and the gradients of s by the nodes of a side: x0, x1, apex. The gradient of s by the apex is not needed for the
- * blocks on and below the diagonal. */
+/* p and the gradients of s by the nodes of a side: x0, x1, apex. The gradient of s by the apex is not needed
+ * for the blocks on and below the diagonal. */
 typedef struct drape_dihedral_change {
     lanes p[3][3], foot[2][3];
 } drape_dihedral_change;
@@ -123,7 +126,8 @@ LANES_INLINE void drape_dihedral_measure_change(const drape_dihedral_lanes *h, c
     }
 }
 
-/* The blocks on and below the diagonal. Both sides add to those of the edge; the one between the apices is 0. */
+/* The blocks on and below the diagonal. Both sides add to those of the edge; the one between the apices is
+ * 0. */
 LANES_INLINE void drape_dihedral_hessian(const drape_dihedral_lanes *h, double *ddq)
 {
     lanes along[3];

@@ -16,7 +16,8 @@ enum {
 
 extern const char *const drape_load_edges[];
 
-/* The number of edges. Refuses a mesh that has none, and one that is not a grid if a side of the grid is given. */
+/* The number of edges. Refuses a mesh that has none, and one that is not a grid if a side of the grid is
+ * given. */
 drape_status drape_load_count(const drape_cloth_view *cloth, const double *values,
                               drape_term_builder *builder, int32_t *count);
 

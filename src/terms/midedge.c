@@ -1,20 +1,21 @@
 /*
  * midedge.c: the shape operator of a triangle with normals at the middles of its edges,
  *     K = 1/A sum_i L_i (theta_i/2 + phi_i) nu_i nu_i'
- * over its edges: L length, nu the outward normal in the plane, theta the angle of the hinge, phi the angle from the
- * mean normal of the two triangles to the normal of the edge (Grinspun, Gingold, Reisman & Zorin 2006,
- * Computing discrete shape operators on general meshes, section 4). Since K A = sum L (slope across the edge)
- * nu, and the slope is one number for both triangles, sums of K over triangles telescope: a constant moment
- * is in equilibrium on any mesh.
+ * over its edges: L length, nu the outward normal in the plane, theta the angle of the hinge, phi the angle
+ * from the mean normal of the two triangles to the normal of the edge (Grinspun, Gingold, Reisman & Zorin
+ * 2006, Computing discrete shape operators on general meshes, section 4). Since K A = sum L (slope across the
+ * edge) nu, and the slope is one number for both triangles, sums of K over triangles telescope: a constant
+ * moment is in equilibrium on any mesh.
  *
- * Usually the edge normals are additional unknowns, or phi is 0. With phi = 0, K is exact if the two triangles of every
- * edge are point reflections of each other; otherwise plates converge to results 5 to 15 % too stiff. Here phi is a linear
- * function phi_i = sum c_ij theta_j of the angles of the five hinges of the two triangles: the one with the smallest c
- * that makes K exact for every quadratic deflection. It is the same from both sides of the edge. So there are no further
- * unknowns, and deflections converge with the square of the mesh size on any mesh. On symmetric meshes c = 0.
+ * Usually the edge normals are additional unknowns, or phi is 0. With phi = 0, K is exact if the two
+ * triangles of every edge are point reflections of each other; otherwise plates converge to results 5 to 15 %
+ * too stiff. Here phi is a linear function phi_i = sum c_ij theta_j of the angles of the five hinges of the
+ * two triangles: the one with the smallest c that makes K exact for every quadratic deflection. It is the
+ * same from both sides of the edge. So there are no further unknowns, and deflections converge with the
+ * square of the mesh size on any mesh. On symmetric meshes c = 0.
  *
- * The slope across a free edge is unconstrained: it takes the value of least energy, M_nn = 0. Across a clamped edge the
- * normal keeps its direction, and theta_i/2 + phi_i is the angle of the triangle to it.
+ * The slope across a free edge is unconstrained: it takes the value of least energy, M_nn = 0. Across a
+ * clamped edge the normal keeps its direction, and theta_i/2 + phi_i is the angle of the triangle to it.
  *
  * Every bending has energy: K = 0 on both sides of an edge implies theta/2 + phi = theta/2 - phi = 0.
  */
@@ -146,7 +147,8 @@ static void slopes(const patch *p, int h, int kind, const double about[2], doubl
 
 /* ---- phi ---- */
 
-/* Cyclic Jacobi rotations: leaves the eigenvalues on the diagonal of a (3 x 3), eigenvectors in the columns of v. */
+/* Cyclic Jacobi rotations: leaves the eigenvalues on the diagonal of a (3 x 3), eigenvectors in the columns
+ * of v. */
 static void diagonalize(double a[9], double v[9])
 {
     for (int i = 0; i < 9; i++)
@@ -189,8 +191,8 @@ static void least_solution(const double *m, int n, const double target[3], doubl
         c[j] = m[j] * y[0] + m[n + j] * y[1] + m[2 * n + j] * y[2];
 }
 
-/* phi of own edge i from the open hinges of its two triangles. It is exact for quadratic deflections about the middle of
- * the edge, whose slope there is 0. */
+/* phi of own edge i from the open hinges of its two triangles. It is exact for quadratic deflections about
+ * the middle of the edge, whose slope there is 0. */
 static void find_phi(patch *p, int i)
 {
     const int near[5] = {i, (i + 1) % 3, (i + 2) % 3, 3 + 2 * i, 4 + 2 * i};
@@ -219,8 +221,8 @@ static void find_phi(patch *p, int i)
 
 /* ---- K ---- */
 
-/* The derivatives of K = (K11, K22, 2 K12) by the angle of each hinge, b (9 x 3), and by the slopes of the free edges, f.
- * Returns the number of free edges. */
+/* The derivatives of K = (K11, K22, 2 K12) by the angle of each hinge, b (9 x 3), and by the slopes of the
+ * free edges, f. Returns the number of free edges. */
 static int gather_columns(const patch *p, double area, double b[3 * MIDEDGE_HINGES], double f[9])
 {
     int count = 0;

@@ -1,9 +1,9 @@
 /*
  * midedge.h: the shape operator of a triangle from the angles of the hinges around it.
  *
- * Local nodes: 0 1 2 of the triangle; 3 + i the apex beyond its edge i, which goes from node i to node i + 1; 6 + 2 i and
- * 7 + 2 i the apices beyond the two other edges of that neighbour. Hinges: 0 1 2 at its own edges; 3 + 2 i and 4 + 2 i
- * at those of neighbour i.
+ * Local nodes: 0 1 2 of the triangle; 3 + i the apex beyond its edge i, which goes from node i to node i + 1;
+ * 6 + 2 i and 7 + 2 i the apices beyond the two other edges of that neighbour. Hinges: 0 1 2 at its own
+ * edges; 3 + 2 i and 4 + 2 i at those of neighbour i.
  */
 #ifndef DRAPE_TERMS_MIDEDGE_H
 #define DRAPE_TERMS_MIDEDGE_H
@@ -20,12 +20,13 @@ typedef struct drape_midedge {
     bool clamped[3], free[3];    /* own edges: with a fixed normal; on the boundary and not clamped */
     bool wide;                   /* some c of hinges other than the own is not 0 */
     int rank;                    /* number of squares in the energy: 3 less the free edges */
-    /* E = 1/2 sum k (q - q0)^2 [J], q = l . K = sum c theta; theta of a clamped edge is the angle to its direction. */
+    /* E = 1/2 sum k (q - q0)^2 [J], q = l . K = sum c theta; theta of a clamped edge is the angle to its
+     * direction. */
     double k[3], l[9], c[3][MIDEDGE_HINGES];
 } drape_midedge;
 
-/* The shape operator of a triangle. law: C of orthotropic.h [N m]; values: those of orthotropic.h. False if the warp is
- * normal to the triangle. */
+/* The shape operator of a triangle. law: C of orthotropic.h [N m]; values: those of orthotropic.h. False if
+ * the warp is normal to the triangle. */
 bool drape_midedge_of(const drape_cloth_view *cloth, int32_t triangle, const double *values,
                       const double law[9], drape_midedge *out);
 

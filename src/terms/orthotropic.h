@@ -21,14 +21,14 @@ enum {
     DRAPE_ORTHOTROPIC_COUNT = DRAPE_ORTHOTROPIC_DIRECTION + 3
 };
 
-/* C (3 x 3) from values. Values that are NaN are replaced by measured ones; if measured is NULL, by those of an isotropic
- * sheet with the stiffness `strip` of a strip and the Poisson ratio. */
+/* C (3 x 3) from values. Values that are NaN are replaced by measured ones; if measured is NULL, by those of
+ * an isotropic sheet with the stiffness `strip` of a strip and the Poisson ratio. */
 void drape_orthotropic_law(const double *values, const drape_woven *measured, double strip, double poisson,
                            double c[9]);
 
-/* Two orthonormal axes (3 each) in the plane of a triangle at rest, the first along the projection of the warp, and the
- * corners in them (3 x 2), the first at 0. Returns false if the warp is normal to the plane, unless the law is isotropic:
- * then the first axis is along an edge. */
+/* Two orthonormal axes (3 each) in the plane of a triangle at rest, the first along the projection of the
+ * warp, and the corners in them (3 x 2), the first at 0. Returns false if the warp is normal to the plane,
+ * unless the law is isotropic: then the first axis is along an edge. */
 bool drape_orthotropic_frame(const double *values, const double *const corner[3], const double c[9],
                              double axes[6], double flat[6]);
 

@@ -82,8 +82,8 @@ double drape_spring_rest_length(const drape_cloth_view *cloth, const int32_t pai
 
 /* ---- Building ---- */
 
-/* The mean of both ends, so that the forces at both are equal: with the row of the neighbour, as in Boson, they differ,
- * and the net force of a sheet is not zero. */
+/* The mean of both ends, so that the forces at both are equal: with the row of the neighbour, as in Boson,
+ * they differ, and the net force of a sheet is not zero. */
 static double gradient_factor(const drape_cloth_view *cloth, const int32_t pair[2], double gradient)
 {
     if (gradient == 0)

@@ -25,13 +25,13 @@ typedef struct drape_spring_offset {
     int32_t rows, columns;
 } drape_spring_offset;
 
-/* All offsets, two for each kind: neighbours along rows and columns, diagonals of cells, and two steps along rows and
- * columns. A kind is the index of its first offset. */
+/* All offsets, two for each kind: neighbours along rows and columns, diagonals of cells, and two steps along
+ * rows and columns. A kind is the index of its first offset. */
 enum { DRAPE_SPRING_STRUCTURAL = 0, DRAPE_SPRING_SHEAR = 2, DRAPE_SPRING_BEND = 4, DRAPE_SPRING_OFFSETS = 6 };
 extern const drape_spring_offset drape_spring_offsets[DRAPE_SPRING_OFFSETS];
 
-/* Pairs of nodes of one cloth: on a rectangular grid by offsets, for each offset in the order of nodes; without offsets
- * the edges of any mesh. */
+/* Pairs of nodes of one cloth: on a rectangular grid by offsets, for each offset in the order of nodes;
+ * without offsets the edges of any mesh. */
 typedef struct drape_spring_set {
     const drape_cloth_view *cloth;
     const drape_spring_offset *offset; /* (offset_count) */
@@ -44,7 +44,8 @@ void drape_spring_pair(const drape_spring_set *set, int32_t spring, int32_t pair
 /* Distance of two nodes at rest [m]. */
 double drape_spring_rest_length(const drape_cloth_view *cloth, const int32_t pair[2]);
 
-/* Builds the springs of a set, or of one kind of offsets; that one refuses meshes other than grids of rectangles. */
+/* Builds the springs of a set, or of one kind of offsets; that one refuses meshes other than grids of
+ * rectangles. */
 drape_status drape_spring_build(const drape_spring_set *set, const double *values,
                                 drape_term_builder *builder);
 drape_status drape_spring_build_kind(const drape_cloth_view *cloth, int kind, const double *values,

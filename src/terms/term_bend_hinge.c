@@ -1,14 +1,17 @@
 /*
- * bend.hinge: a torsion spring along each inner edge, on the angle theta between its two triangles (dihedral.h).
+ * bend.hinge: a torsion spring along each inner edge, on the angle theta between its two triangles
+ * (dihedral.h).
  *
  * E = 1/2 k (theta - theta0)^2.
  * consistent: k = D |e|^2/(A1 + A2), D = E h^3/(12 (1 - nu^2)). Its bending Poisson ratio is -1/3 on the
  *     equilateral lattice.
- * report: k = 2/sqrt(3) E h^3/12 on every hinge, as in the DEP report and in DisMech: without (1 - nu^2), and correct on
+ * report: k = 2/sqrt(3) E h^3/12 on every hinge, as in the DEP report and in DisMech: without (1 - nu^2), and
+ * correct on
  *     equilateral meshes only.
  *
- * theta jumps by 2 pi where the hinge is folded onto itself. The internal variable is the angle in the last accepted
- * state; the angle is taken on the branch nearest to it, so that energy and force are smooth through pi.
+ * theta jumps by 2 pi where the hinge is folded onto itself. The internal variable is the angle in the last
+ * accepted state; the angle is taken on the branch nearest to it, so that energy and force are smooth through
+ * pi.
  */
 #include "base/lanes.h"
 #include "terms/dihedral.h"

@@ -2,13 +2,16 @@
  * bend.midedge: bending of every triangle, E = A/2 (K - K0)' C (K - K0), K = (K11, K22, 2 K12) its shape
  * operator with normals at the middles of its edges (midedge.h), C the law of orthotropic.h.
  *
- * C = sum k l l', so E = 1/2 sum k (q - q0)^2 with q = l . K = sum c theta over at most nine hinges. Each square is an
- * element: three per triangle, less one for each free edge. Elements have 12 nodes, or 6 if no triangle needs hinges
- * other than its own, as on lattices. A hinge whose c is 0 is left out, and its nodes are replaced by the first node.
+ * C = sum k l l', so E = 1/2 sum k (q - q0)^2 with q = l . K = sum c theta over at most nine hinges. Each
+ * square is an element: three per triangle, less one for each free edge. Elements have 12 nodes, or 6 if no
+ * triangle needs hinges other than its own, as on lattices. A hinge whose c is 0 is left out, and its nodes
+ * are replaced by the first node.
  *
- * A clamped edge has a direction in space instead of a second triangle: x3 = (x0 + x1)/2 + r with r as at rest.
+ * A clamped edge has a direction in space instead of a second triangle: x3 = (x0 + x1)/2 + r with r as at
+ * rest.
  *
- * The internal variables are the nine angles in the last accepted state: each angle is taken on the branch nearest to it.
+ * The internal variables are the nine angles in the last accepted state: each angle is taken on the branch
+ * nearest to it.
  */
 #include "base/vec3.h"
 #include "terms/dihedral.h"
@@ -73,8 +76,8 @@ static bool clamp_of(const drape_elements *el, int32_t element, int hinge, doubl
     return vec3_dot(r, r) > 0;
 }
 
-/* Up to LANES hinges of an element: their numbers, their nodes (3 if clamped, else 4), and their angles with derivatives
- * by these nodes. */
+/* Up to LANES hinges of an element: their numbers, their nodes (3 if clamped, else 4), and their angles with
+ * derivatives by these nodes. */
 typedef struct hinges {
     int count, number[LANES], nodes[LANES];
     double theta[LANES], g[12 * LANES], h[144 * LANES];
@@ -94,8 +97,8 @@ static int corners_of(const drape_elements *el, int32_t element, int hinge, cons
     return nodes;
 }
 
-/* Measures hinges from number `from` on, leaving out those whose c is 0, with first and second derivatives if wanted;
- * returns the number to continue with. */
+/* Measures hinges from number `from` on, leaving out those whose c is 0, with first and second derivatives if
+ * wanted; returns the number to continue with. */
 static int measure_hinges(const drape_elements *el, int32_t element, int from, const double *x, bool first,
                           bool second, hinges *s)
 {

@@ -1,7 +1,7 @@
 /*
- * damp.kelvin_voigt: a dashpot parallel to the spring of every strain measure of its cloth: the generalized force is
- * beta k q', and so the force on the nodes beta k q' grad q(x). It vanishes exactly in rigid motion, where q' = 0.
- * Fixed-step methods take q' as a difference of q, IDA as grad q . v.
+ * damp.kelvin_voigt: a dashpot parallel to the spring of every strain measure of its cloth: the generalized
+ * force is beta k q', and so the force on the nodes beta k q' grad q(x). It vanishes exactly in rigid motion,
+ * where q' = 0. Fixed-step methods take q' as a difference of q, IDA as grad q . v.
  */
 #include "terms/terms.h"
 

@@ -1,6 +1,6 @@
 /*
- * drag.viscous: linear drag of a medium at rest on every node: g = c A v with the node's share A of the area. It acts on
- * rigid motion by design; damp.kelvin_voigt does not. dg/dv = c A I, dg/dx = 0.
+ * drag.viscous: linear drag of a medium at rest on every node: g = c A v with the node's share A of the area.
+ * It acts on rigid motion by design; damp.kelvin_voigt does not. dg/dv = c A I, dg/dx = 0.
  */
 #include "terms/terms.h"
 

@@ -2,13 +2,14 @@
  * drag.wind: the pressure of a steady wind on every triangle. With m = (x1 - x0) x (x2 - x0), twice the
  * area times the normal n, and u = w - (v0 + v1 + v2)/3, the wind relative to the triangle,
  *     F = 1/2 rho C A |u.n| (u.n) n = rho C/4 |q| q m / |m|^2,   q = u . m,
- * a third of it on each node. So the wind acts along the normal only (Provot 1995, section 3.2, there linear in
- * u.n) and with the square of its speed, as on a flat plate (Hoerner 1965, Fluid-Dynamic Drag, 3: C = 1.17 for a
- * square plate across the wind). There is no friction along the sheet and no lee: the wind also acts on a layer behind
- * another.
+ * a third of it on each node. So the wind acts along the normal only (Provot 1995, section 3.2, there linear
+ * in u.n) and with the square of its speed, as on a flat plate (Hoerner 1965, Fluid-Dynamic Drag, 3: C = 1.17
+ * for a square plate across the wind). There is no friction along the sheet and no lee: the wind also acts on
+ * a layer behind another.
  *
  *     dF = rho C/4 [2 |q| m dq + |q| q dm - |q| q m d(|m|^2)/|m|^2] / |m|^2,  dq = u . dm + m . du
- * F is C1 in x and v; a triangle without area has no force. In air at rest F dissipates: -F . v = |q|^3 ... >= 0.
+ * F is C1 in x and v; a triangle without area has no force. In air at rest F dissipates: -F . v = |q|^3 ...
+ * >= 0.
  */
 #include "base/vec3.h"
 #include "terms/terms.h"

@@ -1,5 +1,5 @@
-/* gravity: E = -m g . x of every node, with its lumped mass m. Linear: it has no Hessian. It is modelled if the gravity
- * of the scene is not zero. */
+/* gravity: E = -m g . x of every node, with its lumped mass m. Linear: it has no Hessian. It is modelled if
+ * the gravity of the scene is not zero. */
 #include "terms/terms.h"
 
 enum { REST_FORCE_X, REST_FORCE_Y, REST_FORCE_Z, REST_COUNT };

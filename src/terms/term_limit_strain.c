@@ -4,14 +4,14 @@
  *     E = K (L w)^2 b(y),  b = 0 for y <= 0,  -y^2 ln(1 - y) for 0 < y <= 1 - cap
  *     dE/dl = K L w b',    b' = -2 y ln(1 - y) + y^2/(1 - y)
  *     d2E/dl2 = K b'',     b'' = -2 ln(1 - y) + 4 y/(1 - y) + y^2/(1 - y)^2
- * which is the barrier of Li et al. 2020 (Incremental Potential Contact, eq. 6) with the gap limit - s: zero below the
- * onset, C2 there since b ~ y^3, and unbounded towards the limit. b'' >= 0 and b' >= 0, so the Hessian
- * b'' grad l grad l' + b' hess l is positive semidefinite.
+ * which is the barrier of Li et al. 2020 (Incremental Potential Contact, eq. 6) with the gap limit - s: zero
+ * below the onset, C2 there since b ~ y^3, and unbounded towards the limit. b'' >= 0 and b' >= 0, so the
+ * Hessian b'' grad l grad l' + b' hess l is positive semidefinite.
  *
- * If the barrier were infinite beyond the limit, Newton could not start there, but the first guess of fast nodes is
- * beyond it, and so is a sheet whose pins were moved. Therefore b continues above y = 1 - cap as the parabola that is C2
- * there. Iterates may be beyond the limit; states may not: the check rejects them. The forces at the limit are about
- * 2/cap K L w; a larger load needs a larger stiffness or a smaller cap.
+ * If the barrier were infinite beyond the limit, Newton could not start there, but the first guess of fast
+ * nodes is beyond it, and so is a sheet whose pins were moved. Therefore b continues above y = 1 - cap as the
+ * parabola that is C2 there. Iterates may be beyond the limit; states may not: the check rejects them. The
+ * forces at the limit are about 2/cap K L w; a larger load needs a larger stiffness or a smaller cap.
  *
  * Compressed springs are not limited, as in CS184.
  */

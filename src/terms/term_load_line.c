@@ -1,5 +1,5 @@
-/* load.line: a dead force per length on boundary edges: E = -f . (x0 + x1) L/2 with the rest length L. Linear: it has
- * no Hessian. */
+/* load.line: a dead force per length on boundary edges: E = -f . (x0 + x1) L/2 with the rest length L.
+ * Linear: it has no Hessian. */
 #include "terms/load.h"
 #include "terms/terms.h"
 

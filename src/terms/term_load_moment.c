@@ -1,16 +1,18 @@
 /*
- * load.moment: a moment per length on boundary edges, about each edge as it was at rest: E = M L psi with the rest length
- * L and the twist psi of the edge's triangle about the direction e0 of the edge at rest. With q the unit quaternion of the
- * triangle's rotation, psi = 2 atan2(q . e0, q_w). By the unit vectors t, in the triangle's plane from the edge to the
- * apex, and n, the normal, and their values t0 and n0 at rest,
+ * load.moment: a moment per length on boundary edges, about each edge as it was at rest: E = M L psi with the
+ * rest length L and the twist psi of the edge's triangle about the direction e0 of the edge at rest. With q
+ * the unit quaternion of the triangle's rotation, psi = 2 atan2(q . e0, q_w). By the unit vectors t, in the
+ * triangle's plane from the edge to the apex, and n, the normal, and their values t0 and n0 at rest,
  *     S = n0.t - t0.n = 4 q_w (q . e0),  C = t0.t + n0.n = 2 (q_w^2 - (q . e0)^2),  psi = atan2(S, C).
- * It bends a strip to the curvature M/D at any angle. If the edge is also tilted by a small angle, the moment turns by
- * half that angle: a semitangential moment (Argyris, Dunne & Scharpf 1978, On large displacement - small strain
- * analysis of structures with rotational degrees of freedom), whose potential is unchanged by the tilt to second order.
- * A moment about the present edge is not: its work changes by M sin(2 psi) w^2/4 with a tilt w, which tips over a strip
- * wound up by more than 3.7. psi is undefined if the triangle has turned by pi about a direction across e0.
+ * It bends a strip to the curvature M/D at any angle. If the edge is also tilted by a small angle, the moment
+ * turns by half that angle: a semitangential moment (Argyris, Dunne & Scharpf 1978, On large displacement -
+ * small strain analysis of structures with rotational degrees of freedom), whose potential is unchanged by
+ * the tilt to second order. A moment about the present edge is not: its work changes by M sin(2 psi) w^2/4
+ * with a tilt w, which tips over a strip wound up by more than 3.7. psi is undefined if the triangle has
+ * turned by pi about a direction across e0.
  *
- * The internal variable is the angle in the last accepted state: angles are taken on the branch nearest to it.
+ * The internal variable is the angle in the last accepted state: angles are taken on the branch nearest to
+ * it.
  */
 #include "base/vec3.h"
 #include "terms/dihedral.h"
@@ -128,8 +130,8 @@ static void add_first(const direction *v, const double c[3], double g[6])
             g[j] += b[i] * v->by[i][j];
 }
 
-/* Adds to h the second derivatives of c . unit, without the part b . (second derivatives of a), where b is given by
- * across(). The second derivatives by a are -(u b' + b u' + (c.u) (I - u u')/|a|)/|a|. */
+/* Adds to h the second derivatives of c . unit, without the part b . (second derivatives of a), where b is
+ * given by across(). The second derivatives by a are -(u b' + b u' + (c.u) (I - u u')/|a|)/|a|. */
 static void add_second(const direction *v, const double c[3], double h[6][6])
 {
     double b[3], curvature[3][3];

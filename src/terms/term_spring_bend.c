@@ -1,6 +1,6 @@
-/* spring.bend: springs from each node to the second next along its row and its column, which resist bending as bending
- * shortens them. They shorten with the square of the curvature, so their energy grows with its fourth power, and a flat
- * sheet has no bending stiffness at all. */
+/* spring.bend: springs from each node to the second next along its row and its column, which resist bending
+ * as bending shortens them. They shorten with the square of the curvature, so their energy grows with its
+ * fourth power, and a flat sheet has no bending stiffness at all. */
 #include "terms/spring.h"
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

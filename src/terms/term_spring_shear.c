@@ -1,5 +1,5 @@
-/* spring.shear: springs along both diagonals of each cell of a square grid. Springs along rows and columns alone do not
- * resist shear. */
+/* spring.shear: springs along both diagonals of each cell of a square grid. Springs along rows and columns
+ * alone do not resist shear. */
 #include "terms/spring.h"
 
 static drape_status build(const drape_cloth_view *cloth, const double *values, drape_term_builder *builder)

@@ -1,6 +1,6 @@
 /*
- * spring.structural: springs that resist stretching: from each node to the next along its row and its column on a grid of
- * rectangles; along all edges of any other mesh.
+ * spring.structural: springs that resist stretching: from each node to the next along its row and its column
+ * on a grid of rectangles; along all edges of any other mesh.
  */
 #include "terms/spring.h"
 

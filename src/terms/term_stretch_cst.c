@@ -8,9 +8,10 @@
  * so the Hessian of q is constant, W in each of the three directions. (Bonet & Wood 2008, Nonlinear Continuum
  * Mechanics for Finite Element Analysis, 6.3; Volino, Magnenat-Thalmann & Faure 2009.)
  *
- * f W is the geometric stiffness of the stress f l: W = B' L B with L = (l1 l3; l3 l2). Its positive part is that of f L,
- * the tension part of the stress, which is known at rest: L = L+ + L-, by the eigenvalues. Without it, Newton's matrix of
- * a sheet under tension would be as soft sideways as without tension, and steps too long by the ratio of the two.
+ * f W is the geometric stiffness of the stress f l: W = B' L B with L = (l1 l3; l3 l2). Its positive part is
+ * that of f L, the tension part of the stress, which is known at rest: L = L+ + L-, by the eigenvalues.
+ * Without it, Newton's matrix of a sheet under tension would be as soft sideways as without tension, and
+ * steps too long by the ratio of the two.
  */
 #include "base/vec3.h"
 #include "terms/orthotropic.h"
@@ -103,8 +104,8 @@ static void positive(const drape_elements *el, int32_t first, int32_t count, con
     }
 }
 
-/* L+ of L, both as (L11, L22, L12). The eigenvalues are mean +- radius; L+ is a linear combination of L and the
- * identity. */
+/* L+ of L, both as (L11, L22, L12). The eigenvalues are mean +- radius; L+ is a linear combination of L and
+ * the identity. */
 static void tension_part(const double l[3], double plus[3])
 {
     const double mean = (l[0] + l[1]) / 2, radius = hypot((l[0] - l[1]) / 2, l[2]);

@@ -7,7 +7,8 @@
  *     (1998); each triangle has half a spring, so a boundary edge has K/2. On an equilateral mesh
  *     K = sqrt(3)/2 E h, and the lattice equals constant-strain triangles of a sheet with nu = 1/3.
  * report: as the code of the DEP report, where k_s = sqrt(3)/2 E h L^2 [J] is used as a force [N]:
- *     E = 1/2 k_s L q^2, too soft by a factor of the edge length, with boundary edges as stiff as the others. It is there
+ *     E = 1/2 k_s L q^2, too soft by a factor of the edge length, with boundary edges as stiff as the others.
+ *     It is there
  *     to reproduce the trajectories of the report.
  */
 #include "base/vec3.h"

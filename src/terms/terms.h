@@ -1,5 +1,5 @@
-/* terms.h: the table of terms, and what their files share. A term is the constant drape_term_<name> of term_<name>.c;
- * its interface is drape/extend.h. */
+/* terms.h: the table of terms, and what their files share. A term is the constant drape_term_<name> of
+ * term_<name>.c; its interface is drape/extend.h. */
 #ifndef DRAPE_TERMS_TERMS_H
 #define DRAPE_TERMS_TERMS_H
 
@@ -31,15 +31,16 @@ static inline void drape_lanes_elements(int32_t first, int32_t count, int32_t el
         element[l] = first + l < count ? first + l : count - 1;
 }
 
-/* Whether a step lowered a ratio (of a length to its rest length). The slack is the rounding of coordinates up to a
- * thousand lengths from the origin. */
+/* Whether a step lowered a ratio (of a length to its rest length). The slack is the rounding of coordinates
+ * up to a thousand lengths from the origin. */
 static inline bool drape_fell(double ratio, double before)
 {
     return ratio < before - 1e-12;
 }
 
-/* For the check of a term: finds the lowest ratio of the elements 0, every, 2 every ..., ignoring those below the limit
- * that the step did not lower. fault has reason, what and limit on entry. before may be NULL: none is ignored. */
+/* For the check of a term: finds the lowest ratio of the elements 0, every, 2 every ..., ignoring those below
+ * the limit that the step did not lower. fault has reason, what and limit on entry. before may be NULL: none
+ * is ignored. */
 typedef double drape_ratio(const drape_elements *el, int32_t element, const double *x);
 drape_status drape_check_ratios(const drape_elements *el, const double *x, const double *before,
                                 int32_t every, drape_ratio *ratio_of, drape_fault *fault);

@@ -293,8 +293,8 @@ START_TEST(shorter_defs_of_older_callers_are_read)
 }
 END_TEST
 
-/* The def of which only the first `size` bytes were known, count of them one after another, as an older caller's array
- * has them; behind the last there is nothing. */
+/* The def of which only the first `size` bytes were known, count of them one after another, as an older
+ * caller's array has them; behind the last there is nothing. */
 static void *as_older(const void *defs, size_t count, size_t full, size_t size)
 {
     char *older = malloc(count * size);
@@ -306,8 +306,8 @@ static void *as_older(const void *defs, size_t count, size_t full, size_t size)
     return older;
 }
 
-/* Of each def, every shorter version: one that ends before each of its members. What a caller left at its default is what
- * it would have been. */
+/* Of each def, every shorter version: one that ends before each of its members. What a caller left at its
+ * default is what it would have been. */
 START_TEST(every_older_def_is_read)
 {
     static const size_t sims[] = {offsetof(drape_sim_def, controller),
@@ -537,9 +537,9 @@ static int zeroed(int which)
     else if (which == 12)
         s.scene.collider_count = 1;
     else if (which == 14)
-        collider = (drape_collider_def){.row = {.type = "sphere", .setting_count = 1}};
+        collider = (drape_collider_def){.entry = {.type = "sphere", .setting_count = 1}};
     else if (which == 15)
-        collider = (drape_collider_def){.row = {.type = "sphere"}, .key_count = 1};
+        collider = (drape_collider_def){.entry = {.type = "sphere"}, .key_count = 1};
     else if (which == 16)
         s.scene.contact_count = 1;
     else if (which == 17)
@@ -1418,8 +1418,8 @@ static drape_sim *make_sim_of(drape_context *ctx, const drape_model *model, cons
     return sim;
 }
 
-/* Backward Euler without forces but gravity: n steps of h from v0 move by n h v0 + g h^2 n (n + 1)/2, and h and
- * the sums are exact in binary but for rounding of g. */
+/* Backward Euler without forces but gravity: n steps of h from v0 move by n h v0 + g h^2 n (n + 1)/2, and h
+ * and the sums are exact in binary but for rounding of g. */
 typedef struct meddler {
     drape_context *ctx;
     drape_sim *sim;
@@ -1966,7 +1966,8 @@ static void count_line(void *user, drape_log_level level, const char *text)
     ++*(int *)user;
 }
 
-/* One iteration does not bring the fall of a hung sheet to a millionth of its tolerance, at any step that is allowed. */
+/* One iteration does not bring the fall of a hung sheet to a millionth of its tolerance, at any step that is
+ * allowed. */
 START_TEST(the_log_of_a_host_is_told_of_rejections)
 {
     int lines = 0;

@@ -51,7 +51,8 @@ static drape_status count_frames(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* To a file and back, in another sim of another model of the same scene, with other threads; observers stay. */
+/* To a file and back, in another sim of another model of the same scene, with other threads; observers
+ * stay. */
 START_TEST(a_file_is_taken_by_another_sim)
 {
     static const char *const rows[] = {"be", "bdf2", "ida", "verlet"};

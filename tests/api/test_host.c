@@ -1,5 +1,5 @@
-/* test_host.c: what a host does while a sim runs, by the public header alone: it moves pins and colliders, pushes,
- * blows, cancels, and reads forces. */
+/* test_host.c: what a host does while a sim runs, by the public header alone: it moves pins and colliders,
+ * pushes, blows, cancels, and reads forces. */
 #include <float.h>
 #include <math.h>
 #include <pthread.h>
@@ -105,8 +105,8 @@ static drape_status watch_pin(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* A fixed pin and one on a track, sent straight: where they are to be at the end, to the bit, and on the line between
- * to rounding (1 m, some ten operations); and where they rest afterwards. */
+/* A fixed pin and one on a track, sent straight: where they are to be at the end, to the bit, and on the line
+ * between to rounding (1 m, some ten operations); and where they rest afterwards. */
 START_TEST(pins_go_where_they_are_sent)
 {
     for (int i = 0; i < METHODS; i++) {
@@ -146,8 +146,9 @@ START_TEST(pins_go_where_they_are_sent)
 }
 END_TEST
 
-/* A pin that the host sends along the pieces of a track, from key to key, is that track: the same steps, but for the
- * rounding of positions, which Newton's tolerance of 1e-9 N on springs of some 10 N/m makes up to 1e-10 m of. */
+/* A pin that the host sends along the pieces of a track, from key to key, is that track: the same steps, but
+ * for the rounding of positions, which Newton's tolerance of 1e-9 N on springs of some 10 N/m makes up to
+ * 1e-10 m of. */
 START_TEST(a_host_is_as_good_as_a_track)
 {
     static const char track[] =
@@ -182,8 +183,8 @@ START_TEST(a_host_is_as_good_as_a_track)
 }
 END_TEST
 
-/* A cubic through positions and velocities of x = a sin(w t) is off by at most (a w^4 h^4)/384 inside, and starts no
- * integrator anew: ida, which does at every kink, takes fewer steps than with straight ways. */
+/* A cubic through positions and velocities of x = a sin(w t) is off by at most (a w^4 h^4)/384 inside, and
+ * starts no integrator anew: ida, which does at every kink, takes fewer steps than with straight ways. */
 START_TEST(velocities_make_a_motion_smooth)
 {
     const double a = 0.05, w = 9;
@@ -275,8 +276,8 @@ END_TEST
 
 /* ---- Forces ---- */
 
-/* Reactions carry what hangs from pins, and what is pushed: the sum over pins is the weight of all nodes less the push,
- * but for the residuals of 16 free nodes at 1e-8 N. */
+/* Reactions carry what hangs from pins, and what is pushed: the sum over pins is the weight of all nodes less
+ * the push, but for the residuals of 16 free nodes at 1e-8 N. */
 START_TEST(reactions_carry_the_weight)
 {
     failing_allocator memory = {0};
@@ -306,8 +307,9 @@ START_TEST(reactions_carry_the_weight)
 }
 END_TEST
 
-/* A triangle without forces of its own, pushed by F on each node: backward Euler's v_n = n h F/m, x_n - x_0 = h^2 F/m
- * n (n + 1)/2, so that F (x_n - x_0) - m v_n^2/2 = h^2 F^2/m n/2 is lost. Rounding: some 100 operations on 1 m, 1 J. */
+/* A triangle without forces of its own, pushed by F on each node: backward Euler's v_n = n h F/m, x_n - x_0 =
+ * h^2 F/m n (n + 1)/2, so that F (x_n - x_0) - m v_n^2/2 = h^2 F^2/m n/2 is lost. Rounding: some 100
+ * operations on 1 m, 1 J. */
 START_TEST(a_push_does_its_work)
 {
     failing_allocator memory = {0};
@@ -392,7 +394,8 @@ START_TEST(springs_of_verlet_are_pushed_and_pulled)
 }
 END_TEST
 
-/* What lies on a table is carried by it, within the residuals of 20 nodes at 1e-8 N; what pushes it along is friction. */
+/* What lies on a table is carried by it, within the residuals of 20 nodes at 1e-8 N; what pushes it along is
+ * friction. */
 START_TEST(contact_carries_the_weight)
 {
     failing_allocator memory = {0};
@@ -475,8 +478,8 @@ START_TEST(wind_takes_cloth_along)
 }
 END_TEST
 
-/* A host's steady wind is that of the row: the same equations, and the same states but for rounding; the inner
- * solves of newton_k, which end at a share of what they began with, make some 1e-8 m of it. */
+/* A host's steady wind is that of the row: the same equations, and the same states but for rounding; the
+ * inner solves of newton_k, which end at a share of what they began with, make some 1e-8 m of it. */
 START_TEST(a_steady_wind_is_that_of_the_row)
 {
     for (int i = 0; i < METHODS; i++) {
@@ -504,7 +507,8 @@ START_TEST(a_steady_wind_is_that_of_the_row)
 }
 END_TEST
 
-/* A field that tells its gradient is solved by Newton's method; one that does not comes to the same state, later. */
+/* A field that tells its gradient is solved by Newton's method; one that does not comes to the same state,
+ * later. */
 START_TEST(a_field_without_gradient_takes_longer)
 {
     double x[2][3];
@@ -633,7 +637,8 @@ END_TEST
 
 /* ---- Reading ---- */
 
-/* Of a sheet in the plane z = 0, rows downwards, they are its normal; of a bent one, unit vectors; of a point, none. */
+/* Of a sheet in the plane z = 0, rows downwards, they are its normal; of a bent one, unit vectors; of a
+ * point, none. */
 START_TEST(normals_are_of_length_one)
 {
     failing_allocator memory = {0};
@@ -682,8 +687,9 @@ static void send_all(host *h, field *f, double sign)
     good(h, drape_sim_set_wind(h->sim, blow, f));
 }
 
-/* Saved while pins and colliders are on their ways, restored into a sim that sent them elsewhere: the same bits to the
- * end, under its own wind; and the restored one is cancelled by its own flag, raised before or after. */
+/* Saved while pins and colliders are on their ways, restored into a sim that sent them elsewhere: the same
+ * bits to the end, under its own wind; and the restored one is cancelled by its own flag, raised before or
+ * after. */
 START_TEST(a_checkpoint_keeps_what_the_host_moves)
 {
     for (int i = 0; i < METHODS; i++) {

@@ -63,8 +63,8 @@ static record *watch(scene *s)
 /* ---- Scenes ---- */
 
 /*
- * A sheet of 7 edges a side that swings by two corners, at a step far too long for plain Newton. All powers of
- * two, so that parts of a step are exact.
+ * A sheet of 7 edges a side that swings by two corners, at a step far too long for plain Newton. All powers
+ * of two, so that parts of a step are exact.
  */
 #define STEP 0.125 /* [s] */
 
@@ -236,7 +236,8 @@ static void check_bound(const scene *s, const record *r, drape_status status)
     ck_assert(drape_sim_hash(s->sim) == r->before);
 }
 
-/* Advances to `end`, stopped as often as it may be. Half of the stops, another sim goes on from a checkpoint of this one. */
+/* Advances to `end`, stopped as often as it may be. Half of the stops, another sim goes on from a checkpoint
+ * of this one. */
 static int advance_bounded(scene *s, scene *other, double end)
 {
     record *r = watch(s);
@@ -259,8 +260,8 @@ static int advance_bounded(scene *s, scene *other, double end)
     return stops;
 }
 
-/* Each advance tries max_attempts steps within one dt and no more; who advances again and again, or goes on from a checkpoint,
- * comes to the bits of a run without a bound. */
+/* Each advance tries max_attempts steps within one dt and no more; who advances again and again, or goes on
+ * from a checkpoint, comes to the bits of a run without a bound. */
 START_TEST(a_bound_on_attempts_ends_the_advance_and_changes_no_bit)
 {
     static const char *const controllers[] = {"'type': 'halving'", "'type': 'strain', 'max_stretch': 0.05",
@@ -300,8 +301,8 @@ START_TEST(a_run_without_rejections_never_meets_the_bound)
 END_TEST
 
 /*
- * Flight at 1 m/s, and a last step of 0.17 us at a tolerance of 1e-13 N: the inertia M v/h of a node, some 1e4 N, is
- * rounded to 1e-12. What is left of it is no failure, and half the step would double it.
+ * Flight at 1 m/s, and a last step of 0.17 us at a tolerance of 1e-13 N: the inertia M v/h of a node, some
+ * 1e4 N, is rounded to 1e-12. What is left of it is no failure, and half the step would double it.
  */
 START_TEST(a_residual_of_rounding_is_converged)
 {
@@ -467,8 +468,8 @@ START_TEST(the_error_controller_never_tries_a_refused_size_again)
 }
 END_TEST
 
-/* The first step knows nothing of the error of its velocities; at tight tolerances there is a first step all the
- * same, and steps after it. be at rtol 1e-10 wants some 0.5 us a step. */
+/* The first step knows nothing of the error of its velocities; at tight tolerances there is a first step all
+ * the same, and steps after it. be at rtol 1e-10 wants some 0.5 us a step. */
 START_TEST(the_error_controller_starts_at_tight_tolerances)
 {
     for (size_t k = 0; k < sizeof fixed_rows / sizeof *fixed_rows; k++)
@@ -650,8 +651,8 @@ START_TEST(kinetic_energy_from_nowhere_is_refused)
 END_TEST
 
 /*
- * A smaller force on a sheet in flight at 10 m/s adds 2 m/s2 x 1/16 s to it a step, in a second 1/2 m (2 m/s)^2, a 25th
- * of what it had: no explosion, and the audit has it as gain.
+ * A smaller force on a sheet in flight at 10 m/s adds 2 m/s2 x 1/16 s to it a step, in a second 1/2 m (2
+ * m/s)^2, a 25th of what it had: no explosion, and the audit has it as gain.
  */
 START_TEST(a_slow_gain_is_no_runaway)
 {
@@ -668,8 +669,8 @@ START_TEST(a_slow_gain_is_no_runaway)
 END_TEST
 
 /*
- * In time it is: the run may gain a tenth of what it had to live on, the start's 1/2 m v0^2 and 1/2 m L^2/s^2 of a
- * scene without gravity, L the diagonal. 1/2 m (a t)^2 is that much at t, which halving finds to dt_min.
+ * In time it is: the run may gain a tenth of what it had to live on, the start's 1/2 m v0^2 and 1/2 m L^2/s^2
+ * of a scene without gravity, L the diagonal. 1/2 m (a t)^2 is that much at t, which halving finds to dt_min.
  */
 START_TEST(a_slow_gain_ends_the_run_when_it_is_large)
 {
@@ -689,9 +690,9 @@ START_TEST(a_slow_gain_ends_the_run_when_it_is_large)
 END_TEST
 
 /*
- * midpoint on a sheet whose stretch waves the step does not resolve: a converged step may leave the springs far more
- * than the sheet, which falls less than its diagonal L, can have had. Nothing is accepted that gains more than half
- * of that in all: m g L and the 1/2 m g L of the scene.
+ * midpoint on a sheet whose stretch waves the step does not resolve: a converged step may leave the springs
+ * far more than the sheet, which falls less than its diagonal L, can have had. Nothing is accepted that gains
+ * more than half of that in all: m g L and the 1/2 m g L of the scene.
  */
 START_TEST(elastic_energy_from_nowhere_is_refused)
 {
@@ -721,8 +722,8 @@ START_TEST(elastic_energy_from_nowhere_is_refused)
 }
 END_TEST
 
-/* A pin that jumps in 1 ps has, for that long, 1e20 J of its own: they are no part of the audit, which would lose
- * all else in their rounding. */
+/* A pin that jumps in 1 ps has, for that long, 1e20 J of its own: they are no part of the audit, which would
+ * lose all else in their rounding. */
 START_TEST(a_jump_of_a_pin_is_no_energy_of_the_sheet)
 {
     scene s =
@@ -735,8 +736,8 @@ START_TEST(a_jump_of_a_pin_is_no_energy_of_the_sheet)
     const drape_energy before = drape_sim_energy(s.sim);
     scene_advance(&s, 0.1000000000005);
     const drape_energy e = drape_sim_energy(s.sim);
-    /* half way the pin has stretched its springs; the sheet has not moved. What the work of the pin is summed to by
-     * the trapezoidal rule is exact for springs without a start. */
+    /* half way the pin has stretched its springs; the sheet has not moved. What the work of the pin is summed
+     * to by the trapezoidal rule is exact for springs without a start. */
     ck_assert_double_eq_tol(e.kinetic, before.kinetic, 1e-6 * before.kinetic);
     assert_below(fabs(e.numerical - before.numerical), 0.01 * e.elastic);
     scene_close(&s);

@@ -425,8 +425,8 @@ START_TEST(what_nothing_holds_has_no_equilibrium_and_ends)
 }
 END_TEST
 
-/* A sheet lies on another: what couples them is in no pattern of the model, and the Hessian has it all the same. Each wrong
- * sign would be a mode. */
+/* A sheet lies on another: what couples them is in no pattern of the model, and the Hessian has it all the
+ * same. Each wrong sign would be a mode. */
 START_TEST(one_sheet_lies_on_another)
 {
     scene s = scene_open(

@@ -1,7 +1,7 @@
 /*
- * test_checkpoint.c: a sim that is saved, and another that is restored from it and goes on, have the bits of one that was
- * never interrupted: over all integrators, ways of Newton, linear solvers and controllers, in scenes with all that is kept from
- * step to step.
+ * test_checkpoint.c: a sim that is saved, and another that is restored from it and goes on, have the bits of
+ * one that was never interrupted: over all integrators, ways of Newton, linear solvers and controllers, in
+ * scenes with all that is kept from step to step.
  */
 #include <inttypes.h>
 
@@ -32,7 +32,8 @@
     " {'type': 'box', 'center': [0.2,-0.1,-0.05], 'size': [0.08,0.08,0.08], 'friction': 0.2}],"              \
     " 'self_contact': {'thickness': 0.004, 'friction': 0.2}, "
 
-/* Two sheets, the upper one falling on the lower one: cloth touches cloth where the matrix has no place for it at first. */
+/* Two sheets, the upper one falling on the lower one: cloth touches cloth where the matrix has no place for
+ * it at first. */
 #define LAYERS                                                                                               \
     "{'drape': 1, 'cloth': [{'name': 'low', 'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': "   \
     "0.2,"                                                                                                   \
@@ -47,7 +48,8 @@
     " 'integrator': {'method': '%s', 'dt': 0.01%s}, 'controller': {'type': '%s'}, 'duration': 1,"            \
     " 'frame_rate': 330}"
 
-/* A sheet that is pushed together and buckles: matrices that are not definite, whose repair remembers the last one. */
+/* A sheet that is pushed together and buckles: matrices that are not definite, whose repair remembers the
+ * last one. */
 #define BUCKLING                                                                                             \
     "{'drape': 1, 'cloth': [{'name': 'sheet', 'mesh': {'grid': 'square', 'columns': 8, 'rows': 5, 'width': " \
     "0.4,"                                                                                                   \
@@ -169,8 +171,8 @@ static void check_contact(scene *s, const bytes *middle, const char *what)
     drape_sim_destroy(&other);
 }
 
-/* One that goes on to the end, saved at a frame within and between two advances; two that are restored from these, one of
- * which did something else before. */
+/* One that goes on to the end, saved at a frame within and between two advances; two that are restored from
+ * these, one of which did something else before. */
 static void check(scene *s, const char *what)
 {
     watcher whole = {.save_at = 20}, from_frame = {.save_at = -1}, from_middle = {.save_at = -1};
@@ -389,8 +391,9 @@ static void blow(void *user, double t, int32_t count, const double *x, double *w
         wind[3 * i + 2] = 2 * sin(40 * t);
 }
 
-/* Pins that it sends, one of which the scene fixed; a collider; forces; a wind, which is the sim's own that is restored. In the
- * middle of their ways it is saved, and after the restoration it can still be cancelled. */
+/* Pins that it sends, one of which the scene fixed; a collider; forces; a wind, which is the sim's own that
+ * is restored. In the middle of their ways it is saved, and after the restoration it can still be
+ * cancelled. */
 START_TEST(what_a_host_moves_goes_on)
 {
     for (int i = 0; drape_integrators[i]; i++) {

@@ -1,6 +1,7 @@
 /*
  * test_colliders.c: every row of the colliders: its distance against one found by brute force, its normal and
- * curvature against differences, the features of its shape against its distance, and meshes that are no solid.
+ * curvature against differences, the features of its shape against its distance, and meshes that are no
+ * solid.
  */
 #include "colliders/colliders.h"
 
@@ -96,8 +97,8 @@ static void write_globe(const char *path, int rings, double dent)
     fclose(file);
 }
 
-/* A wedge with its tip at 0, whose upper face is a fan of 30 triangles about the tip and whose lower face is one:
- * a mean of normals that is not weighted by their angles has the points below the tip inside. */
+/* A wedge with its tip at 0, whose upper face is a fan of 30 triangles about the tip and whose lower face is
+ * one: a mean of normals that is not weighted by their angles has the points below the tip inside. */
 static void write_wedge(const char *path)
 {
     enum { TOP = 1, SLICES = 30, LOW = TOP + SLICES + 1, HIGH = LOW + 1 };

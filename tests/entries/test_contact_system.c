@@ -1,6 +1,7 @@
 /*
- * test_contact_system.c: the Jacobian of the whole system with active contacts against differences of its force,
- * for every row of the colliders, resting and moving, with implicit and lagged friction, and for cloth on cloth.
+ * test_contact_system.c: the Jacobian of the whole system with active contacts against differences of its
+ * force, for every row of the colliders, resting and moving, with implicit and lagged friction, and for cloth
+ * on cloth.
  */
 #include "assemble/check.h"
 #include "contact/broad_phase.h"
@@ -92,9 +93,9 @@ static double scale_of(const probe *t, const double *a)
     return most;
 }
 
-/* Largest difference over the largest entry, the best of some steps. Barriers change over 1e-3 m: with e = 1e-7
- * truncation is (e/1e-4)^2 = 1e-6 where gaps are a tenth of that, rounding 1e-16 0.3/e/1e-4 = 3e-6; both fall or
- * rise by 10 from step to step. */
+/* Largest difference over the largest entry, the best of some steps. Barriers change over 1e-3 m: with e =
+ * 1e-7 truncation is (e/1e-4)^2 = 1e-6 where gaps are a tenth of that, rounding 1e-16 0.3/e/1e-4 = 3e-6; both
+ * fall or rise by 10 from step to step. */
 static double error_of(probe *t, double weight, double time)
 {
     const drape_model *m = t->s.model;
@@ -266,8 +267,8 @@ START_TEST(contact_has_rows_of_its_own)
 }
 END_TEST
 
-/* No collider and no self-contact: no time, no memory, nothing. What contact takes is beside the other parts of a
- * step, not within them: their sum is no more than the steps, to the rounding of sums of times. */
+/* No collider and no self-contact: no time, no memory, nothing. What contact takes is beside the other parts
+ * of a step, not within them: their sum is no more than the steps, to the rounding of sums of times. */
 START_TEST(who_has_none_pays_nothing)
 {
     static const char *const rows[] = {"be", "bdf2", "midpoint", "trbdf2", "ida", "static", "verlet"};
@@ -299,8 +300,8 @@ END_TEST
     "{'translate': [0, %g, 0]}}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, "    \
     "'terms': ['stretch.edge', 'bend.hinge']}"
 
-/* Bytes that a context gave and has not back; each piece keeps its size in front. An empty array is one byte, which is
- * nobody's. */
+/* Bytes that a context gave and has not back; each piece keeps its size in front. An empty array is one byte,
+ * which is nobody's. */
 static size_t held;
 
 static void *hold(void *user, size_t size)
@@ -322,7 +323,8 @@ static void let_go(void *user, void *memory)
     free(piece);
 }
 
-/* A system says how much memory it has, to the byte: contact, its lists as they grew, and the wider pattern. */
+/* A system says how much memory it has, to the byte: contact, its lists as they grew, and the wider
+ * pattern. */
 START_TEST(bytes_are_all_of_them)
 {
     scene s = scene_model(
@@ -386,8 +388,8 @@ static void add_energy(void *user, const drape_pair *found)
     w->acting++;
 }
 
-/* What pairs share is counted once with all its area: the sum is that of all pairs, to the rounding of some hundred
- * numbers of one sign, and they are fewer. */
+/* What pairs share is counted once with all its area: the sum is that of all pairs, to the rounding of some
+ * hundred numbers of one sign, and they are fewer. */
 START_TEST(active_contacts_are_all_pairs)
 {
     scene s = scene_model("{'drape': 1, 'cloth': [" LAYER ", " LAYER "], 'self_contact': {'thickness': 2e-2},"

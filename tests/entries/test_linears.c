@@ -324,8 +324,8 @@ START_TEST(kept_pivots_that_become_zero_are_chosen_again)
 }
 END_TEST
 
-/* A node's own 3 x 3 block is symmetric in the pattern whatever the mesh: a difference there is the least that
- * can be overlooked. A solver that took one triangle for both would be off by about the difference. */
+/* A node's own 3 x 3 block is symmetric in the pattern whatever the mesh: a difference there is the least
+ * that can be overlooked. A solver that took one triangle for both would be off by about the difference. */
 START_TEST(a_small_part_that_is_not_symmetric_is_not_lost)
 {
     problem q = open_problem();
@@ -509,8 +509,8 @@ START_TEST(a_sheet_of_many_supernodes)
 }
 END_TEST
 
-/* Ordered by minimum degree and, where METIS is built, by nested dissection; with several branches for the threads and
- * fronts that they share. */
+/* Ordered by minimum degree and, where METIS is built, by nested dissection; with several branches for the
+ * threads and fronts that they share. */
 START_TEST(threads_give_the_same_bits)
 {
     static const int32_t sides[] = {24, 40};
@@ -539,8 +539,8 @@ START_TEST(threads_give_the_same_bits)
 }
 END_TEST
 
-/* What a row falls back to is made when it is needed: definite matrices do not pay for it, and where there is no
- * memory then, the row says so, has no factors, and does the work when asked again. */
+/* What a row falls back to is made when it is needed: definite matrices do not pay for it, and where there is
+ * no memory then, the row says so, has no factors, and does the work when asked again. */
 START_TEST(no_memory_for_the_fallback)
 {
     static const int32_t sides[] = {8, 24}; /* klu, and umfpack where it is built */

@@ -196,8 +196,8 @@ static drape_model *membrane(drape_context *ctx)
     return make_model(ctx, &(model_def){.mesh = MESH_IRREGULAR, .terms = &term, .term_count = 1});
 }
 
-/* The Jacobian of a sheet that is stretched by these factors along x and z, exact and projected. Returns the largest
- * entry of their difference over that of the exact one. */
+/* The Jacobian of a sheet that is stretched by these factors along x and z, exact and projected. Returns the
+ * largest entry of their difference over that of the exact one. */
 static double projected_away(drape_context *ctx, const drape_model *m, double along, double across)
 {
     const size_t values = (size_t)m->pattern.nonzeros;
@@ -226,8 +226,9 @@ static double projected_away(drape_context *ctx, const drape_model *m, double al
     return away / most;
 }
 
-/* Equal tension both ways: f1 L1 = (S, nu S), f2 L2 = (0, (1 - nu) S), f3 = 0: all of it pulls, and nothing is lost.
- * Compressed as much, all of the stress is lost: S/E = .02 (1 + .01)/(1 - nu) of a stiffness of 1 or so. */
+/* Equal tension both ways: f1 L1 = (S, nu S), f2 L2 = (0, (1 - nu) S), f3 = 0: all of it pulls, and nothing
+ * is lost. Compressed as much, all of the stress is lost: S/E = .02 (1 + .01)/(1 - nu) of a stiffness of 1 or
+ * so. */
 START_TEST(the_membrane_keeps_its_tension)
 {
     drape_context *ctx = NULL;

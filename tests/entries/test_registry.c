@@ -1,5 +1,5 @@
-/* test_registry.c: what all tables have in common: entries are well formed and are found by their names, and other names are refused with
- * the list of those that there are. */
+/* test_registry.c: what all tables have in common: entries are well formed and are found by their names, and
+ * other names are refused with the list of those that there are. */
 #include "base/registry.h"
 #include "colliders/colliders.h"
 #include "compile/compile.h"

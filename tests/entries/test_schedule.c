@@ -133,9 +133,10 @@ START_TEST(advances_do_not_shift_the_count)
 }
 END_TEST
 
-/* A host that adds up its frames, t += 1/60, drifts away from k/60 by up to half an ulp a frame, which is 1e-9 dt after some
- * thousand frames, and in less than one frame once t is some 1e5 s: each frame is one step all the same, and never one of 1e-9
- * dt more. A frame is as long as it was asked for but for the rounding of its ends. */
+/* A host that adds up its frames, t += 1/60, drifts away from k/60 by up to half an ulp a frame, which is
+ * 1e-9 dt after some thousand frames, and in less than one frame once t is some 1e5 s: each frame is one step
+ * all the same, and never one of 1e-9 dt more. A frame is as long as it was asked for but for the rounding of
+ * its ends. */
 static void sum_frames(double start, double rate, int steps_a_frame, int frames)
 {
     drape_schedule s;

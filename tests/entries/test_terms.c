@@ -455,8 +455,8 @@ START_TEST(dissipation_takes_power)
 }
 END_TEST
 
-/* What Newton takes the forces on measures for, ahead of a correction p: their change is df/dx . p, here a difference
- * of fourth order whose step makes the error some 1e-13 of the forces' own size. */
+/* What Newton takes the forces on measures for, ahead of a correction p: their change is df/dx . p, here a
+ * difference of fourth order whose step makes the error some 1e-13 of the forces' own size. */
 static void check_stress(drape_context *ctx, const variant *v, const drape_model *model)
 {
     static const double at[4] = {-2, -1, 1, 2}, weight[4] = {1, -8, 8, -1};

@@ -1,4 +1,5 @@
-/* test_verlet.c: the explicit row and its rules, against what they say in numbers small enough to do by hand. */
+/* test_verlet.c: the explicit row and its rules, against what they say in numbers small enough to do by
+ * hand. */
 #include "support/scene.h"
 
 #include "base/vec3.h"
@@ -43,9 +44,9 @@ static scene sheet(void)
         6, 5, 0.5, 0.4, 0.3);
 }
 
-/* The position form is CS184's x' = x + c (x - x_before) + a h^2 with x_before = x - h v at the start: the same
- * numbers, done here on positions alone with forces of the library. Rounding: positions of 1 m have 1e-16,
- * which the recurrence sums twice over: 200^2/2 times that. */
+/* The position form is CS184's x' = x + c (x - x_before) + a h^2 with x_before = x - h v at the start: the
+ * same numbers, done here on positions alone with forces of the library. Rounding: positions of 1 m have
+ * 1e-16, which the recurrence sums twice over: 200^2/2 times that. */
 START_TEST(the_position_form_is_the_recurrence_of_positions)
 {
     const double h = 1e-3, c = 1 - 0.3 / 100;
@@ -108,9 +109,9 @@ END_TEST
 /* ---- Stability ---- */
 
 /* A row of n free nodes of mass m between springs k, pinned at one end and free at the other, doubled by the
- * second row that the grid needs: along x the eigenvalues of both are 2 k/m (1 - cos((2 j - 1) pi/(2 n + 1))),
- * the largest for j = n. Springs across the rows are of no stiffness. Lanczos has it to 1e-6 with 30 products
- * for 2 x 8 x 3 unknowns; differences have 1e-6. */
+ * second row that the grid needs: along x the eigenvalues of both are 2 k/m (1 - cos((2 j - 1) pi/(2 n +
+ * 1))), the largest for j = n. Springs across the rows are of no stiffness. Lanczos has it to 1e-6 with 30
+ * products for 2 x 8 x 3 unknowns; differences have 1e-6. */
 START_TEST(omega_is_that_of_a_chain)
 {
     const double k = 40, m = 0.01;
@@ -225,8 +226,8 @@ static void one_step(scene *s, const char *rule, double x[3], double v[3])
     scene_close(s);
 }
 
-/* From (0, 0.01, 0) the way of 0.01 (1, -2, 0) meets the plane at half: t = (0.005, 0.0001, 0) with the offset,
- * and x = x0 + (1 - 0.25)(t - x0). */
+/* From (0, 0.01, 0) the way of 0.01 (1, -2, 0) meets the plane at half: t = (0.005, 0.0001, 0) with the
+ * offset, and x = x0 + (1 - 0.25)(t - x0). */
 START_TEST(a_plane_stops_as_in_cs184)
 {
     double x[3], v[3];
@@ -239,8 +240,8 @@ START_TEST(a_plane_stops_as_in_cs184)
 }
 END_TEST
 
-/* A plane that goes along with the tangential velocity of the node drags nothing: the way seen from it is straight
- * down, and friction acts on that alone. */
+/* A plane that goes along with the tangential velocity of the node drags nothing: the way seen from it is
+ * straight down, and friction acts on that alone. */
 START_TEST(friction_is_against_the_moving_surface)
 {
     double x[3], v[3];
@@ -277,8 +278,8 @@ START_TEST(a_floor_keeps_the_place_as_in_boson)
 }
 END_TEST
 
-/* F = (3, -8) on a floor: 3 - 0.25 x 8 = 1 along it is left, less 0.5 v; nothing across. Straight down nothing
- * is left, where Boson divides 0 by 0; up nothing rubs. */
+/* F = (3, -8) on a floor: 3 - 0.25 x 8 = 1 along it is left, less 0.5 v; nothing across. Straight down
+ * nothing is left, where Boson divides 0 by 0; up nothing rubs. */
 START_TEST(friction_on_forces_as_in_boson)
 {
     scene s = flyers("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], 'friction': 0.25}");
@@ -302,9 +303,10 @@ START_TEST(friction_on_forces_as_in_boson)
 }
 END_TEST
 
-/* A row of three, 1 m apart, of which the first is pinned and the others are at 1.5 and 3.5. One pass: the spring
- * to the pin gets 1.1 m, all of it at its free end; then the next, 2.4 m long, loses 1.3 m by halves; the bend
- * spring may have 2.2 m and has 2.85. It leaves the first one too long, as CS184 does; passes do not. */
+/* A row of three, 1 m apart, of which the first is pinned and the others are at 1.5 and 3.5. One pass: the
+ * spring to the pin gets 1.1 m, all of it at its free end; then the next, 2.4 m long, loses 1.3 m by halves;
+ * the bend spring may have 2.2 m and has 2.85. It leaves the first one too long, as CS184 does; passes do
+ * not. */
 START_TEST(strains_are_limited)
 {
     for (int many = 0; many < 2; many++) {
@@ -369,7 +371,8 @@ static void limit_by_hand(const drape_verlet_limit *l, double *x)
     }
 }
 
-/* Whether many, few or no springs are too long, looking at them in patches gives the bits of one after the other. */
+/* Whether many, few or no springs are too long, looking at them in patches gives the bits of one after the
+ * other. */
 START_TEST(patches_are_one_spring_after_the_other)
 {
     static const double moves[] = {0.001, 0.005, 0.01, 0.02, 0.05, 0.2};
@@ -391,8 +394,8 @@ START_TEST(patches_are_one_spring_after_the_other)
 }
 END_TEST
 
-/* Springs in runs, weight once and the rest by the system: the sums of the system in another order. A node has 12
- * springs of up to 3 N, so that each of its sums is off by less than 50 roundings of that. */
+/* Springs in runs, weight once and the rest by the system: the sums of the system in another order. A node
+ * has 12 springs of up to 3 N, so that each of its sums is off by less than 50 roundings of that. */
 START_TEST(forces_are_those_of_the_system)
 {
     double x[3 * 33 * 12], v[3 * 33 * 12], g[3 * 33 * 12], expected[3 * 33 * 12];
@@ -424,8 +427,8 @@ static bool share_a_box(const double *a, const double *b)
     return true;
 }
 
-/* The rule without lists: every point against every other, in the order of their numbers; own: of the same box alone,
- * as points stand before the first turn. */
+/* The rule without lists: every point against every other, in the order of their numbers; own: of the same
+ * box alone, as points stand before the first turn. */
 static void push_by_hand(const drape_model *m, bool own, double share, double *x)
 {
     double reach = 2 * m->contact.self_thickness, before[3 * 196];
@@ -463,8 +466,9 @@ static scene crumpled(double size, double thickness, double *x)
     return s;
 }
 
-/* Boxes and lists find what everything against everything finds, to the bit, from a heap in which each point has
- * all others near, more than lists may have, to points far apart; also when lists of before are used again. */
+/* Boxes and lists find what everything against everything finds, to the bit, from a heap in which each point
+ * has all others near, more than lists may have, to points far apart; also when lists of before are used
+ * again. */
 static void hold_to_the_rule(double size, bool own, double share)
 {
     double x[3 * 196], y[3 * 196];

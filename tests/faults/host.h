@@ -220,8 +220,8 @@ static inline void host_check_message(const host_sim *s, const char *reason)
     ck_assert_msg(strstr(message, reason) && !strchr(message, '\n'), "%s is not in: %s", reason, message);
 }
 
-/* All ways in which the Newton row can be set that its faults depend on. The line search by work is not among them:
- * it asks for another matrix where one is singular or not finite, and gets a good one. */
+/* All ways in which the Newton row can be set that its faults depend on. The line search by work is not among
+ * them: it asks for another matrix where one is singular or not finite, and gets a good one. */
 static const char *const host_settings[] = {
     ", 'globalization': 'none'",
     ", 'globalization': 'line_search'",

@@ -1,5 +1,6 @@
-/* test_cancel.c: a context's cancel says yes at each of its calls in turn, while a scene is read and compiled, a sim is made and
- * restored: each time a clean DRAPE_E_STOPPED, NULL, no leak; what was there before goes on with the same bits. */
+/* test_cancel.c: a context's cancel says yes at each of its calls in turn, while a scene is read and
+ * compiled, a sim is made and restored: each time a clean DRAPE_E_STOPPED, NULL, no leak; what was there
+ * before goes on with the same bits. */
 #include <stdio.h>
 #include <unistd.h>
 

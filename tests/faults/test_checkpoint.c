@@ -1,6 +1,6 @@
 /*
- * test_checkpoint.c: checkpoints that are cut short, damaged, of something else, or that find no room, no memory, no folder: each is
- * refused with one line, and the sim goes on as if nothing had been.
+ * test_checkpoint.c: checkpoints that are cut short, damaged, of something else, or that find no room, no
+ * memory, no folder: each is refused with one line, and the sim goes on as if nothing had been.
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -139,8 +139,8 @@ static drape_status stop_soon(void *user, const drape_event *event)
     return --*left < 0 ? DRAPE_E_STOPPED : DRAPE_OK;
 }
 
-/* What no disk does but somebody might: other bytes under a good checksum. Whatever it is taken for, nothing crashes, and what
- * is refused changes nothing. */
+/* What no disk does but somebody might: other bytes under a good checksum. Whatever it is taken for, nothing
+ * crashes, and what is refused changes nothing. */
 static void forge(const char *integrator, const char *settings, uint64_t seed)
 {
     victim v = make_victim(integrator, settings);

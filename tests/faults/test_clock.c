@@ -1,7 +1,7 @@
 /*
- * test_clock.c: the clock jumps, forwards and back, as that of a machine which sleeps or is moved, though CLOCK_MONOTONIC should
- * not: steps have the same bits, a budget ends a call and no call hangs, and what is told of time is finite. clock_gettime
- * is taken from under the library.
+ * test_clock.c: the clock jumps, forwards and back, as that of a machine which sleeps or is moved, though
+ * CLOCK_MONOTONIC should not: steps have the same bits, a budget ends a call and no call hangs, and what is
+ * told of time is finite. clock_gettime is taken from under the library.
  */
 #define _GNU_SOURCE
 #include "support/scene.h"
@@ -61,8 +61,8 @@ START_TEST(steps_do_not_depend_on_the_clock)
 }
 END_TEST
 
-/* Whatever it believes of the time that is left, a call makes no more steps than the frame and the debt ask for at the
- * row's own step, and the state is good. */
+/* Whatever it believes of the time that is left, a call makes no more steps than the frame and the debt ask
+ * for at the row's own step, and the state is good. */
 START_TEST(a_budget_on_a_jumping_clock_ends)
 {
     for (size_t i = 0; i < ROWS; i++)

@@ -197,7 +197,8 @@ START_TEST(no_heap_call_in_rejected_steps)
 }
 END_TEST
 
-/* With colliders: once the lists of contacts have grown, here in the same run before, nothing is taken any more. */
+/* With colliders: once the lists of contacts have grown, here in the same run before, nothing is taken any
+ * more. */
 START_TEST(no_heap_call_in_contact)
 {
     static const char *const rows[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};

@@ -237,8 +237,8 @@ static drape_status note_accepted(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* Every allocation of a run fails once, from the n-th on after all was made. It is told; the state is the last that
- * was accepted, and the run goes on from there. */
+/* Every allocation of a run fails once, from the n-th on after all was made. It is told; the state is the
+ * last that was accepted, and the run goes on from there. */
 static long grow_lists(const drape_model *model, const char *row)
 {
     const double t = 0.08;

@@ -16,8 +16,9 @@
 #include "model/scene.h"
 
 #define MOST_MEMORY ((size_t)16 << 20)
-/* [s] of CPU. Between two looks at the cancellation lie some passes over elements and contacts, and a factorisation:
- * milliseconds for the few nodes of a target, under the sanitizers and with other programs' caches ten times as much. */
+/* [s] of CPU. Between two looks at the cancellation lie some passes over elements and contacts, and a
+ * factorisation: milliseconds for the few nodes of a target, under the sanitizers and with other programs'
+ * caches ten times as much. */
 #define SOON 5
 
 void fuzz_die(const char *file, int line, const char *promise, const char *format, ...)

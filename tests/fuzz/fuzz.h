@@ -1,7 +1,7 @@
 /*
- * fuzz.h: what the fuzz targets share. A target is one file with drape_fuzz_one, which tries the library on some bytes and
- * dies where it breaks a promise. With libFuzzer (tools/fuzz) it looks for such bytes; linked to replay.c it goes
- * over files that are given.
+ * fuzz.h: what the fuzz targets share. A target is one file with drape_fuzz_one, which tries the library on
+ * some bytes and dies where it breaks a promise. With libFuzzer (tools/fuzz) it looks for such bytes; linked
+ * to replay.c it goes over files that are given.
  */
 #ifndef DRAPE_TESTS_FUZZ_H
 #define DRAPE_TESTS_FUZZ_H
@@ -25,8 +25,8 @@ _Noreturn void fuzz_die(const char *file, int line, const char *promise, const c
 
 /* ---- Contexts ---- */
 
-/* A context whose allocator gives at most `most` bytes at a time: a scene may ask for a mesh of any size, and is then
- * refused as on a machine that has no more. */
+/* A context whose allocator gives at most `most` bytes at a time: a scene may ask for a mesh of any size, and
+ * is then refused as on a machine that has no more. */
 drape_context *fuzz_open(size_t most);
 
 /* Destroys it. Nothing that was made with it may be left. */
@@ -48,17 +48,19 @@ double fuzz_magnitude(fuzz_bytes *bytes, double least, double most); /* the same
 
 /* ---- Sims ---- */
 
-/* Advances to t in at most `attempts` attempts, and cancels what takes more than `seconds` of CPU: the work of a single
- * attempt has bounds of its own, which may be high ("static" follows a thousand steps of pseudo time). What does not heed
- * the cancellation soon, by CPU and not by the clock of a busy machine, breaks a promise; a loop that never does hangs,
- * which libFuzzer and the timeout of the tests tell. Along the way and after it: numbers
- * are finite, a rejected attempt or a failure leaves the last accepted state to the bit. Once for each sim. */
+/* Advances to t in at most `attempts` attempts, and cancels what takes more than `seconds` of CPU: the work
+ * of a single attempt has bounds of its own, which may be high ("static" follows a thousand steps of pseudo
+ * time). What does not heed the cancellation soon, by CPU and not by the clock of a busy machine, breaks a
+ * promise; a loop that never does hangs, which libFuzzer and the timeout of the tests tell. Along the way and
+ * after it: numbers are finite, a rejected attempt or a failure leaves the last accepted state to the bit.
+ * Once for each sim. */
 drape_status fuzz_advance(drape_context *ctx, drape_sim *sim, double t, int attempts, double seconds);
 
 /* Parses and compiles a text; NULL where it was refused. What it is printed as compiles, too. */
 drape_model *fuzz_scene(drape_context *ctx, const uint8_t *data, size_t size);
 
-/* Reads a mesh of the format of this row of the imports, and brings what was read through all stages of a mesh. */
+/* Reads a mesh of the format of this row of the imports, and brings what was read through all stages of a
+ * mesh. */
 void fuzz_mesh(const char *format, const uint8_t *data, size_t size);
 
 #endif

@@ -1,7 +1,8 @@
 /*
- * fuzz_checkpoint.c: a checkpoint of a small sim, changed in places, its length and checksum made right again: what a
- * checksum cannot tell must be told by what is read. The first byte chooses the integrator; each 4 bytes after it are a
- * change. What is refused leaves the sim as it is; what is taken goes on for some steps.
+ * fuzz_checkpoint.c: a checkpoint of a small sim, changed in places, its length and checksum made right
+ * again: what a checksum cannot tell must be told by what is read. The first byte chooses the integrator;
+ * each 4 bytes after it are a change. What is refused leaves the sim as it is; what is taken goes on for some
+ * steps.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -16,7 +17,8 @@
 #define CHANGES     16
 #define STEP        0.01 /* [s] */
 
-/* Every part that has something to keep: contact, friction, an internal variable, a moving pin, the past of the steps. */
+/* Every part that has something to keep: contact, friction, an internal variable, a moving pin, the past of
+ * the steps. */
 static const char sheet[] =
     "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"equilateral\", \"edges\": 2, \"edge_length\": 0.1},"
     "\"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200},"

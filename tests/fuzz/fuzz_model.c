@@ -1,7 +1,8 @@
 /*
- * fuzz_model.c: a scene out of the bytes, in memory, and some steps of it. Meshes are small and may be all but
- * degenerate; materials go to the ends of their ranges; terms, colliders, contact, controllers and integrators are what
- * the tables have, with settings drawn out of their own ranges. What a scene is refused for, with one line, is left out of it.
+ * fuzz_model.c: a scene out of the bytes, in memory, and some steps of it. Meshes are small and may be all
+ * but degenerate; materials go to the ends of their ranges; terms, colliders, contact, controllers and
+ * integrators are what the tables have, with settings drawn out of their own ranges. What a scene is refused
+ * for, with one line, is left out of it.
  */
 #include <math.h>
 #include <stdio.h>
@@ -75,7 +76,8 @@ static void draw_value(fuzz_bytes *in, const drape_param *p, int most, drape_set
     }
 }
 
-/* Those that are required, and each other one where a bit says so. most: integers lie at most so far above their least. */
+/* Those that are required, and each other one where a bit says so. most: integers lie at most so far above
+ * their least. */
 static void draw(fuzz_bytes *in, const drape_param *params, int count, int most, drawn *d)
 {
     unsigned bits = 0;
@@ -140,7 +142,8 @@ static void draw_triangles(mesh *m, int columns, int rows, unsigned flips)
         }
 }
 
-/* A lattice of some size whose cells are as flat as `squeeze` says, each node out of its place by some of a cell. */
+/* A lattice of some size whose cells are as flat as `squeeze` says, each node out of its place by some of a
+ * cell. */
 static void draw_mesh(mesh *m, drape_mesh_def *def, fuzz_bytes *in)
 {
     const int columns = 1 + (int)fuzz_below(in, MOST_SIDE), rows = 1 + (int)fuzz_below(in, MOST_SIDE);

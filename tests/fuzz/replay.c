@@ -1,5 +1,5 @@
-/* replay.c: `fuzz_<target> FOLDER` without libFuzzer: each file of a folder once, by name, which it says before so that a
- * crash has one. TAP. */
+/* replay.c: `fuzz_<target> FOLDER` without libFuzzer: each file of a folder once, by name, which it says
+ * before so that a crash has one. TAP. */
 #include <dirent.h>
 #include <stdio.h>
 #include <stdlib.h>

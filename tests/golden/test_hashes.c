@@ -1,17 +1,19 @@
 /*
- * test_hashes.c: every example scene under every integrator, for three attempts: the bits of the state are those of hashes.txt, where
- * that is of this build, and in any build those of another process, of other numbers of threads, of a sim that was stopped at
- * each attempt or saved and restored between two, beside others on the same thread and on another one.
+ * test_hashes.c: every example scene under every integrator, for three attempts: the bits of the state are
+ * those of hashes.txt, where that is of this build, and in any build those of another process, of other
+ * numbers of threads, of a sim that was stopped at each attempt or saved and restored between two, beside
+ * others on the same thread and on another one.
  *
- * Meshes are made coarse, so that there is time for contact: where a scene has colliders or layers, the attempts begin where `be` has
- * brought it to after most of its duration, and it is looked that they act there. With a sanitizer,
- * which makes all ten times slower, every other scene is left out: box_edge, crumple, flag, fold, hung_sheet, sphere_drape and
- * verlet_100 stay, under every integrator.
+ * Meshes are made coarse, so that there is time for contact: where a scene has colliders or layers, the
+ * attempts begin where `be` has brought it to after most of its duration, and it is looked that they act
+ * there. With a sanitizer, which makes all ten times slower, every other scene is left out: box_edge,
+ * crumple, flag, fold, hung_sheet, sphere_drape and verlet_100 stay, under every integrator.
  *
- * hashes.txt begins with the build that its bits belong to: they depend on the compiler, the solvers, and on the C library and
- * BLAS, which pick their functions by the processor. The name of the build has a hash of what the C library's functions give, and the
- * name of OpenBLAS's kernels. On another build the runs are compared with those of a second process instead. `tools/hashes`
- * writes the file anew: with DRAPE_HASHES=FILE this program writes its own hashes there and tests nothing.
+ * hashes.txt begins with the build that its bits belong to: they depend on the compiler, the solvers, and on
+ * the C library and BLAS, which pick their functions by the processor. The name of the build has a hash of
+ * what the C library's functions give, and the name of OpenBLAS's kernels. On another build the runs are
+ * compared with those of a second process instead. `tools/hashes` writes the file anew: with
+ * DRAPE_HASHES=FILE this program writes its own hashes there and tests nothing.
  */
 #include <dirent.h>
 #include <dlfcn.h>
@@ -36,7 +38,8 @@
 #define MOST_SCENES 64
 #define MOST_ROWS   32
 #define MOST_PREPARED                                                                                        \
-    1000 /* nodes of a scene that is brought to its moment: one in the form of CS184 stays as large as it is */
+    1000 /* nodes of a scene that is brought to its moment: one in the form of CS184 stays as large as it
+            is */
 #define MOST_NODES 200 /* grids of more are made of every other node, and again */
 #define LINE       512
 
@@ -83,8 +86,9 @@ static uint64_t library_hash(void)
     return hash;
 }
 
-/* BLAS picks its kernels by the processor, and those for triangular solves differ in a last digit where products of
- * matrices agree: so the kernels are named and not sampled. A BLAS that is not OpenBLAS has no name for them. */
+/* BLAS picks its kernels by the processor, and those for triangular solves differ in a last digit where
+ * products of matrices agree: so the kernels are named and not sampled. A BLAS that is not OpenBLAS has no
+ * name for them. */
 static const char *blas_kernels(void)
 {
     typedef char *describe(void);
@@ -140,7 +144,8 @@ static drape_status halve(drape_scene *scene, int32_t cloth, const char *key, in
     return drape_scene_set(scene, pointer, text);
 }
 
-/* Makes the grids of more nodes coarser, once; whether there were any. Equilateral ones, which no contact is in, stay. */
+/* Makes the grids of more nodes coarser, once; whether there were any. Equilateral ones, which no contact is
+ * in, stay. */
 static bool make_coarser(drape_scene *scene, const drape_model *model)
 {
     bool any = false;
@@ -177,7 +182,8 @@ static drape_model *compile(drape_context *ctx, const char *name)
 
 /* ---- Where the attempts begin ---- */
 
-/* A state in the middle of a scene that has contact, by `be` of one thread, and so of the same bits each time; else the beginning. */
+/* A state in the middle of a scene that has contact, by `be` of one thread, and so of the same bits each
+ * time; else the beginning. */
 typedef struct moment {
     double t;
     double *x, *v;
@@ -271,8 +277,8 @@ static drape_status look(void *user, const drape_event *event)
     return d->each || d->left == 0 ? 1 : DRAPE_OK;
 }
 
-/* Statics ends after some steps of its flow, where each node is held but for twenty times the heaviest one's weight: to the end
- * it would take minutes for cloth that falls freely or flutters. */
+/* Statics ends after some steps of its flow, where each node is held but for twenty times the heaviest one's
+ * weight: to the end it would take minutes for cloth that falls freely or flutters. */
 static double loose_tolerance(const drape_model *model)
 {
     double most = 0;
@@ -403,7 +409,8 @@ static int write_table(const char *path)
     return fclose(file) != 0;
 }
 
-/* How many lines are not as here; the first of them is told. same_build: that of the file is this one, else 0 is returned. */
+/* How many lines are not as here; the first of them is told. same_build: that of the file is this one, else 0
+ * is returned. */
 static int compare_file(const char *path, bool *same_build, char *told, size_t size)
 {
     char line[LINE], build[LINE], here[LINE + 16], scene[64], row[64], status[64];
@@ -472,7 +479,8 @@ typedef struct pair {
     golden plain, restored;
 } pair;
 
-/* Two sims in turns, attempt by attempt, with two threads and with three, one of which is another one after its first attempt. */
+/* Two sims in turns, attempt by attempt, with two threads and with three, one of which is another one after
+ * its first attempt. */
 static void *drive_two(void *user)
 {
     pair *p = user;
@@ -522,7 +530,8 @@ START_TEST(sims_at_once_have_the_same_bits)
 }
 END_TEST
 
-/* What a scene has, acts at its moment: colliders in each scene that has some, friction and layers in some. */
+/* What a scene has, acts at its moment: colliders in each scene that has some, friction and layers in
+ * some. */
 static int scenes_pushed, scenes_layered, scenes_rubbed;
 
 static void count_what_acts(const ready *s, const drape_integrator_ops *row)

@@ -56,8 +56,8 @@ START_TEST(expected_values_are_those_of_other_sources)
     /* q L^3 = 12.8538 sqrt(E I G J), which is B w sqrt(2/(1 + nu)), of hinges 19.79 D w. */
     ck_assert_double_eq_tol(find("lateral_buckling")->expected(0) / sqrt(2), 12.8538, 5e-5);
     ck_assert_double_eq_tol(find("lateral_buckling_hinges")->documented(0), 19.79, 5e-3);
-    /* A lone strip of the overhang, clamped at one end, sinks by q l^4/(8 D), l = 0.4 of the radius: a plate that goes
-     * round is near that, the less it contracts the more. */
+    /* A lone strip of the overhang, clamped at one end, sinks by q l^4/(8 D), l = 0.4 of the radius: a plate
+     * that goes round is near that, the less it contracts the more. */
     ck_assert_double_eq_tol(find("cusick_stiff")->expected(0), pow(0.4, 4) / 8, 0.25 * pow(0.4, 4) / 8);
 }
 END_TEST

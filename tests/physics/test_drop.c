@@ -333,9 +333,9 @@ START_TEST(a_fold_never_crosses_itself)
 }
 END_TEST
 
-/* A sheet on one that is held, on a slope of tan a = 0.3: with mu = 0.6 it creeps at most at 0.3 eps once it has
- * settled, within the millimetres of its fall onto the other's edges; with 0 it slides up to g sin a t^2/2 and be's
- * h/t = 5 %, less what be takes of it where edges ride over edges: less than half. */
+/* A sheet on one that is held, on a slope of tan a = 0.3: with mu = 0.6 it creeps at most at 0.3 eps once it
+ * has settled, within the millimetres of its fall onto the other's edges; with 0 it slides up to g sin a
+ * t^2/2 and be's h/t = 5 %, less what be takes of it where edges ride over edges: less than half. */
 START_TEST(friction_holds_layers)
 {
     const double t = 0.2, slope = 0.3, fall = 9.81 / hypot(1, slope);
@@ -371,7 +371,8 @@ START_TEST(friction_holds_layers)
 }
 END_TEST
 
-/* Layers are no volumes: what starts below the plane's surface is told as it stands, in both signs of the depth. */
+/* Layers are no volumes: what starts below the plane's surface is told as it stands, in both signs of the
+ * depth. */
 START_TEST(what_is_inside_a_collider_is_told)
 {
     static const double heights[] = {0.02, -0.01};

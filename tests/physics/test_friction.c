@@ -1,8 +1,8 @@
 /*
- * test_friction.c: Coulomb's law against closed forms. A sheet on a plane has the same pressure everywhere, so
- * that it moves as one body: it sticks or slides, creeps as the smoothing says, stops where the integrator's
- * own recurrence says, is carried along by what moves under it. A strip over a post shows exp(mu angle). The
- * energy audit tells the work of friction and of moving colliders.
+ * test_friction.c: Coulomb's law against closed forms. A sheet on a plane has the same pressure everywhere,
+ * so that it moves as one body: it sticks or slides, creeps as the smoothing says, stops where the
+ * integrator's own recurrence says, is carried along by what moves under it. A strip over a post shows exp(mu
+ * angle). The energy audit tells the work of friction and of moving colliders.
  */
 #include "contact/barrier.h"
 #include "support/scene.h"
@@ -24,8 +24,8 @@ typedef struct sliding {
     const char *contact, *collider; /* more settings, each after a comma */
 } sliding;
 
-/* The gap at which the barrier carries the weight: -K A b'(s) = m g cos a, the same for all nodes, for mass and
- * share of contact both go by area. b' rises from -inf.. to 0 at s = 1. */
+/* The gap at which the barrier carries the weight: -K A b'(s) = m g cos a, the same for all nodes, for mass
+ * and share of contact both go by area. b' rises from -inf.. to 0 at s = 1. */
 static double resting_gap(const drape_model *m, double g)
 {
     const double wanted = SIGMA * g / m->contact.stiffness;
@@ -156,9 +156,9 @@ END_TEST
 
 /* ---- How far it slides ---- */
 
-/* x_n of the rows for x'' = -a from v0. be: v0 t - a h^2 n (n + 1)/2. bdf2 is exact on parabolas, but its first
- * step is be's: e_1 = -a h^2/2 and e_{n+1} = (4 e_n - e_{n-1})/3, so e_n = 3/2 e_1 (1 - 3^-n). The others are
- * exact on parabolas. */
+/* x_n of the rows for x'' = -a from v0. be: v0 t - a h^2 n (n + 1)/2. bdf2 is exact on parabolas, but its
+ * first step is be's: e_1 = -a h^2/2 and e_{n+1} = (4 e_n - e_{n-1})/3, so e_n = 3/2 e_1 (1 - 3^-n). The
+ * others are exact on parabolas. */
 static double way_in(const char *row, double v0, double a, double h, int n)
 {
     const double t = n * h, exact = v0 * t - a * t * t / 2;
@@ -187,7 +187,8 @@ START_TEST(slides_as_far_as_it_should)
                    p.contact, got, wanted, got / wanted - 1, e.dissipated, e.numerical);
             ck_assert_int_eq(did.steps_rejected, 0);
             assert_below(fabs(got / wanted - 1), 1e-5);
-            /* mu m g s, exactly in step methods; by the trapezoidal rule, of a force that is constant, in ida */
+            /* mu m g s, exactly in step methods; by the trapezoidal rule, of a force that is constant, in
+             * ida */
             assert_below(fabs(e.dissipated / (p.mu * m * GRAVITY * got) - 1), 1e-5);
             /* be takes m |dv|^2/2 a step itself, midpoint nothing */
             const double own = strcmp(p.row, "be") == 0 ? n * m * a * a * p.dt * p.dt / 2 : 0;
@@ -200,9 +201,9 @@ END_TEST
 
 /* ---- Moving colliders ---- */
 
-/* A plate that starts to move at U carries the sheet along: both have slid m U^2/(2 mu m g) on each other when
- * they have one velocity, and then nothing but the decay of the smoothing is left, at most 0.66 a step of
- * midpoint. The plate's work is m U^2, half of it heat: midpoint's audit has it but for the step in which
+/* A plate that starts to move at U carries the sheet along: both have slid m U^2/(2 mu m g) on each other
+ * when they have one velocity, and then nothing but the decay of the smoothing is left, at most 0.66 a step
+ * of midpoint. The plate's work is m U^2, half of it heat: midpoint's audit has it but for the step in which
  * sliding ends, which may slide by a h too far or not far enough: (a h/U)^2. */
 START_TEST(a_plate_carries_the_sheet)
 {
@@ -230,8 +231,9 @@ START_TEST(a_plate_carries_the_sheet)
 }
 END_TEST
 
-/* A plate that rises at U under the sheet kicks it and does work on it: mostly m g U t. Midpoint's own part is
- * its error in the energy of the barrier, whose frequency w = 1e3/s makes (w h)^2/24 of the kick's m (2 U)^2/2. */
+/* A plate that rises at U under the sheet kicks it and does work on it: mostly m g U t. Midpoint's own part
+ * is its error in the energy of the barrier, whose frequency w = 1e3/s makes (w h)^2/24 of the kick's m (2
+ * U)^2/2. */
 START_TEST(a_rising_plate_does_work)
 {
     for (size_t k = 0; k < ROWS; k++) {
@@ -299,12 +301,13 @@ static double pull_at(scene *s, int32_t first)
     return g[3 * first + 1] + g[3 * first + 3 + 1];
 }
 
-/* Pulled slowly at one end, all of it slides towards that end, faster than eps. A node that turns by 2 b = pi/48
- * between tensions at the angle b with its tangent has T2/T1 = (1 + mu tan b)/(1 - mu tan b), which is
- * exp(2 mu b) but for a share 2 mu b (1 + mu^2) b^2/3: mu pi b^2 (1 + mu^2)/3 = 4e-4 in all. At the ends of the
- * arc a node turns by anything from 0 to 2 b, on one side of its normal: cos 2 b, 2 b^2 = 2e-3 each. The legs
- * come in from REACH further out than the strip lies, an angle of REACH/leg = 2e-3 each, mu times that. Lagged
- * friction is that of pressures one step ago, which have grown with the time since, but for a tenth: by h/t. */
+/* Pulled slowly at one end, all of it slides towards that end, faster than eps. A node that turns by 2 b =
+ * pi/48 between tensions at the angle b with its tangent has T2/T1 = (1 + mu tan b)/(1 - mu tan b), which is
+ * exp(2 mu b) but for a share 2 mu b (1 + mu^2) b^2/3: mu pi b^2 (1 + mu^2)/3 = 4e-4 in all. At the ends of
+ * the arc a node turns by anything from 0 to 2 b, on one side of its normal: cos 2 b, 2 b^2 = 2e-3 each. The
+ * legs come in from REACH further out than the strip lies, an angle of REACH/leg = 2e-3 each, mu times that.
+ * Lagged friction is that of pressures one step ago, which have grown with the time since, but for a tenth:
+ * by h/t. */
 START_TEST(a_capstan_holds_by_its_angle)
 {
     static const double mus[] = {0.1, 0.3, 0.5};

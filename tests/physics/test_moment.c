@@ -1,4 +1,5 @@
-/* test_moment.c: the potential of load.moment against quaternions, and a strip that it winds up to a circle. */
+/* test_moment.c: the potential of load.moment against quaternions, and a strip that it winds up to a
+ * circle. */
 #include "support/scene.h"
 
 #define PI     3.14159265358979323846
@@ -34,8 +35,9 @@ static void turn(const double q[4], const double *x, double *out)
     out[2] = x[2] + 2 * (q[0] * a[1] - q[1] * a[0]);
 }
 
-/* Turned as a whole about any direction by any angle below pi, a sheet has M L 2 atan2(q . e0, q_w) of it, and no other energy:
- * positions of size 1 and unit vectors of triangles of size 0.4 are known to a few roundings. */
+/* Turned as a whole about any direction by any angle below pi, a sheet has M L 2 atan2(q . e0, q_w) of it,
+ * and no other energy: positions of size 1 and unit vectors of triangles of size 0.4 are known to a few
+ * roundings. */
 START_TEST(the_potential_is_the_twist_of_the_quaternion)
 {
     static const double ways[][3] = {{0, 0, 1},     {0, 0, -1},       {1, 0, 0},
@@ -67,9 +69,9 @@ START_TEST(the_potential_is_the_twist_of_the_quaternion)
 }
 END_TEST
 
-/* 2 pi B/L winds a strip up to a full circle, whose end is at its clamp, and there it is stable in space. With edges of a =
- * L/20 the curvature is off by (kappa a)^2/8 at most, where a triangle is the chord of its arc: the end by 2 pi times that of the
- * radius L/2 pi. */
+/* 2 pi B/L winds a strip up to a full circle, whose end is at its clamp, and there it is stable in space.
+ * With edges of a = L/20 the curvature is off by (kappa a)^2/8 at most, where a triangle is the chord of its
+ * arc: the end by 2 pi times that of the radius L/2 pi. */
 START_TEST(a_strip_is_wound_up_to_a_circle)
 {
     const double rigidity = 1e-4, edge = 1.0 / 20;

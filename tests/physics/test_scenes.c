@@ -1,7 +1,8 @@
 /*
- * test_scenes.c: every scene of examples/scenes runs: the beginning of each, coarser than it is where its mesh is
- * a grid, ends "ok"; nothing lies in a collider and no edge passes through a triangle, neither at the ends of steps nor at
- * frames. A scene that is not in the table runs as it is for a tenth of a second, so that none is forgotten.
+ * test_scenes.c: every scene of examples/scenes runs: the beginning of each, coarser than it is where its
+ * mesh is a grid, ends "ok"; nothing lies in a collider and no edge passes through a triangle, neither at the
+ * ends of steps nor at frames. A scene that is not in the table runs as it is for a tenth of a second, so
+ * that none is forgotten.
  */
 #include <dirent.h>
 
@@ -98,7 +99,8 @@ static scene load(const beginning *b)
     return s;
 }
 
-/* 1e-9 m is what the check of a step allows; the samples of faces are rounded at 1e-16 of coordinates of 1 m. */
+/* 1e-9 m is what the check of a step allows; the samples of faces are rounded at 1e-16 of coordinates of 1
+ * m. */
 static void check_kept(const beginning *b, const audit_worst *worst)
 {
     const double allowed = 1e-9 + 1e-15;
@@ -151,8 +153,8 @@ END_TEST
     "[[0,[0,0,0]],[0.12,[-0.05,0.25,0]],[0.25,[-0.25,0.42,0]],[0.38,[-0.5,0.42,0]],[0.55,[-0.72,0.15,0]],"   \
     "[0.65,[-0.78,0.022,0]]]"
 
-/* A square sheet folded onto itself and one that crumples, 20 points a side, at CS184's thickness and a tenth of it.
- * bench/results/folds.csv has 50, and the fold at 80. */
+/* A square sheet folded onto itself and one that crumples, 20 points a side, at CS184's thickness and a tenth
+ * of it. bench/results/folds.csv has 50, and the fold at 80. */
 START_TEST(no_edge_passes_a_triangle)
 {
     static const beginning folds[] = {

@@ -1,11 +1,11 @@
 /*
- * test_seed.c: the scenes of CS184 and Boson as their programs run them: the headline figures of a build of each
- * (docs/seed_systems.md), and where they fail.
+ * test_seed.c: the scenes of CS184 and Boson as their programs run them: the headline figures of a build of
+ * each (docs/seed_systems.md), and where they fail.
  *
- * What that build leaves open moves the figures: its order of springs in the pass of the limit, what its hash of
- * boxes collects beside a point's own, float or double. The tolerances are twice the difference that the order of
- * springs alone makes here, which is far below what a wrong rule does: without the pass strains are 20 % at 30
- * substeps, without damping the kinetic energy is 200 J.
+ * What that build leaves open moves the figures: its order of springs in the pass of the limit, what its hash
+ * of boxes collects beside a point's own, float or double. The tolerances are twice the difference that the
+ * order of springs alone makes here, which is far below what a wrong rule does: without the pass strains are
+ * 20 % at 30 substeps, without damping the kinetic energy is 200 J.
  */
 #include "support/scene.h"
 
@@ -76,7 +76,8 @@ START_TEST(pinned2_after_three_seconds)
 }
 END_TEST
 
-/* Theirs: frame 14; the limit of strains feeds what grows, so that the frame is that of chance within some. */
+/* Theirs: frame 14; the limit of strains feeds what grows, so that the frame is that of chance within
+ * some. */
 START_TEST(pinned2_blows_up_at_two_substeps)
 {
     scene s = load("cs184_pinned2", "/integrator/substeps", "2");

@@ -84,8 +84,8 @@ START_TEST(backward_euler_takes_the_dashpot_in_step_form)
 }
 END_TEST
 
-/* Implicit midpoint, whose rate is grad q . v: for a quadratic energy and a linear dashpot energy and what was
- * dissipated add up to what there was, but for what residuals of r do over the way of the nodes. */
+/* Implicit midpoint, whose rate is grad q . v: for a quadratic energy and a linear dashpot energy and what
+ * was dissipated add up to what there was, but for what residuals of r do over the way of the nodes. */
 START_TEST(midpoint_accounts_for_every_joule)
 {
     const double tolerance = 1e-11;

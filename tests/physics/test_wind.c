@@ -1,5 +1,5 @@
-/* test_wind.c: drag.wind against closed forms: the force on a flat sheet, a sheet that falls level, one that the
- * wind takes along. */
+/* test_wind.c: drag.wind against closed forms: the force on a flat sheet, a sheet that falls level, one that
+ * the wind takes along. */
 #include "support/scene.h"
 
 #include "assemble/check.h"
@@ -66,7 +66,8 @@ static void swirl(void *user, double t, int32_t count, const double *x, double *
         }
 }
 
-/* dg/dx has what the wind changes as nodes move, dg/dv not: of both drags, of their sum in the system, and of D. */
+/* dg/dx has what the wind changes as nodes move, dg/dv not: of both drags, of their sum in the system, and of
+ * D. */
 START_TEST(derivatives_in_the_wind_of_a_host)
 {
     static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
@@ -89,11 +90,12 @@ START_TEST(derivatives_in_the_wind_of_a_host)
 END_TEST
 
 /*
- * A level sheet stays flat: the shares of weight and wind of a node are the same. Backward Euler's v1 = v0 + h (k u1 |u1| - g),
- * u = w - v, k = rho C/(2 sigma), is for the wind it meets, u1 = u0 + h g - h k u1^2, the positive root
+ * A level sheet stays flat: the shares of weight and wind of a node are the same. Backward Euler's v1 = v0 +
+ * h (k u1 |u1| - g), u = w - v, k = rho C/(2 sigma), is for the wind it meets, u1 = u0 + h g - h k u1^2, the
+ * positive root
  *     u1 = (sqrt(1 + 4 h k (u0 + h g)) - 1)/(2 h k).
- * Tolerance: a residual of 1e-12 N on the least mass, 200 * 1e-3 * 0.01/6 kg (a corner in one triangle), moves v by
- * h r/m = 3e-11 m/s a step, n = 100 of them, and u's own contraction is not counted.
+ * Tolerance: a residual of 1e-12 N on the least mass, 200 * 1e-3 * 0.01/6 kg (a corner in one triangle),
+ * moves v by h r/m = 3e-11 m/s a step, n = 100 of them, and u's own contraction is not counted.
  */
 static void fall_level(double wind, double gravity)
 {

@@ -1,12 +1,13 @@
 /*
- * soak.c: sims that are driven for long as a host drives them, frame after frame, t += 1/60, with pins and colliders moved
- * at each: whether memory grows, and whether a second run has the same bits at every mark, although it is saved and
- * restored there. `soak [--steps N] [--minutes M] [CASE...]`: each case for so many steps (default a few seconds' worth), or
- * for so long. TAP on stdout.
+ * soak.c: sims that are driven for long as a host drives them, frame after frame, t += 1/60, with pins and
+ * colliders moved at each: whether memory grows, and whether a second run has the same bits at every mark,
+ * although it is saved and restored there. `soak [--steps N] [--minutes M] [CASE...]`: each case for so many
+ * steps (default a few seconds' worth), or for so long. TAP on stdout.
  *
- * Memory is what the process has to itself, by the page (Anonymous of /proc/self/smaps_rollup, which counts them, where
- * other counters of Linux are off by up to 64 pages a thread), or what malloc has given out, and what Drape took by its
- * allocator, by the byte. Both are measured at each mark. In the first marks a case warms up: lists of contacts grow to the longest of the motion.
+ * Memory is what the process has to itself, by the page (Anonymous of /proc/self/smaps_rollup, which counts
+ * them, where other counters of Linux are off by up to 64 pages a thread), or what malloc has given out, and
+ * what Drape took by its allocator, by the byte. Both are measured at each mark. In the first marks a case
+ * warms up: lists of contacts grow to the longest of the motion.
  */
 #include <fcntl.h>
 #include <inttypes.h>
@@ -30,8 +31,9 @@
 #define FRAME      (1.0 / 60) /* [s] */
 #define PERIOD     240        /* frames of the host's motion */
 #define MOST_MARKS 65536
-/* [bytes] A piece of malloc may be larger than asked for by a rest that is too small to be one, below 32 bytes: some hundred pieces
- * of a sim. What is lost at each restore, 16 bytes at least, is more after 256 of them. */
+/* [bytes] A piece of malloc may be larger than asked for by a rest that is too small to be one, below 32
+ * bytes: some hundred pieces of a sim. What is lost at each restore, 16 bytes at least, is more after 256 of
+ * them. */
 #define HEAP_SLACK  4096
 #define SHORT_MARKS 12 /* after the warm ones, when nothing is said */
 
@@ -143,7 +145,8 @@ static int64_t count_heap(void)
 #endif
 }
 
-/* A sim that is made anew again and again leaves gaps, which malloc fills in its own time: there the pages say nothing. */
+/* A sim that is made anew again and again leaves gaps, which malloc fills in its own time: there the pages
+ * say nothing. */
 static memory measure(bool restart)
 {
     return (memory){.own = own, .all = restart ? count_heap() : count_pages()};
@@ -208,7 +211,8 @@ static drape_status save_and_restore(drape_sim *sim)
     return status ? status : drape_sim_restore_from(sim, saved, saved_size);
 }
 
-/* To where the host's motion has them at the end of this frame: to and fro on a sine, counted within its period. */
+/* To where the host's motion has them at the end of this frame: to and fro on a sine, counted within its
+ * period. */
 static drape_status move(const soak *c, drape_sim *sim, int64_t frame)
 {
     const drape_model *model = drape_sim_model(sim);

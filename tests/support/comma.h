@@ -1,6 +1,6 @@
 /*
- * comma.h: a locale whose numbers have a decimal comma. Where none is installed it is made, by localedef out of Debian's
- * package locales, into a folder of its own.
+ * comma.h: a locale whose numbers have a decimal comma. Where none is installed it is made, by localedef out
+ * of Debian's package locales, into a folder of its own.
  */
 #ifndef DRAPE_TESTS_COMMA_H
 #define DRAPE_TESTS_COMMA_H

@@ -1,8 +1,8 @@
 /*
  * ida_full.h: IDA without Drape's reduction, to compare with: the system of 2 n unknowns as it stands,
  *     y = (x, v),  F = [x' - v ; M v' + g(x, v)],  dF/dy + c_j dF/dy' = [c_j I, -I ; K, D + c_j M],
- * in SUNDIALS' own sparse matrix, factored by SUNDIALS' own KLU. IDA is set as src/integrators/ida.c sets
- * it, with the same test of convergence, so in exact arithmetic both take the same steps. Pins must stand still.
+ * in SUNDIALS' own sparse matrix, factored by SUNDIALS' own KLU. IDA is set as src/integrators/ida.c sets it,
+ * with the same test of convergence, so in exact arithmetic both take the same steps. Pins must stand still.
  *
  * SUNDIALS clears a sparse matrix before every Jacobian, indices too. The Jacobian here writes every value
  * and no index, so the matrix's zero is made to do nothing.

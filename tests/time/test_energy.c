@@ -208,12 +208,12 @@ static drape_status note_swing(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* Springs 600 times as stiff as those of CS184's sheet, undamped, let go level: every row steps over the fastest
- * waves, w h = 8 (ida) to 400, or half resolves them. A run that ends well has at no time gained more than its
- * row may, as a share of what there was to live on: the fall of gravity and 1/2 m g L. On top of it there may be
- * the 1e-6 that a step is not judged for, 3600 times at most. ida ended such runs with twice the energy of their
- * start, when it went by contraction rates of long ago; it took three times the steps for it, and two of its
- * steps had to be refused. */
+/* Springs 600 times as stiff as those of CS184's sheet, undamped, let go level: every row steps over the
+ * fastest waves, w h = 8 (ida) to 400, or half resolves them. A run that ends well has at no time gained more
+ * than its row may, as a share of what there was to live on: the fall of gravity and 1/2 m g L. On top of it
+ * there may be the 1e-6 that a step is not judged for, 3600 times at most. ida ended such runs with twice the
+ * energy of their start, when it went by contraction rates of long ago; it took three times the steps for it,
+ * and two of its steps had to be refused. */
 START_TEST(no_row_that_ends_well_has_gained_energy_from_stiff_springs)
 {
     int well = 0;

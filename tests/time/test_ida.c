@@ -500,7 +500,8 @@ END_TEST
 
 /* ---- The matrix of a correction ---- */
 
-/* A sheet that slides over the top of a ball, with dashpots and friction, which make the matrix not symmetric. */
+/* A sheet that slides over the top of a ball, with dashpots and friction, which make the matrix not
+ * symmetric. */
 static scene sliding(const char *matrix, double rtol)
 {
     return scene_open(
@@ -516,8 +517,8 @@ static scene sliding(const char *matrix, double rtol)
         rtol, matrix);
 }
 
-/* The equations are the same, whatever the matrix: so is the error, to what one sequence of steps may differ from
- * another, a factor of 2. Work: the symmetric part loses no more than a quarter of the iterations. */
+/* The equations are the same, whatever the matrix: so is the error, to what one sequence of steps may differ
+ * from another, a factor of 2. Work: the symmetric part loses no more than a quarter of the iterations. */
 START_TEST(half_of_the_matrix_does_as_well)
 {
     scene reference = sliding("exact", 1e-7), exact = sliding("exact", 1e-4),

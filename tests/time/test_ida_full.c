@@ -4,12 +4,12 @@
  *
  * In exact arithmetic both are the same, step by step. What is left is round-off: a Newton correction d of
  * the order of the tolerance is solved to DBL_EPSILON times a condition number of 1 + (w h)^2 < 1e5: below
- * 1e-13 m for d < 1e-2 m. Between the steps it grows: IDA makes one correction a step with old factors
- * where that is within its tolerance, and what the old factors do not reach grows by some factor a step
- * until new ones come. With dashpots, whose matrix turns with the sheet, that factor reaches 5, and
- * round-off can grow as far as the tolerance of the run. Hence short runs, weak dashpots and a tolerance
- * that keeps the factors young. The matrix is the exact one, as a part of it would be another iteration. 1e-10 m leaves room for a thousandfold growth; velocities are faster by
- * the 1e2/s of the stiffest wave that the steps resolve.
+ * 1e-13 m for d < 1e-2 m. Between the steps it grows: IDA makes one correction a step with old factors where
+ * that is within its tolerance, and what the old factors do not reach grows by some factor a step until new
+ * ones come. With dashpots, whose matrix turns with the sheet, that factor reaches 5, and round-off can grow
+ * as far as the tolerance of the run. Hence short runs, weak dashpots and a tolerance that keeps the factors
+ * young. The matrix is the exact one, as a part of it would be another iteration. 1e-10 m leaves room for a
+ * thousandfold growth; velocities are faster by the 1e2/s of the stiffest wave that the steps resolve.
  */
 #include "solvers/linear.h"
 #include "support/ida_full.h"
@@ -80,8 +80,8 @@ START_TEST(the_reduced_system_gives_the_trajectory_of_the_full_one)
 }
 END_TEST
 
-/* Dashpots in continuous time make K not symmetric, which a solver of symmetric matrices has to notice. D is in
- * the reduced matrix, in its right-hand side and in both blocks of the full one. */
+/* Dashpots in continuous time make K not symmetric, which a solver of symmetric matrices has to notice. D is
+ * in the reduced matrix, in its right-hand side and in both blocks of the full one. */
 START_TEST(so_it_does_with_damping)
 {
     const char *terms =

@@ -222,10 +222,10 @@ static drape_sim_def controlled(const char *row, const drape_setting *settings, 
 }
 
 /* Local errors are held to rtol: steps go with rtol^(1/(p+1)), the error at a time with rtol^(p/(p+1)): a
- * decade of rtol gains 10^(1/2) in order 1 and 10^(2/3) in order 2. Over the three decades one quarter of
- * the exponent is left for the start, where the first steps are of another size than they will be. A row with a
- * stability limit has substeps where the error would let a step be larger, and with them errors far below: it is
- * held to this over the last decade, where a step is one. */
+ * decade of rtol gains 10^(1/2) in order 1 and 10^(2/3) in order 2. Over the three decades one quarter of the
+ * exponent is left for the start, where the first steps are of another size than they will be. A row with a
+ * stability limit has substeps where the error would let a step be larger, and with them errors far below: it
+ * is held to this over the last decade, where a step is one. */
 START_TEST(error_falls_with_the_controllers_rtol)
 {
     double *reference = converged(DASHPOTS, HUNG);

@@ -1,8 +1,8 @@
 /*
  * test_realtime.c: the rung for real time, and the advance with a budget.
  *
- * A second that a clock measures is no ground for a test: budgets here are either never reached (an hour) or never
- * kept (a nanosecond), and what lies between is for the bench.
+ * A second that a clock measures is no ground for a test: budgets here are either never reached (an hour) or
+ * never kept (a nanosecond), and what lies between is for the bench.
  */
 #include "support/scene.h"
 
@@ -36,9 +36,10 @@ static drape_realtime advance(scene *s, double frame, double budget)
 
 /* ---- The rung ---- */
 
-/* One and two iterations against the converged step, on a sheet that falls by half a metre: the errors of one step are those of
- * Newton's second iterate, quadratic in the guess's h^2 dv/2 ~ 1 mm, and of conjugate gradients to a tenth; 2 % of the
- * way is a bound with room, the goal of the bench. Two are better by more than half. */
+/* One and two iterations against the converged step, on a sheet that falls by half a metre: the errors of one
+ * step are those of Newton's second iterate, quadratic in the guess's h^2 dv/2 ~ 1 mm, and of conjugate
+ * gradients to a tenth; 2 % of the way is a bound with room, the goal of the bench. Two are better by more
+ * than half. */
 START_TEST(few_iterations_are_near_the_converged_step)
 {
     scene exact = scene_open(HUNG, "", "be", "");
@@ -59,8 +60,8 @@ START_TEST(few_iterations_are_near_the_converged_step)
 }
 END_TEST
 
-/* With enough iterations and digits it is backward Euler: both are within their residuals of the same equations, for
- * which a residual of 1e-9 N a node moves it by h^2 F/m = 2.8e-4 x 1e-9/8e-4 m a step. */
+/* With enough iterations and digits it is backward Euler: both are within their residuals of the same
+ * equations, for which a residual of 1e-9 N a node moves it by h^2 F/m = 2.8e-4 x 1e-9/8e-4 m a step. */
 START_TEST(with_many_iterations_it_is_backward_euler)
 {
     scene exact = scene_open(HUNG, "", "be", ", 'tolerance': 1e-9");
@@ -76,7 +77,8 @@ START_TEST(with_many_iterations_it_is_backward_euler)
 }
 END_TEST
 
-/* Contact, friction, damping and drag belong to it: a damped sheet with drag falls onto a sphere and stays on it. */
+/* Contact, friction, damping and drag belong to it: a damped sheet with drag falls onto a sphere and stays on
+ * it. */
 START_TEST(contact_and_damping_are_in_it)
 {
     scene s = scene_open(
@@ -118,9 +120,9 @@ static scene at_rate(const char *terms, const char *more, double rate, double en
     return s;
 }
 
-/* At 30 Hz a frame is two steps of dt, so nothing at all changes; at 120 Hz one of dt/2. Backward Euler is of first
- * order: the state at rate r is off by C/r, so 60 and 120 Hz differ by half of what a step of 1/30 and 1/60 do, up to
- * second order, for which there is a quarter. */
+/* At 30 Hz a frame is two steps of dt, so nothing at all changes; at 120 Hz one of dt/2. Backward Euler is of
+ * first order: the state at rate r is off by C/r, so 60 and 120 Hz differ by half of what a step of 1/30 and
+ * 1/60 do, up to second order, for which there is a quarter. */
 START_TEST(frame_rates_differ_by_the_order_of_the_method)
 {
     const char *damping =
@@ -139,10 +141,10 @@ START_TEST(frame_rates_differ_by_the_order_of_the_method)
 }
 END_TEST
 
-/* What does not move knows no steps: heavily damped, the sheet comes to hang the same at 30, 60 and 120 Hz. What is
- * left of its motion after 3 s falls as exp(-t c/2m) with c/m = 5/0.2 per second or faster: below rounding. The
- * slowest way to rest is overdamped sideways swinging, g/L m/c = 0.4/s, from some mm: stiffness and drag are told by
- * the lowest node. Its height differs by the square of that. */
+/* What does not move knows no steps: heavily damped, the sheet comes to hang the same at 30, 60 and 120 Hz.
+ * What is left of its motion after 3 s falls as exp(-t c/2m) with c/m = 5/0.2 per second or faster: below
+ * rounding. The slowest way to rest is overdamped sideways swinging, g/L m/c = 0.4/s, from some mm: stiffness
+ * and drag are told by the lowest node. Its height differs by the square of that. */
 START_TEST(what_rests_does_not_know_the_frame_rate)
 {
     double lowest[3];
@@ -159,9 +161,9 @@ END_TEST
 
 /* ---- Budgets ---- */
 
-/* A budget that nothing fits into: steps grow to the longest, of which there is at most one a call; what is owed stays
- * below it, and the rest is dropped. Then there is time again: within a few frames the rung is the full one and nothing
- * is owed. */
+/* A budget that nothing fits into: steps grow to the longest, of which there is at most one a call; what is
+ * owed stays below it, and the rest is dropped. Then there is time again: within a few frames the rung is the
+ * full one and nothing is owed. */
 START_TEST(it_degrades_and_recovers)
 {
     scene s = scene_open(HUNG, "", "newton_k", "");
@@ -204,8 +206,8 @@ START_TEST(one_late_frame_is_made_up_for)
 }
 END_TEST
 
-/* Rows that choose their own steps, and rows without efforts, keep the same promise; a plain advance goes on with the
- * scene's own steps. */
+/* Rows that choose their own steps, and rows without efforts, keep the same promise; a plain advance goes on
+ * with the scene's own steps. */
 START_TEST(every_row_with_a_time_takes_frames)
 {
     for (int i = 0; drape_integrators[i]; i++) {

@@ -1,4 +1,5 @@
-/* test_approx_jacobian.c: the coarse space, conjugate gradients, and the matrix that stands for a Jacobian. */
+/* test_approx_jacobian.c: the coarse space, conjugate gradients, and the matrix that stands for a
+ * Jacobian. */
 #include "entries/models.h"
 #include "nonlinear/approx_jacobian.h"
 #include "solvers/pcg.h"
@@ -223,7 +224,8 @@ static void close_state(state *q)
     scene_close(&q->s);
 }
 
-/* Largest |A x - (m_w M + J+) x| over the largest of either, for a random x along `direction` alone, or any. */
+/* Largest |A x - (m_w M + J+) x| over the largest of either, for a random x along `direction` alone, or
+ * any. */
 static double mismatch(state *q, double mass_weight, const double *direction)
 {
     const drape_model *m = q->s.model;
@@ -274,9 +276,9 @@ START_TEST(across_a_flat_sheet_bending_is_exact)
 }
 END_TEST
 
-/* Symmetric and positive: x'Ay = y'Ax, x'Ax > 0. And solved in iterations that do not grow with the sheet: the
- * condition of M/h2 + K here is 8 E h h2/m = 8 x 1000/(3600 x 0.2/side^2), 1e4 at side 31, for which plain conjugate
- * gradients take hundreds. */
+/* Symmetric and positive: x'Ay = y'Ax, x'Ax > 0. And solved in iterations that do not grow with the sheet:
+ * the condition of M/h2 + K here is 8 E h h2/m = 8 x 1000/(3600 x 0.2/side^2), 1e4 at side 31, for which
+ * plain conjugate gradients take hundreds. */
 START_TEST(it_is_solved_in_few_iterations_at_any_size)
 {
     for (int side = 11; side <= 31; side += 10) {

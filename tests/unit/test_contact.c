@@ -233,8 +233,8 @@ START_TEST(test_barrier)
 }
 END_TEST
 
-/* On a path that is called free the gap never falls below what is to be kept; a path that is not free is cut before
- * the gap is gone and after most of it is. */
+/* On a path that is called free the gap never falls below what is to be kept; a path that is not free is cut
+ * before the gap is gone and after most of it is. */
 START_TEST(test_step_fraction)
 {
     uint64_t seed = 11;

@@ -17,8 +17,8 @@ static const char sheet[] =
     " 'terms': ['stretch.edge', 'bend.hinge']%s}],"
     " 'gravity': [0, 0, 0], 'integrator': {'method': '%s', 'dt': 0.002, 'tolerance': 1e-10}, 'duration': 1}";
 
-/* The spring adds k (x - target) to g of its node and k to the diagonal of its block, and nothing elsewhere: both are
- * differences of sums that are equal but for one addition, so to the rounding of the larger. */
+/* The spring adds k (x - target) to g of its node and k to the diagonal of its block, and nothing elsewhere:
+ * both are differences of sums that are equal but for one addition, so to the rounding of the larger. */
 START_TEST(force_and_jacobian_are_those_of_a_spring)
 {
     scene h = scene_open(sheet, "", "be");
@@ -56,8 +56,8 @@ START_TEST(force_and_jacobian_are_those_of_a_spring)
 }
 END_TEST
 
-/* Inner forces sum to nothing: after one step of backward Euler from rest the momentum is h times the spring's force
- * at its end, to the residual that is left, at most 1e-10 N in each of 16 nodes. */
+/* Inner forces sum to nothing: after one step of backward Euler from rest the momentum is h times the
+ * spring's force at its end, to the residual that is left, at most 1e-10 N in each of 16 nodes. */
 START_TEST(a_free_sheet_takes_the_spring_s_momentum)
 {
     scene h = scene_open(sheet, "", "be");
@@ -76,8 +76,8 @@ START_TEST(a_free_sheet_takes_the_spring_s_momentum)
 }
 END_TEST
 
-/* What the spring is set to is the host's work: the energy that is missing does not change, and the elastic one is
- * the spring's, to the rounding of a few joules. */
+/* What the spring is set to is the host's work: the energy that is missing does not change, and the elastic
+ * one is the spring's, to the rounding of a few joules. */
 START_TEST(its_work_is_booked)
 {
     scene h = scene_open(sheet, "", "be");
@@ -100,8 +100,8 @@ START_TEST(its_work_is_booked)
 }
 END_TEST
 
-/* Under every row that moves in time the node comes nearer; and a fixed corner, a wrong number and a wrong value are
- * refused without a change. */
+/* Under every row that moves in time the node comes nearer; and a fixed corner, a wrong number and a wrong
+ * value are refused without a change. */
 START_TEST(every_integrator_follows)
 {
     for (int i = 0; drape_integrators[i]; i++) {

@@ -8,8 +8,8 @@
     " 'density': 200}, 'terms': [%s], 'pins': [{'corner': 'top-left'}]}], 'gravity': [0, %g, 0],"            \
     " 'integrator': {'dt': 0.01, 'tolerance': 1e-9}, 'duration': 1, 'frame_rate': %g}"
 
-/* x = rest + G rest with a G of rank 3: its principal strains in the plane of the sheet, from the stretches of its
- * two sides, which are orthogonal at rest. */
+/* x = rest + G rest with a G of rank 3: its principal strains in the plane of the sheet, from the stretches
+ * of its two sides, which are orthogonal at rest. */
 START_TEST(strain_is_that_of_the_deformation)
 {
     const double G[3][3] = {{0.11, -0.23, 0.05}, {0.31, 0.07, -0.19}, {-0.13, 0.29, 0.17}};
@@ -51,8 +51,8 @@ START_TEST(strain_is_that_of_the_deformation)
 }
 END_TEST
 
-/* Elements of two and of four nodes, a law, and a barrier. Sums of positive numbers in another order: some nodes
- * times the rounding. */
+/* Elements of two and of four nodes, a law, and a barrier. Sums of positive numbers in another order: some
+ * nodes times the rounding. */
 START_TEST(energy_density_adds_up_to_the_elastic_energy)
 {
     static const char *const terms[] = {
@@ -82,7 +82,8 @@ typedef struct falling {
     int frames, between;
 } falling;
 
-/* Backward Euler's velocity in a fall is g t at every step, so that between steps the linear mix is g t, too. */
+/* Backward Euler's velocity in a fall is g t at every step, so that between steps the linear mix is g t,
+ * too. */
 static drape_status check_fall(void *user, const drape_event *event)
 {
     falling *f = user;

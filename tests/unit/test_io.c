@@ -836,7 +836,8 @@ START_TEST(full_disk_leaves_a_valid_glb)
 }
 END_TEST
 
-/* Frames of the model at rest until one fails, on a disk that takes files of `size` bytes; how many were good. */
+/* Frames of the model at rest until one fails, on a disk that takes files of `size` bytes; how many were
+ * good. */
 static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
 {
     static double field[NODES * 3];

@@ -1,4 +1,5 @@
-/* test_lab.c: what experiments measure with: lines through powers, material points on other meshes, distances. */
+/* test_lab.c: what experiments measure with: lines through powers, material points on other meshes,
+ * distances. */
 #include "lab/statistics.h"
 #include "lab/text.h"
 #include "lab/trace.h"
@@ -56,8 +57,9 @@ START_TEST(a_power_is_found_exactly)
 }
 END_TEST
 
-/* Residuals in logarithms of +d, -2d, +d at abscissae -1, 0, 1 (times log 2): slope as without them; its standard
- * error is sqrt(6 d^2/1 / (2 log(2)^2)), and Student's t for one degree of freedom at 97.5 % is 12.7062. */
+/* Residuals in logarithms of +d, -2d, +d at abscissae -1, 0, 1 (times log 2): slope as without them; its
+ * standard error is sqrt(6 d^2/1 / (2 log(2)^2)), and Student's t for one degree of freedom at 97.5 % is
+ * 12.7062. */
 START_TEST(confidence_is_students)
 {
     const double d = 1e-3, x[] = {0.5, 1, 2}, y[] = {0.5 * exp(d), exp(-2 * d), 2 * exp(d)};
@@ -70,8 +72,8 @@ START_TEST(confidence_is_students)
 }
 END_TEST
 
-/* A field that is linear in the rest positions is linear in every triangle: taken at another mesh's nodes it is exact,
- * whichever triangle a point on an edge is given to. */
+/* A field that is linear in the rest positions is linear in every triangle: taken at another mesh's nodes it
+ * is exact, whichever triangle a point on an edge is given to. */
 START_TEST(a_linear_field_is_taken_exactly)
 {
     drape_context *ctx = new_context();

@@ -289,8 +289,8 @@ static double twice_area(const drape_mesh *mesh, int32_t t)
     return (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2]);
 }
 
-/* Its triangles all look up, and fill what lies between the polygons of its two rims; it is closed, so V - E + F = 0
- * and the rims alone are boundary. */
+/* Its triangles all look up, and fill what lies between the polygons of its two rims; it is closed, so V - E
+ * + F = 0 and the rims alone are boundary. */
 START_TEST(annuli)
 {
     enum { ROWS = 4, SPOKES = 7 };

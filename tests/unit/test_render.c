@@ -1,4 +1,5 @@
-/* test_render.c: what is computed before anything is drawn: surfaces, colours, letters, the camera, frames. */
+/* test_render.c: what is computed before anything is drawn: surfaces, colours, letters, the camera,
+ * frames. */
 #include "render/body.h"
 #include "render/camera.h"
 #include "render/font.h"
@@ -26,8 +27,8 @@ static const char colliders[] =
     " {'type': 'cylinder', 'a': [0, 7, 0], 'b': [0.3, 7.5, 0], 'radius': 0.2},"
     " {'type': 'plane', 'point': [0, -1, 0], 'normal': [0.1, 1, 0]}]";
 
-/* Every point lies on the surface: it was brought there by Newton steps on the exact distance, and is then rounded to
- * a float of at most 8 m, 5e-7. Normals have the length 1 and look outwards. */
+/* Every point lies on the surface: it was brought there by Newton steps on the exact distance, and is then
+ * rounded to a float of at most 8 m, 5e-7. Normals have the length 1 and look outwards. */
 START_TEST(bodies_lie_on_their_surface)
 {
     scene h = scene_model(CLOTH, "", colliders);
@@ -54,8 +55,8 @@ START_TEST(bodies_lie_on_their_surface)
 }
 END_TEST
 
-/* A box's corners are found: the extremes of its points are those of the box, of half lengths .25, .15, .35 without a
- * turn, to the pull of the mean, 1 in 100 of a cell of 0.7 m / 56. */
+/* A box's corners are found: the extremes of its points are those of the box, of half lengths .25, .15, .35
+ * without a turn, to the pull of the mean, 1 in 100 of a cell of 0.7 m / 56. */
 START_TEST(corners_of_a_box_are_sharp)
 {
     scene h = scene_model(CLOTH, "",
@@ -78,9 +79,9 @@ END_TEST
 
 /* ---- Cloth ---- */
 
-/* Nodes on a sphere of radius 1, an eighth of it over the sheet: normals by area weighting are within the square of an
- * edge's angle, 0.12 rad, and curved points nearer to the sphere than the flat triangles are, whose middles lie an
- * eighth of that square inside. Nodes are drawn where they are. */
+/* Nodes on a sphere of radius 1, an eighth of it over the sheet: normals by area weighting are within the
+ * square of an edge's angle, 0.12 rad, and curved points nearer to the sphere than the flat triangles are,
+ * whose middles lie an eighth of that square inside. Nodes are drawn where they are. */
 START_TEST(cloth_is_drawn_round_through_its_nodes)
 {
     drape_skin skin;
@@ -118,8 +119,9 @@ START_TEST(cloth_is_drawn_round_through_its_nodes)
 }
 END_TEST
 
-/* Every triangle runs as its mesh's does: the normal by its corners is on the side of the smooth one. On a flat sheet
- * the texture is as long as wide, u along x, v away from the first row, seen from the front not mirrored. */
+/* Every triangle runs as its mesh's does: the normal by its corners is on the side of the smooth one. On a
+ * flat sheet the texture is as long as wide, u along x, v away from the first row, seen from the front not
+ * mirrored. */
 START_TEST(texture_is_not_mirrored)
 {
     static const char *const orientations[] = {"", ", 'orientation': 'vertical'"};
@@ -154,8 +156,8 @@ END_TEST
 
 /* ---- Colours, letters, camera ---- */
 
-/* Lightness in OKLab: the cube root of luminance comes near it (the weights of its L are all positive and sum to 1).
- * It rises in each of 256 steps, and each half of the ramp has its half of it, to a tenth. */
+/* Lightness in OKLab: the cube root of luminance comes near it (the weights of its L are all positive and sum
+ * to 1). It rises in each of 256 steps, and each half of the ramp has its half of it, to a tenth. */
 START_TEST(ramp_is_even_in_lightness)
 {
     double last = -1, middle = 0, first = 0;

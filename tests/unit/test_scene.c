@@ -661,22 +661,22 @@ START_TEST(test_colliders_and_contact)
     ck_assert_msg(read_quoted(obstacles) == DRAPE_OK, "%s", message());
     ck_assert_uint_eq(def.collider_count, 3);
     const drape_collider_def *sphere = &def.colliders[0], *box = &def.colliders[1], *mesh = &def.colliders[2];
-    ck_assert_str_eq(sphere->row.type, "sphere");
+    ck_assert_str_eq(sphere->entry.type, "sphere");
     ck_assert_ptr_null(sphere->name);
     ck_assert_double_eq(sphere->friction, 0.3);
     ck_assert_uint_eq(sphere->key_count, 0);
-    ck_assert_uint_eq(sphere->row.setting_count, 2);
-    check_numbers(&sphere->row.settings[0], "center", 3, (const double[]){0.5, 0.2, -1});
-    check_setting(&sphere->row.settings[1], "radius", 0.2, NULL);
-    ck_assert_ptr_null(sphere->row.settings[1].vector);
+    ck_assert_uint_eq(sphere->entry.setting_count, 2);
+    check_numbers(&sphere->entry.settings[0], "center", 3, (const double[]){0.5, 0.2, -1});
+    check_setting(&sphere->entry.settings[1], "radius", 0.2, NULL);
+    ck_assert_ptr_null(sphere->entry.settings[1].vector);
     ck_assert_str_eq(box->name, "step");
     ck_assert_double_eq(box->friction, 0);
-    check_setting(&box->row.settings[0], "size", 2, NULL);
-    check_numbers(&box->row.settings[1], "rotate", 4, (const double[]){0, 1, 0, 30});
+    check_setting(&box->entry.settings[0], "size", 2, NULL);
+    check_numbers(&box->entry.settings[1], "rotate", 4, (const double[]){0, 1, 0, 30});
     ck_assert_uint_eq(box->key_count, 2);
     ck_assert_double_eq(box->track[1].time, 2);
     check_vector(box->track[1].displacement, 0, 1, 0);
-    check_setting(&mesh->row.settings[0], "file", 0, "a.obj");
+    check_setting(&mesh->entry.settings[0], "file", 0, "a.obj");
     ck_assert_uint_eq(def.self_contact_count, 1);
     check_setting(&def.self_contact[0], "thickness", 0.0095, NULL);
     ck_assert_uint_eq(def.contact_count, 2);
@@ -1266,8 +1266,8 @@ static void append(void *user, const char *text, size_t size)
     strncat(user, text, size);
 }
 
-/* What is set is read, and is still so after the scene was printed and read again; a default is read where nothing
- * is set; what is out of range is refused; the key is where its pointer says. */
+/* What is set is read, and is still so after the scene was printed and read again; a default is read where
+ * nothing is set; what is out of range is refused; the key is where its pointer says. */
 static void check_key(const drape_scene_key *key, const char *pointer)
 {
     static char printed[1 << 14];

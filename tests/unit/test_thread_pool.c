@@ -1,6 +1,7 @@
 /*
- * test_crew.c: loops dealt out to threads. Every round is done once, by the function of its own loop, before the loop returns,
- * whatever the number of rounds and threads; helpers that slept come again; a caller whose helpers do not come does all.
+ * test_crew.c: loops dealt out to threads. Every round is done once, by the function of its own loop, before
+ * the loop returns, whatever the number of rounds and threads; helpers that slept come again; a caller whose
+ * helpers do not come does all.
  */
 #include "base/thread_pool.h"
 
@@ -76,8 +77,8 @@ START_TEST(every_round_is_done_once)
 }
 END_TEST
 
-/* Between two loops helpers fall asleep; the next one wakes them. A round here lasts until another thread takes
- * the other one, so that the loop would not end if none came. */
+/* Between two loops helpers fall asleep; the next one wakes them. A round here lasts until another thread
+ * takes the other one, so that the loop would not end if none came. */
 static atomic_int here;
 
 static void meet(void *user, int64_t round)
@@ -106,8 +107,9 @@ START_TEST(helpers_that_sleep_are_woken)
 }
 END_TEST
 
-/* Helpers in the middle of a round of theirs: the caller does all others meanwhile. The first round that a helper takes waits
- * for all others to be done; a team whose rounds were dealt out beforehand would never end. */
+/* Helpers in the middle of a round of theirs: the caller does all others meanwhile. The first round that a
+ * helper takes waits for all others to be done; a team whose rounds were dealt out beforehand would never
+ * end. */
 typedef struct held {
     pthread_t caller;
     atomic_int done, held;
