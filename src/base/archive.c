@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define FORMAT     1
-#define MAGIC      "DRAPE\r\n\x1a" /* text tools that change line ends break it at its beginning */
+#define MAGIC      "DRAPE\r\n\x1a" /* its line ends make text-mode transfers break it at once */
 #define MAGIC_SIZE 8
 #define HEAD       (MAGIC_SIZE + sizeof(uint32_t))
 #define TAIL       (2 * sizeof(uint64_t))
@@ -79,7 +79,7 @@ void drape_archive_write_to(drape_archive *a, drape_context *ctx, const char *na
 
 /* ---- Reading ---- */
 
-/* The text is there as far as the size says. */
+/* Checks magic, length, checksum and version of the format. */
 static drape_status check_whole(drape_archive *a, size_t size)
 {
     uint64_t length, hash;
@@ -202,7 +202,7 @@ void drape_archive_same(drape_archive *a, const char *what, int64_t value)
                            what, there, value);
 }
 
-/* ---- The end ---- */
+/* ---- End ---- */
 
 static void put_tail(drape_archive *a)
 {

@@ -1,5 +1,5 @@
-/* contact.c: what contact is made of: the scene's "contact" and "self_contact", and the scales of the scene
- * where it does not say. */
+/* contact.c: the parameters of contact, from the scene's "contact" and "self_contact", with defaults derived
+ * from the scales of the scene. */
 #include "compile/stages.h"
 
 #include <math.h>
@@ -70,7 +70,7 @@ static double track_speed(const drape_track *track)
     return most;
 }
 
-/* The speed at which the scene itself sends cloth against a collider. */
+/* The largest speed at which the scene itself can move cloth against a collider. */
 static double scene_speed(const drape_model *model)
 {
     double cloth = 0, collider = 0;
@@ -81,10 +81,11 @@ static double scene_speed(const drape_model *model)
     return cloth + collider;
 }
 
-/* sigma (2 |g| L + v^2) / d, sigma the largest areal density, L the scene's size: up to where it touches, the
- * barrier takes up 6 d of it an area (contact/barrier.h), 12 times the energy of that speed and of a fall
- * over L; what has more cannot be stopped. The cloth's own weight is at most d / (2 L) of the stiffness, so
- * that at rest it lies nearly d off. Without gravity L / s^2 stands for |g|. */
+/* sigma (2 |g| L + v^2) / d, with sigma the largest areal density and L the size of the scene. Up to the
+ * distance zero, the barrier absorbs 6 d of this per area (contact/barrier.h), which is 12 times the energy
+ * of the speed v and of a fall over L; cloth with more energy cannot be stopped. The weight of the cloth is
+ * at most d / (2 L) of the stiffness, so that at rest it lies at nearly the distance d. Without gravity, L /
+ * s^2 replaces |g|. */
 static double stiffness_of_fall(const drape_model *model)
 {
     double sigma = 0, g = norm(model->gravity), v = scene_speed(model);

@@ -1,4 +1,4 @@
-/* settings.c: "contact" and "self_contact" of a scene, as tables of one entry. */
+/* settings.c: "contact" and "self_contact" of a scene, as tables of one entry each. */
 #include "compile/compile.h"
 
 static const drape_entry contact = {.name = "contact",

@@ -1,10 +1,11 @@
 /*
- * stable: steps of the nominal size where they are stable, else as large as the stability limit of an
- * explicit row allows, times a safety. The limit is found again every few steps, as the stiffness of a
- * stretched or folded sheet is another, and where a step failed: one that was above it is forgotten. Rows
- * without a limit take nominal steps. A step that fails below the limit is halved.
+ * stable: steps of the nominal size where they are stable, otherwise the stability limit of an explicit
+ * integrator times a safety factor. The limit is estimated again every few steps, because stretching and
+ * folding change the stiffness of the sheet, and also after a failed step: a step above the new limit is
+ * rolled back. Integrators without a limit take nominal steps. A step that fails below the limit is halved.
  *
- * A step of verlet is as many substeps as the scene says, so that it is the substeps that keep below 2/omega.
+ * A step of verlet consists of as many substeps as the scene says; it is the substeps that must stay below
+ * 2/omega.
  */
 #include "control/halve.h"
 
@@ -13,7 +14,7 @@
 enum { PARAM_DT_MIN, PARAM_MAX_ATTEMPTS, PARAM_SAFETY, PARAM_EVERY, PARAM_COUNT };
 enum { SCRATCH_LIMIT, SCRATCH_LEFT };
 
-#define SLACK 1e-6 /* a limit of which a step was made is found again to this */
+#define SLACK 1e-6 /* tolerance for a limit that is estimated again, when the step was chosen from it */
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
@@ -32,7 +33,8 @@ static double stable_step(const drape_trial *trial, const drape_state *at)
     return found.step;
 }
 
-/* The largest stable step: where the attempt came if that is known, else where it began. */
+/* Returns the largest stable step: at the end of the attempt if that state is known, otherwise at its
+ * start. */
 static double limit_of(const double *values, drape_trial *trial)
 {
     double *limit = &trial->scratch[SCRATCH_LIMIT], *left = &trial->scratch[SCRATCH_LEFT];

@@ -1,7 +1,7 @@
 /*
- * strain: halving that also refuses a step in which the cloth moves too far: an edge that changes its
- * length, or a node that moves, by more than a share of the rest length. What happens in such a step is
- * not resolved, even if the solver converged.
+ * strain: halving that also rejects a step in which the cloth moves too far: an edge changes its length, or a
+ * node moves, by more than a given fraction of the rest length. Such a step does not resolve the motion, even
+ * if the solver converged.
  */
 #include "base/vec3.h"
 #include "control/halve.h"
@@ -35,7 +35,7 @@ static double way(const drape_trial *trial, int32_t node)
     return vec3_norm(d);
 }
 
-/* Keeps the worst of one kind; limit and what are set by the caller. */
+/* Keeps the largest value of one kind; the caller sets limit and what. */
 static void keep(drape_diagnostic *diagnostic, const int32_t *node, int count, double value)
 {
     if (value <= diagnostic->value)

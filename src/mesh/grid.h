@@ -1,16 +1,18 @@
-/* grid.h: what grids share: rows and columns of nodes, two triangles in each cell between them. */
+/* grid.h: what all grids share: rows and columns of nodes, with two triangles in each cell between them. */
 #ifndef DRAPE_MESH_GRID_H
 #define DRAPE_MESH_GRID_H
 
 #include "mesh/mesh.h"
 
-/* DRAPE_MAX_NODES is not passed by the product; the fault is at pointer/columns. Errors: DRAPE_E_ARGUMENT. */
+/* Checks that columns x rows is at most DRAPE_MAX_NODES; the fault is reported at pointer/columns. Errors:
+ * DRAPE_E_ARGUMENT. */
 drape_status drape_grid_check_size(drape_context *ctx, const char *pointer, int64_t columns, int64_t rows);
 
-/* Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX): the same everywhere. */
+/* Returns a number in [-1, 1) from a linear congruential generator (Knuth's MMIX): the same on every
+ * machine. */
 double drape_grid_random(uint64_t *seed);
 
-/* Room for rows x columns nodes and the triangles between them. Faults are reported at pointer. */
+/* Allocates rows x columns nodes and the triangles between them. Faults are reported at pointer. */
 drape_status drape_grid_allocate(drape_context *ctx, const char *pointer, int32_t rows, int32_t columns,
                                  drape_mesh *mesh);
 

@@ -5,23 +5,23 @@
 
 #define KEYS(array) .keys = array, .key_count = sizeof array / sizeof *array
 
-/* Where a value goes: a member of the def, or an array and its count. */
+/* The place of a value: a member of the def, or an array and its count. */
 #define IN(def, member)           .offset = offsetof(def, member)
 #define ARRAY(def, member, count) .offset = offsetof(def, member), .count_offset = offsetof(def, count)
 #define SETTINGS(def, member, count)                                                                         \
     .open = true, .settings_offset = offsetof(def, member), .settings_count_offset = offsetof(def, count)
 
-/* In place of a default: nothing is there unless it is given. */
+/* In place of a default: there is none unless it is given. */
 #define NONE DRAPE_DERIVED("none")
-/* Likewise, with nothing to say about it: one of several keys is given, or an object has defaults inside. */
+/* The same without a description: one of several keys is given, or an object has defaults inside. */
 #define UNSAID DRAPE_DERIVED("")
 
-/* A key without a value of its own; one whose value is a text with a default. */
+/* A key without a value of its own; a key whose value is a text with a default. */
 #define SHAPED(shape_, name_, default_, help_)                                                               \
     .param = {.name = name_, .unit = "1", .default_value = default_, .help = help_}, .shape = shape_
 #define TEXT_OR(name, text, help) DRAPE_TEXT(name, help, .derived = text), .literal = true
 
-/* In place of bounds. */
+/* In place of bounds: no bound. */
 #define LOWEST  DRAPE_ABOVE(-INFINITY)
 #define HIGHEST DRAPE_BELOW(INFINITY)
 
