@@ -111,7 +111,7 @@ void drape_param_range_text(const drape_param *param, char *text, size_t size)
         choices_text(param, text, size);
         return;
     case DRAPE_PARAM_TEXT:
-        snprintf(text, size, "a string, not empty");
+        snprintf(text, size, "a non-empty string");
         return;
     case DRAPE_PARAM_VECTOR:
         snprintf(several, sizeof several, "%s%s, each in ", param->uniform ? "a number or " : "", numbers);
@@ -238,7 +238,7 @@ static drape_status turn_value(drape_context *ctx, const char *pointer, const dr
         return refuse_number(ctx, pointer, param, isfinite(axis) ? angle : axis);
     if (axis == 0 && angle != 0)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
-                             "the axis of a turn by %.10g degrees is 0 0 0; it must not be zero", angle);
+                             "the axis of a rotation by %.10g degrees is 0 0 0; it must not be zero", angle);
     for (int k = 0; k < 3; k++)
         value[k] = axis > 0 ? v[k] / axis * angle : 0;
     return DRAPE_OK;

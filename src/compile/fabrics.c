@@ -35,14 +35,15 @@
 #define SHEAR   34.4 /* [N/m] */
 
 /* clang-format off */
-#define ROW(name, what, source, density, warp, weft, coupling, shear, bend_warp, bend_weft, diagonal, drape) \
+#define ENTRY(name, what, source, density, warp, weft, coupling, shear, bend_warp, bend_weft, diagonal,      \
+              drape) \
     {name, what, source, density, {warp, weft, coupling, shear}, {bend_warp, bend_weft, diagonal}, drape},
-const drape_fabric drape_fabrics[] = {DRAPE_FABRICS(ROW) {NULL, NULL, NULL, 0, {0, 0, 0, 0}, {0, 0, 0}, 0}};
-#undef ROW
+const drape_fabric drape_fabrics[] = {DRAPE_FABRICS(ENTRY) {NULL, NULL, NULL, 0, {0, 0, 0, 0}, {0, 0, 0}, 0}};
+#undef ENTRY
 
-#define ROW(name, ...) name,
-const char *const drape_fabric_names[] = {DRAPE_FABRICS(ROW) NULL};
-#undef ROW
+#define ENTRY(name, ...) name,
+const char *const drape_fabric_names[] = {DRAPE_FABRICS(ENTRY) NULL};
+#undef ENTRY
 
 /* clang-format on */
 

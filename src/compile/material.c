@@ -28,7 +28,7 @@ static const drape_param params[] = {
     [YOUNG_MODULUS] = DRAPE_NUMBER("young_modulus", "Pa", DRAPE_DERIVED("required without a fabric"),
                                    DRAPE_ABOVE(0), 1e15, "Young's modulus E of the sheet"),
     [POISSON_RATIO] = DRAPE_NUMBER("poisson_ratio", "1", 1.0 / 3.0, DRAPE_ABOVE(-1), 0.5,
-                                   "Poisson's ratio nu; stretch.edge has 1/3 whatever is said here"),
+                                   "Poisson's ratio nu; stretch.edge always has 1/3"),
     [THICKNESS] = DRAPE_NUMBER("thickness", "m", DRAPE_DERIVED("required without a fabric"), DRAPE_ABOVE(0),
                                10, "thickness h of the sheet"),
     [DENSITY] = DRAPE_NUMBER("density", "kg/m3", DRAPE_DERIVED("from areal_density or total_mass"),
@@ -40,11 +40,11 @@ static const drape_param params[] = {
     [MASS] =
         DRAPE_CHOICE("mass", MASS_AREA, mass_choices,
                      "area: lumped, a third of each triangle to each node; uniform: the same on every node"),
-    [FABRIC] =
-        DRAPE_CHOICE("fabric", 0, drape_fabric_names,
-                     "a measured one (`drape list fabrics`): its areal density where none is given; its "
-                     "bending is that of bend.midedge, and without young_modulus and thickness its tension "
-                     "and shear are those of stretch.cst"),
+    [FABRIC] = DRAPE_CHOICE(
+        "fabric", 0, drape_fabric_names,
+        "a measured fabric (`drape list fabrics`): gives the areal density unless the scene does, the "
+        "bending of bend.midedge and, without young_modulus and thickness, the tension and "
+        "shear of stretch.cst"),
 };
 
 const drape_entry drape_material_entry = {

@@ -19,7 +19,8 @@ enum { SCRATCH_LIMIT, SCRATCH_LEFT };
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
     [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(1000000),
-    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1, "share of the step that the estimate allows"),
+    [PARAM_SAFETY] =
+        DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1, "fraction of the step that the estimate allows"),
     [PARAM_EVERY] =
         DRAPE_INTEGER("every", "1", 10, 1, 1e6, "steps between two estimates of the stability limit"),
 };
@@ -81,7 +82,7 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 
 const drape_controller_ops drape_controller_stable = {
     .entry = {.name = "stable",
-              .summary = "nominal steps, smaller where an explicit integrator's stability limit asks for it",
+              .summary = "nominal steps, reduced where an explicit integrator's stability limit requires it",
               .reference = "2/omega: Courant, Friedrichs & Lewy 1928; Hairer, Lubich & Wanner 2003",
               DRAPE_PARAMS(params)},
     .own_steps = true,

@@ -86,7 +86,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 
 const drape_grid_ops drape_grid_annulus = {
     .entry = {.name = "annulus",
-              .summary = "a ring between two circles: what overhangs the disc of a drape tester",
+              .summary =
+                  "a ring between two circles, like the overhanging part of the cloth in a drape tester",
               DRAPE_PARAMS(params)},
     .generate = generate,
 };

@@ -13,8 +13,8 @@ enum { JITTER = GRID_RECTANGLE_COUNT, SEED, ORIENTATION, PARAM_COUNT };
 static const drape_param params[PARAM_COUNT] = {
     GRID_RECTANGLE,
     [JITTER] =
-        DRAPE_NUMBER("jitter", "1", 0.25, 0, 0.4, "how far nodes are out of line, as a share of a cell"),
-    [SEED] = DRAPE_INTEGER("seed", "1", 1, 0, 1e9, "another mesh of the same kind"),
+        DRAPE_NUMBER("jitter", "1", 0.25, 0, 0.4, "largest displacement of nodes, as a fraction of a cell"),
+    [SEED] = DRAPE_INTEGER("seed", "1", 1, 0, 1e9, "seed of the displacements"),
     [ORIENTATION] = GRID_ORIENTATION,
 };
 
@@ -68,7 +68,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 
 const drape_grid_ops drape_grid_irregular = {
     .entry = {.name = "irregular",
-              .summary = "a rectangle of columns x rows nodes out of line, to show what depends on the mesh",
+              .summary = "a rectangle of columns x rows nodes at irregular positions, to reveal results that "
+                         "depend on the mesh",
               DRAPE_PARAMS(params)},
     .generate = generate,
 };

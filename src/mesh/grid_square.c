@@ -24,9 +24,9 @@ static const drape_param params[PARAM_COUNT] = {
     GRID_RECTANGLE,
     [DIAGONALS] = DRAPE_CHOICE("diagonals", ALTERNATING, diagonals, "how the cells are split into triangles"),
     [ORIENTATION] = GRID_ORIENTATION,
-    [NOISE] =
-        DRAPE_NUMBER("noise", "m", 0, 0, 1e9,
-                     "nodes are off the plane by up to this, at random and always the same: breaks symmetry"),
+    [NOISE] = DRAPE_NUMBER(
+        "noise", "m", 0, 0, 1e9,
+        "largest offset of nodes from the plane, pseudo-random and reproducible: breaks symmetry"),
 };
 
 static void place_nodes(drape_mesh *mesh, double width, double height, bool vertical)

@@ -153,9 +153,10 @@ static drape_status read_obj(drape_context *ctx, const drape_mesh_source *source
 }
 
 const drape_import_ops drape_import_obj = {
-    .entry = {.name = "obj",
-              .summary =
-                  "Wavefront OBJ; polygons become fans of triangles, all but nodes and faces is passed over"},
+    .entry =
+        {.name = "obj",
+         .summary =
+             "Wavefront OBJ; polygons become fans of triangles, everything but nodes and faces is ignored"},
     .ending = ".obj",
     .read = read_obj,
 };

@@ -272,7 +272,7 @@ static drape_status read_header(ply_reader *reader)
 
 /* The smallest number of bytes that an item of the element can take; in text, a digit and a blank per
  * value. */
-static int64_t least_bytes(const ply_reader *reader, const ply_element *element)
+static int64_t min_item_bytes(const ply_reader *reader, const ply_element *element)
 {
     int64_t bytes = 0;
     for (int i = 0; i < element->property_count; i++) {
@@ -290,7 +290,7 @@ static drape_status check_counts(ply_reader *reader)
     const int64_t left = reader->text.end - reader->text.at + (reader->format == ASCII);
     for (int i = 0; i < reader->element_count; i++) {
         const ply_element *element = &reader->elements[i];
-        const int64_t least = least_bytes(reader, element);
+        const int64_t least = min_item_bytes(reader, element);
         if (least > 0 && element->count > left / least)
             return drape_mesh_fail(reader->ctx, reader->source, element->line,
                                    "%lld items of %.*s; the %lld bytes after the header hold at most %lld",

@@ -32,7 +32,7 @@ drape_status drape_mesh_check_transform(drape_context *ctx, const char *pointer,
                              rotate[0], rotate[1], rotate[2], rotate[3]);
     if (rotate[3] != 0 && rotate[0] == 0 && rotate[1] == 0 && rotate[2] == 0)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
-                             "the axis of a turn by %g degrees is 0 0 0; it must not be zero", rotate[3]);
+                             "the axis of a rotation by %g degrees is 0 0 0; it must not be zero", rotate[3]);
     snprintf(place, sizeof place, "%s/transform/translate", pointer);
     if (!all_finite(translate, 3))
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "%g %g %g; each must be finite", translate[0],

@@ -259,7 +259,7 @@ static void archive_path(drape_path *path, drape_archive *a)
         drape_archive_doubles(a, path->v[i], 3);
     }
     if (drape_archive_is_reading(a) && !is_path(path))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves something along no way");
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an invalid path");
 }
 
 /* Pins with a track come first, in the model's order, then the others in the order in which the host moved
@@ -275,7 +275,7 @@ static void archive_place(drape_motion *motion, int32_t i, drape_archive *a)
     if (good)
         find_place(motion, node);
     else
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves node %d, which is no pin", (int)node);
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves node %d, which is not pinned", (int)node);
 }
 
 void drape_motion_archive(drape_motion *motion, drape_archive *a)

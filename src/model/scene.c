@@ -417,7 +417,7 @@ static drape_status find_child(drape_scene *scene, const char *pointer, const la
         return DRAPE_OK;
     }
     drape_json_describe(at->container, given, sizeof given);
-    snprintf(why, sizeof why, "is %s, no object or array", given);
+    snprintf(why, sizeof why, "is %s, not an object or array", given);
     return cannot_set(scene, pointer, at->path.text, why);
 }
 
@@ -501,7 +501,7 @@ static drape_status replace_root(drape_scene *scene, json_t *value)
 {
     if (!json_is_object(value)) {
         json_decref(value);
-        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "cannot set the whole scene to what is no object");
+        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "the whole scene can only be set to an object");
     }
     json_decref(scene->root);
     scene->root = value;

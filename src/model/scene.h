@@ -1,7 +1,7 @@
 /* scene.h: the text of a scene as defs, and the keys that a scene may have.
  *
  * A key is a parameter together with the place in a def where its value is stored. The tables in scene_keys.c
- * drive the reader (scene_json.c), the defaults of defs, the checks of a host's defs, and every description
+ * drive the reader (scene_json.c), the defaults of defs, the checks of defs from hosts, and every description
  * of scenes: `drape list`, the schema, `drape info`. A new key is one entry there. */
 #ifndef DRAPE_MODEL_SCENE_H
 #define DRAPE_MODEL_SCENE_H

@@ -194,7 +194,7 @@ static drape_status check_normal(drape_context *ctx, json_t *plane)
     for (size_t i = 0; i < json_array_size(normal); i++)
         if (json_number_value(json_array_get(normal, i)) != 0)
             return DRAPE_OK;
-    return normal ? drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/plane/normal", "it has no direction: it is 0 0 0")
+    return normal ? drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/plane/normal", "0 0 0 has no direction")
                   : DRAPE_OK;
 }
 
