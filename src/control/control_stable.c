@@ -14,7 +14,9 @@
 enum { PARAM_DT_MIN, PARAM_MAX_ATTEMPTS, PARAM_SAFETY, PARAM_EVERY, PARAM_COUNT };
 enum { SCRATCH_LIMIT, SCRATCH_LEFT };
 
-#define SLACK 1e-6 /* tolerance for a limit that is estimated again, when the step was chosen from it */
+#define SLACK                                                                                                \
+    1e-6 /* relative tolerance between the limit from which a step was chosen and the same limit estimated
+            again */
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,

@@ -842,8 +842,8 @@ static const struct {
     {"/a~2", "1", "\"/a~2\" is not a JSON pointer, as \"/integrator/dt\" is one; in it ~ is written ~0"},
     {"/duration/x", "1", "cannot set /duration/x: /duration is 5, not an object or array"},
     {"/cloth/0/terms/0/k", "1",
-     "cannot set /cloth/0/terms/0/k: /cloth/0/terms/0 is \"stretch.edge\", no object or "
-     "array"},
+     "cannot set /cloth/0/terms/0/k: /cloth/0/terms/0 is \"stretch.edge\", not an "
+     "object or array"},
     {"/cloth/1/name", "x", "cannot set /cloth/1/name: /cloth is an array of 1; \"-\" appends"},
     {"/cloth/0/pins/3", "{}", "cannot set /cloth/0/pins/3: /cloth/0/pins is an array of 3; \"-\" appends"},
     {"/cloth/name", "x",
