@@ -29,7 +29,7 @@ DRAPE_C_BEGIN
 
 /* ---- Status ---- */
 
-/* The sign says what to do next: 0: done; > 0: a smaller step may succeed; < 0: it will not, so stop and
+/* The sign says what to do next: 0, done; > 0, a smaller step may succeed; < 0, it will not, so stop and
  * report. */
 typedef enum drape_status {
     DRAPE_OK = 0,
@@ -228,10 +228,11 @@ DRAPE_API void drape_collider_def_init(drape_collider_def *def, size_t struct_si
 /* A parsed scene file that can still be changed before it is compiled. */
 typedef struct drape_scene drape_scene;
 
-/* Read a scene file, or the text of a scene. name stands for the file in messages; relative mesh file names
- * are then resolved against the working directory. Only the JSON syntax is checked here; drape_scene_compile
- * checks keys and values, after any changes. Errors: DRAPE_E_FILE, DRAPE_E_PARSE, DRAPE_E_ARGUMENT (a NULL
- * argument), DRAPE_E_MEMORY; the message has the form "scene.json:LINE:COLUMN: what". */
+/* Read a scene file, or the text of a scene, for which name stands in messages. Relative mesh file names are
+ * resolved against the folder of the scene file or, for a text, the working directory. Only the JSON syntax
+ * is checked here; drape_scene_compile checks keys and values, after any changes. Errors: DRAPE_E_FILE,
+ * DRAPE_E_PARSE, DRAPE_E_ARGUMENT (a NULL argument), DRAPE_E_MEMORY, DRAPE_E_STOPPED (the context's cancel
+ * function); the message has the form "scene.json:LINE:COLUMN: what". */
 DRAPE_API drape_status drape_scene_load(drape_context *ctx, const char *path, drape_scene **out);
 DRAPE_API drape_status drape_scene_parse(drape_context *ctx, const char *text, const char *name,
                                          drape_scene **out);
@@ -297,7 +298,7 @@ typedef struct drape_collider_motion {
                                path given by the host */
 } drape_collider_motion;
 
-/* The number of obstacles, and where its track puts one of them at time t [s]. */
+/* The number of obstacles, and the position of one of them on its track at time t [s]. */
 DRAPE_API int32_t drape_model_collider_count(const drape_model *model);
 DRAPE_API drape_collider_motion drape_model_collider(const drape_model *model, int32_t index, double t);
 
