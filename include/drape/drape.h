@@ -354,7 +354,7 @@ DRAPE_API void drape_sim_destroy(drape_sim **sim);
  * DRAPE_E_STEP_TOO_SMALL (the step was halved below dt_min; "ida" took max_steps; max_attempts within one
  * dt), DRAPE_E_SOLVER (a step failed under the controller "fixed"), DRAPE_E_STOPPED (by an observer or
  * drape_sim_cancel), DRAPE_E_ARGUMENT (t_end not finite). The message names the time, step size, reason and
- * the worst element. */
+ * diagnostic. */
 DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);
 
 /* What a call of drape_sim_advance_realtime did. */
@@ -365,9 +365,9 @@ typedef struct drape_realtime {
     double dropped; /* [s] simulated time given up in this call because more was owed than is allowed */
     double dropped_total;   /* [s] simulated time given up since the sim was created */
     double seconds;         /* [s] wall-clock time of the call, including its observers */
-    bool kept;              /* whether that was within the budget */
-    const char *level;      /* "full", "fewer iterations", or "larger steps" (longer than dt, or time is
-                               owed) */
+    bool kept;              /* whether `seconds` is within the budget */
+    const char *level;      /* "full", "fewer iterations", or "larger steps" (longer than dt, or
+                               time is owed) */
     int effort;             /* of the integrator: 0 as its parameters say; higher values are cheaper */
     int attempts, rejected; /* steps attempted in this call, and how many of them were rejected */
     double h;               /* [s] largest accepted step; 0: none was accepted */
