@@ -1,19 +1,20 @@
 /*
- * drape.h: all that a user of the library needs: context, scene, model, sim, observers.
+ * drape.h: everything a user of the library needs: contexts, scenes, models, sims, observers.
  *
  * Units are SI: metres, kilograms, seconds, newtons, joules, radians. Axes are right-handed with Y up;
- * gravity is explicit. Vectors of nodes are interleaved: x0 y0 z0 x1 y1 z1 ... in double precision.
+ * gravity is given explicitly. Arrays of node vectors are interleaved, x0 y0 z0 x1 y1 z1 ..., in double
+ * precision.
  *
- * Errors. Functions that can fail return a drape_status; drape_context_message() then says what, where, which
- * value, and what would be right. The library never prints, exits or aborts.
+ * Errors. A function that can fail returns a drape_status; drape_context_message() then says what is wrong,
+ * where, with which value, and what would be right. The library never prints, exits or aborts.
  *
- * Ownership. An object is made by _create, _load or _parse and freed by _destroy, which takes the address of
- * the handle, writes NULL there and does nothing to a NULL handle. A context outlives what was made from it;
- * a model outlives its sims.
+ * Ownership. An object is made by a function that ends in _create, _load, _parse or _compile, and freed by
+ * its _destroy, which takes the address of the handle and sets the handle to NULL. Destroying a NULL handle
+ * does nothing. A context must outlive everything made from it, and a model must outlive its sims.
  *
- * Threads. A context and a scene belong to one thread at a time. A model is read-only: several threads may
- * read it and run sims on it, each thread with a context of its own. A sim belongs to one thread at a time;
- * drape_sim_cancel alone may be called from any.
+ * Threads. A context or a scene may be used by one thread at a time. A model is read-only: several threads
+ * may read it and run sims on it, each with a context of its own. A sim may be used by one thread at a time;
+ * only drape_sim_cancel may be called from any thread.
  */
 #ifndef DRAPE_DRAPE_H
 #define DRAPE_DRAPE_H
@@ -28,34 +29,37 @@ DRAPE_C_BEGIN
 
 /* ---- Status ---- */
 
-/* The sign says who acts: 0 done; > 0 a smaller step may succeed; < 0 it will not, stop and explain. */
+/* The sign says what to do next: 0, done; > 0, a smaller step may succeed; < 0, it will not, so stop and
+ * report. */
 typedef enum drape_status {
     DRAPE_OK = 0,
     DRAPE_RETRY_NONLINEAR = 1,   /* the nonlinear solver did not reach its tolerance */
-    DRAPE_RETRY_LINEAR = 2,      /* the linear solver failed: singular matrix, no memory for its fill-in */
-    DRAPE_RETRY_NONFINITE = 3,   /* a residual, a Jacobian entry or a result is not a finite number */
-    DRAPE_RETRY_DEGENERATE = 4,  /* an element collapsed: edge length, altitude, hinge angle */
-    DRAPE_RETRY_REJECTED = 5,    /* the step controller or the error test refused the step */
-    DRAPE_E_ARGUMENT = -1,       /* a wrong argument, scene value or command line */
+    DRAPE_RETRY_LINEAR = 2,      /* the linear solver failed: singular matrix, or no memory for its fill-in */
+    DRAPE_RETRY_NONFINITE = 3,   /* a residual, a Jacobian entry or a result is not finite */
+    DRAPE_RETRY_DEGENERATE = 4,  /* an element collapsed: edge length, altitude or hinge angle */
+    DRAPE_RETRY_REJECTED = 5,    /* the step controller or the error test rejected the step */
+    DRAPE_E_ARGUMENT = -1,       /* an invalid argument, scene value or command line */
     DRAPE_E_MEMORY = -2,         /* an allocation failed */
     DRAPE_E_FILE = -3,           /* a file cannot be opened, read or written */
-    DRAPE_E_PARSE = -4,          /* the text of a scene or mesh is not of its format */
-    DRAPE_E_STEP_TOO_SMALL = -5, /* below dt_min, or too many of them; the last accepted state stays */
-    DRAPE_E_SOLVER = -6,  /* a step failed and no smaller step may be tried, or the solver cannot be set up */
-    DRAPE_E_VERSION = -7, /* a struct or a file of another version of Drape */
-    DRAPE_E_STOPPED = -8  /* an observer, drape_sim_cancel, or the context's cancel asked to stop */
+    DRAPE_E_PARSE = -4,          /* the text of a scene or mesh is malformed */
+    DRAPE_E_STEP_TOO_SMALL = -5, /* the step is below dt_min, or there were too many steps; the last accepted
+                                    state is kept */
+    DRAPE_E_SOLVER = -6,  /* a step failed and no smaller step may be tried, or the solver could not be set
+                             up */
+    DRAPE_E_VERSION = -7, /* a struct or file belongs to another version of Drape */
+    DRAPE_E_STOPPED = -8  /* an observer, drape_sim_cancel or the context's cancel function asked to stop */
 } drape_status;
 
-/* The status' name in lower case without the prefix: "ok", "retry_nonlinear", "e_step_too_small"; "unknown"
- * for no status. */
+/* The name of a status in lower case without its prefix: "ok", "retry_nonlinear", "e_step_too_small";
+ * "unknown" for a value that is not a status. */
 DRAPE_API const char *drape_status_name(drape_status status);
 
-/* "0.1.0": the version of the library that is linked, to compare with the DRAPE_VERSION_* of the header. */
+/* The version of the linked library, such as "0.1.0"; compare it with DRAPE_VERSION_* of the header. */
 DRAPE_API const char *drape_version(void);
 
 /* ---- Context ---- */
 
-/* Allocator, log, and the last message. */
+/* Holds the allocator, the log function, the last message, and user-defined terms and colliders. */
 typedef struct drape_context drape_context;
 
 /* Severity of a log line. */
@@ -63,97 +67,102 @@ typedef enum drape_log_level { DRAPE_LOG_INFO = 0, DRAPE_LOG_WARNING = 1 } drape
 
 /* Settings of a context. Initialise with drape_context_def_init. */
 typedef struct drape_context_def {
-    size_t struct_size; /* set by drape_context_def_init; a def with 0 here is refused */
-    /* Allocator of all memory of Drape's own; both functions or neither. allocate returns NULL on failure and
-     * memory aligned for any type; release takes what allocate gave, never NULL. Default: malloc and free.
-     * SUNDIALS and KLU use malloc. */
+    size_t struct_size; /* set by drape_context_def_init; a def with 0 here is rejected */
+    /* Allocator for all memory that Drape itself takes. Set both functions or neither. allocate returns
+     * memory aligned for any type, or NULL on failure; release receives what allocate returned, never NULL.
+     * Default: malloc and free. SUNDIALS and KLU always use malloc. */
     void *(*allocate)(void *user, size_t size);
     void (*release)(void *user, void *memory);
     void *allocator_user;
-    /* Receives log lines without a newline. Default NULL: nothing is logged. */
+    /* Receives log lines without a newline. Default NULL: no logging. */
     void (*log)(void *user, drape_log_level level, const char *text);
     void *log_user;
-    /* Asked between the stages of reading and compiling a scene, of making a sim and of restoring one, in the
-     * thread of the call: whether to end it with DRAPE_E_STOPPED, as if it had not been made. It may be asked
-     * thousands of times and must only look. Default NULL: never. A sim that is there is ended by
-     * drape_sim_cancel. */
+    /* Called between the stages of reading or compiling a scene and of creating or restoring a sim, on the
+     * calling thread. If it returns true, the operation ends with DRAPE_E_STOPPED as if it had never been
+     * started. It may be called thousands of times, so it must be cheap and free of side effects. Default
+     * NULL: never cancel. To stop a running sim, use drape_sim_cancel. */
     bool (*cancel)(void *user);
     void *cancel_user;
 } drape_context_def;
 
-/* Fills *def with the defaults. struct_size is sizeof(drape_context_def) of the caller. */
+/* Fills *def with the defaults. Pass the caller's sizeof(drape_context_def) as struct_size. */
 DRAPE_API void drape_context_def_init(drape_context_def *def, size_t struct_size);
 
-/* Makes a context. def NULL: the defaults. Errors: DRAPE_E_ARGUMENT (def not initialised, out NULL),
- * DRAPE_E_MEMORY. */
+/* Creates a context. If def is NULL, the defaults apply. Errors: DRAPE_E_ARGUMENT (def not initialised, or
+ * out is NULL), DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_context_create(const drape_context_def *def, drape_context **out);
 
-/* Frees a context, after all that was made from it. */
+/* Frees a context. Everything made from it must have been freed before. */
 DRAPE_API void drape_context_destroy(drape_context **ctx);
 
-/* What the last failed call had to say, one line without newline; "" before any failure. Valid until the next
- * call with this context or with an object made from it. NULL ctx: a fixed text. */
+/* The message of the last failed call: one line without a newline, "" before any failure. Valid until the
+ * next call with this context or with an object made from it. For a NULL ctx, a fixed text. */
 DRAPE_API const char *drape_context_message(const drape_context *ctx);
 
-/* ---- Scene in memory: what a host fills instead of a scene file ---- */
+/* ---- Scene in memory: structs that a host fills instead of writing a scene file ---- */
 
-/* Defs of this section begin with struct_size, set by their _init; those of an array are of one size.
- * Settings, rows and keys of tracks have none: they stay as they are. */
+/* Defs in this section begin with struct_size, set by their _init function; all defs of one array have the
+ * same size. drape_setting, drape_entry_def and drape_track_key have no struct_size: their layout is
+ * fixed. */
 
-/* One parameter by name. Numbers and integers go into number with text and vector NULL; choices and file
- * names into text; booleans as text "true" or "false", or as number 0 or 1; vectors into vector. */
+/* One parameter, given by name. Numbers and integers go into number, with text and vector NULL; choices and
+ * file names go into text; booleans go into text as "true" or "false", or into number as 0 or 1; vectors go
+ * into vector. */
 typedef struct drape_setting {
-    const char *name;     /* of the parameter */
-    double number;        /* of numbers, integers and booleans */
-    const char *text;     /* of choices, names of files, booleans; NULL: none */
+    const char *name;     /* name of the parameter */
+    double number;        /* value of a number, integer or boolean */
+    const char *text;     /* value of a choice, file name or boolean; NULL: none */
     const double *vector; /* vector_count numbers: 3, or 4 for axis and angle [degrees] */
-    size_t vector_count;  /* of vector */
+    size_t vector_count;  /* length of vector */
 } drape_setting;
 
-/* A row of one of Drape's tables by name, with the parameters that differ from their defaults. `drape list`
- * shows all. */
+/* An entry of one of Drape's tables, such as a term or an integrator, chosen by name, with the parameters
+ * that differ from their defaults. `drape list` shows all entries. */
 typedef struct drape_entry_def {
-    const char *type;              /* the name of the row */
-    const drape_setting *settings; /* setting_count of them; NULL for none */
-    size_t setting_count;          /* of settings */
+    const char *type;              /* name of the entry */
+    const drape_setting *settings; /* setting_count settings; NULL: none */
+    size_t setting_count;          /* length of settings */
 } drape_entry_def;
 
-/* A triangle mesh: one of three sources. Exactly one of grid.type, file, positions is set. It lies inside the
- * def of a cloth and grows into what is reserved. */
+/* A triangle mesh from one of three sources: exactly one of grid.type, file and positions is set. It is
+ * embedded in drape_cloth_def, so it can grow only into its reserved members. */
 typedef struct drape_mesh_def {
-    drape_entry_def grid;              /* a row of the grids: "equilateral", "square" */
-    const char *file;                  /* an OBJ or PLY file, by its ending */
+    drape_entry_def grid;              /* a grid, such as "equilateral" or "square" */
+    const char *file;                  /* an OBJ or PLY file; the extension decides which */
     const double *positions;           /* node_count x 3 [m], copied */
     const int32_t *triangles;          /* triangle_count x 3, 0-based, copied */
-    size_t node_count, triangle_count; /* of positions and triangles */
+    size_t node_count, triangle_count; /* lengths of positions and triangles */
     double scale[3];                   /* default 1 1 1; applied first */
-    double rotate[4];                  /* axis x y z and angle [degrees]; default none; applied second */
+    double rotate[4];                  /* axis x y z and angle [degrees]; default: no rotation; applied
+                                          second */
     double translate[3];               /* [m]; default 0; applied last */
-    void *reserved[4];                 /* NULL */
+    void *reserved[4];                 /* must be NULL */
 } drape_mesh_def;
 
-/* Displacement of pinned nodes from their rest positions, or of a collider from where its parameters put it,
- * as a piecewise linear function of time, constant before the first and after the last key. */
+/* A key of a track. A track is the displacement of pinned nodes from their rest positions, or of a collider
+ * from the position that its parameters define, as a piecewise linear function of time; it is constant before
+ * the first and after the last key. */
 typedef struct drape_track_key {
     double time;            /* [s], strictly increasing from key to key */
     double displacement[3]; /* [m] */
 } drape_track_key;
 
-/* Nodes of one cloth held fixed, or moved along a track. Exactly one of nodes, corner, edge, row (>= 0),
- * has_box selects them. corner, edge and row exist on grids only. */
+/* Nodes of one cloth that are held fixed or moved along a track. Exactly one of nodes, corner, edge, row (>=
+ * 0) and has_box selects them; corner, edge and row apply to grids only. */
 typedef struct drape_pin_def {
     size_t struct_size;   /* set by drape_pin_def_init */
-    const int32_t *nodes; /* node_count node numbers of this cloth */
-    size_t node_count;    /* of nodes */
-    const char *corner;   /* "top-left", "top-right", "bottom-left", "bottom-right"; top is row 0, left is
-                             column 0 */
-    const char *edge;     /* "top", "bottom", "left", "right" */
-    int32_t row;          /* -1: not selected by row */
-    bool has_box;         /* box_min and box_max are set */
-    double box_min[3], box_max[3]; /* [m], rest coordinates after the transform; boundary included */
+    const int32_t *nodes; /* node_count node numbers, local to this cloth */
+    size_t node_count;    /* length of nodes */
+    const char *corner;   /* "top-left", "top-right", "bottom-left" or "bottom-right"; the top is row 0, the
+                             left is column 0 */
+    const char *edge;     /* "top", "bottom", "left" or "right" */
+    int32_t row;          /* a row of the grid; -1: not selected by row */
+    bool has_box;         /* whether box_min and box_max are set */
+    double box_min[3], box_max[3]; /* [m], rest coordinates after the transform; the boundary is included */
     const drape_track_key *track;  /* key_count keys; NULL: fixed */
-    size_t key_count;              /* of track */
-    bool clamp; /* edges between its nodes keep the direction of the sheet, for bending terms that see it */
+    size_t key_count;              /* length of track */
+    bool clamp; /* edges between these nodes keep the direction of the sheet across them, for bending terms
+                   that support it */
 } drape_pin_def;
 
 /* One piece of cloth. */
@@ -162,50 +171,52 @@ typedef struct drape_cloth_def {
     const char *name;    /* NULL: "cloth0", "cloth1" ... */
     drape_mesh_def mesh; /* its triangles at rest */
     const drape_setting
-        *material;         /* young_modulus, poisson_ratio, thickness, density ...: `drape list` shows all */
-    size_t material_count; /* of material */
-    const drape_entry_def *terms; /* rows of the terms that are modelled */
-    size_t term_count;            /* of terms */
+        *material;         /* young_modulus, poisson_ratio, thickness, density ...; `drape list` shows all */
+    size_t material_count; /* length of material */
+    const drape_entry_def *terms; /* the terms to model */
+    size_t term_count;            /* length of terms */
     const drape_pin_def *pins;    /* nodes that are held or moved; NULL: none */
-    size_t pin_count;             /* of pins */
-    double velocity[3];           /* [m/s] of every node at t = 0 */
+    size_t pin_count;             /* length of pins */
+    double velocity[3];           /* initial velocity of every node [m/s] */
 } drape_cloth_def;
 
-/* A rigid obstacle: a row of the colliders with its parameters. Initialise with drape_collider_def_init. */
+/* A rigid obstacle: a collider with its parameters. Initialise with drape_collider_def_init. */
 typedef struct drape_collider_def {
     size_t struct_size;           /* set by drape_collider_def_init */
-    drape_entry_def entry;        /* "plane", "sphere" ... */
+    drape_entry_def entry;        /* the collider: "plane", "sphere" ... */
     const char *name;             /* NULL: "collider0", "collider1" ... */
-    double friction;              /* Coulomb's mu between it and cloth [1], [0, 1000]; default 0 */
-    const drape_track_key *track; /* displacement from where the parameters put it; NULL: it rests */
-    size_t key_count;             /* of track */
+    double friction;              /* Coulomb's mu between collider and cloth [1], in [0, 1000]; default 0 */
+    const drape_track_key *track; /* displacement from the position that the parameters define; NULL: it does
+                                     not move */
+    size_t key_count;             /* length of track */
 } drape_collider_def;
 
-/* A whole scene. Initialise with drape_scene_def_init; everything pointed to need only live until
+/* A whole scene. Initialise with drape_scene_def_init. Everything it points to need only live until
  * drape_model_create returns. */
 typedef struct drape_scene_def {
     size_t struct_size;            /* set by drape_scene_def_init */
     const drape_cloth_def *cloths; /* at least one */
-    size_t cloth_count;            /* of cloths */
+    size_t cloth_count;            /* length of cloths */
     double gravity[3];             /* [m/s2]; default 0 -9.81 0 */
-    drape_entry_def integrator; /* default "be"; keys of any integrator row are accepted, those of other rows
-                                   are ignored */
-    drape_entry_def controller; /* default "halving" */
-    double duration;            /* [s], required > 0 when run from the command line; default 1 */
-    double frame_rate;          /* [1/s] of frame events; default 60 */
-    const char *const *formats; /* frame formats of `drape run`, rows of the exporters; default none */
-    size_t format_count;        /* of formats */
-    const char *folder;         /* folder that relative mesh files are in; NULL: the working directory */
+    drape_entry_def integrator;    /* default "be"; settings of any integrator are accepted, those of other
+                                   integrators are ignored */
+    drape_entry_def controller;    /* default "halving" */
+    double duration;               /* [s]; the command-line program requires a value > 0; default 1 */
+    double frame_rate;             /* rate of frame events [1/s]; default 60 */
+    const char *const *formats;    /* names of the frame formats that `drape run` writes; default: none */
+    size_t format_count;           /* length of formats */
+    const char *folder;            /* folder against which relative mesh file names are resolved; NULL: the
+                                   working directory */
     const drape_collider_def *colliders; /* at most 4096 */
-    size_t collider_count;               /* of colliders */
-    const drape_setting *self_contact;   /* thickness, friction; NULL: cloth goes through cloth */
-    size_t self_contact_count;           /* of self_contact */
-    const drape_setting *contact;        /* distance, stiffness ...: `drape list contact` shows all */
-    size_t contact_count;                /* of contact */
-    const char *up; /* axis that points up in frames of `drape run`: "y" or "z"; NULL: "y" */
+    size_t collider_count;               /* length of colliders */
+    const drape_setting *self_contact;   /* thickness, friction; NULL: the cloth passes through itself */
+    size_t self_contact_count;           /* length of self_contact */
+    const drape_setting *contact;        /* distance, stiffness ...; `drape list contact` shows all */
+    size_t contact_count;                /* length of contact */
+    const char *up; /* axis that points up in frames written by `drape run`: "y" or "z"; NULL: "y" */
 } drape_scene_def;
 
-/* Fill a def with the defaults above. */
+/* Fill a def with the defaults documented above. Pass the caller's sizeof of the def as struct_size. */
 DRAPE_API void drape_scene_def_init(drape_scene_def *def, size_t struct_size);
 DRAPE_API void drape_cloth_def_init(drape_cloth_def *def, size_t struct_size);
 DRAPE_API void drape_mesh_def_init(drape_mesh_def *def, size_t struct_size);
@@ -214,330 +225,336 @@ DRAPE_API void drape_collider_def_init(drape_collider_def *def, size_t struct_si
 
 /* ---- Scene from text ---- */
 
-/* A parsed scene file, open to changes before it is compiled. */
+/* A parsed scene file that can still be changed before it is compiled. */
 typedef struct drape_scene drape_scene;
 
-/* Reads a scene file, or the text of one (name stands for the file in messages; relative mesh files are
- * sought in the working directory). Only the syntax of JSON is checked here; keys and values are checked by
- * drape_scene_compile, after changes. Errors: DRAPE_E_FILE, DRAPE_E_PARSE, DRAPE_E_MEMORY; message
- * "scene.json:LINE:COLUMN: what". */
+/* Read a scene file, or the text of a scene, for which name stands in messages. Relative mesh file names are
+ * resolved against the folder of the scene file or, for a text, the working directory. Only the JSON syntax
+ * is checked here; drape_scene_compile checks keys and values, after any changes. Errors: DRAPE_E_FILE,
+ * DRAPE_E_PARSE, DRAPE_E_ARGUMENT (a NULL argument), DRAPE_E_MEMORY, DRAPE_E_STOPPED (the context's cancel
+ * function); the message has the form "scene.json:LINE:COLUMN: what". */
 DRAPE_API drape_status drape_scene_load(drape_context *ctx, const char *path, drape_scene **out);
 DRAPE_API drape_status drape_scene_parse(drape_context *ctx, const char *text, const char *name,
                                          drape_scene **out);
 
-/* Sets the value at a JSON pointer ("/integrator/dt") to a JSON text ("0.001", "\"ida\"", "[0,0,0]"; numbers
- * may be .5, +5 or 5. as well; a text that is not JSON is taken as a string, so ida may stand without
- * quotes). Missing objects on the way are made. "-" appends to an array. Errors: DRAPE_E_ARGUMENT (not a
- * pointer, a step into a number or past an array), DRAPE_E_MEMORY. */
+/* Sets the value at a JSON pointer ("/integrator/dt") to a JSON text ("0.001", "\"ida\"", "[0,0,0]"). Numbers
+ * may also be written .5, +5 or 5.; a text that is not JSON is taken as a string, so ida needs no quotes.
+ * Missing objects on the path are created. The key "-" appends to an array. Errors: DRAPE_E_ARGUMENT (not a
+ * pointer, or one that leads into a number or past the end of an array), DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char *value);
 
-/* Frees a scene; models made from it stay. */
+/* Frees a scene. Models compiled from it remain valid. */
 DRAPE_API void drape_scene_destroy(drape_scene **scene);
 
-/* ---- Model
- * ---------------------------------------------------------------------------------------------------------
- */
+/* ---- Model ---- */
 
 /* A compiled scene: rest geometry, masses, elements, parameters, sparsity. Immutable. */
 typedef struct drape_model drape_model;
 
-/* Compiles a scene. Errors: DRAPE_E_ARGUMENT, DRAPE_E_PARSE, DRAPE_E_FILE, DRAPE_E_MEMORY; the message starts
- * with the place: "scene.json:LINE:COLUMN: /pointer: what, value, range" for scenes from text, "/pointer:
- * ..." for scenes in memory, where the pointer names the value as it would stand in a file. *out is NULL on
- * failure. */
+/* Compile a scene. Errors: DRAPE_E_ARGUMENT, DRAPE_E_PARSE, DRAPE_E_FILE, DRAPE_E_VERSION, DRAPE_E_MEMORY,
+ * DRAPE_E_STOPPED (the context's cancel function). The message starts with the place of the fault:
+ * "scene.json:LINE:COLUMN: /pointer: what, value, range" for a scene from text, "/pointer: ..." for a scene
+ * in memory, where the pointer names the value as it would appear in a file. *out is NULL on failure. */
 DRAPE_API drape_status drape_scene_compile(drape_scene *scene, drape_model **out);
 DRAPE_API drape_status drape_model_create(drape_context *ctx, const drape_scene_def *def, drape_model **out);
-/* drape_scene_load and drape_scene_compile in one call. */
+/* Calls drape_scene_load and drape_scene_compile. */
 DRAPE_API drape_status drape_model_load(drape_context *ctx, const char *scene_path, drape_model **out);
 
-/* Frees a model, after all its sims. */
+/* Frees a model. All its sims must have been freed before. */
 DRAPE_API void drape_model_destroy(drape_model **model);
 
-/* Sizes. A NULL model has none of anything. dofs: unknowns, 3 a free node; nonzeros: of the full dofs x dofs
- * Jacobian. */
+/* Sizes; all are 0 for a NULL model. The number of dofs (unknowns) is 3 per free node; nonzeros are counted
+ * in the full dofs x dofs Jacobian. */
 DRAPE_API int32_t drape_model_node_count(const drape_model *model);
 DRAPE_API int32_t drape_model_triangle_count(const drape_model *model);
 DRAPE_API int64_t drape_model_dof_count(const drape_model *model);
 DRAPE_API int64_t drape_model_nonzero_count(const drape_model *model);
 
-/* Arrays of the model, valid as long as it lives: triangles (triangle_count x 3, node numbers of the whole
- * model), rest positions (node_count x 3 [m]), lumped masses (node_count [kg]), pinned flags (node_count, 1
+/* Arrays of the model, valid as long as the model: triangles (triangle_count x 3, node numbers of the whole
+ * model), rest positions (node_count x 3 [m]), lumped masses (node_count [kg]), pinned flags (node_count, 1:
  * pinned). */
 DRAPE_API const int32_t *drape_model_triangles(const drape_model *model);
 DRAPE_API const double *drape_model_rest_positions(const drape_model *model);
 DRAPE_API const double *drape_model_masses(const drape_model *model);
 DRAPE_API const uint8_t *drape_model_pinned(const drape_model *model);
 
-/* The pieces of cloth: each owns a contiguous range of nodes and of triangles, in scene order. */
+/* A piece of cloth. Each owns a contiguous range of nodes and of triangles, in scene order. */
 typedef struct drape_cloth_range {
-    const char *name;                       /* as in the scene, or "cloth0" ... */
-    int32_t first_node, node_count;         /* its nodes, in numbers of the model */
+    const char *name;                       /* as in the scene, or "cloth0", "cloth1" ... */
+    int32_t first_node, node_count;         /* its nodes, as node numbers of the model */
     int32_t first_triangle, triangle_count; /* its triangles */
 } drape_cloth_range;
 
-/* How many pieces of cloth there are, and one of them; an index that none has gives a range of nothing. */
+/* The number of pieces of cloth, and one of them. An index out of range gives an empty range. */
 DRAPE_API int32_t drape_model_cloth_count(const drape_model *model);
 DRAPE_API drape_cloth_range drape_model_cloth(const drape_model *model, int32_t index);
 
-/* The obstacles, in scene order, and where they are at time t [s]. */
+/* An obstacle and its position at a time t [s]. Obstacles are numbered in scene order. */
 typedef struct drape_collider_motion {
-    const char *name;       /* as in the scene, or "collider0" ... */
-    const char *type;       /* the row */
-    double displacement[3]; /* [m] from where its parameters put it */
-    double velocity[3];     /* [m/s]; at a key of the track that of the piece after it, at the end of a host's
-                               way 0 */
+    const char *name;       /* as in the scene, or "collider0", "collider1" ... */
+    const char *type;       /* name of the collider entry, such as "sphere" */
+    double displacement[3]; /* [m] from the position that its parameters define */
+    double velocity[3];     /* [m/s]; at a key of a track, that of the piece after the key; 0 at the end of a
+                               path given by the host */
 } drape_collider_motion;
 
-/* How many obstacles there are, and where one of them is by its track at time t [s]. */
+/* The number of obstacles, and the position of one of them on its track at time t [s]. */
 DRAPE_API int32_t drape_model_collider_count(const drape_model *model);
 DRAPE_API drape_collider_motion drape_model_collider(const drape_model *model, int32_t index, double t);
 
-/* How far each triangle is stretched at positions x (node_count x 3 [m]): strain (triangle_count x 2) gets
- * its principal engineering strains [1], lambda - 1 of the principal stretches lambda of the triangle against
- * its rest shape, the larger one first. Rest lengths that terms have of their own play no part. */
+/* The strain of each triangle at positions x (node_count x 3 [m]): strain (triangle_count x 2) receives the
+ * principal engineering strains [1], lambda - 1 for the principal stretches lambda of the triangle relative
+ * to its rest shape, the larger one first. Rest lengths that belong to individual terms are not
+ * considered. */
 DRAPE_API void drape_model_strain(const drape_model *model, const double *x, double *strain);
 
-/* The scene's own duration [s] and frame rate [1/s]. */
+/* The scene's duration [s] and frame rate [1/s]. */
 DRAPE_API double drape_model_duration(const drape_model *model);
 DRAPE_API double drape_model_frame_rate(const drape_model *model);
 
-/* ---- Sim
- * -----------------------------------------------------------------------------------------------------------
- */
+/* ---- Sim ---- */
 
 /* A running simulation: the state, the integrator, the controller and their workspace. */
 typedef struct drape_sim drape_sim;
 
-/* How to run. Initialise with drape_sim_def_init; what is left at its default is the scene's own. */
+/* How to run. Initialise with drape_sim_def_init; whatever is left at its default is taken from the scene. */
 typedef struct drape_sim_def {
     size_t struct_size;                       /* set by drape_sim_def_init */
-    const char *integrator;                   /* a row of the integrators; NULL: the scene's */
+    const char *integrator;                   /* name of an integrator; NULL: the scene's */
     const drape_setting *integrator_settings; /* override the scene's settings */
-    size_t integrator_setting_count;          /* of integrator_settings */
-    const char *controller;                   /* a row of the controllers; NULL: the scene's */
+    size_t integrator_setting_count;          /* length of integrator_settings */
+    const char *controller;                   /* name of a controller; NULL: the scene's */
     const drape_setting *controller_settings; /* override the scene's settings */
-    size_t controller_setting_count;          /* of controller_settings */
+    size_t controller_setting_count;          /* length of controller_settings */
     double dt;                                /* [s]; 0: the scene's */
     double dt_min;                            /* [s]; 0: the scene's */
-    double frame_rate;                        /* [1/s] of frame events; 0: the scene's */
-    int threads; /* threads that evaluate elements, 1 to 256; default 1; the result does not depend on it */
+    double frame_rate;                        /* rate of frame events [1/s]; 0: the scene's */
+    int threads; /* threads that evaluate elements, 1 to 256; default 1; results do not depend on it */
     double realtime_step; /* [s] longest step that drape_sim_advance_realtime takes to keep up, and the most
-                             time that it owes; 0: four times dt */
+                             time that may be owed; default 0: four times dt */
 } drape_sim_def;
 
 /* Fills *def with the defaults. */
 DRAPE_API void drape_sim_def_init(drape_sim_def *def, size_t struct_size);
 
-/* Makes a sim at t = 0 in the model's rest positions and initial velocities. NULL def: the scene's integrator
- * and controller. All heap memory of Drape's own is taken here: none in a step. The messages of the sim go to
- * ctx, which may differ from the model's. Errors: DRAPE_E_ARGUMENT (unknown row, setting out of range),
- * DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
+/* Creates a sim at t = 0 with the model's rest positions and initial velocities. If def is NULL, the scene's
+ * integrator and controller are used. All heap memory of Drape itself is allocated here; no step allocates
+ * any. The messages of the sim go to ctx, which may differ from the model's context. Errors: DRAPE_E_ARGUMENT
+ * (unknown entry, or a setting out of range), DRAPE_E_MEMORY, DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's
+ * cancel function). */
 DRAPE_API drape_status drape_sim_create(drape_context *ctx, const drape_model *model,
                                         const drape_sim_def *def, drape_sim **out);
 
 /* Frees a sim. */
 DRAPE_API void drape_sim_destroy(drape_sim **sim);
 
-/* Advances to t_end [s]. Steps end at t0 + k dt; only the last one is cut to end at t_end, and a remainder
- * below 1e-9 dt joins the step before. A t_end not after the present time, but for rounding, does nothing. On
- * failure the state is that of the last accepted step. Errors: DRAPE_E_STEP_TOO_SMALL (halving gave up; "ida"
- * took max_steps; max_attempts in one dt), DRAPE_E_SOLVER (a step failed under the controller "fixed"),
- * DRAPE_E_STOPPED (an observer asked, or drape_sim_cancel), DRAPE_E_ARGUMENT (t_end not finite); the message
- * names time, step, reason and worst element. */
+/* Advances to t_end [s]. Steps end at t0 + k dt; only the last one is shortened to end at t_end, and a
+ * remainder below 1e-9 dt joins the step before it. If t_end is not later than the present time, apart from
+ * rounding, nothing happens. After a failure the state is the last accepted one. Errors:
+ * DRAPE_E_STEP_TOO_SMALL (the step was halved below dt_min; "ida" took max_steps; max_attempts within one
+ * dt), DRAPE_E_SOLVER (a step failed under the controller "fixed"), DRAPE_E_STOPPED (by an observer or
+ * drape_sim_cancel), DRAPE_E_ARGUMENT (t_end not finite). The message names the time, step size, reason and
+ * diagnostic. */
 DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);
 
 /* What a call of drape_sim_advance_realtime did. */
 typedef struct drape_realtime {
-    double time;    /* [s] simulated time that it came to */
-    double debt;    /* [s] of the frame, and of those before, that is owed to the next call; 0: it kept up */
-    double dropped; /* [s] given up in this call, because more was owed than may be */
-    double dropped_total;   /* [s] since the sim was made */
-    double seconds;         /* [s] of wall clock that the call took, its observers included */
-    bool kept;              /* that was within the budget */
-    const char *level;      /* "full"; "fewer iterations"; "larger steps": longer than dt, or time is owed */
-    int effort;             /* of the integrator: 0, as its parameters say, and up, cheaper */
-    int attempts, rejected; /* steps of this call, and those of them that were forgotten */
+    double time;    /* [s] simulated time that was reached */
+    double debt;    /* [s] simulated time, of this frame and earlier ones, that is owed to the next call; 0:
+                       it kept up */
+    double dropped; /* [s] simulated time given up in this call because more was owed than is allowed */
+    double dropped_total;   /* [s] simulated time given up since the sim was created */
+    double seconds;         /* [s] wall-clock time of the call, including its observers */
+    bool kept;              /* whether `seconds` is within the budget */
+    const char *level;      /* "full", "fewer iterations", or "larger steps" (longer than dt, or
+                               time is owed) */
+    int effort;             /* of the integrator: 0 as its parameters say; higher values are cheaper */
+    int attempts, rejected; /* steps attempted in this call, and how many of them were rejected */
     double h;               /* [s] largest accepted step; 0: none was accepted */
-    double residual; /* [N] largest of the accepted steps, in the norm of the integrator; NaN: it has none */
+    double residual; /* [N] largest residual of the accepted steps, in the norm of the integrator; NaN: the
+                        integrator reports none */
 } drape_realtime;
 
-/* Advances by a frame in a given time: for games, previews, anything that must show a state when it is due.
- * Makes frame_dt [s] and what earlier calls left over, in equal steps no longer than dt. If that is not
- * expected to fit into budget_seconds of wall clock, by what steps took lately, then the integrator tries
- * less hard (rows with efforts, such as "newton_k"), then steps are longer, up to realtime_step of the def,
- * and then time is left over. The rung is chosen anew in each call, and a better one is returned to as soon
- * as it fits.
+/* Advances by one frame within a wall-clock budget, for games, previews and anything else that must show a
+ * state when it is due. It simulates frame_dt [s], plus what earlier calls left over, in equal steps no
+ * longer than dt. If, judging by the time that recent steps took, that will not fit into budget_seconds of
+ * wall-clock time, the integrator first reduces its effort (if it supports that, as "newton_k" does); then
+ * steps become longer, up to realtime_step of the def; then simulated time is left over. The level is chosen
+ * anew in each call and rises again as soon as a better one fits.
  *
- * The work of a call is bounded: after its first accepted step none is begun that is not expected to end in
- * time. Time owed is at most one longest step; what is more is dropped, simulated time then runs behind the
- * clock for good, and late frames do not make later ones later. Steps follow the frames, so at another frame
- * rate the state differs by the integrator's own error in h and nothing else. A later drape_sim_advance goes
- * on with the scene's own steps. Which rung is taken depends on the clock, so two runs may differ; with a
- * budget that is never reached they do not.
+ * The work of a call is bounded: after its first accepted step, no step is begun that is not expected to end
+ * in time. The time owed never exceeds one longest step. Anything beyond that is dropped: simulated time then
+ * stays behind the clock for good, but late frames do not delay later ones. Steps follow the frames, so at
+ * another frame rate the state differs only by the integrator's error in h. A later drape_sim_advance
+ * continues with the scene's own steps. The level depends on the clock, so two runs may differ; they do not
+ * if the budget is never reached.
  *
  * *report, unless NULL, is filled whatever the status. Integrators and controllers that choose their own
- * steps keep doing so, within the bound. Errors: as drape_sim_advance; DRAPE_E_ARGUMENT (frame_dt not in (0,
- * 1e6], budget not in [0, 1e9], an integrator without time). */
+ * steps continue to do so, within the bound. Errors: as drape_sim_advance; DRAPE_E_ARGUMENT (frame_dt not in
+ * (0, 1e6], budget not in [0, 1e9], or an integrator that does not integrate in time). */
 DRAPE_API drape_status drape_sim_advance_realtime(drape_sim *sim, double frame_dt, double budget_seconds,
                                                   drape_realtime *report);
 
-/* Puts the sim into a state of the host's own, from which the next advance starts: time [s], 0 to 1e9, before
- * or after the present one; positions [m] and velocities [m/s], node_count x 3, copied. Pinned nodes must lie
- * where their pins have them at t, to 1e-9 of the scene's size, and are put there exactly; those that
- * drape_sim_move_pins has sent rest where x has them. The velocities of fixed ones become 0, those of moved
- * ones are taken until a step gives them the mean of their track. Internal variables follow from the
- * positions: a hinge's angle is taken on the branch nearest to its present one.
+/* Puts the sim into a user-defined state, from which the next advance starts: time [s], 0 to 1e9, before or
+ * after the present one; positions [m] and velocities [m/s], node_count x 3 each, which are copied. Pinned
+ * nodes must lie where their pins are at t, to within 1e-9 of the size of the scene, and are put there
+ * exactly; nodes that drape_sim_move_pins has moved rest where x has them. Velocities of fixed pins become 0;
+ * those of moving pins are kept until a step replaces them by the mean velocity of the track. Internal
+ * variables follow from the positions: a hinge angle is taken on the branch nearest to its present value.
  *
  * The integrator and the controller start anew, as after a kink; steps are counted from t, and the energies
- * dissipated and numerical from 0. Frames go on with the first at or after t; where t is the present time,
- * with the next that was not told. Statistics go on. Positions and velocities that a sim of the same model
- * had, at the same time, are taken to the bit, so a one-step integrator goes on from them as that sim did
- * where k dt has no rounding.
+ * dissipated and numerical from 0. Frames continue with the first one at or after t or, if t is the present
+ * time, with the next one that was not reported. Statistics continue. Positions and velocities that come from
+ * a sim of the same model at the same time are restored bit for bit, so a one-step integrator continues from
+ * them exactly as that sim did, provided that k dt has no rounding error.
  *
- * Nothing is allocated, and no element checked: a state with one that is degenerate is a start that steps may
- * lead out of. Not for observers. Errors: DRAPE_E_ARGUMENT (NULL, not finite, a pinned node elsewhere), and
- * then nothing has changed. Thread-safety: as the sim. */
+ * Nothing is allocated, and elements are not checked: a state with a degenerate element is a start that steps
+ * may lead out of. Must not be called by an observer. Errors: DRAPE_E_ARGUMENT (NULL, not finite, or a pinned
+ * node elsewhere); the sim is then unchanged. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_set_state(drape_sim *sim, double t, const double *x, const double *v);
 
-/* Pulls a free node by a spring of stiffness [N/m] from it to target [m]: the force stiffness (target - x),
- * in the equations of every step from the next one on, implicit where the integrator is. It replaces the one
- * before; stiffness 0 lets go. The spring's energy is counted as elastic, and what moving its target takes as
- * the work of a pin. Integrators start anew. Nothing is allocated. Not for observers. Errors:
- * DRAPE_E_ARGUMENT (no such node, a pinned one, a stiffness below 0, not finite), and then nothing has
- * changed. Thread-safety: as the sim. */
+/* Pulls a free node towards target [m] by a spring of the given stiffness [N/m]. The force stiffness (target
+ * - x) is part of the equations of every step from the next one on, and implicit if the integrator is. A call
+ * replaces the spring of the call before; stiffness 0 removes it. The spring's energy counts as elastic, and
+ * the work of moving its target counts as that of a pin. Integrators start anew. Nothing is allocated. Must
+ * not be called by an observer. Errors: DRAPE_E_ARGUMENT (no such node, a pinned node, or a stiffness that is
+ * negative or not finite); the sim is then unchanged. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_set_drag_spring(drape_sim *sim, int32_t node, double stiffness,
                                                  const double target[3]);
 
-/* The force of that spring on its node in the present state [N]; 0 without one. */
+/* The force of that spring on its node in the present state [N]; 0 if there is no spring. */
 DRAPE_API void drape_sim_drag_spring_force(const drape_sim *sim, double force[3]);
 
-/* Makes the advance that is running, or else the next one, return DRAPE_E_STOPPED with the last accepted
- * state: before its next step, or at the next evaluation of forces within one, which is then forgotten and
- * counted as rejected ("cancelled"). A later advance goes on from there. Thread-safety: may be called from
- * any thread and from a signal handler, as long as the sim lives. NULL is fine. */
+/* Makes the running advance, or else the next one, return DRAPE_E_STOPPED with the last accepted state:
+ * before its next step, or at the next evaluation of forces within a step, which is then rolled back and
+ * counted as rejected ("cancelled"). A later advance continues from there. Thread-safety: may be called from
+ * any thread and from a signal handler, as long as the sim lives. NULL is allowed. */
 DRAPE_API void drape_sim_cancel(drape_sim *sim);
 
 /* ---- Sim: what a host moves ----
  *
- * For a host that has its own idea of where things are, frame by frame: it says where pins and colliders are to be at
- * the end of the frame, advances by the frame, and says the next. Nothing here allocates;
- * none is for observers; after an error nothing has changed. Thread-safety: as the sim. */
+ * For a host that moves pins and colliders itself, frame by frame: it sets where they are to be at the end of
+ * the frame, advances by the frame, and sets the next positions. None of these functions allocates memory or
+ * may be called by an observer, and after an error nothing has changed. Thread-safety: as the sim. */
 
-/* Sends pinned nodes, fixed ones and ones on tracks alike, on ways of the host's: node nodes[i] goes in the
- * next `seconds` of simulated time from where it is to positions[3 i ...] [m], where it then rests, or goes
- * on by the next call. velocities (count x 3 [m/s]): with how much it comes there, on a cubic from its
- * present position and velocity, so that calls from frame to frame make a smooth motion; NULL: straight, at
- * one speed. A node that was sent once is the host's for good: its track no longer counts.
- * drape_sim_set_state leaves such nodes where the state has them, at rest.
+/* Moves pinned nodes, whether fixed or on tracks, along user-defined paths. In the next `seconds` of
+ * simulated time node nodes[i] moves from its present position to positions[3 i ...] [m]; there it rests
+ * unless another call moves it on. velocities (count x 3 [m/s]) gives the velocity on arrival: the path is
+ * then a cubic from the present position and velocity, so that calls from frame to frame give a smooth
+ * motion. With velocities NULL the path is straight, at constant speed. A node that was moved once stays
+ * under the host's control: its track no longer applies, and drape_sim_set_state leaves it where the state
+ * has it, at rest.
  *
- * Before drape_sim_advance_realtime, seconds is the frame and what is owed, frame_dt + drape_realtime.debt.
+ * Before drape_sim_advance_realtime, seconds is the frame plus what is owed: frame_dt + drape_realtime.debt.
  *
- * The way is known to the integrator in full: any step inside it, and any frame, has pins where the way has
- * them. A jump of velocity is a kink, at which "ida" starts anew. Errors: DRAPE_E_ARGUMENT (no such node, one
- * that is free, the same one twice is not looked for; seconds not in (0, 1e9], not finite or beyond 1e9 m or
- * m/s). */
+ * The integrator knows the whole path: within any step, and in any frame, pins are exactly on it. A jump in
+ * velocity is a kink, at which "ida" starts anew. A node that is listed twice is not detected. Errors:
+ * DRAPE_E_ARGUMENT (no such node, a free node, seconds not in (0, 1e9], or a value that is not finite or
+ * beyond 1e9 m or m/s). */
 DRAPE_API drape_status drape_sim_move_pins(drape_sim *sim, int32_t count, const int32_t *nodes,
                                            double seconds, const double *positions, const double *velocities);
 
-/* The same for a collider as a whole: to a displacement [m] from where its parameters put it.
- * `drape_sim_collider` tells where it is. */
+/* The same for a whole collider: moves it to a displacement [m] from the position that its parameters define.
+ * drape_sim_collider returns its present position. */
 DRAPE_API drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double seconds,
                                                const double displacement[3], const double *velocity);
 
-/* Pushes nodes: forces (node_count x 3 [N], copied) act from the next step on, the same whatever the nodes
- * do, until they are replaced; NULL: none. On a pinned node they are taken up by its pin. Their work counts
- * as that of pins. "ida" starts anew. Errors: DRAPE_E_ARGUMENT (not finite). */
+/* Pushes nodes: forces (node_count x 3 [N], copied) act from the next step on, regardless of the motion of
+ * the nodes, until they are replaced. NULL: no forces. A force on a pinned node is taken up by its pin. The
+ * work of the forces counts as that of pins. "ida" starts anew. Errors: DRAPE_E_ARGUMENT (not finite). */
 DRAPE_API drape_status drape_sim_push(drape_sim *sim, const double *forces);
 
-/* The velocity of the medium at time t [s] at count points: wind (count x 3 [m/s]) at x (count x 3 [m]).
- * gradient, unless NULL, gets dwind_i/dx_j at [9 p + 3 i + j] [1/s]; it comes filled with zeros, and a field
- * that leaves them loses convergence, not accuracy: Newton's matrix then lacks that part. wind comes filled
- * with zeros, too. Called several times a step within drape_sim_advance, in its thread, at states that are
- * only tried: the same t and x must give the same wind, and within one advance it is to be smooth in t. */
+/* Computes the velocity of the medium at time t [s] at count points: wind (count x 3 [m/s]) at x (count x 3
+ * [m]). gradient, unless NULL, receives dwind_i/dx_j at [9 p + 3 i + j] [1/s]. Both outputs are filled with
+ * zeros before the call. Leaving gradient at zero costs convergence, not accuracy, as Newton's matrix then
+ * lacks that part. The function is called several times per step within drape_sim_advance, on its thread,
+ * also at trial states: the same t and x must give the same wind, and within one advance the wind should be
+ * smooth in t. */
 typedef void drape_wind_field(void *user, double t, int32_t count, const double *x, double *wind,
                               double *gradient);
 
-/* Moves the medium that drag terms are in ("drag.wind", added to its own steady wind, "drag.viscous", and a
- * host's with in_medium); field NULL: it rests again. Errors: DRAPE_E_ARGUMENT (no term of the model is in a
- * medium). */
+/* Sets the velocity of the medium for drag terms: "drag.wind" (added to its own steady wind), "drag.viscous",
+ * and user-defined terms with in_medium. If field is NULL, the medium is at rest again. Errors:
+ * DRAPE_E_ARGUMENT (no term of the model is in a medium). */
 DRAPE_API drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *field, void *user);
 
 /* ---- Sim: what can be read ---- */
 
-/* The last accepted state: time [s], positions [m] and velocities [m/s], node_count x 3; valid until the next
- * call that changes the sim. */
+/* The last accepted state: time [s], positions [m] and velocities [m/s], node_count x 3 each; valid until the
+ * next call that changes the sim. drape_sim_model returns the model that the sim was created with. */
 DRAPE_API double drape_sim_time(const drape_sim *sim);
 DRAPE_API const double *drape_sim_positions(const drape_sim *sim);
 DRAPE_API const double *drape_sim_velocities(const drape_sim *sim);
 DRAPE_API const drape_model *drape_sim_model(const drape_sim *sim);
 
-/* A 64-bit hash of time, positions, velocities and internal variables of the last accepted state, nothing
- * else. */
+/* A 64-bit hash of the time, positions, velocities and internal variables of the last accepted state, and of
+ * nothing else. */
 DRAPE_API uint64_t drape_sim_hash(const drape_sim *sim);
 
-/* How many triangles of the cloth reach into a collider of the scene, counted from 0, by more than 1e-9 m; by
- * 28 points of each. With implicit rows and `ida` none does that did not in the beginning (docs/contact.md).
- * *deepest, if not NULL: how deep [m]. -1: there is no such collider. */
+/* Counts the triangles of the cloth that penetrate a collider by more than 1e-9 m, tested at 28 points of
+ * each. collider is its number in the scene, from 0. With implicit integrators and "ida", a triangle that was
+ * outside at the start stays outside (docs/contact.md). *deepest, if not NULL, receives the largest depth
+ * [m]. Returns -1 if there is no such collider. */
 DRAPE_API int32_t drape_sim_inside(const drape_sim *sim, int32_t collider, double *deepest);
 
-/* Normals of the last accepted state (node_count x 3 [1]): the mean of the triangles around a node weighted
- * by their areas, of length 1, counterclockwise outside; 0 where those add up to nothing.
- * drape_model_normals: at other positions x (node_count x 3 [m]). */
+/* Normals of the nodes (node_count x 3 [1]): the area-weighted mean over the triangles around a node,
+ * normalised, with the side outside from which the triangles are counterclockwise; 0 where the mean vanishes.
+ * drape_sim_normals: in the last accepted state; drape_model_normals: at positions x (node_count x 3 [m]). */
 DRAPE_API void drape_sim_normals(const drape_sim *sim, double *normals);
 DRAPE_API void drape_model_normals(const drape_model *model, const double *x, double *normals);
 
-/* Forces in the last accepted state, into arrays of the host's (node_count x 3 [N]).
+/* Forces in the last accepted state, written to arrays of the caller (node_count x 3 [N]).
  *
- * drape_sim_reactions: what pins do to pinned nodes, 0 on free ones: the force that keeps a node on its way
- * against cloth, gravity, contact and push, without what it takes to speed up the node's own mass. Rates that
- * damping laws take from a step are those of the velocities here.
+ * drape_sim_reactions: the forces of pins on pinned nodes, 0 on free ones. A reaction is the force that keeps
+ * a node on its path against cloth, gravity, contact and push, excluding the force that accelerates the
+ * node's own mass. Damping laws that take rates from a step use the present velocities here.
  *
- * drape_sim_contact_forces: of contact and friction, with colliders and between layers, on every node;
- * drape_sim_collider_force: of cloth on one collider, as a whole. Colliders have the mean velocity of the
- * last step, so ask before moving them on. Under "newton_k", which does not bring the residual of a step to
- * zero, all of these are far off (docs/choosing.md). An integrator that moves nodes out of what they meet
- * ("verlet") has no such forces, and says so. Errors: DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. Thread-safety: as the
- * sim. Not for observers. */
+ * drape_sim_contact_forces: contact and friction on every node, with colliders and between layers of cloth.
+ * drape_sim_collider_force: the total force of the cloth on one collider. Colliders have the mean velocity of
+ * the last step, so call these before moving them on. Under "newton_k", which does not bring the residual of
+ * a step to zero, all of these forces are far off (docs/choosing.md). An integrator that resolves contact by
+ * moving nodes ("verlet") has no such forces and returns an error. Errors: DRAPE_E_ARGUMENT, DRAPE_E_MEMORY.
+ * Thread-safety: as the sim. Must not be called by an observer. */
 DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_contact_forces(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3]);
 
-/* Where a collider is in the last accepted state, as drape_model_collider, with the host's moves. */
+/* The position of a collider in the last accepted state, as drape_model_collider, but including moves by the
+ * host. */
 DRAPE_API drape_collider_motion drape_sim_collider(const drape_sim *sim, int32_t collider);
 
 /* Energies of the last accepted state [J]. */
 typedef struct drape_energy {
-    double kinetic;    /* [J] of the free nodes, as the motion of pinned ones is prescribed */
+    double kinetic;    /* [J] of the free nodes only, as the motion of pinned nodes is prescribed */
     double elastic;    /* [J] of all terms that have an energy, and of drape_sim_set_drag_spring */
-    double gravity;    /* [J] the potential, zero at the origin */
-    double contact;    /* [J] of pairs that are nearer than their activation distance */
-    double dissipated; /* [J] the work that damping and drag terms took since t = 0 or drape_sim_set_state */
-    double numerical;  /* [J] what is missing otherwise, the integrator's own dissipation (negative: gain),
-                          after the work of pins and colliders that move and of drape_sim_push */
+    double gravity;    /* [J] potential energy, zero at the origin */
+    double contact;    /* [J] of pairs that are closer than their activation distance */
+    double dissipated; /* [J] work taken by damping and drag terms since t = 0 or drape_sim_set_state */
+    double numerical;  /* [J] the rest of the balance, after the work of moving pins and colliders and of
+                          drape_sim_push: the integrator's own dissipation; negative: a gain */
 } drape_energy;
 
-/* Adds up the energies of the last accepted state. */
+/* Sums the energies of the last accepted state. */
 DRAPE_API drape_energy drape_sim_energy(drape_sim *sim);
 
-/* Where the elastic energy of the last accepted state is: density (node_count) [J/m2], that of each element
- * in equal parts on its nodes, over the area that is lumped to a node at rest. Its sum over nodes, each times
- * its area, is the elastic energy. */
+/* The distribution of the elastic energy of the last accepted state: density (node_count) [J/m2]. The energy
+ * of each element is divided equally among its nodes, and each node's share is divided by the area that is
+ * lumped to it at rest. The sum over nodes of density times area is the elastic energy. */
 DRAPE_API void drape_sim_energy_density(drape_sim *sim, double *density);
 
-/* Work done since the sim was made. Times in seconds of wall clock; newton times are parts of steps. */
+/* Counts of the work done since the sim was created. Times are wall-clock seconds. */
 typedef struct drape_statistics {
-    int64_t steps_accepted, steps_rejected; /* attempts by what became of them */
-    int64_t steps_unconverged; /* of the accepted: taken although unconverged, by on_failure "accept" */
-    double h_min, h_max;       /* [s] of accepted steps; 0 before the first */
-    int64_t newton_iterations; /* of all attempts, as what follows */
-    int64_t jacobians;         /* evaluated */
-    int64_t factorizations;    /* of matrices, those that were refused too */
-    int64_t linear_iterations; /* of solvers that iterate */
-    int64_t residuals;         /* evaluated */
-    double wall_setup;         /* [s] of a clock on a wall, as what follows: making the sim */
-    double wall_steps;         /* [s] all steps, with the parts below */
-    /* [s] Parts of wall_steps, none of them a part of another: residual and Jacobian are without their
-     * contact. */
+    int64_t steps_accepted, steps_rejected; /* attempted steps by outcome */
+    int64_t steps_unconverged; /* accepted steps that did not converge, under on_failure "accept" */
+    double h_min, h_max;       /* [s] smallest and largest accepted step; 0 before the first */
+    int64_t newton_iterations; /* of all attempts, as are the counts that follow */
+    int64_t jacobians;         /* evaluations of the Jacobian */
+    int64_t factorizations;    /* matrix factorizations, including failed ones */
+    int64_t linear_iterations; /* iterations of iterative linear solvers */
+    int64_t residuals;         /* evaluations of the residual */
+    double wall_setup;         /* [s] wall-clock time, as are the times that follow: creating the sim */
+    double wall_steps;         /* [s] all steps, including the parts below */
+    /* [s] Disjoint parts of wall_steps: the residual and the Jacobian exclude their contact. */
     double wall_residual;
     double wall_jacobian;
     double wall_factor;
@@ -545,109 +562,113 @@ typedef struct drape_statistics {
     double wall_contact;
     double strain_min, strain_max; /* |e|/L - 1 over all edges and accepted steps */
     bool stability_known;   /* "static" found an equilibrium and the signs of its Hessian's eigenvalues */
-    int64_t unstable_modes; /* how many are negative: 0 for a stable equilibrium */
+    int64_t unstable_modes; /* number of negative eigenvalues: 0 for a stable equilibrium */
 } drape_statistics;
 
-/* Copies what was counted so far. */
+/* Returns a copy of the counts so far. */
 DRAPE_API drape_statistics drape_sim_statistics(const drape_sim *sim);
 
-/* Reasons for which attempts were rejected, with their counts: "max_iterations", "line_search",
- * "edge_collapse" ..., "other" for all past the 31st. index runs from 0; *count is 0 and the result NULL past
- * the last. */
+/* The reasons why attempts were rejected, with their counts: "max_iterations", "line_search", "edge_collapse"
+ * ...; all reasons after the 31st are counted as "other". index starts at 0; past the last reason *count is 0
+ * and the result is NULL. */
 DRAPE_API const char *drape_sim_reason(const drape_sim *sim, int index, int64_t *count);
 
 /* ---- Checkpoints ---- */
 
-/* Takes size bytes, in the order in which they come. DRAPE_OK to go on; a negative status to stop with, whose
- * message it may have set by drape_context_set_message. */
+/* Receives the next size bytes of a stream. Returns DRAPE_OK to continue, or a negative status to stop; it
+ * may have set the message with drape_context_set_message. */
 typedef drape_status drape_write(void *user, const void *bytes, size_t size);
 
-/* Saves a sim between two calls that advance it, so that a sim of the same model goes on from there with the
- * same bits: states, what integrator, controller, contact and linear solver know of the past, the energies
- * and statistics so far, the number of the next frame; where a host sent pins and colliders, what it pushes
- * and pulls. Not saved are observers, the field of drape_sim_set_wind, and what a host's own terms or
- * colliders keep. May also be called by an observer of a frame: the frames that are left of the step are told
- * after drape_sim_restore, by the next advance.
+/* Save a sim between two calls that advance it, so that a sim of the same model can continue from there with
+ * the same bits. Saved are the states; the history kept by integrator, controller, contact and linear solver;
+ * the energies and statistics so far; the number of the next frame; the paths that a host set for pins and
+ * colliders; its push and its drag spring. Not saved are observers, the field of drape_sim_set_wind, and
+ * anything that user-defined terms or colliders keep. An observer may also save on a frame event: the
+ * remaining frames of the step are then reported by the first advance after drape_sim_restore.
  *
- * drape_sim_save writes a file: under another name first, then to the disk, then under its own, so that at
- * any moment, a crash of the machine too, there is the file before or the new one whole. It takes a buffer of
- * 64 KiB and gives it back; drape_sim_save_to takes no memory. Sizes: 100 to 400 bytes a node; for "ida" and
- * modified Newton a matrix beside.
+ * drape_sim_save writes a file under a temporary name, flushes it to the disk, and then renames it, so that
+ * at any moment, even if the machine crashes, either the previous file or the new one is complete. It
+ * allocates a buffer of 64 KiB and frees it again; drape_sim_save_to allocates nothing. Size: 100 to 400
+ * bytes per node, plus a matrix for "ida" and modified Newton.
  *
- * Errors: DRAPE_E_ARGUMENT (NULL), DRAPE_E_MEMORY, DRAPE_E_FILE; what `write` returned. The sim is as it was.
- * Thread-safety: as the sim. */
+ * Errors: DRAPE_E_ARGUMENT (NULL), DRAPE_E_MEMORY, DRAPE_E_FILE, or whatever `write` returned. The sim is
+ * unchanged. Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_save(drape_sim *sim, const char *path);
 DRAPE_API drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, void *user);
 
-/* Puts a sim, whatever it did before, where the saved one was; bytes (size) need only live during the call.
- * The sim was made with the model of the saved one, or one from the same scene, by the same build, with the
- * same integrator, controller, their settings and frame rate; threads may differ. Its observers and its wind
- * stay, and it may be cancelled as before; observers are told nothing. Arrays that the sim gave out before
- * are no longer valid. A sim is made beside the present one for it: for the time of the call there are both.
- * With a SUNDIALS without its private headers (docs/checkpoints.md) "ida" starts anew from the state.
+/* Restore the saved state into a sim, whatever it did before. bytes (size) need only live during the call.
+ * The sim must have been created with the model of the saved sim, or one from the same scene, by the same
+ * build, with the same integrator, controller, settings and frame rate; the number of threads may differ. Its
+ * observers and its wind are kept, and it can be cancelled as before; observers are not notified. Arrays that
+ * the sim returned before are no longer valid. The restored sim is built beside the present one, so both
+ * exist during the call. If Drape was built without the private headers of SUNDIALS (docs/checkpoints.md),
+ * "ida" starts anew from the state.
  *
- * A file of `drape run --checkpoint-every` is such a one, too. Errors, and then the sim is as it was:
- * DRAPE_E_ARGUMENT (NULL, another model, row or setting), DRAPE_E_VERSION (another build), DRAPE_E_PARSE
- * (damaged, or no checkpoint), DRAPE_E_FILE, DRAPE_E_MEMORY, DRAPE_E_SOLVER. Not for observers.
+ * Files written by `drape run --checkpoint-every` can be restored, too. Errors, after which the sim is
+ * unchanged: DRAPE_E_ARGUMENT (NULL, or another model, integrator, controller or setting), DRAPE_E_VERSION
+ * (another build), DRAPE_E_PARSE (damaged, or not a checkpoint), DRAPE_E_FILE, DRAPE_E_MEMORY,
+ * DRAPE_E_SOLVER, DRAPE_E_STOPPED (the context's cancel function). Must not be called by an observer.
  * Thread-safety: as the sim. */
 DRAPE_API drape_status drape_sim_restore(drape_sim *sim, const char *path);
 DRAPE_API drape_status drape_sim_restore_from(drape_sim *sim, const void *bytes, size_t size);
 
 /* ---- Observers ---- */
 
-/* The element or node that an attempt has most to say about. */
+/* The element or node that explains the outcome of an attempt best. */
 typedef struct drape_diagnostic {
-    const char *what;    /* "residual", "edge length / rest length", "altitude / rest altitude" ...; "" for
-                            none */
-    const char *term;    /* the row that found it, "" for a node */
+    const char *what;    /* "residual", "edge length / rest length", "altitude / rest altitude" ...; "":
+                            nothing to report */
+    const char *term;    /* name of the term that found it; "" for a node */
     int32_t element;     /* element number in that term of that cloth; -1 for a node */
-    int32_t node[4];     /* its first nodes, numbers of the whole model; -1 past the last */
+    int32_t node[4];     /* its first nodes, as node numbers of the model; unused places are -1 */
     int32_t cloth;       /* index of its cloth; -1 for none */
-    double value, limit; /* in the unit of what */
+    double value, limit; /* both in the unit of what */
 } drape_diagnostic;
 
 /* One attempted step. */
 typedef struct drape_attempt {
-    int64_t index;       /* counts attempts from 0 */
+    int64_t index;       /* number of the attempt, from 0 */
     double t, h;         /* start and size [s] */
-    drape_status status; /* > 0 with accepted: on_failure "accept" took an unconverged state */
-    const char *reason;  /* "converged", "max_iterations", ...: a short token, static */
-    bool accepted;       /* the sim went on from its end; else it was forgotten */
+    drape_status status; /* > 0 with accepted: on_failure "accept" accepted an unconverged state */
+    const char *reason;  /* "converged", "max_iterations" ...: a short static token */
+    bool accepted;       /* the sim continued from its end; otherwise the step was rolled back */
     int iterations;      /* Newton iterations */
     double residual;     /* of the free nodes at the end of the attempt, in the norm of the integrator [N] */
-    double tolerance; /* that it was to reach [N]; with the reason "rounding" what rounding alone leaves; NaN:
-                         the row promises none */
-    drape_diagnostic diagnostic; /* what the attempt has most to say about */
+    double tolerance;    /* target for the residual [N]; with the reason "rounding", the level that rounding
+                         alone leaves; NaN: the integrator guarantees none */
+    drape_diagnostic diagnostic; /* the element or node to report */
 } drape_attempt;
 
-/* What an observer is told about. */
+/* What an event reports. */
 typedef enum drape_event_kind {
-    DRAPE_EVENT_ATTEMPT, /* after each attempt was judged; the sim's state is the one kept */
+    DRAPE_EVENT_ATTEMPT, /* an attempt was judged; the sim's state is the one that is kept */
     DRAPE_EVENT_FRAME    /* a frame time was reached: t = 0 at the first advance, then k / frame_rate */
 } drape_event_kind;
 
-/* What an observer is told. Valid during the call. */
+/* What an observer receives. Valid during the call. */
 typedef struct drape_event {
     drape_event_kind kind;        /* what happened */
-    drape_sim *sim;               /* to whom */
+    drape_sim *sim;               /* the sim that the event belongs to */
     const drape_attempt *attempt; /* ATTEMPT only */
-    int64_t frame;                /* FRAME: its number from 0 */
+    int64_t frame;                /* FRAME: number of the frame, from 0 */
     double time;                  /* FRAME [s] */
-    const double *positions;  /* FRAME: node_count x 3 [m]; cubic Hermite between the steps around it, or the
-                                 straight way, or the nearer of them, where that leads through something */
-    const double *velocities; /* FRAME: node_count x 3 [m/s]; linear between the steps around it */
+    const double *positions;  /* FRAME: node_count x 3 [m]; interpolated between the two steps around it by a
+                                 cubic Hermite polynomial or, where that passes through something, linearly,
+                                 or else taken from the nearer step */
+    const double *velocities; /* FRAME: node_count x 3 [m/s]; linear between the two steps around it */
 } drape_event;
 
-/* Called within drape_sim_advance. Returns 0 to go on, anything else to stop: the advance then returns
- * DRAPE_E_STOPPED if the value was > 0, else that status, with the message that the observer may have set by
- * drape_context_set_message. An observer must not advance or destroy the sim, nor set its state. */
+/* Called within drape_sim_advance. Returns 0 to continue. Any other value stops the advance, which then
+ * returns DRAPE_E_STOPPED if the value is > 0, else the value itself, with the message that the observer may
+ * have set by drape_context_set_message. An observer must not advance or destroy the sim, nor set its
+ * state. */
 typedef drape_status drape_observer(void *user, const drape_event *event);
 
-/* Adds an observer; they are called in the order in which they were added, at most 8. Errors:
+/* Adds an observer. Observers are called in the order in which they were added; there are at most 8. Errors:
  * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_sim_observe(drape_sim *sim, drape_observer *observer, void *user);
 
-/* For observers: sets what drape_context_message will say, printf style. */
+/* For observers: sets the text that drape_context_message returns, in the style of printf. */
 DRAPE_API void drape_context_set_message(drape_context *ctx, const char *format, ...) DRAPE_PRINTF(2, 3);
 
 DRAPE_C_END

@@ -1,16 +1,16 @@
-/* export.h: symbol visibility, C/C++ brackets, version. The only place that knows about C++ or visibility. */
+/* export.h: symbol visibility, C/C++ linkage, version. The only file that knows about C++ or visibility. */
 #ifndef DRAPE_EXPORT_H
 #define DRAPE_EXPORT_H
 
-/* The version of this header; drape_version() is that of the library. */
+/* The version of this header; drape_version() returns that of the library. */
 #define DRAPE_VERSION_MAJOR 0
 #define DRAPE_VERSION_MINOR 1
 #define DRAPE_VERSION_PATCH 0
 
 #if defined(__GNUC__)
-/* What the shared library shows. */
+/* Marks what the shared library exports. */
 #define DRAPE_API __attribute__((visibility("default")))
-/* Arguments that the compiler holds against a text as of printf; both count from 1. */
+/* Lets the compiler check arguments against a printf format; both are argument numbers from 1. */
 #define DRAPE_PRINTF(text, first) __attribute__((format(printf, text, first)))
 #else
 #define DRAPE_API
@@ -18,7 +18,7 @@
 #endif
 
 #ifdef __cplusplus
-/* The brackets around declarations that C and C++ share. */
+/* Enclose the declarations that C and C++ share. */
 #define DRAPE_C_BEGIN extern "C" {
 #define DRAPE_C_END   }
 #else

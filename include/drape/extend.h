@@ -1,21 +1,21 @@
 /*
- * extend.h: all that an author of a term or a collider needs: parameter lists, the view of a cloth, the ops
- * table of a term, the shape and the ops table of a collider.
+ * extend.h: everything an author of a term or a collider needs: parameter lists, the view of a cloth, the
+ * function table of a term, the shape and the function table of a collider.
  *
- * A term is a sum over elements of one cloth. Its author writes, for a range of elements in local
- * coordinates, one of
+ * A term is a sum over elements of one cloth. Its author writes one of the following, for a range of elements
+ * in local coordinates:
  *
- *   - measure: a scalar strain measure q(x) with gradient and Hessian, of which the library makes the energy
- *     E = 1/2 k (q - q0)^2
+ *   - measure: a scalar strain measure q(x) with gradient and Hessian, from which the library makes the
+ *     energy E = 1/2 k (q - q0)^2
  *   - energy: any energy E(x) with gradient and Hessian
- *   - dissipation: a force g(x, v), positive against the motion, with its derivatives
+ *   - dissipation: a force g(x, v), counted positive against the motion, with its derivatives
  *   - law: a force along the strain measures of the other terms of its cloth, such as a damping
  *
- * The library owns the loops, the sparsity, the scatter, the projection, boundary conditions and threads.
+ * The library provides the loops, sparsity, assembly, projection, boundary conditions and threads.
  *
  * Thread-safety: every function of a term may be called from several threads at once on different ranges; it
- * must not allocate and must read nothing but its arguments. The exception is build, called once per cloth
- * while a model is compiled.
+ * must not allocate memory and must read nothing but its arguments. The exception is build, which is called
+ * once per cloth while a model is compiled.
  */
 #ifndef DRAPE_EXTEND_H
 #define DRAPE_EXTEND_H
@@ -28,62 +28,65 @@ DRAPE_C_BEGIN
 
 /* ---- Parameters ---- */
 
-/* What a parameter is. */
+/* The kind of a parameter. */
 typedef enum drape_param_kind {
-    DRAPE_PARAM_NUMBER,  /* any number of the range */
-    DRAPE_PARAM_INTEGER, /* a whole one */
+    DRAPE_PARAM_NUMBER,  /* any number in the range */
+    DRAPE_PARAM_INTEGER, /* an integer in the range */
     DRAPE_PARAM_BOOLEAN, /* 0 or 1 */
-    DRAPE_PARAM_CHOICE,  /* the index of one of choices */
-    DRAPE_PARAM_VECTOR,  /* three numbers, one after another in the values; the range holds for each */
-    DRAPE_PARAM_TURN,    /* three numbers: a vector along the axis, as long as the angle [degrees], which the
-                            range holds for; may be given as axis and angle, four numbers */
-    DRAPE_PARAM_TEXT     /* a text, such as the name of a file; it does not travel: its value is 0 */
+    DRAPE_PARAM_CHOICE,  /* an index into choices */
+    DRAPE_PARAM_VECTOR,  /* three consecutive values; the range applies to each */
+    DRAPE_PARAM_TURN,    /* a rotation as three values: a vector along the axis whose length is the angle
+                            [degrees], to which the range applies; may also be given as axis and angle, four
+                            numbers */
+    DRAPE_PARAM_TEXT     /* a text, such as a file name; its numerical value is always 0 */
 } drape_param_kind;
 
-/* One parameter. All values travel as doubles: integers exact, booleans 0 or 1, choices by index; a vector
- * or a turn takes three of them, so that the values of the parameters after it stand two further on. In C the
- * macros below write one. */
+/* One parameter. All values are stored as doubles: integers exactly, booleans as 0 or 1, choices by index. A
+ * vector or a rotation occupies three values, which shifts the values of later parameters by two. In C, the
+ * macros below write one parameter each. */
 typedef struct drape_param {
     const char *name;           /* as in scenes */
-    drape_param_kind kind;      /* what values it has */
-    const char *unit;           /* "N/m", "s", "1" for none */
-    double default_value;       /* NaN: there is none, see derived */
-    const char *derived;        /* with a NaN default: what is taken instead, in words; NULL: the parameter is
-                                   required */
-    double min, max;            /* closed range; ignored by booleans and choices */
+    drape_param_kind kind;      /* the kind of its values */
+    const char *unit;           /* "N/m", "s"; "1" for none */
+    double default_value;       /* NaN: no fixed default, see derived */
+    const char *derived;        /* if default_value is NaN: what is used instead, as text; NULL: the parameter
+                                   is required */
+    double min, max;            /* closed range; ignored for booleans and choices */
     bool open_min, open_max;    /* the bound itself is excluded */
-    const char *const *choices; /* NULL-ended list of names */
-    const char *help;           /* what it is and what it does, one line */
-    bool uniform;               /* VECTOR: one number may stand for three equal ones */
-    const char *numbers;        /* VECTOR: what the three are, "[k11, k22, k12]"; NULL: [x, y, z] */
+    const char *const *choices; /* NULL-terminated list of names */
+    const char *help;           /* meaning and effect, in one line */
+    bool uniform;               /* VECTOR: a single number may stand for three equal ones */
+    const char *numbers;        /* VECTOR: the names of the three numbers, "[k11, k22, k12]"; NULL: [x, y,
+                                   z] */
 } drape_param;
 
-/* A parameter that is a number: name, unit, default, range and help. C only, as C++17 has no designated
- * initialisers:
+/* A number: name, unit, default, range and help. For C only, as C++17 has no designated initialisers:
+ *
  *     static const drape_param params[] = {
  *         DRAPE_NUMBER("tolerance", "N", 1e-6, DRAPE_ABOVE(0), 1e12, "bound on the residual"),
  *         DRAPE_VECTOR("size", "m", DRAPE_REQUIRED, 0, 1e9, "lengths of the edges", .uniform = true),
  *         DRAPE_CHOICE("rest", 0, rest_choices, "rest angles: those of the mesh, or flat")};
- * DRAPE_REQUIRED and DRAPE_DERIVED stand for a default, DRAPE_ABOVE and DRAPE_BELOW for a bound that the
- * range excludes. Other members may follow the help. */
+ *
+ * DRAPE_REQUIRED and DRAPE_DERIVED may replace a default, DRAPE_ABOVE and DRAPE_BELOW a bound that the range
+ * excludes. Further members may follow the help. */
 #define DRAPE_NUMBER(name_, unit_, default_, min_, max_, ...)                                                \
     {                                                                                                        \
         .name = name_, .kind = DRAPE_PARAM_NUMBER, .unit = unit_, .default_value = default_, .min = min_,    \
         .max = max_, .help = __VA_ARGS__                                                                     \
     }
-/* A whole number. */
+/* An integer. */
 #define DRAPE_INTEGER(name_, unit_, default_, min_, max_, ...)                                               \
     {                                                                                                        \
         .name = name_, .kind = DRAPE_PARAM_INTEGER, .unit = unit_, .default_value = default_, .min = min_,   \
         .max = max_, .help = __VA_ARGS__                                                                     \
     }
-/* Three numbers; default and range are those of each. */
+/* Three numbers; the default and the range apply to each. */
 #define DRAPE_VECTOR(name_, unit_, default_, min_, max_, ...)                                                \
     {                                                                                                        \
         .name = name_, .kind = DRAPE_PARAM_VECTOR, .unit = unit_, .default_value = default_, .min = min_,    \
         .max = max_, .help = __VA_ARGS__                                                                     \
     }
-/* A rotation; the range is that of its angle [degrees]. */
+/* A rotation; the range applies to its angle [degrees]. */
 #define DRAPE_TURN(name_, default_, min_, max_, ...)                                                         \
     {                                                                                                        \
         .name = name_, .kind = DRAPE_PARAM_TURN, .unit = "degrees", .default_value = default_, .min = min_,  \
@@ -95,13 +98,13 @@ typedef struct drape_param {
         .name = name_, .kind = DRAPE_PARAM_BOOLEAN, .unit = "1", .default_value = default_,                  \
         .help = __VA_ARGS__                                                                                  \
     }
-/* One of a NULL-ended list of names; the default is an index. */
+/* One of a NULL-terminated list of names; the default is an index. */
 #define DRAPE_CHOICE(name_, default_, choices_, ...)                                                         \
     {                                                                                                        \
         .name = name_, .kind = DRAPE_PARAM_CHOICE, .unit = "1", .default_value = default_,                   \
         .choices = choices_, .help = __VA_ARGS__                                                             \
     }
-/* A text, always required. */
+/* A text; always required. */
 #define DRAPE_TEXT(name_, ...)                                                                               \
     {                                                                                                        \
         .name = name_, .kind = DRAPE_PARAM_TEXT, .unit = "1", .default_value = DRAPE_REQUIRED,               \
@@ -109,302 +112,316 @@ typedef struct drape_param {
     }
 /* In place of a default: the parameter must be given. */
 #define DRAPE_REQUIRED ((double)NAN)
-/* In place of a default: what is taken instead, in words. */
+/* In place of a default: a description of what is used instead. */
 #define DRAPE_DERIVED(words) DRAPE_REQUIRED, .derived = words
-/* In place of min: values are above it. */
+/* In place of min: values must be above the bound. */
 #define DRAPE_ABOVE(bound) bound, .open_min = true
-/* In place of max: values are below it. */
+/* In place of max: values must be below the bound. */
 #define DRAPE_BELOW(bound) bound, .open_max = true
 
-#define DRAPE_MAX_PARAMS 24 /* values of all parameters of an entry */
+#define DRAPE_MAX_PARAMS 24 /* limit on the number of values that the parameters of an entry occupy */
 
 /* ---- Entries ---- */
 
-/* What every implementation that is chosen by name says of itself: a term, a collider, and all that `drape
- * list` shows. The struct of its functions begins with it, behind its size where it has one. Texts and
- * parameters are static. */
+/* Describes one implementation that is chosen by name: a term, a collider, and everything else that `drape
+ * list` shows. A function table begins with it, after struct_size if it has one. Texts and parameters are
+ * static. */
 typedef struct drape_entry {
     const char *name;          /* as in scenes: "bend.hinge" */
     const char *summary;       /* one line for `drape list` */
-    const char *reference;     /* where the method is from: paper and equation; NULL: nowhere else */
-    const drape_param *params; /* param_count of them; NULL: none */
-    int param_count;           /* of params */
+    const char *reference;     /* source of the method: paper and equation; NULL: none */
+    const drape_param *params; /* param_count parameters; NULL: none */
+    int param_count;           /* length of params */
 } drape_entry;
 
 /* Initialises params and param_count of an entry from an array. */
 #define DRAPE_PARAMS(array) .params = (array), .param_count = (int)(sizeof(array) / sizeof *(array))
 
-/* ---- What a term is built from ---- */
+/* ---- The data that a term is built from ---- */
 
-/* Stiffness and mass of a sheet, resolved. SI units. */
+/* Resolved stiffness and mass of a sheet, in SI units. */
 typedef struct drape_material {
     double young_modulus, poisson_ratio, thickness; /* [Pa], [1], [m] */
-    double areal_density;      /* [kg/m2]; total mass over area where the mass is uniform */
+    double areal_density;      /* [kg/m2]; the total mass divided by the area if the mass is uniform over
+                                  nodes */
     double membrane_stiffness; /* E h [N/m] */
     double flexural_rigidity;  /* D = E h^3 / (12 (1 - nu^2)) [N m] */
-    double bending_warp, bending_weft, bending_twist; /* of a measured fabric [N m]; NaN: it is none */
+    double bending_warp, bending_weft, bending_twist; /* of a measured fabric [N m]; NaN: not a measured
+                                                         fabric */
 } drape_material;
 
-/* Stiffness of a woven sheet, in tension [N/m] or in bending [N m]. */
+/* Stiffnesses of a woven sheet, in tension [N/m] or in bending [N m]. */
 typedef struct drape_woven {
-    double warp, weft; /* of strips along them with free sides */
-    double shear;      /* of shear, or of twist */
+    double warp, weft; /* of strips cut along warp and weft, with free sides */
+    double shear;      /* shear stiffness or, in bending, twist stiffness */
     double poisson;    /* sqrt(nu12 nu21) [1] */
 } drape_woven;
 
-/* One cloth at rest. Node numbers are local to the cloth. All arrays are const and live as long as the model
- * is compiled. */
+/* One cloth at rest. Node numbers are local to the cloth. All arrays are const and valid while the model is
+ * compiled. */
 typedef struct drape_cloth_view {
-    int32_t node_count, triangle_count, edge_count, hinge_count; /* of the arrays below */
+    int32_t node_count, triangle_count, edge_count, hinge_count; /* lengths of the arrays below */
     const double *rest;                                          /* (node_count x 3) rest positions [m] */
     const int32_t *triangle;                                     /* (triangle_count x 3) */
     const double *triangle_area;                                 /* (triangle_count) [m2] */
     const int32_t *edge;                                         /* (edge_count x 2) */
-    const int32_t *edge_triangle; /* (edge_count x 2) triangles beside the edge; second -1 on the boundary */
+    const int32_t *edge_triangle; /* (edge_count x 2) triangles beside the edge; the second is -1 on the
+                                     boundary */
     const double *edge_length;    /* (edge_count) [m] */
-    const int32_t *hinge; /* (hinge_count x 4) x0 x1 the shared edge, x2 x3 the apices of its two triangles */
-    const int32_t *hinge_edge;    /* (hinge_count) */
+    const int32_t *hinge;         /* (hinge_count x 4) x0 x1: the shared edge, x2 x3: the apices of its two
+                             triangles */
+    const int32_t *hinge_edge;    /* (hinge_count) edge number of the hinge */
     const int32_t *triangle_edge; /* (triangle_count x 3) the edge from corner k to corner k + 1 */
-    const uint8_t *edge_clamped;  /* (edge_count) 1: a pin keeps the direction of the sheet across it */
-    const double *node_area;      /* (node_count) lumped, a third of each triangle [m2] */
+    const uint8_t *edge_clamped;  /* (edge_count) 1: a pin keeps the direction of the sheet across the edge */
+    const double *node_area;      /* (node_count) lumped: a third of each adjacent triangle [m2] */
     const double *node_mass;      /* (node_count) lumped [kg] */
-    int32_t rows, columns;        /* of a grid, in nodes: node r * columns + c; 0 on other meshes */
-    bool rectangular;             /* a grid whose cells are rectangles before its transform */
+    int32_t rows, columns;        /* of a grid, in nodes: node r * columns + c; 0 for other meshes */
+    bool rectangular;             /* the mesh is a grid whose cells are rectangles before its transform */
     drape_material material;      /* of the sheet */
     double gravity[3];            /* [m/s2] */
-    const drape_woven *tension, *bending; /* of a measured fabric; NULL: the material says all */
+    const drape_woven *tension, *bending; /* of a measured fabric; NULL: use material */
 } drape_cloth_view;
 
 /* Receives the elements of a term while its cloth is compiled. Opaque. */
 typedef struct drape_term_builder drape_term_builder;
 
-/* Announces the elements of a term; called once, first, by build. nodes: of an element, 1 to
- * DRAPE_MAX_ELEMENT_NODES; rest_count: numbers of rest data an element. Errors: DRAPE_E_MEMORY,
+/* Announces the elements of a term. build must call it once, before anything else. Each element has as many
+ * nodes as the term's `nodes`, and rest_count numbers of rest data. Errors: DRAPE_E_MEMORY,
  * DRAPE_E_ARGUMENT. */
 DRAPE_API drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count);
 
-/* The same for elements of fewer nodes than the term's, on this cloth. A node may stand in several places of
- * an element, as its first does in places that are left over: its derivatives are the sum of theirs. */
+/* The same for a cloth on which elements have fewer nodes than the term's `nodes`. A node may occur in
+ * several places of an element, as the first one does in unused places: derivatives of such places add up. */
 DRAPE_API drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t element_count, int nodes,
                                                 int rest_count);
 
-/* Says that elements of this cloth hold on to directions in space: their forces have a torque. */
+/* Declares that elements of this cloth are attached to fixed directions in space, so that their forces have a
+ * torque. */
 DRAPE_API void drape_term_anchor(drape_term_builder *builder);
 
-/* Sets element `element`: its nodes (local to the cloth) and its rest data. Measures keep k [J/q2] in rest[0]
- * and q0 in rest[1]; terms that are damped keep c >= 0 [J s/q2] in rest[2]. */
+/* Sets element number `element`: its nodes (local to the cloth) and its rest data. Measures keep k [J/q2] in
+ * rest[0] and q0 in rest[1]; terms with `damped` keep c >= 0 [J s/q2] in rest[2]. */
 DRAPE_API void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t *nodes,
                               const double *rest);
 
-/* Refuses to build: the reason is reported at the place of the term in the scene. Returns DRAPE_E_ARGUMENT.
- */
+/* Rejects the cloth: the reason is reported at the place of the term in the scene. Returns DRAPE_E_ARGUMENT,
+ * which build must return. */
 DRAPE_API drape_status drape_term_refuse(drape_term_builder *builder, const char *format, ...)
     DRAPE_PRINTF(2, 3);
 
-/* The most nodes that an element has. */
+/* The maximum number of nodes of an element. */
 #define DRAPE_MAX_ELEMENT_NODES 12
-/* Their coordinates. */
+/* The maximum number of coordinates of an element. */
 #define DRAPE_MAX_ELEMENT_DOFS (3 * DRAPE_MAX_ELEMENT_NODES)
 
-/* The elements of one term on one cloth, const after compile. */
+/* The elements of one term on one cloth; constant after the model is compiled. */
 typedef struct drape_elements {
-    int32_t count;        /* elements */
-    int nodes;            /* nodes an element */
-    int rest_count;       /* numbers of rest data an element */
+    int32_t count;        /* number of elements */
+    int nodes;            /* nodes per element */
+    int rest_count;       /* numbers of rest data per element */
     const int32_t *node;  /* (count x nodes) node numbers of the whole model */
     const double *rest;   /* (rest_count x count): item k of element e is rest[k * count + e] */
     const double *params; /* values in the order of the term's parameters */
 } drape_elements;
 
-/* What a check found, for the message of a rejected step. */
+/* The fault that a check found, for the message of a rejected step. */
 typedef struct drape_fault {
-    const char *reason;  /* short token: "edge_collapse"; static text */
-    const char *what;    /* "edge length / rest length"; static text */
-    int32_t element;     /* the worst */
-    double value, limit; /* of what, there, and where it becomes a fault */
+    const char *reason;  /* short static token: "edge_collapse" */
+    const char *what;    /* static text: "edge length / rest length" */
+    int32_t element;     /* the element where the fault is largest */
+    double value, limit; /* the quantity `what` at that element, and the bound beyond which it is a fault */
 } drape_fault;
 
-/* ---- The ops table of a term ---- */
+/* ---- The function table of a term ---- */
 
-/* The most elements that pair is asked for at once. */
+/* The maximum number of elements in one call of pair. */
 #define DRAPE_PAIR_BLOCK 32
-/* How many elements lanes takes at once. */
+/* The number of elements in one call of lanes. */
 #define DRAPE_LANES 4
 
 /*
- * A term. Exactly one of measure, energy, dissipation, law is set. Ranges are elements first ... first +
- * count
- * - 1; outputs are element-major: item i belongs to element first + i. d = 3 * nodes. Gradients have the sign
- * of dE/dx, so a force is minus that. x, v: (nodes of the model x 3). internal: (element_count) internal
- * variables of the last accepted state, of terms that have them, else NULL. An output pointer that is NULL is
- * not wanted.
+ * A term. Exactly one of measure, energy, dissipation and law is set. A range consists of elements first ...
+ * first + count - 1; outputs are element-major: item i belongs to element first + i. d is 3 * nodes.
+ * Gradients have the sign of dE/dx, so forces are their negatives. x, v: (nodes of the model x 3). internal:
+ * (element_count) internal variables of the last accepted state for terms that have them, else NULL. An
+ * output pointer may be NULL: that output is not needed.
  */
 typedef struct drape_term_ops {
-    size_t struct_size;        /* sizeof(drape_term_ops) of the author */
-    drape_entry entry;         /* with a reference: paper and equation of the formula */
+    size_t struct_size;        /* the author's sizeof(drape_term_ops) */
+    drape_entry entry;         /* its reference is the paper and equation of the formula */
     const char *element_name;  /* "edge", "hinge", "node": for messages */
-    int nodes;                 /* nodes an element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
-    bool linear;               /* energy: its Hessian is zero and takes no sparsity */
-    bool potential_of_gravity; /* energy: a force from outside, counts as gravity, not as elastic */
-    bool convex;               /* measure: its Hessian ddq is positive semidefinite, as of a length */
-    bool has_internal;         /* internal variables in each element */
-    int internal_count;        /* of an element, one after another; 0: one */
-    bool constraint; /* an energy that keeps a limit: integrators that move nodes to keep limits do without */
-    bool damped;     /* measure: a dashpot of its own in each element, force c q' on q */
-    bool distance;   /* measure: q is the distance of its two nodes, of all elements */
+    int nodes;                 /* nodes per element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
+    bool linear;               /* energy: its Hessian is zero and needs no sparsity */
+    bool potential_of_gravity; /* energy: an external force that counts as gravity, not as elastic */
+    bool convex;               /* measure: its Hessian ddq is positive semidefinite, as that of a length is */
+    bool has_internal;         /* each element has internal variables */
+    int internal_count;        /* internal variables per element, stored consecutively; 0 means 1 */
+    bool constraint; /* an energy that enforces a limit; integrators that enforce limits by moving nodes omit
+                        it */
+    bool damped;     /* measure: each element has a dashpot of its own, with force c q' on q */
+    bool distance;   /* measure: q is the distance between the two nodes, for all elements */
 
-    /* Adds the elements of one cloth. Called once a cloth. Errors: what the builder returned. */
+    /* Adds the elements of one cloth. Called once per cloth. Returns DRAPE_OK or the error that a builder
+     * function returned. */
     drape_status (*build)(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder);
 
-    /* q [q] (count), dq (count x d), ddq (count x d x d, symmetric). */
+    /* Writes q [q] (count), dq (count x d) and ddq (count x d x d, symmetric). */
     void (*measure)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                     const double *internal, double *q, double *dq, double *ddq);
 
-    /* Optional, beside measure, where nodes is 2 and q is a linear function of the distance of the nodes: the
-     * same with a tenth of the numbers. q (count), d (3 x count: all x, all y, all z) = x1 - x0 [m], c
-     * (count) with dq = (-c d, c d), so that ddq = (P -P; -P P), P = c (I - d d'/d.d). count is at most
+    /* Optional, beside measure, if nodes is 2 and q is a linear function of the distance of the nodes: the
+     * same with a tenth of the numbers. q (count); d (3 x count: all x, all y, all z) = x1 - x0 [m]; c
+     * (count) such that dq = (-c d, c d) and ddq = (P -P; -P P) with P = c (I - d d'/d.d). count is at most
      * DRAPE_PAIR_BLOCK. */
     void (*pair)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *q,
                  double *d, double *c);
 
-    /* Optional, beside measure: the same for the DRAPE_LANES elements of a list at once; the same one may
-     * stand in several places. Item i of the element in place l is at [DRAPE_LANES i + l]: q (1), dq (d), ddq
+    /* Optional, beside measure: the same for a list of DRAPE_LANES elements at once, in which an element may
+     * occur more than once. Item i of the element in place l is at [DRAPE_LANES i + l]: q (1), dq (d) and ddq
      * (d x d), of which only the 3 x 3 blocks on and below the diagonal are written. */
     void (*lanes)(const drape_elements *el, const int32_t *element, const double *x, const double *internal,
                   double *q, double *dq, double *ddq);
 
-    /* e [J] (count), g [N] (count x d), hess [N/m] (count x d x d, symmetric). */
+    /* Writes e [J] (count), g [N] (count x d) and hess [N/m] (count x d x d, symmetric). */
     void (*energy)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                    const double *internal, double *e, double *g, double *hess);
 
-    /* g [N] (count x d), dg_dx [N/m], dg_dv [N s/m] (count x d x d each). */
+    /* Writes g [N] (count x d), dg_dx [N/m] and dg_dv [N s/m] (count x d x d each). */
     void (*dissipation)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                         const double *v, double *g, double *dg_dx, double *dg_dv);
 
     /* For count elements with stiffness k [J], strain = q - q0 and rate = q' [q/s]: adds the generalised
-     * force [J/q] on q, its derivatives by strain and by rate, and the energy [J] if it has one. All are
-     * (count). dissipative: the force takes work, without an energy. */
+     * force [J/q] on q, its derivatives with respect to strain and rate, and the energy [J] if the law has
+     * one. All arrays have length count. */
     void (*law)(const double *params, int32_t count, const double *k, const double *strain,
                 const double *rate, double *force, double *dforce_dstrain, double *dforce_drate,
                 double *energy);
-    bool dissipative; /* law: as said there */
+    bool dissipative; /* law: the force dissipates energy and has no potential */
 
-    /* The internal variable of elements after a step was accepted: from those before and the new positions.
-     */
+    /* Computes the internal variables after a step was accepted, from those before it and the new
+     * positions. */
     void (*commit)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                    const double *before, double *after);
 
-    /* The internal variable of elements at rest, x the rest positions. after and before are indexed by
-     * element, like internal. */
+    /* Computes the internal variables at rest, where x are the rest positions. after and before are indexed
+     * by element, like internal. */
     void (*initial)(const drape_elements *el, int32_t first, int32_t count, const double *x, double *after);
 
-    /* Looks for an element that a step from before to x made degenerate: DRAPE_OK, or DRAPE_RETRY_DEGENERATE
-     * with *fault filled for the worst. One that was so before and did not become worse is not the step's
-     * fault: else no step could lead out of it. before NULL: none is excused. check NULL: none can be. */
+    /* Looks for an element that became degenerate in a step from before to x. Returns DRAPE_OK, or
+     * DRAPE_RETRY_DEGENERATE with *fault filled for the largest fault. An element that was already degenerate
+     * and did not become more so is not reported, as otherwise no step could lead out of such a state. before
+     * may be NULL: then nothing is excused. check may be NULL: the term has no degenerate elements. */
     drape_status (*check)(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault);
 
-    /* dissipation: it is in a medium. v is the velocity against it, less by the wind of
+    /* dissipation: it acts against a medium. v is then the velocity relative to the wind of
      * drape_sim_set_wind. */
     bool in_medium;
 
-    /* Optional, beside measure: the ddq with which force ddq is its positive semidefinite part, given the
-     * force of each element, so (ddq)+ where it pulls and (ddq)- where it pushes; ddq (count x d x d,
-     * symmetric). Without it, and without convex, what is made positive loses force ddq, and with it the
-     * stiffness that tension gives. */
+    /* Optional, beside measure: replaces ddq by the matrix for which force ddq is the positive semidefinite
+     * part, given the force of each element: (ddq)+ if the force is positive and (ddq)- if it is negative;
+     * ddq (count x d x d, symmetric). If a term has neither this nor convex, the positive semidefinite matrix
+     * omits force ddq, and with it the stiffness that tension causes. */
     void (*positive)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                      const double *internal, const double *force, double *ddq);
 } drape_term_ops;
 
-/* Registers a user-defined term: scenes compiled with this context may name it from then on. *ops is copied;
- * what it points to must outlive the context and every model compiled with it. Ops of an older, shorter
- * version are read. Errors: DRAPE_E_ARGUMENT (not well formed, name taken, more than 32), DRAPE_E_VERSION
- * (struct_size). */
+/* Registers a user-defined term, which scenes compiled with this context may then use by name. *ops is
+ * copied; everything it points to must outlive the context and every model compiled with it. A shorter table
+ * of an older version is accepted. Errors: DRAPE_E_ARGUMENT (not well formed, name already in use, more than
+ * 32), DRAPE_E_VERSION (struct_size). */
 DRAPE_API drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *ops);
 
-/* Makes a range function out of a function for one element. x (d) and v (d) are local coordinates; writes
- * what is not NULL. Use as static void my_energy(const drape_elements *el, int32_t first, int32_t count,
- * const double *x, const double *internal, double *e, double *g, double *hess) { drape_energy_range(el,
- * first, count, x, e, g, hess, my_element); } */
+/* Makes a range function out of a function for one element. x (d) are local coordinates; outputs that are
+ * NULL are not written. Use:
+ *
+ *     static void my_energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
+ *                           const double *internal, double *e, double *g, double *hess)
+ *     {
+ *         drape_energy_range(el, first, count, x, e, g, hess, my_element);
+ *     } */
 typedef void drape_element_energy(const drape_elements *el, int32_t element, const double *x, double *e,
                                   double *g, double *hess);
 DRAPE_API void drape_energy_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                   double *e, double *g, double *hess, drape_element_energy *one);
 
-/* Makes the function measure of a term out of its lanes, for a range of any count. */
+/* Implements the function measure of a term by its lanes, for a range of any length. */
 typedef void drape_measure_lanes(const drape_elements *el, const int32_t *element, const double *x,
                                  const double *internal, double *q, double *dq, double *ddq);
 DRAPE_API void drape_measure_range(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                    const double *internal, double *q, double *dq, double *ddq,
                                    drape_measure_lanes *lanes);
 
-/* For terms with pair: d (3 x count) and the distance l (count) of the two nodes of each element. */
+/* For terms with pair: the vector d (3 x count) between the two nodes of each element and their distance l
+ * (count). */
 DRAPE_API void drape_pair_distance(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                    double *l, double *d);
 
 /* ---- Colliders ---- */
 
-/* What of a collider cloth can touch besides its smooth surface, in the collider's own coordinates, with the
- * surface `radius` outside of it: points against the faces of a cloth, segments against its edges, and
- * triangles (colliders without a smooth distance) against its nodes. No segment has the length 0. A shape
- * begins as all zeros; arrays are taken by drape_shape_reserve. */
+/* The parts of a collider that cloth can touch besides its smooth surface, in the collider's own coordinates:
+ * points against the faces of a cloth, segments against its edges, and triangles (for colliders without a
+ * smooth distance) against its nodes. The surface lies `radius` outside of them. No segment has length 0. A
+ * shape starts as all zeros; its arrays are allocated by drape_shape_reserve. */
 typedef struct drape_collider_shape {
-    int32_t point_count, segment_count, triangle_count; /* of the arrays below */
+    int32_t point_count, segment_count, triangle_count; /* lengths of the arrays below */
     double *point;                                      /* (point_count x 3) [m] */
-    int32_t *segment;                                   /* (segment_count x 2) numbers of points */
-    int32_t *triangle; /* (triangle_count x 3) numbers of points, counterclockwise from outside */
-    double radius;     /* [m] */
-    bool inscribed;    /* of a convex body: its points and segments stay inside of a curved surface */
-    const void *kept;  /* what the collider keeps for its distance, of drape_shape_take; NULL for nothing */
-    struct drape_shape_builder *builder; /* of the functions below; NULL outside of the function shape */
+    int32_t *segment;                                   /* (segment_count x 2) point numbers */
+    int32_t *triangle; /* (triangle_count x 3) point numbers, counterclockwise from outside */
+    double radius;     /* distance of the surface from these parts [m] */
+    bool inscribed;    /* of a convex body: its points and segments stay inside a curved surface */
+    const void *kept;  /* data that the collider keeps for its distance, from drape_shape_take; NULL: none */
+    struct drape_shape_builder *builder; /* used by the functions below; NULL outside the function shape */
 } drape_collider_shape;
 
-/* Takes the arrays of a shape; they live as long as the model. Called once. Errors: DRAPE_E_MEMORY. */
+/* Allocates the arrays of a shape, which live as long as the model. Call it once. Errors: DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_shape_reserve(drape_collider_shape *shape, int32_t points, int32_t segments,
                                            int32_t triangles);
 
-/* Memory that lives as long as the model, zeroed, for what the collider keeps; NULL: return
- * DRAPE_E_MEMORY. */
+/* Allocates count x size bytes, zeroed, for data that the collider keeps; they live as long as the model.
+ * Returns NULL if memory is out: shape must then return DRAPE_E_MEMORY. */
 DRAPE_API void *drape_shape_take(drape_collider_shape *shape, size_t count, size_t size);
 
-/* Refuses a value: the reason is reported at the parameter in the scene. Returns DRAPE_E_ARGUMENT. */
+/* Rejects a value: the reason is reported at that parameter in the scene. Returns DRAPE_E_ARGUMENT, which
+ * shape must return. */
 DRAPE_API drape_status drape_shape_refuse(drape_collider_shape *shape, const char *parameter,
                                           const char *format, ...) DRAPE_PRINTF(3, 4);
 
 /* Fills points, segments and triangles from the OBJ or PLY file that the TEXT parameter of this name gives,
- * relative to the scene: scaled, then turned about the origin (a value of the kind TURN), then moved. The
- * mesh must be closed and its triangles counterclockwise from outside. Errors: DRAPE_E_FILE, DRAPE_E_PARSE,
- * DRAPE_E_ARGUMENT, DRAPE_E_MEMORY; return them. */
+ * relative to the scene. The mesh is scaled, then rotated about the origin by turn (a value of the kind
+ * DRAPE_PARAM_TURN), then translated. It must be closed, with its triangles counterclockwise from outside.
+ * Errors, which shape must return: DRAPE_E_FILE, DRAPE_E_PARSE, DRAPE_E_ARGUMENT, DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_shape_read_mesh(drape_collider_shape *shape, const char *parameter,
                                              const double scale[3], const double turn[3],
                                              const double translate[3]);
 
 /*
- * A collider: a rigid, closed obstacle. values: in the order of params; a vector takes three.
- * Coordinates are the collider's own: a track moves it as a whole. Thread-safety: as for terms; shape, called
- * once a collider while a model is compiled, may allocate.
+ * A collider: a rigid, closed obstacle. values are in the order of params; a vector occupies three.
+ * Coordinates are the collider's own: a track moves it as a whole. Thread-safety: as for terms, except that
+ * shape, which is called once per collider while a model is compiled, may allocate memory.
  */
 typedef struct drape_collider_ops {
-    size_t struct_size; /* sizeof(drape_collider_ops) of the author */
-    drape_entry entry;  /* with a reference: where its distance is from */
+    size_t struct_size; /* the author's sizeof(drape_collider_ops) */
+    drape_entry entry;  /* its reference is the source of the distance */
 
-    /* Refuses values that do not go together, and fills the shape. tolerance [m]: how far a polygon may stay
-     * inside a curved surface. */
+    /* Rejects invalid combinations of values, and fills the shape. tolerance [m]: how far a polygon may lie
+     * inside a curved surface that it approximates. */
     drape_status (*shape)(const double *values, double tolerance, drape_collider_shape *shape);
 
-    /* The signed distance of x from the surface [m], negative inside; normal (3), its gradient, of length 1;
-     * curvature (3 x 3 [1/m]), its Hessian. Outputs that are NULL are not wanted. Everywhere defined: where
-     * the gradient is not unique, one of those there. */
+    /* Returns the signed distance of x from the surface [m], negative inside. Writes its gradient normal (3),
+     * of length 1, and its Hessian curvature (3 x 3 [1/m]) unless they are NULL. Must be defined everywhere:
+     * where the gradient is not unique, any one of the candidates is returned. */
     double (*distance)(const double *values, const drape_collider_shape *shape, const double *x,
                        double *normal, double *curvature);
 
-    /* The derivatives of distance serve contact in a residual: they are continuous outside, and nodes of the
-     * cloth meet the surface by it. Else they meet the shape's triangles. */
+    /* Whether the derivatives of distance are suitable for contact in a residual, that is, continuous
+     * outside. Nodes of the cloth then meet the surface through distance; otherwise they meet the triangles
+     * of the shape. */
     bool smooth;
 } drape_collider_ops;
 
-/* Registers a user-defined collider, as drape_context_add_term does a term. Errors: DRAPE_E_ARGUMENT
- * (not well formed, name taken, more than 32), DRAPE_E_VERSION (struct_size). */
+/* Registers a user-defined collider, as drape_context_add_term does for a term. Errors: DRAPE_E_ARGUMENT (not
+ * well formed, name already in use, more than 32), DRAPE_E_VERSION (struct_size). */
 DRAPE_API drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *ops);
 
 DRAPE_C_END

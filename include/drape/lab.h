@@ -1,13 +1,13 @@
 /*
- * lab.h: experiments on a scene: work against accuracy, maps of stability, orders of convergence. A library
- * of its own, libdrape_lab, since its statistics link GSL (GPL) and libdrape does not.
+ * lab.h: experiments on a scene: work against accuracy, maps of stability, orders of convergence. They are a
+ * separate library, libdrape_lab, because their statistics link GSL (GPL) and libdrape does not.
  *
- * An experiment is a list of cases, each the scene with some values changed. The result of a case is a line
- * of JSON in the folder, so an interrupted run resumes where it stopped, and the shards of a sweep that ran
- * separately are merged: the report needs only the lines.
+ * An experiment is a list of cases, each of which is the scene with some values changed. The result of a case
+ * is a line of JSON in the output folder. An interrupted run therefore resumes where it stopped, and shards
+ * of a sweep that ran separately can be merged: the report needs only the lines.
  *
- * Threads: a call uses `jobs` threads of its own, each with a context of its own. progress is called by one
- * at a time, not always by the same.
+ * Threads: a call uses `jobs` threads of its own, each with its own context. progress is called by one thread
+ * at a time, but not always by the same one.
  */
 #ifndef DRAPE_LAB_H
 #define DRAPE_LAB_H
@@ -16,70 +16,74 @@
 
 DRAPE_C_BEGIN
 
-/* A value of the scene, as of drape_scene_set: a JSON pointer and a JSON text. */
+/* A value of the scene, as for drape_scene_set: a JSON pointer and a JSON text. */
 typedef struct drape_lab_setting {
     const char *pointer, *value; /* "/integrator/dt", "0.01" */
 } drape_lab_setting;
 
-/* Progress of a sweep. done: cases that need no more work, of total in this shard; total 0: the reference
- * solution is being made. seconds_left: NaN while it is unknown. */
+/* Reports the progress of a sweep: done of total cases of this shard need no more work. total is 0 while the
+ * reference solution is computed. seconds_left is NaN while it is unknown. */
 typedef void drape_lab_progress(void *user, int64_t done, int64_t total, double seconds_left);
 
-/* Whether to stop: the cases in progress are abandoned, the lines of those done are kept. Called by all
- * threads, at any time: it must be thread-safe. */
+/* Returns whether to stop. If so, cases in progress are abandoned, and the results of finished cases are
+ * kept. Called by all threads at any time, so it must be thread-safe. */
 typedef bool drape_lab_cancel(void *user);
 
-/* What to run. Initialise with drape_lab_def_init. Strings live during the call. */
+/* What to run. Initialise with drape_lab_def_init. Strings need only live during the call. */
 typedef struct drape_lab_def {
     size_t struct_size;                /* set by drape_lab_def_init */
-    const char *scene;                 /* a scene file */
-    const char *folder;                /* for results; made if it does not exist */
-    const drape_lab_setting *settings; /* of all cases */
-    size_t setting_count;              /* of settings */
-    const char *const *integrators;    /* names; none: the default of the experiment */
-    size_t integrator_count;           /* of integrators */
-    const char *const *axes;           /* stability: 2 or 3 of "/pointer=from:to:n" or "...:nlog" */
-    size_t axis_count;                 /* of axes */
-    int levels;                        /* converge: refinements, 3 to 12; default 6 */
-    bool space;                        /* converge: also of the mesh */
-    double strain_limit;               /* stability: an edge strained by more is unphysical; default 0.2 */
-    double case_seconds; /* [s] CPU time of a case, which is then stopped as over budget; default 30 */
-    int repeats;         /* tradeoff: of which the least CPU time counts; default 3 */
-    int jobs;            /* threads, 1 to 256; default 1: cases that run side by side cost each other time */
-    int shard, shards;   /* cases whose number is shard - 1 modulo shards; default 1 of 1 */
-    drape_lab_progress *progress; /* NULL: none */
+    const char *scene;                 /* name of a scene file */
+    const char *folder;                /* output folder; created if it does not exist */
+    const drape_lab_setting *settings; /* applied to all cases */
+    size_t setting_count;              /* length of settings */
+    const char *const *integrators;    /* names of integrators; none: the default of the experiment */
+    size_t integrator_count;           /* length of integrators */
+    const char *const *axes;           /* stability: 2 or 3 axes of the form "/pointer=from:to:n" or
+                                          "/pointer=from:to:nlog" */
+    size_t axis_count;                 /* length of axes */
+    int levels;                        /* converge: number of refinements, 3 to 12; default 6 */
+    bool space;                        /* converge: refine the mesh, too */
+    double strain_limit;               /* stability: a result in which an edge is strained by more counts as
+                                          unphysical; default 0.2 */
+    double case_seconds; /* [s] CPU time of a case, after which it is stopped as over budget; default 30 */
+    int repeats;         /* tradeoff: runs per case, of which the smallest CPU time counts; default 3 */
+    int jobs;            /* threads, 1 to 256; default 1, because cases that run side by side slow each other
+                            down */
+    int shard, shards;   /* this shard runs the cases whose number is shard - 1 modulo shards; default 1 of
+                            1 */
+    drape_lab_progress *progress; /* NULL: no reports */
     drape_lab_cancel *cancel;     /* NULL: never */
-    void *user;                   /* of both */
+    void *user;                   /* passed to progress and cancel */
 } drape_lab_def;
 
 /* Fills *def with the defaults. */
 DRAPE_API void drape_lab_def_init(drape_lab_def *def, size_t struct_size);
 
-/* The outcome. */
+/* The outcome of a run or a merge. */
 typedef struct drape_lab_outcome {
-    int64_t cases;    /* of the experiment */
-    int64_t done;     /* of them with a line by now */
-    int64_t resumed;  /* of those, found from before */
-    int64_t failed;   /* of those, that did not complete */
-    int64_t rejected; /* steps that were rejected in all of them */
+    int64_t cases;    /* cases of the experiment */
+    int64_t done;     /* cases that have a result by now */
+    int64_t resumed;  /* those of them whose result was found in the folder */
+    int64_t failed;   /* those of them that did not complete */
+    int64_t rejected; /* steps that were rejected in all of them together */
     bool input;       /* a failure is due to the input, not to the output folder */
-    char *text;       /* the summary of the report, lines; free with drape_lab_outcome_free */
+    char *text;       /* summary of the report, several lines; free it with drape_lab_outcome_free */
 } drape_lab_outcome;
 
-/* Frees the text of an outcome; the struct is the caller's. */
+/* Frees the text of an outcome. The struct itself belongs to the caller. */
 DRAPE_API void drape_lab_outcome_free(drape_lab_outcome *outcome);
 
-/* Runs "tradeoff", "stability" or "converge" into the folder: cases.jsonl, experiment.json, results.csv,
- * pictures and report.html; a shard, beside which others may write, only experiment.json and
- * cases-1-of-4.jsonl: the merge writes the rest. Earlier lines of the same experiment are kept as they are.
- * Errors: DRAPE_E_ARGUMENT (no such experiment, a wrong def, a setting that no case uses, a folder that holds
- * another experiment), those of loading the scene, DRAPE_E_FILE, DRAPE_E_SOLVER (no reference: the folder is
- * left as it was before), DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
+/* Runs "tradeoff", "stability" or "converge" and writes cases.jsonl, experiment.json, results.csv, pictures
+ * and report.html into the folder. A shard, whose folder other shards may share, writes only experiment.json
+ * and cases-1-of-4.jsonl; the merge writes the rest. Existing results of the same experiment are kept as they
+ * are. Errors: DRAPE_E_ARGUMENT (no such experiment, an invalid def, a setting that no case uses, a folder
+ * that holds another experiment), those of loading the scene, DRAPE_E_FILE, DRAPE_E_SOLVER (the reference
+ * could not be computed: the folder is left as it was), DRAPE_E_MEMORY, DRAPE_E_STOPPED (cancelled). */
 DRAPE_API drape_status drape_lab_run(drape_context *ctx, const char *experiment, const drape_lab_def *def,
                                      drape_lab_outcome *outcome);
 
-/* Brings the lines of several folders together in one, with the report over them. Errors: DRAPE_E_FILE,
- * DRAPE_E_PARSE (a line that is no result), DRAPE_E_ARGUMENT (folders of different experiments),
+/* Merges the results of several folders into one and writes the report on them. Errors: DRAPE_E_FILE,
+ * DRAPE_E_PARSE (a line that is not a result), DRAPE_E_ARGUMENT (folders of different experiments),
  * DRAPE_E_MEMORY. */
 DRAPE_API drape_status drape_lab_merge(drape_context *ctx, const char *const *folders, size_t count,
                                        const char *folder, drape_lab_outcome *outcome);

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define FORMAT     1
-#define MAGIC      "DRAPE\r\n\x1a" /* text tools that change line ends break it at its beginning */
+#define MAGIC      "DRAPE\r\n\x1a" /* its line ends make text-mode transfers break it at once */
 #define MAGIC_SIZE 8
 #define HEAD       (MAGIC_SIZE + sizeof(uint32_t))
 #define TAIL       (2 * sizeof(uint64_t))
@@ -79,13 +79,13 @@ void drape_archive_write_to(drape_archive *a, drape_context *ctx, const char *na
 
 /* ---- Reading ---- */
 
-/* The text is there as far as the size says. */
+/* Checks magic, length, checksum and version of the format. */
 static drape_status check_whole(drape_archive *a, size_t size)
 {
     uint64_t length, hash;
     uint32_t format;
     if (size < HEAD + TAIL || memcmp(a->from, MAGIC, MAGIC_SIZE) != 0)
-        return drape_archive_fail(a, DRAPE_E_PARSE, "it is no checkpoint of Drape");
+        return drape_archive_fail(a, DRAPE_E_PARSE, "it is not a Drape checkpoint");
     memcpy(&length, a->from + size - TAIL, sizeof length);
     memcpy(&hash, a->from + size - sizeof hash, sizeof hash);
     if (length != size - TAIL || drape_hash_bytes(DRAPE_HASH_START, a->from, size - sizeof hash) != hash)
@@ -93,8 +93,8 @@ static drape_status check_whole(drape_archive *a, size_t size)
     memcpy(&format, a->from + MAGIC_SIZE, sizeof format);
     if (format != FORMAT)
         return drape_archive_fail(a, DRAPE_E_VERSION,
-                                  "the checkpoint is of format %" PRIu32 "; this build reads format %d",
-                                  format, FORMAT);
+                                  "the checkpoint has format %" PRIu32 "; this build reads format %d", format,
+                                  FORMAT);
     return DRAPE_OK;
 }
 
@@ -116,7 +116,7 @@ drape_status drape_archive_read_from(drape_archive *a, drape_context *ctx, const
 static void get(drape_archive *a, void *data, size_t size)
 {
     if (size > a->end - a->size) {
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint ends too soon");
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint is truncated");
         memset(data, 0, size);
         return;
     }
@@ -175,7 +175,8 @@ void drape_archive_text(drape_archive *a, char *text, size_t size)
     int64_t length = a->reading ? 0 : (int64_t)strlen(text);
     drape_archive_int64(a, &length);
     if (length < 0 || (uint64_t)length >= size) {
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a text of %" PRId64 " bytes", length);
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an invalid text of %" PRId64 " bytes",
+                           length);
         length = 0;
     }
     drape_archive_bytes(a, text, (size_t)length);
@@ -198,11 +199,11 @@ void drape_archive_same(drape_archive *a, const char *what, int64_t value)
     drape_archive_int64(a, &there);
     if (!a->status && there != value)
         drape_archive_fail(a, DRAPE_E_ARGUMENT,
-                           "the checkpoint is of something else: %s is %" PRId64 " there, %" PRId64 " here",
+                           "the checkpoint does not fit this sim: %s is %" PRId64 " there, %" PRId64 " here",
                            what, there, value);
 }
 
-/* ---- The end ---- */
+/* ---- End ---- */
 
 static void put_tail(drape_archive *a)
 {
@@ -220,6 +221,6 @@ drape_status drape_archive_end(drape_archive *a)
     if (!a->reading)
         put_tail(a);
     else if (!a->status && a->size != a->end)
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint goes on where it should end");
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint is longer than expected");
     return a->status;
 }

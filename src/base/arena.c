@@ -6,7 +6,7 @@
 
 struct drape_arena_block {
     struct drape_arena_block *before, *after;
-    size_t size; /* of memory */
+    size_t size; /* bytes of memory */
     alignas(max_align_t) unsigned char memory[];
 };
 
@@ -45,7 +45,7 @@ static void count_bytes(drape_arena *arena, size_t taken, size_t released)
 
 void *drape_arena_take(drape_arena *arena, size_t count, size_t size)
 {
-    size_t bytes = 0, total = SIZE_MAX; /* an overflow is refused by drape_alloc, with its message */
+    size_t bytes = 0, total = SIZE_MAX; /* on overflow SIZE_MAX, which drape_alloc refuses with a message */
     if (__builtin_mul_overflow(count, size, &bytes) ||
         __builtin_add_overflow(bytes, sizeof(struct drape_arena_block), &total))
         total = SIZE_MAX;

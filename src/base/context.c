@@ -1,4 +1,4 @@
-/* context.c: see context.h. The message is composed in place, so that a failure of an allocation can be told
+/* context.c: see context.h. Messages are composed in place, so that a failed allocation can be reported
  * without allocating. */
 #include "base/context.h"
 
@@ -95,7 +95,8 @@ char *drape_copy_text(drape_context *ctx, const char *text)
     return copy;
 }
 
-/* A message is one line: what stands in a file or an argument may hold anything. */
+/* Messages are one line, but text quoted from files and arguments may contain line breaks and control
+ * characters. */
 static void make_one_line(char *text)
 {
     for (; *text; text++)
@@ -191,7 +192,7 @@ void drape_log(drape_context *ctx, drape_log_level level, const char *format, ..
     ctx->def.log(ctx->def.log_user, level, text);
 }
 
-/* newlocale on the predefined "C" needs no memory in glibc: it returns its static object. */
+/* In glibc newlocale on the predefined "C" needs no memory: it returns a static object. */
 locale_t drape_locale_enter(void)
 {
     locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);

@@ -14,44 +14,44 @@
 struct drape_context {
     drape_context_def def;
     char message[DRAPE_MESSAGE_SIZE];
-    char pointer[256]; /* JSON pointer of the last fault, "" for none: the scene reader finds line and column
-                          by it */
+    char pointer[256]; /* JSON pointer of the last fault, from which the scene reader finds line and column;
+                          "": none */
     char text[DRAPE_MESSAGE_SIZE];                   /* the message without its place */
-    drape_term_ops host_terms[DRAPE_MAX_HOST_TERMS]; /* copies, of this version's size */
+    drape_term_ops host_terms[DRAPE_MAX_HOST_TERMS]; /* copies, with the size of this version */
     int host_term_count;
     drape_collider_ops host_colliders[DRAPE_MAX_HOST_COLLIDERS];
     int host_collider_count;
 };
 
-/* User-defined entry `index` of the context; NULL past the last. */
+/* User-defined entry number `index` of the context; NULL past the last. */
 const drape_entry *drape_context_term(const drape_context *ctx, int index);
 const drape_entry *drape_context_collider(const drape_context *ctx, int index);
 
-/* count x size bytes, zeroed, aligned for any type; NULL with a message on failure or overflow. 0 bytes give
- * a valid pointer. */
+/* Allocates count x size bytes, zeroed and aligned for any type. Returns NULL with a message on failure or
+ * overflow. 0 bytes give a valid pointer. */
 void *drape_alloc(drape_context *ctx, size_t count, size_t size);
-void drape_free(drape_context *ctx, void *memory); /* NULL is fine */
+void drape_free(drape_context *ctx, void *memory); /* NULL is allowed */
 char *drape_copy_text(drape_context *ctx, const char *text);
 
-/* Set the message and return status. drape_fail_at names a place by its JSON pointer: message "pointer:
- * text". */
+/* Set the message and return status. drape_fail_at also names the place by its JSON pointer: message
+ * "pointer: text". */
 drape_status drape_fail(drape_context *ctx, drape_status status, const char *format, ...) DRAPE_PRINTF(3, 4);
 drape_status drape_fail_at(drape_context *ctx, drape_status status, const char *pointer, const char *format,
                            ...) DRAPE_PRINTF(4, 5);
-/* A function of the host, before whose call the message was emptied, returned status: says so where it failed
- * and said nothing. */
+/* For the status of a user-defined function, before whose call the message was cleared: if it failed without
+ * setting a message, sets this one. Returns status. */
 drape_status drape_fail_unsaid(drape_context *ctx, drape_status status, const char *pointer,
                                const char *format, ...) DRAPE_PRINTF(4, 5);
 drape_status drape_fail_memory(drape_context *ctx, size_t bytes);
 
-/* For what takes long before a sim runs, between its stages: DRAPE_E_STOPPED with its message where the host
- * wants no more of it. */
+/* For long operations before a sim runs, called between their stages: returns DRAPE_E_STOPPED with a message
+ * if the host asks to cancel. */
 drape_status drape_check_cancel(drape_context *ctx);
 
 void drape_log(drape_context *ctx, drape_log_level level, const char *format, ...) DRAPE_PRINTF(3, 4);
 
-/* The C locale for all reading and writing of numbers, whatever the host's is: old = drape_locale_enter();
- * ... drape_locale_leave(old). */
+/* Switches to the C locale, for all reading and writing of numbers, whatever the locale of the host: old =
+ * drape_locale_enter(); ... drape_locale_leave(old). */
 locale_t drape_locale_enter(void);
 void drape_locale_leave(locale_t old);
 

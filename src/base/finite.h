@@ -1,5 +1,5 @@
-/* finite.h: whether all numbers of an array are finite, in one pass without a branch: 0 a is NaN where a is
- * NaN or infinite. */
+/* finite.h: whether all numbers of an array are finite, in one pass without a branch: 0 a is NaN if a is NaN
+ * or infinite, and 0 otherwise. */
 #ifndef DRAPE_BASE_FINITE_H
 #define DRAPE_BASE_FINITE_H
 

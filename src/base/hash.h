@@ -1,4 +1,4 @@
-/* hash.h: FNV-1a, 64 bits, over bytes (Fowler, Noll, Vo; RFC 9923). */
+/* hash.h: FNV-1a with 64 bits, over bytes (Fowler, Noll, Vo; RFC 9923). */
 #ifndef DRAPE_BASE_HASH_H
 #define DRAPE_BASE_HASH_H
 

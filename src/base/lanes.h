@@ -1,10 +1,10 @@
 /*
- * lanes.h: four doubles at once. GCC and Clang make of it what the processor has; a lane is computed as a
- * lone double would be, with the same bits on all of them.
+ * lanes.h: four doubles at once, as vector types of GCC and Clang, which map them to the processor's vectors.
+ * Each lane is computed as a single double would be, so all processors give the same bits.
  *
- * A function over lanes is LANES_INLINE, so that it becomes part of one that is LANES_DISPATCH: that is
- * compiled for several processors and picked when the program starts. A call between functions for different
- * processors must not pass lanes.
+ * A function over lanes is marked LANES_INLINE, so that it is inlined into one marked LANES_DISPATCH, which
+ * is compiled for several processors and selected when the program starts. A call between functions for
+ * different processors must not pass lanes.
  */
 #ifndef DRAPE_BASE_LANES_H
 #define DRAPE_BASE_LANES_H
@@ -19,7 +19,7 @@ typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
 
 #define LANES_INLINE static inline __attribute__((always_inline))
 
-/* The sanitizers' code is not ready when the program picks. */
+/* The sanitizers' code is not initialised yet when the program selects a version. */
 #if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__) &&             \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define LANES_DISPATCH __attribute__((target_clones("avx2", "default")))
@@ -58,7 +58,7 @@ LANES_INLINE void lanes_cross(const lanes a[3], const lanes b[3], lanes out[3])
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* A point of the array (points x 3) a lane. */
+/* One point of the array (points x 3) per lane. */
 LANES_INLINE void lanes_gather(const double *from, const int32_t point[LANES], lanes out[3])
 {
     for (int l = 0; l < LANES; l++)

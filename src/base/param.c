@@ -7,7 +7,7 @@
 #include <string.h>
 
 #define MAX_WORD   63
-#define RANGE_SIZE 1024 /* bytes of a range in words: lists of choices are long */
+#define RANGE_SIZE 1024 /* bytes of a range as text: lists of choices are long */
 
 int drape_param_find(const drape_param *params, int param_count, const char *name)
 {
@@ -53,7 +53,7 @@ bool drape_param_is_required(const drape_param *param)
     return isnan(param->default_value) && !param->derived;
 }
 
-/* Levenshtein distance by one row of the table; words longer than MAX_WORD are never meant. */
+/* Levenshtein distance, keeping one row of the table. Words longer than MAX_WORD match nothing. */
 static size_t edit_distance(const char *a, const char *b)
 {
     size_t na = strlen(a), nb = strlen(b), row[MAX_WORD + 1];
@@ -80,7 +80,7 @@ static size_t edit_distance(const char *a, const char *b)
 const char *drape_did_you_mean(const char *word, const char *const *candidates, size_t count)
 {
     const char *best = NULL;
-    size_t best_distance = 1 + strlen(word) / 3; /* a third of the letters may be wrong */
+    size_t best_distance = 1 + strlen(word) / 3; /* up to a third of the letters may be wrong */
     for (size_t i = 0; i < count; i++) {
         size_t distance = edit_distance(word, candidates[i]);
         if (distance <= best_distance && (!best || distance < best_distance)) {
@@ -111,7 +111,7 @@ void drape_param_range_text(const drape_param *param, char *text, size_t size)
         choices_text(param, text, size);
         return;
     case DRAPE_PARAM_TEXT:
-        snprintf(text, size, "a string, not empty");
+        snprintf(text, size, "a non-empty string");
         return;
     case DRAPE_PARAM_VECTOR:
         snprintf(several, sizeof several, "%s%s, each in ", param->uniform ? "a number or " : "", numbers);
@@ -226,19 +226,19 @@ static drape_status number_value(drape_context *ctx, const char *pointer, const 
     return DRAPE_OK;
 }
 
-/* Axis and angle become a vector along the axis, as long as the angle. */
+/* Converts axis and angle to a vector along the axis whose length is the angle. */
 static drape_status turn_value(drape_context *ctx, const char *pointer, const drape_param *param,
                                const drape_setting *setting, double *value)
 {
     const double *v = setting->vector;
     double axis = hypot(hypot(v[0], v[1]), v[2]), angle = setting->vector_count == 4 ? v[3] : axis;
-    if (setting->vector_count == 3 && !isfinite(axis * axis)) /* a square that others take */
+    if (setting->vector_count == 3 && !isfinite(axis * axis)) /* later code takes the square */
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "the rotation vector is too long");
     if (!in_range(param, angle) || !isfinite(axis))
         return refuse_number(ctx, pointer, param, isfinite(axis) ? angle : axis);
     if (axis == 0 && angle != 0)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer,
-                             "the axis of a turn by %.10g degrees is 0 0 0; it must not be zero", angle);
+                             "the axis of a rotation by %.10g degrees is 0 0 0; it must not be zero", angle);
     for (int k = 0; k < 3; k++)
         value[k] = axis > 0 ? v[k] / axis * angle : 0;
     return DRAPE_OK;

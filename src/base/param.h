@@ -1,64 +1,66 @@
-/* param.h: parameters and the values that settings give them: names, kinds, ranges, defaults, in numbers and
- * in words. The keys of a scene are parameters too (model/scene.h). */
+/* param.h: parameters, and the values that settings give them: names, kinds, ranges and defaults, as numbers
+ * and as text. The keys of a scene are parameters too (model/scene.h). */
 #ifndef DRAPE_BASE_PARAM_H
 #define DRAPE_BASE_PARAM_H
 
 #include "base/context.h"
 
-/* How many values a parameter takes, at most DRAPE_PARAM_WIDEST, and a list of them up to the given one: the
- * place of its first value. */
+/* The number of values that a parameter occupies, at most DRAPE_PARAM_WIDEST; and the index of the first
+ * value of a parameter in a list, which is the number of values of the parameters before it. */
 #define DRAPE_PARAM_WIDEST 3
 int drape_param_width(const drape_param *param);
 int drape_param_place(const drape_param *params, int index);
 
-/* The default, once for each value. */
+/* Writes the default, once per value. */
 void drape_param_default(const drape_param *param, double *values);
 
-/* Whether there is neither a default nor anything else in its place. */
+/* Whether a setting must be given: there is no default, neither fixed nor derived. */
 bool drape_param_is_required(const drape_param *param);
 
-/* Values of params in their order: the default where no setting names it (NaN where the default is derived).
- * Faults are reported at "pointer/name". A setting of a name that the list does not have is a fault, with a
- * "did you mean". */
+/* Resolves the values of params, in their order: the default if no setting names the parameter (NaN if the
+ * default is derived). Faults are reported at "pointer/name". A setting whose name is not in the list is a
+ * fault, with a "did you mean". */
 drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_param *params,
                                   int param_count, const drape_setting *settings, size_t setting_count,
                                   double *values);
 
-/* Checks one setting against its parameter and converts it; writes as many values as the parameter takes. */
+/* Checks one setting against its parameter and converts it; writes as many values as the parameter
+ * occupies. */
 drape_status drape_param_value(drape_context *ctx, const char *pointer, const drape_param *param,
                                const drape_setting *setting, double *value);
 
-/* Sets the message of a value that is not allowed, or of a parameter that nothing gives, with what the
- * parameter takes, at the pointer. Returns DRAPE_E_ARGUMENT. */
+/* Set the message for a value that is not allowed, or for a required parameter that is missing, with what the
+ * parameter accepts, at the pointer. Return DRAPE_E_ARGUMENT. */
 drape_status drape_param_refuse(drape_context *ctx, const char *pointer, const drape_param *param,
                                 const char *given);
 drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param);
 
-/* Whether a host's list can be read: no more than DRAPE_MAX_PARAMS values, each parameter with a name and a
- * unit, a choice with choices. */
+/* Whether a user-defined list is well formed: at most DRAPE_MAX_PARAMS values; each parameter has a name and
+ * a unit, and a choice has choices. */
 bool drape_params_are_well_formed(const drape_param *params, int param_count);
 
-/* The index of a name; -1 if it is not in the list. */
+/* Returns the index of a name; -1 if it is not in the list. */
 int drape_param_find(const drape_param *params, int param_count, const char *name);
 
-/* ---- In words ---- */
+/* ---- As text ---- */
 
-/* "(0, 1e+9] N/m", "[x, y, z], each in [0, 1]" or "one of: a, b": the range of a parameter. */
+/* Writes the range of a parameter: "(0, 1e+9] N/m", "[x, y, z], each in [0, 1]" or "one of: a, b". */
 void drape_param_range_text(const drape_param *param, char *text, size_t size);
 
-/* The same with the kind of a number: "a number in (0, 1e+9] N/m". */
+/* The same with the kind of number: "a number in (0, 1e+9] N/m". */
 void drape_param_takes_text(const drape_param *param, char *text, size_t size);
 
-/* A value of a parameter: "0.001", "true", "report", "[0, 1, 0]". */
+/* Writes a value of a parameter: "0.001", "true", "report", "[0, 1, 0]". */
 void drape_param_value_text(const drape_param *param, const double *value, char *text, size_t size);
 
-/* A number with the digits that it needs to read back as itself, 10 at least where they are not zeros. */
+/* Writes a number with enough digits to read back as itself: at least 10, without trailing zeros. */
 void drape_number_text(double number, char *text, size_t size);
 
-/* The candidate nearest to word by edit distance, NULL if none is near enough to be meant. */
+/* Returns the candidate nearest to word by edit distance; NULL if none is close enough to be a plausible
+ * misspelling. */
 const char *drape_did_you_mean(const char *word, const char *const *candidates, size_t count);
 
-/* For three %s behind a fault: `; did you mean "x"?`, or nothing where meant is NULL. */
+/* Arguments for three %s at the end of a message: `; did you mean "x"?`, or nothing if meant is NULL. */
 #define DRAPE_MEANT(meant) (meant) ? "; did you mean \"" : "", (meant) ? (meant) : "", (meant) ? "\"?" : ""
 
 #endif

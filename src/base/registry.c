@@ -6,8 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_NAMES  128 /* that a message lists */
-#define NAMES_SIZE 800 /* of their list: the suggestion behind it still has room */
+#define MAX_NAMES  128 /* names that a message lists */
+#define NAMES_SIZE 800 /* bytes of that list; leaves room for the suggestion after it */
 
 int drape_registry_count(const drape_registry *registry)
 {

@@ -1,10 +1,10 @@
 /*
- * registry.h: what is chosen by name. A registry is a table of entries, with what messages and `drape list`
- * call it. src/meson.build generates one for each kind of implementation, from the names in the folders'
- * meson.build.
+ * registry.h: implementations that are chosen by name. A registry is a table of entries, together with its
+ * names in messages and in `drape list`. src/meson.build generates one for each kind of implementation, from
+ * the names in the meson.build of the folders.
  *
- * An index counts the built-in entries, in the order of the table, and then those that the user of a context
- * defined. ctx may be NULL everywhere but in drape_registry_choose: built-in entries alone.
+ * An index counts the built-in entries in the order of the table, then the user-defined entries of a context.
+ * ctx may be NULL everywhere except in drape_registry_choose: then only built-in entries are considered.
  */
 #ifndef DRAPE_BASE_REGISTRY_H
 #define DRAPE_BASE_REGISTRY_H
@@ -12,29 +12,30 @@
 #include "base/context.h"
 
 typedef struct drape_registry {
-    const char *noun;                  /* what an entry is, in messages: "term" */
-    const char *key, *title;           /* of the table in `drape list`: "terms", "Terms" */
-    const char *place;                 /* where a scene names an entry, in words; "" for nowhere */
-    const drape_entry *const *entries; /* built in, NULL-ended */
-    /* User-defined entry `index` of a context; NULL past the last. NULL: only built-in entries. */
+    const char *noun;                  /* name of an entry in messages: "term" */
+    const char *key, *title;           /* name of the table in `drape list`: "terms", "Terms" */
+    const char *place;                 /* where a scene names an entry, as text; "": nowhere */
+    const drape_entry *const *entries; /* built-in, NULL-terminated */
+    /* Returns user-defined entry number `index` of a context; NULL past the last. If this is NULL, there are
+     * only built-in entries. */
     const drape_entry *(*user_defined)(const drape_context *ctx, int index);
 } drape_registry;
 
-int drape_registry_count(const drape_registry *registry); /* of built-in entries */
+int drape_registry_count(const drape_registry *registry); /* number of built-in entries */
 
-/* NULL past the last. */
+/* Returns NULL past the last entry. */
 const drape_entry *drape_registry_entry(const drape_registry *registry, const drape_context *ctx, int index);
 
-/* The index of a name; -1: there is no such entry. */
+/* Returns the index of a name; -1 if there is no such entry. */
 int drape_registry_find(const drape_registry *registry, const drape_context *ctx, const char *name);
 
-/* The message that all unknown names have: `there is no term "streth"; there are bend, stretch; did you mean
+/* Size of the message for an unknown name: `there is no term "streth"; there are bend, stretch; did you mean
  * "stretch"?` */
 #define DRAPE_UNKNOWN_SIZE 1024
 void drape_registry_unknown(const drape_registry *registry, const drape_context *ctx, const char *name,
                             char text[DRAPE_UNKNOWN_SIZE]);
 
-/* drape_registry_find, which reports an unknown name at a JSON pointer, "" for none. Errors:
+/* drape_registry_find that reports an unknown name at a JSON pointer ("": no place). Errors:
  * DRAPE_E_ARGUMENT. */
 drape_status drape_registry_choose(drape_context *ctx, const drape_registry *registry, const char *pointer,
                                    const char *name, int *index);

@@ -1,8 +1,8 @@
 /*
- * thread_pool.c: see thread_pool.h. The number of open tasks and the number of the loop are in one atomic
- * word. A thread takes a task by decrementing it, if it is unchanged since it was read: so a thread that has
- * read a loop that is over takes no task of the next loop, which it would run with the function of the other.
- * Which thread runs a task is left to chance; what the task writes is not.
+ * thread_pool.c: see thread_pool.h. The number of open tasks and the number of the loop share one atomic
+ * word. A thread takes a task by decrementing the word if it is unchanged since it was read. A thread that
+ * has read the word of a finished loop therefore takes no task of the next loop, which it would run with the
+ * wrong function. Which thread runs a task is left to chance; what the task writes must not depend on it.
  */
 #include "base/thread_pool.h"
 
@@ -12,30 +12,31 @@
 #include <signal.h>
 #include <stdatomic.h>
 
-/* Spins before a thread sleeps. Each yields the core and takes a third of a microsecond if nobody wants it:
- * together a millisecond or two, longer than the caller takes between two loops of one step. Waking a core
- * that sleeps takes up to a tenth of that, each time; longer spinning on a core that others want had no
- * measurable cost. */
+/* Number of spins before a thread sleeps. Each yields the core and takes a third of a microsecond if no other
+ * thread wants it; together they take one to two milliseconds, longer than the caller needs between two loops
+ * of one step. Waking a sleeping core takes up to a tenth of that, every time; longer spinning on a core that
+ * others want had no measurable cost. */
 #define HELPER_SPINS 5000
 #define CALLER_SPINS 3000
-/* mask of `open`: tasks not taken; the bits above it are the number of the loop */
+/* mask of `open` for the tasks not yet taken; the bits above are the number of the loop */
 #define LEFT  0xffffffffu
 #define APART 64 /* bytes of a cache line: a write by one thread invalidates the line for all others */
 
 struct drape_pool {
     int threads, helpers;
-    pthread_t *helper;    /* (threads - 1), of which helpers run */
-    pthread_mutex_t lock; /* for going to sleep */
+    pthread_t *helper;    /* (threads - 1), of which `helpers` are running */
+    pthread_mutex_t lock; /* guards going to sleep */
     pthread_cond_t work, done;
-    /* The loop: written while it has no open task, and read by threads for which it may be over already. */
+    /* The loop: written while no task is open, but still read by threads for which the loop may already be
+     * over. */
     _Atomic(drape_task *) run;
     _Atomic(void *) user;
     atomic_int_fast64_t tasks;
     char apart[APART];
     atomic_uint_fast64_t open;
     char apart_again[APART];
-    atomic_int_fast64_t unfinished; /* tasks that are not reported done */
-    atomic_int asleep;              /* helpers */
+    atomic_int_fast64_t unfinished; /* tasks that have not been reported as done */
+    atomic_int asleep;              /* number of sleeping helpers */
     atomic_bool waiting, ended;     /* waiting: the caller sleeps */
 };
 
@@ -46,7 +47,7 @@ int drape_pool_threads(const drape_pool *pool)
 
 /* ---- Tasks ---- */
 
-/* Takes a task and runs it; false if none is open. */
+/* Takes a task and runs it; returns false if none is open. */
 static bool run_task(drape_pool *c)
 {
     uint_fast64_t open = atomic_load(&c->open);
@@ -62,7 +63,8 @@ static bool run_task(drape_pool *c)
     return false;
 }
 
-/* Runs all it can take. They belong to one loop, which does not end before they are reported done. */
+/* Runs as many tasks as it can take. They belong to one loop, which does not end before they are reported as
+ * done. */
 static void run_tasks(drape_pool *c)
 {
     int64_t done = 0;
@@ -107,7 +109,7 @@ static void *help(void *pool)
     return NULL;
 }
 
-/* Helpers block all signals: these are for the host's threads. */
+/* Helpers block all signals, which are for the host's threads. */
 static void start_helpers(drape_pool *c)
 {
     sigset_t all, before;
@@ -161,8 +163,8 @@ void drape_pool_destroy(drape_pool **pool)
 
 /* ---- The caller ---- */
 
-/* The loop is written before its tasks are open. `open` and `asleep` are both sequentially consistent: a
- * helper that goes to sleep has counted itself before it reads `open` for the last time. */
+/* The loop is written before its tasks are opened. `open` and `asleep` are both sequentially consistent: a
+ * helper that goes to sleep counts itself before it reads `open` for the last time. */
 static void call_helpers(drape_pool *c, int64_t tasks, drape_task *run, void *user)
 {
     const uint_fast64_t loop = (atomic_load_explicit(&c->open, memory_order_relaxed) >> 32) + 1;

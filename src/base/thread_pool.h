@@ -1,8 +1,8 @@
 /*
- * thread_pool.h: threads that help with loops over independent tasks. Each thread that is free takes the next
- * task; the caller takes tasks too, and waits only for those that a helper has begun. A helper that another
- * program keeps from its core takes none, so the caller does its part; threads that meet at a barrier would
- * wait for it at every loop.
+ * thread_pool.h: threads that help with loops over independent tasks. Each free thread takes the next task;
+ * the caller takes tasks, too, and waits only for those that a helper has begun. A helper that is kept from
+ * its core by another program takes no tasks, and the caller does its share; threads that meet at a barrier
+ * would have to wait for it in every loop.
  */
 #ifndef DRAPE_BASE_THREAD_POOL_H
 #define DRAPE_BASE_THREAD_POOL_H
@@ -14,16 +14,16 @@
 typedef struct drape_pool drape_pool;
 typedef void drape_task(void *user, int64_t task);
 
-/* The caller and threads - 1 helpers, fewer if the system refuses. *out is NULL for one thread.
- * Errors: DRAPE_E_MEMORY. */
+/* Creates a pool of the caller and threads - 1 helpers, or fewer if the system refuses. For one thread *out
+ * is NULL. Errors: DRAPE_E_MEMORY. */
 drape_status drape_pool_create(drape_arena *arena, int threads, drape_pool **out);
-void drape_pool_destroy(drape_pool **pool); /* ends the threads; before the arena is freed */
+void drape_pool_destroy(drape_pool **pool); /* ends the threads; call it before the arena is freed */
 
-/* The number asked for; 1 for NULL. */
+/* Returns the number of threads asked for; 1 if pool is NULL. */
 int drape_pool_threads(const drape_pool *pool);
 
-/* Calls run(user, k) for k = 0 ... tasks - 1 < 2^31, and returns when all are done; with pool NULL in order,
- * by the caller. One loop at a time: a task starts none. */
+/* Calls run(user, k) for k = 0 ... tasks - 1 < 2^31 and returns when all are done; if pool is NULL, the
+ * caller runs them in order. Only one loop runs at a time: a task must not start another. */
 void drape_parallel(drape_pool *pool, int64_t tasks, drape_task *run, void *user);
 
 #endif

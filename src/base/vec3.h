@@ -1,4 +1,4 @@
-/* vec3.h: vectors of three doubles, inline. */
+/* vec3.h: inline functions on vectors of three doubles. */
 #ifndef DRAPE_BASE_VEC3_H
 #define DRAPE_BASE_VEC3_H
 

@@ -1,5 +1,5 @@
-/* build_pattern.c: sparsity of the Jacobian from the elements that have a Hessian, and each element's place
- * in it. */
+/* build_pattern.c: the sparsity of the Jacobian from the elements that have a Hessian, and the place of each
+ * element in it. */
 #include "compile/stages.h"
 
 static drape_status place_term(drape_model *model, drape_term *term)

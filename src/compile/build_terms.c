@@ -1,4 +1,4 @@
-/* build_terms.c: terms by name, their parameters, their elements; laws are tied to the measures of their
+/* build_terms.c: terms by name, their parameters and elements; connects laws to the measures of their
  * cloth. */
 #include "compile/stages.h"
 #include "terms/terms.h"
@@ -12,9 +12,9 @@ struct drape_term_builder {
     drape_term *term;
     const char *pointer;
     int32_t first_node, node_count;
-    int32_t *node; /* the elements' arrays while they are filled; node -1: not yet */
+    int32_t *node; /* the arrays of the elements while they are filled; node -1: not set yet */
     double *rest;
-    bool beyond; /* an element was set that was not announced */
+    bool beyond; /* the term set an element that it had not announced */
 };
 
 drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count)
@@ -173,7 +173,7 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
     return status ? status : check_elements(&builder);
 }
 
-/* The terms that the scene names, then gravity if there is any. */
+/* Builds the terms that the scene names, then gravity if it is not zero. */
 static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth_def *def)
 {
     const double *g = model->gravity;
@@ -196,7 +196,7 @@ static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth
     return status;
 }
 
-/* A term that can damp need not: where all its dashpots are 0 nothing asks for their rates. */
+/* A term whose dashpots are all 0 has no damping, so its rates are not needed. */
 static const double *own_damping(const drape_term *term)
 {
     const drape_elements *el = &term->elements;
@@ -207,7 +207,8 @@ static const double *own_damping(const drape_term *term)
     return NULL;
 }
 
-/* Places in the lists of measures and internal variables; laws onto the measures of their cloth. */
+/* Assigns indices in the lists of measures and internal variables, and connects laws to the measures of their
+ * cloth. */
 static drape_status tie(drape_model *model, int32_t c)
 {
     drape_cloth *cloth = &model->cloths[c];
@@ -246,7 +247,7 @@ drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def)
     size_t count = 0;
     drape_status status = DRAPE_OK;
     for (size_t c = 0; c < def->cloth_count; c++)
-        count += def->cloths[c].term_count + 1; /* + 1: gravity */
+        count += def->cloths[c].term_count + 1; /* + 1 for gravity */
     model->terms = drape_arena_take(&model->arena, count, sizeof *model->terms);
     if (!model->terms)
         return DRAPE_E_MEMORY;
@@ -270,7 +271,7 @@ static bool well_formed(const drape_term_ops *ops)
            drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
 }
 
-/* The first version's ops ended here. */
+/* The size of the function table in its first version. */
 #define MIN_SIZE offsetof(drape_term_ops, in_medium)
 
 drape_status drape_context_add_term(drape_context *ctx, const drape_term_ops *given)

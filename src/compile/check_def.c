@@ -1,5 +1,5 @@
-/* check_def.c: a scene def that a host filled may have NULL where something should be, or values that no
- * scene could have: found here along the keys of a scene, so that nobody else has to look. */
+/* check_def.c: checks a scene def filled by a host along the keys of a scene. It may contain NULL where a
+ * value is required, or values that no scene file could give; later stages need not check for them again. */
 #include "compile/stages.h"
 
 #include <math.h>
@@ -11,7 +11,7 @@
 
 typedef struct checker {
     drape_context *ctx;
-    drape_pointer at; /* of what is being checked */
+    drape_pointer at; /* pointer to the value that is being checked */
 } checker;
 
 static drape_status refuse_null(checker *c, const char *what)
@@ -45,7 +45,7 @@ static drape_status check_value(checker *c, const drape_scene_key *key, const ch
 
 static drape_status check_object(checker *c, const drape_scene_object *object, const char *def);
 
-/* Integers of a list, and the keys of a track, are checked by those who take them. */
+/* Integers of a list and the keys of a track are checked where they are used. */
 static drape_status check_array(checker *c, const drape_scene_key *key, const char *def)
 {
     const size_t mark = c->at.length;

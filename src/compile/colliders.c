@@ -1,12 +1,12 @@
-/* colliders.c: colliders by name, their parameters, shapes and tracks. */
+/* colliders.c: colliders by name, with their parameters, shapes and tracks. */
 #include "colliders/colliders.h"
 #include "compile/stages.h"
 
 #include <stdio.h>
 #include <string.h>
 
-/* How far a polygon may stay inside a curved surface, of the activation distance: an edge of the cloth that
- * rests on a polygon then is pushed off nearly as if it were the surface. */
+/* How far a polygon may lie inside a curved surface, as a fraction of the activation distance: an edge of the
+ * cloth that rests on the polygon is then pushed away nearly as by the surface. */
 #define SHARE_OF_DISTANCE 0.1
 
 static drape_status find_collider(drape_context *ctx, const char *pointer, const char *name,
@@ -82,8 +82,8 @@ static bool well_formed(const drape_collider_ops *ops)
     return named && drape_params_are_well_formed(ops->entry.params, ops->entry.param_count);
 }
 
-/* The first version's ops ended here: `smooth` may be missing, and a collider without it is met by its
- * triangles. */
+/* The size of the function table in its first version: `smooth` may be missing, and cloth then meets the
+ * collider through its triangles. */
 #define MIN_SIZE offsetof(drape_collider_ops, smooth)
 
 drape_status drape_context_add_collider(drape_context *ctx, const drape_collider_ops *given)

@@ -76,7 +76,7 @@ static drape_status name_cloth(drape_model *model, int32_t c, const drape_cloth_
     return drape_arena_status(&model->arena);
 }
 
-/* Where the mesh came from, for whoever asks what was modelled. */
+/* Copies where the mesh came from, for descriptions of the model. */
 static drape_status copy_source(drape_model *model, const drape_mesh_def *def, drape_cloth *cloth)
 {
     memcpy(cloth->scale, def->scale, sizeof cloth->scale);
@@ -105,7 +105,7 @@ static drape_status compile_cloth(drape_model *model, int32_t c, const drape_sce
     return status;
 }
 
-/* Gives every cloth its range of nodes and triangles. */
+/* Assigns every cloth its range of nodes and triangles. */
 static drape_status count_all(drape_model *model)
 {
     int64_t nodes = 0, triangles = 0, edges = 0;
@@ -156,7 +156,7 @@ static double bounding_diagonal(const double *x, int32_t node_count)
     return sqrt(pow(high[0] - low[0], 2) + pow(high[1] - low[1], 2) + pow(high[2] - low[2], 2));
 }
 
-/* The arrays of all cloths one after another. */
+/* Concatenates the arrays of all cloths. */
 static drape_status gather(drape_model *model)
 {
     drape_arena *arena = &model->arena;
@@ -189,14 +189,15 @@ static drape_status compile_cloths(drape_model *model, const drape_scene_def *de
         status = drape_check_cancel(model->ctx);
         if (!status)
             status = compile_cloth(model, (int32_t)c, def);
-        model->cloth_count = (int32_t)c + 1; /* an unfinished one is freed too */
+        model->cloth_count = (int32_t)c + 1; /* count an unfinished cloth, too, so that it is freed */
     }
     if (!status)
         status = count_all(model);
     return status ? status : gather(model);
 }
 
-/* Pinned nodes start at rest or with their track: the initial velocity is of the free ones. */
+/* Pinned nodes start at rest or with the velocity of their track: the initial velocity applies only to free
+ * nodes. */
 static void stop_pinned(drape_model *model)
 {
     for (int32_t i = 0; i < model->node_count; i++)

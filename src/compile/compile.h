@@ -1,4 +1,4 @@
-/* compile.h: scene -> model. The only place that looks up names while a model is built. */
+/* compile.h: compiles a scene to a model. Names are looked up only here. */
 #ifndef DRAPE_COMPILE_COMPILE_H
 #define DRAPE_COMPILE_COMPILE_H
 
@@ -7,7 +7,7 @@
 
 extern const drape_entry drape_material_entry; /* its parameters are those of a material */
 
-/* The parameters of contact and of self-contact, in this order, and their values in a model. */
+/* The parameters of contact and of self-contact, in the order of their values in a model. */
 enum {
     DRAPE_CONTACT_DISTANCE,
     DRAPE_CONTACT_STIFFNESS,
@@ -19,19 +19,19 @@ enum { DRAPE_SELF_THICKNESS, DRAPE_SELF_FRICTION, DRAPE_SELF_PARAM_COUNT };
 extern const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT];
 extern const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT];
 
-/* What has parameters and no kinds: a table of one entry each. */
+/* Parameter lists that offer no choice of an implementation, as tables of one entry each. */
 extern const drape_registry drape_material_registry, drape_contact_registry, drape_self_contact_registry;
 
 void drape_contact_values(const drape_contact_def *contact, double values[DRAPE_CONTACT_PARAM_COUNT]);
 void drape_self_contact_values(const drape_contact_def *contact, double values[DRAPE_SELF_PARAM_COUNT]);
 
-/* A host's def, of this version or an older one, as one of this version: what it points to and is not the
- * host's still lives in the arena. Errors: DRAPE_E_VERSION, DRAPE_E_MEMORY. */
+/* Converts a host's def of this or an older version to this version. Data that are not the host's live in the
+ * arena. Errors: DRAPE_E_VERSION, DRAPE_E_MEMORY. */
 drape_status drape_compile_read_def(drape_context *ctx, drape_arena *arena, const drape_scene_def *given,
                                     drape_scene_def *out);
 
-/* Makes a model. Faults are reported at JSON pointers of the scene. Integrator and controller are copied, not
- * yet checked. */
+/* Compiles a def to a model. Faults are reported at JSON pointers of the scene. Integrator and controller are
+ * copied but not checked yet. */
 drape_status drape_compile(drape_context *ctx, const drape_scene_def *def, drape_model **out);
 
 #endif

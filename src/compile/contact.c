@@ -1,5 +1,5 @@
-/* contact.c: what contact is made of: the scene's "contact" and "self_contact", and the scales of the scene
- * where it does not say. */
+/* contact.c: the parameters of contact, from the scene's "contact" and "self_contact", with defaults derived
+ * from the scales of the scene. */
 #include "compile/stages.h"
 
 #include <math.h>
@@ -10,18 +10,18 @@ static const char *const frictions[] = {"implicit", "lagged", NULL};
 const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
     [DRAPE_CONTACT_DISTANCE] =
         DRAPE_NUMBER("distance", "m", DRAPE_DERIVED("the largest thickness of the cloths"), DRAPE_ABOVE(0),
-                     1e3, "activation distance: nearer to a collider than this, cloth is pushed off"),
+                     1e3, "activation distance: cloth closer to a collider than this is pushed away"),
     [DRAPE_CONTACT_STIFFNESS] = DRAPE_NUMBER(
         "stiffness", "Pa",
         DRAPE_DERIVED("areal density (2 gravity L + v^2) / distance, L the diagonal of the rest bounding "
-                      "box, v the greatest speed of cloth at the start and of colliders, together"),
+                      "box, v the largest initial speed of cloth plus that of colliders"),
         DRAPE_ABOVE(0), 1e15, "scale of the contact pressure at that distance"),
     [DRAPE_CONTACT_FRICTION_VELOCITY] =
         DRAPE_NUMBER("friction_velocity", "m/s", 1e-3, DRAPE_ABOVE(0), 1e3,
-                     "sliding slower than this, friction falls to zero smoothly"),
+                     "sliding speed below which friction falls smoothly to zero"),
     [DRAPE_CONTACT_FRICTION] =
         DRAPE_CHOICE("friction", IMPLICIT, frictions,
-                     "implicit: of the normal force at the end of the step; lagged: at its start"),
+                     "implicit: with the normal force at the end of the step; lagged: at its start"),
 };
 
 const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT] = {
@@ -62,15 +62,15 @@ static double track_speed(const drape_track *track)
     double most = 0;
     for (size_t k = 1; k < track->key_count; k++) {
         const drape_track_key *a = &track->keys[k - 1], *b = &track->keys[k];
-        double way[3];
+        double move[3];
         for (int i = 0; i < 3; i++)
-            way[i] = b->displacement[i] - a->displacement[i];
-        most = fmax(most, norm(way) / (b->time - a->time));
+            move[i] = b->displacement[i] - a->displacement[i];
+        most = fmax(most, norm(move) / (b->time - a->time));
     }
     return most;
 }
 
-/* The speed at which the scene itself sends cloth against a collider. */
+/* The largest speed at which the scene itself can move cloth against a collider. */
 static double scene_speed(const drape_model *model)
 {
     double cloth = 0, collider = 0;
@@ -81,10 +81,11 @@ static double scene_speed(const drape_model *model)
     return cloth + collider;
 }
 
-/* sigma (2 |g| L + v^2) / d, sigma the largest areal density, L the scene's size: up to where it touches, the
- * barrier takes up 6 d of it an area (contact/barrier.h), 12 times the energy of that speed and of a fall
- * over L; what has more cannot be stopped. The cloth's own weight is at most d / (2 L) of the stiffness, so
- * that at rest it lies nearly d off. Without gravity L / s^2 stands for |g|. */
+/* sigma (2 |g| L + v^2) / d, with sigma the largest areal density and L the size of the scene. Up to the
+ * distance zero, the barrier absorbs 6 d of this per area (contact/barrier.h), which is 12 times the energy
+ * of the speed v and of a fall over L; cloth with more energy cannot be stopped. The weight of the cloth is
+ * at most d / (2 L) of the stiffness, so that at rest it lies at nearly the distance d. Without gravity, L /
+ * s^2 replaces |g|. */
 static double stiffness_of_fall(const drape_model *model)
 {
     double sigma = 0, g = norm(model->gravity), v = scene_speed(model);

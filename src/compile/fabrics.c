@@ -1,14 +1,14 @@
 /*
- * fabrics.c: measured fabrics. A new one is a line in fabrics_table.h.
+ * fabrics.c: measured fabrics. To add one, add a line to fabrics_table.h.
  *
  * Wang, O'Brien & Ramamoorthi 2011, Data-driven elastic models for cloth (ACM TOG 30, 4): areal density,
  * tension, shear and bending of ten fabrics, measured on the same specimens. The values are from their data
- * base, which comes with ARCSim, interpreted as the forces of ARCSim, by the same group, do: stress C (F'F -
- * I), so K = 2 c of Green's strain and c33 of the shear angle, at rest (the first line of a file; they
- * stiffen at 17 %), and k |e|^2/(8 (A1 + A2)) theta^2 for a hinge, so a rigidity k/4 in the direction that
- * the hinge bends. Warp is the direction v, in which the jeans have no elastic yarns. Negative couplings are
- * set to 0, as ARCSim does. Both stiff wovens have c = 2 000 within one per cent, which may be a bound of
- * their fit.
+ * base, which is distributed with ARCSim, and are interpreted as in ARCSim, by the same group: stress C (F'F
+ * - I), so that K = 2 c of Green's strain and c33 of the shear angle, at rest (the first line of a file; they
+ * stiffen at 17 %), and k |e|^2/(8 (A1 + A2)) theta^2 for a hinge, that is, a rigidity k/4 in the direction
+ * in which the hinge bends. Warp is the direction v, in which the jeans have no elastic yarns. Negative
+ * couplings are set to 0, as in ARCSim. Both stiff wovens have c = 2 000 to within one per cent, which may be
+ * a bound of their fit.
  *
  * Feng, Huang, Xu & Wang 2022, Learning-based bending stiffness parameter estimation by a drape tester (ACM
  * TOG 41, 6): areal density and, by cantilever tests, rigidities of strips of 618 fabrics along warp, weft
@@ -20,9 +20,9 @@
  * drape coefficient. Their tables are quoted from another paper, without G; 2HB, the moment of friction
  * between yarns, has no place in an elastic term: docs/validate.md.
  *
- * Values that were not published are derived. Tension: that of 500 gf/cm (490 N/m), the load of a KES test,
- * at 5 %, as wovens stretch by a few per cent under it. Shear: the median of the ten fabrics of Wang et al.
- * Twist: that of an isotropic sheet.
+ * Values that were not published are derived. Tension: wovens are taken to stretch by 5 % under the load of a
+ * KES test, 500 gf/cm (490 N/m). Shear: the median of the ten fabrics of Wang et al. Twist: that of an
+ * isotropic sheet.
  */
 #include "compile/fabrics.h"
 
@@ -35,14 +35,15 @@
 #define SHEAR   34.4 /* [N/m] */
 
 /* clang-format off */
-#define ROW(name, what, source, density, warp, weft, coupling, shear, bend_warp, bend_weft, diagonal, drape) \
+#define ENTRY(name, what, source, density, warp, weft, coupling, shear, bend_warp, bend_weft, diagonal,      \
+              drape) \
     {name, what, source, density, {warp, weft, coupling, shear}, {bend_warp, bend_weft, diagonal}, drape},
-const drape_fabric drape_fabrics[] = {DRAPE_FABRICS(ROW) {NULL, NULL, NULL, 0, {0, 0, 0, 0}, {0, 0, 0}, 0}};
-#undef ROW
+const drape_fabric drape_fabrics[] = {DRAPE_FABRICS(ENTRY) {NULL, NULL, NULL, 0, {0, 0, 0, 0}, {0, 0, 0}, 0}};
+#undef ENTRY
 
-#define ROW(name, ...) name,
-const char *const drape_fabric_names[] = {DRAPE_FABRICS(ROW) NULL};
-#undef ROW
+#define ENTRY(name, ...) name,
+const char *const drape_fabric_names[] = {DRAPE_FABRICS(ENTRY) NULL};
+#undef ENTRY
 
 /* clang-format on */
 
@@ -51,7 +52,7 @@ static double or_else(double published, double derived)
     return isnan(published) ? derived : published;
 }
 
-/* Stiffnesses of strips with free sides: C11 (1 - nu^2) with nu^2 = C12^2/(C11 C22). */
+/* Computes stiffnesses of strips with free sides: C11 (1 - nu^2) with nu^2 = C12^2/(C11 C22). */
 void drape_fabric_tension(const drape_fabric *fabric, drape_woven *tension)
 {
     const double warp = or_else(fabric->tension.warp, TENSION), weft = or_else(fabric->tension.weft, TENSION);
@@ -59,7 +60,7 @@ void drape_fabric_tension(const drape_fabric *fabric, drape_woven *tension)
     *tension = (drape_woven){warp * free, weft * free, or_else(fabric->tension.shear, SHEAR), nu};
 }
 
-/* A strip at 45 degrees of an orthotropic plate has 4/B45 = 1/B1 + 1/B2 - 2 nu/sqrt(B1 B2) + 1/twist; nu was
+/* A strip of an orthotropic plate at 45 degrees has 4/B45 = 1/B1 + 1/B2 - 2 nu/sqrt(B1 B2) + 1/twist; nu was
  * not measured and is taken as 0. */
 void drape_fabric_bending(const drape_fabric *fabric, drape_woven *bending)
 {

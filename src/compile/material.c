@@ -1,6 +1,6 @@
 /*
- * material.c: from Young's modulus, Poisson's ratio, thickness and a density to membrane stiffness E h,
- * flexural rigidity D = E h^3/(12 (1 - nu^2)) and lumped masses.
+ * material.c: derives membrane stiffness E h, flexural rigidity D = E h^3/(12 (1 - nu^2)) and lumped masses
+ * from Young's modulus, Poisson's ratio, thickness and a density.
  */
 #include "compile/fabrics.h"
 #include "compile/stages.h"
@@ -28,7 +28,7 @@ static const drape_param params[] = {
     [YOUNG_MODULUS] = DRAPE_NUMBER("young_modulus", "Pa", DRAPE_DERIVED("required without a fabric"),
                                    DRAPE_ABOVE(0), 1e15, "Young's modulus E of the sheet"),
     [POISSON_RATIO] = DRAPE_NUMBER("poisson_ratio", "1", 1.0 / 3.0, DRAPE_ABOVE(-1), 0.5,
-                                   "Poisson's ratio nu; stretch.edge has 1/3 whatever is said here"),
+                                   "Poisson's ratio nu; stretch.edge always has 1/3"),
     [THICKNESS] = DRAPE_NUMBER("thickness", "m", DRAPE_DERIVED("required without a fabric"), DRAPE_ABOVE(0),
                                10, "thickness h of the sheet"),
     [DENSITY] = DRAPE_NUMBER("density", "kg/m3", DRAPE_DERIVED("from areal_density or total_mass"),
@@ -40,11 +40,11 @@ static const drape_param params[] = {
     [MASS] =
         DRAPE_CHOICE("mass", MASS_AREA, mass_choices,
                      "area: lumped, a third of each triangle to each node; uniform: the same on every node"),
-    [FABRIC] =
-        DRAPE_CHOICE("fabric", 0, drape_fabric_names,
-                     "a measured one (`drape list fabrics`): its areal density where none is given; its "
-                     "bending is that of bend.midedge, and without young_modulus and thickness its tension "
-                     "and shear are those of stretch.cst"),
+    [FABRIC] = DRAPE_CHOICE(
+        "fabric", 0, drape_fabric_names,
+        "a measured fabric (`drape list fabrics`): gives the areal density unless the scene does, the "
+        "bending of bend.midedge and, without young_modulus and thickness, the tension and "
+        "shear of stretch.cst"),
 };
 
 const drape_entry drape_material_entry = {
@@ -85,7 +85,8 @@ static drape_status total_mass(drape_context *ctx, const char *pointer, const do
     return DRAPE_OK;
 }
 
-/* Young's modulus and thickness: both are required without a fabric, and both or none with one. */
+/* Checks Young's modulus and thickness: both are required without a fabric; with one, both or neither must be
+ * given. */
 static drape_status check_stiffness(drape_context *ctx, const char *pointer, const double *values)
 {
     static const int needed[] = {YOUNG_MODULUS, THICKNESS};
@@ -98,8 +99,8 @@ static drape_status check_stiffness(drape_context *ctx, const char *pointer, con
     return DRAPE_OK;
 }
 
-/* Thickness and modulus of the isotropic sheet whose strips have the mean tension K and bending B of the
- * fabric, h = sqrt(12 B/K), E = K/h, for terms that know no fabrics, such as hinges and edges. */
+/* Computes thickness and modulus of the isotropic sheet whose strips have the mean tension K and bending B of
+ * the fabric, h = sqrt(12 B/K), E = K/h, for terms that do not use fabrics, such as hinges and edges. */
 static void fill_in(const drape_woven *tension, const drape_woven *bending, double *values)
 {
     const double k = sqrt(tension->warp * tension->weft), b = sqrt(bending->warp * bending->weft);
@@ -115,7 +116,7 @@ static bool is_given(const drape_cloth_def *def, const char *name)
     return false;
 }
 
-/* Values that the scene gives go before measured ones. */
+/* Values that the scene gives take precedence over measured ones. */
 static void take_fabric(const drape_cloth_def *def, double *values, drape_cloth *cloth)
 {
     const drape_fabric *fabric = &drape_fabrics[(int)values[FABRIC]];

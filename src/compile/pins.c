@@ -1,23 +1,25 @@
-/* pins.c: which nodes are pinned, along which track; numbers of the free nodes. Pinned nodes leave the system
- * altogether. */
+/* pins.c: which nodes are pinned, along which track; numbers the free nodes. Pinned nodes are eliminated from
+ * the system. */
 #include "compile/stages.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#define ROUND_OFF 1e-14 /* relative: a coordinate that is meant to lie on the side of a box lies in it */
+#define ROUND_OFF                                                                                            \
+    1e-14 /* relative: a coordinate that is meant to lie on the boundary of a box counts as
+                           inside */
 
-/* One pin under construction: where it stands in the scene, and which cloth it pins. */
+/* One pin under construction: its place in the scene, and the cloth that it pins. */
 typedef struct pin_place {
     drape_model *model;
     const drape_cloth *cloth;
     const drape_pin_def *def;
     char pointer[128];
     int32_t track;          /* number of its track, -1: fixed */
-    int32_t *track_of_node; /* (node_count): -1 fixed or free */
-    uint8_t *clamped;       /* (node_count) 1: of a pin that clamps */
-    int32_t taken;          /* nodes pinned so far by this pin */
+    int32_t *track_of_node; /* (node_count) -1: fixed or free */
+    uint8_t *clamped;       /* (node_count) 1: held by a pin that clamps */
+    int32_t taken;          /* number of nodes pinned so far by this pin */
 } pin_place;
 
 static drape_status refuse(const pin_place *pin, const char *key, const char *text)
@@ -57,7 +59,7 @@ static drape_status take_list(pin_place *pin)
     return status;
 }
 
-/* Nodes (row, column) of a grid within [first, last] ranges. */
+/* Pins nodes (row, column) of a grid within the ranges [first, last]. */
 static drape_status take_range(pin_place *pin, const char *key, int32_t first_row, int32_t last_row,
                                int32_t first_column, int32_t last_column)
 {
@@ -68,12 +70,12 @@ static drape_status take_range(pin_place *pin, const char *key, int32_t first_ro
     return status;
 }
 
-/* Narrows first and last row, first and last column to the side that the text begins with. */
+/* Narrows first and last row, first and last column to the side with which the text begins. */
 static void narrow(const char *side, const drape_mesh *mesh, int32_t range[4])
 {
     static const struct {
         const char *name;
-        int bound; /* that moves to the opposite one */
+        int bound; /* index of the bound that is set to the opposite one */
     } sides[] = {{"top", 1}, {"bottom", 0}, {"left", 3}, {"right", 2}};
     const int32_t opposite[4] = {mesh->rows - 1, 0, mesh->columns - 1, 0};
     for (size_t i = 0; i < sizeof sides / sizeof *sides; i++)
@@ -81,7 +83,7 @@ static void narrow(const char *side, const drape_mesh *mesh, int32_t range[4])
             range[sides[i].bound] = opposite[sides[i].bound];
 }
 
-/* first, second: the sides that meet in a corner; both the same for a whole side. */
+/* first, second: the sides that meet in a corner; equal for a whole side. */
 static drape_status take_sides(pin_place *pin, const char *key, const char *first, const char *second)
 {
     const drape_mesh *mesh = &pin->cloth->mesh;
@@ -175,7 +177,7 @@ static drape_status pin_cloths(drape_model *model, const drape_scene_def *def, i
     return status;
 }
 
-/* The edges that keep the direction of the sheet across them. */
+/* Finds the edges that keep the direction of the sheet across them. */
 static drape_status clamp_edges(drape_model *model, const uint8_t *clamped)
 {
     for (int32_t c = 0; c < model->cloth_count; c++) {

@@ -1,7 +1,7 @@
 /*
- * read_def.c: the defs of a host that was built against an older header, whose structs ended earlier. Each
- * def begins with its size as the host knew it, which in an array leads to the next; members that the host
- * did not know have their defaults.
+ * read_def.c: converts the defs of a host that was built against an older header, whose structs were shorter.
+ * Each def begins with its size as the host knows it, which in an array is also the distance to the next def;
+ * members that the host does not know get their defaults.
  */
 #include "compile/stages.h"
 
@@ -10,7 +10,7 @@
 
 #include "model/scene.h"
 
-/* The size that all defs of an array begin with; 0 if they differ. */
+/* Returns the size with which all defs of an array begin; 0 if they differ. */
 static size_t stride_of(const char *array, size_t count, size_t size)
 {
     size_t stride, other;
@@ -26,8 +26,8 @@ static size_t stride_of(const char *array, size_t count, size_t size)
 static drape_status widen_arrays(drape_context *ctx, drape_arena *arena, const drape_scene_object *object,
                                  char *def);
 
-/* Replaces the array of a key by defs as they are here, in the arena. NULL, or more than there may be, is not
- * read: drape_compile_check_def finds what is missing, and refuses such a count. */
+/* Replaces the array of a key by defs of the present size, in the arena. A NULL array or one that is too long
+ * is not read: drape_compile_check_def reports missing arrays and refuses such counts. */
 static drape_status widen_array(drape_context *ctx, drape_arena *arena, const drape_scene_key *key, char *def)
 {
     const size_t size = key->child->def_size;

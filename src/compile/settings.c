@@ -1,4 +1,4 @@
-/* settings.c: "contact" and "self_contact" of a scene, as tables of one entry. */
+/* settings.c: "contact" and "self_contact" of a scene, as tables of one entry each. */
 #include "compile/compile.h"
 
 static const drape_entry contact = {.name = "contact",
@@ -6,7 +6,7 @@ static const drape_entry contact = {.name = "contact",
                                     DRAPE_PARAMS(drape_contact_params)};
 static const drape_entry self_contact = {
     .name = "self_contact",
-    .summary = "cloth against cloth; a scene without it lets cloth through itself",
+    .summary = "contact of cloth with cloth; without it cloth passes through itself",
     DRAPE_PARAMS(drape_self_contact_params)};
 
 const drape_registry drape_contact_registry = {

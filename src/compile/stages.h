@@ -1,39 +1,40 @@
-/* stages.h: the stages of drape_compile, one file each. All take the model under construction and report at
- * JSON pointers. */
+/* stages.h: the stages of drape_compile, one file each. All take the model under construction and report
+ * faults at JSON pointers. */
 #ifndef DRAPE_COMPILE_STAGES_H
 #define DRAPE_COMPILE_STAGES_H
 
 #include "base/param.h"
 #include "compile/compile.h"
 
-/* Checks a def along the keys of a scene: no array is NULL, all values are in range. */
+/* Checks a def along the keys of a scene: required arrays are not NULL, all values are in range. */
 drape_status drape_compile_check_def(drape_context *ctx, const drape_scene_def *def);
 
-/* Resolves the material of a cloth whose mesh stands, and lumps its mass. pointer: "/cloth/0". */
+/* Resolves the material of a cloth whose mesh is complete, and lumps its mass. pointer: "/cloth/0". */
 drape_status drape_compile_material(drape_model *model, const char *pointer, const drape_cloth_def *def,
                                     drape_cloth *cloth);
 
-/* Marks the pinned nodes of all cloths, numbers the free ones, keeps the tracks. */
+/* Marks the pinned nodes of all cloths, numbers the free ones, and stores the tracks. */
 drape_status drape_compile_pins(drape_model *model, const drape_scene_def *def);
 
-/* Checks a track, of one key or more, and copies it. pointer: of what has it. */
+/* Checks a track of one or more keys and copies it. pointer: that of its pin or collider. */
 drape_status drape_compile_track(drape_model *model, const char *pointer, const drape_track_key *keys,
                                  size_t key_count, drape_track *track);
 
-/* What the scene chose, copied; a type that is NULL is the fallback. */
+/* Copies a choice of the scene; a type that is NULL is replaced by the fallback. */
 drape_status drape_compile_choice(drape_model *model, const drape_entry_def *def, const char *fallback,
                                   drape_choice *choice);
 
-/* Resolves contact and self-contact; the materials stand. */
+/* Resolves contact and self-contact, after the materials. */
 drape_status drape_compile_contact(drape_model *model, const drape_scene_def *def);
 
-/* Builds the colliders; contact is resolved. */
+/* Builds the colliders, after contact. */
 drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *def);
 
-/* Builds the terms of all cloths and gives measures and internal variables their places. */
+/* Builds the terms of all cloths and assigns indices to measures and internal variables. */
 drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def);
 
-/* The Jacobian's pattern from all terms, and the block of each node pair of each element. */
+/* Builds the pattern of the Jacobian from all terms, and finds the block of each node pair of each
+ * element. */
 drape_status drape_compile_pattern(drape_model *model);
 
 #endif

@@ -1,6 +1,6 @@
 /*
- * control.h: what to do with an attempted step. A controller is the constant drape_controller_<name> of
- * control_<name>.c.
+ * control.h: decides what to do with an attempted step. A controller is the constant drape_controller_<name>
+ * of control_<name>.c.
  */
 #ifndef DRAPE_CONTROL_CONTROL_H
 #define DRAPE_CONTROL_CONTROL_H
@@ -9,35 +9,36 @@
 
 typedef enum drape_verdict {
     DRAPE_ACCEPT,
-    DRAPE_RETRY, /* forget the attempt, try again with a step of h_next */
-    DRAPE_STOP   /* forget it and stop: status says why */
+    DRAPE_RETRY, /* roll back and try again with a step of h_next */
+    DRAPE_STOP   /* roll back and stop; status says why */
 } drape_verdict;
 
-/* An attempt to be judged, and what the judge has to say. */
+/* An attempted step to be judged, and the judgement. */
 typedef struct drape_trial {
     const drape_model *model;
-    const drape_state *past[2];  /* the states before in, latest first; NULL where there is none, or the row
-                                    did not ask */
-    const drape_state *in, *out; /* out is of worth only with status 0, or with info->usable */
-    int order;                   /* of the integrator */
-    double *scratch;             /* [2] a controller's memory between steps; 0 at first */
-    double h;                    /* [s] the size that was tried */
+    const drape_state *past[2];  /* the states before `in`, latest first; NULL if there is none or the
+                                    controller did not ask for it */
+    const drape_state *in, *out; /* out is meaningful only if status is 0 or info->usable */
+    int order;                   /* order of accuracy of the integrator */
+    double *scratch;             /* [2] values that a controller keeps between steps; initially 0 */
+    double h;                    /* [s] the size of the attempted step */
     double dt;                   /* [s] the nominal size */
-    const drape_integrator_ops *integrator; /* for its stability limit, which costs evaluations of forces */
+    const drape_integrator_ops *integrator; /* for its stability limit, whose estimate takes evaluations of
+                                               forces */
     void *integrator_state;
-    drape_step_info *info; /* a controller that rejects sets reason and worst */
-    drape_status status;   /* of the attempt; on DRAPE_STOP the negative one to return */
+    drape_step_info *info; /* a controller that rejects a step sets reason and diagnostic */
+    drape_status status;   /* status of the attempt; on DRAPE_STOP, set to the negative status to return */
     double h_next;         /* [s] set on DRAPE_RETRY, and by controllers with own_steps on DRAPE_ACCEPT */
 } drape_trial;
 
 typedef struct drape_controller_ops {
     drape_entry entry;
-    bool own_steps;    /* steps follow h_next, not the counted grid of dt */
-    int history_depth; /* how many states before in it wants, at most 2 */
+    bool own_steps;    /* steps follow h_next, not the fixed grid of dt */
+    int history_depth; /* number of states before `in` that it needs, at most 2 */
     drape_verdict (*judge)(const double *values, drape_trial *trial);
 } drape_controller_ops;
 
-extern const drape_controller_ops *const drape_controllers[]; /* NULL-ended */
+extern const drape_controller_ops *const drape_controllers[]; /* NULL-terminated */
 extern const drape_registry drape_controller_registry;
 
 #endif

@@ -1,15 +1,15 @@
 /*
- * error: any fixed-step row becomes adaptive. The local error is estimated, as BDF codes do it, by what
- * separates the solution of the step from its prediction: the polynomial through the states before, of the
- * degree p of the method's order, continued to the end of the step; positions and velocities each from
- * their own past, because a method's velocities are not the exact derivatives of its positions. With
- * x^(p+1) the derivative, prediction and solution differ by the product of (t1 - t_j) over (p+1)! of it,
- * and the method's local error is about h^(p+1)/(p+1)!: so the estimate is the difference times h^(p+1)
- * over that product. That is exact for backward Euler, 3/4 of the error of bdf2 at constant steps and more
- * than that of midpoint.
+ * error: makes any fixed-step integrator adaptive. The local error is estimated, as in BDF codes, from the
+ * difference between the solution of the step and its prediction. The prediction is the polynomial of degree
+ * p, the method's order, through the preceding states, continued to the end of the step. Positions and
+ * velocities are predicted separately, because a method's velocities are not the exact derivatives of its
+ * positions. With x^(p+1) the derivative, prediction and solution differ by x^(p+1) times the product of (t1
+ * - t_j) over (p+1)!, and the method's local error is about h^(p+1)/(p+1)! x^(p+1). The estimate is therefore
+ * the difference times h^(p+1) over that product. This is exact for backward Euler, 3/4 of the error of bdf2
+ * at constant steps, and more than the error of midpoint.
  *
- * Weights are a length and a velocity, as IDA's. The next step follows from this error and the last by a PI
- * rule (Gustafsson 1991; Hairer & Wanner 1996, IV.2):
+ * Errors are weighted by a length and a velocity, as IDA's are. The next step follows from this error and the
+ * last one by a PI rule (Gustafsson 1991; Hairer & Wanner 1996, IV.2):
  *     h_next = h safety e^(-0.7/(p+1)) e_before^(0.4/(p+1)).
  */
 #include "base/reason.h"
@@ -35,7 +35,7 @@ enum { SCRATCH_LAST_ERROR };
 #define MAX_GROWTH   2.0 /* bdf2 is zero-stable below 1 + sqrt(2) */
 #define MAX_CUT      0.2
 #define FIRST_SHARE  10.0 /* see first_error */
-#define MIN_ERROR    1e-4 /* smaller ones are round-off and say nothing of the next step */
+#define MIN_ERROR    1e-4 /* smaller errors are round-off and say nothing about the next step */
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
@@ -44,17 +44,19 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_ATOL_X] = DRAPE_ATOL_X_PARAM,
     [PARAM_ATOL_V] = DRAPE_ATOL_V_PARAM,
     [PARAM_DT_MAX] = DRAPE_NUMBER("dt_max", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),
-    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1, "share of the step that the estimate allows"),
+    [PARAM_SAFETY] =
+        DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1, "fraction of the step that the estimate allows"),
 };
 
-/* A prediction: weights of the states in, past[0], past[1], and the factor from its difference to the
+/* A prediction: the weights of the states in, past[0] and past[1], and the factor from the difference to the
  * local error. */
 typedef struct prediction {
     double weight[3], factor;
     int points;
 } prediction;
 
-/* Lagrange's weights for the continuation to t1; as many points as the order wants and the past has. */
+/* Computes Lagrange's weights for extrapolation to t1, from as many points as the order needs and the history
+ * provides. */
 static prediction predict(const drape_trial *trial)
 {
     prediction p = {.points = 1, .factor = 1};
@@ -71,23 +73,24 @@ static prediction predict(const drape_trial *trial)
     return p;
 }
 
-/* The difference of a solution to its prediction, as a local error. */
+/* Converts the difference between a solution and its prediction to a local error. */
 static double difference(const prediction *p, double solution, double y0, double y1, double y2)
 {
     return p->factor * (solution - (p->weight[0] * y0 + p->weight[1] * y1 + p->weight[2] * y2));
 }
 
-/* The first step has no past, so that its velocities have no estimate: what they change by, g h, is none, and
- * at tight tolerances would allow no step at all. Positions have one, h^2 a/2 beyond flight. So the step may
- * also be a share 1/FIRST_SHARE of that at which the whole of it is atol_x, as in Hairer, Norsett & Wanner
- * 1993, II.4: its square is as small as the tolerance is, and with it the error h^2 v''/2 of velocities. */
+/* The first step has no history, so there is no estimate for velocities: their whole change g h is not an
+ * error, and at tight tolerances would allow no step at all. For positions there is one: h^2 a/2, the
+ * deviation from uniform motion. The step may therefore also be 1/FIRST_SHARE of that at which this deviation
+ * equals atol_x, as in Hairer, Norsett & Wanner 1993, II.4: its square then is as small as the tolerance, and
+ * so is the error h^2 v''/2 of velocities. */
 static double first_error(double by_both, double by_positions)
 {
     return by_both <= 1 ? by_both : fmin(by_both, FIRST_SHARE * sqrt(by_positions));
 }
 
-/* *worst_node: that of the largest part, -1 for none. Root mean square over the free DOFs of the weighted
- * errors of positions and velocities. */
+/* Returns the root mean square over the free DOFs of the weighted errors of positions and velocities.
+ * *worst_node receives the node with the largest contribution; -1: none. */
 static double local_error(const double *values, const drape_trial *trial, int32_t *worst_node)
 {
     const drape_model *m = trial->model;
@@ -102,12 +105,12 @@ static double local_error(const double *values, const drape_trial *trial, int32_
         for (size_t k = 0; k < 3; k++) {
             size_t i = 3 * (size_t)m->node_of_free[f] + k;
             double flight =
-                p.points == 1 ? trial->h * a->v[i] : 0; /* the first step knows its velocity at least */
+                p.points == 1 ? trial->h * a->v[i] : 0; /* in the first step at least the velocity is known */
             double ex = (difference(&p, trial->out->x[i], a->x[i], b->x[i], c->x[i]) - flight) / atol_x;
             double ev = difference(&p, trial->out->v[i], a->v[i], b->v[i], c->v[i]) / atol_v;
             sum += ex * ex + ev * ev;
             positions += ex * ex;
-            if (!(ex * ex + ev * ev <= largest) && !isnan(largest)) { /* the first that is no number stays */
+            if (!(ex * ex + ev * ev <= largest) && !isnan(largest)) { /* the first NaN is kept */
                 largest = ex * ex + ev * ev;
                 *worst_node = m->node_of_free[f];
             }
@@ -137,7 +140,8 @@ static drape_verdict reject(const double *values, drape_trial *trial, double err
                            .limit = 1};
     drape_verdict verdict = drape_halve(values[PARAM_DT_MIN], trial);
     double proposed = fmax(values[PARAM_DT_MIN], factor * trial->h);
-    if (verdict == DRAPE_RETRY && trial->in->t + proposed > trial->in->t) /* else the half, which does */
+    /* otherwise the halved step, which changes the time, is used */
+    if (verdict == DRAPE_RETRY && trial->in->t + proposed > trial->in->t)
         trial->h_next = proposed;
     return verdict;
 }
@@ -148,7 +152,7 @@ static drape_verdict judge(const double *values, drape_trial *trial)
         return drape_halve(values[PARAM_DT_MIN], trial);
     int32_t node;
     double error = local_error(values, trial, &node), last = trial->scratch[SCRATCH_LAST_ERROR];
-    if (!(error <= 1)) /* a NaN is rejected */
+    if (!(error <= 1)) /* also rejects NaN */
         return reject(values, trial, error, node);
     double e = fmax(error, MIN_ERROR), before = last > 0 ? last : e, p = trial->order + 1;
     trial->scratch[SCRATCH_LAST_ERROR] = e;
@@ -162,7 +166,7 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 
 const drape_controller_ops drape_controller_error = {
     .entry = {.name = "error",
-              .summary = "step size by the local error: predictor against solution, PI rule",
+              .summary = "step size from the local error, estimated by a predictor, with a PI rule",
               .reference = "Gustafsson 1991; Hairer & Wanner 1996, IV.2",
               DRAPE_PARAMS(params)},
     .own_steps = true,

@@ -1,4 +1,4 @@
-/* fixed: every step has the nominal size; the first that fails ends the run. */
+/* fixed: every step has the nominal size; the first failed step ends the run. */
 #include "control/control.h"
 
 static drape_verdict judge(const double *values, drape_trial *trial)

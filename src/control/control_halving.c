@@ -1,7 +1,7 @@
 /*
- * halving: a failed step is forgotten and tried at half its size, so that the halves fill the same nominal
- * interval; after two equal steps that end where a step of twice the size would, that size is tried again.
- * Below dt_min, or where a step no longer moves the time, the run ends.
+ * halving: a failed step is rolled back and retried at half the size, so that the halves fill the same
+ * nominal interval. After two equal steps that end where a step of twice the size would, the larger size is
+ * tried again. The run ends if the size falls below dt_min or a step no longer changes the time.
  */
 #include "control/halve.h"
 

@@ -1,10 +1,11 @@
 /*
- * stable: steps of the nominal size where they are stable, else as large as the stability limit of an
- * explicit row allows, times a safety. The limit is found again every few steps, as the stiffness of a
- * stretched or folded sheet is another, and where a step failed: one that was above it is forgotten. Rows
- * without a limit take nominal steps. A step that fails below the limit is halved.
+ * stable: steps of the nominal size where they are stable, otherwise the stability limit of an explicit
+ * integrator times a safety factor. The limit is estimated again every few steps, because stretching and
+ * folding change the stiffness of the sheet, and also after a failed step: a step above the new limit is
+ * rolled back. Integrators without a limit take nominal steps. A step that fails below the limit is halved.
  *
- * A step of verlet is as many substeps as the scene says, so that it is the substeps that keep below 2/omega.
+ * A step of verlet consists of as many substeps as the scene says; it is the substeps that must stay below
+ * 2/omega.
  */
 #include "base/reason.h"
 #include "control/halve.h"
@@ -14,12 +15,15 @@
 enum { PARAM_DT_MIN, PARAM_MAX_ATTEMPTS, PARAM_SAFETY, PARAM_EVERY, PARAM_COUNT };
 enum { SCRATCH_LIMIT, SCRATCH_LEFT };
 
-#define SLACK 1e-6 /* a limit of which a step was made is found again to this */
+#define SLACK                                                                                                \
+    1e-6 /* relative tolerance between the limit from which a step was chosen and the same limit estimated
+            again */
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
     [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(1000000),
-    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1, "share of the step that the estimate allows"),
+    [PARAM_SAFETY] =
+        DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1, "fraction of the step that the estimate allows"),
     [PARAM_EVERY] =
         DRAPE_INTEGER("every", "1", 10, 1, 1e6, "steps between two estimates of the stability limit"),
 };
@@ -33,7 +37,8 @@ static double stable_step(const drape_trial *trial, const drape_state *at)
     return found.step;
 }
 
-/* The largest stable step: where the attempt came if that is known, else where it began. */
+/* Returns the largest stable step: at the end of the attempt if that state is known, otherwise at its
+ * start. */
 static double limit_of(const double *values, drape_trial *trial)
 {
     double *limit = &trial->scratch[SCRATCH_LIMIT], *left = &trial->scratch[SCRATCH_LEFT];
@@ -80,7 +85,7 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 
 const drape_controller_ops drape_controller_stable = {
     .entry = {.name = "stable",
-              .summary = "nominal steps, smaller where an explicit integrator's stability limit asks for it",
+              .summary = "nominal steps, reduced where an explicit integrator's stability limit requires it",
               .reference = "2/omega: Courant, Friedrichs & Lewy 1928; Hairer, Lubich & Wanner 2003",
               DRAPE_PARAMS(params)},
     .own_steps = true,

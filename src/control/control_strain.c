@@ -1,7 +1,7 @@
 /*
- * strain: halving that also refuses a step in which the cloth moves too far: an edge that changes its
- * length, or a node that moves, by more than a share of the rest length. What happens in such a step is
- * not resolved, even if the solver converged.
+ * strain: halving that also rejects a step in which the cloth moves too far: an edge changes its length, or a
+ * node moves, by more than a given fraction of the rest length. Such a step does not resolve the motion, even
+ * if the solver converged.
  */
 #include "base/reason.h"
 #include "base/vec3.h"
@@ -16,10 +16,10 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(10000),
     [PARAM_MAX_STRETCH] =
         DRAPE_NUMBER("max_stretch", "1", 0.1, DRAPE_ABOVE(0), 1e6,
-                     "largest change of an edge's length in one step, over its rest length"),
+                     "largest change of an edge's length in one step, relative to its rest length"),
     [PARAM_MAX_MOVE] =
         DRAPE_NUMBER("max_move", "1", 10, DRAPE_ABOVE(0), 1e9,
-                     "largest way of a node in one step, over the length of the shortest of its edges"),
+                     "largest displacement of a node in one step, relative to its shortest edge"),
 };
 
 static double length_between(const double *x, const int32_t *node)
@@ -29,14 +29,14 @@ static double length_between(const double *x, const int32_t *node)
     return vec3_norm(d);
 }
 
-static double way(const drape_trial *trial, int32_t node)
+static double displacement(const drape_trial *trial, int32_t node)
 {
     double d[3];
     vec3_sub(trial->out->x + 3 * (size_t)node, trial->in->x + 3 * (size_t)node, d);
     return vec3_norm(d);
 }
 
-/* Keeps the worst of one kind; limit and what are set by the caller. */
+/* Keeps the largest value of one kind; the caller sets limit and what. */
 static void keep(drape_diagnostic *diagnostic, const int32_t *node, int count, double value)
 {
     if (value <= diagnostic->value)
@@ -52,7 +52,7 @@ static bool too_far(const double *values, drape_trial *trial)
     drape_diagnostic stretch = {
         .what = "change of edge length / rest length", .term = "", .element = -1, .node = {-1, -1, -1, -1}};
     drape_diagnostic move = {
-        .what = "way of a node / edge length", .term = "", .element = -1, .node = {-1, -1, -1, -1}};
+        .what = "displacement of a node / edge length", .term = "", .element = -1, .node = {-1, -1, -1, -1}};
     stretch.limit = values[PARAM_MAX_STRETCH];
     move.limit = values[PARAM_MAX_MOVE];
     for (int32_t e = 0; e < m->edge_count; e++) {
@@ -60,8 +60,8 @@ static bool too_far(const double *values, drape_trial *trial)
         double rest = m->edge_length[e];
         keep(&stretch, node, 2,
              fabs(length_between(trial->out->x, node) - length_between(trial->in->x, node)) / rest);
-        keep(&move, &node[0], 1, way(trial, node[0]) / rest);
-        keep(&move, &node[1], 1, way(trial, node[1]) / rest);
+        keep(&move, &node[0], 1, displacement(trial, node[0]) / rest);
+        keep(&move, &node[1], 1, displacement(trial, node[1]) / rest);
     }
     bool stretched = stretch.value > stretch.limit, moved = move.value > move.limit;
     if (!stretched && !moved)

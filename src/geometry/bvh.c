@@ -5,12 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define LEAF 1 /* elements of a leaf */
+#define LEAF 1 /* elements per leaf */
 
 /* ---- Building ---- */
 
 typedef struct entry {
-    double middle[3]; /* the sum of the element's nodes */
+    double middle[3]; /* the sum of the positions of the element's nodes */
     int32_t element;
 } entry;
 
@@ -100,7 +100,7 @@ drape_status drape_bvh_build(drape_arena *arena, int32_t count, int nodes, const
     return DRAPE_OK;
 }
 
-/* ---- Fitting ---- */
+/* ---- Refitting ---- */
 
 static void include(drape_box *box, const double *x)
 {
@@ -132,7 +132,7 @@ drape_box drape_box_of(const int32_t *node, int nodes, const double *x, const do
     return box;
 }
 
-/* Children are stored after their parent: going backwards fits them first. */
+/* Children are stored after their parent: going backwards refits them first. */
 void drape_bvh_fit(drape_bvh *bvh, const double *x, const double *y)
 {
     for (int32_t i = bvh->branch_count - 1; i >= 0; i--) {

@@ -7,14 +7,15 @@
 #include <string.h>
 
 #define PARALLEL                                                                                             \
-    1e-12 /* sin^2 of the angle below which segments count as parallel: ends are then as near as any points */
+    1e-12 /* sin^2 of the angle below which segments count as parallel: end points are then as near as any
+             others */
 
 static double clamp01(double t)
 {
     return t < 0 ? 0 : t > 1 ? 1 : t;
 }
 
-/* p = sum c x, from differences of points because coordinates may be large. */
+/* p = sum c x, computed from differences of points, because coordinates may be large. */
 static void measure(double x[4][3], drape_closest *at)
 {
     double p[3] = {0};
@@ -92,7 +93,7 @@ void drape_closest_point_triangle(double x[4][3], drape_closest *at)
 
 /* ---- Two segments ---- */
 
-/* Parameters s and t are free unless they are at an end. */
+/* The parameters s and t are free unless they are at an end. */
 static void between(double s, double t, bool s_moves, bool t_moves, drape_closest *at)
 {
     const double c[4] = {1 - s, s, -(1 - t), -t};
@@ -107,7 +108,7 @@ static void between(double s, double t, bool s_moves, bool t_moves, drape_closes
     }
 }
 
-/* The parameter of the point of a segment that is nearest to a given point. */
+/* Returns the parameter of the point of a segment that is nearest to a given point. */
 static double nearest(double along, double length2)
 {
     return length2 > 0 ? clamp01(along / length2) : 0;
@@ -150,7 +151,7 @@ void drape_closest_reduce(drape_closest *at, int which[4])
 
 /* ---- Derivatives ---- */
 
-/* The inverse of G = T . T. */
+/* Computes the inverse of G = T . T. */
 static void invert(double t[2][3], int params, double inverse[2][2])
 {
     double a = vec3_dot(t[0], t[0]), b = vec3_dot(t[0], t[1]), c = vec3_dot(t[1], t[1]);

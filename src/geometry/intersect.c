@@ -1,8 +1,7 @@
 /*
- * intersect.c: see intersect.h. An edge is tested against the triangles whose boxes meet its box. An edge p q
- * crosses triangle a b c where p and q lie on different sides of its plane and the line through them
- * has a b, b c and c a on the same side: five signs of tetrahedron volumes (equivalent to Moeller & Trumbore
- * 1997).
+ * intersect.c: see intersect.h. An edge is tested against the triangles whose boxes overlap its box. An edge
+ * p q crosses a triangle a b c if p and q lie on different sides of its plane and the line through them has a
+ * b, b c and c a on the same side: five signs of tetrahedron volumes (equivalent to Moeller & Trumbore 1997).
  */
 #include "geometry/intersect.h"
 
@@ -12,10 +11,10 @@
 #include <float.h>
 #include <math.h>
 
-#define ROUNDINGS 8 /* rounding errors of a volume: of its coordinates, differences, products and sums */
+#define ROUNDINGS 8 /* rounding errors of a volume: from its coordinates, differences, products and sums */
 
-/* Six times the volume of the tetrahedron a b c d; 0 if it is within rounding of 0: an edge that lies in the
- * plane of a triangle does not cross it. */
+/* Returns six times the volume of the tetrahedron a b c d, or 0 if that is within rounding of 0: an edge that
+ * lies in the plane of a triangle does not cross it. */
 static double volume(const double *a, const double *b, const double *c, const double *d)
 {
     double u[3], v[3], w[3], n[3], largest = 0;
@@ -45,7 +44,7 @@ static bool crosses(const double *x, const int32_t *edge, const int32_t *triangl
     return ab == (volume(p, q, b, c) > 0) && ab == (volume(p, q, c, a) > 0);
 }
 
-/* One edge that is tested against triangles. */
+/* The search for triangles that one edge crosses. */
 typedef struct search {
     const drape_model *model;
     const double *x;

@@ -1,8 +1,8 @@
 /*
  * mesh_distance.c: see mesh_distance.h.
  *
- * The nearest point is searched depth first in a tree of boxes, the nearer child before the other (Ericson
- * 2005, section 6.3; points of triangles: 5.1.5).
+ * The nearest point is searched depth first in a tree of boxes, the nearer child first (Ericson 2005, section
+ * 6.3; points of triangles: 5.1.5).
  *
  * x is outside if n . (x - c) > 0 for the angle-weighted pseudo-normal n of the face, edge or point that
  * contains the nearest point c (Baerentzen and Aanaes 2005, "Signed distance computation using the angle
@@ -17,10 +17,10 @@
 
 struct drape_mesh_distance {
     drape_bvh boxes;      /* of the shape's triangles */
-    int32_t *edge_of;     /* (triangle_count x 3) segment between corners k and k + 1 */
-    double *face_normal;  /* (triangle_count x 3) of length 1 */
-    double *edge_normal;  /* (segment_count x 3) of any length */
-    double *point_normal; /* (point_count x 3) of any length */
+    int32_t *edge_of;     /* (triangle_count x 3) number of the segment between corners k and k + 1 */
+    double *face_normal;  /* (triangle_count x 3) unit vectors */
+    double *edge_normal;  /* (segment_count x 3) not normalised */
+    double *point_normal; /* (point_count x 3) not normalised */
 };
 
 /* ---- Normals ---- */
@@ -55,7 +55,7 @@ static void add_normals(const drape_collider_shape *s, int32_t t, drape_mesh_dis
     }
 }
 
-/* The number of segment a b. */
+/* Returns the number of the segment a b. */
 static int32_t find_segment(const drape_collider_shape *s, int32_t a, int32_t b)
 {
     int32_t low = 0, high = s->segment_count - 1, least = a < b ? a : b, most = a < b ? b : a;
@@ -103,7 +103,7 @@ const drape_mesh_distance *drape_mesh_distance_create(drape_arena *arena, const 
 typedef enum feature_kind { FACE, EDGE, POINT } feature_kind;
 
 typedef struct nearest {
-    double squared; /* of the distance [m2] */
+    double squared; /* squared distance [m2] */
     double at[3];
     int32_t triangle;
     feature_kind kind;
@@ -121,7 +121,7 @@ static void offer(nearest *best, const double *x, const double *at, int32_t t, f
     }
 }
 
-/* Offers the point of the edge from corner k that is nearest to x. */
+/* Offers the point nearest to x on the edge from corner k. */
 static void offer_edge(const drape_collider_shape *s, int32_t t, int k, const double *x, nearest *best)
 {
     double along[3], from[3], at[3];
@@ -140,8 +140,8 @@ static void offer_edge(const drape_collider_shape *s, int32_t t, int k, const do
     }
 }
 
-/* If x lies inside of all three edges, the nearest point is the foot of its perpendicular; otherwise it is on
- * an edge that x lies outside of. */
+/* If x lies inside all three edges, the nearest point is its perpendicular projection; otherwise it is on an
+ * edge that x lies outside of. */
 static void offer_triangle(const drape_collider_shape *s, const drape_mesh_distance *mesh, int32_t t,
                            const double *x, nearest *best)
 {
@@ -177,7 +177,7 @@ static double squared_distance(const drape_box *b, const double *x)
 /* A branch that has not been visited yet. */
 typedef struct pending {
     int32_t index;
-    double squared; /* of the distance of its box */
+    double squared; /* squared distance of its box */
 } pending;
 
 static pending pending_at(const drape_mesh_distance *mesh, int32_t index, const double *x)
@@ -219,8 +219,8 @@ static double face_distance(const double *n, const double *from, double *normal,
     return vec3_dot(from, n);
 }
 
-/* The distance from an edge with the direction u, or from a point (u NULL). On it the normal is the
- * pseudo-normal. */
+/* Returns the signed distance from an edge with the direction u, or from a point (u NULL). On the edge or
+ * point itself the normal is the pseudo-normal. */
 static double round_signed(const double *pseudo, const double *u, const double *from, double *normal,
                            double *curvature)
 {

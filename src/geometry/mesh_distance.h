@@ -7,11 +7,11 @@
 
 typedef struct drape_mesh_distance drape_mesh_distance;
 
-/* For the points, segments and triangles of a shape; segments are the edges of its triangles, sorted by
- * (lower, higher) point, the lower first. NULL: out of memory. */
+/* Prepares the points, segments and triangles of a shape; segments are the edges of its triangles, sorted by
+ * (lower, higher) point, the lower one first. Returns NULL if memory is out. */
 const drape_mesh_distance *drape_mesh_distance_create(drape_arena *arena, const drape_collider_shape *shape);
 
-/* As the function distance of drape_collider_ops. */
+/* Implements the function distance of drape_collider_ops. */
 double drape_mesh_distance_at(const drape_mesh_distance *mesh, const drape_collider_shape *shape,
                               const double *x, double *normal, double *curvature);
 

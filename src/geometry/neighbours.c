@@ -3,13 +3,13 @@
  *
  * Points are sorted by bucket, then by number, where
  *     bucket = hash of a box's y and z + its number along x,
- * so that the boxes of a row along x lie one after another and are searched as one range.
+ * so that the boxes of a row along x are consecutive and can be searched as one range.
  *
- * The lists hold the points that are nearer than the reach, the moves of two points and a skin. They are
- * valid until a point has moved by half of the skin, not counting the mean motion of all points. If lists
- * become too long, in a heap of points, the boxes are searched at each question: a point that has not moved
- * since the update is where it was sorted; another one has moved by share times the reach at most, and a ball
- * that much larger finds it in its old box.
+ * The lists hold the points whose distance is less than the reach plus the moves of two points plus a skin.
+ * They are valid until a point has moved by half of the skin, not counting the mean motion of all points. If
+ * the lists become too long, as in a heap of points, each query searches the boxes instead: a point that has
+ * not moved since the update is where it was sorted; one that has moved did so by at most share times the
+ * reach, and a ball enlarged by that finds it in its old box.
  */
 #include "geometry/neighbours.h"
 
@@ -18,8 +18,8 @@
 
 #include <string.h>
 
-#define SKIN     0.5 /* of the reach */
-#define FARTHEST 1e9 /* boxes are numbered in 32 bits: all points beyond share a box */
+#define SKIN     0.5 /* as a fraction of the reach */
+#define FARTHEST 1e9 /* box numbers have 32 bits: all points beyond share a box */
 
 drape_status drape_neighbours_create(drape_arena *arena, int32_t points, double reach, drape_neighbours *s)
 {
@@ -43,7 +43,8 @@ drape_status drape_neighbours_create(drape_arena *arena, int32_t points, double 
 
 /* ---- Boxes ---- */
 
-/* floor(x per_box): the conversion truncates towards zero, and floor itself is a call on plain x86-64. */
+/* Computes floor(x per_box): the conversion truncates towards zero, and floor itself is a function call on
+ * baseline x86-64. */
 static int32_t box_number(double x, double per_box)
 {
     double number = x * per_box;
@@ -61,11 +62,12 @@ static void box_of(const drape_neighbours *s, const double *x, int32_t box[3])
 
 static int32_t bucket_of(const drape_neighbours *s, int32_t x, int32_t y, int32_t z)
 {
-    uint32_t row = (uint32_t)y * 0x9E3779B1u ^ (uint32_t)z * 0x85EBCA77u; /* odd factors: all rows differ */
+    /* odd factors are bijections in y and in z */
+    uint32_t row = (uint32_t)y * 0x9E3779B1u ^ (uint32_t)z * 0x85EBCA77u;
     return (int32_t)(((row ^ row >> 15) + (uint32_t)x) & (uint32_t)(s->buckets - 1));
 }
 
-/* The row along x that contains a box. */
+/* Returns the row along x that contains a box. */
 static uint64_t row_of(int32_t y, int32_t z)
 {
     return (uint64_t)(uint32_t)y << 32 | (uint32_t)z;
@@ -83,7 +85,7 @@ static void sort_points(drape_neighbours *s, const double *x)
     for (int32_t b = 0; b < s->buckets; b++)
         s->start[b + 1] += s->start[b];
     for (int32_t i = s->points - 1; i >= 0;
-         i--) { /* backwards: the ends of the buckets move to their starts */
+         i--) { /* backwards: the ends of the buckets become their starts */
         int32_t box[3], at = --s->start[s->bucket[i] + 1];
         box_of(s, x + 3 * (size_t)i, box);
         s->place[i] = at;
@@ -98,18 +100,19 @@ static void sort_points(drape_neighbours *s, const double *x)
 
 /* ---- Searching boxes ---- */
 
-/* The points nearer than the reach to one point. */
+/* The search for points nearer to one point than the reach. */
 typedef struct search {
     int32_t point;
     const double *x;
     double square_of_reach;
-    int32_t low[3], high[3]; /* boxes that are searched */
+    int32_t low[3], high[3]; /* range of boxes to search */
     int32_t *found;
-    int count; /* more than DRAPE_MAX_NEIGHBOURS: not all are in found */
+    int count; /* more than DRAPE_MAX_NEIGHBOURS: found is incomplete */
 } search;
 
-/* Points from first to last that are of the row and not of another one with the same hash. A point is always
- * written and counted only if it belongs: a branch here would be mispredicted half of the time. */
+/* Adds the points from first to last that belong to the row, and not to another row with the same hash. A
+ * point is always written, and counted only if it belongs: a branch here would be mispredicted half of the
+ * time. */
 static inline void search_range(const drape_neighbours *s, search *q, uint64_t row, int32_t first,
                                 int32_t last)
 {
@@ -167,13 +170,13 @@ int drape_neighbours_search(const drape_neighbours *s, int32_t point, const doub
 
 /* ---- Lists ---- */
 
-/* The rows of boxes around one in which the second point of a pair is searched; the rows on the other side
- * search for it. */
+/* The rows of boxes, relative to that of a point, in which the second point of a pair is searched; the rows
+ * on the other side search for it from there. */
 #define ROWS 4
 static const int32_t rows_ahead[ROWS][2] = {{0, 1}, {1, -1}, {1, 0}, {1, 1}};
 
-/* The sorted points that may be near to those of one box: of the next box of its row, and of three boxes of
- * each of the rows ahead. A range that wraps around the table is two. */
+/* The sorted points that may be near those of one box: those of the next box in its row, and of three boxes
+ * in each of the rows ahead. A range that wraps around the table is split in two. */
 typedef struct surroundings {
     int32_t bucket;
     uint64_t row;
@@ -227,7 +230,8 @@ static inline int32_t pair_with(const drape_neighbours *s, int32_t at, uint64_t 
     return count;
 }
 
-/* All pairs of points nearer than reach, which is the size of the boxes. -1: there is no room for all. */
+/* Collects all pairs of points nearer than reach, which is the size of the boxes. Returns -1 if there is no
+ * room for all. */
 static int32_t collect_pairs(drape_neighbours *s, double reach)
 {
     const int32_t room = s->points * (DRAPE_MEAN_NEIGHBOURS / 2);
@@ -249,8 +253,9 @@ static int32_t collect_pairs(drape_neighbours *s, double reach)
     return count;
 }
 
-/* From pairs to the list of every point, in ascending order: first unordered lists, in near; then each point
- * in turn is appended to the lists of the points in its own list. False: some list is too long. */
+/* Turns pairs into a list for every point, in ascending order: first into unordered lists, in near; then each
+ * point in turn is appended to the lists of the points in its own list. Returns false if a list is too
+ * long. */
 static bool spread_pairs(drape_neighbours *s, int32_t count)
 {
     int32_t total = 0, *sorted = s->pair;
@@ -279,9 +284,9 @@ static bool spread_pairs(drape_neighbours *s, int32_t count)
     return true;
 }
 
-/* ---- How long lists are valid ---- */
+/* ---- Validity of the lists ---- */
 
-/* The sum of x - x0 over all points, by LANES partial sums. */
+/* Sums x - x0 over all points, in LANES partial sums. */
 static inline void sum_moves(size_t n, const double *restrict x, const double *restrict x0, double sum[3])
 {
     double lane[3 * LANES] = {0};
@@ -301,8 +306,8 @@ static inline double square_of_move(const double *x, const double *x0, const dou
     return a * a + b * b + c * c;
 }
 
-/* The largest distance that a point has moved from x0 to x, relative to the mean of all; infinite if a number
- * is not finite. */
+/* Returns the largest distance that a point has moved from x0 to x, relative to the mean of all points;
+ * infinity if a number is not finite. */
 LANES_DISPATCH static double farthest_moved(size_t n, const double *restrict x, const double *restrict x0)
 {
     double mean[3], lane[LANES] = {0}, square;

@@ -1,11 +1,11 @@
-/* round.h: the distance from a point or a line, shared by spheres, capsules, cylinders and the edges of
+/* round.h: the distance from a point or a line; shared by spheres, capsules, cylinders and the edges of
  * meshes. */
 #ifndef DRAPE_GEOMETRY_ROUND_H
 #define DRAPE_GEOMETRY_ROUND_H
 
 #include "base/vec3.h"
 
-/* A unit vector at right angles to the unit vector u. */
+/* Computes a unit vector perpendicular to the unit vector u. */
 static inline void round_across(const double *u, double *out)
 {
     int least =
@@ -17,8 +17,8 @@ static inline void round_across(const double *u, double *out)
         out[k] /= length;
 }
 
-/* The distance |r| from the nearest point, and its derivatives: normal n = r / |r| and curvature
- * (I - n n^T - u u^T) / |r|, where u is the direction of the line that r starts from, NULL for a point. On
+/* Returns the distance |r| from the nearest point and writes its derivatives: normal n = r / |r| and
+ * curvature (I - n n^T - u u^T) / |r|. u is the direction of the line on which r starts; NULL for a point. On
  * the point or line itself the normal is arbitrary and the curvature 0. */
 static inline double round_distance(const double *r, const double *u, double *normal, double *curvature)
 {

@@ -1,4 +1,4 @@
-/* grid.c: see grid.h; and makes the grid that a def names. */
+/* grid.c: see grid.h; also generates the grid that a def names. */
 #include "mesh/grid.h"
 
 #include <stdio.h>

@@ -1,8 +1,8 @@
 /*
- * grid_annulus.c: a ring between two circles about the y axis, in the plane y = 0, normal +y. Rows are
- * circles from the inner to the outer one, so that pins of row 0, or of the edge "top", hold the inner rim,
- * and "bottom" is the outer; columns are spokes, and the last is beside the first. Every second circle is
- * turned by half a spoke. Node (r, c):
+ * grid_annulus.c: a ring between two circles about the y axis, in the plane y = 0, with normal +y. Rows are
+ * circles from the inner to the outer one: pins on row 0 or the edge "top" hold the inner rim, "bottom" is
+ * the outer rim. Columns are spokes, the last one next to the first. Every second circle is rotated by half a
+ * spoke. Node (r, c) is at
  *
  *     R = inner + r (outer - inner)/(circles - 1),  a = 2 pi (c + (r odd ? 1/2 : 0))/spokes,
  *     x = R cos a,  z = -R sin a
@@ -42,7 +42,7 @@ static int32_t *put(int32_t *next, int32_t a, int32_t b, int32_t c)
     return next + 3;
 }
 
-/* Letters as in grid.h, r outwards. A node of a turned circle lies between two of the next. */
+/* Letters as in grid.h, with r outwards. A node of a rotated circle lies between two of the next circle. */
 static void split_cells(drape_mesh *mesh)
 {
     int32_t *next = mesh->triangle;
@@ -86,7 +86,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 
 const drape_grid_ops drape_grid_annulus = {
     .entry = {.name = "annulus",
-              .summary = "a ring between two circles: what overhangs the disc of a drape tester",
+              .summary =
+                  "a ring between two circles, like the overhanging part of the cloth in a drape tester",
               DRAPE_PARAMS(params)},
     .generate = generate,
 };

@@ -1,13 +1,13 @@
 /*
- * grid_equilateral.c: a sheet of equilateral triangles, in the plane y = 0, normal +y. With e edges of length
- * l in each row and s strips of triangles, as many as edges unless the scene says how many, node (r, c) is at
+ * grid_equilateral.c: a sheet of equilateral triangles in the plane y = 0, with normal +y. With e edges of
+ * length l in each row and s strips of triangles (default: s = e), node (r, c) is at
  *
  *     x = (c + (r odd ? 1/2 : 0)) l,    z = -r sqrt(3)/2 l,    0 <= c <= e,  0 <= r <= s.
  *
- * A row lies half an edge right or left of the row before, so the short diagonal of its cells changes with
- * the row: B-C from an even to an odd row, A-D from an odd to an even one (letters: grid.h). Of the cloth
- * that results every edge has length l; with s = e it has 2 e^2 triangles, e (3 e + 2) edges and e (3 e - 2)
- * hinges.
+ * Each row is shifted by half an edge against the one before, alternately right and left, so the short
+ * diagonal of the cells alternates: B-C from an even to an odd row, A-D from an odd to an even one (letters
+ * as in grid.h). Every edge of the resulting cloth has length l; with s = e it has 2 e^2 triangles, e (3 e +
+ * 2) edges and e (3 e - 2) hinges.
  */
 #include <math.h>
 
@@ -15,7 +15,7 @@
 
 enum { EDGES, EDGE_LENGTH, STRIPS, PARAM_COUNT };
 
-/* MAX_EDGES + 1 nodes a side are DRAPE_MAX_NODES. */
+/* MAX_EDGES + 1 nodes along each side give DRAPE_MAX_NODES. */
 #define MAX_EDGES 16383
 
 static const drape_param params[PARAM_COUNT] = {

@@ -1,8 +1,8 @@
 /*
- * grid_irregular.c: a rectangle of columns x rows nodes out of line. Node (r, c) is that of the grid
- * "square", inside moved by up to `jitter` of a cell in both directions, on the sides along them; cells are
- * split along their shorter diagonal. What a scheme owes to the symmetry of a mesh is lost here: so do
- * results that depend on it show.
+ * grid_irregular.c: a rectangle of columns x rows nodes at irregular positions. Node (r, c) is that of the
+ * grid "square", displaced by up to `jitter` of a cell, in both directions inside and along the sides on the
+ * boundary; cells are split along their shorter diagonal. This removes the symmetry of a regular mesh and so
+ * reveals results that depend on it.
  */
 #include <math.h>
 
@@ -13,8 +13,8 @@ enum { JITTER = GRID_RECTANGLE_COUNT, SEED, ORIENTATION, PARAM_COUNT };
 static const drape_param params[PARAM_COUNT] = {
     GRID_RECTANGLE,
     [JITTER] =
-        DRAPE_NUMBER("jitter", "1", 0.25, 0, 0.4, "how far nodes are out of line, as a share of a cell"),
-    [SEED] = DRAPE_INTEGER("seed", "1", 1, 0, 1e9, "another mesh of the same kind"),
+        DRAPE_NUMBER("jitter", "1", 0.25, 0, 0.4, "largest displacement of nodes, as a fraction of a cell"),
+    [SEED] = DRAPE_INTEGER("seed", "1", 1, 0, 1e9, "seed of the displacements"),
     [ORIENTATION] = GRID_ORIENTATION,
 };
 
@@ -40,7 +40,7 @@ static double distance(const drape_mesh *mesh, int32_t a, int32_t b)
     return hypot(hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
 }
 
-/* Triangles turn counterclockwise seen from +y or +z. */
+/* Triangles are counterclockwise as seen from +y or +z. */
 static void split_cells(bool vertical, drape_mesh *mesh)
 {
     int32_t *next = mesh->triangle;
@@ -68,7 +68,8 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
 
 const drape_grid_ops drape_grid_irregular = {
     .entry = {.name = "irregular",
-              .summary = "a rectangle of columns x rows nodes out of line, to show what depends on the mesh",
+              .summary = "a rectangle of columns x rows nodes at irregular positions, to reveal results that "
+                         "depend on the mesh",
               DRAPE_PARAMS(params)},
     .generate = generate,
 };

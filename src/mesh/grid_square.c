@@ -4,11 +4,12 @@
  *
  *     horizontal: (u, 0, -w), normal +y        vertical: (u, -w, 0), normal +z.
  *
- * With noise a node is up to that far off the plane: it lets a sheet fall that would stand on its edge for
- * ever.
+ * noise moves each node off the plane by up to that distance, so that a sheet that would otherwise stand on
+ * its edge for ever falls.
  *
- * The diagonals of its cells are parallel, from (r, c) to (r+1, c+1), or alternate with r + c, beginning with
- * that one: alternating ones do not make the sheet stiffer along one diagonal than along the other.
+ * The diagonals of the cells are either parallel, from (r, c) to (r+1, c+1), or alternate with r + c,
+ * beginning with that one. Alternating diagonals avoid a sheet that is stiffer along one diagonal than along
+ * the other.
  */
 #include <math.h>
 
@@ -23,9 +24,9 @@ static const drape_param params[PARAM_COUNT] = {
     GRID_RECTANGLE,
     [DIAGONALS] = DRAPE_CHOICE("diagonals", ALTERNATING, diagonals, "how the cells are split into triangles"),
     [ORIENTATION] = GRID_ORIENTATION,
-    [NOISE] =
-        DRAPE_NUMBER("noise", "m", 0, 0, 1e9,
-                     "nodes are off the plane by up to this, at random and always the same: breaks symmetry"),
+    [NOISE] = DRAPE_NUMBER(
+        "noise", "m", 0, 0, 1e9,
+        "largest offset of nodes from the plane, pseudo-random and reproducible: breaks symmetry"),
 };
 
 static void place_nodes(drape_mesh *mesh, double width, double height, bool vertical)
@@ -62,7 +63,7 @@ static drape_status generate(drape_context *ctx, const char *pointer, const doub
     mesh->rectangular = true;
     place_nodes(mesh, values[GRID_WIDTH], values[GRID_HEIGHT], vertical);
     add_noise(mesh, values[NOISE], vertical);
-    /* Rows of a vertical sheet go down where those of grid.h go up. */
+    /* Rows of a vertical sheet go down; those of grid.h go up. */
     drape_grid_triangulate(mesh, falling[(int)values[DIAGONALS]], vertical);
     return DRAPE_OK;
 }

@@ -1,5 +1,4 @@
-/* import.c: reads a mesh file whole into memory and hands it to the format that its ending names.
- */
+/* import.c: reads a whole mesh file into memory and passes it to the format that its extension names. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -13,7 +12,7 @@
 #define MAX_FILE_SIZE INT32_MAX /* [bytes] */
 
 typedef struct contents {
-    char *data; /* size bytes and a 0 byte */
+    char *data; /* size bytes, then a 0 byte */
     size_t size;
 } contents;
 
@@ -38,7 +37,8 @@ static const drape_import_ops *find_import(const char *file)
     return NULL;
 }
 
-/* folder/file, or file alone where it is absolute or there is no folder; NULL with a message. */
+/* Returns folder/file, or file alone if it is absolute or there is no folder; NULL with a message if memory
+ * is out. */
 static char *join(drape_arena *arena, const char *folder, const char *file)
 {
     if (!folder || !*folder || *file == '/')
@@ -55,7 +55,7 @@ static drape_status fail_file(drape_context *ctx, const char *pointer, const cha
     return drape_fail_at(ctx, DRAPE_E_FILE, pointer, "%s: cannot be read: %s", path, reason);
 }
 
-/* Reads until the announced size or, where the file shrank meanwhile, its end. */
+/* Reads up to the announced size, or to the end of the file if it has shrunk since. */
 static drape_status read_descriptor(drape_context *ctx, const char *pointer, const char *path, int descriptor,
                                     contents *file)
 {
@@ -94,7 +94,7 @@ static drape_status read_open_file(drape_arena *arena, const char *pointer, cons
     return file->data ? read_descriptor(ctx, pointer, path, descriptor, file) : DRAPE_E_MEMORY;
 }
 
-/* O_NONBLOCK: to open a pipe that nobody writes to would wait for ever. */
+/* O_NONBLOCK: opening a pipe without a writer would otherwise block for ever. */
 static drape_status read_whole_file(drape_arena *arena, const char *pointer, const char *path, contents *file)
 {
     const int descriptor = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);

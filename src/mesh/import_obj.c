@@ -1,10 +1,11 @@
 /*
- * import_obj.c: Wavefront OBJ (Wavefront Technologies, Advanced Visualizer manual, appendix B1). Of its
- * statements a sheet needs two: "v x y z ..." makes a node, "f a b c ..." a polygon, which becomes a fan of
- * triangles around its first corner. A corner is v, v/vt, v//vn or v/vt/vn; v counts from 1, or from -1
- * backwards from the last node so far. All else is passed over.
+ * import_obj.c: Wavefront OBJ (Wavefront Technologies, Advanced Visualizer manual, appendix B1). A sheet
+ * needs two of its statements: "v x y z ..." defines a node, "f a b c ..." a polygon, which becomes a fan of
+ * triangles around its first corner. A corner is v, v/vt, v//vn or v/vt/vn; v counts from 1, or backwards
+ * from -1 for the last node so far. All other statements are ignored.
  *
- * Read twice: the first time only counts, so that the arrays are made once and of the right size.
+ * The file is read twice: the first pass only counts, so that the arrays are allocated once with the right
+ * size.
  */
 #include <string.h>
 
@@ -58,7 +59,7 @@ static drape_status read_node(obj_reader *reader)
     return DRAPE_OK;
 }
 
-/* The first of up to three whole numbers between slashes; the others may be empty. */
+/* Parses the first of up to three integers between slashes; the others may be empty. */
 static bool corner_number(drape_word corner, int64_t *number)
 {
     for (int field = 0; field < 3; field++) {
@@ -152,9 +153,10 @@ static drape_status read_obj(drape_context *ctx, const drape_mesh_source *source
 }
 
 const drape_import_ops drape_import_obj = {
-    .entry = {.name = "obj",
-              .summary =
-                  "Wavefront OBJ; polygons become fans of triangles, all but nodes and faces is passed over"},
+    .entry =
+        {.name = "obj",
+         .summary =
+             "Wavefront OBJ; polygons become fans of triangles, everything but nodes and faces is ignored"},
     .ending = ".obj",
     .read = read_obj,
 };

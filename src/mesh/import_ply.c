@@ -1,10 +1,11 @@
 /*
  * import_ply.c: the Stanford polygon format (Turk 1994, "The PLY Polygon File Format"), ascii and binary. A
  * header lists elements (vertex, face, others) with their properties; the items of each element follow in
- * that order, all in text or all in bytes. Taken are x, y, z of vertex and the list vertex_indices (or
- * vertex_index) of face; all else is passed over.
+ * that order, all as text or all as bytes. The reader uses x, y, z of vertex and the list vertex_indices (or
+ * vertex_index) of face and ignores everything else.
  *
- * The data are read twice: the first time only counts triangles, since a face may have any number of corners.
+ * The data are read twice: the first pass only counts triangles, because a face may have any number of
+ * corners.
  */
 #include <math.h>
 #include <stdarg.h>
@@ -38,14 +39,14 @@ typedef enum ply_role { X, Y, Z, CORNERS, PASSED_OVER } ply_role;
 #define ROLE_COUNT PASSED_OVER
 
 typedef struct ply_property {
-    ply_type count_type; /* of a list; else NO_TYPE */
+    ply_type count_type; /* type of a list's count; NO_TYPE: not a list */
     ply_type type;
     ply_role role;
 } ply_property;
 
 typedef struct ply_element {
     drape_word name;
-    int64_t line; /* of the header */
+    int64_t line; /* line of the header */
     int64_t count;
     int first_property, property_count;
 } ply_element;
@@ -56,7 +57,7 @@ typedef struct ply_reader {
     drape_context *ctx;
     const drape_mesh_source *source;
     drape_mesh *mesh;
-    drape_text text; /* the header; then the data of either kind */
+    drape_text text; /* the header, later the data, whether ascii or binary */
     ply_format format;
     ply_element elements[MAX_ELEMENTS];
     ply_property properties[MAX_PROPERTIES];
@@ -65,11 +66,11 @@ typedef struct ply_reader {
     /* while the data are read: */
     const ply_element *element;
     int64_t item;
-    bool counting;    /* the first time: nothing is written */
+    bool counting;    /* the first pass: nothing is written */
     size_t triangles; /* so far */
 } ply_reader;
 
-/* A fault at the present place: a line, or an item where there are no lines. */
+/* Reports a fault at the present place: a line or, in binary data, an item. */
 static drape_status fail(const ply_reader *reader, const char *format, ...) DRAPE_PRINTF(2, 3);
 
 static drape_status fail(const ply_reader *reader, const char *format, ...)
@@ -88,7 +89,7 @@ static drape_status fail(const ply_reader *reader, const char *format, ...)
 
 /* Header */
 
-/* Takes the next word of a header line; what it is stands in the message if there is none. */
+/* Takes the next word of a header line; what: its description, for the message if there is none. */
 static drape_status take(ply_reader *reader, const char *what, drape_word *word)
 {
     if (drape_text_next_word(&reader->text, word))
@@ -248,7 +249,7 @@ static drape_status check_contents(const ply_reader *reader)
     return DRAPE_OK;
 }
 
-/* Goes through the lines up to end_header; the text then stands at the data. */
+/* Reads the lines up to end_header; the text is then at the start of the data. */
 static drape_status read_header(ply_reader *reader)
 {
     drape_word word;
@@ -269,8 +270,9 @@ static drape_status read_header(ply_reader *reader)
     return fail(reader, "the header has no end_header");
 }
 
-/* The fewest bytes that an item of the element takes: in text a digit and a blank a value. */
-static int64_t least_bytes(const ply_reader *reader, const ply_element *element)
+/* The smallest number of bytes that an item of the element can take; in text, a digit and a blank per
+ * value. */
+static int64_t min_item_bytes(const ply_reader *reader, const ply_element *element)
 {
     int64_t bytes = 0;
     for (int i = 0; i < element->property_count; i++) {
@@ -281,15 +283,14 @@ static int64_t least_bytes(const ply_reader *reader, const ply_element *element)
     return bytes;
 }
 
-/* Counts come from a file: none is believed, no memory taken for it, that the rest of the file cannot hold.
- */
+/* Refuses counts that the rest of the file cannot hold, before memory is allocated for them. */
 static drape_status check_counts(ply_reader *reader)
 {
-    /* the last line of a text may lack its end */
+    /* the last line of a text may have no line end */
     const int64_t left = reader->text.end - reader->text.at + (reader->format == ASCII);
     for (int i = 0; i < reader->element_count; i++) {
         const ply_element *element = &reader->elements[i];
-        const int64_t least = least_bytes(reader, element);
+        const int64_t least = min_item_bytes(reader, element);
         if (least > 0 && element->count > left / least)
             return drape_mesh_fail(reader->ctx, reader->source, element->line,
                                    "%lld items of %.*s; the %lld bytes after the header hold at most %lld",
@@ -325,7 +326,7 @@ static double decode(ply_type type, const unsigned char *bytes, bool big_endian)
     return (double)bits;
 }
 
-/* The next value; value NULL: passed over. */
+/* Reads the next value; a NULL value skips it. */
 static drape_status read_value(ply_reader *reader, ply_type type, double *value)
 {
     drape_text *text = &reader->text;
@@ -416,7 +417,7 @@ static drape_status read_property_value(ply_reader *reader, const ply_property *
     return read_value(reader, property->type, x);
 }
 
-/* In text an item is a line; empty lines are passed over. */
+/* In ascii data an item is a line; empty lines are skipped. */
 static drape_status find_item_line(ply_reader *reader)
 {
     drape_word word;
@@ -452,7 +453,7 @@ static drape_status read_item(ply_reader *reader)
     return status;
 }
 
-/* Reads the items of all elements, from where the text stands. */
+/* Reads the items of all elements, from the present place of the text. */
 static drape_status read_items(ply_reader *reader, bool counting)
 {
     drape_status status = DRAPE_OK;
@@ -460,7 +461,7 @@ static drape_status read_items(ply_reader *reader, bool counting)
     reader->triangles = 0;
     for (int i = 0; i < reader->element_count && !status; i++) {
         reader->element = &reader->elements[i];
-        if (reader->element->property_count == 0) /* such items take no byte and no line */
+        if (reader->element->property_count == 0) /* items without properties take no byte and no line */
             continue;
         for (reader->item = 0; reader->item < reader->element->count && !status; reader->item++)
             status = read_item(reader);

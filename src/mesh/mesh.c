@@ -79,7 +79,8 @@ static drape_status take_from_source(drape_context *ctx, const char *pointer, co
                                   def->triangle_count, mesh);
 }
 
-/* Positions are checked before, too: a rotation spreads one coordinate that is not a number to all three. */
+/* Positions are also checked before the transform, because a rotation spreads one coordinate that is not a
+ * number to all three. */
 static drape_status place_nodes(drape_context *ctx, const char *pointer, const drape_mesh_source *source,
                                 const drape_mesh_def *def, drape_mesh *mesh)
 {

@@ -1,8 +1,9 @@
-/* order.c: radix sort: one stable counting sort a part of the key, from the last part to the first.
- * O(parts (count + limit)) for any input, where a hash table or quicksort would have bad ones. */
+/* order.c: radix sort: one stable counting sort per part of the key, from the last part to the first. It
+ * takes O(parts (count + limit)) for any input; hash tables and quicksort have bad cases. */
 #include "mesh/order.h"
 
-/* Sorts from by part into to; start (limit + 1) is workspace: the place of the next item of each value. */
+/* Sorts `from` by one part into `to`. start (limit + 1) is workspace: the place of the next item of each
+ * value. */
 static void sort_by_part(const int32_t *key, int parts, int part, int32_t count, int32_t limit,
                          const int32_t *from, int32_t *to, int32_t *start)
 {

@@ -1,5 +1,6 @@
 /* rest.c: measures a mesh at rest: areas of triangles |(x1 - x0) x (x2 - x0)| / 2, lengths of edges, and the
- * area that is lumped to each node, a third of each triangle around it (so their sum is the sheet's area). */
+ * area lumped to each node, a third of each triangle around it (so that these sum to the area of the
+ * sheet). */
 #include "base/vec3.h"
 #include "mesh/mesh.h"
 

@@ -1,4 +1,4 @@
-/* text.c: see text.h. The byte after the text is 0, so one character can always be looked at. */
+/* text.c: see text.h. The byte after the text is 0, so looking one character ahead is always safe. */
 #include "mesh/text.h"
 
 #include <math.h>
@@ -19,7 +19,7 @@ static bool is_blank(char c)
     return c == ' ' || c == '\t' || c == '\v' || c == '\f';
 }
 
-/* Bytes of the line end at a place, 0 if there is none. */
+/* Returns the number of bytes of a line end at this place; 0: there is none. */
 static int line_end(const drape_text *text, const char *at)
 {
     if (at >= text->end)
@@ -29,7 +29,7 @@ static int line_end(const drape_text *text, const char *at)
     return *at == '\n';
 }
 
-/* Bytes of a backslash and the line end behind it, 0 if there is no such thing at this place. */
+/* Returns the number of bytes of a backslash and the line end after it; 0: there is none here. */
 static int continued_end(const drape_text *text, const char *at)
 {
     if (!text->continuation || *at != '\\')
@@ -70,7 +70,7 @@ bool drape_text_next_line(drape_text *text)
     drape_word rest;
     while (drape_text_next_word(text, &rest)) {
     }
-    while (text->at < text->end && !line_end(text, text->at)) /* a comment */
+    while (text->at < text->end && !line_end(text, text->at)) /* skip a comment */
         text->at++;
     if (text->at == text->end)
         return false;

@@ -1,10 +1,11 @@
-/* topology.c: unique edges, the triangles beside them, and hinges. Each triangle has three sides; the sides
- * sorted by (lower node, higher node) stand in runs, and a run is an edge: of one side on the boundary, of
- * two inside, where it is a hinge. */
+/* topology.c: unique edges, the triangles beside them, and hinges. Each triangle has three sides. Sorting the
+ * sides by (lower node, higher node) forms runs, and each run is an edge: with one side on the boundary, and
+ * with two sides inside, where the edge is a hinge. */
 #include "mesh/mesh.h"
 #include "mesh/order.h"
 
-/* Side s = 3 t + k of triangle t lies between its nodes k and k + 1: lower node first. (3 T x 2) */
+/* Lists the sides (3 T x 2): side s = 3 t + k of triangle t lies between its nodes k and k + 1, lower node
+ * first. */
 static int32_t *list_sides(drape_arena *scratch, const drape_mesh *mesh)
 {
     const size_t count = 3 * (size_t)mesh->triangle_count;
@@ -19,7 +20,7 @@ static int32_t *list_sides(drape_arena *scratch, const drape_mesh *mesh)
     return side;
 }
 
-/* Length of the run of equal sides that begins at place `first` of the order. */
+/* Returns the length of the run of equal sides that begins at place `first` of the order. */
 static int32_t run_length(const int32_t *side, const int32_t *order, int32_t first, int32_t count)
 {
     const int32_t *edge = side + 2 * (size_t)order[first];
@@ -62,7 +63,7 @@ static drape_status allocate_edges(drape_mesh *mesh)
     return drape_arena_status(arena);
 }
 
-/* The node of its triangle that side s does not touch. */
+/* Returns the node of the triangle that is opposite to its side s. */
 static int32_t apex(const drape_mesh *mesh, int32_t s)
 {
     return mesh->triangle[s % 3 == 0 ? s + 2 : s - 1];

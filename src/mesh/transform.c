@@ -1,5 +1,5 @@
-/* transform.c: places a mesh: x' = R (s x) + t, componentwise scale s, rotation R by an angle about an axis,
- * translation t. */
+/* transform.c: transforms a mesh: x' = R (s x) + t, with componentwise scale s, rotation R by an angle about
+ * an axis, and translation t. */
 #include "mesh/mesh.h"
 
 #include <math.h>
@@ -32,7 +32,7 @@ drape_status drape_mesh_check_transform(drape_context *ctx, const char *pointer,
                              rotate[0], rotate[1], rotate[2], rotate[3]);
     if (rotate[3] != 0 && rotate[0] == 0 && rotate[1] == 0 && rotate[2] == 0)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place,
-                             "the axis of a turn by %g degrees is 0 0 0; it must not be zero", rotate[3]);
+                             "the axis of a rotation by %g degrees is 0 0 0; it must not be zero", rotate[3]);
     snprintf(place, sizeof place, "%s/transform/translate", pointer);
     if (!all_finite(translate, 3))
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, place, "%g %g %g; each must be finite", translate[0],
@@ -40,8 +40,8 @@ drape_status drape_mesh_check_transform(drape_context *ctx, const char *pointer,
     return DRAPE_OK;
 }
 
-/* Exact for multiples of 90 degrees: cos(pi/2) in floating point is not 0, and would tilt a sheet that was
- * turned upright. */
+/* Exact for multiples of 90 degrees: in floating point cos(pi/2) is not 0 and would tilt a sheet that is
+ * rotated upright. */
 static void sine_and_cosine(double degrees, double *sine, double *cosine)
 {
     const double pi = 3.14159265358979323846;
@@ -68,7 +68,7 @@ void drape_rotation_matrix(const double rotate[4], double matrix[3][3])
 {
     double sine = 0, cosine = 1, k[3] = {0, 0, 0};
     const double largest = fmax(fabs(rotate[0]), fmax(fabs(rotate[1]), fabs(rotate[2])));
-    if (largest > 0) { /* divided by its largest component first, so that no square under- or overflows */
+    if (largest > 0) { /* divide by the largest component first, so that no square under- or overflows */
         sine_and_cosine(rotate[3], &sine, &cosine);
         for (int i = 0; i < 3; i++)
             k[i] = rotate[i] / largest;

@@ -1,13 +1,13 @@
-/* validate.c: refuses meshes that are no sheet of cloth, and names the place: what would otherwise divide by
- * zero in a term, make the mass matrix singular or join what does not touch. */
+/* validate.c: refuses meshes that are not a sheet of cloth, and names the place. Such meshes would divide by
+ * zero in a term, make the mass matrix singular, or connect parts that share no edge. */
 #include <math.h>
 
 #include "base/vec3.h"
 #include "mesh/mesh.h"
 #include "mesh/order.h"
 
-#define MAX_COORDINATE 1e9   /* [m]: beyond, neighbouring doubles lie more than 1e-7 m apart */
-#define MIN_THINNESS   1e-12 /* altitude / longest edge: rounding of positions is 1e-16 of it */
+#define MAX_COORDINATE 1e9   /* [m]: beyond this, neighbouring doubles are more than 1e-7 m apart */
+#define MIN_THINNESS   1e-12 /* altitude / longest edge; the rounding of positions is 1e-16 of the edge */
 
 drape_status drape_mesh_validate_positions(drape_context *ctx, const drape_mesh_source *source,
                                            const drape_mesh *mesh)
@@ -38,7 +38,8 @@ static drape_status check_indices(drape_context *ctx, const drape_mesh_source *s
     return DRAPE_OK;
 }
 
-/* altitude over the longest edge l is (2 area / l) / l; 0 where the triangle is too small to be measured */
+/* The altitude over the longest edge l is (2 area / l) / l; returns 0 if the triangle is too small to be
+ * measured. */
 static double thinness(const drape_mesh *mesh, const int32_t *n)
 {
     double side[3][3], normal[3], longest_squared = 0;
@@ -64,7 +65,7 @@ static drape_status check_shapes(drape_context *ctx, const drape_mesh_source *so
     return DRAPE_OK;
 }
 
-/* The nodes of each triangle in ascending order. (triangle_count x 3) */
+/* Returns the nodes of each triangle in ascending order. (triangle_count x 3) */
 static int32_t *sort_corners(drape_arena *scratch, const drape_mesh *mesh)
 {
     int32_t *sorted = drape_arena_take(scratch, (size_t)mesh->triangle_count, 3 * sizeof *sorted);
@@ -122,7 +123,7 @@ drape_status drape_mesh_validate_triangles(drape_context *ctx, const drape_mesh_
     return status;
 }
 
-/* Union-find over corners (corner 3 t + k is node k of triangle t): the lowest corner of a set stands for it;
+/* Union-find over corners (corner 3 t + k is node k of triangle t): the lowest corner represents its set;
  * path halving (Tarjan and van Leeuwen 1984, doi:10.1145/62.2160, section 2). */
 static int32_t find(int32_t *parent, int32_t corner)
 {
@@ -149,7 +150,8 @@ static int32_t corner_at(const drape_mesh *mesh, int32_t triangle, int32_t node)
     return 3 * triangle + (n[0] == node ? 0 : n[1] == node ? 1 : 2);
 }
 
-/* Joins, at both ends of every inner edge, the corners of its two triangles: the sets are the fans. */
+/* Joins the corners of the two triangles of each inner edge, at both of its ends: the resulting sets are the
+ * fans. */
 static void join_fans(const drape_mesh *mesh, int32_t *parent)
 {
     for (int32_t corner = 0; corner < 3 * mesh->triangle_count; corner++)
@@ -163,7 +165,7 @@ static void join_fans(const drape_mesh *mesh, int32_t *parent)
     }
 }
 
-/* fan (node_count): workspace, the first fan found at each node, -1 before. */
+/* fan (node_count) is workspace: the first fan found at each node, initially -1. */
 static drape_status check_fans(drape_context *ctx, const drape_mesh_source *source, const drape_mesh *mesh,
                                const int32_t *parent, int32_t *fan)
 {

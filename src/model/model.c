@@ -1,4 +1,4 @@
-/* model.c: what can be asked of a compiled scene. */
+/* model.c: queries on a compiled scene. */
 #include "model/model.h"
 
 #include "model/track.h"

@@ -1,4 +1,4 @@
-/* model.h: the compiled scene. Everything in it is constant once drape_compile has made it; the state is
+/* model.h: the compiled scene. Everything in it is constant once drape_compile has made it; the state is kept
  * elsewhere. */
 #ifndef DRAPE_MODEL_MODEL_H
 #define DRAPE_MODEL_MODEL_H
@@ -7,29 +7,29 @@
 #include "mesh/mesh.h"
 #include "sparse/pattern.h"
 
-/* One row of the terms on one cloth. */
+/* One term on one cloth. */
 typedef struct drape_term {
     const drape_term_ops *ops;
     int32_t cloth;
     double params[DRAPE_MAX_PARAMS];
-    drape_elements elements; /* node numbers of the whole model */
-    int32_t *block; /* (count x nodes x nodes) block of each node pair in the pattern, -1 pinned; NULL: no
+    drape_elements elements; /* with node numbers of the whole model */
+    int32_t *block; /* (count x nodes x nodes) block of each node pair in the pattern, -1: pinned; NULL: no
                        sparsity */
-    bool anchored;  /* its elements hold on to directions in space */
-    int64_t first_internal;               /* its internal variables in a state; -1 for none */
-    int64_t first_measure;                /* its measures in the list of all measures; -1 for none */
-    const struct drape_term *const *laws; /* laws of the cloth, on this measure */
+    bool anchored;  /* its elements are attached to fixed directions in space */
+    int64_t first_internal;               /* index of its internal variables in a state; -1: none */
+    int64_t first_measure;                /* index of its measures in the list of all measures; -1: none */
+    const struct drape_term *const *laws; /* laws of the cloth that act on this measure */
     int law_count;
-    const double *damping; /* (elements.count) its measures' own dashpots [J s/q2]; NULL: it has none */
+    const double *damping; /* (elements.count) its measures' own dashpots [J s/q2]; NULL: none */
 } drape_term;
 
-/* Whether a term has a Hessian, and what it couples then. */
+/* Whether the term has a Hessian, so that it couples the nodes of an element. */
 static inline bool drape_term_couples(const drape_term *term)
 {
     return !term->ops->law && !term->ops->linear && term->elements.count > 0;
 }
 
-/* Internal variables of an element. */
+/* Internal variables per element. */
 static inline int drape_term_internals(const drape_term *term)
 {
     return term->ops->internal_count > 0 ? term->ops->internal_count : term->ops->has_internal;
@@ -41,25 +41,25 @@ static inline drape_coupling drape_term_coupling(const drape_term *term)
         .count = term->elements.count, .nodes = term->elements.nodes, .node = term->elements.node};
 }
 
-/* A row that was chosen by name, with the settings that the scene gave. */
+/* An entry chosen by name, with the settings that the scene gave. */
 typedef struct drape_choice {
     char *type;
     drape_setting *settings; /* (setting_count) */
     size_t setting_count;
 } drape_choice;
 
-/* One cloth: its mesh at rest, and what the scene said of it. */
+/* One cloth: its mesh at rest and the data of the scene. */
 typedef struct drape_cloth {
     char *name;
     drape_mesh mesh;
-    drape_choice grid; /* type "" where the mesh is no grid */
-    char *file;        /* NULL where it is from no file */
+    drape_choice grid; /* its type is "" if the mesh is not a grid */
+    char *file;        /* NULL if the mesh is not from a file */
     double scale[3], rotate[4], translate[3];
     double material_values[DRAPE_MAX_PARAMS]; /* in the order of the parameters of drape_material_entry */
     drape_material material;
-    drape_woven tension, bending; /* of a measured fabric; warp 0: it is none */
+    drape_woven tension, bending; /* of a measured fabric; warp 0: not a measured fabric */
     double *node_mass;            /* (mesh.node_count) [kg] */
-    uint8_t *edge_clamped;        /* (mesh.edge_count) 1: both its nodes are held by pins that clamp */
+    uint8_t *edge_clamped;        /* (mesh.edge_count) 1: both nodes are held by pins that clamp */
     double velocity[3];           /* [m/s] at t = 0 */
     int32_t first_node, first_triangle;
     const struct drape_term **laws; /* (law_count) */
@@ -75,30 +75,30 @@ typedef struct drape_track {
 typedef struct drape_collider {
     const drape_collider_ops *ops;
     char *name;
-    drape_choice choice; /* what the scene said */
+    drape_choice choice; /* the choice of the scene */
     double values[DRAPE_MAX_PARAMS];
     drape_collider_shape shape;
     double friction;   /* Coulomb's mu [1] */
-    drape_track track; /* displacement from where its values put it; no keys: it rests */
+    drape_track track; /* displacement from the position that its values define; no keys: it does not move */
 } drape_collider;
 
-/* What contact is made of, resolved. */
+/* Resolved parameters of contact. */
 typedef struct drape_contact_def {
-    double distance;          /* activation distance of cloth and collider [m] */
+    double distance;          /* activation distance between cloth and collider [m] */
     double stiffness;         /* scale of the contact pressure [Pa] */
-    double friction_velocity; /* below it friction falls to zero [m/s] */
-    bool lagged;              /* friction takes normal force and direction from the start of the step */
-    bool self;                /* cloth against cloth */
-    double self_thickness;    /* layers are kept twice this apart [m] */
+    double friction_velocity; /* sliding speed below which friction falls to zero [m/s] */
+    bool lagged;              /* friction uses the normal force and direction from the start of the step */
+    bool self;                /* contact of cloth with cloth */
+    double self_thickness;    /* half the distance that layers of cloth keep [m] */
     double self_friction;     /* mu [1] */
 } drape_contact_def;
 
 struct drape_model {
-    drape_arena arena; /* holds all that is below but the meshes */
+    drape_arena arena; /* holds everything below except the meshes */
     drape_context *ctx;
     int32_t cloth_count, term_count, node_count, triangle_count, edge_count;
     drape_cloth *cloths;
-    drape_term *terms;     /* (term_count) in scene order; gravity last of each cloth */
+    drape_term *terms;     /* (term_count) in scene order, gravity last in each cloth */
     double *rest;          /* (node_count x 3) [m] */
     double *velocity;      /* (node_count x 3) [m/s] at t = 0 */
     double *mass;          /* (node_count) [kg] */
@@ -106,7 +106,7 @@ struct drape_model {
     int32_t *edge;         /* (edge_count x 2) */
     double *edge_length;   /* (edge_count) [m] */
     uint8_t *pinned;       /* (node_count) */
-    int32_t *free_of_node; /* (node_count) number among the free nodes, -1 pinned */
+    int32_t *free_of_node; /* (node_count) number among the free nodes, -1: pinned */
     int32_t *node_of_free; /* (free_count) */
     int32_t free_count;
     int32_t *moved_node;  /* (moved_count) pinned nodes with a track */
@@ -116,25 +116,26 @@ struct drape_model {
     drape_collider *colliders; /* (collider_count) */
     int32_t collider_count;
     drape_contact_def contact;
-    drape_choice contact_choice, self_choice; /* what the scene said of them */
+    drape_choice contact_choice, self_choice; /* the settings of the scene */
     int64_t internal_count, measure_count;
     bool has_laws;        /* some term needs the rates of measures */
-    bool has_dissipation; /* some term takes energy out */
+    bool has_dissipation; /* some term dissipates energy */
     drape_pattern pattern;
-    size_t pattern_bytes; /* of the arena's */
+    size_t pattern_bytes; /* bytes of the pattern in the arena */
     double length;        /* diagonal of the rest bounding box [m], > 0 */
     double gravity[3];    /* [m/s2] */
     drape_choice integrator, controller;
     double duration, frame_rate;
     char **formats;
     size_t format_count;
-    bool z_up; /* frames are turned so that z points up */
+    bool z_up; /* frames are rotated so that z points up */
 };
 
-/* Writes the positions that tracks give pinned nodes at time t; other entries of x (node_count x 3) stay. */
+/* Writes the positions that tracks give pinned nodes at time t; other entries of x (node_count x 3) are
+ * unchanged. */
 void drape_model_place_pins(const drape_model *model, double t, double *x);
 
-/* The cloth that a node belongs to. */
+/* Returns the cloth that a node belongs to. */
 int32_t drape_model_cloth_of(const drape_model *model, int32_t node);
 
 #endif

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-/* ---- Making ---- */
+/* ---- Creation ---- */
 
 static size_t pinned_count(const drape_model *m)
 {
@@ -46,9 +46,9 @@ drape_status drape_motion_create(drape_arena *arena, const drape_model *model, d
     return DRAPE_OK;
 }
 
-/* ---- A path ---- */
+/* ---- Paths ---- */
 
-/* Hermite's cubic, at s = (t - t0)/(t1 - t0) of the path. */
+/* Cubic Hermite interpolation at s = (t - t0)/(t1 - t0) of the path. */
 static void path_displacement(const drape_path *w, double t, double x[3])
 {
     if (t <= w->t[0] || t >= w->t[1]) {
@@ -77,7 +77,7 @@ static bool rests(const double v[3])
     return v[0] == 0 && v[1] == 0 && v[2] == 0;
 }
 
-/* ---- A track or a path ---- */
+/* ---- Tracks and paths ---- */
 
 static void displacement_of(const drape_track *track, const drape_path *path, double t, double x[3])
 {
@@ -100,7 +100,8 @@ static void velocity_of(const drape_track *track, const drape_path *path, double
         memset(v, 0, 3 * sizeof *v);
 }
 
-/* Its end is one unless it comes to rest there; its beginning unless it goes on as before. */
+/* The end of a path is a kink unless it comes to rest there; its beginning is one unless it continues
+ * smoothly. */
 static double next_kink_of(const drape_track *track, const drape_path *path, double t, double end)
 {
     for (int i = 0; path->given && i < 2; i++)
@@ -122,8 +123,8 @@ static bool at_kink_of(const drape_track *track, const drape_path *path, double 
     return false;
 }
 
-/* The velocity that leads to where it is at t, and whether it is known: not at the key of a track, nor where
- * the host has changed its mind about the same moment. */
+/* Writes the velocity that leads to the position at t. Returns whether it is known: it is not at a key of a
+ * track, nor where the host replaces a path at the moment at which it began. */
 static bool leading_velocity(const drape_track *track, const drape_path *path, double t, double v[3])
 {
     if (path->given && (t == path->t[0] || t == path->t[1])) {
@@ -155,7 +156,7 @@ static const drape_track *pin_track(const drape_motion *motion, int32_t i)
     return motion->moved_track[i] >= 0 ? &motion->model->tracks[motion->moved_track[i]] : NULL;
 }
 
-/* Paths of pins are positions, not displacements, so that a pin reaches exactly the position that the host
+/* Paths of pins hold positions, not displacements, so that a pin reaches exactly the position that the host
  * gave. */
 static void place_pin(const drape_motion *motion, int32_t i, double t, double x[3])
 {
@@ -176,7 +177,7 @@ void drape_motion_pin_velocity(const drape_motion *motion, int32_t i, double t, 
     velocity_of(pin_track(motion, i), &motion->pin_path[i], t, within, v);
 }
 
-/* The number of a pin among the moved ones, of which it is one from now on. */
+/* Returns the number of a pin among the moved ones, adding it to them if necessary. */
 static int32_t find_place(drape_motion *motion, int32_t node)
 {
     int32_t i = motion->place[node];
@@ -236,7 +237,7 @@ void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t
     send(&motion->model->colliders[collider].track, &motion->collider_path[collider], t, span, from, x, v);
 }
 
-/* ---- In a checkpoint ---- */
+/* ---- Checkpoints ---- */
 
 static bool is_path(const drape_path *path)
 {
@@ -258,10 +259,11 @@ static void archive_path(drape_path *path, drape_archive *a)
         drape_archive_doubles(a, path->v[i], 3);
     }
     if (drape_archive_is_reading(a) && !is_path(path))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves something along no way");
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an invalid path");
 }
 
-/* Those with a track come first, in the model's order; the others as the host named them. */
+/* Pins with a track come first, in the model's order, then the others in the order in which the host moved
+ * them. */
 static void archive_place(drape_motion *motion, int32_t i, drape_archive *a)
 {
     int32_t node = a->reading ? -1 : motion->moved_node[i];
@@ -273,7 +275,7 @@ static void archive_place(drape_motion *motion, int32_t i, drape_archive *a)
     if (good)
         find_place(motion, node);
     else
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves node %d, which is no pin", (int)node);
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint moves node %d, which is not pinned", (int)node);
 }
 
 void drape_motion_archive(drape_motion *motion, drape_archive *a)
@@ -293,7 +295,7 @@ void drape_motion_archive(drape_motion *motion, drape_archive *a)
         archive_path(&motion->collider_path[c], a);
 }
 
-/* ---- All of them ---- */
+/* ---- All pins and colliders ---- */
 
 double drape_motion_next_kink(const drape_motion *motion, double t, double end)
 {

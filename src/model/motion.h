@@ -1,6 +1,6 @@
 /*
- * motion.h: where pinned nodes and colliders are at a time: on the tracks of the model, or on a path that a
- * host gives them while a sim runs. The model does not change; a motion belongs to one sim.
+ * motion.h: the positions of pinned nodes and colliders at a time: on the tracks of the model, or on paths
+ * that a host sets while a sim runs. The model does not change; a motion belongs to one sim.
  */
 #ifndef DRAPE_MODEL_MOTION_H
 #define DRAPE_MODEL_MOTION_H
@@ -8,12 +8,12 @@
 #include "base/archive.h"
 #include "model/model.h"
 
-/* A cubic from its first moment to its last, at rest before and after: x and v at both. x is a position of a
- * pin, a displacement of a collider. */
+/* A cubic from a first to a last moment, at rest before and after, given by x and v at both. x is the
+ * position of a pin or the displacement of a collider. */
 typedef struct drape_path {
-    bool given;     /* else the track counts */
-    bool smooth;    /* its first velocity is that which led there: no kink */
-    double t[2];    /* [s] increasing, or equal: at rest at x[1] for good */
+    bool given;     /* if not, the track applies */
+    bool smooth;    /* its first velocity continues the motion before it: no kink */
+    double t[2];    /* [s] increasing; if equal, at rest at x[1] for good */
     double x[2][3]; /* [m] */
     double v[2][3]; /* [m/s] */
 } drape_path;
@@ -21,44 +21,44 @@ typedef struct drape_path {
 typedef struct drape_motion {
     const drape_model *model;
     int32_t moved_count;       /* pinned nodes with a track or a path */
-    int32_t *moved_node;       /* (as many as are pinned) */
-    int32_t *moved_track;      /* the same; -1: none */
-    int32_t *place;            /* (node_count) number among the moved ones, -1: none */
-    drape_path *pin_path;      /* (as many as are pinned) */
+    int32_t *moved_node;       /* (number of pinned nodes) */
+    int32_t *moved_track;      /* (number of pinned nodes) -1: no track */
+    int32_t *place;            /* (node_count) number among the moved nodes, -1: none */
+    drape_path *pin_path;      /* (number of pinned nodes) */
     drape_path *collider_path; /* (collider_count) */
 } drape_motion;
 
 drape_status drape_motion_create(drape_arena *arena, const drape_model *model, drape_motion **out);
 
-/* The paths that a host gave, and which pins have one. */
+/* Archives the paths that a host set, and which pins have one. */
 void drape_motion_archive(drape_motion *motion, drape_archive *archive);
 
-/* Writes the positions of moved pins at time t; other entries of x (node_count x 3) stay. */
+/* Writes the positions of moved pins at time t; other entries of x (node_count x 3) are unchanged. */
 void drape_motion_place_pins(const drape_motion *motion, double t, double *x);
 
-/* The velocity at time t of moved pin i, of the piece of its track or path that the time `within` lies in: at
- * a kink there are two, and the later one is that at the kink. */
+/* Writes the velocity of moved pin i at time t, on that piece of its track or path which contains the time
+ * `within`: at a kink there are two velocities, and the velocity at the kink itself is the later one. */
 void drape_motion_pin_velocity(const drape_motion *motion, int32_t i, double t, double within, double v[3]);
 
-/* Whether a collider moves at all, its displacement, and its velocity as above. */
+/* Whether a collider ever moves; its displacement; and its velocity, as above. */
 bool drape_motion_moves_collider(const drape_motion *motion, int32_t collider);
 void drape_motion_collider(const drape_motion *motion, int32_t collider, double t, double displacement[3]);
 void drape_motion_collider_velocity(const drape_motion *motion, int32_t collider, double t, double within,
                                     double v[3]);
 
-/* The next time after t, before end, at which some velocity jumps; else end. */
+/* Returns the next time after t and before end at which some velocity jumps; otherwise end. */
 double drape_motion_next_kink(const drape_motion *motion, double t, double end);
 bool drape_motion_at_kink(const drape_motion *motion, double t);
 
-/* From now on a pinned node moves on a user-defined path: from where it is at time t, on a cubic, to the
- * position x and the velocity v at t + span [s]; v NULL: straight, at one speed. A collider: to the
- * displacement x. */
+/* Move a pinned node on a user-defined path from now on: from its position at time t, on a cubic, to the
+ * position x and the velocity v at t + span [s]; if v is NULL, on a straight line at constant speed. For a
+ * collider x is a displacement. */
 void drape_motion_send_pin(drape_motion *motion, int32_t node, double t, double span, const double x[3],
                            const double *v);
 void drape_motion_send_collider(drape_motion *motion, int32_t collider, double t, double span,
                                 const double x[3], const double *v);
 
-/* Pins that a host moved rest from now on where these positions (node_count x 3) have them. */
+/* Pins that a host has moved rest from now on at these positions (node_count x 3). */
 void drape_motion_hold_pins(drape_motion *motion, const double *x);
 
 #endif

@@ -1,5 +1,5 @@
-/* normals.c: normals of nodes. The cross product of two edges of a triangle is its normal, as long as twice
- * its area: their sum around a node is the mean weighted by area. */
+/* normals.c: normals of nodes. The cross product of two edges of a triangle points along its normal and has
+ * the length of twice its area, so the sum around a node is the area-weighted mean. */
 #include "base/vec3.h"
 #include "model/model.h"
 

@@ -1,4 +1,4 @@
-/* scene.c: the scene object: a text, its JSON tree, and what was set in the tree since. */
+/* scene.c: the scene object: a text, its JSON tree, and the values set in the tree since. */
 #include "model/scene.h"
 
 #include <ctype.h>
@@ -12,34 +12,34 @@
 #include "model/scene_print.h"
 #include "model/scene_text.h"
 
-/* jansson counts in int, and its tree takes some ten times the text. */
+/* jansson counts in int, and its tree takes about ten times the size of the text. */
 #define MAX_FILE   ((size_t)1 << 30)
 #define FIRST_READ ((size_t)1 << 16)
-#define MAX_NAME   300 /* of a file in messages */
-#define MAX_SET    80  /* of a value in messages, in "--set /pointer=value" */
+#define MAX_NAME   300 /* length of a file name in messages */
+#define MAX_SET    80  /* length of a value in messages, in "--set /pointer=value" */
 #define LOAD_FLAGS                                                                                           \
-    (JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL) /* integers beyond int64 are numbers too */
+    (JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL) /* integers beyond int64 are numbers, too */
 
-/* A value that drape_scene_set gave. */
+/* A value set by drape_scene_set. */
 typedef struct override {
     struct override *before;
-    char *pointer; /* of the value, with an index where "-" appended */
+    char *pointer; /* pointer to the value, with an index in place of an appending "-" */
     char *shown;   /* "--set /integrator/dt=-1" */
 } override;
 
 struct drape_scene {
     drape_context *ctx;
-    char *text;       /* as it was read */
-    char *name;       /* of the text in messages, one line */
-    char *folder;     /* of mesh files; NULL: the working directory */
+    char *text;       /* the text as it was read */
+    char *name;       /* name of the text in messages, one line */
+    char *folder;     /* folder of mesh files; NULL: the working directory */
     json_t *root;     /* an object */
-    json_t *ours;     /* root in our form, if it is of another: what the last defs are made of */
-    override *last;   /* the latest of the overrides */
-    drape_arena kept; /* name, folder, overrides */
-    drape_arena defs; /* arrays of the last drape_scene_to_def */
+    json_t *ours;     /* root converted to our format, if it has another one: the source of the last defs */
+    override *last;   /* the most recent override */
+    drape_arena kept; /* holds name, folder and overrides */
+    drape_arena defs; /* holds the arrays of the last drape_scene_to_def */
 };
 
-/* ---- Making and freeing ---- */
+/* ---- Creation and destruction ---- */
 
 void drape_scene_destroy(drape_scene **scene)
 {
@@ -60,8 +60,8 @@ drape_context *drape_scene_context(drape_scene *scene)
     return scene->ctx;
 }
 
-/* Messages are one line, and a place must leave room for what is said of it: of a long path the end is kept.
- */
+/* Messages are one line, and a place must leave room for the fault itself: of a long path only the end is
+ * kept. */
 static char *shown_name(drape_scene *scene, const char *name)
 {
     size_t length = strlen(name);
@@ -117,7 +117,7 @@ static drape_status cannot_read(drape_scene *scene, const char *why)
     return drape_fail(scene->ctx, DRAPE_E_FILE, "%s: cannot read the scene: %s", scene->name, why);
 }
 
-/* Twice the room, keeping used bytes. */
+/* Doubles the buffer and keeps the bytes used so far. */
 static drape_status grow(drape_scene *scene, size_t used, size_t *room)
 {
     char *larger = drape_alloc(scene->ctx, 2 * *room + 1, 1);
@@ -130,7 +130,8 @@ static drape_status grow(drape_scene *scene, size_t used, size_t *room)
     return DRAPE_OK;
 }
 
-/* Reads to the end: what a pipe holds is known only then, and a file may grow while it is read. */
+/* Reads to the end of the file: the size of a pipe is known only then, and a file may grow while it is
+ * read. */
 static drape_status read_all(drape_scene *scene, FILE *file, size_t room, size_t *size)
 {
     *size = 0;
@@ -169,7 +170,7 @@ static drape_status read_file(drape_scene *scene, const char *path, size_t *size
         else if (S_ISREG(info.st_mode) && info.st_size > (off_t)MAX_FILE)
             status = cannot_read(scene, "it is larger than 1 GiB");
         else if (S_ISREG(info.st_mode))
-            room = (size_t)info.st_size + 1; /* one more, so that its end is seen without growing */
+            room = (size_t)info.st_size + 1; /* one more, so that the end is detected without growing */
     }
     if (!status)
         status = read_all(scene, file, room, size);
@@ -186,7 +187,7 @@ static drape_status parse_fault(drape_scene *scene, size_t offset, const char *w
     return drape_fail(scene->ctx, DRAPE_E_PARSE, "%s:%zu:%zu: %s", scene->name, line, column, what);
 }
 
-/* jansson's message at the token that it is about. */
+/* Reports jansson's message at the token that it is about. */
 static drape_status syntax_fault(drape_scene *scene, json_error_t *error)
 {
     size_t consumed = (size_t)error->position;
@@ -208,7 +209,8 @@ static drape_status syntax_fault(drape_scene *scene, json_error_t *error)
     const char *text = error->text;
     if (!*text)
         return drape_fail_memory(scene->ctx, consumed);
-    if (strncmp(text, "'[' or ", 7) == 0) /* what jansson takes at the top, and a scene does not */
+    if (strncmp(text, "'[' or ", 7) == 0) /* tokens that jansson accepts at the top level and a scene does
+                                             not */
         text += 7;
     drape_text_mend_end(error->text);
     return parse_fault(scene, drape_text_token(scene->text, consumed, at_end), text);
@@ -247,7 +249,7 @@ static drape_status parse_text(drape_scene *scene, size_t size)
     return status;
 }
 
-/* Hands out the scene, or frees it. */
+/* Passes the scene to the caller, or frees it after a failure. */
 static drape_status finish(drape_scene *scene, drape_status status, drape_scene **out)
 {
     if (status)
@@ -299,12 +301,12 @@ drape_status drape_scene_parse(drape_context *ctx, const char *text, const char 
 
 /* ---- Setting values ---- */
 
-/* Where a pointer leads to in the tree. */
+/* The place in the tree to which a pointer leads. */
 typedef struct landing {
-    json_t *container;            /* of the last key, or of the first that is not there */
+    json_t *container;            /* container of the last key, or of the first key that is missing */
     char key[DRAPE_POINTER_SIZE]; /* that key */
-    const char *rest;             /* what follows it in the pointer */
-    drape_pointer path;           /* the pointer up to the key, with an index where "-" appends */
+    const char *rest;             /* the remaining pointer after key */
+    drape_pointer path;           /* the pointer up to the key, with an index in place of an appending "-" */
 } landing;
 
 static drape_status cannot_set(drape_scene *scene, const char *pointer, const char *at, const char *why)
@@ -313,7 +315,7 @@ static drape_status cannot_set(drape_scene *scene, const char *pointer, const ch
                       *why ? " " : "", why);
 }
 
-/* 1 text is UTF-8, 0 it is not, -1 no memory: jansson says NULL to both. */
+/* Returns 1 if the text is UTF-8, 0 if it is not, -1 if memory is out: jansson returns NULL in both cases. */
 static int is_utf8(const char *text)
 {
     json_t *checked = json_string(text), *any = json_string_nocheck(text);
@@ -345,8 +347,8 @@ static drape_status check_pointer(drape_scene *scene, const char *pointer)
     return DRAPE_OK;
 }
 
-/* A number as people write it and JSON does not: ".5", "-.5", "+5", "5." and these with an exponent. NULL:
- * not a number. */
+/* Parses a number in forms that people write and JSON does not allow: ".5", "-.5", "+5", "5." and these with
+ * an exponent. Returns NULL if the text is not a number. */
 static json_t *loose_number(const char *text)
 {
     char number[MAX_SET + 3];
@@ -369,7 +371,7 @@ static json_t *loose_number(const char *text)
     return json_loads(number, LOAD_FLAGS | JSON_DECODE_ANY, NULL);
 }
 
-/* The JSON value that a text says, else the text as a string. */
+/* Parses a text as a JSON value, or takes it as a string. */
 static drape_status parse_value(drape_scene *scene, const char *text, json_t **value)
 {
     json_error_t error;
@@ -387,7 +389,7 @@ static drape_status parse_value(drape_scene *scene, const char *text, json_t **v
     return *value ? DRAPE_OK : drape_fail_memory(scene->ctx, strlen(text));
 }
 
-/* The element of an array that a key names; *element stays NULL for "-". */
+/* Finds the element of an array that a key names; *element stays NULL for "-". */
 static drape_status find_element(drape_scene *scene, const char *pointer, const landing *at, json_t **element)
 {
     size_t index, size = json_array_size(at->container);
@@ -415,7 +417,7 @@ static drape_status find_child(drape_scene *scene, const char *pointer, const la
         return DRAPE_OK;
     }
     drape_json_describe(at->container, given, sizeof given);
-    snprintf(why, sizeof why, "is %s, no object or array", given);
+    snprintf(why, sizeof why, "is %s, not an object or array", given);
     return cannot_set(scene, pointer, at->path.text, why);
 }
 
@@ -427,7 +429,7 @@ static void extend_path(landing *at)
         drape_pointer_push(&at->path, at->key);
 }
 
-/* Follows a pointer, which is not empty, as far as the tree has it; changes nothing. */
+/* Follows a non-empty pointer as far as it exists in the tree; changes nothing. */
 static drape_status land(drape_scene *scene, const char *pointer, landing *at)
 {
     json_t *child = scene->root;
@@ -443,7 +445,7 @@ static drape_status land(drape_scene *scene, const char *pointer, landing *at)
     return DRAPE_OK;
 }
 
-/* Puts a value, which it takes over, into a container; -1: no memory. */
+/* Puts a value, whose reference it takes over, into a container. Returns -1 if memory is out. */
 static int put(json_t *container, const char *key, json_t *value)
 {
     size_t index;
@@ -453,8 +455,9 @@ static int put(json_t *container, const char *key, json_t *value)
                                             : json_array_append_new(container, value);
 }
 
-/* The value, which it takes over, inside of what the keys of `rest` stand for, made from the inside out: "-"
- * is an element of an array, others are members of objects. NULL: no memory. */
+/* Wraps a value, whose reference it takes over, in the containers that the keys of `rest` name, from the
+ * inside out: "-" makes an array with one element, other keys make objects with one member. Returns NULL if
+ * memory is out. */
 static json_t *wrap(const char *rest, json_t *value)
 {
     char left[DRAPE_POINTER_SIZE], key[DRAPE_POINTER_SIZE];
@@ -473,7 +476,7 @@ static json_t *wrap(const char *rest, json_t *value)
     return value;
 }
 
-/* Remembers a value that is about to be set. */
+/* Records a value that is about to be set. */
 static drape_status new_override(drape_scene *scene, const char *path, const char *pointer, const char *text,
                                  override **out)
 {
@@ -493,26 +496,26 @@ static drape_status new_override(drape_scene *scene, const char *path, const cha
     return DRAPE_OK;
 }
 
-/* Takes the value over. */
+/* Takes over the reference to value. */
 static drape_status replace_root(drape_scene *scene, json_t *value)
 {
     if (!json_is_object(value)) {
         json_decref(value);
-        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "cannot set the whole scene to what is no object");
+        return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "the whole scene can only be set to an object");
     }
     json_decref(scene->root);
     scene->root = value;
     return DRAPE_OK;
 }
 
-/* Takes the value over. */
+/* Takes over the reference to value. */
 static drape_status insert(drape_scene *scene, landing *at, json_t *value)
 {
     value = wrap(at->rest, value);
     return value && put(at->container, at->key, value) == 0 ? DRAPE_OK : drape_fail_memory(scene->ctx, 1);
 }
 
-/* Whatever can fail, except for memory, comes before the first change. */
+/* Everything that can fail, except for memory, comes before the first change. */
 static drape_status set_value(drape_scene *scene, const char *pointer, const char *text)
 {
     landing at = {.container = NULL};
@@ -545,7 +548,7 @@ drape_status drape_scene_set(drape_scene *scene, const char *pointer, const char
     if (!pointer || !value)
         return drape_fail(scene->ctx, DRAPE_E_ARGUMENT, "drape_scene_set: pointer and value are needed");
     locale_t old = drape_locale_enter();
-    drape_arena_free(&scene->defs); /* earlier defs point into values that may be freed */
+    drape_arena_free(&scene->defs); /* earlier defs point to values that may be freed */
     drape_status status = set_value(scene, pointer, value);
     drape_locale_leave(old);
     return status;
@@ -576,7 +579,7 @@ drape_status drape_scene_to_def(drape_scene *scene, drape_scene_def *def)
     return status;
 }
 
-/* Whether a pointer is the other or leads to it. */
+/* Whether a pointer equals the other one or leads to it. */
 static bool leads_to(const char *pointer, const char *other)
 {
     size_t length = strlen(pointer);
@@ -591,7 +594,7 @@ static const override *override_above(const drape_scene *scene, const char *poin
     return o;
 }
 
-/* What was set inside of the part of a pointer that the text does not have: the latest. */
+/* Returns the latest override inside the part of a pointer that the text does not contain. */
 static const override *override_beside(const drape_scene *scene, const char *pointer)
 {
     char missing[DRAPE_POINTER_SIZE];
@@ -610,8 +613,9 @@ static const override *override_beside(const drape_scene *scene, const char *poi
     return o;
 }
 
-/* A value is where it was set last; else where it is in the text; else, where something was set in what the
- * text does not have; else, because it is missing, where its nearest ancestor is. */
+/* The place of a value is that where it was set last, or else its place in the text. For a value that is in
+ * neither, it is the override that set something beside it or, as the value is missing, its nearest ancestor
+ * in the text. */
 static void place_of(const drape_scene *scene, const char *pointer, char *place, size_t size)
 {
     size_t offset, line, column;

@@ -1,18 +1,20 @@
 /*
- * scene_cs184.c: see scene_cs184.h. Such a scene is an object of at most "cloth", "sphere" and "plane", whose
- * members are checked here; members that CS184 does not know are ignored, as there. Settings that its program
- * keeps in windows and constants have the values it starts with: gravity -9.8, 90 frames a second of 30
- * substeps, bend springs of 0.2 ks, strains limited to 10 % in one pass, self-contact.
+ * scene_cs184.c: see scene_cs184.h. Such a scene is an object with at most "cloth", "sphere" and "plane",
+ * whose members are checked here; like CS184 itself, the reader ignores members that CS184 does not know.
+ * Settings that the CS184 program keeps in windows and constants have that program's initial values: gravity
+ * -9.8, 90 frames per second with 30 substeps each, bend springs of 0.2 ks, strains limited to 10 % in one
+ * pass, self-contact.
  *
- * Beside these a scene may have keys of our form for the whole scene, so that a command line can set the
- * integrator, the duration, the output; they are copied. An integrator without a method is verlet.
+ * In addition a scene may contain those keys of our format that apply to the whole scene, so that a command
+ * line can set the integrator, the duration or the output; they are copied. The default method of an
+ * integrator is verlet.
  *
- * Sheets of CS184 lie at y = 1 with rows along +z, or stand with rows along +y and a random z of at most 1 mm
+ * CS184 sheets lie at y = 1 with rows along +z, or stand with rows along +y and a random z of at most 1 mm
  * that breaks the symmetry. Rows of our grids go along -z or -y: a rotation by 180 degrees about x maps one
  * to the other. All points have the same mass.
  *
- * Methods that do not move nodes use limit.strain and contact, which Verlet leaves out; friction is Coulomb's
- * mu for them.
+ * Methods that do not enforce limits by moving nodes use limit.strain and contact, which Verlet omits; for
+ * them, friction is Coulomb's mu.
  */
 #include "model/scene_cs184.h"
 
@@ -25,12 +27,12 @@
 #include "model/scene_json.h"
 #include "model/scene_text.h"
 
-#define DURATION   3.0 /* [s]; their program runs until it is closed */
+#define DURATION   3.0 /* [s]; the CS184 program runs until it is closed */
 #define FRAME_RATE 90
 #define SUBSTEPS   30
 #define NOISE      1e-3 /* [m] */
 
-/* All are required, but for "pinned" of a cloth. */
+/* All are required, except for "pinned" of a cloth. */
 static const drape_param cloth_params[] = {
     DRAPE_NUMBER("width", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, NULL),
     DRAPE_NUMBER("height", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, NULL),
@@ -69,7 +71,7 @@ static const object objects[] = {{"cloth", true, PARAMS(cloth_params)},
                                  {"plane", false, PARAMS(plane_params)}};
 #define OBJECTS (sizeof objects / sizeof *objects)
 
-/* Keys of our form that are copied. */
+/* Keys of our format that are copied. */
 static const char *const ours[] = {"description", "gravity", "integrator", "controller", "duration",
                                    "frame_rate",  "output",  "contact",    NULL};
 
@@ -148,7 +150,7 @@ static double number_of(json_t *object_value, const char *name)
     return json_number_value(json_object_get(object_value, name));
 }
 
-/* Checks one pin, at its pointer. */
+/* Checks one pin at its pointer. */
 static drape_status check_pin(drape_context *ctx, drape_pointer *at, json_t *pin, const double points[2])
 {
     if (json_array_size(pin) != 2)
@@ -192,7 +194,7 @@ static drape_status check_normal(drape_context *ctx, json_t *plane)
     for (size_t i = 0; i < json_array_size(normal); i++)
         if (json_number_value(json_array_get(normal, i)) != 0)
             return DRAPE_OK;
-    return normal ? drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/plane/normal", "it has no direction: it is 0 0 0")
+    return normal ? drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/plane/normal", "0 0 0 has no direction")
                   : DRAPE_OK;
 }
 
@@ -209,7 +211,7 @@ static drape_status check(drape_context *ctx, json_t *root)
     return status ? status : check_normal(ctx, json_object_get(root, "plane"));
 }
 
-/* ---- Our form. NULL, which jansson passes on, is out of memory. ---- */
+/* ---- Our format. NULL means out of memory; jansson's functions accept it as an argument. ---- */
 
 static json_t *pins_of(json_t *cloth)
 {
@@ -237,7 +239,8 @@ static double stiffness_of(json_t *cloth, const char *enabled)
     return on ? number_of(cloth, "ks") : 0;
 }
 
-/* Springs that are switched off have no stiffness, but still obey the strain limit, as in CS184. */
+/* Springs that are switched off have no stiffness, but the strain limit still applies to them, as in
+ * CS184. */
 static json_t *terms_of(json_t *cloth)
 {
     return json_pack("[{s:s,s:f},{s:s,s:f},{s:s,s:f,s:f},{s:s,s:f,s:s}]", "type", "spring.structural",
@@ -257,7 +260,7 @@ static json_t *mesh_of(json_t *cloth)
                      "translate", 0.0, vertical ? 0.0 : 1.0, 0.0, "rotate", 1.0, 0.0, 0.0, 180.0);
 }
 
-/* E h = ks, the membrane stiffness of a sheet of these springs; no term here asks for it. */
+/* E h = ks, the membrane stiffness of a sheet of these springs; no term used here needs it. */
 static json_t *material_of(json_t *cloth)
 {
     double thickness = fmax(number_of(cloth, "thickness"), 1e-4);
@@ -293,7 +296,7 @@ static json_t *colliders_of(json_t *root)
     return array;
 }
 
-/* That of the CS184 program, with the settings that the scene gives of our form. */
+/* The integrator of the CS184 program, with any settings that the scene gives in our format. */
 static json_t *integrator_of(json_t *root)
 {
     json_t *cloth = json_object_get(root, "cloth");
@@ -309,8 +312,8 @@ static json_t *integrator_of(json_t *root)
     return made;
 }
 
-/* Their program goes on whatever happens, and a step that blew up ends it: no smaller one is tried. Other
- * methods have the controller that they have by default. */
+/* The CS184 program never retries a step with a smaller one: a step that diverges ends it. Other methods get
+ * their default controller. */
 static const char *controller_of(json_t *root)
 {
     const char *method = json_string_value(json_object_get(json_object_get(root, "integrator"), "method"));

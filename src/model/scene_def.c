@@ -1,5 +1,5 @@
-/* scene_def.c: the values of keys in defs: their defaults, how they are stored and looked up; and keys in
- * words. */
+/* scene_def.c: the values of keys in defs: defaults, storing and reading; and descriptions of keys as
+ * text. */
 #include "model/scene.h"
 
 #include <math.h>
@@ -9,7 +9,7 @@
 #include "base/vec3.h"
 #include "model/scene_text.h"
 
-/* ---- Keys by name and place ---- */
+/* ---- Keys by name and pointer ---- */
 
 const drape_scene_key *drape_scene_key_of(const drape_scene_object *object, const char *name)
 {
@@ -30,7 +30,7 @@ const drape_scene_key *drape_scene_key_at(const char *pointer)
         if (!key)
             return NULL;
         object = key->child;
-        if (object && key->shape != DRAPE_SCENE_OBJECT && *pointer) /* the index of an element */
+        if (object && key->shape != DRAPE_SCENE_OBJECT && *pointer) /* skip the index of an element */
             pointer = drape_pointer_next(pointer, name);
         if (!pointer)
             return NULL;
@@ -117,8 +117,7 @@ void drape_scene_store(const drape_scene_key *key, const drape_setting *setting,
 
 /* ---- Defaults ---- */
 
-/* Arrays without a default stay empty, as the zeros of the def have them; a list has a default of one text or
- * none. */
+/* Arrays without a default stay empty, as in a zeroed def; a list has at most one text as its default. */
 static void set_default(const drape_scene_key *key, void *def)
 {
     static const double no_rotation[4] = {0};
@@ -147,8 +146,8 @@ void drape_scene_set_defaults(const drape_scene_object *object, void *def)
         set_default(&object->keys[i], def);
 }
 
-/* struct_size is the caller's sizeof: a caller built against an older header has a shorter struct, whose
- * members are the first ones of ours; of a longer one, the members that we do not know become zero. */
+/* struct_size is the caller's sizeof. A caller built against an older header has a shorter struct, whose
+ * members are the first ones of ours. In a longer struct, the members that we do not know are set to zero. */
 static void give(void *def, size_t struct_size, bool sized, const void *defaults, size_t size)
 {
     if (!def)
@@ -159,7 +158,8 @@ static void give(void *def, size_t struct_size, bool sized, const void *defaults
         memcpy(def, &struct_size, struct_size < sizeof struct_size ? struct_size : sizeof struct_size);
 }
 
-/* Two defaults are those of hosts only: the text of a scene must give a duration, and has frames written. */
+/* Two defaults apply only to hosts: the text of a scene must give a duration, and its frames are written by
+ * default. */
 void drape_scene_def_init(drape_scene_def *def, size_t struct_size)
 {
     drape_scene_def defaults = {.struct_size = struct_size};
@@ -198,7 +198,7 @@ void drape_pin_def_init(drape_pin_def *def, size_t struct_size)
     give(def, struct_size, true, &defaults, sizeof defaults);
 }
 
-/* ---- Keys in words ---- */
+/* ---- Keys as text ---- */
 
 void drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size)
 {

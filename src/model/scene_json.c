@@ -1,4 +1,5 @@
-/* scene_json.c: walks the tree of a scene along the tables of scene_keys.c: one reader a shape of key. */
+/* scene_json.c: walks the tree of a scene along the tables of scene_keys.c, with one reader per shape of
+ * key. */
 #include "model/scene_json.h"
 
 #include <math.h>
@@ -9,21 +10,21 @@
 #include "model/scene.h"
 
 #define MAX_KEYS  16  /* of one object, for the lists in messages */
-#define MAX_TAKES 600 /* bytes of what a key takes, in words */
+#define MAX_TAKES 600 /* bytes of the description of what a key accepts */
 
 typedef struct reader {
     drape_context *ctx;
     drape_arena *arena;
-    drape_pointer at; /* of the value that is being read */
+    drape_pointer at; /* pointer to the value that is being read */
 } reader;
 
-/* Reads the value of a key into def, the def of the object that has the key. */
+/* Reads the value of a key into def, the def of the object that contains the key. */
 typedef drape_status read_function(reader *r, const drape_scene_key *key, json_t *value, char *def);
 static read_function read_value;
 
-/* ---- Words for messages ---- */
+/* ---- Texts for messages ---- */
 
-/* In quotes, shortened if it is long. */
+/* Quotes a string, shortened if it is long. */
 static void quote(const char *string, char *text, size_t size)
 {
     char some[61];
@@ -143,7 +144,7 @@ static drape_status read_remark(reader *r, const drape_scene_key *key, json_t *v
     return json_is_string(value) ? DRAPE_OK : refuse(r, key, value);
 }
 
-/* The elements of an array, which has as many as out. */
+/* Reads the elements of an array, as many as out has room for. */
 static drape_status read_numbers(reader *r, json_t *array, double *out)
 {
     for (size_t i = 0; i < json_array_size(array); i++) {
@@ -155,14 +156,14 @@ static drape_status read_numbers(reader *r, json_t *array, double *out)
     return DRAPE_OK;
 }
 
-/* Three numbers inside another array; `what` is their name in messages. */
+/* Reads three numbers inside another array; `what` is their name in messages. */
 static drape_status read_three(reader *r, json_t *value, const char *what, double *out)
 {
     return json_array_size(value) == 3 ? read_numbers(r, value, out)
                                        : refuse_as(r, value, what, "three numbers, [x, y, z]");
 }
 
-/* Booleans become texts, so that no parameter takes them for a number. */
+/* Booleans become texts, so that no parameter mistakes them for numbers. */
 static drape_status read_setting(reader *r, const char *name, json_t *value, drape_setting *out)
 {
     *out = (drape_setting){.name = name};
@@ -247,7 +248,7 @@ static drape_status read_box(reader *r, const drape_scene_key *key, json_t *valu
 
 /* ---- Arrays ---- */
 
-/* Takes the memory of an array with as many elements as value and puts it into the def; refuses what is no
+/* Allocates an array with as many elements as value and stores it in the def; refuses a value that is not an
  * array, too short or too long. */
 static drape_status take_array(reader *r, const drape_scene_key *key, json_t *value, size_t size, char *def,
                                void *array)
@@ -264,7 +265,7 @@ static drape_status take_array(reader *r, const drape_scene_key *key, json_t *va
     return DRAPE_OK;
 }
 
-/* Each element is stored as a key of its own would be. */
+/* Each element is stored like a key of its own. */
 static drape_status read_list(reader *r, const drape_scene_key *key, json_t *value, char *def)
 {
     const size_t size = key->param.kind == DRAPE_PARAM_INTEGER ? sizeof(int32_t) : sizeof(const char *);
@@ -330,7 +331,7 @@ static drape_status read_member(reader *r, const char *name, json_t *value, drap
     return status;
 }
 
-/* Members that are not keys are settings in an open object, and faults in others. */
+/* Members that are not keys are settings in an open object, and faults in other objects. */
 static drape_status read_others(reader *r, const drape_scene_object *object, json_t *value, char *def)
 {
     drape_setting *settings = NULL;
@@ -351,7 +352,7 @@ static drape_status read_others(reader *r, const drape_scene_object *object, jso
             return status;
         count++;
     }
-    if (open) { /* an object without settings differs from no object */
+    if (open) { /* an object without settings differs from a missing object */
         memcpy(def + object->settings_offset, &settings, sizeof settings);
         memcpy(def + object->settings_count_offset, &count, sizeof count);
     }
@@ -394,7 +395,7 @@ static drape_status read_members(reader *r, const drape_scene_object *object, js
     return DRAPE_OK;
 }
 
-/* Unknown keys first: what is missing may be there under a misspelt name. */
+/* Unknown keys are reported first: a missing key may be there under a misspelled name. */
 static drape_status read_object(reader *r, const drape_scene_object *object, json_t *value, char *def)
 {
     drape_status status = read_others(r, object, value, def);
@@ -415,7 +416,7 @@ static drape_status read_element(reader *r, const drape_scene_key *key, json_t *
 {
     drape_scene_set_defaults(key->child, def);
     if (key->shape == DRAPE_SCENE_ENTRIES && json_string_length(value) > 0)
-        return read_value(r, &key->child->keys[0], value, def); /* its "type" */
+        return read_value(r, &key->child->keys[0], value, def); /* the key "type" */
     if (!json_is_object(value))
         return refuse_as(r, value, "an element",
                          key->shape == DRAPE_SCENE_ENTRIES ? "a name, or an object with a \"type\""
@@ -451,7 +452,7 @@ static drape_status read_value(reader *r, const drape_scene_key *key, json_t *va
 
 /* ---- The scene ---- */
 
-/* The version is checked first, as another version has other keys. */
+/* The version is checked first, because other versions have other keys. */
 static drape_status check_version(reader *r, json_t *root)
 {
     const drape_scene_key *key = &drape_form_scene.keys[0];
@@ -465,7 +466,7 @@ static drape_status check_version(reader *r, json_t *root)
     return status;
 }
 
-/* No two cloths have the same name, with the names that the library gives included. */
+/* Checks that no two cloths have the same name, including the names that the library assigns. */
 static drape_status check_names(reader *r, const drape_scene_def *def)
 {
     json_t *names = json_object(); /* used as a set */

@@ -5,23 +5,23 @@
 
 #define KEYS(array) .keys = array, .key_count = sizeof array / sizeof *array
 
-/* Where a value goes: a member of the def, or an array and its count. */
+/* The place of a value: a member of the def, or an array and its count. */
 #define IN(def, member)           .offset = offsetof(def, member)
 #define ARRAY(def, member, count) .offset = offsetof(def, member), .count_offset = offsetof(def, count)
 #define SETTINGS(def, member, count)                                                                         \
     .open = true, .settings_offset = offsetof(def, member), .settings_count_offset = offsetof(def, count)
 
-/* In place of a default: nothing is there unless it is given. */
+/* In place of a default: there is none unless it is given. */
 #define NONE DRAPE_DERIVED("none")
-/* Likewise, with nothing to say about it: one of several keys is given, or an object has defaults inside. */
+/* The same without a description: one of several keys is given, or an object has defaults inside. */
 #define UNSAID DRAPE_DERIVED("")
 
-/* A key without a value of its own; one whose value is a text with a default. */
+/* A key without a value of its own; a key whose value is a text with a default. */
 #define SHAPED(shape_, name_, default_, help_)                                                               \
     .param = {.name = name_, .unit = "1", .default_value = default_, .help = help_}, .shape = shape_
 #define TEXT_OR(name, text, help) DRAPE_TEXT(name, help, .derived = text), .literal = true
 
-/* In place of bounds. */
+/* In place of bounds: no bound. */
 #define LOWEST  DRAPE_ABOVE(-INFINITY)
 #define HIGHEST DRAPE_BELOW(INFINITY)
 
@@ -40,7 +40,7 @@ static const drape_scene_key pin_keys[] = {
      IN(drape_pin_def, edge)},
     {DRAPE_INTEGER("row", "1", UNSAID, 0, INT32_MAX, "a row of a grid, from 0"), IN(drape_pin_def, row)},
     {DRAPE_VECTOR("box", "m", UNSAID, LOWEST, HIGHEST,
-                  "nodes inside, rest coordinates after the transform, boundary included"),
+                  "nodes inside a box of rest coordinates after the transform, boundary included"),
      .shape = DRAPE_SCENE_BOX},
     {DRAPE_VECTOR("track", "s and m", DRAPE_DERIVED("none: fixed"), LOWEST, HIGHEST,
                   "displacement from rest, linear between the times"),
@@ -111,8 +111,7 @@ const drape_scene_object drape_form_mesh = {.name = "mesh",
 /* ---- Cloth ---- */
 
 static const drape_scene_key cloth_keys[] = {
-    {DRAPE_TEXT("name", "name of its own", .derived = "\"cloth0\", \"cloth1\" ..."),
-     IN(drape_cloth_def, name)},
+    {DRAPE_TEXT("name", "unique name", .derived = "\"cloth0\", \"cloth1\" ..."), IN(drape_cloth_def, name)},
     {SHAPED(DRAPE_SCENE_OBJECT, "mesh", DRAPE_REQUIRED, "a grid or a file"), IN(drape_cloth_def, mesh),
      .child = &drape_form_mesh},
     {SHAPED(DRAPE_SCENE_OBJECT, "material", UNSAID, "parameters of the material"), .child = &material},
@@ -120,7 +119,8 @@ static const drape_scene_key cloth_keys[] = {
      ARRAY(drape_cloth_def, terms, term_count), .child = &term},
     {SHAPED(DRAPE_SCENE_OBJECTS, "pins", NONE, "nodes held fixed or moved"),
      ARRAY(drape_cloth_def, pins, pin_count), .child = &drape_form_pin},
-    {DRAPE_VECTOR("velocity", "m/s", 0, -1e9, 1e9, "of every node at t = 0"), IN(drape_cloth_def, velocity)},
+    {DRAPE_VECTOR("velocity", "m/s", 0, -1e9, 1e9, "initial velocity of every node"),
+     IN(drape_cloth_def, velocity)},
 };
 
 const drape_scene_object drape_form_cloth = {
@@ -131,12 +131,12 @@ const drape_scene_object drape_form_cloth = {
 static const drape_scene_key collider_keys[] = {
     {DRAPE_TEXT("type", "name of a collider; its parameters stand beside it"),
      IN(drape_collider_def, entry.type)},
-    {DRAPE_TEXT("name", "name of its own", .derived = "\"collider0\", \"collider1\" ..."),
+    {DRAPE_TEXT("name", "unique name", .derived = "\"collider0\", \"collider1\" ..."),
      IN(drape_collider_def, name)},
-    {DRAPE_NUMBER("friction", "1", 0, 0, 1e3, "Coulomb's mu between it and cloth"),
+    {DRAPE_NUMBER("friction", "1", 0, 0, 1e3, "Coulomb's mu between collider and cloth"),
      IN(drape_collider_def, friction)},
     {DRAPE_VECTOR("track", "s and m", DRAPE_DERIVED("none: it rests"), LOWEST, HIGHEST,
-                  "displacement from where its parameters put it, linear between the times"),
+                  "displacement from the position that its parameters define, linear between the times"),
      .shape = DRAPE_SCENE_TRACK, ARRAY(drape_collider_def, track, key_count), .at_least = 1},
 };
 
@@ -159,9 +159,9 @@ static const drape_scene_object contact = {.name = "contact",
 static const drape_scene_key output_keys[] = {
     {TEXT_OR("formats", "npy", "names of frame formats"), .shape = DRAPE_SCENE_LIST,
      ARRAY(drape_scene_def, formats, format_count)},
-    {DRAPE_CHOICE("up", 0, up_axes,
-                  "the axis that points up in frames: \"z\" turns them, (x, y, z) to (x, -z, y); npy and glb "
-                  "have y up always"),
+    {DRAPE_CHOICE(
+         "up", 0, up_axes,
+         "axis that points up in frames: \"z\" maps (x, y, z) to (x, -z, y); npy and glb always have y up"),
      IN(drape_scene_def, up)},
 };
 const drape_scene_object drape_form_output = {.name = "output", KEYS(output_keys)};
@@ -169,7 +169,7 @@ const drape_scene_object drape_form_output = {.name = "output", KEYS(output_keys
 static const double earth[3] = {0, -9.81, 0};
 
 static const drape_scene_key scene_keys[] = {
-    {SHAPED(DRAPE_SCENE_VERSION, "drape", DRAPE_REQUIRED, "the version of this form of scenes")},
+    {SHAPED(DRAPE_SCENE_VERSION, "drape", DRAPE_REQUIRED, "version of the scene format")},
     {SHAPED(DRAPE_SCENE_REMARK, "description", UNSAID, "a remark")},
     {SHAPED(DRAPE_SCENE_OBJECTS, "cloth", DRAPE_REQUIRED, "the pieces of cloth"),
      ARRAY(drape_scene_def, cloths, cloth_count), .at_least = 1, .at_most = DRAPE_MAX_CLOTHS,
@@ -179,7 +179,7 @@ static const drape_scene_key scene_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECTS, "colliders", NONE, "rigid obstacles"),
      ARRAY(drape_scene_def, colliders, collider_count), .at_most = DRAPE_MAX_COLLIDERS,
      .child = &drape_form_collider},
-    {SHAPED(DRAPE_SCENE_OBJECT, "self_contact", DRAPE_DERIVED("none: it goes through itself"),
+    {SHAPED(DRAPE_SCENE_OBJECT, "self_contact", DRAPE_DERIVED("none: cloth passes through itself"),
             "cloth against cloth"),
      .optional = true, .child = &self_contact},
     {SHAPED(DRAPE_SCENE_OBJECT, "contact", UNSAID, "how contact with colliders and between layers acts"),
@@ -188,7 +188,7 @@ static const drape_scene_key scene_keys[] = {
      IN(drape_scene_def, integrator), .child = &integrator},
     {SHAPED(DRAPE_SCENE_OBJECT, "controller", UNSAID, "step controller and its settings"),
      IN(drape_scene_def, controller), .child = &controller},
-    {DRAPE_NUMBER("duration", "s", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "the simulated time"),
+    {DRAPE_NUMBER("duration", "s", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "simulated time"),
      IN(drape_scene_def, duration)},
     {DRAPE_NUMBER("frame_rate", "1/s", 60, DRAPE_ABOVE(0), 1e6, "frames a second"),
      IN(drape_scene_def, frame_rate)},

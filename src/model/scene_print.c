@@ -1,7 +1,7 @@
 /*
- * scene_print.c: the tree of a scene as JSON text for people: what fits on a line is on one, numbers are the
- * shortest that read back as themselves. jansson's own printers break every vector over four lines and say
- * 0.050000000000000003.
+ * scene_print.c: the tree of a scene as readable JSON text: whatever fits on a line stays on one line, and
+ * numbers have the fewest digits that read back as the same number. jansson's own printers break every vector
+ * over four lines and print 0.050000000000000003.
  */
 #include "model/scene_print.h"
 
@@ -50,7 +50,7 @@ static void print_number(printer *p, double number)
     }
     if (!strchr(text, 'e') || number != (double)(long)number || number > 1e6 || number < -1e6)
         put_text(p, text);
-    else { /* 100 rather than 1e+02 */
+    else { /* write 100, not 1e+02 */
         snprintf(text, sizeof text, "%ld", (long)number);
         put_text(p, text);
     }
@@ -94,7 +94,7 @@ static bool has_scalars_alone(json_t *value)
     return json_is_array(value);
 }
 
-/* Long lists of numbers stay on one line: one number a line would not read better. */
+/* Long lists of numbers stay on one line, as one number per line would be no more readable. */
 static bool is_one_line(const printer *p, json_t *value)
 {
     if (is_scalar(value) || has_scalars_alone(value))
@@ -109,7 +109,7 @@ static bool is_one_line(const printer *p, json_t *value)
 
 /* ---- Containers ---- */
 
-/* What stands before an element: nothing before the first on the same line. */
+/* Writes the separator before an element: nothing before the first one on the same line. */
 static void separate(printer *p, bool first, bool one_line, size_t indent)
 {
     if (!first)

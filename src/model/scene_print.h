@@ -1,4 +1,4 @@
-/* scene_print.h: a JSON tree as text. */
+/* scene_print.h: prints a JSON tree as text. */
 #ifndef DRAPE_MODEL_SCENE_PRINT_H
 #define DRAPE_MODEL_SCENE_PRINT_H
 

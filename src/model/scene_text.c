@@ -1,5 +1,5 @@
-/* scene_text.c: see scene_text.h. jansson keeps no positions of values, and a map of them would cost every
- * scene what only a fault needs; so the text is scanned again, when there is a fault. */
+/* scene_text.c: see scene_text.h. jansson keeps no positions of values. Only a fault needs them, so the text
+ * is scanned again after a fault rather than indexed for every scene. */
 #include "model/scene_text.h"
 
 #include <jansson.h>
@@ -79,7 +79,7 @@ static bool starts_comment(const char *p)
     return p[0] == '/' && (p[1] == '/' || p[1] == '*');
 }
 
-/* Past white space and comments, up to a comment that is not closed. */
+/* Skips white space and comments, up to a comment that is not closed. */
 static const char *skip_space(const char *p)
 {
     for (;;) {
@@ -99,7 +99,7 @@ static const char *first_token(const char *text)
     return skip_space(marked ? text + 3 : text);
 }
 
-/* A string ends with its line: one quote that is missing must not turn the rest of the text inside out. */
+/* A string ends with its line, so that a missing quote does not invert the meaning of the remaining text. */
 static const char *string_end(const char *p)
 {
     for (p++; *p && *p != '"' && *p != '\n'; p++)
@@ -108,7 +108,7 @@ static const char *string_end(const char *p)
     return *p == '"' ? p + 1 : p;
 }
 
-/* p is at the start of a token, not at the end of the text. */
+/* p must be at the start of a token, not at the end of the text. */
 static const char *token_end(const char *p)
 {
     const char *delimiters = " \t\r\n{}[],:\"";
@@ -190,7 +190,7 @@ void drape_text_place(const char *text, size_t offset, size_t *line, size_t *col
     }
 }
 
-/* Whether the string from p to end says key. */
+/* Whether the string from p to end equals key. */
 static bool says(const char *p, const char *end, const char *key)
 {
     size_t length = (size_t)(end - p);
@@ -202,7 +202,7 @@ static bool says(const char *p, const char *end, const char *key)
     return same;
 }
 
-/* The value of a member of the object at p, and where its key is; NULL if there is none. */
+/* Finds the value of a member of the object at p, and the place of its key. Returns NULL if there is none. */
 static const char *find_member(const char *p, const char *key, const char **place)
 {
     for (p = skip_space(p + 1); *p == '"'; p = skip_space(p)) {

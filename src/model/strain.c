@@ -1,14 +1,14 @@
 /*
- * strain.c: principal strains of triangles. With the edge vectors D = (x1 - x0, x2 - x0), R the same at rest,
- * in a frame of the triangle's own that its first edge begins, the deformation gradient is F = D R^-1 (3 x
- * 2). The principal stretches are the roots of the eigenvalues of F'F, those of a symmetric 2 x 2 matrix.
+ * strain.c: principal strains of triangles. Let D = (x1 - x0, x2 - x0) be the edge vectors, and R the same at
+ * rest, in a frame of the triangle whose first axis is its first edge. The deformation gradient is F = D R^-1
+ * (3 x 2). The principal stretches are the square roots of the eigenvalues of F'F, a symmetric 2 x 2 matrix.
  */
 #include <math.h>
 
 #include "base/vec3.h"
 #include "model/model.h"
 
-/* The edge vectors of a triangle. */
+/* Computes the two edge vectors of a triangle. */
 static void edges_of(const double *x, const int32_t *node, double u[3], double v[3])
 {
     vec3_sub(x + 3 * (size_t)node[1], x + 3 * (size_t)node[0], u);

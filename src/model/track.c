@@ -1,7 +1,7 @@
 /* track.c: see track.h. */
 #include "model/track.h"
 
-/* The last key at or before t; -1 if t is before the first. */
+/* Returns the last key at or before t; -1 if t is before the first. */
 static int64_t key_before(const drape_track_key *keys, size_t key_count, double t)
 {
     int64_t low = -1, high = (int64_t)key_count;

@@ -1,17 +1,17 @@
-/* pattern.c: see pattern.h. Neighbours are counted, listed with repeats, then each column is sorted and made
- * unique. */
+/* pattern.c: see pattern.h. Neighbours are first counted, then listed with repeats; then each column is
+ * sorted and repeats are removed. */
 #include "sparse/pattern.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* Neighbour lists with repeats: entries start[j] ... start[j+1] - 1 of row. */
+/* Lists of neighbours, with repeats: entries start[j] ... start[j+1] - 1 of row. */
 typedef struct neighbours {
     int64_t *start, *next;
     int32_t *row;
 } neighbours;
 
-/* Calls visit for every (row, column) of every coupling, in order. */
+/* Called for every (row, column) of every coupling, in order. */
 typedef void visit_pair(neighbours *list, int32_t row, int32_t column);
 
 static void visit_couplings(const drape_coupling *couplings, int coupling_count, const int32_t *block_of_node,
@@ -66,7 +66,8 @@ static int compare_rows(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Sorts each list and drops repeats, in place; next[j] becomes the number that stays. Returns the sum. */
+/* Sorts each list and removes repeats, in place; next[j] becomes the number of remaining entries. Returns
+ * their sum. */
 static int64_t make_unique(neighbours *list, int32_t block_count)
 {
     int64_t total = 0;
@@ -172,7 +173,7 @@ void drape_pattern_place(const drape_pattern *pattern, const int32_t *block_of_n
     }
 }
 
-/* A block and its mirror, which may be itself. */
+/* Symmetrizes a block and its mirror, which may be the block itself. */
 static void symmetrize_block(double *a, int64_t stride, double *b, int64_t mirror_stride)
 {
     for (int c = 0; c < 3; c++)

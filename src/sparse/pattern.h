@@ -1,10 +1,10 @@
 /*
- * pattern.h: the sparsity of a symmetric matrix of 3x3 blocks, in compressed sparse columns (CSC) of scalars,
- * and where each block of an element lies in it. Built once; assembling is then adding at known places.
+ * pattern.h: the sparsity of a symmetric matrix of 3x3 blocks in compressed sparse columns (CSC) of scalars,
+ * and the place of each element's blocks in it. It is built once; assembly then adds at known places.
  *
- * Block column j holds the blocks block_start[j] ... block_start[j+1] - 1, rows ascending. Its three scalar
- * columns are equally long, so block k of column j starts at value 9 * block_start[j] + 3 * (k -
- * block_start[j]), and its next column lies stride = 3 * (blocks in column j) values further.
+ * Block column j holds the blocks block_start[j] ... block_start[j+1] - 1, with rows ascending. Its three
+ * scalar columns have equal lengths, so block k of column j starts at value 9 * block_start[j] + 3 * (k -
+ * block_start[j]), and its next column is stride = 3 * (blocks in column j) values further.
  */
 #ifndef DRAPE_SPARSE_PATTERN_H
 #define DRAPE_SPARSE_PATTERN_H
@@ -12,40 +12,40 @@
 #include "base/arena.h"
 
 typedef struct drape_pattern {
-    int32_t block_count;  /* block columns */
-    int64_t n, nonzeros;  /* scalars: n = 3 block_count */
+    int32_t block_count;  /* number of block columns */
+    int64_t n, nonzeros;  /* scalar sizes: n = 3 block_count */
     int32_t *block_start; /* (block_count + 1) */
     int32_t *block_row;   /* (blocks) */
-    int32_t *diagonal;    /* (block_count) the block on the diagonal of each column */
+    int32_t *diagonal;    /* (block_count) number of the diagonal block of each column */
     int64_t *column;      /* (n + 1) CSC column pointers */
-    int64_t *row;         /* (nonzeros) CSC rows */
+    int64_t *row;         /* (nonzeros) CSC row indices */
 } drape_pattern;
 
-/* Elements that couple all their nodes: node (count x nodes), numbers that block_of_node maps to block
- * columns or -1. */
+/* Elements that couple all their nodes: node (count x nodes) holds numbers that block_of_node maps to block
+ * columns, or to -1. */
 typedef struct drape_coupling {
     int32_t count;
     int nodes;
     const int32_t *node;
 } drape_coupling;
 
-/* The union of the diagonal and all couplings. Errors: DRAPE_E_MEMORY, DRAPE_E_ARGUMENT (more than 2^31 - 1
- * blocks). */
+/* Builds the union of the diagonal and all couplings. Errors: DRAPE_E_MEMORY, DRAPE_E_ARGUMENT (more than
+ * 2^31 - 1 blocks). */
 drape_status drape_pattern_build(drape_arena *arena, int32_t block_count, const int32_t *block_of_node,
                                  const drape_coupling *couplings, int coupling_count, drape_pattern *pattern);
 
-/* The block at (row, column); -1 if either is -1. It must be in the pattern. */
+/* Returns the block at (row, column), which must be in the pattern; -1 if either is -1. */
 int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t column);
-bool drape_pattern_has(const drape_pattern *pattern, int32_t row, int32_t column); /* both >= 0 */
+bool drape_pattern_has(const drape_pattern *pattern, int32_t row, int32_t column); /* both must be >= 0 */
 
-/* The block of each pair of nodes of each element, row by row: block (count x nodes x nodes). */
+/* Writes the block of each pair of nodes of each element, row by row: block (count x nodes x nodes). */
 void drape_pattern_place(const drape_pattern *pattern, const int32_t *block_of_node,
                          const drape_coupling *coupling, int32_t *block);
 
-/* A becomes (A + A')/2; a symmetric one keeps its bits. */
+/* Replaces A by (A + A')/2; a symmetric matrix keeps its bits. */
 void drape_pattern_symmetrize(const drape_pattern *pattern, double *values);
 
-/* The first value of a block and the distance to its next column. */
+/* Returns the first value of a block and the distance to its next column. */
 static inline double *drape_pattern_at(const drape_pattern *pattern, double *values, int32_t column,
                                        int32_t block, int64_t *stride)
 {

@@ -1,6 +1,6 @@
 /*
- * project.c: eigenvalues by cyclic Jacobi rotations (Golub & Van Loan, Matrix Computations, 8.5), negative
- * ones set to zero. Jacobi, and not LAPACK: for 6 x 6 and 12 x 12 it is as fast, needs no heap and no
+ * project.c: eigenvalues by cyclic Jacobi rotations (Golub & Van Loan, Matrix Computations, 8.5), then
+ * negative ones set to zero. For 6 x 6 and 12 x 12 matrices Jacobi is as fast as LAPACK, needs no heap and no
  * library, and gives the same bits everywhere.
  */
 #include "sparse/project.h"
@@ -10,7 +10,7 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_SWEEPS 30 /* convergence is quadratic: 6 to 8 sweeps are usual */
+#define MAX_SWEEPS 30 /* convergence is quadratic: 6 to 8 sweeps are typical */
 
 static double off_diagonal(int n, const double *a)
 {
@@ -57,10 +57,10 @@ static void rotate_rows(int n, double *m, int p, int q, double c, double s)
     }
 }
 
-/* a becomes diagonal, v its eigenvectors in columns. */
+/* Diagonalises a; v receives the eigenvectors as columns. */
 static void diagonalise(int n, double *a, double *v)
 {
-    double small = 1e-30 * squared_norm(n, a); /* relative 1e-15 in the norm */
+    double small = 1e-30 * squared_norm(n, a); /* 1e-15 relative to the norm */
     for (int i = 0; i < n * n; i++)
         v[i] = i % (n + 1) == 0;
     for (int sweep = 0; sweep < MAX_SWEEPS && off_diagonal(n, a) > small; sweep++)

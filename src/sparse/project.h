@@ -1,9 +1,9 @@
-/* project.h: the nearest positive semidefinite matrix to a symmetric one (in the Frobenius norm), for element
+/* project.h: the positive semidefinite matrix nearest to a symmetric one (in the Frobenius norm), for element
  * Hessians. */
 #ifndef DRAPE_SPARSE_PROJECT_H
 #define DRAPE_SPARSE_PROJECT_H
 
-/* a (n x n, symmetric, n <= DRAPE_MAX_ELEMENT_DOFS) becomes V max(Lambda, 0) V'. */
+/* Replaces a (n x n, symmetric, n <= DRAPE_MAX_ELEMENT_DOFS) by V max(Lambda, 0) V'. */
 void drape_project(int n, double *a);
 
 #endif

@@ -510,7 +510,7 @@ def test_list():
 def test_list_of_keys():
     """list shows the keys of a scene, object by object, with what each takes; every key of the schema is there"""
     text = good("list", "scene")
-    for part in (r"\n  cloth +/cloth/N\n", r"\n  mesh +/cloth/N/mesh; exactly one of grid, file\n", r"\n    duration +the simulated time\n"
+    for part in (r"\n  cloth +/cloth/N\n", r"\n  mesh +/cloth/N/mesh; exactly one of grid, file\n", r"\n    duration +simulated time\n"
                  r" +a number in \(0, 1000000000\] s; required\n", r"one of: top-left, top-right", r"\n    row +a row of a grid, from 0\n +an integer in \[0, 2147483647\]\n"):
         assert re.search(part, text), (part, text)
     equal(re.findall(r"^  (\S+)", good("list", "pin"), re.M), ["pin"])

@@ -474,7 +474,7 @@ START_TEST(transform_faults)
     def.scale[1] = 1;
     def.rotate[3] = 90;
     assert_refused(&def,
-                   "/m/transform/rotate: the axis of a turn by 90 degrees is 0 0 0; it must not be zero");
+                   "/m/transform/rotate: the axis of a rotation by 90 degrees is 0 0 0; it must not be zero");
     def.rotate[0] = INFINITY;
     assert_refused(&def, "/m/transform/rotate: inf 0 0 90; axis and angle must be finite");
     def.rotate[0] = 1;

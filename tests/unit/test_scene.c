@@ -411,7 +411,7 @@ static const struct {
     {"{'drape': [1, 2}", "s.json:1:16: ']' expected near '}'"},
     {"// only a remark", "s.json: the scene is empty"},
     /* the scene */
-    {"{}", "s.json:1:1: /drape: \"drape\" is missing: the version of this form of scenes; the number 1"},
+    {"{}", "s.json:1:1: /drape: \"drape\" is missing: version of the scene format; the number 1"},
     {"{'drape': 2, 'newer': 1}", "s.json:1:2: /drape: a scene of version 2; this library reads version 1"},
     {"{'drape': '1'}", "s.json:1:2: /drape: \"1\" is not allowed; drape is the number 1"},
     {"{'drape': null}", "s.json:1:2: /drape: null is not allowed; drape is the number 1"},
@@ -422,7 +422,7 @@ static const struct {
     {"{'drape': 1, 'cloth': {}}", "s.json:1:14: /cloth: an object is not allowed; cloth is an array of "
                                   "objects, at least one, at most 1048576"},
     {"{'drape': 1, 'cloth': [{'mesh': {'grid': 'g'}}]}",
-     "s.json:1:1: /duration: \"duration\" is missing: the simulated time; a number in (0, 1000000000] s"},
+     "s.json:1:1: /duration: \"duration\" is missing: simulated time; a number in (0, 1000000000] s"},
     {"{'drape': 1, 'cloth': [1]}", "s.json:1:24: /cloth/0: 1 is not allowed; an element is an object"},
     {"{'drape': 1, 'cloth': [{}]}",
      "s.json:1:24: /cloth/0/mesh: \"mesh\" is missing: a grid or a file; an object"},
@@ -434,7 +434,7 @@ static const struct {
      "s.json:2:15: /colliders/0: \"plane\" is not allowed; an element is an object"},
     {ROOT("'colliders': [{}]"), "s.json:2:15: /colliders/0/type: \"type\" is missing: name of a "
                                 "collider; its parameters stand beside "
-                                "it; a string, not empty"},
+                                "it; a non-empty string"},
     {ROOT("'colliders': [{'type': 's', 'friction': -0.1}]"),
      "s.json:2:29: /colliders/0/friction: -0.1 is not allowed; friction is a number in [0, 1000]"},
     {ROOT("'colliders': [{'type': 's', 'friction': 1000.5}]"),
@@ -469,9 +469,9 @@ static const struct {
      "s.json:2:16: /gravity/1: \"-9.81\" is not allowed; an element is a number"},
     {ROOT("'integrator': 'be'"), "s.json:2:1: /integrator: \"be\" is not allowed; integrator is an object"},
     {ROOT("'integrator': {'method': 1}"),
-     "s.json:2:16: /integrator/method: 1 is not allowed; method is a string, not empty"},
+     "s.json:2:16: /integrator/method: 1 is not allowed; method is a non-empty string"},
     {ROOT("'integrator': {'method': ''}"),
-     "s.json:2:16: /integrator/method: \"\" is not allowed; method is a string, not empty"},
+     "s.json:2:16: /integrator/method: \"\" is not allowed; method is a non-empty string"},
     {ROOT("'integrator': {'dt': [null]}"),
      "s.json:2:23: /integrator/dt/0: null is not allowed; an element is a number"},
     {ROOT("'controller': {'dt_min': null}"),
@@ -497,14 +497,14 @@ static const struct {
     {ROOT("'output': {'format': ['npy']}"),
      "s.json:2:12: /output/format: unknown key \"format\"; did you mean \"formats\"?"},
     {ROOT("'output': {'formats': 'npy'}"),
-     "s.json:2:12: /output/formats: \"npy\" is not allowed; formats is an array, each a string, not empty"},
+     "s.json:2:12: /output/formats: \"npy\" is not allowed; formats is an array, each a non-empty string"},
     {ROOT("'output': {'formats': ['npy', '']}"),
-     "s.json:2:31: /output/formats/1: \"\" is not allowed; an element is a string, not empty"},
+     "s.json:2:31: /output/formats/1: \"\" is not allowed; an element is a non-empty string"},
     {ROOT("'output': {'formats': [1]}"),
-     "s.json:2:24: /output/formats/0: 1 is not allowed; an element is a string, not empty"},
+     "s.json:2:24: /output/formats/0: 1 is not allowed; an element is a non-empty string"},
     /* cloth */
-    {CLOTH("'name': ''"), "s.json:2:1: /cloth/0/name: \"\" is not allowed; name is a string, not empty"},
-    {CLOTH("'name': 3"), "s.json:2:1: /cloth/0/name: 3 is not allowed; name is a string, not empty"},
+    {CLOTH("'name': ''"), "s.json:2:1: /cloth/0/name: \"\" is not allowed; name is a non-empty string"},
+    {CLOTH("'name': 3"), "s.json:2:1: /cloth/0/name: 3 is not allowed; name is a non-empty string"},
     {CLOTH("'nam': 'x'"), "s.json:2:1: /cloth/0/nam: unknown key \"nam\"; did you mean \"name\"?"},
     {CLOTH("'material': []"),
      "s.json:2:1: /cloth/0/material: an empty array is not allowed; material is an object"},
@@ -520,7 +520,7 @@ static const struct {
     {CLOTH("'terms': [3]"),
      "s.json:2:11: /cloth/0/terms/0: 3 is not allowed; an element is a name, or an object with a \"type\""},
     {CLOTH("'terms': ['stretch.edge', {'stiffness': 1}]"),
-     "s.json:2:27: /cloth/0/terms/1/type: \"type\" is missing: name of a term; a string, not empty"},
+     "s.json:2:27: /cloth/0/terms/1/type: \"type\" is missing: name of a term; a non-empty string"},
     {CLOTH("'terms': [{'type': 'bend.hinge', 'stiffness': null}]"),
      "s.json:2:34: /cloth/0/terms/0/stiffness: null is not allowed; a setting is a number, true, false, a "
      "string or an array of numbers"},
@@ -543,9 +543,8 @@ static const struct {
      "s.json:1:40: /cloth/0/mesh: exactly one of grid, file is needed; given: grid, file"},
     {MESH("{'file': 'x.obj', 'rows': 3}"),
      "s.json:2:19: /cloth/0/mesh/rows: unknown key \"rows\" without \"grid\"; known: grid, file, transform"},
-    {MESH("{'grid': 5}"), "s.json:2:2: /cloth/0/mesh/grid: 5 is not allowed; grid is a string, not empty"},
-    {MESH("{'file': ''}"),
-     "s.json:2:2: /cloth/0/mesh/file: \"\" is not allowed; file is a string, not empty"},
+    {MESH("{'grid': 5}"), "s.json:2:2: /cloth/0/mesh/grid: 5 is not allowed; grid is a non-empty string"},
+    {MESH("{'file': ''}"), "s.json:2:2: /cloth/0/mesh/file: \"\" is not allowed; file is a non-empty string"},
     {MESH("{'grid': 'g', 'rows': ['3']}"),
      "s.json:2:24: /cloth/0/mesh/rows/0: \"3\" is not allowed; an element is a number"},
     {MESH("{'grid': 'g', 'transform': []}"),
@@ -835,16 +834,16 @@ static const struct {
      "--set /integrater/dt=1: /integrater: unknown key \"integrater\"; did you mean "
      "\"integrator\"?"},
     {"/cloth/0/terms/-/beta", "1",
-     "--set /cloth/0/terms/-/beta=1: /cloth/0/terms/3/type: \"type\" is missing: name of a term; a string, "
-     "not empty"},
-    {"", "{}", "--set ={}: /drape: \"drape\" is missing: the version of this form of scenes; the number 1"},
-    {"", "3", "cannot set the whole scene to what is no object"},
+     "--set /cloth/0/terms/-/beta=1: /cloth/0/terms/3/type: \"type\" is missing: name of a term; a "
+     "non-empty string"},
+    {"", "{}", "--set ={}: /drape: \"drape\" is missing: version of the scene format; the number 1"},
+    {"", "3", "the whole scene can only be set to an object"},
     {"integrator", "1", "\"integrator\" is not a JSON pointer, as \"/integrator/dt\" is one"},
     {"/a~2", "1", "\"/a~2\" is not a JSON pointer, as \"/integrator/dt\" is one; in it ~ is written ~0"},
-    {"/duration/x", "1", "cannot set /duration/x: /duration is 5, no object or array"},
+    {"/duration/x", "1", "cannot set /duration/x: /duration is 5, not an object or array"},
     {"/cloth/0/terms/0/k", "1",
-     "cannot set /cloth/0/terms/0/k: /cloth/0/terms/0 is \"stretch.edge\", no object or "
-     "array"},
+     "cannot set /cloth/0/terms/0/k: /cloth/0/terms/0 is \"stretch.edge\", not an "
+     "object or array"},
     {"/cloth/1/name", "x", "cannot set /cloth/1/name: /cloth is an array of 1; \"-\" appends"},
     {"/cloth/0/pins/3", "{}", "cannot set /cloth/0/pins/3: /cloth/0/pins is an array of 3; \"-\" appends"},
     {"/cloth/name", "x",
@@ -929,7 +928,7 @@ START_TEST(test_set_order)
     ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
     ck_assert_str_eq(message(),
                      "--set /output={\"formats\": [2]}: /output/formats/0: 2 is not allowed; an element is "
-                     "a string, not empty");
+                     "a non-empty string");
     char pointer[2 * DRAPE_POINTER_SIZE];
     memset(pointer, '/', sizeof pointer);
     pointer[DRAPE_POINTER_SIZE] = 0;
