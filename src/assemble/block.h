@@ -18,13 +18,11 @@ typedef struct drape_request {
     const drape_point *point;
     bool energy, hessian;
     bool conservative, dissipative; /* which parts of the forces */
-    double positive_share; /* how much of the positive semidefinite part, see drape_system_jacobian */
-    bool velocity;         /* the Hessian wanted is dg/dv alone */
-    bool remainder;        /* only what belongs to no measure */
-    const double
-        *along;     /* (node_count x 3) displacement from the point to where stress is wanted; NULL: at the
-                  point */
-    double *stress; /* (measure_count) gets the forces on measures; NULL: not wanted */
+    double positive_share;       /* how much of the positive semidefinite part, see drape_system_jacobian */
+    bool velocity;               /* the Hessian wanted is dg/dv alone */
+    bool remainder;              /* only what belongs to no measure */
+    const double *along;         /* (node_count x 3) displacement of the nodes; NULL: none */
+    double *stress;              /* (measure_count) gets the forces on measures; NULL: not wanted */
     const bool *without;         /* (term_count) terms that are left out; NULL: none */
     const double *against;       /* (node_count x 3) v relative to the medium; NULL: the medium rests */
     const double *wind_gradient; /* (node_count x 3 x 3) W of wind.h; NULL with `against` */

@@ -19,8 +19,7 @@ struct drape_summer {
     int threads;
     bool unconstrained;
     drape_block *blocks; /* (threads) */
-    reach **reaches; /* (term_count) the reach of each block of each term; NULL with one thread, which needs
-                    none */
+    reach **reaches;     /* (term_count) of each term's blocks; NULL: one thread */
 };
 
 static int32_t block_count(const drape_term *term)

@@ -18,9 +18,8 @@ struct drape_system {
     const drape_pattern *pattern; /* the model's, or the extended one */
     drape_arena extension;        /* holds the extended pattern and its block slots */
     drape_pattern extended;       /* the model's pattern with the pairs of nodes that contact couples */
-    int32_t *
-        *blocks; /* (term_count) as drape_term.block, for the extended pattern; NULL: the model's is in use */
-    drape_status status; /* of drape_system_status */
+    int32_t **blocks;             /* (term_count) slots in the extended pattern; NULL: it is not in use */
+    drape_status status;          /* of drape_system_status */
     drape_motion *motion;
     drape_drag_spring drag;
     double *push; /* (node_count x 3) [N], if pushed */

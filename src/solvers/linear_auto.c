@@ -1,6 +1,6 @@
 /*
- * auto: the solver that was measured to be the fastest at this number of unknowns (bench/linears) among those
- * in this build: each has the number from which on it is (best_from).
+ * auto: picks the solver that was measured to be the fastest at this number of unknowns (bench/linears),
+ * among those in this build: each names the number from which on it is the fastest (best_from).
  */
 #include "solvers/linear.h"
 
@@ -13,8 +13,8 @@ typedef struct auto_state {
     void *solver;
 } auto_state;
 
-/* The solver that is picked from the next larger size on; NULL: none. */
-static const drape_linear_ops *next_row(int64_t from)
+/* The solver that is picked at the next larger sizes; NULL: none. */
+static const drape_linear_ops *next_larger(int64_t from)
 {
     const drape_linear_ops *next = NULL;
     for (int i = 0; drape_linears[i]; i++)
@@ -81,7 +81,7 @@ static size_t bytes(const void *state)
 static void report(const void *state, drape_linear_report *out)
 {
     const auto_state *s = state;
-    const drape_linear_ops *next = next_row(s->row->best_from);
+    const drape_linear_ops *next = next_larger(s->row->best_from);
     *out = (drape_linear_report){.row = s->row};
     if (s->row->report)
         s->row->report(s->solver, out);

@@ -1,5 +1,5 @@
-/* pick.c: which solver of this build is the fastest for a number of unknowns, by their best_from and
- * general_from; and what all solvers archive, destroy and count in the same way. */
+/* pick.c: the fastest solver in this build for a number of unknowns, by best_from or general_from; and what
+ * is the same for all solvers when they are archived, destroyed and measured. */
 #include "solvers/linear.h"
 
 static int64_t best_from(const drape_linear_ops *row)
@@ -12,7 +12,7 @@ static int64_t general_from(const drape_linear_ops *row)
     return row->general_from;
 }
 
-/* Below the smallest size of all solvers, the solver with that size. */
+/* If n is below the smallest size of all solvers, the solver with the smallest. */
 static const drape_linear_ops *pick(int64_t n, int64_t (*from_of)(const drape_linear_ops *row))
 {
     const drape_linear_ops *best = NULL;
