@@ -1,4 +1,5 @@
-/* field_residual.c: what the solver left of a free node's equation at the end of the last step. */
+/* field_residual.c: the residual of a free node's equation that the solver left at the end of the last
+ * step. */
 #include "fields/fields.h"
 
 #include "base/vec3.h"

@@ -17,7 +17,7 @@ typedef struct drape_linear_ops drape_linear_ops;
 
 /* What a solver did. */
 typedef struct drape_linear_report {
-    const drape_linear_ops *row;      /* the solver: the requested one, or the one that it picked */
+    const drape_linear_ops *ops;      /* the solver: the requested one, or the one that it picked */
     char why[96];                     /* why it was picked; "" if nothing was picked */
     int64_t fallbacks;                /* matrices that its own method could not factor */
     const drape_linear_ops *fallback; /* the solver that factored them; NULL: none was needed */
@@ -73,7 +73,7 @@ extern const char *const drape_linears_names[];       /* choices of a parameter,
 extern const drape_registry drape_linear_registry;
 
 /* Archives a solver; values as in `archive`, and NULL if the last factor call failed. */
-void drape_linear_archive(const drape_linear_ops *row, void *state, drape_archive *a, const double *values);
+void drape_linear_archive(const drape_linear_ops *ops, void *state, drape_archive *a, const double *values);
 
 /* *state becomes NULL; it may be NULL already. */
 void drape_linear_destroy(const drape_linear_ops *ops, void **state);

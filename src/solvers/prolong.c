@@ -7,8 +7,9 @@
 
 #define MAX_FUNCTIONS 16 /* largest number of functions at a node; beyond it the smallest are dropped */
 /* share of a node's value that each averaging takes from its neighbours */
-#define SMOOTH   (2.0 / 3)
-#define DROP     0.08 /* of the largest at a node: smaller values are dropped, the others scaled to add up to 1 */
+#define SMOOTH (2.0 / 3)
+/* share of the largest value at a node: smaller ones are dropped, the others scaled to add up to 1 */
+#define DROP     0.08
 #define WIDENING 1.1 /* of the spacing: fastest at 2 500 and 10 000 nodes (bench/speed) */
 
 int drape_prolong_spacing(int32_t nodes)
@@ -45,7 +46,8 @@ static void grow(const drape_graph *g, int32_t seed, int32_t id, int spacing, fr
     }
 }
 
-/* Each next node that is `spacing` or more edges away from all seeds becomes one. Returns the number of seeds. */
+/* Each next node that is `spacing` or more edges away from all seeds becomes one. Returns the number of
+ * seeds. */
 static int32_t aggregate(const drape_graph *g, int spacing, front *f)
 {
     int32_t seeds = 0;
