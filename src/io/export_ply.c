@@ -1,13 +1,13 @@
 /*
- * export_ply.c: folder/frame_000000.ply, ...: a binary PLY file a frame, little endian: vertices as double x
- * y z [m], faces as lists of int, counted from 0; all cloths in one mesh. Format: G. Turk, The PLY Polygon
- * File Format, 1994.
+ * export_ply.c: folder/frame_000000.ply, ...: one binary PLY file for each frame, little endian: vertices
+ * as double x y z [m], faces as lists of int counted from 0; all cloths in one mesh. Format: G. Turk, The
+ * PLY Polygon File Format, 1994.
  */
 #include <inttypes.h>
 
 #include "io/export.h"
 
-#define FACE_SIZE 13 /* the count 3 in a byte, three nodes in four */
+#define FACE_SIZE 13 /* the count 3 in one byte, three nodes in four bytes each */
 
 static drape_status ply_clean(drape_context *ctx, const char *folder)
 {
