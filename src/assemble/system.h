@@ -30,9 +30,7 @@ typedef struct drape_point {
     const double *stress;   /* (measure_count) the forces on measures that weigh their second derivatives in a
                    Jacobian; NULL: those at this point */
     double t;               /* [s] time of the colliders' poses */
-    double
-        span[2]; /* [s] interval over which the colliders' velocities are taken; both ends equal: they are at
-                rest */
+    double span[2]; /* [s] over which the velocities of colliders are taken; equal: they are at rest */
 } drape_point;
 
 /* Workspace for a model; threads >= 1. The arena owns all of it except the threads. Errors: DRAPE_E_MEMORY;

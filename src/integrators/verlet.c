@@ -2,25 +2,25 @@
  * verlet.c: explicit steps, each split into substeps of h. With a = -M^-1 g(x, v) and c = 1 - damping/100:
  *
  * velocity   v <- c v, x' = x + h v + h^2/2 a(x, v), v' = v + h/2 (a(x, v) + a(x', v + h a(x, v)))
- *            velocity Verlet: second order, also with forces that depend on v.
+ *     velocity Verlet: second order, also with forces that depend on v.
  * position   v' = c v + h a(x, v), x' = x + h v'
- *            x' = x + c (x - x_before) + h^2 a of CS184 and Boson, with v = (x - x_before)/h: the same
- *            numbers up to rounding, but with the state (x, v). v is the velocity half a substep ago: first
- *            order.
+ *     x' = x + c (x - x_before) + h^2 a of CS184 and Boson, with v = (x - x_before)/h: the same numbers up
+ *     to rounding, but with the state (x, v). v is the velocity half a substep ago: first order.
  *
- * Then nodes are moved: cloth that is too near to cloth apart, out of colliders, and to where springs are not
- * too long (verlet.h). A move by d changes the velocity of a node by d/h: Verlet's velocity is a difference
- * of positions.
+ * Then nodes are moved: apart where cloth is too near to cloth, out of colliders, and to where springs are
+ * not too long (verlet.h). Moving a node by d changes its velocity by d/h, as Verlet's velocity is a
+ * difference of positions.
  *
  * Stable for
  *     h < (sqrt(mu^2 + 2 (1 + c) omega^2) - mu)/omega^2
- * with omega^2 the largest eigenvalue of M^-1 K and mu of M^-1 D: from z^2 - (1 + c - h^2 omega^2 - h mu) z
- * + c - h mu, whose roots are the growth of one wave in a substep of the position form if omega and mu belong
- * to the same wave. For mu = 0, c = 1 it is 2/omega. Damping lowers it because its forces lag. The limit of
- * the velocity form is a little higher. The moves of nodes are not considered.
+ * with omega^2 the largest eigenvalue of M^-1 K and mu that of M^-1 D: from z^2 - (1 + c - h^2 omega^2 - h
+ * mu) z + c - h mu, whose roots are the growth factors of one wave in a substep of the position form if
+ * omega and mu belong to the same wave. For mu = 0, c = 1 it is 2/omega. Damping lowers it because its
+ * forces lag. The limit of the velocity form is slightly higher. The moves of nodes are not considered.
  *
- * Energy: `dissipated` has the work of the dissipative terms and what c takes. The energy of the moves of
- * nodes has no force and no law; it is left in `numerical`, with the error of the substeps.
+ * Energy: `dissipated` contains the work of the dissipative terms and the energy removed by c. Moves of
+ * nodes have neither a force nor a law, so their energy is part of `numerical`, with the error of the
+ * substeps.
  */
 #include "integrators/verlet.h"
 

@@ -1,4 +1,4 @@
-/* newton_params.c: the parameters of integrators that step by Newton. */
+/* newton_params.c: the parameters of integrators that use Newton's method. */
 #include "nonlinear/newton.h"
 #include "solvers/linear.h"
 
