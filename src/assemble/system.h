@@ -27,9 +27,9 @@ typedef struct drape_point {
     const double *internal; /* (internal_count) of the last accepted state */
     double weight;          /* w [1/s]: v = w x + const, and q' = w q + history */
     const double *history;  /* (measure_count) [q/s]; NULL: q' = grad q . v, as in continuous time */
-    const double *stress;   /* (measure_count) the forces on measures that weigh their second derivatives in a
-                   Jacobian; NULL: those at this point */
-    double t;               /* [s] time of the colliders' poses */
+    const double
+        *stress;    /* (measure_count) weights of the measures' second derivatives; NULL: the forces here */
+    double t;       /* [s] time of the colliders' poses */
     double span[2]; /* [s] over which the velocities of colliders are taken; equal: they are at rest */
 } drape_point;
 

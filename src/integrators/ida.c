@@ -77,14 +77,14 @@ static const drape_param params[PARAM_COUNT] = {
                                       "highest order of the BDF"),
     [PARAM_MAX_STEP] =
         DRAPE_NUMBER("max_step", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),
-    [PARAM_MAX_STEPS] = DRAPE_INTEGER(
-        "max_steps", "1/s", 100000, 1, 1e9,
-        "steps within one second of simulated time, those that end an advance apart; one more ends the run"),
+    [PARAM_MAX_STEPS] = DRAPE_INTEGER("max_steps", "1/s", 100000, 1, 1e9,
+                                      "most steps within one second of simulated time, not counting those "
+                                      "that end an advance; one more ends the run"),
     [PARAM_LINEAR_SOLVER] = DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver"),
     [PARAM_MATRIX] = DRAPE_CHOICE(
         "matrix", MATRIX_AUTO, matrix_choices,
-        "of Newton's corrections; symmetric: the symmetric part of the exact one, which friction and "
-        "dashpots make another; auto: that, and exact ones for a while where it fails"),
+        "matrix of Newton's corrections; symmetric: the symmetric part of the exact one, which differs from "
+        "it with friction and dashpots; auto: symmetric, and exact for a while if that fails"),
 };
 
 typedef struct ida_state {

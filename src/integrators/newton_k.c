@@ -29,20 +29,22 @@ enum {
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),
-    [PARAM_ITERATIONS] = DRAPE_INTEGER("iterations", "1", 1, 1, 1000, "inexact Newton iterations a step"),
+    [PARAM_ITERATIONS] =
+        DRAPE_INTEGER("iterations", "1", 1, 1, 1000, "inexact Newton iterations in each step"),
     [PARAM_TOLERANCE] = DRAPE_NUMBER("tolerance", "N", 1e-6, DRAPE_ABOVE(0), 1e12,
                                      "residual of the free nodes, largest component, below which no "
                                      "iteration is made; not a bound on an accepted state"),
-    [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
-                                              "more iterations where the residual is not below that of the "
-                                              "guess after the others; then the step is rejected"),
+    [PARAM_RESCUE_ITERATIONS] =
+        DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
+                      "further iterations if the residual is not below that of the guess after the first "
+                      "ones; if it still is not, the step is rejected"),
     [PARAM_EXTRAPOLATION] = DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
-                                         "share of the last change of velocity that the guess takes along"),
+                                         "share of the last change of velocity that the guess extrapolates"),
     [PARAM_LINEAR_TOLERANCE] = DRAPE_NUMBER("linear_tolerance", "1", 0.1, 1e-14, DRAPE_BELOW(1),
                                             "conjugate gradients reduce the residual of a correction to this "
                                             "share at 1/60 s, in proportion to the step at others"),
-    [PARAM_LINEAR_ITERATIONS] =
-        DRAPE_INTEGER("max_linear_iterations", "1", 60, 1, 100000, "of conjugate gradients, a correction"),
+    [PARAM_LINEAR_ITERATIONS] = DRAPE_INTEGER("max_linear_iterations", "1", 60, 1, 100000,
+                                              "iterations of conjugate gradients for each correction"),
     [PARAM_COARSE_SPACING] =
         DRAPE_INTEGER("coarse_spacing", "1", 0, 0, 100,
                       "edges between the centres of the coarse functions; 0: by the number of nodes"),

@@ -122,7 +122,7 @@ drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def
     for (int64_t k = 0; !status && k < count; k++) {
         drape_file_name(&frames->file, "%s/" DRAPE_FRAME_NAME, frames->folder, k, ending);
         if (stat(frames->file.path, &info))
-            status = drape_file_fail(ctx, "go on with", frames->file.path, errno);
+            status = drape_file_fail(ctx, "continue", frames->file.path, errno);
     }
     return status;
 }

@@ -1,4 +1,4 @@
-/* export.h: frame formats. Each is an entry of one table; the recorder drives all of them in the same way. */
+/* export.h: frame formats. Each is an entry of one table; the recorder drives all of them alike. */
 #ifndef DRAPE_IO_EXPORT_H
 #define DRAPE_IO_EXPORT_H
 

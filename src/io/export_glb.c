@@ -545,11 +545,10 @@ static drape_status glb_sync(void *state)
 }
 
 const drape_exporter_ops drape_exporter_glb = {
-    .entry =
-        {.name = "glb",
-         .summary =
-             "positions.glb: glTF 2.0 with a morph target a frame, float32, normals, and an animation; y up",
-         .reference = "Khronos, glTF 2.0 specification, 2021 (ISO/IEC 12113)"},
+    .entry = {.name = "glb",
+              .summary = "positions.glb: glTF 2.0 with a morph target for each frame, float32, normals, and "
+                         "an animation; y up",
+              .reference = "Khronos, glTF 2.0 specification, 2021 (ISO/IEC 12113)"},
     .state_size = sizeof(glb_state),
     .y_up = true,
     .check = glb_check,

@@ -65,9 +65,11 @@ static drape_status obj_close(drape_context *ctx, void *state)
 }
 
 const drape_exporter_ops drape_exporter_obj = {
-    .entry = {.name = "obj",
-              .summary = "frame_000000.obj ...: a Wavefront OBJ file a frame, an object a cloth, 17 digits",
-              .reference = "Wavefront Advanced Visualizer manual, appendix B1"},
+    .entry =
+        {.name = "obj",
+         .summary =
+             "frame_000000.obj ...: a Wavefront OBJ file for each frame, an object for each cloth, 17 digits",
+         .reference = "Wavefront Advanced Visualizer manual, appendix B1"},
     .state_size = sizeof(drape_frame_files),
     .open = obj_open,
     .clean = obj_clean,

@@ -72,7 +72,7 @@ static drape_status ply_close(drape_context *ctx, void *state)
 
 const drape_exporter_ops drape_exporter_ply = {
     .entry = {.name = "ply",
-              .summary = "frame_000000.ply ...: a binary PLY file a frame, double precision",
+              .summary = "frame_000000.ply ...: a binary PLY file for each frame, double precision",
               .reference = "G. Turk, The PLY Polygon File Format, 1994"},
     .state_size = sizeof(drape_frame_files),
     .open = ply_open,

@@ -289,10 +289,8 @@ static drape_status vtp_close(drape_context *ctx, void *state)
 
 const drape_exporter_ops drape_exporter_vtp = {
     .entry = {.name = "vtp",
-              .summary =
-                  "frame_000000.vtp ... and frames.pvd: VTK PolyData a frame, float64, with velocity, energy "
-                  "density and "
-                  "strain, and their times",
+              .summary = "frame_000000.vtp ... and frames.pvd: VTK PolyData for each frame, float64, with "
+                         "velocity, energy density and strain, and the times of the frames",
               .reference = "VTK User's Guide, 11th edition, section 19.3, XML file formats"},
     .state_size = sizeof(vtp_state),
     .wants_fields = true,

@@ -1,4 +1,4 @@
-/* inside.c: how much of the cloth is inside a collider, for scenes that start that way. */
+/* inside.c: how much of the cloth is inside a collider, for scenes that start with cloth inside. */
 #include "sim/sim.h"
 
 #include "base/vec3.h"

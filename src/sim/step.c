@@ -298,11 +298,11 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     sim->statistics.wall_contact += contact_seconds(sim) - contact;
     log_rejection(sim, attempt);
-    drape_status told = notify_attempt(sim, attempt);
-    drape_status framed = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
+    drape_status notified = notify_attempt(sim, attempt);
+    drape_status emitted = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
     if (stop)
         return explain(sim, stop, attempt);
-    return told ? told : framed;
+    return notified ? notified : emitted;
 }
 
 drape_status drape_sim_advance(drape_sim *sim, double t_end)

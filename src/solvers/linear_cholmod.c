@@ -439,9 +439,8 @@ static void report(const void *state, drape_linear_report *out)
 
 const drape_linear_ops drape_linear_cholmod = {
     .entry = {.name = "cholmod",
-              .summary =
-                  "supernodal Cholesky with a symbolic factor kept for good; what is not symmetric positive "
-                  "definite goes to umfpack or klu, by size",
+              .summary = "supernodal Cholesky, analysed once; a matrix that is not symmetric positive "
+                         "definite goes to umfpack or klu, by size",
               .reference = "Chen, Davis, Hager & Rajamanickam 2008, Algorithm 887: CHOLMOD"},
     .borrows_heap = true, /* the update of the largest supernode, and what OpenMP needs for a loop */
     .create = create,

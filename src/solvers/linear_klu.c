@@ -135,7 +135,7 @@ static size_t bytes(const void *state)
 
 const drape_linear_ops drape_linear_klu = {
     .entry = {.name = "klu",
-              .summary = "sparse LU with AMD ordering; pivots are kept from step to step",
+              .summary = "sparse LU with AMD ordering; pivots are kept between steps",
               .reference = "Davis & Palamadai Natarajan 2010, Algorithm 907: KLU"},
     .best_from = 1,
     .general_from = 1,

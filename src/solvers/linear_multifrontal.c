@@ -767,9 +767,8 @@ static void report(const void *state, drape_linear_report *out)
 
 const drape_linear_ops drape_linear_multifrontal = {
     .entry = {.name = "multifrontal",
-              .summary =
-                  "multifrontal Cholesky of our own, the same bits with any number of threads; what is not "
-                  "symmetric positive definite goes to umfpack or klu, by size",
+              .summary = "Drape's own multifrontal Cholesky, with the same bits for any number of threads; a "
+                         "matrix that is not symmetric positive definite goes to umfpack or klu, by size",
               .reference = "Duff & Reid 1983; Liu 1992, The multifrontal method for sparse matrix solution"},
     .best_from = 100,     /* a third of klu's time at 400 unknowns */
     .borrows_heap = true, /* by the fallback, at the first matrix that needs it */
