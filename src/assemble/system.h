@@ -27,9 +27,8 @@ typedef struct drape_point {
     const double *internal; /* (internal_count) of the last accepted state */
     double weight;          /* w [1/s]: v = w x + const, and q' = w q + history */
     const double *history;  /* (measure_count) [q/s]; NULL: q' = grad q . v, as in continuous time */
-    const double
-        *stress;    /* (measure_count) weights of the measures' second derivatives; NULL: the forces here */
-    double t;       /* [s] time of the colliders' poses */
+    const double *stress;   /* (measure_count) the f before ddq in a Jacobian; NULL: the forces here */
+    double t;               /* [s] time of the colliders' poses */
     double span[2]; /* [s] over which the velocities of colliders are taken; equal: they are at rest */
 } drape_point;
 
@@ -95,8 +94,8 @@ drape_status drape_system_begin(drape_system *system, const drape_state *in);
 void drape_system_rest(drape_system *system);
 
 /* The sparsity of the assembled matrices. Contact between cloths changes it: drape_system_extend_pattern
- * makes it include every pair that acts at the point. *changed: the pattern was rebuilt, at the same
- * address. Errors: DRAPE_E_MEMORY. */
+ * makes it include every pair that acts at the point. *changed: the pattern was rebuilt,
+ * perhaps at the same address. Errors: DRAPE_E_MEMORY. */
 const drape_pattern *drape_system_pattern(const drape_system *system);
 drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed);
 

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-/* ---- Making ---- */
+/* ---- Creation ---- */
 
 static void count_features(const drape_model *m, int32_t *points, int32_t *segments, int32_t *triangles)
 {

@@ -133,7 +133,7 @@ typedef struct substep {
     drape_step_info *info;
 } substep;
 
-/* ---- Making ---- */
+/* ---- Creation ---- */
 
 static drape_status create_arrays(drape_arena *arena, verlet_state *s)
 {

@@ -128,7 +128,7 @@ drape_status drape_verlet_force_create(drape_arena *arena, drape_system *system,
     return status ? status : sum_linear(arena->ctx, f);
 }
 
-/* ---- Summing ---- */
+/* ---- Sums ---- */
 
 static inline void spring_forces(const run *r, const double *restrict x, size_t n, double *restrict px,
                                  double *restrict py, double *restrict pz)

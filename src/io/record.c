@@ -243,7 +243,7 @@ static drape_status read_times(drape_record *run)
     return status;
 }
 
-/* ---- The whole record ---- */
+/* ---- Opening and closing ---- */
 
 drape_status drape_record_open(drape_context *ctx, const char *folder, int32_t nodes, drape_record *run)
 {

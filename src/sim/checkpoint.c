@@ -238,7 +238,7 @@ drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, void *user)
                              drape_status_name(status));
 }
 
-/* What a run archives for its files follows the sim and is not read here. */
+/* Reads the sim only: a run archives more for its files after it. */
 drape_status drape_sim_restore_from(drape_sim *sim, const void *bytes, size_t size)
 {
     drape_archive a;

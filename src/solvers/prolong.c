@@ -188,7 +188,7 @@ drape_status drape_prolong_build(drape_arena *arena, const drape_graph *g, int s
     return status;
 }
 
-/* ---- Use ---- */
+/* ---- Restriction and prolongation ---- */
 
 void drape_prolong_restrict(const drape_prolong *p, const double *fine, double *coarse)
 {
