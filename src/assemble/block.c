@@ -7,7 +7,7 @@
 #define D DRAPE_MAX_ELEMENT_DOFS
 #define N DRAPE_BLOCK
 
-_Static_assert(LANES == DRAPE_LANES, "rows with lanes fill one");
+_Static_assert(LANES == DRAPE_LANES, "terms with lanes fill one vector");
 
 /* ---- Forces on measures ---- */
 
@@ -16,7 +16,7 @@ static bool has_rates(const drape_term *term)
     return term->law_count > 0 || term->damping;
 }
 
-/* In step methods. */
+/* q' = w q + history: the rates of step methods. */
 static void rates_of_history(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const double *history = want->point->history + term->first_measure + b->first;
@@ -50,7 +50,7 @@ static void sum_stresses(const drape_term *term, const drape_request *want, drap
     }
 }
 
-/* The forces on measures where the nodes go, which changes the measures by `ahead`. */
+/* The forces on measures where the nodes are displaced to, which changes the measures by `ahead`. */
 static void write_stress(const drape_term *term, const drape_request *want, const drape_block *b,
                          const double *ahead)
 {
@@ -59,9 +59,10 @@ static void write_stress(const drape_term *term, const drape_request *want, cons
         to[i] = b->force[i] + (b->by_strain[i] + want->point->weight * b->by_rate[i]) * ahead[i];
 }
 
-/* The weights of ddq and dq dq' in the Hessian. With a share of the positive semidefinite part that is
- * known without eigenvalues: f ddq where the measure is convex and pulls, and the Gauss-Newton part (Teran et
- * al. 2005; Tamstorf & Grinspun 2013, 5). A row that splits ddq by itself (`positive`) keeps the weight. */
+/* The weights of ddq and dq dq' in the Hessian. With positive_share, the positive semidefinite part is
+ * taken without eigenvalues: f ddq only where the measure is convex and f > 0, and the Gauss-Newton part
+ * (Teran et al. 2005; Tamstorf & Grinspun 2013, 5). A term that projects ddq itself (`positive`) keeps its
+ * weight. */
 static void weigh(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const bool convex = term->ops->convex, split = term->ops->positive;
@@ -91,13 +92,13 @@ static bool is_nonsymmetric(const drape_term *term, const drape_request *want)
 
 /* ---- Measures of pairs ---- */
 
-/* What pairs of one block share: component k of pair i at [k][i]. */
+/* The geometry of the pairs of one block: component k of pair i at [k][i]. */
 typedef struct pairs {
     double d[3][N];        /* from the first node to the second */
     double approach[3][N]; /* v1 - v0, in continuous time */
 } pairs;
 
-/* dq . v with v of the nodes, and in p->approach v1 - v0. */
+/* rate = dq . v with the nodes' v; p->approach = v1 - v0. */
 static void pairs_along(const drape_term *term, const double *v, const drape_block *b, pairs *p, double *rate)
 {
     const int32_t *node = term->elements.node + 2 * (size_t)b->first;
@@ -149,7 +150,7 @@ static void add_nonsymmetric_pairs(drape_block *b, const pairs *p)
     }
 }
 
-/* A tenth of the numbers of a gradient and Hessian, and loops without calls. */
+/* Pairs have a special case: a tenth of the numbers of a gradient and Hessian, and loops without calls. */
 static void evaluate_pairs(const drape_term *term, const drape_request *want, drape_block *b)
 {
     pairs p;
@@ -169,7 +170,8 @@ static void evaluate_pairs(const drape_term *term, const drape_request *want, dr
             b->gradient[r * N + i] = p.d[r][i] * (b->force[i] * b->per_length[i]);
     if (!want->hessian)
         return;
-    for (int32_t i = b->count; i < N; i++) /* the last block is not full: numbers that no one takes */
+    for (int32_t i = b->count; i < N;
+         i++) /* a last block that is not full: harmless numbers that nobody reads */
         b->per_length[i] = b->of_ddq[i] = b->of_dq[i] = 0, p.d[0][i] = p.d[1][i] = p.d[2][i] = 1;
     weigh(term, want, b);
     pair_blocks(b, &p);
@@ -177,7 +179,7 @@ static void evaluate_pairs(const drape_term *term, const drape_request *want, dr
         add_nonsymmetric_pairs(b, &p);
 }
 
-/* ---- Other measures, side by side in lanes ---- */
+/* ---- Other measures, interleaved in lanes ---- */
 
 static void lay_out(int numbers, const double *from, int32_t count, double *to)
 {
@@ -218,7 +220,7 @@ static void gather(const drape_elements *el, int32_t element, const double *v, d
         memcpy(local + 3 * a, v + 3 * (size_t)node[a], 3 * sizeof *local);
 }
 
-/* dq . v with v of the nodes. */
+/* rate = dq . v with the nodes' v. */
 static void measures_along(const drape_term *term, const double *nodes, const drape_block *b, double *rate)
 {
     const int d = 3 * term->elements.nodes;
@@ -268,7 +270,7 @@ LANES_DISPATCH static void velocity_hessians(int d, drape_block *b)
         }
 }
 
-/* The whole of one element's Hessian, with the part that is not symmetric. */
+/* The full Hessian of one element, including the nonsymmetric part. */
 static void nonsymmetric_hessian(const drape_term *term, const drape_request *want, drape_block *b, int32_t i)
 {
     const int d = 3 * term->elements.nodes;
@@ -289,7 +291,8 @@ static void nonsymmetric_hessian(const drape_term *term, const drape_request *wa
                                      dq[LANES * r] * (b->of_dq[i] * dq[LANES * c] + along[c]);
 }
 
-/* ddq in b->hessian, moved by positive_share to the part of it that its force makes positive. */
+/* Moves ddq in b->hessian by positive_share towards the part of it that is positive semidefinite under the
+ * measure's force. */
 static void split_hessians(const drape_term *term, const drape_request *want, drape_block *b)
 {
     const drape_elements *el = &term->elements;
@@ -339,7 +342,7 @@ static void evaluate_measures(const drape_term *term, const drape_request *want,
         hessians_of_measures(term, want, b);
 }
 
-/* ---- Energies and dissipations, one element after another ---- */
+/* ---- Energies and dissipations, element by element ---- */
 
 static void evaluate_energies(const drape_term *term, const drape_request *want, drape_block *b)
 {
@@ -348,7 +351,7 @@ static void evaluate_energies(const drape_term *term, const drape_request *want,
                       want->hessian ? b->hessian : NULL);
 }
 
-/* h -= dg/dv W, where the wind on an element's nodes changes as they move. */
+/* h -= dg/dv W: the wind at an element's nodes changes as they move. */
 static void carry_wind(const drape_term *term, const double *gradient, const double *dg_dv, int32_t element,
                        double *h)
 {
@@ -400,7 +403,7 @@ void drape_block_evaluate(const drape_term *term, const drape_request *want, dra
     else
         evaluate_dissipations(term, want, b);
     const int d = 3 * term->elements.nodes;
-    const bool given = term->ops->measure; /* with its positive part already */
+    const bool given = term->ops->measure; /* the positive part is taken already */
     for (int32_t i = 0; want->hessian && want->positive_share > 0 && !given && i < b->count; i++)
         project(d, want->positive_share, b->hessian + (size_t)i * (size_t)(d * d), b->scratch);
 }

@@ -1,47 +1,47 @@
 /*
- * block.h: a block of elements of one term, evaluated: their forces and Hessians, not yet added anywhere.
- * What is known of strain measures becomes forces here:
+ * block.h: evaluates a block of elements of one term: their forces and Hessians, not yet added anywhere.
+ * Strain measures and their derivatives become forces here:
  *     g = f dq,  f summed over elasticity, the elements' own dashpots and laws
  *     H = f ddq + (df/dq + w df/dq') dq dq'                       step methods: q' = w q + history
  *     H = f ddq + df/dq dq dq' + df/dq' dq (ddq v + w dq)'        continuous time: q' = dq . v
- * Inner loops are over elements, so that compilers make vectors of them.
+ * Inner loops run over elements, so that compilers can vectorise them.
  */
 #ifndef DRAPE_ASSEMBLE_BLOCK_H
 #define DRAPE_ASSEMBLE_BLOCK_H
 
 #include "assemble/system.h"
 
-#define DRAPE_BLOCK 32 /* elements: their Hessians stay in the cache */
+#define DRAPE_BLOCK 32 /* elements; few enough that their Hessians stay in the cache */
 
-/* What a sum over a term is wanted for. */
+/* What a sum over a term is to contain, and where. */
 typedef struct drape_request {
     const drape_point *point;
     bool energy, hessian;
     bool conservative, dissipative; /* which parts of the forces */
-    double positive_share; /* of the positive semidefinite part in Hessians, see drape_system_jacobian */
-    bool velocity;         /* the Hessian wanted is dg/dv alone */
-    bool remainder;        /* only what is of no measure */
-    const double *along;   /* (node_count x 3) where stress is wanted, from the point; NULL: there */
-    double *stress;        /* (measure_count) gets the forces on measures; NULL: not wanted */
-    const bool *without;   /* (term_count) terms that are left out; NULL: none */
-    const double *against; /* (node_count x 3) v against the medium; NULL: it rests */
-    const double *wind_gradient; /* (node_count x 3 x 3), beside it */
+    double positive_share;       /* how much of the positive semidefinite part, see drape_system_jacobian */
+    bool velocity;               /* the Hessian wanted is dg/dv alone */
+    bool remainder;              /* only what belongs to no measure */
+    const double *along;         /* (node_count x 3) displacement of the nodes; NULL: none */
+    double *stress;              /* (measure_count) gets the forces on measures; NULL: not wanted */
+    const bool *without;         /* (term_count) terms that are left out; NULL: none */
+    const double *against;       /* (node_count x 3) v relative to the medium; NULL: the medium rests */
+    const double *wind_gradient; /* (node_count x 3 x 3) W of wind.h; NULL with `against` */
 } drape_request;
 
 /*
  * With `pairs` the results are the force and the block of a pair: g = (-pull, pull), H = (block -block;
- * -block block), component k of element i at [k DRAPE_BLOCK + i]. Else number k of element i lies at
- * [start(i) + stride k], and `mirrored` says that of a Hessian the blocks above the diagonal are those below
- * it, transposed, and not written.
+ * -block block), component k of element i at [k DRAPE_BLOCK + i]. Otherwise number k of element i lies at
+ * [start(i) + stride k]. With `mirrored`, only the Hessian's blocks on and below the diagonal are written;
+ * those above are their transposes.
  */
 typedef struct drape_block {
     int32_t first, count;
     bool pairs, mirrored;
-    int stride; /* 1, or DRAPE_LANES: elements stand side by side */
+    int stride; /* 1, or DRAPE_LANES: elements are interleaved */
     double energy[DRAPE_BLOCK];
     double gradient[DRAPE_BLOCK * DRAPE_MAX_ELEMENT_DOFS];
     double hessian[DRAPE_BLOCK * DRAPE_MAX_ELEMENT_DOFS * DRAPE_MAX_ELEMENT_DOFS];
-    /* Of measures. */
+    /* For measures: */
     double q[DRAPE_BLOCK], dq[DRAPE_BLOCK * DRAPE_MAX_ELEMENT_DOFS];
     double per_length[DRAPE_BLOCK]; /* of pairs: dq = per_length (-d, d) */
     double strain[DRAPE_BLOCK], rate[DRAPE_BLOCK];
@@ -50,10 +50,10 @@ typedef struct drape_block {
         of_dq[DRAPE_BLOCK]; /* H = of_ddq ddq + of_dq dq dq' + what is not symmetric */
     double scratch[DRAPE_BLOCK * DRAPE_MAX_ELEMENT_DOFS * DRAPE_MAX_ELEMENT_DOFS];
 } drape_block;
-_Static_assert(DRAPE_BLOCK <= DRAPE_PAIR_BLOCK, "rows with pair take a block");
-_Static_assert(DRAPE_BLOCK % DRAPE_LANES == 0, "lanes fill a block");
+_Static_assert(DRAPE_BLOCK <= DRAPE_PAIR_BLOCK, "a term with pair takes a whole block");
+_Static_assert(DRAPE_BLOCK % DRAPE_LANES == 0, "a block is a whole number of lanes");
 
-/* Where the numbers of an element start, if an element has so many. */
+/* The position of an element's first number, if each element has that many. */
 static inline size_t drape_block_start(const drape_block *b, int32_t i, int numbers)
 {
     if (b->stride == 1)
@@ -61,7 +61,7 @@ static inline size_t drape_block_start(const drape_block *b, int32_t i, int numb
     return (size_t)(i - i % DRAPE_LANES) * (size_t)numbers + (size_t)(i % DRAPE_LANES);
 }
 
-/* b->first and b->count say which elements. */
+/* The caller sets b->first and b->count. */
 void drape_block_evaluate(const drape_term *term, const drape_request *want, drape_block *b);
 
 #endif

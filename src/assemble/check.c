@@ -1,16 +1,17 @@
 /*
- * check.c: see check.h. Per term: the functions that its author wrote, element by element, one coordinate at
- * a time. Then the assembled Jacobian along random directions, as step methods and as IDA use it. Errors are
- * relative to the largest entry; a Hessian's also to the gradient over the element's size, because a linear
- * term has none.
+ * check.c: see check.h. For each term, the functions that its author wrote are checked element by element,
+ * one coordinate at a time. Then the assembled Jacobian is checked along random directions, as step methods
+ * and as IDA use it. Errors are relative to the largest entry of the derivative; for a Hessian also to the
+ * gradient over the element's size, because a linear term has no Hessian.
  *
- * The step of the differences is 1e-5 of the element's size: truncation is about its square, 1e-10, rounding
- * 1e-16/1e-5. Barriers change over lengths far below that size, so shorter steps are tried, too, and the
- * smallest error counts: a wrong derivative is wrong at all of them. Where a barrier begins its gradient is
- * arbitrarily small, so an element's error is relative to at least a millionth of the term's largest entry.
+ * The step of the differences is 1e-5 of the mean edge length: the truncation error is about its square,
+ * 1e-10, the rounding error 1e-16/1e-5. Barriers change over lengths far below that, so shorter steps are
+ * tried, too, and the smallest error counts: a wrong derivative is wrong at all of them. Where a barrier
+ * begins, its gradient is arbitrarily small, so an element's error is relative to at least a millionth of
+ * the term's largest entry.
  *
- * Contact is checked where the scene has it: the sheet is moved until its deepest node lies half of the
- * activation distance off a collider, or folded onto itself; steps are relative to that distance.
+ * Contact is checked where the scene has it: the sheet is moved until its deepest node is half of the
+ * activation distance away from a collider, or is folded onto itself; steps are relative to that distance.
  */
 #include "assemble/check.h"
 
@@ -19,20 +20,22 @@
 #include <math.h>
 #include <string.h>
 
-#define D                DRAPE_MAX_ELEMENT_DOFS
-#define SAMPLE           200 /* elements of a term that are checked, about */
-#define DIRECTIONS       8
-#define DEFORMATION      0.08 /* of the mean edge length, a coordinate */
-#define DIFFERENCE_STEP  1e-5 /* of the mean edge length */
-#define SHORTER_STEP     0.1  /* factor from one step of differences to the next */
-#define STEPS            3
-#define MIN_SCALE        1e-6 /* of the largest derivative in a term, for an element's own */
+#define D               DRAPE_MAX_ELEMENT_DOFS
+#define SAMPLE          200 /* approximate number of elements of a term that are checked */
+#define DIRECTIONS      8
+#define DEFORMATION     0.08 /* of the mean edge length, in each coordinate */
+#define DIFFERENCE_STEP 1e-5 /* of the mean edge length */
+#define SHORTER_STEP    0.1  /* from one step of the differences to the next */
+#define STEPS           3
+/* of the term's largest derivative: the smallest scale of an element's errors */
+#define MIN_SCALE        1e-6
 #define GRADIENT_LIMIT   1e-7
 #define HESSIAN_LIMIT    1e-6
 #define INVARIANCE_LIMIT 1e-9
 #define CONTACT_STEP     1e-4 /* of the distance over which contact acts */
 #define APPROACHES       20   /* moves of the sheet towards a collider */
-#define FOLD_SHIFT       0.07 /* of the displacement of a layer, so that no edge lies exactly on another */
+/* fraction of a layer's displacement, so that no edge lies exactly on another */
+#define FOLD_SHIFT 0.07
 
 typedef struct checker {
     drape_system *system;
@@ -40,11 +43,11 @@ typedef struct checker {
     uint64_t random;
     double size; /* [m] mean edge length */
     double *x, *v, *internal, *history;
-    double *x2, *v2, *g1, *g2, *direction; /* scratch, nodes */
+    double *x2, *v2, *g1, *g2, *direction; /* (node_count x 3) scratch */
     double *values;                        /* a Jacobian in the system's pattern */
     drape_arena *arena;
-    drape_check_result *rows;
-    int row_count;
+    drape_check_result *results;
+    int result_count;
 } checker;
 
 /* In [-1, 1]; a linear congruential generator (Knuth's MMIX), so that every machine sees the same state. */
@@ -56,8 +59,8 @@ static double uniform(checker *c)
 
 static void report(checker *c, const char *term, const char *what, double error, double limit)
 {
-    if (c->row_count < DRAPE_MAX_CHECK_RESULTS)
-        c->rows[c->row_count++] = (drape_check_result){
+    if (c->result_count < DRAPE_MAX_CHECK_RESULTS)
+        c->results[c->result_count++] = (drape_check_result){
             .term = term, .what = what, .error = error, .limit = limit, .pass = error <= limit};
 }
 
@@ -120,7 +123,7 @@ static double mean_edge(const drape_model *m)
 
 /* ---- One term, element by element ---- */
 
-/* What an author's function returns for one element: a scalar, its gradient, the Hessian. */
+/* What an author's function returns for one element: a value, its gradient and Hessian. */
 typedef struct local {
     double scalar, gradient[D], hessian[D * D], velocity[D * D];
 } local;
@@ -139,8 +142,8 @@ static void evaluate(const drape_term *term, int32_t e, const double *x, const d
         term->ops->dissipation(&term->elements, e, 1, x, v, out->gradient, out->hessian, out->velocity);
 }
 
-/* The first place of the node that stands in place a. */
-static int first_place(const drape_elements *el, int32_t e, int a)
+/* The first local index of the node with local index a: an element may contain a node twice. */
+static int first_copy(const drape_elements *el, int32_t e, int a)
 {
     const int32_t *node = el->node + (size_t)e * (size_t)el->nodes;
     for (int b = 0; b < a; b++)
@@ -149,13 +152,13 @@ static int first_place(const drape_elements *el, int32_t e, int a)
     return a;
 }
 
-/* Adds the derivatives in further places of a node to those in its first: derivatives by nodes, not by
- * places. */
-static void gather_places(const drape_elements *el, int32_t e, local *l)
+/* Adds the derivatives by further copies of a node to those by its first: derivatives by nodes, not by
+ * local indices. */
+static void gather_copies(const drape_elements *el, int32_t e, local *l)
 {
     const int d = 3 * el->nodes;
     for (int a = 0; a < el->nodes; a++) {
-        const int b = first_place(el, e, a);
+        const int b = first_copy(el, e, a);
         for (int i = 0; b < a && i < 3; i++) {
             const int from = 3 * a + i, to = 3 * b + i;
             l->gradient[to] += l->gradient[from];
@@ -172,7 +175,7 @@ static void gather_places(const drape_elements *el, int32_t e, local *l)
     }
 }
 
-/* Moves coordinate i of an element by +- step in array (positions or velocities) and evaluates. */
+/* Moves coordinate i of an element by +step and -step in array (positions or velocities) and evaluates. */
 static void evaluate_beside(const checker *c, const drape_term *term, int32_t e, int i, double step,
                             double *array, local *plus, local *minus)
 {
@@ -184,11 +187,11 @@ static void evaluate_beside(const checker *c, const drape_term *term, int32_t e,
     array[at] = kept - step;
     evaluate(term, e, c->x, c->v, c->internal, minus);
     array[at] = kept;
-    gather_places(&term->elements, e, plus);
-    gather_places(&term->elements, e, minus);
+    gather_copies(&term->elements, e, plus);
+    gather_copies(&term->elements, e, minus);
 }
 
-/* The sizes of the derivatives of an element or a term, or their errors relative to these. */
+/* The sizes of the derivatives of an element or a term, or errors relative to these sizes. */
 typedef struct errors {
     double gradient, hessian, velocity, symmetry;
 } errors;
@@ -212,19 +215,19 @@ static errors size_of(const checker *c, const drape_term *term, const local *her
     return (errors){g, h, fmax(largest(here->velocity, d * d), g / c->size), h};
 }
 
-/* The errors of one element with one step; min: scales are no smaller. */
+/* The errors of one element with one step; min: the smallest scales. */
 static errors compare_once(const checker *c, const drape_term *term, int32_t e, double step, errors min)
 {
     int d = 3 * term->elements.nodes;
     local here, plus, minus;
     double dg[D], dh[D * D], dv[D * D] = {0}, symmetry = 0;
     evaluate(term, e, c->x, c->v, c->internal, &here);
-    gather_places(&term->elements, e, &here);
+    gather_copies(&term->elements, e, &here);
     for (int i = 0; i < d; i++) {
         dg[i] = 0;
         for (int j = 0; j < d; j++)
             dh[d * j + i] = 0;
-        if (first_place(&term->elements, e, i / 3) < i / 3)
+        if (first_copy(&term->elements, e, i / 3) < i / 3)
             continue;
         evaluate_beside(c, term, e, i, step, c->x, &plus, &minus);
         dg[i] = (plus.scalar - minus.scalar) / (2 * step);
@@ -256,7 +259,8 @@ static errors compare_element(const checker *c, const drape_term *term, int32_t 
     return best;
 }
 
-/* MIN_SCALE of the largest derivatives of a term, over every stride-th element. */
+/* The smallest scales of an element's errors: MIN_SCALE of the term's largest derivatives, over every
+ * stride-th element. */
 static errors min_scale(const checker *c, const drape_term *term, int32_t stride)
 {
     errors max = {0};
@@ -288,7 +292,8 @@ static void check_elements(checker *c, const drape_term *term)
     report(c, term->ops->entry.name, "symmetry", max.symmetry, INVARIANCE_LIMIT);
 }
 
-/* Net force and net torque of a measure's term, over the sum of magnitudes: internal forces have neither. */
+/* Net force and net torque of a term with a measure, over the sum of magnitudes: internal forces have
+ * neither. */
 static void check_invariance(checker *c, int32_t t)
 {
     const drape_term *term = &c->model->terms[t];
@@ -313,7 +318,7 @@ static void check_invariance(checker *c, int32_t t)
                INVARIANCE_LIMIT);
 }
 
-/* At one state and at two steps along each of its arguments. */
+/* At one state, with a difference along each of the law's arguments. */
 static void check_law(checker *c, const drape_term *law)
 {
     const double k = 2.385, at = 0.117, moves = -0.731, h = 1e-6;
@@ -332,7 +337,7 @@ static void check_law(checker *c, const drape_term *law)
 
 /* ---- The assembled Jacobian ---- */
 
-/* x2, v2 = the state moved by s along direction on the free nodes; v moves by w times that. */
+/* x2, v2 = the state moved by s along direction at the free nodes; v moves by weight times that. */
 static void move(checker *c, double s, double weight)
 {
     const drape_model *m = c->model;
@@ -343,8 +348,8 @@ static void move(checker *c, double s, double weight)
     }
 }
 
-/* Room for a Jacobian at a point, whatever contact couples there. */
-static drape_status make_room(checker *c, const drape_point *point)
+/* Extends the pattern to what contact couples at a point, and takes memory for a Jacobian. */
+static drape_status prepare_jacobian(checker *c, const drape_point *point)
 {
     bool changed;
     drape_status status = drape_system_extend_pattern(c->system, point, &changed);
@@ -356,7 +361,7 @@ static drape_status make_room(checker *c, const drape_point *point)
     return c->values ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-/* y = J p over the free DOFs, into y (nodes). */
+/* y = J p over the free DOFs; y (node_count x 3). */
 static void multiply(const checker *c, double *y)
 {
     const drape_model *m = c->model;
@@ -371,7 +376,7 @@ static void multiply(const checker *c, double *y)
     }
 }
 
-/* Which force a Jacobian is of. */
+/* The force that a Jacobian belongs to. */
 typedef void force(drape_system *system, const drape_point *point, double *g);
 
 static void contact_force(drape_system *system, const drape_point *point, double *g)
@@ -379,7 +384,7 @@ static void contact_force(drape_system *system, const drape_point *point, double
     drape_system_contact_part(system, point, true, g, NULL);
 }
 
-/* Error of the Jacobian in c->values along c->direction at a point that is c's. */
+/* The error of the Jacobian in c->values along c->direction, at a point whose x and v are the checker's. */
 static double direction_error(checker *c, double step, drape_point point, force *of)
 {
     const drape_model *m = c->model;
@@ -397,8 +402,8 @@ static double direction_error(checker *c, double step, drape_point point, force 
     return ratio(largest_difference(c->g1, c->g2, n), scale);
 }
 
-/* Of the Jacobian in c->values: over all directions the largest error, each with its best step; step: the
- * longest. */
+/* The error of the Jacobian in c->values: the largest over all directions, each with its best step of
+ * STEPS, from `step` down. */
 static double largest_direction_error(checker *c, double step, const drape_point *point, force *of)
 {
     double error = 0;
@@ -417,7 +422,7 @@ static drape_status check_jacobian(checker *c, const char *what, double weight, 
 {
     const drape_point point = {
         .x = c->x, .v = c->v, .internal = c->internal, .weight = weight, .history = history};
-    drape_status status = make_room(c, &point);
+    drape_status status = prepare_jacobian(c, &point);
     if (status)
         return status;
     drape_system_jacobian(c->system, &point, 0, 0, c->values);
@@ -428,7 +433,7 @@ static drape_status check_jacobian(checker *c, const char *what, double weight, 
 
 /* ---- Contact ---- */
 
-/* Moves all nodes until the deepest free one lies `gap` off a collider. */
+/* Moves all nodes until the deepest free one is `gap` away from a collider. */
 static void approach(checker *c, const drape_collider *collider, double gap)
 {
     const drape_model *m = c->model;
@@ -448,7 +453,8 @@ static void approach(checker *c, const drape_collider *collider, double gap)
     }
 }
 
-/* Folds the rest positions in the middle of their longest side, layers `gap` apart along the shortest. */
+/* Folds the rest positions at the middle of their longest extent, into layers `gap` apart along the
+ * shortest. */
 static void fold(checker *c, double gap)
 {
     const drape_model *m = c->model;
@@ -473,7 +479,7 @@ static void fold(checker *c, double gap)
     }
 }
 
-/* Energy, force and Jacobian of contact alone, where c->x is; errors above those in *max are kept there. */
+/* Compares energy, force and Jacobian of contact alone at c->x; raises *max to errors above it. */
 static drape_status compare_contact(checker *c, double distance, errors *max)
 {
     drape_state state = {.x = c->x, .v = c->v};
@@ -481,7 +487,7 @@ static drape_status compare_contact(checker *c, double distance, errors *max)
     size_t n = 3 * (size_t)c->model->node_count;
     drape_status status = drape_system_begin(c->system, &state);
     if (!status)
-        status = make_room(c, &point);
+        status = prepare_jacobian(c, &point);
     if (status)
         return status;
     double step = CONTACT_STEP * distance, best = INFINITY;
@@ -505,7 +511,7 @@ static drape_status compare_contact(checker *c, double distance, errors *max)
 
 static void report_contact(checker *c, const char *name, errors max)
 {
-    report(c, name, "gradient", max.gradient, HESSIAN_LIMIT); /* gaps have the rounding of positions */
+    report(c, name, "gradient", max.gradient, HESSIAN_LIMIT); /* gaps have the rounding errors of positions */
     report(c, name, "Jacobian with friction", max.hessian, HESSIAN_LIMIT);
 }
 
@@ -532,7 +538,7 @@ static drape_status check_contact(checker *c, const drape_state *rest)
     return status;
 }
 
-/* ---- All of it ---- */
+/* ---- All checks ---- */
 
 static drape_status allocate(checker *c, drape_arena *arena)
 {
@@ -562,13 +568,14 @@ static drape_status check_terms(drape_context *ctx, checker *c)
 }
 
 drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, unsigned seed,
-                                     drape_check_result *rows, int *row_count)
+                                     drape_check_result *results, int *result_count)
 {
     const drape_model *model = drape_system_model(system);
     drape_arena arena = drape_arena_of(ctx);
     drape_state rest;
-    checker c = {.system = system, .model = model, .random = seed, .size = mean_edge(model), .rows = rows};
-    *row_count = 0;
+    checker c = {
+        .system = system, .model = model, .random = seed, .size = mean_edge(model), .results = results};
+    *result_count = 0;
     drape_status status = drape_state_create(&arena, model, &rest);
     if (!status)
         status = allocate(&c, &arena);
@@ -584,7 +591,7 @@ drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, u
         status = drape_check_cancel(ctx);
     if (!status)
         status = check_contact(&c, &rest);
-    *row_count = c.row_count;
+    *result_count = c.result_count;
     drape_arena_free(&arena);
     return status;
 }

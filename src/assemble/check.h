@@ -1,23 +1,26 @@
-/* check.h: every analytic derivative against central differences at a deformed, rotated, moving state. */
+/* check.h: compares every analytic derivative with central differences at a deformed, rotated, moving
+ * state. */
 #ifndef DRAPE_ASSEMBLE_CHECK_H
 #define DRAPE_ASSEMBLE_CHECK_H
 
 #include "assemble/system.h"
 
 typedef struct drape_check_result {
-    const char *term; /* name of the row, "contact", "self_contact" or "assembled" */
+    const char *term; /* name of a term, "contact", "self_contact" or "assembled" */
     const char *what; /* "gradient", "Hessian", "force by rate" ... */
-    double error;     /* largest over the sample, relative */
+    double error;     /* relative, the largest in the sample */
     double limit;
     bool pass;
 } drape_check_result;
 
 #define DRAPE_MAX_CHECK_RESULTS 1024
 
-/* Fills rows (DRAPE_MAX_CHECK_RESULTS) for the terms of the system's model, and for its contact. seed: of the
- * deformation. The system's pattern may be another one since: no sim goes on with it. Errors: DRAPE_E_MEMORY,
- * DRAPE_E_STOPPED (the context's cancel); a failed comparison is no error, its row says so. */
+/* Compares the derivatives of all terms of the system's model, and of its contact; results
+ * (DRAPE_MAX_CHECK_RESULTS) gets one entry for each comparison. seed: of the random deformation. The
+ * system's pattern may be another one afterwards, so no sim can continue with this system. Errors:
+ * DRAPE_E_MEMORY, DRAPE_E_STOPPED (the context was cancelled); a failed comparison is not an error but an
+ * entry. */
 drape_status drape_check_derivatives(drape_context *ctx, drape_system *system, unsigned seed,
-                                     drape_check_result *rows, int *row_count);
+                                     drape_check_result *results, int *result_count);
 
 #endif

@@ -1,4 +1,4 @@
-/* drag_spring.h: a spring from a node to a point of space, by which a host drags cloth: E = k/2 |x -
+/* drag_spring.h: a spring from a node to a point in space, by which a host drags cloth: E = k/2 |x -
  * target|^2. */
 #ifndef DRAPE_ASSEMBLE_DRAG_SPRING_H
 #define DRAPE_ASSEMBLE_DRAG_SPRING_H
@@ -21,7 +21,7 @@ static inline double drape_drag_spring_energy(const drape_drag_spring *spring, c
     return sum;
 }
 
-/* Adds the gradient of its energy to g (node_count x 3). */
+/* Adds the gradient of the spring's energy to g (node_count x 3). */
 static inline void drape_drag_spring_add_gradient(const drape_drag_spring *spring, const double *x, double *g)
 {
     for (size_t k = 0; spring->stiffness > 0 && k < 3; k++) {
@@ -30,7 +30,7 @@ static inline void drape_drag_spring_add_gradient(const drape_drag_spring *sprin
     }
 }
 
-/* Adds its Hessian to values in the pattern; the node is free. */
+/* Adds the spring's Hessian to values in the pattern; its node is free. */
 static inline void drape_drag_spring_add_hessian(const drape_drag_spring *spring, const drape_model *model,
                                                  const drape_pattern *pattern, double *values)
 {

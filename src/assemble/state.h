@@ -1,4 +1,4 @@
-/* state.h: what changes in time: t, x, v and the internal variables of the terms that have some. */
+/* state.h: what changes in time: t, x, v, and the internal variables of the terms that have any. */
 #ifndef DRAPE_ASSEMBLE_STATE_H
 #define DRAPE_ASSEMBLE_STATE_H
 
@@ -10,10 +10,12 @@ typedef struct drape_state {
     double *internal; /* (internal_count) */
 } drape_state;
 
-/* A state in the rest positions and initial velocities at t = 0, with pins where their tracks begin. */
+/* A state with the rest positions and initial velocities at t = 0, and pins where their tracks begin.
+ * Errors: DRAPE_E_MEMORY. */
 drape_status drape_state_create(drape_arena *arena, const drape_model *model, drape_state *state);
 
-/* after.internal from before.internal and after.x: what the terms remember of an accepted step. */
+/* Computes after->internal from before->internal and after->x: what the terms remember of an accepted
+ * step. */
 void drape_state_commit(const drape_model *model, const drape_state *before, drape_state *after);
 
 uint64_t drape_state_hash(const drape_model *model, const drape_state *state);

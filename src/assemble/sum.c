@@ -3,23 +3,23 @@
 
 #include <string.h>
 
-/* The lowest and the highest node of a block of elements. */
+/* The lowest and the highest node that a block of elements touches. */
 typedef struct reach {
     int32_t low, high;
 } reach;
 
-/* The nodes first ... last - 1. */
+/* The nodes first ... last - 1, which one task owns. */
 typedef struct share {
     int32_t first, last;
 } share;
 
 struct drape_summer {
     const drape_model *model;
-    drape_pool *pool; /* of the system; NULL: none */
+    drape_pool *pool; /* the system's; NULL: one thread */
     int threads;
     bool unconstrained;
     drape_block *blocks; /* (threads) */
-    reach **reaches;     /* (term_count) for each block of each term; NULL: one thread needs none */
+    reach **reaches;     /* (term_count) of each term's blocks; NULL: one thread */
 };
 
 static int32_t block_count(const drape_term *term)
@@ -33,7 +33,7 @@ static int32_t elements_in(const drape_term *term, int32_t block)
     return left < DRAPE_BLOCK ? left : DRAPE_BLOCK;
 }
 
-/* ---- Making ---- */
+/* ---- Creation ---- */
 
 static reach reach_of(const drape_term *term, int32_t block)
 {
@@ -81,7 +81,7 @@ bool drape_summer_leaves(const drape_summer *s, const drape_term *term)
     return s->unconstrained && term->ops->constraint;
 }
 
-/* ---- Adding a block ---- */
+/* ---- Adding a block of elements ---- */
 
 static bool owns(const share *own, int32_t node)
 {
@@ -125,7 +125,7 @@ static void share_energies(const drape_term *term, const drape_block *b, double 
     }
 }
 
-/* to (r, c) += sign from (r, c); rows of from are `row` apart, its columns `column`. */
+/* to(r, c) += sign from(r, c); the rows of `from` are `row` apart, its columns `column`. */
 static inline void add_block(const double *from, int row, int column, double sign, double *to, int64_t stride)
 {
     for (int c = 0; c < 3; c++)
@@ -133,7 +133,7 @@ static inline void add_block(const double *from, int row, int column, double sig
             to[c * stride + r] += sign * from[row * r + column * c];
 }
 
-/* A column of blocks of one element in the matrix. */
+/* A column of 3 x 3 blocks in the matrix. */
 typedef struct column {
     double *start;
     int64_t stride;
@@ -174,7 +174,7 @@ static void add_hessian(const int32_t *block, int n, const drape_block *b, const
         if (block[n * r + c] < 0)
             continue;
         double *to = col->start + 3 * (block[n * r + c] - col->first);
-        if (b->mirrored && r < c) /* the block (c, r), transposed */
+        if (b->mirrored && r < c) /* the transpose of block (c, r) */
             add_block(h + 3 * step * (d * c + r), step, step * d, 1, to, col->stride);
         else
             add_block(h + 3 * step * (d * r + c), step * d, step, 1, to, col->stride);
@@ -248,7 +248,7 @@ static void clear(const drape_summer *s, const share *own, const drape_sums *to)
         }
 }
 
-/* Sums for the nodes of one share. */
+/* Sums for the nodes of one share, over all blocks of elements that touch them. */
 static void add_share(drape_summer *s, const drape_request *want, const drape_sums *to, int thread)
 {
     const int64_t nodes = s->model->node_count;
@@ -269,7 +269,7 @@ static void add_share(drape_summer *s, const drape_request *want, const drape_su
     }
 }
 
-/* Stresses of a share of the blocks of each term. */
+/* Writes the stresses of one share of the blocks of each term. */
 static void stress_of_share(drape_summer *s, const drape_request *want, int thread)
 {
     for (int32_t i = 0; i < s->model->term_count; i++) {
@@ -280,7 +280,7 @@ static void stress_of_share(drape_summer *s, const drape_request *want, int thre
     }
 }
 
-/* The job that is dealt out to threads. */
+/* Arguments of the tasks. */
 typedef struct order {
     drape_summer *summer;
     const drape_request *want;
@@ -293,7 +293,7 @@ static void add_task(void *user, int64_t thread)
     add_share(o->summer, o->want, o->to, (int)thread);
 }
 
-/* There may be fewer threads than shares: shares are tasks, not threads. */
+/* The shares are tasks of the pool, not threads: the pool may have fewer threads than there are shares. */
 void drape_summer_add(drape_summer *s, const drape_request *want, const drape_sums *to)
 {
     drape_parallel(s->pool, s->threads, add_task, &(order){s, want, to});

@@ -1,4 +1,4 @@
-/* system.c: see system.h. Sums over the elements of terms are sum.h's. */
+/* system.c: see system.h. The sums over the elements of terms are in sum.h. */
 #include "assemble/system.h"
 
 #include "assemble/sum.h"
@@ -14,19 +14,21 @@ struct drape_system {
     const drape_model *model;
     drape_pool *pool;             /* NULL: one thread */
     drape_summer *summer;         /* over the elements of terms */
-    drape_contact *contact;       /* NULL: none */
+    drape_contact *contact;       /* NULL: the model has none, or it was not added */
     const drape_pattern *pattern; /* the model's, or the extended one */
-    drape_arena extension;        /* holds the extended pattern and blocks */
-    drape_pattern extended;       /* with what contact couples */
-    int32_t **blocks; /* (term_count) as in the terms, for the extended pattern; NULL while there is none */
-    drape_status status; /* of placing contact */
+    drape_arena extension;        /* holds the extended pattern and its block slots */
+    drape_pattern extended;       /* the model's pattern with the pairs of nodes that contact couples */
+    int32_t **blocks;             /* (term_count) slots in the extended pattern; NULL: it is not in use */
+    drape_status status;          /* of drape_system_status */
     drape_motion *motion;
     drape_drag_spring drag;
-    double *push; /* (node_count x 3) */
+    double *push; /* (node_count x 3) [N], if pushed */
     bool pushed;
     drape_wind wind;
-    const atomic_bool *cancel; /* NULL: nobody cancels */
+    const atomic_bool *cancel; /* NULL: there is no flag to watch */
 };
+
+/* ---- Creation ---- */
 
 drape_status drape_system_create(drape_arena *arena, const drape_model *model, int threads,
                                  drape_system **out)
@@ -47,13 +49,6 @@ drape_status drape_system_create(drape_arena *arena, const drape_model *model, i
     if (status)
         drape_system_destroy(out);
     return status;
-}
-
-static void forget_extension(drape_system *system)
-{
-    drape_arena_free(&system->extension);
-    system->blocks = NULL;
-    system->pattern = &system->model->pattern;
 }
 
 void drape_system_destroy(drape_system **system)
@@ -80,15 +75,7 @@ drape_pool *drape_system_pool(const drape_system *system)
     return system->pool;
 }
 
-void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *spring)
-{
-    system->drag = *spring;
-}
-
-const drape_drag_spring *drape_system_drag_spring(const drape_system *system)
-{
-    return &system->drag;
-}
+/* ---- Pins, colliders and loads of the host ---- */
 
 const drape_motion *drape_system_motion(const drape_system *system)
 {
@@ -98,6 +85,16 @@ const drape_motion *drape_system_motion(const drape_system *system)
 drape_motion *drape_system_steer(drape_system *system)
 {
     return system->motion;
+}
+
+void drape_system_set_drag_spring(drape_system *system, const drape_drag_spring *spring)
+{
+    system->drag = *spring;
+}
+
+const drape_drag_spring *drape_system_drag_spring(const drape_system *system)
+{
+    return &system->drag;
 }
 
 void drape_system_set_push(drape_system *system, const double *force)
@@ -134,6 +131,8 @@ void drape_system_add_loads(const drape_system *system, const double *x, double 
         g[i] -= system->push[i];
 }
 
+/* ---- Steps ---- */
+
 void drape_system_watch(drape_system *system, const atomic_bool *cancel)
 {
     system->cancel = cancel;
@@ -145,23 +144,6 @@ bool drape_system_cancelled(drape_system *system)
     if (cancelled && !system->status)
         system->status = DRAPE_E_STOPPED;
     return cancelled;
-}
-
-/* ---- Contact ---- */
-
-drape_status drape_system_add_contact(drape_system *system)
-{
-    return drape_contact_create(system->arena, system->motion, &system->contact);
-}
-
-const drape_contact *drape_system_contact(const drape_system *system)
-{
-    return system->contact;
-}
-
-double drape_system_clock(const drape_system *system)
-{
-    return drape_clock_seconds() - drape_contact_seconds(system->contact);
 }
 
 drape_status drape_system_begin(drape_system *system, const drape_state *in)
@@ -181,12 +163,25 @@ drape_status drape_system_status(const drape_system *system)
     return system->status;
 }
 
-const drape_pattern *drape_system_pattern(const drape_system *system)
+/* ---- Contact ---- */
+
+drape_status drape_system_add_contact(drape_system *system)
 {
-    return system->pattern;
+    return drape_contact_create(system->arena, system->motion, &system->contact);
 }
 
-/* False where there is no contact, or no memory for it. */
+const drape_contact *drape_system_contact(const drape_system *system)
+{
+    return system->contact;
+}
+
+double drape_system_clock(const drape_system *system)
+{
+    return drape_clock_seconds() - drape_contact_seconds(system->contact);
+}
+
+/* Finds the contacts at the point. False if the model has no contact, or if it fails: see
+ * drape_system_status. */
 static bool place_contact(drape_system *system, const drape_point *point)
 {
     if (!system->contact)
@@ -198,107 +193,6 @@ static bool place_contact(drape_system *system, const drape_point *point)
     if (status && !system->status)
         system->status = status;
     return status == DRAPE_OK;
-}
-
-/* The places of the terms in the extended pattern. */
-static drape_status place_terms(drape_system *system)
-{
-    const drape_model *model = system->model;
-    drape_arena *arena = &system->extension;
-    system->blocks = drape_arena_take(arena, (size_t)model->term_count, sizeof *system->blocks);
-    for (int32_t i = 0; system->blocks && i < model->term_count; i++) {
-        if (!drape_term_couples(&model->terms[i]))
-            continue;
-        const drape_coupling coupling = drape_term_coupling(&model->terms[i]);
-        const size_t places = (size_t)coupling.count * (size_t)(coupling.nodes * coupling.nodes);
-        system->blocks[i] = drape_arena_take(arena, places, sizeof **system->blocks);
-        if (system->blocks[i])
-            drape_pattern_place(&system->extended, model->free_of_node, &coupling, system->blocks[i]);
-    }
-    return drape_arena_status(arena);
-}
-
-/* A pattern of these pairs (pairs x 4 nodes) and the terms. */
-static drape_status extend(drape_system *system, int32_t pairs, const int32_t *nodes)
-{
-    const drape_model *model = system->model;
-    drape_context *ctx = system->arena->ctx;
-    drape_coupling *couplings = drape_alloc(ctx, (size_t)model->term_count + 1, sizeof *couplings);
-    int count = 0;
-    if (pairs < 0 || !couplings) {
-        drape_free(ctx, couplings);
-        return DRAPE_E_MEMORY;
-    }
-    for (int32_t i = 0; i < model->term_count; i++)
-        if (drape_term_couples(&model->terms[i]))
-            couplings[count++] = drape_term_coupling(&model->terms[i]);
-    couplings[count++] = (drape_coupling){.count = pairs, .nodes = 4, .node = nodes};
-    forget_extension(system);
-    drape_status status = drape_pattern_build(&system->extension, model->free_count, model->free_of_node,
-                                              couplings, count, &system->extended);
-    drape_free(ctx, couplings);
-    if (!status)
-        status = place_terms(system);
-    if (status) /* the model's own again: it too differs from the pattern before */
-        forget_extension(system);
-    else
-        system->pattern = &system->extended;
-    return status;
-}
-
-drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed)
-{
-    *changed = false;
-    if (!place_contact(system, point))
-        return system->status;
-    if (drape_contact_fits(system->contact, system->pattern))
-        return DRAPE_OK;
-    *changed = true;
-    const int32_t *nodes = NULL;
-    int32_t pairs = drape_contact_couplings(system->contact, &nodes);
-    return extend(system, pairs, nodes);
-}
-
-static void archive_drag_spring(drape_system *system, drape_archive *a)
-{
-    const drape_model *m = system->model;
-    drape_drag_spring *spring = &system->drag;
-    drape_archive_int32(a, &spring->node);
-    drape_archive_double(a, &spring->stiffness);
-    drape_archive_doubles(a, spring->target, 3);
-    if (drape_archive_is_reading(a) && spring->stiffness > 0 &&
-        (spring->node < 0 || spring->node >= m->node_count || m->pinned[spring->node]))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pulls node %d, which is not free",
-                           (int)spring->node);
-}
-
-static void archive_push(drape_system *system, drape_archive *a)
-{
-    const size_t n = 3 * (size_t)system->model->node_count;
-    drape_archive_bool(a, &system->pushed);
-    if (system->pushed)
-        drape_archive_doubles(a, system->push, n);
-    if (drape_archive_is_reading(a) && !drape_all_finite(system->push, n))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pushes with a force that is not finite");
-}
-
-/* The list of pairs that the extended pattern was made of is archived: it is that of an earlier state. */
-void drape_system_archive(drape_system *system, drape_archive *a)
-{
-    bool contact = system->contact != NULL, extended = system->blocks != NULL;
-    const int32_t *nodes = NULL;
-    drape_archive_mark(a, "system");
-    drape_motion_archive(system->motion, a);
-    archive_drag_spring(system, a);
-    archive_push(system, a);
-    drape_archive_same(a, "whether there is contact", contact);
-    if (contact)
-        drape_contact_archive(system->contact, a);
-    drape_archive_bool(a, &extended);
-    if (!drape_archive_is_reading(a) || !contact || !extended)
-        return;
-    int32_t pairs = drape_contact_coupled(system->contact, &nodes);
-    drape_archive_note(a, extend(system, pairs, nodes));
 }
 
 const double *drape_system_on_colliders(const drape_system *system)
@@ -322,14 +216,82 @@ drape_status drape_system_check_contact(drape_system *system, const double *x, d
     return system->contact ? drape_contact_check(system->contact, x, t, reason, diagnostic) : DRAPE_OK;
 }
 
-/* ---- Sums over terms ---- */
+/* ---- The pattern ---- */
 
-static drape_sums into_values(const drape_system *system, double *values)
+const drape_pattern *drape_system_pattern(const drape_system *system)
 {
-    return (drape_sums){.values = values, .pattern = system->pattern, .blocks = system->blocks};
+    return system->pattern;
 }
 
-/* Gives terms in a medium its velocity at the point. */
+static void forget_extension(drape_system *system)
+{
+    drape_arena_free(&system->extension);
+    system->blocks = NULL;
+    system->pattern = &system->model->pattern;
+}
+
+/* Finds the slots of the terms' blocks in the extended pattern. */
+static drape_status place_terms(drape_system *system)
+{
+    const drape_model *model = system->model;
+    drape_arena *arena = &system->extension;
+    system->blocks = drape_arena_take(arena, (size_t)model->term_count, sizeof *system->blocks);
+    for (int32_t i = 0; system->blocks && i < model->term_count; i++) {
+        if (!drape_term_couples(&model->terms[i]))
+            continue;
+        const drape_coupling coupling = drape_term_coupling(&model->terms[i]);
+        const size_t places = (size_t)coupling.count * (size_t)(coupling.nodes * coupling.nodes);
+        system->blocks[i] = drape_arena_take(arena, places, sizeof **system->blocks);
+        if (system->blocks[i])
+            drape_pattern_place(&system->extended, model->free_of_node, &coupling, system->blocks[i]);
+    }
+    return drape_arena_status(arena);
+}
+
+/* Builds the extended pattern: of all terms and these pairs of contact (pairs x 4 nodes). */
+static drape_status extend(drape_system *system, int32_t pairs, const int32_t *nodes)
+{
+    const drape_model *model = system->model;
+    drape_context *ctx = system->arena->ctx;
+    drape_coupling *couplings = drape_alloc(ctx, (size_t)model->term_count + 1, sizeof *couplings);
+    int count = 0;
+    if (pairs < 0 || !couplings) {
+        drape_free(ctx, couplings);
+        return DRAPE_E_MEMORY;
+    }
+    for (int32_t i = 0; i < model->term_count; i++)
+        if (drape_term_couples(&model->terms[i]))
+            couplings[count++] = drape_term_coupling(&model->terms[i]);
+    couplings[count++] = (drape_coupling){.count = pairs, .nodes = 4, .node = nodes};
+    forget_extension(system);
+    drape_status status = drape_pattern_build(&system->extension, model->free_count, model->free_of_node,
+                                              couplings, count, &system->extended);
+    drape_free(ctx, couplings);
+    if (!status)
+        status = place_terms(system);
+    if (status) /* back to the model's pattern: it, too, differs from the previous one */
+        forget_extension(system);
+    else
+        system->pattern = &system->extended;
+    return status;
+}
+
+drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed)
+{
+    *changed = false;
+    if (!place_contact(system, point))
+        return system->status;
+    if (drape_contact_fits(system->contact, system->pattern))
+        return DRAPE_OK;
+    *changed = true;
+    const int32_t *nodes = NULL;
+    int32_t pairs = drape_contact_couplings(system->contact, &nodes);
+    return extend(system, pairs, nodes);
+}
+
+/* ---- Forces ---- */
+
+/* For the terms in the medium: the velocity relative to it at each node. */
 static void evaluate_wind(drape_system *system, drape_request *want)
 {
     const drape_point *point = want->point;
@@ -365,6 +327,13 @@ void drape_system_dissipation(drape_system *system, const drape_point *point, do
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
     if (place_contact(system, point))
         drape_contact_add_forces(system->contact, false, true, g);
+}
+
+/* ---- Jacobians ---- */
+
+static drape_sums into_values(const drape_system *system, double *values)
+{
+    return (drape_sums){.values = values, .pattern = system->pattern, .blocks = system->blocks};
 }
 
 static void add_masses(const drape_system *system, double mass_weight, double *values)
@@ -440,25 +409,7 @@ void drape_system_damping(drape_system *system, const drape_point *point, double
         drape_contact_add_jacobian(system->contact, 0, true, false, system->pattern, values);
 }
 
-double drape_system_contact_energy(drape_system *system, const drape_point *point)
-{
-    return place_contact(system, point) ? drape_contact_potential(system->contact) : 0;
-}
-
-void drape_system_contact_part(drape_system *system, const drape_point *point, bool friction, double *g,
-                               double *values)
-{
-    if (g)
-        memset(g, 0, 3 * (size_t)system->model->node_count * sizeof *g);
-    if (values)
-        memset(values, 0, (size_t)system->pattern->nonzeros * sizeof *values);
-    if (!place_contact(system, point))
-        return;
-    if (g)
-        drape_contact_add_forces(system->contact, true, friction, g);
-    if (values)
-        drape_contact_add_jacobian(system->contact, point->weight, false, false, system->pattern, values);
-}
+/* ---- Energies ---- */
 
 static bool has_energy(const drape_system *system, const drape_term *term)
 {
@@ -489,6 +440,28 @@ void drape_system_node_energy(drape_system *system, const drape_point *point, do
         if (!term->ops->potential_of_gravity && has_energy(system, term))
             drape_summer_add_term(system->summer, term, &want, &to, NULL);
     }
+}
+
+double drape_system_contact_energy(drape_system *system, const drape_point *point)
+{
+    return place_contact(system, point) ? drape_contact_potential(system->contact) : 0;
+}
+
+/* ---- One part alone ---- */
+
+void drape_system_contact_part(drape_system *system, const drape_point *point, bool friction, double *g,
+                               double *values)
+{
+    if (g)
+        memset(g, 0, 3 * (size_t)system->model->node_count * sizeof *g);
+    if (values)
+        memset(values, 0, (size_t)system->pattern->nonzeros * sizeof *values);
+    if (!place_contact(system, point))
+        return;
+    if (g)
+        drape_contact_add_forces(system->contact, true, friction, g);
+    if (values)
+        drape_contact_add_jacobian(system->contact, point->weight, false, false, system->pattern, values);
 }
 
 void drape_system_term(drape_system *system, int32_t term, const drape_point *point, double *energy,
@@ -597,4 +570,49 @@ drape_diagnostic drape_system_diagnose_dof(const drape_system *system, const dou
                               .cloth = node >= 0 ? drape_model_cloth_of(model, node) : -1,
                               .value = model->free_count > 0 ? fabs(free_vector[diagnostic]) : 0,
                               .limit = limit};
+}
+
+/* ---- Checkpoints ---- */
+
+static void archive_drag_spring(drape_system *system, drape_archive *a)
+{
+    const drape_model *m = system->model;
+    drape_drag_spring *spring = &system->drag;
+    drape_archive_int32(a, &spring->node);
+    drape_archive_double(a, &spring->stiffness);
+    drape_archive_doubles(a, spring->target, 3);
+    if (drape_archive_is_reading(a) && spring->stiffness > 0 &&
+        (spring->node < 0 || spring->node >= m->node_count || m->pinned[spring->node]))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pulls node %d, which is not free",
+                           (int)spring->node);
+}
+
+static void archive_push(drape_system *system, drape_archive *a)
+{
+    const size_t n = 3 * (size_t)system->model->node_count;
+    drape_archive_bool(a, &system->pushed);
+    if (system->pushed)
+        drape_archive_doubles(a, system->push, n);
+    if (drape_archive_is_reading(a) && !drape_all_finite(system->push, n))
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pushes with a force that is not finite");
+}
+
+/* The pairs of contact that the extended pattern was built from are archived, too: they belong to an
+ * earlier state, so they cannot be found again from the present one. */
+void drape_system_archive(drape_system *system, drape_archive *a)
+{
+    bool contact = system->contact != NULL, extended = system->blocks != NULL;
+    const int32_t *nodes = NULL;
+    drape_archive_mark(a, "system");
+    drape_motion_archive(system->motion, a);
+    archive_drag_spring(system, a);
+    archive_push(system, a);
+    drape_archive_same(a, "whether there is contact", contact);
+    if (contact)
+        drape_contact_archive(system->contact, a);
+    drape_archive_bool(a, &extended);
+    if (!drape_archive_is_reading(a) || !contact || !extended)
+        return;
+    int32_t pairs = drape_contact_coupled(system->contact, &nodes);
+    drape_archive_note(a, extend(system, pairs, nodes));
 }

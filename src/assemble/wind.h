@@ -1,6 +1,6 @@
 /*
- * wind.h: the medium that a host moves. Terms in a medium (drag) are given the velocity against it, v - w(t,
- * x), and their derivatives become, W = dw/dx of each node,
+ * wind.h: the moving medium, set by a host. Terms in the medium (drag) see the velocity relative to it, v -
+ * w(t, x). With W = dw/dx at each node their derivatives become
  *     dg/dx = g_x - g_v W,   dg/dv = g_v
  */
 #ifndef DRAPE_ASSEMBLE_WIND_H
@@ -15,14 +15,15 @@ typedef struct drape_wind {
     double *gradient; /* (node_count x 3 x 3) W [1/s] */
 } drape_wind;
 
-/* Room for a field, where some term of the model feels it; the medium rests. Errors: DRAPE_E_MEMORY. */
+/* Memory for a field, if some term of the model feels it; the medium is at rest at first. Errors:
+ * DRAPE_E_MEMORY. */
 drape_status drape_wind_create(drape_arena *arena, const drape_model *model, drape_wind *wind);
 
-/* Evaluates the field at all nodes: wind->against, and wind->gradient if gradient. */
+/* Evaluates the field at all nodes into wind->against and, if `gradient`, wind->gradient. */
 void drape_wind_evaluate(drape_wind *wind, int32_t node_count, double t, const double *x, const double *v,
                          bool gradient);
 
-/* Whether some term of the model is in the medium. */
+/* Whether a term of the model is in the medium. */
 bool drape_wind_is_felt(const drape_model *model);
 
 #endif

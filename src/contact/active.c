@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-#define SLOTS 4 /* of the hash table, for each contact that there is room for */
+#define SLOTS 4 /* of the hash table, for each contact in `room` */
 
 /* Removes the nodes that have no weight. */
 static void reduce(drape_active_contact *contact)
@@ -20,8 +20,8 @@ static void reduce(drape_active_contact *contact)
         contact->pair.node[a] = -1;
 }
 
-/* Whether several pairs can be this contact: two points, or a point and an edge. A contact of four nodes is
- * only that of its own pair, and so is one that depends on more than its nodes. */
+/* Whether several pairs can be this contact: two points, or a point and an edge. A contact of four nodes
+ * belongs to its own pair only, and so does one that depends on more than its nodes. */
 static bool is_shared(const drape_active_contact *contact)
 {
     const int points = contact->gap.closest.points;
@@ -47,7 +47,7 @@ static void key_of(const drape_active_contact *contact, int32_t key[3])
         return;
     }
     int positive = (c[0] > 0) + (c[1] > 0) + (c[2] > 0),
-        single = 0; /* the sign of one weight is unlike the others */
+        single = 0; /* the index of the weight with the other sign */
     while (single < 2 && (c[single] > 0) != (positive == 1))
         single++;
     const int32_t nodes[3] = {n[single], n[single == 0], n[single == 2 ? 1 : 2]};
@@ -66,7 +66,7 @@ static bool is_same(const drape_active_contact *a, const drape_active_contact *b
     return memcmp(key, other, sizeof key) == 0;
 }
 
-/* The slot of a contact, or the free one for it. */
+/* The slot of a contact, or a free one for it. */
 static int32_t *slot_of(const drape_active_set *set, const drape_active_contact *contact)
 {
     int32_t key[3];
@@ -80,7 +80,7 @@ static int32_t *slot_of(const drape_active_set *set, const drape_active_contact 
     return &set->slots[at];
 }
 
-/* Room for one more contact, in the table too. */
+/* Makes room for one more contact, in the hash table, too. */
 static bool grow(drape_active_set *set)
 {
     int32_t room = set->room;

@@ -1,7 +1,7 @@
 /*
  * active.h: the active set: the candidates whose gap is below the activation distance, each with its
- * geometry. Pairs of large pieces are often contacts of smaller ones (an edge that is closest at its end is
- * that point): these are listed once, with the sum of their areas.
+ * geometry. Several pairs of larger pieces may be the same contact of smaller ones (for an edge that is
+ * closest at its end, that end): such a contact is listed once, with the sum of their areas.
  */
 #ifndef DRAPE_CONTACT_ACTIVE_H
 #define DRAPE_CONTACT_ACTIVE_H
@@ -9,7 +9,7 @@
 #include "contact/candidates.h"
 
 typedef struct drape_active_contact {
-    drape_pair pair; /* its nodes are the points of the gap, -1 beyond */
+    drape_pair pair; /* its nodes are the points of the gap; -1 for points that do not exist */
     drape_gap gap;
 } drape_active_contact;
 
@@ -17,7 +17,7 @@ typedef struct drape_active_set {
     drape_arena *arena;
     drape_active_contact *contacts; /* (count of room) */
     int32_t count, room;
-    int32_t *slots; /* (several x room) hash table by nodes: 1 + a contact, 0: free */
+    int32_t *slots; /* (several x room) hash table with the nodes as keys: 1 + index of a contact; 0: free */
 } drape_active_set;
 
 /* Lists the active contacts of a configuration in which no point has moved farther than `moved` from the

@@ -2,8 +2,9 @@
  * barrier.h: the energy of a gap, b(s) with s = gap / activation distance: the logarithmic barrier of Li et
  * al. 2020 (Incremental Potential Contact, eq. 6) scaled to length one,
  *     b = -(s - 1)^2 ln s   for s < 1,  0 beyond,
- * C2 at s = 1. Below s = DRAPE_BARRIER_LOW it continues as its osculating parabola and is finite everywhere,
- * so that an iterate of Newton, or a start without a gap, is pushed out again. No step is accepted there.
+ * C2 at s = 1. Below s = DRAPE_BARRIER_LOW it continues as its osculating parabola and is finite
+ * everywhere, so that a Newton iterate, or a start without a gap, is pushed out again. No step is accepted
+ * there.
  */
 #ifndef DRAPE_CONTACT_BARRIER_H
 #define DRAPE_CONTACT_BARRIER_H

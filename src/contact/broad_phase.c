@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-/* ---- Making ---- */
+/* ---- Creation ---- */
 
 static void count_features(const drape_model *m, int32_t *points, int32_t *segments, int32_t *triangles)
 {
@@ -59,7 +59,7 @@ static double area_of(const double *x, const int32_t *node)
     return 0.5 * sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]);
 }
 
-/* A node has a third of the area of its triangles, an edge the mean of its two nodes. */
+/* A node gets a third of the area of its triangles, an edge the mean of its two nodes. */
 static void share_areas(drape_broad_phase *s)
 {
     const drape_model *m = s->model;
@@ -98,7 +98,7 @@ drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *m, 
             s->obstacle_radius = fmax(s->obstacle_radius, m->colliders[i].shape.radius);
     list_features(s);
     share_areas(s);
-    const bool met = points > 0 || m->contact.self; /* faces and edges have something to meet */
+    const bool met = points > 0 || m->contact.self; /* faces and edges can meet something */
     drape_status status =
         drape_bvh_build(arena, met ? m->triangle_count : 0, 3, m->triangle, m->rest, &s->faces);
     if (!status)
@@ -134,13 +134,13 @@ static void set_collider(const drape_broad_phase *s, int32_t collider, drape_pai
 
 /* ---- Searching ---- */
 
-/* One piece that is tested against the pieces in a tree. */
+/* A piece that is tested against those in a tree. */
 typedef struct query {
     drape_broad_phase *broad;
     const double *x, *y;
     drape_broad_phase_visit *visit;
     void *user;
-    drape_pair pair; /* its constants, as far as the piece alone gives them */
+    drape_pair pair; /* its constants, as far as they depend on this piece alone */
     int32_t piece;   /* number of the point, edge or segment */
 } query;
 
@@ -212,7 +212,7 @@ static double reach_of(const drape_pair *pair, double reach)
     return fmax(0, pair->distance + pair->radius + reach);
 }
 
-/* Tests some pieces against a tree: the piece is `nodes` nodes from `node` on. */
+/* Tests a piece against those in a tree: its nodes are the `nodes` ones from `node` on. */
 static void search_tree(query *q, int32_t piece, const int32_t *node, int nodes, double reach,
                         const drape_bvh *tree, drape_bvh_visit *visit)
 {

@@ -1,7 +1,7 @@
 /*
- * broad_phase.h: which pairs of pieces may come near each other, at some positions or on the path to others.
- * Pieces are the nodes, edges and faces of the cloths and the features of the colliders' shapes, whose points
- * are numbered after the nodes.
+ * broad_phase.h: finds the pairs of pieces that may come near each other, at given positions or on the path
+ * to others. Pieces are the nodes, edges and faces of the cloths and the features of the colliders' shapes,
+ * whose points are numbered after the nodes.
  */
 #ifndef DRAPE_CONTACT_BROAD_PHASE_H
 #define DRAPE_CONTACT_BROAD_PHASE_H
@@ -13,7 +13,7 @@ typedef struct drape_broad_phase {
     const drape_model *model;
     int32_t points;          /* nodes, and points of colliders */
     int32_t *point_collider; /* (points - node_count) */
-    double *rest;            /* (points x 3): nodes at rest, points of colliders without displacement */
+    double *rest;            /* (points x 3): nodes at rest, points of undisplaced colliders */
     drape_bvh faces, edges;  /* of the cloths */
     drape_bvh obstacles;     /* triangles of colliders without a smooth distance */
     int32_t *segment;        /* (segments x 2) of colliders */
@@ -21,18 +21,18 @@ typedef struct drape_broad_phase {
     int32_t segments;
     int32_t *triangle; /* (obstacles.count x 3) of colliders */
     int32_t *triangle_collider;
-    double *node_area, *edge_area, *face_area; /* shares of the sheet [m2] */
+    double *node_area, *edge_area, *face_area; /* area of the sheet that belongs to each [m2] */
     double max_distance;                       /* largest activation distance of any pair [m] */
     double obstacle_radius;                    /* largest radius around the triangles of an obstacle [m] */
 } drape_broad_phase;
 
 drape_status drape_broad_phase_create(drape_arena *arena, const drape_model *model, drape_broad_phase *out);
 
-/* Calls visit for every pair whose pieces may be within its activation distance plus reach, at x or anywhere
- * on the straight path from there to y (NULL: only at x), in an order that does not depend on the positions.
- * A negative reach shrinks the distance to 0 at least, so that pairs that meet are found. Pairs whose nodes
- * are all pinned are left out, and so are surfaces: every free node is paired with them. x, y: (points x
- * 3). */
+/* Calls visit for every pair whose pieces may be within its activation distance plus reach, at x or
+ * anywhere on the straight path from x to y (NULL: only at x), in an order that does not depend on the
+ * positions. A negative reach shrinks the distance, but not below 0, so that touching pairs are found. Left
+ * out are pairs whose nodes are all pinned, and pairs with surfaces, since every free node is paired with
+ * all of them. x, y: (points x 3). */
 typedef void drape_broad_phase_visit(void *user, const drape_pair *pair);
 void drape_broad_phase_pairs(drape_broad_phase *broad, const double *x, const double *y, double reach,
                              drape_broad_phase_visit *visit, void *user);

@@ -21,8 +21,8 @@ typedef struct search {
     drape_status status;
 } search;
 
-/* Layers of one sheet that are near to each other at rest are not in contact there: they have half of that
- * distance. */
+/* Layers of one sheet that are close together at rest must not be in contact there: their activation
+ * distance is at most half of the rest distance. */
 static double activation_distance(const search *s, const drape_pair *pair)
 {
     if (pair->collider >= 0 || drape_pair_is_apart(pair, &s->rest, 2 * pair->distance))

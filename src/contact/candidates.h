@@ -1,7 +1,7 @@
 /*
- * candidates.h: the candidate pairs: found by the broad phase at some positions and kept as long as no point
- * moves farther from there than the margin. Their order depends on the pieces alone: sums over those that act
- * have the same bits whatever the positions of the search.
+ * candidates.h: the candidate pairs, found by the broad phase at some positions and valid until a point
+ * moves farther from there than the margin. Their order depends on the pieces alone: sums over the active
+ * ones have the same bits wherever the search was made.
  */
 #ifndef DRAPE_CONTACT_CANDIDATES_H
 #define DRAPE_CONTACT_CANDIDATES_H
@@ -11,28 +11,28 @@
 typedef struct drape_candidates {
     drape_arena *arena;
     drape_broad_phase *broad;
-    bool known;                /* there was a search, and memory for all that it found */
+    bool known;                /* a search was made, and there was memory for everything that it found */
     double margin;             /* how far points may move from the positions of the search [m] */
-    double *x;                 /* (points x 3) those positions */
+    double *x;                 /* (points x 3) the positions of the search */
     drape_collider_pose *pose; /* (collider_count) */
-    drape_pair *pairs;         /* (count of room), surfaces too */
+    drape_pair *pairs;         /* (count of room) including those with surfaces */
     int32_t count, room;
 } drape_candidates;
 
-/* arena and broad outlive the candidates. */
+/* arena and broad must outlive the candidates. */
 drape_status drape_candidates_create(drape_arena *arena, drape_broad_phase *broad, drape_candidates *out);
 
-/* Finds all pairs that can become active where no point is farther than margin from these positions, which
- * may be its own. Errors: DRAPE_E_MEMORY. */
+/* Finds all pairs that can become active while no point is farther than margin from these positions, which
+ * may be the candidates' own. Errors: DRAPE_E_MEMORY. */
 drape_status drape_candidates_search(drape_candidates *candidates, const drape_configuration *at,
                                      double margin);
 
-/* The largest distance of a point from where the search had it; INFINITY if there was none, or if a position
- * is not finite. */
+/* The largest distance of a point from its position at the search; INFINITY if there was none, or if a
+ * position is not finite. */
 double drape_candidates_moved(const drape_candidates *candidates, const drape_configuration *at);
 
-/* Whether a candidate can come nearer than `gap` if no point is farther than moved from the positions of the
- * search. */
+/* Whether the gap of a candidate can fall below `gap` while no point is farther than moved from the
+ * positions of the search. */
 static inline bool drape_candidate_may(const drape_pair *pair, double moved, double gap)
 {
     return pair->found - 2 * moved < gap;

@@ -7,9 +7,9 @@
 
 #include <string.h>
 
-#define KEEP_ITERATE 0.5 /* of a gap, where an iterate of Newton is cut short */
+#define KEEP_ITERATE 0.5 /* of a gap, kept when a Newton iterate is cut short */
 #define MARCH_SHARE  0.9
-#define MAX_MARCHES  10000 /* of a node along its path */
+#define MAX_MARCHES  10000 /* maximum number of steps of a node along its path */
 
 /* A displacement of all points, and the first pair that limits it. */
 typedef struct path {
@@ -19,7 +19,7 @@ typedef struct path {
     drape_pair limiting;
 } path;
 
-/* Not searched beyond the fraction that another pair leaves: if forces throw nodes very far, a pair
+/* Does not search beyond the step fraction that another pair leaves: if forces throw nodes very far, a pair
  * approaches so slowly relative to its speed that searching each to its own end would take for ever. */
 static void follow(void *user, const drape_pair *pair)
 {
@@ -41,8 +41,8 @@ static double longest_move(const drape_contact *c, const path *p)
     return sqrt(largest);
 }
 
-/* Paths are straight: if both ends are near the last search, all between them is. Two points approach each
- * other by no more than the sum of their moves. */
+/* Paths are straight: if both ends are near the last search, all points between them are. Two points
+ * approach each other by no more than the sum of their displacements. */
 double drape_contact_free_fraction(drape_contact *c, const double *x, const double *y,
                                    const drape_collider_pose *pose, double keep, bool core,
                                    drape_pair *limiting)
@@ -67,8 +67,8 @@ double drape_contact_free_fraction(drape_contact *c, const double *x, const doub
     return p.fraction;
 }
 
-/* The same for a node and a surface: marching by the distance, which no path can outrun, until keep of the
- * gap is left. 1 from inside. */
+/* The same for a node and a surface, by steps of the length of the distance, with which no path can cross
+ * the surface, until keep of the gap is left. Returns 1 if the node starts inside. */
 static double march(const drape_collider *collider, const drape_collider_pose *pose, const double *x,
                     const double *y, double keep)
 {

@@ -1,4 +1,4 @@
-/* check.c: whether the end of a step is allowed: penetration and collisions. See contact.h. */
+/* check.c: checks whether the end of a step is allowed: penetration and collisions. See contact.h. */
 #include "contact/parts.h"
 
 #include "base/clock.h"
@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define TOUCH       1e-9  /* [m] a piece may be this deep in a collider */
-#define MAX_MARCHES 10000 /* of a node along its path */
+#define MAX_MARCHES 10000 /* maximum number of steps of a node along its path */
 
 static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *pair, const char *what,
                                       double value, double limit)
@@ -29,8 +29,8 @@ static drape_diagnostic diagnostic_of(const drape_contact *c, const drape_pair *
     return found;
 }
 
-/* Finds the active contact with the largest penetration beyond its limit: it may be as deep as before the
- * step. */
+/* Finds the active contact whose penetration exceeds its limit most; the penetration before the step is
+ * allowed. */
 static drape_status check_depth(drape_contact *c, const char **reason, drape_diagnostic *diagnostic)
 {
     double excess = 0;
@@ -50,8 +50,9 @@ static drape_status check_depth(drape_contact *c, const char **reason, drape_dia
     return excess > 0 ? DRAPE_RETRY_REJECTED : DRAPE_OK;
 }
 
-/* Whether a node on its straight path passes through the surface although both ends are outside: marching by
- * the distance, which no path can outrun. x, y: in the collider's own coordinates. */
+/* Whether a node passes through the surface on its straight path although both ends are outside, by steps
+ * of the length of the distance, with which no path can cross the surface. x, y: in the collider's own
+ * coordinates. */
 static bool dips(const drape_collider *collider, const double *x, const double *y)
 {
     double p[3], at[3], t = 0,
@@ -90,7 +91,7 @@ static drape_status check_surfaces(drape_contact *c, const char **reason, drape_
     return DRAPE_OK;
 }
 
-/* The least distance of an edge (two nodes) or a face (three) of cloth; `enough` as in depth.h. */
+/* The smallest distance of an edge (two nodes) or a face (three) of cloth; `enough` as in depth.h. */
 static double depth_of(const drape_collider *collider, const drape_collider_pose *pose, const double *x,
                        const int32_t *node, int nodes, double enough)
 {
@@ -101,8 +102,8 @@ static double depth_of(const drape_collider *collider, const drape_collider_pose
                       : drape_depth_face(collider, pose, corner, enough);
 }
 
-/* Edges or faces of cloth against the curved surfaces of shapes that are inside of them (inscribed). A piece
- * may be as deep as it was before. */
+/* Checks edges or faces of cloth against the curved surfaces of shapes whose features lie inside these
+ * surfaces (inscribed). A piece may be as deep as it was before. */
 static drape_status check_inscribed(drape_contact *c, const int32_t *node, int nodes, int32_t count,
                                     const char **reason, drape_diagnostic *diagnostic)
 {

@@ -25,7 +25,7 @@ static void archive_couplings(drape_contact *c, drape_archive *a)
     }
 }
 
-/* A search needs finite numbers. */
+/* Whether positions are finite, as a search needs. */
 static bool is_valid(const drape_contact *c)
 {
     const size_t n = 3 * (size_t)c->broad.points;
@@ -33,7 +33,8 @@ static bool is_valid(const drape_contact *c)
            c->steps.margin <= c->model->length && c->next_margin >= 0 && c->next_margin <= c->model->length;
 }
 
-/* The active set at the beginning of the step follows from the positions alone: any search there finds it. */
+/* The active set at the beginning of the step depends on the positions alone, so a new search finds the
+ * same one. */
 static drape_status restore_start(drape_contact *c)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
@@ -47,8 +48,8 @@ static drape_status restore_start(drape_contact *c)
     return status;
 }
 
-/* Which candidates the steps have, and so what a pattern is made for, follows from where their last search
- * was. */
+/* Which candidates the steps have, and so which pairs a new pattern would contain, depends on the positions
+ * of their last search. */
 static drape_status restore(drape_contact *c)
 {
     const drape_configuration at = {.model = c->model, .x = c->steps.x, .pose = c->steps.pose};

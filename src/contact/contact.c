@@ -1,16 +1,16 @@
 /*
- * contact.c: see contact.h. How a pair of pieces reaches the Jacobian:
+ * contact.c: see contact.h. The path of a pair of pieces to the Jacobian:
  *
- *     broad_phase.c  pairs whose boxes meet, searched in trees of boxes (geometry/bvh.h)
+ *     broad_phase.c  pairs whose boxes overlap, searched in trees of boxes (geometry/bvh.h)
  *     candidates.c   those near enough to become active before the next search
- *     pair.c         narrow phase: closest points, gap, normal and weights of one candidate, evaluated once
+ *     pair.c         narrow phase: closest points, gap, normal and weights of a candidate, evaluated once
  *     active.c       the active set: candidates whose gap is below the activation distance, equal ones merged
- *     force.c        energy, gradient and Hessian of one active contact, by the barrier (barrier.h)
- *     friction.c     its friction, with the normal force of now or of the beginning of the step (lagged)
+ *     force.c        energy, gradient and Hessian of an active contact, by the barrier (barrier.h)
+ *     friction.c     its friction, with the normal force of now or, lagged, of the beginning of the step
  *     jacobian.c     dg/dx + w dg/dv of the active set, block by block into the pattern
  *
- * This file has the states between which that happens: the beginning of a step, and where contact is
- * evaluated.
+ * This file has the two configurations that these work on: the beginning of a step, and the one at which
+ * contact is evaluated.
  */
 #include "contact/parts.h"
 
@@ -20,12 +20,12 @@
 
 #include <string.h>
 
-#define MIN_MARGIN   0.25 /* of a mean edge: how far points may move before a new search, at least */
-#define MAX_MARGIN   0.4  /* and at most, */
-#define MARGIN_STEPS 1.5  /* or the displacement of this many steps like the last one */
-#define LEAD_BEGIN   1.0  /* a search at the beginning of a step is made this many displacements ahead, */
-#define LEAD_WITHIN  -0.5 /* within the step half back to its beginning, as the next trial may start there, */
-#define MAX_LEAD     0.8  /* and at most this share of the margin away */
+#define MIN_MARGIN   0.25 /* of a mean edge: smallest margin, by which points may move before a new search, */
+#define MAX_MARGIN   0.4  /* and largest one; */
+#define MARGIN_STEPS 1.5  /* between them it is the displacement of this many steps like the last one */
+#define LEAD_BEGIN   1.0  /* displacements by which a search at the beginning of a step is made ahead; */
+#define LEAD_WITHIN  -0.5 /* within a step it is made half back, as the next trial may start there; */
+#define MAX_LEAD     0.8  /* the largest such distance, as a share of the margin */
 
 static drape_status take_arrays(drape_arena *arena, drape_contact *c)
 {
@@ -124,7 +124,7 @@ static void fill_velocities(const drape_contact *c, const double *nodes, double 
         memcpy(v + 3 * i, c->pose[c->broad.point_collider[i - n]].velocity, 3 * sizeof *v);
 }
 
-/* Returns whether a collider is elsewhere than before. */
+/* Returns whether a collider has moved. */
 static bool move_colliders(drape_contact *c, double t, const double span[2])
 {
     bool moved = false;
@@ -163,7 +163,8 @@ static double displacement(const drape_contact *c, const double *x)
     return sqrt(largest);
 }
 
-/* Searches where points are expected, ahead or half back: the candidates then hold before and after that. */
+/* Searches at positions that are extrapolated by `lead`, so that the candidates hold both before and after
+ * these. */
 static drape_status search(drape_contact *c, drape_candidates *candidates, double lead)
 {
     const double start = drape_clock_seconds(), limit = MAX_LEAD * c->next_margin;
@@ -190,7 +191,7 @@ drape_status drape_contact_go(drape_contact *c, const drape_contact_at *at, doub
     fill_velocities(c, at->v, c->v);
     const bool listed = c->listed == &c->steps || (c->listed && c->between_steps);
     if (listed && !moved && memcmp(at->x, c->x, 3 * (size_t)c->model->node_count * sizeof *c->x) == 0)
-        return DRAPE_OK; /* forces, energy and derivatives are often evaluated at one point */
+        return DRAPE_OK; /* forces, energy and derivatives are often evaluated at the same point */
     c->listed = NULL;
     drape_contact_fill(c, at->x, c->pose, c->x);
     const drape_configuration now = drape_contact_configuration(c);
@@ -259,7 +260,8 @@ void drape_contact_measure_start(drape_contact *c)
     }
 }
 
-/* Fast sheets are searched with a larger margin and ahead, once in a step or two and not at every trial. */
+/* For fast sheets the search has a larger margin and is made ahead of the motion: once in a step or two
+ * instead of at every trial. */
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
     const double start = drape_clock_seconds(), last = c->steps.known ? displacement(c, x) : 0;

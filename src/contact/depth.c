@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#define ENOUGH   1e-12 /* [m] between the least value and its lower bound */
+#define ENOUGH   1e-12 /* [m] between the minimum and its lower bound */
 #define MAX_CUTS 60
 #define SECTIONS 40               /* of a face: 0.618^40 of its height are left */
 #define GOLDEN   0.61803398874989 /* (sqrt 5 - 1)/2 */
@@ -47,7 +47,8 @@ double drape_depth_edge(const drape_collider *collider, const drape_collider_pos
     return least;
 }
 
-/* The least distance on the line from side 0 1 to side 0 2, at the share s of their lengths. */
+/* The smallest distance on the line that joins the points of the sides 0 1 and 0 2 at the share s of their
+ * lengths. */
 static double depth_across(const drape_collider *collider, const drape_collider_pose *pose,
                            const double *const corner[3], double s)
 {
@@ -76,7 +77,8 @@ static bool may_be_deep(const drape_collider *collider, const drape_collider_pos
     return true;
 }
 
-/* The least value on a line parallel to side 1 2 is a convex function of s: golden section (Kiefer 1953). */
+/* The minimum on a line parallel to side 1 2 is a convex function of s, minimised by golden section (Kiefer
+ * 1953). */
 double drape_depth_face(const drape_collider *collider, const drape_collider_pose *pose,
                         const double *const corner[3], double enough)
 {

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-/* Pairs with a shorter activation distance take up the same energy. */
+/* The stiffness is such that pairs with a shorter activation distance can absorb the same energy. */
 drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_pair *pair)
 {
     const drape_contact_def *def = &c->model->contact;

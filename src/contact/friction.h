@@ -1,9 +1,9 @@
 /*
- * friction.h: friction of one contact of up to four points, with exact derivatives. It acts against the
- * relative tangential velocity u_t of the closest points (Li et al. 2020, eq. 15 to 17, with velocities in
- * place of displacements over a step):
+ * friction.h: friction of one contact of up to four points, with exact derivatives. It opposes the relative
+ * tangential velocity u_t of the closest points (Li et al. 2020, eq. 15 to 17, with velocities instead of
+ * displacements over a step):
  *     g_i = c_i mu lambda f(|u_t|/eps) u_t/|u_t|,   f(y) = 2 y - y^2 for y < 1, else 1
- * with the normal force lambda: that of the same positions or, lagged, that of the beginning of the step.
+ * with the normal force lambda at the same positions or, lagged, at the beginning of the step.
  */
 #ifndef DRAPE_CONTACT_FRICTION_H
 #define DRAPE_CONTACT_FRICTION_H
@@ -15,12 +15,12 @@
 void drape_friction_force(const drape_gap *gap, const drape_contact_law *law, double lambda, double v[4][3],
                           double *g, double *dgdv);
 
-/* A symmetric matrix above dg/dv: c_i c_j mu lambda f(y)/|u_t| (I - n n'). Unlike dg/dv it is as stiff along
- * the sliding velocity as across, so that a step by it does not reverse the friction. */
+/* A symmetric upper bound of dg/dv: c_i c_j mu lambda f(y)/|u_t| (I - n n'). Unlike dg/dv it is as stiff
+ * along the sliding velocity as across it, so that a step computed with it does not reverse the friction. */
 void drape_friction_bound(const drape_gap *gap, const drape_contact_law *law, double lambda, double v[4][3],
                           double *dgdv);
 
-/* Adds to dgdx (12 x 12) how friction that is not lagged changes with lambda, c and normal. */
+/* Adds to dgdx (12 x 12) the change of friction that is not lagged with lambda, c and the normal. */
 void drape_friction_slope(const drape_gap *gap, const drape_gap_slopes *slopes, const drape_contact_law *law,
                           double v[4][3], double *dgdx);
 

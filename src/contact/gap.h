@@ -12,7 +12,7 @@
 typedef struct drape_gap {
     double value;          /* [m] */
     drape_closest closest; /* d gap / dx_i = c_i normal, of its points; 1 point: c is 1, params and slope 0 */
-    bool fixed_normal;     /* the normal and c do not change with the points: a sharp feature that touches */
+    bool fixed_normal;     /* the normal and c do not change with the points: a sharp feature is touched */
     bool mollified;        /* m and dm are set; else m = 1 and dm = 0 */
     double m, dm[12];      /* mollifier of nearly parallel edges, and its derivative */
     double curvature[9];   /* 1 point: of the smooth surface, dn/dx (3 x 3 [1/m]) */
@@ -21,7 +21,7 @@ typedef struct drape_gap {
 /* How the geometry changes with the points. Column 3 i + k belongs to coordinate k of point i. */
 typedef struct drape_gap_slopes {
     drape_closest_slopes closest; /* dc/dx and dn/dx */
-    double ddm[12][12];           /* of the mollifier, where there is one */
+    double ddm[12][12];           /* of the mollifier, if there is one */
 } drape_gap_slopes;
 
 /* The mollifier of edges 0 1 and 2 3 (Li et al. 2020, eq. 24), a function of q = |e1 x e2|^2: m = q/w (2 -

@@ -8,8 +8,8 @@
 #include <string.h>
 
 #define D 12
-#define PATTERN_MARGIN                                                                                       \
-    0.25 /* of a mean edge: pairs this near to becoming active have their blocks when a pattern is made */
+/* of a mean edge: pairs this near to becoming active have their blocks when a pattern is made */
+#define PATTERN_MARGIN 0.25
 
 static int32_t free_of(const drape_model *m, int32_t point)
 {
@@ -35,7 +35,7 @@ static void add_blocks(const drape_contact *c, const drape_active_contact *conta
         }
 }
 
-/* Which derivatives are wanted: dg/dx + weight dg/dv, or weight dg/dv alone. */
+/* The requested derivatives: dg/dx + weight dg/dv, or weight dg/dv alone. */
 typedef struct request {
     double weight;
     bool velocity_only, positive;
@@ -132,7 +132,7 @@ bool drape_contact_fits(const drape_contact *c, const drape_pattern *pattern)
     return true;
 }
 
-/* Four nodes each: the first one again in place of those that are missing. */
+/* Lists the nodes of a pair; if it has fewer than four, the first one is repeated. */
 static bool add_coupling(drape_contact *c, const drape_pair *pair, int points)
 {
     int32_t *coupling =

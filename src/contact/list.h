@@ -6,8 +6,8 @@
 
 #define DRAPE_LIST_START 64
 
-/* The list with room for one element more than count, its contents kept. NULL: out of memory, and list is as
- * it was. */
+/* Grows the list, if necessary, to room for one more element than count, and keeps its content. NULL: out
+ * of memory, and the list is unchanged. */
 static inline void *drape_list_grow(drape_arena *arena, void *list, int32_t count, int32_t *room, size_t size)
 {
     const int32_t wanted = *room > 0 ? 2 * *room : DRAPE_LIST_START;

@@ -6,11 +6,11 @@
 #include <math.h>
 #include <string.h>
 
-#define PARALLEL_WIDTH                                                                                       \
-    1e-3 /* of |e1|^2 |e2|^2 at rest: sin^2 below which edges are mollified (Li et al. 2020) */
-#define TOUCHING     1e-9 /* [m] below this distance, positions do not determine a normal */
-#define ADVANCE      0.9  /* share of the fraction that is certainly free, taken at once */
-#define MAX_ADVANCES 1000 /* then the fraction reached is safe, if not the largest */
+/* of |e1|^2 |e2|^2 at rest: sin^2 below which edges are mollified (Li et al. 2020) */
+#define PARALLEL_WIDTH 1e-3
+#define TOUCHING       1e-9 /* [m] below this distance, positions do not determine a normal */
+#define ADVANCE        0.9  /* share of the certainly free fraction that is taken at once */
+#define MAX_ADVANCES   1000 /* after these the fraction reached is safe, even if it is not the largest */
 
 typedef void find_closest(double x[4][3], drape_closest *at);
 
@@ -56,8 +56,8 @@ static double mollifier_width(const drape_pair *pair, const double *rest)
     return PARALLEL_WIDTH * vec3_dot(u, u) * vec3_dot(w, w);
 }
 
-/* A sharp feature that touches has no direction from its closest points. Its normal is the one across both
- * pieces, out of the collider, and fixed. */
+/* For a sharp feature at distance 0, the closest points give no direction. Its normal is then the one
+ * across both pieces, out of the collider, and fixed. */
 static void touching_normal(const drape_pair *pair, const drape_configuration *at, double x[4][3],
                             double normal[3])
 {
@@ -160,8 +160,8 @@ void drape_pair_slopes(const drape_pair *pair, const drape_gap *gap, const drape
 
 /* ---- Continuous collision detection ---- */
 
-/* The largest rate at which both pieces can approach each other, per step fraction; their common motion does
- * not count. */
+/* The largest rate at which the two pieces can approach each other, per step fraction, without their common
+ * motion. */
 static double approach_speed(drape_pair_kind kind, double p[4][3])
 {
     double mean[3] = {0}, first = 0, second = 0;

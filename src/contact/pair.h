@@ -1,7 +1,7 @@
 /*
  * pair.h: two pieces that may come into contact, and the narrow phase: a node and the smooth surface of a
- * collider, a point and a triangle, or two segments. Points are nodes of the cloth and, from node_count on,
- * points of colliders.
+ * collider, a point and a triangle, or two segments. Points are the nodes of the cloth and, numbered from
+ * node_count on, the points of colliders.
  */
 #ifndef DRAPE_CONTACT_PAIR_H
 #define DRAPE_CONTACT_PAIR_H
@@ -20,9 +20,9 @@ typedef struct drape_pair {
     int32_t node[4];
     int32_t collider; /* -1: cloth and cloth */
     double radius;    /* the gap is the distance less this [m] */
-    double area;      /* that its force acts on [m2] */
+    double area;      /* area on which its force acts [m2] */
     double distance;  /* activation distance [m] */
-    double found;     /* a candidate: the gap where it was found [m] */
+    double found;     /* for a candidate: its gap at the search [m] */
 } drape_pair;
 
 /* All points at one instant. */
@@ -35,23 +35,25 @@ typedef struct drape_configuration {
 int drape_pair_points(const drape_pair *pair);
 double drape_pair_gap_value(const drape_pair *pair, const drape_configuration *at);
 
-/* Whether boxes around the pieces already show that the gap is larger than `gap`, as for most candidates. */
+/* Whether the boxes around the pieces already show that the gap is larger than `gap`, as for most
+ * candidates. */
 bool drape_pair_is_apart(const drape_pair *pair, const drape_configuration *at, double gap);
 
-/* The geometry of the pair, with all four points. False if it is not below the activation distance: then only
- * the value of the gap is set, INFINITY if the pieces are apart. rest: (points x 3), for the width of the
- * mollifier. */
+/* Computes the geometry of the pair, with all four points. Returns false if the gap is not below the
+ * activation distance: then only its value is set, INFINITY if the pieces are apart. rest: (points x 3),
+ * for the width of the mollifier. */
 bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const double *rest,
                     drape_gap *gap);
 
-/* How it changes with the points. The nodes of the pair are those of the points of the gap. */
+/* Computes how the gap changes with the points. The nodes of the pair must be those of the points of the
+ * gap. */
 void drape_pair_slopes(const drape_pair *pair, const drape_gap *gap, const drape_configuration *at,
                        const double *rest, drape_gap_slopes *slopes);
 
-/* Continuous collision detection: the largest step fraction from x to y, straight and for all points
- * together, without contact of the pair (additive continuous collision detection, Li et al. 2021,
- * Codimensional IPC, algorithm 1). It stops where `keep` of the gap at the start is left. At most `limit`,
- * beyond which it does not search, and which it returns for a pair in contact at the start (with a collider:
+/* Continuous collision detection: the largest step fraction on the straight path from x to y, the same for
+ * all points, without contact of the pair (additive continuous collision detection, Li et al. 2021,
+ * Codimensional IPC, algorithm 1). It stops when `keep` of the initial gap is left. It does not search
+ * beyond `limit`, which it returns at most, also for a pair in contact at the start (with a collider:
  * within 1e-9 m of it). core: the radius counts as 0. */
 double drape_pair_step_fraction(const drape_pair *pair, const double *x, const double *y, double keep,
                                 bool core, double limit);

@@ -1,4 +1,4 @@
-/* field_contact.c: the size of the force of contact and friction on a node. */
+/* field_contact.c: the magnitude of the force of contact and friction on a node. */
 #include "fields/fields.h"
 
 #include "base/vec3.h"
@@ -9,7 +9,7 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
 {
     const drape_model *m = sim->model;
     const drape_state *s = drape_sim_state(sim);
-    (void)x; /* forces as stiff as these are of a step's end alone */
+    (void)x; /* forces this stiff are meaningful only at the end of a step */
     memset(values, 0, (size_t)m->node_count * sizeof *values);
     if (sim->chosen.integrator->projects_contact && (m->collider_count || m->contact.self))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
@@ -18,7 +18,8 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
     if (!drape_system_contact(sim->system))
         return DRAPE_OK;
     drape_status status =
-        sim->before < 0 ? drape_system_begin(sim->system, s) : DRAPE_OK; /* else a step has */
+        /* otherwise the last step has begun there */
+        sim->before < 0 ? drape_system_begin(sim->system, s) : DRAPE_OK;
     if (status)
         return status;
     double *g = drape_alloc(sim->ctx, (size_t)m->node_count, 3 * sizeof *g);

@@ -8,7 +8,7 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
 }
 
 const drape_field_ops drape_field_energy = {
-    .entry = {.name = "energy", .summary = "elastic energy of the sheet by its area"},
+    .entry = {.name = "energy", .summary = "elastic energy of the sheet per area"},
     .unit = "J/m2",
     .shown = 1,
     .shown_unit = "J/m²",

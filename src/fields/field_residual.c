@@ -1,4 +1,5 @@
-/* field_residual.c: what the solver left of a free node's equation at the end of the last step. */
+/* field_residual.c: the residual of a free node's equation that the solver left at the end of the last
+ * step. */
 #include "fields/fields.h"
 
 #include "base/vec3.h"
@@ -22,8 +23,7 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
 }
 
 const drape_field_ops drape_field_residual = {
-    .entry = {.name = "residual",
-              .summary = "what the last step's solver left of a node's equation of motion"},
+    .entry = {.name = "residual", .summary = "residual of a node's equation of motion after the last step"},
     .unit = "N",
     .shown = 1,
     .shown_unit = "N",

@@ -1,5 +1,5 @@
-/* field_strain.c: the largest principal strain of the sheet. A node has the mean of its triangles, by their
- * area at rest. */
+/* field_strain.c: the largest principal strain of the sheet. A node has the mean over its triangles,
+ * weighted by their rest areas. */
 #include "fields/fields.h"
 
 #include <string.h>

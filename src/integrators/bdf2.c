@@ -1,28 +1,28 @@
 /*
- * bdf2: the backward differentiation formula of order 2 with variable steps. With r = h/h_before,
- * a = r^2/(1 + 2 r) and the weight w = (1 + 2 r)/(1 + r)/h:
+ * bdf2: the backward differentiation formula of order 2 with variable steps. With r = h/h_before, a =
+ * r^2/(1 + 2 r) and the weight w = (1 + 2 r)/(1 + r)/h:
  *     v1 = w (x1 - x0 - a (x0 - x_))
  *     M w (v1 - v0 - a (v0 - v_)) + g(x1, v1) = 0,  q' = w (q1 - q0 - a (q0 - q_))
- * where x_, v_, q_ are of the state before in. With d = x1 - x0 and c = a (x0 - x_):
+ * where x_, v_, q_ belong to the state before the present one. With d = x1 - x0 and c = a (x0 - x_):
  *     M w^2 (d - p) + g(x0 + d, w (d - c)) = 0,  p = c + (v0 + a (v0 - v_))/w
- * A- and L-stable at constant steps, zero-stable for r < 1 + sqrt(2), which halving and doubling keep.
- * Hairer, Norsett & Wanner 1993, III.5. The first step and the one after a discontinuity are backward
- * Euler, which the same formulas give for r = 0.
+ * A- and L-stable at constant steps, zero-stable for r < 1 + sqrt(2), which halving and doubling satisfy.
+ * Hairer, Norsett & Wanner 1993, III.5. The first step, and the first one after a discontinuity, are
+ * backward Euler, which the same formulas give for r = 0.
  */
 #include "integrators/implicit.h"
 
 #include <string.h>
 
-/* What the formula needs of the past of a state: differences to the state before it. */
+/* What the formula needs to know of the past: differences between a state and the one before it. */
 typedef struct past {
-    double t, h;          /* of the state, and of the step that led to it */
+    double t, h;          /* [s] time of the state; size of the step that led to it */
     double *dx, *dv, *dq; /* x0 - x_, v0 - v_ (nodes), q0 - q_ (measures) */
     bool known;
 } past;
 
 typedef struct bdf2_state {
     drape_implicit common; /* first */
-    past past, made;       /* of the last accepted state; of the state that the last attempt made */
+    past past, made;       /* of the last accepted state; of the state that the last attempt computed */
     double *q0;            /* measures */
 } bdf2_state;
 
@@ -48,7 +48,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     return status ? status : drape_arena_status(arena);
 }
 
-/* The attempt before was accepted if it made the state that this one starts from. */
+/* The last attempt was accepted if the state that it computed is the one that this step starts from. */
 static void settle_past(bdf2_state *s, const drape_state *in)
 {
     if (s->made.known && s->made.t == in->t) {
@@ -80,7 +80,7 @@ static void set_equation(bdf2_state *s, const drape_state *in, double a, double 
         c->history[i] = -w * (s->q0[i] + (a > 0 ? a * s->past.dq[i] : 0));
 }
 
-/* What the next step needs if this one is accepted. */
+/* Computes what the next step needs if this one is accepted. */
 static void remember(bdf2_state *s, const drape_state *in, const drape_state *out, double h)
 {
     drape_implicit *c = &s->common;

@@ -1,31 +1,32 @@
 /*
- * ida: variable order and step with local error control by IDA (Hindmarsh et al. 2005; Brenan, Campbell &
- * Petzold 1996).
+ * ida: variable order and step size with local error control by IDA (Hindmarsh et al. 2005; Brenan,
+ * Campbell & Petzold 1996).
  *     y = (x, v) of the free nodes,  F = [x' - v ; M v' + g(x, v, t)] = 0
  *
- * Each Newton correction of IDA solves [c_j I, -I; K, D + c_j M] (dx, dv) = (r1, r2), K = dg/dx, D =
- * dg/dv. Eliminating dv = c_j dx - r1 leaves
+ * Each Newton correction of IDA solves [c_j I, -I; K, D + c_j M] (dx, dv) = (r1, r2), K = dg/dx, D = dg/dv.
+ * Eliminating dv = c_j dx - r1 leaves
  *     (K + c_j D + c_j^2 M) dx = r2 + (D + c_j M) r1:
- * the matrix of a backward Euler step of size 1/c_j, with the same pattern and the same linear solvers.
- * IDA keeps Jacobian and factors while c_j stays near theirs; that is most of its advantage over one
- * factorisation an iteration. ida_newton.h decides when the iteration with old factors has converged.
+ * the matrix of a backward Euler step of size 1/c_j, with the same pattern and the same linear solvers. IDA
+ * keeps Jacobian and factors while c_j stays near the value that they were computed for; that is most of
+ * its advantage over one factorisation for each iteration. ida_newton.h decides when the iteration with old
+ * factors has converged.
  *
- * That iteration needs no exact matrix either. What makes it nonsymmetric is friction, whose force follows
- * the normal force, and dashpots of strains that rotate: small beside c_j^2 M and c_j D at the steps that
- * both ask for. With half of it on each side Cholesky factors serve: half of the time or less in most scenes
- * of contact, for as many iterations. Where much slides, the iteration may fail with them: then some matrices
- * are exact.
+ * That iteration does not need an exact matrix either. The nonsymmetric parts are those of friction, whose
+ * force follows the normal force, and of dashpots of strains that rotate. Both are small beside c_j^2 M and
+ * c_j D at the step sizes at which they occur. If each off-diagonal pair is replaced by its mean, Cholesky
+ * factors can be used: half of the time or less in most scenes with contact, for as many iterations. Where
+ * much cloth slides, the iteration may fail with them: then some matrices are exact.
  *
  * Error weights are a length and a velocity, the same for every node: 1/atol_x and 1/atol_v. A relative
- * part would make the error depend on where the scene lies. The maximum order is 2 at loose tolerances,
- * because BDF 3 to 5 are not A-stable and feed energy into undamped waves; it is 5 when the tolerance
- * resolves them.
+ * part would make the error depend on where the scene is. The maximum order is 2 at loose tolerances,
+ * because BDF 3 to 5 are not A-stable and feed energy into undamped waves; it is 5 if the tolerance
+ * resolves these waves.
  *
- * Pins that move have kinks at the keys of their tracks, and where a host sends them elsewhere: IDA stops
- * there and starts anew.
+ * The motion of pins has kinks at the keys of their tracks, and where a host changes their paths: IDA stops
+ * there and restarts.
  *
- * IDA chooses order and step, predicts, tests errors and iterates. Its callbacks are below in the order in
- * which it calls them, then the stages of our step around IDASolve.
+ * IDA chooses order and step, predicts, tests errors and iterates. Its callbacks follow in the order in
+ * which it calls them, then the stages of a step around IDASolve.
  */
 #include "base/finite.h"
 #include "base/reason.h"
@@ -53,16 +54,16 @@ enum {
 };
 enum { MATRIX_AUTO, MATRIX_SYMMETRIC, MATRIX_EXACT };
 
-#define TIGHT          1e-4 /* rtol below which order 5 pays */
+#define TIGHT          1e-4 /* rtol below which order 5 is used */
 #define LOOSE_ORDER    2
 #define TIGHT_ORDER    5
-#define NEWTON_SHARE   0.33 /* of the error tolerance that is left to the Newton iteration */
-#define MAX_EXACT_SPAN 64   /* exact matrices in a row, where symmetric ones keep failing */
-/* New factors past a change of c_j by (1 - d)/(1 + d). IDA's own 0.25 takes a quarter more residuals for
- * as many factors. */
+#define NEWTON_SHARE   0.33 /* of the error tolerance: bound for the error of the Newton iteration */
+#define MAX_EXACT_SPAN 64   /* maximum number of exact matrices in a row if symmetric ones keep failing */
+/* The matrix is factored again when c_j changed by more than (1 - d)/(1 + d). IDA's own d, 0.25, takes a
+ * quarter more residuals for as many factorisations. */
 #define CJ_CHANGE 0.1
-/* Of the energy of a scene. At rtol 1e-3 a smooth fall swings by half a percent: a larger gain comes from
- * waves that are amplified. */
+/* Share of the energy of a scene. At rtol 1e-3 the energy of a smooth fall oscillates by half a percent: a
+ * larger gain means that waves are amplified. */
 #define GAIN             0.02
 #define MAX_ERROR_FAILS  10 /* error test failures in one step */
 #define MAX_SOLVER_FAILS 10 /* convergence failures in one step */
@@ -77,14 +78,14 @@ static const drape_param params[PARAM_COUNT] = {
                                       "highest order of the BDF"),
     [PARAM_MAX_STEP] =
         DRAPE_NUMBER("max_step", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),
-    [PARAM_MAX_STEPS] = DRAPE_INTEGER(
-        "max_steps", "1/s", 100000, 1, 1e9,
-        "steps within one second of simulated time, those that end an advance apart; one more ends the run"),
+    [PARAM_MAX_STEPS] = DRAPE_INTEGER("max_steps", "1/s", 100000, 1, 1e9,
+                                      "most steps within one second of simulated time, not counting those "
+                                      "that end an advance; one more ends the run"),
     [PARAM_LINEAR_SOLVER] = DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver"),
     [PARAM_MATRIX] = DRAPE_CHOICE(
         "matrix", MATRIX_AUTO, matrix_choices,
-        "of Newton's corrections; symmetric: the symmetric part of the exact one, which friction and "
-        "dashpots make another; auto: that, and exact ones for a while where it fails"),
+        "matrix of Newton's corrections; symmetric: the symmetric part of the exact one, which differs from "
+        "it with friction and dashpots; auto: symmetric, and exact for a while if that fails"),
 };
 
 typedef struct ida_state {
@@ -99,30 +100,30 @@ typedef struct ida_state {
     N_Vector y, rate, weights, between; /* (x, v), (x', v'), absolute tolerances, dense output */
     drape_sun_linear *linear;
     drape_ida_newton newton;
-    double *x, *v, *g;  /* nodes: where the residual was evaluated last, and g there */
-    double *damping;    /* D (nonzeros); NULL where nothing dissipates */
+    double *x, *v, *g;  /* nodes: where the residual was evaluated last; g there */
+    double *damping;    /* D (nonzeros); NULL if nothing dissipates */
     double *reduced;    /* right-hand side of the reduced system (n) */
-    double *dissipated; /* nodes; NULL where nothing dissipates */
+    double *dissipated; /* nodes; NULL if nothing dissipates */
 
-    /* The matrix, kept from step to step. */
+    /* The matrix, kept between steps. */
     double factored_cj;      /* c_j of the factors */
-    bool symmetric;          /* they are of the symmetric part */
-    int64_t exact_remaining; /* matrices before the symmetric part is tried again, */
-    int64_t exact_span;      /* of so many */
-    int64_t failures; /* of the iteration with a new matrix, as IDA had counted them at the last matrix */
+    bool symmetric;          /* the factors are those of the symmetric part */
+    int64_t exact_remaining; /* exact matrices until the symmetric part is tried again, */
+    int64_t exact_span;      /* of this many in a row */
+    int64_t failures;        /* of the iteration with a new matrix, as counted by IDA until the last matrix */
 
-    /* From step to step. */
+    /* Kept between steps. */
     const double *internal; /* of the last accepted state */
-    double span[2];         /* [s] no pin or collider has a kink inside */
-    double reached;         /* [s] time of IDA's state; NAN: it must start anew */
-    double from;            /* [s] time that the last good step began at; NAN: none */
-    double powers[2];       /* [W] taken by dissipation and put in by pins, at the time reached */
-    double second;          /* [s] the second of simulated time that steps are counted in */
-    int64_t steps;          /* attempted in it, but for those that end an advance */
-    long counted;           /* Newton iterations of IDA that `work` has already */
+    double span[2];         /* [s] interval without a kink in the motion of pins and colliders */
+    double reached;         /* [s] time of IDA's state; NAN: it must restart */
+    double from;            /* [s] time at which the last successful step began; NAN: none */
+    double powers[2];       /* [W] power of dissipation; power of pins; both at the time reached */
+    double second;          /* [s] beginning of the second of simulated time in which steps are counted */
+    int64_t steps;          /* attempted in that second, except those that end an advance */
+    long counted;           /* Newton iterations of IDA that `work` contains already */
     drape_work work;
 
-    /* Why callbacks refused to go on in this step, of which IDA keeps only the sign. */
+    /* Why callbacks failed in this step; IDA keeps only the sign. */
     bool nonfinite, crossing; /* the last residual */
     drape_status failure;     /* < 0: the pattern could not be extended */
 } ida_state;
@@ -182,7 +183,7 @@ static int residual(sunrealtype t, N_Vector y, N_Vector rate, N_Vector out, void
 
 /* ---- Jacobian ---- */
 
-/* The matrices for the system's present pattern. */
+/* Takes the matrices for the system's present pattern. */
 static drape_status renew_matrices(ida_state *s)
 {
     const drape_pattern *pattern = drape_system_pattern(s->system);
@@ -195,7 +196,7 @@ static drape_status renew_matrices(ida_state *s)
     return drape_sun_linear_extend_pattern(s->linear, pattern);
 }
 
-/* Contact may couple what it did not before. */
+/* Contact may couple new nodes. */
 static drape_status extend_pattern(ida_state *s, const drape_point *point)
 {
     bool changed;
@@ -204,15 +205,15 @@ static drape_status extend_pattern(ida_state *s, const drape_point *point)
     return !status && s->linear->stale ? renew_matrices(s) : status;
 }
 
-/* Excludes contact, and the new analysis in extend_pattern, which count elsewhere. */
+/* Excludes contact and the new analysis in extend_pattern, which are timed separately. */
 static double jacobian_clock(const ida_state *s)
 {
     return drape_system_clock(s->system) - s->linear->factor_seconds;
 }
 
-/* Whether the next matrix is to be the symmetric part. Where the iteration failed with a new one that was,
- * exact ones follow for a while: twice as many as the last time, and half as many after each symmetric one
- * that converged. */
+/* Whether the next matrix is the symmetric part. If the iteration failed with a new symmetric matrix, exact
+ * ones are used for a while: twice as many as the last time, or half as many after each symmetric one that
+ * converged. */
 static bool choose_symmetric(ida_state *s)
 {
     long failures = 0;
@@ -287,7 +288,7 @@ static int solve_reduced(SUNLinearSolver solver, SUNMatrix matrix, N_Vector out,
 
 /* ---- Work of dissipation, pins and colliders ---- */
 
-/* At time t, of forces on colliders (NULL: no contact) that move. */
+/* Power at time t of forces on moving colliders; NULL: no contact. */
 static double collider_power(const ida_state *s, double t, const double *force)
 {
     double power = 0;
@@ -302,8 +303,8 @@ static double collider_power(const ida_state *s, double t, const double *force)
     return power;
 }
 
-/* Power at the state in s->x, s->v at time t: of dissipative forces, and of the forces that moved pins and
- * colliders need. */
+/* Power at the state in s->x, s->v at time t: of dissipative forces, and of the forces that move pins and
+ * colliders. */
 static void measure_powers(ida_state *s, double t, double powers[2])
 {
     const drape_model *m = s->model;
@@ -327,7 +328,7 @@ static void measure_powers(ida_state *s, double t, double powers[2])
         }
 }
 
-/* Work by the trapezoidal rule. */
+/* Adds the work, by the trapezoidal rule. */
 static void audit(ida_state *s, const drape_state *in, const drape_state *out, drape_step_info *info)
 {
     double after[2];
@@ -339,8 +340,8 @@ static void audit(ida_state *s, const drape_state *in, const drape_state *out, d
 
 /* ---- A step ---- */
 
-/* After a failure: the degenerate element or the node whose force is not finite, else the node of the largest
- * weighted error. */
+/* After a failure, reports the degenerate element or the node whose force is not finite; otherwise the node
+ * with the largest weighted error. */
 static void diagnose(ida_state *s, drape_step_info *info)
 {
     if (s->n == 0)
@@ -360,10 +361,10 @@ static void diagnose(ida_state *s, drape_step_info *info)
     info->diagnostic = drape_system_diagnose_dof(s->system, s->reduced, "local error / tolerance", 1);
 }
 
-/* Work is bounded: an undamped sheet that has degenerated may be followed for ever with steps that all
- * succeed. The bound is a rate, so that it is the same however a host divides its advances; steps that end
- * one are the host's choice and not counted. A host that continues after the failure is given as many steps
- * again. */
+/* Bounds the work, because steps may follow a degenerate, undamped sheet for ever without a failure. The
+ * bound is a rate, so that it does not depend on how a host divides its advances; steps that end an advance
+ * are the host's choice and are not counted. A host that continues after the failure gets the same number
+ * of steps again. */
 static bool exhausted(ida_state *s, const drape_state *in, drape_step_info *info)
 {
     if (floor(in->t) != s->second)
@@ -394,16 +395,16 @@ static drape_status start(ida_state *s, const drape_state *in, drape_step_info *
     s->counted = 0;
     s->failures = 0;
     info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
-    if (!drape_all_finite(rate + s->n, (size_t)s->n)) /* IDA would cut its step ten times over it */
+    if (!drape_all_finite(rate + s->n, (size_t)s->n)) /* IDA would cut its step ten times because of it */
         return DRAPE_RETRY_NONFINITE;
     info->reason = drape_reason_name(DRAPE_REASON_SOLVER);
     return IDAReInit(s->ida, in->t, s->y, s->rate) ? DRAPE_E_SOLVER : DRAPE_OK;
 }
 
-/* Continues from `in` if IDA's state is there, else starts anew, with a first step of at most h where an
- * attempt before was rejected. *t: the next kink or the end, whichever comes first: that is how far a scene
- * without free nodes goes. Pinned nodes that do not move keep their positions, and no velocity, in s->x and
- * s->v for the whole step. */
+/* Continues from `in` if that is IDA's state; otherwise restarts, with a first step of at most h if the
+ * attempt before was rejected. *t: the next kink or the end, whichever comes first; a scene without free
+ * nodes advances to there. Pinned nodes that do not move keep their positions, and zero velocity, in s->x
+ * and s->v for the whole step. */
 static drape_status prepare(ida_state *s, const drape_state *in, double end, double h, double *t,
                             drape_step_info *info)
 {
@@ -431,7 +432,7 @@ static drape_status prepare(ida_state *s, const drape_state *in, double end, dou
     return IDASetStopTime(s->ida, stop) ? DRAPE_E_SOLVER : DRAPE_OK;
 }
 
-/* Every return code of IDASolve, as what it means for the step. */
+/* The meaning of every return code of IDASolve for the step. */
 static drape_status status_of(int code, bool nonfinite, const char **reason)
 {
     *reason = drape_reason_name(nonfinite ? DRAPE_REASON_NONFINITE : DRAPE_REASON_CONVERGED);
@@ -465,7 +466,7 @@ static drape_status status_of(int code, bool nonfinite, const char **reason)
     }
 }
 
-/* One step of IDA, at most to `end`; *t: where it came to. */
+/* Makes one step of IDA, at most to `end`; *t: the time that it reached. */
 static drape_status solve(ida_state *s, double end, double h, double *t, drape_step_info *info)
 {
     long iterations = 0;
@@ -485,8 +486,8 @@ static drape_status solve(ida_state *s, double end, double h, double *t, drape_s
     s->counted = iterations;
     if (status)
         IDAGetCurrentStep(s->ida, &info->h);
-    info->h =
-        fmin(info->h, h); /* IDA's may be of an earlier attempt: half of that would be no smaller step */
+    info->h = fmin(info->h, h); /* IDA's step may belong to an earlier attempt: half of that would not be a
+                             smaller step */
     return status;
 }
 
@@ -500,7 +501,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     if (exhausted(s, in, info))
         return DRAPE_E_STEP_TOO_SMALL;
     if (in->t ==
-        s->from) /* the sim rejected the last step, with which IDA was content: mostly for its energy */
+        s->from) /* the sim rejected the last step, which IDA had accepted: mostly because of its energy */
         s->newton.strict = true;
     s->from = NAN;
     info->reason = drape_reason_name(DRAPE_REASON_SOLVER);
@@ -547,7 +548,7 @@ static void restart(void *state, const drape_state *from)
     drape_ida_newton_forget(&s->newton);
 }
 
-/* ---- Making and freeing ---- */
+/* ---- Creation and destruction ---- */
 
 static void create_arrays(ida_state *s)
 {
@@ -676,7 +677,7 @@ static drape_work work(const void *state)
     return work;
 }
 
-/* Its factors are kept from step to step, with c_j and D. */
+/* Its factors are kept between steps, with c_j and D. */
 static void archive_factors(ida_state *s, drape_archive *a)
 {
     if (drape_archive_is_reading(a) && drape_system_pattern(s->system) != s->linear->pattern)
@@ -716,7 +717,7 @@ static size_t bytes(const void *state)
     const ida_state *s = state;
     double max_order = s->values[PARAM_MAX_ORDER];
     size_t order = isnan(max_order) ? TIGHT_ORDER : (size_t)max_order;
-    size_t vectors = 4 + order + 1 + 6; /* ours, the history of IDA, its scratch */
+    size_t vectors = 4 + order + 1 + 6; /* allocated here; the history of IDA; its scratch */
     return 2 * (size_t)s->n * vectors * sizeof(double) + (s->linear ? drape_sun_linear_bytes(s->linear) : 0);
 }
 

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <sunnonlinsol/sunnonlinsol_newton.h>
 
-#define UNKNOWN  20.0 /* error left after a correction with new factors: a rate of .95, as IDA assumes */
+#define UNKNOWN  20.0 /* error left after a correction with new factors: a rate of 0.95, as IDA assumes */
 #define AGEING   2.0
 #define SLOWEST  0.9  /* a larger rate asks for new factors, or a smaller step; IDA's own */
 #define ROUNDING 1e-4 /* of the tolerance: a smaller first correction is rounding; IDA's own */

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-/* ---- Making and freeing ---- */
+/* ---- Creation and destruction ---- */
 
 drape_status drape_implicit_init(drape_arena *arena, drape_system *system, drape_implicit *s)
 {
@@ -159,7 +159,7 @@ void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_
 
 /* ---- For the table ---- */
 
-/* One-step methods keep nothing of the past but factors. */
+/* One-step methods keep nothing between steps except factors. */
 void drape_implicit_restart(void *state, const drape_state *from)
 {
     (void)from;

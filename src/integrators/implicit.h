@@ -1,7 +1,7 @@
 /*
- * implicit.h: shared by the implicit integrators of fixed steps. Each of them is a choice of the step
- * equation (nonlinear/step_equation.h), of its base, weights, inertia and history, and of the solver; arrays,
- * pins and the audit of work are the same.
+ * implicit.h: shared by the implicit integrators with fixed steps. Each of them chooses the step equation
+ * (nonlinear/step_equation.h) by its base, weights, inertia and history, and the solver; arrays, pins and
+ * the account of work are the same.
  */
 #ifndef DRAPE_INTEGRATORS_IMPLICIT_H
 #define DRAPE_INTEGRATORS_IMPLICIT_H
@@ -12,19 +12,19 @@
 typedef struct drape_implicit {
     drape_step_equation equation;
     const drape_motion *motion;
-    drape_newton *newton; /* NULL in integrators that have another solver */
+    drape_newton *newton; /* NULL in integrators with another solver */
     double *d;            /* free DOFs: the unknown */
-    double *history;      /* measures; NULL where no law wants rates */
-    double *dissipated;   /* nodes; NULL where nothing dissipates */
+    double *history;      /* measures; NULL if no law needs rates */
+    double *dissipated;   /* nodes; NULL if nothing dissipates */
     bool inertial_guess;  /* d = p; else d = 0 */
 } drape_implicit;
 
-/* For integrators that embed it, without a solver or with Newton. Errors: as of drape_newton_create. */
+/* For integrators that embed it: without a solver, or with Newton's. Errors: as for drape_newton_create. */
 drape_status drape_implicit_init(drape_arena *arena, drape_system *system, drape_implicit *implicit);
 drape_status drape_implicit_init_newton(drape_arena *arena, drape_system *system, const double *values,
                                         drape_implicit *implicit);
 
-/* The functions of integrators that have it first in their state, or nothing else. */
+/* The functions of integrators whose state begins with it, or is nothing else. */
 drape_status drape_implicit_create(drape_arena *arena, drape_system *system, const double *values,
                                    void **state);
 void drape_implicit_restart(void *state, const drape_state *from);
@@ -34,35 +34,35 @@ void drape_implicit_archive(void *state, drape_archive *a);
 size_t drape_implicit_bytes(const void *state);
 void drape_implicit_destroy(void **state);
 
-/* Nodes for a step or stage that begins at in: free ones where they are there, at rest; pinned ones where
- * their tracks have them at time t, with their mean velocity over span, since in. */
+/* The nodes for a step or stage that begins at `in`: free nodes at their positions there, with zero
+ * velocity; pinned nodes where their tracks are at time t, with their mean velocity over span. */
 void drape_implicit_place(const drape_implicit *implicit, const drape_state *in, double t, double span,
                           double *x, double *v);
 
-/* The same as the base of the equation, with colliders at time t. Rates of measures are q' = grad q . v until
- * a history is set. */
+/* Sets these as the base of the equation, with colliders at time t. Rates of measures are q' = grad q . v
+ * until a history is set. */
 void drape_implicit_base(drape_implicit *implicit, const drape_state *in, double t, double span);
 
-/* The equation of backward Euler: base, v1 = (x1 - x0)/h, q' = (q1 - q0)/h. mass_weight: 1/h^2. */
+/* Sets the equation of backward Euler: base, v1 = (x1 - x0)/h, q' = (q1 - q0)/h. mass_weight: 1/h^2. */
 void drape_implicit_backward_euler(drape_implicit *implicit, const drape_state *in, double t, double h,
                                    double mass_weight);
 
-/* q at the positions of a state, into q (measures); nothing where no law wants rates. */
+/* Computes q (measures) at the positions of a state, if a law needs rates. */
 void drape_implicit_measure(drape_implicit *implicit, const drape_state *state, double *q);
 
-/* Solves for d by Newton: from the guess that the parameters ask for, or from d as it is. Iterations add up
- * in info. */
+/* Solves for d by Newton's method, from the guess chosen by the parameters, or from the present d. Adds the
+ * iterations to info. */
 drape_status drape_implicit_solve(drape_implicit *implicit, drape_step_info *info);
 drape_status drape_implicit_solve_from(drape_implicit *implicit, drape_step_info *info);
 
-/* The report of a solve into info. */
+/* Copies the report of a solve to info. */
 void drape_implicit_report(const drape_solve_report *report, drape_step_info *info);
 
-/* Work from t0 to t1 of the forces that the system last put on moving colliders; 0 without contact. */
+/* Work from t0 to t1 of the forces on moving colliders at the system's last evaluation; 0 without contact. */
 double drape_implicit_collider_work(const drape_implicit *implicit, double t0, double t1);
 
-/* Work over a step: of dissipative forces on all nodes, and of moved pins against g, where the equation was
- * evaluated last. What speeds up the pinned nodes' own mass is no work on the cloth. */
+/* Work over a step of dissipative forces on all nodes, and of moved pins against g, where the equation was
+ * evaluated last. The force that accelerates the pinned nodes' own mass does no work on the cloth. */
 void drape_implicit_audit(drape_implicit *implicit, const drape_state *in, const drape_state *out,
                           drape_step_info *info);
 

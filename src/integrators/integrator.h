@@ -1,6 +1,7 @@
 /*
  * integrator.h: time integrators, the entries of one table. An integrator is the constant
- * drape_integrator_<name> of <name>.c. step(in, out) never writes in: rejecting a step is forgetting out.
+ * drape_integrator_<name> of <name>.c. step(in, out) never writes to in, so a step is rejected by
+ * discarding out.
  */
 #ifndef DRAPE_INTEGRATORS_INTEGRATOR_H
 #define DRAPE_INTEGRATORS_INTEGRATOR_H
@@ -12,74 +13,75 @@
 /* What a step reports. */
 typedef struct drape_step_info {
     const char *reason; /* "converged", or why not; static text */
-    double h;           /* [s] the step that was taken; set by integrators that choose their own */
+    double h;           /* [s] the step taken; set by integrators that choose their own steps */
     int iterations;
     double residual, tolerance; /* [N] */
     bool lenient, usable;       /* see drape_solve_report */
-    double dissipated;          /* [J] work that dissipative terms took in this step */
-    double pin_work;            /* [J] work that moving pins put in */
-    bool committed;             /* out->internal is set; its elements were checked on the way */
+    double dissipated;          /* [J] work of dissipative terms in this step */
+    double pin_work;            /* [J] work of moving pins */
+    bool committed;             /* out->internal is set, and its elements were checked during the step */
     drape_diagnostic diagnostic;
 } drape_step_info;
 
-/* How large an explicit integrator may step at a state: what the fastest wave of the forces there allows. */
+/* The stable step size of an explicit integrator at a state, given by the fastest wave of the forces
+ * there. */
 typedef struct drape_stability {
     double omega;   /* [rad/s] largest eigenfrequency, of M^-1 K */
     double damping; /* [1/s] largest rate of M^-1 D */
-    double limit;   /* [s] in a longer substep the smallest disturbance grows; INFINITY where nothing pulls */
-    double substep; /* [s] of a step of the size asked for */
-    double step;    /* [s] largest stable step: as many substeps of `limit`; INFINITY where their number
-                       follows the limit */
+    double limit;   /* [s] in longer substeps the smallest disturbance grows; INFINITY without elastic
+                       forces */
+    double substep; /* [s] substep of a step of the requested size */
+    double step;    /* [s] largest stable step: all its substeps of length `limit`; INFINITY if their
+                       number adapts to the limit */
 } drape_stability;
 
 typedef struct drape_integrator_ops {
     drape_entry entry; /* one of its parameters is dt */
     int order;         /* of convergence in h */
-    /* values in the order of params. Takes all memory that stepping needs: from the arena, which outlives it,
-     * or such that destroy frees it. After a failure, too, *state is destroyed unless it is NULL. */
+    /* values: in the order of params. Takes all memory that stepping needs: from the arena, which outlives
+     * it, or such that destroy frees it. If it fails, *state must still be destroyed unless it is NULL. */
     drape_status (*create)(drape_arena *arena, drape_system *system, const double *values, void **state);
-    /* It chooses its own steps: h is the time left to the end of the advance or, after a rejection, an upper
-     * bound; out->t is the end of the advance, which a step may reach and not pass, and is set to where the
-     * step ends. */
+    /* It chooses its own steps: h is then the time left to the end of the advance or, after a rejection, an
+     * upper bound; out->t is the end of the advance, which a step may reach but not pass, and is set to the
+     * time at which the step ends. */
     bool own_steps;
-    /* Energy that a run may gain without a source, as a share of the energy that the scene had to offer; 0: a
-     * tenth, for integrators that conserve energy and let it swing. */
+    /* Energy that a run may gain without a source, as a share of the energy available in the scene; 0: a
+     * tenth, for integrators that conserve energy up to oscillations. */
     double gain;
-    /* Between the states of a step there is no motion, so no frames. */
+    /* There is no motion between the states of a step, so there are no frames. */
     bool steady_state;
-    /* It keeps contact and limits by moving nodes: forces that stand for them (contact of the model, terms
-     * that are a constraint) must not act beside it. The sim makes its system without them. */
+    /* It enforces contact and limits by moving nodes, so the forces that stand for them (contact of the
+     * model, terms that are a constraint) must not act, too: the sim creates its system without them. */
     bool projects_contact;
-    /* From in to out, whose t is set: h = the nominal size of the step, exact where out->t - in->t is
-     * rounded. Fills in out->x and out->v. */
+    /* Steps from in to out, whose t is set. h: the nominal size of the step, exact, while out->t - in->t is
+     * rounded. Sets out->x and out->v. */
     drape_status (*step)(void *state, const drape_state *in, drape_state *out, double h,
                          drape_step_info *info);
-    /* The next step starts anew from a state that this integrator did not make, or after a rejection. */
+    /* The next step restarts from a state that this integrator did not compute, or after a rejection. */
     void (*restart)(void *state, const drape_state *from);
-    /* Its next step relies on forces that are smooth from step to step: where they jump it must start
-     * anew. */
+    /* Its next step assumes forces that are smooth between steps: if they jump, it must be restarted. */
     bool smooth_forces;
-    /* The stability limit at a state, for steps of size h: a function of the state alone. NULL: stable for
-     * any h. */
+    /* The stability limit at a state for steps of size h, which is a function of the state alone. NULL:
+     * stable for any h. */
     void (*stability)(void *state, const drape_state *at, double h, drape_stability *out);
     /* Positions (node_count x 3) at a time within the last step. NULL: cubic Hermite interpolation between
-     * the states serves. */
+     * the states is used. */
     void (*interpolate)(void *state, double t, double *x);
-    /* F of the free DOFs (3 free_count [N]) where the solver of the last step left it. NULL: it solves no
+    /* F of the free DOFs (3 free_count [N]) that the solver of the last step left. NULL: it solves no
      * equation. */
     const double *(*residual)(const void *state);
-    /* How much work a step may take, for a mode that must meet a deadline: from 0, as the parameters say, to
-     * efforts - 1, the cheapest. NULL: there is one effort. */
+    /* The level of effort of a step, if a deadline must be met: from 0, as the parameters say, to efforts -
+     * 1, the cheapest. NULL: there is only one level. */
     int efforts;
     void (*set_effort)(void *state, int effort);
     drape_work (*work)(const void *state);
-    /* All that the next steps depend on besides the state they start from, and the work done: into an archive
-     * or, where this was just made for a system of the same model with the same pattern, out of it. What has
-     * the same bits however it came about is left out. */
+    /* Writes everything that the next steps depend on besides the state that they start from, and the work
+     * done, to an archive or, if this was just created for a system of the same model with the same
+     * pattern, reads it back. Data with the same bits whenever they are computed are left out. */
     void (*archive)(void *state, drape_archive *a);
-    /* Bytes outside of the arena: factors, vectors of SUNDIALS. NULL: none. */
+    /* Bytes outside the arena: factors, vectors of SUNDIALS. NULL: none. */
     size_t (*bytes)(const void *state);
-    /* Frees what is not the arena's. NULL: there is nothing. */
+    /* Frees what is not in the arena. NULL: everything is in the arena. */
     void (*destroy)(void **state);
 } drape_integrator_ops;
 

@@ -1,14 +1,14 @@
 /*
- * midpoint: implicit midpoint, the second-order member of the Gauss family: symplectic, it conserves
- * linear and angular momentum and damps nothing. Hairer, Lubich & Wanner 2006, II.1.3.
+ * midpoint: the implicit midpoint rule, the second-order Gauss method: symplectic; it conserves linear and
+ * angular momentum and damps nothing. Hairer, Lubich & Wanner 2006, II.1.3.
  *     xm = (x0 + x1)/2,  vm = (x1 - x0)/h,  M (v1 - v0)/h + g(xm, vm) = 0,  v1 = 2 vm - v0
  * With d = xm - x0:  4 M/h^2 (d - h v0/2) + g(x0 + d, 2 d/h) = 0.
  *
- * Rates of measures are grad q(xm) . vm. That is of second order, and it vanishes on rigid motion exactly:
- * where x1 is x0 turned by an angle a, vm is the rigid velocity field (2/h) tan(a/2) k x xm at xm. A
- * difference of q from x0 to xm would be the rate a quarter of a step too early.
+ * Rates of measures are grad q(xm) . vm. That is of second order, and it is exactly zero for rigid motion:
+ * if x1 is x0 rotated by an angle a, vm is the rigid velocity field (2/h) tan(a/2) k x xm at xm. The
+ * difference of q between x0 and xm would be the rate a quarter of a step too early.
  *
- * Stiff waves that h does not resolve ring on undamped: for those take bdf2 or ida.
+ * Stiff waves that h does not resolve oscillate undamped: for scenes with these use bdf2 or ida.
  */
 #include "integrators/implicit.h"
 

@@ -1,12 +1,13 @@
 /*
- * newton_k: backward Euler by k inexact Newton iterations a step, for real time. be solves the same equation
- * (be.c) to a tolerance; here the solver is nonlinear/inexact_newton.h, and no step is accepted unchecked:
- * the residual of its end is reported, and where it has not fallen below that of the guess the step is
+ * newton_k: backward Euler with k inexact Newton iterations in each step, for real time. be.c solves the
+ * same equation to a tolerance; here the solver is nonlinear/inexact_newton.h. No step is accepted
+ * unchecked: the final residual is reported, and if it has not fallen below that of the guess the step is
  * refused, so that the controller halves it.
  *
- * The guess: the nodes fly on, and a share s of the last change of velocity acts again,
+ * The guess extrapolates the motion, with a share s of the last change of velocity,
  *     d = h v0 + s h^2 (v0 - v-1)/h0
- * s = 1/2 halves the error of one iteration on a swinging sheet; s = 1 amplifies its own noise and diverges.
+ * s = 1/2 halves the error of one iteration on a swinging sheet; s = 1 amplifies its own noise and
+ * diverges.
  */
 #include "integrators/implicit.h"
 #include "nonlinear/inexact_newton.h"
@@ -28,29 +29,32 @@ enum {
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),
-    [PARAM_ITERATIONS] = DRAPE_INTEGER("iterations", "1", 1, 1, 1000, "inexact Newton iterations a step"),
+    [PARAM_ITERATIONS] =
+        DRAPE_INTEGER("iterations", "1", 1, 1, 1000, "inexact Newton iterations in each step"),
     [PARAM_TOLERANCE] = DRAPE_NUMBER("tolerance", "N", 1e-6, DRAPE_ABOVE(0), 1e12,
                                      "residual of the free nodes, largest component, below which no "
                                      "iteration is made; not a bound on an accepted state"),
-    [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
-                                              "more iterations where the residual is not below that of the "
-                                              "guess after the others; then the step is rejected"),
+    [PARAM_RESCUE_ITERATIONS] =
+        DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
+                      "further iterations if the residual is not below that of the guess after the first "
+                      "ones; if it still is not, the step is rejected"),
     [PARAM_EXTRAPOLATION] = DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
-                                         "share of the last change of velocity that the guess takes along"),
+                                         "share of the last change of velocity that the guess extrapolates"),
     [PARAM_LINEAR_TOLERANCE] = DRAPE_NUMBER("linear_tolerance", "1", 0.1, 1e-14, DRAPE_BELOW(1),
                                             "conjugate gradients reduce the residual of a correction to this "
                                             "share at 1/60 s, in proportion to the step at others"),
-    [PARAM_LINEAR_ITERATIONS] =
-        DRAPE_INTEGER("max_linear_iterations", "1", 60, 1, 100000, "of conjugate gradients, a correction"),
+    [PARAM_LINEAR_ITERATIONS] = DRAPE_INTEGER("max_linear_iterations", "1", 60, 1, 100000,
+                                              "iterations of conjugate gradients for each correction"),
     [PARAM_COARSE_SPACING] =
         DRAPE_INTEGER("coarse_spacing", "1", 0, 0, 100,
                       "edges between the centres of the coarse functions; 0: by the number of nodes"),
 };
 
-#define NOMINAL_RATE        60. /* [1/s] linear_tolerance is for steps of its inverse */
-#define MAX_LINEAR_RESIDUAL 0.5 /* share of a residual that is left, at any step */
+#define NOMINAL_RATE        60. /* [1/s] linear_tolerance applies to steps of 1/60 s */
+#define MAX_LINEAR_RESIDUAL 0.5 /* relative residual left at any step size */
 
-/* What a step tries at each effort: iterations, and conjugate gradients in each. 0: as the parameters say. */
+/* The work of a step at each level of effort: Newton iterations, and conjugate gradient iterations in each.
+ * 0: as the parameters say. */
 static const struct {
     int iterations, linear_iterations;
 } efforts[] = {{0, 0}, {1, 4}};
@@ -60,7 +64,7 @@ typedef struct newton_k {
     double values[PARAM_COUNT];
     drape_inexact_newton *newton;
     double *past[2]; /* nodes: velocities at the start of the step before, and of the one before that */
-    double past_time[2], past_end; /* [s] of these, and where the last attempt ended; NAN: there is none */
+    double past_time[2], past_end; /* [s] of these; end of the last attempt, NAN: there is none */
     int effort;
 } newton_k;
 
@@ -95,7 +99,7 @@ static void destroy(void **state)
     *state = NULL;
 }
 
-/* Keeps the velocities that steps began with. A second attempt at the same step has the same past. */
+/* Keeps the velocities with which steps began. A second attempt at the same step has the same past. */
 static void remember(newton_k *s, const drape_state *in, double end)
 {
     bool again = in->t == s->past_time[0], follows = in->t == s->past_end;
@@ -121,9 +125,9 @@ static void guess(newton_k *s, const drape_state *in, double h)
     }
 }
 
-/* The share of the residual that is left. A displacement e that is missing from a step is a velocity e/h, of
- * which a second has 1/h: for these to vanish with h as the method's own error does, e must be of order h^3.
- * The guess is off by h^2, so the share is of order h. */
+/* The relative residual that is left. An error e in the displacement of a step is an error e/h in its
+ * velocity, and a second has 1/h steps: for the sum to vanish with h like the method's own error, e must be
+ * of order h^3. The error of the guess is of order h^2, so the relative residual is of order h. */
 static double linear_tolerance(const newton_k *s)
 {
     double share = s->values[PARAM_LINEAR_TOLERANCE] * NOMINAL_RATE / s->common.equation.point.weight;

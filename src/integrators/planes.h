@@ -1,4 +1,4 @@
-/* planes.h: vectors of all nodes as three arrays, all x, all y, all z, for loops that are made vectors of. */
+/* planes.h: vectors of all nodes as three arrays, all x, all y, all z, for loops that compilers vectorise. */
 #ifndef DRAPE_INTEGRATORS_PLANES_H
 #define DRAPE_INTEGRATORS_PLANES_H
 

@@ -1,14 +1,14 @@
 /*
- * stability.c: the largest eigenvalue of A = M^-1/2 K M^-1/2 by the power iteration u, A u, A^2 u ... in the
- * form that keeps all earlier powers: Lanczos' recurrence, whose tridiagonal matrix T has the largest Ritz
- * value of the whole sequence as its own (Parlett 1998, 13). Power iteration alone needs hundreds of products
- * where a sheet's fastest waves lie close together.
+ * stability.c: the largest eigenvalue of A = M^-1/2 K M^-1/2 by Lanczos' recurrence, a power iteration u, A
+ * u, A^2 u ... that keeps all earlier powers: the largest eigenvalue of its tridiagonal matrix T is the
+ * largest Ritz value of the whole sequence (Parlett 1998, 13). The power iteration alone needs hundreds of
+ * products if the fastest waves of a sheet are close together.
  *     b_j u_j+1 = A u_j - a_j u_j - b_j-1 u_j-1,  a_j = u_j . A u_j
- * Orthogonality is lost in time; that repeats eigenvalues of T and moves none out of the spectrum.
+ * Orthogonality is gradually lost; that repeats eigenvalues of T but moves none out of the spectrum.
  *
- * K u = (g(x + e u) - g(x))/e at v = 0, where no dashpot and no drag has a force; D u likewise by v. e moves
- * no node by more than 1e-6 of the shortest edge: elements are linear there to 1e-6, and rounding of x in
- * the forces is 1e-10 of the difference.
+ * K u = (g(x + e u) - g(x))/e at v = 0, where no dashpot and no drag has a force; D u likewise with v. e
+ * moves no node by more than 1e-6 of the shortest edge: on that scale elements are linear up to 1e-6, and
+ * the effect of rounding x is 1e-10 of the difference of the forces.
  */
 #include "integrators/stability.h"
 
@@ -17,7 +17,7 @@
 
 #define MOVE       1e-6  /* of the shortest edge */
 #define EXHAUSTED  1e-12 /* of |a_j|: a smaller b_j ends the recurrence */
-#define BISECTIONS 60    /* of the interval of the largest eigenvalue: to rounding */
+#define BISECTIONS 60    /* of the interval with the largest eigenvalue: down to rounding */
 
 struct drape_spectrum {
     drape_system *system;
@@ -63,7 +63,7 @@ drape_status drape_spectrum_create(drape_arena *arena, drape_system *system, int
     return DRAPE_OK;
 }
 
-/* Returns the norm that u had. */
+/* Normalises u and returns its former norm. */
 static double normalise(double *u, size_t n)
 {
     double sum = 0;
@@ -77,8 +77,8 @@ static double normalise(double *u, size_t n)
     return norm;
 }
 
-/* u_0: numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX). Every wave has a part in them,
- * and they are the same everywhere. */
+/* u_0: numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX). Every wave contributes to
+ * them, and they are the same on every machine. */
 static void start(drape_spectrum *s)
 {
     uint64_t seed = 1;
@@ -90,8 +90,8 @@ static void start(drape_spectrum *s)
     normalise(s->u, s->dofs);
 }
 
-/* next = M^-1/2 (g(y + e M^-1/2 u) - g(y))/e, where y is s->x or s->v; its free entries are those of `from`
- * (NULL: 0) before and after. */
+/* next = M^-1/2 (g(y + e M^-1/2 u) - g(y))/e, where y is s->x or s->v, whose free entries are those of
+ * `from` (NULL: 0) before and after the call. */
 static void product(drape_spectrum *s, const drape_state *at, double *y, const double *from)
 {
     const drape_model *m = s->model;
@@ -140,7 +140,7 @@ static double largest_of(const double *a, const double *b, int n)
     return 0.5 * (low + high);
 }
 
-/* The largest eigenvalue of the matrix whose products are by y. */
+/* The largest eigenvalue of the matrix whose products are derivatives by y. */
 static double largest(drape_spectrum *s, const drape_state *at, double *y, const double *from)
 {
     const size_t dofs = s->dofs;
@@ -161,7 +161,7 @@ static double largest(drape_spectrum *s, const drape_state *at, double *y, const
         s->b[n] = normalise(s->u, dofs);
         n++;
         if (!(s->b[n - 1] > EXHAUSTED * fabs(a)))
-            break; /* all that u can reach is known, or numbers are not finite */
+            break; /* the space of the sequence is exhausted, or numbers are not finite */
     }
     return largest_of(s->a, s->b, n);
 }

@@ -1,14 +1,13 @@
 /*
- * static: equilibrium, grad E(x) = 0 with the pins where they are at the end. Newton's method on that stalls
- * far from the solution, so pseudo-transient continuation leads there (Kelley & Keyes 1998): implicit Euler
- * steps of the gradient flow M x' = -grad E in a pseudo time,
+ * static: equilibrium, grad E(x) = 0 with the pins at their final positions. Newton's method stalls far
+ * from the solution, so the solution is approached by pseudo-transient continuation (Kelley & Keyes 1998):
+ * implicit Euler steps of the gradient flow M x' = -grad E in a pseudo time,
  *     m M d + grad E(x + d) = 0,   x <- x + d,
- * each a Newton solve, with a weight m that falls with the residual and by half at least, so that the last
- * steps are Newton's own. A step that fails, or ends in a degenerate element, is forgotten and tried with a
- * larger m. Damping and velocities have no part.
+ * each of them a Newton solve. The weight m falls with the residual, and at least by half in each step, so
+ * that the last steps are Newton steps. A step that fails, or ends in a degenerate element, is discarded
+ * and retried with a larger m. Damping and velocities have no effect.
  *
- * Whether the equilibrium is stable is seen from the signs of D in K = L D L': it is stable if none is
- * negative.
+ * The signs of D in K = L D L' show whether the equilibrium is stable: it is if none is negative.
  */
 #include "base/reason.h"
 #include "integrators/implicit.h"
@@ -17,16 +16,17 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_STEPS   1000 /* of pseudo time */
-#define MAX_FAILS   40   /* in a row */
-#define MIN_FACTOR  0.02 /* of m from one step to the next */
-#define MAX_FACTOR  0.5 /* the same, also where the residual does not fall yet: then the flow has far to go */
+#define MAX_STEPS  1000 /* of pseudo time */
+#define MAX_FAILS  40   /* in a row */
+#define MIN_FACTOR 0.02 /* of m from one step to the next */
+/* the same, used also while the residual does not fall: then the flow is far from its end */
+#define MAX_FACTOR  0.5
 #define FAIL_FACTOR 10.0 /* of m after a failure */
 
 typedef struct static_state {
     drape_implicit common; /* first */
     drape_arena *arena;
-    double *internal; /* of the terms, at the present step of pseudo time */
+    double *internal; /* of the terms, at the present step in pseudo time */
     bool stability_known;
     int64_t unstable_modes;
 } static_state;
@@ -43,8 +43,8 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     return status ? status : drape_arena_status(arena);
 }
 
-/* The equation of a step of pseudo time from x. Colliders rest, and its corrections are too large for forces
- * to first order in them. */
+/* Sets the equation of a step in pseudo time from x. Colliders rest, and corrections are too large for
+ * forces to first order in them. */
 static void set_equation(static_state *s, const double *x, double mass_weight)
 {
     drape_step_equation *e = &s->common.equation;
@@ -58,7 +58,7 @@ static void set_equation(static_state *s, const double *x, double mass_weight)
     memset(e->inertia, 0, e->dofs * sizeof *e->inertia);
 }
 
-/* One step of pseudo time from out->x, which moves on success. */
+/* Makes one step in pseudo time from out->x, which changes only on success. */
 static drape_status pseudo_step(static_state *s, double mass_weight, drape_state *out, drape_step_info *info)
 {
     drape_implicit *c = &s->common;
@@ -78,7 +78,7 @@ static drape_status pseudo_step(static_state *s, double mass_weight, drape_state
     return drape_system_begin(e->system, &(drape_state){.t = e->point.t, .x = out->x, .v = e->v_base});
 }
 
-/* The residual of statics where the equation was evaluated last: the largest component of grad E on the free
+/* The static residual where the equation was evaluated last: the largest component of grad E on the free
  * nodes. */
 static double static_residual(const static_state *s)
 {
@@ -89,7 +89,8 @@ static double static_residual(const static_state *s)
     return max;
 }
 
-/* After a failure: the residual of statics where the flow has come, not that of the step that failed. */
+/* After a failure, reports the static residual at the end of the last successful step, not that of the
+ * failed one. */
 static void report_residual(static_state *s, const drape_state *out, double tolerance, drape_step_info *info)
 {
     drape_step_equation *e = &s->common.equation;
@@ -101,7 +102,7 @@ static void report_residual(static_state *s, const drape_state *out, double tole
     info->residual = info->diagnostic.value;
 }
 
-/* Follows the flow until the residual of statics is within the tolerance. */
+/* Follows the flow until the static residual is within the tolerance. */
 static drape_status follow(static_state *s, double mass_weight, double tolerance, drape_state *out,
                            drape_step_info *info)
 {

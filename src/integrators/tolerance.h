@@ -1,6 +1,6 @@
 /*
- * tolerance.h: local errors are measured by a length and a velocity, the same for every node: a part
- * relative to the positions would make the error depend on where the scene lies. Both follow from one
+ * tolerance.h: local errors are measured relative to a length and a velocity, the same for every node: a
+ * part relative to the positions would make the error depend on where the scene is. Both follow from one
  * number, rtol, and the size of the scene.
  */
 #ifndef DRAPE_INTEGRATORS_TOLERANCE_H
@@ -21,7 +21,7 @@
                  DRAPE_DERIVED("rtol sqrt(g L), or rtol L/s without gravity, L the diagonal"),               \
                  DRAPE_ABOVE(0), 1e9, "local error of velocities")
 
-/* Replaces NaN by the value that the parameters say is derived. */
+/* Replaces NaN by the derived value that the parameters describe. */
 void drape_derive_tolerances(const drape_model *model, double rtol, double *atol_x, double *atol_v);
 
 #endif

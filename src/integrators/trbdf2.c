@@ -1,12 +1,12 @@
 /*
- * trbdf2: a trapezoidal step to t0 + gamma h, then the backward differentiation formula of order 2 through
- * both its ends to t0 + h. gamma = 2 - sqrt(2) gives both stages the same matrix. Second order, A- and
- * L-stable, one step: it has no history that a kink or a change of h could spoil. Bank et al.
- * 1985; Hosea & Shampine 1996. With w = 2/(gamma h), a1 = 1/(gamma (2 - gamma)), a0 = a1 - 1:
+ * trbdf2: a trapezoidal step to t0 + gamma h, then a step to t0 + h by the backward differentiation formula
+ * of order 2 through both ends of the first. With gamma = 2 - sqrt(2) both stages have the same matrix.
+ * Second order, A- and L-stable, one-step: it has no history that a kink or a change of h could spoil. Bank
+ * et al. 1985; Hosea & Shampine 1996. With w = 2/(gamma h), a1 = 1/(gamma (2 - gamma)), a0 = a1 - 1:
  *     xg = x0 + (v0 + vg)/w,         M w (vg - v0) + g0 + gg = 0
  *     x1 = a1 xg - a0 x0 + v1/w,     M w (v1 - a1 vg + a0 v0) + g1 = 0
- * As Newton problems, d = xg - x0 and p = 2 v0/w - M^-1 g0/w^2; d = v1/w and p = (a1 vg - a0 v0)/w.
- * Rates of measures are grad q . v.
+ * As Newton problems: d = xg - x0 and p = 2 v0/w - M^-1 g0/w^2; d = v1/w and p = (a1 vg - a0 v0)/w. Rates
+ * of measures are grad q . v.
  */
 #include "integrators/implicit.h"
 
@@ -34,7 +34,7 @@ static drape_status create(drape_arena *arena, drape_system *system, const doubl
     return status ? status : drape_arena_status(arena);
 }
 
-/* Solves for the end x, v of a stage, whose base, inertia and guess are set. */
+/* Solves for the end x, v of a stage, whose base, inertia and guess must be set. */
 static drape_status solve_stage(trbdf2_state *s, double w, double *x, double *v, drape_step_info *info)
 {
     drape_step_equation *e = &s->common.equation;
@@ -48,10 +48,10 @@ static drape_status solve_stage(trbdf2_state *s, double w, double *x, double *v,
     return status;
 }
 
-/* Adds the work over a stage, by the midpoint rule with the mean velocity: of dissipative forces, and of the
- * forces that move pins and colliders along their paths. With powers at the ends, the force of a stiff
- * dashpot at a jump of a pin's velocity would count for a good part of the step. The base and g0 serve as
- * scratch. */
+/* Adds the work over a stage, by the midpoint rule with the mean velocity: of dissipative forces, and of
+ * the forces that move pins and colliders along their paths. If powers at the two ends were used, the force
+ * of a stiff dashpot at a jump of a pin's velocity would count for a large part of the step. The base and
+ * g0 serve as scratch. */
 static void add_work(trbdf2_state *s, const double *from, const double *to, double t, double span,
                      drape_step_info *info)
 {
@@ -82,7 +82,7 @@ static void add_work(trbdf2_state *s, const double *from, const double *to, doub
     info->dissipated += drape_implicit_collider_work(c, t, t + span);
 }
 
-/* g0, with the velocities that pins and colliders have in the stage on average. */
+/* Computes g0, with the mean velocities of pins and colliders in the stage. */
 static void evaluate_start(trbdf2_state *s, const drape_state *in)
 {
     drape_step_equation *e = &s->common.equation;
@@ -97,7 +97,8 @@ static void evaluate_start(trbdf2_state *s, const drape_state *in)
     drape_system_force(e->system, &start, s->g0);
 }
 
-/* To xg, vg. The guess is flight without g0, whose stiff part would throw it far off. */
+/* The first stage, to xg, vg. The guess is free flight without g0, whose stiff part would make it far too
+ * long. */
 static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, double w,
                               drape_step_info *info)
 {
@@ -118,8 +119,9 @@ static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, 
     return status;
 }
 
-/* To out. Pins take their velocity by the same formula: that of their track but for a kink inside. The guess
- * of predictor rest is d = 0: x1 from the two before without a velocity. */
+/* The second stage, to out. Pins get their velocity from the same formula, which is that of their track
+ * unless there is a kink in the step. The guess of predictor rest is d = 0: x1 from xg and x0, with zero
+ * velocity. */
 static drape_status differentiate(trbdf2_state *s, const drape_state *in, double h, double w,
                                   drape_state *out, drape_step_info *info)
 {

@@ -2,25 +2,25 @@
  * verlet.c: explicit steps, each split into substeps of h. With a = -M^-1 g(x, v) and c = 1 - damping/100:
  *
  * velocity   v <- c v, x' = x + h v + h^2/2 a(x, v), v' = v + h/2 (a(x, v) + a(x', v + h a(x, v)))
- *            velocity Verlet: second order, also with forces that depend on v.
+ *     velocity Verlet: second order, also with forces that depend on v.
  * position   v' = c v + h a(x, v), x' = x + h v'
- *            x' = x + c (x - x_before) + h^2 a of CS184 and Boson, with v = (x - x_before)/h: the same
- *            numbers up to rounding, but with the state (x, v). v is the velocity half a substep ago: first
- *            order.
+ *     x' = x + c (x - x_before) + h^2 a of CS184 and Boson, with v = (x - x_before)/h: the same numbers up
+ *     to rounding, but with the state (x, v). v is the velocity half a substep ago: first order.
  *
- * Then nodes are moved: cloth that is too near to cloth apart, out of colliders, and to where springs are not
- * too long (verlet.h). A move by d changes the velocity of a node by d/h: Verlet's velocity is a difference
- * of positions.
+ * Then nodes are moved: apart where cloth is too near to cloth, out of colliders, and to where springs are
+ * not too long (verlet.h). Moving a node by d changes its velocity by d/h, as Verlet's velocity is a
+ * difference of positions.
  *
  * Stable for
  *     h < (sqrt(mu^2 + 2 (1 + c) omega^2) - mu)/omega^2
- * with omega^2 the largest eigenvalue of M^-1 K and mu of M^-1 D: from z^2 - (1 + c - h^2 omega^2 - h mu) z
- * + c - h mu, whose roots are the growth of one wave in a substep of the position form if omega and mu belong
- * to the same wave. For mu = 0, c = 1 it is 2/omega. Damping lowers it because its forces lag. The limit of
- * the velocity form is a little higher. The moves of nodes are not considered.
+ * with omega^2 the largest eigenvalue of M^-1 K and mu that of M^-1 D: from z^2 - (1 + c - h^2 omega^2 - h
+ * mu) z + c - h mu, whose roots are the growth factors of one wave in a substep of the position form if
+ * omega and mu belong to the same wave. For mu = 0, c = 1 it is 2/omega. Damping lowers it because its
+ * forces lag. The limit of the velocity form is slightly higher. The moves of nodes are not considered.
  *
- * Energy: `dissipated` has the work of the dissipative terms and what c takes. The energy of the moves of
- * nodes has no force and no law; it is left in `numerical`, with the error of the substeps.
+ * Energy: `dissipated` contains the work of the dissipative terms and the energy removed by c. Moves of
+ * nodes have neither a force nor a law, so their energy is part of `numerical`, with the error of the
+ * substeps.
  */
 #include "integrators/verlet.h"
 
@@ -61,41 +61,43 @@ static const char *const contact_choices[] = {
 static const char *const boxes_choices[] = {[BOXES_ALL] = "all", [BOXES_OWN] = "own", NULL};
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),
-    [PARAM_SUBSTEPS] = DRAPE_INTEGER("substeps", "1", 0, 0, 1e6,
-                                     "of a step; 0: as many as the stability limit at its start asks for"),
+    [PARAM_SUBSTEPS] = DRAPE_INTEGER(
+        "substeps", "1", 0, 0, 1e6,
+        "number of substeps of a step; 0: as many as the stability limit at its start requires"),
     [PARAM_FORM] =
         DRAPE_CHOICE("form", FORM_VELOCITY, form_choices,
                      "velocity: second order; position: x' = x + (x - x_before) + a h^2 as CS184 and Boson"),
     [PARAM_DAMPING] = DRAPE_NUMBER("damping", "%", 0, 0, 100,
-                                   "velocity that every substep takes: more substeps damp more, as in CS184"),
+                                   "velocity lost in each substep: more substeps damp more, as in CS184"),
     [PARAM_CONTACT] =
         DRAPE_CHOICE("contact", DRAPE_VERLET_CS184, contact_choices,
-                     "how nodes leave colliders; cs184: friction is the share of a correction that is not "
-                     "made; boson: nodes stop on flat surfaces, friction changes forces"),
+                     "how nodes are moved out of colliders; cs184: friction is the share of a correction "
+                     "that is left out; boson: nodes stop on flat surfaces, friction changes forces"),
     [PARAM_SURFACE_OFFSET] = DRAPE_NUMBER("surface_offset", "m", 1e-4, 0, 1e9,
-                                          "cs184: how far outside of a flat surface a node is put"),
+                                          "cs184: distance from a flat surface at which a node is placed"),
     [PARAM_FRICTION_RANGE] =
-        DRAPE_NUMBER("friction_range", "m", 0.5, 0, 1e9, "boson: nodes this near to a surface rub on it"),
+        DRAPE_NUMBER("friction_range", "m", 0.5, 0, 1e9,
+                     "boson: distance from a surface up to which nodes have friction with it"),
     [PARAM_FRICTION_DRAG] =
-        DRAPE_NUMBER("friction_drag", "N s/m", 0.5, 0, 1e9, "boson: drag of a node that rubs"),
-    [PARAM_SELF_BOXES] =
-        DRAPE_CHOICE("self_boxes", BOXES_ALL, boxes_choices,
-                     "where cloth is looked for near a point of cloth; own: in its own box alone, as CS184"),
+        DRAPE_NUMBER("friction_drag", "N s/m", 0.5, 0, 1e9, "boson: drag of a node under friction"),
+    [PARAM_SELF_BOXES] = DRAPE_CHOICE(
+        "self_boxes", BOXES_ALL, boxes_choices,
+        "where to search for cloth near a point of cloth; own: only in its own box, as in CS184"),
     [PARAM_STRAIN_LIMIT] =
         DRAPE_NUMBER("strain_limit", "1", DRAPE_DERIVED("none"), 0, 1e6,
                      "no spring is longer than 1 + this times its rest length; 0.1 in CS184"),
-    [PARAM_STRAIN_LIMIT_ITERATIONS] =
-        DRAPE_INTEGER("strain_limit_iterations", "1", 1, 1, 1e6,
-                      "most passes over all springs; one does not reach the limit, as in CS184"),
+    [PARAM_STRAIN_LIMIT_ITERATIONS] = DRAPE_INTEGER(
+        "strain_limit_iterations", "1", 1, 1, 1e6,
+        "maximum number of passes over all springs; one, as in CS184, does not reach the limit"),
     [PARAM_STRAIN_LIMIT_TOLERANCE] =
         DRAPE_NUMBER("strain_limit_tolerance", "1", 1e-3, 0, 1,
-                     "passes end where no spring is longer than 1 + this allows"),
+                     "passes end when no spring is longer than (1 + this) times its limit"),
     [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.8, 0.01, 1,
                                   "substeps 0: share of the stability limit that a substep takes"),
     [PARAM_MAX_SUBSTEPS] =
         DRAPE_INTEGER("max_substeps", "1", 10000, 1, 1e6, "substeps 0: a step that needs more is rejected"),
     [PARAM_MAX_SPEED] = DRAPE_NUMBER("max_speed", "m/s", 1e6, DRAPE_ABOVE(0), 1e100,
-                                     "a step in which a node is faster has blown up and is rejected"),
+                                     "a step in which a node is faster is rejected, because it has blown up"),
     [PARAM_GUARD] = DRAPE_BOOLEAN("guard", true,
                                   "energy from nowhere and collapsed elements reject a step; false, as in "
                                   "CS184 and Boson: only max_speed does"),
@@ -132,7 +134,7 @@ typedef struct substep {
     drape_step_info *info;
 } substep;
 
-/* ---- Making ---- */
+/* ---- Creation ---- */
 
 static drape_status create_arrays(drape_arena *arena, verlet_state *s)
 {

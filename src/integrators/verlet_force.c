@@ -24,13 +24,13 @@ struct drape_verlet_force {
     drape_system *system;
     const drape_model *model;
     bool *summed;  /* (term_count) here */
-    bool has_rest; /* some are summed by the system */
+    bool has_rest; /* some terms are summed by the system */
     int32_t run_count;
     run *runs;
     double *x, *g, *constant; /* planes (3 x node_count) */
 };
 
-/* ---- Making ---- */
+/* ---- Creation ---- */
 
 /* The end of the run that begins at an element. */
 static int32_t run_end(const drape_elements *el, int32_t first)
@@ -128,7 +128,7 @@ drape_status drape_verlet_force_create(drape_arena *arena, drape_system *system,
     return status ? status : sum_linear(arena->ctx, f);
 }
 
-/* ---- Summing ---- */
+/* ---- Sums ---- */
 
 static inline void spring_forces(const run *r, const double *restrict x, size_t n, double *restrict px,
                                  double *restrict py, double *restrict pz)

@@ -1,17 +1,17 @@
 /*
- * verlet_limit.c: the limit of strains of CS184 and Provot (1995): one spring after the other, a spring that
- * is too long is shortened to its longest length, by half at each end, or all of it at the end that is free.
- * A pass moves springs that it has already shortened, so that the limit is not met after one pass: CS184
- * makes only one. Passes are repeated until no spring is longer than the slack allows, or their number is
- * reached.
+ * verlet_limit.c: the limit of strains of CS184 and Provot (1995). The springs are visited one after the
+ * other; a spring that is too long is shortened to its limit, by half at each end, or entirely at the free
+ * end if the other is pinned. A pass also moves springs that it has already shortened, so one pass does not
+ * reach the limit; CS184 makes only one. Passes are repeated until no spring is longer than the slack
+ * allows, or their maximum number is reached.
  *
- * All springs take part, of any stiffness, in the order in which CS184 makes them: by their later node.
+ * All springs take part, of any stiffness, in the order in which CS184 creates them: by their later node.
  *
  * Most springs are not too long. They are checked in patches: consecutive nodes whose springs lead to the
- * same differences of node numbers, as inside of a grid, so that the springs of one difference are a loop
- * over arrays without indices. A node without a spring that is too long is done unless one of its springs'
- * nodes moves before its turn, as it would be in the sequence of springs. The springs of other nodes, and
- * those in no patch, are taken one after the other.
+ * same differences of node numbers, as in the interior of a grid, so that the springs of one difference are
+ * a loop over arrays without indices. A node none of whose springs is too long needs no further work,
+ * unless a node of one of its springs moves before its turn in the sequence of springs. The springs of
+ * other nodes, and those in no patch, are visited one after the other.
  */
 #include "base/lanes.h"
 #include "base/vec3.h"
@@ -25,12 +25,12 @@
 #define MIN_PATCH_NODES 4  /* smaller patches are not worth it */
 #define MAX_STEPS       8  /* springs of a node */
 
-/* Springs first ... first + steps x nodes - 1, as many of each node: spring s of node `from` + i joins it
+/* Springs first ... first + steps x nodes - 1, as many for each node: spring s of node `from` + i joins it
  * with from + i - back[s]. steps 0: any springs, `nodes` of them. */
 struct drape_verlet_patch {
     int32_t first, nodes, steps, from;
     int32_t back[MAX_STEPS];
-    int32_t reach; /* springs of a node and of one up to this many nodes later may share a node */
+    int32_t reach; /* springs of a node may share a node with those of one up to this many nodes later */
 };
 
 static bool is_spring(const drape_term *term)
@@ -43,7 +43,7 @@ static int32_t later(const int32_t *node)
     return node[0] > node[1] ? node[0] : node[1];
 }
 
-/* start: of the springs of each node that is their later one. */
+/* start: where the springs begin whose later node is each node. */
 static void count_springs(const drape_model *m, int32_t *start)
 {
     for (int32_t i = 0; i < m->term_count; i++) {
@@ -168,7 +168,7 @@ static int32_t find_patches(drape_verlet_limit *l, drape_verlet_patch *out)
     return count;
 }
 
-/* ---- Making ---- */
+/* ---- Creation ---- */
 
 drape_status drape_verlet_limit_create(drape_arena *arena, const drape_model *m, double limit, int passes,
                                        double tolerance, drape_verlet_limit *out)
@@ -227,8 +227,8 @@ static double limit_each(const drape_verlet_limit *l, int32_t first, int32_t cou
     return worst;
 }
 
-/* excess: for each node, by how much the square of the length of a spring is above its limit at most; 0 if
- * none is. Returns whether some excess is positive. */
+/* excess: for each node, the most by which the square of the length of one of its springs exceeds its
+ * limit; 0 if none does. Returns whether some excess is positive. */
 LANES_DISPATCH static bool find_excess(const drape_verlet_limit *l, const drape_verlet_patch *p,
                                        double excess[MAX_PATCH_NODES])
 {
@@ -265,7 +265,7 @@ static double limit_patch(const drape_verlet_limit *l, const drape_verlet_patch 
     return worst;
 }
 
-/* Returns the largest square of length/longest that it met. */
+/* Returns the largest square of length/longest that it found. */
 static double pass(const drape_verlet_limit *l)
 {
     double worst = 0;

@@ -30,7 +30,7 @@
 
 #include <string.h>
 
-#define FARTHEST 1e9 /* boxes are numbered in 32 bits: all points beyond share a box */
+#define FARTHEST 1e9 /* boxes have 32-bit numbers: all points farther away share a box */
 
 /* A collider over one substep. */
 typedef struct pose {
@@ -185,7 +185,7 @@ static uint64_t box_of(const drape_verlet_self *s, const double *x)
     return box;
 }
 
-/* near NULL: all points, which are count. */
+/* Moves node i by the rule. near NULL: all points, of which there are count. */
 static void push_node(const drape_verlet_self *s, int32_t i, const int32_t *near, int count, double share,
                       double *x)
 {
@@ -205,8 +205,8 @@ static void push_node(const drape_verlet_self *s, int32_t i, const int32_t *near
         vec3_add_scaled(share / pushing, sum, own);
 }
 
-/* Keeps the near points in the box of a point, in `kept`, which may be near; of all points (near NULL) the
- * first. */
+/* Copies the near points in the box of a point to `kept`, which may be near. near NULL: of all points, the
+ * first that fit. */
 static int keep_box(const drape_verlet_self *s, int32_t i, const int32_t *near, int count, const double *x,
                     int32_t kept[DRAPE_MAX_NEIGHBOURS + 1])
 {
@@ -221,8 +221,8 @@ static int keep_box(const drape_verlet_self *s, int32_t i, const int32_t *near, 
     return number;
 }
 
-/* The near points of a point that push it; NULL: all points do, in a heap of cloth much thicker than its mesh
- * is fine, where a point has more near points than a list holds. */
+/* Finds the near points that push a point. NULL: all points do, as in a pile of cloth much thicker than its
+ * mesh is fine, where a point has more near points than a list can hold. */
 static int find_near(const drape_verlet_self *s, int32_t i, const double *x,
                      int32_t room[DRAPE_MAX_NEIGHBOURS + 1], const int32_t **near)
 {

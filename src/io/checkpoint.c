@@ -18,7 +18,7 @@ static drape_status read_all(drape_context *ctx, int fd, const char *path, char 
         ssize_t n = read(fd, to + done, size - done);
         if (n < 0 && errno == EINTR)
             continue;
-        if (n <= 0) /* it became shorter */
+        if (n <= 0) /* the file was shortened meanwhile */
             return drape_file_fail(ctx, "read", path, n < 0 ? errno : EIO);
         done += (size_t)n;
     }
@@ -31,7 +31,7 @@ static drape_status take_file(drape_context *ctx, int fd, const char *path, void
     if (fstat(fd, &info))
         return drape_file_fail(ctx, "read", path, errno);
     if (!S_ISREG(info.st_mode))
-        return drape_fail(ctx, DRAPE_E_FILE, "cannot read \"%.500s\": it is no regular file", path);
+        return drape_fail(ctx, DRAPE_E_FILE, "cannot read \"%.500s\": it is not a regular file", path);
     *size = (size_t)info.st_size;
     *bytes = drape_alloc(ctx, *size, 1);
     if (!*bytes)
@@ -62,7 +62,7 @@ drape_status drape_checkpoint_read(drape_context *ctx, const char *path, bool *t
 
 /* ---- Writing ---- */
 
-/* A failure of the file is told by its end. */
+/* A failure of the file is reported when the file is finished. */
 static drape_status put(void *user, const void *bytes, size_t size)
 {
     drape_file_put(user, bytes, size);
@@ -95,7 +95,7 @@ drape_status drape_sim_save(drape_sim *sim, const char *path)
     if (!sim)
         return DRAPE_E_ARGUMENT;
     if (!path || !*path)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_save: there is no name of a file");
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_save: path is NULL");
     drape_status status = drape_file_create(sim->ctx, strlen(path), &file);
     if (status)
         return status;
@@ -117,7 +117,7 @@ drape_status drape_sim_restore(drape_sim *sim, const char *path)
     if (guarded)
         return guarded;
     if (!path || !*path)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_restore: there is no name of a file");
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_restore: path is NULL");
     drape_status status = drape_checkpoint_read(sim->ctx, path, NULL, &bytes, &size);
     if (!status)
         status = drape_archive_read_from(&a, sim->ctx, path, bytes, size);

@@ -10,7 +10,7 @@ void drape_csv_put_integer(drape_file *file, int64_t value)
     drape_file_print(file, ",%" PRId64, value);
 }
 
-/* The sign of a NaN says nothing. */
+/* A NaN is written without its sign, which has no meaning. */
 void drape_csv_put_number(drape_file *file, double value)
 {
     if (isnan(value))

@@ -1,19 +1,19 @@
-/* csv.h: fields of the rows of a CSV as of RFC 4180, but with lines that end in \n alone, as the tools of a
- * Unix expect. Each begins with its comma: the first field of a row is the caller's. */
+/* csv.h: writes the fields of a CSV as in RFC 4180, except that lines end in \n alone, as Unix tools
+ * expect. Each field is preceded by a comma, so the first field of a row is written by the caller. */
 #ifndef DRAPE_IO_CSV_H
 #define DRAPE_IO_CSV_H
 
 #include "io/file.h"
 
 void drape_csv_put_integer(drape_file *file, int64_t value);
-/* 17 digits, in the locale of the thread. */
+/* With 17 digits, in the locale of the thread. */
 void drape_csv_put_number(drape_file *file, double value);
-/* Quoted where it must be; NULL is an empty field. */
+/* In quotes if necessary; NULL is an empty field. */
 void drape_csv_put_text(drape_file *file, const char *text);
 
-/* Takes the memory for the table folder/NAME. kept < 0: puts a file with the line of column names in the
- * place of any that is there; else goes on behind the first `kept` bytes of the one that is there, after
- * drape_file_trim. Destroy the file also after a failure. Errors: DRAPE_E_MEMORY, DRAPE_E_FILE. */
+/* Takes the memory for the table folder/NAME and opens it. kept < 0: replaces any such file by one with the
+ * line of column names; otherwise continues the existing file after its first `kept` bytes, once
+ * drape_file_trim is called. Destroy the file even after a failure. Errors: DRAPE_E_MEMORY, DRAPE_E_FILE. */
 drape_status drape_csv_open(drape_context *ctx, const char *folder, const char *name, const char *columns,
                             off_t kept, drape_file *file);
 

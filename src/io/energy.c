@@ -1,9 +1,9 @@
 /*
- * energy.c: see energy.h. A row is one write to the system, so that a killed run leaves whole rows.
+ * energy.c: see energy.h. A row is written by one system call, so that a killed run leaves whole rows.
  *
- * The energies of interpolated positions would be wrong: stretching is so stiff that the error of an
- * interpolation, harmless to the eye, may be an energy of the size of the motion's, and no velocities belong
- * to it. So a row has those of an accepted state, and says when that was.
+ * The energies of interpolated positions would be wrong: stretching is so stiff that an interpolation error
+ * too small to be seen can have as much energy as the motion itself, and interpolated positions have no
+ * consistent velocities. So a row contains the energies of an accepted state, and the time of that state.
  */
 #include "io/energy.h"
 

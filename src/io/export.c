@@ -11,7 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define NAME_ROOM  64 /* longest name of a frame's file */
+#define NAME_ROOM  64 /* longest name of a frame file */
 #define FRAME_WORD "frame_"
 
 /* ---- One file ---- */
@@ -57,10 +57,10 @@ void drape_export_archive_size(drape_archive *a, off_t *size)
     *size = (off_t)bytes;
 }
 
-/* ---- A file a frame ---- */
+/* ---- One file for each frame ---- */
 
-/* frame_, so many digits or more, a dot, the ending; or that with ".part", which a killed run left. *frame:
- * its number; of the latter none is kept. */
+/* Whether the name is frame_, at least so many digits, a dot and the ending, or that with ".part", as a
+ * killed run leaves it. *frame: its number; INT64_MAX with ".part", so that it counts as a late frame. */
 static bool is_frame_file(const char *name, size_t least, const char *ending, int64_t *frame)
 {
     size_t word = strlen(FRAME_WORD);
@@ -76,7 +76,7 @@ static bool is_frame_file(const char *name, size_t least, const char *ending, in
     return !*rest || strcmp(rest, DRAPE_FILE_PART) == 0;
 }
 
-/* Removes frames from one on. */
+/* Removes the frames from number `from` on. */
 static drape_status remove_frames(drape_context *ctx, const char *folder, size_t digits, const char *ending,
                                   int64_t from)
 {
@@ -122,7 +122,7 @@ drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def
     for (int64_t k = 0; !status && k < count; k++) {
         drape_file_name(&frames->file, "%s/" DRAPE_FRAME_NAME, frames->folder, k, ending);
         if (stat(frames->file.path, &info))
-            status = drape_file_fail(ctx, "go on with", frames->file.path, errno);
+            status = drape_file_fail(ctx, "continue", frames->file.path, errno);
     }
     return status;
 }

@@ -1,19 +1,19 @@
 /*
- * export_glb.c: folder/positions.glb: binary glTF 2.0. The mesh, all cloths in one, is the first frame; each
- * later one is a morph target, its displacements in float32, with normals, and an animation of the targets'
- * weights plays them: at the time of frame k weight k - 1 is 1 and the others are 0, and between two times
- * they mix linearly, as positions do.
+ * export_glb.c: folder/positions.glb: binary glTF 2.0. The mesh, all cloths in one, is the first frame.
+ * Each later frame is a morph target: its displacements in float32, with normals. An animation of the
+ * targets' weights plays them: at the time of frame k weight k - 1 is 1 and the others are 0; between two
+ * times they are interpolated linearly, as positions are.
  *
  *     header                  12 bytes
- *     JSON chunk              8 bytes and JSON of a fixed length, with blanks for what is not there yet
+ *     JSON chunk              8 bytes and JSON of a fixed length, with blanks for what is not known yet
  *     binary chunk            8 bytes, triangles, positions and normals of the first frame, the differences
  *                             of the others, and at the end, when all frames are known, times and weights
  *
- * After each frame its displacements are complete in the file before its few numbers are written into their
- * blanks: a run that is killed leaves a valid file with all frames as morph targets, without the animation.
- * That comes last because the weights are a matrix, frames x targets.
+ * The displacements of a frame are complete in the file before its few numbers are written into their
+ * blanks: a run that is killed leaves a valid file with all frames as morph targets, but without the
+ * animation. The animation comes last because the weights are a matrix, frames x targets.
  *
- * glTF has y up and metres, as Drape has. Specification: Khronos, glTF 2.0, 3.6.2 (accessors), 3.7.2.2 (morph
+ * glTF has y up and metres, like Drape. Specification: Khronos, glTF 2.0, 3.6.2 (accessors), 3.7.2.2 (morph
  * targets), 3.11 (animations), 4.4 (GLB).
  */
 #include <float.h>
@@ -29,8 +29,8 @@
 #define FILE_NAME    "positions.glb"
 #define JSON_OFFSET  20
 #define MAX_FRAMES   16384                  /* their weights take 1 GiB */
-#define MAX_BYTES    (UINT32_MAX - 65535.0) /* lengths are 32 bits */
-#define FIXED_ROOM   4096                   /* JSON without the parts of a frame */
+#define MAX_BYTES    (UINT32_MAX - 65535.0) /* lengths have 32 bits */
+#define FIXED_ROOM   4096                   /* JSON without the parts of each frame */
 #define TARGET_WIDTH 36                     /* ,{"POSITION":32769,"NORMAL":32770} */
 #define WEIGHT_WIDTH 2                      /* ,0 */
 #define BOUND_WIDTH  17                     /* -1.17549435e-38 and a comma */
@@ -40,10 +40,10 @@
     ",{\"bufferView\":1,\"byteOffset\":%u,\"componentType\":5126,\"count\":%u,\"type\":\"VEC3\","
 #define BOUNDS_ROOM   (120 + 6 * BOUND_WIDTH)
 #define NORMALS_ROOM  100
-#define ACCESSOR_ROOM (BOUNDS_ROOM + NORMALS_ROOM) /* both of a frame */
+#define ACCESSOR_ROOM (BOUNDS_ROOM + NORMALS_ROOM) /* both accessors of a frame */
 #define TIMES_ROOM    640
 
-/* Blanks in the JSON, to be filled later; from its beginning. */
+/* Positions of the blanks in the JSON, counted from its beginning. */
 typedef struct blanks {
     size_t buffer_length, view_length, views, accessors, times, targets_open, targets, targets_close,
         weights_open, weights, weights_close, animation;
@@ -52,17 +52,35 @@ typedef struct blanks {
 typedef struct glb_state {
     const drape_export_def *def;
     drape_file file;
-    uint32_t room;   /* frames that there is room for */
-    uint32_t frames; /* whole ones in the file */
-    bool live;       /* the file ends with them: it may go on there */
-    char *json;      /* while the file is begun; then a scratch */
+    uint32_t room;   /* number of frames for which there is room */
+    uint32_t frames; /* complete frames in the file */
+    bool live;       /* the file ends with these frames and can be continued */
+    char *json;      /* for the beginning of the file; not used after that is written */
     size_t json_size, used;
     blanks at;
     float *base;    /* (node_count x 3) positions of the first frame */
-    float *upright; /* (node_count x 3) normals of it */
-    double *normal; /* (node_count x 3) of the frame in work */
+    float *upright; /* (node_count x 3) normals of the first frame */
+    double *normal; /* (node_count x 3) normals of the present frame */
     float *times;   /* (room) */
 } glb_state;
+
+/* ---- Sizes ---- */
+
+static uint32_t triangle_bytes(const glb_state *glb)
+{
+    return 12 * (uint32_t)drape_model_triangle_count(glb->def->model);
+}
+
+static uint32_t node_bytes(const glb_state *glb)
+{
+    return 12 * (uint32_t)drape_model_node_count(glb->def->model);
+}
+
+/* Positions and normals of one frame. */
+static uint32_t frame_bytes(const glb_state *glb)
+{
+    return 2 * node_bytes(glb);
+}
 
 /* ---- JSON ---- */
 
@@ -75,7 +93,7 @@ static void add(glb_state *glb, const char *format, ...)
     va_end(values);
 }
 
-/* Where the blanks begin. */
+/* Adds blanks and returns where they begin. */
 static size_t add_blanks(glb_state *glb, size_t count)
 {
     size_t at = glb->used;
@@ -84,72 +102,7 @@ static size_t add_blanks(glb_state *glb, size_t count)
     return at;
 }
 
-static uint32_t triangle_bytes(const glb_state *glb)
-{
-    return 12 * (uint32_t)drape_model_triangle_count(glb->def->model);
-}
-
-static uint32_t node_bytes(const glb_state *glb)
-{
-    return 12 * (uint32_t)drape_model_node_count(glb->def->model);
-}
-
-/* Positions and normals. */
-static uint32_t frame_bytes(const glb_state *glb)
-{
-    return 2 * node_bytes(glb);
-}
-
-/* The mean of the normals of the triangles around a node, weighted by area; upwards where they cancel. */
-static void find_normals(glb_state *glb, const double *x)
-{
-    const drape_model *model = glb->def->model;
-    const int32_t *node = drape_model_triangles(model);
-    memset(glb->normal, 0, 3 * (size_t)drape_model_node_count(model) * sizeof *glb->normal);
-    for (size_t t = 0; t < (size_t)drape_model_triangle_count(model); t++, node += 3) {
-        const double *a = x + 3 * (size_t)node[0];
-        double ab[3], ac[3], n[3];
-        vec3_sub(x + 3 * (size_t)node[1], a, ab);
-        vec3_sub(x + 3 * (size_t)node[2], a, ac);
-        vec3_cross(ab, ac, n);
-        for (int k = 0; k < 3; k++)
-            vec3_add_scaled(1, n, glb->normal + 3 * (size_t)node[k]);
-    }
-    for (size_t i = 0; i < (size_t)drape_model_node_count(model); i++) {
-        double *n = glb->normal + 3 * i, length = vec3_norm(n);
-        for (int k = 0; k < 3; k++)
-            n[k] = length > 0 ? n[k] / length : k == 1;
-    }
-}
-
-/* The accessor of a frame's normals, without bounds. */
-static void name_normals(const glb_state *glb, uint32_t frame, char text[NORMALS_ROOM])
-{
-    int length = snprintf(text, NORMALS_ROOM, ACCESSOR_HEAD, frame * frame_bytes(glb) + node_bytes(glb),
-                          node_bytes(glb) / 12);
-    text[length - 1] = '}'; /* in place of the comma */
-}
-
-static void add_bounds(const float bounds[6], char *text, size_t size)
-{
-    snprintf(text, size, "\"min\":[%.9g,%.9g,%.9g],\"max\":[%.9g,%.9g,%.9g]}", bounds[0], bounds[1],
-             bounds[2], bounds[3], bounds[4], bounds[5]);
-}
-
-static void find_bounds(const glb_state *glb, const double *x, bool relative, float bounds[6])
-{
-    for (int k = 0; k < 3; k++) {
-        bounds[k] = FLT_MAX;
-        bounds[3 + k] = -FLT_MAX;
-    }
-    for (size_t i = 0; i < 3 * (size_t)drape_model_node_count(glb->def->model); i++) {
-        float value = relative ? (float)(x[i] - (double)glb->base[i]) : (float)x[i];
-        bounds[i % 3] = fminf(bounds[i % 3], value);
-        bounds[3 + i % 3] = fmaxf(bounds[3 + i % 3], value);
-    }
-}
-
-/* Positions and normals of frame k are accessors 2 k + 1 and 2 k + 2 in view 1. */
+/* Positions and normals of frame k are the accessors 2 k + 1 and 2 k + 2, in view 1. */
 static void add_buffers(glb_state *glb)
 {
     add(glb, "\"buffers\":[{\"byteLength\":");
@@ -202,7 +155,103 @@ static void make_json(glb_state *glb)
     glb->json_size = glb->used;
 }
 
-/* ---- The file ---- */
+/* ---- Opening ---- */
+
+static drape_status glb_check(drape_context *ctx, const char *pointer, const drape_export_def *def)
+{
+    double frames = (double)def->most_frames, nodes = drape_model_node_count(def->model);
+    double bytes = 12.0 * drape_model_triangle_count(def->model) + 24 * nodes * frames + 4 * frames * frames +
+                   frames * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
+    if (frames <= MAX_FRAMES && bytes <= MAX_BYTES)
+        return DRAPE_OK;
+    return drape_fail_at(
+        ctx, DRAPE_E_ARGUMENT, pointer,
+        "glb: %.0f frames of %.0f nodes take %.3g bytes; a file has at most %d frames and 4 GiB: "
+        "lower the frame rate or take another format",
+        frames, nodes, bytes, MAX_FRAMES);
+}
+
+static drape_status glb_clean(drape_context *ctx, const char *folder)
+{
+    return drape_export_clean(ctx, folder, FILE_NAME);
+}
+
+static drape_status allocate(const drape_export_def *def, glb_state *glb)
+{
+    drape_arena *arena = def->arena;
+    glb->def = def;
+    glb->room = (uint32_t)def->most_frames;
+    glb->json_size = FIXED_ROOM + (size_t)glb->room * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
+    glb->json = drape_arena_take(arena, glb->json_size, 1);
+    size_t count = 3 * (size_t)drape_model_node_count(def->model);
+    glb->base = drape_arena_take(arena, count, sizeof *glb->base);
+    glb->upright = drape_arena_take(arena, count, sizeof *glb->upright);
+    glb->normal = drape_arena_take(arena, count, sizeof *glb->normal);
+    glb->times = drape_arena_take(arena, glb->room, sizeof *glb->times);
+    if (drape_arena_status(arena))
+        return DRAPE_E_MEMORY;
+    make_json(glb);
+    return DRAPE_OK;
+}
+
+static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
+{
+    drape_status status = allocate(def, state);
+    return status ? status : drape_export_begin(ctx, def->folder, FILE_NAME, &((glb_state *)state)->file);
+}
+
+/* ---- Normals and bounds ---- */
+
+/* The mean of the normals of the triangles around each node, weighted by area; upwards if they cancel. */
+static void find_normals(glb_state *glb, const double *x)
+{
+    const drape_model *model = glb->def->model;
+    const int32_t *node = drape_model_triangles(model);
+    memset(glb->normal, 0, 3 * (size_t)drape_model_node_count(model) * sizeof *glb->normal);
+    for (size_t t = 0; t < (size_t)drape_model_triangle_count(model); t++, node += 3) {
+        const double *a = x + 3 * (size_t)node[0];
+        double ab[3], ac[3], n[3];
+        vec3_sub(x + 3 * (size_t)node[1], a, ab);
+        vec3_sub(x + 3 * (size_t)node[2], a, ac);
+        vec3_cross(ab, ac, n);
+        for (int k = 0; k < 3; k++)
+            vec3_add_scaled(1, n, glb->normal + 3 * (size_t)node[k]);
+    }
+    for (size_t i = 0; i < (size_t)drape_model_node_count(model); i++) {
+        double *n = glb->normal + 3 * i, length = vec3_norm(n);
+        for (int k = 0; k < 3; k++)
+            n[k] = length > 0 ? n[k] / length : k == 1;
+    }
+}
+
+static void find_bounds(const glb_state *glb, const double *x, bool relative, float bounds[6])
+{
+    for (int k = 0; k < 3; k++) {
+        bounds[k] = FLT_MAX;
+        bounds[3 + k] = -FLT_MAX;
+    }
+    for (size_t i = 0; i < 3 * (size_t)drape_model_node_count(glb->def->model); i++) {
+        float value = relative ? (float)(x[i] - (double)glb->base[i]) : (float)x[i];
+        bounds[i % 3] = fminf(bounds[i % 3], value);
+        bounds[3 + i % 3] = fmaxf(bounds[3 + i % 3], value);
+    }
+}
+
+static void format_bounds(const float bounds[6], char *text, size_t size)
+{
+    snprintf(text, size, "\"min\":[%.9g,%.9g,%.9g],\"max\":[%.9g,%.9g,%.9g]}", bounds[0], bounds[1],
+             bounds[2], bounds[3], bounds[4], bounds[5]);
+}
+
+/* The accessor of a frame's normals, which has no bounds. */
+static void format_normals(const glb_state *glb, uint32_t frame, char text[NORMALS_ROOM])
+{
+    int length = snprintf(text, NORMALS_ROOM, ACCESSOR_HEAD, frame * frame_bytes(glb) + node_bytes(glb),
+                          node_bytes(glb) / 12);
+    text[length - 1] = '}'; /* instead of the comma */
+}
+
+/* ---- Changes to the beginning of the file ---- */
 
 static drape_status fill(glb_state *glb, size_t at, const char *format, ...) DRAPE_PRINTF(3, 4);
 static drape_status fill(glb_state *glb, size_t at, const char *format, ...)
@@ -223,7 +272,7 @@ static drape_status write_word(glb_state *glb, off_t at, uint32_t word)
     return drape_file_overwrite(&glb->file, at, bytes, sizeof bytes);
 }
 
-/* All lengths, as the file is now. views: bytes of positions. */
+/* Writes all lengths as they are now. positions: bytes of positions and normals. */
 static drape_status write_lengths(glb_state *glb, uint32_t positions)
 {
     off_t binary = JSON_OFFSET + (off_t)glb->json_size;
@@ -236,59 +285,9 @@ static drape_status write_lengths(glb_state *glb, uint32_t positions)
     return status ? status : fill(glb, glb->at.view_length, "%10" PRIu32, positions);
 }
 
-static drape_status glb_clean(drape_context *ctx, const char *folder)
-{
-    return drape_export_clean(ctx, folder, FILE_NAME);
-}
-
-static drape_status glb_check(drape_context *ctx, const char *pointer, const drape_export_def *def)
-{
-    double frames = (double)def->most_frames, nodes = drape_model_node_count(def->model);
-    double bytes = 12.0 * drape_model_triangle_count(def->model) + 24 * nodes * frames + 4 * frames * frames +
-                   frames * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
-    if (frames <= MAX_FRAMES && bytes <= MAX_BYTES)
-        return DRAPE_OK;
-    return drape_fail_at(
-        ctx, DRAPE_E_ARGUMENT, pointer,
-        "glb: %.0f frames of %.0f nodes take %.3g bytes; a file has at most %d frames and 4 GiB: "
-        "lower the frame rate or take another format",
-        frames, nodes, bytes, MAX_FRAMES);
-}
-
-static drape_status take_rooms(const drape_export_def *def, glb_state *glb)
-{
-    drape_arena *arena = def->arena;
-    glb->def = def;
-    glb->room = (uint32_t)def->most_frames;
-    glb->json_size = FIXED_ROOM + (size_t)glb->room * (ACCESSOR_ROOM + TARGET_WIDTH + WEIGHT_WIDTH);
-    glb->json = drape_arena_take(arena, glb->json_size, 1);
-    size_t count = 3 * (size_t)drape_model_node_count(def->model);
-    glb->base = drape_arena_take(arena, count, sizeof *glb->base);
-    glb->upright = drape_arena_take(arena, count, sizeof *glb->upright);
-    glb->normal = drape_arena_take(arena, count, sizeof *glb->normal);
-    glb->times = drape_arena_take(arena, glb->room, sizeof *glb->times);
-    if (drape_arena_status(arena))
-        return DRAPE_E_MEMORY;
-    make_json(glb);
-    return DRAPE_OK;
-}
-
-static drape_status glb_open(drape_context *ctx, const drape_export_def *def, void *state)
-{
-    drape_status status = take_rooms(def, state);
-    return status ? status : drape_export_begin(ctx, def->folder, FILE_NAME, &((glb_state *)state)->file);
-}
-
 /* ---- Frames ---- */
 
-static void put_triangles(glb_state *glb)
-{
-    const int32_t *node = drape_model_triangles(glb->def->model);
-    for (size_t i = 0; i < triangle_bytes(glb) / 4; i++)
-        drape_file_put_word(&glb->file, (uint32_t)node[i]);
-}
-
-/* Everything at once: a file without positions would be none. */
+/* The file appears with its first frame, since a file without positions would not be valid. */
 static drape_status write_first(glb_state *glb, const drape_frame *frame)
 {
     float bounds[6];
@@ -296,9 +295,9 @@ static drape_status write_first(glb_state *glb, const drape_frame *frame)
     uint32_t length = triangle_bytes(glb) + frame_bytes(glb);
     find_bounds(glb, frame->positions, false, bounds);
     int head = snprintf(accessor, sizeof accessor, ACCESSOR_HEAD, 0u, node_bytes(glb) / 12);
-    add_bounds(bounds, accessor + head, sizeof accessor - (size_t)head);
+    format_bounds(bounds, accessor + head, sizeof accessor - (size_t)head);
     memcpy(glb->json + glb->at.accessors, accessor, strlen(accessor));
-    name_normals(glb, 0, accessor);
+    format_normals(glb, 0, accessor);
     memcpy(glb->json + glb->at.accessors + BOUNDS_ROOM, accessor, strlen(accessor));
     snprintf(accessor, sizeof accessor, "%10" PRIu32, length);
     memcpy(glb->json + glb->at.buffer_length, accessor, LENGTH_WIDTH);
@@ -312,8 +311,9 @@ static drape_status write_first(glb_state *glb, const drape_frame *frame)
     drape_file_put_text(&glb->file, "JSON");
     drape_file_put(&glb->file, glb->json, glb->json_size);
     drape_file_put_word(&glb->file, length);
-    drape_file_put(&glb->file, "BIN", 4); /* with its 0 */
-    put_triangles(glb);
+    drape_file_put(&glb->file, "BIN", 4); /* with its terminating 0 */
+    for (size_t i = 0; i < triangle_bytes(glb) / 4; i++)
+        drape_file_put_word(&glb->file, (uint32_t)drape_model_triangles(glb->def->model)[i]);
     for (size_t i = 0; i < node_bytes(glb) / 4; i++) {
         glb->base[i] = (float)frame->positions[i];
         drape_file_put_float(&glb->file, glb->base[i]);
@@ -326,8 +326,8 @@ static drape_status write_first(glb_state *glb, const drape_frame *frame)
     return drape_file_publish(&glb->file);
 }
 
-/* The frame's accessor, target and weight; the first target opens the lists. */
-static drape_status name_target(glb_state *glb, const drape_frame *frame)
+/* Adds the frame's accessors, target and weight; the first target also opens the lists. */
+static drape_status add_target(glb_state *glb, const drape_frame *frame)
 {
     uint32_t target = glb->frames - 1;
     float bounds[6];
@@ -335,10 +335,10 @@ static drape_status name_target(glb_state *glb, const drape_frame *frame)
     find_bounds(glb, frame->positions, true, bounds);
     int head =
         snprintf(text, sizeof text, ACCESSOR_HEAD, glb->frames * frame_bytes(glb), node_bytes(glb) / 12);
-    add_bounds(bounds, text + head, sizeof text - (size_t)head);
+    format_bounds(bounds, text + head, sizeof text - (size_t)head);
     size_t at = glb->at.accessors + (size_t)glb->frames * ACCESSOR_ROOM;
     drape_status status = fill(glb, at, "%s", text);
-    name_normals(glb, glb->frames, text);
+    format_normals(glb, glb->frames, text);
     if (!status)
         status = fill(glb, at + BOUNDS_ROOM, "%s", text);
     if (!status && target == 0)
@@ -355,7 +355,7 @@ static drape_status name_target(glb_state *glb, const drape_frame *frame)
     return status;
 }
 
-static drape_status write_target(glb_state *glb, const drape_frame *frame)
+static drape_status write_next(glb_state *glb, const drape_frame *frame)
 {
     off_t before = glb->file.kept;
     for (size_t i = 0; i < node_bytes(glb) / 4; i++)
@@ -369,10 +369,10 @@ static drape_status write_target(glb_state *glb, const drape_frame *frame)
     status = write_lengths(glb, (glb->frames + 1) * frame_bytes(glb));
     if (status)
         drape_file_cut(&glb->file, before);
-    return status ? status : name_target(glb, frame);
+    return status ? status : add_target(glb, frame);
 }
 
-/* Times of an animation strictly increase, in float32. */
+/* The frame's time; the times of an animation must strictly increase, in float32. */
 static float time_of(const glb_state *glb, const drape_frame *frame)
 {
     float time = (float)frame->time;
@@ -389,23 +389,16 @@ static drape_status glb_write(drape_context *ctx, void *state, const drape_frame
                           "\"%.500s\" has room for %" PRIu32 " frames, those of the scene's duration",
                           glb->file.path, glb->room);
     glb->times[glb->frames] = time_of(glb, frame);
-    drape_status status = glb->frames == 0 ? write_first(glb, frame) : write_target(glb, frame);
+    drape_status status = glb->frames == 0 ? write_first(glb, frame) : write_next(glb, frame);
     if (!status)
         glb->frames++;
     glb->live = glb->frames > 0;
     return status;
 }
 
-/* ---- The animation ---- */
+/* ---- Animation and end ---- */
 
-static void put_weights(glb_state *glb)
-{
-    for (uint32_t frame = 0; frame < glb->frames; frame++)
-        for (uint32_t target = 1; target < glb->frames; target++)
-            drape_file_put_float(&glb->file, frame == target);
-}
-
-static drape_status name_animation(glb_state *glb)
+static drape_status add_animation(glb_state *glb)
 {
     uint32_t n = glb->frames, offset = triangle_bytes(glb) + n * frame_bytes(glb);
     drape_status status =
@@ -433,11 +426,23 @@ static drape_status write_animation(glb_state *glb)
 {
     for (uint32_t i = 0; i < glb->frames; i++)
         drape_file_put_float(&glb->file, glb->times[i]);
-    put_weights(glb);
+    for (uint32_t frame = 0; frame < glb->frames; frame++)
+        for (uint32_t target = 1; target < glb->frames; target++)
+            drape_file_put_float(&glb->file, frame == target);
     drape_status status = drape_file_keep(&glb->file);
     if (!status)
         status = write_lengths(glb, glb->frames * frame_bytes(glb));
-    return status ? status : name_animation(glb);
+    return status ? status : add_animation(glb);
+}
+
+static drape_status glb_close(drape_context *ctx, void *state)
+{
+    glb_state *glb = state;
+    (void)ctx;
+    drape_status status = glb->frames > 1 && glb->live ? write_animation(glb) : DRAPE_OK;
+    drape_status closing = drape_file_close(&glb->file);
+    drape_file_destroy(&glb->file);
+    return status ? status : closing;
 }
 
 /* ---- Checkpoints ---- */
@@ -459,7 +464,22 @@ static void glb_archive(void *state, drape_archive *a)
     drape_archive_bytes(a, glb->times, glb->frames * sizeof *glb->times);
 }
 
-/* Over what was written from one item of a list on. */
+/* Before the first frame there is no file. */
+static drape_status glb_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
+                               drape_archive *a)
+{
+    glb_state *glb = state;
+    (void)frames;
+    drape_status status = allocate(def, glb);
+    if (status)
+        return status;
+    glb_archive(glb, a);
+    if (a->status || glb->frames == 0)
+        return a->status;
+    return drape_export_reopen(ctx, def->folder, FILE_NAME, glb->file.kept, &glb->file);
+}
+
+/* Blanks a list from item `from` on. */
 static drape_status blank_items(glb_state *glb, size_t list, size_t width, uint32_t from)
 {
     size_t begin = list + from * width, end = list + glb->room * width;
@@ -474,7 +494,7 @@ static drape_status blank_items(glb_state *glb, size_t list, size_t width, uint3
     return status;
 }
 
-/* All that frames after those that there are, and the animation, put into the blanks. */
+/* Blanks everything that later frames and the animation wrote. */
 static drape_status blank_rest(glb_state *glb)
 {
     const blanks *at = &glb->at;
@@ -496,28 +516,13 @@ static drape_status blank_rest(glb_state *glb)
         if (!pieces[i].kept)
             status = drape_file_overwrite(&glb->file, (off_t)(JSON_OFFSET + pieces[i].begin), blank,
                                           pieces[i].size);
-    /* accessor k is of frame k, target and weight k of frame k + 1 */
+    /* accessors k belong to frame k, target and weight k to frame k + 1 */
     for (size_t i = 0; !status && i < sizeof lists / sizeof *lists; i++)
         status = blank_items(glb, lists[i].begin, lists[i].width, i == 0 || n == 0 ? n : n - 1);
     return status;
 }
 
-/* Before its first frame it has no file. */
-static drape_status glb_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
-                               drape_archive *a)
-{
-    glb_state *glb = state;
-    (void)frames;
-    drape_status status = take_rooms(def, glb);
-    if (status)
-        return status;
-    glb_archive(glb, a);
-    if (a->status || glb->frames == 0)
-        return a->status;
-    return drape_export_reopen(ctx, def->folder, FILE_NAME, glb->file.kept, &glb->file);
-}
-
-/* The animation and targets go before the data they point to. */
+/* Removes the animation and targets before the data that they refer to. */
 static drape_status glb_cut(drape_context *ctx, void *state, int64_t frames)
 {
     glb_state *glb = state;
@@ -539,22 +544,11 @@ static drape_status glb_sync(void *state)
     return glb->frames > 0 ? drape_file_sync(&glb->file) : DRAPE_OK;
 }
 
-static drape_status glb_close(drape_context *ctx, void *state)
-{
-    glb_state *glb = state;
-    (void)ctx;
-    drape_status status = glb->frames > 1 && glb->live ? write_animation(glb) : DRAPE_OK;
-    drape_status closing = drape_file_close(&glb->file);
-    drape_file_destroy(&glb->file);
-    return status ? status : closing;
-}
-
 const drape_exporter_ops drape_exporter_glb = {
-    .entry =
-        {.name = "glb",
-         .summary =
-             "positions.glb: glTF 2.0 with a morph target a frame, float32, normals, and an animation; y up",
-         .reference = "Khronos, glTF 2.0 specification, 2021 (ISO/IEC 12113)"},
+    .entry = {.name = "glb",
+              .summary = "positions.glb: glTF 2.0 with a morph target for each frame, float32, normals, and "
+                         "an animation; y up",
+              .reference = "Khronos, glTF 2.0 specification, 2021 (ISO/IEC 12113)"},
     .state_size = sizeof(glb_state),
     .y_up = true,
     .check = glb_check,

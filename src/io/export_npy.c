@@ -2,9 +2,9 @@
  * export_npy.c: folder/positions.npy: frames x nodes x 3, float64, C order, little endian.
  *
  * NPY format version 1.0 (numpy.lib.format; NEP 1): magic, version, length of the header, a Python dict
- * padded by blanks so that the data start at a multiple of 64 bytes. The header has the same length for any
- * number of frames, and the count in it is raised after the frame's data are written: at any moment the file
- * holds what its header says.
+ * padded with blanks so that the data begin at a multiple of 64 bytes. The header has the same length for
+ * any number of frames, and its count is raised after a frame's data are written: at any moment the file
+ * contains what its header says.
  */
 
 #include "io/export.h"
@@ -20,14 +20,14 @@
 typedef struct npy_state {
     drape_file file;
     int32_t node_count;
-    int64_t frames; /* whole ones in the file */
+    int64_t frames; /* complete frames in the file */
 } npy_state;
 
 static void make_header(int64_t frames, int32_t node_count, char header[HEADER_SIZE])
 {
     const int length = HEADER_SIZE - MAGIC_SIZE;
     memset(header, ' ', HEADER_SIZE);
-    memcpy(header, "\x93NUMPY\x01", 8); /* with version 1.0: the 0 is the string's end */
+    memcpy(header, "\x93NUMPY\x01", 8); /* with version 1.0, whose 0 is the end of the string */
     header[8] = (char)(length & 0xff);
     header[9] = (char)(length >> 8);
     int used = snprintf(header + MAGIC_SIZE, (size_t)length,
@@ -100,7 +100,7 @@ static drape_status npy_resume(drape_context *ctx, const drape_export_def *def, 
                      : drape_export_reopen(ctx, def->folder, FILE_NAME, npy->file.kept, &npy->file);
 }
 
-/* The count first: at any moment there is at least what the header says. */
+/* First lowers the count: at any moment the file contains at least what its header says. */
 static drape_status npy_cut(drape_context *ctx, void *state, int64_t frames)
 {
     npy_state *npy = state;

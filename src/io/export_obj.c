@@ -1,7 +1,7 @@
 /*
- * export_obj.c: folder/frame_000000.obj, ...: a Wavefront OBJ file a frame: per cloth `o name`, `v x y z`
- * [m], `f a b c` with nodes counted from 1 over the whole file. 17 digits, so that a reader gets the same
- * doubles. Format: Wavefront Advanced Visualizer manual, appendix B1.
+ * export_obj.c: folder/frame_000000.obj, ...: one Wavefront OBJ file for each frame. For each cloth `o
+ * name`, `v x y z` [m], `f a b c` with nodes counted from 1 over the whole file. Numbers have 17 digits, so
+ * that a reader gets the same doubles. Format: Wavefront Advanced Visualizer manual, appendix B1.
  */
 #include <inttypes.h>
 
@@ -17,7 +17,7 @@ static drape_status obj_open(drape_context *ctx, const drape_export_def *def, vo
     return drape_frame_files_open(ctx, def, "obj", state);
 }
 
-/* A name may hold anything; a line may not hold its end. */
+/* A name may contain any character; control characters, such as line breaks, are replaced. */
 static void put_object(drape_file *file, const char *name)
 {
     drape_file_put_text(file, "o ");
@@ -65,9 +65,11 @@ static drape_status obj_close(drape_context *ctx, void *state)
 }
 
 const drape_exporter_ops drape_exporter_obj = {
-    .entry = {.name = "obj",
-              .summary = "frame_000000.obj ...: a Wavefront OBJ file a frame, an object a cloth, 17 digits",
-              .reference = "Wavefront Advanced Visualizer manual, appendix B1"},
+    .entry =
+        {.name = "obj",
+         .summary =
+             "frame_000000.obj ...: a Wavefront OBJ file for each frame, an object for each cloth, 17 digits",
+         .reference = "Wavefront Advanced Visualizer manual, appendix B1"},
     .state_size = sizeof(drape_frame_files),
     .open = obj_open,
     .clean = obj_clean,

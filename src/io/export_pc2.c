@@ -1,10 +1,10 @@
 /*
- * export_pc2.c: folder/positions.pc2 and positions.obj: a point cache and the mesh that it moves, for the
- * Mesh Cache of Blender and its like. The mesh is the first frame, all cloths as one object.
+ * export_pc2.c: folder/positions.pc2 and positions.obj: a point cache and the mesh that it moves, for
+ * Blender's Mesh Cache and similar programs. The mesh is the first frame, with all cloths as one object.
  *
  * PC2, version 1, little endian: "POINTCACHE2\0", int32 version, int32 points, float32 first frame, float32
  * step in frames, int32 samples; then for each sample float32 x y z of each point. The number of samples is
- * raised after a sample is written: at any moment the file holds what its header says.
+ * raised after a sample is written: at any moment the file contains what its header says.
  */
 #include <inttypes.h>
 #include <string.h>
@@ -18,7 +18,7 @@
 typedef struct pc2_state {
     const drape_export_def *def;
     drape_file file, mesh;
-    int32_t samples; /* whole ones in the file */
+    int32_t samples; /* complete samples in the file */
 } pc2_state;
 
 static drape_status pc2_clean(drape_context *ctx, const char *folder)
@@ -29,7 +29,7 @@ static drape_status pc2_clean(drape_context *ctx, const char *folder)
 
 static void put_header(pc2_state *pc2)
 {
-    drape_file_put(&pc2->file, "POINTCACHE2", 12); /* with its 0 */
+    drape_file_put(&pc2->file, "POINTCACHE2", 12); /* with its terminating 0 */
     drape_file_put_word(&pc2->file, 1);
     drape_file_put_word(&pc2->file, (uint32_t)drape_model_node_count(pc2->def->model));
     drape_file_put_float(&pc2->file, 0);
@@ -97,7 +97,7 @@ static void pc2_archive(void *state, drape_archive *a)
     drape_export_archive_size(a, &pc2->file.kept);
 }
 
-/* The mesh was written with the first frame, and closed. */
+/* Checks that the mesh exists: it was written and closed with the first frame. */
 static drape_status check_mesh(drape_context *ctx, const drape_export_def *def, pc2_state *pc2)
 {
     drape_status status = drape_export_reopen(ctx, def->folder, MESH_NAME, 1, &pc2->mesh);
@@ -118,7 +118,7 @@ static drape_status pc2_resume(drape_context *ctx, const drape_export_def *def, 
     return status ? status : drape_export_reopen(ctx, def->folder, FILE_NAME, pc2->file.kept, &pc2->file);
 }
 
-/* The count first: at any moment there is at least what the header says. */
+/* First lowers the count: at any moment the file contains at least what its header says. */
 static drape_status pc2_cut(drape_context *ctx, void *state, int64_t frames)
 {
     pc2_state *pc2 = state;

@@ -1,13 +1,13 @@
 /*
- * export_ply.c: folder/frame_000000.ply, ...: a binary PLY file a frame, little endian: vertices as double x
- * y z [m], faces as lists of int, counted from 0; all cloths in one mesh. Format: G. Turk, The PLY Polygon
- * File Format, 1994.
+ * export_ply.c: folder/frame_000000.ply, ...: one binary PLY file for each frame, little endian: vertices
+ * as double x y z [m], faces as lists of int counted from 0; all cloths in one mesh. Format: G. Turk, The
+ * PLY Polygon File Format, 1994.
  */
 #include <inttypes.h>
 
 #include "io/export.h"
 
-#define FACE_SIZE 13 /* the count 3 in a byte, three nodes in four */
+#define FACE_SIZE 13 /* the count 3 in one byte, three nodes in four bytes each */
 
 static drape_status ply_clean(drape_context *ctx, const char *folder)
 {
@@ -72,7 +72,7 @@ static drape_status ply_close(drape_context *ctx, void *state)
 
 const drape_exporter_ops drape_exporter_ply = {
     .entry = {.name = "ply",
-              .summary = "frame_000000.ply ...: a binary PLY file a frame, double precision",
+              .summary = "frame_000000.ply ...: a binary PLY file for each frame, double precision",
               .reference = "G. Turk, The PLY Polygon File Format, 1994"},
     .state_size = sizeof(drape_frame_files),
     .open = ply_open,

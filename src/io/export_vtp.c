@@ -1,11 +1,12 @@
 /*
- * export_vtp.c: folder/frame_000000.vtp, ...: a VTK XML file of PolyData a frame, and folder/frames.pvd,
- * which gives each its time. Positions are float64, fields float32, appended raw, little endian. All cloths
- * are in one mesh; the cells say which they belong to. Formats: VTK XML file formats (VTK User's Guide, 11th
- * ed., section 19.3), ParaView's collections of them.
+ * export_vtp.c: folder/frame_000000.vtp, ...: one VTK XML file of PolyData for each frame, and
+ * folder/frames.pvd, a collection that gives each frame its time. Positions are float64, fields float32,
+ * appended raw, little endian. All cloths are in one mesh; an array of the cells says which cloth they
+ * belong to. Formats: VTK XML file formats (VTK User's Guide, 11th ed., section 19.3), ParaView's
+ * collections of them.
  *
- * The collection ends with the same line always: a frame is written over it, with the line after it, in one
- * write.
+ * The collection always ends with the same line: a frame's entry is written over it, followed by that line
+ * again, in one write.
  */
 #include <inttypes.h>
 #include <stdio.h>
@@ -14,7 +15,7 @@
 #include "io/export.h"
 
 #define PVD_NAME "frames.pvd"
-#define PVD_ROOM 256 /* for an entry and the end */
+#define PVD_ROOM 256 /* for an entry and the last line */
 
 static const char pvd_begin[] = "<?xml version=\"1.0\"?>\n"
                                 "<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
@@ -24,7 +25,7 @@ static const char pvd_end[] = "</Collection></VTKFile>\n";
 typedef struct vtp_state {
     drape_frame_files frames;
     drape_file pvd;
-    off_t entries_end; /* in the collection */
+    off_t entries_end; /* position in the collection */
 } vtp_state;
 
 /* ---- The collection ---- */
@@ -40,7 +41,7 @@ static drape_status pvd_open(drape_context *ctx, const char *folder, vtp_state *
     return drape_file_publish(&vtp->pvd);
 }
 
-/* On a full disk the old end is put back where it was, in room that the file has. */
+/* On a full disk the last line is restored where it was: the file already has that room. */
 static drape_status pvd_add(vtp_state *vtp, const drape_frame *frame)
 {
     char text[PVD_ROOM];
@@ -64,7 +65,7 @@ static drape_status pvd_add(vtp_state *vtp, const drape_frame *frame)
 typedef struct array {
     const char *type, *name;
     int components;
-    size_t count, size; /* of components, all together; bytes of one */
+    size_t count, size; /* number of components of all tuples; bytes of a component */
     void (*put)(drape_file *file, const drape_model *model, const drape_frame *frame);
 } array;
 
@@ -126,7 +127,7 @@ static void put_least_strains(drape_file *file, const drape_model *model, const 
     put_strains(file, frame, 1, drape_model_triangle_count(model));
 }
 
-/* The mean of a triangle's nodes. */
+/* The mean over a triangle's nodes. */
 static void put_cell_densities(drape_file *file, const drape_model *model, const drape_frame *frame)
 {
     const int32_t *node = drape_model_triangles(model);
@@ -145,7 +146,7 @@ static void put_cloths(drape_file *file, const drape_model *model, const drape_f
 
 enum { POINTS, CELL_FIELDS = 4, CORNERS = 8, ARRAY_COUNT = 10 };
 
-/* In the order of the appended data: points, point data, cell data, corners of the cells. */
+/* The arrays in the order of the appended data: points, point data, cell data, corners of the cells. */
 static void list_arrays(const drape_model *model, array list[ARRAY_COUNT])
 {
     size_t nodes = (size_t)drape_model_node_count(model), cells = (size_t)drape_model_triangle_count(model);
@@ -164,7 +165,7 @@ static void list_arrays(const drape_model *model, array list[ARRAY_COUNT])
     memcpy(list, all, sizeof all);
 }
 
-/* Declares arrays first ... end - 1. Each is in the data after those before it, behind its size in 8
+/* Declares the arrays first ... end - 1. In the data each follows those before it, after its size in 8
  * bytes. */
 static void put_declarations(drape_file *file, const array *list, int first, int end)
 {
@@ -260,7 +261,8 @@ static drape_status vtp_resume(drape_context *ctx, const drape_export_def *def, 
                                         vtp->entries_end + (off_t)sizeof pvd_end - 1, &vtp->pvd);
 }
 
-/* The collection's end over what comes after, then the cut: at any moment it ends well. */
+/* Writes the last line over the entries to be removed, then trims: at any moment the collection is
+ * complete. */
 static drape_status vtp_cut(drape_context *ctx, void *state, int64_t frames)
 {
     vtp_state *vtp = state;
@@ -287,10 +289,8 @@ static drape_status vtp_close(drape_context *ctx, void *state)
 
 const drape_exporter_ops drape_exporter_vtp = {
     .entry = {.name = "vtp",
-              .summary =
-                  "frame_000000.vtp ... and frames.pvd: VTK PolyData a frame, float64, with velocity, energy "
-                  "density and "
-                  "strain, and their times",
+              .summary = "frame_000000.vtp ... and frames.pvd: VTK PolyData for each frame, float64, with "
+                         "velocity, energy density and strain, and the times of the frames",
               .reference = "VTK User's Guide, 11th edition, section 19.3, XML file formats"},
     .state_size = sizeof(vtp_state),
     .wants_fields = true,

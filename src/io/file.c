@@ -31,14 +31,15 @@ drape_status drape_file_create(drape_context *ctx, size_t path_length, drape_fil
     return DRAPE_OK;
 }
 
-/* 0 or errno. After EINTR the descriptor is gone too, and nothing was lost. */
+/* 0 or errno. After EINTR the descriptor is closed, too, and no data were lost. */
 static int close_descriptor(drape_file *file)
 {
     file->open = false;
     return close(file->fd) && errno != EINTR ? errno : 0;
 }
 
-/* The file gets its own name, or vanishes if there was an error. Returns the error, or that of the rename. */
+/* Renames the file to its own name or, after an error, removes it. Returns that error, or that of the
+ * rename. */
 static int settle(drape_file *file, int error)
 {
     if (*file->part && !error && rename(file->part, file->path))
@@ -92,8 +93,7 @@ drape_status drape_file_begin(drape_file *file)
     return DRAPE_OK;
 }
 
-/* What is in the buffer goes to the system. After a failure all further bytes are dropped until the record
- * ends. */
+/* Writes the buffer to the file. After a failure all further bytes are dropped until the record ends. */
 static void flush(drape_file *file)
 {
     size_t done = 0;
@@ -178,7 +178,7 @@ drape_status drape_file_publish(drape_file *file)
     return DRAPE_OK;
 }
 
-/* 0 or errno. What cannot be synced, a pipe, has no disk to wait for. */
+/* 0 or errno. A file that cannot be synced, such as a pipe, has no disk to wait for. */
 static int sync_descriptor(int fd)
 {
     int code;
@@ -188,7 +188,7 @@ static int sync_descriptor(int fd)
     return code && errno != EINVAL && errno != ENOTSUP ? errno : 0;
 }
 
-/* Closed first: some file systems tell only then that there was no room. */
+/* Closes the file before the rename: some file systems report a full disk only on closing. */
 drape_status drape_file_finish(drape_file *file)
 {
     flush(file);
@@ -199,7 +199,8 @@ drape_status drape_file_finish(drape_file *file)
     return error ? drape_file_fail(file->ctx, "write", file->path, error) : DRAPE_OK;
 }
 
-/* What cannot be cut, a pipe, keeps what it got; the failure that led here is the one to report. */
+/* A file that cannot be cut, such as a pipe, stays as it is; the failure that led here is the one to
+ * report. */
 void drape_file_cut(drape_file *file, off_t size)
 {
     if (ftruncate(file->fd, size) == 0 && lseek(file->fd, size, SEEK_SET) == size)
@@ -235,7 +236,7 @@ drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *da
     return DRAPE_OK;
 }
 
-/* The failure that led here is the one to report. */
+/* Its own failures are ignored: the one that led here is the one to report. */
 void drape_file_restore(drape_file *file, off_t offset, const void *data, size_t size)
 {
     if (pwrite(file->fd, data, size, offset) == (ssize_t)size)
@@ -248,22 +249,22 @@ drape_status drape_file_sync(drape_file *file)
     return error ? drape_file_fail(file->ctx, "write", file->path, error) : DRAPE_OK;
 }
 
-/* Whether it is a file that has as much as it should; says what is wrong. */
+/* Checks that it is a regular file of at least this size, and reports why not. */
 static drape_status check_reopened(drape_file *file, off_t size)
 {
     struct stat info;
     if (fstat(file->fd, &info))
-        return drape_file_fail(file->ctx, "go on with", file->path, errno);
+        return drape_file_fail(file->ctx, "continue", file->path, errno);
     if (!S_ISREG(info.st_mode))
-        return drape_fail(file->ctx, DRAPE_E_FILE, "cannot go on with \"%.500s\": it is no regular file",
+        return drape_fail(file->ctx, DRAPE_E_FILE, "cannot continue \"%.500s\": it is not a regular file",
                           file->path);
     if (info.st_size < size)
         return drape_fail(file->ctx, DRAPE_E_FILE,
-                          "cannot go on with \"%.500s\": it has %lld bytes, and had %lld at the checkpoint",
+                          "cannot continue \"%.500s\": it has %lld bytes, and had %lld at the checkpoint",
                           file->path, (long long)info.st_size, (long long)size);
     return lseek(file->fd, size, SEEK_SET) == size
                ? DRAPE_OK
-               : drape_file_fail(file->ctx, "go on with", file->path, errno);
+               : drape_file_fail(file->ctx, "continue", file->path, errno);
 }
 
 drape_status drape_file_reopen(drape_file *file, off_t size)
@@ -271,7 +272,7 @@ drape_status drape_file_reopen(drape_file *file, off_t size)
     *file->part = 0;
     file->fd = open(file->path, O_WRONLY | O_CLOEXEC | O_NONBLOCK);
     if (file->fd < 0)
-        return drape_file_fail(file->ctx, "go on with", file->path, errno);
+        return drape_file_fail(file->ctx, "continue", file->path, errno);
     file->open = true;
     file->used = 0;
     file->error = 0;
@@ -291,7 +292,7 @@ drape_status drape_file_close(drape_file *file)
     return error ? drape_file_fail(file->ctx, "close", file->path, error) : DRAPE_OK;
 }
 
-/* 0, or errno. A folder that is there is good whatever mkdir found to say, such as EROFS. */
+/* 0 or errno. An existing folder is a success whatever error mkdir reports, such as EROFS. */
 static int make_one(const char *path)
 {
     struct stat info;
@@ -320,7 +321,7 @@ static int sync_folder(const char *folder)
 {
     int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd < 0)
-        return errno == EACCES ? 0 : errno; /* a folder that may be written and not read */
+        return errno == EACCES ? 0 : errno; /* a folder may be writable without being readable */
     int error = sync_descriptor(fd);
     close(fd);
     return error;

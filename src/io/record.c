@@ -14,7 +14,7 @@
 #include "io/scene_copy.h"
 
 #define NPY_MAGIC  "\x93NUMPY\x01"
-#define NPY_HEADER 128 /* as the exporter writes it; any other length is read, too */
+#define NPY_HEADER 128 /* the size that the exporter writes; headers of other sizes are read, too */
 
 /* ---- Names ---- */
 
@@ -54,7 +54,7 @@ static drape_status not_positions(const drape_record *run, const char *path, con
     return drape_fail(run->ctx, DRAPE_E_PARSE, "\"%.500s\": %s", path, what);
 }
 
-/* frames x nodes x 3, float64: as export_npy.c writes it. */
+/* An array of frames x nodes x 3, float64, as export_npy.c writes it. */
 static drape_status read_header(drape_record *run, const char *path)
 {
     char header[NPY_HEADER + 1] = "";
@@ -112,7 +112,7 @@ drape_status drape_record_read(const drape_record *run, int64_t frame, double *x
 
 /* ---- Tables ---- */
 
-/* Splits a line of CSV (RFC 4180) in place; the number of cells, at most room. */
+/* Splits a line of CSV (RFC 4180) in place. Returns the number of cells, at most room. */
 static size_t split(char *line, char **cells, size_t room)
 {
     size_t count = 0;
@@ -135,12 +135,12 @@ static size_t split(char *line, char **cells, size_t room)
     return count;
 }
 
-#define MAX_CELLS 64 /* of a line */
+#define MAX_CELLS 64 /* in one line */
 
 typedef struct table {
     const char *const *columns;
     size_t count;
-    size_t place[DRAPE_MOST_COLUMNS]; /* of each column in a line */
+    size_t place[DRAPE_MOST_COLUMNS]; /* of each requested column in a line */
 } table;
 
 static const char *find_columns(table *t, char *header)
@@ -158,7 +158,8 @@ static const char *find_columns(table *t, char *header)
     return NULL;
 }
 
-/* A line without its end; false for the end of the file, and for one that a killed run left. */
+/* Reads a line and removes its end; false at the end of the file, and for an incomplete line left by a
+ * killed run. */
 static bool next_line(FILE *file, char **line, size_t *room)
 {
     ssize_t length = getline(line, room, file);
@@ -222,7 +223,7 @@ static void take_time(void *user, int64_t row, char *const *cells)
         run->times[row] = strtod(cells[0], NULL);
 }
 
-/* A killed run may have a frame more than rows, as frames come first. */
+/* A killed run may have one frame more than rows, because frames are written first. */
 static drape_status read_times(drape_record *run)
 {
     static const char *const columns[] = {"t"};
@@ -242,7 +243,7 @@ static drape_status read_times(drape_record *run)
     return status;
 }
 
-/* ---- All of it ---- */
+/* ---- Opening and closing ---- */
 
 drape_status drape_record_open(drape_context *ctx, const char *folder, int32_t nodes, drape_record *run)
 {

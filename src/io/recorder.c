@@ -12,7 +12,7 @@
 #include "io/steps.h"
 #include "sim/sim.h"
 
-/* Times that differ by rounding only: k / frame_rate against a sum of steps. Steps are longer than this. */
+/* Times closer than this are the same up to rounding: k / frame_rate and a sum of steps. Steps are longer. */
 #define SAME_TIME 1e-12
 
 #define MAX_FRAMES INT64_C(1000000000000000)
@@ -28,25 +28,27 @@ struct drape_recorder {
     drape_arena arena;
     drape_sim *sim;
     char *folder;         /* without a slash at its end */
-    drape_export_def def; /* of the formats */
+    drape_export_def def; /* for the formats */
     output *outputs;
     size_t output_count;
-    double *fields; /* of a frame; NULL if no format wants any */
-    double *turned; /* positions and velocities with z up; NULL if no format wants these */
+    double *fields;  /* of one frame; NULL if no format wants any */
+    double *rotated; /* positions and velocities with z up; NULL if no format wants them */
     drape_file steps, energies;
-    drape_file checkpoint; /* where checkpoints are written; without a path: no checkpoints are */
-    int64_t every;         /* frames between checkpoints; 0: only drape_recorder_checkpoint makes them */
-    double start, wall; /* [s] of the clock when the run began; wall time of the run at the last checkpoint */
+    drape_file checkpoint; /* the file of the checkpoints; without a path none are written */
+    int64_t every;         /* frames between checkpoints; 0: only drape_recorder_checkpoint writes them */
+    double start, wall;    /* [s] clock when the run began; wall time of the run until the last checkpoint */
     int64_t frames;
     double last_time; /* [s] of the last frame */
     bool moved;       /* a step was accepted after the last frame */
     bool finished;
     double seconds;
-    drape_status failure; /* the first one; DRAPE_OK for none */
+    drape_status failure; /* the first one; DRAPE_OK: none */
     char message[DRAPE_MESSAGE_SIZE];
 };
 
-/* All output happens in the C locale and is timed. */
+/* ---- Time and failures ---- */
+
+/* Output takes place in the C locale, and its time is measured. */
 typedef struct scope {
     locale_t locale;
     double start;
@@ -57,14 +59,14 @@ static scope scope_enter(void)
     return (scope){.start = drape_clock_seconds(), .locale = drape_locale_enter()};
 }
 
-/* A finished run takes no more time. */
+/* After the run has finished, time is no longer counted. */
 static void scope_leave(drape_recorder *r, scope s)
 {
     drape_locale_leave(s.locale);
     r->seconds += r->finished ? 0 : drape_clock_seconds() - s.start;
 }
 
-/* Keeps the first failure, which is returned for all later ones. */
+/* Keeps the first failure, which is also returned later. */
 static void note(drape_recorder *r, drape_status status)
 {
     if (!status || r->failure)
@@ -78,10 +80,10 @@ static drape_status report(drape_recorder *r)
     return r->failure ? drape_fail(r->ctx, r->failure, "%s", r->message) : DRAPE_OK;
 }
 
-/* ---- Frames and lines of tables ---- */
+/* ---- Frames ---- */
 
 /* (x, y, z) to (x, -z, y): a quarter turn about x. */
-static const double *turn(const double *from, size_t count, double *to)
+static const double *rotate(const double *from, size_t count, double *to)
 {
     for (size_t i = 0; i < 3 * count; i += 3) {
         to[i] = from[i];
@@ -91,7 +93,7 @@ static const double *turn(const double *from, size_t count, double *to)
     return to;
 }
 
-/* Fields of the frame, if a format wants any. */
+/* Adds the fields to the frame, if a format wants any. */
 static void add_fields(drape_recorder *r, const double *velocities, drape_frame *frame)
 {
     const drape_model *model = drape_sim_model(r->sim);
@@ -105,22 +107,22 @@ static void add_fields(drape_recorder *r, const double *velocities, drape_frame 
     frame->energy_density = density;
 }
 
-static drape_frame turned_frame(const drape_recorder *r, const drape_frame *frame)
+static drape_frame rotated_frame(const drape_recorder *r, const drape_frame *frame)
 {
     size_t nodes = (size_t)drape_model_node_count(drape_sim_model(r->sim));
-    drape_frame turned = *frame;
-    turned.positions = turn(frame->positions, nodes, r->turned);
+    drape_frame rotated = *frame;
+    rotated.positions = rotate(frame->positions, nodes, r->rotated);
     if (frame->velocities)
-        turned.velocities = turn(frame->velocities, nodes, r->turned + 3 * nodes);
-    return turned;
+        rotated.velocities = rotate(frame->velocities, nodes, r->rotated + 3 * nodes);
+    return rotated;
 }
 
 static void write_outputs(drape_recorder *r, const drape_frame *frame)
 {
-    const drape_frame turned = r->turned ? turned_frame(r, frame) : *frame;
+    const drape_frame rotated = r->rotated ? rotated_frame(r, frame) : *frame;
     for (size_t i = 0; i < r->output_count && !r->failure; i++) {
         const output *o = &r->outputs[i];
-        note(r, o->ops->write(r->ctx, o->state, o->ops->y_up ? frame : &turned));
+        note(r, o->ops->write(r->ctx, o->state, o->ops->y_up ? frame : &rotated));
     }
 }
 
@@ -166,7 +168,7 @@ static void archive_duration(drape_recorder *r, drape_archive *a)
                            there, here);
 }
 
-/* All but what the formats archive themselves. */
+/* Everything except what the formats archive themselves. */
 static void archive_progress(drape_recorder *r, drape_archive *a)
 {
     drape_archive_mark(a, "recorder");
@@ -183,7 +185,7 @@ static void archive_progress(drape_recorder *r, drape_archive *a)
     drape_export_archive_size(a, &r->energies.kept);
 }
 
-/* The disk must have all frames that a checkpoint counts before it has the checkpoint. */
+/* All frames that a checkpoint counts must be on the disk before the checkpoint is. */
 static drape_status sync_files(drape_recorder *r)
 {
     drape_status status = drape_file_sync(&r->steps);
@@ -211,17 +213,31 @@ static drape_status write_checkpoint(drape_recorder *r)
     return drape_checkpoint_end(&a, &r->checkpoint);
 }
 
-static void write_due_checkpoint(drape_recorder *r)
+drape_status drape_recorder_checkpoint(drape_recorder *r)
 {
-    if (!r->failure && r->every > 0 && r->frames % r->every == 0)
-        note(r, write_checkpoint(r));
+    if (r->failure)
+        return report(r);
+    if (!r->checkpoint.path)
+        return drape_fail(r->ctx, DRAPE_E_ARGUMENT, "the recorder was made without checkpoints");
+    locale_t old = drape_locale_enter();
+    note(r, write_checkpoint(r));
+    drape_locale_leave(old);
+    return report(r);
 }
+
+/* ---- Events of the sim ---- */
 
 static void write_attempt(drape_recorder *r, const drape_attempt *attempt)
 {
     drape_energy energy = drape_sim_energy(r->sim);
     r->moved = r->moved || attempt->accepted;
     note(r, drape_steps_write(&r->steps, attempt, &energy));
+}
+
+static void write_due_checkpoint(drape_recorder *r)
+{
+    if (!r->failure && r->every > 0 && r->frames % r->every == 0)
+        note(r, write_checkpoint(r));
 }
 
 static drape_status observe(void *user, const drape_event *event)
@@ -245,29 +261,15 @@ static drape_status observe(void *user, const drape_event *event)
     return report(r);
 }
 
-/* ---- Opening ---- */
+/* ---- Formats ---- */
 
-static drape_status check_def(drape_context *ctx, const drape_sim *sim, const drape_recorder_def *def)
-{
-    if (!sim || !def || !def->folder || !*def->folder)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "a recorder needs a sim and the name of a folder");
-    if (def->format_count && !def->formats)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "a recorder of %zu formats needs their names",
-                          def->format_count);
-    return DRAPE_OK;
-}
-
-/* One at t = 0, one each 1 / frame_rate, one at the end. */
-static int64_t most_frames(const drape_sim *sim)
-{
-    const double counted = drape_model_duration(sim->model) * sim->frame_rate;
-    return counted < MAX_FRAMES ? (int64_t)counted + 3 : MAX_FRAMES;
-}
-
+/* Of most_frames, one is at t = 0, one at each multiple of 1 / frame_rate, one at the end. */
 static drape_export_def def_of(const drape_sim *sim)
 {
-    return (drape_export_def){
-        .model = sim->model, .frame_rate = sim->frame_rate, .most_frames = most_frames(sim)};
+    const double counted = drape_model_duration(sim->model) * sim->frame_rate;
+    return (drape_export_def){.model = sim->model,
+                              .frame_rate = sim->frame_rate,
+                              .most_frames = counted < MAX_FRAMES ? (int64_t)counted + 3 : MAX_FRAMES};
 }
 
 drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, const char *pointer,
@@ -309,21 +311,23 @@ static drape_status choose_outputs(drape_recorder *r, const drape_recorder_def *
     return DRAPE_OK;
 }
 
-static drape_status take_rooms(drape_recorder *r)
+static drape_status allocate_arrays(drape_recorder *r)
 {
     const drape_model *model = r->sim->model;
     size_t nodes = (size_t)model->node_count, triangles = (size_t)model->triangle_count;
-    bool fields = false, turns = false;
+    bool fields = false, rotates = false;
     for (size_t i = 0; i < r->output_count; i++) {
         fields = fields || r->outputs[i].ops->wants_fields;
-        turns = turns || (model->z_up && !r->outputs[i].ops->y_up);
+        rotates = rotates || (model->z_up && !r->outputs[i].ops->y_up);
     }
     if (fields)
         r->fields = drape_arena_take(&r->arena, nodes + 2 * triangles, sizeof *r->fields);
-    if (turns)
-        r->turned = drape_arena_take(&r->arena, 6 * nodes, sizeof *r->turned);
+    if (rotates)
+        r->rotated = drape_arena_take(&r->arena, 6 * nodes, sizeof *r->rotated);
     return drape_arena_status(&r->arena);
 }
+
+/* ---- Files ---- */
 
 static drape_status make_folder(drape_recorder *r, const char *folder)
 {
@@ -335,26 +339,34 @@ static drape_status make_folder(drape_recorder *r, const char *folder)
     return drape_folder_make(r->ctx, r->folder);
 }
 
-/* Of all formats, not only of those that are written now. */
-static drape_status clean_folder(drape_recorder *r)
+static drape_status prepare_checkpoints(drape_recorder *r, const drape_recorder_def *def)
 {
-    drape_status status = DRAPE_OK;
-    for (int i = 0; drape_exporters[i] && !status; i++)
-        status = drape_exporters[i]->clean(r->ctx, r->folder);
+    r->every = def->checkpoint_every;
+    r->start = def->start;
+    r->def = def_of(r->sim);
+    r->def.arena = &r->arena;
+    r->def.folder = r->folder;
+    r->def.durable = def->checkpoints;
+    if (!def->checkpoints)
+        return DRAPE_OK;
+    drape_status status =
+        drape_file_create(r->ctx, strlen(r->folder) + sizeof DRAPE_CHECKPOINT_NAME, &r->checkpoint);
+    if (!status)
+        drape_file_name(&r->checkpoint, "%s/" DRAPE_CHECKPOINT_NAME, r->folder);
     return status;
 }
 
-/* Removes a checkpoint of an earlier run first, as its frames are removed next. */
+/* Removes a checkpoint of an earlier run first, because it counts frames that are removed next. */
 static drape_status open_files(drape_recorder *r)
 {
     drape_status status = drape_export_clean(r->ctx, r->folder, DRAPE_CHECKPOINT_NAME);
     if (!status)
         status = drape_export_clean(r->ctx, r->folder, DRAPE_CHECKPOINT_NAME DRAPE_FILE_PART);
-    if (!status)
-        status = clean_folder(r);
+    for (int i = 0; drape_exporters[i] && !status; i++) /* all formats, not only those written now */
+        status = drape_exporters[i]->clean(r->ctx, r->folder);
     for (size_t i = 0; i < r->output_count && !status; i++) {
         output *o = &r->outputs[i];
-        o->open = true; /* close is due after an open that failed, too */
+        o->open = true; /* close must also follow an open that failed */
         status = o->ops->open(r->ctx, &r->def, o->state);
     }
     if (!status)
@@ -362,7 +374,7 @@ static drape_status open_files(drape_recorder *r)
     return status ? status : drape_energy_open(r->ctx, r->folder, -1, &r->energies);
 }
 
-/* Removes what follows the frames of the checkpoint, once all files were found to have these. */
+/* Removes what follows the frames of the checkpoint, after all files were found to contain these. */
 static drape_status cut_files(drape_recorder *r)
 {
     drape_status status = drape_file_trim(&r->steps);
@@ -395,41 +407,6 @@ static drape_status resume_files(drape_recorder *r, drape_archive *a)
     return status ? status : cut_files(r);
 }
 
-static drape_status prepare_checkpoints(drape_recorder *r, const drape_recorder_def *def)
-{
-    r->every = def->checkpoint_every;
-    r->start = def->start;
-    r->def = def_of(r->sim);
-    r->def.arena = &r->arena;
-    r->def.folder = r->folder;
-    r->def.durable = def->checkpoints;
-    if (!def->checkpoints)
-        return DRAPE_OK;
-    drape_status status =
-        drape_file_create(r->ctx, strlen(r->folder) + sizeof DRAPE_CHECKPOINT_NAME, &r->checkpoint);
-    if (!status)
-        drape_file_name(&r->checkpoint, "%s/" DRAPE_CHECKPOINT_NAME, r->folder);
-    return status;
-}
-
-/* a NULL: a run from its beginning. */
-static drape_status set_up(drape_recorder *r, const drape_recorder_def *def, drape_archive *a)
-{
-    drape_status status = choose_outputs(r, def);
-    if (!status)
-        status = take_rooms(r);
-    if (!status)
-        status = make_folder(r, def->folder);
-    if (!status)
-        status = prepare_checkpoints(r, def);
-    if (!status)
-        status = a ? resume_files(r, a) : open_files(r);
-    r->start -= r->wall;
-    if (!status) /* last: an observer cannot be removed from a sim */
-        status = drape_sim_observe(r->sim, observe, r);
-    return status;
-}
-
 static void close_files(drape_recorder *r)
 {
     for (size_t i = 0; i < r->output_count; i++) {
@@ -440,6 +417,36 @@ static void close_files(drape_recorder *r)
     }
     note(r, drape_file_close(&r->steps));
     note(r, drape_file_close(&r->energies));
+}
+
+/* ---- Creation ---- */
+
+static drape_status check_def(drape_context *ctx, const drape_sim *sim, const drape_recorder_def *def)
+{
+    if (!sim || !def || !def->folder || !*def->folder)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "a recorder needs a sim and the name of a folder");
+    if (def->format_count && !def->formats)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "a recorder of %zu formats needs their names",
+                          def->format_count);
+    return DRAPE_OK;
+}
+
+/* a NULL: a run from its beginning; otherwise the run of a checkpoint is continued. */
+static drape_status set_up(drape_recorder *r, const drape_recorder_def *def, drape_archive *a)
+{
+    drape_status status = choose_outputs(r, def);
+    if (!status)
+        status = allocate_arrays(r);
+    if (!status)
+        status = make_folder(r, def->folder);
+    if (!status)
+        status = prepare_checkpoints(r, def);
+    if (!status)
+        status = a ? resume_files(r, a) : open_files(r);
+    r->start -= r->wall;
+    if (!status) /* the last stage, because an observer cannot be removed from a sim */
+        status = drape_sim_observe(r->sim, observe, r);
+    return status;
 }
 
 static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
@@ -481,7 +488,7 @@ drape_status drape_recorder_resume(drape_context *ctx, drape_sim *sim, const dra
     return create(ctx, sim, def, a, out);
 }
 
-/* ---- Closing ---- */
+/* ---- The end ---- */
 
 static bool last_frame_is_due(const drape_recorder *r)
 {
@@ -502,28 +509,6 @@ drape_status drape_recorder_finish(drape_recorder *r)
     return report(r);
 }
 
-drape_status drape_recorder_checkpoint(drape_recorder *r)
-{
-    if (r->failure)
-        return report(r);
-    if (!r->checkpoint.path)
-        return drape_fail(r->ctx, DRAPE_E_ARGUMENT, "the recorder was made without checkpoints");
-    locale_t old = drape_locale_enter();
-    note(r, write_checkpoint(r));
-    drape_locale_leave(old);
-    return report(r);
-}
-
-bool drape_recorder_is_finished(const drape_recorder *recorder)
-{
-    return recorder && recorder->finished;
-}
-
-double drape_recorder_wall(const drape_recorder *recorder)
-{
-    return recorder ? recorder->wall : 0;
-}
-
 void drape_recorder_destroy(drape_recorder **recorder)
 {
     if (!recorder || !*recorder)
@@ -536,6 +521,18 @@ void drape_recorder_destroy(drape_recorder **recorder)
     drape_arena_free(&r->arena);
     drape_free(r->ctx, r);
     *recorder = NULL;
+}
+
+/* ---- Queries ---- */
+
+bool drape_recorder_is_finished(const drape_recorder *recorder)
+{
+    return recorder && recorder->finished;
+}
+
+double drape_recorder_wall(const drape_recorder *recorder)
+{
+    return recorder ? recorder->wall : 0;
 }
 
 double drape_recorder_seconds(const drape_recorder *recorder)

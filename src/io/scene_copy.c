@@ -1,4 +1,4 @@
-/* scene_copy.c: see scene_copy.h. A scene names files as the source of a cloth's mesh, and in the text
+/* scene_copy.c: see scene_copy.h. A scene names files as sources of the meshes of cloths, and in the text
  * parameters of colliders. */
 #include "io/scene_copy.h"
 
@@ -13,14 +13,14 @@
 #include "model/scene_text.h"
 
 #define MESH_NAME   "scene_mesh_%d%.15s"
-#define MESH_ROOM   48 /* for a name of that kind */
+#define MESH_ROOM   48 /* for the name of a copied mesh */
 #define COPIED_ONCE 16384
 
 typedef struct copier {
     drape_context *ctx;
     drape_scene *scene;
     const char *path, *folder;
-    int files; /* copied so far */
+    int files; /* number of files copied so far */
     drape_file out;
 } copier;
 
@@ -35,7 +35,7 @@ bool drape_scene_copy_is(const char *path, const char *folder)
 
 /* ---- Meshes ---- */
 
-/* The file as it is opened from here: relative to the folder of the scene. NULL: no memory. */
+/* The path of a mesh as it is opened here: relative to the folder of the scene. NULL: out of memory. */
 static char *whole_path(const copier *c, const char *file)
 {
     const char *slash = strrchr(c->path, '/');
@@ -64,7 +64,7 @@ static drape_status copy_bytes(copier *c, int from, const char *source)
     return drape_file_finish(&c->out);
 }
 
-/* What cannot be read again, a pipe, stays where it is. */
+/* A file that cannot be read twice, such as a pipe, is not copied. */
 static drape_status copy_file(copier *c, const char *source, const char *pointer)
 {
     struct stat info;

@@ -1,6 +1,6 @@
 /*
- * steps.c: see steps.h. A row is one write to the system, so that a killed run leaves whole rows. Where an
- * attempt has nothing worst to name, the worst_ fields are empty; worst_element is empty for a node.
+ * steps.c: see steps.h. A row is written by one system call, so that a killed run leaves whole rows. If an
+ * attempt has no diagnostic, the worst_ fields are empty; worst_element is empty for a node.
  */
 #include "io/steps.h"
 

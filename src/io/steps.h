@@ -1,4 +1,4 @@
-/* steps.h: the step log, folder/steps.csv: a row for every attempted step, accepted or not. */
+/* steps.h: the step log, folder/steps.csv: one row for each attempted step, accepted or not. */
 #ifndef DRAPE_IO_STEPS_H
 #define DRAPE_IO_STEPS_H
 
@@ -7,8 +7,8 @@
 /* As drape_csv_open. */
 drape_status drape_steps_open(drape_context *ctx, const char *folder, off_t kept, drape_file *file);
 
-/* Adds a row, in the C locale. energy: of the state kept after the attempt. On failure the file ends with the
- * row before. Errors: DRAPE_E_FILE. */
+/* Adds a row; call it in the C locale. energy: of the state after the attempt. After a failure the file
+ * ends with the row before. Errors: DRAPE_E_FILE. */
 drape_status drape_steps_write(drape_file *file, const drape_attempt *attempt, const drape_energy *energy);
 
 #endif

@@ -1,8 +1,8 @@
 /*
- * summary.c: see summary.h. The keys are a contract with whoever reads summaries: add, do not rename.
+ * summary.c: see summary.h. The keys are a contract with readers of summaries: add keys, do not rename any.
  *
- * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere below ends
- * as a NULL at the top.
+ * jansson refuses to set a value that is NULL and returns NULL for it, so a failed allocation anywhere
+ * below ends as a NULL at the top.
  */
 #include "io/summary.h"
 
@@ -26,7 +26,7 @@ typedef struct count_item {
 
 #define LENGTH(array) (sizeof(array) / sizeof *(array))
 
-/* Takes both references. The object, or NULL if it or the value is not there. */
+/* Consumes both references. Returns the object, or NULL if it or the value is NULL. */
 static json_t *with(json_t *object, const char *key, json_t *value)
 {
     if (json_object_set_new(object, key, value) == 0)
@@ -35,7 +35,7 @@ static json_t *with(json_t *object, const char *key, json_t *value)
     return NULL;
 }
 
-/* JSON has no NaN and no infinity. */
+/* NaN and infinity become null, as JSON has neither. */
 static json_t *number(double value)
 {
     return isfinite(value) ? json_real(value) : json_null();
@@ -55,8 +55,8 @@ static json_t *with_counts(json_t *object, const count_item *items, size_t count
     return object;
 }
 
-/* A message may hold the name of a file, in any encoding, or be cut within a letter: where it is not UTF-8,
- * all that is not ASCII becomes a question mark. */
+/* A message may contain the name of a file in any encoding, or be cut inside a character: if it is not
+ * valid UTF-8, all bytes that are not ASCII become question marks. */
 static json_t *text(const char *bytes)
 {
     char copy[DRAPE_MESSAGE_SIZE];
@@ -118,7 +118,7 @@ static json_t *energy(drape_sim *sim)
     return with_reals(json_object(), parts, LENGTH(parts));
 }
 
-/* Of an equilibrium: whether it is stable, and how many eigenvalues of its Hessian are negative. */
+/* For an equilibrium: whether it is stable, and the number of negative eigenvalues of its Hessian. */
 static json_t *stability(const drape_statistics *s)
 {
     json_t *object = with(json_object(), "stable", json_boolean(s->unstable_modes == 0));
@@ -141,7 +141,8 @@ static json_t *realtime(const drape_summary_realtime *r)
     return with_reals(with_counts(json_object(), counts, LENGTH(counts)), times, LENGTH(times));
 }
 
-/* Of each collider, where there are any: how many triangles of the cloth reach into it, and how deep [m]. */
+/* For each collider, if there are any: the number of triangles of the cloth that reach into it, and how
+ * deep [m]. */
 static json_t *with_inside(json_t *object, const drape_sim *sim)
 {
     json_t *list = json_array();
@@ -152,7 +153,7 @@ static json_t *with_inside(json_t *object, const drape_sim *sim)
         one = with(one, "deepest", number(deepest));
         if (json_array_append_new(list, one)) {
             json_decref(list);
-            list = NULL; /* so is the object, then */
+            list = NULL; /* then object becomes NULL, too */
             break;
         }
     }
@@ -199,7 +200,7 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
 static int put(const char *bytes, size_t size, void *file)
 {
     drape_file_put(file, bytes, size);
-    return 0; /* the file remembers its failures */
+    return 0; /* the file keeps its first failure */
 }
 
 static drape_status write_json(drape_context *ctx, const json_t *json, const char *path, drape_file *file)

@@ -91,8 +91,8 @@ static void multiply(const void *owner, const double *x, double *y)
     drape_approx_jacobian_multiply(owner, x, y);
 }
 
-/* z = D^-1 r + P A_c^-1 P' r. The coarse solver has factors: its solve fails only if numbers are not finite,
- * and then its part is left out. */
+/* z = D^-1 r + P A_c^-1 P' r. The coarse solve can only fail if numbers are not finite, and then its part
+ * is left out. */
 static void precondition(const void *owner, const double *r, double *z)
 {
     const drape_approx_jacobian *s = owner;
@@ -132,7 +132,7 @@ static bool read_block(const drape_pattern *p, double *values, int32_t column, i
     return any;
 }
 
-/* b = (b + mirror')/2: friction makes blocks nonsymmetric. */
+/* b = (b + mirror')/2, because friction makes blocks nonsymmetric. */
 static void symmetrize(double *b, const double *mirror)
 {
     double t[9];
@@ -219,7 +219,7 @@ static void sum_coarse_pairs(drape_approx_jacobian *s)
     }
 }
 
-/* The pattern's values from the blocks at and below its diagonal. */
+/* Expands the blocks on and below the diagonal to the values of the pattern. */
 static void expand_coarse(drape_approx_jacobian *s)
 {
     static const int place[9] = {0, 1, 2, 1, 3, 4, 2, 4, 5};
@@ -308,7 +308,7 @@ int drape_approx_jacobian_solve(drape_approx_jacobian *s, const double *b, doubl
     return s->pcg.iterations;
 }
 
-/* ---- Making and freeing ---- */
+/* ---- Creation and destruction ---- */
 
 drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *system, int spacing,
                                           drape_approx_jacobian **out)
@@ -345,7 +345,7 @@ void drape_approx_jacobian_destroy(drape_approx_jacobian **out)
     *out = NULL;
 }
 
-/* A step begins with an update: of the factors only what later ones depend on is kept. */
+/* Each step begins with an update, so of the factors only what later ones depend on is archived. */
 void drape_approx_jacobian_archive(drape_approx_jacobian *s, drape_archive *a)
 {
     drape_archive_mark(a, "approximate jacobian");

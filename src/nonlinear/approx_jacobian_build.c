@@ -27,8 +27,9 @@ static drape_status list_pairs(drape_approx_jacobian *s)
 
 /* ---- The coarse space ---- */
 
-/* Both passes over the edges of the mesh between free nodes: counts the neighbours of each node in start[node
- * + 2], or lists them from start[node + 1] on, which then is where the list of the next node begins. */
+/* One of two passes over the edges of the mesh between free nodes: the first counts the neighbours of each
+ * node in start[node + 2]; the second lists them from start[node + 1] on, which it advances to where the
+ * list of the next node begins. */
 static void pass_edges(const drape_model *m, int32_t *start, int32_t *neighbor)
 {
     for (int32_t e = 0; e < m->edge_count; e++) {
@@ -139,8 +140,8 @@ static int differences(const drape_approx_jacobian *s, int32_t pair, int32_t col
     return count;
 }
 
-/* What one pair adds to the coarse matrix, from entry `at` of the list on; returns the next. Without store,
- * only counts. */
+/* What one pair adds to the coarse matrix, from entry `at` of the list on; returns the next entry. Without
+ * store it only counts the entries. */
 static int64_t add_pair(drape_approx_jacobian *s, int32_t pair, int64_t at, bool store)
 {
     coarse_matrix *c = &s->coarse;

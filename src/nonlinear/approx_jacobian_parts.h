@@ -9,12 +9,13 @@
 #include "solvers/pcg.h"
 #include "solvers/prolong.h"
 
-/* The matrix on the coarse space. Its pattern's blocks are the slots. */
+/* The matrix on the coarse space. Its slots are the blocks of its pattern. */
 typedef struct coarse_matrix {
     drape_prolong prolong;
     drape_pattern pattern;
     double *elastic, *damping, *mass; /* (slots) of the scalar stiffness */
-    int64_t *pair_start; /* (pairs + 1): what a pair adds to which slots at or below the diagonal */
+    int64_t *pair_start; /* (pairs + 1) where the list of each pair begins: what it adds to which slots on
+                            or below the diagonal */
     int32_t *slot;
     double *weight;
     double *sum;    /* (6 x slots) symmetric blocks */
@@ -24,7 +25,7 @@ typedef struct coarse_matrix {
     void *solver;
 } coarse_matrix;
 
-/* The blocks of R that are not zero, at or below the diagonal. */
+/* The nonzero blocks of R on or below the diagonal. */
 typedef struct remainder_matrix {
     drape_arena arena; /* holds the arrays */
     double *values;    /* of the system's pattern; NULL: there is no R */
@@ -37,8 +38,8 @@ struct drape_approx_jacobian {
     drape_arena *arena;
     drape_system *system;
     const drape_model *model;
-    int32_t nodes, pairs; /* free nodes; pairs of all terms that have some */
-    int32_t *pair;        /* (pairs x 2) free nodes, -1 pinned */
+    int32_t nodes, pairs; /* number of free nodes; number of pairs of all terms of pairs */
+    int32_t *pair;        /* (pairs x 2) free nodes; -1: pinned */
     double *h;            /* (6 x pairs) */
     drape_scalar_stiffness scalar;
     coarse_matrix coarse;
@@ -47,7 +48,7 @@ struct drape_approx_jacobian {
     drape_pcg pcg;
 };
 
-/* All that does not change with the state. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
+/* Everything that does not change with the state. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER. */
 drape_status drape_approx_jacobian_build(drape_approx_jacobian *jacobian, int spacing);
 
 /* Takes the arrays of R for the system's present pattern. Errors: DRAPE_E_MEMORY. */

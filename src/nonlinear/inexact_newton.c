@@ -1,8 +1,8 @@
 /*
- * inexact_newton.c: see inexact_newton.h. An iteration is
- *   correct   A p = -F by conjugate gradients, A near J
- *   feasible  p shortened to what passes through nothing
- *   advance   d + a p, a = 1, 1/2, 1/4 ... until the work along p has not turned too far
+ * inexact_newton.c: see inexact_newton.h. The stages of an iteration:
+ *     correct   A p = -F by conjugate gradients, with A near J
+ *     feasible  p shortened to its feasible fraction, on which nothing passes through anything
+ *     advance   d + a p with a = 1, 1/2, 1/4 ..., until the residual at its end does little work along p
  */
 #include "nonlinear/inexact_newton.h"
 
@@ -13,8 +13,9 @@
 #include <math.h>
 #include <string.h>
 
-#define WORK_FRACTION 0.5 /* of the work along a correction may be left beyond the minimum */
-#define MAX_HALVINGS  6   /* of a correction; the last is taken if F is finite there */
+/* of the initial work along a correction, which the residual may do beyond the minimum */
+#define WORK_FRACTION 0.5
+#define MAX_HALVINGS  6 /* of a correction; the last one is taken if F is finite there */
 
 struct drape_inexact_newton {
     drape_step_equation *equation;
@@ -59,7 +60,7 @@ static drape_status correct(drape_inexact_newton *s, const drape_inexact_setting
     return DRAPE_OK;
 }
 
-/* False if F is finite at none of the steps. */
+/* Returns false if F is finite at none of the step lengths. */
 static bool advance(drape_inexact_newton *s, double *d)
 {
     drape_step_equation *e = s->equation;
@@ -109,7 +110,7 @@ drape_status drape_inexact_newton_solve(drape_inexact_newton *s, const drape_ine
                                         double *d, drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
-    *report = (drape_solve_report){.tolerance = NAN}; /* the residual is reported, not bounded */
+    *report = (drape_solve_report){.tolerance = NAN}; /* the residual is reported but not bounded */
     drape_status status = iterate(s, settings, d, report);
     report->residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
     drape_step_equation_diagnose(e, settings->tolerance, report);

@@ -1,11 +1,11 @@
 /*
  * inexact_newton.h: a fixed number of inexact Newton iterations on a step equation (Dembo, Eisenstat &
- * Steihaug 1982), for steps that must not take long. Compared with newton.h
- *   - the matrix is near the Jacobian (approx_jacobian.h), and costs less than a residual,
- *   - conjugate gradients find each correction, to a share of its residual,
- *   - there are no factors of the whole matrix: memory and time grow with the number of nodes.
- * Where the residual has not fallen below that of the guess there are more iterations, and then the step is
- * refused: no step is accepted unchecked.
+ * Steihaug 1982), for steps of bounded cost. In contrast to newton.h
+ *     - the matrix is only near the Jacobian (approx_jacobian.h), and costs less than a residual,
+ *     - conjugate gradients compute each correction to a relative tolerance,
+ *     - the whole matrix is not factored: memory and time grow with the number of nodes.
+ * If the residual has not fallen below that of the guess, some more iterations are made; if it still has
+ * not, the step is refused. So no step is accepted unchecked.
  */
 #ifndef DRAPE_NONLINEAR_INEXACT_NEWTON_H
 #define DRAPE_NONLINEAR_INEXACT_NEWTON_H
@@ -15,25 +15,27 @@
 typedef struct drape_inexact_newton drape_inexact_newton;
 
 typedef struct drape_inexact_settings {
-    int iterations, rescue_iterations; /* rescue: at most as many more until the residual has fallen */
-    double tolerance;                  /* [N] of the largest component: no iteration is made below it */
-    double linear_tolerance; /* share of the residual that conjugate gradients leave in each correction */
+    int iterations, rescue_iterations; /* rescue: maximum number of further iterations, until the residual
+                                          has fallen */
+    double tolerance;                  /* [N] largest component of F below which iterations end */
+    double linear_tolerance; /* relative residual that conjugate gradients leave in each correction */
     int max_linear_iterations;
 } drape_inexact_settings;
 
-/* coarse_spacing: see approx_jacobian.h. Both equation and arena outlive it. Errors: DRAPE_E_MEMORY,
- * DRAPE_E_SOLVER; then, too, drape_inexact_newton_destroy frees what the linear solver took. */
+/* coarse_spacing: see approx_jacobian.h. The equation and the arena must outlive it. Errors:
+ * DRAPE_E_MEMORY, DRAPE_E_SOLVER; even then drape_inexact_newton_destroy must be called, to free what the
+ * linear solver took. */
 drape_status drape_inexact_newton_create(drape_arena *arena, drape_step_equation *equation,
                                          int coarse_spacing, drape_inexact_newton **out);
 void drape_inexact_newton_destroy(drape_inexact_newton **newton);
 
-/* Goes from the guess d (free DOFs) to where the iterations end. DRAPE_OK: the residual there has fallen
- * below that of the guess, or is within the tolerance; the equation was evaluated last at d. The residual is
- * reported without a tolerance. */
+/* Iterates from the guess d (free DOFs), and leaves the result in d. DRAPE_OK: the residual there has
+ * fallen below that of the guess, or is within the tolerance; the equation was evaluated last at d. The
+ * residual is reported without a tolerance. */
 drape_status drape_inexact_newton_solve(drape_inexact_newton *newton, const drape_inexact_settings *settings,
                                         double *d, drape_solve_report *report);
 
-/* What it keeps from solve to solve, and the equation's work. */
+/* Archives what is kept between solves, and the equation's work. */
 void drape_inexact_newton_archive(drape_inexact_newton *newton, drape_archive *a);
 
 size_t drape_inexact_newton_bytes(const drape_inexact_newton *newton); /* outside of its arena */

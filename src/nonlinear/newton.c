@@ -1,26 +1,26 @@
 /*
- * newton.c: see newton.h. A solve runs through these stages, which stand below in this order:
+ * newton.c: see newton.h. A solve runs through these stages, whose functions follow in this order:
  *
- *   guess      the caller's d, shortened to its feasible fraction; d = 0 where it breaks a limit
- *   residual   F(d)
- *   jacobian   J(d), in the pattern that contact has there
- *   factor     factors of J; an indefinite J is repaired by a share of the positive parts of its elements
- *   correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress predicted
- *              for the next J; p shortened or lengthened by line search, completed by chord steps
- *   conclude   what KINSOL's return code means, and F at the d where it ended, in the norm that was asked for
+ *     guess      the caller's d, shortened to its feasible fraction; d = 0 if it violates a limit
+ *     residual   F(d)
+ *     jacobian   J(d), in a pattern that includes the contacts there
+ *     factor     factors of J; an indefinite J is repaired by a share of the positive parts of its elements
+ *     correct    p = -J^-1 F, made a descent direction, shortened to its feasible fraction; stress predicted
+ *                for the next J; p shortened or lengthened by line search, completed by chord steps
+ *     conclude   what KINSOL's return code means, and F at the final d, in the requested norm
  *
- * KINSOL calls those between guess and conclude in each iteration: residual as its system function, jacobian
- * as its Jacobian function, factor and correct as setup and solve of its linear solver.
+ * KINSOL calls the stages between guess and conclude in each iteration: residual as its system function,
+ * jacobian as its Jacobian function, factor and correct as setup and solve of its linear solver.
  *
- * KINSOL does the rest: it adds p to d, counts iterations, and ends the loop where the largest component of F
- * is within its bound, where p moves nothing, where p is at its size limit five times in a row, or after
- * max_iterations. With `newton: modified` it also decides when factors are too old, and with `globalization:
- * line_search` it shortens p itself, by the sum of squares of F.
+ * KINSOL does the rest: it adds p to d, counts iterations, and ends the loop when the largest component of
+ * F is within its bound, when p is too short to change anything, when p is at its size limit five times in
+ * a row, or after max_iterations. With `newton: modified` it also decides when factors are too old, and
+ * with `globalization: line_search` it shortens p itself, by the sum of squares of F.
  *
- * Contact and the default globalization, `work`, are ours, and are inside `correct`: KINSOL is given a linear
- * solver whose solution is the step to be taken. Its own line search can neither stop at contact nor ask for
- * another matrix, and measures progress by the sum of squares of F, in which stiff stretching outweighs all
- * other forces.
+ * Contact and the default globalization, `work`, are implemented here, inside `correct`: the solution that
+ * KINSOL gets from its linear solver is the step to be taken. KINSOL's own line search can neither stop at
+ * contact nor ask for another matrix, and it measures progress by the sum of squares of F, in which stiff
+ * stretching outweighs all other forces.
  */
 #include "nonlinear/newton.h"
 
@@ -35,20 +35,21 @@
 #include <nvector/nvector_serial.h>
 #include <string.h>
 
-/* KINSOL's settings that no user should need, all set, none left to a default. */
+/* KINSOL's settings that no user should need. All are set; none is left to a default. */
 #define SETUPS_EXACT    1     /* iterations between Jacobians: exact Newton */
 #define SETUPS_MODIFIED 10    /* and modified Newton */
-#define STEP_TOLERANCE  1e-15 /* of the scene's size: a shorter correction moves nothing */
-#define MAX_NEWTON_STEP 1e3   /* of the scene's size, a node: KINSOL's own limit is 1 for the guess d = 0 */
-#define MAX_BETA_FAIL   1000  /* failures of its line search's curvature condition: as many as it likes */
+#define STEP_TOLERANCE  1e-15 /* of the scene's size: a shorter correction changes nothing */
+/* of the scene's size, for each node: KINSOL's own limit is 1 for the guess d = 0 */
+#define MAX_NEWTON_STEP 1e3
+#define MAX_BETA_FAIL   1000 /* failures of its line search's curvature condition: in effect unlimited */
 
-#define WORK_FRACTION  0.5  /* of the work along a correction may be left when the line search ends */
+#define WORK_FRACTION  0.5  /* of the initial work along a correction, at which the line search ends */
 #define MAX_TRIALS     8    /* of the line search */
 #define SHORT_STEP     0.5  /* after a shorter step the next matrix is positive semidefinite */
-#define MIN_SHARE      1e-3 /* of the positive part, tried first on an indefinite matrix */
+#define MIN_SHARE      1e-3 /* of the positive parts: the smallest share tried on an indefinite matrix */
 #define SHARE_GROWTH   4    /* from one try to the next */
-#define MAX_PREDICTION 8    /* corrections of a solve after which stress is predicted no more */
-#define MAX_CHORDS     2    /* chord steps a correction */
+#define MAX_PREDICTION 8    /* corrections in a solve, after which stress is no longer predicted */
+#define MAX_CHORDS     2    /* chord steps for each correction */
 
 struct drape_newton {
     drape_step_equation *equation;
@@ -62,18 +63,19 @@ struct drape_newton {
     double *trial;                    /* free DOFs: where the line search was last; NULL unless it searches */
     double *chord, *chord_minus_f;    /* free DOFs: a chord step and its right-hand side; the same */
 
-    /* From solve to solve. */
+    /* Kept between solves. */
     double repair_share;         /* the share that made the last indefinite matrix definite */
     double factored_mass_weight; /* of the factors that modified Newton may keep; 0: none */
 
-    /* From iteration to iteration of one solve. */
+    /* Kept between the iterations of one solve. */
     int corrections;
-    double positive_share; /* of the positive parts in the matrix, or in the next one after a line search */
+    double positive_share; /* of the positive parts in the present matrix; after a line search, in the next
+                              one */
     bool trial_evaluated;  /* the last evaluation was at `trial`, and F is finite there */
     drape_status failure;  /* < 0: why a callback ended the solve, of which KINSOL keeps only the sign */
 };
 
-/* What a callback returns: KINSOL takes > 0 as recoverable, < 0 as fatal, as drape_status does. */
+/* A callback's return value: KINSOL takes > 0 as recoverable and < 0 as fatal, as drape_status does. */
 static int return_status(drape_newton *s, drape_status status)
 {
     if (status < 0)
@@ -81,8 +83,8 @@ static int return_status(drape_newton *s, drape_status status)
     return status;
 }
 
-/* KINSOL compares the largest component of F with this, which implies the tolerance in the norm that was
- * asked for. */
+/* KINSOL compares the largest component of F with this bound, which implies the tolerance in the requested
+ * norm. */
 static double max_norm_bound(const drape_newton *s)
 {
     double tolerance = s->values[DRAPE_NEWTON_TOLERANCE], n = (double)s->equation->dofs;
@@ -110,8 +112,8 @@ static void begin(drape_newton *s)
     e->work.jacobian_seconds += drape_system_clock(e->system) - clock;
 }
 
-/* A guess beyond a limit is worse than none: springs that are too long pull with forces far above any that
- * act. */
+/* A guess that violates a limit is worse than d = 0: springs beyond their limit pull with forces far above
+ * any others. */
 static void improve_guess(drape_newton *s, double *d)
 {
     drape_step_equation *e = s->equation;
@@ -123,8 +125,8 @@ static void improve_guess(drape_newton *s, double *d)
 
 /* ---- Residual ---- */
 
-/* KINSOL must not be shown a NaN: its norms ignore it, and it would pass for convergence. Where the line
- * search ended, F is known already. */
+/* KINSOL must never get a NaN: its norms ignore it, so it would look like convergence. After a line search
+ * F is known already. */
 static int residual(N_Vector d_vector, N_Vector f, void *user)
 {
     drape_newton *s = user;
@@ -141,7 +143,7 @@ static int residual(N_Vector d_vector, N_Vector f, void *user)
 
 /* ---- Jacobian ---- */
 
-/* Contact may couple what it did not before: then the linear solver is made anew. */
+/* Contact may couple new nodes: then the linear solver is created again. */
 static drape_status extend_pattern(drape_newton *s, const drape_point *point)
 {
     bool changed;
@@ -152,7 +154,7 @@ static drape_status extend_pattern(drape_newton *s, const drape_point *point)
     return status;
 }
 
-/* Excludes contact, and the new analysis in extend_pattern, which count elsewhere. */
+/* Excludes contact and the new analysis in extend_pattern, which are timed separately. */
 static double jacobian_clock(const drape_newton *s)
 {
     return drape_system_clock(s->equation->system) - s->linear->factor_seconds;
@@ -187,17 +189,17 @@ static int jacobian(N_Vector d, N_Vector f, SUNMatrix matrix, void *user, N_Vect
 
 /* ---- Factor ---- */
 
-/* Assembles and factors J at the present iterate with a share of the positive parts: with 1 in any case, with
- * less only if that is positive definite, else DRAPE_RETRY_LINEAR. */
+/* Assembles and factors J at the present iterate with a share of the positive parts. With share 1 it is
+ * factored in any case, with less only if it is positive definite, else the result is DRAPE_RETRY_LINEAR. */
 static drape_status factor_with_share(drape_newton *s, double share)
 {
     drape_status status = assemble(s, N_VGetArrayPointer(s->unknown), share);
     return status ? status : drape_sun_linear_factor(s->linear, share < 1);
 }
 
-/* An indefinite matrix gives directions that lead nowhere good. With the whole positive parts they lead down,
- * but slowly: the smaller the share that makes the matrix definite, the nearer its direction is to Newton's.
- * The share that was needed last is tried first, halved. */
+/* An indefinite matrix gives useless directions. With the whole positive parts they are descent directions,
+ * but convergence is slow: the smaller the share that makes the matrix definite, the nearer its direction
+ * is to Newton's. The first share tried is half of the one that was needed last. */
 static int factor(SUNLinearSolver solver, SUNMatrix matrix)
 {
     (void)matrix;
@@ -215,8 +217,8 @@ static int factor(SUNLinearSolver solver, SUNMatrix matrix)
 
 /* ---- Correct ---- */
 
-/* A p that climbs is of an indefinite matrix, which the linear solver could not tell: the positive
- * semidefinite one gives one that descends. */
+/* If p is not a descent direction, the matrix is indefinite, which the linear solver could not tell:
+ * factors the one with the positive semidefinite parts, which gives a descent direction. */
 static drape_status ensure_descent(drape_newton *s, const double *minus_f, double *p)
 {
     if (drape_step_equation_dot(s->equation, minus_f, p) > 0 || s->positive_share == 1)
@@ -225,8 +227,8 @@ static drape_status ensure_descent(drape_newton *s, const double *minus_f, doubl
     return status ? status : drape_sun_linear_solve(s->linear, minus_f, p);
 }
 
-/* Where many corrections did not lead to an end, sheets buckle: there forces to first order in the last
- * correction say little, and the iteration may go in circles. */
+/* If many corrections have not led to a solution, the sheet is buckling: then forces extrapolated along the
+ * last correction are meaningless, and the iteration may cycle. */
 static void predict_stress(drape_newton *s, const double *p)
 {
     drape_step_equation *e = s->equation;
@@ -238,12 +240,13 @@ static void predict_stress(drape_newton *s, const double *p)
     e->work.jacobian_seconds += drape_system_clock(e->system) - start;
 }
 
-/* The a at which p is taken: the work of the residual along it, F(d + a p) . p, is to be at most a fraction
- * of `start`, what it was at a = 0, of either sign; a positive one has passed the minimum. Found by doubling
- * and bisection. This is the line search of Matthies & Strang 1979: it needs no energy, so it holds for
- * friction and damping too. A matrix with positive parts is too stiff by far along what is unstable: its
- * corrections are lengthened until the work is small enough, else a sheet that buckles takes a hundred of
- * them. Others are taken whole if they stop short of the minimum. */
+/* The step length a at which p is taken: there the work of the residual along p, F(d + a p) . p, is in
+ * magnitude at most a fraction of `start`, its value at a = 0; a positive value lies beyond the minimum. It
+ * is found by doubling and bisection. This is the line search of Matthies & Strang 1979: it needs no
+ * energy, so it applies to friction and damping, too. A matrix with positive parts is far too stiff along
+ * unstable directions: its corrections are lengthened until the work is small enough, because otherwise a
+ * buckling sheet takes a hundred of them. Other corrections are taken whole if they stop short of the
+ * minimum. */
 static double search_along(drape_newton *s, const double *d, const double *p, double start)
 {
     drape_step_equation *e = s->equation;
@@ -271,9 +274,10 @@ static double largest(const double *f, size_t n)
     return max;
 }
 
-/* Chord steps: where p brought the residual so far down that the same fall once or twice more ends the solve,
- * the rest is corrected with the factors of p, at a tenth of the cost of an iteration. F is known at d + p;
- * minus_f is what it was at d. A chord step that does not lower the residual is undone. */
+/* Chord steps: if p lowered the residual so far that lowering it by the same factor once or twice more
+ * would end the solve, the rest is corrected with the factors that gave p, at a tenth of the cost of an
+ * iteration. F is known at d + p; minus_f is -F at d. A chord step that does not lower the residual is
+ * undone. */
 static drape_status add_chords(drape_newton *s, const double *d, double *p, const double *minus_f)
 {
     drape_step_equation *e = s->equation;
@@ -301,8 +305,8 @@ static drape_status add_chords(drape_newton *s, const double *d, double *p, cons
     return DRAPE_OK;
 }
 
-/* The step that is taken from the present iterate d. A p that is not finite is left for KINSOL to evaluate,
- * and fail. */
+/* Turns p into the step that is taken from the present iterate d. A p that is not finite is left to KINSOL,
+ * whose evaluation then fails. */
 static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
 {
     drape_step_equation *e = s->equation;
@@ -338,7 +342,7 @@ static int correct(SUNLinearSolver solver, SUNMatrix matrix, N_Vector p, N_Vecto
 
 /* ---- Conclude ---- */
 
-/* Every return code of KINSol, as what it means for the step. */
+/* The meaning of every return code of KINSol for the step. */
 static drape_status status_of(int code, const char **reason)
 {
     switch (code) {
@@ -376,8 +380,8 @@ static drape_status status_of(int code, const char **reason)
     }
 }
 
-/* Whether F at d is small enough. KINSOL's last evaluation was at d if it converged; else it may have been a
- * trial. */
+/* Whether F at d is small enough. If KINSOL converged, its last evaluation was at d; otherwise it may have
+ * been at a trial point. */
 static drape_status judge(drape_newton *s, drape_status status, const double *d, drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
@@ -397,7 +401,7 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
         report->tolerance = rounding;
         return DRAPE_OK;
     }
-    if (!status) { /* unreachable as long as KINSOL tests what its documentation says */
+    if (!status) { /* unreachable if KINSOL tests what its documentation says */
         report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
         status = DRAPE_RETRY_NONLINEAR;
     }
@@ -410,7 +414,7 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
     drape_step_equation *e = s->equation;
     long iterations = 0;
     drape_status status = status_of(code, &report->reason);
-    KINGetNumNonlinSolvIters(s->kin, &iterations); /* of this solve: KINSol clears its counters */
+    KINGetNumNonlinSolvIters(s->kin, &iterations); /* of this solve: KINSol resets its counters */
     report->iterations = (int)iterations;
     e->work.newton_iterations += iterations;
     if (drape_system_status(e->system))
@@ -447,7 +451,7 @@ drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *
     return conclude(s, KINSol(s->kin, s->unknown, strategy, s->ones, s->ones), d, report);
 }
 
-/* ---- Making and freeing ---- */
+/* ---- Creation and destruction ---- */
 
 static bool configure(drape_newton *s)
 {
@@ -557,7 +561,7 @@ void drape_newton_forget_factors(drape_newton *s)
     s->factored_mass_weight = 0;
 }
 
-/* Modified Newton keeps its factors, and monitors the residual by what it was in the solve before. */
+/* Modified Newton keeps its factors, and monitors the residual relative to that of the previous solve. */
 void drape_newton_archive(drape_newton *s, drape_archive *a)
 {
     drape_step_equation *e = s->equation;

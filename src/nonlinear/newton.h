@@ -1,6 +1,6 @@
 /*
- * newton.h: solves a step equation to a tolerance by Newton's method, with KINSOL. newton.c says at its top
- * how an iteration runs, and which parts of it are KINSOL's.
+ * newton.h: solves a step equation to a tolerance by Newton's method, with KINSOL. The comment at the top
+ * of newton.c describes an iteration, and which parts of it are KINSOL's.
  */
 #ifndef DRAPE_NONLINEAR_NEWTON_H
 #define DRAPE_NONLINEAR_NEWTON_H
@@ -8,7 +8,8 @@
 #include "base/param.h"
 #include "nonlinear/step_equation.h"
 
-/* The parameters of integrators that step by Newton, in this order, at the head of their lists. */
+/* The parameters of integrators that use Newton's method, in the order in which they begin the integrators'
+ * lists. */
 enum {
     DRAPE_NEWTON_DT,
     DRAPE_NEWTON_TOLERANCE,
@@ -25,7 +26,7 @@ enum {
 };
 extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
 
-/* Their choices. */
+/* Values of the choices among these parameters. */
 enum { DRAPE_NEWTON_FAILURE_REJECT, DRAPE_NEWTON_FAILURE_ACCEPT };
 enum { DRAPE_NEWTON_METHOD_EXACT, DRAPE_NEWTON_METHOD_MODIFIED };
 enum {
@@ -38,29 +39,30 @@ enum { DRAPE_NEWTON_PREDICTOR_INERTIAL, DRAPE_NEWTON_PREDICTOR_REST };
 
 typedef struct drape_newton drape_newton;
 
-/* values: of the parameters. Both equation and arena outlive it. Errors: DRAPE_E_MEMORY, DRAPE_E_SOLVER;
- * then, too, drape_newton_destroy frees what SUNDIALS and the linear solver took. */
+/* values: of the parameters. The equation and the arena must outlive it. Errors: DRAPE_E_MEMORY,
+ * DRAPE_E_SOLVER; even then drape_newton_destroy must be called, to free what SUNDIALS and the linear
+ * solver took. */
 drape_status drape_newton_create(drape_arena *arena, drape_step_equation *equation, const double *values,
                                  drape_newton **out);
 void drape_newton_destroy(drape_newton **newton);
 
 /* Solves the equation for d (free DOFs; on entry the guess). DRAPE_OK: the residual at d is within the
- * tolerance, in the norm that was asked for. > 0: it is not, and the report says why; report->usable if the
- * settings ask to continue all the same. With either, the equation was evaluated last at d. */
+ * tolerance, in the requested norm. > 0: it is not, and the report says why; report->usable if the settings
+ * ask to continue nevertheless. In both cases the equation was evaluated last at d. */
 drape_status drape_newton_solve(drape_newton *newton, double *d, drape_solve_report *report);
 
-/* J at a point with a weight of its own, in the pattern that the system has there; valid until the next
- * solve. The factors are forgotten. Errors: DRAPE_E_MEMORY. */
+/* J at a point with the given mass weight, in the pattern that the system has there; valid until the next
+ * solve. The factors are discarded. Errors: DRAPE_E_MEMORY. */
 drape_status drape_newton_matrix(drape_newton *newton, const drape_point *point, double mass_weight,
                                  const drape_pattern **pattern, const double **values);
 
 /* The parameter values it was made with, in the order of drape_newton_params. */
 const double *drape_newton_values(const drape_newton *newton);
 
-/* The factors belong to another equation from now on: modified Newton must not reuse them. */
+/* From now on the factors belong to another equation, so modified Newton must not reuse them. */
 void drape_newton_forget_factors(drape_newton *newton);
 
-/* What it keeps from solve to solve, and the equation's work. */
+/* Archives what is kept between solves, and the equation's work. */
 void drape_newton_archive(drape_newton *newton, drape_archive *a);
 
 drape_work drape_newton_work(const drape_newton *newton);

@@ -1,4 +1,4 @@
-/* report.h: what the solution of a nonlinear system reports, and the work that it took. */
+/* report.h: the report of the solution of a nonlinear system, and the work that it took. */
 #ifndef DRAPE_NONLINEAR_REPORT_H
 #define DRAPE_NONLINEAR_REPORT_H
 
@@ -10,9 +10,9 @@ typedef struct drape_solve_report {
     const char *reason; /* "converged", or why not; static text */
     int iterations;
     double residual, tolerance; /* [N] */
-    /* lenient: settings on_failure accept: states are only guarded against numbers that are not finite and
-     * against passing through something. usable: with a status > 0, they ask to continue with what there
-     * is. */
+    /* lenient: the settings have on_failure accept, so states are only checked for numbers that are not
+     * finite and for passing through something. usable: the status is > 0, and the settings ask to continue
+     * with the result nevertheless. */
     bool lenient, usable;
     drape_diagnostic diagnostic;
 } drape_solve_report;

@@ -3,8 +3,8 @@
 
 #include <string.h>
 
-/* Adds the Hessians of the measures at rest, rates weighted by w. Strains are zero there, so they are k_eff
- * dq dq'. */
+/* Adds the Hessians of the measures at rest, with rates weighted by w. Strains are zero there, so these are
+ * k_eff dq dq'. */
 static void add_rest_hessians(drape_system *system, const double *internal, const double *at_rest, double w,
                               double *values)
 {
@@ -22,8 +22,8 @@ static double trace_at(const drape_pattern *p, double *values, int32_t column, i
     return a[0] + a[stride + 1] + a[2 * stride + 2];
 }
 
-/* Fills in the traces of the blocks from the values at weights 0 and 1 (NULL: no damping), without zeros off
- * the diagonal. */
+/* Stores the traces of the blocks, from the values at the weights 0 and 1 (NULL: no damping), without zeros
+ * off the diagonal. */
 static drape_status pack(drape_arena *arena, double *elastic, double *damped, drape_scalar_stiffness *c)
 {
     const drape_pattern *p = &c->model->pattern;

@@ -1,9 +1,10 @@
 /*
- * scalar_stiffness.h: a matrix of one scalar a pair of nodes that stands for the Hessian of strain measures,
- * for all three coordinates alike: the trace of each 3 x 3 block of the measures' Hessian at rest, k dq dq',
- * constant from there on. For a hinge it is the stencil on the flat sheet. Since (tr B)^2 <= 3 |B|^2 it
- * bounds the Hessian of one measure up to a factor of 3, and exactly where all gradients of the measure are
- * parallel, as those of a hinge are. Measures that depend on the distance of two nodes are left out.
+ * scalar_stiffness.h: a constant matrix with one scalar for each pair of nodes, which approximates the
+ * Hessian of strain measures for all three coordinates alike: the trace of each 3 x 3 block of the
+ * measures' Hessian at rest, k dq dq'. For a hinge it is the stencil on the flat sheet. Since (tr B)^2 <= 3
+ * |B|^2, it bounds the Hessian of one measure up to a factor of 3, and exactly if all gradients of the
+ * measure are parallel, as those of a hinge are. Measures that depend on the distance of two nodes are left
+ * out.
  */
 #ifndef DRAPE_NONLINEAR_SCALAR_STIFFNESS_H
 #define DRAPE_NONLINEAR_SCALAR_STIFFNESS_H
@@ -17,14 +18,14 @@ typedef struct drape_scalar_stiffness {
     int32_t *start, *column, *diagonal; /* (n + 1), (entries), (n) */
     double *elastic, *damping;          /* damping NULL: there is none */
     double *sum;                        /* m_w M + elastic + w damping */
-    double weight, mass_weight;         /* w and m_w of the sum; 0: there is none yet */
+    double weight, mass_weight;         /* w and m_w of the sum; 0: not computed yet */
 } drape_scalar_stiffness;
 
 /* Errors: DRAPE_E_MEMORY. */
 drape_status drape_scalar_stiffness_build(drape_arena *arena, drape_system *system,
                                           drape_scalar_stiffness *out);
 
-/* The sum for these weights. */
+/* Computes the sum for these weights. */
 void drape_scalar_stiffness_weigh(drape_scalar_stiffness *scalar, double weight, double mass_weight);
 
 #endif

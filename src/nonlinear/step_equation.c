@@ -7,7 +7,8 @@
 #include <math.h>
 #include <string.h>
 
-#define ROUNDINGS 4 /* of each term of a residual: its own, that of its product, that of the sum */
+/* rounding errors of each term of a residual: its own, that of its product, that of the sum */
+#define ROUNDINGS 4
 
 drape_status drape_step_equation_init(drape_arena *arena, drape_system *system, drape_step_equation *s)
 {
@@ -115,8 +116,8 @@ double drape_step_equation_norm(const drape_step_equation *s, drape_norm norm)
     return choose(&sum, norm);
 }
 
-/* Terms are rounded to some DBL_EPSILON of themselves. At small h the inertia of a node in flight, M |v|/h,
- * is more than 1e16 times a tight tolerance, and halving h doubles it. */
+/* The rounding error of a term is some DBL_EPSILON times the term. At small h the inertia of a node in
+ * flight, M |v|/h, is more than 1e16 times a tight tolerance, and halving h doubles it. */
 double drape_step_equation_rounding(const drape_step_equation *s, const double *d, drape_norm norm)
 {
     norms sum = {0};

@@ -1,16 +1,17 @@
 /*
- * step_equation.h: the nonlinear equation of one implicit step, or of one stage of it. With the displacement
- * d of the free nodes from a base configuration,
+ * step_equation.h: the nonlinear equation of one implicit step, or of one stage of it. With the
+ * displacement d of the free nodes from a base configuration,
  *     x = x_base + d,  v = v_base + w d
  *     F(d) = m_w M (d - p) + g(x, v) = 0       [N]
  *     J(d) = m_w M + dg/dx + w dg/dv           [N/m]
  * An integrator is a choice of the base, the weights m_w and w, the inertial displacement p and the history
- * of strain rates. Backward Euler: m_w = 1/h^2, w = 1/h, p = h v0. The unknowns are displacements and not
- * positions, so that M (d - p) keeps its digits at small h, wherever the scene lies.
+ * of strain rates. Backward Euler: m_w = 1/h^2, w = 1/h, p = h v0. The unknowns are displacements, not
+ * positions, so that M (d - p) keeps its digits at small h wherever the scene is.
  *
- * Friction and damping have no energy that could be minimised. The merit of a step a p from d is the work of
- * the residual along it, F(d + a p) . p: it is negative while p still leads down, and zero where the energy
- * along p, if there is one, is least. A step is feasible where no two pieces pass through each other on it.
+ * Friction and damping have no energy to minimise. The merit of a step a p from d is therefore the work of
+ * the residual along it, F(d + a p) . p: it is negative while the energy along p, if there is one, still
+ * falls, and zero where that energy is smallest. A step is feasible if no two pieces pass through each
+ * other on it.
  *
  * The solvers are newton.h (to a tolerance) and inexact_newton.h (a fixed number of iterations).
  */
@@ -25,25 +26,26 @@ typedef struct drape_step_equation {
     const drape_model *model;
     size_t nodes, dofs; /* entries of these arrays */
 
-    /* The equation: an integrator fills this in before a solve. */
-    double *x_base, *v_base; /* nodes: at d = 0; pinned nodes as they are at the end of the step */
+    /* The equation, which an integrator sets before a solve. */
+    double *x_base, *v_base; /* nodes: at d = 0; pinned nodes as at the end of the step */
     double *inertia;         /* free DOFs: p [m] */
     double mass_weight;      /* m_w [1/s2] */
     drape_point point;       /* w, history, internal variables, time; its x and v are those below */
-    const double *x_start;   /* nodes: where the step or stage begins; NULL: its corrections are too large for
-                                forces to first order in them (stress_predictor.h) */
+    const double *x_start;   /* nodes: the beginning of the step or stage; NULL: no stress is predicted,
+                                because corrections are too large for forces to first order in them
+                                (stress_predictor.h) */
 
-    /* Where it was evaluated last: after a solve that returned a state, at its solution. */
+    /* Where it was evaluated last: after a solve that returned a state, at the solution. */
     double *x, *v, *g; /* nodes: g(x, v) [N] */
     double *f;         /* free DOFs: F [N] */
 
-    double *x_ahead; /* nodes: the end of a step that is tested for contact; NULL without contact */
+    double *x_ahead; /* nodes: the end of a step tested for contact; NULL without contact */
     drape_work work;
 } drape_step_equation;
 
 typedef enum { DRAPE_NORM_MAX, DRAPE_NORM_L1, DRAPE_NORM_L2 } drape_norm;
 
-/* Takes the arrays, which live as long as the arena. Errors: DRAPE_E_MEMORY. */
+/* Takes the arrays from the arena. Errors: DRAPE_E_MEMORY. */
 drape_status drape_step_equation_init(drape_arena *arena, drape_system *system,
                                       drape_step_equation *equation);
 
@@ -53,41 +55,42 @@ static inline size_t drape_step_equation_at(const drape_step_equation *equation,
     return 3 * (size_t)equation->model->node_of_free[i / 3] + i % 3;
 }
 
-/* Goes to d = 0: pinned nodes keep these positions and velocities in all that follows. */
+/* Moves to d = 0. Pinned nodes keep these positions and velocities from then on. */
 void drape_step_equation_begin(drape_step_equation *equation);
 
-/* Goes to d without evaluating F. */
+/* Moves to d without evaluating F. */
 void drape_step_equation_move(drape_step_equation *equation, const double *d);
 
-/* Goes to d and evaluates F; false if it is not finite. */
+/* Moves to d and evaluates F; false if F is not finite. */
 bool drape_step_equation_evaluate(drape_step_equation *equation, const double *d);
 
 /* The same at trial = d + a p, with its merit *work = F(trial) . p [J]; INFINITY if F is not finite. */
 bool drape_step_equation_try(drape_step_equation *equation, const double *d, double a, const double *p,
                              double *trial, double *work);
 
-/* J at the last point into values. stress: see drape_point; NULL: the forces there. positive_share, 0 to 1:
- * how much of the difference from the Hessian of each element to its positive semidefinite part is added. */
+/* J at the last point, into values. stress: see drape_point; NULL: the forces at that point.
+ * positive_share, 0 to 1: the share of the difference between each element's Hessian and its positive
+ * semidefinite part that is added. */
 void drape_step_equation_jacobian(drape_step_equation *equation, const double *stress, double positive_share,
                                   double *values);
 
 /* Shortens a step p from the last point to its largest feasible fraction. */
 void drape_step_equation_make_feasible(drape_step_equation *equation, double *p);
 
-/* The norm of F, and a bound on that of its rounding errors at d. */
+/* The norm of F; a bound on the norm of its rounding errors at d. */
 double drape_step_equation_norm(const drape_step_equation *equation, drape_norm norm);
 double drape_step_equation_rounding(const drape_step_equation *equation, const double *d, drape_norm norm);
 
-/* Reports the free node whose residual is the largest. */
+/* Reports the free node with the largest residual. */
 void drape_step_equation_diagnose(const drape_step_equation *equation, double tolerance,
                                   drape_solve_report *report);
 
-/* For numbers that are not finite: DRAPE_RETRY_DEGENERATE with the element that collapsed, if there is one,
- * else status. */
+/* For numbers that are not finite: returns DRAPE_RETRY_DEGENERATE and reports the element that collapsed,
+ * if there is one; otherwise returns status. */
 drape_status drape_step_equation_find_cause(const drape_step_equation *equation, drape_status status,
                                             drape_solve_report *report);
 
-/* a . b of free DOFs. */
+/* a . b over the free DOFs. */
 static inline double drape_step_equation_dot(const drape_step_equation *equation, const double *a,
                                              const double *b)
 {

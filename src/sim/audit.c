@@ -1,29 +1,31 @@
 /*
- * audit.c: where the energy goes. Kinetic, elastic and gravitational energy are of the state; what damping
- * terms took and moving pins put in is summed over accepted steps by the integrators; the remainder is the
- * integrator's own.
+ * audit.c: the energy account of a run. Kinetic, elastic and gravitational energy are functions of the
+ * state; the integrators sum what damping terms dissipated and the work of moving pins over accepted steps;
+ * the remainder is the numerical dissipation of the integrator.
  *
- * Kinetic energy is that of the free nodes. The motion of pinned ones is prescribed: whatever it takes to
- * bring them to speed is no part of what happens, and for a pin that jumps it would be so large that all
- * else were lost in its rounding.
+ * Kinetic energy is that of the free nodes. The motion of pinned nodes is prescribed: the energy that
+ * accelerates them is not part of the account. For a pin that jumps it would be so large that everything
+ * else would be lost in its rounding error.
  */
 #include "integrators/tolerance.h"
 #include "sim/sim.h"
 
 #include <math.h>
 
-#define JUMP      4.0  /* explosions are kinetic energies that grew by more */
-#define SHARE     0.5  /* and of which more than this share came from nowhere */
-#define UNNOTICED 1e-6 /* of the compared energies: less is below what adaptive integrators resolve */
-#define ROUNDED                                                                                              \
-    1e-12 /* of the same energies: below it there is no gain. Not a share of the step size: small steps gain
-             little each */
-#define QUIET 1e-16 /* of the scene's own energy: motion at 1e-8 of the scene's speed is rounding */
+#define JUMP  4.0 /* an explosion is a kinetic energy that grew by more than this factor in one step, */
+#define SHARE 0.5 /* and of which more than this share is unaccounted for */
+/* of the compared energies: smaller gains are below what adaptive integrators resolve */
+#define UNNOTICED 1e-6
+/* of the same energies: smaller gains are rounding errors. Not a share of the step size: small steps gain
+ * little each */
+#define ROUNDED 1e-12
+#define QUIET   1e-16 /* of the scene's own energy: motion at 1e-8 of the scene's speed is rounding error */
 
-/* Limits relative to the energy available so far. Integrators that conserve energy, or bound an error, let it
- * oscillate by some per cent. */
+/* Limits relative to the energy available to the run so far. Integrators that conserve energy, or bound an
+ * error, let it oscillate by some per cent. */
 #define STEP_GAIN 0.25 /* gained in one step */
-#define RUN_GAIN  0.1  /* gained since numerical dissipation was largest, if the integrator does not set it */
+/* gained since numerical dissipation was largest; an integrator may set another limit */
+#define RUN_GAIN 0.1
 
 static double kinetic(const drape_model *model, const double *v)
 {
@@ -36,7 +38,7 @@ static double kinetic(const drape_model *model, const double *v)
     return 0.5 * sum;
 }
 
-/* The energy of a state with the internal variables of the state before, after this much work. */
+/* The energy of a state, given the internal variables of the state before it and the work so far. */
 static drape_energy measure(const drape_sim *sim, const drape_state *state, const double *internal,
                             double dissipated, double pin_work)
 {
@@ -88,8 +90,8 @@ void drape_sim_reset_energy(drape_sim *sim)
     sim->energy_known = false;
 }
 
-/* The energy of the scene's mass at the scene's speed: the unit in which rounding may move a sheet at
- * rest. */
+/* The kinetic energy of the scene's mass at the scene's speed: the unit for the rounding errors that may
+ * move a sheet at rest. */
 static double scene_energy(const drape_model *m)
 {
     double mass = 0, atol_x = NAN, atol_v = NAN;
@@ -128,7 +130,7 @@ static drape_diagnostic gain_at(const drape_model *m, const double *v, const cha
                               .limit = limit};
 }
 
-/* A sudden gain of kinetic energy in one step; e is the energy at its beginning. */
+/* Whether kinetic energy exploded in one step; e is the energy at its beginning. */
 static bool exploded(const drape_energy *e, const drape_energy *made, double gain, double quiet)
 {
     if (!(made->kinetic > JUMP * e->kinetic && gain > SHARE * made->kinetic))
@@ -138,9 +140,9 @@ static bool exploded(const drape_energy *e, const drape_energy *made, double gai
     return gain > UNNOTICED * size + QUIET * quiet;
 }
 
-/* The energy available to the run so far: what it started with, the largest fall in gravity, the work of pins
- * and damping (whose sums have errors of their own), and the energy of the scene's mass at the scene's speed,
- * for starts at rest. */
+/* The energy available to the run so far: the initial energy, the largest fall in gravity, the work of pins
+ * and damping (whose sums have errors of their own), and, for starts at rest, the energy of the scene's
+ * mass at the scene's speed. */
 static double offered(const drape_audit *audit, const drape_energy *made, const drape_step_info *info,
                       double quiet)
 {
@@ -160,7 +162,8 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
            scale = offered(audit, &made, info, quiet), run = audit->best - made.numerical;
     sim->made = made;
     sim->made_known = true;
-    if (m->free_count == 0) /* all motion is prescribed: only the sums of pins' work have errors */
+    if (m->free_count == 0) /* all motion is prescribed: a gain is only an error in the sum of the pins'
+                               work */
         return false;
     if (exploded(&e, &made, gain, quiet))
         info->diagnostic =
@@ -182,7 +185,7 @@ void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
     audit->dissipated += info->dissipated;
     audit->pin_work += info->pin_work;
     audit->offered += fabs(info->pin_work) + fabs(info->dissipated);
-    /* otherwise the step commits internal variables */
+    /* with internal variables, committing the step changes the energy */
     sim->energy_known = sim->made_known && sim->model->internal_count == 0;
     if (!sim->made_known)
         return;

@@ -1,10 +1,10 @@
 /*
- * checkpoint.c: a sim as bytes, from which another sim of the same model goes on with the same bits. What is
- * archived is what the next steps depend on; all else follows from it, or from the model.
+ * checkpoint.c: a sim as bytes, from which another sim of the same model continues with the same bits. Only
+ * what the next steps depend on is archived; everything else follows from it, or from the model.
  *
- * A sim that is restored is made anew beside the present one and takes its place when all went well: nothing
- * of what the present one kept can have a part in it, and a failure at any moment leaves the present one as
- * it is.
+ * A restored sim is created anew beside the present one and takes its place only if everything succeeded:
+ * nothing that the present one keeps can influence it, and a failure at any moment leaves the present one
+ * unchanged.
  */
 #include "base/finite.h"
 #include "sim/sim.h"
@@ -15,7 +15,7 @@
 #include <string.h>
 
 #define MAX_LEVELS  60
-#define MAX_SECONDS 1e9 /* [s] as the duration of a scene */
+#define MAX_SECONDS 1e9 /* [s] the limit of a scene's duration */
 #define REASON_ROOM 64
 #define MEMORY_NAME "checkpoint in memory"
 
@@ -38,8 +38,8 @@ static bool is_place(int index, int least, int count)
     return index >= least && index < count;
 }
 
-/* The present one, and those before it that are still asked for; what the next attempt writes to is left
- * out. */
+/* The present state, and the earlier ones that are still needed; the one that the next attempt overwrites
+ * is left out. */
 static void archive_states(drape_sim *sim, drape_archive *a)
 {
     const int count = 2 + sim->chosen.controller->history_depth;
@@ -58,9 +58,9 @@ static void archive_states(drape_sim *sim, drape_archive *a)
             archive_state(sim->model, &sim->states[i], a);
 }
 
-/* ---- What the driver keeps ---- */
+/* ---- State of the driver ---- */
 
-/* Of what ends a loop over steps or frames. */
+/* Checks what the loops over steps and frames depend on to end. */
 static bool is_schedule(const drape_schedule *s)
 {
     return s->level >= 0 && s->level <= MAX_LEVELS && s->part >= 0 && s->part < (int64_t)1 << s->level &&
@@ -104,7 +104,7 @@ static void archive_audit(drape_sim *sim, drape_archive *a)
     archive_energy(&sim->energy, a);
 }
 
-/* A reason is static text where it was counted; where it is read, the sim keeps it. */
+/* A counted reason is static text; a reason that was read is stored in the sim's arena. */
 static void archive_reason(drape_sim *sim, drape_reason_total *reason, drape_archive *a)
 {
     char text[REASON_ROOM];
@@ -130,7 +130,7 @@ static void archive_reasons(drape_sim *sim, drape_archive *a)
     }
 }
 
-/* Between the frames of the step that led here; rows without time have none but the first. */
+/* Whether the next frame lies within the last step. A steady-state integrator has only the first frame. */
 static bool is_next_frame(const drape_sim *sim)
 {
     const drape_state *before = &sim->states[sim->before >= 0 ? sim->before : sim->now];
@@ -194,7 +194,8 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
 
 /* ---- For hosts ---- */
 
-/* The contents change places, but for what is the host's: who looks on, who may cancel, the wind. */
+/* Exchanges the contents of two sims, except what belongs to the host: observers, the cancel flag, the
+ * wind. */
 static void take_place(drape_sim *sim, drape_sim *made)
 {
     drape_sim old;
@@ -237,7 +238,7 @@ drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, void *user)
                              drape_status_name(status));
 }
 
-/* What a run adds for its files is none of the sim's. */
+/* Reads the sim only: a run archives more for its files after it. */
 drape_status drape_sim_restore_from(drape_sim *sim, const void *bytes, size_t size)
 {
     drape_archive a;

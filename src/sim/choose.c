@@ -1,4 +1,5 @@
-/* choose.c: see choose.h. Both tables are walked in the same way, so that the rules are written once. */
+/* choose.c: see choose.h. The tables of integrators and controllers are searched by the same code, so that
+ * the rules are written once. */
 #include "sim/choose.h"
 
 #include <stdio.h>
@@ -6,7 +7,7 @@
 
 #define MAX_KEYS 256
 
-/* An object of the scene that chooses from a table. */
+/* An object of the scene that chooses an entry of a table. */
 typedef struct choice {
     const char *pointer, *key; /* "/integrator", "method" */
     const drape_registry *registry;
@@ -27,8 +28,8 @@ static drape_status unknown_key(drape_context *ctx, const choice *c, const char 
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "unknown key \"%.60s\"%s%s%s", name, DRAPE_MEANT(meant));
 }
 
-/* Checks a setting against every entry that has a parameter of its name; keeps the value for the chosen
- * one. */
+/* Checks a setting against every entry that has a parameter of its name; stores the value if the chosen
+ * entry has one. */
 static drape_status apply(drape_context *ctx, const choice *c, int chosen, const drape_setting *setting,
                           double *values)
 {
@@ -63,7 +64,7 @@ static drape_status apply_all(drape_context *ctx, const choice *c, int chosen, c
     return status;
 }
 
-/* name, settings: of the def; they override the scene's. */
+/* Chooses by name, or else as the scene does, and applies the scene's and then the given settings. */
 static drape_status choose(drape_context *ctx, const choice *c, const char *name, const drape_choice *scene,
                            const drape_setting *settings, size_t setting_count, double *values, int *chosen)
 {
@@ -79,7 +80,7 @@ static drape_status choose(drape_context *ctx, const choice *c, const char *name
     return status ? status : apply_all(ctx, c, *chosen, settings, setting_count, values);
 }
 
-/* A positive number of the def itself, such as dt, is one more setting. */
+/* A positive number in the def itself, such as dt, is one more setting. */
 static drape_status apply_number(drape_context *ctx, const choice *c, int chosen, const char *name,
                                  double number, double *values)
 {

@@ -1,27 +1,27 @@
-/* choose.h: integrator and controller by name, with their parameters. Keys of any entry of the table are
- * accepted; those that the chosen one does not have are ignored. */
+/* choose.h: chooses integrator and controller by name, with their parameters. The parameters of all entries
+ * of a table are accepted as keys; those that the chosen entry does not have are ignored. */
 #ifndef DRAPE_SIM_CHOOSE_H
 #define DRAPE_SIM_CHOOSE_H
 
 #include "control/control.h"
 
-/* What a sim runs with. */
+/* The integrator and controller of a sim, with their parameters. */
 typedef struct drape_chosen {
     const drape_integrator_ops *integrator;
     const drape_controller_ops *controller;
     double integrator_values[DRAPE_MAX_PARAMS], controller_values[DRAPE_MAX_PARAMS];
 } drape_chosen;
 
-/* The scene's choices, overridden by def if there is one. Faults are reported at "/integrator/..." and
+/* The scene's choices, overridden by def if it is not NULL. Errors are reported at "/integrator/..." and
  * "/controller/...". */
 drape_status drape_choose(drape_context *ctx, const drape_model *model, const drape_sim_def *def,
                           drape_chosen *chosen);
 
-/* The value of the parameter of that name; fallback if there is none. */
+/* The value of the named parameter; fallback if there is no such parameter. */
 double drape_chosen_integrator_value(const drape_chosen *chosen, const char *name, double fallback);
 double drape_chosen_controller_value(const drape_chosen *chosen, const char *name, double fallback);
 
-/* Whether the chosen integrator or controller ignores a setting that the scene gave. */
+/* Whether the scene gave a setting that the chosen integrator or controller ignores. */
 bool drape_chosen_ignores_integrator(const drape_chosen *chosen, const char *name);
 bool drape_chosen_ignores_controller(const drape_chosen *chosen, const char *name);
 

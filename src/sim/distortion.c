@@ -1,7 +1,8 @@
 /*
- * distortion.c: what a failure that names a node does not say. A solve that stands still, or a matrix that
- * is singular, has its cause more often than not in an element that lost its shape; its forces are lengths
- * over lengths that are almost 0. Looked for once, when a run ends, in the state that it ends in.
+ * distortion.c: finds the most distorted element, for the message of a failure that names only a node. If a
+ * solve stagnates or a matrix is singular, the cause is most often an element that lost its shape: its
+ * forces are quotients of lengths that are almost 0. It is searched for once, when a run ends, in the final
+ * state.
  */
 #include "base/vec3.h"
 #include "sim/sim.h"
@@ -9,10 +10,11 @@
 #include <math.h>
 #include <stdio.h>
 
-#define BADLY 10.0 /* an edge so many times as long or short as at rest, or an altitude, is told */
+/* reported: an edge or altitude that changed from its rest length by more than this factor */
+#define BADLY 10.0
 
 typedef struct distortion {
-    double size; /* the ratio or its inverse, whichever is above 1 */
+    double size; /* the ratio or its inverse, whichever is larger */
     double ratio;
     const char *what, *of;
     const int32_t *node;
@@ -33,7 +35,7 @@ static double distance(const double *x, int32_t a, int32_t b)
     return vec3_norm(d);
 }
 
-/* Over the longest edge: the least of the three. */
+/* The smallest of the triangle's altitudes: the one over its longest edge. */
 static double altitude(const double *x, const int32_t *node)
 {
     const double *a = x + 3 * (size_t)node[0];

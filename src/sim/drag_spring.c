@@ -1,5 +1,5 @@
-/* pull.c: a spring by which a host drags a node. Setting it changes the energy of the state that is there:
- * that is the host's work, like a pin's. */
+/* drag_spring.c: a spring by which a host drags a node. Setting it changes the energy of the present state;
+ * the account counts this as work of the host, like a pin's. */
 #include "sim/sim.h"
 
 #include <math.h>

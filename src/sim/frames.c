@@ -1,15 +1,15 @@
 /*
  * frames.c: frame times are k / frame_rate. No step is shortened for a frame: between the states of a step,
- * positions are the cubic Hermite interpolant of both positions and velocities, of fourth order in h for
- * smooth motion. Where that leads through a collider or through cloth, the straight way is taken, and where
- * that does, too, the nearer of the two states.
+ * positions are the cubic Hermite interpolant of positions and velocities, of fourth order in h for smooth
+ * motion. If the interpolated positions pass through a collider or through cloth, positions are
+ * interpolated linearly instead, and if those do, too, the nearer of the two states is shown.
  */
 #include "sim/sim.h"
 
 #include <math.h>
 #include <string.h>
 
-#define SAME_TIME 1e-9 /* of the step: a frame nearer than this to a state is that state */
+#define SAME_TIME 1e-9 /* of the step: a frame nearer than this to a state shows that state */
 
 static void hermite(const drape_state *a, const drape_state *b, double t, size_t n, double *x)
 {
@@ -27,7 +27,7 @@ static void straight(const drape_state *a, const drape_state *b, double t, size_
         x[i] = (1 - s) * a->x[i] + s * b->x[i];
 }
 
-/* Into sim->frame: the integrator's own dense output where it has one. */
+/* Interpolates into sim->frame, by the integrator's own dense output if it has one. */
 static void interpolate(drape_sim *sim, const drape_state *before, double t)
 {
     const drape_state *now = drape_sim_state(sim);
@@ -41,7 +41,8 @@ static void interpolate(drape_sim *sim, const drape_state *before, double t)
     drape_motion_place_pins(drape_system_motion(sim->system), t, sim->frame);
 }
 
-/* Contact still compares with the state before: the last step began there. */
+/* Checks contact in sim->frame. Contact still compares with the state before, in which the last step
+ * began. */
 static drape_status check(drape_sim *sim, double t)
 {
     const char *reason;
@@ -49,7 +50,7 @@ static drape_status check(drape_sim *sim, double t)
     return drape_system_check_contact(sim->system, sim->frame, t, &reason, &diagnostic);
 }
 
-/* Into sim->frame, past all obstacles. */
+/* Interpolates into sim->frame without passing through obstacles. */
 static drape_status make_frame(drape_sim *sim, const drape_state *before, double t)
 {
     const drape_state *now = drape_sim_state(sim);
@@ -66,7 +67,8 @@ static drape_status make_frame(drape_sim *sim, const drape_state *before, double
     return status < 0 ? status : DRAPE_OK;
 }
 
-/* Into sim->frame_velocity. Not the slope of the interpolant: that has what steps overshoot by. */
+/* Interpolates into sim->frame_velocity. This is not the slope of the interpolated positions, which would
+ * contain the overshoot of steps. */
 static void mix_velocities(drape_sim *sim, const drape_state *before, double t)
 {
     const drape_state *now = drape_sim_state(sim);
@@ -95,7 +97,7 @@ drape_status drape_sim_emit_frames(drape_sim *sim)
     drape_status status = DRAPE_OK;
     if (before && sim->chosen.integrator->steady_state)
         return DRAPE_OK;
-    if (sim->observer_count == 0) { /* nobody looks: count them, but make none */
+    if (sim->observer_count == 0) { /* without observers frames are counted but not computed */
         sim->next_frame = (int64_t)floor((now->t + near) * sim->frame_rate) + 1;
         return DRAPE_OK;
     }

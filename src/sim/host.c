@@ -1,13 +1,14 @@
-/* host.c: what a host moves while a sim runs: pins, colliders, forces, the medium. */
+/* host.c: what a host may change while a sim runs: pins, colliders, forces and the medium; and the forces
+ * that it may read. */
 #include "base/finite.h"
 #include "sim/sim.h"
 
 #include <math.h>
 
-#define MAX_SECONDS  1e9 /* [s] as the duration of a scene */
-#define MAX_DISTANCE 1e9 /* [m], [m/s], as the keys of a track */
+#define MAX_SECONDS  1e9 /* [s] the limit of a scene's duration */
+#define MAX_DISTANCE 1e9 /* [m], [m/s] the limit of a track's keys */
 
-static bool is_way(const double *x, const double *v)
+static bool is_within_limits(const double *x, const double *v)
 {
     bool good = x != NULL;
     for (int k = 0; good && k < 3; k++)
@@ -35,7 +36,7 @@ static drape_status check_pin(const drape_sim *sim, int32_t node, const double *
     if (!m->pinned[node])
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_move_pins: node %d is free; only pinned ones are moved", (int)node);
-    if (!is_way(x, v))
+    if (!is_within_limits(x, v))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_move_pins: position and velocity of node %d must be within %g m and m/s",
                           (int)node, MAX_DISTANCE);
@@ -80,7 +81,7 @@ drape_status drape_sim_move_collider(drape_sim *sim, int32_t collider, double se
     drape_status status = check_collider(sim, "drape_sim_move_collider", collider);
     if (!status)
         status = check_seconds(sim, "drape_sim_move_collider", seconds);
-    if (!status && !is_way(displacement, velocity))
+    if (!status && !is_within_limits(displacement, velocity))
         status = drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                             "drape_sim_move_collider: displacement and velocity must be within %g m and m/s",
                             MAX_DISTANCE);
@@ -104,8 +105,8 @@ drape_collider_motion drape_sim_collider(const drape_sim *sim, int32_t collider)
 
 /* ---- Forces ---- */
 
-/* Rows that go by how forces went before start anew; others take them as they come. */
-static void forces_jump(drape_sim *sim)
+/* Integrators that extrapolate forces from earlier steps restart; others need not. */
+static void announce_new_forces(drape_sim *sim)
 {
     if (sim->chosen.integrator->smooth_forces)
         sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
@@ -119,7 +120,7 @@ drape_status drape_sim_push(drape_sim *sim, const double *forces)
     if (forces && !drape_all_finite(forces, 3 * (size_t)sim->model->node_count))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_push: a force is not finite");
     drape_system_set_push(sim->system, forces);
-    forces_jump(sim);
+    announce_new_forces(sim);
     return DRAPE_OK;
 }
 
@@ -132,23 +133,24 @@ drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *field, void *u
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_set_wind: no term of the model is in a medium, as drag.wind is");
     drape_system_set_wind(sim->system, field, user);
-    forces_jump(sim);
+    announce_new_forces(sim);
     return DRAPE_OK;
 }
 
 /* ---- Reading forces ---- */
 
-/* The present state; colliders move as in the last step. */
+/* The point of the present state; colliders move as in the last step. */
 static drape_status place(drape_sim *sim, drape_point *point)
 {
     const drape_state *now = drape_sim_state(sim);
     double before = sim->before >= 0 ? sim->states[sim->before].t : now->t;
     *point = (drape_point){
         .x = now->x, .v = now->v, .internal = now->internal, .t = now->t, .span = {before, now->t}};
-    return sim->before < 0 ? drape_system_begin(sim->system, now) : DRAPE_OK; /* else a step has */
+    /* otherwise the last step has begun there */
+    return sim->before < 0 ? drape_system_begin(sim->system, now) : DRAPE_OK;
 }
 
-/* That somebody cancels the next advance is no fault of reading. */
+/* A pending request to cancel the next advance is not an error of reading. */
 static drape_status read_status(const drape_sim *sim)
 {
     drape_status status = drape_system_status(sim->system);

@@ -1,7 +1,7 @@
 /*
- * identity.c: what a checkpoint is of. The same model is the same numbers after compile, however the scene
- * was written: names, comments, files and the run's duration have no part. The same build has the same
- * solvers: bits depend on them.
+ * identity.c: identifies what a checkpoint belongs to. Two models are the same if they have the same
+ * numbers after compile, however their scenes were written: names, comments, files and the run's duration
+ * do not count. Two builds are the same if they have the same solvers, on which the bits depend.
  */
 #include "base/hash.h"
 #include "sim/sim.h"
@@ -119,7 +119,7 @@ static uint64_t model_hash(const drape_model *m)
 
 /* ---- The choices ---- */
 
-/* Values of parameters that nobody set may be NaN, of the same bits everywhere. */
+/* Parameters that nobody set may be NaN, with the same bits everywhere. */
 static uint64_t choices_hash(const drape_sim *sim)
 {
     const drape_chosen *c = &sim->chosen;
@@ -154,7 +154,7 @@ static void archive_build(drape_archive *a)
                            there, here);
 }
 
-static void archive_row(drape_archive *a, const char *what, const char *name)
+static void archive_name(drape_archive *a, const char *what, const char *name)
 {
     char there[ROW_ROOM];
     snprintf(there, sizeof there, "%s", name);
@@ -184,8 +184,8 @@ void drape_sim_archive_identity(drape_sim *sim, drape_archive *a)
     }
     drape_archive_mark(a, "identity");
     archive_build(a);
-    archive_row(a, "integrator", sim->chosen.integrator->entry.name);
-    archive_row(a, "controller", sim->chosen.controller->entry.name);
+    archive_name(a, "integrator", sim->chosen.integrator->entry.name);
+    archive_name(a, "controller", sim->chosen.controller->entry.name);
     drape_archive_same(a, "the number of nodes", m->node_count);
     drape_archive_same(a, "the number of free nodes", m->free_count);
     archive_hash(a, "another model", sim->model_hash);

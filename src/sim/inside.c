@@ -1,4 +1,4 @@
-/* inside.c: how much of the cloth is in a collider, for whoever runs a scene that starts so. */
+/* inside.c: how much of the cloth is inside a collider, for scenes that start with cloth inside. */
 #include "sim/sim.h"
 
 #include "base/vec3.h"
@@ -7,8 +7,8 @@
 #include <math.h>
 #include <string.h>
 
-#define ACROSS 6    /* parts of a side: 28 points of a face are looked at */
-#define TOUCH  1e-9 /* [m] deep is not inside: what contact allows */
+#define ACROSS 6    /* parts of a side: 28 points of a face are tested */
+#define TOUCH  1e-9 /* [m] a point less deep than this is not inside: contact allows it */
 
 static double deepest_of(const drape_collider *collider, const drape_collider_pose *pose, const double *x,
                          const int32_t *node)

@@ -1,4 +1,4 @@
-/* load.c: from a scene to a model whose integrator and controller are known to be good. */
+/* load.c: from a scene to a model, after checking its choice of integrator and controller. */
 #include "compile/compile.h"
 #include "model/scene.h"
 #include "sim/choose.h"

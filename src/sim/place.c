@@ -1,6 +1,6 @@
 /*
- * place.c: a state of the host's own. It is made in the other of two states, so that one that is refused
- * changes nothing; what was kept of the way to the present state is forgotten.
+ * place.c: a user-defined state. It is built in the state that the next attempt would overwrite, so that a
+ * refused one changes nothing; the history that led to the present state is discarded.
  */
 #include "base/finite.h"
 #include "sim/sim.h"
@@ -8,8 +8,9 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_SECONDS 1e9  /* [s] as the duration of a scene */
-#define PIN_SLIP    1e-9 /* of the scene's size: the host's rounding of where a pin has its node */
+#define MAX_SECONDS 1e9 /* [s] the limit of a scene's duration */
+/* of the scene's size: rounding error allowed between the given position of a pinned node and its pin */
+#define PIN_SLIP 1e-9
 
 static drape_status check_given(const drape_sim *sim, double t, const double *x, const double *v)
 {
@@ -33,8 +34,8 @@ static drape_status check_given(const drape_sim *sim, double t, const double *x,
     return DRAPE_OK;
 }
 
-/* Pinned nodes where their pins have them at the time of the state; those that a host has moved where it has
- * them now. */
+/* Places pinned nodes where their pins are at the time of the state, and those that the host moves at their
+ * given positions. */
 static void place_pinned(const drape_sim *sim, const double *given, drape_state *state)
 {
     const drape_model *m = sim->model;
@@ -50,8 +51,8 @@ static void place_pinned(const drape_sim *sim, const double *given, drape_state 
     }
 }
 
-/* Fixed nodes have no velocity, nor have those that rest where the host put them; others that move keep what
- * was given, until a step gives them the mean of their way. */
+/* Fixed nodes have no velocity, nor have those at rest where the host put them; pinned nodes that move keep
+ * the given one until a step sets it to the mean over their displacement. */
 static void stop_fixed(const drape_sim *sim, const double *given, drape_state *state)
 {
     const drape_model *m = sim->model;
@@ -83,7 +84,7 @@ static drape_status check_pinned(const drape_sim *sim, const double *given, cons
     return DRAPE_OK;
 }
 
-/* The first frame at or after the present time. */
+/* The index of the first frame at or after the present time. */
 static int64_t first_frame(const drape_sim *sim)
 {
     double t = drape_sim_state(sim)->t;
@@ -91,7 +92,7 @@ static int64_t first_frame(const drape_sim *sim)
     return (double)k / sim->frame_rate < t ? k + 1 : k;
 }
 
-/* The state is a start: nothing of what led to the one before counts. */
+/* Makes the state a beginning: nothing that led to the previous state counts. */
 static void start_anew(drape_sim *sim, double t_before)
 {
     double t = drape_sim_state(sim)->t;
@@ -100,7 +101,7 @@ static void start_anew(drape_sim *sim, double t_before)
     sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
     drape_sim_leave_realtime(sim);
     drape_schedule_init(&sim->schedule, sim->schedule.stepping, sim->schedule.dt, t);
-    if (t != t_before) /* else the frame at t may have been told */
+    if (t != t_before) /* otherwise the frame at t may have been emitted already */
         sim->next_frame = first_frame(sim);
     drape_sim_reset_energy(sim);
 }

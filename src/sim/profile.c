@@ -7,25 +7,25 @@
 #include <math.h>
 #include <string.h>
 
-#define BUDGET      0.02 /* [s] for the repeats of one measurement */
+#define BUDGET      0.02 /* [s] for the repetitions of one measurement */
 #define MAX_REPEATS 200
-/* Displacement of the nodes, as a share of the scene's mean edge. Edges that are 1e-3 shorter than at rest
- * make the matrix of a common scene indefinite, which a step seldom meets and for which solvers take other
- * ways. */
+/* Displacement of the nodes, as a share of the scene's mean edge. Edges shortened by 1e-3 would make the
+ * matrix of a common scene indefinite, which is rare in a step and is handled by other code in the
+ * solvers. */
 #define DEFORMATION 1e-5
 
-/* Where everything is evaluated, and room for the results. */
+/* The point at which everything is evaluated, and memory for the results. */
 typedef struct bench {
     drape_context *ctx;
     const drape_sim *sim;
     drape_arena arena;
-    double *x, *v, *g; /* nodes */
-    double *history;   /* measures; NULL where no law wants rates */
+    double *x, *v, *g; /* (node_count x 3) */
+    double *history;   /* (measure_count); NULL if no law needs rates */
     double *values;    /* of the Jacobian */
-    double *b, *d;     /* free DOFs */
+    double *b, *d;     /* (free DOFs) */
     drape_point point;
     double mass_weight;
-    int32_t term; /* that is measured */
+    int32_t term; /* the one that is measured */
     const drape_linear_ops *linear;
     void *solver;
     drape_status status; /* of the last factor or solve */
@@ -63,7 +63,7 @@ static void deform(bench *s, double dt)
         s->b[i] = next_random(&seed);
 }
 
-/* As in a step of size dt from the state of the sim. */
+/* Evaluates as in a step of size dt from the state of the sim. */
 static void set_point(bench *s, double dt)
 {
     const drape_state *from = drape_sim_state(s->sim);
@@ -95,7 +95,7 @@ static drape_status create(bench *s, bool implicit)
     return drape_arena_status(&s->arena);
 }
 
-/* ---- Measuring ---- */
+/* ---- Measurement ---- */
 
 static void term_residual(bench *s)
 {
@@ -127,7 +127,7 @@ static void solve(bench *s)
     s->status = s->linear->solve(s->solver, s->b, s->d);
 }
 
-/* The shortest time of a call; the first one, which warms the caches, counts where it is the only one. */
+/* The shortest time of a call. The first call, which warms the caches, counts only if it is the only one. */
 static double shortest(bench *s, void (*call)(bench *s))
 {
     double begin = drape_clock_seconds(), best = INFINITY, now = begin;
@@ -142,7 +142,7 @@ static double shortest(bench *s, void (*call)(bench *s))
 
 /* ---- Terms ---- */
 
-/* seen: a mark for each block of the pattern. */
+/* The entries of the Jacobian that a term couples. seen: one mark for each block of the pattern. */
 static int64_t count_nonzeros(const drape_term *term, unsigned char *seen, size_t blocks)
 {
     const drape_elements *el = &term->elements;
@@ -203,9 +203,9 @@ static drape_status measure_terms(bench *s, bool implicit, drape_profile_term *t
     return DRAPE_OK;
 }
 
-/* ---- The whole ---- */
+/* ---- The whole step ---- */
 
-/* The parts add up to all memory that the model and the sim have. */
+/* Counts all memory of the model and the sim, by parts that add up to the whole. */
 static void count_bytes(const drape_sim *sim, drape_profile *out)
 {
     const drape_model *model = sim->model;
@@ -223,16 +223,16 @@ static void count_bytes(const drape_sim *sim, drape_profile *out)
 
 static void report_solver(const bench *s, drape_profile *out)
 {
-    drape_linear_report report = {.row = s->linear};
+    drape_linear_report report = {.ops = s->linear};
     if (s->linear->report)
         s->linear->report(s->solver, &report);
-    out->linear_picked = report.row->entry.name;
+    out->linear_picked = report.ops->entry.name;
     out->linear_fallback = report.fallback ? report.fallback->entry.name : "";
     memcpy(out->linear_why, report.why, sizeof out->linear_why);
 }
 
-/* The integrator's solver has no factors before the first step: ours, of the same pattern, says what they
- * will take. */
+/* The integrator's solver has no factors before the first step: a solver with the same pattern measures
+ * what they will take. */
 static drape_status measure_solver(bench *s, drape_profile *out)
 {
     drape_status status = s->linear->create(&s->arena, &s->sim->model->pattern, &s->solver);

@@ -1,13 +1,14 @@
 /*
- * realtime.c: an advance with a budget. What is owed, the frame and what earlier frames left over, is made in
- * equal steps no longer than dt, so that at any frame rate a step is the same equations at its own h. If that
- * does not fit into the budget, judged by what steps cost lately, the integrator takes a cheaper level of
- * effort, then steps become longer than dt, then time is left over. Left-over time above one longest step is
- * dropped: late frames must not make later ones later.
+ * realtime.c: an advance with a budget. The time owed, which is the frame and what earlier frames left
+ * over, is covered by equal steps no longer than dt, so that at any frame rate a step is the same equations
+ * with its own h. If the steps are not expected to fit into the budget, judged by the cost of recent steps,
+ * the integrator takes a cheaper level of effort; then steps become longer than dt; then time is left over
+ * for the next call. Left-over time above one longest step is dropped, so that late frames do not delay
+ * later ones more and more.
  *
- * The work of a call is bounded: after its first accepted step it begins a step only if that is expected to
- * end in time. A step that takes longer than a frame is made once in several frames: those between show the
- * state before.
+ * The work of a call is bounded: after its first accepted step it begins another only if that one is
+ * expected to end in time. A step that takes longer than a frame is made once in several frames; the frames
+ * between show the state before it.
  */
 #include "base/clock.h"
 #include "sim/sim.h"
@@ -15,11 +16,11 @@
 #include <math.h>
 
 #define KEEP    0.9  /* of the budget: a level of effort that is expected to take more is left */
-#define RECOVER 0.6  /* of the budget: a better level is taken again if it is expected to take less */
+#define RECOVER 0.6  /* of the budget: a better level is resumed if it is expected to take less */
 #define LEARN   0.3  /* weight of the last attempt in the expected cost */
-#define CHEAPER 0.7  /* of the cost of the next better level, before it was measured */
-#define STRETCH 4    /* longest step, in dt, if the def does not set it */
-#define SAME    1e-9 /* of dt: rounding of the host's sum of frames */
+#define CHEAPER 0.7  /* assumed cost relative to the next better level, until it is measured */
+#define STRETCH 4    /* longest step, in dt, unless the def sets it */
+#define SAME    1e-9 /* of dt: allowance for rounding in the host's sum of frames */
 
 static int effort_count(const drape_sim *sim)
 {
@@ -36,7 +37,7 @@ static void set_effort(drape_sim *sim, int effort)
 
 /* ---- What steps cost ---- */
 
-/* Expected seconds of an attempt; 0: none was made yet. */
+/* Expected seconds of an attempt; 0: no attempt was made yet. */
 static double expected(const drape_sim *sim, int effort)
 {
     const double *cost = sim->realtime.cost;
@@ -46,7 +47,7 @@ static double expected(const drape_sim *sim, int effort)
     return cost[known] * pow(CHEAPER, effort - known);
 }
 
-/* All efforts get slower or faster with the machine: their ratios stay. */
+/* The machine makes all levels of effort slower or faster alike: their ratios are kept. */
 static void learn(drape_sim *sim, double seconds)
 {
     double *cost = sim->realtime.cost, *own = &cost[sim->realtime.effort];
@@ -70,8 +71,7 @@ static int64_t steps_of(double owed, double h)
     return (int64_t)fmax(1, ceil(owed / h - SAME));
 }
 
-/* The best level whose steps fit into the budget; better levels than the present one are returned to one at a
- * time. */
+/* Finds the best level whose steps fit into the budget. It returns to better levels one at a time. */
 static bool plan_effort(const drape_sim *sim, double owed, double budget, plan *out)
 {
     int now = sim->realtime.effort;
@@ -86,8 +86,9 @@ static bool plan_effort(const drape_sim *sim, double owed, double budget, plan *
     return false;
 }
 
-/* Steps at the least effort, longer than dt: as many as fit; where not even one does, one for so many frames
- * that it costs no more than their budgets, and none before that many are owed. */
+/* Steps at the lowest level of effort, longer than dt: as many as fit into the budget. If not even one
+ * fits, one step for so many frames that it costs no more than their budgets together, and no step before
+ * that many frames are owed. */
 static plan plan_stretched(const drape_sim *sim, double owed, double frame, double budget)
 {
     int effort = effort_count(sim) - 1;
@@ -108,8 +109,8 @@ static plan make_plan(const drape_sim *sim, double owed, double frame, double bu
 
 /* ---- A call ---- */
 
-/* Steps of h from now on where the sim counts them; rows and controllers that choose their own do that here,
- * too. */
+/* Sets the end of the call and, if the sim counts steps, their size h; integrators and controllers that
+ * choose their own steps continue to do so. */
 static void aim(drape_sim *sim, const plan *p, double end)
 {
     drape_schedule *s = &sim->schedule;
@@ -142,7 +143,7 @@ static drape_status take_steps(drape_sim *sim, double deadline, drape_realtime *
     return status;
 }
 
-/* After a rejection the next call does not try again what was refused in this one; later ones do. */
+/* After a rejection, the next call does not retry the rejected step size; later calls do. */
 static void bound_steps(drape_realtime_memory *m, const drape_realtime *report)
 {
     if (report->rejected > 0 && report->h > 0)
@@ -151,7 +152,7 @@ static void bound_steps(drape_realtime_memory *m, const drape_realtime *report)
         m->cap = m->cap < m->longest ? 2 * m->cap : INFINITY;
 }
 
-/* What was not made is owed to the next call, or dropped. */
+/* Time that was not covered is owed to the next call, or dropped. */
 static void settle(drape_sim *sim, double goal, drape_realtime *report)
 {
     drape_realtime_memory *m = &sim->realtime;

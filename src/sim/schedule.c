@@ -4,9 +4,9 @@
 #include <float.h>
 #include <math.h>
 
-#define MAX_LEVELS 60   /* parts are counted in 64 bits */
-#define JOIN       1e-9 /* of dt: a shorter remainder joins the interval before */
-/* of the time: a shorter remainder is rounding of the host's own sum */
+#define MAX_LEVELS 60   /* number of parts is a 64-bit integer */
+#define JOIN       1e-9 /* of dt: a shorter remainder is joined to the interval before it */
+/* of the time: a shorter remainder is rounding error in the host's own sum */
 #define ROUNDING (1e3 * DBL_EPSILON)
 
 void drape_schedule_init(drape_schedule *s, drape_stepping stepping, double dt, double start)
@@ -38,16 +38,18 @@ static double rounding(double t)
     return 4 * DBL_EPSILON * fabs(t);
 }
 
-/* Remainders up to this join the interval before; it is above the rounding that a frame can add. */
+/* Remainders up to this are joined to the interval before; it exceeds the rounding error that a frame can
+ * add. */
 static double min_remainder(const drape_schedule *s)
 {
     return fmax(JOIN * s->dt, 2 * rounding(s->end));
 }
 
 /*
- * The interval after count: a whole one, one that the end cuts, or one that takes a tiny remainder along.
- * After the latter two counting starts anew at the end: a host that adds up its frames leaves the counted
- * times ever further behind, and would come to a remainder that is just too large to join, a step of 1e-9 dt.
+ * Opens the interval after `count`: a whole one, one cut by the end, or one extended by a tiny remainder.
+ * After the latter two, counting restarts at the end. Otherwise the times of a host that adds up its frames
+ * would drift ever further from the counted times, until a remainder is just too large to be joined and
+ * becomes a step of 1e-9 dt.
  */
 static void open_interval(drape_schedule *s)
 {
@@ -68,8 +70,8 @@ static bool next_free(const drape_schedule *s, double *t1, double *h)
     return s->end - s->now > ROUNDING * fabs(s->end);
 }
 
-/* What is left of the advance is taken whole if one step does it, in halves if two do, so that no tiny
- * step is left over. */
+/* The rest of the advance is covered by one step if one suffices, or by two halves if two do, so that no
+ * tiny step is left over. */
 static bool next_proposed(const drape_schedule *s, double *t1, double *h)
 {
     double left = s->end - s->now;
@@ -83,7 +85,8 @@ static bool next_counted(drape_schedule *s, double *t1, double *h)
     if (s->part == 0) {
         double left = s->end - interval_time(s, s->count);
         double least =
-            s->stepped ? min_remainder(s) : ROUNDING * fabs(s->end); /* the first step has none to join */
+            /* before the first step there is none to join */
+            s->stepped ? min_remainder(s) : ROUNDING * fabs(s->end);
         if (!(left > least))
             return false;
         open_interval(s);
@@ -126,7 +129,7 @@ static void close_interval(drape_schedule *s)
     }
 }
 
-/* A level is left as soon as the finished parts make whole parts of the level below. */
+/* The level is lowered as soon as the finished parts make up whole parts of the lower level. */
 static void accept_part(drape_schedule *s)
 {
     s->part++;

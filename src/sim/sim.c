@@ -1,4 +1,4 @@
-/* sim.c: making, freeing and asking a sim. */
+/* sim.c: creating, destroying and querying a sim. */
 #include "sim/sim.h"
 
 #include "base/clock.h"
@@ -15,7 +15,7 @@ void drape_sim_def_init(drape_sim_def *def, size_t struct_size)
     memcpy(def, &defaults, struct_size < sizeof defaults ? struct_size : sizeof defaults);
 }
 
-/* Reads a def of this or an older, shorter version. */
+/* Reads a def of this version or of an older, shorter one. */
 static drape_status read_def(drape_context *ctx, const drape_sim_def *given, drape_sim_def *def)
 {
     drape_sim_def_init(def, sizeof *def);
@@ -81,7 +81,7 @@ static drape_stepping stepping_of(const drape_chosen *chosen)
     return chosen->controller->own_steps ? DRAPE_STEPS_PROPOSED : DRAPE_STEPS_COUNTED;
 }
 
-/* A sim with nothing but its arena. */
+/* Creates a sim with nothing but its arena. */
 static drape_status open_sim(drape_context *ctx, const drape_model *model, double frame_rate,
                              double longest_asked, drape_sim **out)
 {
@@ -99,7 +99,7 @@ static drape_status open_sim(drape_context *ctx, const drape_model *model, doubl
     return sim->arena ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
-/* Makes all that a sim with its choices needs. */
+/* Creates everything that a sim with its choices needs. */
 static drape_status start_sim(drape_sim *sim, int threads)
 {
     drape_status status = create_states(sim);

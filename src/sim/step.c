@@ -1,7 +1,7 @@
 /*
  * step.c: the driver. An advance is a loop of propose, attempt, check, judge, accept or reject, each a
- * function here. The step is made in the other of two states: rejecting is forgetting it, accepting is
- * changing which one counts.
+ * function here. A step is made in the state `next`: rejecting it discards that state, accepting it
+ * exchanges `now` and `next`.
  */
 #include "base/clock.h"
 #include "base/finite.h"
@@ -13,12 +13,12 @@
 #include <stdio.h>
 #include <string.h>
 
+/* ---- Attempt and check ---- */
+
 static drape_state *next_state(drape_sim *sim)
 {
     return &sim->states[sim->next];
 }
-
-/* ---- Check ---- */
 
 static drape_status check(drape_sim *sim, drape_step_info *info)
 {
@@ -43,8 +43,6 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
                               &info->diagnostic);
 }
 
-/* ---- Attempt ---- */
-
 static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info *info)
 {
     drape_state *next = next_state(sim);
@@ -64,83 +62,6 @@ static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info
     if (degenerate)
         info->usable = false;
     return degenerate ? degenerate : status;
-}
-
-/* ---- Accept and reject ---- */
-
-static void measure_strain(drape_sim *sim, const double *x)
-{
-    const drape_model *m = sim->model;
-    drape_statistics *s = &sim->statistics;
-    bool first = s->steps_accepted == 0;
-    double low = first ? INFINITY : s->strain_min, high = first ? -INFINITY : s->strain_max;
-    for (int32_t e = 0; e < m->edge_count; e++) {
-        const double *a = x + 3 * (size_t)m->edge[2 * (size_t)e],
-                     *b = x + 3 * (size_t)m->edge[2 * (size_t)e + 1];
-        double dx = b[0] - a[0], dy = b[1] - a[1], dz = b[2] - a[2];
-        double strain = sqrt(dx * dx + dy * dy + dz * dz) / m->edge_length[e] - 1;
-        low = strain < low ? strain : low;
-        high = strain > high ? strain : high;
-    }
-    s->strain_min = low;
-    s->strain_max = high;
-}
-
-/* Makes the new state the present one. The present one becomes past, as many as the controller wants; the
- * oldest is overwritten next. */
-static void turn_states(drape_sim *sim)
-{
-    int history_depth = sim->chosen.controller->history_depth, spare = sim->now;
-    for (int k = 0; k < history_depth; k++) {
-        int older = sim->past[k];
-        sim->past[k] = spare;
-        spare = older;
-    }
-    while (spare < 0 || spare == sim->next || spare == sim->past[0] || spare == sim->past[1])
-        spare++; /* not all states are used yet: take the first free one */
-    sim->before = sim->now;
-    sim->now = sim->next;
-    sim->next = spare;
-}
-
-static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
-{
-    drape_statistics *s = &sim->statistics;
-    if (!info->committed)
-        drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
-    turn_states(sim);
-    drape_sim_add_work(sim, info);
-    measure_strain(sim, drape_sim_state(sim)->x);
-    s->h_min = s->steps_accepted == 0 ? info->h : fmin(info->h, s->h_min);
-    s->h_max = fmax(info->h, s->h_max);
-    s->steps_accepted++;
-    s->steps_unconverged += info->usable;
-    drape_schedule_accept(&sim->schedule, drape_sim_state(sim)->t, h_next);
-}
-
-static void count_reason(drape_sim *sim, const char *reason)
-{
-    int i = 0;
-    while (i < sim->reason_count && strcmp(sim->reasons[i].reason, reason) != 0)
-        i++;
-    if (i == sim->reason_count && i >= DRAPE_MAX_REASONS - 1) {
-        i = DRAPE_MAX_REASONS - 1;
-        reason = drape_reason_name(DRAPE_REASON_OTHER);
-    }
-    if (i == sim->reason_count)
-        sim->reasons[sim->reason_count++] = (drape_reason_total){.reason = reason};
-    sim->reasons[i].count++;
-}
-
-/* If the attempt overwrote the state that the last step began with, the sim has no state before, as at a
- * start. A steady-state integrator keeps `before`: it has no frames after its first step, and needs to know
- * that there was one. */
-static void reject(drape_sim *sim, const drape_step_info *info)
-{
-    if (sim->before == sim->next && !sim->chosen.integrator->steady_state)
-        sim->before = -1;
-    sim->statistics.steps_rejected++;
-    count_reason(sim, info->reason);
 }
 
 /* ---- Judge ---- */
@@ -167,11 +88,88 @@ static drape_verdict judge(drape_sim *sim, drape_step_info *info, drape_status s
     return sim->chosen.controller->judge(sim->chosen.controller_values, trial);
 }
 
-/* ---- Reporting ---- */
+/* ---- Accept and reject ---- */
+
+static void measure_strain(drape_sim *sim, const double *x)
+{
+    const drape_model *m = sim->model;
+    drape_statistics *s = &sim->statistics;
+    bool first = s->steps_accepted == 0;
+    double low = first ? INFINITY : s->strain_min, high = first ? -INFINITY : s->strain_max;
+    for (int32_t e = 0; e < m->edge_count; e++) {
+        const double *a = x + 3 * (size_t)m->edge[2 * (size_t)e],
+                     *b = x + 3 * (size_t)m->edge[2 * (size_t)e + 1];
+        double dx = b[0] - a[0], dy = b[1] - a[1], dz = b[2] - a[2];
+        double strain = sqrt(dx * dx + dy * dy + dz * dz) / m->edge_length[e] - 1;
+        low = strain < low ? strain : low;
+        high = strain > high ? strain : high;
+    }
+    s->strain_min = low;
+    s->strain_max = high;
+}
+
+/* Makes the new state the present one. The present one joins the past states that the controller wants; the
+ * oldest of these is overwritten next. */
+static void rotate_states(drape_sim *sim)
+{
+    int history_depth = sim->chosen.controller->history_depth, spare = sim->now;
+    for (int k = 0; k < history_depth; k++) {
+        int older = sim->past[k];
+        sim->past[k] = spare;
+        spare = older;
+    }
+    while (spare < 0 || spare == sim->next || spare == sim->past[0] || spare == sim->past[1])
+        spare++; /* not all states are in use yet: take the first free one */
+    sim->before = sim->now;
+    sim->now = sim->next;
+    sim->next = spare;
+}
+
+static void accept(drape_sim *sim, const drape_step_info *info, double h_next)
+{
+    drape_statistics *s = &sim->statistics;
+    if (!info->committed)
+        drape_state_commit(sim->model, drape_sim_state(sim), next_state(sim));
+    rotate_states(sim);
+    drape_sim_add_work(sim, info);
+    measure_strain(sim, drape_sim_state(sim)->x);
+    s->h_min = s->steps_accepted == 0 ? info->h : fmin(info->h, s->h_min);
+    s->h_max = fmax(info->h, s->h_max);
+    s->steps_accepted++;
+    s->steps_unconverged += info->usable;
+    drape_schedule_accept(&sim->schedule, drape_sim_state(sim)->t, h_next);
+}
+
+static void count_reason(drape_sim *sim, const char *reason)
+{
+    int i = 0;
+    while (i < sim->reason_count && strcmp(sim->reasons[i].reason, reason) != 0)
+        i++;
+    if (i == sim->reason_count && i >= DRAPE_MAX_REASONS - 1) {
+        i = DRAPE_MAX_REASONS - 1;
+        reason = drape_reason_name(DRAPE_REASON_OTHER);
+    }
+    if (i == sim->reason_count)
+        sim->reasons[sim->reason_count++] = (drape_reason_total){.reason = reason};
+    sim->reasons[i].count++;
+}
+
+/* If the attempt overwrote the state in which the last step began, the sim has no earlier state, as at its
+ * start. With a steady-state integrator `before` is kept, because it also says that there was a step, after
+ * which there are no more frames. */
+static void reject(drape_sim *sim, const drape_step_info *info)
+{
+    if (sim->before == sim->next && !sim->chosen.integrator->steady_state)
+        sim->before = -1;
+    sim->statistics.steps_rejected++;
+    count_reason(sim, info->reason);
+}
+
+/* ---- Messages ---- */
 
 /* "bend.hinge 37 (nodes 4 5 9 10 of sheet): altitude / rest altitude = 3e-09, limit 1e-06" */
-static void describe_worst(const drape_model *model, const drape_diagnostic *diagnostic, char *text,
-                           size_t size)
+static void describe_diagnostic(const drape_model *model, const drape_diagnostic *diagnostic, char *text,
+                                size_t size)
 {
     size_t used = 0;
     text[0] = 0;
@@ -200,7 +198,7 @@ static void log_rejection(drape_sim *sim, const drape_attempt *attempt)
     char diagnostic[400];
     if (attempt->accepted || !sim->ctx->def.log)
         return;
-    describe_worst(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
+    describe_diagnostic(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
     drape_log(sim->ctx, DRAPE_LOG_INFO, "t=%.9g h=%.4g: step rejected, %s (%s)%s", attempt->t, attempt->h,
               attempt->reason, drape_status_name(attempt->status), diagnostic);
 }
@@ -212,11 +210,12 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
         return stop;
     if (stop == DRAPE_E_STOPPED)
         return drape_sim_check_cancel(sim);
-    describe_worst(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
-    if (attempt->diagnostic.element < 0) /* the diagnostic names a node; the distortion may say why */
+    describe_diagnostic(sim->model, &attempt->diagnostic, diagnostic, sizeof diagnostic);
+    /* a diagnostic that names only a node may not give the cause, which the distortion may */
+    if (attempt->diagnostic.element < 0)
         drape_sim_describe_distortion(sim, distortion, sizeof distortion);
-    if (!isnan(attempt->tolerance) && !isnan(attempt->residual)) /* integrators that bound errors have no
-                                                                    residual */
+    /* NAN: integrators that bound errors have no residual */
+    if (!isnan(attempt->tolerance) && !isnan(attempt->residual))
         snprintf(residual, sizeof residual, ", residual %.4g N for a tolerance of %.4g N", attempt->residual,
                  attempt->tolerance);
     return drape_fail(sim->ctx, stop, "t=%.9g h=%.4g: %s (%s) after %d iterations%s%s%s", attempt->t,
@@ -224,14 +223,14 @@ static drape_status explain(drape_sim *sim, drape_status stop, const drape_attem
                       residual, diagnostic, distortion);
 }
 
-/* An integrator that chooses its own steps has no dt, and a bound of its own. */
+/* An integrator that chooses its own steps has no dt, and a limit of its own. */
 drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
 {
     char diagnostic[400];
     const drape_schedule *s = &sim->schedule;
     if (!(s->dt > 0) || (double)s->tries < sim->max_attempts)
         return DRAPE_OK;
-    describe_worst(sim->model, &last->diagnostic, diagnostic, sizeof diagnostic);
+    describe_diagnostic(sim->model, &last->diagnostic, diagnostic, sizeof diagnostic);
     return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
                       "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64 " attempts since t=%.9g did not "
                       "come as far as one dt, %.4g s, and the controller's max_attempts is %.15g%s",
@@ -239,13 +238,13 @@ drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
                       last->iterations, s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic);
 }
 
+/* ---- One step, and an advance ---- */
+
 static drape_status notify_attempt(drape_sim *sim, const drape_attempt *attempt)
 {
     drape_event event = {.kind = DRAPE_EVENT_ATTEMPT, .sim = sim, .attempt = attempt};
     return drape_sim_notify(sim, &event);
 }
-
-/* ---- One step, and all of them ---- */
 
 /* The description of an attempt for the observers. */
 static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *info, drape_status status,
@@ -263,7 +262,8 @@ static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *
                            .diagnostic = info->diagnostic};
 }
 
-/* One attempt from proposal to verdict. *stop: the negative status that ends the advance, 0 to go on. */
+/* Makes one attempt, from proposal to verdict. *stop: the negative status that ends the advance; 0:
+ * continue. */
 static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status *stop)
 {
     drape_step_info info = {.reason = drape_reason_name(DRAPE_REASON_CONVERGED), .h = h};
@@ -289,7 +289,7 @@ static double contact_seconds(const drape_sim *sim)
            drape_contact_seconds(drape_system_contact(sim->system));
 }
 
-/* The frames inside an accepted step are passed on even if an observer stops the run at the attempt. */
+/* Frames inside an accepted step are emitted even if an observer stops the run at the attempt. */
 drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *attempt)
 {
     drape_status stop = DRAPE_OK;
@@ -299,11 +299,11 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     sim->statistics.wall_contact += contact_seconds(sim) - contact;
     log_rejection(sim, attempt);
-    drape_status told = notify_attempt(sim, attempt);
-    drape_status framed = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
+    drape_status notified = notify_attempt(sim, attempt);
+    drape_status emitted = attempt->accepted ? drape_sim_emit_frames(sim) : DRAPE_OK;
     if (stop)
         return explain(sim, stop, attempt);
-    return told ? told : framed;
+    return notified ? notified : emitted;
 }
 
 drape_status drape_sim_advance(drape_sim *sim, double t_end)
@@ -313,11 +313,12 @@ drape_status drape_sim_advance(drape_sim *sim, double t_end)
     drape_status guarded = drape_sim_guard(sim, "drape_sim_advance");
     if (guarded)
         return guarded;
-    sim->ctx->message[0] = 0; /* after a failure the message is of this advance */
+    sim->ctx->message[0] = 0; /* so that after a failure the message belongs to this advance */
     if (!isfinite(t_end))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_advance: t_end is not finite");
     drape_status status =
-        drape_sim_emit_frames(sim); /* the first frame, and those that a stop by an observer left */
+        drape_sim_emit_frames(sim); /* the first frame, and those left over when an observer stopped the
+                                       run */
     drape_sim_leave_realtime(sim);
     drape_schedule_aim(&sim->schedule, t_end);
     while (!status && drape_schedule_next(&sim->schedule, &t1, &h)) {

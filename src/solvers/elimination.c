@@ -1,8 +1,9 @@
 /*
- * elimination.c: see elimination.h. Order by minimum degree (AMD) or, for larger ones where METIS is there,
- * nested dissection; elimination tree with path compression (Liu 1990, The role of elimination trees in
- * sparse factorization); postorder; rows of the columns from those of their children. Then a front is merged
- * with its last child where the two take longer than the one, zeros included.
+ * elimination.c: see elimination.h. The stages: order by minimum degree (AMD) or, for larger patterns if
+ * METIS is in the build, by nested dissection; elimination tree with path compression (Liu 1990, The role
+ * of elimination trees in sparse factorization); postorder; the rows of each column from those of its
+ * children. Finally a front is merged with its last child where one front takes less time than two, even
+ * with the zeros that this adds.
  */
 #define _XOPEN_SOURCE 700 /* initstate */
 #include "solvers/elimination.h"
@@ -15,28 +16,29 @@
 #include <metis.h>
 #endif
 
-#define DISSECTED 1500 /* blocks; below, nested dissection fills no less than minimum degree */
+#define DISSECTED 1500 /* block columns; below, nested dissection gives no less fill-in than minimum degree */
 
 /* Workspace of the construction. */
 typedef struct maker {
     drape_arena *arena, scratch;
     const drape_pattern *pattern;
     drape_elimination *e;
-    int32_t *parent, *post, *head, *next, *mark, *stack; /* (n) of columns; head, next: lists of children */
-    int32_t **rows;                                      /* (n) of fronts, as they are found */
-    int32_t *length;                                     /* (n) of rows */
+    int32_t *parent, *post, *head, *next, *mark, *stack; /* (n) by column; head, next: lists of children */
+    int32_t **rows;                                      /* (n) by front, allocated as they are found */
+    int32_t *length;                                     /* (n) number of rows by front */
 } maker;
 
 /* ---- Order and tree ---- */
 
 #ifdef DRAPE_METIS
-#define RAND_STATE 128 /* [bytes] as much as rand() begins with, so that it gives the same numbers */
+/* [bytes] the size of the state that rand() starts with, so that it gives the same numbers */
+#define RAND_STATE 128
 
 /*
- * METIS seeds rand() and draws its cuts from it. rand() belongs to the whole process: two calls at once would
- * take each other's numbers and give another order, and so other bits, and a host's own sequence would begin
- * again. So only one thread at a time calls METIS, with a state of rand() of its own. A host that calls
- * rand() from another thread meanwhile still disturbs it.
+ * METIS seeds rand() and draws its cuts from it. rand() belongs to the whole process: two concurrent calls
+ * would take each other's numbers and so find another order, with other bits in the results, and the host's
+ * own sequence would restart. So only one thread at a time calls METIS, with a separate state of rand(). A
+ * host that calls rand() from another thread meanwhile still disturbs it.
  */
 static int dissect_locked(idx_t *n, idx_t *start, idx_t *other, idx_t *options, maker *m)
 {
@@ -114,7 +116,7 @@ static void list_children(maker *m)
         }
 }
 
-/* Depth first without recursion: a column is written when it has no children left. */
+/* A depth-first walk without recursion: a column is written when it has no children left. */
 static void find_postorder(maker *m)
 {
     int32_t written = 0;
@@ -137,7 +139,7 @@ static void find_postorder(maker *m)
     }
 }
 
-/* The order becomes the tree's own, in which a front's columns are neighbours. */
+/* Replaces the order by the postorder of the tree, in which the columns of a front are neighbours. */
 static void reorder(maker *m)
 {
     for (int32_t k = 0; k < m->e->n; k++)
@@ -149,8 +151,7 @@ static void reorder(maker *m)
 
 /* ---- Fronts ---- */
 
-/* Time of a front in arbitrary units: its arithmetic in tiles of 4 x 4 blocks, its memory, its
- * administration. */
+/* Time of a front in arbitrary units: arithmetic in tiles of 4 x 4 blocks, memory traffic, overhead. */
 static double cost_of(int32_t columns, int32_t rows)
 {
     const double w = 3.0 * columns, r = 12.0 * ((rows + 3) / 4), d = 12.0 * ((columns + 3) / 4);
@@ -163,7 +164,8 @@ static int compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Rows below j of column j of the matrix and of the fronts that end in children of j, into m->stack. */
+/* Collects in m->stack the rows below j: those of column j of the matrix and those of the fronts that end
+ * in children of j. Returns their number. */
 static int32_t gather_rows(maker *m, int32_t j)
 {
     const drape_pattern *p = m->pattern;
@@ -187,7 +189,7 @@ static int32_t gather_rows(maker *m, int32_t j)
     return count;
 }
 
-/* Front f ends: its rows are those of its first column that lie beyond its last column. It is listed as a
+/* Ends front f: its rows are those of its first column that lie beyond its last column. It is listed as a
  * child of the column above. */
 static void close_front(maker *m, int32_t f)
 {
@@ -205,7 +207,7 @@ static void close_front(maker *m, int32_t f)
     }
 }
 
-/* Consecutive columns with the same rows below them are one front. */
+/* Groups consecutive columns with the same rows below them into fronts. */
 static bool find_fronts(maker *m)
 {
     drape_elimination *e = m->e;
@@ -214,7 +216,7 @@ static bool find_fronts(maker *m)
         m->head[j] = m->mark[j] = -1;
     for (int32_t j = 0; j < e->n; j++) {
         const bool linked = j > 0 && m->parent[j - 1] == j;
-        if (f >= 0) { /* so that j, or a column above it, sees its rows */
+        if (f >= 0) { /* so that the column above, j or a later one, sees its rows */
             e->first[f + 1] = j;
             if (!linked)
                 close_front(m, f);
@@ -258,8 +260,8 @@ static bool is_better_merged(const maker *m, int32_t first, int32_t middle, int3
            cost_of(middle - first, m->length[g]) + cost_of(last - middle, m->length[f]);
 }
 
-/* Fronts are pushed on a stack that overwrites their list; the last child of a front is on top when it is
- * pushed. */
+/* The fronts are pushed on a stack that overwrites their list; when a front is pushed, its last child is on
+ * top. */
 static void merge_fronts(maker *m)
 {
     drape_elimination *e = m->e;
@@ -280,7 +282,7 @@ static void merge_fronts(maker *m)
     e->first[e->count] = e->n;
 }
 
-/* ---- The result ---- */
+/* ---- Result ---- */
 
 int32_t drape_front_find(const drape_elimination *e, int32_t front, int32_t row)
 {

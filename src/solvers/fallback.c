@@ -46,7 +46,7 @@ void drape_fallback_archive(drape_fallback *f, bool *factored, drape_archive *a,
 
 drape_linear_report drape_fallback_report(const drape_fallback *f, const drape_linear_ops *owner)
 {
-    return (drape_linear_report){.row = owner, .fallbacks = f->count, .fallback = f->solver ? f->ops : NULL};
+    return (drape_linear_report){.ops = owner, .fallbacks = f->count, .fallback = f->solver ? f->ops : NULL};
 }
 
 size_t drape_fallback_bytes(const drape_fallback *f)

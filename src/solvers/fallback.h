@@ -1,7 +1,7 @@
 /*
- * fallback.h: the general solver to which a method for symmetric positive definite matrices hands all others,
- * as they stand: the fastest one for the size. It is made for the first such matrix: most scenes have none,
- * and its analysis would be up to half of create.
+ * fallback.h: the general solver to which a solver for symmetric positive definite matrices passes all
+ * other matrices, unchanged: the fastest one for the size. It is created for the first such matrix, because
+ * most scenes have none and its analysis would take up to half of the time of create.
  */
 #ifndef DRAPE_SOLVERS_FALLBACK_H
 #define DRAPE_SOLVERS_FALLBACK_H
@@ -11,23 +11,23 @@
 typedef struct drape_fallback {
     const drape_linear_ops *ops;
     const drape_pattern *pattern;
-    drape_arena arena; /* of the solver */
-    void *solver;      /* NULL before the first matrix */
+    drape_arena arena; /* holds the solver */
+    void *solver;      /* NULL before the first such matrix */
     bool active;       /* the last matrix was factored here */
-    int64_t count;     /* matrices it was given */
+    int64_t count;     /* matrices passed to it */
 } drape_fallback;
 
-/* arena keeps its address. Takes no memory. */
+/* The arena must stay at its address. Takes no memory. */
 drape_fallback drape_fallback_of(drape_arena *arena, const drape_pattern *pattern);
 void drape_fallback_destroy(drape_fallback *fallback);
 
-/* Errors: those of the solver's create and factor; then it is not active, and may be called again. */
+/* Errors: those of the solver's create and factor; after one it is not active, and may be called again. */
 drape_status drape_fallback_factor(drape_fallback *fallback, const double *values);
 
-/* The state of the solver, and the owner's *factored; values as of drape_linear_ops.archive. */
+/* Archives the state of the solver and the owner's *factored; values as in drape_linear_ops.archive. */
 void drape_fallback_archive(drape_fallback *fallback, bool *factored, drape_archive *a, const double *values);
 
-/* What the owner reports, and the bytes of libraries. */
+/* The owner's report; the bytes that libraries took. */
 drape_linear_report drape_fallback_report(const drape_fallback *fallback, const drape_linear_ops *owner);
 size_t drape_fallback_bytes(const drape_fallback *fallback);
 

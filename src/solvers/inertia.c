@@ -1,4 +1,5 @@
-/* inertia.c: see inertia.h. AMD orders, LDL (Davis 2005, Algorithm 849) factors without pivoting. */
+/* inertia.c: see inertia.h. The matrix is ordered by AMD and factored without pivoting by LDL (Davis 2005,
+ * Algorithm 849). */
 #include "solvers/inertia.h"
 
 #include "base/arena.h"
@@ -15,7 +16,7 @@ typedef struct ldl_work {
     double *value;
 } ldl_work;
 
-/* SuiteSparse takes its index arrays without const and does not write them. */
+/* SuiteSparse takes index arrays without const, but does not write to them. */
 static index_t *indices(const int64_t *array)
 {
     return (index_t *)(uintptr_t)array;

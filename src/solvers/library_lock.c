@@ -3,7 +3,7 @@
 
 #include <pthread.h>
 
-/* The libraries are shared by the whole process, and so is the lock. */
+/* The libraries are shared by the whole process, and so is their lock. */
 static pthread_mutex_t library = PTHREAD_MUTEX_INITIALIZER;
 
 void drape_library_lock(void)

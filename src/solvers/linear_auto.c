@@ -1,6 +1,6 @@
 /*
- * auto: the solver that was measured to be the fastest at this number of unknowns (bench/linears) among those
- * in this build: each has the number from which on it is (best_from).
+ * auto: picks the solver that was measured to be the fastest at this number of unknowns (bench/linears),
+ * among those in this build: each names the number from which on it is the fastest (best_from).
  */
 #include "solvers/linear.h"
 
@@ -8,13 +8,13 @@
 #include <stdio.h>
 
 typedef struct auto_state {
-    const drape_linear_ops *row;
+    const drape_linear_ops *ops;
     int64_t n;
     void *solver;
 } auto_state;
 
-/* The solver that is picked from the next larger size on; NULL: none. */
-static const drape_linear_ops *next_row(int64_t from)
+/* The solver that is picked at the next larger sizes; NULL: none. */
+static const drape_linear_ops *next_larger(int64_t from)
 {
     const drape_linear_ops *next = NULL;
     for (int i = 0; drape_linears[i]; i++)
@@ -26,7 +26,7 @@ static const drape_linear_ops *next_row(int64_t from)
 static void destroy(void **state)
 {
     auto_state *s = *state;
-    drape_linear_destroy(s->row, &s->solver);
+    drape_linear_destroy(s->ops, &s->solver);
 }
 
 static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
@@ -34,8 +34,8 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     auto_state *s = drape_arena_take(arena, 1, sizeof *s);
     if (!s)
         return DRAPE_E_MEMORY;
-    *s = (auto_state){.row = drape_linear_best(pattern->n), .n = pattern->n};
-    drape_status status = s->row->create(arena, pattern, &s->solver);
+    *s = (auto_state){.ops = drape_linear_best(pattern->n), .n = pattern->n};
+    drape_status status = s->ops->create(arena, pattern, &s->solver);
     if (!status)
         *state = s;
     return status;
@@ -44,49 +44,49 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
 static void use_threads(void *state, drape_pool *pool)
 {
     auto_state *s = state;
-    if (s->row->use_threads)
-        s->row->use_threads(s->solver, pool);
+    if (s->ops->use_threads)
+        s->ops->use_threads(s->solver, pool);
 }
 
 static drape_status factor(void *state, const double *values)
 {
     auto_state *s = state;
-    return s->row->factor(s->solver, values);
+    return s->ops->factor(s->solver, values);
 }
 
 static drape_status factor_definite(void *state, const double *values)
 {
     auto_state *s = state;
-    return (s->row->factor_definite ? s->row->factor_definite : s->row->factor)(s->solver, values);
+    return (s->ops->factor_definite ? s->ops->factor_definite : s->ops->factor)(s->solver, values);
 }
 
 static drape_status solve(void *state, const double *b, double *x)
 {
     auto_state *s = state;
-    return s->row->solve(s->solver, b, x);
+    return s->ops->solve(s->solver, b, x);
 }
 
 static void archive(void *state, drape_archive *a, const double *values)
 {
     auto_state *s = state;
-    drape_linear_archive(s->row, s->solver, a, values);
+    drape_linear_archive(s->ops, s->solver, a, values);
 }
 
 static size_t bytes(const void *state)
 {
     const auto_state *s = state;
-    return drape_linear_bytes(s->row, s->solver);
+    return drape_linear_bytes(s->ops, s->solver);
 }
 
 static void report(const void *state, drape_linear_report *out)
 {
     const auto_state *s = state;
-    const drape_linear_ops *next = next_row(s->row->best_from);
-    *out = (drape_linear_report){.row = s->row};
-    if (s->row->report)
-        s->row->report(s->solver, out);
-    const char *name = next ? next->entry.name : s->row->entry.name;
-    int64_t from = next ? next->best_from : s->row->best_from;
+    const drape_linear_ops *next = next_larger(s->ops->best_from);
+    *out = (drape_linear_report){.ops = s->ops};
+    if (s->ops->report)
+        s->ops->report(s->solver, out);
+    const char *name = next ? next->entry.name : s->ops->entry.name;
+    int64_t from = next ? next->best_from : s->ops->best_from;
     if (from > 1)
         snprintf(out->why, sizeof out->why, "%" PRId64 " unknowns; %s from %" PRId64 " on", s->n, name, from);
     else

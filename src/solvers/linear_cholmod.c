@@ -1,13 +1,14 @@
 /*
- * cholmod: supernodal Cholesky by CHOLMOD (Chen, Davis, Hager & Rajamanickam 2008) for a symmetric positive
- * definite matrix. The graph of blocks is ordered and analysed once, in create, nine times smaller than that
- * of the scalars; the factors' memory is taken there too. Nested dissection by METIS, which Debian has shared
- * only, saves a quarter of a factorisation at 10 000 nodes and nothing up to 529, for 1.6 times the analysis.
+ * cholmod: supernodal Cholesky factorisation by CHOLMOD (Chen, Davis, Hager & Rajamanickam 2008) of a
+ * symmetric positive definite matrix. The graph of 3 x 3 blocks, nine times smaller than that of the
+ * scalars, is ordered and analysed once, in create; the memory of the factors is taken there, too. Nested
+ * dissection by METIS, which Debian has as a shared library only, saves a quarter of a factorisation at 10
+ * 000 nodes and nothing up to 529, for 1.6 times the analysis.
  *
  * Callers do not say whether a matrix is symmetric: each entry of the lower triangle is compared with its
- * mirror while it is copied. A matrix that is not symmetric (internal damping in continuous time and friction
- * have such a part), not positive definite, or singular to working precision goes to the fallback
- * (fallback.h); no matrix is made symmetric that is not.
+ * mirror while it is copied. A matrix that is not symmetric (internal damping in continuous time and
+ * friction have such a part), not positive definite, or singular to working precision goes to the fallback
+ * (fallback.h); no matrix is symmetrised.
  */
 #include "solvers/fallback.h"
 #include "solvers/library_lock.h"
@@ -22,14 +23,14 @@
 
 typedef SuiteSparse_long index_t;
 
-/* Round-off in a_ij, whose elements' parts are at most about sqrt(a_ii a_jj) each. Below it, a difference
- * between mirrored entries moves the solution as rounding the entries does. */
+/* Relative rounding error in a_ij, to which elements contribute at most about sqrt(a_ii a_jj) each. A
+ * smaller difference between mirrored entries moves the solution no more than rounding the entries does. */
 #define SYMMETRY  1e-13
-#define MIN_RCOND 1e-15 /* below: singular to working precision; the fallback decides */
+#define MIN_RCOND 1e-15 /* smaller: singular to working precision, so the fallback decides */
 
 extern const drape_linear_ops drape_linear_cholmod;
 
-/* A triangle of the permuted matrix, as blocks or as scalars. */
+/* A triangle of the permuted matrix, of blocks or of scalars. */
 typedef struct triangle {
     index_t *column, *row;
 } triangle;
@@ -40,23 +41,24 @@ typedef struct cholmod_state {
     cholmod_common common;
     index_t *order;             /* (blocks) the block column of the pattern that is eliminated k-th */
     triangle blocks;            /* lower, rows ascending */
-    int32_t *source, *mirror;   /* (lower blocks) the pattern's block that each is, and the transposed one */
+    int32_t *source, *mirror;   /* (lower blocks) the block of the pattern that each one is a copy of, and
+                                   its mirror */
     triangle scalars;           /* lower */
-    double *values;             /* of the scalars */
+    double *values;             /* of `scalars` */
     double *diagonal;           /* (n) in the pattern's order */
     double *solution, *scratch; /* (n), (largest supernode) for solve */
     cholmod_factor *factor;
     drape_fallback fallback;
-    bool factored; /* here or by the fallback */
+    bool factored; /* by Cholesky or by the fallback */
 } cholmod_state;
 
 _Static_assert(sizeof(index_t) == sizeof(int64_t), "the pattern's indices are passed to CHOLMOD as they are");
 
 /* ---- Analysis ---- */
 
-/* What only the analysis needs, over blocks but for scalar_*. */
+/* Workspace of the analysis; over blocks, except for scalar_*. */
 typedef struct analysis {
-    index_t *column, *row; /* the pattern, in CHOLMOD's indices */
+    index_t *column, *row; /* the pattern, with CHOLMOD's integers */
     index_t *inverse, *parent, *post, *count, *first, *level;
     triangle upper, scalar_upper;
     index_t *scalar_parent;
@@ -71,7 +73,7 @@ static drape_status allocate(cholmod_state *s, analysis *a, drape_arena *scratch
 {
     const drape_pattern *p = s->pattern;
     const size_t blocks = (size_t)p->block_count, n = (size_t)p->n;
-    /* of one triangle, the diagonal in it */
+    /* entries of one triangle, including the diagonal */
     const size_t lower_blocks = ((size_t)p->block_start[blocks] + blocks) / 2,
                  lower_scalars = ((size_t)p->nonzeros + n) / 2;
     s->order = take_indices(s->arena, blocks);
@@ -97,7 +99,7 @@ static drape_status allocate(cholmod_state *s, analysis *a, drape_arena *scratch
     return drape_arena_status(s->arena) ? DRAPE_E_MEMORY : drape_arena_status(scratch);
 }
 
-/* A triangle with this many entries as CHOLMOD's matrix; stype -1: lower, 1: upper. */
+/* A triangle with this many columns as a matrix of CHOLMOD; stype -1: lower, 1: upper. */
 static cholmod_sparse as_matrix(const triangle *t, index_t n, int stype, double *values)
 {
     return (cholmod_sparse){.nrow = (size_t)n,
@@ -114,7 +116,8 @@ static cholmod_sparse as_matrix(const triangle *t, index_t n, int stype, double 
                             .packed = 1};
 }
 
-/* Counts to places: count[j] entries of column j become its start, which also goes to next[j]. */
+/* Turns counts into starts: count[j] entries of column j become the place where they begin, which is also
+ * copied to next[j]. */
 static void start_columns(index_t *column, index_t *next, index_t n)
 {
     index_t at = 0;
@@ -126,7 +129,7 @@ static void start_columns(index_t *column, index_t *next, index_t n)
     column[n] = at;
 }
 
-/* The lower triangle of the permuted blocks. Its rows are walked in order, so they are ascending in each
+/* The lower triangle of the permuted blocks. Its rows are visited in order, so they are ascending in each
  * column; a row of it is a column of the pattern, whose block is the mirror. */
 static void permute_lower(cholmod_state *s, analysis *a)
 {
@@ -170,7 +173,8 @@ static bool permute(cholmod_state *s, analysis *a)
     return cholmod_l_etree(&upper, a->parent, &s->common);
 }
 
-/* Minimum degree, then the elimination tree's own order, in which supernodes are contiguous. */
+/* Orders by minimum degree, then by the postorder of the elimination tree, in which supernodes are
+ * contiguous. */
 static bool order_blocks(cholmod_state *s, analysis *a)
 {
     const drape_pattern *p = s->pattern;
@@ -188,19 +192,19 @@ static bool order_blocks(cholmod_state *s, analysis *a)
     return permute(s, a);
 }
 
-/* Entries in each column of the factors. */
+/* Counts the entries in each column of the factors. */
 static bool count_columns(cholmod_state *s, analysis *a)
 {
     index_t n = s->pattern->block_count;
     cholmod_sparse lower = as_matrix(&s->blocks, n, -1, NULL);
     for (index_t k = 0; k < n; k++)
-        a->post[k] = k; /* it is in postorder already */
+        a->post[k] = k; /* the order is a postorder already */
     return cholmod_l_rowcolcounts(&lower, NULL, 0, a->parent, a->post, NULL, a->count, a->first, a->level,
                                   &s->common);
 }
 
-/* Each block becomes nine scalars, one on the diagonal the six of its triangle. In the elimination tree the
- * three scalars of a block are a chain. */
+/* Expands each block to nine scalars, a diagonal block to the six of its lower triangle. In the elimination
+ * tree the three scalars of a block column form a chain. */
 static void expand(cholmod_state *s, analysis *a)
 {
     index_t low = 0, up = 0;
@@ -220,7 +224,7 @@ static void expand(cholmod_state *s, analysis *a)
     a->scalar_upper.column[s->pattern->n] = up;
 }
 
-/* The supernodes, and memory for the factors. */
+/* Finds the supernodes and takes the memory of the factors. */
 static bool find_supernodes(cholmod_state *s, analysis *a)
 {
     index_t n = s->pattern->n;
@@ -284,7 +288,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
 
 /* ---- Factors ---- */
 
-/* False where one is not positive: then the matrix is not positive definite. */
+/* False if an entry is not positive: then the matrix is not positive definite. */
 static bool read_diagonal(cholmod_state *s, const double *values)
 {
     const drape_pattern *p = s->pattern;
@@ -300,7 +304,7 @@ static bool read_diagonal(cholmod_state *s, const double *values)
     return true;
 }
 
-/* Copies one block below or on the diagonal to its three columns; false where it differs from its mirror. */
+/* Copies one block on or below the diagonal to its three columns; false if it differs from its mirror. */
 static bool copy_block(cholmod_state *s, const double *values, index_t k, index_t column, double *to[3])
 {
     const drape_pattern *p = s->pattern;
@@ -319,7 +323,7 @@ static bool copy_block(cholmod_state *s, const double *values, index_t k, index_
     return symmetric;
 }
 
-/* The lower triangle, permuted; false where the matrix is not symmetric. */
+/* Copies the permuted lower triangle; false if the matrix is not symmetric. */
 static bool copy_values(cholmod_state *s, const double *values)
 {
     for (index_t column = 0; column < s->pattern->block_count; column++) {
@@ -333,8 +337,8 @@ static bool copy_values(cholmod_state *s, const double *values)
     return true;
 }
 
-/* Debian's CHOLMOD starts four threads of OpenMP whatever the environment says; how many threads there are
- * is for the host to say. */
+/* Debian's CHOLMOD starts four OpenMP threads whatever the environment says; the number of threads is for
+ * the host to choose. */
 static bool factor_lower(cholmod_state *s)
 {
     cholmod_sparse lower = as_matrix(&s->scalars, s->pattern->n, -1, s->values);
@@ -349,9 +353,9 @@ static bool factor_lower(cholmod_state *s)
            cholmod_l_rcond(s->factor, &s->common) > MIN_RCOND;
 }
 
-/* Cholesky factors are tried for each symmetric matrix: leaving attempts out after failures saved 2 or 3 of
- * the 52 that failed in the 512 matrices of a folding sheet, and gave definite matrices to the slower
- * fallback. */
+/* A Cholesky factorisation is tried for each symmetric matrix: skipping attempts after failures saved 2 or
+ * 3 of the 52 failed ones for the 512 matrices of a folding sheet, and gave positive definite matrices to
+ * the slower fallback. */
 static drape_status factor_any(cholmod_state *s, const double *values, bool definite)
 {
     s->fallback.active = s->factored = false;
@@ -435,9 +439,8 @@ static void report(const void *state, drape_linear_report *out)
 
 const drape_linear_ops drape_linear_cholmod = {
     .entry = {.name = "cholmod",
-              .summary =
-                  "supernodal Cholesky with a symbolic factor kept for good; what is not symmetric positive "
-                  "definite goes to umfpack or klu, by size",
+              .summary = "supernodal Cholesky, analysed once; a matrix that is not symmetric positive "
+                         "definite goes to umfpack or klu, by size",
               .reference = "Chen, Davis, Hager & Rajamanickam 2008, Algorithm 887: CHOLMOD"},
     .borrows_heap = true, /* the update of the largest supernode, and what OpenMP needs for a loop */
     .create = create,

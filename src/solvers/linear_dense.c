@@ -1,5 +1,5 @@
-/* dense: LU with partial pivoting of the full matrix by SUNDIALS: n^2 numbers, 2/3 n^3 operations. The
- * baseline that sparse solvers are measured against. */
+/* dense: LU factorisation with partial pivoting of the full matrix, by SUNDIALS: n^2 numbers, 2/3 n^3
+ * operations. The baseline against which the sparse solvers are measured. */
 #include "solvers/linear.h"
 
 #include "base/finite.h"
@@ -9,7 +9,7 @@
 
 typedef struct dense_state {
     const drape_pattern *pattern;
-    double **column; /* (n) pointers to columns, as SUNDIALS has its dense matrices */
+    double **column; /* (n) pointers to the columns, as SUNDIALS represents its dense matrices */
     double *values;  /* (n x n) column-major */
     sunindextype *pivot;
     bool factored;

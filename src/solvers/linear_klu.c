@@ -1,9 +1,10 @@
 /*
- * klu: sparse LU by KLU (Davis & Palamadai Natarajan 2010), the reference solver. AMD ordering, because the
- * pattern is symmetric; no block triangular form, because the mesh is connected. The first factorisation
- * chooses pivots; later ones keep them (refactor), which takes no heap, and are done afresh where the kept
- * pivots turn out to be too small. The factors of a matrix depend on the one that its pivots were chosen for:
- * its values are kept, so that a checkpoint can choose them again.
+ * klu: sparse LU factorisation by KLU (Davis & Palamadai Natarajan 2010), the reference solver. AMD
+ * ordering, because the pattern is symmetric; no block triangular form, because the mesh is connected. The
+ * first factorisation chooses pivots; later ones keep them (refactor), which takes no memory from the heap,
+ * and choose new ones where the kept pivots turn out to be too small. The factors therefore depend also on
+ * the matrix that the pivots were chosen for: its values are kept, so that a checkpoint can choose the same
+ * pivots again.
  */
 #include "solvers/linear.h"
 
@@ -13,21 +14,21 @@
 #include <string.h>
 
 #define ORDER_AMD 0
-#define MIN_RCOND 1e-15 /* below: singular to working precision; a fresh choice of pivots is tried first */
+#define MIN_RCOND 1e-15 /* smaller: singular to working precision; new pivots are tried first */
 
 typedef struct klu_state {
     const drape_pattern *pattern;
     klu_l_common common;
     klu_l_symbolic *symbolic;
     klu_l_numeric *numeric; /* NULL before the first and after a failed factorisation */
-    double *chosen_for;     /* (nonzeros) the values that its pivots were chosen for */
-    bool refactored;        /* it was factored with other values since */
+    double *chosen_for;     /* (nonzeros) the values that the pivots were chosen for */
+    bool refactored;        /* other values were factored since, with these pivots */
 } klu_state;
 
 _Static_assert(sizeof(SuiteSparse_long) == sizeof(int64_t),
                "the pattern's indices are passed to KLU as they are");
 
-/* KLU takes its index arrays without const and does not write them. */
+/* KLU takes index arrays without const, but does not write to them. */
 static SuiteSparse_long *indices(const int64_t *array)
 {
     return (SuiteSparse_long *)(uintptr_t)array;
@@ -134,7 +135,7 @@ static size_t bytes(const void *state)
 
 const drape_linear_ops drape_linear_klu = {
     .entry = {.name = "klu",
-              .summary = "sparse LU with AMD ordering; pivots are kept from step to step",
+              .summary = "sparse LU with AMD ordering; pivots are kept between steps",
               .reference = "Davis & Palamadai Natarajan 2010, Algorithm 907: KLU"},
     .best_from = 1,
     .general_from = 1,

@@ -1,14 +1,14 @@
 /*
  * multifrontal: Cholesky factors of a symmetric positive definite matrix, front by front (Duff & Reid 1983;
- * Liu 1992, The multifrontal method for sparse matrix solution). A front is a dense matrix of a few columns
- * of the matrix and all rows that fill in below them. It is assembled from the entries of its columns and
- * from what its children's eliminations left on its columns and rows; its columns are factored; what that
- * leaves on its rows, the update, goes to its parent in the elimination tree.
+ * Liu 1992, The multifrontal method for sparse matrix solution). A front is a dense matrix that consists of
+ * a few columns of the matrix and all rows that fill in below them. It is assembled from the entries of its
+ * columns and from the updates of its children; then its columns are factored; the Schur complement on its
+ * rows is its update, which goes to its parent in the elimination tree.
  *
- * Fronts of different branches of the tree do not depend on each other: each branch is a task for one thread,
- * and the few large fronts at the top, which join the branches, are shared by all threads. Every sum runs in
- * an order that the pattern alone decides, so the bits do not depend on the number of threads. All memory is
- * taken in create.
+ * Fronts in different branches of the tree are independent: each branch is a task for one thread, and the
+ * few large fronts at the top, which join the branches, are each shared by all threads. Every sum is added
+ * in an order that depends on the pattern alone, so the bits do not depend on the number of threads. All
+ * memory is taken in create.
  *
  * A matrix that is not symmetric positive definite goes to the fallback (fallback.h).
  */
@@ -21,25 +21,25 @@
 #include <math.h>
 #include <string.h>
 
-/* Round-off in a_ij, whose elements' parts are at most about sqrt(a_ii a_jj) each. Below it, a difference
- * between mirrored entries moves the solution as rounding the entries does. */
+/* Relative rounding error in a_ij, to which elements contribute at most about sqrt(a_ii a_jj) each. A
+ * smaller difference between mirrored entries moves the solution no more than rounding the entries does. */
 #define SYMMETRY  1e-13
-#define MIN_RCOND 1e-15 /* below: singular to working precision; the fallback decides */
-#define BRANCHES  24    /* a branch is at most this part of all work */
+#define MIN_RCOND 1e-15 /* smaller: singular to working precision, so the fallback decides */
+#define BRANCHES  24    /* a branch has at most this part of all work */
 #define S         DRAPE_STRIP
 #define A_STRIP   (DRAPE_STRIP / 3) /* blocks in a strip */
-/* columns multiplied at once: two strips of it fit into the nearest cache */
+/* columns multiplied together: two strips of this length fit into the first-level cache */
 #define CHUNK     (10 * DRAPE_STRIP)
 #define ALIGNMENT 64
 
 extern const drape_linear_ops drape_linear_multifrontal;
 
-/* The size of a front, and where it is stored. Its panel holds its columns, its update what it leaves to its
- * parent. */
+/* The size of a front, and where it is stored. Its panel holds its columns, its update what it passes to
+ * its parent. */
 typedef struct front {
-    int32_t columns, rows; /* scalars: factored, and below them */
+    int32_t columns, rows; /* scalars: factored columns, and rows below them */
     int32_t column_strips, row_strips;
-    int64_t panel, update;        /* where they begin in panels and updates */
+    int64_t panel, update;        /* where they begin in `panels` and `updates` */
     int32_t first_child, sibling; /* -1: none */
     int32_t branch;               /* -1: at the top */
     bool odd;                     /* its depth in the tree is odd */
@@ -51,31 +51,31 @@ typedef struct multifrontal {
     drape_elimination e;
     front *fronts;                 /* (e.count) */
     int32_t *branch, branch_count; /* first and last front of each branch; children come before parents */
-    int32_t *top, top_count;       /* the other fronts, children first */
-    int32_t *mirror;               /* (lower blocks, as the pattern has them) the transposed block of each */
-    int32_t *source, *target; /* (lower blocks, in the order of elimination) the pattern's block that each is,
-                                 and where it goes, counted from the beginning of its front's panel */
-    int32_t *target_start;    /* (e.n + 1) the first of each column in source and target */
+    int32_t *top, top_count;       /* the fronts in no branch, children first */
+    int32_t *mirror;               /* (lower blocks, in the pattern's order) the transposed block of each */
+    int32_t *source, *target; /* (lower blocks, in the order of elimination) the block of the pattern, and
+                                 its position in the panel of its front */
+    int32_t *target_start;    /* (e.n + 1) where each column begins in source and target */
     int32_t *in_panel,
-        *in_update; /* (rows of all fronts) where a row lies in its front's parent; see place_rows */
+        *in_update; /* (rows of all fronts) position of a row in the front's parent; see find_row_positions */
     double *panels, *updates; /* aligned for the tiles */
     double *inverse;          /* (n) of the diagonal of the factors */
     double *work;             /* (n) the solution, in the order of elimination */
     double *left;             /* (rows of all fronts x 3) see part */
     double *scratch;          /* (branches + 1, scratch_size) */
     int64_t panel_size, update_size;
-    int32_t widest, tallest; /* scalars, of all fronts, in whole strips */
+    int32_t widest, tallest; /* of all fronts: most columns and most rows, in scalars of whole strips */
     double *diagonal;        /* (n) in the pattern's order */
     drape_pool *pool;        /* NULL: one thread */
     bool *failed;            /* (e.count) the front is not positive definite */
     const double *values;    /* of the matrix that is being factored */
     drape_fallback fallback;
-    bool factored; /* here or by the fallback */
+    bool factored; /* by Cholesky or by the fallback */
 } multifrontal;
 
-/* ---- Where fronts lie ---- */
+/* ---- Storage of the fronts ---- */
 
-/* Tiles on and below the diagonal, columns of tiles one after another. */
+/* Tiles on and below the diagonal, stored by columns of tiles. */
 static int64_t update_tiles(const front *f)
 {
     return (int64_t)f->row_strips * (f->row_strips + 1) / 2;
@@ -111,13 +111,12 @@ static void measure_fronts(multifrontal *s)
     }
 }
 
-/* Branches are the largest subtrees whose work is at most a BRANCHES-th of all; the other fronts are the
- * top. */
+/* Branches are the largest subtrees with at most 1 / BRANCHES of all work; the other fronts are the top. */
 static void find_branches(multifrontal *s, double *work, int32_t *begin)
 {
     const int32_t count = s->e.count;
     double total = 0;
-    for (int32_t i = 0; i < count; i++) { /* work: of a subtree; begin: its first front */
+    for (int32_t i = 0; i < count; i++) { /* work: of the subtree below i; begin: its first front */
         work[i] += s->e.work[i];
         total += s->e.work[i];
         begin[i] = s->fronts[i].first_child >= 0 ? begin[s->fronts[i].first_child] : i;
@@ -139,8 +138,8 @@ static void find_branches(multifrontal *s, double *work, int32_t *begin)
 }
 
 /* Updates of fronts of even depth lie on one stack, those of odd depth on another: while a front writes its
- * own update, those of its children are at the end of the other stack. Each branch has two stacks, and so has
- * the top. */
+ * own update, those of its children are at the end of the other stack. Each branch has a pair of stacks,
+ * and so has the top. */
 typedef struct stacks {
     int64_t end[2], peak[2];
 } stacks;
@@ -150,13 +149,13 @@ static void push_update(multifrontal *s, int32_t i, stacks *k)
     front *f = &s->fronts[i];
     for (int32_t c = f->first_child; c >= 0; c = s->fronts[c].sibling)
         if (s->fronts[c].branch == f->branch && s->fronts[c].update < k->end[!f->odd])
-            k->end[!f->odd] = s->fronts[c].update; /* the first of them lies deepest */
+            k->end[!f->odd] = s->fronts[c].update; /* the first child's lies deepest */
     f->update = k->end[f->odd];
     k->end[f->odd] += update_tiles(f) * DRAPE_TILE;
     k->peak[f->odd] = k->end[f->odd] > k->peak[f->odd] ? k->end[f->odd] : k->peak[f->odd];
 }
 
-static void place_updates(multifrontal *s)
+static void allocate_updates(multifrontal *s)
 {
     for (int32_t i = s->e.count - 1; i >= 0; i--)
         s->fronts[i].odd = s->e.parent[i] >= 0 && !s->fronts[s->e.parent[i]].odd;
@@ -175,11 +174,29 @@ static void place_updates(multifrontal *s)
     }
 }
 
-/* ---- Where entries go ---- */
+static drape_status lay_out_fronts(multifrontal *s)
+{
+    drape_arena scratch = drape_arena_of(s->arena->ctx);
+    const size_t count = (size_t)s->e.count;
+    double *work = drape_arena_take(&scratch, count, sizeof *work);
+    int32_t *begin = drape_arena_take(&scratch, count, sizeof *begin);
+    s->fronts = drape_arena_take(s->arena, count, sizeof *s->fronts);
+    s->branch = drape_arena_take(s->arena, count, 2 * sizeof *s->branch);
+    s->top = drape_arena_take(s->arena, count, sizeof *s->top);
+    const bool good = !drape_arena_status(&scratch) && !drape_arena_status(s->arena);
+    if (good) {
+        measure_fronts(s);
+        find_branches(s, work, begin);
+        allocate_updates(s);
+    }
+    drape_arena_free(&scratch);
+    return good ? DRAPE_OK : DRAPE_E_MEMORY;
+}
 
-/* The place of block (row, column), both in the order of elimination, from the beginning of the panel of
- * front i. */
-static int64_t place_in_panel(const multifrontal *s, int32_t i, int32_t row, int32_t column)
+/* ---- Positions of entries ---- */
+
+/* The position of block (row, column), both in the order of elimination, in the panel of front i. */
+static int64_t position_in_panel(const multifrontal *s, int32_t i, int32_t row, int32_t column)
 {
     const front *f = &s->fronts[i];
     const int32_t columns = f->columns / 3, at = drape_front_find(&s->e, i, row);
@@ -188,8 +205,8 @@ static int64_t place_in_panel(const multifrontal *s, int32_t i, int32_t row, int
     return ((int64_t)strip * f->columns + 3 * (int64_t)(column - s->e.first[i])) * S + 3 * within;
 }
 
-/* False where a panel is too large for 32-bit places. */
-static bool place_entries(multifrontal *s)
+/* False if a panel is too large for 32-bit positions. */
+static bool find_entry_positions(multifrontal *s)
 {
     const drape_pattern *p = s->pattern;
     int32_t at = 0, *mirror = s->mirror;
@@ -204,7 +221,7 @@ static bool place_entries(multifrontal *s)
                 const int32_t row = s->e.place[p->block_row[k]];
                 if (row < column)
                     continue;
-                const int64_t target = place_in_panel(s, i, row, column);
+                const int64_t target = position_in_panel(s, i, row, column);
                 if (target > INT32_MAX)
                     return false;
                 s->source[at] = k;
@@ -215,10 +232,10 @@ static bool place_entries(multifrontal *s)
     return true;
 }
 
-/* Where each row of a front lies in its parent, counted from the beginning of a column: in the parent's
- * panel, and in its update, there from where the tile of the first strip would be. in_update -1: the parent
- * factors the row. False where a panel is too large for 32-bit places. */
-static bool place_rows(multifrontal *s)
+/* The position of each row of a front in its parent, counted from the beginning of a column: in the
+ * parent's panel, and in its update, there from the tile of the first strip. in_update -1: the parent
+ * factors the row. False if a panel is too large for 32-bit positions. */
+static bool find_row_positions(multifrontal *s)
 {
     for (int32_t i = 0; i < s->e.count; i++) {
         const front *up = s->e.parent[i] >= 0 ? &s->fronts[s->e.parent[i]] : NULL;
@@ -235,7 +252,7 @@ static bool place_rows(multifrontal *s)
     return true;
 }
 
-/* ---- Making ---- */
+/* ---- Creation ---- */
 
 static double *take_aligned(drape_arena *arena, int64_t count)
 {
@@ -244,29 +261,10 @@ static double *take_aligned(drape_arena *arena, int64_t count)
     return (double *)((at + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT);
 }
 
-/* Doubles of scratch of one branch, or the top. */
+/* The number of doubles of scratch for one branch, or for the top. */
 static int64_t scratch_size(const multifrontal *s)
 {
     return 5 * (int64_t)s->widest + s->tallest;
-}
-
-static drape_status place_fronts(multifrontal *s)
-{
-    drape_arena scratch = drape_arena_of(s->arena->ctx);
-    const size_t count = (size_t)s->e.count;
-    double *work = drape_arena_take(&scratch, count, sizeof *work);
-    int32_t *begin = drape_arena_take(&scratch, count, sizeof *begin);
-    s->fronts = drape_arena_take(s->arena, count, sizeof *s->fronts);
-    s->branch = drape_arena_take(s->arena, count, 2 * sizeof *s->branch);
-    s->top = drape_arena_take(s->arena, count, sizeof *s->top);
-    const bool good = !drape_arena_status(&scratch) && !drape_arena_status(s->arena);
-    if (good) {
-        measure_fronts(s);
-        find_branches(s, work, begin);
-        place_updates(s);
-    }
-    drape_arena_free(&scratch);
-    return good ? DRAPE_OK : DRAPE_E_MEMORY;
 }
 
 static drape_status create(drape_arena *arena, const drape_pattern *pattern, void **state)
@@ -279,7 +277,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     s->fallback = drape_fallback_of(arena, pattern);
     drape_status status = drape_elimination_create(arena, pattern, &s->e);
     if (!status)
-        status = place_fronts(s);
+        status = lay_out_fronts(s);
     if (status)
         return status;
     const size_t n = (size_t)pattern->n, lower = ((size_t)pattern->nonzeros / 9 + n / 3) / 2,
@@ -301,7 +299,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     s->updates = take_aligned(arena, s->update_size);
     if (drape_arena_status(arena))
         return DRAPE_E_MEMORY;
-    if (!place_entries(s) || !place_rows(s))
+    if (!find_entry_positions(s) || !find_row_positions(s))
         return drape_fail(arena->ctx, DRAPE_E_SOLVER, "the factors have a front of more than 2^31 entries");
     *state = s;
     return DRAPE_OK;
@@ -318,9 +316,67 @@ static void use_threads(void *state, drape_pool *pool)
     ((multifrontal *)state)->pool = pool;
 }
 
+/* ---- Values ---- */
+
+/* Properties checked before a matrix is factored. */
+typedef struct properties {
+    bool finite, positive, symmetric; /* positive: its diagonal is positive */
+} properties;
+
+static bool copy_diagonal(multifrontal *s)
+{
+    const drape_pattern *p = s->pattern;
+    bool positive = true;
+    for (int32_t j = 0; j < p->block_count; j++) {
+        int64_t stride;
+        const double *at = drape_pattern_at(p, (double *)(uintptr_t)s->values, j, p->diagonal[j], &stride);
+        for (int c = 0; c < 3; c++) {
+            s->diagonal[3 * j + c] = at[c * stride + c];
+            positive &= s->diagonal[3 * j + c] > 0;
+        }
+    }
+    return positive;
+}
+
+/* Whether block k of column j is the transpose of the block `mirrored`, up to rounding errors. */
+static bool is_mirrored(const multifrontal *s, int32_t j, int32_t k, int32_t mirrored)
+{
+    const drape_pattern *p = s->pattern;
+    const int32_t i = p->block_row[k];
+    int64_t stride, mirror_stride;
+    double *values = (double *)(uintptr_t)s->values;
+    const double *block = drape_pattern_at(p, values, j, k, &stride),
+                 *mirror = drape_pattern_at(p, values, i, mirrored, &mirror_stride);
+    bool same = true, symmetric = true;
+    for (int c = 0; c < 3; c++)
+        for (int r = 0; r < 3; r++)
+            same &= block[c * stride + r] == mirror[r * mirror_stride + c];
+    for (int e = 0; !same && e < 9; e++) {
+        const int c = e / 3, r = e % 3;
+        const double difference = block[c * stride + r] - mirror[r * mirror_stride + c];
+        symmetric &=
+            difference * difference <= SYMMETRY * SYMMETRY * s->diagonal[3 * i + r] * s->diagonal[3 * j + c];
+    }
+    return symmetric;
+}
+
+/* Visits the matrix column by column, as it is stored: in a well-numbered mesh a mirrored block is never
+ * far from its block. */
+static properties inspect(multifrontal *s)
+{
+    const drape_pattern *p = s->pattern;
+    const int32_t *mirror = s->mirror;
+    properties of = {.finite = drape_all_finite(s->values, (size_t)p->nonzeros), .symmetric = true};
+    of.positive = of.finite && copy_diagonal(s);
+    for (int32_t j = 0; of.positive && j < p->block_count; j++)
+        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++)
+            of.symmetric &= is_mirrored(s, j, k, *mirror++);
+    return of;
+}
+
 /* ---- One front ---- */
 
-static void copy_block(const multifrontal *s, int32_t at, int32_t column, double *panel)
+static void copy_entries(const multifrontal *s, int32_t at, int32_t column, double *panel)
 {
     int64_t stride;
     const double *from = drape_pattern_at(s->pattern, (double *)(uintptr_t)s->values, s->e.order[column],
@@ -333,7 +389,7 @@ static void copy_block(const multifrontal *s, int32_t at, int32_t column, double
 
 typedef double couple __attribute__((vector_size(2 * sizeof(double))));
 
-/* Adds a block of a child's update; both lie in strips. */
+/* Adds a block of a child's update to a block of its parent; both lie in strips. */
 static inline void add_block(const double *from, double *to)
 {
     for (int c = 0; c < 3; c++, from += S, to += S) {
@@ -346,28 +402,28 @@ static inline void add_block(const double *from, double *to)
     }
 }
 
-/* A front that is being made, as the tasks dealt out to threads see it. */
+/* A front being factored, as seen by the tasks that share the work. */
 typedef struct job {
     multifrontal *s;
     int32_t index;
     const front *f;
     double *panel, *update;
-    drape_pool *pool; /* NULL: this thread alone, in a branch */
+    drape_pool *pool; /* NULL: one thread, in a branch */
 } job;
 
-/* The update of a child, from its block column `first` on, for add_child_column. */
+/* The update of a child from its block column `first` on: argument of add_child_column. */
 typedef struct child_job {
     const job *to;
     int32_t child, first;
 } child_job;
 
-/* The columns that are factored now, for finish_strip. */
+/* The columns being factored: argument of finish_strip. */
 typedef struct strip_job {
     const job *of;
     int32_t first, width;
 } strip_job;
 
-/* Adds a column of blocks of a child's update to its front. */
+/* Adds a block column of a child's update to its parent. */
 static void add_child_column(void *user, int64_t task)
 {
     const child_job *from_child = user;
@@ -386,7 +442,7 @@ static void add_child_column(void *user, int64_t task)
 }
 
 /* The first block row of a child's update that its parent does not factor. */
-static int32_t first_row_left(const multifrontal *s, int32_t child)
+static int32_t first_row_not_factored(const multifrontal *s, int32_t child)
 {
     const int32_t *place = s->in_update + s->e.row_start[child];
     int32_t low = 0, high = s->fronts[child].rows / 3;
@@ -400,12 +456,12 @@ static int32_t first_row_left(const multifrontal *s, int32_t child)
     return low;
 }
 
-/* Adds what the children's updates have in the columns that are factored here, or in the others. */
+/* Adds those columns of the children's updates that are factored in this front, or the others. */
 static void add_children(const job *w, bool factored)
 {
     const multifrontal *s = w->s;
     for (int32_t child = w->f->first_child; child >= 0; child = s->fronts[child].sibling) {
-        const int32_t middle = first_row_left(s, child), all = s->fronts[child].rows / 3;
+        const int32_t middle = first_row_not_factored(s, child), all = s->fronts[child].rows / 3;
         child_job columns = {.to = w, .child = child, .first = factored ? 0 : middle};
         drape_parallel(w->pool, factored ? middle : all - middle, add_child_column, &columns);
     }
@@ -419,7 +475,7 @@ static void assemble(const job *w)
            (size_t)(f->column_strips + f->row_strips) * S * (size_t)f->columns * sizeof *w->panel);
     for (int32_t column = s->e.first[w->index]; column < s->e.first[w->index + 1]; column++)
         for (int32_t at = s->target_start[column]; at < s->target_start[column + 1]; at++)
-            copy_block(s, at, column, w->panel);
+            copy_entries(s, at, column, w->panel);
     add_children(w, true);
 }
 
@@ -428,8 +484,8 @@ static double *strip_of(const job *w, int64_t strip)
     return w->panel + strip * S * w->f->columns;
 }
 
-/* The columns that are factored now, in one strip below their diagonal: products with the columns before them
- * are subtracted, then it is divided by the diagonal tile. */
+/* Finishes the columns being factored in one strip below their diagonal tile: subtracts the products with
+ * the earlier columns, then divides by the diagonal tile. */
 static void finish_strip(void *user, int64_t task)
 {
     const strip_job *strips = user;
@@ -457,8 +513,8 @@ static bool factor_columns(const job *w)
     return true;
 }
 
-/* The tiles of one column of strips of the update, a chunk of factored columns at a time. */
-static void make_update_column(void *user, int64_t task)
+/* Computes one column of tiles of the update, over chunks of the factored columns. */
+static void compute_update_column(void *user, int64_t task)
 {
     const job *w = user;
     const front *f = w->f;
@@ -472,7 +528,7 @@ static void make_update_column(void *user, int64_t task)
     }
 }
 
-static void make_front(multifrontal *s, int32_t i, drape_pool *pool)
+static void factor_front(multifrontal *s, int32_t i, drape_pool *pool)
 {
     const front *f = &s->fronts[i];
     job w = {.s = s,
@@ -485,79 +541,23 @@ static void make_front(multifrontal *s, int32_t i, drape_pool *pool)
     s->failed[i] = !factor_columns(&w);
     if (s->failed[i])
         return;
-    drape_parallel(pool, f->row_strips, make_update_column, &w);
+    drape_parallel(pool, f->row_strips, compute_update_column, &w);
     add_children(&w, false);
 }
 
-/* ---- Factors ---- */
+/* ---- All fronts ---- */
 
-static void make_branch(void *user, int64_t task)
+static void factor_branch(void *user, int64_t task)
 {
     multifrontal *s = user;
     for (int32_t i = s->branch[2 * task]; i <= s->branch[2 * task + 1]; i++) {
-        make_front(s, i, NULL);
+        factor_front(s, i, NULL);
         if (s->failed[i])
             return;
     }
 }
 
-/* What is known of a matrix before it is factored. */
-typedef struct properties {
-    bool finite, positive, symmetric; /* positive: the diagonal is */
-} properties;
-
-static bool copy_diagonal(multifrontal *s)
-{
-    const drape_pattern *p = s->pattern;
-    bool positive = true;
-    for (int32_t j = 0; j < p->block_count; j++) {
-        int64_t stride;
-        const double *at = drape_pattern_at(p, (double *)(uintptr_t)s->values, j, p->diagonal[j], &stride);
-        for (int c = 0; c < 3; c++) {
-            s->diagonal[3 * j + c] = at[c * stride + c];
-            positive &= s->diagonal[3 * j + c] > 0;
-        }
-    }
-    return positive;
-}
-
-/* Whether block k of column j is the transpose of the block `mirrored`, up to round-off. */
-static bool is_mirrored(const multifrontal *s, int32_t j, int32_t k, int32_t mirrored)
-{
-    const drape_pattern *p = s->pattern;
-    const int32_t i = p->block_row[k];
-    int64_t stride, mirror_stride;
-    double *values = (double *)(uintptr_t)s->values;
-    const double *block = drape_pattern_at(p, values, j, k, &stride),
-                 *mirror = drape_pattern_at(p, values, i, mirrored, &mirror_stride);
-    bool same = true, symmetric = true;
-    for (int c = 0; c < 3; c++)
-        for (int r = 0; r < 3; r++)
-            same &= block[c * stride + r] == mirror[r * mirror_stride + c];
-    for (int e = 0; !same && e < 9; e++) {
-        const int c = e / 3, r = e % 3;
-        const double difference = block[c * stride + r] - mirror[r * mirror_stride + c];
-        symmetric &=
-            difference * difference <= SYMMETRY * SYMMETRY * s->diagonal[3 * i + r] * s->diagonal[3 * j + c];
-    }
-    return symmetric;
-}
-
-/* Column by column, as the values lie: in a well-numbered mesh a mirrored block is never far from its
- * block. */
-static properties inspect(multifrontal *s)
-{
-    const drape_pattern *p = s->pattern;
-    const int32_t *mirror = s->mirror;
-    properties of = {.finite = drape_all_finite(s->values, (size_t)p->nonzeros), .symmetric = true};
-    of.positive = of.finite && copy_diagonal(s);
-    for (int32_t j = 0; of.positive && j < p->block_count; j++)
-        for (int32_t k = p->diagonal[j]; k < p->block_start[j + 1]; k++)
-            of.symmetric &= is_mirrored(s, j, k, *mirror++);
-    return of;
-}
-
-/* The ratio of the extreme pivots bounds the condition from below. */
+/* The ratio of the extreme pivots is a lower bound of the condition number. */
 static bool is_well_conditioned(const multifrontal *s)
 {
     double low = INFINITY, high = 0;
@@ -571,12 +571,12 @@ static bool is_well_conditioned(const multifrontal *s)
 static bool factor_cholesky(multifrontal *s)
 {
     memset(s->failed, 0, (size_t)s->e.count * sizeof *s->failed);
-    drape_parallel(s->pool, s->branch_count, make_branch, s);
+    drape_parallel(s->pool, s->branch_count, factor_branch, s);
     for (int32_t i = 0; i < s->e.count; i++)
         if (s->failed[i])
             return false;
     for (int32_t k = 0; k < s->top_count; k++) {
-        make_front(s, s->top[k], s->pool);
+        factor_front(s, s->top[k], s->pool);
         if (s->failed[s->top[k]])
             return false;
     }
@@ -610,18 +610,18 @@ static drape_status factor_definite(void *state, const double *values)
     return factor_any(state, values, true);
 }
 
-/* ---- Solutions ---- */
+/* ---- Solution ---- */
 
 /* A front and the parts of the solution that it works on. */
 typedef struct part {
     const front *f;
     const double *panel, *inverse;
     const int32_t *row;   /* (f->rows / 3) */
-    double *left;         /* (f->rows) what it leaves to its parent */
-    double *x, *y, *sums; /* of its columns, of its rows, four sums a column */
+    double *left;         /* (f->rows) what it passes to its parent */
+    double *x, *y, *sums; /* of its columns; of its rows; four partial sums for each column */
 } part;
 
-/* Scratch is a branch's own, or the top's. */
+/* The scratch belongs to the front's branch, or to the top. */
 static part part_of(multifrontal *s, int32_t i)
 {
     const front *f = &s->fronts[i];
@@ -640,14 +640,14 @@ static part part_of(multifrontal *s, int32_t i)
                   .sums = sums};
 }
 
-/* Columns p ... of a strip. */
+/* A strip from column p on. */
 static const double *strip_from(const part *w, int64_t strip, int32_t p)
 {
     return w->panel + (strip * w->f->columns + p) * S;
 }
 
-/* What children left, on columns and rows. */
-static void take_from_children(const multifrontal *s, const part *w)
+/* Adds what the children passed on to the front's columns and rows. */
+static void add_from_children(const multifrontal *s, const part *w)
 {
     const int32_t columns = w->f->columns / 3;
     for (int32_t child = w->f->first_child; child >= 0; child = s->fronts[child].sibling)
@@ -663,7 +663,7 @@ static void solve_forward(multifrontal *s, int32_t i)
 {
     const part w = part_of(s, i);
     const front *f = w.f;
-    take_from_children(s, &w);
+    add_from_children(s, &w);
     for (int32_t d = 0; d < f->column_strips; d++) {
         const int32_t first = S * d, width = f->columns - first < S ? f->columns - first : S;
         const double *tile = strip_from(&w, d, first);
@@ -744,6 +744,8 @@ static drape_status solve(void *state, const double *b, double *x)
     return drape_all_finite(x, n) ? DRAPE_OK : DRAPE_RETRY_LINEAR;
 }
 
+/* ---- Checkpoints and reports ---- */
+
 static void archive(void *state, drape_archive *a, const double *values)
 {
     multifrontal *s = state;
@@ -765,12 +767,11 @@ static void report(const void *state, drape_linear_report *out)
 
 const drape_linear_ops drape_linear_multifrontal = {
     .entry = {.name = "multifrontal",
-              .summary = "multifrontal Cholesky of our own, the same bits with any number of threads; what "
-                         "is not symmetric "
-                         "positive definite goes to umfpack or klu, by size",
+              .summary = "Drape's own multifrontal Cholesky, with the same bits for any number of threads; a "
+                         "matrix that is not symmetric positive definite goes to umfpack or klu, by size",
               .reference = "Duff & Reid 1983; Liu 1992, The multifrontal method for sparse matrix solution"},
     .best_from = 100,     /* a third of klu's time at 400 unknowns */
-    .borrows_heap = true, /* that of the fallback, at the first matrix for it */
+    .borrows_heap = true, /* by the fallback, at the first matrix that needs it */
     .create = create,
     .use_threads = use_threads,
     .factor = factor,

@@ -1,12 +1,12 @@
 /*
- * pcg: conjugate gradients for a symmetric positive definite matrix, preconditioned by two parts that are
- * added: the inverses of its diagonal blocks, and the inverse of the matrix on a coarse space (prolong.h), P
- * (P'AP)^-1 P'. It takes no factors of the matrix itself: memory and the time of an iteration grow with the
- * nonzeros, and the number of iterations hardly grows. Callers that need no exact solution ask for fewer
- * digits.
+ * pcg: conjugate gradients for a symmetric positive definite matrix, with a preconditioner that is the sum
+ * of two parts: the inverses of the diagonal blocks, and the inverse of the matrix on a coarse space
+ * (prolong.h), P (P'AP)^-1 P'. The matrix itself is not factored: memory and the time of an iteration grow
+ * with the nonzeros, and the number of iterations hardly grows. Callers that need no exact solution ask for
+ * a looser tolerance.
  *
- * A matrix that is not symmetric or not positive definite, which the iteration notices at the latest, goes to
- * the fallback (fallback.h).
+ * A matrix that is not symmetric, or not positive definite, which the iteration notices at the latest, goes
+ * to the fallback (fallback.h).
  */
 #include "base/finite.h"
 #include "solvers/fallback.h"
@@ -16,10 +16,11 @@
 #include <math.h>
 #include <string.h>
 
-#define EXACT          1e-14 /* of the residual, for callers that want all digits */
+#define EXACT          1e-14 /* relative residual for callers that want all digits */
 #define MAX_ITERATIONS 2000  /* a matrix that needs more goes to the fallback */
-#define SYMMETRY       1e-13 /* as in linear_cholmod.c: round-off in mirrored entries */
-/* the pattern's graph joins nodes across an edge, too: its paths are so much shorter */
+#define SYMMETRY       1e-13 /* as in linear_cholmod.c: rounding error in mirrored entries */
+/* of drape_prolong_spacing: the graph of the pattern also couples the nodes opposite an edge, so its paths
+ * are shorter by this factor */
 #define HOP 0.67
 
 extern const drape_linear_ops drape_linear_pcg;
@@ -27,22 +28,23 @@ extern const drape_linear_ops drape_linear_pcg;
 typedef struct pcg_state {
     drape_arena *arena;
     const drape_pattern *pattern;
-    double *values;  /* (nonzeros) of the last factor */
+    double *values;  /* (nonzeros) of the last factor call */
     double *inverse; /* (9 x blocks) of the diagonal blocks, row by row */
     drape_prolong prolong;
     drape_pattern coarse;
-    int32_t *slot; /* the coarse block that each product of weights goes to, in the order of add_galerkin */
+    int32_t *slot; /* the coarse block that each product of weights is added to, in the order of
+                      add_galerkin */
     double *coarse_values, *coarse_b, *coarse_x;
     const drape_linear_ops *coarse_ops;
     void *coarse_solver;
     drape_pcg pcg;
     drape_fallback fallback;
-    bool factored; /* here or by the fallback */
+    bool factored; /* by this solver or by the fallback */
 } pcg_state;
 
 /* ---- The coarse space ---- */
 
-/* Products of weights that the block at (row, column) takes part in, in a fixed order. */
+/* The number of products of weights that the fine block (row, column) contributes to. */
 static int64_t products(const drape_prolong *p, int32_t row, int32_t column)
 {
     return (int64_t)(p->start[row + 1] - p->start[row]) * (p->start[column + 1] - p->start[column]);
@@ -67,7 +69,7 @@ static drape_status find_slots(pcg_state *s)
     return DRAPE_OK;
 }
 
-/* Coarse functions that meet are coupled. */
+/* Couples coarse functions that overlap or are adjacent. */
 static drape_status build_coarse_pattern(pcg_state *s, const drape_graph *graph, drape_arena *scratch)
 {
     int32_t *start, *neighbor, count = s->prolong.coarse, used = 0;
@@ -113,7 +115,7 @@ static drape_status build_coarse(pcg_state *s)
     return s->coarse_ops->create(s->arena, &s->coarse, &s->coarse_solver);
 }
 
-/* P' A P */
+/* The coarse matrix P' A P. */
 static void add_galerkin(pcg_state *s)
 {
     const drape_pattern *fine = s->pattern;
@@ -137,7 +139,7 @@ static void add_galerkin(pcg_state *s)
 
 /* ---- The iteration ---- */
 
-/* y = A x = A' x: each entry is a sum down a column. */
+/* y = A x = A' x: each entry of y is a sum down a column. */
 static void multiply(const void *owner, const double *x, double *y)
 {
     const pcg_state *s = owner;
@@ -227,7 +229,7 @@ static bool is_symmetric(const pcg_state *s)
     return true;
 }
 
-/* Inverts a diagonal block by its cofactors; false where it is not positive definite. */
+/* Inverts a diagonal block by its cofactors; false if it is not positive definite. */
 static bool invert(const double a[9], double *inverse)
 {
     double xx = a[4] * a[8] - a[5] * a[7], xy = a[5] * a[6] - a[3] * a[8], xz = a[3] * a[7] - a[4] * a[6];
@@ -308,7 +310,7 @@ static drape_status solve(void *state, const double *b, double *x)
     return solve_inexact(state, b, x, EXACT, &iterations);
 }
 
-/* The coarse matrix is archived as it is: it may belong to an earlier matrix than that of the fallback. */
+/* The coarse matrix is archived itself: it may belong to an earlier matrix than the fallback's. */
 static void archive(void *state, drape_archive *a, const double *values)
 {
     pcg_state *s = state;
@@ -337,13 +339,12 @@ static void report(const void *state, drape_linear_report *out)
 }
 
 const drape_linear_ops drape_linear_pcg = {
-    .entry =
-        {.name = "pcg",
-         .summary =
-             "conjugate gradients with diagonal blocks and a coarse space, no factors of the matrix; what is "
-             "not symmetric positive definite goes to umfpack or klu, by size",
-         .reference = "Hestenes & Stiefel 1952; Vanek, Mandel & Brezina 1996"},
-    .borrows_heap = true, /* by the solver of the coarse space, and by the fallback */
+    .entry = {.name = "pcg",
+              .summary =
+                  "conjugate gradients with diagonal blocks and a coarse space, no factors of the matrix; a "
+                  "matrix that is not symmetric positive definite goes to umfpack or klu, by size",
+              .reference = "Hestenes & Stiefel 1952; Vanek, Mandel & Brezina 1996"},
+    .borrows_heap = true, /* for the solver of the coarse space, and for the fallback */
     .create = create,
     .factor = factor,
     .solve = solve,

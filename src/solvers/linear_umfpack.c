@@ -1,8 +1,8 @@
 /*
- * umfpack: multifrontal LU by UMFPACK (Davis 2004), for large matrices that have no Cholesky factors. The
- * pattern is symmetric, so it is ordered for that: AMD, and pivots on the diagonal unless they are a
- * thousandth of what is below. Ordering and analysis are done once, in create; each factorisation chooses its
- * pivots afresh and takes its factors from the heap anew.
+ * umfpack: multifrontal LU factorisation by UMFPACK (Davis 2004), for large matrices without Cholesky
+ * factors. The ordering assumes a symmetric pattern: AMD, with pivots on the diagonal unless they are
+ * smaller than a thousandth of the largest entry below. Ordering and analysis are done once, in create;
+ * each factorisation chooses its own pivots and takes new memory from the heap for its factors.
  */
 #include "solvers/library_lock.h"
 #include "solvers/linear.h"
@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <umfpack.h>
 
-#define MIN_RCOND 1e-15 /* below: singular to working precision */
+#define MIN_RCOND 1e-15 /* smaller: singular to working precision */
 
 typedef SuiteSparse_long index_t;
 
@@ -22,13 +22,13 @@ typedef struct umfpack_state {
     double control[UMFPACK_CONTROL], info[UMFPACK_INFO];
     void *symbolic;
     void *numeric;  /* NULL before the first and after a failed factorisation */
-    index_t *index; /* (n) of solve */
-    double *work;   /* (n) of solve */
+    index_t *index; /* (n) workspace of solve */
+    double *work;   /* workspace of solve */
 } umfpack_state;
 
 _Static_assert(sizeof(index_t) == sizeof(int64_t), "the pattern's indices are passed to UMFPACK as they are");
 
-/* int64_t may be another type of the same size. */
+/* int64_t may be a different type of the same size. */
 static const index_t *indices(const int64_t *array)
 {
     return (const index_t *)array;
@@ -115,8 +115,9 @@ const drape_linear_ops drape_linear_umfpack = {
     .entry = {.name = "umfpack",
               .summary = "multifrontal LU with AMD ordering; pivots are chosen at each factorisation",
               .reference = "Davis 2004, Algorithm 832: UMFPACK V4.3"},
-    .general_from = 1000, /* with OpenBLAS 0.8 of klu's time at 1 200, half at 2 300, a quarter at 7 500 */
-    .borrows_heap = true, /* fronts, and the factors anew */
+    .general_from = 1000, /* with OpenBLAS 0.8 of klu's time at 1 200 unknowns, half at 2 300, a quarter at
+                             7 500 */
+    .borrows_heap = true, /* for fronts, and for new factors */
     .create = create,
     .factor = factor,
     .solve = solve,

@@ -11,8 +11,8 @@ static double dot(const double *a, const double *b, int64_t n)
     return sum;
 }
 
-/* A direction of no positive curvature before the first step: the preconditioned residual itself is taken,
- * which descends. */
+/* A direction without positive curvature. Before the first step x becomes the preconditioned residual
+ * itself, which is a descent direction. */
 static void stop_indefinite(drape_pcg *s, double *x)
 {
     s->definite = false;

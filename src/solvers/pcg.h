@@ -1,7 +1,7 @@
 /*
- * pcg.h: preconditioned conjugate gradients (Hestenes & Stiefel 1952) for A x = b, A symmetric positive
- * definite, both it and the preconditioner given as functions. At a direction without positive curvature A is
- * not positive definite: the iteration ends there, with its last x.
+ * pcg.h: preconditioned conjugate gradients (Hestenes & Stiefel 1952) for A x = b with A symmetric positive
+ * definite; A and the preconditioner are functions. At a direction without positive curvature A is not
+ * positive definite: the iteration stops there and returns the last x.
  */
 #ifndef DRAPE_SOLVERS_PCG_H
 #define DRAPE_SOLVERS_PCG_H
@@ -15,12 +15,12 @@ typedef struct drape_pcg {
     void (*precondition)(const void *owner, const double *r, double *z); /* z = P^-1 r */
     double *r, *z, *p, *q;                                               /* (n) workspace */
     int iterations;                                                      /* of the last solve */
-    bool definite;  /* no direction of negative curvature was met */
+    bool definite;  /* no direction without positive curvature was met */
     bool converged; /* the tolerance was reached */
 } drape_pcg;
 
-/* x from b, until the residual falls to a share `tolerance` in the norm of P^-1. The iteration starts at 0,
- * and every iterate is a direction of descent of x'Ax/2 - b'x. */
+/* Solves for x, starting at 0, until the norm of the residual, weighted by P^-1, falls to `tolerance` times
+ * its initial value. Every iterate is a descent direction of x'Ax/2 - b'x. */
 void drape_pcg_solve(drape_pcg *pcg, const double *b, double *x, double tolerance, int max_iterations);
 
 #endif

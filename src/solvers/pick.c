@@ -1,19 +1,19 @@
-/* pick.c: which solver of this build is the fastest for a number of unknowns, by their best_from and
- * general_from; and what all solvers archive, destroy and count in the same way. */
+/* pick.c: the fastest solver in this build for a number of unknowns, by best_from or general_from; and what
+ * is the same for all solvers when they are archived, destroyed and measured. */
 #include "solvers/linear.h"
 
-static int64_t best_from(const drape_linear_ops *row)
+static int64_t best_from(const drape_linear_ops *ops)
 {
-    return row->best_from;
+    return ops->best_from;
 }
 
-static int64_t general_from(const drape_linear_ops *row)
+static int64_t general_from(const drape_linear_ops *ops)
 {
-    return row->general_from;
+    return ops->general_from;
 }
 
-/* Below the smallest size of all solvers, the solver with that size. */
-static const drape_linear_ops *pick(int64_t n, int64_t (*from_of)(const drape_linear_ops *row))
+/* If n is below the smallest size of all solvers, the solver with the smallest. */
+static const drape_linear_ops *pick(int64_t n, int64_t (*from_of)(const drape_linear_ops *ops))
 {
     const drape_linear_ops *best = NULL;
     for (int i = 0; drape_linears[i]; i++) {
@@ -34,15 +34,15 @@ const drape_linear_ops *drape_linear_general(int64_t n)
     return pick(n, general_from);
 }
 
-void drape_linear_archive(const drape_linear_ops *row, void *state, drape_archive *a, const double *values)
+void drape_linear_archive(const drape_linear_ops *ops, void *state, drape_archive *a, const double *values)
 {
     bool factored = values != NULL;
     drape_archive_bool(a, &factored);
-    if (row->archive)
-        row->archive(state, a, values);
-    else if (drape_archive_is_reading(a) && values && row->factor(state, values))
+    if (ops->archive)
+        ops->archive(state, a, values);
+    else if (drape_archive_is_reading(a) && values && ops->factor(state, values))
         drape_archive_fail(a, DRAPE_E_SOLVER, "a matrix of the checkpoint has no factors by \"%s\" here",
-                           row->entry.name);
+                           ops->entry.name);
 }
 
 void drape_linear_destroy(const drape_linear_ops *ops, void **state)

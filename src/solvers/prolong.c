@@ -5,12 +5,12 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_FUNCTIONS 16 /* functions at a node; if there are more, the smallest are left out */
-/* share of a node's value that comes from its neighbours, in each averaging */
+#define MAX_FUNCTIONS 16 /* largest number of functions at a node; beyond it the smallest are dropped */
+/* share of a node's value that each averaging takes from its neighbours */
 #define SMOOTH (2.0 / 3)
-#define DROP                                                                                                 \
-    0.08 /* of the largest at a node: smaller values are left out, the others scaled to add up to 1 */
-#define WIDENING 1.1 /* of the spacing: measured best at 2 500 and 10 000 nodes (bench/speed rungs) */
+/* share of the largest value at a node: smaller ones are dropped, the others scaled to add up to 1 */
+#define DROP     0.08
+#define WIDENING 1.1 /* of the spacing: fastest at 2 500 and 10 000 nodes (bench/speed) */
 
 int drape_prolong_spacing(int32_t nodes)
 {
@@ -24,7 +24,7 @@ typedef struct front {
     int32_t *distance, *queue, *aggregate; /* (nodes) */
 } front;
 
-/* All nodes that are nearer to a new seed than to those before. */
+/* Assigns to a new seed all nodes that are nearer to it than to the earlier seeds. */
 static void grow(const drape_graph *g, int32_t seed, int32_t id, int spacing, front *f)
 {
     int32_t head = 0, tail = 0;
@@ -41,12 +41,13 @@ static void grow(const drape_graph *g, int32_t seed, int32_t id, int spacing, fr
                 continue;
             f->distance[next] = f->distance[node] + 1;
             f->aggregate[next] = id;
-            f->queue[tail++] = next; /* once a call: distances of a front only grow */
+            f->queue[tail++] = next; /* once in each call: distances only grow along the search */
         }
     }
 }
 
-/* The next node that no seed is near becomes one. Returns their number. */
+/* Each next node that is `spacing` or more edges away from all seeds becomes one. Returns the number of
+ * seeds. */
 static int32_t aggregate(const drape_graph *g, int spacing, front *f)
 {
     int32_t seeds = 0;
@@ -60,7 +61,7 @@ static int32_t aggregate(const drape_graph *g, int spacing, front *f)
 
 /* ---- Functions ---- */
 
-/* The values at each node while they are smoothed. */
+/* The values at each node, as they are smoothed. */
 typedef struct table {
     int32_t *count, *column; /* (nodes), (nodes x MAX_FUNCTIONS) */
     double *value;
@@ -187,7 +188,7 @@ drape_status drape_prolong_build(drape_arena *arena, const drape_graph *g, int s
     return status;
 }
 
-/* ---- Use ---- */
+/* ---- Restriction and prolongation ---- */
 
 void drape_prolong_restrict(const drape_prolong *p, const double *fine, double *coarse)
 {
@@ -208,9 +209,9 @@ void drape_prolong_add(const drape_prolong *p, const double *coarse, double *fin
                     p->weight[k] * coarse[3 * (size_t)p->column[k] + (size_t)c];
 }
 
-/* ---- What meets what ---- */
+/* ---- Coupled functions ---- */
 
-/* The nodes at which each coarse function is not zero: node[start[a]] ... */
+/* The nodes at which each coarse function is nonzero: node[start[a]] ... node[start[a + 1] - 1]. */
 static bool transpose(drape_arena *arena, const drape_prolong *p, int32_t **start, int32_t **node)
 {
     size_t total = (size_t)p->start[p->fine];
@@ -228,7 +229,8 @@ static bool transpose(drape_arena *arena, const drape_prolong *p, int32_t **star
     return true;
 }
 
-/* The functions at one node that function a has not met yet, mark[b] == a. to NULL: only counts. */
+/* The functions at one node that function a has not been coupled to yet (mark[b] != a), and marks them. to
+ * NULL: only counts them. */
 static int32_t meet_at(const drape_prolong *p, int32_t node, int32_t a, int32_t *mark, int32_t *to)
 {
     int32_t count = 0;

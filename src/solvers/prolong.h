@@ -1,9 +1,9 @@
 /*
  * prolong.h: a coarse space on a graph of nodes, by smoothed aggregation (Vanek, Mandel & Brezina 1996,
- * Algebraic multigrid by smoothed aggregation): seeds some edges apart, each node to its nearest seed, and
- * the indicator functions of these aggregates averaged over neighbours until they overlap. The functions add
- * up to 1 at each node, so a translation of everything is in the space. It depends on the graph alone: any
- * mesh has one, and it is made once.
+ * Algebraic multigrid by smoothed aggregation): seeds are chosen some edges apart, each node joins its
+ * nearest seed, and the indicator functions of these aggregates are averaged over neighbours until they
+ * overlap. The functions add up to 1 at each node, so a translation of everything is in the space. It
+ * depends on the graph alone, so it exists for any mesh and is built once.
  */
 #ifndef DRAPE_SOLVERS_PROLONG_H
 #define DRAPE_SOLVERS_PROLONG_H
@@ -19,12 +19,12 @@ typedef struct drape_graph {
 typedef struct drape_prolong {
     int32_t fine, coarse;
     int32_t *start;  /* (fine + 1) */
-    int32_t *column; /* the coarse functions that are not zero at each node */
+    int32_t *column; /* the coarse functions that are nonzero at each node */
     double *weight;  /* their values there */
 } drape_prolong;
 
-/* The edges between seeds that suit so many nodes: the more nodes, the wider, so that the coarse matrix costs
- * no more than the fine one. */
+/* A suitable number of edges between seeds for this many nodes: larger for more nodes, so that the coarse
+ * matrix costs no more than the fine one. */
 int drape_prolong_spacing(int32_t nodes);
 
 /* Errors: DRAPE_E_MEMORY. */
@@ -35,9 +35,9 @@ drape_status drape_prolong_build(drape_arena *arena, const drape_graph *graph, i
 void drape_prolong_restrict(const drape_prolong *prolong, const double *fine, double *coarse);
 void drape_prolong_add(const drape_prolong *prolong, const double *coarse, double *fine);
 
-/* Which coarse functions meet through a symmetric graph of the nodes, as one that has them on its diagonal:
- * start (coarse + 1) and neighbor, rows not sorted. Workspace is taken from the arena, too: let it be one for
- * the moment. Errors: DRAPE_E_MEMORY. */
+/* The pattern of the coarse matrix: which coarse functions are coupled through a symmetric graph of the
+ * nodes. start (coarse + 1) and neighbor, including the diagonal, rows not sorted. Workspace is taken from
+ * the arena, too: pass a temporary one. Errors: DRAPE_E_MEMORY. */
 drape_status drape_prolong_meet(drape_arena *arena, const drape_prolong *prolong, const drape_graph *graph,
                                 int32_t **start, int32_t **neighbor);
 

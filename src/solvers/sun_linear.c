@@ -47,7 +47,7 @@ drape_status drape_sun_linear_factor(drape_sun_linear *linear, bool definite)
     return linear->status;
 }
 
-/* SUNDIALS wants 0, > 0 recoverable, < 0 fatal: the signs of drape_status. */
+/* SUNDIALS expects 0, > 0 for a recoverable and < 0 for a fatal failure: the signs of drape_status. */
 static int setup(SUNLinearSolver solver, SUNMatrix matrix)
 {
     (void)matrix;
@@ -73,7 +73,7 @@ static int solve(SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector 
     return drape_sun_linear_solve(solver->content, N_VGetArrayPointer(b), N_VGetArrayPointer(x));
 }
 
-/* Values of the pattern, and the solver's state for it; both empty before. */
+/* Takes the pattern's values and creates the solver's state; neither exists yet. */
 static drape_status create_state(drape_sun_linear *linear, const drape_pattern *pattern)
 {
     linear->pattern = pattern;

@@ -1,4 +1,4 @@
-/* sundials_compat.h: the only file that knows the difference between SUNDIALS 6 and 7. */
+/* sundials_compat.h: the only file that handles the differences between SUNDIALS 6 and 7. */
 #ifndef DRAPE_SOLVERS_SUNDIALS_COMPAT_H
 #define DRAPE_SOLVERS_SUNDIALS_COMPAT_H
 
@@ -20,7 +20,7 @@ static inline void drape_sundials_quiet(int line, const char *function, const ch
 {
     (void)line, (void)function, (void)file, (void)message, (void)code, (void)data, (void)context;
 }
-/* A SUNDIALS context that prints nothing: what went wrong is read from return codes. 0 on success. */
+/* A SUNDIALS context that prints nothing: failures are read from return codes. 0 on success. */
 static inline int drape_sundials_context(SUNContext *out)
 {
     int code = SUNContext_Create(SUN_COMM_NULL, out);

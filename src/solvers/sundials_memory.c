@@ -27,7 +27,7 @@ static void archive_vector(drape_archive *a, N_Vector v)
     drape_archive_doubles(a, N_VGetArrayPointer(v), (size_t)N_VGetLength(v));
 }
 
-/* Counters start anew with each KINSol; what modified Newton watches the residual by does not. */
+/* Each KINSol resets its counters, but not the quantities by which modified Newton monitors the residual. */
 bool drape_kinsol_archive(void *kinsol, drape_archive *a)
 {
     KINMem k = kinsol;
@@ -46,7 +46,7 @@ bool drape_kinsol_archive(void *kinsol, drape_archive *a)
     return true;
 }
 
-/* The last of the vectors of differences that IDAInit took. */
+/* The index of the last of the difference vectors allocated by IDAInit. */
 static int last_column(const struct IDAMemRec *s)
 {
     return s->ida_maxord_alloc > 3 ? s->ida_maxord_alloc : 3;
@@ -60,7 +60,7 @@ void drape_ida_clear(void *ida)
     N_VConst(0, s->ida_ee);
 }
 
-/* The history itself: divided differences, and the steps that they are of. */
+/* The history itself: scaled divided differences, and the steps that they belong to. */
 static void archive_history(IDAMem s, drape_archive *a)
 {
     drape_archive_same(a, "IDA's largest order", s->ida_maxord_alloc);
@@ -90,7 +90,7 @@ static void archive_steps(IDAMem s, drape_archive *a)
         archive_long(a, counts[i]);
 }
 
-/* Orders are places in the history. */
+/* Orders are indices into the history. */
 static void check_orders(const struct IDAMemRec *s, drape_archive *a)
 {
     const int most = s->ida_maxord, orders[] = {s->ida_kk, s->ida_kused, s->ida_knew};
@@ -99,7 +99,7 @@ static void check_orders(const struct IDAMemRec *s, drape_archive *a)
             drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has the order %d of %d", orders[i], most);
 }
 
-/* What the first IDASolve does before its first step, and no later one. False: it fails. */
+/* What the first IDASolve does before its first step, and no later one does. False if it fails. */
 static bool set_up(IDAMem s)
 {
     s->ida_edata = s;
@@ -115,7 +115,7 @@ bool drape_ida_archive(void *ida, drape_archive *a)
     archive_steps(s, a);
     check_orders(s, a);
     if (drape_archive_is_reading(a) && s->ida_SetupDone && !set_up(s))
-        drape_archive_fail(a, DRAPE_E_SOLVER, "IDA does not go on from the checkpoint");
+        drape_archive_fail(a, DRAPE_E_SOLVER, "IDA cannot continue from the checkpoint");
     return true;
 }
 

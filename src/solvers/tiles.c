@@ -1,11 +1,11 @@
-/* tiles.c: see tiles.h. Every sum runs over the same products in the same order on every processor. */
+/* tiles.c: see tiles.h. Every sum adds the same products in the same order on every processor. */
 #include "solvers/tiles.h"
 
 #include "base/lanes.h"
 
 #define S     DRAPE_STRIP
 #define PARTS (S / LANES)
-#define WIDE  3 /* columns at once */
+#define WIDE  3 /* columns computed together */
 
 LANES_INLINE void multiply_columns(const double *a, const double *b, int depth, bool fresh, double *to)
 {
@@ -26,7 +26,7 @@ LANES_INLINE void multiply_columns(const double *a, const double *b, int depth, 
             lanes_store(to + S * j + LANES * i,
                         (fresh ? (lanes){0} : lanes_load(to + S * j + LANES * i)) - sum[j][i]);
 }
-_Static_assert(PARTS == 3, "three vectors a column");
+_Static_assert(PARTS == 3, "a column of a strip is three vectors");
 
 LANES_DISPATCH void drape_tile_multiply(const double *a, const double *b, int depth, int columns, bool fresh,
                                         double *to)

@@ -149,7 +149,7 @@ static void *open_solver(problem *q, const drape_linear_ops *ops)
 /* What a row says of itself, filled in for those that say nothing. */
 static drape_linear_report report_of(const drape_linear_ops *ops, const void *solver)
 {
-    drape_linear_report report = {.row = ops};
+    drape_linear_report report = {.ops = ops};
     if (ops->report)
         ops->report(solver, &report);
     return report;
@@ -471,7 +471,7 @@ static void check_residual(const sheet *q, bool definite, const char *name)
 static void check_fallback(const drape_linear_report *report, int64_t n, int64_t count)
 {
     const drape_linear_ops *expected = NULL;
-    bool falls = falls_back(report->row);
+    bool falls = falls_back(report->ops);
     for (int i = 0; falls && drape_linears[i]; i++) {
         int64_t from = drape_linears[i]->general_from;
         if (from > 0 && from <= n && (!expected || from > expected->general_from))
@@ -625,11 +625,11 @@ START_TEST(auto_picks_by_size_and_says_so)
                 expected = drape_linears[i];
         ck_assert_int_eq(chooser->create(q.arena, &q.p, &solver), DRAPE_OK);
         drape_linear_report report = report_of(chooser, solver);
-        ck_assert_ptr_eq(report.row, expected);
-        ck_assert_ptr_nonnull(report.row);
+        ck_assert_ptr_eq(report.ops, expected);
+        ck_assert_ptr_nonnull(report.ops);
         ck_assert_str_ne(report.why, "");
         if (k == 0)
-            ck_assert_str_eq(report.row->entry.name, "klu");
+            ck_assert_str_eq(report.ops->entry.name, "klu");
         drape_linear_destroy(chooser, &solver);
         close_sheet(&q);
     }
