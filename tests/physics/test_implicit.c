@@ -1,7 +1,7 @@
 /*
- * test_implicit.c: the scenes of CS184 and Boson by implicit steps, at the steps at which their programs blow
- * up and far beyond: springs 200 times as stiff, a hundredth of the mass, both, 1/30 s. The sheets are small,
- * so that this takes seconds; bench/implicit has them whole.
+ * test_implicit.c: the scenes of CS184 and Boson by implicit steps, at the steps at which their programs blow up and
+ * far beyond: springs 200 times as stiff, a hundredth of the mass, both, 1/30 s. The sheets are small, so that this
+ * takes seconds; bench/implicit runs them at full size.
  */
 #include "support/scene.h"
 
@@ -42,7 +42,7 @@ typedef struct setting {
         "/cloth/density", "1.5"                                                                              \
     }
 
-/* Of Boson's sheet a corner between two of its pins: 21 x 21 nodes of 1 kg, 200/99 m apart. */
+/* A corner of Boson's sheet between two of its pins: 21 x 21 nodes of 1 kg, 200/99 m apart. */
 #define CORNER                                                                                               \
     {"/cloth/0/mesh/columns", "21"}, {"/cloth/0/mesh/rows", "21"}, {"/cloth/0/mesh/width", "40.404"},        \
         {"/cloth/0/mesh/height", "40.404"},                                                                  \
@@ -53,7 +53,7 @@ typedef struct setting {
 typedef struct run {
     const char *scene;
     double time;  /* [s] */
-    double limit; /* of the strain of all springs; infinite: none */
+    double limit; /* of the strain of all springs; infinite: no limit */
     setting set[MOST_SETTINGS];
 } run;
 
@@ -89,7 +89,7 @@ static scene load(const run *r)
     return s;
 }
 
-/* The strain of the longest of all springs, in all accepted states. */
+/* The largest strain of all springs in all accepted states. */
 static drape_status watch(void *user, const drape_event *event)
 {
     double *most = user;
@@ -106,9 +106,9 @@ static drape_status watch(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* Implicit steps take energy: what moves, stretches and hangs has no more in the end than what hung in the
- * beginning at rest. The slack is that of ida's tolerance, 1e-3 of m g L, over the times that a wave crosses
- * the sheet, some tens. */
+/* Implicit steps lose energy: kinetic, elastic and potential energy at the end are no more than the potential energy at
+ * the start, at rest. The slack is that of ida's tolerance, 1e-3 of m g L, times the number of crossings of a wave, some
+ * tens. */
 static void falls_and_no_more(const scene *s, double start)
 {
     const drape_model *m = s->model;
