@@ -40,7 +40,7 @@ static void agree(const char *one, const char *other)
     for (size_t i = 0; i < 3 * (size_t)a.model->node_count; i++)
         worst = fmax(worst, fabs(drape_sim_positions(a.sim)[i] - drape_sim_positions(b.sim)[i]));
     const double squeezed = fmax(0, -drape_sim_statistics(a.sim).strain_min);
-    const double d = STEP * STEP * 12 * spring * squeezed / scene_least_mass(&a);
+    const double d = STEP * STEP * 12 * spring * squeezed / scene_min_mass(&a);
     const double noise = 2 * (1 + 1e-3 / STEP) * force_noise(spring, 0.6);
     assert_below(d, 0.1);
     assert_below(worst, drift_bound(&a, STEPS, STEP, a.residual + b.residual + noise) *

@@ -121,15 +121,15 @@ static double deepest(const watch *w, const double *x, double t)
 {
     const drape_model *m = w->s->model;
     const drape_collider_motion at = drape_model_collider(m, 0, t);
-    double most = -INFINITY;
+    double max = -INFINITY;
     for (int32_t f = 0; f < m->triangle_count; f++) {
         double corner[3][3];
         for (int a = 0; a < 3; a++)
             for (int k = 0; k < 3; k++)
                 corner[a][k] = x[3 * m->triangle[3 * f + a] + k] - at.displacement[k];
-        most = fmax(most, solid_depth(w->body, corner, DEEPEST));
+        max = fmax(max, solid_depth(w->body, corner, DEEPEST));
     }
-    return most;
+    return max;
 }
 
 static drape_status look(void *user, const drape_event *event)

@@ -123,7 +123,7 @@ START_TEST(sticks_but_for_its_creep)
                                .contact = i / 2 ? ", 'friction': 'lagged'" : ""};
             scene s = open_sliding(&p);
             const double y = 1 - sqrt(1 - p.slope / p.mu), weight = GRAVITY / hypot(1, p.slope);
-            const double slope = scene_least_mass(&s) * weight * p.mu * 2 * (1 - y) / EPS;
+            const double slope = scene_min_mass(&s) * weight * p.mu * 2 * (1 - y) / EPS;
             /* residuals also tilt the sheet and change its gap: an error of the normal force of the same size */
             const double bound =
                 strcmp(methods[k], "ida") == 0 ? ida_velocity(&s) : 4 * TOL / slope + 1e-9 * EPS;

@@ -8,7 +8,7 @@
 #include "base/vec3.h"
 #include "model/scene.h"
 
-#define MOST_SETTINGS 10
+#define MAX_SETTINGS 10
 
 typedef struct setting {
     const char *pointer, *value;
@@ -54,7 +54,7 @@ typedef struct run {
     const char *scene;
     double time;  /* [s] */
     double limit; /* of the strain of all springs; infinite: no limit */
-    setting set[MOST_SETTINGS];
+    setting set[MAX_SETTINGS];
 } run;
 
 static const run runs[] = {
@@ -79,7 +79,7 @@ static scene load(const run *r)
     const char *root = getenv("DRAPE_SOURCE");
     snprintf(path, sizeof path, "%s/examples/scenes/%s.json", root ? root : ".", r->scene);
     drape_status status = drape_scene_load(s.ctx, path, &parsed);
-    for (int i = 0; !status && i < MOST_SETTINGS && r->set[i].pointer; i++)
+    for (int i = 0; !status && i < MAX_SETTINGS && r->set[i].pointer; i++)
         status = drape_scene_set(parsed, r->set[i].pointer, r->set[i].value);
     if (!status)
         status = drape_scene_compile(parsed, &s.model);
@@ -92,7 +92,7 @@ static scene load(const run *r)
 /* The largest strain of all springs in all accepted states. */
 static drape_status watch(void *user, const drape_event *event)
 {
-    double *most = user;
+    double *max = user;
     const drape_model *m = drape_sim_model(event->sim);
     const double *x = drape_sim_positions(event->sim);
     for (int32_t i = 0; i < m->term_count; i++) {
@@ -100,7 +100,7 @@ static drape_status watch(void *user, const drape_event *event)
         for (int32_t e = 0; m->terms[i].ops->distance && e < el->count; e++) {
             double d[3];
             vec3_sub(x + 3 * (size_t)el->node[2 * e + 1], x + 3 * (size_t)el->node[2 * e], d);
-            *most = fmax(*most, vec3_norm(d) / el->rest[el->count + e] - 1);
+            *max = fmax(*max, vec3_norm(d) / el->rest[el->count + e] - 1);
         }
     }
     return DRAPE_OK;

@@ -32,17 +32,17 @@ static scene load(const char *name, const char *pointer, const char *value)
 static double longest(const scene *s)
 {
     const drape_model *m = s->model;
-    double most = -1;
+    double max = -1;
     for (int32_t i = 0; i < m->term_count; i++) {
         const drape_elements *el = &m->terms[i].elements;
         for (int32_t e = 0; m->terms[i].ops->pair && e < el->count; e++) {
             double d[3];
             vec3_sub(drape_sim_positions(s->sim) + 3 * (size_t)el->node[2 * e + 1],
                      drape_sim_positions(s->sim) + 3 * (size_t)el->node[2 * e], d);
-            most = fmax(most, vec3_norm(d) / el->rest[el->count + e] - 1);
+            max = fmax(max, vec3_norm(d) / el->rest[el->count + e] - 1);
         }
     }
-    return most;
+    return max;
 }
 
 static double lowest(const scene *s)
