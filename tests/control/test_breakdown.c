@@ -1,8 +1,9 @@
 /*
- * test_breakdown.c: the cost of the DEP report's breakdown cases at the step at which its program broke down. Such a
- * case may be halved, but all its Newton iterations, including those of rejected attempts, are at most 3 times those of
- * a clean run: the same scene over the same time at the largest of the steps dt, dt/2, dt/4 ... at which no attempt is
- * rejected. Also printed: iterations per nominal step, over those per step of the clean run.
+ * test_breakdown.c: the cost of the DEP report's breakdown cases at the step at which its program broke
+ * down. Such a case may be halved, but all its Newton iterations, including those of rejected attempts, are
+ * at most 3 times those of a clean run: the same scene over the same time at the largest of the steps dt,
+ * dt/2, dt/4 ... at which no attempt is rejected. Also printed: iterations per nominal step, over those per
+ * step of the clean run.
  */
 #include "support/dep.h"
 

@@ -1,9 +1,11 @@
 /*
- * test_extremes.c: every run ends, whatever its scene: it completes, or has a negative status and a true message. No
- * state ever contains NaN, no accepted step has a residual above its tolerance, no run is retried endlessly.
- * Every case is a variation of one sheet, 8 edges of 0.1 m a side, 1 MPa, 1 mm, 200 kg/m3, pinned at two corners,
- * undamped, so that only the integrator removes the energy that an extreme adds. It runs for 1 s or for the time in the
- * table, for 3 s if DRAPE_SLOW is set.
+ * test_extremes.c: every run ends, whatever its scene: it completes, or has a negative status and a true
+ * message. No state ever contains NaN, no accepted step has a residual above its tolerance, no run is
+ * retried endlessly.
+ *
+ * Every case is a variation of one sheet, 8 edges of 0.1 m a side, 1 MPa, 1 mm, 200 kg/m3, pinned at two
+ * corners, undamped, so that only the integrator removes the energy that an extreme adds. It runs for 1 s
+ * or for the time in the table, for 3 s if DRAPE_SLOW is set.
  */
 #include "support/scene.h"
 
@@ -16,8 +18,8 @@
 #define PI        3.14159265358979323846
 
 /*
- * More attempts than this are considered a hang. Halving could take 1e7 steps a second before it gives up, each as short
- * as dt_min; the slowest of the cases takes a twentieth of this.
+ * More attempts than this are considered a hang. Halving could take 1e7 steps a second before it gives up,
+ * each as short as dt_min; the slowest of the cases takes a twentieth of this.
  */
 #define MAX_ATTEMPTS(duration) (1000 + 200000 * duration)
 
@@ -109,9 +111,9 @@ static void hung(sheet *s)
 }
 
 /*
- * A disc of 8 rings of 10 nodes, each ring 10^(3/7) times as wide as the one inside: triangles of similar shape, a
- * thousandfold in size, so that masses are a million to one. Pinned at two nodes of the rim, or at the smallest
- * triangles, whose springs are by far too weak for the weight.
+ * A disc of 8 rings of 10 nodes, each ring 10^(3/7) times as wide as the one inside: triangles of similar
+ * shape, a thousandfold in size, so that masses are a million to one. Pinned at two nodes of the rim, or at
+ * the smallest triangles, whose springs are by far too weak for the weight.
  */
 #define RINGS  8
 #define SPOKES 10
@@ -162,8 +164,8 @@ static void collapsing(sheet *s)
 }
 
 /*
- * A triangle whose altitude is slightly above the limit of validation, 1e-12 of its longest edge, between a wide one
- * and the rim.
+ * A triangle whose altitude is slightly above the limit of validation, 1e-12 of its longest edge, between a
+ * wide one and the rim.
  */
 static void sliver(sheet *s)
 {
@@ -180,8 +182,8 @@ static void sliver(sheet *s)
 }
 
 /*
- * Row 1 is pinned; row 2 is moved around it by 4 rad, so that the hinges between fold onto themselves and through, and
- * the free rows follow.
+ * Row 1 is pinned; row 2 is moved around it by 4 rad, so that the hinges between fold onto themselves and
+ * through, and the free rows follow.
  */
 static void folding(sheet *s)
 {
@@ -218,7 +220,8 @@ static void jumping(sheet *s)
 /* ---- Initial states that are not at rest ---- */
 
 /*
- * Moves every free node by up to 0.4 edges in every direction; the generator is the example in the C standard.
+ * Moves every free node by up to 0.4 edges in every direction; the generator is the example in the C
+ * standard.
  */
 static void crumple(scene *s)
 {
@@ -267,15 +270,16 @@ typedef struct extreme {
 } extreme;
 
 /*
- * The integrators that may stop, and why. midpoint damps nothing: waves of a sheet at 1 MPa or more that the step does
- * not resolve, or that follow an impact, persist, and sooner or later a triangle passes through itself in its plane.
- * There its normal turns by pi however small the step is, and the branch of the hinge is a guess: "hinge_branch",
- * "altitude_collapse", "max_iterations" at dt_min. IDA resolves the motion and may reach the same. An edge that starts
- * below min_length is still below it in the small first steps of IDA. A spring has no direction if its edge has length 0
- * at the start or at the end.
- * The integrators that crawl: the smallest triangles of the disc weigh 10 ug and are finally whirled about by the rest.
- * IDA follows each of their turns with steps of 0.2 us, 4e6 a second, until max_steps ends it; midpoint advances in steps
- * of that size.
+ * The integrators that may stop, and why. midpoint damps nothing: waves of a sheet at 1 MPa or more that
+ * the step does not resolve, or that follow an impact, persist, and sooner or later a triangle passes
+ * through itself in its plane. There its normal turns by pi however small the step is, and the branch of
+ * the hinge is a guess: "hinge_branch", "altitude_collapse", "max_iterations" at dt_min. IDA resolves the
+ * motion and may reach the same. An edge that starts below min_length is still below it in the small first
+ * steps of IDA. A spring has no direction if its edge has length 0 at the start or at the end.
+ *
+ * The integrators that crawl: the smallest triangles of the disc weigh 10 ug and are finally whirled about
+ * by the rest. IDA follows each of their turns with steps of 0.2 us, 4e6 a second, until max_steps ends it;
+ * midpoint advances in steps of that size.
  */
 static const extreme extremes[] = {
     {.name = "E 1 Pa", .modulus = 1},
@@ -509,7 +513,8 @@ START_TEST(ida_ends_whatever_the_scene_is)
 END_TEST
 
 /*
- * The report's triangle with an altitude of 1e-12 is at the limit of validation: below it is refused and named.
+ * The report's triangle with an altitude of 1e-12 is at the limit of validation: below it is refused and
+ * named.
  */
 START_TEST(validation_refuses_an_altitude_below_1e_12)
 {

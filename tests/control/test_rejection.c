@@ -1,7 +1,7 @@
 /*
- * test_rejection.c: a rejected step leaves no trace. The state after it is that before it to the bit; the accepted
- * steps fill their intervals exactly and are those of a run that never tried the others; every attempt is reported once
- * with its reason; and a run that cannot succeed ends.
+ * test_rejection.c: a rejected step leaves no trace. The state after it is that before it to the bit; the
+ * accepted steps fill their intervals exactly and are those of a run that never tried the others; every
+ * attempt is reported once with its reason; and a run that cannot succeed ends.
  */
 #include <jansson.h>
 #include <unistd.h>
@@ -63,8 +63,8 @@ static record *watch(scene *s)
 /* ---- Scenes ---- */
 
 /*
- * A sheet of 7 edges a side that swings on two corners, at a step far too long for plain Newton. All sizes are powers of
- * two, so that parts of a step are exact.
+ * A sheet of 7 edges a side that swings on two corners, at a step far too long for plain Newton. All sizes
+ * are powers of two, so that parts of a step are exact.
  */
 #define STEP 0.125 /* [s] */
 
@@ -82,7 +82,8 @@ static scene swinging(const char *integrator, const char *controller)
 
 /* ---- Halving ---- */
 
-/* Repeats the steps that halving accepted with the controller that never halves: the same states, to the bit. */
+/* Repeats the steps that halving accepted with the controller that never halves: the same states, to the
+ * bit. */
 static void repeat_without_rejections(const char *integrator, const record *r)
 {
     scene s = swinging(integrator, "'type': 'fixed'");
@@ -111,8 +112,8 @@ START_TEST(a_run_with_rejections_is_the_run_of_its_accepted_steps)
 END_TEST
 
 /*
- * Step ends are points of the binary subdivision of the interval; every k dt is one of them, and the size is that of the
- * part.
+ * Step ends are points of the binary subdivision of the interval; every k dt is one of them, and the size
+ * is that of the part.
  */
 START_TEST(parts_fill_their_interval_exactly)
 {
@@ -161,8 +162,8 @@ START_TEST(nominal_times_are_met_to_the_bit)
 END_TEST
 
 /*
- * A rejection halves the step. A success makes the next step at most twice as long, and does so as soon as the step ends
- * where one of twice the size would end.
+ * A rejection halves the step. A success makes the next step at most twice as long, and does so as soon as
+ * the step ends where one of twice the size would end.
  */
 START_TEST(sizes_are_halved_and_grow_back)
 {
@@ -186,8 +187,8 @@ START_TEST(sizes_are_halved_and_grow_back)
 END_TEST
 
 /*
- * One node is moved onto its neighbour: every step that reaches it is too long, and the message must say when, why and
- * which edge.
+ * One node is moved onto its neighbour: every step that reaches it is too long, and the message must say
+ * when, why and which edge.
  */
 START_TEST(a_step_that_gets_too_small_names_time_reason_and_element)
 {
@@ -236,8 +237,8 @@ static void check_bound(const scene *s, const record *r, drape_status status)
     ck_assert(drape_sim_hash(s->sim) == r->before);
 }
 
-/* Advances to `end`, however often the bound stops it. After every second stop, s is restored from its own checkpoint;
- * `other` continues from that of the last stop. */
+/* Advances to `end`, however often the bound stops it. After every second stop, s is restored from its own
+ * checkpoint; `other` continues from that of the last stop. */
 static int advance_bounded(scene *s, scene *other, double end)
 {
     record *r = watch(s);
@@ -260,8 +261,8 @@ static int advance_bounded(scene *s, scene *other, double end)
     return stops;
 }
 
-/* Each advance tries at most max_attempts steps within one dt; a host that advances again and again, or continues from a
- * checkpoint, gets the bits of a run without a bound. */
+/* Each advance tries at most max_attempts steps within one dt; a host that advances again and again, or
+ * continues from a checkpoint, gets the bits of a run without a bound. */
 START_TEST(a_bound_on_attempts_ends_the_advance_and_changes_no_bit)
 {
     static const char *const controllers[] = {"'type': 'halving'", "'type': 'strain', 'max_stretch': 0.05",
@@ -301,8 +302,8 @@ START_TEST(a_run_without_rejections_never_meets_the_bound)
 END_TEST
 
 /*
- * Flight at 1 m/s, and a last step of 0.17 us at a tolerance of 1e-13 N: the inertia M v/h of a node, about 1e4 N, is
- * rounded to 1e-12. A residual of that size is not a failure, and half the step would double it.
+ * Flight at 1 m/s, and a last step of 0.17 us at a tolerance of 1e-13 N: the inertia M v/h of a node, about
+ * 1e4 N, is rounded to 1e-12. A residual of that size is not a failure, and half the step would double it.
  */
 START_TEST(a_residual_of_rounding_is_converged)
 {
@@ -385,8 +386,8 @@ END_TEST
 /* ---- Strain ---- */
 
 /*
- * The largest change of an edge's length over its rest length, and the largest displacement of a node over its shortest
- * edge (here all edges are alike).
+ * The largest change of an edge's length over its rest length, and the largest displacement of a node over
+ * its shortest edge (here all edges are alike).
  */
 static void largest(const scene *s, const double *from, double *stretch, double *move)
 {
@@ -468,8 +469,8 @@ START_TEST(the_error_controller_never_tries_a_refused_size_again)
 }
 END_TEST
 
-/* For the first step there is no estimate of the error in velocities; at tight tolerances the run must still start and
- * continue. At rtol 1e-10 be needs about 0.5 us a step. */
+/* For the first step there is no estimate of the error in velocities; at tight tolerances the run must
+ * still start and continue. At rtol 1e-10 be needs about 0.5 us a step. */
 START_TEST(the_error_controller_starts_at_tight_tolerances)
 {
     for (size_t k = 0; k < sizeof fixed_rows / sizeof *fixed_rows; k++)
@@ -624,8 +625,8 @@ static scene flying(const drape_term_ops *term, const char *integrator, double s
 }
 
 /*
- * From rest, all the kinetic energy from a force without an energy is from nowhere, at any step size: the check must
- * refuse it, and the run must end.
+ * From rest, all the kinetic energy from a force without an energy is from nowhere, at any step size: the
+ * check must refuse it, and the run must end.
  */
 START_TEST(kinetic_energy_from_nowhere_is_refused)
 {
@@ -650,8 +651,8 @@ START_TEST(kinetic_energy_from_nowhere_is_refused)
 END_TEST
 
 /*
- * A smaller force on a sheet in flight at 10 m/s adds 2 m/s2 x 1/16 s to it a step, in a second 1/2 m (2 m/s)^2, a 25th
- * of its energy: it is not a runaway, and the audit has it as a gain.
+ * A smaller force on a sheet in flight at 10 m/s adds 2 m/s2 x 1/16 s to it a step, in a second 1/2 m (2
+ * m/s)^2, a 25th of its energy: it is not a runaway, and the audit has it as a gain.
  */
 START_TEST(a_slow_gain_is_no_runaway)
 {
@@ -668,9 +669,9 @@ START_TEST(a_slow_gain_is_no_runaway)
 END_TEST
 
 /*
- * After a longer time it is one: the run may gain a tenth of its available energy, which is the initial 1/2 m v0^2 and,
- * in a scene without gravity, 1/2 m L^2/s^2, L the diagonal. 1/2 m (a t)^2 reaches that at t, which halving finds to
- * dt_min.
+ * After a longer time it is one: the run may gain a tenth of its available energy, which is the initial 1/2
+ * m v0^2 and, in a scene without gravity, 1/2 m L^2/s^2, L the diagonal. 1/2 m (a t)^2 reaches that at t,
+ * which halving finds to dt_min.
  */
 START_TEST(a_slow_gain_ends_the_run_when_it_is_large)
 {
@@ -690,9 +691,9 @@ START_TEST(a_slow_gain_ends_the_run_when_it_is_large)
 END_TEST
 
 /*
- * midpoint on a sheet whose stretch waves the step does not resolve: a converged step may add far more elastic energy
- * than the sheet, which falls by less than its diagonal L, can have had. No state is accepted that gains more than half
- * of the available energy in all: m g L and the 1/2 m g L of the scene.
+ * midpoint on a sheet whose stretch waves the step does not resolve: a converged step may add far more
+ * elastic energy than the sheet, which falls by less than its diagonal L, can have had. No state is
+ * accepted that gains more than half of the available energy in all: m g L and the 1/2 m g L of the scene.
  */
 START_TEST(elastic_energy_from_nowhere_is_refused)
 {
@@ -722,8 +723,8 @@ START_TEST(elastic_energy_from_nowhere_is_refused)
 }
 END_TEST
 
-/* A pin that jumps in 1 ps has, for that time, a kinetic energy of its own of 1e20 J. It is not part of the audit, in
- * which all other energies would be lost by rounding. */
+/* A pin that jumps in 1 ps has, for that time, a kinetic energy of its own of 1e20 J. It is not part of the
+ * audit, in which all other energies would be lost by rounding. */
 START_TEST(a_jump_of_a_pin_is_no_energy_of_the_sheet)
 {
     scene s =
@@ -736,8 +737,8 @@ START_TEST(a_jump_of_a_pin_is_no_energy_of_the_sheet)
     const drape_energy before = drape_sim_energy(s.sim);
     scene_advance(&s, 0.1000000000005);
     const drape_energy e = drape_sim_energy(s.sim);
-    /* in the middle of the jump the pin has stretched its springs; the sheet has not moved. The work of the pin, summed by
-     * the trapezoidal rule, is exact for springs that start without stretch. */
+    /* in the middle of the jump the pin has stretched its springs; the sheet has not moved. The work of the
+     * pin, summed by the trapezoidal rule, is exact for springs that start without stretch. */
     ck_assert_double_eq_tol(e.kinetic, before.kinetic, 1e-6 * before.kinetic);
     assert_below(fabs(e.numerical - before.numerical), 0.01 * e.elastic);
     scene_close(&s);
@@ -745,8 +746,8 @@ START_TEST(a_jump_of_a_pin_is_no_energy_of_the_sheet)
 END_TEST
 
 /*
- * Drag of the wrong sign: v1 = v0/(1 - c h). With c h = 5/8 the kinetic energy grows 7 times in every step of backward
- * Euler. Its work is accounted as negative dissipation: no energy is from nowhere.
+ * Drag of the wrong sign: v1 = v0/(1 - c h). With c h = 5/8 the kinetic energy grows 7 times in every step
+ * of backward Euler. Its work is accounted as negative dissipation: no energy is from nowhere.
  */
 START_TEST(energy_that_a_term_answers_for_is_no_runaway)
 {
@@ -886,8 +887,8 @@ END_TEST
 
 /*
  * A start below min_length can be left. An edge at 1e-7 of its length pushes its nodes apart with the force
- * k/L^2 (1 - 1e-7) L: in steps of 1e-7 s it grows by about 1e-8 of its length in the first one, so it is below the limit
- * of 1e-6 for several steps. With "fixed", the first rejected one would end the run.
+ * k/L^2 (1 - 1e-7) L: in steps of 1e-7 s it grows by about 1e-8 of its length in the first one, so it is
+ * below the limit of 1e-6 for several steps. With "fixed", the first rejected one would end the run.
  */
 START_TEST(a_start_below_the_limit_is_left)
 {

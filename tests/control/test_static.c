@@ -1,11 +1,13 @@
 /*
  * test_static.c: equilibria of the integrator "static" against closed forms.
- * Strips are the lattice of the grid "equilateral". Rows 0 and 1 are pinned, which clamps the strip at the middle between
- * them, so L_eff is half a row more than from row 1 to the tip. For a strip e edges wide, the hinges of a row have
- * E I = D w (8 e - 4)/(9 e - 4), 8/9 D w for a wide strip: see tests/physics/test_bending.c, which derives that and the
- * two bounds that are used here. The clamp keeps the strip from curving across, so one width of it is stiffer by at most
- * D w/EI - 1: the share of that in the deflection is 1 - (1 - w/L)^4. The position of the clamp, and the half loaded row
- * at the tip, are uncertain by a quarter of a row, 4 (row/L)/4 of L^4.
+ *
+ * Strips are the lattice of the grid "equilateral". Rows 0 and 1 are pinned, which clamps the strip at the
+ * middle between them, so L_eff is half a row more than from row 1 to the tip. For a strip e edges wide,
+ * the hinges of a row have E I = D w (8 e - 4)/(9 e - 4), 8/9 D w for a wide strip: see
+ * tests/physics/test_bending.c, which derives that and the two bounds that are used here. The clamp keeps
+ * the strip from curving across, so one width of it is stiffer by at most D w/EI - 1: the share of that in
+ * the deflection is 1 - (1 - w/L)^4. The position of the clamp, and the half loaded row at the tip, are
+ * uncertain by a quarter of a row, 4 (row/L)/4 of L^4.
  */
 #include "drape/extend.h"
 #include "support/scene.h"
@@ -188,8 +190,8 @@ static load strip_load(double thinner, double gravity, double tolerance)
 }
 
 /*
- * physics.md, section 3: drop over reach of the clamped elastica under its own weight. It grows at most in proportion to
- * G, and G falls with E I: the bounds of the deflection are those of H/W.
+ * physics.md, section 3: drop over reach of the clamped elastica under its own weight. It grows at most in
+ * proportion to G, and G falls with E I: the bounds of the deflection are those of H/W.
  */
 START_TEST(heavy_cantilever_hangs_as_the_elastica)
 {
@@ -262,10 +264,10 @@ static const drape_term_ops load_term = {
     .energy = load_energy};
 
 /*
- * physics.md: P L^2/EI = 1, 2, 4. The length is that to the last row, which carries the load. w/L grows at most in
- * proportion to P, u/L to P^2. The curvature is largest at the clamp, where the strip is stiffer: of the deflection
- * P L^3/3 the first width has the share 1 - (1 - w/L)^3, less than the bound at the top of this file. The uncertain
- * position of the clamp adds 3 (row/L)/4.
+ * physics.md: P L^2/EI = 1, 2, 4. The length is that to the last row, which carries the load. w/L grows at
+ * most in proportion to P, u/L to P^2. The curvature is largest at the clamp, where the strip is stiffer:
+ * of the deflection P L^3/3 the first width has the share 1 - (1 - w/L)^3, less than the bound at the top
+ * of this file. The uncertain position of the clamp adds 3 (row/L)/4.
  */
 START_TEST(end_loaded_cantilever_bends_as_the_elastica)
 {
@@ -299,12 +301,13 @@ END_TEST
 /* ---- Chains ---- */
 
 /*
- * A strip one edge wide of N rows, 1.2 m long, without bending, pinned at its ends, which a track has moved to a distance
- * of 1 m. The row edges of a lattice lie across, the slanted ones zigzag along; as the symmetry of the load keeps rows
- * parallel, the strip is a chain whose links are the rows. A chain of N links with its mass in the joints differs from
- * the catenary by second order in 1/N: a parabola's chord polygon lies inside by sag/N^2 at the lowest point, and the
- * half links at the ends carry no weight, 1/N^2 again, so at most 4/N^2 of the sag. The stretch eps = T/(E h w)
- * lengthens the chain; d sag/d length is below 1 (sag .29, length 1.2: at span 1, 0.86), so it adds eps 1.2.
+ * A strip one edge wide of N rows, 1.2 m long, without bending, pinned at its ends, which a track has moved
+ * to a distance of 1 m. The row edges of a lattice lie across, the slanted ones zigzag along; as the
+ * symmetry of the load keeps rows parallel, the strip is a chain whose links are the rows. A chain of N
+ * links with its mass in the joints differs from the catenary by second order in 1/N: a parabola's chord
+ * polygon lies inside by sag/N^2 at the lowest point, and the half links at the ends carry no weight, 1/N^2
+ * again, so at most 4/N^2 of the sag. The stretch eps = T/(E h w) lengthens the chain; d sag/d length is
+ * below 1 (sag .29, length 1.2: at span 1, 0.86), so it adds eps 1.2.
  */
 START_TEST(a_strip_hung_by_its_ends_is_a_catenary)
 {
@@ -329,12 +332,13 @@ START_TEST(a_strip_hung_by_its_ends_is_a_catenary)
 END_TEST
 
 /*
- * A strip that hangs by its upper row, in small strain: u(L) = rho g L^2/(2 E h) where it is free to narrow. The lattice
- * is the constant-strain sheet of nu = 1/3, whose stress is linear along the strip; the stretch of a gap between rows is
- * that at its middle, and the sum of these is exactly the integral of a linear function. Only sides and ends cause
- * errors. The pinned row keeps its width, so up to one width from it the lattice is stiffer by at most
- * 1/(1 - nu^2) - 1 = 1/8; that width has at most 2 w/L of the elongation. The sides are zigzags: the outermost half
- * column of the e + 1/2 of a row has springs on one side only, so between 0 and 1/(e + 1/2) of the width carries nothing.
+ * A strip that hangs by its upper row, in small strain: u(L) = rho g L^2/(2 E h) where it is free to
+ * narrow. The lattice is the constant-strain sheet of nu = 1/3, whose stress is linear along the strip; the
+ * stretch of a gap between rows is that at its middle, and the sum of these is exactly the integral of a
+ * linear function. Only sides and ends cause errors. The pinned row keeps its width, so up to one width
+ * from it the lattice is stiffer by at most 1/(1 - nu^2) - 1 = 1/8; that width has at most 2 w/L of the
+ * elongation. The sides are zigzags: the outermost half column of the e + 1/2 of a row has springs on one
+ * side only, so between 0 and 1/(e + 1/2) of the width carries nothing.
  */
 START_TEST(a_hanging_strip_is_longer_by_its_weight)
 {
@@ -358,11 +362,11 @@ END_TEST
 /* ---- Stability ---- */
 
 /*
- * A strip that stands on its clamped foot buckles under its own weight at G = 7.83735 (Greenhill). By Rayleigh's
- * quotient the foot, which cannot curve across, raises that by at most the stiffening, 4 %, and the position of the clamp,
- * uncertain by a quarter of a row, changes L^3 by 3 (row/L)/4 = 1.3 %: 0.9 and 1.1 lie outside. A flat strip is an
- * equilibrium on both sides, as bending and stretching in the plane do not couple to first order; above, one mode is
- * unstable (the second has G = 55.98).
+ * A strip that stands on its clamped foot buckles under its own weight at G = 7.83735 (Greenhill). By
+ * Rayleigh's quotient the foot, which cannot curve across, raises that by at most the stiffening, 4 %, and
+ * the position of the clamp, uncertain by a quarter of a row, changes L^3 by 3 (row/L)/4 = 1.3 %: 0.9 and
+ * 1.1 lie outside. A flat strip is an equilibrium on both sides, as bending and stretching in the plane do
+ * not couple to first order; above, one mode is unstable (the second has G = 55.98).
  */
 static drape_statistics stand(double factor)
 {
@@ -419,8 +423,8 @@ START_TEST(what_nothing_holds_has_no_equilibrium_and_ends)
 }
 END_TEST
 
-/* A sheet that lies on another: the nodes that contact couples are not coupled in the model's pattern, but must be in the
- * Hessian. Each wrong sign would be a mode. */
+/* A sheet that lies on another: the nodes that contact couples are not coupled in the model's pattern, but
+ * must be in the Hessian. Each wrong sign would be a mode. */
 START_TEST(one_sheet_lies_on_another)
 {
     scene s = scene_open(

@@ -1,7 +1,7 @@
 /*
- * test_checkpoint.c: a sim that is saved, and another one that is restored from the checkpoint and continued,
- * have the same bits as a sim that was never interrupted: for all integrators, Newton variants, linear solvers
- * and controllers, in scenes with everything that is kept from step to step.
+ * test_checkpoint.c: a sim that is saved, and another one that is restored from the checkpoint and
+ * continued, have the same bits as a sim that was never interrupted: for all integrators, Newton variants,
+ * linear solvers and controllers, in scenes with everything that is kept from step to step.
  */
 #include <inttypes.h>
 
@@ -32,8 +32,8 @@
     " {'type': 'box', 'center': [0.2,-0.1,-0.05], 'size': [0.08,0.08,0.08], 'friction': 0.2}],"              \
     " 'self_contact': {'thickness': 0.004, 'friction': 0.2}, "
 
-/* Two sheets, the upper one falling on the lower one: contact between nodes that the pattern of the matrix does
- * not couple at the start. */
+/* Two sheets, the upper one falling on the lower one: contact between nodes that the pattern of the matrix
+ * does not couple at the start. */
 #define LAYERS                                                                                               \
     "{'drape': 1, 'cloth': [{'name': 'low', 'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': "   \
     "0.2,"                                                                                                   \
@@ -48,7 +48,8 @@
     " 'integrator': {'method': '%s', 'dt': 0.01%s}, 'controller': {'type': '%s'}, 'duration': 1,"            \
     " 'frame_rate': 330}"
 
-/* A sheet that is compressed and buckles: indefinite matrices, whose modification depends on the previous one. */
+/* A sheet that is compressed and buckles: indefinite matrices, whose modification depends on the previous
+ * one. */
 #define BUCKLING                                                                                             \
     "{'drape': 1, 'cloth': [{'name': 'sheet', 'mesh': {'grid': 'square', 'columns': 8, 'rows': 5, 'width': " \
     "0.4,"                                                                                                   \
@@ -141,7 +142,8 @@ static drape_sim *make_sim(scene *s, watcher *w)
     return sim;
 }
 
-/* Compares the contact forces of the present states, and the lagged friction, which depends on the step before. */
+/* Compares the contact forces of the present states, and the lagged friction, which depends on the step
+ * before. */
 static void same_contact(drape_sim *a, drape_sim *b, const char *what)
 {
     size_t n = 3 * (size_t)drape_sim_model(a)->node_count;

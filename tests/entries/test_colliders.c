@@ -1,6 +1,6 @@
 /*
- * test_colliders.c: all colliders: the distance against one found by brute force, normal and curvature against
- * differences, the features of the shape against the distance, and meshes that are not solids.
+ * test_colliders.c: all colliders: the distance against one found by brute force, normal and curvature
+ * against differences, the features of the shape against the distance, and meshes that are not solids.
  */
 #include "colliders/colliders.h"
 
@@ -67,8 +67,9 @@ static void write_cube(const char *path, cube_change change)
     fclose(file);
 }
 
-/* A globe: `rings` rings of 2 rings points between the poles; 4 rings (rings - 1) + 4 rings triangles. dent: how
- * much nearer to the center every other point lies, so that some points, edges and faces are concave. */
+/* A globe: `rings` rings of 2 rings points between the poles; 4 rings (rings - 1) + 4 rings triangles.
+ * dent: how much nearer to the center every other point lies, so that some points, edges and faces are
+ * concave. */
 static void write_globe(const char *path, int rings, double dent)
 {
     const double pi = acos(-1.0);
@@ -205,7 +206,8 @@ static bool in_box(const double *x)
     return fabs(y[0]) < 0.5 && fabs(y[1]) < 0.25 && fabs(y[2]) < 0.4;
 }
 
-/* Inside the box and not beyond the rounding: at most 0.1 from the box that is smaller by 0.1 on all sides. */
+/* Inside the box and not beyond the rounding: at most 0.1 from the box that is smaller by 0.1 on all
+ * sides. */
 static bool in_round_box(const double *x)
 {
     const double half[3] = {0.4, 0.15, 0.3};
@@ -310,8 +312,8 @@ static bool is_inside(const drape_collider *c, const struct variant *v, const do
     return v->inside ? v->inside(x) : winding(&c->shape, x) > 0.5;
 }
 
-/* The sign is that of the body's definition. From x along -d n the surface is met exactly at the distance |d|,
- * and no point nearer than |d| is on the other side: so |d| is the distance from the surface. */
+/* The sign is that of the body's definition. From x along -d n the surface is met exactly at the distance
+ * |d|, and no point nearer than |d| is on the other side: so |d| is the distance from the surface. */
 static void check_distance(const drape_collider *c, const struct variant *v)
 {
     for (int i = 0; i < 3000; i++) {
@@ -358,7 +360,8 @@ START_TEST(a_mesh_equals_its_box)
             x[k] = between(-1.2, 1.2);
         const double d = distance_of(&mesh.model->colliders[0], x, n[0], h[0]);
         ck_assert_double_eq_tol(d, distance_of(&box.model->colliders[0], x, n[1], h[1]), 1e-14);
-        /* the normal changes by the rounding of the foot over the distance, the curvature by that over d again */
+        /* the normal changes by the rounding of the foot over the distance, the curvature by that over d
+         * again */
         for (int k = 0; k < 9 && d > 1e-3; k++) {
             ck_assert_double_eq_tol(h[0][k], h[1][k], 1e-14 / (d * d));
             ck_assert_double_eq_tol(n[0][k % 3], n[1][k % 3], 1e-14 / d);
@@ -372,11 +375,11 @@ END_TEST
 
 /* ---- Derivatives ---- */
 
-/* Central differences of the distance and of the normal, with step h. Within a smooth piece their errors are h^2/6
- * times the derivative two orders above. At a distance r from a point or an edge, that is at most 9/r^3 for the
- * normal and 3/r^2 for the distance; rounding adds about 1e-15/(r h). With h = 1e-5 and r > 0.2: 1e-10/6 * 9/0.008
- * + 5e-10 = 2e-8. Places where a difference straddles two pieces are left out: there the Hessians at its ends
- * differ. */
+/* Central differences of the distance and of the normal, with step h. Within a smooth piece their errors
+ * are h^2/6 times the derivative two orders above. At a distance r from a point or an edge, that is at most
+ * 9/r^3 for the normal and 3/r^2 for the distance; rounding adds about 1e-15/(r h). With h = 1e-5 and r >
+ * 0.2: 1e-10/6 * 9/0.008 + 5e-10 = 2e-8. Places where a difference straddles two pieces are left out: there
+ * the Hessians at its ends differ. */
 #define STEP      1e-5
 #define TOLERANCE 1e-7
 
@@ -506,8 +509,8 @@ END_TEST
 /* ---- Shapes ---- */
 
 /* Every point, segment and triangle, grown by the radius, touches the surface from inside: no part of it is
- * outside, and none is deeper than the tolerance of a polygon, a tenth of the distance of 0.01. Flat faces have
- * only their borders as features: the middle of a segment is as deep as the edges of the collider. */
+ * outside, and none is deeper than the tolerance of a polygon, a tenth of the distance of 0.01. Flat faces
+ * have only their borders as features: the middle of a segment is as deep as the edges of the collider. */
 static void check_shape(const drape_collider *c, const struct variant *v)
 {
     const drape_collider_shape *s = &c->shape;
@@ -650,9 +653,9 @@ END_TEST
 
 /* ---- Speed ---- */
 
-/* A search through all of the 40 000 triangles takes some milliseconds. Near the surface, where contact queries
- * are made, the tree visits a few leaves: one or two microseconds. 50 are allowed, for slow machines and
- * sanitizers. */
+/* A search through all of the 40 000 triangles takes some milliseconds. Near the surface, where contact
+ * queries are made, the tree visits a few leaves: one or two microseconds. 50 are allowed, for slow
+ * machines and sanitizers. */
 START_TEST(queries_of_large_meshes_are_fast)
 {
     enum { QUERIES = 20000 };

@@ -266,9 +266,9 @@ START_TEST(only_scenes_with_contact_have_it_checked)
 }
 END_TEST
 
-/* Without colliders and self-contact, contact takes no time and no memory. The time of contact is separate from
- * the other parts of a step, not within them: the sum of all parts is at most the time of the steps, up to the
- * rounding of sums. */
+/* Without colliders and self-contact, contact takes no time and no memory. The time of contact is separate
+ * from the other parts of a step, not within them: the sum of all parts is at most the time of the steps,
+ * up to the rounding of sums. */
 START_TEST(scenes_without_contact_pay_nothing)
 {
     static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "ida", "static", "verlet"};
@@ -388,8 +388,9 @@ static void add_energy(void *user, const drape_pair *found)
     w->acting++;
 }
 
-/* An active contact that several pairs share is counted once, with the area of all. The sum of energies is that
- * of all pairs, up to the rounding of some hundred positive numbers, and there are fewer contacts than pairs. */
+/* An active contact that several pairs share is counted once, with the area of all. The sum of energies is
+ * that of all pairs, up to the rounding of some hundred positive numbers, and there are fewer contacts than
+ * pairs. */
 START_TEST(active_contacts_are_all_pairs)
 {
     scene s = scene_model("{'drape': 1, 'cloth': [" LAYER ", " LAYER "], 'self_contact': {'thickness': 2e-2},"
@@ -415,7 +416,8 @@ START_TEST(active_contacts_are_all_pairs)
 }
 END_TEST
 
-/* A query between steps, for frames or for forces that a host reads, may make contact search at another state. */
+/* A query between steps, for frames or for forces that a host reads, may make contact search at another
+ * state. */
 static void query(drape_sim *sim)
 {
     const size_t n = 3 * (size_t)sim->model->node_count;

@@ -11,7 +11,8 @@ static void defaults(const drape_controller_ops *ops, double *values)
         values[i] = generic_value(&ops->entry.params[i]);
 }
 
-/* Calls judge of a controller: an attempt with step h from time t that ended with *status, for a sheet at rest. */
+/* Calls judge of a controller: an attempt with step h from time t that ended with *status, for a sheet at
+ * rest. */
 static drape_verdict judge(const drape_controller_ops *ops, const double *values, double t, double h,
                            drape_step_info *info, drape_status *status)
 {

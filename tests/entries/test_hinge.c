@@ -212,8 +212,8 @@ static void flatten(double *x, const int32_t *node, double share)
     }
 }
 
-/* Collapses the altitudes of every hinge in turn; the element reported has that altitude, or one that the same move
- * flattened more. */
+/* Collapses the altitudes of every hinge in turn; the element reported has that altitude, or one that the
+ * same move flattened more. */
 START_TEST(a_collapsed_altitude_is_reported)
 {
     sheet s = make_sheet("bend.hinge");
@@ -314,8 +314,8 @@ static void shorten(double *x, const int32_t *node, double share)
         x[3 * node[0] + k] = x[3 * node[1] + k] + share * (x[3 * node[0] + k] - x[3 * node[1] + k]);
 }
 
-/* If a value was below its limit before the step, it may stay or grow, so that a crumpled start can be left; it
- * must not fall. */
+/* If a value was below its limit before the step, it may stay or grow, so that a crumpled start can be
+ * left; it must not fall. */
 START_TEST(what_was_degenerate_must_not_become_worse)
 {
     check_below_limit("stretch.edge", shorten);

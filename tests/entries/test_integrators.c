@@ -1,5 +1,5 @@
-/* test_integrators.c: all integrators: form, step(in, out), free fall, a damped swinging sheet; and that a step
- * that reports convergence has converged. */
+/* test_integrators.c: all integrators: form, step(in, out), free fall, a damped swinging sheet; and that a
+ * step that reports convergence has converged. */
 #include <stdio.h>
 
 #include "integrators/integrator.h"
@@ -56,7 +56,8 @@ typedef struct stepper {
     drape_state in, out, kept;
 } stepper;
 
-/* An irregular sheet that hangs by two nodes, with every kind of term, among them damping, drag and bending. */
+/* An irregular sheet that hangs by two nodes, with every kind of term, among them damping, drag and
+ * bending. */
 static stepper open_stepper(const drape_integrator_ops *ops, const double *values)
 {
     const drape_setting beta = {"beta", 0.01, NULL}, drag = {"coefficient", 0.05, NULL};
@@ -147,9 +148,9 @@ static void for_all_choices(void (*use)(const drape_integrator_ops *ops, const d
     }
 }
 
-/* Steps, whether they succeed or fail, leave `in` unchanged; after a restart the same `in` gives the same bits.
- * The exception is modified Newton: KINSOL keeps a part of the previous solve, which shows when steps are inexact;
- * there both results are within the tolerance. */
+/* Steps, whether they succeed or fail, leave `in` unchanged; after a restart the same `in` gives the same
+ * bits. The exception is modified Newton: KINSOL keeps a part of the previous solve, which shows when steps
+ * are inexact; there both results are within the tolerance. */
 static void check_steps(const drape_integrator_ops *ops, const double *values, const char *what)
 {
     stepper s = open_stepper(ops, values);
@@ -270,8 +271,8 @@ START_TEST(a_converged_step_is_converged)
 }
 END_TEST
 
-/* One iteration is not enough for a sheet that is released: the step fails, or is accepted and reported as not
- * converged. */
+/* One iteration is not enough for a sheet that is released: the step fails, or is accepted and reported as
+ * not converged. */
 START_TEST(a_step_that_has_not_converged_is_reported)
 {
     for (int i = 0; drape_integrators[i]; i++)
@@ -303,8 +304,9 @@ END_TEST
  * ----------------------------------------------------------------------------------------------------------
  */
 
-/* How far free fall may be off after a time t. Order 1 leads or lags by g h t/2; higher orders are exact except
- * for a start of order 1, about g h^2; methods that choose their steps keep to rtol 1e-3 of 0.5 m in each of a few. */
+/* How far free fall may be off after a time t. Order 1 leads or lags by g h t/2; higher orders are exact
+ * except for a start of order 1, about g h^2; methods that choose their steps keep to rtol 1e-3 of 0.5 m in
+ * each of a few. */
 static double fall_tolerance(const drape_integrator_ops *ops, double h, double t)
 {
     if (ops->own_steps)
@@ -371,7 +373,8 @@ static drape_status all_converged(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* One second of a curved sheet that swings on two nodes. Its energy never rises: only gravity does work on it. */
+/* One second of a curved sheet that swings on two nodes. Its energy never rises: only gravity does work on
+ * it. */
 START_TEST(a_damped_sheet_swings)
 {
     const drape_setting beta = {"beta", 0.01, NULL};

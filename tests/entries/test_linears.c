@@ -1,4 +1,5 @@
-/* test_linears.c: all linear solvers on the pattern of a cloth, against Gaussian elimination in long double. */
+/* test_linears.c: all linear solvers on the pattern of a cloth, against Gaussian elimination in long
+ * double. */
 #include "solvers/linear.h"
 
 #include <float.h>
@@ -120,8 +121,8 @@ static void solve_dense(problem *q)
     }
 }
 
-/* Factors the values, solves, and compares: the limit is 1e-10 of the largest component. The condition numbers of
- * these matrices are about 1e3, so the expected loss is 1e-13. */
+/* Factors the values, solves, and compares: the limit is 1e-10 of the largest component. The condition
+ * numbers of these matrices are about 1e3, so the expected loss is 1e-13. */
 static void check_solution(problem *q, const drape_linear_ops *ops, void *solver, const char *what)
 {
     double size = 0, error = 0;
@@ -303,8 +304,8 @@ START_TEST(a_right_hand_side_that_is_not_finite_is_reported)
 }
 END_TEST
 
-/* The pivots that were chosen for the first matrix are zero in the second, which is regular: its pivots are off
- * the diagonal of each node's block. */
+/* The pivots that were chosen for the first matrix are zero in the second, which is regular: its pivots are
+ * off the diagonal of each node's block. */
 START_TEST(kept_pivots_that_become_zero_are_chosen_again)
 {
     problem q = open_problem();
@@ -324,8 +325,9 @@ START_TEST(kept_pivots_that_become_zero_are_chosen_again)
 }
 END_TEST
 
-/* The 3 x 3 block of a node is symmetric in the pattern of every mesh, so a difference there is the smallest that
- * a solver can overlook. Taking one triangle for both gives an error of about the difference. */
+/* The 3 x 3 block of a node is symmetric in the pattern of every mesh, so a difference there is the
+ * smallest that a solver can overlook. Taking one triangle for both gives an error of about the
+ * difference. */
 START_TEST(a_small_part_that_is_not_symmetric_is_not_lost)
 {
     problem q = open_problem();
@@ -390,7 +392,8 @@ typedef struct sheet {
     double *values, *b, *x, *again;
 } sheet;
 
-/* side x side nodes, each coupled to those at most two rows and columns away: the pattern of a cloth with hinges. */
+/* side x side nodes, each coupled to those at most two rows and columns away: the pattern of a cloth with
+ * hinges. */
 static sheet open_sheet(int32_t side)
 {
     sheet q = {.ctx = make_context()};
@@ -425,7 +428,8 @@ static void close_sheet(sheet *q)
     drape_context_destroy(&q->ctx);
 }
 
-/* Symmetric and random. With shift 1 the diagonal dominates weakly; the smaller shift, the more indefinite. */
+/* Symmetric and random. With shift 1 the diagonal dominates weakly; the smaller shift, the more
+ * indefinite. */
 static void fill_sheet(sheet *q, double shift, uint64_t seed)
 {
     uint64_t side = seed;
@@ -444,9 +448,9 @@ static void fill_sheet(sheet *q, double shift, uint64_t seed)
     }
 }
 
-/* Backward stability: |A x - b| <= c eps (|A| |x| + |b|) row by row, c = 1e4 for Cholesky factors of about 1e3
- * unknowns. KLU accepts a diagonal pivot that is a thousandth of the largest: a thousand times that if the matrix
- * is indefinite. */
+/* Backward stability: |A x - b| <= c eps (|A| |x| + |b|) row by row, c = 1e4 for Cholesky factors of about
+ * 1e3 unknowns. KLU accepts a diagonal pivot that is a thousandth of the largest: a thousand times that if
+ * the matrix is indefinite. */
 static void check_residual(const sheet *q, bool definite, const char *name)
 {
     double *r = take((size_t)q->p.n, sizeof *r), *size = take((size_t)q->p.n, sizeof *size), max = 0;
@@ -509,8 +513,8 @@ START_TEST(a_sheet_of_many_supernodes)
 }
 END_TEST
 
-/* Ordered by minimum degree and, if METIS is built in, by nested dissection; with several branches for the threads
- * and fronts that they share. */
+/* Ordered by minimum degree and, if METIS is built in, by nested dissection; with several branches for the
+ * threads and fronts that they share. */
 START_TEST(threads_give_the_same_bits)
 {
     static const int32_t sides[] = {24, 40};

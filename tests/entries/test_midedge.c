@@ -1,6 +1,7 @@
 /*
- * test_midedge.c: bend.midedge on any mesh: exact for every quadratic deflection; in equilibrium under a constant
- * moment; six nodes an element on symmetric meshes; and clamps that have exact derivatives and hold.
+ * test_midedge.c: bend.midedge on any mesh: exact for every quadratic deflection; in equilibrium under a
+ * constant moment; six nodes an element on symmetric meshes; and clamps that have exact derivatives and
+ * hold.
  */
 #include <stdio.h>
 
@@ -40,8 +41,9 @@ static void deflect(const drape_model *m, const double bend[3], double *x)
     }
 }
 
-/* A triangle without a free edge has three consecutive squares with the same first three nodes; their energy is
- * A/2 b'Cb. The warp is x, the weft -z: that changes the sign of b12, which C does not couple to the others. */
+/* A triangle without a free edge has three consecutive squares with the same first three nodes; their
+ * energy is A/2 b'Cb. The warp is x, the weft -z: that changes the sign of b12, which C does not couple to
+ * the others. */
 static void check_energies(const drape_model *m, const double *x, const double law[4], const double bend[3])
 {
     static const double flat[9 * 3000];
@@ -99,8 +101,9 @@ START_TEST(quadratics_are_exact)
 }
 END_TEST
 
-/* If the two triangles of every edge are point reflections of each other, phi is 0 and elements have six nodes.
- * Alternating diagonals are mirror images across sides of cells: they need twelve, as all other meshes do. */
+/* If the two triangles of every edge are point reflections of each other, phi is 0 and elements have six
+ * nodes. Alternating diagonals are mirror images across sides of cells: they need twelve, as all other
+ * meshes do. */
 START_TEST(symmetric_grids_need_six_nodes)
 {
     drape_context *ctx = make_context();
@@ -171,7 +174,8 @@ START_TEST(clamps_hold)
             x[3 * i + 2] = m->rest[3 * i + 2];
         }
         drape_system_energy(system, &(drape_point){.x = x, .internal = internal}, &elastic, &gravity);
-        /* A clamped sheet bends by the 0.1 within a cell of 0.1 m: at least D/2 kappa^2 over a fourth of a cell. */
+        /* A clamped sheet bends by the 0.1 within a cell of 0.1 m: at least D/2 kappa^2 over a fourth of a
+         * cell. */
         const double rigidity = m->cloths[0].material.flexural_rigidity, kappa = 0.1 / 0.1;
         if (clamp)
             ck_assert_double_ge(elastic, rigidity / 2 * kappa * kappa * 0.4 * 0.1 / 4);

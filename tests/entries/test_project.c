@@ -37,8 +37,8 @@ static bool is_above(int n, const double *a, double sign, double shift)
     return true;
 }
 
-/* P is the projection of A onto the cone of positive semidefinite matrices exactly if P is in the cone, P - A is in
- * it too (the cone is its own dual), and the two are orthogonal (Moreau). */
+/* P is the projection of A onto the cone of positive semidefinite matrices exactly if P is in the cone, P -
+ * A is in it too (the cone is its own dual), and the two are orthogonal (Moreau). */
 static void check_projected(int n, const double *a, const double *p)
 {
     double scale = norm(n, a), inner = 0, rest[N * N];
@@ -226,9 +226,9 @@ static double projected_away(drape_context *ctx, const drape_model *m, double al
     return away / max;
 }
 
-/* Equal tension in both directions: f1 L1 = (S, nu S), f2 L2 = (0, (1 - nu) S), f3 = 0: all of it is tension, and
- * nothing is lost. If compressed as much, all of the stress is lost: S/E = .02 (1 + .01)/(1 - nu) of a stiffness of
- * about 1. */
+/* Equal tension in both directions: f1 L1 = (S, nu S), f2 L2 = (0, (1 - nu) S), f3 = 0: all of it is
+ * tension, and nothing is lost. If compressed as much, all of the stress is lost: S/E = .02 (1 + .01)/(1 -
+ * nu) of a stiffness of about 1. */
 START_TEST(the_membrane_keeps_its_tension)
 {
     drape_context *ctx = NULL;

@@ -1,5 +1,5 @@
-/* test_registry.c: what all tables have in common: entries are well formed and are found by their names; other
- * names are refused with the list of those that exist. */
+/* test_registry.c: what all tables have in common: entries are well formed and are found by their names;
+ * other names are refused with the list of those that exist. */
 #include "base/registry.h"
 #include "colliders/colliders.h"
 #include "compile/compile.h"

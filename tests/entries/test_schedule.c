@@ -1,5 +1,5 @@
-/* test_schedule.c: the steps of fixed-step methods: counted times, halves that fill their interval, growth, the
- * shortened last step. */
+/* test_schedule.c: the steps of fixed-step methods: counted times, halves that fill their interval, growth,
+ * the shortened last step. */
 #include "sim/schedule.h"
 
 #include <float.h>
@@ -133,9 +133,10 @@ START_TEST(advances_do_not_shift_the_count)
 }
 END_TEST
 
-/* A host that adds up its frames, t += 1/60, drifts away from k/60 by up to half an ulp a frame: by 1e-9 dt after
- * some thousand frames, and in less than one frame once t is about 1e5 s. Each frame is one step nevertheless, and
- * there is never another one of 1e-9 dt. A frame is as long as requested, up to the rounding of its ends. */
+/* A host that adds up its frames, t += 1/60, drifts away from k/60 by up to half an ulp a frame: by 1e-9 dt
+ * after some thousand frames, and in less than one frame once t is about 1e5 s. Each frame is one step
+ * nevertheless, and there is never another one of 1e-9 dt. A frame is as long as requested, up to the
+ * rounding of its ends. */
 static void sum_frames(double start, double rate, int steps_a_frame, int frames)
 {
     drape_schedule s;
@@ -191,8 +192,9 @@ START_TEST(an_interval_left_half_done_is_given_up)
 }
 END_TEST
 
-/* For any sequence of rejections and ends, times increase strictly, h is the difference of times up to their
- * rounding, an advance ends exactly at its end, the sizes add up, and no step is larger than dt (1 + 1e-9). */
+/* For any sequence of rejections and ends, times increase strictly, h is the difference of times up to
+ * their rounding, an advance ends exactly at its end, the sizes add up, and no step is larger than dt (1 +
+ * 1e-9). */
 START_TEST(any_sequence_fills_the_time)
 {
     for (uint64_t trial = 1; trial <= 1000; trial++) {

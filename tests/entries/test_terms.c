@@ -11,8 +11,8 @@
 
 /* ---- A model of one term ---- */
 
-/* One term with one choice of one of its parameters, with its defaults, or with a dashpot in each element; a law
- * comes with all measures. */
+/* One term with one choice of one of its parameters, with its defaults, or with a dashpot in each element;
+ * a law comes with all measures. */
 typedef struct variant {
     const drape_term_ops *ops;
     enum model_mesh mesh;
@@ -54,7 +54,8 @@ static bool is_external(const drape_term_ops *ops)
     return ops->potential_of_gravity;
 }
 
-/* A model of the term only; NULL if the term refuses the mesh, which its message says. All terms accept rectangles. */
+/* A model of the term only; NULL if the term refuses the mesh, which its message says. All terms accept
+ * rectangles. */
 static drape_model *try_alone(drape_context *ctx, const variant *v)
 {
     drape_setting settings[DRAPE_MAX_PARAMS + 1];
@@ -333,7 +334,8 @@ END_TEST
 
 /* ---- Physics of one term ---- */
 
-/* E(R x + t) = E(x). Positions of 3 m are rounded, strains are 0.1 of 0.1 m: 1e-15 * 30 / 0.1, and a margin. */
+/* E(R x + t) = E(x). Positions of 3 m are rounded, strains are 0.1 of 0.1 m: 1e-15 * 30 / 0.1, and a
+ * margin. */
 static void check_invariance(drape_context *ctx, const variant *v, const drape_model *model)
 {
     if (is_external(v->ops))
@@ -386,8 +388,8 @@ static double rounding_force(const drape_model *model, const drape_point *point)
     return 1e-14 * force;
 }
 
-/* At rest a measure has no force (except for a hinge that is to be flat on a curved mesh), a drag has none, and
- * there is no energy. A law at rest has no rate. */
+/* At rest a measure has no force (except for a hinge that is to be flat on a curved mesh), a drag has none,
+ * and there is no energy. A law at rest has no rate. */
 static void check_rest(drape_context *ctx, const variant *v, const drape_model *model)
 {
     bool flat = v->param >= 0 && is_choice(&v->ops->entry.params[v->param]) &&
@@ -453,8 +455,8 @@ START_TEST(dissipation_takes_power)
 }
 END_TEST
 
-/* Newton predicts the forces on measures after a correction p by their change df/dx . p. It is compared with a
- * difference of fourth order whose step makes the error about 1e-13 of the size of the forces. */
+/* Newton predicts the forces on measures after a correction p by their change df/dx . p. It is compared
+ * with a difference of fourth order whose step makes the error about 1e-13 of the size of the forces. */
 static void check_stress(drape_context *ctx, const variant *v, const drape_model *model)
 {
     static const double at[4] = {-2, -1, 1, 2}, weight[4] = {1, -8, 8, -1};
@@ -589,8 +591,8 @@ START_TEST(threads_give_the_same_bits)
 }
 END_TEST
 
-/* x'(projected Jacobian - mass)x >= 0 for laws and measures: a sum of positive semidefinite blocks is positive
- * semidefinite. */
+/* x'(projected Jacobian - mass)x >= 0 for laws and measures: a sum of positive semidefinite blocks is
+ * positive semidefinite. */
 static void check_projection(drape_context *ctx, const variant *v, const drape_model *model)
 {
     state s = make_state(ctx, model, 11, 0.04);

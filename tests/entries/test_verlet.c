@@ -4,8 +4,8 @@
 #include "base/vec3.h"
 #include "integrators/verlet.h"
 
-/* Most grids here are chains along x: their rows are 1e3 m apart, and springs between rows have no effect, unless
- * the scene says otherwise. */
+/* Most grids here are chains along x: their rows are 1e3 m apart, and springs between rows have no effect,
+ * unless the scene says otherwise. */
 #define GRID     "{'grid': 'square', 'columns': %d, 'rows': %d, 'width': %g, 'height': %g}"
 #define MATERIAL "'material': {'young_modulus': 1, 'thickness': 1, 'total_mass': %g, 'mass': 'uniform'}"
 
@@ -43,9 +43,9 @@ static scene sheet(void)
         6, 5, 0.5, 0.4, 0.3);
 }
 
-/* The position form is CS184's x' = x + c (x - x_before) + a h^2 with x_before = x - h v at the start. Here the
- * same numbers are computed on positions only, with forces of the library. Rounding: positions of 1 m have 1e-16,
- * which the recurrence sums twice: 200^2/2 times that. */
+/* The position form is CS184's x' = x + c (x - x_before) + a h^2 with x_before = x - h v at the start. Here
+ * the same numbers are computed on positions only, with forces of the library. Rounding: positions of 1 m
+ * have 1e-16, which the recurrence sums twice: 200^2/2 times that. */
 START_TEST(the_position_form_is_the_recurrence_of_positions)
 {
     const double h = 1e-3, c = 1 - 0.3 / 100;
@@ -107,10 +107,10 @@ END_TEST
 
 /* ---- Stability ---- */
 
-/* A chain of n free nodes of mass m between springs k, pinned at one end and free at the other, doubled by the
- * second row that the grid needs: along x the eigenvalues of both are 2 k/m (1 - cos((2 j - 1) pi/(2 n + 1))),
- * the largest for j = n. Springs across the rows have no stiffness. With 30 products for 2 x 8 x 3 unknowns,
- * Lanczos is accurate to 1e-6; the differences are accurate to 1e-6 too. */
+/* A chain of n free nodes of mass m between springs k, pinned at one end and free at the other, doubled by
+ * the second row that the grid needs: along x the eigenvalues of both are 2 k/m (1 - cos((2 j - 1) pi/(2 n
+ * + 1))), the largest for j = n. Springs across the rows have no stiffness. With 30 products for 2 x 8 x 3
+ * unknowns, Lanczos is accurate to 1e-6; the differences are accurate to 1e-6 too. */
 START_TEST(omega_is_that_of_a_chain)
 {
     const double k = 40, m = 0.01;
@@ -168,7 +168,8 @@ END_TEST
 
 START_TEST(steps_follow_the_limit)
 {
-    /* substeps 0: the integrator takes as many as the limit requires; substeps 1: the controller cuts the step. */
+    /* substeps 0: the integrator takes as many as the limit requires; substeps 1: the controller cuts the
+     * step. */
     for (int f = 0; f < 2; f++) {
         scene s = sheet();
         const drape_setting settings[] = {number("substeps", f)};
@@ -225,8 +226,8 @@ static void one_step(scene *s, const char *rule, double x[3], double v[3])
     scene_close(s);
 }
 
-/* From (0, 0.01, 0) the displacement of 0.01 (1, -2, 0) meets the plane at half: t = (0.005, 0.0001, 0) with the
- * offset, and x = x0 + (1 - 0.25)(t - x0). */
+/* From (0, 0.01, 0) the displacement of 0.01 (1, -2, 0) meets the plane at half: t = (0.005, 0.0001, 0)
+ * with the offset, and x = x0 + (1 - 0.25)(t - x0). */
 START_TEST(a_plane_stops_as_in_cs184)
 {
     double x[3], v[3];
@@ -239,8 +240,8 @@ START_TEST(a_plane_stops_as_in_cs184)
 }
 END_TEST
 
-/* A plane that moves with the tangential velocity of the node does not drag it: the displacement relative to the
- * plane is straight down, and friction acts on that only. */
+/* A plane that moves with the tangential velocity of the node does not drag it: the displacement relative
+ * to the plane is straight down, and friction acts on that only. */
 START_TEST(friction_is_against_the_moving_surface)
 {
     double x[3], v[3];
@@ -277,8 +278,8 @@ START_TEST(a_floor_keeps_the_place_as_in_boson)
 }
 END_TEST
 
-/* F = (3, -8) on a floor: 3 - 0.25 x 8 = 1 remains along it, less 0.5 v, and nothing across. Of a force straight
- * down nothing remains, where Boson divides 0 by 0; a force upwards has no friction. */
+/* F = (3, -8) on a floor: 3 - 0.25 x 8 = 1 remains along it, less 0.5 v, and nothing across. Of a force
+ * straight down nothing remains, where Boson divides 0 by 0; a force upwards has no friction. */
 START_TEST(friction_on_forces_as_in_boson)
 {
     scene s = flyers("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], 'friction': 0.25}");
@@ -302,9 +303,9 @@ START_TEST(friction_on_forces_as_in_boson)
 }
 END_TEST
 
-/* Three nodes in a line, 1 m apart; the first is pinned, the others are at 1.5 and 3.5. One pass: the spring to
- * the pin is cut to 1.1 m, all of it at its free end; then the next, 2.4 m long, loses 1.3 m in equal halves.
- * The pass leaves the first one too long, as in CS184; further passes do
+/* Three nodes in a line, 1 m apart; the first is pinned, the others are at 1.5 and 3.5. One pass: the
+ * spring to the pin is cut to 1.1 m, all of it at its free end; then the next, 2.4 m long, loses 1.3 m in
+ * equal halves. The pass leaves the first one too long, as in CS184; further passes do
  * not. */
 START_TEST(strains_are_limited)
 {
@@ -393,8 +394,9 @@ START_TEST(patches_are_one_spring_after_the_other)
 }
 END_TEST
 
-/* Springs in runs, the weight once, and the other terms by the system: sums in another order than the system's. A
- * node has 12 springs of up to 3 N, so each of its sums is off by less than 50 roundings of that. */
+/* Springs in runs, the weight once, and the other terms by the system: sums in another order than the
+ * system's. A node has 12 springs of up to 3 N, so each of its sums is off by less than 50 roundings of
+ * that. */
 START_TEST(forces_are_those_of_the_system)
 {
     double x[3 * 33 * 12], v[3 * 33 * 12], g[3 * 33 * 12], expected[3 * 33 * 12];
@@ -426,8 +428,8 @@ static bool share_a_box(const double *a, const double *b)
     return true;
 }
 
-/* The rule without lists: every point against every other, in the order of their numbers; own: only against those
- * in the same box at the positions before the first pass. */
+/* The rule without lists: every point against every other, in the order of their numbers; own: only against
+ * those in the same box at the positions before the first pass. */
 static void push_by_hand(const drape_model *m, bool own, double share, double *x)
 {
     double reach = 2 * m->contact.self_thickness, before[3 * 196];
@@ -465,9 +467,9 @@ static scene crumpled(double size, double thickness, double *x)
     return s;
 }
 
-/* Boxes and lists find the same pairs as a comparison of all points with all, to the bit: from a heap in which
- * each point is near all others, more than lists hold, to points far apart; also when earlier lists are used
- * again. */
+/* Boxes and lists find the same pairs as a comparison of all points with all, to the bit: from a heap in
+ * which each point is near all others, more than lists hold, to points far apart; also when earlier lists
+ * are used again. */
 static void check_against_the_rule(double size, bool own, double share)
 {
     double x[3 * 196], y[3 * 196];

@@ -1,16 +1,18 @@
 /*
- * test_hashes.c: every example scene with every integrator, for three attempts. The bits of the state must be those of
- * hashes.txt, if that file is of this build. In any build they must be the same in another process, with other numbers
- * of threads, in a sim that is stopped at each attempt or saved and restored between two, and beside other sims on the
- * same thread and on another one.
- * Meshes are made coarser, so that there is time for contact: if a scene has colliders or self-contact, the attempts
- * start from the state that `be` reaches after most of its duration, and the test checks that there is contact in it.
- * With a sanitizer, which makes all ten times slower, every other scene is left out: box_edge, crumple, flag, fold,
- * hung_sheet, sphere_drape and verlet_100 remain, with every integrator. hashes.txt begins with the build that its bits
- * belong to: they depend on the compiler, the solvers, and on the C library and BLAS, which select their functions by
- * the processor. The name of the build has a hash of results of the C library's functions, and the name of OpenBLAS's
- * kernels. On another build the runs are compared with those of a second process instead. `tools/hashes` writes the
- * file: with DRAPE_HASHES=FILE this program writes its own hashes there and tests nothing.
+ * test_hashes.c: every example scene with every integrator, for three attempts. The bits of the state must
+ * be those of hashes.txt, if that file is of this build. In any build they must be the same in another
+ * process, with other numbers of threads, in a sim that is stopped at each attempt or saved and restored
+ * between two, and beside other sims on the same thread and on another one.
+ *
+ * Meshes are made coarser, so that there is time for contact: if a scene has colliders or self-contact, the
+ * attempts start from the state that `be` reaches after most of its duration, and the test checks that
+ * there is contact in it. With a sanitizer, which makes all ten times slower, every other scene is left
+ * out: box_edge, crumple, flag, fold, hung_sheet, sphere_drape and verlet_100 remain, with every
+ * integrator. hashes.txt begins with the build that its bits belong to: they depend on the compiler, the
+ * solvers, and on the C library and BLAS, which select their functions by the processor. The name of the
+ * build has a hash of results of the C library's functions, and the name of OpenBLAS's kernels. On another
+ * build the runs are compared with those of a second process instead. `tools/hashes` writes the file: with
+ * DRAPE_HASHES=FILE this program writes its own hashes there and tests nothing.
  */
 #include <dirent.h>
 #include <dlfcn.h>
@@ -82,8 +84,9 @@ static uint64_t library_hash(void)
     return hash;
 }
 
-/* BLAS selects its kernels by the processor. Those for triangular solves may differ in a last digit where products of
- * matrices agree, so the kernels are named and not sampled. A BLAS other than OpenBLAS does not name them. */
+/* BLAS selects its kernels by the processor. Those for triangular solves may differ in a last digit where
+ * products of matrices agree, so the kernels are named and not sampled. A BLAS other than OpenBLAS does not
+ * name them. */
 static const char *blas_kernels(void)
 {
     typedef char *describe(void);
@@ -139,8 +142,8 @@ static drape_status halve(drape_scene *scene, int32_t cloth, const char *key, in
     return drape_scene_set(scene, pointer, text);
 }
 
-/* Makes the grids with more than MAX_NODES nodes coarser, once; returns whether there were any. Equilateral grids,
- * which are in no scene with contact, keep their size. */
+/* Makes the grids with more than MAX_NODES nodes coarser, once; returns whether there were any. Equilateral
+ * grids, which are in no scene with contact, keep their size. */
 static bool make_coarser(drape_scene *scene, const drape_model *model)
 {
     bool any = false;
@@ -177,8 +180,8 @@ static drape_model *compile(drape_context *ctx, const char *name)
 
 /* ---- The state before the attempts ---- */
 
-/* A state in the middle of a scene that has contact, reached by `be` with one thread, and so with the same bits each
- * time; in other scenes the beginning. */
+/* A state in the middle of a scene that has contact, reached by `be` with one thread, and so with the same
+ * bits each time; in other scenes the beginning. */
 typedef struct moment {
     double t;
     double *x, *v;
@@ -272,8 +275,8 @@ static drape_status look(void *user, const drape_event *event)
     return d->each || d->left == 0 ? 1 : DRAPE_OK;
 }
 
-/* Statics ends after some steps of its flow, when the force on each node is below twenty times the weight of the heaviest:
- * a tighter tolerance would take minutes for cloth that falls freely or flutters. */
+/* Statics ends after some steps of its flow, when the force on each node is below twenty times the weight
+ * of the heaviest: a tighter tolerance would take minutes for cloth that falls freely or flutters. */
 static double loose_tolerance(const drape_model *model)
 {
     double heaviest = 0;
@@ -404,8 +407,8 @@ static int write_table(const char *path)
     return fclose(file) != 0;
 }
 
-/* Returns the number of lines that differ from the table; `difference` describes the first one. If the file is of
- * another build, same_build is false and 0 is returned. */
+/* Returns the number of lines that differ from the table; `difference` describes the first one. If the file
+ * is of another build, same_build is false and 0 is returned. */
 static int compare_file(const char *path, bool *same_build, char *difference, size_t size)
 {
     char line[LINE], build[LINE], here[LINE + 16], scene[64], method[64], status[64];
@@ -474,8 +477,8 @@ typedef struct pair {
     golden plain, restored;
 } pair;
 
-/* Two sims that advance in turns, attempt by attempt, with two and with three threads; the second one is saved and
- * restored after its first attempt. */
+/* Two sims that advance in turns, attempt by attempt, with two and with three threads; the second one is
+ * saved and restored after its first attempt. */
 static void *drive_two(void *user)
 {
     pair *p = user;
@@ -525,8 +528,8 @@ START_TEST(sims_at_once_have_the_same_bits)
 }
 END_TEST
 
-/* The contact that a scene has acts at its moment: colliders in each scene that has some, friction and self-contact in
- * some scenes. */
+/* The contact that a scene has acts at its moment: colliders in each scene that has some, friction and
+ * self-contact in some scenes. */
 static int scenes_pushed, scenes_layered, scenes_rubbed;
 
 static void count_contact(const ready *s, const drape_integrator_ops *method)

@@ -1,11 +1,13 @@
 /*
- * test_agreement.c: settings that must not change the result, and settings that may change it within the tolerance
- * only.
- * The scene: a sheet that hangs by two corners and swings out under gravity. Two runs whose residuals stay below r1
- * and r2 solve perturbed problems: if the Hessian is not negative, they differ by at most drift_bound(r1 + r2).
- * Springs compressed by e have a negative stiffness of K e across their direction, which with 6 springs a node is at
- * most 12 K e; that of hinges is less. With d = h^2 12 K e/m, the error then also grows by the solution of
- * e_{n+1} - 2 e_n + e_{n-1} = d e_{n+1}, which is below cosh(n sqrt(d/(1 - d))).
+ * test_agreement.c: settings that must not change the result, and settings that may change it within the
+ * tolerance only.
+ *
+ * The scene: a sheet that hangs by two corners and swings out under gravity. Two runs whose residuals stay
+ * below r1 and r2 solve perturbed problems: if the Hessian is not negative, they differ by at most
+ * drift_bound(r1 + r2). Springs compressed by e have a negative stiffness of K e across their direction,
+ * which with 6 springs a node is at most 12 K e; that of hinges is less. With d = h^2 12 K e/m, the error
+ * then also grows by the solution of e_{n+1} - 2 e_n + e_{n-1} = d e_{n+1}, which is below cosh(n sqrt(d/(1
+ * - d))).
  */
 #include "solvers/linear.h"
 #include "support/scene.h"
@@ -121,8 +123,8 @@ START_TEST(frames_do_not_change_a_bit)
 }
 END_TEST
 
-/* With dt = 1/240 s a sixtieth of a second is four steps. The ends k/60 and 4k/240 differ by round-off; the schedule
- * recognizes them as the same time: the steps are the same, and the states equal to the last bit. */
+/* With dt = 1/240 s a sixtieth of a second is four steps. The ends k/60 and 4k/240 differ by round-off; the
+ * schedule recognizes them as the same time: the steps are the same, and the states equal to the last bit. */
 START_TEST(one_advance_or_sixty)
 {
     drape_sim_def def;
@@ -140,9 +142,9 @@ START_TEST(one_advance_or_sixty)
 }
 END_TEST
 
-/* With dt = 7 ms the advances cut steps: other steps, and so another result, different in the first order of the
- * method. The run must still end at the requested time without losing a step: the time is exact and the number of
- * steps is 60 times that of one advance. */
+/* With dt = 7 ms the advances cut steps: other steps, and so another result, different in the first order
+ * of the method. The run must still end at the requested time without losing a step: the time is exact and
+ * the number of steps is 60 times that of one advance. */
 START_TEST(advances_that_cut_steps_end_in_time)
 {
     drape_sim_def def;

@@ -1,4 +1,5 @@
-/* test_dep_slow.c: the larger sheets on which the DEP report's program failed (see test_dep.c); takes minutes. */
+/* test_dep_slow.c: the larger sheets on which the DEP report's program failed (see test_dep.c); takes
+ * minutes. */
 #include "support/dep.h"
 #include "support/optional.h"
 

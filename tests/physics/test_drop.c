@@ -1,7 +1,7 @@
 /*
- * test_drop.c: cloth that falls on things. With every integrator and on every kind of collider no vertex, edge or
- * face is ever inside, according to a separate check (support/solids.h), neither in states nor in frames between
- * them; cloth that falls on itself never passes through itself.
+ * test_drop.c: cloth that falls on things. With every integrator and on every kind of collider no vertex,
+ * edge or face is ever inside, according to a separate check (support/solids.h), neither in states nor in
+ * frames between them; cloth that falls on itself never passes through itself.
  */
 #include "geometry/intersect.h"
 #include "support/scene.h"
@@ -153,7 +153,8 @@ static drape_status look(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* 0.3 m wide and off center by some millimetres, so that nothing is symmetric; there are frames between steps. */
+/* 0.3 m wide and off center by some millimetres, so that nothing is symmetric; there are frames between
+ * steps. */
 static scene open_drop(const char *method, const struct target *on, double speed)
 {
     return scene_open(
@@ -303,7 +304,8 @@ static scene open_fold(const char *method, const char *self)
         self, method);
 }
 
-/* A strip dropped edge-on onto a floor folds onto itself; it passes through itself only without self-contact. */
+/* A strip dropped edge-on onto a floor folds onto itself; it passes through itself only without
+ * self-contact. */
 START_TEST(a_fold_never_crosses_itself)
 {
     const solid floor = {.planes = 1, .plane = {{0, 1, 0, 0}}};
@@ -334,9 +336,9 @@ START_TEST(a_fold_never_crosses_itself)
 }
 END_TEST
 
-/* A sheet on a pinned one, on a slope of tan a = 0.3. With mu = 0.6 it creeps at most at 0.3 eps once it has settled,
- * within the millimetres of its fall onto the other's edges. With 0 it slides up to g sin a t^2/2 and be's
- * h/t = 5 %, less what be dissipates where edges slide over edges: less than half. */
+/* A sheet on a pinned one, on a slope of tan a = 0.3. With mu = 0.6 it creeps at most at 0.3 eps once it
+ * has settled, within the millimetres of its fall onto the other's edges. With 0 it slides up to g sin a
+ * t^2/2 and be's h/t = 5 %, less what be dissipates where edges slide over edges: less than half. */
 START_TEST(friction_holds_layers)
 {
     const double t = 0.2, slope = 0.3, fall = 9.81 / hypot(1, slope);
@@ -372,7 +374,8 @@ START_TEST(friction_holds_layers)
 }
 END_TEST
 
-/* The reported depth is that of the sheet without its thickness. One sheet is above the plane, the other below it. */
+/* The reported depth is that of the sheet without its thickness. One sheet is above the plane, the other
+ * below it. */
 START_TEST(what_is_inside_a_collider_is_reported)
 {
     static const double heights[] = {0.02, -0.01};

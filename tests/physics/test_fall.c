@@ -1,7 +1,9 @@
 /*
- * test_fall.c: exact properties of backward Euler for any forces within the sheet: these have no resultant and no
- * moment, and do no work on rigid motion.
- * Bounds come from two sources: residuals r that the attempts report, and round-off of the forces (force_noise).
+ * test_fall.c: exact properties of backward Euler for any forces within the sheet: these have no resultant
+ * and no moment, and do no work on rigid motion.
+ *
+ * Bounds come from two sources: residuals r that the attempts report, and round-off of the forces
+ * (force_noise).
  */
 #include "support/scene.h"
 
@@ -100,9 +102,9 @@ START_TEST(free_fall_is_exact)
 }
 END_TEST
 
-/* The same fall with and without dashpots differs from the exact one by the same bound. Damping takes no work: strain
- * rates are round-off, 4 DBL_EPSILON size/(L h), so forces are BETA K times that of a length, and the work is that
- * force over the fall, 1.5 m, on every node. */
+/* The same fall with and without dashpots differs from the exact one by the same bound. Damping takes no
+ * work: strain rates are round-off, 4 DBL_EPSILON size/(L h), so forces are BETA K times that of a length,
+ * and the work is that force over the fall, 1.5 m, on every node. */
 START_TEST(falling_cloth_does_not_feel_its_damping)
 {
     const int steps = 50;
@@ -124,8 +126,8 @@ START_TEST(falling_cloth_does_not_feel_its_damping)
 }
 END_TEST
 
-/* Backward Euler itself loses M g^2 h^2/2 a step in free fall: v1 = v0 - g h, x1 = x0 + h v1. The log of energies
- * has it as numerical. Errors: of positions (as above) times M g, of velocities times M v, twice. */
+/* Backward Euler itself loses M g^2 h^2/2 a step in free fall: v1 = v0 - g h, x1 = x0 + h v1. The log of
+ * energies has it as numerical. Errors: of positions (as above) times M g, of velocities times M v, twice. */
 START_TEST(energy_lost_in_free_fall_is_reported)
 {
     const int steps = 50;
@@ -161,12 +163,12 @@ static double largest(const double *a, size_t n)
 }
 
 /*
- * Damping forces at a rigidly rotated state of a bent and stretched sheet. Both forms of the rate are zero up to
- * round-off: v = omega x x in continuous time, and q(x1) = q(x0) between two rotated states in a step. Bound: an
- * edge's rate is wrong by the round-off of a velocity over L, a hinge's by the same times |grad theta| <= 4/H, and
- * the forces are beta k times |grad q| times that: springs 6 beta K, hinges 12 a node, beta D-like k_b (4/H)^2,
- * H >= L/2 here. The same speeds along the strain give forces of beta K v: the last assertion shows that the test
- * would detect them.
+ * Damping forces at a rigidly rotated state of a bent and stretched sheet. Both forms of the rate are zero
+ * up to round-off: v = omega x x in continuous time, and q(x1) = q(x0) between two rotated states in a
+ * step. Bound: an edge's rate is wrong by the round-off of a velocity over L, a hinge's by the same times
+ * |grad theta| <= 4/H, and the forces are beta k times |grad q| times that: springs 6 beta K, hinges 12 a
+ * node, beta D-like k_b (4/H)^2, H >= L/2 here. The same speeds along the strain give forces of beta K v:
+ * the last assertion shows that the test would detect them.
  */
 START_TEST(turning_cloth_does_not_feel_its_damping)
 {
@@ -208,7 +210,8 @@ START_TEST(turning_cloth_does_not_feel_its_damping)
 }
 END_TEST
 
-/* P' = sum of residuals: besides M g t, n steps change the momentum by at most n h nodes r in each direction. */
+/* P' = sum of residuals: besides M g t, n steps change the momentum by at most n h nodes r in each
+ * direction. */
 START_TEST(linear_momentum_is_conserved)
 {
     const int steps = 40;
@@ -227,8 +230,8 @@ START_TEST(linear_momentum_is_conserved)
 }
 END_TEST
 
-/* L1 = L0 + h sum m v1 x v0, since x1 x v1 = x1 x v0 + x1 x (v1 - v0), x1 = x0 + h v1, and internal forces have no
- * moment about any point. Residuals add h sum x1 x r: 2 h size nodes r. */
+/* L1 = L0 + h sum m v1 x v0, since x1 x v1 = x1 x v0 + x1 x (v1 - v0), x1 = x0 + h v1, and internal forces
+ * have no moment about any point. Residuals add h sum x1 x r: 2 h size nodes r. */
 START_TEST(angular_momentum_of_backward_euler)
 {
     const int steps = 40;
@@ -256,9 +259,9 @@ START_TEST(angular_momentum_of_backward_euler)
 }
 END_TEST
 
-/* A horizontal sheet in a medium: every node has the same mass per area, so v1 = (v0 + g h)/(1 + c h/rho) exactly,
- * and rho g/c in the limit. Its energy is dissipated by drag: c A v1 . h v1 a step. Velocities are off by at most
- * n h r sqrt(3 nodes)/m_min (see drift_bound). */
+/* A horizontal sheet in a medium: every node has the same mass per area, so v1 = (v0 + g h)/(1 + c h/rho)
+ * exactly, and rho g/c in the limit. Its energy is dissipated by drag: c A v1 . h v1 a step. Velocities are
+ * off by at most n h r sqrt(3 nodes)/m_min (see drift_bound). */
 START_TEST(drag_slows_a_falling_sheet)
 {
     const double c = 7, rho = 0.5;

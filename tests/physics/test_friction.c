@@ -1,8 +1,8 @@
 /*
- * test_friction.c: Coulomb's law against closed forms. A sheet on a plane has the same pressure everywhere, so it
- * moves as one body: it sticks or slides, creeps as the smoothing predicts, stops where the integrator's own
- * recurrence predicts, and is carried along by a moving collider. A strip over a post shows exp(mu angle). The
- * energy audit reports the work of friction and of moving colliders.
+ * test_friction.c: Coulomb's law against closed forms. A sheet on a plane has the same pressure everywhere,
+ * so it moves as one body: it sticks or slides, creeps as the smoothing predicts, stops where the
+ * integrator's own recurrence predicts, and is carried along by a moving collider. A strip over a post
+ * shows exp(mu angle). The energy audit reports the work of friction and of moving colliders.
  */
 #include "contact/barrier.h"
 #include "support/scene.h"
@@ -24,8 +24,8 @@ typedef struct sliding {
     const char *contact, *collider; /* more settings, each after a comma */
 } sliding;
 
-/* The gap at which the barrier carries the weight: -K A b'(s) = m g cos a. It is the same for all nodes, since both
- * mass and contact area are proportional to the area. b' rises from -inf to 0 at s = 1. */
+/* The gap at which the barrier carries the weight: -K A b'(s) = m g cos a. It is the same for all nodes,
+ * since both mass and contact area are proportional to the area. b' rises from -inf to 0 at s = 1. */
 static double resting_gap(const drape_model *m, double g)
 {
     const double wanted = SIGMA * g / m->contact.stiffness;
@@ -109,8 +109,9 @@ static double ida_velocity(const scene *s)
 /* ---- Sticking and sliding ---- */
 
 /* At rest except for the creep, f(u/eps) = tan a/mu with f(y) = 2 y - y^2. The velocity converges to it as
- * exp(-t/tau), tau = eps/(2 mu g cos a (1 - y)) = 0.15 to 1.1 ms; 100 ms at 1 ms leave (1/(1 + h/tau))^100 with
- * be, 0.55^100 with midpoint: nothing. A residual r is an error r/(m g cos a mu f'/eps) of the velocity. */
+ * exp(-t/tau), tau = eps/(2 mu g cos a (1 - y)) = 0.15 to 1.1 ms; 100 ms at 1 ms leave (1/(1 + h/tau))^100
+ * with be, 0.55^100 with midpoint: nothing. A residual r is an error r/(m g cos a mu f'/eps) of the
+ * velocity. */
 START_TEST(sticks_but_for_its_creep)
 {
     static const double shares[] = {0.5, 0.99};
@@ -124,7 +125,8 @@ START_TEST(sticks_but_for_its_creep)
             scene s = open_sliding(&p);
             const double y = 1 - sqrt(1 - p.slope / p.mu), weight = GRAVITY / hypot(1, p.slope);
             const double slope = scene_min_mass(&s) * weight * p.mu * 2 * (1 - y) / EPS;
-            /* residuals also tilt the sheet and change its gap: an error of the normal force of the same size */
+            /* residuals also tilt the sheet and change its gap: an error of the normal force of the same
+             * size */
             const double bound =
                 strcmp(methods[k], "ida") == 0 ? ida_velocity(&s) : 4 * TOL / slope + 1e-9 * EPS;
             scene_advance(&s, 0.1);
@@ -137,8 +139,9 @@ START_TEST(sticks_but_for_its_creep)
 }
 END_TEST
 
-/* If tan a > mu nothing holds the sheet: v >= (sin a - mu cos a) g t. The excess is at most eps, gained while friction
- * is not yet complete, and the velocity that gravity gives in one step: the step in which friction begins. */
+/* If tan a > mu nothing holds the sheet: v >= (sin a - mu cos a) g t. The excess is at most eps, gained
+ * while friction is not yet complete, and the velocity that gravity gives in one step: the step in which
+ * friction begins. */
 START_TEST(slides_beyond_its_angle)
 {
     for (size_t k = 0; k < METHODS; k++) {
@@ -157,9 +160,9 @@ END_TEST
 
 /* ---- How far it slides ---- */
 
-/* x_n of the integrators for x'' = -a from v0. be: v0 t - a h^2 n (n + 1)/2. bdf2 is exact on parabolas, but its
- * first step is be's: e_1 = -a h^2/2 and e_{n+1} = (4 e_n - e_{n-1})/3, so e_n = 3/2 e_1 (1 - 3^-n). The others are
- * exact on parabolas. */
+/* x_n of the integrators for x'' = -a from v0. be: v0 t - a h^2 n (n + 1)/2. bdf2 is exact on parabolas,
+ * but its first step is be's: e_1 = -a h^2/2 and e_{n+1} = (4 e_n - e_{n-1})/3, so e_n = 3/2 e_1 (1 -
+ * 3^-n). The others are exact on parabolas. */
 static double slide_by_recurrence(const char *method, double v0, double a, double h, int n)
 {
     const double t = n * h, exact = v0 * t - a * t * t / 2;
@@ -188,7 +191,8 @@ START_TEST(slides_as_far_as_it_should)
                    p.contact, got, wanted, got / wanted - 1, e.dissipated, e.numerical);
             ck_assert_int_eq(did.steps_rejected, 0);
             assert_below(fabs(got / wanted - 1), 1e-5);
-            /* mu m g s: exact for step methods; ida integrates it by the trapezoidal rule, which is exact for a constant force */
+            /* mu m g s: exact for step methods; ida integrates it by the trapezoidal rule, which is exact
+             * for a constant force */
             assert_below(fabs(e.dissipated / (p.mu * m * GRAVITY * got) - 1), 1e-5);
             /* be itself loses m |dv|^2/2 a step, midpoint nothing */
             const double own = strcmp(p.method, "be") == 0 ? n * m * a * a * p.dt * p.dt / 2 : 0;
@@ -201,10 +205,10 @@ END_TEST
 
 /* ---- Moving colliders ---- */
 
-/* A plate that starts to move at U carries the sheet along: both have slid m U^2/(2 mu m g) on each other when they
- * have the same velocity, and then only the decay of the smoothing is left, at most 0.66 a step with midpoint. The
- * plate's work is m U^2, half of it heat. Midpoint's audit agrees except for the step in which sliding ends, which
- * may slide by an h too far or not far enough: (a h/U)^2. */
+/* A plate that starts to move at U carries the sheet along: both have slid m U^2/(2 mu m g) on each other
+ * when they have the same velocity, and then only the decay of the smoothing is left, at most 0.66 a step
+ * with midpoint. The plate's work is m U^2, half of it heat. Midpoint's audit agrees except for the step in
+ * which sliding ends, which may slide by an h too far or not far enough: (a h/U)^2. */
 START_TEST(a_plate_carries_the_sheet)
 {
     const double speed = 0.2, t = 0.1;
@@ -233,8 +237,9 @@ START_TEST(a_plate_carries_the_sheet)
 }
 END_TEST
 
-/* A plate that rises at U under the sheet kicks it and does work on it: mostly m g U t. The numerical part of midpoint
- * is its error in the energy of the barrier, whose frequency w = 1e3/s gives (w h)^2/24 of the kick's m (2 U)^2/2. */
+/* A plate that rises at U under the sheet kicks it and does work on it: mostly m g U t. The numerical part
+ * of midpoint is its error in the energy of the barrier, whose frequency w = 1e3/s gives (w h)^2/24 of the
+ * kick's m (2 U)^2/2. */
 START_TEST(a_rising_plate_does_work)
 {
     for (size_t k = 0; k < METHODS; k++) {
@@ -304,12 +309,13 @@ static double pull_at(scene *s, int32_t first)
     return g[3 * first + 1] + g[3 * first + 3 + 1];
 }
 
-/* The strip is pulled slowly at one end, and all of it slides towards that end, faster than eps. A node that turns by
- * 2 b = pi/48 between tensions at the angle b with its tangent has T2/T1 = (1 + mu tan b)/(1 - mu tan b), which is
- * exp(2 mu b) except for a share 2 mu b (1 + mu^2) b^2/3: mu pi b^2 (1 + mu^2)/3 = 4e-4 in all. At the ends of the
- * arc a node turns by an angle between 0 and 2 b, on one side of its normal: cos 2 b, 2 b^2 = 2e-3 each. The legs
- * start REACH further out than the strip lies, an angle of REACH/leg = 2e-3 each, times mu. Lagged friction is that
- * of the pressures one step ago. These have grown in proportion to the time, except for a tenth: by h/t. */
+/* The strip is pulled slowly at one end, and all of it slides towards that end, faster than eps. A node
+ * that turns by 2 b = pi/48 between tensions at the angle b with its tangent has T2/T1 = (1 + mu tan b)/(1
+ * - mu tan b), which is exp(2 mu b) except for a share 2 mu b (1 + mu^2) b^2/3: mu pi b^2 (1 + mu^2)/3 =
+ * 4e-4 in all. At the ends of the arc a node turns by an angle between 0 and 2 b, on one side of its
+ * normal: cos 2 b, 2 b^2 = 2e-3 each. The legs start REACH further out than the strip lies, an angle of
+ * REACH/leg = 2e-3 each, times mu. Lagged friction is that of the pressures one step ago. These have grown
+ * in proportion to the time, except for a tenth: by h/t. */
 START_TEST(a_capstan_holds_by_its_angle)
 {
     static const double mus[] = {0.1, 0.3, 0.5};

@@ -3,8 +3,7 @@
 
 #include "support/four_nodes.h"
 
-#define TOLERANCE                                                                                            \
-    1e-9 /* [m]: a hundred times the difference between solvers, a hundredth of the tolerance of test_oracle.c */
+#define TOLERANCE 1e-9 /* [m]: a hundred times what solvers differ by, a hundredth of that of test_oracle.c */
 
 static void compare(const char *settings)
 {

@@ -1,7 +1,7 @@
 /*
- * test_implicit.c: the scenes of CS184 and Boson by implicit steps, at the steps at which their programs blow up and
- * far beyond: springs 200 times as stiff, a hundredth of the mass, both, 1/30 s. The sheets are small, so that this
- * takes seconds; bench/implicit runs them at full size.
+ * test_implicit.c: the scenes of CS184 and Boson by implicit steps, at the steps at which their programs
+ * blow up and far beyond: springs 200 times as stiff, a hundredth of the mass, both, 1/30 s. The sheets are
+ * small, so that this takes seconds; bench/implicit runs them at full size.
  */
 #include "support/scene.h"
 
@@ -106,9 +106,9 @@ static drape_status watch(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* Implicit steps lose energy: kinetic, elastic and potential energy at the end are no more than the potential energy at
- * the start, at rest. The slack is that of ida's tolerance, 1e-3 of m g L, times the number of crossings of a wave, some
- * tens. */
+/* Implicit steps lose energy: kinetic, elastic and potential energy at the end are no more than the
+ * potential energy at the start, at rest. The slack is that of ida's tolerance, 1e-3 of m g L, times the
+ * number of crossings of a wave, some tens. */
 static void falls_and_no_more(const scene *s, double start)
 {
     const drape_model *m = s->model;

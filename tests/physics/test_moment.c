@@ -1,4 +1,5 @@
-/* test_moment.c: the potential of load.moment against quaternions, and a strip that it winds up into a circle. */
+/* test_moment.c: the potential of load.moment against quaternions, and a strip that it winds up into a
+ * circle. */
 #include "support/scene.h"
 
 #define PI     3.14159265358979323846
@@ -34,8 +35,8 @@ static void turn(const double q[4], const double *x, double *out)
     out[2] = x[2] + 2 * (q[0] * a[1] - q[1] * a[0]);
 }
 
-/* A sheet that is rotated about any axis by any angle below pi has the energy M L 2 atan2(q . e0, q_w) and no other.
- * Positions of size 1 and unit vectors of triangles of size 0.4 are exact up to a few roundings. */
+/* A sheet that is rotated about any axis by any angle below pi has the energy M L 2 atan2(q . e0, q_w) and
+ * no other. Positions of size 1 and unit vectors of triangles of size 0.4 are exact up to a few roundings. */
 START_TEST(the_potential_is_the_twist_of_the_quaternion)
 {
     static const double axes[][3] = {{0, 0, 1},     {0, 0, -1},       {1, 0, 0},
@@ -67,9 +68,9 @@ START_TEST(the_potential_is_the_twist_of_the_quaternion)
 }
 END_TEST
 
-/* The moment 2 pi B/L winds a strip up into a full circle, whose end is at its clamp; there it is stable in space. With
- * edges of a = L/20 the curvature is off by (kappa a)^2/8 at most, as a triangle is the chord of its arc: the end by
- * 2 pi times that of the radius L/2 pi. */
+/* The moment 2 pi B/L winds a strip up into a full circle, whose end is at its clamp; there it is stable in
+ * space. With edges of a = L/20 the curvature is off by (kappa a)^2/8 at most, as a triangle is the chord
+ * of its arc: the end by 2 pi times that of the radius L/2 pi. */
 START_TEST(a_strip_is_wound_up_to_a_circle)
 {
     const double rigidity = 1e-4, edge = 1.0 / 20;

@@ -1,10 +1,11 @@
 /*
- * test_oscillator.c: one node as an exact oscillator. The centre of a hexagon of springs of constant
- * K = sqrt(3)/2 E h, pinned at the six corners, moves in the plane with stiffness K sum u u' = 3 K in every
- * direction. The lattice is symmetric about the centre, so the energy is even: there is no cubic term, and with
- * amplitude a = e L the motion is linear up to e^2.
- * The centre is at the origin, so that its position keeps its digits. Strains, of size e, are known to
- * 4 DBL_EPSILON, and residuals to r in forces of size 3 K a: relative errors of a step are
+ * test_oscillator.c: one node as an exact oscillator. The centre of a hexagon of springs of constant K =
+ * sqrt(3)/2 E h, pinned at the six corners, moves in the plane with stiffness K sum u u' = 3 K in every
+ * direction. The lattice is symmetric about the centre, so the energy is even: there is no cubic term, and
+ * with amplitude a = e L the motion is linear up to e^2.
+ *
+ * The centre is at the origin, so that its position keeps its digits. Strains, of size e, are known to 4
+ * DBL_EPSILON, and residuals to r in forces of size 3 K a: relative errors of a step are
  * e^2 + 4 DBL_EPSILON/e + r/(3 K a).
  */
 #include "support/scene.h"

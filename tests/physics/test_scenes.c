@@ -1,7 +1,8 @@
 /*
- * test_scenes.c: every scene of examples/scenes runs. Its beginning, on a coarser mesh if that is a grid, ends "ok";
- * no part lies in a collider and no edge passes through a triangle, neither at the ends of steps nor at frames. A
- * scene that is not in the table runs unchanged for a tenth of a second, so that none is forgotten.
+ * test_scenes.c: every scene of examples/scenes runs. Its beginning, on a coarser mesh if that is a grid,
+ * ends "ok"; no part lies in a collider and no edge passes through a triangle, neither at the ends of steps
+ * nor at frames. A scene that is not in the table runs unchanged for a tenth of a second, so that none is
+ * forgotten.
  */
 #include <dirent.h>
 
@@ -21,8 +22,8 @@ typedef struct beginning {
     struct {
         const char *pointer, *value;
     } set[MAX_SETTINGS];
-    bool explicit; /* the rules of CS184 and Boson keep only points out of colliders, and cloth off itself only roughly */
-    bool touches; /* comes near a collider within this time */
+    bool explicit; /* explicit rules keep only points out of colliders, and self-contact is approximate */
+    bool touches;  /* comes near a collider within this time */
 } beginning;
 
 static const beginning beginnings[] = {
@@ -151,8 +152,8 @@ END_TEST
     "[[0,[0,0,0]],[0.12,[-0.05,0.25,0]],[0.25,[-0.25,0.42,0]],[0.38,[-0.5,0.42,0]],[0.55,[-0.72,0.15,0]],"   \
     "[0.65,[-0.78,0.022,0]]]"
 
-/* A square sheet that is folded onto itself and one that crumples, 20 points a side, at CS184's thickness and a tenth
- * of it. bench/results/folds.csv has 50 points, and the fold at 80. */
+/* A square sheet that is folded onto itself and one that crumples, 20 points a side, at CS184's thickness
+ * and a tenth of it. bench/results/folds.csv has 50 points, and the fold at 80. */
 START_TEST(no_edge_passes_a_triangle)
 {
     static const beginning folds[] = {

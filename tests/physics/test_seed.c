@@ -1,10 +1,12 @@
 /*
- * test_seed.c: the scenes of CS184 and Boson as their programs run them: the headline figures of a build of each
- * (docs/seed_systems.md), and where they fail.
- * Some properties of that build are not reproduced and affect the figures: its order of springs in the pass of the
- * limit, the points that its hash of boxes collects besides those of a point's own box, float or double. The
- * tolerances are twice the difference that the order of springs alone makes here, which is far below the effect of a
- * wrong rule: without the pass strains are 20 % at 30 substeps, without damping the kinetic energy is 200 J.
+ * test_seed.c: the scenes of CS184 and Boson as their programs run them: the headline figures of a build of
+ * each (docs/seed_systems.md), and where they fail.
+ *
+ * Some properties of that build are not reproduced and affect the figures: its order of springs in the pass
+ * of the limit, the points that its hash of boxes collects besides those of a point's own box, float or
+ * double. The tolerances are twice the difference that the order of springs alone makes here, which is far
+ * below the effect of a wrong rule: without the pass strains are 20 % at 30 substeps, without damping the
+ * kinetic energy is 200 J.
  */
 #include "support/scene.h"
 
@@ -88,8 +90,8 @@ START_TEST(pinned2_blows_up_at_two_substeps)
 }
 END_TEST
 
-/* Their program: frame 160 at dt 0.06; at 0.04 all comes to rest, 0.3 to 0.4 m/s after 1500 frames. Here it is checked
- * after 300, at the end of the first swing. The predicted limit, 0.058 s, is in between. */
+/* Their program: frame 160 at dt 0.06; at 0.04 all comes to rest, 0.3 to 0.4 m/s after 1500 frames. Here it
+ * is checked after 300, at the end of the first swing. The predicted limit, 0.058 s, is in between. */
 START_TEST(boson_blows_up_between)
 {
     scene s = load("verlet_100", "/integrator/dt", "0.06");

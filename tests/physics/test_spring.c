@@ -1,8 +1,9 @@
 /*
  * test_spring.c: the terms spring.* and limit.strain against closed forms.
- * Chains are vertical grids of 2 columns. Each column is a chain of structural springs; the springs between them
- * are neither stretched nor turned, since both move alike. The columns are 10 m apart, so that the edges across,
- * which are limited too, are not stretched by more than one per cent either.
+ *
+ * Chains are vertical grids of 2 columns. Each column is a chain of structural springs; the springs between
+ * them are neither stretched nor turned, since both move alike. The columns are 10 m apart, so that the
+ * edges across, which are limited too, are not stretched by more than one per cent either.
  */
 #include "drape/extend.h"
 #include "support/scene.h"
@@ -19,8 +20,8 @@
 #define SPEED     1.3
 #define LENGTH    0.8
 
-/* One node below each of two pinned ones, thrown downwards: along its spring q = l is linear, so m x'' + c x' + k x = 0
- * exactly, at any amplitude below the length. */
+/* One node below each of two pinned ones, thrown downwards: along its spring q = l is linear, so m x'' + c
+ * x' + k x = 0 exactly, at any amplitude below the length. */
 static scene oscillator(double damping, const char *integrator)
 {
     return scene_open(
@@ -35,9 +36,9 @@ static double stretch(scene *s)
     return -scene_state(s)->x[3 * 2 + 1] - LENGTH;
 }
 
-/* x = v0/wd exp(-a t) sin(wd t), a = c/(2 m), wd = sqrt(k/m - a^2): frequency and decay at once. Steps do not expand
- * the energy norm, so their errors add up. Those of IDA are at most sqrt(N) tolerances in one component, N = 12 the
- * number of unknowns, of x or, over w, of v. */
+/* x = v0/wd exp(-a t) sin(wd t), a = c/(2 m), wd = sqrt(k/m - a^2): frequency and decay at once. Steps do
+ * not expand the energy norm, so their errors add up. Those of IDA are at most sqrt(N) tolerances in one
+ * component, N = 12 the number of unknowns, of x or, over w, of v. */
 START_TEST(one_spring_follows_the_damped_oscillator)
 {
     static const double ratios[] = {0, 0.05, 0.6}; /* of critical damping */
@@ -83,8 +84,9 @@ START_TEST(backward_euler_takes_the_dashpot_in_step_form)
 }
 END_TEST
 
-/* Implicit midpoint, whose rate is grad q . v: for a quadratic energy and a linear dashpot the energy and the dissipation
- * add up to the initial energy, up to the work of residuals of r over the path of the nodes. */
+/* Implicit midpoint, whose rate is grad q . v: for a quadratic energy and a linear dashpot the energy and
+ * the dissipation add up to the initial energy, up to the work of residuals of r over the path of the
+ * nodes. */
 START_TEST(midpoint_accounts_for_every_joule)
 {
     const double tolerance = 1e-11;
@@ -108,9 +110,9 @@ END_TEST
 
 #define ROWS 9 /* nodes of a chain, the first held */
 
-/* Spring j, from row j to j + 1, carries the weight below: (ROWS - 1 - j) m g. Its constant is k times the mean of
- * both ends' 1 + G (1 - row/ROWS). Residuals of at most r in every node shift a node by the sum over the springs
- * above it of (ROWS - 1) r/k. */
+/* Spring j, from row j to j + 1, carries the weight below: (ROWS - 1 - j) m g. Its constant is k times the
+ * mean of both ends' 1 + G (1 - row/ROWS). Residuals of at most r in every node shift a node by the sum
+ * over the springs above it of (ROWS - 1) r/k. */
 START_TEST(chain_hangs_with_its_gradient)
 {
     static const double gradients[] = {0, 0.4, -0.9};
@@ -139,9 +141,9 @@ END_TEST
 
 /* ---- Newton's third law ---- */
 
-/* Forces and moments of all springs and dashpots of a sheet sum to zero, with the gradient, at a deformed, moving
- * state. If a spring had the stiffness of the neighbour's row, as in Boson, 0.4 % of the force of every downward
- * spring would remain. A sum of n terms of size F is known to n DBL_EPSILON F. */
+/* Forces and moments of all springs and dashpots of a sheet sum to zero, with the gradient, at a deformed,
+ * moving state. If a spring had the stiffness of the neighbour's row, as in Boson, 0.4 % of the force of
+ * every downward spring would remain. A sum of n terms of size F is known to n DBL_EPSILON F. */
 START_TEST(forces_and_moments_sum_to_zero)
 {
     scene s =
@@ -178,8 +180,8 @@ START_TEST(forces_and_moments_sum_to_zero)
 }
 END_TEST
 
-/* r rows and c columns: r (c - 1) + (r - 1) c structural, 2 (r - 1)(c - 1) shear, r (c - 2) + (r - 2) c bend springs,
- * each with its own length. The 14 502 springs of CS184's 50 x 50 points are these. */
+/* r rows and c columns: r (c - 1) + (r - 1) c structural, 2 (r - 1)(c - 1) shear, r (c - 2) + (r - 2) c
+ * bend springs, each with its own length. The 14 502 springs of CS184's 50 x 50 points are these. */
 START_TEST(springs_join_the_right_nodes)
 {
     static const char *const kinds[] = {"spring.structural", "spring.shear", "spring.bend"};
@@ -214,8 +216,8 @@ static double barrier_slope(double y)
     return -2 * y * log(1 - y) + y * y / (1 - y);
 }
 
-/* A node on a spring and a limit hangs where m g = k L s + K L w b'(y), s = onset + w y: for a chosen y, the weight is
- * set to match. A residual r moves it by r over a stiffness above k. */
+/* A node on a spring and a limit hangs where m g = k L s + K L w b'(y), s = onset + w y: for a chosen y,
+ * the weight is set to match. A residual r moves it by r over a stiffness above k. */
 START_TEST(limit_balances_its_load)
 {
     static const double windows[] = {-0.5, 1e-3, 0.3, 0.7, 0.97, 0.989};
@@ -236,8 +238,9 @@ START_TEST(limit_balances_its_load)
 }
 END_TEST
 
-/* b and its first two derivatives on both sides of the onset and of the cap, by the energy of one element: they differ
- * by no more than the next derivative, b''' <= 6 at the onset and about 2/cap^3 at the cap, times the distance. */
+/* b and its first two derivatives on both sides of the onset and of the cap, by the energy of one element:
+ * they differ by no more than the next derivative, b''' <= 6 at the onset and about 2/cap^3 at the cap,
+ * times the distance. */
 START_TEST(limit_is_smooth_twice)
 {
     scene s = scene_model(CHAIN(2, 1) "'total_mass': 1}, 'terms': [{'type': 'limit.strain', 'stiffness': 1,"
@@ -267,7 +270,8 @@ START_TEST(limit_is_smooth_twice)
 }
 END_TEST
 
-/* CS184's pinned2 with 9 x 9 points: ks 5000, bend 0.2 ks, hanging by two corners, backward Euler at 1/30 s. */
+/* CS184's pinned2 with 9 x 9 points: ks 5000, bend 0.2 ks, hanging by two corners, backward Euler at 1/30
+ * s. */
 static scene hung_sheet(double gravity, const char *limit)
 {
     return scene_open(
@@ -294,8 +298,8 @@ static double largest_strain(const scene *s, const drape_elements *pairs)
     return max;
 }
 
-/* With the default stiffness, which is derived from the weight at 9.8 m/s2, a hundredfold load keeps every spring
- * below 10 %; without the limit the sheet exceeds it at once. */
+/* With the default stiffness, which is derived from the weight at 9.8 m/s2, a hundredfold load keeps every
+ * spring below 10 %; without the limit the sheet exceeds it at once. */
 START_TEST(limit_holds_a_hundredfold_load)
 {
     static const double loads[] = {-9.8, -980};
@@ -324,8 +328,8 @@ START_TEST(limit_holds_a_hundredfold_load)
 }
 END_TEST
 
-/* If the load exceeds the force of the barrier below its limit, about 2/cap K L w, no state beyond the limit is
- * accepted: the steps become small, and the message gives the reason. */
+/* If the load exceeds the force of the barrier below its limit, about 2/cap K L w, no state beyond the
+ * limit is accepted: the steps become small, and the message gives the reason. */
 START_TEST(overload_stops_with_the_reason)
 {
     scene s = scene_open(CHAIN(2, 0.8) "'total_mass': 1}, 'terms': [{'type': 'limit.strain', 'stiffness': 1,"
@@ -342,8 +346,8 @@ END_TEST
 
 /* ---- Degeneration ---- */
 
-/* A spring of length 0 has no direction: the state is rejected and the spring named. Just above the bound all is
- * finite. */
+/* A spring of length 0 has no direction: the state is rejected and the spring named. Just above the bound
+ * all is finite. */
 START_TEST(collapsed_spring_is_named)
 {
     scene s = oscillator(0.5, "'dt': 0.01");

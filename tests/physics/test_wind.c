@@ -1,5 +1,5 @@
-/* test_wind.c: drag.wind against closed forms: the force on a flat sheet, a sheet that falls horizontally, and one that
- * the wind carries along. */
+/* test_wind.c: drag.wind against closed forms: the force on a flat sheet, a sheet that falls horizontally,
+ * and one that the wind carries along. */
 #include "support/scene.h"
 
 #include "assemble/check.h"
@@ -66,7 +66,8 @@ static void swirl(void *user, double t, int32_t count, const double *x, double *
         }
 }
 
-/* dg/dx includes the change of the wind as nodes move, dg/dv does not: for both drags, their sum in the system, and D. */
+/* dg/dx includes the change of the wind as nodes move, dg/dv does not: for both drags, their sum in the
+ * system, and D. */
 START_TEST(derivatives_in_the_wind_of_a_host)
 {
     static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
@@ -89,11 +90,11 @@ START_TEST(derivatives_in_the_wind_of_a_host)
 END_TEST
 
 /*
- * A horizontal sheet stays flat: every node has the same share of weight and wind. Backward Euler's v1 = v0 + h (k
- * u1 |u1| - g), u = w - v, k = rho C/(2 sigma), is for headwind, u1 = u0 + h g - h k u1^2, the positive root
- * u1 = (sqrt(1 + 4 h k (u0 + h g)) - 1)/(2 h k).
- * Tolerance: a residual of 1e-12 N on the smallest mass, 200 * 1e-3 * 0.01/6 kg (a corner in one triangle), moves v
- * by h r/m = 3e-11 m/s a step, n = 100 of them; the contraction of u itself is not counted.
+ * A horizontal sheet stays flat: every node has the same share of weight and wind. Backward Euler's v1 = v0
+ * + h (k u1 |u1| - g), u = w - v, k = rho C/(2 sigma), is for headwind, u1 = u0 + h g - h k u1^2, the
+ * positive root u1 = (sqrt(1 + 4 h k (u0 + h g)) - 1)/(2 h k).
+ * Tolerance: a residual of 1e-12 N on the smallest mass, 200 * 1e-3 * 0.01/6 kg (a corner in one triangle),
+ * moves v by h r/m = 3e-11 m/s a step, n = 100 of them; the contraction of u itself is not counted.
  */
 static void fall_level(double wind, double gravity)
 {

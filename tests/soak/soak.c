@@ -1,12 +1,13 @@
 /*
- * soak.c: drives sims for long as a host does, frame after frame, t += 1/60, with pins and colliders moved in each
- * frame. It checks that memory does not grow, and that a second run has the same bits at every mark, although it is
- * saved and restored there. `soak [--steps N] [--minutes M] [CASE...]`: each case for at least N steps (default: for a
- * few seconds), or for M minutes. TAP on stdout.
- * The memory is that of the process, in pages (Anonymous of /proc/self/smaps_rollup, which counts them, where other
- * counters of Linux are off by up to 64 pages a thread), or the heap that malloc has allocated, and that allocated by
- * Drape's allocator, in bytes. Both are measured at each mark. In the first marks a case warms up: lists of contacts grow
- * to the longest of the motion.
+ * soak.c: drives sims for long as a host does, frame after frame, t += 1/60, with pins and colliders moved
+ * in each frame. It checks that memory does not grow, and that a second run has the same bits at every
+ * mark, although it is saved and restored there. `soak [--steps N] [--minutes M] [CASE...]`: each case for
+ * at least N steps (default: for a few seconds), or for M minutes. TAP on stdout.
+ *
+ * The memory is that of the process, in pages (Anonymous of /proc/self/smaps_rollup, which counts them,
+ * where other counters of Linux are off by up to 64 pages a thread), or the heap that malloc has allocated,
+ * and that allocated by Drape's allocator, in bytes. Both are measured at each mark. In the first marks a
+ * case warms up: lists of contacts grow to the longest of the motion.
  */
 #include <fcntl.h>
 #include <inttypes.h>
@@ -30,8 +31,9 @@
 #define FRAME     (1.0 / 60) /* [s] */
 #define PERIOD    240        /* frames of the host's motion */
 #define MAX_MARKS 65536
-/* [bytes] A block of malloc may be larger than requested, as remainders below 32 bytes are not split off: for some
- * hundred blocks of a sim. A leak at each restore, of at least 16 bytes, is more than that after 256 of them. */
+/* [bytes] A block of malloc may be larger than requested, as remainders below 32 bytes are not split off:
+ * for some hundred blocks of a sim. A leak at each restore, of at least 16 bytes, is more than that after
+ * 256 of them. */
 #define HEAP_SLACK  4096
 #define SHORT_MARKS 12 /* after the warm-up, by default */
 
@@ -143,8 +145,8 @@ static int64_t count_heap(void)
 #endif
 }
 
-/* A sim that is destroyed and created repeatedly leaves gaps, which malloc reuses at some later time: then the pages are
- * no measure. */
+/* A sim that is destroyed and created repeatedly leaves gaps, which malloc reuses at some later time: then
+ * the pages are no measure. */
 static memory measure(bool restart)
 {
     return (memory){.own = own, .all = restart ? count_heap() : count_pages()};
@@ -209,7 +211,8 @@ static drape_status save_and_restore(drape_sim *sim)
     return status ? status : drape_sim_restore_from(sim, saved, saved_size);
 }
 
-/* Moves pins and collider to their positions at the end of this frame: on a sine, counted within its period. */
+/* Moves pins and collider to their positions at the end of this frame: on a sine, counted within its
+ * period. */
 static drape_status move(const soak *c, drape_sim *sim, int64_t frame)
 {
     const drape_model *model = drape_sim_model(sim);

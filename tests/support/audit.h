@@ -1,7 +1,7 @@
 /*
- * audit.h: checks of a run with contact, at states that the run itself did not check: how deep nodes, and points of
- * faces and edges between them, lie in colliders, and how many edges pass through triangles, at the ends of accepted
- * steps and at frames, which may lie between steps.
+ * audit.h: checks of a run with contact, at states that the run itself did not check: how deep nodes, and
+ * points of faces and edges between them, lie in colliders, and how many edges pass through triangles, at
+ * the ends of accepted steps and at frames, which may lie between steps.
  */
 #ifndef DRAPE_TESTS_AUDIT_H
 #define DRAPE_TESTS_AUDIT_H

@@ -1,6 +1,6 @@
 /*
- * comma.h: a locale whose numbers have a decimal comma. If none is installed, localedef of Debian's package locales
- * makes one in a temporary folder.
+ * comma.h: a locale whose numbers have a decimal comma. If none is installed, localedef of Debian's package
+ * locales makes one in a temporary folder.
  */
 #ifndef DRAPE_TESTS_COMMA_H
 #define DRAPE_TESTS_COMMA_H

@@ -1,6 +1,7 @@
 /*
- * dep.h: the scenes of the DEP report: a horizontal sheet of c edges a side that falls, pinned at four inner nodes
- * r (c + 1) + k, r and k of {c/3, 2 c/3}; edges 0.1 m, 10 g spread evenly over all nodes, E 1e5 Pa, thickness 1 mm.
+ * dep.h: the scenes of the DEP report: a horizontal sheet of c edges a side that falls, pinned at four
+ * inner nodes r (c + 1) + k, r and k of {c/3, 2 c/3}; edges 0.1 m, 10 g spread evenly over all nodes, E 1e5
+ * Pa, thickness 1 mm.
  */
 #ifndef DRAPE_TESTS_DEP_H
 #define DRAPE_TESTS_DEP_H
@@ -75,9 +76,9 @@ static inline void dep_run(const dep_case *c)
         counted += count;
     ck_assert_int_eq(counted, log.rejected);
 
-    /* Each pin carries a quarter of 0.098 N on at least two springs of at least 0.87 N per unit of strain: 1.4 % at rest,
-     * twice that under a sudden load, more when the hanging corners swing; the runs of the report that failed had 10 to
-     * 4000. */
+    /* Each pin carries a quarter of 0.098 N on at least two springs of at least 0.87 N per unit of strain:
+     * 1.4 % at rest, twice that under a sudden load, more when the hanging corners swing; the runs of the
+     * report that failed had 10 to 4000. */
     ck_assert(done.strain_max < 0.2 && done.strain_min > -0.2);
     /* No node can be lower than its shortest path along edges to the nearest pin; NaN fails this too. */
     for (int32_t i = 0; i < s.model->node_count; i++)

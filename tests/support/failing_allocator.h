@@ -1,5 +1,6 @@
-/* failing_allocator.h: a context whose memory is counted and fails on demand. A test makes one allocation after the
- * other fail, and checks that each failure is reported and none leaks:
+/* failing_allocator.h: a context whose memory is counted and fails on demand. A test makes one allocation
+ * after the other fail, and checks that each failure is reported and none leaks:
+ *
  *     failing_allocator memory = {.fail_at = n};
  *     drape_context *ctx = failing_context(&memory);
  *     ...
@@ -14,8 +15,7 @@
 #include "drape/drape.h"
 
 typedef struct failing_allocator {
-    long
-        fail_at; /* number of the call that fails, from 1; 0: none; the memory of the context itself does not count */
+    long fail_at;     /* number of the call that fails, from 1, after the context's own; 0: none */
     bool stay_broken; /* all later calls fail too */
     long calls, live; /* allocations so far; those not yet released */
     size_t largest;   /* [bytes] largest request, failed or not */

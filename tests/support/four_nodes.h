@@ -1,4 +1,5 @@
-/* four_nodes.h: the smallest sheet of the DEP report: two triangles, nodes 0 to 2 pinned, node 3 falls around the hinge. */
+/* four_nodes.h: the smallest sheet of the DEP report: two triangles, nodes 0 to 2 pinned, node 3 falls
+ * around the hinge. */
 #ifndef DRAPE_TESTS_FOUR_NODES_H
 #define DRAPE_TESTS_FOUR_NODES_H
 

@@ -1,10 +1,12 @@
 /*
  * ida_full.h: IDA without Drape's reduction, to compare with: the full system of 2 n unknowns
  *     y = (x, v),  F = [x' - v ; M v' + g(x, v)],  dF/dy + c_j dF/dy' = [c_j I, -I ; K, D + c_j M],
- * in SUNDIALS' own sparse matrix, factored by SUNDIALS' own KLU. IDA is configured as in src/integrators/ida.c, with the
- * same test of convergence, so in exact arithmetic both take the same steps. Pins must not move.
- * SUNDIALS zeros a sparse matrix before every Jacobian, including its indices. The Jacobian here writes every value and
- * no index, so the matrix's function for zeroing is replaced by one that does nothing.
+ * in SUNDIALS' own sparse matrix, factored by SUNDIALS' own KLU. IDA is configured as in
+ * src/integrators/ida.c, with the same test of convergence, so in exact arithmetic both take the same
+ * steps. Pins must not move.
+ *
+ * SUNDIALS zeros a sparse matrix before every Jacobian, including its indices. The Jacobian here writes
+ * every value and no index, so the matrix's function for zeroing is replaced by one that does nothing.
  */
 #ifndef DRAPE_TESTS_IDA_FULL_H
 #define DRAPE_TESTS_IDA_FULL_H

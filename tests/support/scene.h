@@ -1,9 +1,11 @@
 /*
- * scene.h: for tests that run a scene. A scene is JSON text, in which apostrophes stand for quotation marks so that it
- * reads well in C, and printf conversions for numbers:
+ * scene.h: for tests that run a scene. A scene is JSON text, in which apostrophes stand for quotation marks
+ * so that it reads well in C, and printf conversions for numbers:
+ *
  *     scene s = scene_open("{'drape': 1, ..., 'gravity': [0, %g, 0], 'duration': 1}", -9.81);
  *     scene_advance(&s, 1);
  *     scene_close(&s);
+ *
  * Any failure fails the test with the library's message.
  */
 #ifndef DRAPE_TESTS_SCENE_H
@@ -129,19 +131,19 @@ static inline double scene_min_mass(const scene *s)
     return smallest;
 }
 
-/* Round-off of the force on a node [N]. Coordinates of size `size` are rounded by DBL_EPSILON/2 of it, edge vectors by
- * twice that; a spring multiplies that by its constant, a lattice node has 6 springs of at most `spring` [N/m], and the
- * sum of 6 forces and the products in each add as much again. */
+/* Round-off of the force on a node [N]. Coordinates of size `size` are rounded by DBL_EPSILON/2 of it, edge
+ * vectors by twice that; a spring multiplies that by its constant, a lattice node has 6 springs of at most
+ * `spring` [N/m], and the sum of 6 forces and the products in each add as much again. */
 static inline double force_noise(double spring, double size)
 {
     return 6 * 2 * spring * 2 * DBL_EPSILON * size;
 }
 
 /*
- * The largest distance [m] of a node from the exact solution of backward Euler after n steps whose residuals were at
- * most r [N] in every component. With K >= 0 the error obeys e_{n+1} = (1 + h^2 M^-1 K)^-1 (2 e_n - e_{n-1} + h^2 M^-1
- * r), which in the norm of M grows no faster than for K = 0: n (n + 1)/2 h^2 |M^-1/2 r|; and
- * |e|_max <= |M^1/2 e|/sqrt(m_min), |M^-1/2 r| <= sqrt(3 nodes/m_min) r.
+ * The largest distance [m] of a node from the exact solution of backward Euler after n steps whose
+ * residuals were at most r [N] in every component. With K >= 0 the error obeys e_{n+1} = (1 + h^2 M^-1
+ * K)^-1 (2 e_n - e_{n-1} + h^2 M^-1 r), which in the norm of M grows no faster than for K = 0: n (n + 1)/2
+ * h^2 |M^-1/2 r|; and |e|_max <= |M^1/2 e|/sqrt(m_min), |M^-1/2 r| <= sqrt(3 nodes/m_min) r.
  */
 static inline double drift_bound(const scene *s, double n, double h, double r)
 {

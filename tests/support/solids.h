@@ -1,7 +1,7 @@
 /*
- * solids.h: how deep a triangle of cloth lies in a solid, computed independently of the library. For a convex body of
- * planes, and for all points within a radius of a segment, it is exact over the whole triangle; for cylinders and
- * rounded edges it is the maximum over many points of the triangle.
+ * solids.h: how deep a triangle of cloth lies in a solid, computed independently of the library. For a
+ * convex body of planes, and for all points within a radius of a segment, it is exact over the whole
+ * triangle; for cylinders and rounded edges it is the maximum over many points of the triangle.
  */
 #ifndef DRAPE_TESTS_SOLIDS_H
 #define DRAPE_TESTS_SOLIDS_H
@@ -34,7 +34,8 @@ static inline void solid_between(const double *a, const double *b, double t, dou
         out[k] = a[k] + t * (b[k] - a[k]);
 }
 
-/* Whether a part of the triangle is deeper than `depth` in all planes: the part that is left after cutting. */
+/* Whether a part of the triangle is deeper than `depth` in all planes: the part that is left after
+ * cutting. */
 static inline bool solid_cuts(const solid *s, double x[3][3], double depth)
 {
     double p[SOLID_CORNERS][3], q[SOLID_CORNERS][3];

@@ -1,7 +1,8 @@
 /*
- * test_energy.c: the audit of energy. By construction kinetic + elastic + gravity + dissipated + numerical - work of
- * pins is constant, since numerical is the remainder. Tested here: the remainder vanishes with h, or with rtol, as the
- * order of the method says; the dissipation of damping and the work of pins are those of closed forms.
+ * test_energy.c: the audit of energy. By construction kinetic + elastic + gravity + dissipated + numerical
+ * - work of pins is constant, since numerical is the remainder. Tested here: the remainder vanishes with h,
+ * or with rtol, as the order of the method says; the dissipation of damping and the work of pins are those
+ * of closed forms.
  */
 #include "support/scene.h"
 
@@ -41,9 +42,9 @@ static double numerical(const char *method, const char *terms, double dt, const 
     return energy;
 }
 
-/* Slopes of the remainder, as in test_order.c. midpoint conserves quadratic invariants only: what it gains or loses in
- * other energies, and in the work of damping taken at the middle of the step, is of its order; so are the gains and
- * losses of trbdf2. */
+/* Slopes of the remainder, as in test_order.c. midpoint conserves quadratic invariants only: what it gains
+ * or loses in other energies, and in the work of damping taken at the middle of the step, is of its order;
+ * so are the gains and losses of trbdf2. */
 START_TEST(the_remainder_of_one_step_methods_has_their_order)
 {
     static const char *const methods[] = {"be", "midpoint", "trbdf2"}, *const terms[] = {"", DAMPED};
@@ -58,8 +59,8 @@ START_TEST(the_remainder_of_one_step_methods_has_their_order)
 }
 END_TEST
 
-/* Backward Euler loses energy in every step: at least 1/2 m |v1 - v0|^2 if the energy is convex. For hinges and
- * springs under pressure the energy is not convex, but at this h they are slow. */
+/* Backward Euler loses energy in every step: at least 1/2 m |v1 - v0|^2 if the energy is convex. For hinges
+ * and springs under pressure the energy is not convex, but at this h they are slow. */
 START_TEST(be_only_takes_energy)
 {
     const drape_sim_def def = def_of("be", END / 100, NULL);
@@ -76,9 +77,9 @@ START_TEST(be_only_takes_energy)
 }
 END_TEST
 
-/* With order 5 the error at a time falls as rtol^(5/6), and so does the remainder without damping. With damping, its
- * work is summed by the trapezoidal rule, of order 2 in the steps, which go with rtol^(1/6): only as rtol^(1/3), one
- * decade for three. A factor 2 is left for the loosest tolerances. */
+/* With order 5 the error at a time falls as rtol^(5/6), and so does the remainder without damping. With
+ * damping, its work is summed by the trapezoidal rule, of order 2 in the steps, which go with rtol^(1/6):
+ * only as rtol^(1/3), one decade for three. A factor 2 is left for the loosest tolerances. */
 START_TEST(the_remainder_of_ida_falls_with_rtol)
 {
     static const char *const terms[] = {"", DAMPED};
@@ -96,11 +97,11 @@ START_TEST(the_remainder_of_ida_falls_with_rtol)
 }
 END_TEST
 
-/* The oscillator of test_oscillator.c with dashpots and drag: x'' + 2 d x' + w^2 x = 0 with 2 d = w^2 beta +
- * coefficient/areal density. From x = 0 and v0, x = v0/wd exp(-d t) sin(wd t), and the dissipation is the decrease of
- * E. The springs are linear up to (a/L)^2 = 1e-8. midpoint shifts phases of w h by (w h)^2/12 of them and takes work
- * at the middle of the step: an error of at most (w h)^2 of E0; ida's trapezoidal rule has an error of (w h)^2/12 with
- * steps h below 0.3/w at rtol 1e-8. */
+/* The oscillator of test_oscillator.c with dashpots and drag: x'' + 2 d x' + w^2 x = 0 with 2 d = w^2 beta
+ * + coefficient/areal density. From x = 0 and v0, x = v0/wd exp(-d t) sin(wd t), and the dissipation is the
+ * decrease of E. The springs are linear up to (a/L)^2 = 1e-8. midpoint shifts phases of w h by (w h)^2/12
+ * of them and takes work at the middle of the step: an error of at most (w h)^2 of E0; ida's trapezoidal
+ * rule has an error of (w h)^2/12 with steps h below 0.3/w at rtol 1e-8. */
 START_TEST(dissipated_is_the_work_of_damping_in_closed_form)
 {
     const double length = 0.1, density = 0.2, stiffness = 3 * sqrt(3.0) / 2 * 1e3,
@@ -144,11 +145,11 @@ START_TEST(dissipated_is_the_work_of_damping_in_closed_form)
 }
 END_TEST
 
-/* A curtain hangs by its upper edge, at rest under its own weight, and is lifted by H at a speed u that is slow compared
- * with its stretch waves. A pin at constant speed does u times the impulse it gives: u (m g T + p) = m g H + u p. Here p
- * is the momentum at the end, m u if the curtain moves along; waves that are not yet damped, and the integrator's
- * account of the jumps of the pins' own kinetic energy, are of the same size. So the work is m g H within 2 m u^2:
- * 0.5 % of it. */
+/* A curtain hangs by its upper edge, at rest under its own weight, and is lifted by H at a speed u that is
+ * slow compared with its stretch waves. A pin at constant speed does u times the impulse it gives: u (m g T
+ * + p) = m g H + u p. Here p is the momentum at the end, m u if the curtain moves along; waves that are not
+ * yet damped, and the integrator's account of the jumps of the pins' own kinetic energy, are of the same
+ * size. So the work is m g H within 2 m u^2: 0.5 % of it. */
 START_TEST(pins_that_lift_a_sheet_do_m_g_h)
 {
     const double height = 0.1, speed = 0.05;
@@ -207,11 +208,12 @@ static drape_status note_swing(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* Springs 600 times as stiff as those of CS184's sheet, undamped, released horizontally: every integrator steps over the
- * fastest waves, w h = 8 (ida) to 400, or only partly resolves them. A run that completes must at no time have gained
- * more than the integrator's allowed share of the available energy: the decrease of gravity and 1/2 m g L. A gain of up
- * to 1e-6 in a step is not judged, 3600 times at most. With outdated contraction rates, ida completed such runs with
- * twice the energy of their start; it took three times as many steps, and two of them had to be refused. */
+/* Springs 600 times as stiff as those of CS184's sheet, undamped, released horizontally: every integrator
+ * steps over the fastest waves, w h = 8 (ida) to 400, or only partly resolves them. A run that completes
+ * must at no time have gained more than the integrator's allowed share of the available energy: the
+ * decrease of gravity and 1/2 m g L. A gain of up to 1e-6 in a step is not judged, 3600 times at most. With
+ * outdated contraction rates, ida completed such runs with twice the energy of their start; it took three
+ * times as many steps, and two of them had to be refused. */
 START_TEST(completed_runs_have_gained_no_energy_from_stiff_springs)
 {
     int completed = 0;

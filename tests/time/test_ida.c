@@ -1,8 +1,9 @@
 /*
- * test_ida.c: the integrator "ida": tolerances that bound the error, steps that depend on nothing else, restarts, dense
- * output.
- * The sheet: 0.5 m x 0.4 m, pinned at two corners and pushed, soft enough (E h = 20 N/m) that its stretch waves have
- * periods above sqrt(m/(8 K)) 2 pi = 0.03 s, which steps resolve, and smooth up to rounding.
+ * test_ida.c: the integrator "ida": tolerances that bound the error, steps that depend on nothing else,
+ * restarts, dense output.
+ *
+ * The sheet: 0.5 m x 0.4 m, pinned at two corners and pushed, soft enough (E h = 20 N/m) that its stretch
+ * waves have periods above sqrt(m/(8 K)) 2 pi = 0.03 s, which steps resolve, and smooth up to rounding.
  */
 #include "faults/host.h"
 #include "support/scene.h"
@@ -10,7 +11,8 @@
 #define LENGTH 0.6403124237432849 /* [m] diagonal, the length of the default tolerances */
 #define END    0.3                /* [s] */
 
-/* The text of a sheet, for printf: translation along x [m], more terms, pins, rtol, more settings after a comma. */
+/* The text of a sheet, for printf: translation along x [m], more terms, pins, rtol, more settings after a
+ * comma. */
 #define SHEET                                                                                                \
     "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 5, 'width': 0.5, 'height': "   \
     "0.4, "                                                                                                  \
@@ -53,10 +55,10 @@ static double *positions_at(const char *pins, double rtol, const char *more, dou
 
 /* ---- Tolerances ---- */
 
-/* Over 1e-2 ... 1e-8 the error falls with rtol; no error exceeds twice the one before. BDF of order p takes steps of
- * rtol^(1/(p+1)), and its error at a time is that many local errors: rtol^(p/(p+1)), at least rtol^(2/3) in order 2.
- * Six decades of rtol are at least four of the error; one of these is allowed for the loosest tolerances, where IDA is
- * not yet in its asymptotic range. */
+/* Over 1e-2 ... 1e-8 the error falls with rtol; no error exceeds twice the one before. BDF of order p takes
+ * steps of rtol^(1/(p+1)), and its error at a time is that many local errors: rtol^(p/(p+1)), at least
+ * rtol^(2/3) in order 2. Six decades of rtol are at least four of the error; one of these is allowed for
+ * the loosest tolerances, where IDA is not yet in its asymptotic range. */
 static void falls(const char *pins, int max_order)
 {
     char order[40];
@@ -119,8 +121,8 @@ static long long steps_after(const char *more, double rtol)
     return steps;
 }
 
-/* rtol stands for two weights and an order, and nothing else: with all three given, it has no effect; and each of them
- * has an effect of its own. */
+/* rtol stands for two weights and an order, and nothing else: with all three given, it has no effect; and
+ * each of them has an effect of its own. */
 START_TEST(atol_x_and_atol_v_are_the_weights)
 {
     char all[160];
@@ -138,9 +140,10 @@ START_TEST(atol_x_and_atol_v_are_the_weights)
 }
 END_TEST
 
-/* Tolerances do not depend on the position of the scene. At 1000 m positions are rounded to 2^-44 = 5.7e-14 m, at the
- * origin to 1e-16 m; that noise grows by the divergence of neighbouring runs (test_ida_full.c), here by less than 1e4.
- * Decisions to accept a step compare numbers that differ by as much: they are the same except by accident. */
+/* Tolerances do not depend on the position of the scene. At 1000 m positions are rounded to 2^-44 = 5.7e-14
+ * m, at the origin to 1e-16 m; that noise grows by the divergence of neighbouring runs (test_ida_full.c),
+ * here by less than 1e4. Decisions to accept a step compare numbers that differ by as much: they are the
+ * same except by accident. */
 START_TEST(a_scene_far_away_takes_the_same_steps)
 {
     const double far = 1000;
@@ -210,9 +213,9 @@ START_TEST(max_step_is_kept)
 }
 END_TEST
 
-/* A step ends at every key within it, to the last bit, and the next one starts small: IDA has no history there. Its
- * first step is at most a thousandth of the time left, or 1/2 over the norm of the rates; here less than a fifth of the
- * step before. */
+/* A step ends at every key within it, to the last bit, and the next one starts small: IDA has no history
+ * there. Its first step is at most a thousandth of the time left, or 1/2 over the norm of the rates; here
+ * less than a fifth of the step before. */
 START_TEST(steps_end_at_kinks_and_start_anew)
 {
     static const double kinks[] = {0.05, 0.1, 0.17};
@@ -231,8 +234,8 @@ START_TEST(steps_end_at_kinks_and_start_anew)
 }
 END_TEST
 
-/* After an advance that ends at a key, the next one restarts too, as within an advance. Its steps are not the same,
- * because IDA's first step depends on the time to the end, but as small. */
+/* After an advance that ends at a key, the next one restarts too, as within an advance. Its steps are not
+ * the same, because IDA's first step depends on the time to the end, but as small. */
 START_TEST(an_advance_that_ends_at_a_kink_starts_anew_too)
 {
     scene s = sheet(MOVED, 1e-4, "");
@@ -294,9 +297,10 @@ static double worst_frame(const frame_log *a, const frame_log *b)
     return worst;
 }
 
-/* Frames between steps are as accurate as steps that end there: both are within their errors of the converged run. The
- * dense output is the polynomial of the step, whose error is of the size of the local error, atol_x, and is added. So an
- * advance in pieces gives the same result within the tolerance, frame by frame, and ends at the requested time. */
+/* Frames between steps are as accurate as steps that end there: both are within their errors of the
+ * converged run. The dense output is the polynomial of the step, whose error is of the size of the local
+ * error, atol_x, and is added. So an advance in pieces gives the same result within the tolerance, frame by
+ * frame, and ends at the requested time. */
 START_TEST(frames_are_what_a_run_that_stops_there_has)
 {
     static const double rtols[] = {1e-3, 1e-4, 1e-6};
@@ -357,10 +361,10 @@ static double host_distance(const host_sim *s, const host_copy *from)
     return sqrt(sum / nodes);
 }
 
-/* One force or Hessian that is not finite, at the nth evaluation for every n except the first force, which is that of
- * the initial state, where no smaller step helps. IDA retries with a quarter of the step, or the controller restarts
- * it. The run completes with finite states, and its error is at most twice that of a run with the same tolerance
- * without the fault. */
+/* One force or Hessian that is not finite, at the nth evaluation for every n except the first force, which
+ * is that of the initial state, where no smaller step helps. IDA retries with a quarter of the step, or the
+ * controller restarts it. The run completes with finite states, and its error is at most twice that of a
+ * run with the same tolerance without the fault. */
 START_TEST(one_fault_is_recovered_from)
 {
     host_sim tight = host_with_ida(1e-9), good = host_with_ida(1e-4);
@@ -426,8 +430,8 @@ static drape_status note_last(void *user, const drape_event *event)
 
 #define MAX_STEPS 40 /* far fewer steps than the sheet needs for END at rtol 1e-6 */
 
-/* One step too many ends the run with its reason, time, step size and largest error, in the last accepted state. Each
- * further advance may take as many steps again, and they are those of a run without the bound. */
+/* One step too many ends the run with its reason, time, step size and largest error, in the last accepted
+ * state. Each further advance may take as many steps again, and they are those of a run without the bound. */
 START_TEST(too_many_steps_end_the_run)
 {
     char message[100];
@@ -462,8 +466,8 @@ START_TEST(too_many_steps_end_the_run)
 }
 END_TEST
 
-/* The bound is on the steps that IDA chooses: a host may end more advances than that in a second of simulated time, and
- * the next second has a new count. */
+/* The bound is on the steps that IDA chooses: a host may end more advances than that in a second of
+ * simulated time, and the next second has a new count. */
 START_TEST(steps_that_a_host_asks_for_are_not_counted)
 {
     scene s = sheet(HUNG, 1e-2, ", 'max_steps': 100");
@@ -478,8 +482,8 @@ START_TEST(steps_that_a_host_asks_for_are_not_counted)
 }
 END_TEST
 
-/* A host that adds up its times may request an advance by a rounding error, also where IDA restarts. IDA would refuse
- * that as too close; here it is not a step. */
+/* A host that adds up its times may request an advance by a rounding error, also where IDA restarts. IDA
+ * would refuse that as too close; here it is not a step. */
 START_TEST(an_advance_by_one_ulp_is_no_failure)
 {
     scene s = sheet(MOVED, 1e-3, "");
@@ -497,7 +501,8 @@ END_TEST
 
 /* ---- The matrix of a correction ---- */
 
-/* A sheet that slides over the top of a ball, with dashpots and friction, which make the matrix nonsymmetric. */
+/* A sheet that slides over the top of a ball, with dashpots and friction, which make the matrix
+ * nonsymmetric. */
 static scene sliding(const char *matrix, double rtol)
 {
     return scene_open(
@@ -513,8 +518,8 @@ static scene sliding(const char *matrix, double rtol)
         rtol, matrix);
 }
 
-/* The equations are the same for both matrices, and so is the error, up to the difference between two sequences of steps,
- * a factor of 2. Work: the symmetric part needs at most a quarter more iterations. */
+/* The equations are the same for both matrices, and so is the error, up to the difference between two
+ * sequences of steps, a factor of 2. Work: the symmetric part needs at most a quarter more iterations. */
 START_TEST(half_of_the_matrix_does_as_well)
 {
     scene reference = sliding("exact", 1e-7), exact = sliding("exact", 1e-4),

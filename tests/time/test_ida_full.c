@@ -1,14 +1,17 @@
 /*
- * test_ida_full.c: the elimination of velocities changes nothing: IDA with the Schur complement K + c_j D + c_j^2 M has
- * the trajectory of IDA with the unreduced system, factored by SUNDIALS' own KLU (support/ida_full.h).
- * In exact arithmetic both are the same, step by step. Only round-off differs: a Newton correction d of the order of
- * the tolerance is solved to DBL_EPSILON times a condition number of 1 + (w h)^2 < 1e5: below 1e-13 m for d < 1e-2 m.
- * It grows from step to step: IDA makes one correction a step with old factors if that is within its tolerance, and
- * the part that the old factors do not correct grows by some factor a step until there are new ones. With dashpots,
- * whose matrix rotates with the sheet, that factor reaches 5, and round-off can grow as far as the tolerance of the
- * run. Hence short runs, weak dashpots and a tolerance that keeps the factors recent. The matrix is the exact one, as
- * a part of it would be another iteration. 1e-10 m leaves room for a thousandfold growth; the bound of velocities is
- * larger by the 1e2/s of the stiffest wave that the steps resolve.
+ * test_ida_full.c: the elimination of velocities changes nothing: IDA with the Schur complement K + c_j D +
+ * c_j^2 M has the trajectory of IDA with the unreduced system, factored by SUNDIALS' own KLU
+ * (support/ida_full.h).
+ *
+ * In exact arithmetic both are the same, step by step. Only round-off differs: a Newton correction d of the
+ * order of the tolerance is solved to DBL_EPSILON times a condition number of 1 + (w h)^2 < 1e5: below
+ * 1e-13 m for d < 1e-2 m. It grows from step to step: IDA makes one correction a step with old factors if
+ * that is within its tolerance, and the part that the old factors do not correct grows by some factor a
+ * step until there are new ones. With dashpots, whose matrix rotates with the sheet, that factor reaches 5,
+ * and round-off can grow as far as the tolerance of the run. Hence short runs, weak dashpots and a
+ * tolerance that keeps the factors recent. The matrix is the exact one, as a part of it would be another
+ * iteration. 1e-10 m leaves room for a thousandfold growth; the bound of velocities is larger by the 1e2/s
+ * of the stiffest wave that the steps resolve.
  */
 #include "solvers/linear.h"
 #include "support/ida_full.h"
@@ -79,8 +82,8 @@ START_TEST(the_reduced_system_gives_the_trajectory_of_the_full_one)
 }
 END_TEST
 
-/* Dashpots in continuous time make K nonsymmetric, which a solver for symmetric matrices has to notice. D is in the
- * reduced matrix, in its right-hand side and in both blocks of the full one. */
+/* Dashpots in continuous time make K nonsymmetric, which a solver for symmetric matrices has to notice. D
+ * is in the reduced matrix, in its right-hand side and in both blocks of the full one. */
 START_TEST(so_it_does_with_damping)
 {
     const char *terms =

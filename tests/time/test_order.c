@@ -1,11 +1,15 @@
 /*
- * test_order.c: the order of convergence that each integrator declares, measured on a swinging sheet with dashpots and
- * drag; and the error controller.
- * The sheet is soft: E h = 20 N/m and a node of 0.2 kg/m2 x 0.01 m2 = 2 g. Springs, of sqrt(3)/2 E h = 17 N/m at most,
- * give its stretch waves angular frequencies below sqrt(8 x 17/0.002) = 260/s: steps of 2 ms and less resolve them.
- * An error C h^p (1 + c h + ...) has a slope log2(e(h)/e(h/2)) = p + c h/(2 log 2) + ...: it differs from p by an
- * amount that halves with h. c is of the size of the fastest rate, 260/s, times a number below 1. h goes from 1 ms to
- * 0.25 ms: 260 x 0.00025/1.4 = 0.05 at the last pair if that number is 1. The bound is 0.15.
+ * test_order.c: the order of convergence that each integrator declares, measured on a swinging sheet with
+ * dashpots and drag; and the error controller.
+ *
+ * The sheet is soft: E h = 20 N/m and a node of 0.2 kg/m2 x 0.01 m2 = 2 g. Springs, of sqrt(3)/2 E h = 17
+ * N/m at most, give its stretch waves angular frequencies below sqrt(8 x 17/0.002) = 260/s: steps of 2 ms
+ * and less resolve them.
+ *
+ * An error C h^p (1 + c h + ...) has a slope log2(e(h)/e(h/2)) = p + c h/(2 log 2) + ...: it differs from p
+ * by an amount that halves with h. c is of the size of the fastest rate, 260/s, times a number below 1. h
+ * goes from 1 ms to 0.25 ms: 260 x 0.00025/1.4 = 0.05 at the last pair if that number is 1. The bound is
+ * 0.15.
  */
 #include "support/scene.h"
 
@@ -41,8 +45,8 @@ static double distance(const scene *s, const double *reference)
     return sqrt(sum / s->model->node_count);
 }
 
-/* The solution of ida at rtol 1e-10, whose error is 1e-9 m at most (test_ida.c): 1e-3 of the smallest error that is
- * measured here, which changes a slope by 0.002. It restarts at kinks. */
+/* The solution of ida at rtol 1e-10, whose error is 1e-9 m at most (test_ida.c): 1e-3 of the smallest error
+ * that is measured here, which changes a slope by 0.002. It restarts at kinks. */
 static double *converged(const char *terms, const char *pins)
 {
     const drape_setting settings[] = {{"rtol", 1e-10, NULL}, {"max_order", 5, NULL}};
@@ -138,12 +142,13 @@ START_TEST(so_it_does_with_steps_of_changing_size)
 }
 END_TEST
 
-/* At a kink of a track the velocity of the pin jumps. Then the force of springs has a kink in time, and that of dashpots
- * jumps. One-step methods have no history, and with kinks at the ends of steps every step is smooth: they keep their
- * order. The history of bdf2 reaches over the kink. Where the acceleration jumps from f to f + j it has
- * v1 = v0 + h f/3 + 2 h f1/3 with f1 the force of the step. With the exact rate of the dashpot that would be f + j, and
- * v1 off by h j/3: order 1. But the rate is the same formula of q: 3/2 of the new slope less 1/2 of the old, so
- * f1 = f + 3/2 j and v1 = v0 + h (f + j): the impulse is right and the order is kept. */
+/* At a kink of a track the velocity of the pin jumps. Then the force of springs has a kink in time, and
+ * that of dashpots jumps. One-step methods have no history, and with kinks at the ends of steps every step
+ * is smooth: they keep their order. The history of bdf2 reaches over the kink. Where the acceleration jumps
+ * from f to f + j it has v1 = v0 + h f/3 + 2 h f1/3 with f1 the force of the step. With the exact rate of
+ * the dashpot that would be f + j, and v1 off by h j/3: order 1. But the rate is the same formula of q: 3/2
+ * of the new slope less 1/2 of the old, so f1 = f + 3/2 j and v1 = v0 + h (f + j): the impulse is right and
+ * the order is kept. */
 START_TEST(kinks_at_ends_of_steps_leave_the_order)
 {
     for (int i = 0; drape_integrators[i]; i++)
@@ -153,7 +158,8 @@ START_TEST(kinks_at_ends_of_steps_leave_the_order)
 }
 END_TEST
 
-/* Without dashpots the acceleration does not jump, but its slope does: a single error of h^2 in v, for bdf2 as for all. */
+/* Without dashpots the acceleration does not jump, but its slope does: a single error of h^2 in v, for bdf2
+ * as for all. */
 START_TEST(and_without_dashpots_as_well)
 {
     for (int i = 0; drape_integrators[i]; i++)
@@ -168,10 +174,10 @@ static double steps_across_kinks(int k, int n)
     return k == 0 ? 0 : k == n ? END : END * (k - 0.5) / (n - 1);
 }
 
-/* A kink inside a step. The pin takes its mean velocity over the step, so for be and bdf2, whose dashpots' rates are
- * differences of q, the impulse of a dashpot over the step is right and the order is kept. midpoint takes the rate at
- * the middle of the step, grad q . v: its impulse is off by h times a jump: order 1, which shows only where that is
- * larger than its error of second order. */
+/* A kink inside a step. The pin takes its mean velocity over the step, so for be and bdf2, whose dashpots'
+ * rates are differences of q, the impulse of a dashpot over the step is right and the order is kept.
+ * midpoint takes the rate at the middle of the step, grad q . v: its impulse is off by h times a jump:
+ * order 1, which shows only where that is larger than its error of second order. */
 START_TEST(kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_first)
 {
     check_slope("be", DASHPOTS, MOVED, steps_across_kinks, 1);
@@ -214,11 +220,11 @@ static drape_sim_def controlled(const char *method, const drape_setting *setting
     return def;
 }
 
-/* Local errors are bounded by rtol: steps go with rtol^(1/(p+1)), the error at a time with rtol^(p/(p+1)): a decade of
- * rtol gains 10^(1/2) in order 1 and 10^(2/3) in order 2. Over the three decades one quarter of the exponent is left
- * for the start, where the first steps differ in size from later ones. An integrator with a stability limit takes
- * substeps if the error would allow a larger step, and then its errors are far below: it is checked only over the last
- * decade, where a step is a single substep. */
+/* Local errors are bounded by rtol: steps go with rtol^(1/(p+1)), the error at a time with rtol^(p/(p+1)):
+ * a decade of rtol gains 10^(1/2) in order 1 and 10^(2/3) in order 2. Over the three decades one quarter of
+ * the exponent is left for the start, where the first steps differ in size from later ones. An integrator
+ * with a stability limit takes substeps if the error would allow a larger step, and then its errors are far
+ * below: it is checked only over the last decade, where a step is a single substep. */
 START_TEST(error_falls_with_the_controllers_rtol)
 {
     double *reference = converged(DASHPOTS, HUNG);
@@ -248,8 +254,9 @@ START_TEST(error_falls_with_the_controllers_rtol)
 }
 END_TEST
 
-/* The PI rule changes sizes smoothly: they are at most doubled (bdf2 is stable below 1 + sqrt(2)), and few steps are
- * rejected: less than a tenth where the motion is smooth. The last steps of the advance are cut to end with it. */
+/* The PI rule changes sizes smoothly: they are at most doubled (bdf2 is stable below 1 + sqrt(2)), and few
+ * steps are rejected: less than a tenth where the motion is smooth. The last steps of the advance are cut
+ * to end with it. */
 START_TEST(steps_of_the_error_controller_change_gently)
 {
     static step_log log;
@@ -286,8 +293,9 @@ static scene node(void)
         "'pins': [{'nodes': [0, 1, 2, 3, 5, 6, 7, 8]}]}], 'duration': 1}");
 }
 
-/* The controller's estimate of the local error in x or in v, from its report of a rejected step: root mean square over
- * the six components of x and v of the node. Only the first component of the node differs from 0. */
+/* The controller's estimate of the local error in x or in v, from its report of a rejected step: root mean
+ * square over the six components of x and v of the node. Only the first component of the node differs from
+ * 0. */
 static double estimate(const scene *s, bool velocity, double h, const double past[2], const double in[2],
                        const double out[2], double *values)
 {
@@ -324,11 +332,11 @@ static double estimate(const scene *s, bool velocity, double h, const double pas
     return info.diagnostic.value * 1e-15 * sqrt(6);
 }
 
-/* Two steps of backward Euler on x'' = -w^2 x: x1 = (x0 + h v0)/(1 + (w h)^2), v1 = (x1 - x0)/h. The second differences
- * of its x and v are h^2 times the second derivatives by the equation, which is twice its local error
- * y1 - y(h) = h^2/2 y'' + O(h^3), y(h) the exact solution from the state in the middle: the estimate equals that up to
- * some w h. The terms of third order are 1/2 h^3 y''' from the second difference and 1/3 h^3 y''' from the local error,
- * and y''' < 1.5 w y'' at this phase for both: less than 2.5 w h in all. */
+/* Two steps of backward Euler on x'' = -w^2 x: x1 = (x0 + h v0)/(1 + (w h)^2), v1 = (x1 - x0)/h. The second
+ * differences of its x and v are h^2 times the second derivatives by the equation, which is twice its local
+ * error y1 - y(h) = h^2/2 y'' + O(h^3), y(h) the exact solution from the state in the middle: the estimate
+ * equals that up to some w h. The terms of third order are 1/2 h^3 y''' from the second difference and 1/3
+ * h^3 y''' from the local error, and y''' < 1.5 w y'' at this phase for both: less than 2.5 w h in all. */
 START_TEST(the_estimate_for_backward_euler_is_its_local_error)
 {
     static const double phases[] = {0.1, 0.03, 0.01, 0.001}; /* w h */

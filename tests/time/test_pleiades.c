@@ -1,10 +1,12 @@
 /*
- * test_pleiades.c: seven stars in a plane, by the same drivers as cloth. The problem is that of Hairer, Norsett &
- * Wanner 1993, II.10, and of the Test Set for IVP Solvers (Mazzia & Magherini 2008), whose digits at t = 3 are below:
- * masses i, E = -m_i m_j / r, close encounters for which steps of a fixed size must be small throughout. GSL's
- * Runge-Kutta of order 8 integrates the same equations, implemented separately, as a check of those digits.
- * A star is a node, a pair of stars an element of a user-defined term. The masses of nodes would be those of a sheet,
- * so the test sets them in its model.
+ * test_pleiades.c: seven stars in a plane, by the same drivers as cloth. The problem is that of Hairer,
+ * Norsett & Wanner 1993, II.10, and of the Test Set for IVP Solvers (Mazzia & Magherini 2008), whose digits
+ * at t = 3 are below: masses i, E = -m_i m_j / r, close encounters for which steps of a fixed size must be
+ * small throughout. GSL's Runge-Kutta of order 8 integrates the same equations, implemented separately, as
+ * a check of those digits.
+ *
+ * A star is a node, a pair of stars an element of a user-defined term. The masses of nodes would be those
+ * of a sheet, so the test sets them in its model.
  */
 #include "drape/extend.h"
 #include "support/scene.h"
@@ -173,8 +175,8 @@ START_TEST(published_digits_are_those_of_gsl)
 }
 END_TEST
 
-/* The errors of IDA fall with rtol. Its weights are rtol L with L = 10, and the encounters amplify earlier errors by
- * 1e4: rtol 1e-9 may leave 1e-9 10 1e4 = 1e-4. */
+/* The errors of IDA fall with rtol. Its weights are rtol L with L = 10, and the encounters amplify earlier
+ * errors by 1e4: rtol 1e-9 may leave 1e-9 10 1e4 = 1e-4. */
 START_TEST(ida_comes_to_the_published_end)
 {
     double before = INFINITY;
@@ -188,9 +190,9 @@ START_TEST(ida_comes_to_the_published_end)
 }
 END_TEST
 
-/* The order of a method with fixed steps, at the last of two halvings. Steps of 0.05 ms resolve the closest encounter
- * (0.06 apart at a speed of 15: 4 ms) in 80: the next term of the error is (1/80) of the leading one times some number;
- * the bound is 0.2. */
+/* The order of a method with fixed steps, at the last of two halvings. Steps of 0.05 ms resolve the closest
+ * encounter (0.06 apart at a speed of 15: 4 ms) in 80: the next term of the error is (1/80) of the leading
+ * one times some number; the bound is 0.2. */
 static void check_order(const char *method, int order, const drape_setting *more, size_t count)
 {
     double before = NAN, slope = NAN;

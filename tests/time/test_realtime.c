@@ -1,7 +1,8 @@
 /*
  * test_realtime.c: the fixed-iteration step for real time, and the advance with a budget.
- * Measured seconds are no basis for a test: budgets here are either never reached (an hour) or never kept (a
- * nanosecond); those in between are for the bench.
+ *
+ * Measured seconds are no basis for a test: budgets here are either never reached (an hour) or never kept
+ * (a nanosecond); those in between are for the bench.
  */
 #include "support/scene.h"
 
@@ -35,9 +36,10 @@ static drape_realtime advance(scene *s, double frame, double budget)
 
 /* ---- The fixed-iteration step ---- */
 
-/* One and two iterations against the converged step, on a sheet that falls by half a metre. The errors of one step are
- * those of Newton's second iterate, quadratic in the guess's h^2 dv/2 ~ 1 mm, and of conjugate gradients to a tenth; 2 %
- * of the fall is a bound with room, the goal of the bench. Two are better by more than half. */
+/* One and two iterations against the converged step, on a sheet that falls by half a metre. The errors of
+ * one step are those of Newton's second iterate, quadratic in the guess's h^2 dv/2 ~ 1 mm, and of conjugate
+ * gradients to a tenth; 2 % of the fall is a bound with room, the goal of the bench. Two are better by more
+ * than half. */
 START_TEST(few_iterations_are_near_the_converged_step)
 {
     scene exact = scene_open(HUNG, "", "be", "");
@@ -58,8 +60,8 @@ START_TEST(few_iterations_are_near_the_converged_step)
 }
 END_TEST
 
-/* With enough iterations and digits it is backward Euler: both solve the same equations up to their residuals, and a
- * residual of 1e-9 N moves a node by h^2 F/m = 2.8e-4 x 1e-9/8e-4 m a step. */
+/* With enough iterations and digits it is backward Euler: both solve the same equations up to their
+ * residuals, and a residual of 1e-9 N moves a node by h^2 F/m = 2.8e-4 x 1e-9/8e-4 m a step. */
 START_TEST(with_many_iterations_it_is_backward_euler)
 {
     scene exact = scene_open(HUNG, "", "be", ", 'tolerance': 1e-9");
@@ -75,7 +77,8 @@ START_TEST(with_many_iterations_it_is_backward_euler)
 }
 END_TEST
 
-/* It includes contact, friction, damping and drag: a damped sheet with drag falls onto a sphere and stays on it. */
+/* It includes contact, friction, damping and drag: a damped sheet with drag falls onto a sphere and stays
+ * on it. */
 START_TEST(contact_and_damping_are_in_it)
 {
     scene s = scene_open(
@@ -117,9 +120,9 @@ static scene at_rate(const char *terms, const char *more, double rate, double en
     return s;
 }
 
-/* At 30 Hz a frame is two steps of dt, so nothing at all changes; at 120 Hz it is one of dt/2. Backward Euler is of
- * first order: the state at rate r is off by C/r, so 60 and 120 Hz differ by half of the difference between steps of 1/30
- * and 1/60, up to second order, for which a quarter is allowed. */
+/* At 30 Hz a frame is two steps of dt, so nothing at all changes; at 120 Hz it is one of dt/2. Backward
+ * Euler is of first order: the state at rate r is off by C/r, so 60 and 120 Hz differ by half of the
+ * difference between steps of 1/30 and 1/60, up to second order, for which a quarter is allowed. */
 START_TEST(frame_rates_differ_by_the_order_of_the_method)
 {
     const char *damping =
@@ -138,10 +141,10 @@ START_TEST(frame_rates_differ_by_the_order_of_the_method)
 }
 END_TEST
 
-/* The state of rest does not depend on the steps: heavily damped, the sheet comes to rest at the same height at 30, 60
- * and 120 Hz. The motion left after 3 s falls as exp(-t c/2m) with c/m = 5/0.2 per second or faster: below rounding. The
- * slowest mode is overdamped sideways swinging, g/L m/c = 0.4/s, from some mm. The height of the lowest node shows
- * stiffness and drag; it changes by the square of the swing. */
+/* The state of rest does not depend on the steps: heavily damped, the sheet comes to rest at the same
+ * height at 30, 60 and 120 Hz. The motion left after 3 s falls as exp(-t c/2m) with c/m = 5/0.2 per second
+ * or faster: below rounding. The slowest mode is overdamped sideways swinging, g/L m/c = 0.4/s, from some
+ * mm. The height of the lowest node shows stiffness and drag; it changes by the square of the swing. */
 START_TEST(rest_does_not_depend_on_the_frame_rate)
 {
     double lowest[3];
@@ -158,8 +161,9 @@ END_TEST
 
 /* ---- Budgets ---- */
 
-/* A budget too small for any step: steps grow to the longest, with at most one a call; the debt stays below that, and
- * the rest is dropped. Then there is time again: within a few frames the level is full and the debt 0. */
+/* A budget too small for any step: steps grow to the longest, with at most one a call; the debt stays below
+ * that, and the rest is dropped. Then there is time again: within a few frames the level is full and the
+ * debt 0. */
 START_TEST(it_degrades_and_recovers)
 {
     scene s = scene_open(HUNG, "", "newton_k", "");
@@ -202,8 +206,8 @@ START_TEST(a_single_late_frame_is_made_up_for)
 }
 END_TEST
 
-/* Integrators that choose their own steps, and integrators without efforts, also complete the frame; a plain advance
- * continues with the scene's own steps. */
+/* Integrators that choose their own steps, and integrators without efforts, also complete the frame; a
+ * plain advance continues with the scene's own steps. */
 START_TEST(every_integrator_with_a_time_takes_frames)
 {
     for (int i = 0; drape_integrators[i]; i++) {

@@ -41,9 +41,9 @@ static void close_lattice(lattice *l)
     free(l->neighbor);
 }
 
-/* At each node the functions are positive and add up to 1, up to a few roundings of 16 values. Seeds are at least a
- * spacing apart, so balls of a radius below half of it are disjoint: on this lattice a ball of radius r has
- * 2 r (r + 1) + 1 nodes, at the rim at least half of them. */
+/* At each node the functions are positive and add up to 1, up to a few roundings of 16 values. Seeds are at
+ * least a spacing apart, so balls of a radius below half of it are disjoint: on this lattice a ball of
+ * radius r has 2 r (r + 1) + 1 nodes, at the rim at least half of them. */
 START_TEST(coarse_functions_are_a_partition_of_unity)
 {
     scene s = scene_empty();
@@ -223,8 +223,8 @@ static void close_state(state *q)
     scene_close(&q->s);
 }
 
-/* Largest |A x - (m_w M + J+) x| over the largest component of A x, for a random x along `direction`, or in all
- * directions. */
+/* Largest |A x - (m_w M + J+) x| over the largest component of A x, for a random x along `direction`, or in
+ * all directions. */
 static double mismatch(state *q, double mass_weight, const double *direction)
 {
     const drape_model *m = q->s.model;
@@ -276,8 +276,8 @@ START_TEST(across_a_flat_sheet_bending_is_exact)
 END_TEST
 
 /* Symmetric and positive: x'Ay = y'Ax, x'Ax > 0. The number of iterations does not grow with the sheet: the
- * condition number of M/h2 + K here is 8 E h h2/m = 8 x 1000/(3600 x 0.2/side^2), 1e4 at side 31, for which plain
- * conjugate gradients take hundreds. */
+ * condition number of M/h2 + K here is 8 E h h2/m = 8 x 1000/(3600 x 0.2/side^2), 1e4 at side 31, for which
+ * plain conjugate gradients take hundreds. */
 START_TEST(it_is_solved_in_few_iterations_at_any_size)
 {
     for (int side = 11; side <= 31; side += 10) {

@@ -1,7 +1,7 @@
 /*
- * test_contact.c: contact of two pieces. Every derivative is compared with differences, in every region of both
- * kinds of pairs: energy and force, force and Hessian, friction by velocity and by position, the mollifier of
- * nearly parallel edges. Step fractions that are reported as free are free.
+ * test_contact.c: contact of two pieces. Every derivative is compared with differences, in every region of
+ * both kinds of pairs: energy and force, force and Hessian, friction by velocity and by position, the
+ * mollifier of nearly parallel edges. Step fractions that are reported as free are free.
  */
 #include "contact/barrier.h"
 #include "contact/friction.h"
@@ -67,10 +67,10 @@ static double largest(const double *a, int count)
     return max;
 }
 
-/* Central differences with step e: truncation e^2 f'''/6 and rounding 1e-16 f/e. With lengths L of about .1 m and
- * e = 1e-6 these are (e/L)^2 = 1e-10 and 1e-9, times powers of 10 for short gaps: 2e-6 of the largest entry. The
- * closest points of edges at an angle of 1e-2 move within L = 1e-3 .. 1e-4, so e = 2e-9, and rounding is
- * 1e-16 L / e / angle^2 = 1e-5. */
+/* Central differences with step e: truncation e^2 f'''/6 and rounding 1e-16 f/e. With lengths L of about .1
+ * m and e = 1e-6 these are (e/L)^2 = 1e-10 and 1e-9, times powers of 10 for short gaps: 2e-6 of the largest
+ * entry. The closest points of edges at an angle of 1e-2 move within L = 1e-3 .. 1e-4, so e = 2e-9, and
+ * rounding is 1e-16 L / e / angle^2 = 1e-5. */
 static void compare(const char *what, const double *exact, const double *difference, int count, double limit)
 {
     double scale = fmax(largest(exact, count), 1e-9);
@@ -129,8 +129,8 @@ static int region_of(const setting *s)
     return region;
 }
 
-/* Random active pairs, until every region has occurred often enough. Derivatives jump where regions meet, so all
- * points of a difference must be in the same region. */
+/* Random active pairs, until every region has occurred often enough. Derivatives jump where regions meet,
+ * so all points of a difference must be in the same region. */
 static void check_kind(drape_pair_kind kind, double speed)
 {
     uint64_t seed = 7 + (uint64_t)kind;
@@ -227,17 +227,14 @@ START_TEST(test_barrier)
     double last = -INFINITY;
     for (double s = -2; s < 1; s += 1e-3) {
         ck_assert_double_lt(drape_barrier_at(s).db, 0);
-        ck_assert_double_gt(
-            drape_barrier_at(s).db,
-            last); /* On a path that is reported as free, the gap never falls below the share that must remain. A path that is not
-                                                            * free is cut before the gap is 0 and after most of it is gone. */
+        ck_assert_double_gt(drape_barrier_at(s).db, last); /* convex */
         last = drape_barrier_at(s).db;
     }
 }
 END_TEST
 
-/* On a path that is called free the gap never falls below what is to be kept; a path that is not free is cut
- * before the gap is gone and after most of it is. */
+/* On a path that is reported as free, the gap never falls below the share that must remain. A path that is
+ * not free is cut before the gap is 0 and after most of it is gone. */
 START_TEST(test_step_fraction)
 {
     uint64_t seed = 11;

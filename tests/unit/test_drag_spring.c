@@ -17,9 +17,9 @@ static const char sheet[] =
     " 'terms': ['stretch.edge', 'bend.hinge']%s}],"
     " 'gravity': [0, 0, 0], 'integrator': {'method': '%s', 'dt': 0.002, 'tolerance': 1e-10}, 'duration': 1}";
 
-/* The spring adds k (x - target) to g of its node and k to the diagonal of its block, and nothing elsewhere. Both
- * are differences of sums that are equal except for one addition, so they are exact up to the rounding of the
- * larger sum. */
+/* The spring adds k (x - target) to g of its node and k to the diagonal of its block, and nothing
+ * elsewhere. Both are differences of sums that are equal except for one addition, so they are exact up to
+ * the rounding of the larger sum. */
 START_TEST(force_and_jacobian_are_those_of_a_spring)
 {
     scene h = scene_open(sheet, "", "be");
@@ -57,8 +57,8 @@ START_TEST(force_and_jacobian_are_those_of_a_spring)
 }
 END_TEST
 
-/* Internal forces sum to 0: after one step of backward Euler from rest the momentum is h times the spring's force
- * at the end, up to the residual, at most 1e-10 N in each of 16 nodes. */
+/* Internal forces sum to 0: after one step of backward Euler from rest the momentum is h times the spring's
+ * force at the end, up to the residual, at most 1e-10 N in each of 16 nodes. */
 START_TEST(a_free_sheet_takes_the_spring_s_momentum)
 {
     scene h = scene_open(sheet, "", "be");
@@ -77,8 +77,8 @@ START_TEST(a_free_sheet_takes_the_spring_s_momentum)
 }
 END_TEST
 
-/* Setting the spring is work of the host: the numerical loss does not change, and the elastic energy changes by that
- * of the spring, up to the rounding of a few joules. */
+/* Setting the spring is work of the host: the numerical loss does not change, and the elastic energy
+ * changes by that of the spring, up to the rounding of a few joules. */
 START_TEST(its_work_is_accounted)
 {
     scene h = scene_open(sheet, "", "be");
@@ -101,8 +101,8 @@ START_TEST(its_work_is_accounted)
 }
 END_TEST
 
-/* With every integrator that moves in time the node approaches the target. A fixed corner, a wrong number and a
- * wrong value are refused and change nothing. */
+/* With every integrator that moves in time the node approaches the target. A fixed corner, a wrong number
+ * and a wrong value are refused and change nothing. */
 START_TEST(every_integrator_follows)
 {
     for (int i = 0; drape_integrators[i]; i++) {

@@ -469,7 +469,8 @@ START_TEST(ply_binary_faults)
 }
 END_TEST
 
-/* Every prefix of a file is read, or refused with a message of one line; the sanitizers look for other faults. */
+/* Every prefix of a file is read, or refused with a message of one line; the sanitizers look for other
+ * faults. */
 static void truncate_everywhere(const drape_import_ops *import, const void *data, size_t size)
 {
     for (size_t length = 0; length < size; length++) {
@@ -506,8 +507,8 @@ START_TEST(truncated_at_every_byte)
 }
 END_TEST
 
-/* Every byte is replaced by several critical ones: the file is read and validated, or refused; it never crashes and
- * never takes much memory. */
+/* Every byte is replaced by several critical ones: the file is read and validated, or refused; it never
+ * crashes and never takes much memory. */
 static void change_every_byte(const drape_import_ops *import, const void *data, size_t size)
 {
     static const char replacements[] = {0, '\n', '\r', ' ', '-', '9', '/', '\\', '#', 'e', (char)0xFF, 1};

@@ -1,12 +1,13 @@
-/* test_intersect.c: edges that pass through triangles are counted exactly, in whatever cells of the grid they are. */
+/* test_intersect.c: edges that pass through triangles are counted exactly, in whatever cells of the grid
+ * they are. */
 #include "geometry/intersect.h"
 #include "support/suite.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Two squares of 5 x 5 nodes, the second one rotated upright through the middle of the first and slightly shifted so
- * that no edge touches a node. */
+/* Two squares of 5 x 5 nodes, the second one rotated upright through the middle of the first and slightly
+ * shifted so that no edge touches a node. */
 static drape_model *crossed_squares(drape_context *ctx, double shift)
 {
     static const drape_setting grid[] = {

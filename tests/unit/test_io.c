@@ -1,5 +1,5 @@
-/* test_io.c: the files of the recorder and the summary are read back and compared to the last digit; no failure,
- * and not even a kill, leaves a file that cannot be read. */
+/* test_io.c: the files of the recorder and the summary are read back and compared to the last digit; no
+ * failure, and not even a kill, leaves a file that cannot be read. */
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -468,7 +468,8 @@ END_TEST
 
 /* ---- Step log */
 
-/* Splits a row of CSV as RFC 4180 says, in place; returns the number of fields. *next becomes the following row. */
+/* Splits a row of CSV as RFC 4180 says, in place; returns the number of fields. *next becomes the following
+ * row. */
 static int split(char *row, char **field, int room, char **next)
 {
     int count = 0;
@@ -609,8 +610,8 @@ END_TEST
 static const char energy_columns[] =
     "frame,t,t_state,kinetic,elastic,gravity,contact,dissipated,numerical,total\n";
 
-/* The energies of frame k are those of the first state at or after it, as the attempts reported them. Frames of 1/40
- * s lie on and between steps of 1/100 s; the first one is before all steps. */
+/* The energies of frame k are those of the first state at or after it, as the attempts reported them.
+ * Frames of 1/40 s lie on and between steps of 1/100 s; the first one is before all steps. */
 START_TEST(energies_are_of_the_state_at_or_after_the_frame)
 {
     world w;
@@ -660,8 +661,8 @@ static void free_disk(const struct rlimit *old)
     setrlimit(RLIMIT_FSIZE, old);
 }
 
-/* Advances on a disk that takes files of `size` bytes: the sim stops there with a message that names the file, and
- * finish reports it again. */
+/* Advances on a disk that takes files of `size` bytes: the sim stops there with a message that names the
+ * file, and finish reports it again. */
 static void run_on_small_disk(world *w, const char *format, size_t size, const char *name)
 {
     char message[2][1024];
@@ -836,8 +837,8 @@ START_TEST(full_disk_leaves_a_valid_glb)
 }
 END_TEST
 
-/* Writes frames of the model at rest, on a disk that takes files of `size` bytes, until one fails; returns the number
- * of those that succeeded. */
+/* Writes frames of the model at rest, on a disk that takes files of `size` bytes, until one fails; returns
+ * the number of those that succeeded. */
 static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
 {
     static double field[NODES * 3];
@@ -866,8 +867,8 @@ static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
     return frames - 1;
 }
 
-/* Wherever the disk is full, the collection names only whole frames: its list outgrows the limit, which the frames
- * themselves, of about 9 kB, do not. */
+/* Wherever the disk is full, the collection names only whole frames: its list outgrows the limit, which the
+ * frames themselves, of about 9 kB, do not. */
 START_TEST(full_disk_leaves_a_valid_collection)
 {
     for (size_t room = 12000; room < 12090; room += 5) {

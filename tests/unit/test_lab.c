@@ -56,8 +56,9 @@ START_TEST(a_power_is_found_exactly)
 }
 END_TEST
 
-/* Residuals of +d, -2d, +d in the logarithms, at abscissae -1, 0, 1 (times log 2), do not change the slope; its
- * standard error is sqrt(6 d^2/1 / (2 log(2)^2)), and Student's t for one degree of freedom at 97.5 % is 12.7062. */
+/* Residuals of +d, -2d, +d in the logarithms, at abscissae -1, 0, 1 (times log 2), do not change the slope;
+ * its standard error is sqrt(6 d^2/1 / (2 log(2)^2)), and Student's t for one degree of freedom at 97.5 %
+ * is 12.7062. */
 START_TEST(confidence_is_students)
 {
     const double d = 1e-3, x[] = {0.5, 1, 2}, y[] = {0.5 * exp(d), exp(-2 * d), 2 * exp(d)};

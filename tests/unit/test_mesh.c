@@ -289,8 +289,8 @@ static double twice_area(const drape_mesh *mesh, int32_t t)
     return (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2]);
 }
 
-/* Its triangles all face up and fill the area between the polygons of its two rims. It is closed, so V - E + F = 0,
- * and only the rims are boundary. */
+/* Its triangles all face up and fill the area between the polygons of its two rims. It is closed, so V - E
+ * + F = 0, and only the rims are boundary. */
 START_TEST(annuli)
 {
     enum { ROWS = 4, SPOKES = 7 };
@@ -558,7 +558,8 @@ START_TEST(array_faults)
 }
 END_TEST
 
-/* Two closed fans at one node have valid counts of edges and triangles: only a walk around the node finds them. */
+/* Two closed fans at one node have valid counts of edges and triangles: only a walk around the node finds
+ * them. */
 START_TEST(two_closed_fans_at_one_node_are_refused)
 {
     static const double x[] = {0, 0, 0, 1, 1, 0, -1, 1, 1, -1, 1, -1, 1, -1, 0, -1, -1, 1, -1, -1, -1};

@@ -26,8 +26,8 @@ static const char colliders[] =
     " {'type': 'cylinder', 'a': [0, 7, 0], 'b': [0.3, 7.5, 0], 'radius': 0.2},"
     " {'type': 'plane', 'point': [0, -1, 0], 'normal': [0.1, 1, 0]}]";
 
-/* Every point lies on the surface: Newton steps on the exact distance move it there, and then it is rounded to a
- * float of at most 8 m, 5e-7. Normals have length 1 and point outwards. */
+/* Every point lies on the surface: Newton steps on the exact distance move it there, and then it is rounded
+ * to a float of at most 8 m, 5e-7. Normals have length 1 and point outwards. */
 START_TEST(bodies_lie_on_their_surface)
 {
     scene h = scene_model(CLOTH, "", colliders);
@@ -78,9 +78,9 @@ END_TEST
 
 /* ---- Cloth ---- */
 
-/* Nodes on an eighth of a sphere of radius 1. Normals weighted by area are exact up to the square of an edge's angle,
- * below 0.16 rad; the points of curved patches are nearer to the sphere than flat triangles, whose middles lie an
- * eighth of that square inside. Nodes are drawn at their positions. */
+/* Nodes on an eighth of a sphere of radius 1. Normals weighted by area are exact up to the square of an
+ * edge's angle, below 0.16 rad; the points of curved patches are nearer to the sphere than flat triangles,
+ * whose middles lie an eighth of that square inside. Nodes are drawn at their positions. */
 START_TEST(cloth_is_drawn_round_through_its_nodes)
 {
     drape_skin skin;
@@ -118,9 +118,9 @@ START_TEST(cloth_is_drawn_round_through_its_nodes)
 }
 END_TEST
 
-/* Every triangle has the orientation of its mesh: the normal by its corners is on the side of the smooth one. On a
- * flat sheet the texture is as long as wide, with u along x and v away from the first row; seen from the front it
- * is not mirrored. */
+/* Every triangle has the orientation of its mesh: the normal by its corners is on the side of the smooth
+ * one. On a flat sheet the texture is as long as wide, with u along x and v away from the first row; seen
+ * from the front it is not mirrored. */
 START_TEST(texture_is_not_mirrored)
 {
     static const char *const orientations[] = {"", ", 'orientation': 'vertical'"};
@@ -155,8 +155,8 @@ END_TEST
 
 /* ---- Colours, letters, camera ---- */
 
-/* Lightness in OKLab is close to the cube root of luminance (the weights of its L are all positive and sum to 1). It
- * rises in each of 256 steps, and each half of the ramp has half of the rise, to a tenth. */
+/* Lightness in OKLab is close to the cube root of luminance (the weights of its L are all positive and sum
+ * to 1). It rises in each of 256 steps, and each half of the ramp has half of the rise, to a tenth. */
 START_TEST(ramp_is_even_in_lightness)
 {
     double last = -1, middle = 0, first = 0;
@@ -211,7 +211,8 @@ START_TEST(letters_are_all_there)
 }
 END_TEST
 
-/* All points are in the picture, and the outermost ones are at the margin of 1/1.12 on two sides, up to rounding. */
+/* All points are in the picture, and the outermost ones are at the margin of 1/1.12 on two sides, up to
+ * rounding. */
 START_TEST(camera_frames_what_it_is_shown)
 {
     const float points[][3] = {{0, 0, 0}, {1, 0.2f, 0}, {0.3f, -2, 0.5f}, {-0.7f, 0.4f, 1.5f}};

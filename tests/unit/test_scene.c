@@ -1078,7 +1078,7 @@ START_TEST(test_many_nodes)
 }
 END_TEST
 
-/* The decimal comma of a host's locale must not affect numbers. */
+/* A locale with a decimal comma must not affect numbers. */
 START_TEST(test_locale)
 {
     comma_begin();
@@ -1145,8 +1145,8 @@ static void json_release(void *memory)
     free(memory);
 }
 
-/* The same with the memory of jansson, which is malloc's. jansson reports some of its failures (in strings) as wrong
- * syntax: a scene is then refused for the wrong reason, but nothing leaks. */
+/* The same with the memory of jansson, which is malloc's. jansson reports some of its failures (in strings)
+ * as wrong syntax: a scene is then refused for the wrong reason, but nothing leaks. */
 START_TEST(test_no_memory_for_json)
 {
     open_context();
@@ -1266,8 +1266,8 @@ static void append(void *user, const char *text, size_t size)
     strncat(user, text, size);
 }
 
-/* A value that is set is read, and is read again after the scene is printed and parsed; a default is read if nothing
- * is set; a value out of range is refused; the key is at its pointer. */
+/* A value that is set is read, and is read again after the scene is printed and parsed; a default is read
+ * if nothing is set; a value out of range is refused; the key is at its pointer. */
 static void check_key(const drape_scene_key *key, const char *pointer)
 {
     static char printed[1 << 14];

@@ -1,7 +1,7 @@
 /*
- * test_thread_pool.c: loops whose tasks are shared out to threads. Every task runs once, by the function of its own
- * loop, before the loop returns, for any number of tasks and threads; helpers that sleep are woken; a caller runs
- * all tasks that no helper takes.
+ * test_thread_pool.c: loops whose tasks are shared out to threads. Every task runs once, by the function of
+ * its own loop, before the loop returns, for any number of tasks and threads; helpers that sleep are woken;
+ * a caller runs all tasks that no helper takes.
  */
 #include "base/thread_pool.h"
 
@@ -77,8 +77,8 @@ START_TEST(every_task_runs_once)
 }
 END_TEST
 
-/* Between two loops the helpers fall asleep; the next loop wakes them. Each of the two tasks lasts until another
- * thread has begun the other one, so the loop would not end without a helper. */
+/* Between two loops the helpers fall asleep; the next loop wakes them. Each of the two tasks lasts until
+ * another thread has begun the other one, so the loop would not end without a helper. */
 static atomic_int here;
 
 static void meet(void *user, int64_t task)
@@ -107,8 +107,8 @@ START_TEST(helpers_that_sleep_are_woken)
 }
 END_TEST
 
-/* A helper is busy with a task: the caller runs all others meanwhile. The first task that a helper takes waits until
- * all others are done; a pool that assigned tasks to threads beforehand would never end. */
+/* A helper is busy with a task: the caller runs all others meanwhile. The first task that a helper takes
+ * waits until all others are done; a pool that assigned tasks to threads beforehand would never end. */
 typedef struct blocked {
     pthread_t caller;
     atomic_int done, blocked;
