@@ -399,7 +399,7 @@ END_TEST
 
 /* ---- No equilibrium ---- */
 
-START_TEST(what_nothing_holds_has_no_equilibrium_and_ends)
+START_TEST(a_free_sheet_has_no_equilibrium_and_ends)
 {
     static strip mesh;
     make_strip(&mesh, COLUMNS, 6, EDGE, LEVEL);
@@ -450,4 +450,4 @@ END_TEST
 SUITE("static", one_sheet_lies_on_another, heavy_cantilever_hangs_as_the_elastica,
       end_loaded_cantilever_bends_as_the_elastica, a_strip_hung_by_its_ends_is_a_catenary,
       a_hanging_strip_is_longer_by_its_weight, a_standing_strip_is_unstable_above_greenhills_weight,
-      what_nothing_holds_has_no_equilibrium_and_ends)
+      a_free_sheet_has_no_equilibrium_and_ends)

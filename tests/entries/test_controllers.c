@@ -76,7 +76,7 @@ START_TEST(good_steps_are_accepted)
 }
 END_TEST
 
-START_TEST(what_no_smaller_step_helps_stops_with_its_own_status)
+START_TEST(failures_that_no_smaller_step_cures_keep_their_status)
 {
     static const drape_status statuses[] = {DRAPE_E_SOLVER, DRAPE_E_MEMORY, DRAPE_E_ARGUMENT};
     for (int i = 0; drape_controllers[i]; i++)
@@ -153,5 +153,5 @@ START_TEST(halving_stops_where_the_time_stands_still)
 END_TEST
 
 SUITE("controllers", entries_are_well_formed, good_steps_are_accepted,
-      what_no_smaller_step_helps_stops_with_its_own_status, endless_failure_ends, fixed_never_halves,
+      failures_that_no_smaller_step_cures_keep_their_status, endless_failure_ends, fixed_never_halves,
       halving_stops_at_dt_min, halving_stops_where_the_time_stands_still)

@@ -135,7 +135,7 @@ START_TEST(omega_is_that_of_a_chain)
 END_TEST
 
 /* A start off equilibrium by 1e-6 stays near it below the limit and grows above it, damped or not. */
-START_TEST(the_limit_is_the_limit)
+START_TEST(steps_are_stable_only_below_the_limit)
 {
     const char *const forms[] = {"position", "velocity"};
     for (int f = 0; f < 2; f++)
@@ -525,8 +525,8 @@ START_TEST(own_boxes_miss_what_cs184_misses)
 END_TEST
 
 SUITE("verlet", the_position_form_is_the_recurrence_of_positions, a_state_restarts_it_exactly,
-      omega_is_that_of_a_chain, the_limit_is_the_limit, steps_follow_the_limit, a_blow_up_is_reported,
-      a_plane_stops_as_in_cs184, friction_is_against_the_moving_surface, a_sphere_pushes_along_its_radius,
-      a_floor_keeps_the_place_as_in_boson, friction_on_forces_as_in_boson, strains_are_limited,
-      patches_are_one_spring_after_the_other, forces_are_those_of_the_system, boxes_find_all_pairs,
-      own_boxes_miss_what_cs184_misses)
+      omega_is_that_of_a_chain, steps_are_stable_only_below_the_limit, steps_follow_the_limit,
+      a_blow_up_is_reported, a_plane_stops_as_in_cs184, friction_is_against_the_moving_surface,
+      a_sphere_pushes_along_its_radius, a_floor_keeps_the_place_as_in_boson, friction_on_forces_as_in_boson,
+      strains_are_limited, patches_are_one_spring_after_the_other, forces_are_those_of_the_system,
+      boxes_find_all_pairs, own_boxes_miss_what_cs184_misses)

@@ -528,8 +528,8 @@ START_TEST(sims_at_once_have_the_same_bits)
 }
 END_TEST
 
-/* The contact that a scene has acts at its moment: colliders in each scene that has some, friction and
- * self-contact in some scenes. */
+/* The contact of a scene acts in the state before its attempts: colliders in each scene that has some,
+ * friction and self-contact in some scenes. */
 static int scenes_pushed, scenes_layered, scenes_rubbed;
 
 static void count_contact(const ready *s, const drape_integrator_ops *method)

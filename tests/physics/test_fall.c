@@ -102,9 +102,9 @@ START_TEST(free_fall_is_exact)
 }
 END_TEST
 
-/* The same fall with and without dashpots differs from the exact one by the same bound. Damping takes no
- * work: strain rates are round-off, 4 DBL_EPSILON size/(L h), so forces are BETA K times that of a length,
- * and the work is that force over the fall, 1.5 m, on every node. */
+/* Falls with and without dashpots differ by at most the sum of their differences from the exact fall.
+ * Damping takes no work: strain rates are round-off, 4 DBL_EPSILON size/(L h), so forces are BETA K times
+ * that of a length, and the work is that force over the fall, 1.5 m, on every node. */
 START_TEST(falling_cloth_does_not_feel_its_damping)
 {
     const int steps = 50;

@@ -84,7 +84,7 @@ END_TEST
 
 /* Dashpots in continuous time make K nonsymmetric, which a solver for symmetric matrices has to notice. D
  * is in the reduced matrix, in its right-hand side and in both blocks of the full one. */
-START_TEST(so_it_does_with_damping)
+START_TEST(damping_leaves_the_trajectories_equal)
 {
     const char *terms =
         "{'type': 'damp.kelvin_voigt', 'beta': 5e-4}, {'type': 'drag.viscous', 'coefficient': 0.3},";
@@ -93,4 +93,5 @@ START_TEST(so_it_does_with_damping)
 }
 END_TEST
 
-SUITE("ida_full", the_reduced_system_gives_the_trajectory_of_the_full_one, so_it_does_with_damping)
+SUITE("ida_full", the_reduced_system_gives_the_trajectory_of_the_full_one,
+      damping_leaves_the_trajectories_equal)

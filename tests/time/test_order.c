@@ -133,7 +133,7 @@ START_TEST(every_integrator_converges_with_the_order_it_declares)
 END_TEST
 
 /* bdf2 uses the size of the step before; one-step methods use no history. */
-START_TEST(so_it_does_with_steps_of_changing_size)
+START_TEST(steps_of_changing_size_keep_the_order)
 {
     for (int i = 0; drape_integrators[i]; i++)
         if (has_fixed_steps(drape_integrators[i]))
@@ -160,7 +160,7 @@ END_TEST
 
 /* Without dashpots the acceleration does not jump, but its slope does: a single error of h^2 in v, for bdf2
  * as for all. */
-START_TEST(and_without_dashpots_as_well)
+START_TEST(kinks_without_dashpots_leave_the_order_too)
 {
     for (int i = 0; drape_integrators[i]; i++)
         if (has_fixed_steps(drape_integrators[i]))
@@ -366,8 +366,8 @@ START_TEST(the_estimate_for_backward_euler_is_its_local_error)
 }
 END_TEST
 
-SUITE("order", every_integrator_converges_with_the_order_it_declares, so_it_does_with_steps_of_changing_size,
-      kinks_at_ends_of_steps_leave_the_order, and_without_dashpots_as_well,
+SUITE("order", every_integrator_converges_with_the_order_it_declares, steps_of_changing_size_keep_the_order,
+      kinks_at_ends_of_steps_leave_the_order, kinks_without_dashpots_leave_the_order_too,
       kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_first,
       error_falls_with_the_controllers_rtol, steps_of_the_error_controller_change_gently,
       the_estimate_for_backward_euler_is_its_local_error)

@@ -60,9 +60,9 @@ START_TEST(few_iterations_are_near_the_converged_step)
 }
 END_TEST
 
-/* With enough iterations and digits it is backward Euler: both solve the same equations up to their
+/* With enough iterations and digits the step is backward Euler: both solve the same equations up to their
  * residuals, and a residual of 1e-9 N moves a node by h^2 F/m = 2.8e-4 x 1e-9/8e-4 m a step. */
-START_TEST(with_many_iterations_it_is_backward_euler)
+START_TEST(with_many_iterations_the_step_is_backward_euler)
 {
     scene exact = scene_open(HUNG, "", "be", ", 'tolerance': 1e-9");
     scene s = scene_open(
@@ -77,9 +77,9 @@ START_TEST(with_many_iterations_it_is_backward_euler)
 }
 END_TEST
 
-/* It includes contact, friction, damping and drag: a damped sheet with drag falls onto a sphere and stays
- * on it. */
-START_TEST(contact_and_damping_are_in_it)
+/* The fixed-iteration step includes contact, friction, damping and drag: a damped sheet with drag falls
+ * onto a sphere and stays on it. */
+START_TEST(the_step_includes_contact_and_damping)
 {
     scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 13, 'rows': 13, 'width': 0.6, "
@@ -164,7 +164,7 @@ END_TEST
 /* A budget too small for any step: steps grow to the longest, with at most one a call; the debt stays below
  * that, and the rest is dropped. Then there is time again: within a few frames the level is full and the
  * debt 0. */
-START_TEST(it_degrades_and_recovers)
+START_TEST(the_level_degrades_and_recovers)
 {
     scene s = scene_open(HUNG, "", "newton_k", "");
     const double frame = 1.0 / 60, longest = 4 * frame;
@@ -250,7 +250,8 @@ START_TEST(wrong_arguments_are_reported)
 }
 END_TEST
 
-SUITE("realtime", few_iterations_are_near_the_converged_step, with_many_iterations_it_is_backward_euler,
-      contact_and_damping_are_in_it, frame_rates_differ_by_the_order_of_the_method,
-      rest_does_not_depend_on_the_frame_rate, it_degrades_and_recovers, a_single_late_frame_is_made_up_for,
-      every_integrator_with_a_time_takes_frames, wrong_arguments_are_reported)
+SUITE("realtime", few_iterations_are_near_the_converged_step, with_many_iterations_the_step_is_backward_euler,
+      the_step_includes_contact_and_damping, frame_rates_differ_by_the_order_of_the_method,
+      rest_does_not_depend_on_the_frame_rate, the_level_degrades_and_recovers,
+      a_single_late_frame_is_made_up_for, every_integrator_with_a_time_takes_frames,
+      wrong_arguments_are_reported)

@@ -136,7 +136,7 @@ static void leave(const void *owner, const double *r, double *z)
     memcpy(z, r, 6 * sizeof *z);
 }
 
-/* As many iterations as there are distinct eigenvalues: 3 here. */
+/* There are as many iterations as distinct eigenvalues: 3 here. */
 START_TEST(conjugate_gradients_end_with_the_eigenvalues)
 {
     const double d[6] = {1, 1, 5, 5, 9, 9}, b[6] = {1, 2, 3, 4, 5, 6};

@@ -101,8 +101,7 @@ START_TEST(its_work_is_accounted)
 }
 END_TEST
 
-/* With every integrator that moves in time the node approaches the target. A fixed corner, a wrong number
- * and a wrong value are refused and change nothing. */
+/* With every integrator that moves in time the node approaches the target. */
 START_TEST(every_integrator_follows)
 {
     for (int i = 0; drape_integrators[i]; i++) {
@@ -126,6 +125,7 @@ START_TEST(every_integrator_follows)
 }
 END_TEST
 
+/* A fixed corner, a wrong number and a wrong value are refused and change nothing. */
 START_TEST(wrong_arguments_change_nothing)
 {
     scene h = scene_open(sheet, ", 'pins': [{'nodes': [0]}]", "be");

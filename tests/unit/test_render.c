@@ -213,7 +213,7 @@ END_TEST
 
 /* All points are in the picture, and the outermost ones are at the margin of 1/1.12 on two sides, up to
  * rounding. */
-START_TEST(camera_frames_what_it_is_shown)
+START_TEST(camera_frames_all_points)
 {
     const float points[][3] = {{0, 0, 0}, {1, 0.2f, 0}, {0.3f, -2, 0.5f}, {-0.7f, 0.4f, 1.5f}};
     const float nowhere[3] = {0};
@@ -255,4 +255,4 @@ END_TEST
 
 SUITE("render", bodies_lie_on_their_surface, corners_of_a_box_are_sharp,
       cloth_is_drawn_round_through_its_nodes, texture_is_not_mirrored, ramp_is_even_in_lightness,
-      letters_are_all_there, camera_frames_what_it_is_shown, shadings_are_found_by_name)
+      letters_are_all_there, camera_frames_all_points, shadings_are_found_by_name)
