@@ -93,8 +93,7 @@ static void make_strip(int columns, int rows, double l)
 
 /* ---- Scenes ---- */
 
-#define MODULUS                                                                                              \
-    1e3 /* [Pa]; with a soft thick sheet the rounding of the membrane is below the forces of the hinges */
+#define MODULUS   1e3 /* [Pa]; soft and thick: rounding of the membrane is below the hinge forces */
 #define THICKNESS 0.1
 #define DENSITY   0.2 /* per area */
 

@@ -12,8 +12,7 @@
 #include "geometry/intersect.h"
 #include "sim/sim.h"
 
-#define AUDIT_CUTS                                                                                           \
-    6 /* intervals along a triangle's side: a face is sampled at 28 points, among them its corners */
+#define AUDIT_CUTS 6 /* intervals along a side: a face is sampled at 28 points, with its corners */
 
 /* The largest values over all states of one kind. */
 typedef struct audit_worst {
