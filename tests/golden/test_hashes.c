@@ -30,16 +30,15 @@
 #include "support/bytes.h"
 #include "support/suite.h"
 
-#define ATTEMPTS    3
-#define FRAMES      2   /* length of the advance, which may take fewer attempts */
-#define SHARE       0.7 /* of the duration, before the attempts */
-#define LONGEST     2.0 /* [s] upper bound of that time */
-#define MAX_SCENES  64
-#define MAX_METHODS 32
-#define MAX_PREPARED                                                                                         \
-    1000 /* nodes of a scene that is advanced before its attempts: one in the form of CS184 keeps its size */
-#define MAX_NODES 200 /* of larger grids every other node is used, and again */
-#define LINE      512
+#define ATTEMPTS     3
+#define FRAMES       2   /* length of the advance, which may take fewer attempts */
+#define SHARE        0.7 /* of the duration, before the attempts */
+#define LONGEST      2.0 /* [s] upper bound of that time */
+#define MAX_SCENES   64
+#define MAX_METHODS  32
+#define MAX_PREPARED 1000 /* nodes of a scene that is advanced first: CS184 scenes keep their size */
+#define MAX_NODES    200  /* of larger grids every other node is used, and again */
+#define LINE         512
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define EVERY 2 /* of the scenes, in their order */
@@ -530,7 +529,7 @@ END_TEST
 
 /* The contact of a scene acts in the state before its attempts: colliders in each scene that has some,
  * friction and self-contact in some scenes. */
-static int scenes_pushed, scenes_layered, scenes_rubbed;
+static int scenes_with_colliders, scenes_with_self_contact, scenes_with_friction;
 
 static void count_contact(const ready *s, const drape_integrator_ops *method)
 {
@@ -543,17 +542,17 @@ static void count_contact(const ready *s, const drape_integrator_ops *method)
                        LONGEST; /* its contact may begin later than the test has time for */
     ck_assert_msg(s->from->collider || later || drape_model_collider_count(s->model) == 0,
                   "%s: no collider touches the cloth", s->scene);
-    scenes_pushed += s->from->collider;
-    scenes_layered += s->from->self;
-    scenes_rubbed += s->from->friction;
+    scenes_with_colliders += s->from->collider;
+    scenes_with_self_contact += s->from->self;
+    scenes_with_friction += s->from->friction;
 }
 
 START_TEST(contact_acts)
 {
     for_all(count_contact);
-    ck_assert_int_ge(scenes_pushed, 7 / EVERY);
-    ck_assert_int_ge(scenes_layered, 3 / EVERY);
-    ck_assert_int_ge(scenes_rubbed, 6 / EVERY);
+    ck_assert_int_ge(scenes_with_colliders, 7 / EVERY);
+    ck_assert_int_ge(scenes_with_self_contact, 3 / EVERY);
+    ck_assert_int_ge(scenes_with_friction, 6 / EVERY);
 }
 END_TEST
 
