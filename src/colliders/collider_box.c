@@ -10,12 +10,12 @@ enum { CENTER = 0, SIZE = 3, ROTATE = 6, ROUNDING = 9, PARAM_COUNT = 4 }; /* pla
 static const drape_param params[PARAM_COUNT] = {
     DRAPE_VECTOR("center", "m", DRAPE_REQUIRED, -1e9, 1e9, "center of the box"),
     DRAPE_VECTOR("size", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9,
-                 "whole lengths of its edges along x, y, z before it is turned; one number: a cube",
+                 "full lengths of its edges along x, y, z before the rotation; one number: a cube",
                  .uniform = true),
     DRAPE_TURN("rotate", 0, -1e6, 1e6,
-               "turn about the center: axis and angle, or a vector along the axis as long as the angle"),
+               "rotation about the center: axis and angle, or a vector along the axis as long as the angle"),
     DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
-                 "radius of its edges and corners, below half of its least size; the size stays"),
+                 "radius of its edges and corners, below half of its smallest size, which does not change"),
 };
 
 /* Rows are the axes of the box: y = frame (x - center). */
@@ -66,7 +66,7 @@ static drape_status make_shape(const double *values, double tolerance, drape_col
     (void)tolerance;
     if (!(values[ROUNDING] < least / 2))
         return drape_shape_refuse(shape, "rounding",
-                                  "%.10g is not allowed; it is below half of the least size, %.10g m",
+                                  "%.10g is not allowed; it is below half of the smallest size, %.10g m",
                                   values[ROUNDING], least / 2);
     drape_status status = drape_shape_reserve(shape, 8, 12, 0);
     if (!status)
@@ -124,7 +124,7 @@ static double distance(const double *values, const drape_collider_shape *shape, 
 const drape_collider_ops drape_collider_box = {
     .struct_size = sizeof(drape_collider_ops),
     .entry = {.name = "box",
-              .summary = "a box, its edges rounded where wanted",
+              .summary = "a box, whose edges may be rounded",
               .reference = "d = |max(q, 0)| + min(max q, 0) - rounding, q = |y| - (size / 2 - rounding)",
               DRAPE_PARAMS(params)},
     .shape = make_shape,

@@ -22,7 +22,7 @@ static drape_status make_shape(const double *values, double tolerance, drape_col
     (void)tolerance;
     vec3_sub(values + B, values + A, along);
     if (!(vec3_norm(along) > 0))
-        return drape_shape_refuse(shape, "b", "it is a; a capsule without length is a sphere");
+        return drape_shape_refuse(shape, "b", "it is equal to a; a capsule of length 0 is a sphere");
     drape_status status = drape_shape_reserve(shape, 2, 1, 0);
     if (status)
         return status;

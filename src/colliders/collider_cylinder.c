@@ -18,7 +18,7 @@ static const drape_param params[PARAM_COUNT] = {
     END("b", "center of the other one"),
     DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "radius around the axis from a to b"),
     DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
-                 "radius of its rims, below its radius and half of its length; length and radius stay"),
+                 "radius of its rims, below its radius and half of its length, which do not change"),
 };
 
 typedef struct axis {
@@ -33,7 +33,7 @@ static drape_status keep_axis(const double *values, drape_collider_shape *shape)
     vec3_sub(values + B, values + A, kept->u);
     double length = vec3_norm(kept->u);
     if (!(length > 0))
-        return drape_shape_refuse(shape, "b", "it is a; a cylinder has a length");
+        return drape_shape_refuse(shape, "b", "it is equal to a; a cylinder has a length above 0");
     double most = fmin(values[RADIUS], length / 2);
     if (!(values[ROUNDING] < most))
         return drape_shape_refuse(
@@ -153,7 +153,7 @@ const drape_collider_ops drape_collider_cylinder = {
     .struct_size = sizeof(drape_collider_ops),
     .entry =
         {.name = "cylinder",
-         .summary = "a cylinder with flat ends, its rims rounded where wanted",
+         .summary = "a cylinder with flat ends, whose rims may be rounded",
          .reference =
              "d = |max(q, 0)| + min(max q, 0) - rounding, q = (rho, |z|) - (radius, length / 2) + rounding",
          DRAPE_PARAMS(params)},

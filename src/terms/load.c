@@ -49,9 +49,9 @@ drape_status drape_load_count(const drape_cloth_view *cloth, const double *value
     const int side = (int)values[DRAPE_LOAD_EDGE];
     *count = 0;
     if (side != ALL && cloth->columns == 0)
-        return drape_term_refuse(builder,
-                                 "\"edge\": \"%s\" is a side of a grid; this mesh is none: give a box",
-                                 drape_load_edges[side]);
+        return drape_term_refuse(
+            builder, "\"edge\": \"%s\" is a side of a grid, and this mesh is not a grid: give a box",
+            drape_load_edges[side]);
     for (int32_t e = 0; e < cloth->edge_count; e++)
         *count += drape_load_takes(cloth, values, e);
     if (*count == 0)

@@ -77,7 +77,7 @@ bool drape_orthotropic_frame(const double *values, const double *const corner[3]
 drape_status drape_orthotropic_refuse(drape_term_builder *builder, int32_t triangle)
 {
     return drape_term_refuse(builder,
-                             "the warp stands upright on triangle %d of the mesh; \"warp_direction\" is a "
+                             "the warp is perpendicular to triangle %d of the mesh; \"warp_direction\" is a "
                              "direction that lies in the sheet",
                              (int)triangle);
 }

@@ -59,9 +59,9 @@ static const drape_param params[LIST_COUNT] = {
                                     "added to the rest curvature: along the warp, along the weft, twist; "
                                     "positive towards the side from which triangles turn counterclockwise",
                                     .numbers = "[k11, k22, k12]"),
-    [LIST_MIN_ALTITUDE] = DRAPE_NUMBER(
-        "min_altitude", "1", 1e-6, 0, DRAPE_BELOW(1),
-        "a step that takes an altitude of a triangle below this share of its least one at rest is rejected"),
+    [LIST_MIN_ALTITUDE] = DRAPE_NUMBER("min_altitude", "1", 1e-6, 0, DRAPE_BELOW(1),
+                                       "a step that takes an altitude of a triangle below this share of its "
+                                       "smallest one at rest is rejected"),
     [LIST_MAX_TURN] = DRAPE_NUMBER(
         "max_turn", "rad", 2.8, DRAPE_ABOVE(0), 3.14159265358979,
         "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"),
@@ -315,7 +315,7 @@ static double largest_turn(const drape_elements *el, int32_t element, const doub
 static drape_status check(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault)
 {
-    drape_fault low = {drape_reason_name(DRAPE_REASON_ALTITUDE_COLLAPSE), "altitude / least rest altitude",
+    drape_fault low = {drape_reason_name(DRAPE_REASON_ALTITUDE_COLLAPSE), "altitude / smallest rest altitude",
                        -1, INFINITY, el->params[PARAM_MIN_ALTITUDE]};
     drape_fault turned = {drape_reason_name(DRAPE_REASON_HINGE_BRANCH), "turn of a hinge in one step [rad]",
                           -1, 0, el->params[PARAM_MAX_TURN]};
@@ -344,7 +344,7 @@ const drape_term_ops drape_term_bend_midedge = {
              "bending of every triangle, a plate with the true Poisson ratio on any mesh: E = A/2 (K - "
              "K0)'C(K - K0)",
          .reference =
-             "Grinspun, Gingold, Reisman & Zorin 2006, section 4, the turns of the normals from the nodes",
+             "Grinspun, Gingold, Reisman & Zorin 2006, section 4, with edge normals computed from the nodes",
          DRAPE_PARAMS(params)},
     .element_name = "square",
     .nodes = MIDEDGE_NODES,

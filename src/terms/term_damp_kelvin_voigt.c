@@ -33,7 +33,7 @@ const drape_term_ops drape_term_damp_kelvin_voigt = {
         {.name = "damp.kelvin_voigt",
          .summary =
              "internal damping: force beta k q' grad q on every strain measure q of the cloth's other terms",
-         .reference = "Kelvin-Voigt solid: spring and dashpot side by side",
+         .reference = "Kelvin-Voigt solid: spring and dashpot in parallel",
          DRAPE_PARAMS(params)},
     .element_name = "measure",
     .law = law,

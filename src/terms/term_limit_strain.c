@@ -29,10 +29,10 @@ static const char *const over_choices[] = {[OVER_EDGES] = "edges", [OVER_SPRINGS
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_LIMIT] = DRAPE_NUMBER("limit", "1", 0.1, DRAPE_ABOVE(0), 100,
-                                 "strain |e|/L - 1 that no accepted state of an implicit row exceeds; verlet "
-                                 "leaves it out, and has strain_limit"),
+                                 "strain |e|/L - 1 that no accepted state of an implicit integrator exceeds; "
+                                 "verlet ignores this term and has strain_limit instead"),
     [PARAM_ONSET] = DRAPE_NUMBER("onset", "1", DRAPE_DERIVED("half of limit"), 0, 100,
-                                 "strain below limit from which it is resisted; none is below"),
+                                 "strain at which the resistance begins, below limit"),
     [PARAM_STIFFNESS] = DRAPE_NUMBER(
         "stiffness", "N/m",
         DRAPE_DERIVED(
@@ -43,8 +43,8 @@ static const drape_param params[PARAM_COUNT] = {
         DRAPE_CHOICE("over", OVER_EDGES, over_choices,
                      "edges: of the mesh; springs: all structural, shear and bend pairs of a square grid"),
     [PARAM_CAP] = DRAPE_NUMBER("cap", "1", 0.01, 1e-9, 0.5,
-                               "share of limit - onset, next to the limit, where the barrier goes on as a "
-                               "parabola: forces at the limit are some 2/cap stiffness L (limit - onset)"),
+                               "share of limit - onset, next to the limit, where the barrier continues as a "
+                               "parabola: forces at the limit are about 2/cap stiffness L (limit - onset)"),
 };
 
 static double onset_of(const double *values)

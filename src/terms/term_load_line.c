@@ -52,7 +52,7 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
 const drape_term_ops drape_term_load_line = {
     .struct_size = sizeof(drape_term_ops),
     .entry = {.name = "load.line",
-              .summary = "a force per length on edges of the boundary, that keeps its direction",
+              .summary = "a force per length of constant direction on boundary edges",
               .reference = "work of a dead load, lumped by halves",
               DRAPE_PARAMS(params)},
     .element_name = "edge",

@@ -12,7 +12,7 @@ const drape_term_ops drape_term_spring_bend = {
     .struct_size = sizeof(drape_term_ops),
     .entry =
         {.name = "spring.bend",
-         .summary = "springs to the next node but one along rows and columns of a square grid: E = 1/2 k "
+         .summary = "springs to the second next node along rows and columns of a square grid: E = 1/2 k "
                     "(l - L)^2",
          .reference =
              "Provot 1995, Deformation constraints in a mass-spring model to describe rigid cloth behavior",

@@ -1,9 +1,9 @@
 /*
- * test_breakdown.c: what the DEP report's breakdown cases cost at the step at which its program broke down.
- * Such a case may halve; all its Newton iterations, those of rejected attempts too, are at most 3 times
- * those of a clean run: the same scene over the same time at the largest of the steps dt, dt/2, dt/4 ... at
- * which nothing is rejected. Printed besides: iterations for each nominal step, over those for each step of
- * the clean run.
+ * test_breakdown.c: the cost of the DEP report's breakdown cases at the step at which its program broke
+ * down. Such a case may be halved, but all its Newton iterations, including those of rejected attempts, are
+ * at most 3 times those of a clean run: the same scene over the same time at the largest of the steps dt,
+ * dt/2, dt/4 ... at which no attempt is rejected. Also printed: iterations per nominal step, over those per
+ * step of the clean run.
  */
 #include "support/dep.h"
 
@@ -52,7 +52,7 @@ START_TEST(side_12_at_the_steps_that_broke_costs_at_most_three_clean_runs)
 }
 END_TEST
 
-/* The larger sheets broke at the report's own step. */
+/* The larger sheets broke down at the report's own step. */
 START_TEST(side_22_and_23_cost_at_most_three_clean_runs)
 {
     if (!getenv("DRAPE_SLOW")) {

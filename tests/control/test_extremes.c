@@ -1,11 +1,11 @@
 /*
- * test_extremes.c: whatever a scene asks for, a run ends: done, or with a negative status and a message that
- * is true. No state is ever not a number, no accepted step has a residual above its tolerance, no run tries
- * for ever.
+ * test_extremes.c: every run ends, whatever its scene: it completes, or has a negative status and a true
+ * message. No state ever contains NaN, no accepted step has a residual above its tolerance, no run is
+ * retried endlessly.
  *
- * Every case is a variation of one sheet, 8 edges of 0.1 m a side, 1 MPa, 1 mm, 200 kg/m3, hung by two
- * corners, undamped, so that nothing but the integrator takes away what an extreme stirs up. It runs for 1 s
- * or for what the table says, for 3 s where DRAPE_SLOW is set.
+ * Every case is a variation of one sheet, 8 edges of 0.1 m a side, 1 MPa, 1 mm, 200 kg/m3, pinned at two
+ * corners, undamped, so that only the integrator removes the energy that an extreme adds. It runs for 1 s
+ * or for the time in the table, for 3 s if DRAPE_SLOW is set.
  */
 #include "support/scene.h"
 
@@ -18,10 +18,10 @@
 #define PI        3.14159265358979323846
 
 /*
- * More attempts than this are called a hang. Halving could take 1e7 steps a second before it gives up, each
- * as short as dt_min; what the worst of the cases takes is a twentieth of this.
+ * More attempts than this are considered a hang. Halving could take 1e7 steps a second before it gives up,
+ * each as short as dt_min; the slowest of the cases takes a twentieth of this.
  */
-#define MOST_ATTEMPTS(duration) (1000 + 200000 * duration)
+#define MAX_ATTEMPTS(duration) (1000 + 200000 * duration)
 
 /* ---- Meshes and pins in memory ---- */
 
@@ -76,7 +76,7 @@ static void move_pin(pin_list *pin, double t, double x, double y, double z)
     pin->key[pin->keys++] = (drape_track_key){t, {x, y, z}};
 }
 
-/* Nodes at (x_c, y_r, z_r), cells split the same way as those of the grid "equilateral". */
+/* Nodes at (x_c, y_r, z_r), cells split as those of the grid "equilateral". */
 static void lattice(sheet *s, const double *x, const double *y, const double *z, double shift)
 {
     for (int r = 0; r < ROW; r++)
@@ -111,9 +111,9 @@ static void hung(sheet *s)
 }
 
 /*
- * A disc of 8 rings of 10 nodes, each ring 10^(3/7) times as wide as the one inside: triangles alike in
- * shape, a thousandfold in size, so that masses are a million to one. Hung by two nodes of the rim, or by
- * the smallest triangles, whose springs are too weak by far for the weight.
+ * A disc of 8 rings of 10 nodes, each ring 10^(3/7) times as wide as the one inside: triangles of similar
+ * shape, a thousandfold in size, so that masses are a million to one. Pinned at two nodes of the rim, or at
+ * the smallest triangles, whose springs are by far too weak for the weight.
  */
 #define RINGS  8
 #define SPOKES 10
@@ -152,7 +152,7 @@ static void disc_by_centre(sheet *s)
     disc(s, false);
 }
 
-/* Node 1 is moved onto its neighbour, node 0, which is held. */
+/* Node 1 is moved onto its neighbour, the pinned node 0. */
 static void collapsing(sheet *s)
 {
     flat_sheet(s, false);
@@ -164,7 +164,7 @@ static void collapsing(sheet *s)
 }
 
 /*
- * A triangle whose altitude is little above what validation asks for, 1e-12 of its longest edge, between a
+ * A triangle whose altitude is slightly above the limit of validation, 1e-12 of its longest edge, between a
  * wide one and the rim.
  */
 static void sliver(sheet *s)
@@ -182,8 +182,8 @@ static void sliver(sheet *s)
 }
 
 /*
- * Row 1 is held; row 2 goes about it by 4 rad, so that the hinges between fold onto themselves and through,
- * and the free rows follow.
+ * Row 1 is pinned; row 2 is moved around it by 4 rad, so that the hinges between fold onto themselves and
+ * through, and the free rows follow.
  */
 static void folding(sheet *s)
 {
@@ -203,7 +203,7 @@ static void edge_on(sheet *s)
     flat_sheet(s, true);
 }
 
-/* On its lowest row, which is held. */
+/* It stands on its lowest row, which is pinned. */
 static void edge_on_foot(sheet *s)
 {
     flat_sheet(s, true);
@@ -217,11 +217,11 @@ static void jumping(sheet *s)
     move_pin(&s->pin[0], 0.1 + 1e-9, 0, 1, 0);
 }
 
-/* ---- Starts that are not the rest state ---- */
+/* ---- Initial states that are not at rest ---- */
 
 /*
- * Every free node up to 0.4 edges away in every direction; the generator is that of the C standard's
- * example.
+ * Moves every free node by up to 0.4 edges in every direction; the generator is the example in the C
+ * standard.
  */
 static void crumple(scene *s)
 {
@@ -260,26 +260,26 @@ enum { BE = 1, BDF2 = 2, MIDPOINT = 4, IDA = 8, TRBDF2 = 16, EVERY = 31 };
 
 typedef struct extreme {
     const char *name;
-    double modulus, thickness, gravity, dt; /* 0: those of the head of the file; gravity: NaN for none */
+    double modulus, thickness, gravity, dt; /* 0: as above; gravity: NaN for none */
     double duration;                        /* [s]; 0: 1 */
     double speed;                           /* [m/s] downwards at the start */
-    void (*mesh)(sheet *);                  /* NULL: hung */
+    void (*mesh)(sheet *);                  /* NULL: pinned at two corners */
     void (*start)(scene *);                 /* NULL: at rest */
-    unsigned stops;                         /* rows that may stop cleanly; all others must end ok */
-    unsigned crawls; /* rows that run 3 times duration, not 3 s, where DRAPE_SLOW is set */
+    unsigned stops;  /* integrators that may stop with a message; all others must end ok */
+    unsigned crawls; /* integrators that run 3 times duration, not 3 s, if DRAPE_SLOW is set */
 } extreme;
 
 /*
- * Which rows may stop, and why. midpoint damps nothing: where a sheet at 1 MPa or more has waves that the
- * step does not resolve, or is struck, they stay, and sooner or later a triangle goes through itself in its
- * plane. There its normal turns by pi however small the step is, and the hinge's branch is a guess:
- * "hinge_branch", "altitude_collapse", "max_iterations" at dt_min. IDA resolves what it is given and may
- * meet the same. An edge that starts below min_length is, for IDA's first small steps, still below it. A
- * start or an end with an edge of no length has no direction of its spring.
+ * The integrators that may stop, and why. midpoint damps nothing: waves of a sheet at 1 MPa or more that
+ * the step does not resolve, or that follow an impact, persist, and sooner or later a triangle passes
+ * through itself in its plane. There its normal turns by pi however small the step is, and the branch of
+ * the hinge is a guess: "hinge_branch", "altitude_collapse", "max_iterations" at dt_min. IDA resolves the
+ * motion and may reach the same. An edge that starts below min_length is still below it in the small first
+ * steps of IDA. A spring has no direction if its edge has length 0 at the start or at the end.
  *
- * Which rows crawl: the smallest triangles of the disc weigh 10 ug and are in the end whirled about by the
- * rest. IDA follows each of their turns with steps of 0.2 us, 4e6 a second, until max_steps ends it; midpoint
- * comes forward in steps of that size.
+ * The integrators that crawl: the smallest triangles of the disc weigh 10 ug and are finally whirled about
+ * by the rest. IDA follows each of their turns with steps of 0.2 us, 4e6 a second, until max_steps ends it;
+ * midpoint advances in steps of that size.
  */
 static const extreme extremes[] = {
     {.name = "E 1 Pa", .modulus = 1},
@@ -292,7 +292,7 @@ static const extreme extremes[] = {
     {.name = "dt 0.1 s", .dt = 0.1, .stops = MIDPOINT},
     {.name = "dt 1 s", .dt = 1, .stops = MIDPOINT},
     {.name = "masses 1 to 1e6", .mesh = disc_by_rim, .duration = 0.25, .stops = MIDPOINT | IDA},
-    {.name = "masses 1e6, hung by least",
+    {.name = "masses 1e6, hung by centre",
      .mesh = disc_by_centre,
      .duration = 0.1,
      .stops = EVERY,
@@ -311,7 +311,7 @@ static const extreme extremes[] = {
     {.name = "edge of 1e-9 at start",
      .start = nearly_collapse,
      .duration = 0.2,
-     .stops = MIDPOINT | TRBDF2 | IDA}, /* the trapezoidal stage of trbdf2 is as midpoint */
+     .stops = MIDPOINT | TRBDF2 | IDA}, /* the trapezoidal stage of trbdf2 behaves as midpoint */
     {.name = "altitude 1.1e-12", .mesh = sliver, .stops = MIDPOINT},
     {.name = "hinge folded through pi", .mesh = folding, .stops = MIDPOINT},
     {.name = "edge-on, falling", .mesh = edge_on, .speed = 1},
@@ -364,12 +364,12 @@ static drape_status make_model(scene *s, const extreme *c, const sheet *mesh)
     return drape_model_create(s->ctx, &def, &s->model);
 }
 
-/* What the attempts of a run said. */
+/* What the attempts of a run reported. */
 typedef struct outcome {
     scene *scene;
     long attempts, accepted, rejected, unconverged, nonfinite, silent;
     drape_attempt last;
-    bool bounded;    /* the row bounds a residual */
+    bool bounded;    /* the integrator bounds a residual */
     double duration; /* [s] */
 } outcome;
 
@@ -399,10 +399,10 @@ static drape_status note(void *user, const drape_event *event)
     o->nonfinite += !all_finite(drape_sim_positions(o->scene->sim), nodes) ||
                     !all_finite(drape_sim_velocities(o->scene->sim), nodes);
     o->last = *a;
-    return o->attempts < MOST_ATTEMPTS(o->duration) ? DRAPE_OK : DRAPE_RETRY_REJECTED;
+    return o->attempts < MAX_ATTEMPTS(o->duration) ? DRAPE_OK : DRAPE_RETRY_REJECTED;
 }
 
-/* One line "t=... h=...: reason (status) ..." of the time at which the state stands. */
+/* Whether the message is one line "t=... h=...: reason (status) ..." with the time of the present state. */
 static bool message_is_true(const outcome *o)
 {
     char start[80];
@@ -421,7 +421,7 @@ static double duration_of(const extreme *c, unsigned bit)
     return c->crawls & bit ? 3 * duration : 3;
 }
 
-/* What is wrong with an outcome; NULL: nothing. */
+/* The fault of an outcome; NULL: none. */
 static const char *complaint(const extreme *c, const outcome *o, drape_status status, unsigned bit)
 {
     const drape_statistics done = drape_sim_statistics(o->scene->sim);
@@ -440,18 +440,18 @@ static const char *complaint(const extreme *c, const outcome *o, drape_status st
     return c->stops & bit ? NULL : "stopped";
 }
 
-static bool run(const extreme *c, const char *row, unsigned bit)
+static bool run(const extreme *c, const char *method, unsigned bit)
 {
     static sheet mesh;
     scene s = scene_empty();
     const drape_setting settings[] = {{"dt", or_else(c->dt, 1.0 / 60), NULL}};
     drape_sim_def def;
-    outcome o = {.scene = &s, .bounded = strcmp(row, "ida") != 0, .duration = duration_of(c, bit)};
+    outcome o = {.scene = &s, .bounded = strcmp(method, "ida") != 0, .duration = duration_of(c, bit)};
     memset(&mesh, 0, sizeof mesh);
     c->mesh ? c->mesh(&mesh) : hung(&mesh);
     ck_assert_msg(make_model(&s, c, &mesh) == DRAPE_OK, "%s: %s", c->name, drape_context_message(s.ctx));
     drape_sim_def_init(&def, sizeof def);
-    def.integrator = row;
+    def.integrator = method;
     def.controller = "halving";
     def.integrator_settings = settings;
     def.integrator_setting_count = 1;
@@ -463,22 +463,22 @@ static bool run(const extreme *c, const char *row, unsigned bit)
     const drape_status status = drape_sim_advance(s.sim, duration_of(c, bit));
     const drape_statistics done = drape_sim_statistics(s.sim);
     printf("# %-9s %-26s %-16s t %-9.4g %5ld accepted %5ld rejected %6lld iterations, h from %.3g s%s%s\n",
-           row, c->name, drape_status_name(status), drape_sim_time(s.sim), o.accepted, o.rejected,
+           method, c->name, drape_status_name(status), drape_sim_time(s.sim), o.accepted, o.rejected,
            (long long)done.newton_iterations, done.h_min, status ? "; " : "",
            status ? drape_context_message(s.ctx) : "");
 
     const char *wrong = complaint(c, &o, status, bit);
     if (wrong)
-        printf("# %s, %s: %s\n", c->name, row, wrong);
+        printf("# %s, %s: %s\n", c->name, method, wrong);
     scene_close(&s);
     return !wrong;
 }
 
-static void run_all(const char *row, unsigned bit)
+static void run_all(const char *method, unsigned bit)
 {
     int good = 0;
     for (size_t i = 0; i < EXTREMES; i++)
-        good += run(&extremes[i], row, bit);
+        good += run(&extremes[i], method, bit);
     ck_assert_msg(good == EXTREMES, "%d of %d: see above", (int)EXTREMES - good, (int)EXTREMES);
 }
 
@@ -513,8 +513,8 @@ START_TEST(ida_ends_whatever_the_scene_is)
 END_TEST
 
 /*
- * The report's triangle with an altitude of 1e-12 is where validation draws the line: below it is refused,
- * and named.
+ * The report's triangle with an altitude of 1e-12 is at the limit of validation: below it is refused and
+ * named.
  */
 START_TEST(validation_refuses_an_altitude_below_1e_12)
 {

@@ -1,7 +1,7 @@
 /*
- * test_rejection.c: a rejected step never was. The state after it is that before it to the bit, the steps
- * that are kept fill their intervals exactly and are those of a run that never tried the others, every
- * attempt is told once with its reason, and what cannot succeed ends.
+ * test_rejection.c: a rejected step leaves no trace. The state after it is that before it to the bit; the
+ * accepted steps fill their intervals exactly and are those of a run that never tried the others; every
+ * attempt is reported once with its reason; and a run that cannot succeed ends.
  */
 #include <jansson.h>
 #include <unistd.h>
@@ -14,7 +14,7 @@
 #include "support/bytes.h"
 #include "support/scene.h"
 
-#define MOST_STEPS 4000
+#define MAX_STEPS 4000
 
 static const char *const fixed_rows[] = {"be", "bdf2", "midpoint", "trbdf2"};
 
@@ -22,9 +22,9 @@ static const char *const fixed_rows[] = {"be", "bdf2", "midpoint", "trbdf2"};
 
 typedef struct record {
     drape_sim *sim;
-    drape_attempt attempt[MOST_STEPS];
-    double end[MOST_STEPS]; /* [s] where the state stood after the attempt */
-    uint64_t hash[MOST_STEPS];
+    drape_attempt attempt[MAX_STEPS];
+    double end[MAX_STEPS]; /* [s] time of the state after the attempt */
+    uint64_t hash[MAX_STEPS];
     uint64_t before; /* hash of the state that the next attempt starts from */
     int count, accepted, rejected;
 } record;
@@ -34,7 +34,7 @@ static drape_status keep_record(void *user, const drape_event *event)
     record *r = user;
     if (event->kind != DRAPE_EVENT_ATTEMPT)
         return DRAPE_OK;
-    ck_assert(r->count < MOST_STEPS);
+    ck_assert(r->count < MAX_STEPS);
     const drape_attempt *a = event->attempt;
     const uint64_t hash = drape_sim_hash(r->sim);
     ck_assert_int_eq(a->index, r->count);
@@ -63,8 +63,8 @@ static record *watch(scene *s)
 /* ---- Scenes ---- */
 
 /*
- * A sheet of 7 edges a side that swings by two corners, at a step far too long for plain Newton. All powers
- * of two, so that parts of a step are exact.
+ * A sheet of 7 edges a side that swings on two corners, at a step far too long for plain Newton. All sizes
+ * are powers of two, so that parts of a step are exact.
  */
 #define STEP 0.125 /* [s] */
 
@@ -82,7 +82,8 @@ static scene swinging(const char *integrator, const char *controller)
 
 /* ---- Halving ---- */
 
-/* Runs on whatever halving accepted, with the controller that never halves: the same states, to the bit. */
+/* Repeats the steps that halving accepted with the controller that never halves: the same states, to the
+ * bit. */
 static void repeat_without_rejections(const char *integrator, const record *r)
 {
     scene s = swinging(integrator, "'type': 'fixed'");
@@ -111,8 +112,8 @@ START_TEST(a_run_with_rejections_is_the_run_of_its_accepted_steps)
 END_TEST
 
 /*
- * Step ends are places on the binary subdivision of the interval; every k dt is one of them, and the size is
- * that of the part.
+ * Step ends are points of the binary subdivision of the interval; every k dt is one of them, and the size
+ * is that of the part.
  */
 START_TEST(parts_fill_their_interval_exactly)
 {
@@ -139,7 +140,7 @@ START_TEST(parts_fill_their_interval_exactly)
 }
 END_TEST
 
-/* Times that are no sums of halves: all k dt are met to the bit all the same. */
+/* With times that are not sums of halves, all k dt are still met to the bit. */
 START_TEST(nominal_times_are_met_to_the_bit)
 {
     const double dt = 0.15;
@@ -161,8 +162,8 @@ START_TEST(nominal_times_are_met_to_the_bit)
 END_TEST
 
 /*
- * A rejection halves; a success never makes the next step longer than twice itself, and makes it that as
- * soon as the step ends where one of twice the size would.
+ * A rejection halves the step. A success makes the next step at most twice as long, and does so as soon as
+ * the step ends where one of twice the size would end.
  */
 START_TEST(sizes_are_halved_and_grow_back)
 {
@@ -186,7 +187,7 @@ START_TEST(sizes_are_halved_and_grow_back)
 END_TEST
 
 /*
- * One node is led onto its neighbour: every step that reaches it is too long, and what is left to say is
+ * One node is moved onto its neighbour: every step that reaches it is too long, and the message must say
  * when, why and which edge.
  */
 START_TEST(a_step_that_gets_too_small_names_time_reason_and_element)
@@ -200,7 +201,7 @@ START_TEST(a_step_that_gets_too_small_names_time_reason_and_element)
     record *r = watch(&s);
     ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_STEP_TOO_SMALL);
     const drape_attempt *last = &r->attempt[r->count - 1];
-    /* The interval's halves are 2^-4 2^-k; 2^-13 is the last that is not below dt_min. */
+    /* The halves of the interval are 2^-4 2^-k; 2^-13 is the last one that is not below dt_min. */
     ck_assert(last->h == ldexp(1, -13) && drape_sim_time(s.sim) == 0.25 - last->h);
     snprintf(expected, sizeof expected, "t=%.9g h=%.4g: edge_collapse (retry_degenerate) after ",
              drape_sim_time(s.sim), last->h);
@@ -214,9 +215,9 @@ END_TEST
 
 /* ---- A bound on attempts ---- */
 
-#define MOST_ATTEMPTS 2 /* within one dt */
+#define MAX_ATTEMPTS 2 /* within one dt */
 
-/* Checks what is said; the sim stands where the last accepted attempt left it. */
+/* Checks the message; the sim is in the state of the last accepted attempt. */
 static void check_bound(const scene *s, const record *r, drape_status status)
 {
     double t, since;
@@ -236,8 +237,8 @@ static void check_bound(const scene *s, const record *r, drape_status status)
     ck_assert(drape_sim_hash(s->sim) == r->before);
 }
 
-/* Advances to `end`, stopped as often as it may be. Half of the stops, another sim goes on from a checkpoint
- * of this one. */
+/* Advances to `end`, however often the bound stops it. After every second stop, s is restored from its own
+ * checkpoint; `other` continues from that of the last stop. */
 static int advance_bounded(scene *s, scene *other, double end)
 {
     record *r = watch(s);
@@ -260,15 +261,15 @@ static int advance_bounded(scene *s, scene *other, double end)
     return stops;
 }
 
-/* Each advance tries max_attempts steps within one dt and no more; who advances again and again, or goes on
- * from a checkpoint, comes to the bits of a run without a bound. */
+/* Each advance tries at most max_attempts steps within one dt; a host that advances again and again, or
+ * continues from a checkpoint, gets the bits of a run without a bound. */
 START_TEST(a_bound_on_attempts_ends_the_advance_and_changes_no_bit)
 {
     static const char *const controllers[] = {"'type': 'halving'", "'type': 'strain', 'max_stretch': 0.05",
                                               "'type': 'error', 'rtol': 1e-4"};
     for (size_t k = 0; k < sizeof controllers / sizeof *controllers; k++) {
         char bounded[100];
-        snprintf(bounded, sizeof bounded, "%s, 'max_attempts': %d", controllers[k], MOST_ATTEMPTS);
+        snprintf(bounded, sizeof bounded, "%s, 'max_attempts': %d", controllers[k], MAX_ATTEMPTS);
         scene plain = swinging("be", controllers[k]), s = swinging("be", bounded),
               other = swinging("be", bounded);
         scene_advance(&plain, 1);
@@ -284,7 +285,7 @@ START_TEST(a_bound_on_attempts_ends_the_advance_and_changes_no_bit)
 }
 END_TEST
 
-/* A bound of one is that of steps which are never tried again, and a run of those does not meet it. */
+/* A bound of one allows no step to be tried again, and a run without rejections does not reach it. */
 START_TEST(a_run_without_rejections_never_meets_the_bound)
 {
     scene s = scene_open(
@@ -293,7 +294,7 @@ START_TEST(a_run_without_rejections_never_meets_the_bound)
         "'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge']}],"
         "'integrator': {'method': 'be', 'dt': 0.01}, 'controller': {'max_attempts': 1}, 'duration': 1}");
     scene_advance(&s, 0.5);
-    scene_advance(&s, 0.503); /* a host may cut steps as it likes */
+    scene_advance(&s, 0.503); /* a host may cut steps at any time */
     scene_advance(&s, 1);
     ck_assert_int_eq(drape_sim_statistics(s.sim).steps_rejected, 0);
     scene_close(&s);
@@ -301,8 +302,8 @@ START_TEST(a_run_without_rejections_never_meets_the_bound)
 END_TEST
 
 /*
- * Flight at 1 m/s, and a last step of 0.17 us at a tolerance of 1e-13 N: the inertia M v/h of a node, some
- * 1e4 N, is rounded to 1e-12. What is left of it is no failure, and half the step would double it.
+ * Flight at 1 m/s, and a last step of 0.17 us at a tolerance of 1e-13 N: the inertia M v/h of a node, about
+ * 1e4 N, is rounded to 1e-12. A residual of that size is not a failure, and half the step would double it.
  */
 START_TEST(a_residual_of_rounding_is_converged)
 {
@@ -332,8 +333,8 @@ START_TEST(a_residual_of_rounding_is_converged)
 }
 END_TEST
 
-/* Two nodes in one place: no residual is a number, and the message does not call it one. */
-START_TEST(a_residual_that_is_no_number_is_not_told)
+/* Two nodes in one place: the residual is NaN, and the message does not print it as a number. */
+START_TEST(a_nan_residual_is_not_printed)
 {
     scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 4, 'edge_length': 0.1},"
@@ -353,8 +354,8 @@ static drape_status stop_at_once(void *user, const drape_event *event)
     return DRAPE_E_STOPPED;
 }
 
-/* An observer may stop without a message; that of an earlier failure is not its. */
-START_TEST(the_message_of_an_earlier_failure_is_not_told_again)
+/* An observer may stop without a message; then the message of an earlier failure must not appear. */
+START_TEST(the_message_of_an_earlier_failure_is_not_repeated)
 {
     scene s = swinging("be", "'type': 'halving'");
     ck_assert_int_eq(drape_sim_advance(s.sim, NAN), DRAPE_E_ARGUMENT);
@@ -366,7 +367,7 @@ START_TEST(the_message_of_an_earlier_failure_is_not_told_again)
 }
 END_TEST
 
-/* ida without free nodes has nothing to solve and stops at the keys of the tracks all the same. */
+/* Without free nodes ida has no equations to solve, but still stops at the keys of the tracks. */
 START_TEST(ida_without_free_nodes_stops_at_kinks)
 {
     scene s = scene_open(
@@ -385,8 +386,8 @@ END_TEST
 /* ---- Strain ---- */
 
 /*
- * The largest change of an edge's length over its rest length, or way of a node over its shortest edge (here
- * all are alike).
+ * The largest change of an edge's length over its rest length, and the largest displacement of a node over
+ * its shortest edge (here all edges are alike).
  */
 static void largest(const scene *s, const double *from, double *stretch, double *move)
 {
@@ -450,7 +451,7 @@ END_TEST
 
 /* ---- Error ---- */
 
-/* Sizes fall after every rejection, and no state that was refused comes back. */
+/* Sizes fall after every rejection, and no refused state occurs again. */
 START_TEST(the_error_controller_never_tries_a_refused_size_again)
 {
     for (size_t k = 0; k < sizeof fixed_rows / sizeof *fixed_rows; k++) {
@@ -468,8 +469,8 @@ START_TEST(the_error_controller_never_tries_a_refused_size_again)
 }
 END_TEST
 
-/* The first step knows nothing of the error of its velocities; at tight tolerances there is a first step all
- * the same, and steps after it. be at rtol 1e-10 wants some 0.5 us a step. */
+/* For the first step there is no estimate of the error in velocities; at tight tolerances the run must
+ * still start and continue. At rtol 1e-10 be needs about 0.5 us a step. */
 START_TEST(the_error_controller_starts_at_tight_tolerances)
 {
     for (size_t k = 0; k < sizeof fixed_rows / sizeof *fixed_rows; k++)
@@ -489,19 +490,18 @@ START_TEST(the_error_controller_starts_at_tight_tolerances)
 }
 END_TEST
 
-static const drape_controller_ops *row(const char *name)
+static const drape_controller_ops *controller_named(const char *name)
 {
     return drape_controllers[drape_registry_find(&drape_controller_registry, NULL, name)];
 }
 
 /*
- * A solution that is not a number has an estimate that is none: refused, as often as it comes, until the
- * step is too small.
+ * A solution with NaN has an estimate of NaN: it is refused whenever it occurs, until the step is too small.
  */
 START_TEST(an_estimate_that_is_not_a_number_is_refused_until_it_ends)
 {
     static const double wrongs[] = {NAN, INFINITY, -INFINITY};
-    const drape_controller_ops *ops = row("error");
+    const drape_controller_ops *ops = controller_named("error");
     scene s = swinging("be", "");
     double values[DRAPE_MAX_PARAMS];
     for (int i = 0; i < ops->entry.param_count; i++)
@@ -535,9 +535,9 @@ START_TEST(an_estimate_that_is_not_a_number_is_refused_until_it_ends)
             ck_assert(trial.h_next <= h / 2);
             h = trial.h_next;
         }
-        /* from 1 s to dt_min = 1e-7 s in halves at least */
+        /* from 1 s to dt_min = 1e-7 s at least by halves */
         ck_assert_int_le(attempts, 24);
-        ck_assert(scratch[0] == 0); /* a refused estimate leaves nothing behind */
+        ck_assert(scratch[0] == 0); /* a refused estimate does not change the controller's memory */
     }
     scene_close(&s);
 }
@@ -545,7 +545,7 @@ END_TEST
 
 /* ---- Runaway ---- */
 
-/* A force on every node with no energy to it: per mass, a [m/s2] along y, or -c v. */
+/* A force on every node without an energy: per mass, a [m/s2] along y, or -c v. */
 static double push, negative_drag;
 
 static drape_status build(const drape_cloth_view *cloth, const double *params, drape_term_builder *builder)
@@ -625,8 +625,8 @@ static scene flying(const drape_term_ops *term, const char *integrator, double s
 }
 
 /*
- * From rest, all the kinetic energy that a force without an energy gives is from nowhere, at any size of the
- * step: the check must refuse it and the run must end.
+ * From rest, all the kinetic energy from a force without an energy is from nowhere, at any step size: the
+ * check must refuse it, and the run must end.
  */
 START_TEST(kinetic_energy_from_nowhere_is_refused)
 {
@@ -641,7 +641,7 @@ START_TEST(kinetic_energy_from_nowhere_is_refused)
         for (int i = 0; i < r->count; i++) {
             ck_assert_str_eq(r->attempt[i].reason, "energy");
             ck_assert_int_eq(r->attempt[i].status, DRAPE_RETRY_REJECTED);
-            ck_assert_double_eq_tol(r->attempt[i].diagnostic.value, 1, 1e-12); /* all of it */
+            ck_assert_double_eq_tol(r->attempt[i].diagnostic.value, 1, 1e-12); /* all of the energy */
         }
         ck_assert_msg(strstr(drape_context_message(s.ctx), ": energy (retry_rejected) after "), "%s",
                       drape_context_message(s.ctx));
@@ -652,7 +652,7 @@ END_TEST
 
 /*
  * A smaller force on a sheet in flight at 10 m/s adds 2 m/s2 x 1/16 s to it a step, in a second 1/2 m (2
- * m/s)^2, a 25th of what it had: no explosion, and the audit has it as gain.
+ * m/s)^2, a 25th of its energy: it is not a runaway, and the audit has it as a gain.
  */
 START_TEST(a_slow_gain_is_no_runaway)
 {
@@ -669,8 +669,9 @@ START_TEST(a_slow_gain_is_no_runaway)
 END_TEST
 
 /*
- * In time it is: the run may gain a tenth of what it had to live on, the start's 1/2 m v0^2 and 1/2 m L^2/s^2
- * of a scene without gravity, L the diagonal. 1/2 m (a t)^2 is that much at t, which halving finds to dt_min.
+ * After a longer time it is one: the run may gain a tenth of its available energy, which is the initial 1/2
+ * m v0^2 and, in a scene without gravity, 1/2 m L^2/s^2, L the diagonal. 1/2 m (a t)^2 reaches that at t,
+ * which halving finds to dt_min.
  */
 START_TEST(a_slow_gain_ends_the_run_when_it_is_large)
 {
@@ -690,15 +691,15 @@ START_TEST(a_slow_gain_ends_the_run_when_it_is_large)
 END_TEST
 
 /*
- * midpoint on a sheet whose stretch waves the step does not resolve: a converged step may leave the springs
- * far more than the sheet, which falls less than its diagonal L, can have had. Nothing is accepted that gains
- * more than half of that in all: m g L and the 1/2 m g L of the scene.
+ * midpoint on a sheet whose stretch waves the step does not resolve: a converged step may add far more
+ * elastic energy than the sheet, which falls by less than its diagonal L, can have had. No state is
+ * accepted that gains more than half of the available energy in all: m g L and the 1/2 m g L of the scene.
  */
 START_TEST(elastic_energy_from_nowhere_is_refused)
 {
     int64_t count = 0, refused = 0;
     const char *reason;
-    double least = 0, mass = 0;
+    double lowest = 0, mass = 0;
     scene s =
         scene_open("{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 8, 'edge_length': 0.1},"
                    "'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'density': 200},"
@@ -706,24 +707,24 @@ START_TEST(elastic_energy_from_nowhere_is_refused)
                    "'integrator': {'method': 'midpoint'}, 'duration': 3}");
     for (int32_t i = 0; i < s.model->node_count; i++)
         mass += s.model->mass[i];
-    for (int k = 1; k <= 90; k++) { /* it may end before */
+    for (int k = 1; k <= 90; k++) { /* the run may end before */
         const drape_status status = drape_sim_advance(s.sim, k / 60.0);
         ck_assert(status == DRAPE_OK || status == DRAPE_E_STEP_TOO_SMALL);
-        least = fmin(least, drape_sim_energy(s.sim).numerical);
+        lowest = fmin(lowest, drape_sim_energy(s.sim).numerical);
         if (status)
             break;
     }
     for (int i = 0; (reason = drape_sim_reason(s.sim, i, &count)); i++)
         refused += strcmp(reason, "energy") == 0 ? count : 0;
-    printf("# %.3g J gained, %lld steps refused for it\n", -least, (long long)refused);
+    printf("# %.3g J gained, %lld steps refused for it\n", -lowest, (long long)refused);
     ck_assert_int_gt(refused, 0);
-    ck_assert(-least <= 0.5 * 1.5 * mass * 9.81 * s.model->length);
+    ck_assert(-lowest <= 0.5 * 1.5 * mass * 9.81 * s.model->length);
     scene_close(&s);
 }
 END_TEST
 
-/* A pin that jumps in 1 ps has, for that long, 1e20 J of its own: they are no part of the audit, which would
- * lose all else in their rounding. */
+/* A pin that jumps in 1 ps has, for that time, a kinetic energy of its own of 1e20 J. It is not part of the
+ * audit, in which all other energies would be lost by rounding. */
 START_TEST(a_jump_of_a_pin_is_no_energy_of_the_sheet)
 {
     scene s =
@@ -736,8 +737,8 @@ START_TEST(a_jump_of_a_pin_is_no_energy_of_the_sheet)
     const drape_energy before = drape_sim_energy(s.sim);
     scene_advance(&s, 0.1000000000005);
     const drape_energy e = drape_sim_energy(s.sim);
-    /* half way the pin has stretched its springs; the sheet has not moved. What the work of the pin is summed
-     * to by the trapezoidal rule is exact for springs without a start. */
+    /* in the middle of the jump the pin has stretched its springs; the sheet has not moved. The work of the
+     * pin, summed by the trapezoidal rule, is exact for springs that start without stretch. */
     ck_assert_double_eq_tol(e.kinetic, before.kinetic, 1e-6 * before.kinetic);
     assert_below(fabs(e.numerical - before.numerical), 0.01 * e.elastic);
     scene_close(&s);
@@ -745,8 +746,8 @@ START_TEST(a_jump_of_a_pin_is_no_energy_of_the_sheet)
 END_TEST
 
 /*
- * Drag of the wrong sign: v1 = v0/(1 - c h), with c h = 5/8 a kinetic energy that grows 7 times in every
- * step of backward Euler. Its work is known, as dissipation below zero: nothing comes from nowhere.
+ * Drag of the wrong sign: v1 = v0/(1 - c h). With c h = 5/8 the kinetic energy grows 7 times in every step
+ * of backward Euler. Its work is accounted as negative dissipation: no energy is from nowhere.
  */
 START_TEST(energy_that_a_term_answers_for_is_no_runaway)
 {
@@ -763,17 +764,17 @@ START_TEST(energy_that_a_term_answers_for_is_no_runaway)
 }
 END_TEST
 
-/* Without gravity nothing pulls at a sheet at rest but rounding, whose 1e-30 J are no explosion. */
+/* Without gravity a sheet at rest has only forces of rounding, whose 1e-30 J are not a runaway. */
 START_TEST(a_sheet_at_rest_stays_at_rest)
 {
-    static const char *const rows[] = {"be", "bdf2", "midpoint", "ida"};
+    static const char *const methods[] = {"be", "bdf2", "midpoint", "ida"};
     for (size_t k = 0; k < 4; k++) {
         scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 8, 'edge_length': 0.1},"
             "'material': {'young_modulus': 1e6, 'thickness': 1e-3, 'density': 200},"
             "'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'nodes': [0, 8]}]}],"
             "'gravity': [0, 0, 0], 'integrator': {'method': '%s'}, 'duration': 3}",
-            rows[k]);
+            methods[k]);
         record *r = watch(&s);
         scene_advance(&s, 3);
         ck_assert_int_eq(r->rejected, 0);
@@ -794,7 +795,7 @@ static const char *file_in(const char *folder, const char *name)
 static int count_rows(const char *path, int *rejected)
 {
     char line[2000];
-    int rows = -1; /* the head */
+    int rows = -1; /* the header */
     FILE *file = fopen(path, "r");
     ck_assert_ptr_nonnull(file);
     *rejected = 0;
@@ -885,9 +886,9 @@ START_TEST(a_rejection_is_one_line_of_the_hosts_log)
 END_TEST
 
 /*
- * A start below min_length is left. An edge at 1e-7 of its length pushes its nodes apart with the force
- * k/L^2 (1 - 1e-7) L: in steps of 1e-7 s it grows by some 1e-8 of its length in the first, so it is below the
- * limit of 1e-6 for several. Under "fixed", the first of them that is rejected would end the run.
+ * A start below min_length can be left. An edge at 1e-7 of its length pushes its nodes apart with the force
+ * k/L^2 (1 - 1e-7) L: in steps of 1e-7 s it grows by about 1e-8 of its length in the first one, so it is
+ * below the limit of 1e-6 for several steps. With "fixed", the first rejected one would end the run.
  */
 START_TEST(a_start_below_the_limit_is_left)
 {
@@ -921,10 +922,10 @@ START_TEST(a_start_below_the_limit_is_left)
 }
 END_TEST
 
-SUITE("rejection", a_residual_that_is_no_number_is_not_told,
-      the_message_of_an_earlier_failure_is_not_told_again, ida_without_free_nodes_stops_at_kinks,
-      the_error_controller_starts_at_tight_tolerances, a_run_with_rejections_is_the_run_of_its_accepted_steps,
-      parts_fill_their_interval_exactly, nominal_times_are_met_to_the_bit, sizes_are_halved_and_grow_back,
+SUITE("rejection", a_nan_residual_is_not_printed, the_message_of_an_earlier_failure_is_not_repeated,
+      ida_without_free_nodes_stops_at_kinks, the_error_controller_starts_at_tight_tolerances,
+      a_run_with_rejections_is_the_run_of_its_accepted_steps, parts_fill_their_interval_exactly,
+      nominal_times_are_met_to_the_bit, sizes_are_halved_and_grow_back,
       a_step_that_gets_too_small_names_time_reason_and_element,
       a_bound_on_attempts_ends_the_advance_and_changes_no_bit, a_run_without_rejections_never_meets_the_bound,
       a_residual_of_rounding_is_converged, strain_names_the_edge_or_the_node_that_went_too_far,

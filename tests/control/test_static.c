@@ -1,14 +1,13 @@
 /*
  * test_static.c: equilibria of the integrator "static" against closed forms.
  *
- * Strips are the lattice of the grid "equilateral", rows 0 and 1 held, which clamps them at the middle
- * between, so that L_eff is half a row more than from row 1 to the tip. e edges wide, the hinges of a row
- * are E I = D w (8 e - 4)/(9 e - 4), 8/9 D w for a wide strip: see tests/physics/test_bending.c, which
- * derives that and the two bounds that are used here:
- *
- *     the clamp keeps the strip from curving across, so one width of it is stiffer by D w/EI - 1 at most: the
- *     share of that in the deflection is 1 - (1 - w/L)^4; where the clamp is, and the half loaded row at the
- *     tip, are known to a quarter of a row, 4 (row/L)/4 of L^4.
+ * Strips are the lattice of the grid "equilateral". Rows 0 and 1 are pinned, which clamps the strip at the
+ * middle between them, so L_eff is half a row more than from row 1 to the tip. For a strip e edges wide,
+ * the hinges of a row have E I = D w (8 e - 4)/(9 e - 4), 8/9 D w for a wide strip: see
+ * tests/physics/test_bending.c, which derives that and the two bounds that are used here. The clamp keeps
+ * the strip from curving across, so one width of it is stiffer by at most D w/EI - 1: the share of that in
+ * the deflection is 1 - (1 - w/L)^4. The position of the clamp, and the half loaded row at the tip, are
+ * uncertain by a quarter of a row, 4 (row/L)/4 of L^4.
  */
 #include "drape/extend.h"
 #include "support/scene.h"
@@ -17,7 +16,7 @@
 
 #define COLUMNS   4
 #define EDGE      0.02
-#define MODULUS   1e3 /* [Pa] for THICKNESS; thinner sheets have more, and the same D */
+#define MODULUS   1e3 /* [Pa] for THICKNESS; thinner sheets have a larger one, and the same D */
 #define THICKNESS 0.1
 #define DENSITY   0.2 /* [kg/m2] */
 
@@ -28,14 +27,14 @@ typedef struct strip {
     int32_t triangle[6 * MAX_NODES], held[2][2 * MAX_NODES];
     size_t nodes, triangles, held_count[2];
     int columns, rows;
-    drape_track_key key[2]; /* of the second list of held nodes; key_count of them */
+    drape_track_key key[2]; /* of the second list of pinned nodes; key_count of them */
     size_t key_count;
 } strip;
 
-/* rows edges long, away along z, or down, or up along y. */
+/* The strip is `rows` edges long, horizontally along -z, or down, or up along y. */
 enum { LEVEL, DOWN, UP };
 
-static void make_strip(strip *s, int columns, int rows, double edge, int way)
+static void make_strip(strip *s, int columns, int rows, double edge, int direction)
 {
     const int side = columns + 1;
     memset(s, 0, sizeof *s);
@@ -46,8 +45,8 @@ static void make_strip(strip *s, int columns, int rows, double edge, int way)
             const double along = r * sqrt(3.0) / 2 * edge;
             double *at = s->x + 3 * s->nodes++;
             at[0] = (c + (r % 2 ? 0.5 : 0)) * edge;
-            at[1] = way == LEVEL ? 0 : way == UP ? along : -along;
-            at[2] = way == LEVEL ? -along : 0;
+            at[1] = direction == LEVEL ? 0 : direction == UP ? along : -along;
+            at[2] = direction == LEVEL ? -along : 0;
         }
     ck_assert(s->nodes <= MAX_NODES);
     for (int r = 0; r < rows; r++)
@@ -60,7 +59,7 @@ static void make_strip(strip *s, int columns, int rows, double edge, int way)
         }
 }
 
-static void hold_row(strip *s, int list, int row)
+static void pin_row(strip *s, int list, int row)
 {
     for (int c = 0; c <= s->columns; c++)
         s->held[list][s->held_count[list]++] = row * (s->columns + 1) + c;
@@ -69,7 +68,7 @@ static void hold_row(strip *s, int list, int row)
 typedef struct load {
     double modulus, thickness, gravity, tolerance;
     bool bending;
-    const drape_term_ops *host; /* one term more */
+    const drape_term_ops *host; /* one more term */
 } load;
 
 static scene open_strip(const strip *mesh, const load *l)
@@ -120,8 +119,7 @@ static scene open_strip(const strip *mesh, const load *l)
 }
 
 /*
- * The equilibrium at 1 s, where the tracks have ended: residual within the tolerance, and known to be
- * stable.
+ * Advances to 1 s, when the tracks have ended; the residual must be within the tolerance.
  */
 static void settle(scene *s, double tolerance)
 {
@@ -183,8 +181,8 @@ static double stiffening(void)
 #define ROW_SHARE (row_height / strip_length())
 
 /*
- * Young's modulus of a sheet `thinner` times as thin with the same D. Its stretch by the weight, rho g L/(E
- * h) = G (h/L)^2/12, is what shortens or lengthens the arc.
+ * Young's modulus of a sheet `thinner` times as thin with the same D. Its stretch by the weight,
+ * rho g L/(E h) = G (h/L)^2/12, changes the length of the arc.
  */
 static load strip_load(double thinner, double gravity, double tolerance)
 {
@@ -203,8 +201,8 @@ START_TEST(heavy_cantilever_hangs_as_the_elastica)
         const double L = strip_length(), G = table[k][0];
         const double gravity = G * strip_rigidity() / (DENSITY * strip_width() * pow(L, 3));
         make_strip(&mesh, COLUMNS, ROWS, EDGE, LEVEL);
-        hold_row(&mesh, 0, 0);
-        hold_row(&mesh, 0, 1);
+        pin_row(&mesh, 0, 0);
+        pin_row(&mesh, 0, 1);
         const load l = strip_load(10, gravity, 1e-9);
         scene s = open_strip(&mesh, &l);
         settle(&s, 1e-9);
@@ -266,10 +264,10 @@ static const drape_term_ops load_term = {
     .energy = load_energy};
 
 /*
- * physics.md: P L^2/EI = 1, 2, 4. The length is that to the last row, on which the load is. w/L grows at
- * most in proportion to P, u/L to P^2; the curvature is largest at the clamp, where the strip is stiffer: of
- * the deflection P L^3/3 the first width has the share 1 - (1 - w/L)^3, less than the bound of the file's
- * head. Where the clamp is counts for 3 (row/L)/4.
+ * physics.md: P L^2/EI = 1, 2, 4. The length is that to the last row, which carries the load. w/L grows at
+ * most in proportion to P, u/L to P^2. The curvature is largest at the clamp, where the strip is stiffer:
+ * of the deflection P L^3/3 the first width has the share 1 - (1 - w/L)^3, less than the bound at the top
+ * of this file. The uncertain position of the clamp adds 3 (row/L)/4.
  */
 START_TEST(end_loaded_cantilever_bends_as_the_elastica)
 {
@@ -280,8 +278,8 @@ START_TEST(end_loaded_cantilever_bends_as_the_elastica)
         const double L = strip_length();
         end_load = -table[k][0] * strip_rigidity() / (L * L);
         make_strip(&mesh, COLUMNS, ROWS, EDGE, LEVEL);
-        hold_row(&mesh, 0, 0);
-        hold_row(&mesh, 0, 1);
+        pin_row(&mesh, 0, 0);
+        pin_row(&mesh, 0, 1);
         load l = strip_load(10, 0, 1e-9);
         l.host = &load_term;
         scene s = open_strip(&mesh, &l);
@@ -303,13 +301,13 @@ END_TEST
 /* ---- Chains ---- */
 
 /*
- * A strip one edge wide of N rows, 1.2 m long, without bending, hung by its ends, which a track has brought
- * to a distance of 1 m. The row edges of a lattice lie across, the slanted ones zigzag along; with rows kept
- * parallel by the symmetry of the load the strip is a chain whose links are the rows. A chain of N links
- * with its mass in the joints differs from the catenary by second order in 1/N: a parabola's chord polygon
- * lies inside by sag/N^2 at the lowest point and the half links at the ends carry no weight, 1/N^2 again, so
- * 4/N^2 of the sag at the most. The stretch eps = T/(E h w) lengthens the chain; d sag/d length is below 1
- * (sag .29, length 1.2: at span 1, 0.86), so it adds eps 1.2.
+ * A strip one edge wide of N rows, 1.2 m long, without bending, pinned at its ends, which a track has moved
+ * to a distance of 1 m. The row edges of a lattice lie across, the slanted ones zigzag along; as the
+ * symmetry of the load keeps rows parallel, the strip is a chain whose links are the rows. A chain of N
+ * links with its mass in the joints differs from the catenary by second order in 1/N: a parabola's chord
+ * polygon lies inside by sag/N^2 at the lowest point, and the half links at the ends carry no weight, 1/N^2
+ * again, so at most 4/N^2 of the sag. The stretch eps = T/(E h w) lengthens the chain; d sag/d length is
+ * below 1 (sag .29, length 1.2: at span 1, 0.86), so it adds eps 1.2.
  */
 START_TEST(a_strip_hung_by_its_ends_is_a_catenary)
 {
@@ -317,8 +315,8 @@ START_TEST(a_strip_hung_by_its_ends_is_a_catenary)
     static strip mesh;
     const double length = 1.2, edge = length / (LINKS * sqrt(3.0) / 2), stiff = 1e5; /* [N/m] E h */
     make_strip(&mesh, 1, LINKS, edge, LEVEL);
-    hold_row(&mesh, 0, 0);
-    hold_row(&mesh, 1, LINKS);
+    pin_row(&mesh, 0, 0);
+    pin_row(&mesh, 1, LINKS);
     mesh.key[0] = (drape_track_key){0, {0, 0, 0}};
     mesh.key[1] = (drape_track_key){1, {0, 0, length - 1}};
     mesh.key_count = 2;
@@ -326,7 +324,7 @@ START_TEST(a_strip_hung_by_its_ends_is_a_catenary)
     scene s = open_strip(&mesh, &l);
     settle(&s, 1e-9);
     const double sag = -row_mean(&s, &mesh, LINKS / 2, 1);
-    const double tension = DENSITY * 9.81 * length; /* more than that of the catenary, per width */
+    const double tension = DENSITY * 9.81 * length; /* more than the tension of the catenary, per width */
     printf("# sag %.6f m, catenary .292344\n", sag);
     assert_below(fabs(sag - 0.29234380), 4.0 / (LINKS * LINKS) * 0.29234380 + length * tension / stiff);
     scene_close(&s);
@@ -334,13 +332,13 @@ START_TEST(a_strip_hung_by_its_ends_is_a_catenary)
 END_TEST
 
 /*
- * A strip that hangs by its upper row, in small strain: u(L) = rho g L^2/(2 E h) where it is free to narrow.
- * The lattice is the constant-strain sheet of nu = 1/3, whose stress is linear along the strip; the stretch
- * of a gap between rows is that at its middle, and the sum of these is the integral of a linear function
- * exactly. What remains are sides and ends. The held row keeps its width, so that up to one width from it
- * the lattice is stiffer by at most 1/(1 - nu^2) - 1 = 1/8; that width has at most 2 w/L of the elongation.
- * The sides are zigzags: the outermost half column of the e + 1/2 of a row has springs on one side only, so
- * that between 1/(e + 1/2) of the width and none of it carries nothing.
+ * A strip that hangs by its upper row, in small strain: u(L) = rho g L^2/(2 E h) where it is free to
+ * narrow. The lattice is the constant-strain sheet of nu = 1/3, whose stress is linear along the strip; the
+ * stretch of a gap between rows is that at its middle, and the sum of these is exactly the integral of a
+ * linear function. Only sides and ends cause errors. The pinned row keeps its width, so up to one width
+ * from it the lattice is stiffer by at most 1/(1 - nu^2) - 1 = 1/8; that width has at most 2 w/L of the
+ * elongation. The sides are zigzags: the outermost half column of the e + 1/2 of a row has springs on one
+ * side only, so between 0 and 1/(e + 1/2) of the width carries nothing.
  */
 START_TEST(a_hanging_strip_is_longer_by_its_weight)
 {
@@ -348,7 +346,7 @@ START_TEST(a_hanging_strip_is_longer_by_its_weight)
     static strip mesh;
     const double L = LONG * row_height, E = 1e5, h = 1e-3, gravity = 1e-3 * 9.81;
     make_strip(&mesh, WIDE, LONG, EDGE, DOWN);
-    hold_row(&mesh, 0, 0);
+    pin_row(&mesh, 0, 0);
     const load l = {E, h, gravity, 1e-12, true, NULL};
     scene s = open_strip(&mesh, &l);
     settle(&s, 1e-12);
@@ -365,10 +363,10 @@ END_TEST
 
 /*
  * A strip that stands on its clamped foot buckles under its own weight at G = 7.83735 (Greenhill). By
- * Rayleigh's quotient the foot that cannot curve across raises that by the stiffening at most, 4 %, and not
- * knowing the clamp to a quarter of a row changes L^3 by 3 (row/L)/4 = 1.3 %: 0.9 and 1.1 lie outside. A
- * flat strip is an equilibrium on both sides, as bending and the plane do not mix to first order; above, one
- * mode is unstable (the second has G = 55.98).
+ * Rayleigh's quotient the foot, which cannot curve across, raises that by at most the stiffening, 4 %, and
+ * the position of the clamp, uncertain by a quarter of a row, changes L^3 by 3 (row/L)/4 = 1.3 %: 0.9 and
+ * 1.1 lie outside. A flat strip is an equilibrium on both sides, as bending and stretching in the plane do
+ * not couple to first order; above, one mode is unstable (the second has G = 55.98).
  */
 static drape_statistics stand(double factor)
 {
@@ -376,8 +374,8 @@ static drape_statistics stand(double factor)
     const double L = strip_length(), G = 7.83735 * factor;
     const double gravity = G * strip_rigidity() / (DENSITY * strip_width() * pow(L, 3));
     make_strip(&mesh, COLUMNS, ROWS, EDGE, UP);
-    hold_row(&mesh, 0, 0);
-    hold_row(&mesh, 0, 1);
+    pin_row(&mesh, 0, 0);
+    pin_row(&mesh, 0, 1);
     const load l = strip_load(10, gravity, 1e-9);
     scene s = open_strip(&mesh, &l);
     settle(&s, 1e-9);
@@ -401,7 +399,7 @@ END_TEST
 
 /* ---- No equilibrium ---- */
 
-START_TEST(what_nothing_holds_has_no_equilibrium_and_ends)
+START_TEST(a_free_sheet_has_no_equilibrium_and_ends)
 {
     static strip mesh;
     make_strip(&mesh, COLUMNS, 6, EDGE, LEVEL);
@@ -425,8 +423,8 @@ START_TEST(what_nothing_holds_has_no_equilibrium_and_ends)
 }
 END_TEST
 
-/* A sheet lies on another: what couples them is in no pattern of the model, and the Hessian has it all the
- * same. Each wrong sign would be a mode. */
+/* A sheet that lies on another: the nodes that contact couples are not coupled in the model's pattern, but
+ * must be in the Hessian. Each wrong sign would be a mode. */
 START_TEST(one_sheet_lies_on_another)
 {
     scene s = scene_open(
@@ -452,4 +450,4 @@ END_TEST
 SUITE("static", one_sheet_lies_on_another, heavy_cantilever_hangs_as_the_elastica,
       end_loaded_cantilever_bends_as_the_elastica, a_strip_hung_by_its_ends_is_a_catenary,
       a_hanging_strip_is_longer_by_its_weight, a_standing_strip_is_unstable_above_greenhills_weight,
-      what_nothing_holds_has_no_equilibrium_and_ends)
+      a_free_sheet_has_no_equilibrium_and_ends)

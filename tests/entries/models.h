@@ -1,7 +1,7 @@
-/* models.h: what the row tests share: random numbers, models of four meshes made in memory, parameter lists.
- */
-#ifndef DRAPE_TESTS_ROWS_MODELS_H
-#define DRAPE_TESTS_ROWS_MODELS_H
+/* models.h: what the tests of entries share: random numbers, models of four meshes made in memory, checks of
+ * parameter lists. */
+#ifndef DRAPE_TESTS_ENTRIES_MODELS_H
+#define DRAPE_TESTS_ENTRIES_MODELS_H
 
 #include <check.h>
 #include <ctype.h>
@@ -15,7 +15,7 @@
 /* ---- Random numbers
  * --------------------------------------------------------------------------------------------- */
 
-/* In [-1, 1): xorshift64*, another generator than the library's own. */
+/* In [-1, 1): xorshift64*, a generator other than the library's. */
 static inline double random_number(uint64_t *seed)
 {
     *seed ^= *seed >> 12;
@@ -51,8 +51,8 @@ static const char *const mesh_names[MESH_COUNT] = {"equilateral", "square", "irr
 #define IRREGULAR_NODES     (IRREGULAR_COLUMNS * IRREGULAR_ROWS)
 #define IRREGULAR_TRIANGLES (2 * (IRREGULAR_COLUMNS - 1) * (IRREGULAR_ROWS - 1))
 
-/* A sheet of some 0.1 m edges with nodes out of line, diagonals at random, triangles wound at random; bent
- * in both directions where height is not 0. */
+/* A sheet with edges of about 0.1 m, nodes displaced at random, and diagonals and windings chosen at random;
+ * curved in both directions if height is not 0. */
 static inline void irregular_mesh(double height, double *x, int32_t *triangle)
 {
     uint64_t seed = 12345;
@@ -86,7 +86,7 @@ typedef struct model_def {
     double thickness;     /* [m]; 0: 1e-3 */
 } model_def;
 
-/* Everything else: E = 1e5 Pa, nu = 0.3, 0.2 kg/m2. */
+/* All else is fixed: E = 1e5 Pa, nu = 0.3, 0.2 kg/m2. */
 static inline drape_status try_model(drape_context *ctx, const model_def *def, drape_model **out)
 {
     static const int32_t pinned_nodes[] = {0, 3};
@@ -163,8 +163,9 @@ static inline void check_line(const char *text, const char *what)
         ck_assert_msg(!iscntrl((unsigned char)*text), "%s is not one line", what);
 }
 
-/* Lower-case letters, digits, '_', and '.' where allowed: what scenes and command lines spell. */
-static inline void check_word(const char *name, bool dots)
+/* Lower-case letters, digits, '_', and '.' where dots are allowed: the characters of names in scenes and on
+ * command lines. */
+static inline void check_name(const char *name, bool dots)
 {
     check_line(name, "a name");
     ck_assert_msg(islower((unsigned char)*name), "%s", name);
@@ -179,7 +180,7 @@ static inline void check_choices(const drape_param *p)
     ck_assert_msg(p->choices && p->choices[0], "%s has no choices", p->name);
     int count = 0;
     for (; p->choices[count]; count++) {
-        check_word(p->choices[count], false);
+        check_name(p->choices[count], false);
         for (int other = 0; other < count; other++)
             ck_assert_str_ne(p->choices[count], p->choices[other]);
     }
@@ -208,7 +209,7 @@ static inline void check_params(const drape_param *params, int count)
     ck_assert(count >= 0 && (params || count == 0) && drape_param_place(params, count) <= DRAPE_MAX_PARAMS);
     for (int i = 0; i < count; i++) {
         const drape_param *p = &params[i];
-        check_word(p->name, false);
+        check_name(p->name, false);
         check_line(p->unit, "a unit");
         check_line(p->help, "a help text");
         for (int other = 0; other < i; other++)
@@ -224,7 +225,7 @@ static inline void check_params(const drape_param *params, int count)
     }
 }
 
-/* A generic value of a parameter: its default, or inside of its range where it has none. */
+/* A typical value of a parameter: its default, or a value inside its range if it has no default. */
 static inline double generic_value(const drape_param *p)
 {
     if (!isnan(p->default_value))
@@ -232,7 +233,7 @@ static inline double generic_value(const drape_param *p)
     return p->min < 0.37 && 0.37 < p->max ? 0.37 : p->min + 0.37 * (p->max - p->min);
 }
 
-/* Settings (DRAPE_MAX_PARAMS) that give every required parameter a value; the number of them. */
+/* Settings (DRAPE_MAX_PARAMS) that give every required parameter a value; returns their number. */
 static inline size_t required_settings(const drape_param *params, int count, drape_setting *settings)
 {
     size_t used = 0;

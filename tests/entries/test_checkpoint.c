@@ -1,7 +1,7 @@
 /*
- * test_checkpoint.c: a sim that is saved, and another that is restored from it and goes on, have the bits of
- * one that was never interrupted: over all integrators, ways of Newton, linear solvers and controllers, in
- * scenes with all that is kept from step to step.
+ * test_checkpoint.c: a sim that is saved, and another one that is restored from the checkpoint and
+ * continued, have the same bits as a sim that was never interrupted: for all integrators, Newton variants,
+ * linear solvers and controllers, in scenes with everything that is kept from step to step.
  */
 #include <inttypes.h>
 
@@ -9,7 +9,7 @@
 #include "support/bytes.h"
 #include "support/scene.h"
 
-#define MIDDLE 0.08 /* [s] where it is saved */
+#define MIDDLE 0.08 /* [s] time of the checkpoint */
 #define END    0.16
 
 /* ---- Scenes ---- */
@@ -25,15 +25,15 @@
     " %s 'integrator': {'method': '%s', 'dt': 0.01%s}, 'controller': {'type': '%s'},"                        \
     " 'duration': 1, 'frame_rate': 330}"
 
-/* A sheet that falls on a sphere that moves, and on itself where it is folded over. */
+/* A sheet that falls on a moving sphere, and on itself where it is folded over. */
 #define OBSTACLES                                                                                            \
     "'colliders': [{'type': 'sphere', 'center': [0.1,-0.1,-0.08], 'radius': 0.07, 'friction': 0.3,"          \
     " 'track': [[0, [0,0,0]], [0.2, [0.02,0.03,0]]]},"                                                       \
     " {'type': 'box', 'center': [0.2,-0.1,-0.05], 'size': [0.08,0.08,0.08], 'friction': 0.2}],"              \
     " 'self_contact': {'thickness': 0.004, 'friction': 0.2}, "
 
-/* Two sheets, the upper one falling on the lower one: cloth touches cloth where the matrix has no place for
- * it at first. */
+/* Two sheets, the upper one falling on the lower one: contact between nodes that the pattern of the matrix
+ * does not couple at the start. */
 #define LAYERS                                                                                               \
     "{'drape': 1, 'cloth': [{'name': 'low', 'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': "   \
     "0.2,"                                                                                                   \
@@ -48,8 +48,8 @@
     " 'integrator': {'method': '%s', 'dt': 0.01%s}, 'controller': {'type': '%s'}, 'duration': 1,"            \
     " 'frame_rate': 330}"
 
-/* A sheet that is pushed together and buckles: matrices that are not definite, whose repair remembers the
- * last one. */
+/* A sheet that is compressed and buckles: indefinite matrices, whose modification depends on the previous
+ * one. */
 #define BUCKLING                                                                                             \
     "{'drape': 1, 'cloth': [{'name': 'sheet', 'mesh': {'grid': 'square', 'columns': 8, 'rows': 5, 'width': " \
     "0.4,"                                                                                                   \
@@ -62,8 +62,8 @@
 /* ---- What is compared ---- */
 
 typedef struct watcher {
-    uint64_t frames, attempts; /* hashes of all that was told */
-    int64_t save_at;           /* a frame, -1 none */
+    uint64_t frames, attempts; /* hashes of all frames and attempts that were reported */
+    int64_t save_at;           /* number of a frame; -1: none */
     bytes saved;
     uint64_t frames_saved, attempts_saved;
 } watcher;
@@ -108,26 +108,26 @@ static void same_counts(const drape_sim *a, const drape_sim *b, const char *what
                       s.newton_iterations == r.newton_iterations && s.jacobians == r.jacobians &&
                       s.factorizations == r.factorizations && s.linear_iterations == r.linear_iterations &&
                       s.residuals == r.residuals && s.strain_max == r.strain_max && s.h_min == r.h_min,
-                  "%s: other counts", what);
+                  "%s: counts differ", what);
     int64_t count, other;
     for (int i = 0; drape_sim_reason(a, i, &count); i++) {
         const char *reason = drape_sim_reason(b, i, &other);
         ck_assert_msg(reason && strcmp(reason, drape_sim_reason(a, i, &count)) == 0 && count == other,
-                      "%s: other reasons", what);
+                      "%s: reasons differ", what);
     }
 }
 
 static void same_end(drape_sim *a, drape_sim *b, const char *what)
 {
     drape_energy e = drape_sim_energy(a), f = drape_sim_energy(b);
-    ck_assert_msg(drape_sim_time(a) == drape_sim_time(b), "%s: other times", what);
-    ck_assert_msg(drape_sim_hash(a) == drape_sim_hash(b), "%s: other bits", what);
-    ck_assert_msg(memcmp(&e, &f, sizeof e) == 0, "%s: other energies", what);
+    ck_assert_msg(drape_sim_time(a) == drape_sim_time(b), "%s: times differ", what);
+    ck_assert_msg(drape_sim_hash(a) == drape_sim_hash(b), "%s: bits differ", what);
+    ck_assert_msg(memcmp(&e, &f, sizeof e) == 0, "%s: energies differ", what);
     same_counts(a, b, what);
 }
 
-/* Goes on; a scene may come to an end that it cannot pass, and then both must. */
-static drape_status go(drape_sim *sim, double t)
+/* Advances to t. A scene may fail before; then all sims of it must fail. */
+static drape_status advance(drape_sim *sim, double t)
 {
     return drape_sim_advance(sim, t);
 }
@@ -142,7 +142,8 @@ static drape_sim *make_sim(scene *s, watcher *w)
     return sim;
 }
 
-/* Forces of contact where it stands, lagged friction too, which is of the step that led there. */
+/* Compares the contact forces of the present states, and the lagged friction, which depends on the step
+ * before. */
 static void same_contact(drape_sim *a, drape_sim *b, const char *what)
 {
     size_t n = 3 * (size_t)drape_sim_model(a)->node_count;
@@ -154,47 +155,48 @@ static void same_contact(drape_sim *a, drape_sim *b, const char *what)
             .x = at->x, .v = at->v, .internal = at->internal, .t = at->t, .span = {at->t, at->t}};
         drape_system_contact_part(sims[i]->system, &point, true, g[i], NULL);
     }
-    ck_assert_msg(memcmp(g[0], g[1], n * sizeof(double)) == 0, "%s: other forces of contact", what);
+    ck_assert_msg(memcmp(g[0], g[1], n * sizeof(double)) == 0, "%s: contact forces differ", what);
     free(g[0]);
     free(g[1]);
 }
 
-/* In sims of their own: to ask moves the next search. One is restored, the other went there. */
+/* In two further sims, because a query of contact forces changes the next search: one is restored, the other
+ * is advanced to the same time. */
 static void check_contact(scene *s, const bytes *middle, const char *what)
 {
     watcher one_watch = {.save_at = -1}, other_watch = {.save_at = -1};
     drape_sim *one = make_sim(s, &one_watch), *other = make_sim(s, &other_watch);
-    go(one, MIDDLE);
+    advance(one, MIDDLE);
     ck_assert_int_eq(drape_sim_restore_from(other, middle->data, middle->size), DRAPE_OK);
     same_contact(one, other, what);
     drape_sim_destroy(&one);
     drape_sim_destroy(&other);
 }
 
-/* One that goes on to the end, saved at a frame within and between two advances; two that are restored from
- * these, one of which did something else before. */
+/* One sim runs to the end and is saved at a frame within an advance and between two advances. Two others are
+ * restored from these checkpoints; one of them has run before. */
 static void check(scene *s, const char *what)
 {
     watcher whole = {.save_at = 20}, from_frame = {.save_at = -1}, from_middle = {.save_at = -1};
     drape_sim *sim = make_sim(s, &whole);
-    drape_status first = go(sim, MIDDLE);
+    drape_status first = advance(sim, MIDDLE);
     bytes middle = bytes_save(sim);
     check_contact(s, &middle, what);
     uint64_t frames = whole.frames, attempts = whole.attempts;
-    drape_status second = first ? first : go(sim, END);
+    drape_status second = first ? first : advance(sim, END);
     ck_assert_msg(whole.saved.size > 0 || first, "%s: no frame 20", what);
 
     drape_sim *other = make_sim(s, NULL);
-    go(other, 0.023); /* what it did is forgotten */
+    advance(other, 0.023); /* the restoration replaces this state */
     ck_assert_int_eq(drape_sim_observe(other, watch, &from_middle), DRAPE_OK);
     drape_status status = drape_sim_restore_from(other, middle.data, middle.size);
     ck_assert_msg(status == DRAPE_OK, "%s: %s", what, drape_context_message(s->ctx));
     from_middle.frames = frames;
     from_middle.attempts = attempts;
-    ck_assert_int_eq(first ? first : go(other, END), second);
+    ck_assert_int_eq(first ? first : advance(other, END), second);
     same_end(sim, other, what);
-    ck_assert_msg(from_middle.frames == whole.frames, "%s: other frames", what);
-    ck_assert_msg(from_middle.attempts == whole.attempts, "%s: other attempts", what);
+    ck_assert_msg(from_middle.frames == whole.frames, "%s: frames differ", what);
+    ck_assert_msg(from_middle.attempts == whole.attempts, "%s: attempts differ", what);
     drape_sim_destroy(&other);
 
     if (whole.saved.size > 0) {
@@ -203,11 +205,11 @@ static void check(scene *s, const char *what)
         other = make_sim(s, &from_frame);
         ck_assert_int_eq(drape_sim_restore_from(other, whole.saved.data, whole.saved.size), DRAPE_OK);
         if (drape_sim_time(other) < MIDDLE)
-            ck_assert_int_eq(go(other, MIDDLE), first);
-        ck_assert_int_eq(first ? first : go(other, END), second);
+            ck_assert_int_eq(advance(other, MIDDLE), first);
+        ck_assert_int_eq(first ? first : advance(other, END), second);
         same_end(sim, other, what);
-        ck_assert_msg(from_frame.frames == whole.frames, "%s: other frames after a frame", what);
-        ck_assert_msg(from_frame.attempts == whole.attempts, "%s: other attempts after a frame", what);
+        ck_assert_msg(from_frame.frames == whole.frames, "%s: frames differ after a frame", what);
+        ck_assert_msg(from_frame.attempts == whole.attempts, "%s: attempts differ after a frame", what);
         drape_sim_destroy(&other);
     }
     drape_statistics counts = drape_sim_statistics(sim);
@@ -230,8 +232,8 @@ static void check_sheet(int edges, const char *terms, const char *more, const ch
 
 /* ---- Tests ---- */
 
-/* Those that have it ignore what is another row's. */
-START_TEST(every_integrator_goes_on)
+/* All integrators get all settings: each ignores the parameters of the others. */
+START_TEST(every_integrator_resumes)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const char *name = drape_integrators[i]->entry.name;
@@ -244,7 +246,7 @@ START_TEST(every_integrator_goes_on)
 }
 END_TEST
 
-START_TEST(every_way_of_newton_goes_on)
+START_TEST(every_newton_variant_resumes)
 {
     static const char *const settings[] = {", 'newton': 'modified'",
                                            ", 'newton': 'modified', 'globalization': 'none'",
@@ -252,32 +254,32 @@ START_TEST(every_way_of_newton_goes_on)
                                            ", 'newton': 'modified', 'globalization': 'line_search'",
                                            ", 'on_failure': 'accept', 'max_iterations': 1",
                                            ", 'predictor': 'rest', 'project': true"};
-    static const char *const rows[] = {"be", "bdf2", "trbdf2"};
+    static const char *const methods[] = {"be", "bdf2", "trbdf2"};
     for (size_t i = 0; i < sizeof settings / sizeof *settings; i++)
-        for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
-            check_sheet(4, "", "", rows[k], settings[i], "halving", "newton");
-            check_sheet(4, "", OBSTACLES, rows[k], settings[i], "halving", "newton, obstacles");
+        for (size_t k = 0; k < sizeof methods / sizeof *methods; k++) {
+            check_sheet(4, "", "", methods[k], settings[i], "halving", "newton");
+            check_sheet(4, "", OBSTACLES, methods[k], settings[i], "halving", "newton, obstacles");
         }
 }
 END_TEST
 
-/* Large enough for rows that take another one for small matrices, too: 7 edges are 186 unknowns. */
-START_TEST(every_linear_solver_goes_on)
+/* Large enough for solvers that pass small matrices to another solver: 7 edges are 186 unknowns. */
+START_TEST(every_linear_solver_resumes)
 {
-    static const char *const rows[] = {"be", "ida"}, *const newtons[] = {"exact", "modified"};
+    static const char *const methods[] = {"be", "ida"}, *const newtons[] = {"exact", "modified"};
     for (int i = 0; drape_linears[i]; i++)
         for (size_t k = 0; k < 2; k++)
             for (size_t j = 0; j < (k == 0 ? 2 : 1); j++) {
                 char settings[100];
                 snprintf(settings, sizeof settings, ", 'linear_solver': '%s', 'newton': '%s'",
                          drape_linears[i]->entry.name, newtons[j]);
-                check_sheet(7, "", OBSTACLES, rows[k], settings, "halving", "solver");
-                check_sheet(3, "", "", rows[k], settings, "halving", "solver");
+                check_sheet(7, "", OBSTACLES, methods[k], settings, "halving", "solver");
+                check_sheet(3, "", "", methods[k], settings, "halving", "solver");
             }
 }
 END_TEST
 
-START_TEST(every_controller_goes_on)
+START_TEST(every_controller_resumes)
 {
     for (int i = 0; drape_controllers[i]; i++)
         for (int k = 0; drape_integrators[k]; k++) {
@@ -290,7 +292,7 @@ START_TEST(every_controller_goes_on)
 }
 END_TEST
 
-START_TEST(cloth_on_cloth_goes_on)
+START_TEST(cloth_on_cloth_resumes)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const char *name = drape_integrators[i]->entry.name;
@@ -306,8 +308,8 @@ START_TEST(cloth_on_cloth_goes_on)
 }
 END_TEST
 
-/* A node that is pulled, a start of the host's own, frames with a budget that is never reached. */
-START_TEST(what_a_host_did_goes_on)
+/* A node on a drag spring, a user-defined start, frames with a budget that is never reached. */
+START_TEST(what_a_host_did_is_restored)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const char *name = drape_integrators[i]->entry.name;
@@ -316,9 +318,9 @@ START_TEST(what_a_host_did_goes_on)
         scene s = scene_model(SHEET, 4, "", OBSTACLES, name, "", "halving");
         drape_sim *one = make_sim(&s, NULL), *other = make_sim(&s, NULL);
         const double target[3] = {0.1, 0.05, 0.1};
-        ck_assert_int_eq(go(one, MIDDLE), DRAPE_OK);
+        ck_assert_int_eq(advance(one, MIDDLE), DRAPE_OK);
         ck_assert_int_eq(drape_sim_set_state(one, 0.05, drape_sim_positions(one), drape_sim_velocities(one)),
-                         DRAPE_E_ARGUMENT); /* the pin was elsewhere then */
+                         DRAPE_E_ARGUMENT); /* the pin was elsewhere at the checkpoint */
         ck_assert_int_eq(
             drape_sim_set_state(one, MIDDLE, drape_sim_positions(one), drape_sim_velocities(one)), DRAPE_OK);
         ck_assert_int_eq(drape_sim_set_drag_spring(one, 7, 0.5, target), DRAPE_OK);
@@ -328,7 +330,7 @@ START_TEST(what_a_host_did_goes_on)
         ck_assert_mem_eq(saved.data, again.data, saved.size);
         ck_assert_int_eq(drape_sim_restore_from(other, saved.data, saved.size), DRAPE_OK);
         const drape_statistics was = drape_sim_statistics(one), is = drape_sim_statistics(other);
-        ck_assert_mem_eq(&was, &is, offsetof(drape_statistics, stability_known)); /* seconds, too */
+        ck_assert_mem_eq(&was, &is, offsetof(drape_statistics, stability_known)); /* the seconds too */
         double force[2][3];
         drape_sim_drag_spring_force(one, force[0]);
         drape_sim_drag_spring_force(other, force[1]);
@@ -337,7 +339,7 @@ START_TEST(what_a_host_did_goes_on)
         for (int k = 0; k < 2; k++) {
             drape_sim *sim = k ? other : one;
             ck_assert_int_eq(drape_sim_advance_realtime(sim, 0.021, 1e9, NULL), DRAPE_OK);
-            ck_assert_int_eq(go(sim, END), DRAPE_OK);
+            ck_assert_int_eq(advance(sim, END), DRAPE_OK);
         }
         same_end(one, other, name);
         free(saved.data);
@@ -349,18 +351,18 @@ START_TEST(what_a_host_did_goes_on)
 }
 END_TEST
 
-/* An equilibrium says after it whether it is stable. */
-START_TEST(an_equilibrium_goes_on)
+/* An equilibrium also reports whether it is stable. */
+START_TEST(an_equilibrium_resumes)
 {
     scene s = scene_model(SHEET, 3, "", "", "static", "", "halving");
     drape_sim *one = make_sim(&s, NULL), *other = make_sim(&s, NULL);
-    ck_assert_int_eq(go(one, MIDDLE), DRAPE_OK);
+    ck_assert_int_eq(advance(one, MIDDLE), DRAPE_OK);
     bytes saved = bytes_save(one);
     ck_assert_int_eq(drape_sim_restore_from(other, saved.data, saved.size), DRAPE_OK);
     ck_assert(drape_sim_statistics(other).stability_known);
     same_end(one, other, "equilibrium");
-    ck_assert_int_eq(go(one, END), DRAPE_OK);
-    ck_assert_int_eq(go(other, END), DRAPE_OK);
+    ck_assert_int_eq(advance(one, END), DRAPE_OK);
+    ck_assert_int_eq(advance(other, END), DRAPE_OK);
     same_end(one, other, "equilibrium");
     free(saved.data);
     drape_sim_destroy(&one);
@@ -369,21 +371,21 @@ START_TEST(an_equilibrium_goes_on)
 }
 END_TEST
 
-START_TEST(a_sheet_that_buckles_goes_on)
+START_TEST(a_sheet_that_buckles_resumes)
 {
-    static const char *const rows[] = {"be", "bdf2", "midpoint", "trbdf2"};
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+    static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2"};
+    for (size_t i = 0; i < sizeof methods / sizeof *methods; i++)
         for (int k = 0; drape_linears[k]; k++) {
             char what[100];
-            snprintf(what, sizeof what, "buckling, %s, %s", rows[i], drape_linears[k]->entry.name);
-            scene s = scene_model(BUCKLING, rows[i], drape_linears[k]->entry.name);
+            snprintf(what, sizeof what, "buckling, %s, %s", methods[i], drape_linears[k]->entry.name);
+            scene s = scene_model(BUCKLING, methods[i], drape_linears[k]->entry.name);
             check(&s, what);
             scene_close(&s);
         }
 }
 END_TEST
 
-/* Blows to and fro. */
+/* A wind that oscillates. */
 static void blow(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
 {
     (void)user, (void)x, (void)gradient;
@@ -391,10 +393,10 @@ static void blow(void *user, double t, int32_t count, const double *x, double *w
         wind[3 * i + 2] = 2 * sin(40 * t);
 }
 
-/* Pins that it sends, one of which the scene fixed; a collider; forces; a wind, which is the sim's own that
- * is restored. In the middle of their ways it is saved, and after the restoration it can still be
- * cancelled. */
-START_TEST(what_a_host_moves_goes_on)
+/* Pins that the host moves, one of them fixed by the scene; a collider; forces; a wind, which is set again on
+ * the sim that is restored. The checkpoint is taken while they move; after the restoration the motions can
+ * still be cancelled. */
+START_TEST(what_a_host_moves_is_restored)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const char *name = drape_integrators[i]->entry.name;
@@ -410,20 +412,20 @@ START_TEST(what_a_host_moves_goes_on)
         ck_assert(s.model->pinned[pins[0]] && s.model->pinned[pins[1]]);
         ck_assert_int_eq(drape_sim_set_wind(one, blow, NULL), DRAPE_OK);
         ck_assert_int_eq(drape_sim_set_wind(other, blow, NULL), DRAPE_OK);
-        ck_assert_int_eq(go(one, 0.03), DRAPE_OK);
+        ck_assert_int_eq(advance(one, 0.03), DRAPE_OK);
         ck_assert_int_eq(drape_sim_move_pins(one, 2, pins, 0.08, to, NULL), DRAPE_OK);
         ck_assert_int_eq(drape_sim_move_collider(one, 0, 0.07, away, away), DRAPE_OK);
         ck_assert_int_eq(drape_sim_push(one, push), DRAPE_OK);
-        ck_assert_int_eq(go(one, MIDDLE), DRAPE_OK);
+        ck_assert_int_eq(advance(one, MIDDLE), DRAPE_OK);
         bytes saved = bytes_save(one);
         drape_status status = drape_sim_restore_from(other, saved.data, saved.size);
         ck_assert_msg(status == DRAPE_OK, "%s: %s", name, drape_context_message(s.ctx));
         same_contact(one, other, name);
         drape_sim_cancel(other);
-        ck_assert_int_eq(go(other, END), DRAPE_E_STOPPED);
-        drape_status first = go(one, END);
-        ck_assert_int_eq(go(other, END), first);
-        ck_assert_msg(drape_sim_hash(one) == drape_sim_hash(other), "%s: other bits", name);
+        ck_assert_int_eq(advance(other, END), DRAPE_E_STOPPED);
+        drape_status first = advance(one, END);
+        ck_assert_int_eq(advance(other, END), first);
+        ck_assert_msg(drape_sim_hash(one) == drape_sim_hash(other), "%s: bits differ", name);
         const double *x = drape_sim_positions(other) + 3 * pins[0];
         ck_assert_msg(first || (x[0] == to[0] && x[2] == to[2]), "%s: the pin is at %g %g %g", name, x[0],
                       x[1], x[2]);
@@ -436,6 +438,7 @@ START_TEST(what_a_host_moves_goes_on)
 }
 END_TEST
 
-SUITE("entries/checkpoint", what_a_host_moves_goes_on, a_sheet_that_buckles_goes_on, what_a_host_did_goes_on,
-      an_equilibrium_goes_on, every_integrator_goes_on, every_way_of_newton_goes_on,
-      every_linear_solver_goes_on, every_controller_goes_on, cloth_on_cloth_goes_on)
+SUITE("entries/checkpoint", what_a_host_moves_is_restored, a_sheet_that_buckles_resumes,
+      what_a_host_did_is_restored, an_equilibrium_resumes, every_integrator_resumes,
+      every_newton_variant_resumes, every_linear_solver_resumes, every_controller_resumes,
+      cloth_on_cloth_resumes)

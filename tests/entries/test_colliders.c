@@ -1,7 +1,6 @@
 /*
- * test_colliders.c: every row of the colliders: its distance against one found by brute force, its normal and
- * curvature against differences, the features of its shape against its distance, and meshes that are no
- * solid.
+ * test_colliders.c: all colliders: the distance against one found by brute force, normal and curvature
+ * against differences, the features of the shape against the distance, and meshes that are not solids.
  */
 #include "colliders/colliders.h"
 
@@ -24,7 +23,7 @@ static scene with_collider(const char *text)
     return s;
 }
 
-/* ---- Random places: xorshift (Marsaglia 2003), so that every run sees the same ones ---- */
+/* ---- Random points: xorshift (Marsaglia 2003) with a fixed seed, so that every run has the same ---- */
 
 static uint64_t seed = UINT64_C(88172645463325252);
 
@@ -45,8 +44,8 @@ static const int cube_face[12][3] = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6},
                                      {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
 
 typedef struct cube_change {
-    int left_out; /* face; -1: none */
-    int turned;   /* face; -1: none */
+    int left_out; /* number of a face; -1: none */
+    int turned;   /* number of a face; -1: none */
     bool all_turned;
 } cube_change;
 static const cube_change whole_cube = {-1, -1, false};
@@ -68,8 +67,9 @@ static void write_cube(const char *path, cube_change change)
     fclose(file);
 }
 
-/* A globe: `rings` rings of 2 rings points between the poles; 4 rings (rings - 1) + 4 rings triangles. dent:
- * how much every other point lies nearer to the center, so that points, edges and faces are partly hollow. */
+/* A globe: `rings` rings of 2 rings points between the poles; 4 rings (rings - 1) + 4 rings triangles.
+ * dent: how much nearer to the center every other point lies, so that some points, edges and faces are
+ * concave. */
 static void write_globe(const char *path, int rings, double dent)
 {
     const double pi = acos(-1.0);
@@ -97,8 +97,8 @@ static void write_globe(const char *path, int rings, double dent)
     fclose(file);
 }
 
-/* A wedge with its tip at 0, whose upper face is a fan of 30 triangles about the tip and whose lower face is
- * one: a mean of normals that is not weighted by their angles has the points below the tip inside. */
+/* A wedge with its tip at 0. Its upper face is a fan of 30 triangles about the tip, its lower face a single
+ * triangle. By a mean of normals that is not weighted by angles, the points below the tip would be inside. */
 static void write_wedge(const char *path)
 {
     enum { TOP = 1, SLICES = 30, LOW = TOP + SLICES + 1, HIGH = LOW + 1 };
@@ -119,7 +119,7 @@ static void write_wedge(const char *path)
     fclose(file);
 }
 
-/* A folder of its own for the files of a test, with those that the variants below name. */
+/* A temporary folder for the files of a test, with the meshes that the variants below name. */
 static void enter_folder(void)
 {
     char folder[] = "/tmp/drape-colliders-XXXXXX";
@@ -143,8 +143,8 @@ static void leave_folder(void)
 
 /* ---- The variants ---- */
 
-/* Whether x is inside, by the definition of the body and not by its distance; a margin of round-off is left
- * to the callers. */
+/* Whether x is inside, by the definition of the body and not by its distance. Callers leave a margin for
+ * round-off. */
 typedef bool inside_function(const double *x);
 
 static bool in_plane(const double *x)
@@ -206,7 +206,8 @@ static bool in_box(const double *x)
     return fabs(y[0]) < 0.5 && fabs(y[1]) < 0.25 && fabs(y[2]) < 0.4;
 }
 
-/* Inside of the box, and not beyond the rounding: at most 0.1 from the box that is 0.1 smaller all around. */
+/* Inside the box and not beyond the rounding: at most 0.1 from the box that is smaller by 0.1 on all
+ * sides. */
 static bool in_round_box(const double *x)
 {
     const double half[3] = {0.4, 0.15, 0.3};
@@ -230,8 +231,8 @@ static bool in_cube(const double *x)
 }
 
 static const struct variant {
-    const char *row, *text;
-    inside_function *inside; /* NULL: known by the winding number of the mesh */
+    const char *collider, *text;
+    inside_function *inside; /* NULL: decided by the winding number of the mesh */
 } variants[] = {
     {"plane", "{'type': 'plane', 'point': [0.1, 0, 0.2], 'normal': [1, 2, -2]}", in_plane},
     {"sphere", "{'type': 'sphere', 'center': [0.1, -0.2, 0.3], 'radius': 0.7}", in_sphere},
@@ -261,7 +262,7 @@ static void each_variant(visit *one)
     enter_folder();
     for (size_t i = 0; i < VARIANTS; i++) {
         scene s = with_collider(variants[i].text);
-        ck_assert_str_eq(s.model->colliders[0].ops->entry.name, variants[i].row);
+        ck_assert_str_eq(s.model->colliders[0].ops->entry.name, variants[i].collider);
         one(&s.model->colliders[0], &variants[i]);
         scene_close(&s);
     }
@@ -282,7 +283,7 @@ START_TEST(entries_are_well_formed)
         ck_assert_ptr_eq(drape_collider_registry.entries[i], &ops->entry);
         ck_assert(ops->shape && ops->distance);
         for (size_t v = 0; v < VARIANTS; v++)
-            tried = tried || strcmp(variants[v].row, ops->entry.name) == 0;
+            tried = tried || strcmp(variants[v].collider, ops->entry.name) == 0;
         ck_assert_msg(tried, "no variant of %s is tested", ops->entry.name);
     }
 }
@@ -311,8 +312,8 @@ static bool is_inside(const drape_collider *c, const struct variant *v, const do
     return v->inside ? v->inside(x) : winding(&c->shape, x) > 0.5;
 }
 
-/* The sign is that of the body's definition. In direction -n d the surface is met exactly at the distance,
- * and no point nearer than |d| is on the other side: so d is the distance to the surface. */
+/* The sign is that of the body's definition. From x along -d n the surface is met exactly at the distance
+ * |d|, and no point nearer than |d| is on the other side: so |d| is the distance from the surface. */
 static void check_distance(const drape_collider *c, const struct variant *v)
 {
     for (int i = 0; i < 3000; i++) {
@@ -325,7 +326,7 @@ static void check_distance(const drape_collider *c, const struct variant *v)
         ck_assert_double_eq_tol(vec3_norm(n), 1, 1e-14);
         memcpy(foot, x, sizeof foot);
         vec3_add_scaled(-d, n, foot);
-        /* |x| and d are below 3: their rounding, and that of the distance at the foot, is a few eps of it */
+        /* |x| and d are below 3: both, and the distance at the foot, are rounded by a few eps of that */
         ck_assert_msg(fabs(distance_of(c, foot, NULL, NULL)) < 1e-14, "%s: foot of %g %g %g is off by %g",
                       v->text, x[0], x[1], x[2], distance_of(c, foot, NULL, NULL));
         for (int trial = 0; trial < 20; trial++) {
@@ -346,7 +347,7 @@ START_TEST(distances_are_exact)
 END_TEST
 
 /* The mesh of a cube and the box of the same size have the same distance everywhere. */
-START_TEST(a_mesh_is_what_its_box_is)
+START_TEST(a_mesh_equals_its_box)
 {
     enter_folder();
     scene mesh = with_collider("{'type': 'mesh', 'file': 'cube.obj', 'scale': [1, 0.5, 0.8],"
@@ -359,7 +360,8 @@ START_TEST(a_mesh_is_what_its_box_is)
             x[k] = between(-1.2, 1.2);
         const double d = distance_of(&mesh.model->colliders[0], x, n[0], h[0]);
         ck_assert_double_eq_tol(d, distance_of(&box.model->colliders[0], x, n[1], h[1]), 1e-14);
-        /* a normal turns by the rounding of the foot over the distance, the curvature by that over d again */
+        /* the normal changes by the rounding of the foot over the distance, the curvature by that over d
+         * again */
         for (int k = 0; k < 9 && d > 1e-3; k++) {
             ck_assert_double_eq_tol(h[0][k], h[1][k], 1e-14 / (d * d));
             ck_assert_double_eq_tol(n[0][k % 3], n[1][k % 3], 1e-14 / d);
@@ -373,11 +375,11 @@ END_TEST
 
 /* ---- Derivatives ---- */
 
-/* Central differences, step h, of the distance and of the normal. On a piece that is smooth their errors are
- * h^2/6 times the next derivative but one. About a point or an edge at r that of the normal is at most 9/r^3,
- * and that of the distance 3/r^2; rounding adds some 1e-15/(r h). With h = 1e-5 and r > 0.2: 1e-10/6 *
- * 9/0.008 + 5e-10 = 2e-8. A place is left out where a difference straddles two pieces: there the Hessians at
- * its ends differ. */
+/* Central differences of the distance and of the normal, with step h. Within a smooth piece their errors
+ * are h^2/6 times the derivative two orders above. At a distance r from a point or an edge, that is at most
+ * 9/r^3 for the normal and 3/r^2 for the distance; rounding adds about 1e-15/(r h). With h = 1e-5 and r >
+ * 0.2: 1e-10/6 * 9/0.008 + 5e-10 = 2e-8. Places where a difference straddles two pieces are left out: there
+ * the Hessians at its ends differ. */
 #define STEP      1e-5
 #define TOLERANCE 1e-7
 
@@ -396,13 +398,13 @@ static probe probe_at(const drape_collider *c, const double *x, int axis, double
 
 static double largest(const double *a, int count)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < count; i++)
-        most = fmax(most, fabs(a[i]));
-    return most;
+        max = fmax(max, fabs(a[i]));
+    return max;
 }
 
-/* Hessians of one piece differ by h times the third derivative: 1e-5 * 3/0.04 = 0.00075. */
+/* Hessians within one piece differ by h times the third derivative: 1e-5 * 3/0.04 = 0.00075. */
 static bool same_piece(const probe *a, const probe *b)
 {
     for (int i = 0; i < 9; i++)
@@ -439,9 +441,9 @@ static void check_derivatives(const drape_collider *c, const struct variant *v)
             curved += largest(here.h, 9) > 0.1;
         }
     }
-    printf("# %s: %ld differences of %ld places, %ld of them curved\n", v->row, compared, tried, curved);
+    printf("# %s: %ld differences of %ld places, %ld of them curved\n", v->collider, compared, tried, curved);
     ck_assert_int_ge(compared, 20000);
-    ck_assert(curved > 1000 || strcmp(v->row, "plane") == 0);
+    ck_assert(curved > 1000 || strcmp(v->collider, "plane") == 0);
 }
 
 START_TEST(derivatives_are_exact)
@@ -450,8 +452,8 @@ START_TEST(derivatives_are_exact)
 }
 END_TEST
 
-/* Outside, the normal of a smooth row does not jump: between places 1e-7 apart and at least 0.05 off the
- * surface it turns by no more than 1e-7/0.05, of edges too. */
+/* Outside, the normal of a smooth collider is continuous: between places 1e-7 apart and at least 0.05 off the
+ * surface it turns by no more than 1e-7/0.05, past edges too. */
 static void check_smooth(const drape_collider *c, const struct variant *v)
 {
     if (!c->ops->smooth)
@@ -476,7 +478,7 @@ START_TEST(normals_are_continuous_outside)
 }
 END_TEST
 
-/* Where the gradient is not unique: centers, axes, the points and edges of the shape. */
+/* Where the gradient is not unique: centers, axes, and the points and edges of the shape. */
 static void check_everywhere(const drape_collider *c, const struct variant *v)
 {
     double sum[3] = {0};
@@ -507,8 +509,8 @@ END_TEST
 /* ---- Shapes ---- */
 
 /* Every point, segment and triangle, grown by the radius, touches the surface from inside: no part of it is
- * outside, and none is deeper than the tolerance of a polygon, a tenth of the distance of 0.01. Of flat faces
- * only the borders are features: a segment's middle is as deep as the row's own edges are. */
+ * outside, and none is deeper than the tolerance of a polygon, a tenth of the distance of 0.01. Flat faces
+ * have only their borders as features: the middle of a segment is as deep as the edges of the collider. */
 static void check_shape(const drape_collider *c, const struct variant *v)
 {
     const drape_collider_shape *s = &c->shape;
@@ -651,8 +653,9 @@ END_TEST
 
 /* ---- Speed ---- */
 
-/* A search through all of 40 000 triangles takes some milliseconds. Near the surface, where contact asks, the
- * tree visits a few leaves: one or two microseconds; allowed are 50, for slow machines and the sanitizers. */
+/* A search through all of the 40 000 triangles takes some milliseconds. Near the surface, where contact
+ * queries are made, the tree visits a few leaves: one or two microseconds. 50 are allowed, for slow
+ * machines and sanitizers. */
 START_TEST(queries_of_large_meshes_are_fast)
 {
     enum { QUERIES = 20000 };
@@ -679,7 +682,7 @@ START_TEST(queries_of_large_meshes_are_fast)
 }
 END_TEST
 
-SUITE("colliders", entries_are_well_formed, distances_are_exact, a_mesh_is_what_its_box_is,
-      derivatives_are_exact, normals_are_continuous_outside, the_distance_is_defined_everywhere,
-      shapes_lie_on_the_surface, shapes_have_the_right_features, meshes_that_are_no_solid_are_refused,
-      poses_follow_the_track, queries_of_large_meshes_are_fast)
+SUITE("colliders", entries_are_well_formed, distances_are_exact, a_mesh_equals_its_box, derivatives_are_exact,
+      normals_are_continuous_outside, the_distance_is_defined_everywhere, shapes_lie_on_the_surface,
+      shapes_have_the_right_features, meshes_that_are_no_solid_are_refused, poses_follow_the_track,
+      queries_of_large_meshes_are_fast)

@@ -1,7 +1,6 @@
 /*
  * test_contact_system.c: the Jacobian of the whole system with active contacts against differences of its
- * force, for every row of the colliders, resting and moving, with implicit and lagged friction, and for cloth
- * on cloth.
+ * force, for all colliders, at rest and moving, with implicit and lagged friction, and for cloth on cloth.
  */
 #include "assemble/check.h"
 #include "contact/broad_phase.h"
@@ -15,9 +14,9 @@
 static const char octahedron[] = "v 0.15 0 0\nv -0.15 0 0\nv 0 0.15 0\nv 0 -0.15 0\nv 0 0 0.15\nv 0 0 -0.15\n"
                                  "f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n";
 
-/* Each with its top at the height that is given. */
+/* Colliders, each with its top at the given height. */
 static const struct setting {
-    const char *row, *text;
+    const char *collider, *text;
     double top; /* [m] */
 } settings[] = {
     {"plane", "'type': 'plane', 'point': [0,0,0], 'normal': [0.003,1,0.005]", 0.0005},
@@ -45,7 +44,7 @@ static double *take(probe *t, size_t n)
     return out;
 }
 
-/* A crumpled sheet, the last cloth lifted, moving; the system has begun a step there. */
+/* A crumpled sheet in motion, the last cloth lifted; the system has begun a step there. */
 static probe open_probe(scene s, double lift, uint64_t seed)
 {
     probe t = {.s = s};
@@ -87,15 +86,15 @@ static void force_beside(probe *t, drape_point point, double s, double *g)
 
 static double scale_of(const probe *t, const double *a)
 {
-    double most = 0;
+    double max = 0;
     for (size_t i = 0; i < 3 * (size_t)t->s.model->node_count; i++)
-        most = fmax(most, fabs(a[i]));
-    return most;
+        max = fmax(max, fabs(a[i]));
+    return max;
 }
 
-/* Largest difference over the largest entry, the best of some steps. Barriers change over 1e-3 m: with e =
- * 1e-7 truncation is (e/1e-4)^2 = 1e-6 where gaps are a tenth of that, rounding 1e-16 0.3/e/1e-4 = 3e-6; both
- * fall or rise by 10 from step to step. */
+/* Largest difference over the largest entry, for the best of some step sizes e. Barriers change over 1e-3 m:
+ * with e = 1e-7 the truncation error is (e/1e-4)^2 = 1e-6 where gaps are a tenth of that, the rounding error
+ * 1e-16 0.3/e/1e-4 = 3e-6. From one step size to the next, both change by a factor of 10 or more. */
 static double error_of(probe *t, double weight, double time)
 {
     const drape_model *m = t->s.model;
@@ -158,13 +157,13 @@ static void leave_folder(void)
     ck_assert_int_eq(chdir("/") + rmdir(folder), 0);
 }
 
-START_TEST(colliders_of_every_row)
+START_TEST(every_collider)
 {
     enter_folder();
     for (int i = 0; drape_colliders[i]; i++) {
         bool tried = false;
         for (size_t k = 0; k < SETTINGS; k++)
-            tried = tried || strcmp(settings[k].row, drape_colliders[i]->entry.name) == 0;
+            tried = tried || strcmp(settings[k].collider, drape_colliders[i]->entry.name) == 0;
         ck_assert_msg(tried, "no setting of %s is tested", drape_colliders[i]->entry.name);
     }
     for (size_t i = 0; i < SETTINGS; i++)
@@ -205,7 +204,7 @@ START_TEST(cloth_on_cloth)
 }
 END_TEST
 
-/* A point that is no number leaves nothing behind: the next one is what it was. */
+/* A state with NaN has no effect on later ones: the next evaluation is as before it. */
 START_TEST(nan_is_forgotten)
 {
     scene s = scene_model(
@@ -240,8 +239,8 @@ START_TEST(nan_is_forgotten)
 }
 END_TEST
 
-/* `drape check` looks at contact where a scene has it, and only there. */
-START_TEST(contact_has_rows_of_its_own)
+/* `drape check` compares contact forces in scenes with contact, and only there. */
+START_TEST(only_scenes_with_contact_have_it_checked)
 {
     static const char *const more[] = {
         "", ", 'colliders': [{'type': 'box', 'center': [0,-1,0], 'size': [0.2,0.2,0.2], 'friction': 0.4}]",
@@ -267,12 +266,13 @@ START_TEST(contact_has_rows_of_its_own)
 }
 END_TEST
 
-/* No collider and no self-contact: no time, no memory, nothing. What contact takes is beside the other parts
- * of a step, not within them: their sum is no more than the steps, to the rounding of sums of times. */
-START_TEST(who_has_none_pays_nothing)
+/* Without colliders and self-contact, contact takes no time and no memory. The time of contact is separate
+ * from the other parts of a step, not within them: the sum of all parts is at most the time of the steps,
+ * up to the rounding of sums. */
+START_TEST(scenes_without_contact_pay_nothing)
 {
-    static const char *const rows[] = {"be", "bdf2", "midpoint", "trbdf2", "ida", "static", "verlet"};
-    for (size_t k = 0; k < 2 * sizeof rows / sizeof *rows; k++) {
+    static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "ida", "static", "verlet"};
+    for (size_t k = 0; k < 2 * sizeof methods / sizeof *methods; k++) {
         const bool there = k % 2;
         scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, "
@@ -281,14 +281,14 @@ START_TEST(who_has_none_pays_nothing)
             " 'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'row': 0}]}]%s,"
             " 'integrator': {'method': '%s', 'dt': 0.01, 'substeps': 100}, 'duration': 1}",
             there ? ", 'colliders': [{'type': 'plane', 'point': [0,-1,0], 'normal': [0,1,0]}]" : "",
-            rows[k / 2]);
+            methods[k / 2]);
         scene_advance(&s, 0.02);
         const drape_statistics d = drape_sim_statistics(s.sim);
         const double seconds = d.wall_contact;
         ck_assert(d.wall_residual >= 0 && d.wall_jacobian >= 0);
         ck_assert(d.wall_residual + d.wall_jacobian + d.wall_factor + d.wall_solve + seconds <=
                   (1 + 1e-9) * d.wall_steps);
-        ck_assert_msg(there ? seconds > 0 : seconds == 0, "%s: %g s", rows[k / 2], seconds);
+        ck_assert_msg(there ? seconds > 0 : seconds == 0, "%s: %g s", methods[k / 2], seconds);
         ck_assert(there || !drape_system_contact(s.sim->system));
         scene_close(&s);
     }
@@ -300,32 +300,32 @@ END_TEST
     "{'translate': [0, %g, 0]}}, 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, "    \
     "'terms': ['stretch.edge', 'bend.hinge']}"
 
-/* Bytes that a context gave and has not back; each piece keeps its size in front. An empty array is one byte,
- * which is nobody's. */
-static size_t held;
+/* Bytes allocated by a context and not yet released; each block begins with its size. An empty array has one
+ * byte, which no account includes. */
+static size_t allocated;
 
-static void *hold(void *user, size_t size)
+static void *count_allocation(void *user, size_t size)
 {
     (void)user;
     size_t *piece = malloc(size + 2 * sizeof *piece);
     if (!piece)
         return NULL;
     *piece = size > 1 ? size : 0;
-    held += *piece;
+    allocated += *piece;
     return piece + 2;
 }
 
-static void let_go(void *user, void *memory)
+static void count_release(void *user, void *memory)
 {
     (void)user;
     size_t *piece = (size_t *)memory - 2;
-    held -= *piece;
+    allocated -= *piece;
     free(piece);
 }
 
-/* A system says how much memory it has, to the byte: contact, its lists as they grew, and the wider
+/* A system reports its memory to the byte: contact with its lists as they have grown, and the extended
  * pattern. */
-START_TEST(bytes_are_all_of_them)
+START_TEST(all_bytes_are_counted)
 {
     scene s = scene_model(
         "{'drape': 1, 'cloth': [" LAYER ", " LAYER "], 'self_contact': {'thickness': 2e-3, 'friction': 0.2},"
@@ -341,28 +341,28 @@ START_TEST(bytes_are_all_of_them)
     ck_assert_int_eq(drape_state_create(&arena, s.model, &at), DRAPE_OK);
     for (int32_t i = s.model->cloths[1].first_node; i < s.model->node_count; i++)
         at.x[3 * (size_t)i + 1] = 2e-3;
-    s.ctx->def.allocate = hold;
-    s.ctx->def.release = let_go;
+    s.ctx->def.allocate = count_allocation;
+    s.ctx->def.release = count_release;
     ck_assert_int_eq(drape_system_create(&own, s.model, 1, &system), DRAPE_OK);
     ck_assert_int_eq(drape_system_add_contact(system), DRAPE_OK);
-    ck_assert_uint_eq(own.bytes, held);
-    const size_t before = held;
+    ck_assert_uint_eq(own.bytes, allocated);
+    const size_t before = allocated;
     const drape_point point = {.x = at.x, .v = at.v, .internal = at.internal};
     ck_assert_int_eq(drape_system_begin(system, &at), DRAPE_OK);
     ck_assert_int_eq(drape_system_extend_pattern(system, &point, &changed), DRAPE_OK);
     ck_assert(changed);
-    ck_assert_uint_gt(held, before);
-    ck_assert_uint_eq(own.bytes, held);
+    ck_assert_uint_gt(allocated, before);
+    ck_assert_uint_eq(own.bytes, allocated);
     drape_system_destroy(&system);
     drape_arena_free(&own);
-    ck_assert_uint_eq(held, 0);
+    ck_assert_uint_eq(allocated, 0);
     s.ctx->def = def;
     drape_arena_free(&arena);
     scene_close(&s);
 }
 END_TEST
 
-/* Energy pair by pair, none left out and none merged. */
+/* The energy, pair by pair, without merging. */
 typedef struct pairwise {
     const drape_model *model;
     const drape_broad_phase *broad;
@@ -388,8 +388,9 @@ static void add_energy(void *user, const drape_pair *found)
     w->acting++;
 }
 
-/* What pairs share is counted once with all its area: the sum is that of all pairs, to the rounding of some
- * hundred numbers of one sign, and they are fewer. */
+/* An active contact that several pairs share is counted once, with the area of all. The sum of energies is
+ * that of all pairs, up to the rounding of some hundred positive numbers, and there are fewer contacts than
+ * pairs. */
 START_TEST(active_contacts_are_all_pairs)
 {
     scene s = scene_model("{'drape': 1, 'cloth': [" LAYER ", " LAYER "], 'self_contact': {'thickness': 2e-2},"
@@ -415,8 +416,9 @@ START_TEST(active_contacts_are_all_pairs)
 }
 END_TEST
 
-/* Whoever asks between steps may make contact search elsewhere: for frames, or forces that a host reads. */
-static void look_on(drape_sim *sim)
+/* A query between steps, for frames or for forces that a host reads, may make contact search at another
+ * state. */
+static void query(drape_sim *sim)
 {
     const size_t n = 3 * (size_t)sim->model->node_count;
     const drape_state *now = drape_sim_state(sim);
@@ -443,19 +445,19 @@ static uint64_t collapse(bool watched)
     for (int k = 1; k <= 18; k++) {
         scene_advance(&s, 0.02 * k);
         if (watched)
-            look_on(s.sim);
+            query(s.sim);
     }
     const uint64_t hash = drape_sim_hash(s.sim);
     scene_close(&s);
     return hash;
 }
 
-START_TEST(who_looks_on_changes_nothing)
+START_TEST(queries_change_nothing)
 {
     ck_assert(collapse(true) == collapse(false));
 }
 END_TEST
 
-SUITE("contact_system", colliders_of_every_row, cloth_on_cloth, nan_is_forgotten, contact_has_rows_of_its_own,
-      who_has_none_pays_nothing, bytes_are_all_of_them, active_contacts_are_all_pairs,
-      who_looks_on_changes_nothing)
+SUITE("contact_system", every_collider, cloth_on_cloth, nan_is_forgotten,
+      only_scenes_with_contact_have_it_checked, scenes_without_contact_pay_nothing, all_bytes_are_counted,
+      active_contacts_are_all_pairs, queries_change_nothing)

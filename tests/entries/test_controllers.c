@@ -1,4 +1,4 @@
-/* test_controllers.c: what every row of the controllers does with an attempted step. */
+/* test_controllers.c: what every controller does with an attempted step. */
 #include "control/control.h"
 
 #include "assemble/state.h"
@@ -11,8 +11,8 @@ static void defaults(const drape_controller_ops *ops, double *values)
         values[i] = generic_value(&ops->entry.params[i]);
 }
 
-/* The interface of a judge, here once: an attempt of size h from time t that ended with *status, of a
- * sheet that stands still. */
+/* Calls judge of a controller: an attempt with step h from time t that ended with *status, for a sheet at
+ * rest. */
 static drape_verdict judge(const drape_controller_ops *ops, const double *values, double t, double h,
                            drape_step_info *info, drape_status *status)
 {
@@ -76,7 +76,7 @@ START_TEST(good_steps_are_accepted)
 }
 END_TEST
 
-START_TEST(what_no_smaller_step_helps_stops_with_its_own_status)
+START_TEST(failures_that_no_smaller_step_cures_keep_their_status)
 {
     static const drape_status statuses[] = {DRAPE_E_SOLVER, DRAPE_E_MEMORY, DRAPE_E_ARGUMENT};
     for (int i = 0; drape_controllers[i]; i++)
@@ -91,8 +91,8 @@ START_TEST(what_no_smaller_step_helps_stops_with_its_own_status)
 }
 END_TEST
 
-/* Whatever fails for ever ends, with a status that says so, at any time of the clock. */
-START_TEST(failing_for_ever_ends)
+/* An attempt that always fails is given up with a status that says so, at any time. */
+START_TEST(endless_failure_ends)
 {
     static const double times[] = {0, 1e-300, 1, 1e9, -5};
     for (int i = 0; drape_controllers[i]; i++)
@@ -117,7 +117,7 @@ START_TEST(failing_for_ever_ends)
 }
 END_TEST
 
-static const drape_controller_ops *row(const char *name)
+static const drape_controller_ops *controller_named(const char *name)
 {
     return drape_controllers[drape_registry_find(&drape_controller_registry, NULL, name)];
 }
@@ -126,7 +126,7 @@ START_TEST(fixed_never_halves)
 {
     drape_step_info info = {.reason = "max_iterations"};
     drape_status status = DRAPE_RETRY_DEGENERATE;
-    ck_assert_int_eq(judge(row("fixed"), NULL, 0, 1, &info, &status), DRAPE_STOP);
+    ck_assert_int_eq(judge(controller_named("fixed"), NULL, 0, 1, &info, &status), DRAPE_STOP);
     ck_assert_int_eq(status, DRAPE_E_SOLVER);
 }
 END_TEST
@@ -136,8 +136,8 @@ START_TEST(halving_stops_at_dt_min)
     drape_step_info info = {.reason = "max_iterations"};
     const double dt_min = 0.25;
     drape_status status = DRAPE_RETRY_LINEAR;
-    ck_assert_int_eq(judge(row("halving"), &dt_min, 3, 0.5, &info, &status), DRAPE_RETRY);
-    ck_assert_int_eq(judge(row("halving"), &dt_min, 3, 0.499, &info, &status), DRAPE_STOP);
+    ck_assert_int_eq(judge(controller_named("halving"), &dt_min, 3, 0.5, &info, &status), DRAPE_RETRY);
+    ck_assert_int_eq(judge(controller_named("halving"), &dt_min, 3, 0.499, &info, &status), DRAPE_STOP);
     ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
 }
 END_TEST
@@ -147,11 +147,11 @@ START_TEST(halving_stops_where_the_time_stands_still)
     drape_step_info info = {.reason = "max_iterations"};
     const double dt_min = 1e-300;
     drape_status status = DRAPE_RETRY_LINEAR;
-    ck_assert_int_eq(judge(row("halving"), &dt_min, 1e6, 1e-11, &info, &status), DRAPE_STOP);
+    ck_assert_int_eq(judge(controller_named("halving"), &dt_min, 1e6, 1e-11, &info, &status), DRAPE_STOP);
     ck_assert_int_eq(status, DRAPE_E_STEP_TOO_SMALL);
 }
 END_TEST
 
 SUITE("controllers", entries_are_well_formed, good_steps_are_accepted,
-      what_no_smaller_step_helps_stops_with_its_own_status, failing_for_ever_ends, fixed_never_halves,
+      failures_that_no_smaller_step_cures_keep_their_status, endless_failure_ends, fixed_never_halves,
       halving_stops_at_dt_min, halving_stops_where_the_time_stands_still)

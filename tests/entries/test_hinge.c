@@ -1,4 +1,5 @@
-/* test_hinge.c: bend.hinge through pi and beyond, its rest angles, and what is told of collapsed elements. */
+/* test_hinge.c: bend.hinge folded through pi and beyond, its rest angles, and the reports of collapsed
+ * elements. */
 #include <stdio.h>
 
 #include "models.h"
@@ -8,7 +9,7 @@ static const double pi = 3.14159265358979323846;
 
 /* ---- One hinge ---- */
 
-/* Edge 0 1 along x with apices 2 and 3, one on each side, 0.1 m away; folded by angle at rest. */
+/* Edge 0 1 along x with apices 2 and 3, one on each side, 0.1 m away; folded by an angle at rest. */
 typedef struct hinge {
     drape_context *ctx;
     drape_model *model;
@@ -69,7 +70,7 @@ static void free_hinge(hinge *h)
     drape_context_destroy(&h->ctx);
 }
 
-/* Folds to an angle and accepts that state. */
+/* Folds the hinge to an angle and accepts that state. */
 static void accept_angle(hinge *h, double angle)
 {
     place_apex(h->after.x, angle);
@@ -89,8 +90,8 @@ static double energy_at(hinge *h, double angle, double g[12])
     return energy;
 }
 
-/* Apex force k (theta - theta0)/H, H = 0.1 m, perpendicular to its triangle; energy 1/2 k (theta - theta0)^2:
- * of the angle that was folded, however often it went round. */
+/* The force on an apex is k (theta - theta0)/H, H = 0.1 m, perpendicular to its triangle; the energy is 1/2 k
+ * (theta - theta0)^2. theta is the total angle of the fold, over any number of turns. */
 static void check_fold(double rest, double sign, double turn)
 {
     hinge h = make_hinge(rest, "mesh");
@@ -116,14 +117,15 @@ START_TEST(folds_through_pi_smoothly)
 }
 END_TEST
 
-/* What makes the test above one: with the angle of rest as the reference the branch changes at pi. */
+/* Why the test above needs the internal variable: with the rest angle as the reference the branch changes at
+ * pi. */
 START_TEST(the_bare_angle_would_jump)
 {
     hinge h = make_hinge(0, "mesh");
     double g[12], below = energy_at(&h, pi - 0.01, g), force_below = g[10] * cos(pi - 0.01);
     double above = energy_at(&h, pi + 0.01, g), force_above = g[10] * cos(pi + 0.01);
-    ck_assert_double_eq_tol(above, below, 1e-12);      /* (pi - 0.01)^2 both: the other way round */
-    ck_assert_double_lt(force_above * force_below, 0); /* and the force turned */
+    ck_assert_double_eq_tol(above, below, 1e-12);      /* both (pi - 0.01)^2, folded in opposite directions */
+    ck_assert_double_lt(force_above * force_below, 0); /* and the force has changed its sign */
     accept_angle(&h, pi - 0.01);
     ck_assert_double_gt(energy_at(&h, pi + 0.01, g), below);
     ck_assert_double_gt(g[10] * cos(pi + 0.01) * force_below, 0);
@@ -131,7 +133,7 @@ START_TEST(the_bare_angle_would_jump)
 }
 END_TEST
 
-/* A trial that was not accepted leaves no trace. */
+/* A trial that is not accepted does not change the internal variable. */
 START_TEST(only_accepted_states_count)
 {
     hinge h = make_hinge(0, "mesh");
@@ -195,7 +197,7 @@ static void free_sheet(sheet *s)
     drape_context_destroy(&s->ctx);
 }
 
-/* Moves node a to the line from p to q, leaving a share of the way to it. */
+/* Moves node a towards the line from p to q; `share` of its distance remains. */
 static void flatten(double *x, const int32_t *node, double share)
 {
     const double *p = x + 3 * node[0], *q = x + 3 * node[1];
@@ -210,8 +212,9 @@ static void flatten(double *x, const int32_t *node, double share)
     }
 }
 
-/* The altitude of every hinge in turn; the element told has it, or one that the same move flattened more. */
-START_TEST(a_collapsed_altitude_is_told)
+/* Collapses the altitudes of every hinge in turn; the element reported has that altitude, or one that the
+ * same move flattened more. */
+START_TEST(a_collapsed_altitude_is_reported)
 {
     sheet s = make_sheet("bend.hinge");
     const drape_elements *el = &s.model->terms[0].elements;
@@ -243,7 +246,7 @@ START_TEST(a_collapsed_altitude_is_told)
 }
 END_TEST
 
-START_TEST(a_collapsed_edge_is_told)
+START_TEST(a_collapsed_edge_is_reported)
 {
     sheet s = make_sheet("stretch.edge");
     const drape_elements *el = &s.model->terms[0].elements;
@@ -284,10 +287,10 @@ static void check_below_limit(const char *term, void (*squeeze)(double *x, const
     memcpy(before, rest, sizeof before);
     squeeze(before, node, 1e-7);
     static const struct {
-        double share; /* of rest, after the step from 1e-7 */
+        double share; /* of the rest shape, after the step from 1e-7 */
         drape_status status;
-    } steps[] = {{1e-7, DRAPE_OK}, /* it stays */
-                 {2e-7, DRAPE_OK}, /* it leaves, not far enough to be above */
+    } steps[] = {{1e-7, DRAPE_OK}, /* unchanged */
+                 {2e-7, DRAPE_OK}, /* grows, but stays below the limit */
                  {1, DRAPE_OK},
                  {0.9e-7, DRAPE_RETRY_DEGENERATE}};
     for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
@@ -311,8 +314,8 @@ static void shorten(double *x, const int32_t *node, double share)
         x[3 * node[0] + k] = x[3 * node[1] + k] + share * (x[3 * node[0] + k] - x[3 * node[1] + k]);
 }
 
-/* Below its limit before the step: it may stay or grow, so that a crumpled start can be left; it must not
- * fall. */
+/* If a value was below its limit before the step, it may stay or grow, so that a crumpled start can be
+ * left; it must not fall. */
 START_TEST(what_was_degenerate_must_not_become_worse)
 {
     check_below_limit("stretch.edge", shorten);
@@ -320,8 +323,8 @@ START_TEST(what_was_degenerate_must_not_become_worse)
 }
 END_TEST
 
-/* A fold of more than 2.8 in a step is not told from one the other way. */
-START_TEST(a_turn_that_is_too_large_is_told)
+/* A fold by more than 2.8 in one step cannot be distinguished from one in the opposite direction. */
+START_TEST(a_turn_that_is_too_large_is_reported)
 {
     hinge h = make_hinge(0, "mesh");
     const char *reason = "";
@@ -337,7 +340,7 @@ START_TEST(a_turn_that_is_too_large_is_told)
     ck_assert_str_eq(reason, "hinge_branch");
     ck_assert_double_eq_tol(diagnostic.value, 2.9, 1e-12);
     ck_assert_double_eq(diagnostic.limit, 2.8);
-    accept_angle(&h, 1); /* from 1 it is a turn of 1.9 */
+    accept_angle(&h, 1); /* from 1 to 2.9: a fold by 1.9 */
     ck_assert_int_eq(
         drape_system_check(h.system, h.after.x, h.before.x, h.before.internal, &reason, &diagnostic),
         DRAPE_OK);
@@ -349,7 +352,7 @@ START_TEST(a_turn_that_is_too_large_is_told)
 }
 END_TEST
 
-/* A whole sim says so: a pinned corner driven onto its neighbour, in words that name the element. */
+/* In a sim: a pinned corner is driven onto its neighbour, and the message names the element. */
 START_TEST(the_message_names_the_element)
 {
     static const drape_track_key track[] = {{0, {0, 0, 0}}, {1, {0.1, 0, 0}}}; /* node 0 to where node 1 is */
@@ -401,6 +404,6 @@ START_TEST(the_message_names_the_element)
 END_TEST
 
 SUITE("hinge", folds_through_pi_smoothly, the_bare_angle_would_jump, only_accepted_states_count,
-      rest_angles_of_the_mesh_or_flat, a_collapsed_altitude_is_told, a_collapsed_edge_is_told,
-      what_was_degenerate_must_not_become_worse, a_turn_that_is_too_large_is_told,
+      rest_angles_of_the_mesh_or_flat, a_collapsed_altitude_is_reported, a_collapsed_edge_is_reported,
+      what_was_degenerate_must_not_become_worse, a_turn_that_is_too_large_is_reported,
       the_message_names_the_element)

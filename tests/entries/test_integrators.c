@@ -1,5 +1,5 @@
-/* test_integrators.c: every row of the integrators: form, step(in, out), free fall, a damped swinging sheet;
- * and that a step is converged when it says so. */
+/* test_integrators.c: all integrators: form, step(in, out), free fall, a damped swinging sheet; and that a
+ * step that reports convergence has converged. */
 #include <stdio.h>
 
 #include "integrators/integrator.h"
@@ -27,7 +27,7 @@ START_TEST(entries_are_well_formed)
 }
 END_TEST
 
-/* Keys of all rows are accepted by all: a name has one kind and one unit everywhere. */
+/* Every integrator accepts the keys of the others, so a name has the same kind and unit in all of them. */
 START_TEST(shared_names_mean_the_same)
 {
     for (int i = 0; drape_integrators[i]; i++)
@@ -56,7 +56,8 @@ typedef struct stepper {
     drape_state in, out, kept;
 } stepper;
 
-/* An irregular sheet hung by two nodes, with every kind of term that there is: damping, drag, bending. */
+/* An irregular sheet that hangs by two nodes, with every kind of term, among them damping, drag and
+ * bending. */
 static stepper open_stepper(const drape_integrator_ops *ops, const double *values)
 {
     const drape_setting beta = {"beta", 0.01, NULL}, drag = {"coefficient", 0.05, NULL};
@@ -117,14 +118,14 @@ static void defaults(const drape_integrator_ops *ops, double *values)
         values[i] = generic_value(&ops->entry.params[i]);
 }
 
-/* Calls use for every row with each of its choices in turn, alone, the others at their defaults. */
+/* Calls use for every integrator with each choice of each parameter in turn, the others at their defaults. */
 static void for_all_choices(void (*use)(const drape_integrator_ops *ops, const double *values,
                                         const char *what))
 {
     for (int i = 0; drape_integrators[i]; i++) {
         const drape_integrator_ops *ops = drape_integrators[i];
         double values[DRAPE_MAX_PARAMS];
-        if (ops->steady_state) /* an equilibrium is no step in time */
+        if (ops->steady_state) /* an equilibrium is not a step in time */
             continue;
         defaults(ops, values);
         use(ops, values, "defaults");
@@ -147,9 +148,9 @@ static void for_all_choices(void (*use)(const drape_integrator_ops *ops, const d
     }
 }
 
-/* Good steps and steps that fail leave `in` as it is; after a restart the same `in` gives the same bits.
- * But for modified Newton: KINSOL keeps a little of the solve before, and with inexact steps that shows;
- * there two results are both within the tolerance. */
+/* Steps, whether they succeed or fail, leave `in` unchanged; after a restart the same `in` gives the same
+ * bits. The exception is modified Newton: KINSOL keeps a part of the previous solve, which shows when steps
+ * are inexact; there both results are within the tolerance. */
 static void check_steps(const drape_integrator_ops *ops, const double *values, const char *what)
 {
     stepper s = open_stepper(ops, values);
@@ -174,7 +175,7 @@ static void check_steps(const drape_integrator_ops *ops, const double *values, c
         memset(s.out.v, 0xff, s.n * sizeof *s.out.v);
         s.ops->restart(s.state, &s.in);
         ck_assert_int_eq(take_step(&s, h, &info), DRAPE_OK);
-        ck_assert_msg(modified || same_bits(&s, &s.out, &first), "%s, %s: step %d has other bits",
+        ck_assert_msg(modified || same_bits(&s, &s.out, &first), "%s, %s: bits of step %d differ",
                       ops->entry.name, what, k);
         drape_state_commit(s.model, &s.in, &s.out);
         copy_state(&s, &s.out, &s.in);
@@ -188,7 +189,7 @@ START_TEST(steps_do_not_write_their_input_and_repeat)
 }
 END_TEST
 
-/* Two integrators, fresh, on the same path: the same bits without any restart. */
+/* Two new integrators on the same path have the same bits without a restart. */
 static void check_twins(const drape_integrator_ops *ops, const double *values, const char *what)
 {
     stepper a = open_stepper(ops, values), b = open_stepper(ops, values);
@@ -214,9 +215,9 @@ START_TEST(equal_runs_have_equal_bits)
 }
 END_TEST
 
-/* ---- What a step says of itself ---- */
+/* ---- What a step reports ---- */
 
-/* The residual of backward Euler at out, from the states alone: M (v1 - v0)/h + g(x1, v1) over free nodes. */
+/* The residual of backward Euler at out, from the states only: M (v1 - v0)/h + g(x1, v1) over free nodes. */
 static double residual_of(stepper *s, double h, double *history, double *g)
 {
     double worst = 0;
@@ -233,8 +234,8 @@ static double residual_of(stepper *s, double h, double *history, double *g)
     return worst;
 }
 
-/* Rounding: forces of some 10 N in 1e-16 each, positions against displacements: 1e-16 m times stiffnesses of
- * 1e3 N/m and 0.01 kg/h^2. */
+/* Rounding: forces of about 10 N times 1e-16; positions of 1e-16 m times stiffnesses of 1e3 N/m and 0.01
+ * kg/h^2. */
 static void check_residual(const drape_integrator_ops *ops, const double *values, const char *what)
 {
     if (strcmp(ops->entry.name, "be") != 0)
@@ -246,7 +247,7 @@ static void check_residual(const drape_integrator_ops *ops, const double *values
         drape_step_info info;
         double h = k % 10 == 9 ? 0.005 : 0.02;
         drape_status status = take_step(&s, h, &info);
-        if (status) { /* without a controller to halve it a step may fail, but not in silence */
+        if (status) { /* without a controller that halves it a step may fail, but must report it */
             ck_assert_str_ne(info.reason, "converged");
             ck_assert(!(info.residual <= info.tolerance));
             ck_assert_msg(k > 2, "%s, %s: step %d: %s", ops->entry.name, what, k, info.reason);
@@ -270,18 +271,19 @@ START_TEST(a_converged_step_is_converged)
 }
 END_TEST
 
-/* One iteration is not enough for a sheet that is let go: the step says so, or is taken and says so. */
-START_TEST(a_step_that_is_not_converged_says_so)
+/* One iteration is not enough for a sheet that is released: the step fails, or is accepted and reported as
+ * not converged. */
+START_TEST(a_step_that_has_not_converged_is_reported)
 {
     for (int i = 0; drape_integrators[i]; i++)
         for (int accept = 0; accept < 2; accept++) {
             const drape_integrator_ops *ops = drape_integrators[i];
             double values[DRAPE_MAX_PARAMS];
-            int most = param_of(ops, "max_iterations"), on_failure = param_of(ops, "on_failure");
-            if (most < 0 || on_failure < 0 || ops->steady_state)
+            int max_iterations = param_of(ops, "max_iterations"), on_failure = param_of(ops, "on_failure");
+            if (max_iterations < 0 || on_failure < 0 || ops->steady_state)
                 continue;
             defaults(ops, values);
-            values[most] = 1;
+            values[max_iterations] = 1;
             values[on_failure] = accept;
             stepper s = open_stepper(ops, values);
             drape_step_info info;
@@ -302,8 +304,8 @@ END_TEST
  * ----------------------------------------------------------------------------------------------------------
  */
 
-/* How far free fall may be off after a time t: order 1 is g h t/2 behind or ahead; higher ones are exact
- * but for a start of order 1, of some g h^2; one that chooses its steps keeps to rtol 1e-3 of 0.5 m in
+/* How far free fall may be off after a time t. Order 1 leads or lags by g h t/2; higher orders are exact
+ * except for a start of order 1, about g h^2; methods that choose their steps keep to rtol 1e-3 of 0.5 m in
  * each of a few. */
 static double fall_tolerance(const drape_integrator_ops *ops, double h, double t)
 {
@@ -371,7 +373,7 @@ static drape_status all_converged(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* One second of a curved sheet that swings on two nodes. Its energy only falls: nothing but gravity works on
+/* One second of a curved sheet that swings on two nodes. Its energy never rises: only gravity does work on
  * it. */
 START_TEST(a_damped_sheet_swings)
 {
@@ -414,4 +416,4 @@ END_TEST
 
 SUITE("integrators", entries_are_well_formed, shared_names_mean_the_same,
       steps_do_not_write_their_input_and_repeat, equal_runs_have_equal_bits, a_converged_step_is_converged,
-      a_step_that_is_not_converged_says_so, a_triangle_falls_freely, a_damped_sheet_swings)
+      a_step_that_has_not_converged_is_reported, a_triangle_falls_freely, a_damped_sheet_swings)

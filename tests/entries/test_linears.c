@@ -1,5 +1,5 @@
-/* test_linears.c: every row of the linear solvers on the pattern of a cloth, against Gaussian elimination in
- * long double. */
+/* test_linears.c: all linear solvers on the pattern of a cloth, against Gaussian elimination in long
+ * double. */
 #include "solvers/linear.h"
 
 #include <float.h>
@@ -63,7 +63,7 @@ static void close_problem(problem *q)
 
 typedef enum matrix_kind { SPD, INDEFINITE, UNSYMMETRIC, TINY, HUGE_ENTRIES, KIND_COUNT } matrix_kind;
 
-/* Random entries; a diagonal that dominates where the matrix is to be positive definite. */
+/* Random entries; the diagonal dominates if the matrix is to be positive definite. */
 static void fill(problem *q, matrix_kind kind, uint64_t seed)
 {
     const drape_pattern *p = q->p;
@@ -86,7 +86,7 @@ static void fill(problem *q, matrix_kind kind, uint64_t seed)
         q->b[i] = random_number(&seed);
 }
 
-/* Partial pivoting. */
+/* Gaussian elimination with partial pivoting. */
 static void solve_dense(problem *q)
 {
     size_t n = q->n, w = n + 1;
@@ -121,8 +121,8 @@ static void solve_dense(problem *q)
     }
 }
 
-/* Factors the values, solves, and compares: 1e-10 of the largest component. The conditions of these matrices
- * are some 1e3, so 1e-13 is left to be lost. */
+/* Factors the values, solves, and compares: the limit is 1e-10 of the largest component. The condition
+ * numbers of these matrices are about 1e3, so the expected loss is 1e-13. */
 static void check_solution(problem *q, const drape_linear_ops *ops, void *solver, const char *what)
 {
     double size = 0, error = 0;
@@ -146,7 +146,7 @@ static void *open_solver(problem *q, const drape_linear_ops *ops)
     return solver;
 }
 
-/* What a row says of itself, filled in for those that say nothing. */
+/* The report of a solver; the solver itself if it makes none. */
 static drape_linear_report report_of(const drape_linear_ops *ops, const void *solver)
 {
     drape_linear_report report = {.ops = ops};
@@ -177,7 +177,8 @@ START_TEST(random_systems_are_solved)
     problem q = open_problem();
     for (int i = 0; drape_linears[i]; i++) {
         void *solver = open_solver(&q, drape_linears[i]);
-        for (uint64_t seed = 1; seed <= 20; seed++) { /* kinds mixed: kept pivots meet other matrices */
+        for (uint64_t seed = 1; seed <= 20;
+             seed++) { /* kinds alternate, so that kept pivots meet other matrices */
             fill(&q, (matrix_kind)(seed * 3 % KIND_COUNT), seed);
             check_solution(&q, drape_linears[i], solver, names[seed * 3 % KIND_COUNT]);
         }
@@ -255,14 +256,14 @@ static void break_matrix(problem *q, int how)
             q->values[k] = -INFINITY;
     }
 }
-enum { WAYS = 8 };
+enum { BREAKS = 8 };
 
-/* As the first matrix, which pivots are chosen for, and as a later one, for which they are kept. */
-START_TEST(broken_matrices_are_told_and_good_ones_work_again)
+/* Once as the first matrix, for which pivots are chosen, and once as a later one, for which they are kept. */
+START_TEST(broken_matrices_are_reported_and_good_ones_work_again)
 {
     problem q = open_problem();
     for (int i = 0; drape_linears[i]; i++)
-        for (int how = 0; how < WAYS; how++)
+        for (int how = 0; how < BREAKS; how++)
             for (int later = 0; later < 2; later++) {
                 const drape_linear_ops *ops = drape_linears[i];
                 void *solver = open_solver(&q, ops);
@@ -273,7 +274,7 @@ START_TEST(broken_matrices_are_told_and_good_ones_work_again)
                     ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_RETRY_LINEAR);
                 break_matrix(&q, how);
                 ck_assert_msg(ops->factor(solver, q.values) == DRAPE_RETRY_LINEAR,
-                              "%s takes the broken matrix %d, %s", ops->entry.name, how,
+                              "%s accepts the broken matrix %d, %s", ops->entry.name, how,
                               later ? "later" : "first");
                 ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_RETRY_LINEAR);
                 for (uint64_t seed = 1; seed <= 3; seed++) {
@@ -286,7 +287,7 @@ START_TEST(broken_matrices_are_told_and_good_ones_work_again)
 }
 END_TEST
 
-START_TEST(a_right_hand_side_that_is_not_finite_is_told)
+START_TEST(a_right_hand_side_that_is_not_finite_is_reported)
 {
     problem q = open_problem();
     for (int i = 0; drape_linears[i]; i++) {
@@ -303,8 +304,8 @@ START_TEST(a_right_hand_side_that_is_not_finite_is_told)
 }
 END_TEST
 
-/* The pivots that the first matrix chose are zero in the second, which is a good matrix: off-diagonal ones in
- * each block of a node. */
+/* The pivots that were chosen for the first matrix are zero in the second, which is regular: its pivots are
+ * off the diagonal of each node's block. */
 START_TEST(kept_pivots_that_become_zero_are_chosen_again)
 {
     problem q = open_problem();
@@ -324,8 +325,9 @@ START_TEST(kept_pivots_that_become_zero_are_chosen_again)
 }
 END_TEST
 
-/* A node's own 3 x 3 block is symmetric in the pattern whatever the mesh: a difference there is the least
- * that can be overlooked. A solver that took one triangle for both would be off by about the difference. */
+/* The 3 x 3 block of a node is symmetric in the pattern of every mesh, so a difference there is the
+ * smallest that a solver can overlook. Taking one triangle for both gives an error of about the
+ * difference. */
 START_TEST(a_small_part_that_is_not_symmetric_is_not_lost)
 {
     problem q = open_problem();
@@ -346,17 +348,17 @@ START_TEST(a_small_part_that_is_not_symmetric_is_not_lost)
 }
 END_TEST
 
-/* Rows that give what is not positive definite to another one. */
+/* Solvers that pass matrices that are not positive definite to another solver. */
 static bool falls_back(const drape_linear_ops *ops)
 {
-    static const char *const rows[] = {"cholmod", "multifrontal", "pcg"};
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
-        if (strcmp(ops->entry.name, rows[i]) == 0)
+    static const char *const solvers[] = {"cholmod", "multifrontal", "pcg"};
+    for (size_t i = 0; i < sizeof solvers / sizeof *solvers; i++)
+        if (strcmp(ops->entry.name, solvers[i]) == 0)
             return true;
     return false;
 }
 
-/* Which matrices a row gives to another one: where there is one, all but the positive definite ones. */
+/* Such solvers pass on all matrices that are not positive definite, and only these. */
 START_TEST(fallbacks_are_counted)
 {
     problem q = open_problem();
@@ -390,7 +392,8 @@ typedef struct sheet {
     double *values, *b, *x, *again;
 } sheet;
 
-/* side x side nodes, each coupled to those within two: the pattern of a cloth with hinges. */
+/* side x side nodes, each coupled to those at most two rows and columns away: the pattern of a cloth with
+ * hinges. */
 static sheet open_sheet(int32_t side)
 {
     sheet q = {.ctx = make_context()};
@@ -425,7 +428,8 @@ static void close_sheet(sheet *q)
     drape_context_destroy(&q->ctx);
 }
 
-/* Symmetric, random; shift 1: the diagonal dominates, weakly; below: the less the more indefinite. */
+/* Symmetric and random. With shift 1 the diagonal dominates weakly; the smaller shift, the more
+ * indefinite. */
 static void fill_sheet(sheet *q, double shift, uint64_t seed)
 {
     uint64_t side = seed;
@@ -444,12 +448,12 @@ static void fill_sheet(sheet *q, double shift, uint64_t seed)
     }
 }
 
-/* Backward stability: |A x - b| <= c eps (|A| |x| + |b|) row by row, c = 1e4 for Cholesky factors of some 1e3
- * unknowns. KLU takes a diagonal pivot that is a thousandth of the largest: a thousand times that where the
- * matrix is indefinite. */
+/* Backward stability: |A x - b| <= c eps (|A| |x| + |b|) row by row, c = 1e4 for Cholesky factors of about
+ * 1e3 unknowns. KLU accepts a diagonal pivot that is a thousandth of the largest: a thousand times that if
+ * the matrix is indefinite. */
 static void check_residual(const sheet *q, bool definite, const char *name)
 {
-    double *r = take((size_t)q->p.n, sizeof *r), *size = take((size_t)q->p.n, sizeof *size), most = 0;
+    double *r = take((size_t)q->p.n, sizeof *r), *size = take((size_t)q->p.n, sizeof *size), max = 0;
     for (int64_t i = 0; i < q->p.n; i++) {
         r[i] = -q->b[i];
         size[i] = fabs(q->b[i]);
@@ -460,14 +464,14 @@ static void check_residual(const sheet *q, bool definite, const char *name)
             size[q->p.row[k]] += fabs(q->values[k] * q->x[c]);
         }
     for (int64_t i = 0; i < q->p.n; i++)
-        most = fmax(most, fabs(r[i]) / size[i]);
-    ck_assert_msg(most <= (definite ? 1e4 : 1e7) * DBL_EPSILON, "%s: a row of A x - b is %g of its terms",
-                  name, most);
+        max = fmax(max, fabs(r[i]) / size[i]);
+    ck_assert_msg(max <= (definite ? 1e4 : 1e7) * DBL_EPSILON, "%s: a row of A x - b is %g of its terms",
+                  name, max);
     free(r);
     free(size);
 }
 
-/* Who falls back does to the row with the largest general_from that is not above the size. */
+/* The fallback is the solver with the largest general_from that is not above the size. */
 static void check_fallback(const drape_linear_report *report, int64_t n, int64_t count)
 {
     const drape_linear_ops *expected = NULL;
@@ -481,7 +485,7 @@ static void check_fallback(const drape_linear_report *report, int64_t n, int64_t
     ck_assert_ptr_eq(report->fallback, expected);
 }
 
-/* Definite and indefinite in turn; a second solver that is given the same gives the same bits. */
+/* Definite and indefinite matrices in turn; a second solver with the same input gives the same bits. */
 START_TEST(a_sheet_of_many_supernodes)
 {
     static const double shifts[] = {1.01, 0.15, 1.5, 0.2, 1.01};
@@ -509,7 +513,7 @@ START_TEST(a_sheet_of_many_supernodes)
 }
 END_TEST
 
-/* Ordered by minimum degree and, where METIS is built, by nested dissection; with several branches for the
+/* Ordered by minimum degree and, if METIS is built in, by nested dissection; with several branches for the
  * threads and fronts that they share. */
 START_TEST(threads_give_the_same_bits)
 {
@@ -539,11 +543,11 @@ START_TEST(threads_give_the_same_bits)
 }
 END_TEST
 
-/* What a row falls back to is made when it is needed: definite matrices do not pay for it, and where there is
- * no memory then, the row says so, has no factors, and does the work when asked again. */
+/* The fallback of a solver is created when it is needed: definite matrices do not pay for it. If there is no
+ * memory for it then, the solver reports that, has no factors, and succeeds when it is called again. */
 START_TEST(no_memory_for_the_fallback)
 {
-    static const int32_t sides[] = {8, 24}; /* klu, and umfpack where it is built */
+    static const int32_t sides[] = {8, 24}; /* klu, and umfpack if it is built in */
     for (int i = 0; drape_linears[i]; i++)
         for (size_t k = 0; k < sizeof sides / sizeof *sides; k++) {
             const drape_linear_ops *ops = drape_linears[i];
@@ -565,7 +569,7 @@ START_TEST(no_memory_for_the_fallback)
                 status = ops->factor(solver, q.values);
                 if (status)
                     ck_assert_int_eq(ops->solve(solver, q.b, q.x), DRAPE_RETRY_LINEAR);
-                else /* pcg notices no earlier */
+                else /* pcg needs the fallback only when it solves */
                     status = ops->solve(solver, q.b, q.x);
                 failed += status == DRAPE_E_MEMORY;
             }
@@ -585,7 +589,7 @@ START_TEST(no_memory_for_the_fallback)
 }
 END_TEST
 
-/* As where contact changes the sparsity: destroyed and made again on patterns that grow and shrink. */
+/* As when contact changes the sparsity: destroyed and created again on patterns that grow and shrink. */
 START_TEST(made_again_on_other_patterns)
 {
     static const int32_t sides[] = {3, 15, 4, 20, 3, 15};
@@ -608,8 +612,8 @@ START_TEST(made_again_on_other_patterns)
 }
 END_TEST
 
-/* The largest best_from that is not above the size; klu below all others. */
-START_TEST(auto_picks_by_size_and_says_so)
+/* The solver with the largest best_from that is not above the size; klu below all others. */
+START_TEST(auto_chooses_by_size_and_reports_it)
 {
     static const int32_t sides[] = {3, 30};
     const drape_linear_ops *chooser = drape_linears[0];
@@ -636,8 +640,8 @@ START_TEST(auto_picks_by_size_and_says_so)
 }
 END_TEST
 
-/* A + B with B' = -B has A as its symmetric part, to the rounding of the sum; A alone keeps its bits. */
-START_TEST(the_symmetric_part_is_that)
+/* A + B with B' = -B has A as its symmetric part, up to the rounding of the sum; A itself keeps its bits. */
+START_TEST(the_symmetric_part_is_exact)
 {
     sheet q = open_sheet(8);
     fill_sheet(&q, 1, 7);
@@ -659,8 +663,8 @@ START_TEST(the_symmetric_part_is_that)
 END_TEST
 
 SUITE("linears", entries_are_well_formed, random_systems_are_solved,
-      several_right_hand_sides_of_one_factorisation, broken_matrices_are_told_and_good_ones_work_again,
-      a_right_hand_side_that_is_not_finite_is_told, kept_pivots_that_become_zero_are_chosen_again,
+      several_right_hand_sides_of_one_factorisation, broken_matrices_are_reported_and_good_ones_work_again,
+      a_right_hand_side_that_is_not_finite_is_reported, kept_pivots_that_become_zero_are_chosen_again,
       a_small_part_that_is_not_symmetric_is_not_lost, fallbacks_are_counted, a_sheet_of_many_supernodes,
       threads_give_the_same_bits, no_memory_for_the_fallback, made_again_on_other_patterns,
-      auto_picks_by_size_and_says_so, the_symmetric_part_is_that)
+      auto_chooses_by_size_and_reports_it, the_symmetric_part_is_exact)

@@ -1,7 +1,7 @@
 /*
- * test_midedge.c: what bend.midedge promises of any mesh: it is exact for every quadratic deflection, in
- * equilibrium under a constant moment, six nodes wide on symmetric ones, and its clamps have exact
- * derivatives and hold.
+ * test_midedge.c: bend.midedge on any mesh: exact for every quadratic deflection; in equilibrium under a
+ * constant moment; six nodes an element on symmetric meshes; and clamps that have exact derivatives and
+ * hold.
  */
 #include <stdio.h>
 
@@ -10,7 +10,7 @@
 #include "support/suite.h"
 #include "terms/midedge.h"
 
-#define SLOPE 1e-4 /* of the deflections: angles and their small ones differ by its square */
+#define SLOPE 1e-4 /* of the deflections: the angles differ from their linear parts by its square */
 
 static drape_model *sheet(drape_context *ctx, const drape_setting *settings, size_t count,
                           enum model_mesh mesh)
@@ -19,7 +19,7 @@ static drape_model *sheet(drape_context *ctx, const drape_setting *settings, siz
     return make_model(ctx, &(model_def){.mesh = mesh, .terms = &term, .term_count = 1});
 }
 
-/* Whether a node is on the boundary: inside there are as many edges as triangles around it. */
+/* Whether a node is on the boundary: an inner node has as many edges as triangles around it. */
 static bool near_boundary(const drape_model *m, int32_t node)
 {
     int32_t around = 0;
@@ -41,8 +41,9 @@ static void deflect(const drape_model *m, const double bend[3], double *x)
     }
 }
 
-/* Triangles without a free edge have three squares in a row of the same first three nodes; their energy is
- * A/2 b'Cb. The warp is x, the weft -z: b12 changes its sign, but stands alone in C. */
+/* A triangle without a free edge has three consecutive squares with the same first three nodes; their
+ * energy is A/2 b'Cb. The warp is x, the weft -z: that changes the sign of b12, which C does not couple to
+ * the others. */
 static void check_energies(const drape_model *m, const double *x, const double law[4], const double bend[3])
 {
     static const double flat[9 * 3000];
@@ -100,9 +101,9 @@ START_TEST(quadratics_are_exact)
 }
 END_TEST
 
-/* Where the two triangles of every edge are images of each other in its middle the turns of the normals are
- * 0, and elements have six nodes. Alternating diagonals are mirror images across sides of cells: they need
- * twelve, as others do. */
+/* If the two triangles of every edge are point reflections of each other, phi is 0 and elements have six
+ * nodes. Alternating diagonals are mirror images across sides of cells: they need twelve, as all other
+ * meshes do. */
 START_TEST(symmetric_grids_need_six_nodes)
 {
     drape_context *ctx = make_context();
@@ -138,16 +139,17 @@ static drape_model *clamped(drape_context *ctx, bool clamp)
 
 START_TEST(clamps_have_exact_derivatives)
 {
-    static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
+    static drape_check_result results[DRAPE_MAX_CHECK_RESULTS];
     drape_context *ctx = make_context();
     drape_model *model = clamped(ctx, true);
     drape_arena memory = drape_arena_of(ctx);
     drape_system *system = make_system(&memory, model, 1);
     int count = 0;
     ck_assert(model->terms[1].anchored);
-    ck_assert_int_eq(drape_check_derivatives(ctx, system, 3, rows, &count), DRAPE_OK);
+    ck_assert_int_eq(drape_check_derivatives(ctx, system, 3, results, &count), DRAPE_OK);
     for (int i = 0; i < count; i++)
-        ck_assert_msg(rows[i].pass, "%s of %s is off by %g", rows[i].what, rows[i].term, rows[i].error);
+        ck_assert_msg(results[i].pass, "%s of %s is off by %g", results[i].what, results[i].term,
+                      results[i].error);
     drape_system_destroy(&system);
     drape_arena_free(&memory);
     drape_model_destroy(&model);
@@ -155,8 +157,8 @@ START_TEST(clamps_have_exact_derivatives)
 }
 END_TEST
 
-/* A sheet on one row of pins turns about it as on an axis: its Hessian at rest has one mode without
- * stiffness. A clamp takes that away. */
+/* A sheet pinned along one row turns about it as about an axis: its Hessian at rest has one mode without
+ * stiffness. A clamp removes it. */
 START_TEST(clamps_hold)
 {
     drape_context *ctx = make_context();
@@ -172,8 +174,8 @@ START_TEST(clamps_hold)
             x[3 * i + 2] = m->rest[3 * i + 2];
         }
         drape_system_energy(system, &(drape_point){.x = x, .internal = internal}, &elastic, &gravity);
-        /* Where it is clamped the turn of 0.1 is bent within a cell of 0.1 m: at least D/2 kappa^2 over a
-         * fourth of a cell. */
+        /* A clamped sheet bends by the 0.1 within a cell of 0.1 m: at least D/2 kappa^2 over a fourth of a
+         * cell. */
         const double rigidity = m->cloths[0].material.flexural_rigidity, kappa = 0.1 / 0.1;
         if (clamp)
             ck_assert_double_ge(elastic, rigidity / 2 * kappa * kappa * 0.4 * 0.1 / 4);
@@ -189,8 +191,8 @@ START_TEST(clamps_hold)
 }
 END_TEST
 
-/* The sum of C K over triangles telescopes: under a constant moment forces stand on the boundary and next to
- * it alone. */
+/* The sum of C K over triangles telescopes: under a constant moment there are forces only on the boundary and
+ * next to it. */
 START_TEST(constant_moments_are_in_equilibrium)
 {
     drape_context *ctx = make_context();
@@ -214,12 +216,15 @@ START_TEST(constant_moments_are_in_equilibrium)
     for (int32_t i = 0; i < m->node_count; i++) {
         const double *X = m->rest + 3 * i;
         const double depth = fmin(fmin(X[0], 1 - X[0]), fmin(-X[2], 1 + X[2]));
-        double *most = depth > 0.35 ? &inside : &rim; /* a node is felt by triangles up to three cells away */
-        *most = fmax(*most, fabs(g[3 * i + 1]));
+        double *max = depth > 0.35
+                          ? &inside
+                          : &rim; /* a node belongs to elements of triangles up to three cells away */
+        *max = fmax(*max, fabs(g[3 * i + 1]));
         ck_assert(!(depth > 0.35) || !near_boundary(m, i));
     }
     ck_assert(rim > 0 &&
-              inside <= 1e-5 * rim); /* slopes squared, 1e-8, and coefficients left out, 1e-9, over 1/h^2 */
+              inside <=
+                  1e-5 * rim); /* squares of slopes, 1e-8, and coefficients left out, 1e-9, over 1/h^2 */
     drape_free(ctx, internal);
     drape_free(ctx, g);
     drape_free(ctx, x);

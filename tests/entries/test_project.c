@@ -1,4 +1,4 @@
-/* test_project.c: the nearest positive semidefinite matrix, by its properties and by closed forms. */
+/* test_project.c: the nearest positive semidefinite matrix, checked by its properties and by closed forms. */
 #include "sparse/project.h"
 
 #include "models.h"
@@ -37,8 +37,8 @@ static bool is_above(int n, const double *a, double sign, double shift)
     return true;
 }
 
-/* P is the nearest of the cone of positive semidefinite matrices exactly if P is in it, P - A is in it (the
- * cone is its own dual), and the two are orthogonal (Moreau). */
+/* P is the projection of A onto the cone of positive semidefinite matrices exactly if P is in the cone, P -
+ * A is in it too (the cone is its own dual), and the two are orthogonal (Moreau). */
 static void check_projected(int n, const double *a, const double *p)
 {
     double scale = norm(n, a), inner = 0, rest[N * N];
@@ -71,7 +71,7 @@ START_TEST(it_is_the_nearest)
 }
 END_TEST
 
-/* Far from 1, as stiffnesses in N/m are. */
+/* Entries far from 1, as stiffnesses in N/m have. */
 START_TEST(it_does_not_depend_on_the_unit)
 {
     uint64_t seed = 99;
@@ -173,7 +173,7 @@ START_TEST(three_by_three)
 }
 END_TEST
 
-/* A NaN must come out again, and must not keep the rotations going for ever. */
+/* A NaN must stay a NaN, and must not make the rotations endless. */
 START_TEST(nan_stays)
 {
     uint64_t seed = 9;
@@ -197,7 +197,7 @@ static drape_model *membrane(drape_context *ctx)
 }
 
 /* The Jacobian of a sheet that is stretched by these factors along x and z, exact and projected. Returns the
- * largest entry of their difference over that of the exact one. */
+ * largest entry of their difference over the largest of the exact one. */
 static double projected_away(drape_context *ctx, const drape_model *m, double along, double across)
 {
     const size_t values = (size_t)m->pattern.nonzeros;
@@ -206,7 +206,7 @@ static double projected_away(drape_context *ctx, const drape_model *m, double al
            *exact = drape_alloc(ctx, values, sizeof *exact), *projected = drape_alloc(ctx, values, sizeof *x);
     drape_arena memory = drape_arena_of(ctx);
     drape_system *system = NULL;
-    double most = 0, away = 0;
+    double max = 0, away = 0;
     ck_assert(x && v && exact && projected);
     ck_assert_int_eq(drape_system_create(&memory, m, 1, &system), DRAPE_OK);
     for (int32_t i = 0; i < m->node_count; i++) {
@@ -217,18 +217,18 @@ static double projected_away(drape_context *ctx, const drape_model *m, double al
     drape_system_jacobian(system, &point, 0, 0, exact);
     drape_system_jacobian(system, &point, 0, 1, projected);
     for (size_t i = 0; i < values; i++) {
-        most = fmax(most, fabs(exact[i]));
+        max = fmax(max, fabs(exact[i]));
         away = fmax(away, fabs(projected[i] - exact[i]));
     }
     drape_system_destroy(&system);
     drape_arena_free(&memory);
     drape_free(ctx, x), drape_free(ctx, v), drape_free(ctx, exact), drape_free(ctx, projected);
-    return away / most;
+    return away / max;
 }
 
-/* Equal tension both ways: f1 L1 = (S, nu S), f2 L2 = (0, (1 - nu) S), f3 = 0: all of it pulls, and nothing
- * is lost. Compressed as much, all of the stress is lost: S/E = .02 (1 + .01)/(1 - nu) of a stiffness of 1 or
- * so. */
+/* Equal tension in both directions: f1 L1 = (S, nu S), f2 L2 = (0, (1 - nu) S), f3 = 0: all of it is
+ * tension, and nothing is lost. If compressed as much, all of the stress is lost: S/E = .02 (1 + .01)/(1 -
+ * nu) of a stiffness of about 1. */
 START_TEST(the_membrane_keeps_its_tension)
 {
     drape_context *ctx = NULL;

@@ -1,5 +1,5 @@
-/* test_registry.c: what all tables have in common: entries are well formed and are found by their names, and
- * other names are refused with the list of those that there are. */
+/* test_registry.c: what all tables have in common: entries are well formed and are found by their names;
+ * other names are refused with the list of those that exist. */
 #include "base/registry.h"
 #include "colliders/colliders.h"
 #include "compile/compile.h"
@@ -19,7 +19,7 @@ static const struct {
     const drape_registry *registry;
     int at_least;    /* entries */
     bool dots;       /* in their names */
-    bool references; /* all have one */
+    bool references; /* all entries have one */
 } tables[] = {{&drape_grid_registry, 4, false, false},      {&drape_import_registry, 2, false, false},
               {&drape_term_registry, 5, true, true},        {&drape_collider_registry, 2, false, true},
               {&drape_linear_registry, 2, false, true},     {&drape_integrator_registry, 2, false, true},
@@ -37,10 +37,10 @@ START_TEST(entries_are_well_formed)
         check_line(registry->noun, "what an entry is");
         check_line(registry->title, "a title");
         check_line(registry->place, "a place");
-        check_word(registry->key, false);
+        check_name(registry->key, false);
         for (int i = 0; i < count; i++) {
             const drape_entry *entry = registry->entries[i];
-            check_word(entry->name, tables[t].dots);
+            check_name(entry->name, tables[t].dots);
             check_line(entry->summary, "a summary");
             if (tables[t].references)
                 check_line(entry->reference, "a reference");
@@ -50,7 +50,7 @@ START_TEST(entries_are_well_formed)
 }
 END_TEST
 
-/* So no two have the same name. */
+/* So no two entries have the same name. */
 START_TEST(every_entry_is_found_by_its_name)
 {
     drape_context *ctx = make_context();

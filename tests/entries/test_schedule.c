@@ -1,5 +1,5 @@
-/* test_schedule.c: which steps a fixed-step method takes: counted times, halves that fill their interval,
- * growth, the cut at the end. */
+/* test_schedule.c: the steps of fixed-step methods: counted times, halves that fill their interval, growth,
+ * the shortened last step. */
 #include "sim/schedule.h"
 
 #include <float.h>
@@ -7,7 +7,7 @@
 #include "models.h"
 #include "support/suite.h"
 
-/* The interface of counted steps, here once. */
+/* Functions of the schedule with arguments for counted steps. */
 static void begin(drape_schedule *s, double dt, double start)
 {
     drape_schedule_init(s, DRAPE_STEPS_COUNTED, dt, start);
@@ -27,7 +27,7 @@ START_TEST(times_are_counted)
 {
     drape_schedule s;
     double t1, h;
-    const double dt = 0.1; /* a sum of 0.1 has another last digit from the third on */
+    const double dt = 0.1; /* from the third on, a sum of 0.1 has another last digit */
     begin(&s, dt, 0);
     drape_schedule_aim(&s, 100);
     for (int k = 1; k <= 1000; k++) {
@@ -57,7 +57,7 @@ START_TEST(asking_changes_nothing)
 }
 END_TEST
 
-/* Rejected once, then twice: halves and quarters of the same interval, and the size grows back. */
+/* Rejected once, then twice: halves and quarters of the same interval; then the size grows again. */
 START_TEST(halves_fill_the_interval)
 {
     static const struct {
@@ -89,9 +89,9 @@ START_TEST(the_end_cuts_and_tiny_remainders_join)
         int steps;
     } cases[] = {{1, 0.25, 4},
                  {1.1, 0.1, 5},
-                 {1 + 1e-11, 0.25 + 1e-11, 4}, /* below 1e-9 dt: the last step takes it along */
-                 {1 - 1e-11, 0.25 - 1e-11, 4}, /* or gives it */
-                 {1 + 1e-9, 1e-9, 5},          /* not below */
+                 {1 + 1e-11, 0.25 + 1e-11, 4}, /* a remainder below 1e-9 dt: the last step includes it */
+                 {1 - 1e-11, 0.25 - 1e-11, 4}, /* or is shorter by it */
+                 {1 + 1e-9, 1e-9, 5},          /* a remainder that is not below */
                  {0.25e-12, 0.25e-12, 1},      /* no step before it to join */
                  {0.1, 0.1, 1},
                  {0, 0, 0},
@@ -113,7 +113,7 @@ START_TEST(the_end_cuts_and_tiny_remainders_join)
 }
 END_TEST
 
-/* 60 advances of 1/60 s in steps of 1/120 s end in the same steps as one of 1 s. */
+/* 60 advances of 1/60 s in steps of 1/120 s take the same steps as one of 1 s. */
 START_TEST(advances_do_not_shift_the_count)
 {
     drape_schedule s;
@@ -133,10 +133,10 @@ START_TEST(advances_do_not_shift_the_count)
 }
 END_TEST
 
-/* A host that adds up its frames, t += 1/60, drifts away from k/60 by up to half an ulp a frame, which is
- * 1e-9 dt after some thousand frames, and in less than one frame once t is some 1e5 s: each frame is one step
- * all the same, and never one of 1e-9 dt more. A frame is as long as it was asked for but for the rounding of
- * its ends. */
+/* A host that adds up its frames, t += 1/60, drifts away from k/60 by up to half an ulp a frame: by 1e-9 dt
+ * after some thousand frames, and in less than one frame once t is about 1e5 s. Each frame is one step
+ * nevertheless, and there is never another one of 1e-9 dt. A frame is as long as requested, up to the
+ * rounding of its ends. */
 static void sum_frames(double start, double rate, int steps_a_frame, int frames)
 {
     drape_schedule s;
@@ -153,7 +153,7 @@ static void sum_frames(double start, double rate, int steps_a_frame, int frames)
             accept(&s, t1);
         }
         good = good && steps == steps_a_frame && fabs(t1 - now) <= 4 * DBL_EPSILON * now;
-        if (!good) /* an assertion costs more than a frame */
+        if (!good) /* an assertion costs more time than a frame */
             ck_abort_msg("frame %d from %g s, %g Hz: %d steps, the last of %g s, to %.17g", frame, start,
                          rate, steps, h, t1);
     }
@@ -180,7 +180,7 @@ START_TEST(an_interval_left_half_done_is_given_up)
     ck_assert(drape_schedule_next(&s, &t1, &h));
     halve(&s, h);
     ck_assert(drape_schedule_next(&s, &t1, &h));
-    accept(&s, t1); /* at 0.5; the advance ends here */
+    accept(&s, t1); /* at 0.5, where the advance ends */
     drape_schedule_aim(&s, 0.75);
     double sum = 0;
     while (drape_schedule_next(&s, &t1, &h)) {
@@ -192,8 +192,9 @@ START_TEST(an_interval_left_half_done_is_given_up)
 }
 END_TEST
 
-/* Any sequence of rejections and ends: times increase strictly, h is the difference of times but for their
- * rounding, an advance ends at its end exactly, the sizes add up, no step is larger than dt (1 + 1e-9). */
+/* For any sequence of rejections and ends, times increase strictly, h is the difference of times up to
+ * their rounding, an advance ends exactly at its end, the sizes add up, and no step is larger than dt (1 +
+ * 1e-9). */
 START_TEST(any_sequence_fills_the_time)
 {
     for (uint64_t trial = 1; trial <= 1000; trial++) {
@@ -253,8 +254,7 @@ START_TEST(many_halvings_stay_small)
 }
 END_TEST
 
-/* Where steps are proposed: no step above what was proposed (but for the last 1e-9), no tiny one left
- * over. */
+/* Proposed steps: no step exceeds the proposal (except by the last 1e-9), and no tiny one is left over. */
 START_TEST(proposed_steps_reach_the_end)
 {
     for (uint64_t trial = 1; trial <= 500; trial++) {
@@ -282,7 +282,7 @@ START_TEST(proposed_steps_reach_the_end)
 }
 END_TEST
 
-/* Whatever a controller proposes after a rejection, it is a smaller step or there is none. */
+/* Whatever size a controller proposes after a rejection, the next step is smaller or there is none. */
 START_TEST(no_step_is_tried_again_at_its_size)
 {
     static const drape_stepping kinds[] = {DRAPE_STEPS_PROPOSED, DRAPE_STEPS_FREE};

@@ -1,5 +1,4 @@
-/* test_terms.c: every row of the terms, on four meshes and several seeds: derivatives, invariance, rest,
- * ranges. */
+/* test_terms.c: all terms, on four meshes and with several seeds: derivatives, invariance, rest, ranges. */
 #include <stdio.h>
 
 #include "assemble/check.h"
@@ -10,10 +9,10 @@
 #define SEEDS     3
 #define MAX_TERMS 32
 
-/* ---- A model of one row ---- */
+/* ---- A model of one term ---- */
 
-/* One row with one choice of one of its parameters, with its defaults, or with a dashpot in each element; a
- * law comes with all measures. */
+/* One term with one choice of one of its parameters, with its defaults, or with a dashpot in each element;
+ * a law comes with all measures. */
 typedef struct variant {
     const drape_term_ops *ops;
     enum model_mesh mesh;
@@ -21,12 +20,12 @@ typedef struct variant {
     bool pinned;
 } variant;
 
-static bool is_word(const drape_param *p)
+static bool is_choice(const drape_param *p)
 {
     return p->kind == DRAPE_PARAM_CHOICE;
 }
 
-/* Rows that are damped have it as a parameter. */
+/* Terms that may be damped have the dashpots as a parameter. */
 static bool is_dashpot(const drape_term_ops *ops, const drape_param *p)
 {
     return ops->damped && strcmp(p->name, "damping") == 0;
@@ -37,25 +36,26 @@ static size_t settings_of(const variant *v, const drape_term_ops *ops, drape_set
     size_t count = required_settings(ops->entry.params, ops->entry.param_count, settings);
     if (ops == v->ops && v->param >= 0) {
         const drape_param *p = &ops->entry.params[v->param];
-        settings[count++] = is_word(p) ? (drape_setting){p->name, 0, p->choices[v->choice]}
-                                       : (drape_setting){p->name, 2.385, NULL};
+        settings[count++] = is_choice(p) ? (drape_setting){p->name, 0, p->choices[v->choice]}
+                                         : (drape_setting){p->name, 2.385, NULL};
     }
     return count;
 }
 
-/* The one that the scene's vector models, not its terms. */
+/* Gravity is modelled by the scene's vector, not by its list of terms. */
 static bool is_gravity(const drape_term_ops *ops)
 {
     return strcmp(ops->entry.name, "gravity") == 0;
 }
 
-/* Forces from outside: rest is no equilibrium of them, and they know directions in space. */
+/* External forces: rest is not an equilibrium of them, and they depend on directions in space. */
 static bool is_external(const drape_term_ops *ops)
 {
     return ops->potential_of_gravity;
 }
 
-/* The row alone; NULL where it refuses the mesh, which its message says. All rows take rectangles. */
+/* A model of the term only; NULL if the term refuses the mesh, which its message says. All terms accept
+ * rectangles. */
 static drape_model *try_alone(drape_context *ctx, const variant *v)
 {
     drape_setting settings[DRAPE_MAX_PARAMS + 1];
@@ -77,7 +77,7 @@ static bool takes(drape_context *ctx, const drape_term_ops *ops, enum model_mesh
     return built;
 }
 
-/* NULL where the row refuses the mesh. */
+/* NULL if the term refuses the mesh. */
 static drape_model *model_of(drape_context *ctx, const variant *v)
 {
     static drape_setting settings[MAX_TERMS][DRAPE_MAX_PARAMS + 1];
@@ -110,7 +110,7 @@ static void use_variant(drape_context *ctx, const variant *v,
     drape_model_destroy(&model);
 }
 
-/* Calls use for every row, mesh and choice, and with dashpots. */
+/* Calls use for every term, mesh and choice, and with dashpots. */
 static void for_all_variants(void (*use)(drape_context *ctx, const variant *v, const drape_model *model))
 {
     drape_context *ctx = make_context();
@@ -118,7 +118,7 @@ static void for_all_variants(void (*use)(drape_context *ctx, const variant *v, c
         for (int mesh = 0; mesh < MESH_COUNT; mesh++)
             for (int p = -1; p < drape_terms[i]->entry.param_count; p++) {
                 const drape_param *param = &drape_terms[i]->entry.params[p < 0 ? 0 : p];
-                bool words = p >= 0 && is_word(param);
+                bool words = p >= 0 && is_choice(param);
                 if (p >= 0 && !words && !is_dashpot(drape_terms[i], param))
                     continue;
                 for (int c = 0; c == 0 || (words && param->choices[c]); c++)
@@ -134,9 +134,9 @@ static const char *name_of(const variant *v)
     static char text[128];
     snprintf(text, sizeof text, "%s on %s%s%s", v->ops->entry.name, mesh_names[v->mesh],
              v->param >= 0 ? ", " : "",
-             v->param < 0                               ? ""
-             : is_word(&v->ops->entry.params[v->param]) ? v->ops->entry.params[v->param].choices[v->choice]
-                                                        : v->ops->entry.params[v->param].name);
+             v->param < 0                                 ? ""
+             : is_choice(&v->ops->entry.params[v->param]) ? v->ops->entry.params[v->param].choices[v->choice]
+                                                          : v->ops->entry.params[v->param].name);
     return text;
 }
 
@@ -187,7 +187,7 @@ START_TEST(entries_are_well_formed)
     for (; drape_terms[count]; count++) {
         const drape_term_ops *ops = drape_terms[count];
         ck_assert_ptr_eq(drape_term_registry.entries[count], &ops->entry);
-        check_word(ops->element_name, false);
+        check_name(ops->element_name, false);
         ck_assert_uint_eq(ops->struct_size, sizeof *ops);
         ck_assert_int_eq(!!ops->measure + !!ops->energy + !!ops->dissipation + !!ops->law, 1);
         ck_assert(ops->law ? ops->nodes == 0 && !ops->build : ops->build != NULL);
@@ -203,27 +203,27 @@ END_TEST
 
 /* ---- Derivatives ---- */
 
-static void check_limits(const drape_check_result *row)
+static void check_limits(const drape_check_result *result)
 {
     const bool second =
-        strstr(row->what, "Hessian") || strstr(row->what, " by ") || strstr(row->what, "Jacobian");
-    ck_assert_double_le(row->limit, second ? 1e-6 : 1e-7);
+        strstr(result->what, "Hessian") || strstr(result->what, " by ") || strstr(result->what, "Jacobian");
+    ck_assert_double_le(result->limit, second ? 1e-6 : 1e-7);
 }
 
 static void check_variant(drape_context *ctx, const variant *v, const drape_model *model)
 {
-    static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
+    static drape_check_result results[DRAPE_MAX_CHECK_RESULTS];
     drape_arena memory = drape_arena_of(ctx);
     drape_system *system = make_system(&memory, model, 1);
     for (unsigned seed = 1; seed <= SEEDS; seed++) {
         int count = 0, own = 0;
-        ck_assert_int_eq(drape_check_derivatives(ctx, system, 7919 * seed, rows, &count), DRAPE_OK);
+        ck_assert_int_eq(drape_check_derivatives(ctx, system, 7919 * seed, results, &count), DRAPE_OK);
         for (int i = 0; i < count; i++) {
-            ck_assert_msg(rows[i].pass, "%s, seed %u: %s of %s is off by %g", name_of(v), seed, rows[i].what,
-                          rows[i].term, rows[i].error);
-            ck_assert(rows[i].error <= rows[i].limit);
-            check_limits(&rows[i]);
-            own += strcmp(rows[i].term, v->ops->entry.name) == 0;
+            ck_assert_msg(results[i].pass, "%s, seed %u: %s of %s is off by %g", name_of(v), seed,
+                          results[i].what, results[i].term, results[i].error);
+            ck_assert(results[i].error <= results[i].limit);
+            check_limits(&results[i]);
+            own += strcmp(results[i].term, v->ops->entry.name) == 0;
         }
         ck_assert_msg(own >= 2, "%s: %d comparisons", name_of(v), own);
     }
@@ -286,7 +286,7 @@ static const drape_term_ops wrong_term = {
 
 START_TEST(mistakes_are_found)
 {
-    static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
+    static drape_check_result results[DRAPE_MAX_CHECK_RESULTS];
     static const char *const found_as[] = {NULL, "gradient of measure", "Hessian of measure", "symmetry",
                                            "net force"};
     drape_context *ctx = make_context();
@@ -299,10 +299,10 @@ START_TEST(mistakes_are_found)
         int count = 0;
         bool found = false, pass = true;
         wrong = w;
-        ck_assert_int_eq(drape_check_derivatives(ctx, system, 1, rows, &count), DRAPE_OK);
+        ck_assert_int_eq(drape_check_derivatives(ctx, system, 1, results, &count), DRAPE_OK);
         for (int i = 0; i < count; i++) {
-            pass = pass && rows[i].pass;
-            found = found || (found_as[w] && !rows[i].pass && strcmp(rows[i].what, found_as[w]) == 0);
+            pass = pass && results[i].pass;
+            found = found || (found_as[w] && !results[i].pass && strcmp(results[i].what, found_as[w]) == 0);
         }
         ck_assert_int_eq(pass, w == WRONG_NOTHING);
         ck_assert_msg(found || w == WRONG_NOTHING, "mistake %d", w);
@@ -314,7 +314,7 @@ START_TEST(mistakes_are_found)
 }
 END_TEST
 
-/* A row that is damped has no dashpots without a number for them. */
+/* A damped term has no dashpots until they have a coefficient. */
 START_TEST(dashpots_need_their_number)
 {
     drape_context *ctx = make_context();
@@ -332,9 +332,9 @@ START_TEST(dashpots_need_their_number)
 }
 END_TEST
 
-/* ---- Physics of one row ---- */
+/* ---- Physics of one term ---- */
 
-/* E(R x + t) = E(x). Rounding of positions of 3 m against strains of 0.1 of 0.1 m: 1e-15 * 30 / 0.1, and a
+/* E(R x + t) = E(x). Positions of 3 m are rounded, strains are 0.1 of 0.1 m: 1e-15 * 30 / 0.1, and a
  * margin. */
 static void check_invariance(drape_context *ctx, const variant *v, const drape_model *model)
 {
@@ -371,7 +371,7 @@ START_TEST(energy_does_not_change_with_rigid_motion)
 }
 END_TEST
 
-/* The largest force that a strain of rounding, some 1e-15, may make. */
+/* The largest force that a strain of rounding, about 1e-15, can cause. */
 static double rounding_force(const drape_model *model, const drape_point *point)
 {
     double force = 0;
@@ -388,11 +388,11 @@ static double rounding_force(const drape_model *model, const drape_point *point)
     return 1e-14 * force;
 }
 
-/* At rest: no force of a measure (a hinge that is to be flat on a curved mesh excepted), none of a drag, and
- * no energy. A law at rest has no rate. */
+/* At rest a measure has no force (except for a hinge that is to be flat on a curved mesh), a drag has none,
+ * and there is no energy. A law at rest has no rate. */
 static void check_rest(drape_context *ctx, const variant *v, const drape_model *model)
 {
-    bool flat = v->param >= 0 && is_word(&v->ops->entry.params[v->param]) &&
+    bool flat = v->param >= 0 && is_choice(&v->ops->entry.params[v->param]) &&
                 strcmp(v->ops->entry.params[v->param].choices[v->choice], "flat") == 0;
     if (is_external(v->ops) || (flat && v->mesh == MESH_CURVED))
         return;
@@ -418,8 +418,8 @@ START_TEST(no_force_at_rest)
 }
 END_TEST
 
-/* Dissipative forces take power at every velocity; a law takes it at every rate. Internal ones take none of
- * a rigid motion. */
+/* Dissipative forces take power at every velocity, laws at every rate. Internal ones take none from a rigid
+ * motion. */
 static void check_power(drape_context *ctx, const variant *v, const drape_model *model)
 {
     if (!model->has_dissipation)
@@ -455,8 +455,8 @@ START_TEST(dissipation_takes_power)
 }
 END_TEST
 
-/* What Newton takes the forces on measures for, ahead of a correction p: their change is df/dx . p, here a
- * difference of fourth order whose step makes the error some 1e-13 of the forces' own size. */
+/* Newton predicts the forces on measures after a correction p by their change df/dx . p. It is compared
+ * with a difference of fourth order whose step makes the error about 1e-13 of the size of the forces. */
 static void check_stress(drape_context *ctx, const variant *v, const drape_model *model)
 {
     static const double at[4] = {-2, -1, 1, 2}, weight[4] = {1, -8, 8, -1};
@@ -472,7 +472,7 @@ static void check_stress(drape_context *ctx, const variant *v, const drape_model
            *ahead = drape_arena_take(&s.arena, n, sizeof *ahead);
     double *sum = drape_arena_take(&s.arena, n, sizeof *sum),
            *moved = drape_arena_take(&s.arena, n, sizeof *moved);
-    drape_system_stress(system, &s.point, p, here); /* p is 0 yet */
+    drape_system_stress(system, &s.point, p, here); /* p is still 0 */
     uint64_t seed = 17;
     for (size_t i = 0; i < s.n; i++)
         p[i] = 0.1 * random_number(&seed);
@@ -505,7 +505,7 @@ END_TEST
 
 /* ---- Interface ---- */
 
-/* What a row says of one element does not depend on the range it is asked in, nor on what else is wanted. */
+/* The results of an element depend neither on the range it is evaluated in, nor on what else is requested. */
 static void check_ranges(drape_context *ctx, const variant *v, const drape_model *model)
 {
     enum { N = 40, D = DRAPE_MAX_ELEMENT_DOFS };
@@ -522,7 +522,7 @@ static void check_ranges(drape_context *ctx, const variant *v, const drape_model
             continue;
         memset(w1, 0, sizeof w1), memset(w2, 0, sizeof w2), memset(h1, 0, sizeof h1),
             memset(h2, 0, sizeof h2);
-        for (int32_t i = -1; i < count; i++) { /* all at once, then one by one */
+        for (int32_t i = -1; i < count; i++) { /* all elements at once, then one by one */
             size_t at = i < 0 ? 0 : (size_t)i;
             double *e = i < 0 ? e1 : e2 + at, *g = (i < 0 ? g1 : g2) + d * at,
                    *h = (i < 0 ? h1 : h2) + dd * at;
@@ -559,7 +559,7 @@ START_TEST(elements_do_not_depend_on_the_range)
 }
 END_TEST
 
-/* One thread or several: the same bits. The meshes here have more than one block of 32 elements. */
+/* One thread or several give the same bits. The meshes here have more than one block of 32 elements. */
 static void check_threads(drape_context *ctx, const variant *v, const drape_model *model)
 {
     state s = make_state(ctx, model, 9, 0.01);
@@ -591,8 +591,8 @@ START_TEST(threads_give_the_same_bits)
 }
 END_TEST
 
-/* x'(projected Jacobian - mass)x >= 0 for laws and measures: blocks of a positive semidefinite matrix add up
- * to one. */
+/* x'(projected Jacobian - mass)x >= 0 for laws and measures: a sum of positive semidefinite blocks is
+ * positive semidefinite. */
 static void check_projection(drape_context *ctx, const variant *v, const drape_model *model)
 {
     state s = make_state(ctx, model, 11, 0.04);

@@ -1,12 +1,11 @@
-/* test_verlet.c: the explicit row and its rules, against what they say in numbers small enough to do by
- * hand. */
+/* test_verlet.c: the explicit integrator and its rules, with numbers small enough to check by hand. */
 #include "support/scene.h"
 
 #include "base/vec3.h"
 #include "integrators/verlet.h"
 
-/* Nodes 0 and 1 of a row of three, 1 m apart; every spring is along x. rows of a grid are apart by 1e3 m and
- * their springs do nothing, or the scene says otherwise. */
+/* Most grids here are chains along x: their rows are 1e3 m apart, and springs between rows have no effect,
+ * unless the scene says otherwise. */
 #define GRID     "{'grid': 'square', 'columns': %d, 'rows': %d, 'width': %g, 'height': %g}"
 #define MATERIAL "'material': {'young_modulus': 1, 'thickness': 1, 'total_mass': %g, 'mass': 'uniform'}"
 
@@ -44,9 +43,9 @@ static scene sheet(void)
         6, 5, 0.5, 0.4, 0.3);
 }
 
-/* The position form is CS184's x' = x + c (x - x_before) + a h^2 with x_before = x - h v at the start: the
- * same numbers, done here on positions alone with forces of the library. Rounding: positions of 1 m have
- * 1e-16, which the recurrence sums twice over: 200^2/2 times that. */
+/* The position form is CS184's x' = x + c (x - x_before) + a h^2 with x_before = x - h v at the start. Here
+ * the same numbers are computed on positions only, with forces of the library. Rounding: positions of 1 m
+ * have 1e-16, which the recurrence sums twice: 200^2/2 times that. */
 START_TEST(the_position_form_is_the_recurrence_of_positions)
 {
     const double h = 1e-3, c = 1 - 0.3 / 100;
@@ -81,7 +80,7 @@ START_TEST(the_position_form_is_the_recurrence_of_positions)
 }
 END_TEST
 
-/* (t, x, v) is all of the state: a sim put into one goes on with the same bits. */
+/* (t, x, v) is the whole state: a sim that is set to a state continues with the same bits. */
 START_TEST(a_state_restarts_it_exactly)
 {
     const char *const forms[] = {"position", "velocity"};
@@ -108,10 +107,10 @@ END_TEST
 
 /* ---- Stability ---- */
 
-/* A row of n free nodes of mass m between springs k, pinned at one end and free at the other, doubled by the
- * second row that the grid needs: along x the eigenvalues of both are 2 k/m (1 - cos((2 j - 1) pi/(2 n +
- * 1))), the largest for j = n. Springs across the rows are of no stiffness. Lanczos has it to 1e-6 with 30
- * products for 2 x 8 x 3 unknowns; differences have 1e-6. */
+/* A chain of n free nodes of mass m between springs k, pinned at one end and free at the other, doubled by
+ * the second row that the grid needs: along x the eigenvalues of both are 2 k/m (1 - cos((2 j - 1) pi/(2 n
+ * + 1))), the largest for j = n. Springs across the rows have no stiffness. With 30 products for 2 x 8 x 3
+ * unknowns, Lanczos is accurate to 1e-6; the differences are accurate to 1e-6 too. */
 START_TEST(omega_is_that_of_a_chain)
 {
     const double k = 40, m = 0.01;
@@ -123,7 +122,7 @@ START_TEST(omega_is_that_of_a_chain)
     start(&s, settings, 1, "fixed", 0.01);
     drape_stability found;
     s.sim->chosen.integrator->stability(s.sim->integrator, drape_sim_state(s.sim), 0.01, &found);
-    /* Across, two nodes on a spring between rows: 2 k/m alone, below the chain's 4 k/m. */
+    /* Across, two nodes on a spring between rows: only 2 k/m, below the chain's 4 k/m. */
     double omega = sqrt(2 * k / m * (1 - cos(15 * acos(-1) / 17)));
     printf("# omega %.8g, chain %.8g\n", found.omega, omega);
     ck_assert_double_eq_tol(found.omega / omega, 1, 1e-5);
@@ -135,8 +134,8 @@ START_TEST(omega_is_that_of_a_chain)
 }
 END_TEST
 
-/* A start off equilibrium by 1e-6 stays where it is below the limit and grows above it, damped and not. */
-START_TEST(the_limit_is_the_limit)
+/* A start off equilibrium by 1e-6 stays near it below the limit and grows above it, damped or not. */
+START_TEST(steps_are_stable_only_below_the_limit)
 {
     const char *const forms[] = {"position", "velocity"};
     for (int f = 0; f < 2; f++)
@@ -155,7 +154,7 @@ START_TEST(the_limit_is_the_limit)
                 drape_state *now = scene_state(&s);
                 for (int32_t i = 0; i < s.model->node_count; i++)
                     now->x[3 * (size_t)i] += s.model->pinned[i] ? 0 : i % 2 ? 1e-6 : -1e-6;
-                /* The velocity form bears more where it is damped: 1.4 is above both. */
+                /* The velocity form has a larger limit if it is damped: 1.4 is above both. */
                 double h = found.limit * (over ? 1.4 : 0.98);
                 drape_status status = DRAPE_OK;
                 for (int k = 1; k <= 400 && !status; k++)
@@ -169,7 +168,8 @@ END_TEST
 
 START_TEST(steps_follow_the_limit)
 {
-    /* Without substeps as many as the limit asks for; with one the controller cuts the step. */
+    /* substeps 0: the integrator takes as many as the limit requires; substeps 1: the controller cuts the
+     * step. */
     for (int f = 0; f < 2; f++) {
         scene s = sheet();
         const drape_setting settings[] = {number("substeps", f)};
@@ -188,7 +188,7 @@ START_TEST(steps_follow_the_limit)
 END_TEST
 
 /* An explosion ends with a reason and a finite state. */
-START_TEST(a_blow_up_is_said)
+START_TEST(a_blow_up_is_reported)
 {
     for (int guard = 0; guard < 2; guard++) {
         scene s = sheet();
@@ -205,7 +205,7 @@ END_TEST
 
 /* ---- Moving nodes ---- */
 
-/* Four points that fly on, past a plane at y = 0 that may move. */
+/* Four points that fly past a plane at y = 0, which may move. */
 static scene flyers(const char *colliders)
 {
     return scene_model(
@@ -226,8 +226,8 @@ static void one_step(scene *s, const char *rule, double x[3], double v[3])
     scene_close(s);
 }
 
-/* From (0, 0.01, 0) the way of 0.01 (1, -2, 0) meets the plane at half: t = (0.005, 0.0001, 0) with the
- * offset, and x = x0 + (1 - 0.25)(t - x0). */
+/* From (0, 0.01, 0) the displacement of 0.01 (1, -2, 0) meets the plane at half: t = (0.005, 0.0001, 0)
+ * with the offset, and x = x0 + (1 - 0.25)(t - x0). */
 START_TEST(a_plane_stops_as_in_cs184)
 {
     double x[3], v[3];
@@ -240,8 +240,8 @@ START_TEST(a_plane_stops_as_in_cs184)
 }
 END_TEST
 
-/* A plane that goes along with the tangential velocity of the node drags nothing: the way seen from it is
- * straight down, and friction acts on that alone. */
+/* A plane that moves with the tangential velocity of the node does not drag it: the displacement relative
+ * to the plane is straight down, and friction acts on that only. */
 START_TEST(friction_is_against_the_moving_surface)
 {
     double x[3], v[3];
@@ -253,7 +253,7 @@ START_TEST(friction_is_against_the_moving_surface)
 }
 END_TEST
 
-/* A sphere of radius 1 below the origin: the node at (0.01, -0.01) is put onto it, along the radius. */
+/* A sphere of radius 1 below the origin: the node at (0.01, -0.01) is moved onto it along the radius. */
 START_TEST(a_sphere_pushes_along_its_radius)
 {
     double x[3], v[3], from[2] = {0.01, 0.99}, length = sqrt(0.01 * 0.01 + 0.99 * 0.99);
@@ -263,7 +263,7 @@ START_TEST(a_sphere_pushes_along_its_radius)
     ck_assert_double_eq_tol(x[1], 0.01 + 0.5 * (from[1] / length - 1 - 0.01), 1e-15);
     s = flyers("{'type': 'sphere', 'center': [0, -1, 0], 'radius': 1, 'friction': 0.5}");
     one_step(&s, "boson", x, v);
-    /* Boson's push has no friction, but without a force there is nothing to press and none either. */
+    /* Boson's push has no friction; here there is none either, as no force presses the node on. */
     ck_assert_double_eq_tol(x[0], from[0] / length, 1e-15);
     ck_assert_double_eq_tol(x[1], from[1] / length - 1, 1e-15);
 }
@@ -278,8 +278,8 @@ START_TEST(a_floor_keeps_the_place_as_in_boson)
 }
 END_TEST
 
-/* F = (3, -8) on a floor: 3 - 0.25 x 8 = 1 along it is left, less 0.5 v; nothing across. Straight down
- * nothing is left, where Boson divides 0 by 0; up nothing rubs. */
+/* F = (3, -8) on a floor: 3 - 0.25 x 8 = 1 remains along it, less 0.5 v, and nothing across. Of a force
+ * straight down nothing remains, where Boson divides 0 by 0; a force upwards has no friction. */
 START_TEST(friction_on_forces_as_in_boson)
 {
     scene s = flyers("{'type': 'plane', 'point': [0, 0, 0], 'normal': [0, 1, 0], 'friction': 0.25}");
@@ -303,9 +303,9 @@ START_TEST(friction_on_forces_as_in_boson)
 }
 END_TEST
 
-/* A row of three, 1 m apart, of which the first is pinned and the others are at 1.5 and 3.5. One pass: the
- * spring to the pin gets 1.1 m, all of it at its free end; then the next, 2.4 m long, loses 1.3 m by halves;
- * the bend spring may have 2.2 m and has 2.85. It leaves the first one too long, as CS184 does; passes do
+/* Three nodes in a line, 1 m apart; the first is pinned, the others are at 1.5 and 3.5. One pass: the
+ * spring to the pin is cut to 1.1 m, all of it at its free end; then the next, 2.4 m long, loses 1.3 m in
+ * equal halves. The pass leaves the first one too long, as in CS184; further passes do
  * not. */
 START_TEST(strains_are_limited)
 {
@@ -356,7 +356,7 @@ static scene shaken(double by, double *x)
     return s;
 }
 
-/* Limits each spring after the other, as the rule says. */
+/* Limits one spring after the other, as the rule says. */
 static void limit_by_hand(const drape_verlet_limit *l, double *x)
 {
     for (int32_t i = 0; i < l->count; i++) {
@@ -371,7 +371,7 @@ static void limit_by_hand(const drape_verlet_limit *l, double *x)
     }
 }
 
-/* Whether many, few or no springs are too long, looking at them in patches gives the bits of one after the
+/* Whether many, few or no springs are too long, patches of springs give the same bits as one spring after the
  * other. */
 START_TEST(patches_are_one_spring_after_the_other)
 {
@@ -394,8 +394,9 @@ START_TEST(patches_are_one_spring_after_the_other)
 }
 END_TEST
 
-/* Springs in runs, weight once and the rest by the system: the sums of the system in another order. A node
- * has 12 springs of up to 3 N, so that each of its sums is off by less than 50 roundings of that. */
+/* Springs in runs, the weight once, and the other terms by the system: sums in another order than the
+ * system's. A node has 12 springs of up to 3 N, so each of its sums is off by less than 50 roundings of
+ * that. */
 START_TEST(forces_are_those_of_the_system)
 {
     double x[3 * 33 * 12], v[3 * 33 * 12], g[3 * 33 * 12], expected[3 * 33 * 12];
@@ -418,7 +419,7 @@ END_TEST
 
 /* ---- Cloth against cloth ---- */
 
-/* Whether two points are in the same of CS184's boxes, 3/14 m wide here. */
+/* Whether two points are in the same one of CS184's boxes, 3/14 m wide here. */
 static bool share_a_box(const double *a, const double *b)
 {
     for (int k = 0; k < 3; k++)
@@ -427,8 +428,8 @@ static bool share_a_box(const double *a, const double *b)
     return true;
 }
 
-/* The rule without lists: every point against every other, in the order of their numbers; own: of the same
- * box alone, as points stand before the first turn. */
+/* The rule without lists: every point against every other, in the order of their numbers; own: only against
+ * those in the same box at the positions before the first pass. */
 static void push_by_hand(const drape_model *m, bool own, double share, double *x)
 {
     double reach = 2 * m->contact.self_thickness, before[3 * 196];
@@ -441,7 +442,7 @@ static void push_by_hand(const drape_model *m, bool own, double share, double *x
             vec3_sub(x + 3 * (size_t)i, x + 3 * (size_t)j, d);
             double distance = vec3_norm(d);
             if (j == i || !(vec3_dot(d, d) < reach * reach) ||
-                distance == 0) /* compared as squares there too */
+                distance == 0) /* compared as squares in the library too */
                 continue;
             if (own && !share_a_box(before + 3 * (size_t)i, before + 3 * (size_t)j))
                 continue;
@@ -466,10 +467,10 @@ static scene crumpled(double size, double thickness, double *x)
     return s;
 }
 
-/* Boxes and lists find what everything against everything finds, to the bit, from a heap in which each point
- * has all others near, more than lists may have, to points far apart; also when lists of before are used
- * again. */
-static void hold_to_the_rule(double size, bool own, double share)
+/* Boxes and lists find the same pairs as a comparison of all points with all, to the bit: from a heap in
+ * which each point is near all others, more than lists hold, to points far apart; also when earlier lists
+ * are used again. */
+static void check_against_the_rule(double size, bool own, double share)
 {
     double x[3 * 196], y[3 * 196];
     scene s = crumpled(size, 0.02, x);
@@ -496,13 +497,13 @@ START_TEST(boxes_find_all_pairs)
     static const double sizes[] = {0.02, 0.08, 0.15, 0.3, 1, 50};
     for (int k = 0; k < 6; k++)
         for (int own = 0; own < 2; own++) {
-            hold_to_the_rule(sizes[k], own, 1.0 / 30);
-            hold_to_the_rule(sizes[k], own, 1);
+            check_against_the_rule(sizes[k], own, 1.0 / 30);
+            check_against_the_rule(sizes[k], own, 1);
         }
 }
 END_TEST
 
-/* In CS184's own boxes a pair across a face is missed, and one inside is not. The boxes are 3 x 1/14 wide. */
+/* CS184's own boxes miss a pair across a face and find one inside a box. The boxes are 3 x 1/14 wide. */
 START_TEST(own_boxes_miss_what_cs184_misses)
 {
     double x[3 * 196], face = 3.0 / 14;
@@ -524,8 +525,8 @@ START_TEST(own_boxes_miss_what_cs184_misses)
 END_TEST
 
 SUITE("verlet", the_position_form_is_the_recurrence_of_positions, a_state_restarts_it_exactly,
-      omega_is_that_of_a_chain, the_limit_is_the_limit, steps_follow_the_limit, a_blow_up_is_said,
-      a_plane_stops_as_in_cs184, friction_is_against_the_moving_surface, a_sphere_pushes_along_its_radius,
-      a_floor_keeps_the_place_as_in_boson, friction_on_forces_as_in_boson, strains_are_limited,
-      patches_are_one_spring_after_the_other, forces_are_those_of_the_system, boxes_find_all_pairs,
-      own_boxes_miss_what_cs184_misses)
+      omega_is_that_of_a_chain, steps_are_stable_only_below_the_limit, steps_follow_the_limit,
+      a_blow_up_is_reported, a_plane_stops_as_in_cs184, friction_is_against_the_moving_surface,
+      a_sphere_pushes_along_its_radius, a_floor_keeps_the_place_as_in_boson, friction_on_forces_as_in_boson,
+      strains_are_limited, patches_are_one_spring_after_the_other, forces_are_those_of_the_system,
+      boxes_find_all_pairs, own_boxes_miss_what_cs184_misses)

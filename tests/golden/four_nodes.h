@@ -1,11 +1,12 @@
 /*
  * Golden numbers: node 3 of the four-node sheet of the DEP report (support/four_nodes.h), positions in
- * metres after the n-th of 500 steps of backward Euler of 0.01 s, residuals below 1e-12 N. They are
- * Drape's own, made on 64-bit x86 and agreeing to 1.5e-8 m at every step with the report's own program and
- * with the course's Python (physics/test_oracle.c). Linear solvers and kinds of Newton differ by 1e-11.
+ * metres after the n-th of 500 steps of backward Euler of 0.01 s, residuals below 1e-12 N. They were
+ * computed by Drape on 64-bit x86 and agree to 1.5e-8 m at every step with the report's own program and
+ * with the course's Python (physics/test_oracle.c). Different linear solvers and variants of Newton change
+ * them by 1e-11.
  *
  * They may change when the meaning of backward Euler, of the "report" stiffnesses, of the grid or of
- * gravity does: then the oracle must be run again, and the change stands in the changelog under "results
+ * gravity does: then the oracle must be run again, and the change is listed in the changelog under "results
  * changed". They may not change with a solver, a compiler, an ordering or a rewrite of a term.
  */
 static const struct {

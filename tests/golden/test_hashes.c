@@ -1,18 +1,17 @@
 /*
- * test_hashes.c: every example scene under every integrator, for three attempts: the bits of the state are
- * those of hashes.txt, where that is of this build, and in any build those of another process, of other
- * numbers of threads, of a sim that was stopped at each attempt or saved and restored between two, beside
- * others on the same thread and on another one.
+ * test_hashes.c: every example scene with every integrator, for three attempts. The bits of the state must
+ * be those of hashes.txt, if that file is of this build. In any build they must be the same in another
+ * process, with other numbers of threads, in a sim that is stopped at each attempt or saved and restored
+ * between two, and beside other sims on the same thread and on another one.
  *
- * Meshes are made coarse, so that there is time for contact: where a scene has colliders or layers, the
- * attempts begin where `be` has brought it to after most of its duration, and it is looked that they act
- * there. With a sanitizer, which makes all ten times slower, every other scene is left out: box_edge,
- * crumple, flag, fold, hung_sheet, sphere_drape and verlet_100 stay, under every integrator.
- *
- * hashes.txt begins with the build that its bits belong to: they depend on the compiler, the solvers, and on
- * the C library and BLAS, which pick their functions by the processor. The name of the build has a hash of
- * what the C library's functions give, and the name of OpenBLAS's kernels. On another build the runs are
- * compared with those of a second process instead. `tools/hashes` writes the file anew: with
+ * Meshes are made coarser, so that there is time for contact: if a scene has colliders or self-contact, the
+ * attempts start from the state that `be` reaches after most of its duration, and the test checks that
+ * there is contact in it. With a sanitizer, which makes all ten times slower, every other scene is left
+ * out: box_edge, crumple, flag, fold, hung_sheet, sphere_drape and verlet_100 remain, with every
+ * integrator. hashes.txt begins with the build that its bits belong to: they depend on the compiler, the
+ * solvers, and on the C library and BLAS, which select their functions by the processor. The name of the
+ * build has a hash of results of the C library's functions, and the name of OpenBLAS's kernels. On another
+ * build the runs are compared with those of a second process instead. `tools/hashes` writes the file: with
  * DRAPE_HASHES=FILE this program writes its own hashes there and tests nothing.
  */
 #include <dirent.h>
@@ -31,20 +30,18 @@
 #include "support/bytes.h"
 #include "support/suite.h"
 
-#define ATTEMPTS    3
-#define FRAMES      2   /* what is advanced by, where it takes fewer attempts */
-#define SHARE       0.7 /* of the duration, before */
-#define LONGEST     2.0 /* [s] at most */
-#define MOST_SCENES 64
-#define MOST_ROWS   32
-#define MOST_PREPARED                                                                                        \
-    1000 /* nodes of a scene that is brought to its moment: one in the form of CS184 stays as large as it
-            is */
-#define MOST_NODES 200 /* grids of more are made of every other node, and again */
-#define LINE       512
+#define ATTEMPTS     3
+#define FRAMES       2   /* length of the advance, which may take fewer attempts */
+#define SHARE        0.7 /* of the duration, before the attempts */
+#define LONGEST      2.0 /* [s] upper bound of that time */
+#define MAX_SCENES   64
+#define MAX_METHODS  32
+#define MAX_PREPARED 1000 /* nodes of a scene that is advanced first: CS184 scenes keep their size */
+#define MAX_NODES    200  /* of larger grids every other node is used, and again */
+#define LINE         512
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define EVERY 2 /* of the scenes in their order */
+#define EVERY 2 /* of the scenes, in their order */
 #else
 #define EVERY 1
 #endif
@@ -56,10 +53,10 @@ typedef struct golden {
     uint64_t hash;
 } golden;
 
-static golden table[MOST_SCENES * MOST_ROWS];
+static golden table[MAX_SCENES * MAX_METHODS];
 static int table_count;
 
-/* Outside of tests, and on another thread, Check cannot be told. */
+/* Check must not be called outside of tests, nor on another thread. */
 #define REQUIRE(good, ...)                                                                                   \
     do {                                                                                                     \
         if (!(good)) {                                                                                       \
@@ -71,7 +68,7 @@ static int table_count;
 
 /* ---- The build ---- */
 
-/* What of the C library the library calls, at arguments of all sizes. */
+/* A hash of the C library's functions that Drape calls, at arguments of all sizes. */
 static uint64_t library_hash(void)
 {
     uint64_t hash = DRAPE_HASH_START;
@@ -86,9 +83,9 @@ static uint64_t library_hash(void)
     return hash;
 }
 
-/* BLAS picks its kernels by the processor, and those for triangular solves differ in a last digit where
- * products of matrices agree: so the kernels are named and not sampled. A BLAS that is not OpenBLAS has no
- * name for them. */
+/* BLAS selects its kernels by the processor. Those for triangular solves may differ in a last digit where
+ * products of matrices agree, so the kernels are named and not sampled. A BLAS other than OpenBLAS does not
+ * name them. */
 static const char *blas_kernels(void)
 {
     typedef char *describe(void);
@@ -126,7 +123,7 @@ static int list_scenes(const char *folder, char names[][64])
         const size_t length = strlen(entry->d_name);
         if (length < 6 || length > 60 || strcmp(entry->d_name + length - 5, ".json") != 0)
             continue;
-        REQUIRE(count < MOST_SCENES, "more than %d scenes", MOST_SCENES);
+        REQUIRE(count < MAX_SCENES, "more than %d scenes", MAX_SCENES);
         memcpy(names[count], entry->d_name, length - 5);
         names[count++][length - 5] = 0;
     }
@@ -135,7 +132,7 @@ static int list_scenes(const char *folder, char names[][64])
     return count;
 }
 
-/* "/cloth/0/mesh/columns" gets every other of `nodes`. */
+/* Sets "/cloth/0/mesh/columns", or the key given, to every other of `nodes`. */
 static drape_status halve(drape_scene *scene, int32_t cloth, const char *key, int32_t nodes)
 {
     char pointer[64], text[16];
@@ -144,14 +141,14 @@ static drape_status halve(drape_scene *scene, int32_t cloth, const char *key, in
     return drape_scene_set(scene, pointer, text);
 }
 
-/* Makes the grids of more nodes coarser, once; whether there were any. Equilateral ones, which no contact is
- * in, stay. */
+/* Makes the grids with more than MAX_NODES nodes coarser, once; returns whether there were any. Equilateral
+ * grids, which are in no scene with contact, keep their size. */
 static bool make_coarser(drape_scene *scene, const drape_model *model)
 {
     bool any = false;
     for (int32_t c = 0; c < model->cloth_count; c++) {
         const drape_cloth *cloth = &model->cloths[c];
-        if (cloth->mesh.node_count <= MOST_NODES || strcmp(cloth->grid.type, "square") != 0)
+        if (cloth->mesh.node_count <= MAX_NODES || strcmp(cloth->grid.type, "square") != 0)
             continue;
         any = true;
         REQUIRE(!halve(scene, c, "columns", cloth->mesh.columns) &&
@@ -169,7 +166,7 @@ static drape_model *compile(drape_context *ctx, const char *name)
     drape_model *model = NULL;
     snprintf(path, sizeof path, "%.800s/examples/scenes/%.60s.json", source ? source : ".", name);
     drape_status status = drape_scene_load(ctx, path, &scene);
-    for (int32_t before = INT32_MAX, now = 0; now < before;) { /* a scene of another form stays as it is */
+    for (int32_t before = INT32_MAX, now = 0; now < before;) { /* a scene of another form keeps its size */
         before = now > 0 ? now : before;
         drape_model_destroy(&model);
         status = status ? status : drape_scene_compile(scene, &model);
@@ -180,17 +177,17 @@ static drape_model *compile(drape_context *ctx, const char *name)
     return model;
 }
 
-/* ---- Where the attempts begin ---- */
+/* ---- The state before the attempts ---- */
 
-/* A state in the middle of a scene that has contact, by `be` of one thread, and so of the same bits each
- * time; else the beginning. */
+/* A state in the middle of a scene that has contact, reached by `be` with one thread, and so with the same
+ * bits each time; in other scenes the beginning. */
 typedef struct moment {
     double t;
     double *x, *v;
-    bool collider, self, friction; /* what acts */
+    bool collider, self, friction; /* which contact forces act */
 } moment;
 
-/* The model with some things left out: it shares its arrays. */
+/* Runs the model; copies of it may lack colliders or self-contact and share its arrays. */
 static drape_sim *sim_of(drape_context *ctx, const drape_model *model)
 {
     drape_sim *sim = NULL;
@@ -201,7 +198,7 @@ static drape_sim *sim_of(drape_context *ctx, const drape_model *model)
     return sim;
 }
 
-/* Forces of contact (node_count x 3) that the model has at a moment; its sum of squares. */
+/* The contact forces (node_count x 3) of the model at a moment; returns the sum of their squares. */
 static double push(drape_context *ctx, const drape_model *model, const moment *m, bool friction,
                    double *forces)
 {
@@ -219,7 +216,7 @@ static double push(drape_context *ctx, const drape_model *model, const moment *m
     return sum;
 }
 
-static void find_what_acts(drape_context *ctx, const drape_model *model, moment *m)
+static void find_contact(drape_context *ctx, const drape_model *model, moment *m)
 {
     const size_t n = 3 * (size_t)model->node_count;
     double *with = calloc(n, sizeof *with), *without = calloc(n, sizeof *without);
@@ -243,7 +240,7 @@ static moment prepare(const char *scene, const drape_model *model)
     drape_context *ctx = NULL;
     REQUIRE(m.x && m.v && !drape_context_create(NULL, &ctx), "no memory");
     drape_sim *sim = sim_of(ctx, model);
-    const bool meets = drape_model_node_count(model) <= MOST_PREPARED &&
+    const bool meets = drape_model_node_count(model) <= MAX_PREPARED &&
                        (drape_model_collider_count(model) > 0 || model->contact.self);
     REQUIRE(!meets || !drape_sim_advance(sim, fmin(SHARE * drape_model_duration(model), LONGEST)), "%s: %s",
             scene, drape_context_message(ctx));
@@ -252,19 +249,19 @@ static moment prepare(const char *scene, const drape_model *model)
     memcpy(m.v, drape_sim_velocities(sim), n * sizeof *m.v);
     drape_sim_destroy(&sim);
     if (meets)
-        find_what_acts(ctx, model, &m);
+        find_contact(ctx, model, &m);
     drape_context_destroy(&ctx);
     return m;
 }
 
-/* ---- A sim that stops after each attempt, or after the last ---- */
+/* ---- A sim that stops after each attempt, or after the last one ---- */
 
 typedef struct driven {
     drape_context *ctx;
     drape_sim *sim;
     double end;
-    int left;  /* attempts */
-    bool each; /* stops after each attempt */
+    int left;  /* attempts left */
+    bool each; /* stop after each attempt */
     drape_status status;
 } driven;
 
@@ -277,18 +274,18 @@ static drape_status look(void *user, const drape_event *event)
     return d->each || d->left == 0 ? 1 : DRAPE_OK;
 }
 
-/* Statics ends after some steps of its flow, where each node is held but for twenty times the heaviest one's
- * weight: to the end it would take minutes for cloth that falls freely or flutters. */
+/* Statics ends after some steps of its flow, when the force on each node is below twenty times the weight
+ * of the heaviest: a tighter tolerance would take minutes for cloth that falls freely or flutters. */
 static double loose_tolerance(const drape_model *model)
 {
-    double most = 0;
+    double heaviest = 0;
     for (int32_t i = 0; i < drape_model_node_count(model); i++)
-        most = fmax(most, drape_model_masses(model)[i]);
-    return 20 * 9.81 * most;
+        heaviest = fmax(heaviest, drape_model_masses(model)[i]);
+    return 20 * 9.81 * heaviest;
 }
 
-/* At d, which stays where it is. */
-static void start(driven *d, const drape_model *model, const moment *from, const drape_integrator_ops *row,
+/* d must stay at its address. */
+static void start(driven *d, const drape_model *model, const moment *from, const drape_integrator_ops *method,
                   int threads, bool each)
 {
     const drape_setting loose = {.name = "tolerance", .number = loose_tolerance(model)};
@@ -296,18 +293,18 @@ static void start(driven *d, const drape_model *model, const moment *from, const
     *d = (driven){.left = ATTEMPTS, .each = each, .end = from->t + FRAMES / drape_model_frame_rate(model)};
     REQUIRE(!drape_context_create(NULL, &d->ctx), "no context");
     drape_sim_def_init(&def, sizeof def);
-    def.integrator = row->entry.name;
+    def.integrator = method->entry.name;
     def.threads = threads;
     def.integrator_settings = &loose;
-    def.integrator_setting_count = row->steady_state;
+    def.integrator_setting_count = method->steady_state;
     d->status = drape_sim_create(d->ctx, model, &def, &d->sim);
     REQUIRE(d->status || (!drape_sim_set_state(d->sim, from->t, from->x, from->v) &&
                           !drape_sim_observe(d->sim, look, d)),
             "%s", drape_context_message(d->ctx));
 }
 
-/* Goes on to its next stop; false: there is none. */
-static bool go_on(driven *d)
+/* Advances to the next stop; returns whether there may be another one. */
+static bool advance_to_stop(driven *d)
 {
     if (!d->sim || d->left <= 0)
         return false;
@@ -324,35 +321,35 @@ static golden finish(driven *d, const char *scene, const char *integrator)
     return g;
 }
 
-/* Another sim goes on where it is. */
+/* Replaces the sim by another one, restored from its checkpoint. */
 static void save_and_restore(driven *d, const drape_model *model, const moment *from,
-                             const drape_integrator_ops *row, int threads)
+                             const drape_integrator_ops *method, int threads)
 {
     const int left = d->left;
     bytes b = bytes_save(d->sim);
     drape_sim_destroy(&d->sim);
     drape_context_destroy(&d->ctx);
-    start(d, model, from, row, threads, d->each);
+    start(d, model, from, method, threads, d->each);
     d->left = left;
     d->status = drape_sim_restore_from(d->sim, b.data, b.size);
     REQUIRE(!d->status, "%s", drape_context_message(d->ctx));
     free(b.data);
 }
 
-/* ---- All of them, plainly ---- */
+/* ---- All scenes and integrators ---- */
 
-/* A scene that is ready: its name, model, and where its attempts begin. */
+/* A scene that is prepared: its name, its model, and the state before its attempts. */
 typedef struct ready {
     const char *scene;
     const drape_model *model;
     const moment *from;
 } ready;
 
-static moment moments[MOST_SCENES]; /* made by the first who comes, before Check forks */
+static moment moments[MAX_SCENES]; /* made by the first call of for_all, before Check forks */
 
-static void for_all(void (*visit)(const ready *s, const drape_integrator_ops *row))
+static void for_all(void (*visit)(const ready *s, const drape_integrator_ops *method))
 {
-    static char names[MOST_SCENES][64];
+    static char names[MAX_SCENES][64];
     char folder[900];
     const char *source = getenv("DRAPE_SOURCE");
     snprintf(folder, sizeof folder, "%.800s/examples/scenes", source ? source : ".");
@@ -371,13 +368,13 @@ static void for_all(void (*visit)(const ready *s, const drape_integrator_ops *ro
     }
 }
 
-static void fill(const ready *s, const drape_integrator_ops *row)
+static void fill(const ready *s, const drape_integrator_ops *method)
 {
     driven d;
-    REQUIRE(table_count < MOST_SCENES * MOST_ROWS, "more than %d rows", MOST_ROWS);
-    start(&d, s->model, s->from, row, 1, false);
-    go_on(&d);
-    table[table_count++] = finish(&d, s->scene, row->entry.name);
+    REQUIRE(table_count < MAX_SCENES * MAX_METHODS, "more than %d integrators", MAX_METHODS);
+    start(&d, s->model, s->from, method, 1, false);
+    advance_to_stop(&d);
+    table[table_count++] = finish(&d, s->scene, method->entry.name);
 }
 
 static const golden *find(const char *scene, const char *integrator)
@@ -398,7 +395,7 @@ static int write_table(const char *path)
         return 1;
     name_build(build, sizeof build);
     fprintf(file,
-            "# Bits of the states of the example scenes, %d attempts after their moment: scene, integrator, "
+            "# Hashes of the states of the example scenes after %d attempts: scene, integrator, "
             "status, hash; "
             "by tools/hashes.\n"
             "build: %s\n",
@@ -409,11 +406,11 @@ static int write_table(const char *path)
     return fclose(file) != 0;
 }
 
-/* How many lines are not as here; the first of them is told. same_build: that of the file is this one, else 0
- * is returned. */
-static int compare_file(const char *path, bool *same_build, char *told, size_t size)
+/* Returns the number of lines that differ from the table; `difference` describes the first one. If the file
+ * is of another build, same_build is false and 0 is returned. */
+static int compare_file(const char *path, bool *same_build, char *difference, size_t size)
 {
-    char line[LINE], build[LINE], here[LINE + 16], scene[64], row[64], status[64];
+    char line[LINE], build[LINE], here[LINE + 16], scene[64], method[64], status[64];
     uint64_t hash;
     int lines = 0, wrong = 0;
     FILE *file = fopen(path, "r");
@@ -421,18 +418,18 @@ static int compare_file(const char *path, bool *same_build, char *told, size_t s
     name_build(build, sizeof build);
     snprintf(here, sizeof here, "build: %s\n", build);
     *same_build = strcmp(line, here) == 0;
-    snprintf(told, size, "%s", line);
+    snprintf(difference, size, "%s", line);
     while (*same_build && fgets(line, sizeof line, file)) {
-        ck_assert_int_eq(sscanf(line, "%63s %63s %63s %" SCNx64, scene, row, status, &hash), 4);
-        const golden *g = find(scene, row);
+        ck_assert_int_eq(sscanf(line, "%63s %63s %63s %" SCNx64, scene, method, status, &hash), 4);
+        const golden *g = find(scene, method);
         if (EVERY > 1 && !g)
             continue;
         lines++;
         if (g && g->hash == hash && strcmp(drape_status_name(g->status), status) == 0)
             continue;
         if (wrong++ == 0)
-            snprintf(told, size, "%s %s: %s %016" PRIx64 " there, %s %016" PRIx64 " here", scene, row, status,
-                     hash, g ? drape_status_name(g->status) : "none", g ? g->hash : 0);
+            snprintf(difference, size, "%s %s: %s %016" PRIx64 " there, %s %016" PRIx64 " here", scene,
+                     method, status, hash, g ? drape_status_name(g->status) : "none", g ? g->hash : 0);
     }
     fclose(file);
     return *same_build && lines != table_count ? wrong + abs(lines - table_count) : wrong;
@@ -440,8 +437,8 @@ static int compare_file(const char *path, bool *same_build, char *told, size_t s
 
 /* ---- The tests ---- */
 
-/* The file, or where that is of another build one that another process writes. */
-static int compare_process(char *told, size_t size)
+/* Compares the table with that of another process. */
+static int compare_process(char *difference, size_t size)
 {
     char path[] = "/tmp/drape-hashes-XXXXXX", command[128];
     bool same;
@@ -450,7 +447,7 @@ static int compare_process(char *told, size_t size)
     close(fd);
     snprintf(command, sizeof command, "DRAPE_HASHES='%s' /proc/%ld/exe", path, (long)getpid());
     ck_assert_int_eq(system(command), 0);
-    const int wrong = compare_file(path, &same, told, size);
+    const int wrong = compare_file(path, &same, difference, size);
     ck_assert(same);
     unlink(path);
     return wrong;
@@ -458,45 +455,45 @@ static int compare_process(char *told, size_t size)
 
 START_TEST(another_process_had_the_same_bits)
 {
-    char path[1024], told[LINE];
+    char path[1024], difference[LINE];
     const char *source = getenv("DRAPE_SOURCE");
     bool same;
     snprintf(path, sizeof path, "%.800s/tests/golden/hashes.txt", source ? source : ".");
-    int wrong = compare_file(path, &same, told, sizeof told);
+    int wrong = compare_file(path, &same, difference, sizeof difference);
     if (!same) {
-        printf("# hashes.txt is of another build: this one's runs are compared with each other. %s", told);
-        wrong = compare_process(told, sizeof told);
+        printf("# hashes.txt is of another build: two processes of this one are compared. %s", difference);
+        wrong = compare_process(difference, sizeof difference);
     }
     ck_assert_msg(wrong == 0,
-                  "%d of %d lines are not so, such as %s; where results were meant to change, tools/hashes",
-                  wrong, table_count, told);
+                  "%d of %d lines differ, such as %s; after an intended change of results run tools/hashes",
+                  wrong, table_count, difference);
 }
 END_TEST
 
 typedef struct pair {
     const ready *s;
-    const drape_integrator_ops *row;
+    const drape_integrator_ops *method;
     golden plain, restored;
 } pair;
 
-/* Two sims in turns, attempt by attempt, with two threads and with three, one of which is another one after
- * its first attempt. */
+/* Two sims that advance in turns, attempt by attempt, with two and with three threads; the second one is
+ * saved and restored after its first attempt. */
 static void *drive_two(void *user)
 {
     pair *p = user;
     const ready *s = p->s;
     driven plain, restored;
-    start(&plain, s->model, s->from, p->row, 2, true);
-    start(&restored, s->model, s->from, p->row, 3, true);
-    bool more = go_on(&restored);
+    start(&plain, s->model, s->from, p->method, 2, true);
+    start(&restored, s->model, s->from, p->method, 3, true);
+    bool more = advance_to_stop(&restored);
     if (more)
-        save_and_restore(&restored, s->model, s->from, p->row, 1);
+        save_and_restore(&restored, s->model, s->from, p->method, 1);
     for (bool other = true; more || other;) {
-        other = go_on(&plain);
-        more = more && go_on(&restored);
+        other = advance_to_stop(&plain);
+        more = more && advance_to_stop(&restored);
     }
-    p->plain = finish(&plain, s->scene, p->row->entry.name);
-    p->restored = finish(&restored, s->scene, p->row->entry.name);
+    p->plain = finish(&plain, s->scene, p->method->entry.name);
+    p->restored = finish(&restored, s->scene, p->method->entry.name);
     return NULL;
 }
 
@@ -507,18 +504,18 @@ static void check_same(const golden *g, const golden *expected, const char *what
                   drape_status_name(g->status), g->hash, drape_status_name(expected->status), expected->hash);
 }
 
-static void compare_at_once(const ready *s, const drape_integrator_ops *row)
+static void compare_at_once(const ready *s, const drape_integrator_ops *method)
 {
     pthread_t thread;
     driven beside;
-    pair p = {.s = s, .row = row};
-    const golden *expected = find(s->scene, row->entry.name);
+    pair p = {.s = s, .method = method};
+    const golden *expected = find(s->scene, method->entry.name);
     ck_assert_ptr_nonnull(expected);
     ck_assert_int_eq(pthread_create(&thread, NULL, drive_two, &p), 0);
-    start(&beside, s->model, s->from, row, 1, false);
-    go_on(&beside);
+    start(&beside, s->model, s->from, method, 1, false);
+    advance_to_stop(&beside);
     ck_assert_int_eq(pthread_join(thread, NULL), 0);
-    const golden alone = finish(&beside, s->scene, row->entry.name);
+    const golden alone = finish(&beside, s->scene, method->entry.name);
     check_same(&p.plain, expected, "two threads, stopped at each attempt");
     check_same(&p.restored, expected, "three threads, saved, and restored with one");
     check_same(&alone, expected, "while others run");
@@ -530,35 +527,36 @@ START_TEST(sims_at_once_have_the_same_bits)
 }
 END_TEST
 
-/* What a scene has, acts at its moment: colliders in each scene that has some, friction and layers in
- * some. */
-static int scenes_pushed, scenes_layered, scenes_rubbed;
+/* The contact of a scene acts in the state before its attempts: colliders in each scene that has some,
+ * friction and self-contact in some scenes. */
+static int scenes_with_colliders, scenes_with_self_contact, scenes_with_friction;
 
-static void count_what_acts(const ready *s, const drape_integrator_ops *row)
+static void count_contact(const ready *s, const drape_integrator_ops *method)
 {
-    if (row != drape_integrators[0])
+    if (method != drape_integrators[0])
         return;
     printf("# %s at %.3g s, %d nodes:%s%s%s\n", s->scene, s->from->t, (int)drape_model_node_count(s->model),
            s->from->collider ? " collider" : "", s->from->self ? " layers" : "",
            s->from->friction ? " friction" : "");
-    const bool later = SHARE * drape_model_duration(s->model) > LONGEST; /* than what there is time for */
+    const bool later = SHARE * drape_model_duration(s->model) >
+                       LONGEST; /* its contact may begin later than the test has time for */
     ck_assert_msg(s->from->collider || later || drape_model_collider_count(s->model) == 0,
                   "%s: no collider touches the cloth", s->scene);
-    scenes_pushed += s->from->collider;
-    scenes_layered += s->from->self;
-    scenes_rubbed += s->from->friction;
+    scenes_with_colliders += s->from->collider;
+    scenes_with_self_contact += s->from->self;
+    scenes_with_friction += s->from->friction;
 }
 
 START_TEST(contact_acts)
 {
-    for_all(count_what_acts);
-    ck_assert_int_ge(scenes_pushed, 7 / EVERY);
-    ck_assert_int_ge(scenes_layered, 3 / EVERY);
-    ck_assert_int_ge(scenes_rubbed, 6 / EVERY);
+    for_all(count_contact);
+    ck_assert_int_ge(scenes_with_colliders, 7 / EVERY);
+    ck_assert_int_ge(scenes_with_self_contact, 3 / EVERY);
+    ck_assert_int_ge(scenes_with_friction, 6 / EVERY);
 }
 END_TEST
 
-/* The table is made before Check forks, and once. */
+/* The table is made once, before Check forks. */
 int main(void)
 {
     const TTest *const tests[] = {contact_acts, another_process_had_the_same_bits,

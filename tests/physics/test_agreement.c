@@ -1,11 +1,13 @@
 /*
- * test_agreement.c: what must not change the result, and what may only within the tolerance.
+ * test_agreement.c: settings that must not change the result, and settings that may change it within the
+ * tolerance only.
  *
- * The scene: a sheet hung by two corners that swings out under gravity. Two runs whose residuals stay
- * below r1 and r2 solve perturbed problems: as long as the Hessian is not negative they part by
- * drift_bound(r1 + r2). Springs in compression by e take K e across their direction off it, which on 6
- * springs a node is at most 12 K e, hinges less; so with d = h^2 12 K e/m the error grows beside that by
- * the solution of e_{n+1} - 2 e_n + e_{n-1} = d e_{n+1}, which is below cosh(n sqrt(d/(1 - d))).
+ * The scene: a sheet that hangs by two corners and swings out under gravity. Two runs whose residuals stay
+ * below r1 and r2 solve perturbed problems: if the Hessian is not negative, they differ by at most
+ * drift_bound(r1 + r2). Springs compressed by e have a negative stiffness of K e across their direction,
+ * which with 6 springs a node is at most 12 K e; that of hinges is less. With d = h^2 12 K e/m, the error
+ * then also grows by the solution of e_{n+1} - 2 e_n + e_{n-1} = d e_{n+1}, which is below cosh(n sqrt(d/(1
+ * - d))).
  */
 #include "solvers/linear.h"
 #include "support/scene.h"
@@ -34,13 +36,13 @@ static void agree(const char *one, const char *other)
     scene_watch(&b);
     scene_advance(&a, STEPS * STEP);
     scene_advance(&b, STEPS * STEP);
-    ck_assert_int_eq(a.accepted, STEPS); /* none was rejected: the same steps */
+    ck_assert_int_eq(a.accepted, STEPS); /* none was rejected, so both have the same steps */
     ck_assert_int_eq(b.accepted, STEPS);
     ck_assert_int_eq(a.unconverged + b.unconverged, 0);
     for (size_t i = 0; i < 3 * (size_t)a.model->node_count; i++)
         worst = fmax(worst, fabs(drape_sim_positions(a.sim)[i] - drape_sim_positions(b.sim)[i]));
     const double squeezed = fmax(0, -drape_sim_statistics(a.sim).strain_min);
-    const double d = STEP * STEP * 12 * spring * squeezed / scene_least_mass(&a);
+    const double d = STEP * STEP * 12 * spring * squeezed / scene_min_mass(&a);
     const double noise = 2 * (1 + 1e-3 / STEP) * force_noise(spring, 0.6);
     assert_below(d, 0.1);
     assert_below(worst, drift_bound(&a, STEPS, STEP, a.residual + b.residual + noise) *
@@ -121,9 +123,8 @@ START_TEST(frames_do_not_change_a_bit)
 }
 END_TEST
 
-/* With dt = 1/240 s a sixtieth of a second is four steps. Their ends k/60 and 4k/240 differ by round-off,
- * which the schedule knows to be the same time: the steps are the same, and the states equal to the last
- * bit. */
+/* With dt = 1/240 s a sixtieth of a second is four steps. The ends k/60 and 4k/240 differ by round-off; the
+ * schedule recognizes them as the same time: the steps are the same, and the states equal to the last bit. */
 START_TEST(one_advance_or_sixty)
 {
     drape_sim_def def;
@@ -141,9 +142,9 @@ START_TEST(one_advance_or_sixty)
 }
 END_TEST
 
-/* With dt = 7 ms the advances cut steps: other steps, and so another answer, by the first order of the
- * method. What must hold is that it ends where it was told and lost no step: the time is exact and the
- * number of steps is 60 times that of one advance. */
+/* With dt = 7 ms the advances cut steps: other steps, and so another result, different in the first order
+ * of the method. The run must still end at the requested time without losing a step: the time is exact and
+ * the number of steps is 60 times that of one advance. */
 START_TEST(advances_that_cut_steps_end_in_time)
 {
     drape_sim_def def;
@@ -162,7 +163,7 @@ START_TEST(advances_that_cut_steps_end_in_time)
 }
 END_TEST
 
-/* Two sims of one model, and a second run of the same, are the same. */
+/* Two runs of the same scene have the same bits. */
 START_TEST(runs_repeat_bit_for_bit)
 {
     ck_assert(hash_after(NULL, 0.3) == hash_after(NULL, 0.3));

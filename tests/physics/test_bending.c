@@ -1,18 +1,17 @@
 /*
- * test_bending.c: what plate the hinges of bend.hinge are.
+ * test_bending.c: the plate that the hinges of bend.hinge model.
  *
- * A small bending b (2 x 2, second derivatives of the deflection) opens the hinge along direction t, with
- * n normal to it in the plane, on the equilateral lattice of edge l by
- *     theta = sqrt(3)/2 l (b_nn - b_tt/3),
- * and with k = (2/sqrt(3)) D the energy per area is 1/2 D sum (b_nn - b_tt/3)^2 over the three directions,
- * which is
- *     W = 1/2 D ((tr b)^2 - 8/3 det b):    an isotropic plate with nu = -1/3,
- * and a free narrow strip with E I = (8/9) D w. Simply supported plates with straight sides do not feel
- * nu.
+ * Let b (2 x 2) be the second derivatives of a small deflection. On the equilateral lattice with edge l it
+ * opens the hinge along direction t, with n normal to it in the plane, by theta = sqrt(3)/2 l (b_nn -
+ * b_tt/3). With k = (2/sqrt(3)) D the energy per area is 1/2 D sum (b_nn - b_tt/3)^2 over the three
+ * directions, which is
+ *     W = 1/2 D ((tr b)^2 - 8/3 det b):
+ * an isotropic plate with nu = -1/3. A free narrow strip has E I = (8/9) D w. The deflection of simply
+ * supported plates with straight sides does not depend on nu.
  *
- * Statics here is backward Euler with a step of 1e6 s: inertia M/h^2 is below 1e-12 of every stiffness, so
- * each step is a Newton solve of the equilibrium. Deflections are 1e-3 thicknesses, so the membrane, which
- * answers with (w/h)^2, adds 1e-6.
+ * Statics here is backward Euler with a step of 1e6 s: the inertia M/h^2 is below 1e-12 of every stiffness,
+ * so each step is a Newton solve of the equilibrium. Deflections are 1e-3 thicknesses, so the membrane,
+ * whose part is (w/h)^2, adds 1e-6.
  */
 #include "mesh/mesh.h"
 #include "support/scene.h"
@@ -49,8 +48,8 @@ static void add_triangle(int a, int b, int c)
 }
 
 /*
- * A rectangle of `rows` rows (even) of equilateral triangles, `columns` edges along x, with straight
- * sides: every second row begins and ends with half a triangle. Its whole rim is held.
+ * A rectangle of `rows` rows (even) of equilateral triangles, `columns` edges along x, with straight sides:
+ * every second row begins and ends with half a triangle. All of its rim is pinned.
  *     even row: A_0 ... A_n at 0, l ... n l;     odd row: B_0 ... B_n+1 at 0, l/2, 3l/2 ... n l
  */
 static void make_plate(int columns, int rows, double l)
@@ -76,7 +75,7 @@ static void make_plate(int columns, int rows, double l)
     }
 }
 
-/* The lattice of the grid "equilateral", `rows` long and `columns` edges wide. Rows 0 and 1 are held. */
+/* The lattice of the grid "equilateral", `rows` long and `columns` edges wide. Rows 0 and 1 are pinned. */
 static void make_strip(int columns, int rows, double l)
 {
     const int side = columns + 1;
@@ -94,7 +93,7 @@ static void make_strip(int columns, int rows, double l)
 
 /* ---- Scenes ---- */
 
-#define MODULUS   1e3 /* [Pa]; a soft thick sheet keeps the membrane's noise below the hinges' forces */
+#define MODULUS   1e3 /* [Pa]; soft and thick: rounding of the membrane is below the hinge forces */
 #define THICKNESS 0.1
 #define DENSITY   0.2 /* per area */
 
@@ -152,8 +151,8 @@ static double deepest(const scene *s)
 #define GRID_EDGES 8
 #define GRID_EDGE  0.1
 
-/* Energy per area of the hinges: mean of 1/2 k theta^2 over the hinges of each direction, one of each on the
- * area of a node. *uneven: the largest relative spread of |theta| within a direction. */
+/* Energy per area of the hinges: the mean of 1/2 k theta^2 over the hinges of each direction, with one of
+ * each in the area of a node. *uneven: the largest relative spread of |theta| within a direction. */
 static double hinge_density(scene *s, double *uneven)
 {
     const drape_state *state = scene_state(s);
@@ -209,10 +208,11 @@ static void wrap(scene *s, double kappa, double angle)
     }
 }
 
-/* Rolled up in any direction, a sheet has 1/2 D kappa^2. All hinges of a direction are equal, since the
- * wrapped lattice is its own image under the screw motions of the cylinder. Chords make the error: of an
- * arc s its height is wrong by the share (kappa s)^2/12 and its base by (kappa s)^2/6, s <= l, so an angle
- * by at most (kappa l)^2/4 of the largest, the energy by twice that; and halving kappa l quarters it. */
+/* Rolled up in any direction, a sheet has the energy 1/2 D kappa^2 per area. All hinges of a direction are
+ * equal, since the screw motions of the cylinder map the wrapped lattice to itself. The error is that of
+ * chords: for an arc s the height is wrong by the share (kappa s)^2/12 and the base by (kappa s)^2/6, s <=
+ * l, so an angle by at most (kappa l)^2/4 of the largest, the energy by twice that; half the kappa l gives
+ * a quarter of it. */
 START_TEST(rolled_sheet_has_the_energy_of_the_plate)
 {
     static const double angles[] = {0, 0.3, 0.5235987755982988, 1.1, 1.5707963267948966};
@@ -227,7 +227,8 @@ START_TEST(rolled_sheet_has_the_energy_of_the_plate)
             /* DBL_EPSILON of coordinates of 1 m over l, against angles of 0.05 */
             assert_below(uneven, 1e-12);
         }
-        /* Second order, with (kappa l)^2 = 1 % of fourth order mixed in; along an edge it is exact. */
+        /* Second order, with (kappa l)^2 = 1 % of fourth order added; for rolling along an edge it is
+         * exact. */
         if (error[1] > 1e-9)
             ck_assert_double_eq_tol(error[0] / error[1], 4, 4 * 0.05);
     }
@@ -235,7 +236,7 @@ START_TEST(rolled_sheet_has_the_energy_of_the_plate)
 }
 END_TEST
 
-/* A paraboloid y = 1/2 X.bX so shallow that slopes are below 1e-3: all is linear but for their squares. */
+/* A paraboloid y = 1/2 X.bX so shallow that slopes are below 1e-3: all is linear except for their squares. */
 START_TEST(double_curvature_has_the_energy_of_the_plate)
 {
     static const double bends[][3] = {{1, 0, 0}, {1, 1, 0}, {1, -1, 0}, {0, 0, 1}, {0.613, -0.241, 0.377}};
@@ -249,8 +250,8 @@ START_TEST(double_curvature_has_the_energy_of_the_plate)
             scene_state(&s)->x[3 * i + 1] = 0.5 * (a * X[0] * X[0] + b * X[2] * X[2]) + c * X[0] * X[2];
             slope = fmax(slope, hypot(a * X[0] + c * X[2], b * X[2] + c * X[0]));
         }
-        /* Normals and lengths are off by slope^2; theta is a difference of two slopes, each from an edge
-         * to an apex, of one triangle: both see the same first-order slope, so a few slope^2 of theta
+        /* Normals and lengths are off by slope^2. theta is a difference of two slopes, each from an edge to
+         * the apex of one triangle: both have the same slope to first order, so a few slope^2 of theta
          * remain. */
         assert_below(fabs(hinge_density(&s, &uneven) / exact - 1), 4 * slope * slope);
         assert_below(uneven, 4 * slope * slope);
@@ -262,7 +263,7 @@ END_TEST
 /* ---- Plates ---- */
 
 /* Deflection in the middle of a simply supported rectangle a x b under q = 1, by Navier's double series,
- * for W = 1/2 (p (b_xx^2 + b_yy^2) + ...) of which a product of sines sees p (m^4/a^4 + n^4/b^4) + r m^2
+ * for W = 1/2 (p (b_xx^2 + b_yy^2) + ...), in which a product of sines has p (m^4/a^4 + n^4/b^4) + r m^2
  * n^2/(a b)^2. */
 static double navier(double a, double b, double p, double r)
 {
@@ -284,13 +285,14 @@ static double plate_deflection(scene *s, double q)
 }
 
 /*
- * Square plate on all sides. Of a deflection sin sin, b_xy along the two sides that cut triangles in half
- * makes an error of first order: under a pure twist w = x y, x from the side, the half triangle stays
- * level, so that the hinge to its whole neighbour opens as every other does, but has k = D l^2/(A/2 + A),
- * 4/3 of the others'. Its place is l/2 wide. Twist energy there is 1/2 D 8/3 (pi/a)^4 a/2 per unit width
- * and side, of the whole 1/2 D (pi/a)^4 a^2: the plate is stiffer by 2 x 8/3 x 1/2 x 1/3 x 1/2 l/a = 4
- * l/(9 a). Sides along rows lack only hinges that a twist does not open. The rest is of second order: the
- * lattice's error on sin sin is (pi l/a)^2 times coefficients of Taylor series, below 1/2.
+ * A square plate supported on all sides. For a deflection sin sin, b_xy along the two sides that cut
+ * triangles in half causes an error of first order: under a pure twist w = x y, x from the side, the half
+ * triangle stays level, so the hinge to its whole neighbour opens as every other does, but has k = D
+ * l^2/(A/2 + A), 4/3 of the others'. Its region is l/2 wide. The twist energy there is 1/2 D 8/3 (pi/a)^4
+ * a/2 per unit width and side, of the total 1/2 D (pi/a)^4 a^2: the plate is stiffer by 2 x 8/3 x 1/2 x 1/3
+ * x 1/2 l/a = 4 l/(9 a). Sides along rows lack only hinges that a twist does not open. All else is of
+ * second order: the error of the lattice for sin sin is (pi l/a)^2 times coefficients of Taylor series,
+ * below 1/2.
  */
 START_TEST(simply_supported_square_plate)
 {
@@ -326,12 +328,13 @@ static double square_grid_ratio(int cells, const char *diagonals)
 }
 
 /*
- * Right triangles are not an isotropic plate, however fine. Alternating diagonals have two kinds of node,
- * one of which may stand out by eta s^2; hinges open by s (b_xx - 2 eta), s (b_yy - 2 eta) and sqrt(2) s
- * (+-b_xy + 2 eta), and with the eta of least energy, tr b/12,
+ * Right triangles are not an isotropic plate, however fine the mesh. Alternating diagonals have two kinds
+ * of node, one of which may be displaced by eta s^2; hinges open by s (b_xx - 2 eta), s (b_yy - 2 eta) and
+ * sqrt(2) s (+-b_xy + 2 eta), and with the eta of least energy, tr b/12,
  *     W = 1/2 D (5/6 (b_xx^2 + b_yy^2) - 1/3 b_xx b_yy + 4 b_xy^2),
- * whose simply supported plate has a Navier series with 5/6 (m^4 + n^4) + 11/3 m^2 n^2. The grid goes to
- * that, not to the plate; no triangle is cut at the rim, so the error is of second order as above.
+ * whose simply supported plate has a Navier series with 5/6 (m^4 + n^4) + 11/3 m^2 n^2. The grid converges
+ * to that and not to the isotropic plate; the rim cuts no triangle, so the error is of second order as
+ * above.
  */
 START_TEST(alternating_right_triangles_converge_to_another_plate)
 {
@@ -343,9 +346,9 @@ START_TEST(alternating_right_triangles_converge_to_another_plate)
 END_TEST
 
 /*
- * Parallel diagonals: W = 1/2 D (b_xx^2 + b_yy^2 + 6 b_xy^2 +- 2 b_xy tr b). The term with the sign
- * couples bending and twist and only adds compliance to what sines alone give, 1 x (m^4 + n^4) + 6 m^2
- * n^2: a lower bound of .50 on the deflection. No closed form above; what this holds is the gap of
+ * Parallel diagonals: W = 1/2 D (b_xx^2 + b_yy^2 + 6 b_xy^2 +- 2 b_xy tr b). The term with the sign couples
+ * bending and twist and only adds compliance to that of sines alone, 1 x (m^4 + n^4) + 6 m^2 n^2: a lower
+ * bound of .50 on the deflection. There is no closed form for it; this test checks the gap stated in
  * physics.md, .555 of the plate at 160 rows, within s/a.
  */
 START_TEST(parallel_right_triangles_are_half_as_soft)
@@ -372,15 +375,15 @@ static double strip_length(void)
 }
 
 /*
- * A strip clamped level under its own weight. E I of e edges: a bending kappa opens the e level hinges of
- * a row by kappa - c/3 and the 2 e - 1 slanted ones by 2/3 c (times sqrt(3)/2 l), c the curvature across;
- * the c of least energy gives E I = D e l (8 e - 4)/(9 e - 4), 8/9 D w for a wide one. Two held rows clamp
- * at their middle.
+ * A strip clamped horizontally under its own weight. E I of e edges: a bending kappa opens the e level
+ * hinges of a row by kappa - c/3 and the 2 e - 1 slanted ones by 2/3 c (times sqrt(3)/2 l), c the curvature
+ * across; the c of least energy gives E I = D e l (8 e - 4)/(9 e - 4), 8/9 D w for a wide one. Two pinned
+ * rows clamp it at their middle.
  *
- * The clamp keeps c = 0, so up to one width w from it the strip is between that and D w: the deflection is
- * smaller by at most (D w/EI - 1) times the share of the first width, 1 - (1 - w/L)^4. Where exactly the
- * clamp is, and the half loaded row at the tip, are known to one row: of L^4, 4 row/L at the very worst.
- * They are symmetric about the middle of a row to leading order, which leaves a quarter of it.
+ * The clamp enforces c = 0, so up to one width w from it the strip is between that and D w: the deflection
+ * is smaller by at most (D w/EI - 1) times the share of the first width, 1 - (1 - w/L)^4. The position of
+ * the clamp, and the half loaded row at the tip, are uncertain by one row: of L^4, 4 row/L at most. They
+ * are symmetric about the middle of a row to leading order, which leaves a quarter of it.
  */
 static double strip_rigidity(void)
 {
@@ -422,9 +425,9 @@ START_TEST(narrow_cantilever_in_small_deflection)
 END_TEST
 
 /* theta'' + G (1 - s) cos theta = 0, G = rho g w L^3/EI = 10: drop over reach 1.06680232. It grows at most
- * in proportion to G and falls with E I likewise, so the bounds are those above. The thin sheet stretches
- * by rho g L/(E h) = G (h/L)^2/12, 1e-4. Steps of 1 s, long against the slowest swing, come to rest: no
- * kinetic energy is left. */
+ * in proportion to G, and so falls at most in inverse proportion to E I: the bounds are those above. The
+ * thin sheet stretches by rho g L/(E h) = G (h/L)^2/12, 1e-4. Steps of 1 s, long compared with the slowest
+ * swing, end at rest: no kinetic energy is left. */
 START_TEST(heavy_cantilever)
 {
     const double L = strip_length(), wide = STRIP_COLUMNS * STRIP_EDGE, G = 10;
@@ -436,7 +439,7 @@ START_TEST(heavy_cantilever)
     const drape_energy energy = drape_sim_energy(s.sim);
     assert_below(energy.kinetic, 1e-12 * energy.elastic);
     ck_assert_int_eq(s.unconverged, 0);
-    /* The clamp is half a row before row 1, which is at z = - one row. */
+    /* The clamp is half a row before row 1, which is at z = -(one row). */
     const double reach = -tip(&s, 2) - 0.5 * sqrt(3.0) / 2 * STRIP_EDGE;
     const double excess = -tip(&s, 1) / reach / 1.06680232 - 1;
     assert_below(excess, ROW_SHARE);

@@ -1,7 +1,7 @@
 /*
- * test_dep.c: what broke the DEP report's program does not break Drape. There six Newton iterations
- * without a check were accepted whatever came of them: at 169 nodes a step of 0.02 s or more ended in a
- * cloud of points. The larger sheets that broke are in test_dep_slow.c.
+ * test_dep.c: cases in which the DEP report's program failed and Drape does not. That program accepted six
+ * Newton iterations whatever their residual: at 169 nodes a step of 0.02 s or more ended in a cloud of
+ * points. The larger sheets that failed are in test_dep_slow.c.
  */
 #include "support/dep.h"
 
@@ -21,8 +21,8 @@ START_TEST(what_broke_the_report_does_not_break_drape)
 }
 END_TEST
 
-/* The report's own mode goes on with what it has, and the log says so of every such step: a status > 0, a
- * reason that is not "converged". Tolerance 0.1 k_b in the sum norm, k_b = 2/sqrt(3) E h^3/12. */
+/* The report's own mode accepts steps that have not converged, and the log marks every such step: a status
+ * > 0, a reason other than "converged". Tolerance 0.1 k_b in the sum norm, k_b = 2/sqrt(3) E h^3/12. */
 START_TEST(the_reports_own_mode_never_claims_convergence)
 {
     static const dep_case mode = {"side 12, dt 0.02, as the report",

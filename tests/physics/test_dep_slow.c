@@ -1,5 +1,5 @@
-/* test_dep_slow.c: the larger sheets that broke the DEP report's program (see test_dep.c), minutes of
- * them. */
+/* test_dep_slow.c: the larger sheets on which the DEP report's program failed (see test_dep.c); takes
+ * minutes. */
 #include "support/dep.h"
 #include "support/optional.h"
 

@@ -1,7 +1,7 @@
 /*
- * test_drop.c: cloth that falls on things. Under every row and on every kind of collider no vertex, edge or
- * face is ever inside, by a check of its own (support/solids.h), in states and in frames between them; cloth
- * that falls on itself never passes through itself.
+ * test_drop.c: cloth that falls on things. With every integrator and on every kind of collider no vertex,
+ * edge or face is ever inside, according to a separate check (support/solids.h), neither in states nor in
+ * frames between them; cloth that falls on itself never passes through itself.
  */
 #include "geometry/intersect.h"
 #include "support/scene.h"
@@ -11,8 +11,8 @@
 
 #define DEEPEST 1e-9 /* [m] */
 
-static const char *const rows[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};
-#define ROWS (sizeof rows / sizeof *rows)
+static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};
+#define METHODS (sizeof methods / sizeof *methods)
 
 /* ---- Solids ---- */
 
@@ -22,7 +22,7 @@ static double in_cylinder(const double *x) /* axis z, radius 0.08, length 0.2 */
 }
 
 static double in_round_box(
-    const double *x) /* size 0.16 0.12 0.2, rounding 0.03: from a core that much smaller */
+    const double *x) /* size 0.16 0.12 0.2, rounding 0.03: the core is smaller by that */
 {
     const double beyond[3] = {fmax(fabs(x[0]) - 0.05, 0), fmax(fabs(x[1]) - 0.03, 0),
                               fmax(fabs(x[2]) - 0.07, 0)};
@@ -36,7 +36,7 @@ static const char octahedron[] = "v 0.15 0 0\nv -0.15 0 0\nv 0 0.15 0\nv 0 -0.15
 
 static const struct target {
     const char *text;
-    double top; /* [m] of it */
+    double top; /* [m] highest point */
     solid body;
     bool sharp; /* edges or corners that may pierce a sheet */
 } targets[] = {
@@ -112,7 +112,7 @@ static void leave_folder(void)
 typedef struct watch {
     scene *s;
     const solid *body;
-    double state, frame; /* [m] the deepest in any of them */
+    double state, frame; /* [m] deepest penetration in any state, in any frame */
     int64_t crossings;   /* in frames */
     int frames;
 } watch;
@@ -121,15 +121,15 @@ static double deepest(const watch *w, const double *x, double t)
 {
     const drape_model *m = w->s->model;
     const drape_collider_motion at = drape_model_collider(m, 0, t);
-    double most = -INFINITY;
+    double max = -INFINITY;
     for (int32_t f = 0; f < m->triangle_count; f++) {
         double corner[3][3];
         for (int a = 0; a < 3; a++)
             for (int k = 0; k < 3; k++)
                 corner[a][k] = x[3 * m->triangle[3 * f + a] + k] - at.displacement[k];
-        most = fmax(most, solid_depth(w->body, corner, DEEPEST));
+        max = fmax(max, solid_depth(w->body, corner, DEEPEST));
     }
-    return most;
+    return max;
 }
 
 static drape_status look(void *user, const drape_event *event)
@@ -153,8 +153,9 @@ static drape_status look(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* 0.3 m wide and centered but for some millimetres, so that nothing is symmetric; frames between steps. */
-static scene open_drop(const char *row, const struct target *on, double speed)
+/* 0.3 m wide and off center by some millimetres, so that nothing is symmetric; there are frames between
+ * steps. */
+static scene open_drop(const char *method, const struct target *on, double speed)
 {
     return scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 7, 'width': 0.3, 'height': "
@@ -164,7 +165,7 @@ static scene open_drop(const char *row, const struct target *on, double speed)
         " 'terms': ['stretch.edge', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 2e-3}]}],"
         " 'colliders': [%s], 'contact': {'distance': 2e-3}, 'integrator': {'method': '%s', 'dt': 0.01},"
         " 'duration': 1, 'frame_rate': 60}",
-        on->top + 0.03, -speed, on->text, row);
+        on->top + 0.03, -speed, on->text, method);
 }
 
 START_TEST(nothing_is_ever_inside)
@@ -172,8 +173,8 @@ START_TEST(nothing_is_ever_inside)
     enter_folder();
     double states = -INFINITY, frames = -INFINITY;
     for (size_t i = 0; i < TARGETS; i++)
-        for (size_t k = 0; k < ROWS; k++) {
-            scene s = open_drop(rows[k], &targets[i], 0.8);
+        for (size_t k = 0; k < METHODS; k++) {
+            scene s = open_drop(methods[k], &targets[i], 0.8);
             watch w = {.s = &s, .body = &targets[i].body, .state = -INFINITY, .frame = -INFINITY};
             ck_assert_int_eq(drape_sim_observe(s.sim, look, &w), DRAPE_OK);
             scene_advance(&s, 0.25);
@@ -181,7 +182,7 @@ START_TEST(nothing_is_ever_inside)
             printf(
                 "# %s, %.20s: %lld steps, %lld rejected, %lld iterations, %.2f s; deepest in states %.3g, in "
                 "frames %.3g\n",
-                rows[k], targets[i].text, (long long)did.steps_accepted, (long long)did.steps_rejected,
+                methods[k], targets[i].text, (long long)did.steps_accepted, (long long)did.steps_rejected,
                 (long long)did.newton_iterations, did.wall_steps, w.state, w.frame);
             ck_assert_int_eq(w.frames, 16);
             states = fmax(states, w.state);
@@ -195,10 +196,10 @@ START_TEST(nothing_is_ever_inside)
 END_TEST
 
 /* A ball that rises into a sheet held at its corners, and out of it again. */
-START_TEST(nor_in_what_moves)
+START_TEST(nothing_is_ever_inside_a_moving_collider)
 {
     const solid ball = {.round = true, .radius = 0.1};
-    for (size_t k = 0; k < 2 * ROWS; k++) {
+    for (size_t k = 0; k < 2 * METHODS; k++) {
         scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 7, 'rows': 7, 'width': 0.3,"
             " 'height': 0.3, 'transform': {'translate': [-0.147, 0.12, 0.155]}},"
@@ -208,14 +209,15 @@ START_TEST(nor_in_what_moves)
             " 'colliders': [{'type': 'sphere', 'center': [0,0,0], 'radius': 0.1, 'friction': 0.5, 'track':"
             " [[0, [0,0,0]], [0.1, [0.01,0.08,0]], [0.2, [0,0,0.01]]]}], 'contact': {'distance': 2e-3},"
             " 'integrator': {'method': '%s', 'dt': 0.01%s}, 'duration': 1, 'frame_rate': 60}",
-            rows[k % ROWS], k < ROWS ? "" : ", 'on_failure': 'accept', 'max_iterations': 2");
+            methods[k % METHODS], k < METHODS ? "" : ", 'on_failure': 'accept', 'max_iterations': 2");
         watch w = {.s = &s, .body = &ball, .state = -INFINITY, .frame = -INFINITY};
         ck_assert_int_eq(drape_sim_observe(s.sim, look, &w), DRAPE_OK);
         scene_advance(&s, 0.25);
         const drape_statistics did = drape_sim_statistics(s.sim);
-        printf("# %s: %lld steps, %lld rejected; deepest in states %.3g, in frames %.3g\n", rows[k % ROWS],
-               (long long)did.steps_accepted, (long long)did.steps_rejected, w.state, w.frame);
-        ck_assert(w.state > -0.002); /* it was touched */
+        printf("# %s: %lld steps, %lld rejected; deepest in states %.3g, in frames %.3g\n",
+               methods[k % METHODS], (long long)did.steps_accepted, (long long)did.steps_rejected, w.state,
+               w.frame);
+        ck_assert(w.state > -0.002); /* the ball reached the sheet */
         assert_below(w.state, DEEPEST);
         assert_below(w.frame, DEEPEST);
         scene_close(&s);
@@ -225,25 +227,25 @@ END_TEST
 
 /* ---- Starts that are not free ---- */
 
-/* The sheet begins on the top or 0.5 mm inside of it. It comes out, and then it stays out. */
+/* The sheet begins on the top or 0.5 mm inside. It comes out and then stays outside. */
 START_TEST(what_begins_inside_comes_out)
 {
     enter_folder();
     for (size_t i = 0; i < TARGETS; i++)
-        for (size_t k = 0; k < 2 * ROWS; k++) {
-            if (targets[i].sharp && k < ROWS)
+        for (size_t k = 0; k < 2 * METHODS; k++) {
+            if (targets[i].sharp && k < METHODS)
                 continue;
             struct target on = targets[i];
-            on.top -= 0.03 + (k < ROWS ? 0.0005 : 0);
-            scene s = open_drop(rows[k % ROWS], &on, 0);
+            on.top -= 0.03 + (k < METHODS ? 0.0005 : 0);
+            scene s = open_drop(methods[k % METHODS], &on, 0);
             watch w = {.s = &s, .body = &targets[i].body, .state = -INFINITY, .frame = -INFINITY};
             const double before = deepest(&w, drape_sim_positions(s.sim), 0);
             scene_advance(&s, 0.05);
             const double after = deepest(&w, drape_sim_positions(s.sim), 0.05);
             ck_assert_int_eq(drape_sim_observe(s.sim, look, &w), DRAPE_OK);
             scene_advance(&s, 0.15);
-            printf("# %s, %.20s: from %.3g m to %.3g m\n", rows[k % ROWS], on.text, before, after);
-            ck_assert(k >= ROWS || before > 1e-4);
+            printf("# %s, %.20s: from %.3g m to %.3g m\n", methods[k % METHODS], on.text, before, after);
+            ck_assert(k >= METHODS || before > 1e-4);
             assert_below(fmax(after, fmax(w.state, w.frame)), DEEPEST);
             scene_close(&s);
         }
@@ -251,7 +253,7 @@ START_TEST(what_begins_inside_comes_out)
 }
 END_TEST
 
-/* A plate of 2 mm and a sheet at 20 m/s, which makes 0.2 m in a step. */
+/* A plate of 2 mm and a sheet at 20 m/s, which moves 0.2 m in a step. */
 START_TEST(nothing_tunnels)
 {
     const solid plate = {.planes = 6,
@@ -263,8 +265,8 @@ START_TEST(nothing_tunnels)
                                    {0, 0, -1, 0.3}}};
     const struct target on = {"{'type': 'box', 'center': [0,0,0], 'size': [0.6,0.002,0.6]}", 0.001, plate};
     int64_t collisions = 0;
-    for (size_t k = 0; k < ROWS; k++) {
-        scene s = open_drop(rows[k], &on, 20);
+    for (size_t k = 0; k < METHODS; k++) {
+        scene s = open_drop(methods[k], &on, 20);
         watch w = {.s = &s, .body = &plate, .state = -INFINITY, .frame = -INFINITY};
         double lowest = INFINITY;
         int64_t count;
@@ -272,7 +274,7 @@ START_TEST(nothing_tunnels)
         scene_advance(&s, 0.05);
         for (int32_t i = 0; i < s.model->node_count; i++)
             lowest = fmin(lowest, drape_sim_positions(s.sim)[3 * i + 1]);
-        printf("# %s: %lld steps; lowest %.4g m;", rows[k],
+        printf("# %s: %lld steps; lowest %.4g m;", methods[k],
                (long long)drape_sim_statistics(s.sim).steps_accepted, lowest);
         for (int i = 0; drape_sim_reason(s.sim, i, &count); i++) {
             printf(" %lld %s", (long long)count, drape_sim_reason(s.sim, i, NULL));
@@ -289,7 +291,7 @@ END_TEST
 
 /* ---- Cloth on itself ---- */
 
-static scene open_fold(const char *row, const char *self)
+static scene open_fold(const char *method, const char *self)
 {
     return scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 3, 'rows': 13, 'width': 0.05,"
@@ -299,16 +301,17 @@ static scene open_fold(const char *row, const char *self)
         " 'terms': ['stretch.edge', 'bend.hinge', {'type': 'damp.kelvin_voigt', 'beta': 2e-3}]}],"
         " 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': [0,1,0], 'friction': 0.4}],"
         " 'contact': {'distance': 2e-3}%s, 'integrator': {'method': '%s', 'dt': 0.01}, 'duration': 1}",
-        self, row);
+        self, method);
 }
 
-/* Dropped edge-on on a floor, a strip folds onto itself; what would pass through itself else does not. */
+/* A strip dropped edge-on onto a floor folds onto itself; it passes through itself only without
+ * self-contact. */
 START_TEST(a_fold_never_crosses_itself)
 {
     const solid floor = {.planes = 1, .plane = {{0, 1, 0, 0}}};
-    for (size_t k = 0; k <= ROWS; k++) {
-        scene s = open_fold(rows[k % ROWS],
-                            k < ROWS ? ", 'self_contact': {'thickness': 2e-3, 'friction': 0.2}" : "");
+    for (size_t k = 0; k <= METHODS; k++) {
+        scene s = open_fold(methods[k % METHODS],
+                            k < METHODS ? ", 'self_contact': {'thickness': 2e-3, 'friction': 0.2}" : "");
         watch w = {.s = &s, .body = &floor, .state = -INFINITY, .frame = -INFINITY};
         drape_intersections found;
         int64_t without = 0;
@@ -320,10 +323,10 @@ START_TEST(a_fold_never_crosses_itself)
         }
         const drape_statistics did = drape_sim_statistics(s.sim);
         printf("# %s%s: %lld steps, %lld rejected, %lld iterations, %.2f s; %lld crossings in %d frames\n",
-               rows[k % ROWS], k < ROWS ? "" : " without self_contact", (long long)did.steps_accepted,
-               (long long)did.steps_rejected, (long long)did.newton_iterations, did.wall_steps,
-               (long long)(k < ROWS ? w.crossings : without), w.frames);
-        if (k < ROWS)
+               methods[k % METHODS], k < METHODS ? "" : " without self_contact",
+               (long long)did.steps_accepted, (long long)did.steps_rejected, (long long)did.newton_iterations,
+               did.wall_steps, (long long)(k < METHODS ? w.crossings : without), w.frames);
+        if (k < METHODS)
             ck_assert_int_eq(w.crossings + without, 0);
         else
             ck_assert_int_gt(without, 0);
@@ -333,9 +336,9 @@ START_TEST(a_fold_never_crosses_itself)
 }
 END_TEST
 
-/* A sheet on one that is held, on a slope of tan a = 0.3: with mu = 0.6 it creeps at most at 0.3 eps once it
- * has settled, within the millimetres of its fall onto the other's edges; with 0 it slides up to g sin a
- * t^2/2 and be's h/t = 5 %, less what be takes of it where edges ride over edges: less than half. */
+/* A sheet on a pinned one, on a slope of tan a = 0.3. With mu = 0.6 it creeps at most at 0.3 eps once it
+ * has settled, within the millimetres of its fall onto the other's edges. With 0 it slides up to g sin a
+ * t^2/2 and be's h/t = 5 %, less what be dissipates where edges slide over edges: less than half. */
 START_TEST(friction_holds_layers)
 {
     const double t = 0.2, slope = 0.3, fall = 9.81 / hypot(1, slope);
@@ -354,26 +357,26 @@ START_TEST(friction_holds_layers)
             " 'contact': {'friction': '%s'}, 'integrator': {'dt': 0.01}, 'duration': 1}",
             slope * fall, -fall, mu, i / 2 ? "lagged" : "implicit");
         const int32_t first = 49, count = 25;
-        double way = 0;
+        double slid = 0;
         scene_advance(&s, t);
         for (int32_t n = first; n < first + count; n++)
-            way += (drape_sim_positions(s.sim)[3 * n] - drape_model_rest_positions(s.model)[3 * n]) / count;
+            slid += (drape_sim_positions(s.sim)[3 * n] - drape_model_rest_positions(s.model)[3 * n]) / count;
         const double slide = slope * fall * t * t / 2;
-        printf("# mu %g: %.4g m, %.4g m without friction; %.3g J dissipated\n", mu, way, slide,
+        printf("# mu %g: %.4g m, %.4g m without friction; %.3g J dissipated\n", mu, slid, slide,
                drape_sim_energy(s.sim).dissipated);
         if (mu > 0)
-            assert_below(fabs(way), 2e-3);
+            assert_below(fabs(slid), 2e-3);
         else
-            ck_assert(way > 0.5 * slide && way < 1.1 * slide);
+            ck_assert(slid > 0.5 * slide && slid < 1.1 * slide);
         ck_assert((drape_sim_energy(s.sim).dissipated > 0) == (mu > 0));
         scene_close(&s);
     }
 }
 END_TEST
 
-/* Layers are no volumes: what starts below the plane's surface is told as it stands, in both signs of the
- * depth. */
-START_TEST(what_is_inside_a_collider_is_told)
+/* The reported depth is that of the sheet without its thickness. One sheet is above the plane, the other
+ * below it. */
+START_TEST(what_is_inside_a_collider_is_reported)
 {
     static const double heights[] = {0.02, -0.01};
     for (int i = 0; i < 2; i++) {
@@ -395,5 +398,6 @@ START_TEST(what_is_inside_a_collider_is_told)
 }
 END_TEST
 
-SUITE("drop", what_is_inside_a_collider_is_told, nothing_is_ever_inside, nor_in_what_moves,
-      what_begins_inside_comes_out, nothing_tunnels, a_fold_never_crosses_itself, friction_holds_layers)
+SUITE("drop", what_is_inside_a_collider_is_reported, nothing_is_ever_inside,
+      nothing_is_ever_inside_a_moving_collider, what_begins_inside_comes_out, nothing_tunnels,
+      a_fold_never_crosses_itself, friction_holds_layers)

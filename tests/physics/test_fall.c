@@ -1,6 +1,6 @@
 /*
- * test_fall.c: what holds exactly for backward Euler whatever the forces inside the sheet: they have no
- * resultant, no moment, and do no work on rigid motion.
+ * test_fall.c: exact properties of backward Euler for any forces within the sheet: these have no resultant
+ * and no moment, and do no work on rigid motion.
  *
  * Bounds come from two sources: residuals r that the attempts report, and round-off of the forces
  * (force_noise).
@@ -17,7 +17,7 @@
 
 static const double spring = 0.8660254037844386 * MODULUS * THICKNESS; /* of an inner edge [N/m] */
 
-/* A free sheet with everything that acts inside. terms: more of them, each ending in a comma. */
+/* A free sheet with all kinds of internal forces. terms: more terms, each followed by a comma. */
 static scene sheet(const char *terms, double gravity, const char *velocity)
 {
     return scene_open(
@@ -30,13 +30,13 @@ static scene sheet(const char *terms, double gravity, const char *velocity)
 
 static const char damping[] = "{'type': 'damp.kelvin_voigt', 'beta': 0.013},";
 
-/* Numbers of [-1, 1], always the same. */
+/* Numbers in [-1, 1], the same in every run. */
 static double wobble(size_t i)
 {
     return sin(1.7 * (double)i + 0.3) * cos(0.9 * (double)(i * i % 101));
 }
 
-/* Nodes moved by up to a and thrown with up to b m/s, in all directions. */
+/* Moves nodes by up to a, and gives them velocities of up to b m/s, in all directions. */
 static void shake(scene *s, double a, double b)
 {
     drape_state *state = scene_state(s);
@@ -102,9 +102,9 @@ START_TEST(free_fall_is_exact)
 }
 END_TEST
 
-/* The same fall with and without dashpots differs by no more than each from the exact one; and damping takes
- * no work: strain rates are round-off, 4 DBL_EPSILON size/(L h), so forces are BETA K times that of a length,
- * and the work is that force over the fall, 1.5 m, on every node. */
+/* Falls with and without dashpots differ by at most the sum of their differences from the exact fall.
+ * Damping takes no work: strain rates are round-off, 4 DBL_EPSILON size/(L h), so forces are BETA K times
+ * that of a length, and the work is that force over the fall, 1.5 m, on every node. */
 START_TEST(falling_cloth_does_not_feel_its_damping)
 {
     const int steps = 50;
@@ -126,9 +126,8 @@ START_TEST(falling_cloth_does_not_feel_its_damping)
 }
 END_TEST
 
-/* What backward Euler itself takes in free fall is M g^2 h^2/2 a step: v1 = v0 - g h, x1 = x0 + h v1. The
- * log of energies says so: numerical. Errors: of positions (as above) times M g, of velocities times M v,
- * twice. */
+/* Backward Euler itself loses M g^2 h^2/2 a step in free fall: v1 = v0 - g h, x1 = x0 + h v1. The log of
+ * energies has it as numerical. Errors: of positions (as above) times M g, of velocities times M v, twice. */
 START_TEST(energy_lost_in_free_fall_is_reported)
 {
     const int steps = 50;
@@ -142,7 +141,7 @@ START_TEST(energy_lost_in_free_fall_is_reported)
 }
 END_TEST
 
-/* Turns by `angle` about an axis that is no symmetry of anything, then moves; out may be in. */
+/* Rotates by `angle` about an axis without symmetry; out may be in. */
 static void turn(size_t nodes, const double *in, double angle, double *out)
 {
     const double u[3] = {2.0 / 7, 3.0 / 7, 6.0 / 7}, c = cos(angle), s = sin(angle);
@@ -164,12 +163,12 @@ static double largest(const double *a, size_t n)
 }
 
 /*
- * Damping forces at a state turned rigidly, of a sheet that is bent and stretched. Both forms of the rate
- * are zero but for round-off: v = omega x x in continuous time, and q(x1) = q(x0) between two turned
- * states in a step. Bound: an edge's rate is wrong by the round-off of a velocity over L, a hinge's by the
- * same times |grad theta| <= 4/H, and the forces are beta k times |grad q| times that: springs 6 beta K,
- * hinges 12 a node, beta D-like k_b (4/H)^2, H >= L/2 here. The same speeds along the strain give forces
- * of beta K v: the last line says that the test would see them.
+ * Damping forces at a rigidly rotated state of a bent and stretched sheet. Both forms of the rate are zero
+ * up to round-off: v = omega x x in continuous time, and q(x1) = q(x0) between two rotated states in a
+ * step. Bound: an edge's rate is wrong by the round-off of a velocity over L, a hinge's by the same times
+ * |grad theta| <= 4/H, and the forces are beta k times |grad q| times that: springs 6 beta K, hinges 12 a
+ * node, beta D-like k_b (4/H)^2, H >= L/2 here. The same speeds along the strain give forces of beta K v:
+ * the last assertion shows that the test would detect them.
  */
 START_TEST(turning_cloth_does_not_feel_its_damping)
 {
@@ -184,7 +183,7 @@ START_TEST(turning_cloth_does_not_feel_its_damping)
     shake(&s, 0.15 * LENGTH, 0);
     memcpy(bent, state->x, sizeof bent);
     turn(NODES, bent, 0.7, x0);
-    /* v = d/dt of the turn: the turn by a quarter more, of what is normal to the axis */
+    /* v = d/dt of the rotation: a further quarter turn of the part normal to the axis */
     const double u[3] = {2.0 / 7, 3.0 / 7, 6.0 / 7};
     for (int i = 0; i < NODES; i++)
         for (int k = 0; k < 3; k++) {
@@ -211,8 +210,8 @@ START_TEST(turning_cloth_does_not_feel_its_damping)
 }
 END_TEST
 
-/* P' = sum of residuals: n steps change the momentum by n h nodes r at most in each direction, beside M g
- * t. */
+/* P' = sum of residuals: besides M g t, n steps change the momentum by at most n h nodes r in each
+ * direction. */
 START_TEST(linear_momentum_is_conserved)
 {
     const int steps = 40;
@@ -232,7 +231,7 @@ START_TEST(linear_momentum_is_conserved)
 END_TEST
 
 /* L1 = L0 + h sum m v1 x v0, since x1 x v1 = x1 x v0 + x1 x (v1 - v0), x1 = x0 + h v1, and internal forces
- * have no moment about anything. Residuals add h sum x1 x r: 2 h size nodes r. */
+ * have no moment about any point. Residuals add h sum x1 x r: 2 h size nodes r. */
 START_TEST(angular_momentum_of_backward_euler)
 {
     const int steps = 40;
@@ -260,9 +259,9 @@ START_TEST(angular_momentum_of_backward_euler)
 }
 END_TEST
 
-/* A level sheet in a medium: every node has the same mass per area, so v1 = (v0 + g h)/(1 + c h/rho)
- * exactly, with rho g/c in the end. Its energy goes into drag: c A v1 . h v1 a step. Velocities are off by
- * at most n h r sqrt(3 nodes)/m_min (see drift_bound). */
+/* A horizontal sheet in a medium: every node has the same mass per area, so v1 = (v0 + g h)/(1 + c h/rho)
+ * exactly, and rho g/c in the limit. Its energy is dissipated by drag: c A v1 . h v1 a step. Velocities are
+ * off by at most n h r sqrt(3 nodes)/m_min (see drift_bound). */
 START_TEST(drag_slows_a_falling_sheet)
 {
     const double c = 7, rho = 0.5;
@@ -279,11 +278,11 @@ START_TEST(drag_slows_a_falling_sheet)
             worst = fmax(worst, fabs(scene_state(&s)->v[i] - (i % 3 == 1 ? v : 0)));
     }
     const double r = s.residual + force_noise(spring, 1.5);
-    const double slip = steps * STEP * r * sqrt(3.0 * s.model->node_count) / scene_least_mass(&s);
+    const double slip = steps * STEP * r * sqrt(3.0 * s.model->node_count) / scene_min_mass(&s);
     assert_below(worst, slip);
     /* dW = 2 c A v dv t, v below 2 */
     assert_below(fabs(drape_sim_energy(s.sim).dissipated - work), 2 * c * area * 2 * slip * steps * STEP);
-    const double end = -rho * GRAVITY / c; /* of the speed's difference from it this factor is left: */
+    const double end = -rho * GRAVITY / c; /* this factor of the difference from the final speed remains: */
     ck_assert_double_eq_tol(v, end + (2 - end) * pow(1 + c * STEP / rho, -steps), 1e-13);
     scene_close(&s);
 }

@@ -1,8 +1,8 @@
 /*
  * test_friction.c: Coulomb's law against closed forms. A sheet on a plane has the same pressure everywhere,
- * so that it moves as one body: it sticks or slides, creeps as the smoothing says, stops where the
- * integrator's own recurrence says, is carried along by what moves under it. A strip over a post shows exp(mu
- * angle). The energy audit tells the work of friction and of moving colliders.
+ * so it moves as one body: it sticks or slides, creeps as the smoothing predicts, stops where the
+ * integrator's own recurrence predicts, and is carried along by a moving collider. A strip over a post
+ * shows exp(mu angle). The energy audit reports the work of friction and of moving colliders.
  */
 #include "contact/barrier.h"
 #include "support/scene.h"
@@ -18,14 +18,14 @@
 #define RTOL    1e-7  /* of ida */
 
 typedef struct sliding {
-    const char *row;
-    double dt, mu, slope; /* [s], [1], tan of the angle of the plane with the horizon; it falls along x */
+    const char *method;
+    double dt, mu, slope; /* [s], [1], tan of the plane's angle with the horizon; the plane falls along x */
     double velocity;      /* [m/s] down the slope at t = 0 */
     const char *contact, *collider; /* more settings, each after a comma */
 } sliding;
 
-/* The gap at which the barrier carries the weight: -K A b'(s) = m g cos a, the same for all nodes, for mass
- * and share of contact both go by area. b' rises from -inf.. to 0 at s = 1. */
+/* The gap at which the barrier carries the weight: -K A b'(s) = m g cos a. It is the same for all nodes,
+ * since both mass and contact area are proportional to the area. b' rises from -inf to 0 at s = 1. */
 static double resting_gap(const drape_model *m, double g)
 {
     const double wanted = SIGMA * g / m->contact.stiffness;
@@ -50,7 +50,8 @@ static scene open_sliding(const sliding *p)
         " 'colliders': [{'type': 'plane', 'point': [0,0,0], 'normal': [%.17g, %.17g, 0], 'friction': %g%s}],"
         " 'integrator': {'method': '%s', 'dt': %g, 'tolerance': %g, 'rtol': %g}, 'duration': 1}",
         WIDTH, HEIGHT, -degrees, p->velocity * c, -p->velocity * s, -GRAVITY, EPS,
-        p->contact ? p->contact : "", s, c, p->mu, p->collider ? p->collider : "", p->row, p->dt, TOL, RTOL);
+        p->contact ? p->contact : "", s, c, p->mu, p->collider ? p->collider : "", p->method, p->dt, TOL,
+        RTOL);
     const double gap = resting_gap(on.model, GRAVITY * c);
     drape_state *state = scene_state(&on);
     for (int32_t i = 0; i < on.model->node_count; i++) {
@@ -69,14 +70,14 @@ static double mass_of(const scene *s)
     return sum;
 }
 
-/* Of node i down the slope. */
+/* The component of node i down the slope. */
 static double along(const sliding *p, const double *of, int32_t i)
 {
     const double c = 1 / hypot(1, p->slope);
     return (of[3 * i] - p->slope * of[3 * i + 1]) * c;
 }
 
-/* The means over the nodes, and that no node differs from them by more than `spread`. */
+/* The mean over the nodes; asserts that no node differs from it by more than `spread`. */
 static double mean_along(const sliding *p, const scene *s, const double *of, double spread)
 {
     double mean = 0;
@@ -84,22 +85,22 @@ static double mean_along(const sliding *p, const scene *s, const double *of, dou
     for (int32_t i = 0; i < n; i++)
         mean += along(p, of, i) / n;
     for (int32_t i = 0; i < n && spread < INFINITY; i++)
-        ck_assert_msg(fabs(along(p, of, i) - mean) <= spread, "%s: node %d: %.12g, mean %.12g", p->row,
+        ck_assert_msg(fabs(along(p, of, i) - mean) <= spread, "%s: node %d: %.12g, mean %.12g", p->method,
                       (int)i, along(p, of, i), mean);
     return mean;
 }
 
-static double way_of(const sliding *p, scene *s, double t)
+static double slide_of(const sliding *p, scene *s, double t)
 {
     const double before = mean_along(p, s, drape_sim_positions(s->sim), INFINITY);
     scene_advance(s, t);
     return mean_along(p, s, drape_sim_positions(s->sim), INFINITY) - before;
 }
 
-static const char *const rows[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};
-#define ROWS (sizeof rows / sizeof *rows)
+static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};
+#define METHODS (sizeof methods / sizeof *methods)
 
-/* ida bounds errors of a step, in the norm of 2 n unknowns: one of them may have all of it. */
+/* ida bounds the error of a step in a norm over 2 n unknowns: one of them may have all of it. */
 static double ida_velocity(const scene *s)
 {
     return sqrt(2.0 * 3 * s->model->node_count) * RTOL * sqrt(GRAVITY * s->model->length);
@@ -107,48 +108,51 @@ static double ida_velocity(const scene *s)
 
 /* ---- Sticking and sliding ---- */
 
-/* At rest but for the creep, f(u/eps) = tan a/mu with f(y) = 2 y - y^2. The velocity goes to it as
- * exp(-t/tau), tau = eps/(2 mu g cos a (1 - y)) = 0.15 to 1.1 ms; 100 ms at 1 ms leave (1/(1 + h/tau))^100 of
- * be, 0.55^100 of midpoint: nothing. A residual r is an error r/(m g cos a mu f'/eps) of the velocity. */
+/* At rest except for the creep, f(u/eps) = tan a/mu with f(y) = 2 y - y^2. The velocity converges to it as
+ * exp(-t/tau), tau = eps/(2 mu g cos a (1 - y)) = 0.15 to 1.1 ms; 100 ms at 1 ms leave (1/(1 + h/tau))^100
+ * with be, 0.55^100 with midpoint: nothing. A residual r is an error r/(m g cos a mu f'/eps) of the
+ * velocity. */
 START_TEST(sticks_but_for_its_creep)
 {
     static const double shares[] = {0.5, 0.99};
-    for (size_t k = 0; k < ROWS; k++)
+    for (size_t k = 0; k < METHODS; k++)
         for (int i = 0; i < 4; i++) {
-            const sliding p = {.row = rows[k],
+            const sliding p = {.method = methods[k],
                                .dt = 1e-3,
                                .mu = 0.5,
                                .slope = 0.5 * shares[i % 2],
                                .contact = i / 2 ? ", 'friction': 'lagged'" : ""};
             scene s = open_sliding(&p);
             const double y = 1 - sqrt(1 - p.slope / p.mu), weight = GRAVITY / hypot(1, p.slope);
-            const double slope = scene_least_mass(&s) * weight * p.mu * 2 * (1 - y) / EPS;
-            /* residuals also tilt the sheet's gap: an error of the normal force of the same size */
+            const double slope = scene_min_mass(&s) * weight * p.mu * 2 * (1 - y) / EPS;
+            /* residuals also tilt the sheet and change its gap: an error of the normal force of the same
+             * size */
             const double bound =
-                strcmp(rows[k], "ida") == 0 ? ida_velocity(&s) : 4 * TOL / slope + 1e-9 * EPS;
+                strcmp(methods[k], "ida") == 0 ? ida_velocity(&s) : 4 * TOL / slope + 1e-9 * EPS;
             scene_advance(&s, 0.1);
             const double v = mean_along(&p, &s, drape_sim_velocities(s.sim), bound);
-            printf("# %s, tan a / mu = %g%s: creep %.9g of %.9g m/s\n", p.row, p.slope / p.mu, p.contact, v,
-                   y * EPS);
+            printf("# %s, tan a / mu = %g%s: creep %.9g of %.9g m/s\n", p.method, p.slope / p.mu, p.contact,
+                   v, y * EPS);
             assert_below(fabs(v - y * EPS), bound);
             scene_close(&s);
         }
 }
 END_TEST
 
-/* Where tan a > mu nothing holds: v >= (sin a - mu cos a) g t, by at most the eps that it may gain while
- * friction is not whole yet, and what gravity gives in one step: that in which friction begins. */
+/* If tan a > mu nothing holds the sheet: v >= (sin a - mu cos a) g t. The excess is at most eps, gained
+ * while friction is not yet complete, and the velocity that gravity gives in one step: the step in which
+ * friction begins. */
 START_TEST(slides_beyond_its_angle)
 {
-    for (size_t k = 0; k < ROWS; k++) {
-        const sliding p = {.row = rows[k], .dt = 1e-3, .mu = 0.5, .slope = 0.505};
+    for (size_t k = 0; k < METHODS; k++) {
+        const sliding p = {.method = methods[k], .dt = 1e-3, .mu = 0.5, .slope = 0.505};
         scene s = open_sliding(&p);
         const double t = 0.2, fall = GRAVITY / hypot(1, p.slope), v = (p.slope - p.mu) * fall * t;
         scene_advance(&s, t);
         const double got = mean_along(&p, &s, drape_sim_velocities(s.sim), EPS);
         ck_assert(v > 5 * EPS);
         ck_assert_msg(got > v * (1 - 1e-5) && got < v + EPS + p.slope * fall * p.dt,
-                      "%s: %g m/s, %g by Coulomb", p.row, got, v);
+                      "%s: %g m/s, %g by Coulomb", p.method, got, v);
         scene_close(&s);
     }
 }
@@ -156,43 +160,43 @@ END_TEST
 
 /* ---- How far it slides ---- */
 
-/* x_n of the rows for x'' = -a from v0. be: v0 t - a h^2 n (n + 1)/2. bdf2 is exact on parabolas, but its
- * first step is be's: e_1 = -a h^2/2 and e_{n+1} = (4 e_n - e_{n-1})/3, so e_n = 3/2 e_1 (1 - 3^-n). The
- * others are exact on parabolas. */
-static double way_in(const char *row, double v0, double a, double h, int n)
+/* x_n of the integrators for x'' = -a from v0. be: v0 t - a h^2 n (n + 1)/2. bdf2 is exact on parabolas,
+ * but its first step is be's: e_1 = -a h^2/2 and e_{n+1} = (4 e_n - e_{n-1})/3, so e_n = 3/2 e_1 (1 -
+ * 3^-n). The others are exact on parabolas. */
+static double slide_by_recurrence(const char *method, double v0, double a, double h, int n)
 {
     const double t = n * h, exact = v0 * t - a * t * t / 2;
-    if (strcmp(row, "be") == 0)
+    if (strcmp(method, "be") == 0)
         return v0 * t - a * h * h * n * (n + 1) / 2;
-    return strcmp(row, "bdf2") == 0 ? exact - 0.75 * a * h * h * (1 - pow(3, -n)) : exact;
+    return strcmp(method, "bdf2") == 0 ? exact - 0.75 * a * h * h * (1 - pow(3, -n)) : exact;
 }
 
 START_TEST(slides_as_far_as_it_should)
 {
     const int n = 25;
-    for (size_t k = 0; k < ROWS; k++)
+    for (size_t k = 0; k < METHODS; k++)
         for (int lagged = 0; lagged < 2; lagged++) {
-            const sliding p = {.row = rows[k],
+            const sliding p = {.method = methods[k],
                                .dt = 0.01,
                                .mu = 0.3,
                                .velocity = 1,
                                .contact = lagged ? ", 'friction': 'lagged'" : ""};
-            const double a = p.mu * GRAVITY, wanted = way_in(p.row, p.velocity, a, p.dt, n);
+            const double a = p.mu * GRAVITY, wanted = slide_by_recurrence(p.method, p.velocity, a, p.dt, n);
             scene s = open_sliding(&p);
             const double before = drape_sim_energy(s.sim).kinetic, m = mass_of(&s);
-            const double got = way_of(&p, &s, n * p.dt);
+            const double got = slide_of(&p, &s, n * p.dt);
             const drape_energy e = drape_sim_energy(s.sim);
             const drape_statistics did = drape_sim_statistics(s.sim);
-            printf("# %s%s: %.9g m of %.9g m, off by %.2g; dissipated %.9g J, numerical %.3g J\n", p.row,
+            printf("# %s%s: %.9g m of %.9g m, off by %.2g; dissipated %.9g J, numerical %.3g J\n", p.method,
                    p.contact, got, wanted, got / wanted - 1, e.dissipated, e.numerical);
             ck_assert_int_eq(did.steps_rejected, 0);
             assert_below(fabs(got / wanted - 1), 1e-5);
-            /* mu m g s, exactly in step methods; by the trapezoidal rule, of a force that is constant, in
-             * ida */
+            /* mu m g s: exact for step methods; ida integrates it by the trapezoidal rule, which is exact
+             * for a constant force */
             assert_below(fabs(e.dissipated / (p.mu * m * GRAVITY * got) - 1), 1e-5);
-            /* be takes m |dv|^2/2 a step itself, midpoint nothing */
-            const double own = strcmp(p.row, "be") == 0 ? n * m * a * a * p.dt * p.dt / 2 : 0;
-            if (k == 0 || strcmp(p.row, "midpoint") == 0)
+            /* be itself loses m |dv|^2/2 a step, midpoint nothing */
+            const double own = strcmp(p.method, "be") == 0 ? n * m * a * a * p.dt * p.dt / 2 : 0;
+            if (k == 0 || strcmp(p.method, "midpoint") == 0)
                 assert_below(fabs(e.numerical - own), 1e-6 * before);
             scene_close(&s);
         }
@@ -202,56 +206,60 @@ END_TEST
 /* ---- Moving colliders ---- */
 
 /* A plate that starts to move at U carries the sheet along: both have slid m U^2/(2 mu m g) on each other
- * when they have one velocity, and then nothing but the decay of the smoothing is left, at most 0.66 a step
- * of midpoint. The plate's work is m U^2, half of it heat: midpoint's audit has it but for the step in which
- * sliding ends, which may slide by a h too far or not far enough: (a h/U)^2. */
+ * when they have the same velocity, and then only the decay of the smoothing is left, at most 0.66 a step
+ * with midpoint. The plate's work is m U^2, half of it heat. Midpoint's audit agrees except for the step in
+ * which sliding ends, which may slide by an h too far or not far enough: (a h/U)^2. */
 START_TEST(a_plate_carries_the_sheet)
 {
     const double speed = 0.2, t = 0.1;
-    for (size_t k = 0; k < ROWS; k++) {
-        const sliding p = {
-            .row = rows[k], .dt = 1e-3, .mu = 0.5, .collider = ", 'track': [[0, [0,0,0]], [1, [0.2,0,0]]]"};
+    for (size_t k = 0; k < METHODS; k++) {
+        const sliding p = {.method = methods[k],
+                           .dt = 1e-3,
+                           .mu = 0.5,
+                           .collider = ", 'track': [[0, [0,0,0]], [1, [0.2,0,0]]]"};
         scene s = open_sliding(&p);
-        const double a = p.mu * GRAVITY, m = mass_of(&s), got = way_of(&p, &s, t);
+        const double a = p.mu * GRAVITY, m = mass_of(&s), got = slide_of(&p, &s, t);
         const double v = mean_along(&p, &s, drape_sim_velocities(s.sim), 1e-6);
         const drape_energy e = drape_sim_energy(s.sim);
         const double kinetic = m * speed * speed / 2;
-        printf("# %s: velocity %.9g, way %.6g, dissipated/(m U^2/2) = %.5g, numerical/ = %.3g\n", p.row, v,
-               got, e.dissipated / kinetic, e.numerical / kinetic);
-        assert_below(fabs(v - speed), strcmp(p.row, "ida") == 0 ? ida_velocity(&s) : 1e-7);
+        printf("# %s: velocity %.9g, slid %.6g m, dissipated/(m U^2/2) = %.5g, numerical/ = %.3g\n", p.method,
+               v, got, e.dissipated / kinetic, e.numerical / kinetic);
+        assert_below(fabs(v - speed), strcmp(p.method, "ida") == 0 ? ida_velocity(&s) : 1e-7);
         assert_below(fabs(got - (speed * t - speed * speed / (2 * a))), speed * p.dt + EPS * t);
-        /* be and bdf2 have the velocity of the end of a step for all of it: h/(U/a) more or less */
+        /* be and bdf2 use the velocity of the end of a step for the whole step: h/(U/a) more or less */
         const double share = a * p.dt / speed;
         assert_below(fabs(e.dissipated / kinetic - 1),
-                     strcmp(p.row, "midpoint") == 0 ? 4 * share * share : 2 * share);
-        if (strcmp(p.row, "midpoint") == 0)
+                     strcmp(p.method, "midpoint") == 0 ? 4 * share * share : 2 * share);
+        if (strcmp(p.method, "midpoint") == 0)
             assert_below(fabs(e.numerical), 1e-6 * kinetic);
         scene_close(&s);
     }
 }
 END_TEST
 
-/* A plate that rises at U under the sheet kicks it and does work on it: mostly m g U t. Midpoint's own part
- * is its error in the energy of the barrier, whose frequency w = 1e3/s makes (w h)^2/24 of the kick's m (2
- * U)^2/2. */
+/* A plate that rises at U under the sheet kicks it and does work on it: mostly m g U t. The numerical part
+ * of midpoint is its error in the energy of the barrier, whose frequency w = 1e3/s gives (w h)^2/24 of the
+ * kick's m (2 U)^2/2. */
 START_TEST(a_rising_plate_does_work)
 {
-    for (size_t k = 0; k < ROWS; k++) {
+    for (size_t k = 0; k < METHODS; k++) {
         const double speed = 0.1, t = 0.1, h = 1e-4;
-        const sliding p = {
-            .row = rows[k], .dt = h, .mu = 0.5, .collider = ", 'track': [[0, [0,0,0]], [1, [0,0.1,0]]]"};
+        const sliding p = {.method = methods[k],
+                           .dt = h,
+                           .mu = 0.5,
+                           .collider = ", 'track': [[0, [0,0,0]], [1, [0,0.1,0]]]"};
         scene s = open_sliding(&p);
         const double m = mass_of(&s), start = drape_sim_energy(s.sim).gravity;
         scene_advance(&s, t);
         const drape_energy e = drape_sim_energy(s.sim);
         const double lifted = e.gravity - start, work = m * GRAVITY * speed * t;
-        printf("# %s: lifted %.6g J of %.6g J, kinetic %.3g, numerical %.3g J\n", p.row, lifted, work,
+        printf("# %s: lifted %.6g J of %.6g J, kinetic %.3g, numerical %.3g J\n", p.method, lifted, work,
                e.kinetic, e.numerical);
         const double kick = m * 4 * speed * speed / 2;
-        if (strcmp(p.row, "midpoint") == 0)
+        if (strcmp(p.method, "midpoint") == 0)
             assert_below(fabs(e.numerical), 0.01 * kick);
-        /* all: what they take of their own is of the kick */
-        ck_assert_msg(e.numerical > -0.05 * kick && e.numerical < 1.05 * kick, "%s: %g J", p.row,
+        /* for all integrators the numerical loss is that of the kick */
+        ck_assert_msg(e.numerical > -0.05 * kick && e.numerical < 1.05 * kick, "%s: %g J", p.method,
                       e.numerical);
         ck_assert(lifted > work - m * GRAVITY * 1e-4 && lifted < work + kick);
         scene_close(&s);
@@ -268,7 +276,7 @@ END_TEST
 #define BROAD   0.01 /* [m] */
 #define STATION (TURNS + 2 * LEG + 1)
 
-/* A strip of two nodes across that hangs down on both sides of a post, REACH off it. */
+/* A strip of two nodes across that hangs down on both sides of a post, at the distance REACH from it. */
 static void write_strip(const char *path)
 {
     FILE *file = fopen(path, "w");
@@ -291,7 +299,7 @@ static void write_strip(const char *path)
     fclose(file);
 }
 
-/* What the strip pulls at two pins with [N]. */
+/* The force of the strip on two pins [N]. */
 static double pull_at(scene *s, int32_t first)
 {
     double g[3 * 2 * STATION];
@@ -301,13 +309,13 @@ static double pull_at(scene *s, int32_t first)
     return g[3 * first + 1] + g[3 * first + 3 + 1];
 }
 
-/* Pulled slowly at one end, all of it slides towards that end, faster than eps. A node that turns by 2 b =
- * pi/48 between tensions at the angle b with its tangent has T2/T1 = (1 + mu tan b)/(1 - mu tan b), which is
- * exp(2 mu b) but for a share 2 mu b (1 + mu^2) b^2/3: mu pi b^2 (1 + mu^2)/3 = 4e-4 in all. At the ends of
- * the arc a node turns by anything from 0 to 2 b, on one side of its normal: cos 2 b, 2 b^2 = 2e-3 each. The
- * legs come in from REACH further out than the strip lies, an angle of REACH/leg = 2e-3 each, mu times that.
- * Lagged friction is that of pressures one step ago, which have grown with the time since, but for a tenth:
- * by h/t. */
+/* The strip is pulled slowly at one end, and all of it slides towards that end, faster than eps. A node
+ * that turns by 2 b = pi/48 between tensions at the angle b with its tangent has T2/T1 = (1 + mu tan b)/(1
+ * - mu tan b), which is exp(2 mu b) except for a share 2 mu b (1 + mu^2) b^2/3: mu pi b^2 (1 + mu^2)/3 =
+ * 4e-4 in all. At the ends of the arc a node turns by an angle between 0 and 2 b, on one side of its
+ * normal: cos 2 b, 2 b^2 = 2e-3 each. The legs start REACH further out than the strip lies, an angle of
+ * REACH/leg = 2e-3 each, times mu. Lagged friction is that of the pressures one step ago. These have grown
+ * in proportion to the time, except for a tenth: by h/t. */
 START_TEST(a_capstan_holds_by_its_angle)
 {
     static const double mus[] = {0.1, 0.3, 0.5};

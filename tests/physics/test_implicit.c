@@ -1,14 +1,14 @@
 /*
- * test_implicit.c: the scenes of CS184 and Boson by implicit steps, at the steps at which their programs blow
- * up and far beyond: springs 200 times as stiff, a hundredth of the mass, both, 1/30 s. The sheets are small,
- * so that this takes seconds; bench/implicit has them whole.
+ * test_implicit.c: the scenes of CS184 and Boson by implicit steps, at the steps at which their programs
+ * blow up and far beyond: springs 200 times as stiff, a hundredth of the mass, both, 1/30 s. The sheets are
+ * small, so that this takes seconds; bench/implicit runs them at full size.
  */
 #include "support/scene.h"
 
 #include "base/vec3.h"
 #include "model/scene.h"
 
-#define MOST_SETTINGS 10
+#define MAX_SETTINGS 10
 
 typedef struct setting {
     const char *pointer, *value;
@@ -42,7 +42,7 @@ typedef struct setting {
         "/cloth/density", "1.5"                                                                              \
     }
 
-/* Of Boson's sheet a corner between two of its pins: 21 x 21 nodes of 1 kg, 200/99 m apart. */
+/* A corner of Boson's sheet between two of its pins: 21 x 21 nodes of 1 kg, 200/99 m apart. */
 #define CORNER                                                                                               \
     {"/cloth/0/mesh/columns", "21"}, {"/cloth/0/mesh/rows", "21"}, {"/cloth/0/mesh/width", "40.404"},        \
         {"/cloth/0/mesh/height", "40.404"},                                                                  \
@@ -53,8 +53,8 @@ typedef struct setting {
 typedef struct run {
     const char *scene;
     double time;  /* [s] */
-    double limit; /* of the strain of all springs; infinite: none */
-    setting set[MOST_SETTINGS];
+    double limit; /* of the strain of all springs; infinite: no limit */
+    setting set[MAX_SETTINGS];
 } run;
 
 static const run runs[] = {
@@ -79,7 +79,7 @@ static scene load(const run *r)
     const char *root = getenv("DRAPE_SOURCE");
     snprintf(path, sizeof path, "%s/examples/scenes/%s.json", root ? root : ".", r->scene);
     drape_status status = drape_scene_load(s.ctx, path, &parsed);
-    for (int i = 0; !status && i < MOST_SETTINGS && r->set[i].pointer; i++)
+    for (int i = 0; !status && i < MAX_SETTINGS && r->set[i].pointer; i++)
         status = drape_scene_set(parsed, r->set[i].pointer, r->set[i].value);
     if (!status)
         status = drape_scene_compile(parsed, &s.model);
@@ -89,10 +89,10 @@ static scene load(const run *r)
     return s;
 }
 
-/* The strain of the longest of all springs, in all accepted states. */
+/* The largest strain of all springs in all accepted states. */
 static drape_status watch(void *user, const drape_event *event)
 {
-    double *most = user;
+    double *max = user;
     const drape_model *m = drape_sim_model(event->sim);
     const double *x = drape_sim_positions(event->sim);
     for (int32_t i = 0; i < m->term_count; i++) {
@@ -100,15 +100,15 @@ static drape_status watch(void *user, const drape_event *event)
         for (int32_t e = 0; m->terms[i].ops->distance && e < el->count; e++) {
             double d[3];
             vec3_sub(x + 3 * (size_t)el->node[2 * e + 1], x + 3 * (size_t)el->node[2 * e], d);
-            *most = fmax(*most, vec3_norm(d) / el->rest[el->count + e] - 1);
+            *max = fmax(*max, vec3_norm(d) / el->rest[el->count + e] - 1);
         }
     }
     return DRAPE_OK;
 }
 
-/* Implicit steps take energy: what moves, stretches and hangs has no more in the end than what hung in the
- * beginning at rest. The slack is that of ida's tolerance, 1e-3 of m g L, over the times that a wave crosses
- * the sheet, some tens. */
+/* Implicit steps lose energy: kinetic, elastic and potential energy at the end are no more than the
+ * potential energy at the start, at rest. The slack is that of ida's tolerance, 1e-3 of m g L, times the
+ * number of crossings of a wave, some tens. */
 static void falls_and_no_more(const scene *s, double start)
 {
     const drape_model *m = s->model;

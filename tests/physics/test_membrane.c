@@ -64,8 +64,8 @@ static bool on_boundary(int32_t node)
     return row_of(node) % EDGES == 0 || column_of(node) % EDGES == 0;
 }
 
-/* An inner node has six springs in three opposite pairs; an affine map keeps the pairs equal and opposite, so
- * the forces cancel whatever the stretch: at a strain of 1e-9, and at one of 100 %. */
+/* An inner node has six springs in three opposite pairs; an affine map keeps the pairs equal and opposite,
+ * so the forces cancel at any stretch: at a strain of 1e-9, and at one of 100 %. */
 START_TEST(interior_forces_vanish_under_any_affine_map)
 {
     static const double gradient[9] = {0.731, 0.113, 0.412, -0.297, 0.531, 0.843, 0.613, -0.179, -0.921};
@@ -88,9 +88,10 @@ START_TEST(interior_forces_vanish_under_any_affine_map)
 }
 END_TEST
 
-/* The patch test as a solve: boundary nodes are held where the map puts them, the inner ones find their
- * places. A step of 1e6 s is statics: inertia M/h^2 is 1e-18 of the stiffness. The stretch of 5 to 12 % keeps
- * every spring in tension, so the Hessian is at least that of the springs' along-edge parts in the plane. */
+/* The patch test as a solve: boundary nodes are pinned where the map moves them, and the inner ones find
+ * their positions. A step of 1e6 s is statics: the inertia M/h^2 is 1e-18 of the stiffness. The stretch of
+ * 5 to 12 % keeps every spring in tension, so the Hessian is at least that of the springs' along-edge parts
+ * in the plane. */
 START_TEST(patch_test_as_a_solve)
 {
     static const double F[9] = {1.12, 0, 0.03, 0.2, 1, -0.1, 0.02, 0, 1.05};
@@ -137,7 +138,7 @@ START_TEST(patch_test_as_a_solve)
     def.frame_rate = 1e-6;
     ck_assert_msg(drape_model_create(s.ctx, &def, &s.model) == DRAPE_OK, "%s", drape_context_message(s.ctx));
     scene_start(&s, NULL);
-    /* Start the inner nodes off their places, out of the plane too. */
+    /* Start with the inner nodes displaced, out of the plane too. */
     for (int32_t i = 0; i < s.model->node_count; i++)
         for (int c = 0; c < 3 && !on_boundary(i); c++)
             scene_state(&s)->x[3 * (size_t)i + (size_t)c] =
@@ -147,9 +148,9 @@ START_TEST(patch_test_as_a_solve)
     double worst = 0;
     for (size_t i = 0; i < 3 * (size_t)s.model->node_count; i++)
         worst = fmax(worst, fabs(scene_state(&s)->x[i] - scene_state(&rest)->x[i]));
-    /* Error <= residual / least eigenvalue. Out of the plane every spring resists with K q/(1 + q), q >=
-     * 0.04, which is the weakest; the membrane's lowest mode over EDGES cells has at least 2 (pi/EDGES)^2
-     * of it. The residual of DOFs adds up as sqrt(3 x 25 inner nodes). */
+    /* Error <= residual / smallest eigenvalue. Out of the plane every spring resists with K q/(1 + q), q >=
+     * 0.04, which is the weakest stiffness; the membrane's lowest mode over EDGES cells has at least 2
+     * (pi/EDGES)^2 of it. The residual of all DOFs adds up as sqrt(3 x 25 inner nodes). */
     const double weakest = sqrt(3.0) / 2 * membrane * 0.04 / 1.04 * 2 * pow(3.14159265 / EDGES, 2);
     const double noise = force_noise(sqrt(3.0) / 2 * membrane, 2 * (EDGES + 1) * LENGTH);
     assert_below(worst, sqrt(75) * (s.residual + noise) / weakest);
@@ -182,8 +183,8 @@ START_TEST(energy_is_that_of_the_plane_stress_sheet)
 }
 END_TEST
 
-/* Pulled along the edges with free sides: the slanted springs carry nothing and keep their length, so that
- * the width shrinks by sqrt((4 - lambda^2)/3), and the level ones carry E h (lambda - 1) a width. */
+/* Pulled along the edges with free sides: the slanted springs carry nothing and keep their length, so the
+ * width shrinks by sqrt((4 - lambda^2)/3), and the level ones carry E h (lambda - 1) per width. */
 START_TEST(uniform_stretch_with_free_sides)
 {
     static const double lambdas[] = {0.83, 1 + 1e-6, 1.13, 1.71};
@@ -211,8 +212,8 @@ START_TEST(uniform_stretch_with_free_sides)
 }
 END_TEST
 
-/* The report's stiffness is the consistent one times one edge length, in metres, on an inner edge, and twice
- * that on a boundary edge, which the report does not halve. */
+/* The report's stiffness is the consistent one times one edge length, in metres, on an inner edge, and
+ * twice that on a boundary edge, because the report does not halve it there. */
 static int triangles_beside(const drape_model *model, const int32_t *edge)
 {
     int count = 0;
@@ -234,7 +235,7 @@ START_TEST(report_stiffness_is_one_edge_length_too_soft)
     for (int32_t e = 0; e < a->count; e++) {
         const bool outer = triangles_beside(consistent.model, a->node + 2 * e) == 1;
         boundary += outer;
-        /* areas and lengths come from coordinates: a few roundings of numbers of size 1 */
+        /* areas and lengths follow from coordinates: a few roundings of numbers of size 1 */
         ck_assert_double_eq_tol(b->rest[e] / a->rest[e], (outer ? 2 : 1) * LENGTH, 64 * DBL_EPSILON);
     }
     ck_assert_int_eq(boundary, 4 * EDGES);

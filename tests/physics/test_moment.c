@@ -1,4 +1,4 @@
-/* test_moment.c: the potential of load.moment against quaternions, and a strip that it winds up to a
+/* test_moment.c: the potential of load.moment against quaternions, and a strip that it winds up into a
  * circle. */
 #include "support/scene.h"
 
@@ -6,7 +6,7 @@
 #define MOMENT 0.3 /* [N m/m] */
 #define SIDE   0.8 /* [m] */
 
-/* Along the side x = SIDE as the triangle there goes round it. */
+/* The direction of the side x = SIDE as its triangle runs along it. */
 static void side_direction(const drape_model *m, double e[3])
 {
     for (int32_t i = 0; i < 3 * m->triangle_count; i++) {
@@ -35,12 +35,11 @@ static void turn(const double q[4], const double *x, double *out)
     out[2] = x[2] + 2 * (q[0] * a[1] - q[1] * a[0]);
 }
 
-/* Turned as a whole about any direction by any angle below pi, a sheet has M L 2 atan2(q . e0, q_w) of it,
- * and no other energy: positions of size 1 and unit vectors of triangles of size 0.4 are known to a few
- * roundings. */
+/* A sheet that is rotated about any axis by any angle below pi has the energy M L 2 atan2(q . e0, q_w) and
+ * no other. Positions of size 1 and unit vectors of triangles of size 0.4 are exact up to a few roundings. */
 START_TEST(the_potential_is_the_twist_of_the_quaternion)
 {
-    static const double ways[][3] = {{0, 0, 1},     {0, 0, -1},       {1, 0, 0},
+    static const double axes[][3] = {{0, 0, 1},     {0, 0, -1},       {1, 0, 0},
                                      {0.6, 0, 0.8}, {0.3, -0.5, 0.7}, {-0.2, 0.9, 0.4}};
     static const double angles[] = {1e-6, 0.4, 1.5, 2.2, 3.1};
     scene s =
@@ -52,9 +51,9 @@ START_TEST(the_potential_is_the_twist_of_the_quaternion)
     double e[3], x[27], v[27] = {0};
     ck_assert_int_eq(s.model->node_count, 9);
     side_direction(s.model, e);
-    for (size_t i = 0; i < sizeof ways / sizeof *ways; i++)
+    for (size_t i = 0; i < sizeof axes / sizeof *axes; i++)
         for (size_t j = 0; j < sizeof angles / sizeof *angles; j++) {
-            const double *w = ways[i], norm = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]),
+            const double *w = axes[i], norm = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]),
                          sine = sin(angles[j] / 2) / norm;
             const double q[4] = {sine * w[0], sine * w[1], sine * w[2], cos(angles[j] / 2)};
             for (int k = 0; k < 9; k++)
@@ -69,9 +68,9 @@ START_TEST(the_potential_is_the_twist_of_the_quaternion)
 }
 END_TEST
 
-/* 2 pi B/L winds a strip up to a full circle, whose end is at its clamp, and there it is stable in space.
- * With edges of a = L/20 the curvature is off by (kappa a)^2/8 at most, where a triangle is the chord of its
- * arc: the end by 2 pi times that of the radius L/2 pi. */
+/* The moment 2 pi B/L winds a strip up into a full circle, whose end is at its clamp; there it is stable in
+ * space. With edges of a = L/20 the curvature is off by (kappa a)^2/8 at most, as a triangle is the chord
+ * of its arc: the end by 2 pi times that of the radius L/2 pi. */
 START_TEST(a_strip_is_wound_up_to_a_circle)
 {
     const double rigidity = 1e-4, edge = 1.0 / 20;

@@ -1,10 +1,10 @@
 /*
- * test_oracle.c: the trajectory of the DEP report's own programs, step by step. DRAPE_ORACLE names a
- * folder with py1.out.txt (the course's Python) and cc1.out.txt (the report's C++): blocks "Time: t" and
- * the position of node 3 in brackets after the step of that label, the first after the first step. These
- * files are not ours to keep here.
+ * test_oracle.c: the trajectory of the DEP report's own programs, step by step. DRAPE_ORACLE names a folder
+ * with py1.out.txt (the course's Python) and cc1.out.txt (the report's C++): blocks "Time: t" and the
+ * position of node 3 in brackets after the step with that label, the first one after the first step. These
+ * files belong to others and are not kept here.
  *
- * Tolerance: the two differ by 2.3e-8 m between themselves, since the C++ keeps rest lengths in single
+ * Tolerance: the two differ by 2.3e-8 m from each other, since the C++ has rest lengths in single
  * precision, and print 1e-8 m; a residual of 1e-10 N moves a node of 2.5e-3 kg by 4e-12 m a step, 5e-7 m
  * over 500 free steps and far less on a damped pendulum: 1e-7 m.
  */

@@ -1,8 +1,8 @@
 /*
- * test_scenes.c: every scene of examples/scenes runs: the beginning of each, coarser than it is where its
- * mesh is a grid, ends "ok"; nothing lies in a collider and no edge passes through a triangle, neither at the
- * ends of steps nor at frames. A scene that is not in the table runs as it is for a tenth of a second, so
- * that none is forgotten.
+ * test_scenes.c: every scene of examples/scenes runs. Its beginning, on a coarser mesh if that is a grid,
+ * ends "ok"; no part lies in a collider and no edge passes through a triangle, neither at the ends of steps
+ * nor at frames. A scene that is not in the table runs unchanged for a tenth of a second, so that none is
+ * forgotten.
  */
 #include <dirent.h>
 
@@ -10,8 +10,8 @@
 #include "support/audit.h"
 #include "support/scene.h"
 
-#define MOST_SETTINGS 6
-#define MOST_SCENES   64
+#define MAX_SETTINGS 6
+#define MAX_SCENES   64
 
 #define COLUMNS "/cloth/0/mesh/columns"
 #define ROWS    "/cloth/0/mesh/rows"
@@ -21,9 +21,9 @@ typedef struct beginning {
     double time; /* [s] */
     struct {
         const char *pointer, *value;
-    } set[MOST_SETTINGS];
-    bool explicit; /* CS184's and Boson's rules keep points off, and cloth off itself, only roughly */
-    bool touches;  /* comes near a collider in this time */
+    } set[MAX_SETTINGS];
+    bool explicit; /* explicit rules keep only points out of colliders, and self-contact is approximate */
+    bool touches;  /* comes near a collider within this time */
 } beginning;
 
 static const beginning beginnings[] = {
@@ -55,8 +55,8 @@ static int by_name(const void *a, const void *b)
     return strcmp(a, b);
 }
 
-/* Names without ".json", in order. */
-static int find_scenes(char names[MOST_SCENES][64])
+/* Names without ".json", sorted. */
+static int find_scenes(char names[MAX_SCENES][64])
 {
     int count = 0;
     DIR *all = opendir(folder());
@@ -65,7 +65,7 @@ static int find_scenes(char names[MOST_SCENES][64])
         size_t length = strlen(entry->d_name);
         if (length < 6 || strcmp(entry->d_name + length - 5, ".json") != 0)
             continue;
-        ck_assert(count < MOST_SCENES && length < 64);
+        ck_assert(count < MAX_SCENES && length < 64);
         memcpy(names[count], entry->d_name, length - 5);
         names[count++][length - 5] = '\0';
     }
@@ -89,7 +89,7 @@ static scene load(const beginning *b)
     scene s = scene_empty();
     snprintf(path, sizeof path, "%s/%s.json", folder(), b->name);
     drape_status status = drape_scene_load(s.ctx, path, &parsed);
-    for (int i = 0; !status && i < MOST_SETTINGS && b->set[i].pointer; i++)
+    for (int i = 0; !status && i < MAX_SETTINGS && b->set[i].pointer; i++)
         status = drape_scene_set(parsed, b->set[i].pointer, b->set[i].value);
     if (!status)
         status = drape_scene_compile(parsed, &s.model);
@@ -99,8 +99,7 @@ static scene load(const beginning *b)
     return s;
 }
 
-/* 1e-9 m is what the check of a step allows; the samples of faces are rounded at 1e-16 of coordinates of 1
- * m. */
+/* The check of a step allows 1e-9 m; the samples of faces are rounded at 1e-16 of coordinates of 1 m. */
 static void check_kept(const beginning *b, const audit_worst *worst)
 {
     const double allowed = 1e-9 + 1e-15;
@@ -133,7 +132,7 @@ static void run(const beginning *of)
 
 START_TEST(every_scene_begins_well)
 {
-    static char names[MOST_SCENES][64];
+    static char names[MAX_SCENES][64];
     int count = find_scenes(names);
     ck_assert_int_ge(count, (int)(sizeof beginnings / sizeof *beginnings));
     for (int i = 0; i < count; i++) {
@@ -153,8 +152,8 @@ END_TEST
     "[[0,[0,0,0]],[0.12,[-0.05,0.25,0]],[0.25,[-0.25,0.42,0]],[0.38,[-0.5,0.42,0]],[0.55,[-0.72,0.15,0]],"   \
     "[0.65,[-0.78,0.022,0]]]"
 
-/* A square sheet folded onto itself and one that crumples, 20 points a side, at CS184's thickness and a tenth
- * of it. bench/results/folds.csv has 50, and the fold at 80. */
+/* A square sheet that is folded onto itself and one that crumples, 20 points a side, at CS184's thickness
+ * and a tenth of it. bench/results/folds.csv has 50 points, and the fold at 80. */
 START_TEST(no_edge_passes_a_triangle)
 {
     static const beginning folds[] = {
@@ -168,7 +167,7 @@ START_TEST(no_edge_passes_a_triangle)
 }
 END_TEST
 
-/* The audit finds what is wrong: the capstan's strip, moved into the bar, and then through itself. */
+/* The audit finds faults: the capstan's strip is moved into the bar, and then through itself. */
 START_TEST(an_audit_can_fail)
 {
     const beginning b = beginning_of("capstan");
@@ -180,7 +179,7 @@ START_TEST(an_audit_can_fail)
     ck_assert_int_eq(audit_state(&a, state->x, 0, &a.steps), DRAPE_OK);
     ck_assert_double_gt(a.steps.node, 0.03);
     ck_assert_double_ge(a.steps.face, a.steps.node);
-    for (int k = 0; k < 6; k++) /* an edge through the middle of the strip, from below it to above */
+    for (int k = 0; k < 6; k++) /* an edge passes through the middle of the strip, from below it to above */
         state->x[k] = state->x[3 * (s.model->node_count / 2) + k % 3] + (k % 3 != 1 ? 0.003 * (1 + k % 3)
                                                                          : k < 3    ? -0.01
                                                                                     : 0.01);

@@ -2,10 +2,11 @@
  * test_seed.c: the scenes of CS184 and Boson as their programs run them: the headline figures of a build of
  * each (docs/seed_systems.md), and where they fail.
  *
- * What that build leaves open moves the figures: its order of springs in the pass of the limit, what its hash
- * of boxes collects beside a point's own, float or double. The tolerances are twice the difference that the
- * order of springs alone makes here, which is far below what a wrong rule does: without the pass strains are
- * 20 % at 30 substeps, without damping the kinetic energy is 200 J.
+ * Some properties of that build are not reproduced and affect the figures: its order of springs in the pass
+ * of the limit, the points that its hash of boxes collects besides those of a point's own box, float or
+ * double. The tolerances are twice the difference that the order of springs alone makes here, which is far
+ * below the effect of a wrong rule: without the pass strains are 20 % at 30 substeps, without damping the
+ * kinetic energy is 200 J.
  */
 #include "support/scene.h"
 
@@ -33,17 +34,17 @@ static scene load(const char *name, const char *pointer, const char *value)
 static double longest(const scene *s)
 {
     const drape_model *m = s->model;
-    double most = -1;
+    double max = -1;
     for (int32_t i = 0; i < m->term_count; i++) {
         const drape_elements *el = &m->terms[i].elements;
         for (int32_t e = 0; m->terms[i].ops->pair && e < el->count; e++) {
             double d[3];
             vec3_sub(drape_sim_positions(s->sim) + 3 * (size_t)el->node[2 * e + 1],
                      drape_sim_positions(s->sim) + 3 * (size_t)el->node[2 * e], d);
-            most = fmax(most, vec3_norm(d) / el->rest[el->count + e] - 1);
+            max = fmax(max, vec3_norm(d) / el->rest[el->count + e] - 1);
         }
     }
-    return most;
+    return max;
 }
 
 static double lowest(const scene *s)
@@ -62,7 +63,7 @@ static double fastest(const scene *s)
     return speed;
 }
 
-/* Theirs: 12.5 %, -0.083 m, 3.5e-4 J. */
+/* Their program: 12.5 %, -0.083 m, 3.5e-4 J. */
 START_TEST(pinned2_after_three_seconds)
 {
     scene s = load("cs184_pinned2", NULL, NULL);
@@ -76,8 +77,7 @@ START_TEST(pinned2_after_three_seconds)
 }
 END_TEST
 
-/* Theirs: frame 14; the limit of strains feeds what grows, so that the frame is that of chance within
- * some. */
+/* Their program: frame 14. The strain limit amplifies the growth, so the frame is random within a few. */
 START_TEST(pinned2_blows_up_at_two_substeps)
 {
     scene s = load("cs184_pinned2", "/integrator/substeps", "2");
@@ -90,8 +90,8 @@ START_TEST(pinned2_blows_up_at_two_substeps)
 }
 END_TEST
 
-/* Theirs: frame 160 at dt 0.06; at 0.04 all comes to rest, 0.3 to 0.4 m/s after 1500 frames. Here it is asked
- * after 300, when the first swing is over. The limit that is foreseen, 0.058 s, lies between. */
+/* Their program: frame 160 at dt 0.06; at 0.04 all comes to rest, 0.3 to 0.4 m/s after 1500 frames. Here it
+ * is checked after 300, at the end of the first swing. The predicted limit, 0.058 s, is in between. */
 START_TEST(boson_blows_up_between)
 {
     scene s = load("verlet_100", "/integrator/dt", "0.06");

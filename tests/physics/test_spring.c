@@ -1,9 +1,9 @@
 /*
  * test_spring.c: the terms spring.* and limit.strain against closed forms.
  *
- * Chains are vertical grids of 2 columns: each column is a chain of structural springs, and what joins the
- * two is neither stretched nor turned, since both do the same. They are 10 m apart, so that the edges across,
- * too, which are limited with the others, are not stretched by more than one per cent.
+ * Chains are vertical grids of 2 columns. Each column is a chain of structural springs; the springs between
+ * them are neither stretched nor turned, since both move alike. The columns are 10 m apart, so that the
+ * edges across, which are limited too, are not stretched by more than one per cent either.
  */
 #include "drape/extend.h"
 #include "support/scene.h"
@@ -20,8 +20,8 @@
 #define SPEED     1.3
 #define LENGTH    0.8
 
-/* One node below each of two held ones, thrown downwards: along its spring q = l is linear, so m x'' + c x' +
- * k x = 0 exactly, at any amplitude below the length. */
+/* One node below each of two pinned ones, thrown downwards: along its spring q = l is linear, so m x'' + c
+ * x' + k x = 0 exactly, at any amplitude below the length. */
 static scene oscillator(double damping, const char *integrator)
 {
     return scene_open(
@@ -37,8 +37,8 @@ static double stretch(scene *s)
 }
 
 /* x = v0/wd exp(-a t) sin(wd t), a = c/(2 m), wd = sqrt(k/m - a^2): frequency and decay at once. Steps do
- * not expand the energy norm, so their errors add up: those of IDA are at most sqrt(N) tolerances in one
- * component, N = 12 the unknowns, of x or, over w, of v. */
+ * not expand the energy norm, so their errors add up. Those of IDA are at most sqrt(N) tolerances in one
+ * component, N = 12 the number of unknowns, of x or, over w, of v. */
 START_TEST(one_spring_follows_the_damped_oscillator)
 {
     static const double ratios[] = {0, 0.05, 0.6}; /* of critical damping */
@@ -78,29 +78,30 @@ START_TEST(backward_euler_takes_the_dashpot_in_step_form)
         diagnostic = fmax(diagnostic, fabs(stretch(&s) - x));
     }
     assert_below(diagnostic, 50 * h * h / NODE_MASS * (tolerance + force_noise(STIFFNESS + c / h, LENGTH)));
-    /* relative to the first step's, whose v is known to the same errors over h */
+    /* relative to that of the first step, whose v has the same errors over h */
     assert_below(fabs(drape_sim_energy(s.sim).dissipated / taken - 1), 1e-9);
     scene_close(&s);
 }
 END_TEST
 
-/* Implicit midpoint, whose rate is grad q . v: for a quadratic energy and a linear dashpot energy and what
- * was dissipated add up to what there was, but for what residuals of r do over the way of the nodes. */
+/* Implicit midpoint, whose rate is grad q . v: for a quadratic energy and a linear dashpot the energy and
+ * the dissipation add up to the initial energy, up to the work of residuals of r over the path of the
+ * nodes. */
 START_TEST(midpoint_accounts_for_every_joule)
 {
     const double tolerance = 1e-11;
     scene s = oscillator(1.1, "'method': 'midpoint', 'dt': 0.03, 'tolerance': 1e-11");
     const double start = 2 * 0.5 * NODE_MASS * SPEED * SPEED;
-    double way = 0, before = 0;
+    double path = 0, before = 0;
     for (int n = 1; n <= 50; n++) {
         scene_advance(&s, n * 0.03);
-        way += 2 * fabs(stretch(&s) - before);
+        path += 2 * fabs(stretch(&s) - before);
         before = stretch(&s);
     }
     const drape_energy e = drape_sim_energy(s.sim);
     ck_assert_double_gt(e.dissipated, 0.9 * start);
     assert_below(fabs(e.kinetic + e.elastic + e.dissipated - start),
-                 way * (tolerance + force_noise(STIFFNESS, LENGTH)) + 50 * 8 * DBL_EPSILON * start);
+                 path * (tolerance + force_noise(STIFFNESS, LENGTH)) + 50 * 8 * DBL_EPSILON * start);
     scene_close(&s);
 }
 END_TEST
@@ -109,9 +110,9 @@ END_TEST
 
 #define ROWS 9 /* nodes of a chain, the first held */
 
-/* Spring j, from row j to j + 1, carries what hangs below: (ROWS - 1 - j) m g. Its constant is k times the
- * mean of both ends' 1 + G (1 - row/ROWS). Residuals of at most r in every node shift a node by the sum over
- * the springs above it of (ROWS - 1) r/k. */
+/* Spring j, from row j to j + 1, carries the weight below: (ROWS - 1 - j) m g. Its constant is k times the
+ * mean of both ends' 1 + G (1 - row/ROWS). Residuals of at most r in every node shift a node by the sum
+ * over the springs above it of (ROWS - 1) r/k. */
 START_TEST(chain_hangs_with_its_gradient)
 {
     static const double gradients[] = {0, 0.4, -0.9};
@@ -141,8 +142,8 @@ END_TEST
 /* ---- Newton's third law ---- */
 
 /* Forces and moments of all springs and dashpots of a sheet sum to zero, with the gradient, at a deformed,
- * moving state: a spring with the stiffness of the neighbour's row, as Boson has it, leaves 0.4 % of the
- * force of every spring that goes down. A sum of n terms of size F is known to n DBL_EPSILON F. */
+ * moving state. If a spring had the stiffness of the neighbour's row, as in Boson, 0.4 % of the force of
+ * every downward spring would remain. A sum of n terms of size F is known to n DBL_EPSILON F. */
 START_TEST(forces_and_moments_sum_to_zero)
 {
     scene s =
@@ -179,8 +180,8 @@ START_TEST(forces_and_moments_sum_to_zero)
 }
 END_TEST
 
-/* Rows r and columns c: r (c - 1) + (r - 1) c structural, 2 (r - 1)(c - 1) shear, r (c - 2) + (r - 2) c bend;
- * each of its own length. The 14 502 springs of CS184's 50 x 50 points are these. */
+/* r rows and c columns: r (c - 1) + (r - 1) c structural, 2 (r - 1)(c - 1) shear, r (c - 2) + (r - 2) c
+ * bend springs, each with its own length. The 14 502 springs of CS184's 50 x 50 points are these. */
 START_TEST(springs_join_the_right_nodes)
 {
     static const char *const kinds[] = {"spring.structural", "spring.shear", "spring.bend"};
@@ -215,8 +216,8 @@ static double barrier_slope(double y)
     return -2 * y * log(1 - y) + y * y / (1 - y);
 }
 
-/* A node on a spring and a limit hangs where m g = k L s + K L w b'(y), s = onset + w y: at chosen y, for
- * the weight that belongs to it. A residual r moves it by r over a stiffness above k. */
+/* A node on a spring and a limit hangs where m g = k L s + K L w b'(y), s = onset + w y: for a chosen y,
+ * the weight is set to match. A residual r moves it by r over a stiffness above k. */
 START_TEST(limit_balances_its_load)
 {
     static const double windows[] = {-0.5, 1e-3, 0.3, 0.7, 0.97, 0.989};
@@ -238,8 +239,8 @@ START_TEST(limit_balances_its_load)
 END_TEST
 
 /* b and its first two derivatives on both sides of the onset and of the cap, by the energy of one element:
- * they differ by no more than the next derivative, b''' <= 6 at the onset and some 2/cap^3 at the cap, makes
- * of the distance. */
+ * they differ by no more than the next derivative, b''' <= 6 at the onset and about 2/cap^3 at the cap,
+ * times the distance. */
 START_TEST(limit_is_smooth_twice)
 {
     scene s = scene_model(CHAIN(2, 1) "'total_mass': 1}, 'terms': [{'type': 'limit.strain', 'stiffness': 1,"
@@ -247,7 +248,7 @@ START_TEST(limit_is_smooth_twice)
                                       "'gravity': [0, 0, 0], 'duration': 1}");
     const drape_term *term = &s.model->terms[0];
     static const double at[] = {0, 0.9};
-    static const double third[] = {7, 3e3}; /* 2/cap^3 and lesser powers of 1/cap */
+    static const double third[] = {7, 3e3}; /* 2/cap^3 and lower powers of 1/cap */
     const double d = 1e-6;
     int32_t vertical = 0; /* an edge of length 1, from node 0 to 2 */
     while (term->elements.node[2 * vertical] != 0 || term->elements.node[2 * vertical + 1] != 2)
@@ -263,13 +264,14 @@ START_TEST(limit_is_smooth_twice)
         assert_below(fabs(e[1] - e[0] - 2 * d * g[0][1]), 2 * d * d * curve + 1e-15);
         assert_below(fabs(g[1][1] - g[0][1]), 2 * d * curve);
         assert_below(fabs(h[1][7] - h[0][7]), 2 * d * third[i]);
-        ck_assert(i == 0 || h[0][7] > 100); /* there is something to be smooth */
+        ck_assert(i == 0 || h[0][7] > 100); /* the second derivatives compared are not 0 */
     }
     scene_close(&s);
 }
 END_TEST
 
-/* CS184's pinned2 at 9 x 9 points: ks 5000, bend 0.2 ks, hung by two corners, by backward Euler at 1/30 s. */
+/* CS184's pinned2 with 9 x 9 points: ks 5000, bend 0.2 ks, hanging by two corners, backward Euler at 1/30
+ * s. */
 static scene hung_sheet(double gravity, const char *limit)
 {
     return scene_open(
@@ -287,17 +289,17 @@ static scene hung_sheet(double gravity, const char *limit)
 static double largest_strain(const scene *s, const drape_elements *pairs)
 {
     const double *x = drape_sim_positions(s->sim);
-    double most = -1;
+    double max = -1;
     for (int32_t e = 0; e < pairs->count; e++) {
         const double *a = x + 3 * pairs->node[2 * e], *b = x + 3 * pairs->node[2 * e + 1];
         const double length = sqrt(pow(b[0] - a[0], 2) + pow(b[1] - a[1], 2) + pow(b[2] - a[2], 2));
-        most = fmax(most, length / pairs->rest[pairs->count + e] - 1);
+        max = fmax(max, length / pairs->rest[pairs->count + e] - 1);
     }
-    return most;
+    return max;
 }
 
-/* With what the defaults make of the weight at 9.8 m/s2, a hundredfold load stays below 10 %, of every
- * spring; without the limit the sheet is beyond it at once. */
+/* With the default stiffness, which is derived from the weight at 9.8 m/s2, a hundredfold load keeps every
+ * spring below 10 %; without the limit the sheet exceeds it at once. */
 START_TEST(limit_holds_a_hundredfold_load)
 {
     static const double loads[] = {-9.8, -980};
@@ -308,17 +310,17 @@ START_TEST(limit_holds_a_hundredfold_load)
                  i ? ", 'stiffness': 183000" : "");
         scene s = hung_sheet(loads[i], limit), without = hung_sheet(loads[i], "");
         const drape_elements *pairs = &s.model->terms[3].elements;
-        double most = 0, most_without = 0;
+        double max = 0, most_without = 0;
         for (int frame = 1; frame <= 60; frame++) {
             scene_advance(&s, frame / 30.0);
-            most = fmax(most, largest_strain(&s, pairs));
+            max = fmax(max, largest_strain(&s, pairs));
         }
         for (int frame = 1; frame <= 20; frame++) {
             scene_advance(&without, frame / 30.0);
             most_without = fmax(most_without, largest_strain(&without, pairs));
         }
-        printf("# strain %g without, %g with\n", most_without, most);
-        assert_below(most, 0.1);
+        printf("# strain %g without, %g with\n", most_without, max);
+        assert_below(max, 0.1);
         ck_assert_double_gt(most_without, 0.1);
         scene_close(&s);
         scene_close(&without);
@@ -326,9 +328,9 @@ START_TEST(limit_holds_a_hundredfold_load)
 }
 END_TEST
 
-/* Where the load is beyond what the barrier has below its limit, some 2/cap K L w, no state is accepted that
- * breaks it: the steps become small, and the message says why. */
-START_TEST(overload_stops_and_says_so)
+/* If the load exceeds the force of the barrier below its limit, about 2/cap K L w, no state beyond the
+ * limit is accepted: the steps become small, and the message gives the reason. */
+START_TEST(overload_stops_with_the_reason)
 {
     scene s = scene_open(CHAIN(2, 0.8) "'total_mass': 1}, 'terms': [{'type': 'limit.strain', 'stiffness': 1,"
                                        "'cap': 0.5}]}], 'gravity': [0, -9.8, 0], 'integrator': {'dt': 0.01},"
@@ -344,7 +346,7 @@ END_TEST
 
 /* ---- Degeneration ---- */
 
-/* A spring of no length has no direction: the state is rejected and the spring named; just above the bound
+/* A spring of length 0 has no direction: the state is rejected and the spring named. Just above the bound
  * all is finite. */
 START_TEST(collapsed_spring_is_named)
 {
@@ -365,7 +367,7 @@ START_TEST(collapsed_spring_is_named)
     drape_system_force(s.sim->system, &(drape_point){.x = state->x, .v = state->v}, g);
     for (int i = 0; i < 12; i++)
         ck_assert(isfinite(g[i]));
-    /* Pushed down by the spring, held up by the dashpot; 1e-5 m are what is left of numbers below 1. */
+    /* The spring pushes down, the dashpot up; of numbers below 1, 1e-5 m are left. */
     assert_below(fabs(g[7] - STIFFNESS * (LENGTH - 1e-5) + 0.5 * SPEED) / g[7], 4 * DBL_EPSILON / 1e-5);
     scene_close(&s);
 }
@@ -374,4 +376,4 @@ END_TEST
 SUITE("spring", one_spring_follows_the_damped_oscillator, backward_euler_takes_the_dashpot_in_step_form,
       midpoint_accounts_for_every_joule, chain_hangs_with_its_gradient, forces_and_moments_sum_to_zero,
       springs_join_the_right_nodes, limit_balances_its_load, limit_is_smooth_twice,
-      limit_holds_a_hundredfold_load, overload_stops_and_says_so, collapsed_spring_is_named)
+      limit_holds_a_hundredfold_load, overload_stops_with_the_reason, collapsed_spring_is_named)

@@ -1,5 +1,5 @@
-/* test_wind.c: drag.wind against closed forms: the force on a flat sheet, a sheet that falls level, one that
- * the wind takes along. */
+/* test_wind.c: drag.wind against closed forms: the force on a flat sheet, a sheet that falls horizontally,
+ * and one that the wind carries along. */
 #include "support/scene.h"
 
 #include "assemble/check.h"
@@ -14,7 +14,7 @@
     "['stretch.edge', 'bend.hinge', {'type': 'drag.wind', 'wind': [%g, %g, %g]}]}], "                        \
     "'gravity': [0, %g, 0], 'integrator': {'dt': 0.01, 'tolerance': 1e-12}, 'duration': 1}"
 
-/* The sum over the nodes is 1/2 rho C A |u.n| (u.n) n. Rounding: 60 triangles, some 20 operations each. */
+/* The sum over the nodes is 1/2 rho C A |u.n| (u.n) n. Rounding: 60 triangles, about 20 operations each. */
 START_TEST(force_on_a_flat_sheet)
 {
     const double wind[3] = {3, -2, 1.5}, n[3] = {0, cos(0.5), sin(0.5)}; /* y turned about x by 0.5 */
@@ -37,7 +37,7 @@ START_TEST(force_on_a_flat_sheet)
 }
 END_TEST
 
-/* Its derivatives in a wind; the tests of the rows have it in air at rest. */
+/* Its derivatives in a wind; the tests of all terms have it in air at rest. */
 START_TEST(derivatives_in_a_wind)
 {
     static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
@@ -51,7 +51,7 @@ START_TEST(derivatives_in_a_wind)
 }
 END_TEST
 
-/* A wind that turns, is sheared and changes with time, as a host may give it: dw/dx is its matrix. */
+/* A wind as a host may give it: rotating, sheared and changing with time; dw/dx is its matrix. */
 static void swirl(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
 {
     static const double matrix[9] = {0.7, -2.1, 0.4, 1.9, -0.6, 0.3, -0.8, 1.1, 0.5};
@@ -66,8 +66,8 @@ static void swirl(void *user, double t, int32_t count, const double *x, double *
         }
 }
 
-/* dg/dx has what the wind changes as nodes move, dg/dv not: of both drags, of their sum in the system, and of
- * D. */
+/* dg/dx includes the change of the wind as nodes move, dg/dv does not: for both drags, their sum in the
+ * system, and D. */
 START_TEST(derivatives_in_the_wind_of_a_host)
 {
     static drape_check_result rows[DRAPE_MAX_CHECK_RESULTS];
@@ -90,12 +90,11 @@ START_TEST(derivatives_in_the_wind_of_a_host)
 END_TEST
 
 /*
- * A level sheet stays flat: the shares of weight and wind of a node are the same. Backward Euler's v1 = v0 +
- * h (k u1 |u1| - g), u = w - v, k = rho C/(2 sigma), is for the wind it meets, u1 = u0 + h g - h k u1^2, the
- * positive root
- *     u1 = (sqrt(1 + 4 h k (u0 + h g)) - 1)/(2 h k).
- * Tolerance: a residual of 1e-12 N on the least mass, 200 * 1e-3 * 0.01/6 kg (a corner in one triangle),
- * moves v by h r/m = 3e-11 m/s a step, n = 100 of them, and u's own contraction is not counted.
+ * A horizontal sheet stays flat: every node has the same share of weight and wind. Backward Euler's v1 = v0
+ * + h (k u1 |u1| - g), u = w - v, k = rho C/(2 sigma), is for headwind, u1 = u0 + h g - h k u1^2, the
+ * positive root u1 = (sqrt(1 + 4 h k (u0 + h g)) - 1)/(2 h k).
+ * Tolerance: a residual of 1e-12 N on the smallest mass, 200 * 1e-3 * 0.01/6 kg (a corner in one triangle),
+ * moves v by h r/m = 3e-11 m/s a step, n = 100 of them; the contraction of u itself is not counted.
  */
 static void fall_level(double wind, double gravity)
 {
@@ -111,14 +110,15 @@ static void fall_level(double wind, double gravity)
         ck_assert_double_eq_tol(drape_sim_velocities(s.sim)[3 * i], 0, 3e-9);
     }
     drape_energy e = drape_sim_energy(s.sim);
-    ck_assert(wind > 0 ? e.dissipated < 0 : e.dissipated > 0); /* the wind gives, air at rest takes */
+    ck_assert(wind > 0 ? e.dissipated < 0
+                       : e.dissipated > 0); /* wind adds energy, air at rest dissipates it */
     scene_close(&s);
 }
 
 START_TEST(a_level_sheet_falls_and_flies)
 {
     fall_level(0, 9.81); /* to its terminal speed, sqrt(g/k) = 1.655 m/s */
-    fall_level(4, 0);    /* the wind takes it along */
+    fall_level(4, 0);    /* the wind carries it along */
 }
 END_TEST
 

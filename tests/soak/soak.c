@@ -1,13 +1,13 @@
 /*
- * soak.c: sims that are driven for long as a host drives them, frame after frame, t += 1/60, with pins and
- * colliders moved at each: whether memory grows, and whether a second run has the same bits at every mark,
- * although it is saved and restored there. `soak [--steps N] [--minutes M] [CASE...]`: each case for so many
- * steps (default a few seconds' worth), or for so long. TAP on stdout.
+ * soak.c: drives sims for long as a host does, frame after frame, t += 1/60, with pins and colliders moved
+ * in each frame. It checks that memory does not grow, and that a second run has the same bits at every
+ * mark, although it is saved and restored there. `soak [--steps N] [--minutes M] [CASE...]`: each case for
+ * at least N steps (default: for a few seconds), or for M minutes. TAP on stdout.
  *
- * Memory is what the process has to itself, by the page (Anonymous of /proc/self/smaps_rollup, which counts
- * them, where other counters of Linux are off by up to 64 pages a thread), or what malloc has given out, and
- * what Drape took by its allocator, by the byte. Both are measured at each mark. In the first marks a case
- * warms up: lists of contacts grow to the longest of the motion.
+ * The memory is that of the process, in pages (Anonymous of /proc/self/smaps_rollup, which counts them,
+ * where other counters of Linux are off by up to 64 pages a thread), or the heap that malloc has allocated,
+ * and that allocated by Drape's allocator, in bytes. Both are measured at each mark. In the first marks a
+ * case warms up: lists of contacts grow to the longest of the motion.
  */
 #include <fcntl.h>
 #include <inttypes.h>
@@ -23,19 +23,19 @@
 #include "drape/drape.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define COUNTS_PAGES 0 /* sanitizers keep what was given back */
+#define COUNTS_PAGES 0 /* sanitizers keep released memory */
 #else
 #define COUNTS_PAGES 1
 #endif
 
-#define FRAME      (1.0 / 60) /* [s] */
-#define PERIOD     240        /* frames of the host's motion */
-#define MOST_MARKS 65536
-/* [bytes] A piece of malloc may be larger than asked for by a rest that is too small to be one, below 32
- * bytes: some hundred pieces of a sim. What is lost at each restore, 16 bytes at least, is more after 256 of
- * them. */
+#define FRAME     (1.0 / 60) /* [s] */
+#define PERIOD    240        /* frames of the host's motion */
+#define MAX_MARKS 65536
+/* [bytes] A block of malloc may be larger than requested, as remainders below 32 bytes are not split off:
+ * for some hundred blocks of a sim. A leak at each restore, of at least 16 bytes, is more than that after
+ * 256 of them. */
 #define HEAP_SLACK  4096
-#define SHORT_MARKS 12 /* after the warm ones, when nothing is said */
+#define SHORT_MARKS 12 /* after the warm-up, by default */
 
 /* ---- Cases ---- */
 
@@ -43,10 +43,10 @@ typedef struct soak {
     const char *name;
     const char *scene;  /* apostrophes stand for quotation marks */
     int mark;           /* frames from mark to mark */
-    int warm;           /* marks that warm up */
-    int pins[2];        /* nodes that the host moves together, to and fro by sway */
+    int warm;           /* marks of the warm-up */
+    int pins[2];        /* nodes that the host moves together, back and forth by sway */
     double sway[3];     /* [m] */
-    double collider[3]; /* [m] how far collider 0 goes to and fro, where there is one */
+    double collider[3]; /* [m] amplitude of collider 0, if there is one */
 } soak;
 
 #define CLOTH(columns, size, at, modulus)                                                                    \
@@ -93,12 +93,12 @@ enum { CASES = sizeof cases / sizeof *cases };
 
 typedef struct memory {
     int64_t own; /* [bytes] taken by the context's allocator */
-    int64_t all; /* [bytes] of the process: pages, or its heap */
+    int64_t all; /* [bytes] of the process: its pages, or its heap */
 } memory;
 
 static int64_t own;
 
-#define FRONT 16 /* in front of each piece: its size, and the alignment of any type */
+#define FRONT 16 /* before each block: its size, and the alignment of any type */
 
 static void *take(void *user, size_t size)
 {
@@ -111,9 +111,9 @@ static void *take(void *user, size_t size)
     return piece + FRONT;
 }
 
-static void give(void *user, void *given)
+static void release(void *user, void *block)
 {
-    unsigned char *piece = (unsigned char *)given - FRONT;
+    unsigned char *piece = (unsigned char *)block - FRONT;
     size_t size;
     (void)user;
     memcpy(&size, piece, sizeof size);
@@ -121,7 +121,7 @@ static void give(void *user, void *given)
     free(piece);
 }
 
-/* 0 where the system does not tell. */
+/* 0 if the system does not report it. */
 static int64_t count_pages(void)
 {
     static char text[4096];
@@ -134,7 +134,7 @@ static int64_t count_pages(void)
     return line && COUNTS_PAGES ? 1024 * strtoll(line + strlen("\nAnonymous:"), NULL, 10) : 0;
 }
 
-/* What malloc has given out, by whatever library; 0 where it does not tell. */
+/* The bytes that malloc has allocated for all libraries; 0 if it does not report them. */
 static int64_t count_heap(void)
 {
 #if COUNTS_PAGES && defined(__GLIBC__) && __GLIBC_PREREQ(2, 33)
@@ -145,17 +145,17 @@ static int64_t count_heap(void)
 #endif
 }
 
-/* A sim that is made anew again and again leaves gaps, which malloc fills in its own time: there the pages
- * say nothing. */
+/* A sim that is destroyed and created repeatedly leaves gaps, which malloc reuses at some later time: then
+ * the pages are no measure. */
 static memory measure(bool restart)
 {
     return (memory){.own = own, .all = restart ? count_heap() : count_pages()};
 }
 
-static void raise_to(memory *most, memory m)
+static void raise_to(memory *max, memory m)
 {
-    most->own = m.own > most->own ? m.own : most->own;
-    most->all = m.all > most->all ? m.all : most->all;
+    max->own = m.own > max->own ? m.own : max->own;
+    max->all = m.all > max->all ? m.all : max->all;
 }
 
 /* ---- One run ---- */
@@ -166,10 +166,10 @@ typedef struct mark {
 } mark;
 
 typedef struct span {
-    int64_t steps;  /* at least so many, or */
-    double seconds; /* so long by the clock, or */
-    int marks;      /* so many marks, or */
-    bool brief;     /* some marks after those that warm up */
+    int64_t steps;  /* at least this number of steps, or */
+    double seconds; /* this time by the clock, or */
+    int marks;      /* this number of marks, or */
+    bool brief;     /* some marks after the warm-up */
 } span;
 
 typedef struct result {
@@ -179,7 +179,7 @@ typedef struct result {
     char failure[600]; /* "" for none */
 } result;
 
-static mark first[MOST_MARKS], second[MOST_MARKS];
+static mark first[MAX_MARKS], second[MAX_MARKS];
 static unsigned char *saved;
 static size_t saved_size, saved_room;
 
@@ -211,14 +211,14 @@ static drape_status save_and_restore(drape_sim *sim)
     return status ? status : drape_sim_restore_from(sim, saved, saved_size);
 }
 
-/* To where the host's motion has them at the end of this frame: to and fro on a sine, counted within its
+/* Moves pins and collider to their positions at the end of this frame: on a sine, counted within its
  * period. */
 static drape_status move(const soak *c, drape_sim *sim, int64_t frame)
 {
     const drape_model *model = drape_sim_model(sim);
     const double *rest = drape_model_rest_positions(model);
     const double phase = sin(2 * 3.141592653589793 * (double)((frame + 1) % PERIOD) / PERIOD);
-    double to[6], way[3];
+    double to[6], displacement[3];
     int32_t nodes[2];
     for (int i = 0; i < 2; i++) {
         nodes[i] = c->pins[i];
@@ -227,16 +227,15 @@ static drape_status move(const soak *c, drape_sim *sim, int64_t frame)
     }
     drape_status status = drape_sim_move_pins(sim, 2, nodes, FRAME, to, NULL);
     for (int k = 0; k < 3; k++)
-        way[k] = phase * c->collider[k];
+        displacement[k] = phase * c->collider[k];
     if (!status && drape_model_collider_count(model) > 0)
-        status = drape_sim_move_collider(sim, 0, FRAME, way, NULL);
+        status = drape_sim_move_collider(sim, 0, FRAME, displacement, NULL);
     return status;
 }
 
-static bool goes_on(const span *s, const result *r, double start)
+static bool continues(const span *s, const result *r, double start)
 {
-    return r->marks < MOST_MARKS &&
-           (r->steps < s->steps || now() - start < s->seconds || r->marks < s->marks);
+    return r->marks < MAX_MARKS && (r->steps < s->steps || now() - start < s->seconds || r->marks < s->marks);
 }
 
 static drape_status one_mark(const soak *c, drape_sim *sim, bool restart, mark *marks, result *r)
@@ -273,12 +272,12 @@ static result run(const soak *c, const span *s, bool restart, mark *marks)
     const double start = now();
     drape_context_def_init(&def, sizeof def);
     def.allocate = take;
-    def.release = give;
+    def.release = release;
     drape_status status = drape_context_create(&def, &ctx);
     status = status ? status : parse(ctx, c, &scene);
     status = status ? status : drape_scene_compile(scene, &model);
     status = status ? status : drape_sim_create(ctx, model, NULL, &sim);
-    while (!status && goes_on(s, &r, start))
+    while (!status && continues(s, &r, start))
         status = one_mark(c, sim, restart, marks, &r);
     if (status)
         snprintf(r.failure, sizeof r.failure, "%s: %s", drape_status_name(status),
@@ -295,12 +294,12 @@ static result run(const soak *c, const span *s, bool restart, mark *marks)
 
 static memory growth(const mark *marks, int count, int warming, memory *warm)
 {
-    memory most = {0};
+    memory max = {0};
     *warm = (memory){0};
     for (int i = 0; i < count; i++)
-        raise_to(i < warming ? warm : &most, marks[i].memory);
-    return (memory){most.own > warm->own ? most.own - warm->own : 0,
-                    most.all > warm->all ? most.all - warm->all : 0};
+        raise_to(i < warming ? warm : &max, marks[i].memory);
+    return (memory){max.own > warm->own ? max.own - warm->own : 0,
+                    max.all > warm->all ? max.all - warm->all : 0};
 }
 
 static int different(int count)
@@ -311,8 +310,8 @@ static int different(int count)
     return count;
 }
 
-/* Returns whether all is well. */
-static bool tell(int number, const soak *c, const result *r, const mark *marks, const result *before)
+/* Prints the result of a run; returns whether it is good. */
+static bool print_result(int number, const soak *c, const result *r, const mark *marks, const result *before)
 {
     memory warm;
     const memory grown = growth(marks, r->marks, c->warm, &warm);
@@ -339,9 +338,9 @@ static bool try_case(int number, const soak *c, const span *s)
 {
     const span brief = {.marks = c->warm + SHORT_MARKS};
     const result one = run(c, s->brief ? &brief : s, false, first);
-    bool good = tell(2 * number + 1, c, &one, first, NULL);
+    bool good = print_result(2 * number + 1, c, &one, first, NULL);
     const result two = run(c, &(span){.marks = one.marks}, true, second);
-    return tell(2 * number + 2, c, &two, second, &one) && good;
+    return print_result(2 * number + 2, c, &two, second, &one) && good;
 }
 
 /* ---- The program ---- */
@@ -371,7 +370,7 @@ int main(int argc, char **argv)
     if (s.steps <= 0 && !(s.seconds > 0))
         s.brief = true;
     setvbuf(stdout, NULL, _IOLBF, 1 << 12);
-    memset(first, 0, sizeof first); /* pages that are there before anything is measured */
+    memset(first, 0, sizeof first); /* touches all pages before anything is measured */
     memset(second, 0, sizeof second);
     for (int k = 0; k < CASES; k++)
         number += chosen(&cases[k], argc - i, argv + i);

@@ -1,7 +1,7 @@
 /*
- * audit.h: what a run of a scene with contact is judged by, at states that the run itself did not look at:
- * how deep nodes, and points of faces and edges between them, lie in colliders, and how many edges pass
- * through triangles, at the ends of accepted steps and at frames, which may lie between steps.
+ * audit.h: checks of a run with contact, at states that the run itself did not check: how deep nodes, and
+ * points of faces and edges between them, lie in colliders, and how many edges pass through triangles, at
+ * the ends of accepted steps and at frames, which may lie between steps.
  */
 #ifndef DRAPE_TESTS_AUDIT_H
 #define DRAPE_TESTS_AUDIT_H
@@ -12,21 +12,21 @@
 #include "geometry/intersect.h"
 #include "sim/sim.h"
 
-#define AUDIT_CUTS 6 /* points of a triangle's side: a face is sampled at 28, among them its corners */
+#define AUDIT_CUTS 6 /* intervals along a side: a face is sampled at 28 points, with its corners */
 
-/* At one kind of state: the worst of all that were looked at. */
+/* The largest values over all states of one kind. */
 typedef struct audit_worst {
-    double node, face;     /* [m] deepest node, deepest of all samples; negative: the least gap */
-    int64_t intersections; /* most in one state */
-    double node_at, face_at, intersections_at; /* [s] when */
+    double node, face;     /* [m] deepest node, deepest of all samples; negative: the smallest gap */
+    int64_t intersections; /* the largest number in one state */
+    double node_at, face_at, intersections_at; /* [s] their times */
     int64_t states;
 } audit_worst;
 
 typedef struct audit {
     drape_context *ctx;
     const drape_model *model;
-    bool self;  /* look for edges through triangles */
-    bool faces; /* look between the nodes too */
+    bool self;  /* find edges that pass through triangles */
+    bool faces; /* also sample faces between the nodes */
     audit_worst steps, frames;
 } audit;
 
@@ -38,13 +38,13 @@ static inline audit audit_of(drape_context *ctx, const drape_model *model, bool 
 
 static inline double audit_depth(const audit *a, const double *p, double t)
 {
-    double most = -INFINITY;
+    double deepest = -INFINITY;
     for (int32_t k = 0; k < a->model->collider_count; k++) {
         const drape_collider *collider = &a->model->colliders[k];
         const drape_collider_pose pose = drape_collider_pose_at(collider, t);
-        most = fmax(most, -drape_collider_distance(collider, &pose, p, NULL, NULL));
+        deepest = fmax(deepest, -drape_collider_distance(collider, &pose, p, NULL, NULL));
     }
-    return most;
+    return deepest;
 }
 
 static inline void audit_faces(const audit *a, const double *x, double t, audit_worst *worst)

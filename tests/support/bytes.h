@@ -1,4 +1,4 @@
-/* bytes.h: a sim saved in memory. */
+/* bytes.h: a checkpoint of a sim in memory. */
 #ifndef DRAPE_TESTS_BYTES_H
 #define DRAPE_TESTS_BYTES_H
 
@@ -26,7 +26,7 @@ static inline drape_status bytes_keep(void *user, const void *data, size_t size)
     return DRAPE_OK;
 }
 
-/* To be freed. */
+/* data is to be freed. */
 static inline bytes bytes_save(drape_sim *sim)
 {
     bytes b = {0};

@@ -1,6 +1,6 @@
 /*
- * comma.h: a locale whose numbers have a decimal comma. Where none is installed it is made, by localedef out
- * of Debian's package locales, into a folder of its own.
+ * comma.h: a locale whose numbers have a decimal comma. If none is installed, localedef of Debian's package
+ * locales makes one in a temporary folder.
  */
 #ifndef DRAPE_TESTS_COMMA_H
 #define DRAPE_TESTS_COMMA_H
@@ -16,7 +16,7 @@ static bool comma_is_set(void)
     return strcmp(localeconv()->decimal_point, ",") == 0;
 }
 
-/* False where there is none and none can be made: then there is nothing to see. */
+/* False if there is none and none can be made: then the test has nothing to check. */
 static bool comma_begin(void)
 {
     static const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8"};
@@ -29,7 +29,7 @@ static bool comma_begin(void)
     snprintf(command, sizeof command, "localedef -i de_DE -f UTF-8 '%s/de_DE.UTF-8' >/dev/null 2>&1", folder);
     bool made =
         system(command) != -1 && setenv("LOCPATH", folder, 1) == 0 && setlocale(LC_ALL, "de_DE.UTF-8");
-    snprintf(command, sizeof command, "rm -rf '%s'", folder); /* what is set stays */
+    snprintf(command, sizeof command, "rm -rf '%s'", folder); /* the locale that is set remains */
     if (system(command) != 0 || !made || !comma_is_set()) {
         fputs("no locale with a decimal comma: install Debian's package locales\n", stderr);
         return false;

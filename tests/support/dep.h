@@ -1,6 +1,7 @@
 /*
- * dep.h: the scenes of the DEP report: a level sheet of c edges a side that falls, held at four inner nodes
- * r (c + 1) + k, r and k of {c/3, 2 c/3}; edges 0.1 m, 10 g on all nodes alike, E 1e5 Pa, thickness 1 mm.
+ * dep.h: the scenes of the DEP report: a horizontal sheet of c edges a side that falls, pinned at four
+ * inner nodes r (c + 1) + k, r and k of {c/3, 2 c/3}; edges 0.1 m, 10 g spread evenly over all nodes, E 1e5
+ * Pa, thickness 1 mm.
  */
 #ifndef DRAPE_TESTS_DEP_H
 #define DRAPE_TESTS_DEP_H
@@ -15,11 +16,11 @@ typedef struct dep_case {
     const char *integrator; /* more settings, each after a comma */
 } dep_case;
 
-/* What the attempts of a run said. */
+/* What the attempts of a run reported. */
 typedef struct dep_log {
     int64_t attempts, accepted, rejected, unconverged;
-    bool honest;    /* "converged" was said where the residual is within the tolerance, and nowhere else */
-    bool converged; /* every accepted one */
+    bool honest;    /* "converged" was reported if the residual is within the tolerance, and only then */
+    bool converged; /* all accepted attempts */
 } dep_log;
 
 static inline drape_status dep_note(void *user, const drape_event *event)
@@ -52,7 +53,7 @@ static inline scene dep_scene(const dep_case *c)
         c->side, c->modulus, c->stiffness, a * n + a, a * n + b, b * n + a, b * n + b, c->dt, c->integrator);
 }
 
-/* Runs 3 s and checks what must hold of a run that Drape calls good. */
+/* Runs 3 s and checks the properties of a good run. */
 static inline void dep_run(const dep_case *c)
 {
     const double duration = 3;
@@ -75,11 +76,11 @@ static inline void dep_run(const dep_case *c)
         counted += count;
     ck_assert_int_eq(counted, log.rejected);
 
-    /* Each pin carries a quarter of 0.098 N on two springs at least, of 0.87 N a unit of strain or more:
-     * 1.4 % at rest, twice that when loaded at once, more when the hanging corners swing; the broken runs
-     * had 10 to 4000. */
+    /* Each pin carries a quarter of 0.098 N on at least two springs of at least 0.87 N per unit of strain:
+     * 1.4 % at rest, twice that under a sudden load, more when the hanging corners swing; the runs of the
+     * report that failed had 10 to 4000. */
     ck_assert(done.strain_max < 0.2 && done.strain_min > -0.2);
-    /* Nothing can fall lower than its string to the nearest pin is long; NaN fails this too. */
+    /* No node can be lower than its shortest path along edges to the nearest pin; NaN fails this too. */
     for (int32_t i = 0; i < s.model->node_count; i++)
         ck_assert(fabs(drape_sim_positions(s.sim)[3 * i + 1]) < 1.2 * 0.1 * c->side);
     scene_close(&s);

@@ -1,12 +1,11 @@
-/* failing_allocator.h: a context whose memory is counted and fails on demand. Break one allocation after the
- * other and see that each is reported and none leaks:
+/* failing_allocator.h: a context whose memory is counted and fails on demand. A test makes one allocation
+ * after the other fail, and checks that each failure is reported and none leaks:
  *
  *     failing_allocator memory = {.fail_at = n};
  *     drape_context *ctx = failing_context(&memory);
  *     ...
  *     drape_context_destroy(&ctx);
- *     ck_assert_int_eq(memory.live, 0);
- */
+ *     ck_assert_int_eq(memory.live, 0); */
 #ifndef DRAPE_TESTS_FAILING_ALLOCATOR_H
 #define DRAPE_TESTS_FAILING_ALLOCATOR_H
 
@@ -16,11 +15,10 @@
 #include "drape/drape.h"
 
 typedef struct failing_allocator {
-    long
-        fail_at; /* number of the call that fails, from 1; 0: none; the context's own memory does not count */
-    bool stay_broken; /* all calls after it fail too */
+    long fail_at;     /* number of the call that fails, from 1, after the context's own; 0: none */
+    bool stay_broken; /* all later calls fail too */
     long calls, live; /* allocations so far; those not yet released */
-    size_t largest;   /* [bytes] asked for in one call, failed or not */
+    size_t largest;   /* [bytes] largest request, failed or not */
 } failing_allocator;
 
 static inline void *failing_allocate(void *user, size_t size)
@@ -35,7 +33,7 @@ static inline void *failing_allocate(void *user, size_t size)
     void *block = malloc(size);
     if (block) {
         memory->live++;
-        memset(block, 0xA5, size); /* nobody may count on zeros */
+        memset(block, 0xA5, size); /* so that reads of uninitialized memory show */
     }
     return block;
 }

@@ -1,5 +1,5 @@
-/* four_nodes.h: the smallest sheet of the DEP report: two triangles, nodes 0 to 2 fixed, node 3 falls
- * about the hinge. */
+/* four_nodes.h: the smallest sheet of the DEP report: two triangles, nodes 0 to 2 pinned, node 3 falls
+ * around the hinge. */
 #ifndef DRAPE_TESTS_FOUR_NODES_H
 #define DRAPE_TESTS_FOUR_NODES_H
 
@@ -8,7 +8,7 @@
 #define FOUR_NODES_STEPS 500
 #define FOUR_NODES_STEP  0.01 /* [s] */
 
-/* tolerance in newtons of the largest component; more: settings of the integrator, each after a comma */
+/* tolerance: of the largest component [N]; more: settings of the integrator, each after a comma */
 static inline scene four_nodes(double tolerance, const char *more)
 {
     return scene_open(

@@ -1,11 +1,12 @@
 /*
- * ida_full.h: IDA without Drape's reduction, to compare with: the system of 2 n unknowns as it stands,
+ * ida_full.h: IDA without Drape's reduction, to compare with: the full system of 2 n unknowns
  *     y = (x, v),  F = [x' - v ; M v' + g(x, v)],  dF/dy + c_j dF/dy' = [c_j I, -I ; K, D + c_j M],
- * in SUNDIALS' own sparse matrix, factored by SUNDIALS' own KLU. IDA is set as src/integrators/ida.c sets it,
- * with the same test of convergence, so in exact arithmetic both take the same steps. Pins must stand still.
+ * in SUNDIALS' own sparse matrix, factored by SUNDIALS' own KLU. IDA is configured as in
+ * src/integrators/ida.c, with the same test of convergence, so in exact arithmetic both take the same
+ * steps. Pins must not move.
  *
- * SUNDIALS clears a sparse matrix before every Jacobian, indices too. The Jacobian here writes every value
- * and no index, so the matrix's zero is made to do nothing.
+ * SUNDIALS zeros a sparse matrix before every Jacobian, including its indices. The Jacobian here writes
+ * every value and no index, so the matrix's function for zeroing is replaced by one that does nothing.
  */
 #ifndef DRAPE_TESTS_IDA_FULL_H
 #define DRAPE_TESTS_IDA_FULL_H
@@ -32,7 +33,7 @@ typedef struct ida_full {
     const drape_model *model;
     drape_system *system;
     drape_arena arena;
-    drape_state now, next; /* the last step's end; where the residual was evaluated last */
+    drape_state now, next; /* the end of the last step; the point of the last evaluation of the residual */
     double *g, *k, *d;     /* nodes; K and D (nonzeros) */
     int64_t n;             /* free DOFs */
     SUNContext sun;
@@ -40,7 +41,7 @@ typedef struct ida_full {
     N_Vector y, rate, tolerances;
     SUNMatrix matrix;
     SUNLinearSolver solver;
-    drape_ida_newton newton; /* the ida_full must stay where it is */
+    drape_ida_newton newton; /* the ida_full must stay at its address */
     long residuals, jacobians;
 } ida_full;
 
@@ -193,7 +194,7 @@ static inline bool ida_full_configure(ida_full *f, int max_order, int ordering)
            !IDASetDeltaCjLSetup(f->ida, IDA_FULL_CJ_CHANGE);
 }
 
-/* At the model's own start. False where something cannot be had. */
+/* From the model's initial state. False if a part cannot be created. */
 static inline bool ida_full_open(ida_full *f, drape_context *ctx, const drape_model *model, double atol_x,
                                  double atol_v, int max_order, int ordering)
 {
@@ -219,7 +220,7 @@ static inline bool ida_full_open(ida_full *f, drape_context *ctx, const drape_mo
     return good;
 }
 
-/* One step towards end, which it may reach and not pass. The return code of IDASolve. */
+/* One step towards end, which it may reach but not pass. Returns the code of IDASolve. */
 static inline int ida_full_step(ida_full *f, double end)
 {
     double t;

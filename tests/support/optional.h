@@ -1,5 +1,5 @@
-/* optional.h: a test program that runs only where an environment variable is set; else it says in TAP
- * that, and why, it was skipped. */
+/* optional.h: a test program that runs only if an environment variable is set; otherwise it reports in TAP
+ * that it is skipped, and why. */
 #ifndef DRAPE_TESTS_OPTIONAL_H
 #define DRAPE_TESTS_OPTIONAL_H
 

@@ -1,12 +1,12 @@
 /*
- * scene.h: for tests that run a scene. A scene is JSON text, in which apostrophes stand for quotation
- * marks so that it reads well in C, and printf conversions for numbers:
+ * scene.h: for tests that run a scene. A scene is JSON text, in which apostrophes stand for quotation marks
+ * so that it reads well in C, and printf conversions for numbers:
  *
  *     scene s = scene_open("{'drape': 1, ..., 'gravity': [0, %g, 0], 'duration': 1}", -9.81);
  *     scene_advance(&s, 1);
  *     scene_close(&s);
  *
- * Whatever goes wrong fails the test with the library's message.
+ * Any failure fails the test with the library's message.
  */
 #ifndef DRAPE_TESTS_SCENE_H
 #define DRAPE_TESTS_SCENE_H
@@ -54,7 +54,7 @@ static inline scene scene_vmodel(const char *format, va_list values)
     return s;
 }
 
-/* The model alone. */
+/* The model only, without a sim. */
 __attribute__((format(printf, 1, 2))) static inline scene scene_model(const char *format, ...)
 {
     va_list values;
@@ -64,7 +64,7 @@ __attribute__((format(printf, 1, 2))) static inline scene scene_model(const char
     return s;
 }
 
-/* A sim of the scene's model; def NULL: as the scene says. */
+/* Creates a sim of the scene's model; def NULL: as the scene says. */
 static inline void scene_start(scene *s, const drape_sim_def *def)
 {
     const drape_status status = drape_sim_create(s->ctx, s->model, def, &s->sim);
@@ -89,7 +89,7 @@ static inline void scene_close(scene *s)
     drape_context_destroy(&s->ctx);
 }
 
-/* The present state, open to changes before the first step. */
+/* The present state, which may be changed before the first step. */
 static inline drape_state *scene_state(scene *s)
 {
     return &s->sim->states[s->sim->now];
@@ -111,7 +111,7 @@ static inline drape_status scene_note(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* From here on the scene counts attempts and keeps the largest residual. s must stay where it is. */
+/* From here on the scene counts attempts and keeps the largest residual. s must stay at its address. */
 static inline void scene_watch(scene *s)
 {
     ck_assert_int_eq(drape_sim_observe(s->sim, scene_note, s), DRAPE_OK);
@@ -123,34 +123,34 @@ static inline void scene_advance(scene *s, double t)
     ck_assert_msg(status == DRAPE_OK, "%s", drape_context_message(s->ctx));
 }
 
-static inline double scene_least_mass(const scene *s)
+static inline double scene_min_mass(const scene *s)
 {
-    double least = INFINITY;
+    double smallest = INFINITY;
     for (int32_t i = 0; i < s->model->node_count; i++)
-        least = fmin(least, s->model->mass[i]);
-    return least;
+        smallest = fmin(smallest, s->model->mass[i]);
+    return smallest;
 }
 
 /* Round-off of the force on a node [N]. Coordinates of size `size` are rounded by DBL_EPSILON/2 of it, edge
- * vectors by twice that; a spring makes of it its constant times as much, a lattice node has 6 springs of at
- * most `spring` [N/m], and the sum of 6 forces and the products in each add as much again. */
+ * vectors by twice that; a spring multiplies that by its constant, a lattice node has 6 springs of at most
+ * `spring` [N/m], and the sum of 6 forces and the products in each add as much again. */
 static inline double force_noise(double spring, double size)
 {
     return 6 * 2 * spring * 2 * DBL_EPSILON * size;
 }
 
 /*
- * How far a node can be [m] from the exact solution of backward Euler after n steps whose residuals were
- * at most r [N] in every component. With K >= 0 the error obeys e_{n+1} = (1 + h^2 M^-1 K)^-1 (2 e_n -
- * e_{n-1} + h^2 M^-1 r), which in the norm of M grows no faster than for K = 0: n (n + 1)/2 h^2 |M^-1/2
- * r|; and |e|_max <= |M^1/2 e|/sqrt(m_min), |M^-1/2 r| <= sqrt(3 nodes/m_min) r.
+ * The largest distance [m] of a node from the exact solution of backward Euler after n steps whose
+ * residuals were at most r [N] in every component. With K >= 0 the error obeys e_{n+1} = (1 + h^2 M^-1
+ * K)^-1 (2 e_n - e_{n-1} + h^2 M^-1 r), which in the norm of M grows no faster than for K = 0: n (n + 1)/2
+ * h^2 |M^-1/2 r|; and |e|_max <= |M^1/2 e|/sqrt(m_min), |M^-1/2 r| <= sqrt(3 nodes/m_min) r.
  */
 static inline double drift_bound(const scene *s, double n, double h, double r)
 {
-    return n * (n + 1) / 2 * h * h * sqrt(3.0 * s->model->node_count) * r / scene_least_mass(s);
+    return n * (n + 1) / 2 * h * h * sqrt(3.0 * s->model->node_count) * r / scene_min_mass(s);
 }
 
-/* A test prints what it measured: `tools/test` hides it, the log of a failed test shows it. */
+/* Prints the value and its bound: `tools/test` hides the line, the log of a failed test shows it. */
 #define assert_below(value, bound)                                                                           \
     do {                                                                                                     \
         const double value_ = (value), bound_ = (bound);                                                     \

@@ -1,7 +1,7 @@
 /*
- * solids.h: how deep a triangle of cloth lies in a solid, by other means than the library's. In a convex body
- * of planes, and in whatever lies within a radius of a segment, it is exact over the whole triangle; in
- * cylinders and behind rounded edges it is the deepest of many points of it.
+ * solids.h: how deep a triangle of cloth lies in a solid, computed independently of the library. For a
+ * convex body of planes, and for all points within a radius of a segment, it is exact over the whole
+ * triangle; for cylinders and rounded edges it is the maximum over many points of the triangle.
  */
 #ifndef DRAPE_TESTS_SOLIDS_H
 #define DRAPE_TESTS_SOLIDS_H
@@ -19,7 +19,8 @@ typedef struct solid {
     double plane[SOLID_PLANES][4];
     bool round; /* within `radius` of the segment a b */
     double a[3], b[3], radius;
-    double (*depth)(const double *x); /* else sampled: how deep a point lies, in part or more */
+    double (*depth)(
+        const double *x); /* sampled, if not NULL: the depth of a point in the body, or in a part of it */
 } solid;
 
 static inline double solid_dot(const double *a, const double *b)
@@ -33,7 +34,8 @@ static inline void solid_between(const double *a, const double *b, double t, dou
         out[k] = a[k] + t * (b[k] - a[k]);
 }
 
-/* Whether some of the triangle is deeper than `depth` in all planes: what is left of it after cutting. */
+/* Whether a part of the triangle is deeper than `depth` in all planes: the part that is left after
+ * cutting. */
 static inline bool solid_cuts(const solid *s, double x[3][3], double depth)
 {
     double p[SOLID_CORNERS][3], q[SOLID_CORNERS][3];
@@ -69,12 +71,12 @@ static inline double solid_point_segment(const double *p, const double *a, const
     return sqrt(solid_dot(w, w));
 }
 
-/* The squared distance is convex in both parameters: least where its slope is 0, else at an end. */
+/* The squared distance is convex in both parameters: its minimum is where its slope is 0, or at an end. */
 static inline double solid_segments(const double *a, const double *b, const double *c, const double *d)
 {
     double u[3], w[3], r[3], p[3], q[3];
-    double least = fmin(fmin(solid_point_segment(a, c, d), solid_point_segment(b, c, d)),
-                        fmin(solid_point_segment(c, a, b), solid_point_segment(d, a, b)));
+    double smallest = fmin(fmin(solid_point_segment(a, c, d), solid_point_segment(b, c, d)),
+                           fmin(solid_point_segment(c, a, b), solid_point_segment(d, a, b)));
     for (int k = 0; k < 3; k++) {
         u[k] = b[k] - a[k];
         w[k] = d[k] - c[k];
@@ -82,16 +84,16 @@ static inline double solid_segments(const double *a, const double *b, const doub
     }
     const double uu = solid_dot(u, u), ww = solid_dot(w, w), uw = solid_dot(u, w), det = uu * ww - uw * uw;
     if (!(det > 1e-12 * uu * ww))
-        return least;
+        return smallest;
     const double s = (ww * solid_dot(r, u) - uw * solid_dot(r, w)) / det,
                  t = (uw * solid_dot(r, u) - uu * solid_dot(r, w)) / det;
     if (s < 0 || s > 1 || t < 0 || t > 1)
-        return least;
+        return smallest;
     solid_between(a, b, s, p);
     solid_between(c, d, t, q);
     for (int k = 0; k < 3; k++)
         p[k] -= q[k];
-    return fmin(least, sqrt(solid_dot(p, p)));
+    return fmin(smallest, sqrt(solid_dot(p, p)));
 }
 
 static inline void solid_normal(double x[3][3], double *n)
@@ -105,7 +107,7 @@ static inline void solid_normal(double x[3][3], double *n)
         n[k] = u[(k + 1) % 3] * w[(k + 2) % 3] - u[(k + 2) % 3] * w[(k + 1) % 3];
 }
 
-/* Whether a point of the triangle's plane lies in it. */
+/* Whether the projection of p onto the triangle's plane lies in it. */
 static inline bool solid_above(double x[3][3], const double *n, const double *p)
 {
     for (int i = 0; i < 3; i++) {
@@ -122,25 +124,25 @@ static inline bool solid_above(double x[3][3], const double *n, const double *p)
 
 static inline double solid_segment_triangle(const double *a, const double *b, double x[3][3])
 {
-    double n[3], least = INFINITY, p[3];
+    double n[3], smallest = INFINITY, p[3];
     solid_normal(x, n);
     const double length = sqrt(solid_dot(n, n)), base = solid_dot(n, x[0]), from = solid_dot(n, a) - base,
                  to = solid_dot(n, b) - base;
     for (int i = 0; i < 3; i++)
-        least = fmin(least, solid_segments(a, b, x[i], x[(i + 1) % 3]));
+        smallest = fmin(smallest, solid_segments(a, b, x[i], x[(i + 1) % 3]));
     for (int end = 0; end < 2; end++) {
         const double away = (end ? to : from) / length, *x0 = end ? b : a;
         for (int k = 0; k < 3; k++)
             p[k] = x0[k] - away * n[k] / length;
         if (solid_above(x, n, p))
-            least = fmin(least, fabs(away));
+            smallest = fmin(smallest, fabs(away));
     }
     if (from * to < 0) {
         solid_between(a, b, from / (from - to), p);
         if (solid_above(x, n, p))
             return 0;
     }
-    return least;
+    return smallest;
 }
 
 static inline double solid_sample(const solid *s, double x[3][3])
@@ -157,7 +159,7 @@ static inline double solid_sample(const solid *s, double x[3][3])
     return deepest;
 }
 
-/* [m]; below `limit` it need not be right. */
+/* [m]; below `limit` it need not be exact. */
 static inline double solid_depth(const solid *s, double x[3][3], double limit)
 {
     double depth = -INFINITY;

@@ -1,8 +1,8 @@
 /*
- * test_energy.c: the audit of energy. That kinetic + elastic + gravity + dissipated + numerical - work of
- * pins stays what it was holds by construction, since numerical is the remainder. What does not: that the
- * remainder goes away with h, or with rtol, as the order of the method says; that what damping took is
- * what the closed form takes; that pins do the work that the closed form does.
+ * test_energy.c: the audit of energy. By construction kinetic + elastic + gravity + dissipated + numerical
+ * - work of pins is constant, since numerical is the remainder. Tested here: the remainder vanishes with h,
+ * or with rtol, as the order of the method says; the dissipation of damping and the work of pins are those
+ * of closed forms.
  */
 #include "support/scene.h"
 
@@ -19,11 +19,11 @@
 
 #define DAMPED ", {'type': 'damp.kelvin_voigt', 'beta': 2e-3}, {'type': 'drag.viscous', 'coefficient': 0.3}"
 
-static drape_sim_def def_of(const char *row, double dt, const drape_setting *setting)
+static drape_sim_def def_of(const char *method, double dt, const drape_setting *setting)
 {
     drape_sim_def def;
     drape_sim_def_init(&def, sizeof def);
-    def.integrator = row;
+    def.integrator = method;
     def.controller = "fixed";
     def.dt = dt;
     def.integrator_settings = setting;
@@ -31,9 +31,9 @@ static drape_sim_def def_of(const char *row, double dt, const drape_setting *set
     return def;
 }
 
-static double numerical(const char *row, const char *terms, double dt, const drape_setting *setting)
+static double numerical(const char *method, const char *terms, double dt, const drape_setting *setting)
 {
-    const drape_sim_def def = def_of(row, dt, setting);
+    const drape_sim_def def = def_of(method, dt, setting);
     scene s = scene_model(SHEET, terms);
     scene_start(&s, &def);
     scene_advance(&s, END);
@@ -42,24 +42,24 @@ static double numerical(const char *row, const char *terms, double dt, const dra
     return energy;
 }
 
-/* Slopes as in test_order.c, of the remainder. midpoint conserves quadratic invariants only: what it
- * leaves of other energies, and of the work of damping taken at mid-way, is of its order; so is what trbdf2
- * takes or leaves. */
-START_TEST(the_remainder_of_one_step_rows_has_their_order)
+/* Slopes of the remainder, as in test_order.c. midpoint conserves quadratic invariants only: what it gains
+ * or loses in other energies, and in the work of damping taken at the middle of the step, is of its order;
+ * so are the gains and losses of trbdf2. */
+START_TEST(the_remainder_of_one_step_methods_has_their_order)
 {
-    static const char *const rows[] = {"be", "midpoint", "trbdf2"}, *const terms[] = {"", DAMPED};
+    static const char *const methods[] = {"be", "midpoint", "trbdf2"}, *const terms[] = {"", DAMPED};
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 2; k++) {
-            const double a = numerical(rows[i], terms[k], END / 400, NULL),
-                         b = numerical(rows[i], terms[k], END / 800, NULL);
-            printf("# %s%s: remainder %.3g J, %.3g J, slope %.3f\n", rows[i], k ? ", damped" : "", a, b,
+            const double a = numerical(methods[i], terms[k], END / 400, NULL),
+                         b = numerical(methods[i], terms[k], END / 800, NULL);
+            printf("# %s%s: remainder %.3g J, %.3g J, slope %.3f\n", methods[i], k ? ", damped" : "", a, b,
                    log2(fabs(a / b)));
             ck_assert_double_eq_tol(log2(fabs(a / b)), i > 0 ? 2 : 1, 0.15);
         }
 }
 END_TEST
 
-/* Backward Euler takes energy in every step: with a convex energy at least 1/2 m |v1 - v0|^2. Of hinges
+/* Backward Euler loses energy in every step: at least 1/2 m |v1 - v0|^2 if the energy is convex. For hinges
  * and springs under pressure the energy is not convex, but at this h they are slow. */
 START_TEST(be_only_takes_energy)
 {
@@ -77,9 +77,9 @@ START_TEST(be_only_takes_energy)
 }
 END_TEST
 
-/* In order 5 the error at a time falls as rtol^(5/6) and so does the remainder without damping. With it,
- * the work of damping is summed by the trapezoidal rule, of order 2 in the steps, which go with
- * rtol^(1/6): only as rtol^(1/3), a decade for three. A factor 2 is left for the loose end. */
+/* With order 5 the error at a time falls as rtol^(5/6), and so does the remainder without damping. With
+ * damping, its work is summed by the trapezoidal rule, of order 2 in the steps, which go with rtol^(1/6):
+ * only as rtol^(1/3), one decade for three. A factor 2 is left for the loosest tolerances. */
 START_TEST(the_remainder_of_ida_falls_with_rtol)
 {
     static const char *const terms[] = {"", DAMPED};
@@ -98,24 +98,24 @@ START_TEST(the_remainder_of_ida_falls_with_rtol)
 END_TEST
 
 /* The oscillator of test_oscillator.c with dashpots and drag: x'' + 2 d x' + w^2 x = 0 with 2 d = w^2 beta
- * + coefficient/areal density; from x = 0 and v0, x = v0/wd exp(-d t) sin(wd t), and what is dissipated is
- * what is missing of E. The springs are linear but for (a/L)^2 = 1e-8. midpoint turns phases of w h by (w
- * h)^2/12 of them and takes work at mid-way: an error of (w h)^2 of E0 at most; ida's trapezoidal rule of
- * (w h)^2/12 with steps h below 0.3/w at rtol 1e-8. */
+ * + coefficient/areal density. From x = 0 and v0, x = v0/wd exp(-d t) sin(wd t), and the dissipation is the
+ * decrease of E. The springs are linear up to (a/L)^2 = 1e-8. midpoint shifts phases of w h by (w h)^2/12
+ * of them and takes work at the middle of the step: an error of at most (w h)^2 of E0; ida's trapezoidal
+ * rule has an error of (w h)^2/12 with steps h below 0.3/w at rtol 1e-8. */
 START_TEST(dissipated_is_the_work_of_damping_in_closed_form)
 {
     const double length = 0.1, density = 0.2, stiffness = 3 * sqrt(3.0) / 2 * 1e3,
                  mass = density * sqrt(3.0) / 2 * length * length;
     const double w = sqrt(stiffness / mass), speed = 1e-4 * length * w;
     static const double betas[] = {0.2, 0}, drags[] = {0, 0.3}; /* w beta; 2 d/w of drag */
-    static const char *const rows[] = {"midpoint", "ida"};
+    static const char *const methods[] = {"midpoint", "ida"};
     for (int kind = 0; kind < 2; kind++)
         for (int i = 0; i < 2; i++) {
             const drape_setting atol[] = {
                 {"rtol", 1e-8, NULL}, {"atol_x", 1e-8 * 1e-4 * length, NULL}, {"atol_v", 1e-8 * speed, NULL}};
             const double h = 0.02 / w, end = 5 / w, d = w * (betas[kind] + drags[kind]) / 2,
                          wd = sqrt(w * w - d * d);
-            drape_sim_def def = def_of(rows[i], h, i ? atol : NULL);
+            drape_sim_def def = def_of(methods[i], h, i ? atol : NULL);
             def.integrator_setting_count = i ? 3 : 0;
             scene s = scene_model("{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 2, "
                                   "'edge_length': %g, 'transform': {'translate': "
@@ -135,7 +135,7 @@ START_TEST(dissipated_is_the_work_of_damping_in_closed_form)
             const double before = 0.5 * mass * speed * speed,
                          missing = before - 0.5 * mass * v * v - 0.5 * stiffness * x * x;
             const drape_energy e = drape_sim_energy(s.sim);
-            printf("# %s, %s: dissipated %.6g of %.6g J, closed form %.6g J\n", rows[i],
+            printf("# %s, %s: dissipated %.6g of %.6g J, closed form %.6g J\n", methods[i],
                    kind ? "drag" : "dashpots", e.dissipated, before, missing);
             ck_assert_double_gt(missing, 0.3 * before);
             const double step = i ? 0.3 * 0.3 / 12 : 0.02 * 0.02;
@@ -145,19 +145,19 @@ START_TEST(dissipated_is_the_work_of_damping_in_closed_form)
 }
 END_TEST
 
-/* A curtain hung by its upper edge, at rest in its own weight, is lifted by H at a speed u that is slow
- * against its stretch waves. A pin at constant speed does u times the impulse it gives: u (m g T + p) = m
- * g H + u p, p the momentum at the end, m u when the curtain moves along; waves that are not yet damped
- * and how a row counts the jumps of the pins' own kinetic energy are of the same size. So the work is m g
- * H within 2 m u^2: 0.5 % of it. */
+/* A curtain hangs by its upper edge, at rest under its own weight, and is lifted by H at a speed u that is
+ * slow compared with its stretch waves. A pin at constant speed does u times the impulse it gives: u (m g T
+ * + p) = m g H + u p. Here p is the momentum at the end, m u if the curtain moves along; waves that are not
+ * yet damped, and the integrator's account of the jumps of the pins' own kinetic energy, are of the same
+ * size. So the work is m g H within 2 m u^2: 0.5 % of it. */
 START_TEST(pins_that_lift_a_sheet_do_m_g_h)
 {
     const double height = 0.1, speed = 0.05;
     for (int i = 0; drape_integrators[i]; i++) {
-        const drape_integrator_ops *row = drape_integrators[i];
-        if (row->steady_state)
+        const drape_integrator_ops *method = drape_integrators[i];
+        if (method->steady_state)
             continue;
-        drape_sim_def def = def_of(row->entry.name, 0.01, NULL);
+        drape_sim_def def = def_of(method->entry.name, 0.01, NULL);
         def.controller = "halving";
         scene s = scene_model(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 5, 'width': 0.4, "
@@ -179,7 +179,7 @@ START_TEST(pins_that_lift_a_sheet_do_m_g_h)
         const drape_energy after = drape_sim_energy(s.sim);
         const double weight = mass * 9.81 * height, slack = 2 * mass * speed * speed;
         printf("# %s: m g h %.6g J, pins %.6g J, gravity %.6g J, dissipated %.3g J, numerical %.3g J\n",
-               row->entry.name, weight, s.sim->audit.pin_work, after.gravity - before.gravity,
+               method->entry.name, weight, s.sim->audit.pin_work, after.gravity - before.gravity,
                after.dissipated - before.dissipated, after.numerical - before.numerical);
         assert_below(fabs(s.sim->audit.pin_work - weight), slack);
         assert_below(fabs(after.gravity - before.gravity - weight), slack);
@@ -191,8 +191,8 @@ START_TEST(pins_that_lift_a_sheet_do_m_g_h)
 END_TEST
 
 typedef struct swing {
-    double best, gain; /* [J] largest remainder, and how far below it a later one was */
-    double fall;       /* [J] of gravity, at most */
+    double best, gain; /* [J] largest remainder, and the largest decrease of a later one below it */
+    double fall;       /* [J] largest decrease of gravity */
     double start;      /* [J] gravity at the start */
 } swing;
 
@@ -208,20 +208,20 @@ static drape_status note_swing(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* Springs 600 times as stiff as those of CS184's sheet, undamped, let go level: every row steps over the
- * fastest waves, w h = 8 (ida) to 400, or half resolves them. A run that ends well has at no time gained more
- * than its row may, as a share of what there was to live on: the fall of gravity and 1/2 m g L. On top of it
- * there may be the 1e-6 that a step is not judged for, 3600 times at most. ida ended such runs with twice the
- * energy of their start, when it went by contraction rates of long ago; it took three times the steps for it,
- * and two of its steps had to be refused. */
-START_TEST(no_row_that_ends_well_has_gained_energy_from_stiff_springs)
+/* Springs 600 times as stiff as those of CS184's sheet, undamped, released horizontally: every integrator
+ * steps over the fastest waves, w h = 8 (ida) to 400, or only partly resolves them. A run that completes
+ * must at no time have gained more than the integrator's allowed share of the available energy: the
+ * decrease of gravity and 1/2 m g L. A gain of up to 1e-6 in a step is not judged, 3600 times at most. With
+ * outdated contraction rates, ida completed such runs with twice the energy of their start; it took three
+ * times as many steps, and two of them had to be refused. */
+START_TEST(completed_runs_have_gained_no_energy_from_stiff_springs)
 {
-    int well = 0;
+    int completed = 0;
     for (int i = 0; drape_integrators[i]; i++) {
-        const drape_integrator_ops *row = drape_integrators[i];
-        if (row->steady_state)
+        const drape_integrator_ops *method = drape_integrators[i];
+        if (method->steady_state)
             continue;
-        drape_sim_def def = def_of(row->entry.name, 1.0 / 30, NULL);
+        drape_sim_def def = def_of(method->entry.name, 1.0 / 30, NULL);
         def.controller = "halving";
         scene s = scene_model(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 1, "
@@ -236,20 +236,20 @@ START_TEST(no_row_that_ends_well_has_gained_energy_from_stiff_springs)
         swing w = {.start = drape_sim_energy(s.sim).gravity};
         ck_assert_int_eq(drape_sim_observe(s.sim, note_swing, &w), DRAPE_OK);
         const bool ended = drape_sim_advance(s.sim, 3) == DRAPE_OK;
-        const double quiet = 0.5 * 150 * 9.81 * sqrt(2.0), share = row->gain > 0 ? row->gain : 0.1;
-        printf("# %s: %s, %ld steps, %ld rejected, gain %.3g J of %.4g J\n", row->entry.name,
+        const double quiet = 0.5 * 150 * 9.81 * sqrt(2.0), share = method->gain > 0 ? method->gain : 0.1;
+        printf("# %s: %s, %ld steps, %ld rejected, gain %.3g J of %.4g J\n", method->entry.name,
                ended ? "ok" : drape_context_message(s.ctx), s.accepted, s.rejected, w.gain, w.fall + quiet);
         if (ended)
             assert_below(w.gain / (w.fall + quiet), share + 0.0036);
-        if (row->own_steps)
+        if (method->own_steps)
             ck_assert(ended && s.accepted < 2000 && s.rejected < 2);
-        well += ended;
+        completed += ended;
         scene_close(&s);
     }
-    ck_assert_int_ge(well, 6);
+    ck_assert_int_ge(completed, 6);
 }
 END_TEST
 
-SUITE("energy", the_remainder_of_one_step_rows_has_their_order, be_only_takes_energy,
+SUITE("energy", the_remainder_of_one_step_methods_has_their_order, be_only_takes_energy,
       the_remainder_of_ida_falls_with_rtol, dissipated_is_the_work_of_damping_in_closed_form,
-      pins_that_lift_a_sheet_do_m_g_h, no_row_that_ends_well_has_gained_energy_from_stiff_springs)
+      pins_that_lift_a_sheet_do_m_g_h, completed_runs_have_gained_no_energy_from_stiff_springs)

@@ -1,9 +1,9 @@
 /*
- * test_ida.c: the row "ida": tolerances that mean what they say, steps that depend on nothing else,
+ * test_ida.c: the integrator "ida": tolerances that bound the error, steps that depend on nothing else,
  * restarts, dense output.
  *
- * The sheet: 0.5 m x 0.4 m, hung by two corners and pushed, soft enough (E h = 20 N/m) that its stretch
- * waves have periods above sqrt(m/(8 K)) 2 pi = 0.03 s, which steps resolve, and smooth but for rounding.
+ * The sheet: 0.5 m x 0.4 m, pinned at two corners and pushed, soft enough (E h = 20 N/m) that its stretch
+ * waves have periods above sqrt(m/(8 K)) 2 pi = 0.03 s, which steps resolve, and smooth up to rounding.
  */
 #include "faults/host.h"
 #include "support/scene.h"
@@ -11,7 +11,8 @@
 #define LENGTH 0.6403124237432849 /* [m] diagonal, the length of the default tolerances */
 #define END    0.3                /* [s] */
 
-/* The text of a sheet, for printf: shift along x [m], more terms, pins, rtol, more settings after a comma. */
+/* The text of a sheet, for printf: translation along x [m], more terms, pins, rtol, more settings after a
+ * comma. */
 #define SHEET                                                                                                \
     "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 5, 'width': 0.5, 'height': "   \
     "0.4, "                                                                                                  \
@@ -31,7 +32,7 @@ static scene sheet(const char *pins, double rtol, const char *more)
     return scene_open(SHEET, 0.0, pins, rtol, more);
 }
 
-/* Root mean square over the nodes of the distance. */
+/* Root mean square of the distances over the nodes. */
 static double distance(const scene *s, const double *a, const double *b)
 {
     double sum = 0;
@@ -54,10 +55,10 @@ static double *positions_at(const char *pins, double rtol, const char *more, dou
 
 /* ---- Tolerances ---- */
 
-/* Over 1e-2 ... 1e-8 the error falls with rtol, never by more than a factor 2 above the one before. BDF of
- * order p takes steps of rtol^(1/(p+1)), and its error at a time is that many local errors:
- * rtol^(p/(p+1)), at least rtol^(2/3) in order 2. Six decades of rtol are four of the error at least, of
- * which one is granted to the loose end, where IDA is not yet in its asymptotic range. */
+/* Over 1e-2 ... 1e-8 the error falls with rtol; no error exceeds twice the one before. BDF of order p takes
+ * steps of rtol^(1/(p+1)), and its error at a time is that many local errors: rtol^(p/(p+1)), at least
+ * rtol^(2/3) in order 2. Six decades of rtol are at least four of the error; one of these is allowed for
+ * the loosest tolerances, where IDA is not yet in its asymptotic range. */
 static void falls(const char *pins, int max_order)
 {
     char order[40];
@@ -90,7 +91,7 @@ START_TEST(error_falls_with_rtol_in_order_5)
 }
 END_TEST
 
-/* Kinks do not spoil it, because IDA starts anew there. */
+/* Kinks do not spoil the order, because IDA restarts at them. */
 START_TEST(error_falls_with_rtol_over_kinks_of_tracks)
 {
     falls(MOVED, 5);
@@ -120,8 +121,8 @@ static long long steps_after(const char *more, double rtol)
     return steps;
 }
 
-/* rtol is a name for two weights and an order, and nothing else: given all three, it does not count; and
- * each counts for itself. */
+/* rtol stands for two weights and an order, and nothing else: with all three given, it has no effect; and
+ * each of them has an effect of its own. */
 START_TEST(atol_x_and_atol_v_are_the_weights)
 {
     char all[160];
@@ -139,10 +140,10 @@ START_TEST(atol_x_and_atol_v_are_the_weights)
 }
 END_TEST
 
-/* Tolerances do not depend on where the scene lies. At 1000 m positions are rounded to 2^-44 = 5.7e-14 m,
- * at the origin to 1e-16 m; that noise grows by what parts neighbouring runs (test_ida_full.c), here less
- * than 1e4-fold. Decisions to accept a step compare numbers that differ by as much: they are the same but
- * for an accident. */
+/* Tolerances do not depend on the position of the scene. At 1000 m positions are rounded to 2^-44 = 5.7e-14
+ * m, at the origin to 1e-16 m; that noise grows by the divergence of neighbouring runs (test_ida_full.c),
+ * here by less than 1e4. Decisions to accept a step compare numbers that differ by as much: they are the
+ * same except by accident. */
 START_TEST(a_scene_far_away_takes_the_same_steps)
 {
     const double far = 1000;
@@ -173,7 +174,7 @@ END_TEST
 
 /* ---- Steps ---- */
 
-/* Steps as an observer saw them. */
+/* Steps that an observer was notified of. */
 typedef struct step_log {
     double t[4096], h[4096];
     int count;
@@ -203,7 +204,7 @@ START_TEST(max_step_is_kept)
     const double limit = 7e-4;
     scene free_run = sheet(HUNG, 1e-2, ""), s = sheet(HUNG, 1e-2, ", 'max_step': 7e-4");
     const step_log log = steps_of(&s, 0.1), free_log = steps_of(&free_run, 0.1);
-    ck_assert_double_gt(free_log.h[free_log.count / 2], 2 * limit); /* it would take longer ones */
+    ck_assert_double_gt(free_log.h[free_log.count / 2], 2 * limit); /* free steps are longer */
     for (int i = 0; i < log.count; i++) /* a step is the difference of two times of at most 0.1 s */
         ck_assert_double_le(log.h[i], limit + 0.1 * DBL_EPSILON);
     ck_assert_double_eq(drape_sim_time(s.sim), 0.1);
@@ -212,9 +213,9 @@ START_TEST(max_step_is_kept)
 }
 END_TEST
 
-/* A step ends at every key that lies within, to the last bit, and the next starts small: IDA knows nothing
- * of the time before. Its first step is a thousandth of the way left at most, or 1/2 over the norm of the
- * rates; here less than a fifth of the step before. */
+/* A step ends at every key within it, to the last bit, and the next one starts small: IDA has no history
+ * there. Its first step is at most a thousandth of the time left, or 1/2 over the norm of the rates; here
+ * less than a fifth of the step before. */
 START_TEST(steps_end_at_kinks_and_start_anew)
 {
     static const double kinks[] = {0.05, 0.1, 0.17};
@@ -233,8 +234,8 @@ START_TEST(steps_end_at_kinks_and_start_anew)
 }
 END_TEST
 
-/* An advance that ends where a key lies is no different: the next begins anew, as if it had gone on. Its
- * steps are not the same, because IDA's first depends on the way to the end, but as small. */
+/* After an advance that ends at a key, the next one restarts too, as within an advance. Its steps are not
+ * the same, because IDA's first step depends on the time to the end, but as small. */
 START_TEST(an_advance_that_ends_at_a_kink_starts_anew_too)
 {
     scene s = sheet(MOVED, 1e-4, "");
@@ -296,10 +297,10 @@ static double worst_frame(const frame_log *a, const frame_log *b)
     return worst;
 }
 
-/* Frames between steps are as good as steps that end there: both within their errors of the converged run.
- * Dense output is the polynomial of the step, whose error is of the size of the local error, atol_x, which
- * comes on top. So an advance in pieces gives the same answer to the tolerance, frame by frame, and ends
- * where it was told. */
+/* Frames between steps are as accurate as steps that end there: both are within their errors of the
+ * converged run. The dense output is the polynomial of the step, whose error is of the size of the local
+ * error, atol_x, and is added. So an advance in pieces gives the same result within the tolerance, frame by
+ * frame, and ends at the requested time. */
 START_TEST(frames_are_what_a_run_that_stops_there_has)
 {
     static const double rtols[] = {1e-3, 1e-4, 1e-6};
@@ -318,7 +319,7 @@ START_TEST(frames_are_what_a_run_that_stops_there_has)
 }
 END_TEST
 
-/* Nobody watches frames: the steps are the same as with observers of any rate. */
+/* Without observers of frames, the steps are the same as with observers at any rate. */
 START_TEST(frames_do_not_change_the_steps)
 {
     drape_sim_def def;
@@ -360,10 +361,10 @@ static double host_distance(const host_sim *s, const host_copy *from)
     return sqrt(sum / nodes);
 }
 
-/* One force or Hessian that is no number, at the nth evaluation for every n but the first force, which is
- * of the initial state and no smaller step's: IDA takes a quarter of the step and goes on, or the
- * controller makes it start anew. The run comes to its end with finite states, and it is no worse than
- * twice a run of the same tolerance without fault. */
+/* One force or Hessian that is not finite, at the nth evaluation for every n except the first force, which
+ * is that of the initial state, where no smaller step helps. IDA retries with a quarter of the step, or the
+ * controller restarts it. The run completes with finite states, and its error is at most twice that of a
+ * run with the same tolerance without the fault. */
 START_TEST(one_fault_is_recovered_from)
 {
     host_sim tight = host_with_ida(1e-9), good = host_with_ida(1e-4);
@@ -390,7 +391,7 @@ START_TEST(one_fault_is_recovered_from)
 }
 END_TEST
 
-/* A fault that stays ends the run in the state before it, with the reason. */
+/* A fault that persists ends the run in the state before it, with the reason. */
 START_TEST(a_fault_that_stays_ends_the_run)
 {
     for (int kind = HOST_NAN_FORCE; kind <= HOST_INFINITE_FORCE; kind++) {
@@ -409,7 +410,7 @@ END_TEST
 
 /* ---- Work is bounded ---- */
 
-/* The state after the last attempt that was accepted. */
+/* The state after the last accepted attempt. */
 typedef struct last_state {
     double t, h;
     uint64_t hash;
@@ -427,10 +428,10 @@ static drape_status note_last(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-#define MOST 40 /* far fewer steps than the sheet needs for END at rtol 1e-6 */
+#define MAX_STEPS 40 /* far fewer steps than the sheet needs for END at rtol 1e-6 */
 
-/* One step too many ends the run with its reason, time, size of step and worst node, in the last accepted
- * state. Each further advance has as many steps again, and they are those of a run without the bound. */
+/* One step too many ends the run with its reason, time, step size and largest error, in the last accepted
+ * state. Each further advance may take as many steps again, and they are those of a run without the bound. */
 START_TEST(too_many_steps_end_the_run)
 {
     char message[100];
@@ -452,7 +453,7 @@ START_TEST(too_many_steps_end_the_run)
             strstr(drape_context_message(s.ctx), " of cloth0): local error / tolerance = "));
         ck_assert_double_eq(drape_sim_time(s.sim), last.t);
         ck_assert_uint_eq(drape_sim_hash(s.sim), last.hash);
-        ck_assert_int_eq(last.accepted, MOST * ends);
+        ck_assert_int_eq(last.accepted, MAX_STEPS * ends);
         ck_assert_int_eq(drape_sim_statistics(s.sim).steps_rejected, ends);
     }
     printf("# %ld steps, ended %d times\n", last.accepted, ends);
@@ -465,8 +466,8 @@ START_TEST(too_many_steps_end_the_run)
 }
 END_TEST
 
-/* The bound is on what IDA chooses: a host may end more advances than that in a second, and a new second has
- * a new count. */
+/* The bound is on the steps that IDA chooses: a host may end more advances than that in a second of
+ * simulated time, and the next second has a new count. */
 START_TEST(steps_that_a_host_asks_for_are_not_counted)
 {
     scene s = sheet(HUNG, 1e-2, ", 'max_steps': 100");
@@ -481,8 +482,8 @@ START_TEST(steps_that_a_host_asks_for_are_not_counted)
 }
 END_TEST
 
-/* A host that adds up its times may ask for an advance by a rounding error, also where IDA starts anew. IDA
- * would call that too close; it is no step. */
+/* A host that adds up its times may request an advance by a rounding error, also where IDA restarts. IDA
+ * would refuse that as too close; here it is not a step. */
 START_TEST(an_advance_by_one_ulp_is_no_failure)
 {
     scene s = sheet(MOVED, 1e-3, "");
@@ -500,8 +501,8 @@ END_TEST
 
 /* ---- The matrix of a correction ---- */
 
-/* A sheet that slides over the top of a ball, with dashpots and friction, which make the matrix not
- * symmetric. */
+/* A sheet that slides over the top of a ball, with dashpots and friction, which make the matrix
+ * nonsymmetric. */
 static scene sliding(const char *matrix, double rtol)
 {
     return scene_open(
@@ -517,8 +518,8 @@ static scene sliding(const char *matrix, double rtol)
         rtol, matrix);
 }
 
-/* The equations are the same, whatever the matrix: so is the error, to what one sequence of steps may differ
- * from another, a factor of 2. Work: the symmetric part loses no more than a quarter of the iterations. */
+/* The equations are the same for both matrices, and so is the error, up to the difference between two
+ * sequences of steps, a factor of 2. Work: the symmetric part needs at most a quarter more iterations. */
 START_TEST(half_of_the_matrix_does_as_well)
 {
     scene reference = sliding("exact", 1e-7), exact = sliding("exact", 1e-4),

@@ -1,15 +1,17 @@
 /*
- * test_ida_full.c: eliminating velocities changes nothing: IDA with the Schur complement K + c_j D + c_j^2
- * M goes the way of IDA with the unreduced system, factored by SUNDIALS' own KLU (support/ida_full.h).
+ * test_ida_full.c: the elimination of velocities changes nothing: IDA with the Schur complement K + c_j D +
+ * c_j^2 M has the trajectory of IDA with the unreduced system, factored by SUNDIALS' own KLU
+ * (support/ida_full.h).
  *
- * In exact arithmetic both are the same, step by step. What is left is round-off: a Newton correction d of
- * the order of the tolerance is solved to DBL_EPSILON times a condition number of 1 + (w h)^2 < 1e5: below
- * 1e-13 m for d < 1e-2 m. Between the steps it grows: IDA makes one correction a step with old factors where
- * that is within its tolerance, and what the old factors do not reach grows by some factor a step until new
- * ones come. With dashpots, whose matrix turns with the sheet, that factor reaches 5, and round-off can grow
- * as far as the tolerance of the run. Hence short runs, weak dashpots and a tolerance that keeps the factors
- * young. The matrix is the exact one, as a part of it would be another iteration. 1e-10 m leaves room for a
- * thousandfold growth; velocities are faster by the 1e2/s of the stiffest wave that the steps resolve.
+ * In exact arithmetic both are the same, step by step. Only round-off differs: a Newton correction d of the
+ * order of the tolerance is solved to DBL_EPSILON times a condition number of 1 + (w h)^2 < 1e5: below
+ * 1e-13 m for d < 1e-2 m. It grows from step to step: IDA makes one correction a step with old factors if
+ * that is within its tolerance, and the part that the old factors do not correct grows by some factor a
+ * step until there are new ones. With dashpots, whose matrix rotates with the sheet, that factor reaches 5,
+ * and round-off can grow as far as the tolerance of the run. Hence short runs, weak dashpots and a
+ * tolerance that keeps the factors recent. The matrix is the exact one, as a part of it would be another
+ * iteration. 1e-10 m leaves room for a thousandfold growth; the bound of velocities is larger by the 1e2/s
+ * of the stiffest wave that the steps resolve.
  */
 #include "solvers/linear.h"
 #include "support/ida_full.h"
@@ -29,7 +31,7 @@ static scene sheet(const char *more)
                       more);
 }
 
-static void compare_row(const char *linear, const char *terms, double rtol, int max_order, double duration)
+static void compare_order(const char *linear, const char *terms, double rtol, int max_order, double duration)
 {
     const drape_setting settings[] = {{"rtol", rtol, NULL},         {"atol_x", 0.7 * rtol, NULL},
                                       {"atol_v", 2 * rtol, NULL},   {"max_order", max_order, NULL},
@@ -57,7 +59,7 @@ static void compare_row(const char *linear, const char *terms, double rtol, int 
     }
     IDAGetNumSteps(full.ida, &steps);
     printf("# rtol %g, order %d: %ld steps\n", rtol, max_order, steps);
-    ck_assert(moved > 0.1); /* it swung */
+    ck_assert(moved > 0.1); /* the sheet has swung */
     ck_assert_int_eq(steps, s.accepted);
     ck_assert_int_eq(full.residuals, drape_sim_statistics(s.sim).residuals);
     ck_assert_int_eq(full.jacobians, drape_sim_statistics(s.sim).jacobians);
@@ -70,7 +72,7 @@ static void compare_row(const char *linear, const char *terms, double rtol, int 
 static void compare(const char *terms, double rtol, int max_order, double duration)
 {
     for (int i = 0; drape_linears_names[i]; i++)
-        compare_row(drape_linears_names[i], terms, rtol, max_order, duration);
+        compare_order(drape_linears_names[i], terms, rtol, max_order, duration);
 }
 
 START_TEST(the_reduced_system_gives_the_trajectory_of_the_full_one)
@@ -80,9 +82,9 @@ START_TEST(the_reduced_system_gives_the_trajectory_of_the_full_one)
 }
 END_TEST
 
-/* Dashpots in continuous time make K not symmetric, which a solver of symmetric matrices has to notice. D is
- * in the reduced matrix, in its right-hand side and in both blocks of the full one. */
-START_TEST(so_it_does_with_damping)
+/* Dashpots in continuous time make K nonsymmetric, which a solver for symmetric matrices has to notice. D
+ * is in the reduced matrix, in its right-hand side and in both blocks of the full one. */
+START_TEST(damping_leaves_the_trajectories_equal)
 {
     const char *terms =
         "{'type': 'damp.kelvin_voigt', 'beta': 5e-4}, {'type': 'drag.viscous', 'coefficient': 0.3},";
@@ -91,4 +93,5 @@ START_TEST(so_it_does_with_damping)
 }
 END_TEST
 
-SUITE("ida_full", the_reduced_system_gives_the_trajectory_of_the_full_one, so_it_does_with_damping)
+SUITE("ida_full", the_reduced_system_gives_the_trajectory_of_the_full_one,
+      damping_leaves_the_trajectories_equal)

@@ -1,15 +1,15 @@
 /*
- * test_order.c: the order of convergence that each row of the integrators declares, measured on a sheet
- * that swings, with dashpots and drag; and the error controller.
+ * test_order.c: the order of convergence that each integrator declares, measured on a swinging sheet with
+ * dashpots and drag; and the error controller.
  *
  * The sheet is soft: E h = 20 N/m and a node of 0.2 kg/m2 x 0.01 m2 = 2 g. Springs, of sqrt(3)/2 E h = 17
  * N/m at most, give its stretch waves angular frequencies below sqrt(8 x 17/0.002) = 260/s: steps of 2 ms
  * and less resolve them.
  *
- * An error C h^p (1 + c h + ...) has a slope log2(e(h)/e(h/2)) = p + c h/(2 log 2) + ...: it is off p by
- * an amount that halves with h. c is of the size of the fastest rate, 260/s, times a number below 1, and p
- * is approached from h = 1 ms to 0.25 ms: 260 x 0.00025/1.4 = 0.05 at the last pair if that number is 1.
- * The bound is 0.15.
+ * An error C h^p (1 + c h + ...) has a slope log2(e(h)/e(h/2)) = p + c h/(2 log 2) + ...: it differs from p
+ * by an amount that halves with h. c is of the size of the fastest rate, 260/s, times a number below 1. h
+ * goes from 1 ms to 0.25 ms: 260 x 0.00025/1.4 = 0.05 at the last pair if that number is 1. The bound is
+ * 0.15.
  */
 #include "support/scene.h"
 
@@ -45,8 +45,8 @@ static double distance(const scene *s, const double *reference)
     return sqrt(sum / s->model->node_count);
 }
 
-/* By ida at rtol 1e-10, whose error is 1e-9 m at most (test_ida.c): 1e-3 of the smallest that is measured
- * here, which moves a slope by 0.002. It starts anew at kinks. */
+/* The solution of ida at rtol 1e-10, whose error is 1e-9 m at most (test_ida.c): 1e-3 of the smallest error
+ * that is measured here, which changes a slope by 0.002. It restarts at kinks. */
 static double *converged(const char *terms, const char *pins)
 {
     const drape_setting settings[] = {{"rtol", 1e-10, NULL}, {"max_order", 5, NULL}};
@@ -73,19 +73,19 @@ static double equal_steps(int k, int n)
     return END * k / n;
 }
 
-/* Sizes 1 2 1 2 ...: ratios 2 and 1/2, as halving and doubling make them, all the time. */
+/* Sizes 1 2 1 2 ...: ratios 2 and 1/2 in every step, as from halving and doubling. */
 static double uneven_steps(int k, int n)
 {
     return END * (k / 2 * 3 + k % 2) / (n / 2 * 3);
 }
 
-/* Error at the end of n steps. dt is larger than any: every advance is one step. */
-static double error_of(const char *row, const char *terms, const char *pins, const double *reference, int n,
-                       step_end *end)
+/* Error at the end of n steps. dt is larger than any of them: every advance is one step. */
+static double error_of(const char *method, const char *terms, const char *pins, const double *reference,
+                       int n, step_end *end)
 {
     drape_sim_def def;
     drape_sim_def_init(&def, sizeof def);
-    def.integrator = row;
+    def.integrator = method;
     def.controller = "fixed";
     def.dt = 1;
     scene s = sheet(terms, pins, &def);
@@ -98,32 +98,32 @@ static double error_of(const char *row, const char *terms, const char *pins, con
     return error;
 }
 
-/* The slopes over n = 200, 400, 800, of which the last is returned. */
-static double slope_of(const char *row, const char *terms, const char *pins, step_end *end)
+/* The slopes over n = 200, 400, 800; returns the last one. */
+static double slope_of(const char *method, const char *terms, const char *pins, step_end *end)
 {
     double *reference = converged(terms, pins), before = NAN, slope = NAN;
     for (int n = 200; n <= 800; n *= 2) {
-        const double error = error_of(row, terms, pins, reference, n, end);
+        const double error = error_of(method, terms, pins, reference, n, end);
         slope = log2(before / error);
-        printf("# %s, %d steps: error %.3g m, slope %.3f\n", row, n, error, slope);
+        printf("# %s, %d steps: error %.3g m, slope %.3f\n", method, n, error, slope);
         before = error;
     }
     free(reference);
     return slope;
 }
 
-static void check_slope(const char *row, const char *terms, const char *pins, step_end *end, int order)
+static void check_slope(const char *method, const char *terms, const char *pins, step_end *end, int order)
 {
-    const double slope = slope_of(row, terms, pins, end);
-    ck_assert_msg(fabs(slope - order) <= BOUND, "%s: slope %g, order %d", row, slope, order);
+    const double slope = slope_of(method, terms, pins, end);
+    ck_assert_msg(fabs(slope - order) <= BOUND, "%s: slope %g, order %d", method, slope, order);
 }
 
-static bool has_fixed_steps(const drape_integrator_ops *row)
+static bool has_fixed_steps(const drape_integrator_ops *method)
 {
-    return !row->own_steps && !row->steady_state;
+    return !method->own_steps && !method->steady_state;
 }
 
-START_TEST(every_row_converges_with_the_order_it_declares)
+START_TEST(every_integrator_converges_with_the_order_it_declares)
 {
     for (int i = 0; drape_integrators[i]; i++)
         if (has_fixed_steps(drape_integrators[i]))
@@ -132,8 +132,8 @@ START_TEST(every_row_converges_with_the_order_it_declares)
 }
 END_TEST
 
-/* bdf2 knows the size of the step before; one-step rows have nothing to know. */
-START_TEST(so_it_does_with_steps_of_changing_size)
+/* bdf2 uses the size of the step before; one-step methods use no history. */
+START_TEST(steps_of_changing_size_keep_the_order)
 {
     for (int i = 0; drape_integrators[i]; i++)
         if (has_fixed_steps(drape_integrators[i]))
@@ -142,14 +142,13 @@ START_TEST(so_it_does_with_steps_of_changing_size)
 }
 END_TEST
 
-/* At a kink of a track the pin's velocity jumps. Springs then have a force with a kink in time, dashpots
- * one that jumps. One-step rows do not look back, and with kinks at the ends of steps every step is
- * smooth: the order stays.
- *
- * bdf2 looks back over the kink. Where the acceleration jumps from f to f + j it takes v1 = v0 + h f/3 + 2
- * h f1/3 with f1 the force of the step. With the exact rate of the dashpot that would be f + j and v1 off
- * by h j/3: order 1. But the rate is the same formula of q: 3/2 of the new slope less 1/2 of the old, so
- * f1 = f + 3/2 j and v1 = v0 + h (f + j): the impulse is right and the order stays. */
+/* At a kink of a track the velocity of the pin jumps. Then the force of springs has a kink in time, and
+ * that of dashpots jumps. One-step methods have no history, and with kinks at the ends of steps every step
+ * is smooth: they keep their order. The history of bdf2 reaches over the kink. Where the acceleration jumps
+ * from f to f + j it has v1 = v0 + h f/3 + 2 h f1/3 with f1 the force of the step. With the exact rate of
+ * the dashpot that would be f + j, and v1 off by h j/3: order 1. But the rate is the same formula of q: 3/2
+ * of the new slope less 1/2 of the old, so f1 = f + 3/2 j and v1 = v0 + h (f + j): the impulse is right and
+ * the order is kept. */
 START_TEST(kinks_at_ends_of_steps_leave_the_order)
 {
     for (int i = 0; drape_integrators[i]; i++)
@@ -159,9 +158,9 @@ START_TEST(kinks_at_ends_of_steps_leave_the_order)
 }
 END_TEST
 
-/* Without dashpots the acceleration does not jump, but its slope: a single error of h^2 in v, for bdf2 as
- * for all. */
-START_TEST(and_without_dashpots_as_well)
+/* Without dashpots the acceleration does not jump, but its slope does: a single error of h^2 in v, for bdf2
+ * as for all. */
+START_TEST(kinks_without_dashpots_leave_the_order_too)
 {
     for (int i = 0; drape_integrators[i]; i++)
         if (has_fixed_steps(drape_integrators[i]))
@@ -176,9 +175,9 @@ static double steps_across_kinks(int k, int n)
 }
 
 /* A kink inside a step. The pin takes its mean velocity over the step, so for be and bdf2, whose dashpots'
- * rates are differences of q, the impulse of a dashpot over the step is right and the order stays.
- * midpoint takes the rate at mid-way, grad q . v: its impulse is off by h times a jump: order 1, which it
- * comes down to only where that is larger than its error of second order. */
+ * rates are differences of q, the impulse of a dashpot over the step is right and the order is kept.
+ * midpoint takes the rate at the middle of the step, grad q . v: its impulse is off by h times a jump:
+ * order 1, which shows only where that is larger than its error of second order. */
 START_TEST(kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_first)
 {
     check_slope("be", DASHPOTS, MOVED, steps_across_kinks, 1);
@@ -209,11 +208,11 @@ static drape_status note_step(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-static drape_sim_def controlled(const char *row, const drape_setting *settings, size_t count)
+static drape_sim_def controlled(const char *method, const drape_setting *settings, size_t count)
 {
     drape_sim_def def;
     drape_sim_def_init(&def, sizeof def);
-    def.integrator = row;
+    def.integrator = method;
     def.controller = "error";
     def.controller_settings = settings;
     def.controller_setting_count = count;
@@ -221,49 +220,49 @@ static drape_sim_def controlled(const char *row, const drape_setting *settings, 
     return def;
 }
 
-/* Local errors are held to rtol: steps go with rtol^(1/(p+1)), the error at a time with rtol^(p/(p+1)): a
- * decade of rtol gains 10^(1/2) in order 1 and 10^(2/3) in order 2. Over the three decades one quarter of the
- * exponent is left for the start, where the first steps are of another size than they will be. A row with a
- * stability limit has substeps where the error would let a step be larger, and with them errors far below: it
- * is held to this over the last decade, where a step is one. */
+/* Local errors are bounded by rtol: steps go with rtol^(1/(p+1)), the error at a time with rtol^(p/(p+1)):
+ * a decade of rtol gains 10^(1/2) in order 1 and 10^(2/3) in order 2. Over the three decades one quarter of
+ * the exponent is left for the start, where the first steps differ in size from later ones. An integrator
+ * with a stability limit takes substeps if the error would allow a larger step, and then its errors are far
+ * below: it is checked only over the last decade, where a step is a single substep. */
 START_TEST(error_falls_with_the_controllers_rtol)
 {
     double *reference = converged(DASHPOTS, HUNG);
     for (int i = 0; drape_integrators[i]; i++) {
-        const drape_integrator_ops *row = drape_integrators[i];
+        const drape_integrator_ops *method = drape_integrators[i];
         double first = 0, before = INFINITY;
-        const int from = row->stability ? 4 : 2;
-        for (int k = 2; has_fixed_steps(row) && k <= 5; k++) {
+        const int from = method->stability ? 4 : 2;
+        for (int k = 2; has_fixed_steps(method) && k <= 5; k++) {
             const drape_setting rtol = {"rtol", pow(10, -k), NULL};
-            const drape_sim_def def = controlled(row->entry.name, &rtol, 1);
+            const drape_sim_def def = controlled(method->entry.name, &rtol, 1);
             scene s = sheet(DASHPOTS, HUNG, &def);
             scene_advance(&s, END);
             const double error = distance(&s, reference);
-            printf("# %s, rtol 1e-%d: error %.3g m, %lld steps, %lld rejected\n", row->entry.name, k, error,
-                   (long long)drape_sim_statistics(s.sim).steps_accepted,
+            printf("# %s, rtol 1e-%d: error %.3g m, %lld steps, %lld rejected\n", method->entry.name, k,
+                   error, (long long)drape_sim_statistics(s.sim).steps_accepted,
                    (long long)drape_sim_statistics(s.sim).steps_rejected);
-            ck_assert_msg(error <= 2 * before, "%s, rtol 1e-%d: error %g m, before %g m", row->entry.name, k,
-                          error, before);
+            ck_assert_msg(error <= 2 * before, "%s, rtol 1e-%d: error %g m, before %g m", method->entry.name,
+                          k, error, before);
             first = k == from ? error : first;
             before = error;
             scene_close(&s);
         }
-        if (has_fixed_steps(row))
-            assert_below(before, first * pow(10, -0.75 * (5 - from) * row->order / (row->order + 1)));
+        if (has_fixed_steps(method))
+            assert_below(before, first * pow(10, -0.75 * (5 - from) * method->order / (method->order + 1)));
     }
     free(reference);
 }
 END_TEST
 
-/* The PI rule changes sizes smoothly: never more than doubled (bdf2 is stable below 1 + sqrt(2)), few
- * rejections: less than a tenth of the steps where the motion is smooth. The last steps of the advance are
- * cut to end with it. */
+/* The PI rule changes sizes smoothly: they are at most doubled (bdf2 is stable below 1 + sqrt(2)), and few
+ * steps are rejected: less than a tenth where the motion is smooth. The last steps of the advance are cut
+ * to end with it. */
 START_TEST(steps_of_the_error_controller_change_gently)
 {
     static step_log log;
     for (int i = 0; drape_integrators[i]; i++) {
         const drape_setting rtol = {"rtol", 1e-4, NULL};
-        double most = 0, least = INFINITY;
+        double largest = 0, smallest = INFINITY;
         if (!has_fixed_steps(drape_integrators[i]))
             continue;
         const drape_sim_def def = controlled(drape_integrators[i]->entry.name, &rtol, 1);
@@ -272,19 +271,19 @@ START_TEST(steps_of_the_error_controller_change_gently)
         ck_assert_int_eq(drape_sim_observe(s.sim, note_step, &log), DRAPE_OK);
         scene_advance(&s, END);
         for (int k = 1; k < log.count - 2; k++) {
-            most = fmax(most, log.h[k] / log.h[k - 1]);
-            least = fmin(least, log.h[k] / log.h[k - 1]);
+            largest = fmax(largest, log.h[k] / log.h[k - 1]);
+            smallest = fmin(smallest, log.h[k] / log.h[k - 1]);
         }
         printf("# %s: %d steps, %d rejected, ratios %.3f to %.3f\n", drape_integrators[i]->entry.name,
-               log.count, log.rejected, least, most);
-        ck_assert_double_le(most, 2 * (1 + 1e-9)); /* times are rounded */
+               log.count, log.rejected, smallest, largest);
+        ck_assert_double_le(largest, 2 * (1 + 1e-9)); /* times are rounded */
         ck_assert_int_le(10 * log.rejected, log.count);
         scene_close(&s);
     }
 }
 END_TEST
 
-/* One free node for the judge. */
+/* A scene with one free node, for the estimate. */
 static scene node(void)
 {
     return scene_model(
@@ -294,8 +293,8 @@ static scene node(void)
         "'pins': [{'nodes': [0, 1, 2, 3, 5, 6, 7, 8]}]}], 'duration': 1}");
 }
 
-/* What the controller takes for the local error in x or in v, through what it says of a rejected step:
- * root mean square over the six of x and v of the node. Only the first component of the node differs from
+/* The controller's estimate of the local error in x or in v, from its report of a rejected step: root mean
+ * square over the six components of x and v of the node. Only the first component of the node differs from
  * 0. */
 static double estimate(const scene *s, bool velocity, double h, const double past[2], const double in[2],
                        const double out[2], double *values)
@@ -333,12 +332,11 @@ static double estimate(const scene *s, bool velocity, double h, const double pas
     return info.diagnostic.value * 1e-15 * sqrt(6);
 }
 
-/* Two steps of backward Euler on x'' = -w^2 x: x1 = (x0 + h v0)/(1 + (w h)^2), v1 = (x1 - x0)/h. The
- * second differences of its x and v are h^2 times their second derivatives in the sense of the equation,
- * which is twice its local error y1 - y(h) = h^2/2 y'' + O(h^3), y(h) the exact solution from the state in
- * the middle: the estimate is that but for some w h. The terms of third order are of 1/2 h^3 y''' from the
- * second difference and 1/3 h^3 y''' from the local error, and y''' < 1.5 w y'' at this phase for both:
- * less than 2.5 w h in all. */
+/* Two steps of backward Euler on x'' = -w^2 x: x1 = (x0 + h v0)/(1 + (w h)^2), v1 = (x1 - x0)/h. The second
+ * differences of its x and v are h^2 times the second derivatives by the equation, which is twice its local
+ * error y1 - y(h) = h^2/2 y'' + O(h^3), y(h) the exact solution from the state in the middle: the estimate
+ * equals that up to some w h. The terms of third order are 1/2 h^3 y''' from the second difference and 1/3
+ * h^3 y''' from the local error, and y''' < 1.5 w y'' at this phase for both: less than 2.5 w h in all. */
 START_TEST(the_estimate_for_backward_euler_is_its_local_error)
 {
     static const double phases[] = {0.1, 0.03, 0.01, 0.001}; /* w h */
@@ -368,8 +366,8 @@ START_TEST(the_estimate_for_backward_euler_is_its_local_error)
 }
 END_TEST
 
-SUITE("order", every_row_converges_with_the_order_it_declares, so_it_does_with_steps_of_changing_size,
-      kinks_at_ends_of_steps_leave_the_order, and_without_dashpots_as_well,
+SUITE("order", every_integrator_converges_with_the_order_it_declares, steps_of_changing_size_keep_the_order,
+      kinks_at_ends_of_steps_leave_the_order, kinks_without_dashpots_leave_the_order_too,
       kinks_inside_steps_leave_be_and_bdf2_their_order_and_midpoint_the_first,
       error_falls_with_the_controllers_rtol, steps_of_the_error_controller_change_gently,
       the_estimate_for_backward_euler_is_its_local_error)

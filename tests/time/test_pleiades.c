@@ -1,12 +1,12 @@
 /*
- * test_pleiades.c: seven stars in a plane, through the same drivers as cloth. The problem of Hairer, Norsett
- * & Wanner 1993, II.10, and of the Test Set for IVP Solvers (Mazzia & Magherini 2008), whose digits at t = 3
- * are below: masses i, E = -m_i m_j / r, close encounters that make steps of any fixed size work for nothing.
- * GSL's Runge-Kutta of order 8 integrates the same equations, written down once more, as a check of those
- * digits.
+ * test_pleiades.c: seven stars in a plane, by the same drivers as cloth. The problem is that of Hairer,
+ * Norsett & Wanner 1993, II.10, and of the Test Set for IVP Solvers (Mazzia & Magherini 2008), whose digits
+ * at t = 3 are below: masses i, E = -m_i m_j / r, close encounters for which steps of a fixed size must be
+ * small throughout. GSL's Runge-Kutta of order 8 integrates the same equations, implemented separately, as
+ * a check of those digits.
  *
- * A star is a node, a pair of stars an element of a term of the host's. The masses of nodes are those of a
- * sheet, so they are set in the model, which is ours.
+ * A star is a node, a pair of stars an element of a user-defined term. The masses of nodes would be those
+ * of a sheet, so the test sets them in its model.
  */
 #include "drape/extend.h"
 #include "support/scene.h"
@@ -72,7 +72,7 @@ static const drape_term_ops newton = {
     .build = build,
     .energy = energy};
 
-/* A fan of triangles around the fifth star, which nothing but the mesh needs. */
+/* A fan of triangles around the fifth star; only the mesh needs it. */
 static scene stars(const char *integrator, const drape_setting *settings, size_t count)
 {
     static const int32_t triangles[] = {0, 6, 4, 6, 2, 4, 2, 3, 4, 3, 5, 4, 5, 1, 4};
@@ -117,7 +117,7 @@ static scene stars(const char *integrator, const drape_setting *settings, size_t
     return s;
 }
 
-/* Largest distance of a coordinate from the published one. */
+/* Largest difference of a coordinate from the published one. */
 static double error_at_end(const double *x, const double *y, int stride)
 {
     double error = 0;
@@ -157,7 +157,7 @@ static int right_side(double t, const double y[], double dy[], void *unused)
     return GSL_SUCCESS;
 }
 
-/* The encounters amplify an error by some 1e4: 1e-14 a step becomes 1e-9 at the end and less. */
+/* The encounters amplify an error by about 1e4: 1e-14 a step becomes at most 1e-9 at the end. */
 START_TEST(published_digits_are_those_of_gsl)
 {
     gsl_odeiv2_system system = {right_side, NULL, 4 * STARS, NULL};
@@ -175,8 +175,8 @@ START_TEST(published_digits_are_those_of_gsl)
 }
 END_TEST
 
-/* The errors of IDA fall with rtol. Its weights are rtol L with L = 10, and the encounters amplify what comes
- * before them by 1e4: rtol 1e-9 may leave 1e-9 10 1e4 = 1e-4. */
+/* The errors of IDA fall with rtol. Its weights are rtol L with L = 10, and the encounters amplify earlier
+ * errors by 1e4: rtol 1e-9 may leave 1e-9 10 1e4 = 1e-4. */
 START_TEST(ida_comes_to_the_published_end)
 {
     double before = INFINITY;
@@ -190,20 +190,20 @@ START_TEST(ida_comes_to_the_published_end)
 }
 END_TEST
 
-/* The order of each row that has fixed steps, at the last of two halvings. Steps of 0.05 ms resolve the
- * closest encounter (0.06 apart at a speed of 15: 4 ms) in 80: the next term of the error is (1/80) of the
- * leading one times some number; the bound is 0.2. */
-static void check_order(const char *row, int order, const drape_setting *more, size_t count)
+/* The order of a method with fixed steps, at the last of two halvings. Steps of 0.05 ms resolve the closest
+ * encounter (0.06 apart at a speed of 15: 4 ms) in 80: the next term of the error is (1/80) of the leading
+ * one times some number; the bound is 0.2. */
+static void check_order(const char *method, int order, const drape_setting *more, size_t count)
 {
     double before = NAN, slope = NAN;
     for (double dt = 2e-4; dt > 0.4e-4; dt /= 2) {
         drape_setting settings[4] = {{"dt", dt, NULL}};
         memcpy(settings + 1, more, count * sizeof *more);
-        double error = error_of(row, settings, count + 1);
+        double error = error_of(method, settings, count + 1);
         slope = log2(before / error);
         before = error;
     }
-    ck_assert_msg(fabs(slope - order) < 0.2, "%s: slope %g, order %d", row, slope, order);
+    ck_assert_msg(fabs(slope - order) < 0.2, "%s: slope %g, order %d", method, slope, order);
 }
 
 START_TEST(fixed_steps_have_their_order)

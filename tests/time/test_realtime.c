@@ -1,8 +1,8 @@
 /*
- * test_realtime.c: the rung for real time, and the advance with a budget.
+ * test_realtime.c: the fixed-iteration step for real time, and the advance with a budget.
  *
- * A second that a clock measures is no ground for a test: budgets here are either never reached (an hour) or
- * never kept (a nanosecond), and what lies between is for the bench.
+ * Measured seconds are no basis for a test: budgets here are either never reached (an hour) or never kept
+ * (a nanosecond); those in between are for the bench.
  */
 #include "support/scene.h"
 
@@ -34,11 +34,11 @@ static drape_realtime advance(scene *s, double frame, double budget)
     return report;
 }
 
-/* ---- The rung ---- */
+/* ---- The fixed-iteration step ---- */
 
-/* One and two iterations against the converged step, on a sheet that falls by half a metre: the errors of one
- * step are those of Newton's second iterate, quadratic in the guess's h^2 dv/2 ~ 1 mm, and of conjugate
- * gradients to a tenth; 2 % of the way is a bound with room, the goal of the bench. Two are better by more
+/* One and two iterations against the converged step, on a sheet that falls by half a metre. The errors of
+ * one step are those of Newton's second iterate, quadratic in the guess's h^2 dv/2 ~ 1 mm, and of conjugate
+ * gradients to a tenth; 2 % of the fall is a bound with room, the goal of the bench. Two are better by more
  * than half. */
 START_TEST(few_iterations_are_near_the_converged_step)
 {
@@ -60,9 +60,9 @@ START_TEST(few_iterations_are_near_the_converged_step)
 }
 END_TEST
 
-/* With enough iterations and digits it is backward Euler: both are within their residuals of the same
- * equations, for which a residual of 1e-9 N a node moves it by h^2 F/m = 2.8e-4 x 1e-9/8e-4 m a step. */
-START_TEST(with_many_iterations_it_is_backward_euler)
+/* With enough iterations and digits the step is backward Euler: both solve the same equations up to their
+ * residuals, and a residual of 1e-9 N moves a node by h^2 F/m = 2.8e-4 x 1e-9/8e-4 m a step. */
+START_TEST(with_many_iterations_the_step_is_backward_euler)
 {
     scene exact = scene_open(HUNG, "", "be", ", 'tolerance': 1e-9");
     scene s = scene_open(
@@ -77,9 +77,9 @@ START_TEST(with_many_iterations_it_is_backward_euler)
 }
 END_TEST
 
-/* Contact, friction, damping and drag belong to it: a damped sheet with drag falls onto a sphere and stays on
- * it. */
-START_TEST(contact_and_damping_are_in_it)
+/* The fixed-iteration step includes contact, friction, damping and drag: a damped sheet with drag falls
+ * onto a sphere and stays on it. */
+START_TEST(the_step_includes_contact_and_damping)
 {
     scene s = scene_open(
         "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 13, 'rows': 13, 'width': 0.6, "
@@ -98,7 +98,7 @@ START_TEST(contact_and_damping_are_in_it)
         near = fmin(near, sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]));
         lowest = fmin(lowest, x[3 * i + 1]);
     }
-    ck_assert_double_gt(near, 0.2); /* nothing is in it */
+    ck_assert_double_gt(near, 0.2); /* no node is inside */
     ck_assert_double_lt(near, 0.21);
     ck_assert_double_gt(lowest, -1);
     ck_assert_double_lt(drape_sim_statistics(s.sim).strain_max, 0.2);
@@ -120,9 +120,9 @@ static scene at_rate(const char *terms, const char *more, double rate, double en
     return s;
 }
 
-/* At 30 Hz a frame is two steps of dt, so nothing at all changes; at 120 Hz one of dt/2. Backward Euler is of
- * first order: the state at rate r is off by C/r, so 60 and 120 Hz differ by half of what a step of 1/30 and
- * 1/60 do, up to second order, for which there is a quarter. */
+/* At 30 Hz a frame is two steps of dt, so nothing at all changes; at 120 Hz it is one of dt/2. Backward
+ * Euler is of first order: the state at rate r is off by C/r, so 60 and 120 Hz differ by half of the
+ * difference between steps of 1/30 and 1/60, up to second order, for which a quarter is allowed. */
 START_TEST(frame_rates_differ_by_the_order_of_the_method)
 {
     const char *damping =
@@ -141,11 +141,11 @@ START_TEST(frame_rates_differ_by_the_order_of_the_method)
 }
 END_TEST
 
-/* What does not move knows no steps: heavily damped, the sheet comes to hang the same at 30, 60 and 120 Hz.
- * What is left of its motion after 3 s falls as exp(-t c/2m) with c/m = 5/0.2 per second or faster: below
- * rounding. The slowest way to rest is overdamped sideways swinging, g/L m/c = 0.4/s, from some mm: stiffness
- * and drag are told by the lowest node. Its height differs by the square of that. */
-START_TEST(what_rests_does_not_know_the_frame_rate)
+/* The state of rest does not depend on the steps: heavily damped, the sheet comes to rest at the same
+ * height at 30, 60 and 120 Hz. The motion left after 3 s falls as exp(-t c/2m) with c/m = 5/0.2 per second
+ * or faster: below rounding. The slowest mode is overdamped sideways swinging, g/L m/c = 0.4/s, from some
+ * mm. The height of the lowest node shows stiffness and drag; it changes by the square of the swing. */
+START_TEST(rest_does_not_depend_on_the_frame_rate)
 {
     double lowest[3];
     for (int k = 0; k < 3; k++) {
@@ -161,10 +161,10 @@ END_TEST
 
 /* ---- Budgets ---- */
 
-/* A budget that nothing fits into: steps grow to the longest, of which there is at most one a call; what is
- * owed stays below it, and the rest is dropped. Then there is time again: within a few frames the rung is the
- * full one and nothing is owed. */
-START_TEST(it_degrades_and_recovers)
+/* A budget too small for any step: steps grow to the longest, with at most one a call; the debt stays below
+ * that, and the rest is dropped. Then there is time again: within a few frames the level is full and the
+ * debt 0. */
+START_TEST(the_level_degrades_and_recovers)
 {
     scene s = scene_open(HUNG, "", "newton_k", "");
     const double frame = 1.0 / 60, longest = 4 * frame;
@@ -182,7 +182,7 @@ START_TEST(it_degrades_and_recovers)
         ck_assert(r.attempts == 0 || !r.kept);
     }
     ck_assert_double_eq_tol(drape_sim_time(s.sim) + r.debt + dropped - first, 41 * frame, 1e-9);
-    ck_assert_int_le(drape_sim_statistics(s.sim).steps_accepted, 22); /* a step for some frames each */
+    ck_assert_int_le(drape_sim_statistics(s.sim).steps_accepted, 22); /* a step covers several frames */
     for (int k = 0; k < 6; k++)
         r = advance(&s, frame, PLENTY);
     ck_assert(strcmp(r.level, "full") == 0 && r.effort == 0 && r.debt == 0 && r.kept);
@@ -192,8 +192,8 @@ START_TEST(it_degrades_and_recovers)
 }
 END_TEST
 
-/* A frame that was owed once does not make the next ones later: one step too slow in a hundred. */
-START_TEST(one_late_frame_is_made_up_for)
+/* A single frame that is owed does not delay the next ones: one slow step in a hundred. */
+START_TEST(a_single_late_frame_is_made_up_for)
 {
     scene s = scene_open(HUNG, "", "newton_k", "");
     for (int k = 0; k < 30; k++) {
@@ -206,9 +206,9 @@ START_TEST(one_late_frame_is_made_up_for)
 }
 END_TEST
 
-/* Rows that choose their own steps, and rows without efforts, keep the same promise; a plain advance goes on
- * with the scene's own steps. */
-START_TEST(every_row_with_a_time_takes_frames)
+/* Integrators that choose their own steps, and integrators without efforts, also complete the frame; a
+ * plain advance continues with the scene's own steps. */
+START_TEST(every_integrator_with_a_time_takes_frames)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         drape_realtime r;
@@ -233,7 +233,7 @@ START_TEST(every_row_with_a_time_takes_frames)
 }
 END_TEST
 
-START_TEST(wrong_arguments_are_told)
+START_TEST(wrong_arguments_are_reported)
 {
     static const double wrong[][2] = {{0, 1},    {-1, 1},    {NAN, 1},       {2e6, 1},
                                       {0.1, -1}, {0.1, NAN}, {0.1, INFINITY}};
@@ -250,7 +250,8 @@ START_TEST(wrong_arguments_are_told)
 }
 END_TEST
 
-SUITE("realtime", few_iterations_are_near_the_converged_step, with_many_iterations_it_is_backward_euler,
-      contact_and_damping_are_in_it, frame_rates_differ_by_the_order_of_the_method,
-      what_rests_does_not_know_the_frame_rate, it_degrades_and_recovers, one_late_frame_is_made_up_for,
-      every_row_with_a_time_takes_frames, wrong_arguments_are_told)
+SUITE("realtime", few_iterations_are_near_the_converged_step, with_many_iterations_the_step_is_backward_euler,
+      the_step_includes_contact_and_damping, frame_rates_differ_by_the_order_of_the_method,
+      rest_does_not_depend_on_the_frame_rate, the_level_degrades_and_recovers,
+      a_single_late_frame_is_made_up_for, every_integrator_with_a_time_takes_frames,
+      wrong_arguments_are_reported)

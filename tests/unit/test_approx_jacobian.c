@@ -1,5 +1,4 @@
-/* test_approx_jacobian.c: the coarse space, conjugate gradients, and the matrix that stands for a
- * Jacobian. */
+/* test_approx_jacobian.c: the coarse space, conjugate gradients, and the approximate Jacobian. */
 #include "entries/models.h"
 #include "nonlinear/approx_jacobian.h"
 #include "solvers/pcg.h"
@@ -8,7 +7,7 @@
 
 /* ---- The coarse space ---- */
 
-/* side x side nodes, each joined to those beside it. */
+/* side x side nodes, each joined to its neighbours along rows and columns. */
 typedef struct lattice {
     int32_t *start, *neighbor;
     drape_graph graph;
@@ -42,9 +41,9 @@ static void close_lattice(lattice *l)
     free(l->neighbor);
 }
 
-/* At each node the functions are positive and add up to 1: a few roundings of 16 values. Seeds are at least a
- * spacing apart, so there is less than one in each ball of half of it: on this lattice a ball of radius r has
- * 2 r (r + 1) + 1 nodes, those at the rim at least half of that. */
+/* At each node the functions are positive and add up to 1, up to a few roundings of 16 values. Seeds are at
+ * least a spacing apart, so balls of a radius below half of it are disjoint: on this lattice a ball of
+ * radius r has 2 r (r + 1) + 1 nodes, at the rim at least half of them. */
 START_TEST(coarse_functions_are_a_partition_of_unity)
 {
     scene s = scene_empty();
@@ -105,7 +104,7 @@ START_TEST(restriction_is_the_transpose)
 }
 END_TEST
 
-/* No edges at all: each node is a function of its own. */
+/* Without edges each node has a function of its own. */
 START_TEST(nodes_without_neighbours_are_alone)
 {
     scene s = scene_empty();
@@ -137,7 +136,7 @@ static void leave(const void *owner, const double *r, double *z)
     memcpy(z, r, 6 * sizeof *z);
 }
 
-/* As many iterations as there are different eigenvalues: 3 here. */
+/* There are as many iterations as distinct eigenvalues: 3 here. */
 START_TEST(conjugate_gradients_end_with_the_eigenvalues)
 {
     const double d[6] = {1, 1, 5, 5, 9, 9}, b[6] = {1, 2, 3, 4, 5, 6};
@@ -172,7 +171,7 @@ START_TEST(negative_curvature_is_reported)
                    .q = q};
     drape_pcg_solve(&s, b, x, 1e-13, 20);
     ck_assert(!s.definite && !s.converged);
-    ck_assert_mem_eq(x, b, sizeof b); /* it descends nevertheless */
+    ck_assert_mem_eq(x, b, sizeof b); /* x still goes downhill */
 }
 END_TEST
 
@@ -224,8 +223,8 @@ static void close_state(state *q)
     scene_close(&q->s);
 }
 
-/* Largest |A x - (m_w M + J+) x| over the largest of either, for a random x along `direction` alone, or
- * any. */
+/* Largest |A x - (m_w M + J+) x| over the largest component of A x, for a random x along `direction`, or in
+ * all directions. */
 static double mismatch(state *q, double mass_weight, const double *direction)
 {
     const drape_model *m = q->s.model;
@@ -246,7 +245,7 @@ static double mismatch(state *q, double mass_weight, const double *direction)
     return error / size;
 }
 
-/* Of pairs, energies, dissipation: the positive part of the Jacobian itself, at any state. */
+/* For pairs, energies and dissipation it is the positive part of the Jacobian itself, at any state. */
 START_TEST(without_bending_it_is_the_positive_jacobian)
 {
     state q =
@@ -266,7 +265,7 @@ START_TEST(without_bending_it_is_the_positive_jacobian)
 }
 END_TEST
 
-/* Of hinges: at a flat sheet all gradients lie along the normal, and there it is the Jacobian. */
+/* For hinges of a flat sheet all gradients lie along the normal, and in that direction it is the Jacobian. */
 START_TEST(across_a_flat_sheet_bending_is_exact)
 {
     static const double normal[3] = {0, 1, 0};
@@ -276,8 +275,8 @@ START_TEST(across_a_flat_sheet_bending_is_exact)
 }
 END_TEST
 
-/* Symmetric and positive: x'Ay = y'Ax, x'Ax > 0. And solved in iterations that do not grow with the sheet:
- * the condition of M/h2 + K here is 8 E h h2/m = 8 x 1000/(3600 x 0.2/side^2), 1e4 at side 31, for which
+/* Symmetric and positive: x'Ay = y'Ax, x'Ax > 0. The number of iterations does not grow with the sheet: the
+ * condition number of M/h2 + K here is 8 E h h2/m = 8 x 1000/(3600 x 0.2/side^2), 1e4 at side 31, for which
  * plain conjugate gradients take hundreds. */
 START_TEST(it_is_solved_in_few_iterations_at_any_size)
 {

@@ -1,7 +1,7 @@
 /*
  * test_contact.c: contact of two pieces. Every derivative is compared with differences, in every region of
  * both kinds of pairs: energy and force, force and Hessian, friction by velocity and by position, the
- * mollifier where edges are nearly parallel. Step fractions that are called free are.
+ * mollifier of nearly parallel edges. Step fractions that are reported as free are free.
  */
 #include "contact/barrier.h"
 #include "contact/friction.h"
@@ -14,7 +14,7 @@
 
 #define D 12
 
-/* Numbers in (-1, 1), the same on every machine. */
+/* Numbers in (-1, 1) that are the same on every machine. */
 static double next_number(uint64_t *seed)
 {
     *seed = *seed * 6364136223846793005u + 1442695040888963407u;
@@ -27,7 +27,7 @@ static void fill(uint64_t *seed, double scale, double *to, int count)
         to[i] = scale * next_number(seed);
 }
 
-/* A pair of four points that are all of the cloth. */
+/* A pair; its four points are the whole cloth. */
 typedef struct setting {
     drape_pair pair;
     double x[D], v[D], rest[D];
@@ -61,16 +61,16 @@ static void forces_of(const setting *s, double *normal, double *friction)
 
 static double largest(const double *a, int count)
 {
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < count; i++)
-        most = fmax(most, fabs(a[i]));
-    return most;
+        max = fmax(max, fabs(a[i]));
+    return max;
 }
 
-/* Central differences with step e: truncation e^2 f'''/6 and rounding 1e-16 f/e. With lengths L of about .1 m
- * and e = 1e-6 that is (e/L)^2 = 1e-10 and 1e-9, times the powers of 10 of short gaps: 2e-6 of the largest
- * entry. Closest points of edges at an angle of 1e-2 turn over L = 1e-3 .. 1e-4, so e = 2e-9, and rounding is
- * 1e-16 L / e / angle^2 = 1e-5. */
+/* Central differences with step e: truncation e^2 f'''/6 and rounding 1e-16 f/e. With lengths L of about .1
+ * m and e = 1e-6 these are (e/L)^2 = 1e-10 and 1e-9, times powers of 10 for short gaps: 2e-6 of the largest
+ * entry. The closest points of edges at an angle of 1e-2 move within L = 1e-3 .. 1e-4, so e = 2e-9, and
+ * rounding is 1e-16 L / e / angle^2 = 1e-5. */
 static void compare(const char *what, const double *exact, const double *difference, int count, double limit)
 {
     double scale = fmax(largest(exact, count), 1e-9);
@@ -119,7 +119,7 @@ static void check_derivatives(setting *s, double e, double limit)
             ck_assert_double_le(fabs(h[D * i + j] - h[D * j + i]), 1e-10 * largest(h, D * D));
 }
 
-/* The signs of the weights say in which region the closest points lie. */
+/* Which of the weights are 0 identifies the region of the closest points. */
 static int region_of(const setting *s)
 {
     const drape_gap gap = gap_of(s);
@@ -129,8 +129,8 @@ static int region_of(const setting *s)
     return region;
 }
 
-/* Random pairs that act, until every region was met often enough. Derivatives jump where regions meet, so the
- * neighbourhood of the differences has to be of one. */
+/* Random active pairs, until every region has occurred often enough. Derivatives jump where regions meet,
+ * so all points of a difference must be in the same region. */
 static void check_kind(drape_pair_kind kind, double speed)
 {
     uint64_t seed = 7 + (uint64_t)kind;
@@ -176,7 +176,7 @@ START_TEST(test_segments)
 }
 END_TEST
 
-/* Nearly parallel edges above each other: the mollifier is at work. */
+/* Nearly parallel edges above each other, where the mollifier acts. */
 START_TEST(test_parallel)
 {
     uint64_t seed = 3;
@@ -201,7 +201,7 @@ START_TEST(test_parallel)
 }
 END_TEST
 
-/* Where both are parallel, the energy is gone, whatever the closest points are. */
+/* For parallel edges the energy is 0, whatever their closest points are. */
 START_TEST(test_mollified_away)
 {
     setting s = {.pair = {.kind = DRAPE_PAIR_SEGMENTS, .node = {0, 1, 2, 3}, .collider = -1, .distance = 0.2},
@@ -212,7 +212,7 @@ START_TEST(test_mollified_away)
 }
 END_TEST
 
-/* C2 where it begins and where its parabola takes over, and it only ever pushes apart. */
+/* The barrier is C2 where it begins and where its parabola takes over, and its force is always repulsive. */
 START_TEST(test_barrier)
 {
     const double joints[] = {1, DRAPE_BARRIER_LOW}, e = 1e-9;
@@ -233,8 +233,8 @@ START_TEST(test_barrier)
 }
 END_TEST
 
-/* On a path that is called free the gap never falls below what is to be kept; a path that is not free is cut
- * before the gap is gone and after most of it is. */
+/* On a path that is reported as free, the gap never falls below the share that must remain. A path that is
+ * not free is cut before the gap is 0 and after most of it is gone. */
 START_TEST(test_step_fraction)
 {
     uint64_t seed = 11;
@@ -244,12 +244,12 @@ START_TEST(test_step_fraction)
                            .node = {0, 1, 2, 3},
                            .collider = -1,
                            .radius = k % 3 ? 0 : 0.01};
-        double x[D], y[D], at[D], least = INFINITY;
-        const drape_configuration placed = {.x = at};
+        double x[D], y[D], at[D], smallest = INFINITY;
+        const drape_configuration configuration = {.x = at};
         fill(&seed, 0.1, x, D);
         fill(&seed, 0.1, y, D);
         memcpy(at, x, sizeof at);
-        double start = drape_pair_gap_value(&pair, &placed);
+        double start = drape_pair_gap_value(&pair, &configuration);
         if (!(start > 1e-3))
             continue;
         double fraction = drape_pair_step_fraction(&pair, x, y, 0.1, false, 1);
@@ -260,13 +260,13 @@ START_TEST(test_step_fraction)
         for (int i = 0; i <= 200; i++) {
             for (int j = 0; j < D; j++)
                 at[j] = x[j] + fraction * i / 200 * (y[j] - x[j]);
-            least = fmin(least, drape_pair_gap_value(&pair, &placed));
+            smallest = fmin(smallest, drape_pair_gap_value(&pair, &configuration));
         }
-        ck_assert_double_ge(least, (0.1 - 1e-9) * start);
+        ck_assert_double_ge(smallest, (0.1 - 1e-9) * start);
         cut += fraction < 1;
         whole += fraction == 1;
         if (fraction < 1)
-            ck_assert_double_le(drape_pair_gap_value(&pair, &placed), 0.2 * start);
+            ck_assert_double_le(drape_pair_gap_value(&pair, &configuration), 0.2 * start);
     }
     ck_assert_int_ge(cut, 50);
     ck_assert_int_ge(whole, 50);
@@ -284,7 +284,7 @@ static void note(void *user, int32_t element)
     f->elements[f->count++] = element;
 }
 
-/* Every element whose box meets the question's is found once, whatever became of the positions. */
+/* Every element whose box meets that of the query is found once, also after the positions have changed. */
 START_TEST(test_tree)
 {
     uint64_t seed = 5;

@@ -1,4 +1,4 @@
-/* test_pull.c: the spring by which a host drags a node. */
+/* test_drag_spring.c: the spring by which a host drags a node. */
 #include "sim/sim.h"
 #include "support/scene.h"
 #include "support/suite.h"
@@ -10,15 +10,16 @@
 
 static const double target[3] = {0.4, 0.3, -0.2};
 
-/* 16 nodes without pins and gravity; method: of the integrator. */
+/* 16 nodes without pins and gravity; its format arguments are more keys and the method of the integrator. */
 static const char sheet[] =
     "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 3, 'edge_length': 0.1},"
     " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200},"
     " 'terms': ['stretch.edge', 'bend.hinge']%s}],"
     " 'gravity': [0, 0, 0], 'integrator': {'method': '%s', 'dt': 0.002, 'tolerance': 1e-10}, 'duration': 1}";
 
-/* The spring adds k (x - target) to g of its node and k to the diagonal of its block, and nothing elsewhere:
- * both are differences of sums that are equal but for one addition, so to the rounding of the larger. */
+/* The spring adds k (x - target) to g of its node and k to the diagonal of its block, and nothing
+ * elsewhere. Both are differences of sums that are equal except for one addition, so they are exact up to
+ * the rounding of the larger sum. */
 START_TEST(force_and_jacobian_are_those_of_a_spring)
 {
     scene h = scene_open(sheet, "", "be");
@@ -56,8 +57,8 @@ START_TEST(force_and_jacobian_are_those_of_a_spring)
 }
 END_TEST
 
-/* Inner forces sum to nothing: after one step of backward Euler from rest the momentum is h times the
- * spring's force at its end, to the residual that is left, at most 1e-10 N in each of 16 nodes. */
+/* Internal forces sum to 0: after one step of backward Euler from rest the momentum is h times the spring's
+ * force at the end, up to the residual, at most 1e-10 N in each of 16 nodes. */
 START_TEST(a_free_sheet_takes_the_spring_s_momentum)
 {
     scene h = scene_open(sheet, "", "be");
@@ -76,9 +77,9 @@ START_TEST(a_free_sheet_takes_the_spring_s_momentum)
 }
 END_TEST
 
-/* What the spring is set to is the host's work: the energy that is missing does not change, and the elastic
- * one is the spring's, to the rounding of a few joules. */
-START_TEST(its_work_is_booked)
+/* Setting the spring is work of the host: the numerical loss does not change, and the elastic energy
+ * changes by that of the spring, up to the rounding of a few joules. */
+START_TEST(its_work_is_accounted)
 {
     scene h = scene_open(sheet, "", "be");
     const double nowhere[3] = {0};
@@ -100,8 +101,7 @@ START_TEST(its_work_is_booked)
 }
 END_TEST
 
-/* Under every row that moves in time the node comes nearer; and a fixed corner, a wrong number and a wrong
- * value are refused without a change. */
+/* With every integrator that moves in time the node approaches the target. */
 START_TEST(every_integrator_follows)
 {
     for (int i = 0; drape_integrators[i]; i++) {
@@ -125,6 +125,7 @@ START_TEST(every_integrator_follows)
 }
 END_TEST
 
+/* A fixed corner, a wrong number and a wrong value are refused and change nothing. */
 START_TEST(wrong_arguments_change_nothing)
 {
     scene h = scene_open(sheet, ", 'pins': [{'nodes': [0]}]", "be");
@@ -158,4 +159,4 @@ START_TEST(wrong_arguments_change_nothing)
 END_TEST
 
 SUITE("pull", force_and_jacobian_are_those_of_a_spring, a_free_sheet_takes_the_spring_s_momentum,
-      its_work_is_booked, every_integrator_follows, wrong_arguments_change_nothing)
+      its_work_is_accounted, every_integrator_follows, wrong_arguments_change_nothing)

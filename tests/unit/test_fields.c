@@ -1,4 +1,4 @@
-/* test_fields.c: what frames carry beside positions: strain, energy density, velocity. */
+/* test_fields.c: what frames have besides positions: strain, energy density, velocity. */
 #include "support/scene.h"
 
 #define SHEET                                                                                                \
@@ -8,8 +8,8 @@
     " 'density': 200}, 'terms': [%s], 'pins': [{'corner': 'top-left'}]}], 'gravity': [0, %g, 0],"            \
     " 'integrator': {'dt': 0.01, 'tolerance': 1e-9}, 'duration': 1, 'frame_rate': %g}"
 
-/* x = rest + G rest with a G of rank 3: its principal strains in the plane of the sheet, from the stretches
- * of its two sides, which are orthogonal at rest. */
+/* x = rest + G rest with a G of rank 3: the principal strains in the plane of the sheet follow from the
+ * stretches of its two sides, which are orthogonal at rest. */
 START_TEST(strain_is_that_of_the_deformation)
 {
     const double G[3][3] = {{0.11, -0.23, 0.05}, {0.31, 0.07, -0.19}, {-0.13, 0.29, 0.17}};
@@ -24,7 +24,7 @@ START_TEST(strain_is_that_of_the_deformation)
                 x[3 * i + r] += G[r][c] * rest[3 * i + c];
         }
     drape_model_strain(s.model, x, strain);
-    double along[2][3], c[3] = {0, 0, 0}; /* node 6 ends the first side, node 28 the second */
+    double along[2][3], c[3] = {0, 0, 0}; /* node 6 is the end of the first side, node 28 of the second */
     for (int k = 0; k < 3; k++) {
         along[0][k] = (x[3 * 6 + k] - x[k]) / 0.6;
         along[1][k] = (x[3 * 28 + k] - x[k]) / 0.4;
@@ -37,7 +37,8 @@ START_TEST(strain_is_that_of_the_deformation)
     double spread = sqrt((c[0] - c[2]) * (c[0] - c[2]) / 4 + c[1] * c[1]);
     double largest = sqrt((c[0] + c[2]) / 2 + spread) - 1, least = sqrt((c[0] + c[2]) / 2 - spread) - 1;
     ck_assert(largest - least > 0.1);
-    /* Edges are a sixth and a quarter of the sides: their rounding grows by that, and by a few operations. */
+    /* Edges are a sixth and a quarter of the sides: their rounding is larger by that, and by a few
+     * operations. */
     for (int32_t t = 0; t < triangles; t++) {
         ck_assert_double_eq_tol(strain[2 * t], largest, 200 * DBL_EPSILON);
         ck_assert_double_eq_tol(strain[2 * t + 1], least, 200 * DBL_EPSILON);
@@ -51,8 +52,8 @@ START_TEST(strain_is_that_of_the_deformation)
 }
 END_TEST
 
-/* Elements of two and of four nodes, a law, and a barrier. Sums of positive numbers in another order: some
- * nodes times the rounding. */
+/* Elements of two and of four nodes, a law, and a barrier. Sums of positive numbers in two orders: their
+ * difference is at most the number of nodes times the rounding. */
 START_TEST(energy_density_adds_up_to_the_elastic_energy)
 {
     static const char *const terms[] = {
@@ -82,8 +83,8 @@ typedef struct falling {
     int frames, between;
 } falling;
 
-/* Backward Euler's velocity in a fall is g t at every step, so that between steps the linear mix is g t,
- * too. */
+/* In free fall, the velocity of backward Euler is g t after every step, and so is its linear interpolation
+ * between steps. */
 static drape_status check_fall(void *user, const drape_event *event)
 {
     falling *f = user;

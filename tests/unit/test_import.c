@@ -1,4 +1,4 @@
-/* test_import.c: OBJ and PLY: what is read, what each fault says, truncated and hostile data, files. */
+/* test_import.c: OBJ and PLY: what is read, the message of each fault, truncated and hostile data, files. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -24,7 +24,7 @@ static drape_context *new_context(void)
     return ctx;
 }
 
-/* Reads from a copy of exactly size + 1 bytes, so that the address sanitizer sees one byte too many. */
+/* Reads from a copy of exactly size + 1 bytes, so that AddressSanitizer detects a read beyond it. */
 static drape_status read_bytes(drape_context *ctx, const drape_import_ops *import, const void *data,
                                size_t size, drape_mesh *mesh)
 {
@@ -75,7 +75,7 @@ static void ply_refused(const char *text, const char *message)
     assert_refused(&drape_import_ply, text, strlen(text), message);
 }
 
-/* Unit square with corners in order, and its fan. */
+/* The unit square with its corners in order, and its fan. */
 static const double corners[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0};
 static const int32_t fan[] = {0, 1, 2, 0, 2, 3};
 
@@ -184,7 +184,8 @@ END_TEST
 START_TEST(ply_ascii)
 {
     ply_is_square(ASCII VERTICES FACES "end_header\n" SQUARE_ROWS "3 0 1 2\n3 0 2 3\n");
-    ply_is_square(ASCII VERTICES FACES "end_header\n" SQUARE_ROWS "3 0 1 2\n3 0 2 3"); /* no last line end */
+    ply_is_square(ASCII VERTICES FACES "end_header\n" SQUARE_ROWS
+                                       "3 0 1 2\n3 0 2 3"); /* no newline at the end */
     ply_is_square(ASCII VERTICES
                   "element face 1\nproperty list uint8 uint32 vertex_index\nend_header\n" SQUARE_ROWS
                   "4 0 1 2 3\n");
@@ -358,7 +359,7 @@ static void put_double(bytes *out, double value)
     put_bits(out, bits, 8);
 }
 
-/* Every type, lists passed over before and after what is taken, an element between; the unit square. */
+/* Every type, lists that are skipped before and after the data, an element between; the unit square. */
 static bytes binary_square(bool big_endian, const char *line_end)
 {
     bytes out = {.big_endian = big_endian};
@@ -468,7 +469,8 @@ START_TEST(ply_binary_faults)
 }
 END_TEST
 
-/* Any start of a file is read or refused with a message of one line; the sanitizers watch. */
+/* Every prefix of a file is read, or refused with a message of one line; the sanitizers look for other
+ * faults. */
 static void truncate_everywhere(const drape_import_ops *import, const void *data, size_t size)
 {
     for (size_t length = 0; length < size; length++) {
@@ -494,7 +496,7 @@ START_TEST(truncated_at_every_byte)
     truncate_everywhere(&drape_import_ply, big.data, big.size);
     static const char text[] = ASCII VERTICES FACES "end_header\n" SQUARE_ROWS "3 0 1 2\n3 0 2 3\n";
     truncate_everywhere(&drape_import_ply, text, sizeof text - 1);
-    const bytes small = small_binary(); /* without extras, no start of it is a whole mesh */
+    const bytes small = small_binary(); /* without additional elements, no prefix of it is a whole mesh */
     for (size_t length = 0; length < small.size; length++) {
         drape_context *ctx = new_context();
         drape_mesh mesh;
@@ -505,7 +507,8 @@ START_TEST(truncated_at_every_byte)
 }
 END_TEST
 
-/* Every byte replaced by some telling ones: read, validated, or refused; never a crash, never much memory. */
+/* Every byte is replaced by several critical ones: the file is read and validated, or refused; it never
+ * crashes and never takes much memory. */
 static void change_every_byte(const drape_import_ops *import, const void *data, size_t size)
 {
     static const char replacements[] = {0, '\n', '\r', ' ', '-', '9', '/', '\\', '#', 'e', (char)0xFF, 1};
@@ -648,7 +651,7 @@ START_TEST(file_faults)
     remove_file(&f, "pipe.ply");
     write_file(&f, "large.obj", "", 0);
     snprintf(path, sizeof path, "%s/large.obj", f.path);
-    if (truncate(path, INT64_C(1) << 31) == 0) { /* a hole: takes no room */
+    if (truncate(path, INT64_C(1) << 31) == 0) { /* a hole: takes no space on the disk */
         snprintf(message, sizeof message, "/m/file: %s: has 2147483648 bytes; at most 2147483647 can be read",
                  path);
         file_refused(&f, "large.obj", DRAPE_E_FILE, message);

@@ -1,13 +1,13 @@
-/* test_intersect.c: edges that pass through triangles are counted exactly, whatever cells the grid puts
- * them in. */
+/* test_intersect.c: edges that pass through triangles are counted exactly, in whatever cells of the grid
+ * they are. */
 #include "geometry/intersect.h"
 #include "support/suite.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Two squares of 5 x 5 nodes, the second turned upright through the middle of the first, shifted by a hair
- * so that no edge touches a node. */
+/* Two squares of 5 x 5 nodes, the second one rotated upright through the middle of the first and slightly
+ * shifted so that no edge touches a node. */
 static drape_model *crossed_squares(drape_context *ctx, double shift)
 {
     static const drape_setting grid[] = {
@@ -35,7 +35,7 @@ static drape_model *crossed_squares(drape_context *ctx, double shift)
     return model;
 }
 
-/* Every edge against every triangle, by solving for the point where they meet. */
+/* Every edge against every triangle, by solving for their common point. */
 static int64_t count_all_pairs(const drape_model *m, const double *x)
 {
     int64_t count = 0;
@@ -110,7 +110,7 @@ START_TEST(sheets_apart_have_none)
 }
 END_TEST
 
-/* A flat sheet, however it is turned, has nothing that crosses: its volumes are rounding. */
+/* In a flat sheet nothing crosses, whatever its rotation: its volumes are rounding errors. */
 START_TEST(a_flat_sheet_has_none)
 {
     static const drape_setting grid[] = {

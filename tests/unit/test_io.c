@@ -1,5 +1,5 @@
-/* test_io.c: what the recorder and the summary write is read back and compared to the digit; and no failure,
- * not even a kill, leaves a file that cannot be read. */
+/* test_io.c: the files of the recorder and the summary are read back and compared to the last digit; no
+ * failure, and not even a kill, leaves a file that cannot be read. */
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -34,7 +34,7 @@
 
 static const char *const cloth_names[2] = {"left", "right, \"large\""};
 
-/* What an observer of the test's own saw, to compare the files with. */
+/* What an observer of the test has received, to compare the files with. */
 typedef struct seen {
     int frames, attempts;
     double time[MAX_SEEN], x[MAX_SEEN][NODES * 3];
@@ -145,7 +145,7 @@ static drape_status record(world *w, drape_context *ctx, const char *format, dra
     return drape_recorder_create(ctx, w->sim, &def, out);
 }
 
-/* Runs to t_end with one format; all must go well. */
+/* Runs to t_end with one format; everything must succeed. */
 static void run(world *w, const char *format, double t_end)
 {
     drape_recorder *recorder;
@@ -180,7 +180,7 @@ static void write_text(const char *path, const char *text)
     fclose(file);
 }
 
-/* The whole file with a 0 behind it, to be freed. */
+/* The whole file, followed by a 0, to be freed. */
 static char *slurp(const char *path, size_t *size)
 {
     FILE *file = fopen(path, "rb");
@@ -207,8 +207,8 @@ static int count_files(const char *folder, const char *ending)
     return count;
 }
 
-/* Checks the header to the byte; the number of frames that it states, whose data must be there. *data is to
- * be freed. */
+/* Checks the header to the byte. Returns the number of frames in it, whose data must be there. *data is to be
+ * freed. */
 static int64_t read_npy(const char *folder, char **data)
 {
     size_t size;
@@ -325,7 +325,7 @@ START_TEST(the_last_frame_comes_once)
 }
 END_TEST
 
-/* Names, positions and triangles of an OBJ file against x. */
+/* Compares the names, positions and triangles of an OBJ file, the positions with x. */
 static void check_obj(const world *w, const char *name, const double *x)
 {
     char line[256];
@@ -408,7 +408,7 @@ START_TEST(ply_parses_back)
 }
 END_TEST
 
-START_TEST(every_row_writes_the_same_frames)
+START_TEST(every_format_writes_the_same_frames)
 {
     world w;
     const char *formats[32];
@@ -420,7 +420,7 @@ START_TEST(every_row_writes_the_same_frames)
         ck_assert(*drape_exporters[count]->entry.summary && *drape_exporters[count]->entry.reference);
         formats[count] = drape_exporters[count]->entry.name;
     }
-    formats[count] = formats[0]; /* twice counts once */
+    formats[count] = formats[0]; /* a format that is named twice counts once */
     const drape_recorder_def def = {w.out, formats, count + 1};
     ck_assert_int_eq(drape_recorder_create(w.ctx, w.sim, &def, &recorder), DRAPE_OK);
     ck_assert_int_eq(drape_sim_advance(w.sim, 0.03), DRAPE_OK);
@@ -468,7 +468,8 @@ END_TEST
 
 /* ---- Step log */
 
-/* Splits a row of CSV as RFC 4180 says, in place; the number of fields. Ends *next at the row after. */
+/* Splits a row of CSV as RFC 4180 says, in place; returns the number of fields. *next becomes the following
+ * row. */
 static int split(char *row, char **field, int room, char **next)
 {
     int count = 0;
@@ -579,7 +580,7 @@ START_TEST(steps_quotes_and_keeps_digits)
     calm.diagnostic = (drape_diagnostic){"", "", -1, {-1, -1, -1, -1}, -1, 0, 0};
     drape_attempt node = attempt;
     node.diagnostic = (drape_diagnostic){"residual", "", -1, {381, -1, -1, -1}, 0, 1, 2};
-    const drape_attempt *const rows[] = {&attempt, &calm, &node};
+    const drape_attempt *const attempts[] = {&attempt, &calm, &node};
     const drape_energy energy = {1 / 3.0, 1e300, -1e-300, 0, 2.5, -0.1};
     world w;
     size_t size;
@@ -587,7 +588,7 @@ START_TEST(steps_quotes_and_keeps_digits)
     set_up(&w);
     ck_assert_int_eq(drape_steps_open(w.ctx, w.folder, -1, &file), DRAPE_OK);
     for (int i = 0; i < 3; i++)
-        ck_assert_int_eq(drape_steps_write(&file, rows[i], &energy), DRAPE_OK);
+        ck_assert_int_eq(drape_steps_write(&file, attempts[i], &energy), DRAPE_OK);
     ck_assert_int_eq(drape_file_close(&file), DRAPE_OK);
     drape_file_destroy(&file);
     char *data = slurp(in_folder(w.folder, "steps.csv"), &size), *row = data + strlen(columns);
@@ -596,7 +597,7 @@ START_TEST(steps_quotes_and_keeps_digits)
     for (int i = 0; i < 3; i++) {
         char *field[FIELDS + 1];
         ck_assert_int_eq(split(row, field, FIELDS + 1, &row), FIELDS);
-        check_row(field, rows[i], &energy);
+        check_row(field, attempts[i], &energy);
     }
     free(data);
     tear_down(&w);
@@ -609,8 +610,8 @@ END_TEST
 static const char energy_columns[] =
     "frame,t,t_state,kinetic,elastic,gravity,contact,dissipated,numerical,total\n";
 
-/* The energies of frame k are those of the state at or after it, which the attempts saw. Frames of 1/40 s lie
- * on and between steps of 1/100 s; the first is before any step. */
+/* The energies of frame k are those of the first state at or after it, as the attempts reported them.
+ * Frames of 1/40 s lie on and between steps of 1/100 s; the first one is before all steps. */
 START_TEST(energies_are_of_the_state_at_or_after_the_frame)
 {
     world w;
@@ -647,7 +648,7 @@ END_TEST
 
 /* ---- Failures */
 
-/* No file may grow past size from here on: a full disk. Nothing is asserted until free_disk(). */
+/* From here on no file may grow beyond size, as on a full disk. Nothing is asserted until free_disk(). */
 static void fill_disk(size_t size, struct rlimit *old)
 {
     signal(SIGXFSZ, SIG_IGN);
@@ -660,8 +661,8 @@ static void free_disk(const struct rlimit *old)
     setrlimit(RLIMIT_FSIZE, old);
 }
 
-/* Advances on a disk that takes files of `size` bytes: it stops there with a message that names the file, and
- * finish says so again. */
+/* Advances on a disk that takes files of `size` bytes: the sim stops there with a message that names the
+ * file, and finish reports it again. */
 static void run_on_small_disk(world *w, const char *format, size_t size, const char *name)
 {
     char message[2][1024];
@@ -717,7 +718,7 @@ START_TEST(full_disk_leaves_whole_rows)
 }
 END_TEST
 
-/* Frames so often that their rows fill the disk before those of the steps do. */
+/* Frames are so frequent that their rows fill the disk before those of the steps do. */
 START_TEST(full_disk_leaves_whole_rows_of_energies)
 {
     world w;
@@ -742,16 +743,16 @@ START_TEST(full_disk_leaves_no_half_frame)
 {
     static const struct {
         const char *format, *file;
-    } rows[] = {{"obj", "frame_000000.obj"},
-                {"ply", "frame_000000.ply"},
-                {"vtp", "frame_000000.vtp"},
-                {"glb", "positions.glb"},
-                {"pc2", "positions.obj"}};
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+    } cases[] = {{"obj", "frame_000000.obj"},
+                 {"ply", "frame_000000.ply"},
+                 {"vtp", "frame_000000.vtp"},
+                 {"glb", "positions.glb"},
+                 {"pc2", "positions.obj"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         world w;
         set_up(&w);
-        run_on_small_disk(&w, rows[i].format, 500, rows[i].file);
-        ck_assert_int_eq(count_files(w.out, rows[i].file), 0);
+        run_on_small_disk(&w, cases[i].format, 500, cases[i].file);
+        ck_assert_int_eq(count_files(w.out, cases[i].file), 0);
         tear_down(&w);
     }
 }
@@ -763,7 +764,7 @@ static uint32_t word_at(const char *data, size_t at)
     return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
 }
 
-/* The samples of the point cache, which must be whole. */
+/* The samples of the point cache, all of which must be complete. */
 static uint32_t check_pc2(const world *w)
 {
     size_t size;
@@ -792,7 +793,7 @@ START_TEST(full_disk_leaves_a_valid_point_cache)
 }
 END_TEST
 
-/* Of a binary glTF, to be freed by json_decref: its lengths fit the file. */
+/* The JSON of a binary glTF, whose lengths must fit the file; to be freed by json_decref. */
 static json_t *load_glb(const world *w)
 {
     size_t size;
@@ -822,7 +823,7 @@ static size_t count_targets(const json_t *json)
     return count;
 }
 
-/* 13 frames take 13 x 2 304 bytes; the room is enough for all but the last ones. */
+/* 13 frames take 13 x 2 304 bytes; there is room for all but the last ones. */
 START_TEST(full_disk_leaves_a_valid_glb)
 {
     world w;
@@ -836,8 +837,8 @@ START_TEST(full_disk_leaves_a_valid_glb)
 }
 END_TEST
 
-/* Frames of the model at rest until one fails, on a disk that takes files of `size` bytes; how many were
- * good. */
+/* Writes frames of the model at rest, on a disk that takes files of `size` bytes, until one fails; returns
+ * the number of those that succeeded. */
 static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
 {
     static double field[NODES * 3];
@@ -866,8 +867,8 @@ static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
     return frames - 1;
 }
 
-/* However the disk fills up, the collection names whole frames alone: its entries outgrow the room, which the
- * frames themselves, of some 9 kB, do not. */
+/* Wherever the disk is full, the collection names only whole frames: its list outgrows the limit, which the
+ * frames themselves, of about 9 kB, do not. */
 START_TEST(full_disk_leaves_a_valid_collection)
 {
     for (size_t room = 12000; room < 12090; room += 5) {
@@ -896,14 +897,14 @@ END_TEST
 
 static void refuse(world *w, const char *format, drape_status expected, const char *part)
 {
-    drape_recorder *recorder = (drape_recorder *)w; /* anything but NULL: it must become that */
+    drape_recorder *recorder = (drape_recorder *)w; /* not NULL, so that it shows whether it becomes NULL */
     ck_assert_int_eq(record(w, w->ctx, format, &recorder), expected);
     ck_assert_ptr_null(recorder);
     ck_assert_msg(strstr(drape_context_message(w->ctx), part) != NULL, "\"%s\" does not say \"%s\"",
                   drape_context_message(w->ctx), part);
 }
 
-START_TEST(a_disk_full_from_the_start_is_told_at_once)
+START_TEST(a_disk_full_from_the_start_is_reported_at_once)
 {
     world w;
     set_up(&w);
@@ -940,9 +941,9 @@ START_TEST(bad_folders_are_refused)
     ck_assert_int_eq(mkdir(w.out, 0555), 0);
     if (geteuid() != 0) /* root may write anywhere */
         refuse(&w, "npy", DRAPE_E_FILE, "Permission denied");
-    snprintf(w.out, sizeof w.out, "%s", "/proc/drape/out"); /* nobody makes a folder there */
+    snprintf(w.out, sizeof w.out, "%s", "/proc/drape/out"); /* no folder can be made there */
     refuse(&w, "npy", DRAPE_E_FILE, "cannot make the folder \"/proc/drape");
-    snprintf(w.out, sizeof w.out, "%s/", w.folder); /* a slash at the end is fine */
+    snprintf(w.out, sizeof w.out, "%s/", w.folder); /* a slash at the end is allowed */
     run(&w, "npy", 0);
     ck_assert(exists(w.folder, "positions.npy"));
     tear_down(&w);
@@ -960,7 +961,7 @@ START_TEST(unknown_formats_are_refused_before_anything_is_made)
 }
 END_TEST
 
-START_TEST(too_many_observers_are_told)
+START_TEST(too_many_observers_are_reported)
 {
     world w;
     set_up(&w);
@@ -1025,7 +1026,7 @@ END_TEST
 
 /* ---- Memory */
 
-/* Counts, and fails from the call after the left ones on. */
+/* Counts the blocks in use; fails once `left` calls have succeeded. */
 typedef struct meter {
     int left, taken, held;
 } meter;
@@ -1082,7 +1083,7 @@ START_TEST(each_allocation_may_fail)
             ck_assert_int_eq(m.held, 1); /* the context */
         }
     }
-    /* From here on there is no memory at all, and none is needed. */
+    /* From here on there is no memory at all; the rest must need none. */
     m.left = 0;
     ck_assert_int_eq(drape_sim_advance(w.sim, 0.11), DRAPE_OK);
     ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
@@ -1250,7 +1251,7 @@ START_TEST(summary_fails_whole)
 }
 END_TEST
 
-/* A host that speaks German writes 0,5: the files must not. */
+/* In a host with a German locale printf writes 0,5: the files must not. */
 START_TEST(numbers_do_not_follow_the_locale)
 {
     world w;
@@ -1276,12 +1277,12 @@ START_TEST(numbers_do_not_follow_the_locale)
 END_TEST
 
 SUITE("io", npy_is_exact, npy_is_valid_after_each_frame, the_last_frame_comes_once, obj_parses_back,
-      ply_parses_back, every_row_writes_the_same_frames, old_frames_are_removed_and_nothing_else,
+      ply_parses_back, every_format_writes_the_same_frames, old_frames_are_removed_and_nothing_else,
       energies_are_of_the_state_at_or_after_the_frame, full_disk_leaves_whole_rows_of_energies,
       steps_has_a_row_for_each_attempt, steps_quotes_and_keeps_digits, full_disk_leaves_a_valid_npy,
       full_disk_leaves_whole_rows, full_disk_leaves_no_half_frame, full_disk_leaves_a_valid_point_cache,
       full_disk_leaves_a_valid_glb, full_disk_leaves_a_valid_collection,
-      a_disk_full_from_the_start_is_told_at_once, bad_folders_are_refused,
-      unknown_formats_are_refused_before_anything_is_made, too_many_observers_are_told,
+      a_disk_full_from_the_start_is_reported_at_once, bad_folders_are_refused,
+      unknown_formats_are_refused_before_anything_is_made, too_many_observers_are_reported,
       a_killed_run_leaves_whole_files, each_allocation_may_fail, summary_is_complete, summary_is_always_json,
       summary_fails_whole, numbers_do_not_follow_the_locale)

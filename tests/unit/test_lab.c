@@ -1,5 +1,4 @@
-/* test_lab.c: what experiments measure with: lines through powers, material points on other meshes,
- * distances. */
+/* test_lab.c: the measures of experiments: fitted powers, material points on other meshes, distances. */
 #include "lab/statistics.h"
 #include "lab/text.h"
 #include "lab/trace.h"
@@ -42,7 +41,7 @@ static drape_model *sheet(drape_context *ctx, double columns, double rows)
     return model;
 }
 
-/* y = 3 x^2 exactly: the slope is 2 to rounding, with no doubt about it. */
+/* y = 3 x^2 exactly: the slope is 2 up to rounding, with an uncertainty of 0. */
 START_TEST(a_power_is_found_exactly)
 {
     double x[6], y[6];
@@ -57,9 +56,9 @@ START_TEST(a_power_is_found_exactly)
 }
 END_TEST
 
-/* Residuals in logarithms of +d, -2d, +d at abscissae -1, 0, 1 (times log 2): slope as without them; its
- * standard error is sqrt(6 d^2/1 / (2 log(2)^2)), and Student's t for one degree of freedom at 97.5 % is
- * 12.7062. */
+/* Residuals of +d, -2d, +d in the logarithms, at abscissae -1, 0, 1 (times log 2), do not change the slope;
+ * its standard error is sqrt(6 d^2/1 / (2 log(2)^2)), and Student's t for one degree of freedom at 97.5 %
+ * is 12.7062. */
 START_TEST(confidence_is_students)
 {
     const double d = 1e-3, x[] = {0.5, 1, 2}, y[] = {0.5 * exp(d), exp(-2 * d), 2 * exp(d)};
@@ -72,8 +71,8 @@ START_TEST(confidence_is_students)
 }
 END_TEST
 
-/* A field that is linear in the rest positions is linear in every triangle: taken at another mesh's nodes it
- * is exact, whichever triangle a point on an edge is given to. */
+/* A field that is linear in the rest positions is linear in every triangle: its interpolation at the nodes of
+ * another mesh is exact, whichever triangle a point on an edge is assigned to. */
 START_TEST(a_linear_field_is_taken_exactly)
 {
     drape_context *ctx = new_context();
@@ -105,7 +104,7 @@ START_TEST(a_linear_field_is_taken_exactly)
 }
 END_TEST
 
-/* Pinned nodes do not count: all free ones moved by 5 is 5. */
+/* Pinned nodes do not count: if all free ones have moved by 5, the distance is 5. */
 START_TEST(a_distance_is_of_the_free_nodes)
 {
     drape_context *ctx = new_context();
@@ -127,7 +126,7 @@ START_TEST(a_value_of_a_scene_has_its_unit)
     static const struct {
         const char *pointer, *unit;
     } known[] = {{"/integrator/dt", "s"},
-                 {"/integrator/rtol", ""}, /* a number */
+                 {"/integrator/rtol", ""}, /* a plain number */
                  {"/integrator/max_order", ""},
                  {"/cloth/0/material/young_modulus", "Pa"},
                  {"/cloth/3/material/density", "kg/m3"},

@@ -1,4 +1,4 @@
-/* test_mesh.c: grids, arrays, transform, topology, validation, rest measures. Import has its own file. */
+/* test_mesh.c: grids, arrays, transforms, topology, validation, measures at rest. Import has its own test. */
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 #include "support/suite.h"
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
-/* Of coordinates and lengths of order 1: a few roundings, each 2^-53. */
+/* For coordinates and lengths of order 1: a few roundings of 2^-53. */
 #define ROUNDING 1e-15
 
 static drape_mesh_def empty_def(void)
@@ -102,7 +102,7 @@ static void assert_edges(const drape_mesh *mesh)
     }
 }
 
-/* In the plane, the apices lie on opposite sides of the edge: (e x a) . (e x b) < 0. */
+/* In a flat mesh, the apices lie on opposite sides of the edge: (e x a) . (e x b) < 0. */
 static void assert_hinges(const drape_mesh *mesh, bool flat)
 {
     for (int32_t h = 0; h < mesh->hinge_count; h++) {
@@ -125,7 +125,7 @@ static void assert_hinges(const drape_mesh *mesh, bool flat)
     }
 }
 
-/* What holds for every mesh: hinges are the inner edges, 3 T = E + H, and lumping keeps the area. */
+/* True of every mesh: hinges are the inner edges, 3 T = E + H, and lumping preserves the area. */
 static void assert_consistent(const drape_mesh *mesh, bool flat)
 {
     assert_edges(mesh);
@@ -281,7 +281,7 @@ START_TEST(equilateral_strips)
 }
 END_TEST
 
-/* Twice the area of a triangle of the plane y = 0, positive where it turns counterclockwise seen from +y. */
+/* Twice the signed area of a triangle in the plane y = 0, positive if it is counterclockwise seen from +y. */
 static double twice_area(const drape_mesh *mesh, int32_t t)
 {
     const double *a = mesh->x + 3 * mesh->triangle[3 * t], *b = mesh->x + 3 * mesh->triangle[3 * t + 1],
@@ -289,8 +289,8 @@ static double twice_area(const drape_mesh *mesh, int32_t t)
     return (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2]);
 }
 
-/* Its triangles all look up, and fill what lies between the polygons of its two rims; it is closed, so V - E
- * + F = 0 and the rims alone are boundary. */
+/* Its triangles all face up and fill the area between the polygons of its two rims. It is closed, so V - E
+ * + F = 0, and only the rims are boundary. */
 START_TEST(annuli)
 {
     enum { ROWS = 4, SPOKES = 7 };
@@ -405,7 +405,7 @@ START_TEST(transform_scales_then_rotates_then_translates)
     memcpy(def.rotate, rotate, sizeof rotate);
     memcpy(def.translate, translate, sizeof translate);
     drape_mesh mesh = make(ctx, &def);
-    /* (2,0,0) -> (0,2,0); (0,3,0) -> (-3,0,0); (0,0,4) stays; then the shift. Exact. */
+    /* (2,0,0) -> (0,2,0); (0,3,0) -> (-3,0,0); (0,0,4) stays; then the translation. Exact. */
     static const double expected[] = {10, 22, 30, 7, 20, 30, 10, 20, 34};
     for (int i = 0; i < 9; i++)
         ck_assert_double_eq(mesh.x[i], expected[i]);
@@ -440,7 +440,7 @@ START_TEST(rotation_is_exact_at_right_angles_and_right_between)
         ck_assert_double_eq_tol(out[0], cos(a), 20 * ROUNDING);
         ck_assert_double_eq_tol(out[1], sin(a), 20 * ROUNDING);
     }
-    const double diagonal[4] = {1e200, 1e200, 1e200, 120}; /* turns x into y */
+    const double diagonal[4] = {1e200, 1e200, 1e200, 120}; /* rotates x onto y */
     rotated_x_axis(diagonal, out);
     ck_assert_double_eq_tol(out[0], 0, ROUNDING);
     ck_assert_double_eq_tol(out[1], 1, ROUNDING);
@@ -508,7 +508,7 @@ static drape_mesh_def arrays(const double *x, size_t node_count, const int32_t *
     return def;
 }
 
-/* Points of a parabola: no three on a line. */
+/* Points of a parabola: no three are on a line. */
 static const double points[] = {0, 0, 0, 1, 0, 1, 2, 0, 4, 3, 0, 9, 4, 0, 16, 5, 0, 25, 6, 0, 36};
 
 static void assert_triangles_refused(const int32_t *triangle, size_t numbers, size_t nodes,
@@ -558,7 +558,8 @@ START_TEST(array_faults)
 }
 END_TEST
 
-/* Two closed fans at one node pass every count of edges and triangles: only walking the fans finds them. */
+/* Two closed fans at one node have valid counts of edges and triangles: only a walk around the node finds
+ * them. */
 START_TEST(two_closed_fans_at_one_node_are_refused)
 {
     static const double x[] = {0, 0, 0, 1, 1, 0, -1, 1, 1, -1, 1, -1, 1, -1, 0, -1, -1, 1, -1, -1, -1};
@@ -610,7 +611,7 @@ START_TEST(measures_of_a_known_triangle)
 }
 END_TEST
 
-/* A fan of many triangles around one node: no quadratic time at a node of high degree. */
+/* A fan of many triangles around one node: the time must not be quadratic in the degree of a node. */
 START_TEST(a_node_of_high_degree)
 {
     enum { SPOKES = 200000 };
@@ -654,7 +655,7 @@ START_TEST(every_failed_allocation_is_reported_and_none_leaks)
         drape_context_destroy(&ctx);
         ck_assert_int_eq(memory.live, 0);
     }
-    ck_assert_int_ge(failures, 15); /* else the allocator was not asked */
+    ck_assert_int_ge(failures, 15); /* otherwise the allocator was not called */
 }
 END_TEST
 

@@ -1,5 +1,4 @@
-/* test_render.c: what is computed before anything is drawn: surfaces, colours, letters, the camera,
- * frames. */
+/* test_render.c: all that is computed before drawing: surfaces, colours, letters, the camera, frames. */
 #include "render/body.h"
 #include "render/camera.h"
 #include "render/font.h"
@@ -27,8 +26,8 @@ static const char colliders[] =
     " {'type': 'cylinder', 'a': [0, 7, 0], 'b': [0.3, 7.5, 0], 'radius': 0.2},"
     " {'type': 'plane', 'point': [0, -1, 0], 'normal': [0.1, 1, 0]}]";
 
-/* Every point lies on the surface: it was brought there by Newton steps on the exact distance, and is then
- * rounded to a float of at most 8 m, 5e-7. Normals have the length 1 and look outwards. */
+/* Every point lies on the surface: Newton steps on the exact distance move it there, and then it is rounded
+ * to a float of at most 8 m, 5e-7. Normals have length 1 and point outwards. */
 START_TEST(bodies_lie_on_their_surface)
 {
     scene h = scene_model(CLOTH, "", colliders);
@@ -55,8 +54,8 @@ START_TEST(bodies_lie_on_their_surface)
 }
 END_TEST
 
-/* A box's corners are found: the extremes of its points are those of the box, of half lengths .25, .15, .35
- * without a turn, to the pull of the mean, 1 in 100 of a cell of 0.7 m / 56. */
+/* A point of the surface is at the corner of a box of half lengths .25, .15, .35 without rotation, up to the
+ * attraction by the mean, 1 in 100 of a cell of 0.7 m / 56. */
 START_TEST(corners_of_a_box_are_sharp)
 {
     scene h = scene_model(CLOTH, "",
@@ -79,9 +78,9 @@ END_TEST
 
 /* ---- Cloth ---- */
 
-/* Nodes on a sphere of radius 1, an eighth of it over the sheet: normals by area weighting are within the
- * square of an edge's angle, 0.12 rad, and curved points nearer to the sphere than the flat triangles are,
- * whose middles lie an eighth of that square inside. Nodes are drawn where they are. */
+/* Nodes on an eighth of a sphere of radius 1. Normals weighted by area are exact up to the square of an
+ * edge's angle, below 0.16 rad; the points of curved patches are nearer to the sphere than flat triangles,
+ * whose middles lie an eighth of that square inside. Nodes are drawn at their positions. */
 START_TEST(cloth_is_drawn_round_through_its_nodes)
 {
     drape_skin skin;
@@ -101,14 +100,14 @@ START_TEST(cloth_is_drawn_round_through_its_nodes)
     double off_normal = 0, off_sphere = 0;
     for (size_t i = 0; i < skin.vertex_count; i++) {
         const drape_skin_vertex *v = &skin.vertex[i];
-        float way = drape_dot(v->p, v->p), inner = fmaxf(fabsf(v->p[0]), fabsf(v->p[2]));
+        float square = drape_dot(v->p, v->p), inner = fmaxf(fabsf(v->p[0]), fabsf(v->p[2]));
         if (i < 81)
             ck_assert(memcmp(v->p, x + 3 * i, sizeof v->p) == 0);
         ck_assert(fabsf(drape_dot(v->t, v->n)) < 1e-5f && v->t[0] > 0.5f);
-        if (inner > 0.37f) /* at the rim a normal has triangles on one side alone */
+        if (inner > 0.37f) /* at the rim a normal has triangles on one side only */
             continue;
-        off_normal = fmax(off_normal, acos(fmin(1, (double)(drape_dot(v->p, v->n) / sqrtf(way)))));
-        off_sphere = fmax(off_sphere, fabs(sqrt((double)way) - 1));
+        off_normal = fmax(off_normal, acos(fmin(1, (double)(drape_dot(v->p, v->n) / sqrtf(square)))));
+        off_sphere = fmax(off_sphere, fabs(sqrt((double)square) - 1));
     }
     assert_below(off_normal, 0.16 * 0.16);
     assert_below(off_sphere, 0.16 * 0.16 / 8 / 2);
@@ -119,9 +118,9 @@ START_TEST(cloth_is_drawn_round_through_its_nodes)
 }
 END_TEST
 
-/* Every triangle runs as its mesh's does: the normal by its corners is on the side of the smooth one. On a
- * flat sheet the texture is as long as wide, u along x, v away from the first row, seen from the front not
- * mirrored. */
+/* Every triangle has the orientation of its mesh: the normal by its corners is on the side of the smooth
+ * one. On a flat sheet the texture is as long as wide, with u along x and v away from the first row; seen
+ * from the front it is not mirrored. */
 START_TEST(texture_is_not_mirrored)
 {
     static const char *const orientations[] = {"", ", 'orientation': 'vertical'"};
@@ -156,8 +155,8 @@ END_TEST
 
 /* ---- Colours, letters, camera ---- */
 
-/* Lightness in OKLab: the cube root of luminance comes near it (the weights of its L are all positive and sum
- * to 1). It rises in each of 256 steps, and each half of the ramp has its half of it, to a tenth. */
+/* Lightness in OKLab is close to the cube root of luminance (the weights of its L are all positive and sum
+ * to 1). It rises in each of 256 steps, and each half of the ramp has half of the rise, to a tenth. */
 START_TEST(ramp_is_even_in_lightness)
 {
     double last = -1, middle = 0, first = 0;
@@ -180,7 +179,7 @@ START_TEST(ramp_is_even_in_lightness)
 }
 END_TEST
 
-/* All of ASCII that is printed has strokes within its cell; what is not known is a box. */
+/* Every printable ASCII character has strokes within its cell; an unknown one is a box. */
 START_TEST(letters_are_all_there)
 {
     drape_context *ctx = NULL;
@@ -193,7 +192,7 @@ START_TEST(letters_are_all_there)
     ck_assert_int_eq(drape_font_create(&arena, 12, &font), DRAPE_OK);
     for (char c = 33; c < 127; c++) {
         if (strchr("$&@`", c))
-            continue; /* no unit and no name of ours has these */
+            continue; /* no unit and no name of Drape has these */
         const char *at = text;
         text[0] = c;
         int glyph = drape_font_next(&font, &at, &advance), ink = 0;
@@ -212,8 +211,9 @@ START_TEST(letters_are_all_there)
 }
 END_TEST
 
-/* All points are in the picture, and the outermost touch the margin of 1/1.12 on two sides, to rounding. */
-START_TEST(camera_frames_what_it_is_shown)
+/* All points are in the picture, and the outermost ones are at the margin of 1/1.12 on two sides, up to
+ * rounding. */
+START_TEST(camera_frames_all_points)
 {
     const float points[][3] = {{0, 0, 0}, {1, 0.2f, 0}, {0.3f, -2, 0.5f}, {-0.7f, 0.4f, 1.5f}};
     const float nowhere[3] = {0};
@@ -255,4 +255,4 @@ END_TEST
 
 SUITE("render", bodies_lie_on_their_surface, corners_of_a_box_are_sharp,
       cloth_is_drawn_round_through_its_nodes, texture_is_not_mirrored, ramp_is_even_in_lightness,
-      letters_are_all_there, camera_frames_what_it_is_shown, shadings_are_found_by_name)
+      letters_are_all_there, camera_frames_all_points, shadings_are_found_by_name)

@@ -22,7 +22,7 @@ static const char *message(void)
     return drape_context_message(ctx);
 }
 
-/* Texts of tests are written with ' for ", which C would have escaped. */
+/* Texts of tests have ' for ", which C would have to escape. */
 static char *with_quotes(const char *text)
 {
     static char quoted[1 << 16];
@@ -241,7 +241,7 @@ START_TEST(test_numbers)
 }
 END_TEST
 
-/* A caller of an older header has shorter structs: nothing beyond them is written. */
+/* A caller compiled with an older header has shorter structs: nothing is written beyond them. */
 START_TEST(test_def_sizes)
 {
     struct {
@@ -364,7 +364,7 @@ END_TEST
 
 /* ---- Wrong scenes ---- */
 
-/* What is wrong stands in line 2. */
+/* Each has its fault in line 2. */
 #define ROOT(members)  "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g'}}],\n" members "}"
 #define CLOTH(members) "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g'},\n" members "}]}"
 #define MESH(mesh)     "{'drape': 1, 'duration': 1, 'cloth': [{'mesh':\n" mesh "}]}"
@@ -680,7 +680,7 @@ START_TEST(test_colliders_and_contact)
     check_setting(&def.self_contact[0], "thickness", 0.0095, NULL);
     ck_assert_uint_eq(def.contact_count, 2);
     check_setting(&def.contact[0], "friction", 0, "lagged");
-    /* what is not there is not the same as what is empty: an empty one lacks its thickness */
+    /* an empty object is not the same as an absent one: it lacks its thickness */
     ck_assert_int_eq(read_quoted(ROOT("'self_contact': {}")), DRAPE_OK);
     ck_assert(def.self_contact && def.self_contact_count == 0);
     ck_assert_int_eq(read_quoted(ROOT("'colliders': []")), DRAPE_OK);
@@ -705,7 +705,7 @@ START_TEST(test_wrong_scenes)
 }
 END_TEST
 
-/* Long names, keys and strings leave room for what is said of them, and are cut between characters. */
+/* Long names, keys and strings leave room for the rest of the message, and are cut between characters. */
 START_TEST(test_long_texts)
 {
     static char name[2000], text[4000];
@@ -739,7 +739,7 @@ START_TEST(test_deep_nesting)
 }
 END_TEST
 
-/* Every beginning of a scene, and scenes with one byte changed: a result or one line. */
+/* Every prefix of a scene, and scenes with one byte changed, give a result or a message of one line. */
 START_TEST(test_truncations)
 {
     open_context();
@@ -781,7 +781,7 @@ END_TEST
 
 /* ---- Values that are set ---- */
 
-/* Each on the example: message NULL for those that are fine. */
+/* Values that are set in the example; message is NULL if the value is valid. */
 static const struct {
     const char *pointer, *value, *message;
 } sets[] = {
@@ -873,7 +873,7 @@ START_TEST(test_sets)
 }
 END_TEST
 
-/* Numbers that people write and JSON does not have. */
+/* Spellings of numbers that people use and JSON does not have. */
 START_TEST(test_set_loose_numbers)
 {
     static const struct {
@@ -912,7 +912,7 @@ START_TEST(test_set_values)
 }
 END_TEST
 
-/* A failed set leaves the scene as it was; the latest of two sets is the one that is named. */
+/* A failed set leaves the scene unchanged; of two sets of a key the later one is named. */
 START_TEST(test_set_order)
 {
     open_context();
@@ -941,7 +941,7 @@ START_TEST(test_set_order)
 }
 END_TEST
 
-/* ---- Faults of others ---- */
+/* ---- Faults found by others ---- */
 
 START_TEST(test_locate_fault)
 {
@@ -1010,7 +1010,7 @@ START_TEST(test_files)
 }
 END_TEST
 
-/* A pipe says no size: the text comes in pieces. */
+/* The size of a pipe is unknown: the text is read in pieces. */
 START_TEST(test_pipe)
 {
     char folder[] = "/tmp/drape-scene-XXXXXX", path[64];
@@ -1077,7 +1077,7 @@ START_TEST(test_many_nodes)
 }
 END_TEST
 
-/* A host's decimal comma must not reach the numbers. */
+/* A locale with a decimal comma must not affect numbers. */
 START_TEST(test_locale)
 {
     comma_begin();
@@ -1092,7 +1092,7 @@ START_TEST(test_locale)
 }
 END_TEST
 
-/* Parse, set, read: each allocation in turn fails. */
+/* Parses, sets, reads: each allocation in turn fails. */
 static drape_status whole_life(drape_context *context)
 {
     drape_scene *one = NULL;
@@ -1144,8 +1144,8 @@ static void json_release(void *memory)
     free(memory);
 }
 
-/* The same with the memory of jansson, which is malloc's. It does not tell all of its failures from wrong
- * syntax (strings): a scene is then refused for the wrong reason, but nothing is lost. */
+/* The same with the memory of jansson, which is malloc's. jansson reports some of its failures (in strings)
+ * as wrong syntax: a scene is then refused for the wrong reason, but nothing leaks. */
 START_TEST(test_no_memory_for_json)
 {
     open_context();
@@ -1164,12 +1164,12 @@ START_TEST(test_no_memory_for_json)
         ck_assert_int_eq(json_live, 0);
     }
     json_set_alloc_funcs(malloc, free);
-    ck_assert_int_gt(memory_count, 0); /* how many jansson tells apart depends on its random hash seed */
+    ck_assert_int_gt(memory_count, 0); /* how many jansson distinguishes depends on its random hash seed */
     close_context();
 }
 END_TEST
 
-/* What describes the form of a scene walks these tables. */
+/* Checks the tables of keys that the reader walks. */
 static void check_form(const drape_scene_object *object)
 {
     ck_assert_ptr_nonnull(object->name);
@@ -1193,14 +1193,14 @@ START_TEST(test_form)
 }
 END_TEST
 
-/* ---- Every key, whatever it is called ---- */
+/* ---- Every key ---- */
 
 static const char whole[] =
     "{'drape': 1, 'duration': 1, 'cloth': [{'mesh': {'grid': 'g', 'transform': {}}, 'terms': [{'type': 't'}],"
     "'pins': [{'nodes': [0]}]}], 'colliders': [{'type': 'c'}], 'integrator': {}, 'controller': {}, 'output': "
     "{}}";
 
-/* The key that a pointer leads to, and the def that it is in. */
+/* The key that a pointer leads to, and the def it belongs to. */
 static const drape_scene_key *find_key(const char *pointer, const char **at)
 {
     const drape_scene_key *key = NULL;
@@ -1220,7 +1220,7 @@ static const drape_scene_key *find_key(const char *pointer, const char **at)
     }
 }
 
-/* A value that is allowed, and is not the default. */
+/* A value that is allowed and is not the default. */
 static void write_value(const drape_param *param, char *text, size_t size)
 {
     int last = 0;
@@ -1265,8 +1265,8 @@ static void append(void *user, const char *text, size_t size)
     strncat(user, text, size);
 }
 
-/* What is set is read, and is still so after the scene was printed and read again; a default is read where
- * nothing is set; what is out of range is refused; the key is where its pointer says. */
+/* A value that is set is read, and is read again after the scene is printed and parsed; a default is read
+ * if nothing is set; a value out of range is refused; the key is at its pointer. */
 static void check_key(const drape_scene_key *key, const char *pointer)
 {
     static char printed[1 << 14];

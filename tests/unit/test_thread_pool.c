@@ -1,7 +1,7 @@
 /*
- * test_crew.c: loops dealt out to threads. Every round is done once, by the function of its own loop, before
- * the loop returns, whatever the number of rounds and threads; helpers that slept come again; a caller whose
- * helpers do not come does all.
+ * test_thread_pool.c: loops whose tasks are shared out to threads. Every task runs once, by the function of
+ * its own loop, before the loop returns, for any number of tasks and threads; helpers that sleep are woken;
+ * a caller runs all tasks that no helper takes.
  */
 #include "base/thread_pool.h"
 
@@ -13,29 +13,29 @@
 
 #include "support/suite.h"
 
-#define MOST 257
+#define MAX_TASKS 257
 
-/* A loop that writes a number of its own, and who wrote it. */
+/* What a loop has written: a number of its own, and the thread. */
 typedef struct ledger {
     int64_t sign;
-    int64_t entry[MOST]; /* sign + round */
-    pthread_t by[MOST];
-    int times[MOST];
+    int64_t entry[MAX_TASKS]; /* sign + task */
+    pthread_t by[MAX_TASKS];
+    int times[MAX_TASKS];
 } ledger;
 
-static void enter(void *user, int64_t round)
+static void enter(void *user, int64_t task)
 {
     ledger *l = user;
-    l->entry[round] = l->sign + round;
-    l->by[round] = pthread_self();
-    l->times[round]++;
+    l->entry[task] = l->sign + task;
+    l->by[task] = pthread_self();
+    l->times[task]++;
 }
 
-/* Another one, so that a round of one loop by the function of the other shows. */
-static void enter_twice(void *user, int64_t round)
+/* Another function, so that a task of one loop run by the function of another one shows. */
+static void enter_twice(void *user, int64_t task)
 {
-    enter(user, round);
-    enter(user, round);
+    enter(user, task);
+    enter(user, task);
 }
 
 static drape_context *open_context(void)
@@ -45,19 +45,19 @@ static drape_context *open_context(void)
     return ctx;
 }
 
-static void check_loop(drape_pool *pool, ledger *l, int64_t sign, int rounds)
+static void check_loop(drape_pool *pool, ledger *l, int64_t sign, int tasks)
 {
     const bool twice = sign % 2;
     memset(l, 0, sizeof *l);
     l->sign = sign;
-    drape_parallel(pool, rounds, twice ? enter_twice : enter, l);
-    for (int k = 0; k < MOST; k++) {
-        ck_assert_int_eq(l->times[k], k < rounds ? 1 + twice : 0);
-        ck_assert_int_eq(l->entry[k], k < rounds ? sign + k : 0);
+    drape_parallel(pool, tasks, twice ? enter_twice : enter, l);
+    for (int k = 0; k < MAX_TASKS; k++) {
+        ck_assert_int_eq(l->times[k], k < tasks ? 1 + twice : 0);
+        ck_assert_int_eq(l->entry[k], k < tasks ? sign + k : 0);
     }
 }
 
-START_TEST(every_round_is_done_once)
+START_TEST(every_task_runs_once)
 {
     static ledger l;
     drape_context *ctx = open_context();
@@ -68,7 +68,7 @@ START_TEST(every_round_is_done_once)
         ck_assert_int_eq(drape_pool_threads(pool), threads);
         ck_assert_int_eq(pool != NULL, threads > 1);
         for (int k = 0; k < 400; k++)
-            check_loop(pool, &l, 1000 * k + k, k % MOST + k % 2);
+            check_loop(pool, &l, 1000 * k + k, k % MAX_TASKS + k % 2);
         drape_pool_destroy(&pool);
         ck_assert_ptr_null(pool);
     }
@@ -77,13 +77,13 @@ START_TEST(every_round_is_done_once)
 }
 END_TEST
 
-/* Between two loops helpers fall asleep; the next one wakes them. A round here lasts until another thread
- * takes the other one, so that the loop would not end if none came. */
+/* Between two loops the helpers fall asleep; the next loop wakes them. Each of the two tasks lasts until
+ * another thread has begun the other one, so the loop would not end without a helper. */
 static atomic_int here;
 
-static void meet(void *user, int64_t round)
+static void meet(void *user, int64_t task)
 {
-    (void)user, (void)round;
+    (void)user, (void)task;
     atomic_fetch_add(&here, 1);
     while (atomic_load(&here) < 2)
         sched_yield();
@@ -107,20 +107,19 @@ START_TEST(helpers_that_sleep_are_woken)
 }
 END_TEST
 
-/* Helpers in the middle of a round of theirs: the caller does all others meanwhile. The first round that a
- * helper takes waits for all others to be done; a team whose rounds were dealt out beforehand would never
- * end. */
-typedef struct held {
+/* A helper is busy with a task: the caller runs all others meanwhile. The first task that a helper takes
+ * waits until all others are done; a pool that assigned tasks to threads beforehand would never end. */
+typedef struct blocked {
     pthread_t caller;
-    atomic_int done, held;
-} held;
+    atomic_int done, blocked;
+} blocked;
 
-static void hold(void *user, int64_t round)
+static void block(void *user, int64_t task)
 {
-    held *h = user;
-    (void)round;
-    if (!pthread_equal(pthread_self(), h->caller) && !atomic_exchange(&h->held, 1))
-        while (atomic_load(&h->done) < MOST - 1)
+    blocked *h = user;
+    (void)task;
+    if (!pthread_equal(pthread_self(), h->caller) && !atomic_exchange(&h->blocked, 1))
+        while (atomic_load(&h->done) < MAX_TASKS - 1)
             sched_yield();
     atomic_fetch_add(&h->done, 1);
 }
@@ -132,9 +131,9 @@ START_TEST(the_caller_does_what_no_helper_takes)
     drape_pool *pool = NULL;
     ck_assert_int_eq(drape_pool_create(&arena, 2, &pool), DRAPE_OK);
     for (int k = 0; k < 200; k++) {
-        held h = {.caller = pthread_self()};
-        drape_parallel(pool, MOST, hold, &h);
-        ck_assert_int_eq(h.done, MOST);
+        blocked h = {.caller = pthread_self()};
+        drape_parallel(pool, MAX_TASKS, block, &h);
+        ck_assert_int_eq(h.done, MAX_TASKS);
     }
     drape_pool_destroy(&pool);
     drape_arena_free(&arena);
@@ -142,7 +141,7 @@ START_TEST(the_caller_does_what_no_helper_takes)
 }
 END_TEST
 
-/* Two pools do not see each other, and a pool works for whatever thread calls. */
+/* Two pools do not affect each other, and a pool serves any thread that calls it. */
 static void *loop_often(void *pool)
 {
     ledger l;
@@ -180,5 +179,5 @@ START_TEST(pools_work_beside_each_other)
 }
 END_TEST
 
-SUITE("thread_pool", every_round_is_done_once, helpers_that_sleep_are_woken,
-      the_caller_does_what_no_helper_takes, pools_work_beside_each_other)
+SUITE("thread_pool", every_task_runs_once, helpers_that_sleep_are_woken, the_caller_does_what_no_helper_takes,
+      pools_work_beside_each_other)

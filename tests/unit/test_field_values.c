@@ -1,4 +1,4 @@
-/* test_field_rows.c: what is told of a moment at each node, against closed forms. */
+/* test_field_values.c: the fields of a moment at each node, against closed forms. */
 #include "fields/fields.h"
 #include "support/scene.h"
 #include "support/suite.h"
@@ -24,9 +24,9 @@ static drape_status measure(scene *h, const char *name, const double *x)
     return drape_fields[i]->measure(h->sim, x, values);
 }
 
-/* Under x -> (1.04 x, 0.97 z), sheared and turned, the largest principal strain is that of the matrix: for F
- * = R [a s; 0 b] it is ((a + b)^2 + s^2)^1/2 / 2 + ((a - b)^2 + s^2)^1/2 / 2 - 1 in every triangle, and so in
- * every node, to the rounding of squares of numbers near 1. */
+/* Under x -> (1.04 x, 0.97 z), sheared and rotated, the largest principal strain is that of the matrix: for
+ * F = R [a s; 0 b] it is ((a + b)^2 + s^2)^1/2 / 2 + ((a - b)^2 + s^2)^1/2 / 2 - 1 in every triangle, and
+ * so at every node, up to the rounding of squares of numbers near 1. */
 START_TEST(strain_of_a_homogeneous_stretch_is_exact)
 {
     scene h = scene_open(sheet, "be", "");
@@ -48,7 +48,7 @@ START_TEST(strain_of_a_homogeneous_stretch_is_exact)
 END_TEST
 
 /* Density times area sums to the elastic energy of the sim, and no density is negative. Sums of 24 and of
- * some hundred positive numbers in two orders: to 1e-13 of the sum. */
+ * some hundred positive numbers in two orders agree to 1e-13. */
 START_TEST(energy_density_sums_to_the_energy)
 {
     scene h = scene_open(sheet, "be", "");
@@ -87,15 +87,15 @@ static drape_status keep_residual(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* The step log has the largest component; a node's vector is between that and sqrt(3) of it. A row that
- * solves no equations says so. */
+/* The step log has the largest component; a node's vector is between that and sqrt(3) of it. An integrator
+ * that solves no equations reports that there is no residual. */
 START_TEST(residual_is_that_of_the_last_step)
 {
     scene h = scene_open(sheet, "be", "");
     double logged = -1, largest = 0;
     ck_assert_int_eq(drape_sim_observe(h.sim, keep_residual, &logged), DRAPE_OK);
     ck_assert_int_eq(measure(&h, "residual", drape_sim_positions(h.sim)), DRAPE_OK);
-    ck_assert(values[5] == 0); /* before the first step there is none */
+    ck_assert(values[5] == 0); /* there is no residual before the first step */
     ck_assert_int_eq(drape_sim_advance(h.sim, 0.05), DRAPE_OK);
     ck_assert_int_eq(measure(&h, "residual", drape_sim_positions(h.sim)), DRAPE_OK);
     for (int i = 0; i < NODES; i++)
@@ -111,8 +111,9 @@ START_TEST(residual_is_that_of_the_last_step)
 }
 END_TEST
 
-/* The floor carries the sheet: a node's force is upright there, so sizes add up like forces, to the weight of
- * what is free. The pin's share by bending, and what still moves after 3 s, are below a hundredth of it. */
+/* The floor carries the sheet: contact forces on it are vertical, so their sizes add up to the weight of
+ * the free nodes. The share that the pin takes by bending, and the motion left after 3 s, are below a
+ * hundredth of it. */
 START_TEST(contact_forces_carry_the_weight)
 {
     scene h = scene_open(sheet, "be",
@@ -136,5 +137,5 @@ START_TEST(contact_forces_carry_the_weight)
 }
 END_TEST
 
-SUITE("field_rows", strain_of_a_homogeneous_stretch_is_exact, energy_density_sums_to_the_energy,
+SUITE("field_values", strain_of_a_homogeneous_stretch_is_exact, energy_density_sums_to_the_energy,
       velocity_is_the_speed, residual_is_that_of_the_last_step, contact_forces_carry_the_weight)
