@@ -10,7 +10,7 @@
 #define SMOOTH (2.0 / 3)
 #define DROP                                                                                                 \
     0.08 /* of the largest at a node: smaller values are left out, the others scaled to add up to 1 */
-#define WIDENING 1.1 /* of the spacing: measured best at 2 500 and 10 000 nodes (bench/speed rungs) */
+#define WIDENING 1.1 /* of the spacing: measured best at 2 500 and 10 000 nodes (bench/speed levels) */
 
 int drape_prolong_spacing(int32_t nodes)
 {
