@@ -105,8 +105,8 @@ static drape_status add_cases(lab *l)
 static drape_status plan(lab *l)
 {
     if (l->def->levels < MIN_LEVELS || l->def->levels > MAX_LEVELS)
-        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "levels = %d; it is %d to %d", l->def->levels, MIN_LEVELS,
-                          MAX_LEVELS);
+        return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "levels = %d; must be %d to %d", l->def->levels,
+                          MIN_LEVELS, MAX_LEVELS);
     drape_status status = lab_check_integrators(l);
     if (!status)
         status = add_cases(l);

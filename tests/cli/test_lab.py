@@ -199,7 +199,7 @@ def test_validate_goes_on():
         table, message = (text.decode() for text in child.communicate())
     equal(child.returncode, 130, "exit code")
     kept = [json.loads(line) for line in lines_there("v")]
-    equal(message, f"interrupted: {len(kept)} of {cases} cases are done; the same command goes on\n", "message")
+    equal(message, f"interrupted: {len(kept)} of {cases} cases are done; the same command resumes\n", "message")
     assert table.count("pass") == len(kept) + 1, table  # and "passed" in the last line
     # The lines are of these cases: what is changed in them shows in the table, a case of another name is left out.
     kept[0]["obtained"] = 2 * kept[0]["expected"]
