@@ -15,7 +15,7 @@
 #include "mesh/mesh.h"
 #include "model/scene.h"
 
-#define MOST_MEMORY ((size_t)16 << 20)
+#define MAX_MEMORY ((size_t)16 << 20)
 /* [s] of CPU. Between two looks at the cancellation lie some passes over elements and contacts, and a
  * factorisation: milliseconds for the few nodes of a target, under the sanitizers and with other programs'
  * caches ten times as much. */
@@ -295,7 +295,7 @@ static void check_measures(const drape_mesh *mesh)
 void fuzz_mesh(const char *format, const uint8_t *data, size_t size)
 {
     const drape_mesh_source source = {.pointer = "/cloth/0/mesh/file", .file = format};
-    drape_context *ctx = fuzz_open(MOST_MEMORY);
+    drape_context *ctx = fuzz_open(MAX_MEMORY);
     drape_mesh mesh = {0};
     char *ended = malloc(size + 1); /* a copy of its own: a sanitizer sees what is read past its end */
     FUZZ_REQUIRE(ended, "no memory for %zu bytes", size);

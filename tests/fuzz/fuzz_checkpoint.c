@@ -12,10 +12,10 @@
 #include "fuzz/fuzz.h"
 #include "integrators/integrator.h"
 
-#define MOST_MEMORY ((size_t)64 << 20)
-#define TAIL        (2 * sizeof(uint64_t)) /* of an archive: its length and its checksum */
-#define CHANGES     16
-#define STEP        0.01 /* [s] */
+#define MAX_MEMORY ((size_t)64 << 20)
+#define TAIL       (2 * sizeof(uint64_t)) /* of an archive: its length and its checksum */
+#define CHANGES    16
+#define STEP       0.01 /* [s] */
 
 /* Every part that has something to keep: contact, friction, an internal variable, a moving pin, the past of
  * the steps. */
@@ -88,10 +88,10 @@ static void restore(drape_context *ctx, drape_sim *sim, const bytes *b)
 
 /* ---- What is changed, made once: the model, and a checkpoint after three steps for each integrator ---- */
 
-#define MOST_INTEGRATORS 32
+#define MAX_INTEGRATORS 32
 
 static drape_model *model_made;
-static bytes checkpoint_of[MOST_INTEGRATORS];
+static bytes checkpoint_of[MAX_INTEGRATORS];
 static unsigned integrator_count;
 
 static drape_sim *open_sim(drape_context *ctx, unsigned integrator)
@@ -114,7 +114,7 @@ static void make_checkpoints(void)
     model_made = fuzz_scene(ctx, (const uint8_t *)sheet, sizeof sheet - 1);
     FUZZ_REQUIRE(model_made, "%s", drape_context_message(ctx));
     for (; drape_integrators[integrator_count]; integrator_count++) {
-        FUZZ_REQUIRE(integrator_count < MOST_INTEGRATORS, "%u integrators", integrator_count);
+        FUZZ_REQUIRE(integrator_count < MAX_INTEGRATORS, "%u integrators", integrator_count);
         drape_sim *sim = open_sim(ctx, integrator_count);
         FUZZ_REQUIRE(drape_sim_advance(sim, 3 * STEP) == DRAPE_OK, "%s", drape_context_message(ctx));
         FUZZ_REQUIRE(drape_sim_save_to(sim, keep, &checkpoint_of[integrator_count]) == DRAPE_OK, "%s",
@@ -134,7 +134,7 @@ static bytes copy(const bytes *from)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     make_checkpoints();
-    drape_context *ctx = fuzz_open(MOST_MEMORY);
+    drape_context *ctx = fuzz_open(MAX_MEMORY);
     fuzz_bytes in = {.at = data, .end = data + size};
     const unsigned integrator = fuzz_below(&in, integrator_count);
     bytes b = copy(&checkpoint_of[integrator]);
