@@ -17,7 +17,7 @@ typedef enum host_fault {
     HOST_INFINITE_FORCE,
     HOST_NAN_HESSIAN,
     HOST_INFINITE_HESSIAN,
-    HOST_SINGULAR /* cancels the inertia of a node if the step is host_step: its rows of the Jacobian become 0 */
+    HOST_SINGULAR /* cancels the inertia of a node if the step is host_step: its Jacobian rows are 0 */
 } host_fault;
 
 /* host_at: the evaluation that fails, counted from 1; of forces for faults of forces, otherwise of Hessians.

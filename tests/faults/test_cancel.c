@@ -60,7 +60,7 @@ static drape_status live(drape_context *ctx, const char *path)
     drape_scene *scene = NULL;
     drape_model *model = NULL;
     drape_sim *sim = NULL;
-    int rows;
+    int count;
     drape_status status = drape_scene_load(ctx, path, &scene);
     ck_assert_int_eq(status != DRAPE_OK, scene == NULL);
     if (!status) {
@@ -73,7 +73,7 @@ static drape_status live(drape_context *ctx, const char *path)
     }
     if (!status) {
         static drape_check_result results[DRAPE_MAX_CHECK_RESULTS];
-        status = drape_check_derivatives(ctx, sim->system, 1, results, &rows);
+        status = drape_check_derivatives(ctx, sim->system, 1, results, &count);
     }
     if (!status) {
         drape_profile_term terms[16];

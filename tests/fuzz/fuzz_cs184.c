@@ -1,4 +1,5 @@
-/* fuzz_cs184.c: the text of a scene of the CS184 cloth simulator. What compiles and is small takes a step. */
+/* fuzz_cs184.c: the bytes are the text of a scene of the CS184 cloth simulator. If it compiles and is small,
+ * it makes a step. */
 #include "fuzz/fuzz.h"
 
 #define MAX_MEMORY ((size_t)32 << 20)

@@ -1,8 +1,8 @@
 /*
- * fuzz_model.c: a scene out of the bytes, in memory, and some steps of it. Meshes are small and may be all
- * but degenerate; materials go to the ends of their ranges; terms, colliders, contact, controllers and
- * integrators are what the tables have, with settings drawn out of their own ranges. What a scene is refused
- * for, with one line, is left out of it.
+ * fuzz_model.c: a scene made from the bytes, as structs, and some steps of it. Meshes are small and may be
+ * nearly degenerate; materials reach the ends of their ranges; terms, colliders, contact, controllers and
+ * integrators come from the tables, with settings drawn from the ranges of their parameters. If the scene is
+ * refused, with one line, the refused part is removed.
  */
 #include <math.h>
 #include <stdio.h>
@@ -23,14 +23,14 @@
 #define MAX_PINS      3
 #define MAX_TERMS     8
 #define MAX_COLLIDERS 3
-#define MAX_ROWS      32 /* with settings, in a scene */
+#define MAX_ROWS      32 /* parts with settings in a scene */
 #define ATTEMPTS      6
 #define STEPS         3
-#define ALONE         0.4 /* [s] of CPU for an integrator that is the only one, and for each of all */
+#define ALONE         0.4 /* [s] of CPU for a single integrator, and for each when all of them run */
 #define EACH          0.1
-#define MAX_COUNT     40 /* of integers: iterations, substeps; what bounds the work of a step */
+#define MAX_COUNT     40 /* for integers such as iterations and substeps: bounds the work of a step */
 
-/* ---- Settings, drawn from the parameters of a row ---- */
+/* ---- Settings, drawn from the parameters of an entry ---- */
 
 typedef struct drawn {
     drape_setting setting[DRAPE_MAX_PARAMS];
@@ -38,22 +38,22 @@ typedef struct drawn {
     size_t count;
 } drawn;
 
-/* Within the range, by magnitude where it spans some; at its ends now and then. */
+/* A value within the range, logarithmic if it spans several magnitudes; sometimes one of its ends. */
 static double draw_number(fuzz_bytes *in, const drape_param *p)
 {
-    const double most = fmin(p->open_max ? p->max * (1 - 1e-9) : p->max, 1e12),
-                 least = fmax(p->open_min ? p->min + 1e-9 : p->min, -1e12);
+    const double max = fmin(p->open_max ? p->max * (1 - 1e-9) : p->max, 1e12),
+                 min = fmax(p->open_min ? p->min + 1e-9 : p->min, -1e12);
     const unsigned how = fuzz_below(in, 8);
     if (how == 0)
-        return least;
+        return min;
     if (how == 1)
-        return most;
-    if (how < 4 || most <= 0)
-        return fuzz_between(in, fmax(least, -2), fmin(most, 2));
-    return fuzz_magnitude(in, fmax(least, most * 1e-12), most);
+        return max;
+    if (how < 4 || max <= 0)
+        return fuzz_between(in, fmax(min, -2), fmin(max, 2));
+    return fuzz_magnitude(in, fmax(min, max * 1e-12), max);
 }
 
-static void draw_value(fuzz_bytes *in, const drape_param *p, int most, drape_setting *s, double *vector)
+static void draw_value(fuzz_bytes *in, const drape_param *p, int span, drape_setting *s, double *vector)
 {
     unsigned choices = 0;
     while (p->choices && p->choices[choices])
@@ -63,7 +63,7 @@ static void draw_value(fuzz_bytes *in, const drape_param *p, int most, drape_set
     else if (p->kind == DRAPE_PARAM_BOOLEAN)
         s->number = fuzz_below(in, 2);
     else if (p->kind == DRAPE_PARAM_INTEGER)
-        s->number = floor(fuzz_between(in, p->min, fmin(p->max, p->min + most)));
+        s->number = floor(fuzz_between(in, p->min, fmin(p->max, p->min + span)));
     else if (p->kind == DRAPE_PARAM_NUMBER)
         s->number = draw_number(in, p);
     else if (p->kind == DRAPE_PARAM_TEXT)
@@ -76,9 +76,9 @@ static void draw_value(fuzz_bytes *in, const drape_param *p, int most, drape_set
     }
 }
 
-/* Those that are required, and each other one where a bit says so. most: integers lie at most so far above
- * their least. */
-static void draw(fuzz_bytes *in, const drape_param *params, int count, int most, drawn *d)
+/* Draws the required settings, and each other one if a bit is set. span: integers lie at most this far above
+ * their minimum. */
+static void draw(fuzz_bytes *in, const drape_param *params, int count, int span, drawn *d)
 {
     unsigned bits = 0;
     d->count = 0;
@@ -91,7 +91,7 @@ static void draw(fuzz_bytes *in, const drape_param *params, int count, int most,
             continue;
         drape_setting *s = &d->setting[d->count];
         *s = (drape_setting){.name = p->name};
-        draw_value(in, p, most, s, d->vector[d->count++]);
+        draw_value(in, p, span, s, d->vector[d->count++]);
     }
 }
 
@@ -142,8 +142,7 @@ static void draw_triangles(mesh *m, int columns, int rows, unsigned flips)
         }
 }
 
-/* A lattice of some size whose cells are as flat as `squeeze` says, each node out of its place by some of a
- * cell. */
+/* A lattice whose cells are flattened by `squeeze`, with each node displaced by part of a cell. */
 static void draw_mesh(mesh *m, drape_mesh_def *def, fuzz_bytes *in)
 {
     const int columns = 1 + (int)fuzz_below(in, MAX_SIDE), rows = 1 + (int)fuzz_below(in, MAX_SIDE);
@@ -176,7 +175,7 @@ static void draw_grid(scene *s, drape_cloth_def *def, fuzz_bytes *in)
         (drape_entry_def){.type = ops->entry.name, .settings = d->setting, .setting_count = d->count};
 }
 
-/* To where it goes, in a time that may be shorter than any step. */
+/* A displacement, in a time that may be shorter than any step. */
 static void draw_track(fuzz_bytes *in, drape_track_key keys[2])
 {
     const double far = fuzz_magnitude(in, 1e-6, 1e3);
@@ -297,7 +296,7 @@ static void draw_scene(scene *s, fuzz_bytes *in)
         s->def.gravity[1] = fuzz_between(in, -1e4, 1e4);
 }
 
-/* ---- What was refused is left out ---- */
+/* ---- Removing what was refused ---- */
 
 static void drop(void *items, size_t size, size_t *count, unsigned index, const char *pointer)
 {
@@ -307,7 +306,7 @@ static void drop(void *items, size_t size, size_t *count, unsigned index, const 
     --*count;
 }
 
-/* By the place that the message names; false: it is of what a scene cannot do without. */
+/* Removes the part that the message points to; false: the scene cannot do without it. */
 static bool leave_out(scene *s, const char *pointer)
 {
     unsigned i, j;
@@ -373,14 +372,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     static scene s; /* large */
     fuzz_bytes in = {.at = data, .end = data + size};
     drape_context *ctx = fuzz_open(MAX_MEMORY);
-    const unsigned chosen = fuzz_below(&in, 16); /* an integrator; past the last: all of them */
+    const unsigned chosen = fuzz_below(&in, 16); /* index of an integrator; past the last: all of them */
     unsigned count = 0;
     while (drape_integrators[count])
         count++;
     draw_scene(&s, &in);
     drape_model *model = make_model(ctx, &s);
     for (unsigned i = 0; model && i < count; i++) {
-        fuzz_bytes own = in; /* each with the same bytes */
+        fuzz_bytes own = in; /* each reads the same bytes */
         if (chosen == i || chosen >= count)
             run(ctx, model, drape_integrators[i], &own, chosen == i ? ALONE : EACH);
     }

@@ -1,4 +1,4 @@
-/* fuzz_scene.c: the text of a scene in our form: it is refused with one line, or compiles. */
+/* fuzz_scene.c: the bytes are the text of a Drape scene, which is refused with one line or compiles. */
 #include "fuzz/fuzz.h"
 
 #define MAX_MEMORY ((size_t)32 << 20)
