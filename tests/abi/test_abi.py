@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""test_abi.py: the library keeps the interface of the last release (tools/abi), and tools/abi sees what breaks one: dumps of interfaces that
-this library would break, or only extend. Speaks TAP; skipped without libabigail."""
+"""test_abi.py: the library keeps the interface of the last release (tools/abi), and tools/abi detects breaks: it is tried on altered dumps, which
+this library breaks or only extends. Output is TAP; skipped without libabigail."""
 import os
 import re
 import subprocess
@@ -14,14 +14,14 @@ with open(os.path.join(SOURCE, "tests", "abi", "drape-1.abi")) as file:
 
 
 def struct(name, change):
-    """LAST with `change` done to the lines of a struct."""
+    """LAST with `change` applied to the lines of a struct."""
     start = LAST.index(f"<class-decl name='{name}'")
     end = LAST.index("</class-decl>", start)
     return LAST[:start] + change(LAST[start:end]) + LAST[end:]
 
 
 def shorter(text):
-    """A struct of 64 bits less, without its last member."""
+    """A struct without its last member, 64 bits smaller."""
     text = re.sub(r"size-in-bits='(\d+)'", lambda match: f"size-in-bits='{int(match[1]) - 64}'", text, count=1)
     return text[:text.rindex("<data-member")]
 
@@ -32,7 +32,7 @@ def without_function(name):
 
 
 def parameter_of_pull(text):
-    """The type of the argument `node` of drape_sim_set_drag_spring is another one."""
+    """The argument `node` of drape_sim_set_drag_spring has another type."""
     start = text.index("<function-decl name='drape_sim_set_drag_spring'")
     end = text.index("</function-decl>", start)
     kinds = re.findall(r"<parameter type-id='([^']+)'", text[start:end])
