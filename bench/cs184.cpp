@@ -125,10 +125,10 @@ void cs184::add_forces()
         if (!enabled[static_cast<int>(s.kind)])
             continue;
         const double ks = s.kind == Kind::bending ? 0.2 * scene.ks : scene.ks;
-        Vector way = s.b->position - s.a->position;
-        const double stretch = way.norm() - s.rest;
-        way.normalize();
-        const Vector force = ks * stretch * way;
+        Vector along = s.b->position - s.a->position;
+        const double stretch = along.norm() - s.rest;
+        along.normalize();
+        const Vector force = ks * stretch * along;
         s.a->forces += force;
         s.b->forces -= force;
     }
@@ -182,12 +182,12 @@ void cs184::add_corrections(const Point &point, const std::vector<Point *> &box,
     for (const Point *other : box) {
         if (other == &point)
             continue;
-        Vector way = point.position - other->position;
-        const double distance = way.norm();
+        Vector along = point.position - other->position;
+        const double distance = along.norm();
         if (distance >= 2 * scene.thickness || distance == 0)
             continue;
-        way.normalize();
-        sum += (2 * scene.thickness - distance) * way;
+        along.normalize();
+        sum += (2 * scene.thickness - distance) * along;
         count++;
     }
 }
@@ -226,18 +226,18 @@ void cs184::limit_lengths()
     for (Spring &s : springs) {
         if (s.a->pinned && s.b->pinned)
             continue;
-        Vector way = s.b->position - s.a->position;
-        const double excess = way.norm() - 1.1 * s.rest;
+        Vector along = s.b->position - s.a->position;
+        const double excess = along.norm() - 1.1 * s.rest;
         if (!(excess > 0))
             continue;
-        way.normalize();
+        along.normalize();
         if (s.b->pinned) {
-            s.a->position += excess * way;
+            s.a->position += excess * along;
         } else if (s.a->pinned) {
-            s.b->position -= excess * way;
+            s.b->position -= excess * along;
         } else {
-            s.a->position += 0.5 * excess * way;
-            s.b->position -= 0.5 * excess * way;
+            s.a->position += 0.5 * excess * along;
+            s.b->position -= 0.5 * excess * along;
         }
     }
 }

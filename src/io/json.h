@@ -1,8 +1,8 @@
 /*
  * json.h: building JSON with jansson.
  *
- * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere ends as NULL at the
- * top: only the finished value needs a check.
+ * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere ends as NULL at
+ * the top: only the finished value needs a check.
  */
 #ifndef DRAPE_IO_JSON_H
 #define DRAPE_IO_JSON_H
@@ -45,8 +45,8 @@ static inline json_t *drape_json_numbers(const double *values, size_t count)
     return array;
 }
 
-/* A path may be in any encoding, and a message may be cut within a character: a text that is not UTF-8 gets question
- * marks for all bytes beyond ASCII. */
+/* A path may be in any encoding, and a message may be cut within a character: a text that is not UTF-8 gets
+ * question marks for all bytes beyond ASCII. */
 static inline json_t *drape_json_text(const char *bytes)
 {
     char copy[DRAPE_MESSAGE_SIZE];

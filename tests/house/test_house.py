@@ -138,7 +138,7 @@ def words_are_standard(files):
     pattern = re.compile("(?<![a-z])(" + "|".join(re.escape(word) for word in words) + ")(?:e?s)?(?![a-z])", re.I)
     complaints = []
     for path, text in files.items():
-        if path == "CONTRIBUTING.md" or path.startswith("tests/fuzz/corpus/") or path.endswith((".abi", ".csv", ".obj", ".ply", ".svg")):
+        if path in ("CONTRIBUTING.md", "LICENSE") or path.startswith("tests/fuzz/corpus/") or path.endswith((".abi", ".csv", ".obj", ".ply", ".svg")):
             continue
         for match in pattern.finditer(text.replace("_", " ")):
             complaints.append(f'{path}:{line_of(text, match.start())}: "{match.group(1)}": CONTRIBUTING.md has the standard word')
