@@ -361,7 +361,7 @@ static void on_key(window_view *w, int key, bool back)
     }
 }
 
-/* Of the nodes near the pointer that are not pinned, the one nearest to the eye; -1: none. */
+/* The node nearest to the eye of those near the pointer that are not pinned; -1: none. */
 static int32_t node_at(const window_view *w, double x, double y, float *depth)
 {
     const drape_view view = view_of(w);

@@ -17,7 +17,7 @@ static json_t *vector(const double v[3])
 
 /* ---- Parameters ---- */
 
-/* choice: gives the texts; NULL: there are none. */
+/* choice: the source of text values; NULL: there are none. */
 static json_t *value_of(const drape_param *param, const double *value, const drape_choice *choice)
 {
     if (isnan(*value) && param->derived)
@@ -54,7 +54,7 @@ static json_t *params_of(const drape_param *params, int param_count, const doubl
     return object;
 }
 
-/* NULL where none is given. */
+/* The value of a key in a def; NULL if none is given. */
 static json_t *key_value(const drape_scene_key *key, const void *def)
 {
     const char *const *texts;
@@ -72,7 +72,7 @@ static json_t *key_value(const drape_scene_key *key, const void *def)
     return value.text ? drape_json_text(value.text) : value_of(&key->param, &value.number, NULL);
 }
 
-/* Keys that have values of their own; a name stands where it is used. */
+/* Adds the keys that have a value, except names, which are printed where they are used. */
 static json_t *with_keys(json_t *object, const drape_scene_object *form, const void *def)
 {
     for (size_t i = 0; i < form->key_count; i++) {
@@ -144,7 +144,7 @@ static json_t *chosen(const cli_chosen *entry, const drape_chosen *all)
 
 /* ---- Cloths and terms ---- */
 
-/* The values of a parameter list, choices and booleans in words. */
+/* The values of a parameter list; choices and booleans as texts. */
 static json_t *values_of(const drape_param *params, int param_count, const double *values)
 {
     char words[128];
@@ -266,7 +266,7 @@ static json_t *bytes(const cli_info *info)
     return drape_json_with(object, "a_node", drape_json_number((double)sum / info->model->node_count));
 }
 
-/* A limit that is infinite is null. */
+/* An infinite limit becomes null. */
 static json_t *stability(const drape_stability *s)
 {
     json_t *object = drape_json_with(json_object(), "omega", drape_json_number(s->omega));

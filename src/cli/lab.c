@@ -50,7 +50,7 @@ static int read_levels(const cli_lab_request *request, drape_lab_def *def)
     return CLI_GO_ON;
 }
 
-/* Fills the def; its texts and arrays are the request's or in the arena. */
+/* Fills the def; its texts and arrays are those of the request or in the arena. */
 static int make_def(const cli_lab_request *request, int default_jobs, drape_arena *arena, drape_lab_def *def)
 {
     const cli_command *command = &request->command;

@@ -12,7 +12,7 @@
 #include <string.h>
 
 #define MAX_OPTIONS 40
-#define FIRST_VALUE 256 /* what getopt_long returns for option 0: beyond all letters */
+#define FIRST_VALUE 256 /* the value that getopt_long returns for option 0: above all characters */
 #define HELP_VALUE  'h'
 
 /* The options of every verb that takes a scene. Those with a pointer are short forms of --set. */
@@ -210,8 +210,8 @@ static int set_option(cli_command *command, const cli_option *option, const char
 
 /* ---- Command lines ---- */
 
-/* Handles what getopt_long returned. Only a repeatable option may be given twice: else the first value would
- * be lost silently. */
+/* Handles one result of getopt_long. Only a repeatable option may be given twice: otherwise the first value
+ * would be lost silently. */
 static int handle(const drape_verb *verb, option_list *list, int code, char **argv, cli_command *request)
 {
     if (code == HELP_VALUE) {

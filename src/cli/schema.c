@@ -1,7 +1,7 @@
 /*
- * schema.c: see schema.h. As strict as the reader wherever a schema can say it. What it cannot say: that
- * times of a track increase, that names of cloths or colliders differ, that a term is named once, what one
- * parameter of a collider demands of another, and all that depends on a mesh.
+ * schema.c: see schema.h. As strict as the reader, except where a schema cannot express a rule: that times of
+ * a track increase, that names of cloths or colliders differ, that a term is named once, how parameters of a
+ * collider depend on each other, and all rules that depend on a mesh.
  */
 #include "cli/schema.h"
 
@@ -24,7 +24,7 @@ static json_t *typed(const char *type)
     return drape_json_with(json_object(), "type", json_string(type));
 }
 
-/* 3 rather than 3.0 where it is the same. */
+/* An integer if the value is one: 3 rather than 3.0. */
 static json_t *number(double value)
 {
     return value == floor(value) && fabs(value) < 1e15 ? json_integer((json_int_t)value) : json_real(value);
@@ -244,7 +244,7 @@ static json_t *entry_names(const drape_registry *table, bool alone)
     return drape_json_with(json_object(), "enum", names);
 }
 
-/* ---- Which tables stand where in a scene ---- */
+/* ---- Where a scene names entries of tables ---- */
 
 typedef enum opening_kind {
     ENTRY_PARAMS, /* the parameters of the named entry, and no others */
@@ -341,7 +341,7 @@ static bool key_is_required(const drape_scene_key *key)
 
 /* ---- Objects ---- */
 
-/* Whether a key is an alternative to another one, which was chosen. */
+/* Whether a key is excluded because an alternative to it was chosen. */
 static bool is_excluded(const drape_scene_object *object, const char *name, const char *chosen)
 {
     for (int i = 0; chosen && object->one_of && object->one_of[i]; i++)
@@ -395,7 +395,7 @@ static json_t *entry_schema(const drape_scene_object *object, const char *key, c
     return closed(with_params(properties, entry), with_required(required, entry));
 }
 
-/* Without the key that opens the object: one of its alternatives. */
+/* Adds the forms that have, instead of the key that opens the object, one of its alternatives. */
 static json_t *with_closed_forms(json_t *forms, const drape_scene_object *object)
 {
     for (int i = 0; object->open_with && object->one_of && object->one_of[i]; i++) {
@@ -431,7 +431,7 @@ static json_t *table_schema(const drape_scene_object *object, const struct openi
     return closed(properties, required);
 }
 
-/* The first choice of the preset says that there is none. */
+/* The first choice of the preset, "none", means that no preset is used. */
 static json_t *with_preset(json_t *schema, const struct opening *opening)
 {
     json_t *none = drape_json_with(json_object(), "const", json_string("none"));
