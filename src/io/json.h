@@ -1,8 +1,8 @@
 /*
  * json.h: building JSON with jansson.
  *
- * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere ends as NULL at
- * the top: only the finished value needs a check.
+ * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere ends as
+ * NULL at the top: only the finished value needs a check.
  */
 #ifndef DRAPE_IO_JSON_H
 #define DRAPE_IO_JSON_H

@@ -31,7 +31,7 @@ def without_function(name):
     return re.sub(rf" *<function-decl name='{name}'.*?</function-decl>\n", "", text, flags=re.S)
 
 
-def parameter_of_pull(text):
+def argument_of_another_type(text):
     """The argument `node` of drape_sim_set_drag_spring has another type."""
     start = text.index("<function-decl name='drape_sim_set_drag_spring'")
     end = text.index("</function-decl>", start)
@@ -46,7 +46,7 @@ CASES = [
     ("a_function_may_not_go", 1, LAST.replace("drape_sim_cancel", "drape_sim_interrupt")),
     ("a_result_may_not_grow", 1, struct("drape_statistics", shorter)),
     ("a_member_may_not_move", 1, struct("drape_energy", lambda text: text.replace("layout-offset-in-bits='64'", "layout-offset-in-bits='128'"))),
-    ("an_argument_may_not_change", 1, parameter_of_pull(LAST)),
+    ("an_argument_may_not_change", 1, argument_of_another_type(LAST)),
 ]
 
 
