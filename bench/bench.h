@@ -1,6 +1,6 @@
 /*
- * bench.h: what benchmarks share: a sim from scene text in which apostrophes stand for quotation marks, an
- * error that ends the program, repeats, and the head of a CSV file.
+ * bench.h: what benchmarks share: models from scene texts in which apostrophes stand for quotation marks,
+ * sims, errors that end the program, and CSV files.
  */
 #ifndef DRAPE_BENCH_BENCH_H
 #define DRAPE_BENCH_BENCH_H
@@ -30,7 +30,7 @@ static inline drape_context *bench_context(void)
 {
     drape_context *ctx = NULL;
     if (drape_context_create(NULL, &ctx)) {
-        fputs("there is no memory for a context\n", stderr);
+        fputs("out of memory for a context\n", stderr);
         exit(1);
     }
     return ctx;
@@ -66,7 +66,7 @@ static inline size_t bench_count(const drape_setting *settings)
     return count;
 }
 
-/* A sim of the model. Settings end with one without a name; NULL for none. */
+/* A sim of the model. The last setting of an array has no name; NULL: no settings. */
 static inline drape_sim *bench_sim(drape_context *ctx, const drape_model *model, const char *integrator,
                                    const drape_setting *settings, const char *controller,
                                    const drape_setting *controller_settings)
@@ -85,8 +85,8 @@ static inline drape_sim *bench_sim(drape_context *ctx, const drape_model *model,
     return sim;
 }
 
-/* --help is answered on stdout and is no failure; a wrong argument is told on stderr. The status to exit
- * with. */
+/* Prints the usage: on stdout for --help, which is no failure, on stderr for a wrong argument. Returns the
+ * exit code. */
 static inline int bench_usage(const char *argument, const char *text)
 {
     bool asked = strcmp(argument, "--help") == 0;
@@ -94,7 +94,7 @@ static inline int bench_usage(const char *argument, const char *text)
     return asked ? 0 : 2;
 }
 
-/* A CSV file whose rows begin with machine, commit, compiler and build; NULL without a name. */
+/* Opens a CSV file whose rows begin with machine, commit, compiler and build. NULL if name is NULL. */
 static inline FILE *bench_csv(const char *name, const char *columns)
 {
     FILE *csv = name ? fopen(name, "w") : NULL;
@@ -107,7 +107,7 @@ static inline FILE *bench_csv(const char *name, const char *columns)
     return csv;
 }
 
-/* As Linux names it, without commas; "unknown" elsewhere. */
+/* The name of the processor as Linux has it, without commas; "unknown" on other systems. */
 static inline void bench_processor(char *name, size_t size)
 {
     char line[256];

@@ -1,7 +1,7 @@
 /*
- * contact: what contact costs a step of backward Euler. A square sheet of 1 m lies in folds on a floor, above
- * each other like an accordion, and sinks together: after the first steps all layers touch. Wall time of a
- * step by stages, at CS184's thickness and at a tenth of it.
+ * contact: the cost of contact in a step of backward Euler. A square sheet of 1 m, folded like an accordion,
+ * lies on a floor and collapses: after the first steps all layers touch. Prints the wall time of a step and
+ * the share of its stages, at the thickness of CS184 and at a tenth of it.
  *
  *     contact [--csv FILE] [--steps WARM COUNT] [NODES A SIDE ...]      default 6 4, 20 50 100
  */
@@ -9,12 +9,13 @@
 
 #include "contact/contact.h"
 
-#define FLAT 0.1 /* [m] of a fold between two turns */
+#define FLAT 0.1 /* [m] length of the flat part between two turns */
 
-static int warm = 6; /* steps before the clock */
+static int warm = 6; /* steps before the measured ones */
 static int steps = 4;
 
-/* The point at arc length s of an accordion: flat parts of FLAT, turns of radius r, from the floor up. */
+/* The point at arc length s of the accordion, from the floor up: flat parts of length FLAT joined by turns of
+ * radius r. */
 static void fold(double s, double r, double lowest, double *x, double *y)
 {
     double turn = acos(-1) * r, period = FLAT + turn, layer = floor(s / period), along = s - layer * period;
@@ -123,7 +124,7 @@ int main(int argc, char **argv)
         count = i - first + 1;
     }
     if (warm < 0 || steps < 1) {
-        fputs("contact: at least one step is measured\n", stderr);
+        fputs("contact: WARM is at least 0, COUNT at least 1\n", stderr);
         return 2;
     }
     FILE *csv = bench_csv(file, "nodes,thickness_m,friction,active_pairs,step_ms,iterations,contact_percent,"

@@ -1,20 +1,26 @@
 /*
- * cs184.cpp: the loops of the CS184 cloth simulator, written anew from docs/seed_systems.md and the course's published
- * skeleton, as its public versions have them. What `verlet` is measured against.
+ * cs184.cpp: the loops of the CS184 cloth simulator, written anew from docs/seed_systems.md, the course's
+ * published skeleton and public versions of the finished program. The reference of the benchmark `verlet`.
  *
- * Kept, as it is where their time goes:
- *   - a std::vector of point masses of 120 bytes (with the start position and the half-edge that only drawing and reset
- *     need), of double vectors of three, and a std::vector of springs that point at two of them;
- *   - forces by kind of spring, the length taken once for the strain and once more to make the direction a unit;
- *   - a std::unordered_map from a float, which stands for a box of space, to a std::vector of pointers made by new:
- *     deleted, cleared and filled again in every substep, with one look-up to see whether the box is there and one to add;
- *   - one virtual call for each point and object to collide with (pinned2 has none);
- *   - compiled as the rest of the build, without special options, which is how theirs is: -O3 for plain x86-64.
- * Where versions differ, what costs least: a box's key is made of rounded-down quotients (others call fmod three times)
- * and is its own, as long as there are fewer than 256 boxes along each axis (polynomials such as x^3 + y^2 + z meet points
- * of other boxes by chance, which costs look-ups and changes what is pushed); lists are not copied; no .at(), no exceptions.
+ * These parts of the original are kept, because they take its time:
+ *   - a std::vector of point masses of 120 bytes each, with three-component vectors of doubles, the start
+ *     position and the half-edge that only drawing and reset need, and a std::vector of springs that point at
+ *     two masses;
+ *   - forces by kind of spring; the length is computed once for the strain and again to normalize the
+ *     direction;
+ *   - a std::unordered_map from a float, which stands for a box of space, to a std::vector of pointers made
+ *     by new: deleted, cleared and filled again in every substep, with one look-up to find the box and one to
+ *     add;
+ *   - one virtual call for each pair of a point and an object to collide with (pinned2 has no objects);
+ *   - the compiler options: those of the rest of the build and no others, as in the original: -O3, plain
+ *     x86-64.
+ * Where the public versions differ, the cheapest is taken. The key of a box is made of rounded-down quotients
+ * (other versions call fmod three times) and is unique while there are fewer than 256 boxes along each axis;
+ * with polynomials such as x^3 + y^2 + z, boxes share keys by chance, which costs look-ups and changes which
+ * points are pushed apart. Lists are not copied; there is no .at() and there are no exceptions.
  *
- * all_boxes is not theirs: the same map asked for every box within reach, which mends the pairs that they miss.
+ * all_boxes is an addition: the same map, asked for every box within reach, finds the pairs that CS184
+ * misses.
  */
 #include "cs184.h"
 
@@ -119,10 +125,10 @@ void cs184::add_forces()
         if (!enabled[static_cast<int>(s.kind)])
             continue;
         const double ks = s.kind == Kind::bending ? 0.2 * scene.ks : scene.ks;
-        Vector way = s.b->position - s.a->position;
-        const double stretch = way.norm() - s.rest;
-        way.normalize();
-        const Vector force = ks * stretch * way;
+        Vector along = s.b->position - s.a->position;
+        const double stretch = along.norm() - s.rest;
+        along.normalize();
+        const Vector force = ks * stretch * along;
         s.a->forces += force;
         s.b->forces -= force;
     }
@@ -176,12 +182,12 @@ void cs184::add_corrections(const Point &point, const std::vector<Point *> &box,
     for (const Point *other : box) {
         if (other == &point)
             continue;
-        Vector way = point.position - other->position;
-        const double distance = way.norm();
+        Vector along = point.position - other->position;
+        const double distance = along.norm();
         if (distance >= 2 * scene.thickness || distance == 0)
             continue;
-        way.normalize();
-        sum += (2 * scene.thickness - distance) * way;
+        along.normalize();
+        sum += (2 * scene.thickness - distance) * along;
         count++;
     }
 }
@@ -220,18 +226,18 @@ void cs184::limit_lengths()
     for (Spring &s : springs) {
         if (s.a->pinned && s.b->pinned)
             continue;
-        Vector way = s.b->position - s.a->position;
-        const double excess = way.norm() - 1.1 * s.rest;
+        Vector along = s.b->position - s.a->position;
+        const double excess = along.norm() - 1.1 * s.rest;
         if (!(excess > 0))
             continue;
-        way.normalize();
+        along.normalize();
         if (s.b->pinned) {
-            s.a->position += excess * way;
+            s.a->position += excess * along;
         } else if (s.a->pinned) {
-            s.b->position -= excess * way;
+            s.b->position -= excess * along;
         } else {
-            s.a->position += 0.5 * excess * way;
-            s.b->position -= 0.5 * excess * way;
+            s.a->position += 0.5 * excess * along;
+            s.b->position -= 0.5 * excess * along;
         }
     }
 }

@@ -1,8 +1,8 @@
 /*
- * explicit: the corner of the stability map that explicit steps reach: the scenes of CS184 and Boson, stepped
- * as their programs step, over substeps, dt, stiffness and mass, beside what a build of each program did
- * (docs/seed_systems.md). A run has blown up in the frame in which a node is faster than 1e4 lengths of the
- * scene a second.
+ * explicit: the part of the stability map that explicit steps reach. The scenes of the programs CS184 and
+ * Boson are stepped as those programs do it, over substeps, dt, stiffness and mass, and compared with what a
+ * build of each program did (docs/seed_systems.md). A run has blown up in the first frame in which a node is
+ * faster than 1e4 lengths of the scene per second.
  *
  *     explicit [--csv FILE] [SCENES]      SCENES: the folder of cs184_pinned2.json and verlet_100.json
  */
@@ -13,19 +13,19 @@
 
 #include <time.h>
 
-#define FAST 1e4 /* lengths a second */
+#define FAST 1e4 /* lengths of the scene per second */
 
 typedef struct setting {
     const char *pointer, *value;
 } setting;
 
-/* One run, and what the program that the scene comes from did: NaN for what is not known. */
+/* One run, and the result of the program that the scene comes from: NaN if it is not known. */
 typedef struct run {
     const char *scene, *knob, *value;
     setting settings[2];
     int frames;
     double strain, kinetic, lowest, speed;
-    int blow_up; /* frame; 0: it did not */
+    int blow_up; /* frame in which it blew up; 0: it did not */
 } run;
 
 #define PINNED2(substeps, strain_, kinetic_, lowest_, blow_up_)                                              \
@@ -162,21 +162,21 @@ static void measure(drape_sim *sim, run *got)
     got->kinetic = drape_sim_energy(sim).kinetic;
 }
 
-/* Frames are steps here. */
+/* Runs the scene with Drape. A frame is one step of length dt here. */
 static run go(drape_context *ctx, const char *folder, const run *r, drape_stability *stability,
               double *seconds)
 {
     run got = *r;
     drape_model *model = load(ctx, folder, r);
     drape_sim *sim = bench_sim(ctx, model, NULL, NULL, NULL, NULL);
-    double dt = sim->schedule.dt, most = FAST * model->length;
+    double dt = sim->schedule.dt, max_speed = FAST * model->length;
     sim->chosen.integrator->stability(sim->integrator, drape_sim_state(sim), dt, stability);
     got.blow_up = 0;
     clock_t start = clock();
     for (int k = 1; k <= r->frames && !got.blow_up; k++) {
         drape_status status = drape_sim_advance(sim, k * dt);
         measure(sim, &got);
-        if (status || !(got.speed <= most))
+        if (status || !(got.speed <= max_speed))
             got.blow_up = k;
     }
     *seconds = (double)(clock() - start) / CLOCKS_PER_SEC / r->frames;

@@ -1,10 +1,10 @@
 /*
- * ida_schur: what IDA gains from eliminating velocities: CPU time of the row "ida", whose linear solver sees
- * the n x n complement K + c_j D + c_j^2 M, over that of the same IDA with the unreduced system of 2 n
- * unknowns in SUNDIALS' own sparse matrix and KLU, with the ordering that is faster there. The reduced system
- * is measured with the solver that `auto` picks and with KLU, which the unreduced one has too. A square sheet
- * hung by two corners, undamped, rtol 1e-3, max_order 2, as in `work`. Both take the same steps: counts are
- * printed so that it can be seen. The goal is a factor 3 at 2 500 nodes.
+ * ida_schur: what IDA gains from eliminating the velocities. It compares the CPU time of the integrator
+ * "ida", whose linear solver gets the n x n Schur complement K + c_j D + c_j^2 M, with that of the same IDA
+ * on the full system of 2 n unknowns, with SUNDIALS' own sparse matrix and KLU, under the ordering that is
+ * faster there. The reduced system is solved with the solver that `auto` picks and, as the full one, with
+ * KLU. The scene is a square sheet hung by two corners, undamped, rtol 1e-3, max_order 2, as in `work`. Both
+ * take the same steps, as the printed counts show. The goal is a factor of 3 at 2 500 nodes.
  */
 #include "bench.h"
 #include "support/ida_full.h"
@@ -14,9 +14,9 @@
 #define REPEATS  3
 
 typedef struct run {
-    double seconds; /* CPU, the least of the repeats, setup included */
+    double seconds; /* [s] CPU, least of the repeats, with setup */
     long steps, residuals, jacobians;
-    double x, y, z; /* [m] of the last node at the end */
+    double x, y, z; /* [m] position of the last node at the end */
 } run;
 
 static drape_model *sheet(drape_context *ctx, int side)

@@ -1,11 +1,12 @@
 /*
- * implicit: the corner of the stability map beside that of `explicit`: the same scenes by implicit steps, at
- * the steps at which the explicit programs blow up, and far beyond: springs 200 times as stiff, a hundredth
- * of the mass, both, and 1/30 s. `limit` is what no spring may exceed; Boson's scene has none.
+ * implicit: the part of the stability map beyond that of `explicit`. The same scenes with implicit
+ * integrators, at the step lengths at which the explicit programs blow up and far beyond: springs 200 times
+ * as stiff, a hundredth of the mass, both, and steps of 1/30 s. `limit` is the largest strain that a spring
+ * may have; the scene of Boson has no limit.
  *
  *     implicit [--csv FILE] [--side N] [--scene NAME] [SCENES]
- *         --side    nodes along each side of pinned2; 20
- *         --scene   of one scene alone
+ *         --side    nodes along each side of pinned2 (default 20)
+ *         --scene   run only this scene
  *         SCENES    the folder of cs184_pinned2.json and verlet_100.json
  */
 #include "bench.h"
@@ -15,8 +16,8 @@
 
 #include <time.h>
 
-#define MOST_SETTINGS 5
-#define NONE          -1.0
+#define MAX_SETTINGS 5
+#define NONE         -1.0
 
 typedef struct setting {
     const char *pointer, *value;
@@ -24,10 +25,10 @@ typedef struct setting {
 
 typedef struct run {
     const char *scene, *knob, *method;
-    double step; /* [s]; 0: the method's own */
-    double time; /* [s] */
-    double limit;
-    setting settings[MOST_SETTINGS];
+    double step;  /* [s]; 0: the default of the integrator */
+    double time;  /* [s] duration */
+    double limit; /* largest strain allowed; NONE: no limit */
+    setting settings[MAX_SETTINGS];
 } run;
 
 #define PINNED2(method_, step_, knob_, ...)                                                                  \
@@ -78,10 +79,10 @@ static const run runs[] = {
     BOSON("ida", 0, "mass / 2", FEW),
 };
 
-/* What was seen of a run. */
+/* Results of a run. */
 typedef struct outcome {
     const drape_model *model;
-    double strain; /* the largest of all springs and all steps */
+    double strain; /* largest strain of all springs in all steps */
     drape_status status;
     drape_statistics done;
     double kinetic, lowest, cpu;
@@ -120,7 +121,7 @@ static drape_model *load(drape_context *ctx, const char *folder, const run *r, i
     set(ctx, scene, "/controller", "{\"type\": \"halving\"}");
     if (r->step > 0)
         set(ctx, scene, "/integrator/dt", step);
-    for (int i = 0; i < MOST_SETTINGS && r->settings[i].pointer; i++)
+    for (int i = 0; i < MAX_SETTINGS && r->settings[i].pointer; i++)
         set(ctx, scene, r->settings[i].pointer, r->settings[i].value);
     if (drape_scene_compile(scene, &model))
         bench_fail(ctx, "%s", path);
@@ -215,8 +216,8 @@ int main(int argc, char **argv)
     FILE *csv =
         bench_csv(name, "scene,nodes,method,step_s,knob,status,steps,rejected,iterations,strain,limit,"
                         "kinetic_J,lowest_m,cpu_s");
-    printf("%-14s %6s %-4s %7s  %-22s %-8s %6s %5s %7s  %8s %9s %8s %8s\n", "scene", "nodes", "row", "step s",
-           "knob", "status", "steps", "rej.", "iter.", "strain", "kinetic J", "lowest m", "CPU s");
+    printf("%-14s %6s %-4s %7s  %-22s %-8s %6s %5s %7s  %8s %9s %8s %8s\n", "scene", "nodes", "with",
+           "step s", "knob", "status", "steps", "rej.", "iter.", "strain", "kinetic J", "lowest m", "CPU s");
     for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
         if (only && strcmp(only, runs[i].scene) != 0)
             continue;

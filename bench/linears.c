@@ -1,19 +1,19 @@
 /*
- * linears: what each linear solver takes for the matrix of a backward Euler step, by size: create (ordering
- * and analysis, done once a sparsity), the first factorisation, a later one, a solve. Square sheets of 1 m
- * hung by two corners, dt 1/60 s, three matrices of each: of a sheet a little deformed, positive definite;
- * the same with friction on a plane under each node, not symmetric; of a sheet pressed together, indefinite.
- * The least of the repeats. From the first come the sizes of the row `auto`, from the others those of what
- * falls back.
+ * linears: the time of each linear solver for the matrix of a backward Euler step, by size: create (ordering
+ * and analysis, once per sparsity pattern), the first factorization, a later one, a solve. Square sheets of 1
+ * m hung by two corners, dt 1/60 s, with three matrices each: a slightly deformed sheet, positive definite;
+ * the same with friction on a plane under each node, not symmetric; a compressed sheet, indefinite. Times are
+ * the least of the repeats. The size thresholds of the solver `auto` come from the first matrix, those of the
+ * fallbacks from the other two.
  */
 #include "bench.h"
 #include "solvers/linear.h"
 
 #define DT          (1.0 / 60)
-#define DEFORMATION 1e-3 /* of an edge */
-#define PRESSED     0.7  /* of the length, where indefinite */
+#define DEFORMATION 1e-3 /* share of the length of an edge */
+#define PRESSED     0.7  /* share of the length that the compressed, indefinite sheet has left */
 #define FRICTION    0.5  /* mu */
-#define BUDGET      1.0  /* [s] a figure */
+#define BUDGET      1.0  /* [s] time for the repeats of one measurement */
 
 typedef enum matrix_kind { DEFINITE, FRICTIONAL, INDEFINITE, KIND_COUNT } matrix_kind;
 static const char *const kind_names[KIND_COUNT] = {"definite", "friction", "indefinite"};
@@ -37,8 +37,8 @@ static double *take(size_t count)
     return memory;
 }
 
-/* Implicit friction: where the normal force k z holds a node that slides along x, its block of the Jacobian
- * has k at (z, z) and mu k at (x, z). k is the node's own stiffness. */
+/* Implicit friction: if a node slides along x under the normal force k z, its block of the Jacobian has k at
+ * (z, z) and mu k at (x, z). Here k is the stiffness that the node has without contact. */
 static void add_friction(const drape_pattern *p, double *values)
 {
     for (int32_t j = 0; j < p->block_count; j++) {
@@ -155,7 +155,7 @@ static void report(FILE *csv, int nodes, const problem *q, matrix_kind kind, con
             1e3 * t->solve, t->bytes);
 }
 
-/* n^3: beyond, minutes. */
+/* The dense solver takes time n^3: minutes for larger sheets. */
 static bool affordable(const drape_linear_ops *ops, int side)
 {
     return side <= 16 || strcmp(ops->entry.name, "dense") != 0;

@@ -1,20 +1,20 @@
 /*
- * oscillator: what time integrators do to the energy of an undamped oscillator in 100 periods: E/E0 - 1,
- * for ida over its orders and tolerances, for the fixed-step rows over w h. A free node on a spring of the
- * host's, E = 1/2 m w^2 |x - x0|^2, made through drape_context_add_term, moves through the rest position
- * with equal speeds along x, y and z, so that IDA's root mean square over unknowns is that of a single
+ * oscillator: what time integrators do to the energy of an undamped oscillator in 100 periods. Prints E/E0 -
+ * 1, for ida over its orders and tolerances, for the fixed-step integrators over w h. A free node on a spring
+ * with E = 1/2 m w^2 |x - x0|^2, a user-defined term (drape_context_add_term), starts at its rest position
+ * with equal speeds along x, y and z, so that IDA's root mean square over the unknowns is that of a single
  * oscillator. Tolerances are relative to the amplitudes: atol_x = rtol A, atol_v = rtol A w.
  *
- * The table of the design notes was made with other weights: rtol |y| + atol with rtol = atol, w = 1/s, x
- * = 1, v = 0 at the start. IDA alone, set so, is at the end: order 1, 2, 4, 5 at 1e-3: -100 %, -20 %, +424
- * %, -70 %, at 1e-6: -60 %, -5e-4, -1.4e-3, -4.4e-3. Drape's weights do not follow |y|, which would make
- * errors depend on where a scene lies, so its numbers are others, of the same kind. From order 3 on, a
- * factor 2 in the tolerance can change the sign: IDA mostly doubles its step or keeps it, and whether BDF
- * feeds energy in or takes it out depends on w h.
+ * The last lines are of IDA alone, with the weights rtol |y| + atol, rtol = atol, and w = 1/s, x = 1, v = 0
+ * at the start. The orders 1, 2, 4 and 5 change the energy by -100 %, -20 %, +424 % and -70 % at 1e-3, and by
+ * -60 %, -5e-4, -1.4e-3 and -4.4e-3 at 1e-6. Drape's weights do not follow |y|, as errors would then depend
+ * on where a scene lies; its numbers are different but alike in kind. From order 3 on, a factor of 2 in the
+ * tolerance can change the sign: IDA mostly doubles its step or keeps it, and whether BDF adds or removes
+ * energy depends on w h.
  *
- * What to expect: be multiplies E by 1/(1 + (w h)^2) a step, bdf2 by 1 - (w h)^4/2 and less, midpoint by 1
- * exactly. BDF 3 to 5 are not A-stable: they feed energy in at the steps that loose tolerances choose, and
- * take it out at others.
+ * Theory: in each step be multiplies E by 1/(1 + (w h)^2), bdf2 by 1 - (w h)^4/2 or less, midpoint by exactly
+ * 1. BDF 3 to 5 are not A-stable: they add energy at the step lengths that loose tolerances lead to, and
+ * remove energy at others.
  */
 #include "bench.h"
 #include "drape/extend.h"
@@ -76,7 +76,7 @@ static const drape_term_ops harmonic = {
     .build = build,
     .energy = energy};
 
-/* E/E0 - 1 after 100 periods; NaN where the run did not come to its end. */
+/* E/E0 - 1 after 100 periods; NaN if the run did not complete. */
 static double drift(drape_context *ctx, const drape_model *model, const char *integrator,
                     const drape_setting *settings, drape_statistics *work)
 {
@@ -89,15 +89,15 @@ static double drift(drape_context *ctx, const drape_model *model, const char *in
     return status ? NAN : (after.kinetic + after.elastic) / (before.kinetic + before.elastic) - 1;
 }
 
-static void print(FILE *csv, const char *row, int order, const char *knob, double value, double change,
+static void print(FILE *csv, const char *name, int order, const char *knob, double value, double change,
                   const drape_statistics *work)
 {
-    printf("%-9s %5d  %-5s %8g  %+11.3e  %7lld %8lld\n", row, order, knob, value, change,
+    printf("%-10s %5d  %-5s %8g  %+11.3e  %7lld %8lld\n", name, order, knob, value, change,
            (long long)work->steps_accepted, (long long)work->residuals);
     if (!csv)
         return;
     bench_csv_row(csv);
-    fprintf(csv, "%s,%d,%s,%g,%.6e,%lld,%lld\n", row, order, knob, value, change,
+    fprintf(csv, "%s,%d,%s,%g,%.6e,%lld,%lld\n", name, order, knob, value, change,
             (long long)work->steps_accepted, (long long)work->residuals);
 }
 
@@ -116,15 +116,15 @@ static void over_tolerances(drape_context *ctx, const drape_model *model, FILE *
         }
 }
 
-static void over_steps(drape_context *ctx, const drape_model *model, const drape_integrator_ops *row,
+static void over_steps(drape_context *ctx, const drape_model *model, const drape_integrator_ops *ops,
                        FILE *csv)
 {
     static const double phases[] = {0.01, 0.1, 0.5, 1}; /* w h */
     for (size_t k = 0; k < sizeof phases / sizeof *phases; k++) {
         const drape_setting settings[] = {{"dt", phases[k] / OMEGA, NULL}, {"tolerance", 1e-13, NULL}, {0}};
         drape_statistics work;
-        double change = drift(ctx, model, row->entry.name, settings, &work);
-        print(csv, row->entry.name, row->order, "w h", phases[k], change, &work);
+        double change = drift(ctx, model, ops->entry.name, settings, &work);
+        print(csv, ops->entry.name, ops->order, "w h", phases[k], change, &work);
     }
 }
 
@@ -201,8 +201,9 @@ int main(int argc, char **argv)
         "['bench.harmonic'],"
         "'velocity': [%g, %g, %g], 'pins': [{'nodes': [0, 1, 2]}]}], 'gravity': [0, 0, 0], 'duration': 1}",
         SPEED, SPEED, SPEED);
-    FILE *csv = bench_csv(argc == 2 ? argv[1] : NULL, "row,order,knob,value,energy_change,steps,residuals");
-    printf("%-9s %5s  %-14s  %11s  %7s %8s\n", "row", "order", "rtol or w h", "E/E0 - 1", "steps",
+    FILE *csv =
+        bench_csv(argc == 2 ? argv[1] : NULL, "integrator,order,knob,value,energy_change,steps,residuals");
+    printf("%-10s %5s  %-14s  %11s  %7s %8s\n", "integrator", "order", "rtol or w h", "E/E0 - 1", "steps",
            "residuals");
     over_tolerances(ctx, model, csv);
     for (int i = 0; drape_integrators[i]; i++)

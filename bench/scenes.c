@@ -1,8 +1,8 @@
 /*
- * scenes: what runs of scenes cost and how well contact is kept: steps, rejections, Newton iterations, CPU
- * time, the share of contact, the deepest node and the deepest point of a face in a collider, and the most
- * edges through triangles, at the ends of steps and at frames. What is looked at takes time of its own, which
- * is not counted.
+ * scenes: the cost of running scenes, and how well contact holds: steps, rejections, Newton iterations, CPU
+ * time and the share of contact in it; the deepest node and the deepest point of a face in a collider, and
+ * the largest number of edges through triangles, over the ends of steps and over frames. The CPU time does
+ * not include these checks.
  */
 #include "bench.h"
 
@@ -12,14 +12,14 @@
 #include <getopt.h>
 #include <time.h>
 
-#define MOST_SETTINGS 32
+#define MAX_SETTINGS 32
 
 typedef struct setting {
     const char *pointer, *value;
 } setting;
 
 typedef struct request {
-    setting set[MOST_SETTINGS];
+    setting set[MAX_SETTINGS];
     int set_count;
     FILE *csv;
 } request;
@@ -73,7 +73,7 @@ static void print_reasons(const drape_sim *sim)
         printf(" %s %lld", reason, (long long)count);
 }
 
-/* A column; empty without colliders. */
+/* Prints a column, which is empty without colliders. */
 static void print_depth(FILE *csv, double depth)
 {
     if (isfinite(depth))
@@ -82,7 +82,7 @@ static void print_depth(FILE *csv, double depth)
         fputc(',', csv);
 }
 
-/* A value may be a list: its commas would be columns. */
+/* Commas in a value, such as a list, become semicolons: they would end the column. */
 static void print_settings(const request *r)
 {
     for (int i = 0; i < r->set_count; i++) {
@@ -147,16 +147,17 @@ static drape_status run(const request *r, const char *path)
 
 static void usage(FILE *to)
 {
-    fputs("usage: scenes [--set /POINTER=VALUE]... [--csv FILE] SCENE...\n"
-          "Runs scenes; prints steps, work, CPU time, the deepest point in a collider, edges through "
-          "triangles.\n",
-          to);
+    fputs(
+        "usage: scenes [--set /POINTER=VALUE]... [--csv FILE] SCENE...\n"
+        "Runs scenes; prints steps, work, CPU time, the deepest point in a collider and the edges that pass "
+        "through triangles.\n",
+        to);
 }
 
 static void add_setting(request *r, char *text)
 {
     char *equals = strchr(text, '=');
-    if (!equals || r->set_count == MOST_SETTINGS) {
+    if (!equals || r->set_count == MAX_SETTINGS) {
         usage(stderr);
         exit(2);
     }

@@ -1,16 +1,17 @@
 /*
- * speed: what a step costs on every rung, and what it is off by, as one table of cases: groups of sizes and
- * rungs. Two scenes:
- *     dep     the DEP report's setting: equilateral lattice, four inner pins, its stiffness, dt 0.01 s
- *     sheet   a square sheet of 1 m let go level from two corners, E h = 1 000 N/m, D = 1e-4 N m, 0.2 kg/m2, dt 1/60 s: the
- *             workload that other programs were measured on
- * The first step, which takes what is taken once, is left out. Milliseconds are a step's: CPU time of the
- * process (mean, median and worst), wall time, and of that the parts; the rest is what the framework takes.
- * Small cases are repeated: a run is the same each time, so each step's CPU time is the least that it took,
- * and the wall times are those of the fastest run. Work is counted beside time, because machines are noisy
- * and counts are not. Equal hashes are equal bits: of one thread and several. Errors are against backward
- * Euler at the same step, solved to 1e-6 N: positions after 0.5 s, rms and largest, and the rms strain of the
- * edges beside that of the converged sheet; nan where there is nothing to compare with.
+ * speed: the cost of a step with each method and its error, as one table of cases. A group is a scene with
+ * several sizes and methods; a method is an integrator with its settings. Two scenes:
+ *     dep     the setting of the DEP report: equilateral lattice, four inner pins, its stiffness, dt 0.01 s
+ *     sheet   a square sheet of 1 m, released horizontally, hanging by two corners; E h = 1 000 N/m,
+ *             D = 1e-4 N m, 0.2 kg/m2, dt 1/60 s: the workload that other programs were measured with
+ * The first step, with its one-time work, is left out. Times are milliseconds per step: CPU time of the
+ * process (mean, median and maximum), wall time and its parts; the rest is overhead of the framework.
+ * Small cases are repeated. Every repeat computes the same, so the CPU time of a step is the least over the
+ * repeats, and the wall times are those of the fastest repeat. Work is counted too, because times on a busy
+ * machine vary and counts do not. Equal hashes mean equal bits, as with one thread and with several. Errors
+ * are relative to backward Euler at the same step, solved to 1e-6 N: rms and largest distance of the nodes
+ * after 0.5 s, and the rms strain of the edges beside that of the converged sheet; nan if there is nothing
+ * to compare with.
  */
 #include "bench.h"
 #include "sim/profile.h"
@@ -19,12 +20,12 @@
 #include <errno.h>
 #include <inttypes.h>
 
-#define MOST_STEPS    256
-#define MOST_SIDES    8
-#define MOST_RUNGS    7
-#define COMPARE_AT    30    /* steps of 1/60 s */
-#define MOST_COMPARED 11000 /* nodes: beyond, the converged run takes too long */
-#define GROWTH_FROM   2500  /* nodes */
+#define MAX_STEPS    256
+#define MAX_SIDES    8
+#define MAX_METHODS  7
+#define COMPARE_AT   30    /* steps of 1/60 s */
+#define MAX_COMPARED 11000 /* nodes: for larger sheets the converged run takes too long */
+#define GROWTH_FROM  2500  /* nodes */
 #define NAN_RESULT                                                                                           \
     {                                                                                                        \
         .rms_mm = NAN, .largest_mm = NAN, .strain_rms = NAN, .strain_converged = NAN                         \
@@ -34,32 +35,32 @@
 
 typedef enum scene_kind { DEP, SHEET } scene_kind;
 
-typedef struct rung {
+typedef struct method {
     const char *name, *integrator;
     drape_setting settings[3];
     int threads;
-    int most; /* nodes; 0: any. Beyond, it takes minutes a case and says nothing new */
-} rung;
+    int max_nodes; /* 0: unlimited. Larger cases take minutes and show nothing new */
+} method;
 
-static const rung be = {"be", "be", {{NULL, 0, NULL}}, 1}, be_two = {"be", "be", {{NULL, 0, NULL}}, 2},
-                  be_klu = {"be klu", "be", {{"linear_solver", 0, "klu"}}, 1},
-                  be_cholmod = {"be cholmod", "be", {{"linear_solver", 0, "cholmod"}}, 1},
-                  be_dense = {"be dense", "be", {{"linear_solver", 0, "dense"}}, 1},
-                  be_pcg = {"be pcg",
-                            "be",
-                            {{"linear_solver", 0, "pcg"}, {"linear_tolerance", 0.01, NULL}},
-                            1,
-                            2500},
-                  newton_1 = {"newton_k 1", "newton_k", {{NULL, 0, NULL}}, 1},
-                  newton_2 = {"newton_k 2", "newton_k", {{"iterations", 2, NULL}}, 1},
-                  newton_3 = {"newton_k 3", "newton_k", {{"iterations", 3, NULL}}, 1};
+static const method be = {"be", "be", {{NULL, 0, NULL}}, 1}, be_two = {"be", "be", {{NULL, 0, NULL}}, 2},
+                    be_klu = {"be klu", "be", {{"linear_solver", 0, "klu"}}, 1},
+                    be_cholmod = {"be cholmod", "be", {{"linear_solver", 0, "cholmod"}}, 1},
+                    be_dense = {"be dense", "be", {{"linear_solver", 0, "dense"}}, 1},
+                    be_pcg = {"be pcg",
+                              "be",
+                              {{"linear_solver", 0, "pcg"}, {"linear_tolerance", 0.01, NULL}},
+                              1,
+                              2500},
+                    newton_1 = {"newton_k 1", "newton_k", {{NULL, 0, NULL}}, 1},
+                    newton_2 = {"newton_k 2", "newton_k", {{"iterations", 2, NULL}}, 1},
+                    newton_3 = {"newton_k 3", "newton_k", {{"iterations", 3, NULL}}, 1};
 
 typedef struct bench_group {
     const char *name;
     scene_kind scene;
-    double seconds; /* that are simulated */
-    int sides[MOST_SIDES];
-    const rung *rungs[MOST_RUNGS];
+    double seconds; /* simulated time */
+    int sides[MAX_SIDES];
+    const method *methods[MAX_METHODS];
     bool compared;
 } bench_group;
 
@@ -71,17 +72,17 @@ static const bench_group groups[] = {
     {"linear", SHEET, 0.1, {50}, {&be, &be_cholmod, &be_klu}, false},
     {"growth", SHEET, 0.1, {5, 10, 25, 50, 100, 160, 226, 320}, {&be, &be_cholmod}, false},
     {"threads", SHEET, 0.25, {100}, {&be, &be_two}, false},
-    {"rungs", SHEET, 2, {5, 12, 23, 50, 100}, {&newton_1, &newton_2, &newton_3, &be_pcg, &be}, true},
-    {"rungs_growth", SHEET, 0.5, {50, 100, 160, 226, 320}, {&newton_1, &newton_2, &newton_3}, false},
+    {"levels", SHEET, 2, {5, 12, 23, 50, 100}, {&newton_1, &newton_2, &newton_3, &be_pcg, &be}, true},
+    {"levels_growth", SHEET, 0.5, {50, 100, 160, 226, 320}, {&newton_1, &newton_2, &newton_3}, false},
 };
 
-/* Of one size and rung, a step; times in ms. */
+/* The results of a method at one size, per step; times in ms. */
 typedef struct result {
     int nodes, steps;
     long long unknowns, nonzeros, rejected;
     double cpu, median, worst, wall, residual, jacobian, factor, solve, contact;
     double newton, residuals, jacobians, factorizations, iterations;
-    double residual_left; /* [N] the largest of an accepted step */
+    double residual_left; /* [N] largest residual of an accepted step */
     double rms_mm, largest_mm, strain_rms, strain_converged, strain_max;
     size_t bytes;
     uint64_t hash;
@@ -138,24 +139,24 @@ static double strain_of(const drape_model *m, const double *x)
 
 static void compare_states(const drape_model *m, const double *x, const double *converged, result *r)
 {
-    double sum = 0, most = 0;
+    double sum = 0, largest = 0;
     for (size_t i = 0; i < (size_t)m->node_count; i++) {
         double square = 0;
         for (size_t k = 3 * i; k < 3 * i + 3; k++)
             square += (x[k] - converged[k]) * (x[k] - converged[k]);
         sum += square;
-        most = fmax(most, square);
+        largest = fmax(largest, square);
     }
     r->rms_mm = 1e3 * sqrt(sum / m->node_count);
-    r->largest_mm = 1e3 * sqrt(most);
+    r->largest_mm = 1e3 * sqrt(largest);
     r->strain_rms = strain_of(m, x);
     r->strain_converged = strain_of(m, converged);
 }
 
-/* Positions of the converged run at COMPARE_AT; NULL where nothing is compared. */
+/* Positions of the converged run at COMPARE_AT; NULL if nothing is compared. */
 static double *make_converged(const bench_group *g, int side)
 {
-    if (!g->compared || side * side > MOST_COMPARED)
+    if (!g->compared || side * side > MAX_COMPARED)
         return NULL;
     drape_context *ctx = bench_context();
     drape_model *m = sheet_scene(ctx, side);
@@ -183,7 +184,7 @@ static drape_status keep_residual(void *user, const drape_event *event)
 
 /* ---- One run ---- */
 
-static drape_sim *open_sim(drape_context *ctx, const drape_model *m, const rung *g)
+static drape_sim *open_sim(drape_context *ctx, const drape_model *m, const method *g)
 {
     drape_sim *sim = NULL;
     drape_sim_def def;
@@ -208,7 +209,7 @@ static size_t bytes_of(drape_context *ctx, drape_sim *sim)
     return bytes;
 }
 
-/* The parts, from what was counted before and after. */
+/* Sets counts and parts per step, from the statistics before and after. */
 static void divide(result *r, const drape_statistics *a, const drape_statistics *b)
 {
     const double steps = (double)(b->steps_accepted - a->steps_accepted), ms = 1e3 / steps;
@@ -228,8 +229,8 @@ static void divide(result *r, const drape_statistics *a, const drape_statistics 
     r->strain_max = b->strain_max;
 }
 
-/* least (MOST_STEPS) [s] CPU of each step, the least so far. */
-static void run_once(const bench_group *group, int side, const rung *g, const double *converged,
+/* least: (MAX_STEPS) [s] least CPU time of each step over the repeats so far. */
+static void run_once(const bench_group *group, int side, const method *g, const double *converged,
                      double *least, result *r)
 {
     const double dt = step_of(group->scene);
@@ -241,7 +242,7 @@ static void run_once(const bench_group *group, int side, const rung *g, const do
     if (drape_sim_advance(sim, dt))
         bench_fail(ctx, "%s, %s", group->name, g->name);
     const drape_statistics before = drape_sim_statistics(sim);
-    for (int k = 0; k < MOST_STEPS && (k + 1.5) * dt < group->seconds; k++) {
+    for (int k = 0; k < MAX_STEPS && (k + 1.5) * dt < group->seconds; k++) {
         const double cpu = drape_clock_cpu_seconds();
         if (drape_sim_advance(sim, (k + 2) * dt))
             bench_fail(ctx, "%s, %s", group->name, g->name);
@@ -263,7 +264,7 @@ static void run_once(const bench_group *group, int side, const rung *g, const do
     drape_context_destroy(&ctx);
 }
 
-static int repeats_of(int side, const rung *g)
+static int repeats_of(int side, const method *g)
 {
     return g == &be_dense || side > 50 ? 1 : side > 25 ? 3 : 7;
 }
@@ -274,16 +275,16 @@ static int compare_doubles(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-static result measure(const bench_group *group, int side, const rung *g, const double *converged)
+static result measure(const bench_group *group, int side, const method *g, const double *converged)
 {
     result r = NAN_RESULT;
-    double least[MOST_STEPS];
+    double least[MAX_STEPS];
     int count = 0;
-    for (int k = 0; k < MOST_STEPS; k++)
+    for (int k = 0; k < MAX_STEPS; k++)
         least[k] = INFINITY;
     for (int i = 0; i < repeats_of(side, g); i++)
         run_once(group, side, g, converged, least, &r);
-    for (; count < MOST_STEPS && isfinite(least[count]); count++)
+    for (; count < MAX_STEPS && isfinite(least[count]); count++)
         r.cpu += 1e3 * least[count] / r.steps;
     qsort(least, (size_t)count, sizeof *least, compare_doubles);
     r.median = 1e3 * least[count / 2];
@@ -291,7 +292,7 @@ static result measure(const bench_group *group, int side, const rung *g, const d
     return r;
 }
 
-/* ---- What is told ---- */
+/* ---- Output ---- */
 
 static double rest_of(const result *r)
 {
@@ -299,7 +300,7 @@ static double rest_of(const result *r)
 }
 
 static const char csv_columns[] =
-    "group,nodes,rung,threads,unknowns,nonzeros,steps,rejected,cpu_ms,median_cpu_ms,worst_cpu_ms,wall_ms,"
+    "group,nodes,method,threads,unknowns,nonzeros,steps,rejected,cpu_ms,median_cpu_ms,worst_cpu_ms,wall_ms,"
     "residual_ms,"
     "jacobian_ms,factor_ms,solve_ms,contact_ms,rest_ms,newton,residuals,jacobians,factorizations,linear_"
     "iterations,"
@@ -308,12 +309,12 @@ static const char csv_columns[] =
 static void print_head(void)
 {
     printf("%-12s %6s %-13s %2s %5s %4s %9s %9s %9s %9s %9s %9s %9s %5s %6s %6s %6s %6s %7s %6s %7s %s\n",
-           "group", "nodes", "rung", "th", "steps", "rej", "cpu ms", "median", "wall ms", "residual",
+           "group", "nodes", "method", "th", "steps", "rej", "cpu ms", "median", "wall ms", "residual",
            "jacobian", "factor", "solve", "rest%", "newton", "resid.", "factor", "linear", "rms mm", "strain",
            "B/node", "hash");
 }
 
-static void print(const char *group, const rung *g, const result *r)
+static void print(const char *group, const method *g, const result *r)
 {
     printf("%-12s %6d %-13s %2d %5d %4lld %9.3f %9.3f %9.3f %9.3f %9.3f %9.3f %9.3f %5.1f %6.2f %6.2f %6.2f "
            "%6.1f "
@@ -325,7 +326,7 @@ static void print(const char *group, const rung *g, const result *r)
     fflush(stdout);
 }
 
-static void write_row(FILE *csv, const char *group, const rung *g, const result *r)
+static void write_row(FILE *csv, const char *group, const method *g, const result *r)
 {
     bench_csv_row(csv);
     fprintf(csv, "%s,%d,%s,%d,%lld,%lld,%d,%lld,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,", group,
@@ -337,7 +338,7 @@ static void write_row(FILE *csv, const char *group, const rung *g, const result 
     fflush(csv);
 }
 
-/* Of a rung, over the sizes of a group. */
+/* A fit of step time over node count, for one method over the sizes of a group. */
 typedef struct growth {
     int first, last, count; /* nodes, from GROWTH_FROM on */
     double x, y, xx, xy;    /* sums of logarithms */
@@ -357,27 +358,29 @@ static void add_to_growth(growth *a, const result *r)
     a->xy += x * y;
 }
 
-/* The slope by least squares. */
-static void print_growth(const rung *g, const growth *a)
+/* Prints the slope, by least squares in logarithms. */
+static void print_growth(const method *g, const growth *a)
 {
     if (a->count > 1)
-        printf("%s: from %d to %d nodes the median step grows with their number to the power %.2f\n", g->name,
-               a->first, a->last, (a->count * a->xy - a->x * a->y) / (a->count * a->xx - a->x * a->x));
+        printf("%s: from %d to %d nodes the median time of a step grows as the number of nodes to the power "
+               "%.2f\n",
+               g->name, a->first, a->last,
+               (a->count * a->xy - a->x * a->y) / (a->count * a->xx - a->x * a->x));
 }
 
-/* Two rungs that differ in their threads alone. */
-static void print_threads(const rung *const *g, const result *r)
+/* Compares two methods that differ only in their number of threads. */
+static void print_threads(const method *const *g, const result *r)
 {
     if (g[1] && g[1]->threads != g[0]->threads)
         printf("%d threads: %.2f times faster, %s bits\n", g[1]->threads, r[0].wall / r[1].wall,
-               r[0].hash == r[1].hash ? "the same" : "OTHER");
+               r[0].hash == r[1].hash ? "the same" : "DIFFERENT");
 }
 
 /* ---- The groups ---- */
 
-static bool is_for(const rung *g, int side)
+static bool is_for(const method *g, int side)
 {
-    if (g->most > 0 && side * side > g->most)
+    if (g->max_nodes > 0 && side * side > g->max_nodes)
         return false;
     const drape_setting *linear = &g->settings[0];
     return !linear->name || strcmp(linear->name, "linear_solver") != 0 ||
@@ -387,9 +390,9 @@ static bool is_for(const rung *g, int side)
 static void run_side(const bench_group *group, int side, FILE *csv, growth *grown)
 {
     double *converged = make_converged(group, side);
-    result r[MOST_RUNGS];
-    for (int k = 0; k < MOST_RUNGS && group->rungs[k]; k++) {
-        const rung *g = group->rungs[k];
+    result r[MAX_METHODS];
+    for (int k = 0; k < MAX_METHODS && group->methods[k]; k++) {
+        const method *g = group->methods[k];
         if (!is_for(g, side))
             continue;
         r[k] = measure(group, side, g, converged);
@@ -398,35 +401,35 @@ static void run_side(const bench_group *group, int side, FILE *csv, growth *grow
         if (csv)
             write_row(csv, group->name, g, &r[k]);
     }
-    print_threads(group->rungs, r);
+    print_threads(group->methods, r);
     free(converged);
 }
 
-static void run_group(const bench_group *group, int most, FILE *csv)
+static void run_group(const bench_group *group, int max_nodes, FILE *csv)
 {
-    growth grown[MOST_RUNGS] = {{0}};
-    for (int i = 0; i < MOST_SIDES && group->sides[i]; i++)
-        if (group->sides[i] * group->sides[i] <= most)
+    growth grown[MAX_METHODS] = {{0}};
+    for (int i = 0; i < MAX_SIDES && group->sides[i]; i++)
+        if (group->sides[i] * group->sides[i] <= max_nodes)
             run_side(group, group->sides[i], csv, grown);
-    for (int k = 0; k < MOST_RUNGS && group->rungs[k]; k++)
-        print_growth(group->rungs[k], &grown[k]);
+    for (int k = 0; k < MAX_METHODS && group->methods[k]; k++)
+        print_growth(group->methods[k], &grown[k]);
 }
 
 static int usage(const char *argument)
 {
     char text[600];
-    int length =
-        snprintf(text, sizeof text,
-                 "speed [GROUP [CSV [NODES]]]: milliseconds of a step on each rung, its parts and its error\n"
-                 "  GROUP  all");
+    int length = snprintf(
+        text, sizeof text,
+        "speed [GROUP [CSV [NODES]]]: milliseconds per step with each method, its parts and its error\n"
+        "  GROUP  all");
     for (size_t i = 0; i < sizeof groups / sizeof *groups; i++)
         length += snprintf(text + length, sizeof text - (size_t)length, ", %s", groups[i].name);
     snprintf(text + length, sizeof text - (size_t)length,
-             "\n  NODES  none larger; BENCH_COMMIT in the environment names the commit\n");
+             "\n  NODES  the largest size; BENCH_COMMIT in the environment names the commit\n");
     return bench_usage(argument, text);
 }
 
-/* 0: it is no such number. */
+/* 0: not a valid number of nodes. */
 static int read_nodes(const char *text)
 {
     char *end;
@@ -443,8 +446,8 @@ int main(int argc, char **argv)
         known |= strcmp(only, groups[i].name) == 0;
     if (argc > 4 || !known)
         return usage(only);
-    const int most = argc == 4 ? read_nodes(argv[3]) : INT32_MAX;
-    if (most == 0) {
+    const int max_nodes = argc == 4 ? read_nodes(argv[3]) : INT32_MAX;
+    if (max_nodes == 0) {
         fprintf(stderr, "speed: NODES \"%s\": it is an integer, 1 to %d\n", argv[3], INT32_MAX);
         return 2;
     }
@@ -452,6 +455,6 @@ int main(int argc, char **argv)
     print_head();
     for (size_t i = 0; i < sizeof groups / sizeof *groups; i++)
         if (strcmp(only, "all") == 0 || strcmp(only, groups[i].name) == 0)
-            run_group(&groups[i], most, csv);
+            run_group(&groups[i], max_nodes, csv);
     return csv && fclose(csv) != 0;
 }

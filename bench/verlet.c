@@ -1,14 +1,17 @@
 /*
- * verlet: a frame of pinned2 in CS184's mode, 30 substeps with cloth on cloth and the strain limit, against
- * the same frame by its own code (cs184.cpp), in turns, so that both meet the same machine. CPU time of a
- * frame, and their ratio; and how far the sheets are from each other, for both do the same. CS184 looks for
- * near points in a point's own box alone and misses pairs across its faces, we look in all:
+ * verlet: a frame of CS184's scene pinned2, 30 substeps with self-contact and the strain limit, by Drape's
+ * integrator "verlet" and by CS184's own algorithm (cs184.cpp). The two take turns, so that a change of the
+ * machine's speed affects both. Prints the CPU time per frame of each, their ratio, and how far apart the two
+ * sheets are at the end, as both compute the same motion. CS184 looks for near points only in a point's own
+ * box of space and misses pairs across the faces of boxes; Drape looks in all boxes within reach. Three
+ * comparisons, Drape's boxes first:
  *
- *   all own   what each does by itself
+ *   all own   each program as it is
  *   own own   both as CS184
- *   all all   both without missing any: CS184's map asked for all boxes in reach
+ *   all all   both in all boxes, without missing any pair
  *
- *     verlet [--csv FILE] [--side N] [--thickness T] [--frames WARM COUNT] [SCENE]      default 64, the scene's, 30 60
+ *     verlet [--csv FILE] [--side N] [--thickness T] [--frames WARM COUNT] [SCENE]
+ *         default: --side 64, --thickness 0.0095, --frames 30 60
  */
 #include "bench.h"
 
@@ -84,7 +87,7 @@ static double frame_of_reference(cs184 *c)
     return (double)(clock() - start) / CLOCKS_PER_SEC;
 }
 
-/* RMS [m]. */
+/* Root mean square distance of the nodes of the two sheets [m]. */
 static double distance(const cs184 *c, const double *x)
 {
     double sum = 0, d[3];

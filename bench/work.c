@@ -1,33 +1,33 @@
 /*
- * work: accuracy against cost. A square sheet of 12 x 12 nodes, 1 m, E 1e6 Pa, h 1 mm, 0.2 kg/m2,
- * undamped, is let go level and swings down from two corners. The error is the root mean square over the
- * free nodes of the distance to a converged reference at 0.5 s: ida at rtol 1e-8 and order 5, whose own
- * error is its distance to rtol 1e-9. Every row of the integrators, over its dt or rtol, the fixed-step
- * ones under the controllers halving and error; CPU is the least of the repeats. The last lines hold ida
- * at rtol 1e-3 against be at 1/60 s, and both at equal error, between the points of the table by straight
- * lines in logarithms.
+ * work: accuracy against cost. A square sheet of 12 x 12 nodes, 1 m, E 1e6 Pa, h 1 mm, 0.2 kg/m2, undamped,
+ * is released horizontally and swings down from two corners. The error is the root mean square over the free
+ * nodes of the distance from a converged reference at 0.5 s: ida at rtol 1e-8 and order 5, whose own error is
+ * its distance from rtol 1e-9. Every integrator runs over its dt or rtol, those with fixed steps under the
+ * controllers halving and error; CPU time is the least of the repeats. The last lines compare ida at rtol
+ * 1e-3 with be at 1/60 s, and the two at equal error, with linear interpolation in logarithms between the
+ * points of the table.
  */
 #include "bench.h"
 
 #define END     0.5 /* [s] */
 #define REPEATS 3
-#define LONG    1.0 /* [s] CPU: a run that takes longer is not repeated */
+#define LONG    1.0 /* [s] CPU: longer runs are not repeated */
 #define POINTS  128
 
 typedef struct point {
     const char *integrator, *controller, *knob; /* knob: "dt" or "rtol" */
     double value;
-    int max_order;       /* ida; 0: its default */
-    bool good;           /* it came to the end */
+    int max_order;       /* of ida; 0: its default */
+    bool good;           /* the run completed */
     double error, speed; /* RMS [m], [m/s] */
-    double seconds;      /* CPU */
+    double seconds;      /* CPU [s] */
     drape_statistics work;
 } point;
 
 typedef struct bench {
     drape_context *ctx;
     drape_model *model;
-    double *x, *v; /* the reference */
+    double *x, *v; /* of the reference at END */
     point points[POINTS];
     int count;
     FILE *csv;
@@ -113,7 +113,7 @@ static void write_point(const bench *b, const point *p)
                (long long)w->steps_accepted, (long long)w->steps_rejected, (long long)w->residuals,
                (long long)w->jacobians, (long long)w->factorizations, p->seconds);
     else
-        printf("did not come to the end: %s\n", drape_context_message(b->ctx));
+        printf("did not complete: %s\n", drape_context_message(b->ctx));
     fflush(stdout);
     if (!b->csv)
         return;
@@ -137,18 +137,18 @@ static void add(bench *b, const char *integrator, const char *controller, const 
     write_point(b, p);
 }
 
-static void add_row(bench *b, const drape_integrator_ops *row)
+static void add_integrator(bench *b, const drape_integrator_ops *ops)
 {
     static const double rtols[] = {3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6},
                         controlled[] = {3e-2, 1e-2, 1e-3, 1e-4};
     static const int rates[] = {30, 60, 120, 240, 480, 960, 1920}, orders[] = {2, 5};
-    for (size_t i = 0; row->own_steps && i < sizeof orders / sizeof *orders; i++)
+    for (size_t i = 0; ops->own_steps && i < sizeof orders / sizeof *orders; i++)
         for (size_t k = 0; k < sizeof rtols / sizeof *rtols; k++)
-            add(b, row->entry.name, "halving", "rtol", rtols[k], orders[i]);
-    for (size_t i = 0; !row->own_steps && i < sizeof rates / sizeof *rates; i++)
-        add(b, row->entry.name, "halving", "dt", 1.0 / rates[i], 0);
-    for (size_t i = 0; !row->own_steps && i < sizeof controlled / sizeof *controlled; i++)
-        add(b, row->entry.name, "error", "rtol", controlled[i], 0);
+            add(b, ops->entry.name, "halving", "rtol", rtols[k], orders[i]);
+    for (size_t i = 0; !ops->own_steps && i < sizeof rates / sizeof *rates; i++)
+        add(b, ops->entry.name, "halving", "dt", 1.0 / rates[i], 0);
+    for (size_t i = 0; !ops->own_steps && i < sizeof controlled / sizeof *controlled; i++)
+        add(b, ops->entry.name, "error", "rtol", controlled[i], 0);
 }
 
 static const point *find(const bench *b, const char *integrator, double value, int max_order)
@@ -162,7 +162,7 @@ static const point *find(const bench *b, const char *integrator, double value, i
     return NULL;
 }
 
-/* CPU of be with fixed steps at an error; NaN outside the table. */
+/* CPU time [s] of be with fixed steps at an error; NaN outside the range of the table. */
 static double seconds_of_be(const bench *b, double error)
 {
     for (int i = 1; i < b->count; i++) {
@@ -191,8 +191,8 @@ static void compare(const bench *b)
     judge("error", ida->error / be->error, 0.6);
     judge("residuals", (double)ida->work.residuals / (double)be->work.residuals, 1.5);
     judge("jacobians", (double)ida->work.jacobians / (double)be->work.jacobians, 1);
-    judge("CPU at the error of ida, of ida over be", ida->seconds / seconds_of_be(b, ida->error), 0.25);
-    printf("the other points of ida: CPU over that of be at the same error, where be's table reaches\n");
+    judge("CPU time of ida over be at the error of ida", ida->seconds / seconds_of_be(b, ida->error), 0.25);
+    printf("the other points of ida: CPU time over that of be at the same error, within the range of be\n");
     for (int i = 0; i < b->count; i++) {
         const point *p = &b->points[i];
         double seconds = p->good && strcmp(p->integrator, "ida") == 0 ? seconds_of_be(b, p->error) : NAN;
@@ -215,11 +215,11 @@ int main(int argc, char **argv)
         "integrator,max_order,controller,knob,value,good,error_m,error_m_s,accepted,rejected,residuals,"
         "jacobians,factorizations,cpu_s");
     make_reference(&b);
-    printf("%10s %-8s %-14s %10s %10s %7s %5s %9s %9s %8s %9s\n", "row", "control", "dt or rtol", "error m",
-           "m/s", "steps", "rej.", "residuals", "jacobians", "factors", "CPU s");
+    printf("%10s %-8s %-14s %10s %10s %7s %5s %9s %9s %8s %9s\n", "integrator", "control", "dt or rtol",
+           "error m", "m/s", "steps", "rej.", "residuals", "jacobians", "factors", "CPU s");
     for (int i = 0; drape_integrators[i]; i++)
         if (!drape_integrators[i]->steady_state)
-            add_row(&b, drape_integrators[i]);
+            add_integrator(&b, drape_integrators[i]);
     compare(&b);
     free(b.x);
     free(b.v);

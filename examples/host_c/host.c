@@ -1,6 +1,6 @@
 /* host.c: a sheet drapes over a ball that this program moves, in real time: 60 frames per second, with a time
- * budget for each. Build and run: cc host.c $(pkg-config --cflags --libs drape) -lm -o host && ./host
- * [FRAMES] */
+ * budget for each. Build and run:
+ *     cc host.c $(pkg-config --cflags --libs drape) -lm -o host && ./host [FRAMES] */
 #include <drape/drape.h>
 #include <math.h>
 #include <stdio.h>
@@ -22,7 +22,7 @@ static drape_status make_model(drape_context *ctx, drape_model **model)
     cloth.material = material, cloth.material_count = 3;
     cloth.terms = terms, cloth.term_count = 2;
     drape_collider_def_init(&sphere, sizeof sphere);
-    sphere.row = (drape_entry_def){"sphere", ball, 2}, sphere.friction = 0.5;
+    sphere.entry = (drape_entry_def){"sphere", ball, 2}, sphere.friction = 0.5;
     drape_scene_def_init(&scene, sizeof scene);
     scene.cloths = &cloth, scene.cloth_count = 1;
     scene.colliders = &sphere, scene.collider_count = 1;

@@ -1,4 +1,4 @@
-// host.cpp: a flag whose pole is carried through gusts made by this program, which prints the force on the pole. Build and run:
+// host.cpp: a flag in gusts that this program makes, on a pole that it moves; prints the force on the pole. Build and run:
 //     cmake -S . -B build && cmake --build build && build/host [FRAMES]
 #include <drape/drape.h>
 

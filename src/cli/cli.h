@@ -14,9 +14,9 @@
 enum {
     CLI_GO_ON = -1, /* not an exit code: the verb continues */
     CLI_DONE = 0,
-    CLI_FAILED = 1,       /* the simulation, a check or the output */
-    CLI_BAD_INPUT = 2,    /* the scene or the command line; nothing was written */
-    CLI_INTERRUPTED = 130 /* by a signal */
+    CLI_FAILED = 1,       /* the simulation, a check or the output failed */
+    CLI_BAD_INPUT = 2,    /* the scene or the command line is wrong; nothing was written */
+    CLI_INTERRUPTED = 130 /* interrupted by a signal */
 };
 
 /* ---- Command lines ---- */
@@ -59,7 +59,7 @@ typedef struct cli_setting {
 
 /* The part of a command line that all verbs have. The request of a verb begins with it. */
 typedef struct cli_command {
-    drape_arena *arena; /* memory until the verb returns; its context stops where the program is
+    drape_arena *arena; /* memory until the verb returns; its context stops if the program is
                            interrupted */
     drape_context *ctx; /* of the arena */
     const char *verb;
@@ -77,7 +77,7 @@ typedef struct drape_verb {
     bool operand_optional;
     int max_operands;    /* 0: one */
     bool takes_scene;    /* has the options that change a scene */
-    const char *missing; /* what this build lacks to run the verb; NULL: nothing */
+    const char *missing; /* what the build lacks to run the verb; NULL: nothing */
     const char *details; /* lines of its help */
     const cli_option *options;
     size_t option_count;
@@ -93,8 +93,8 @@ void cli_print_help(const drape_verb *verb); /* on stdout */
 /* The operand as help shows it: in brackets if it is optional. */
 void cli_operand_text(const drape_verb *verb, char *text, size_t size);
 
-/* Reads a command line into a request, in which all but arena and ctx is zero. CLI_GO_ON, or the exit code
- * after help or an error was printed. */
+/* Reads a command line into a request, in which all but arena and ctx is zero. Returns CLI_GO_ON, or the exit
+ * code after help or an error was printed. */
 int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *request);
 
 /* Prints one line "drape run: text" on stderr. Returns CLI_BAD_INPUT. */
@@ -105,10 +105,10 @@ int cli_report(drape_context *ctx, int code);
 
 /* ---- Scenes ---- */
 
-/* A context whose scenes, models and sims stop where the program is interrupted (cli/signals.h). */
+/* A context whose scenes, models and sims stop if the program is interrupted (cli/signals.h). */
 drape_status cli_context_create(drape_context **out);
 
-/* A scene that is ready to run, in the context of its command. All NULL: none. */
+/* A scene that is ready to run, in the context of its command. All members NULL: no scene. */
 typedef struct cli_scene {
     drape_context *ctx;
     drape_scene *scene;
@@ -117,8 +117,8 @@ typedef struct cli_scene {
 } cli_scene;
 
 /* Loads a scene, applies the settings, compiles it, checks the formats of the output and makes a sim. Writes
- * no file. CLI_GO_ON, or CLI_BAD_INPUT or CLI_INTERRUPTED after a line was printed. cli_scene_free in any
- * case. */
+ * no file. Returns CLI_GO_ON, or CLI_BAD_INPUT or CLI_INTERRUPTED after a line was printed. Call
+ * cli_scene_free in any case. */
 int cli_scene_load(const cli_command *command, const char *path, cli_scene *out);
 void cli_scene_free(cli_scene *scene);
 

@@ -18,7 +18,7 @@ typedef struct list_request {
     bool markdown, schema;
 } list_request;
 
-#define SCENE_NAME  "scene" /* of what is no table: the keys */
+#define SCENE_NAME  "scene" /* the keys of a scene, which are not in a table */
 #define SCENE_TITLE "The scene file"
 
 /* How a table is printed. */
@@ -122,7 +122,7 @@ static void text_param(const drape_entry *entry, const drape_param *param)
 
 /* ---- As Markdown ---- */
 
-/* A cell: what would end it is written as it must be. */
+/* A cell of a table, with the characters escaped that would end it. */
 static void cell(const char *text)
 {
     fputs(" ", stdout);
@@ -158,7 +158,7 @@ static void markdown_cells(const char *of, const char *name, const char *help, c
     fputc('\n', stdout);
 }
 
-/* A key that stands for others says so: its row of the table is read alone. */
+/* The help of a key that stands for others names them, as a reader may see only its row of the table. */
 static void markdown_key(const cli_object *object, const drape_scene_key *key)
 {
     param_text text = text_of_key(key);
@@ -328,7 +328,7 @@ static int print_request(const void *command)
 {
     const list_request *request = command;
     if (request->schema && (request->command.operand || request->markdown))
-        return cli_misuse("list", "--schema stands alone: it is the form of a whole scene");
+        return cli_misuse("list", "--schema takes no name: it prints the schema of a whole scene");
     if (request->schema)
         return print_schema();
     return print_tables(request->markdown ? &markdown_style : &text_style, request->command.operand);

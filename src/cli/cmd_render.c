@@ -85,7 +85,7 @@ static int read_size(render *r)
     if (r->request->size &&
         (sscanf(r->request->size, "%5dx%5d%c", &r->width, &r->height, &end) != 2 || r->width < MIN_SIDE ||
          r->height < MIN_SIDE || r->width > DRAPE_MAX_PICTURE || r->height > DRAPE_MAX_PICTURE))
-        return cli_misuse("render", "--size \"%.60s\": it is WIDTHxHEIGHT, each %d to %d pixels",
+        return cli_misuse("render", "--size \"%.60s\": must be WIDTHxHEIGHT, each %d to %d pixels",
                           r->request->size, MIN_SIDE, DRAPE_MAX_PICTURE);
     return CLI_GO_ON;
 }
@@ -95,10 +95,11 @@ static int read_camera(render *r)
     double v[3] = {DRAPE_CAMERA_AZIMUTH, DRAPE_CAMERA_ELEVATION, 1};
     if (r->request->camera && (!read_numbers(r->request->camera, v, 2, 3) || fabs(v[1]) > 90 ||
                                fabs(v[0]) > 3600 || v[2] < 0.01 || v[2] > 100))
-        return cli_misuse("render",
-                          "--camera \"%.60s\": it is azimuth,elevation[,zoom]: degrees, elevation -90 to 90, "
-                          "zoom 0.01 to 100",
-                          r->request->camera);
+        return cli_misuse(
+            "render",
+            "--camera \"%.60s\": must be azimuth,elevation[,zoom]: degrees, elevation -90 to 90, "
+            "zoom 0.01 to 100",
+            r->request->camera);
     r->azimuth = v[0];
     r->elevation = v[1];
     r->zoom = v[2];
@@ -111,7 +112,7 @@ static int read_range(render *r)
     if (r->request->range && !r->shading->field)
         return cli_misuse("render", "--range: the shading \"%s\" shows no field", r->shading->entry.name);
     if (r->request->range && (!read_numbers(r->request->range, v, 2, 2) || v[0] >= v[1]))
-        return cli_misuse("render", "--range \"%.60s\": it is low,high, in %s", r->request->range,
+        return cli_misuse("render", "--range \"%.60s\": must be low,high, in %s", r->request->range,
                           r->shading->field->shown_unit);
     double shown = r->shading->field ? r->shading->field->shown : 1;
     r->low = v[0] / shown;
@@ -187,7 +188,7 @@ static int read_out(render *r)
     char *end = NULL;
     long frame = q->frame ? strtol(q->frame, &end, 10) : CLI_LAST_FRAME;
     if (q->frame && (!*q->frame || *end || frame < 0 || frame > 1000000000))
-        return cli_misuse("render", "--frame \"%.60s\": it is a number from 0", q->frame);
+        return cli_misuse("render", "--frame \"%.60s\": must be an integer, 0 or more", q->frame);
     if (q->frame && !r->picture)
         return cli_misuse("render", "--frame is for a picture: --out NAME.png");
     if (q->every && r->picture)

@@ -31,11 +31,11 @@ typedef struct run {
     cli_scene in;
     drape_recorder *recorder; /* NULL without --out */
     char *summary_path;       /* in the folder of --out; NULL without --out */
-    void *checkpoint;         /* contents of the file that the run resumes from; NULL: it starts */
-    drape_archive archive;    /* that reads them */
+    void *checkpoint;         /* contents of the checkpoint that the run resumes from; NULL: it starts anew */
+    drape_archive archive;    /* reads the contents */
     cli_progress progress;
     cli_realtime realtime; /* of --realtime */
-    double start;          /* clock at the start less the time before the checkpoint [s] */
+    double start;          /* clock at the start minus the run time before the checkpoint [s] */
     double wall;           /* duration of the run [s] */
     bool begun;            /* the output could be created */
     drape_status status;
@@ -68,9 +68,9 @@ static drape_recorder_def recorder_def(const run *r)
                                 .start = r->start};
 }
 
-/* When a run is resumed, the recorder and the copy of the scene are there already. A killed run must not
- * leave the summary of the run before it; a summary that is not a regular file stays, as it will be written
- * through. */
+/* When a run is resumed, the recorder and the copy of the scene exist already. Removes an old summary, as a
+ * killed run must not leave the summary of the run before it; a summary that is not a regular file, such as a
+ * pipe, stays. */
 static drape_status begin_output(run *r)
 {
     if (!r->request->out)
@@ -200,7 +200,7 @@ static void print_wall(const run *r, const drape_statistics *s)
     fputc('\n', stdout);
 }
 
-/* Only printed if cloth reaches into a collider at the end. */
+/* Printed only if cloth reaches into a collider at the end. */
 static void print_inside(const run *r)
 {
     double deepest;
@@ -296,7 +296,7 @@ static void simulate(run *r)
     write_summary(r, r->request->summary);
 }
 
-/* A signal after the last step has nothing left to stop. */
+/* A signal after the last step does not interrupt the run. */
 static int conclude(const run *r)
 {
     if (r->begun)
@@ -308,8 +308,8 @@ static int conclude(const run *r)
     return r->status == DRAPE_E_STOPPED ? CLI_INTERRUPTED : CLI_FAILED;
 }
 
-/* The folder of a run gets a copy of the scene as it was run. If the scene itself lies there under that name,
- * options that change it would overwrite the user's file. */
+/* The folder of a run gets a copy of the scene as it was run. If the scene itself is that file, options that
+ * change the scene would overwrite the user's file. */
 static int check_folder(const run_request *request)
 {
     const cli_command *command = &request->command;
@@ -318,7 +318,7 @@ static int check_folder(const run_request *request)
     return cli_misuse(command->verb,
                       "--out \"%.500s\": its " DRAPE_SCENE_COPY
                       " is the scene itself, and would be overwritten by the "
-                      "scene as it is changed here; choose another folder",
+                      "changed scene; choose another folder",
                       request->out);
 }
 
@@ -329,7 +329,7 @@ static int check_checkpoints(const run_request *request)
         return CLI_GO_ON;
     const char *option = request->resume ? "resume" : "checkpoint-every";
     if (!request->out)
-        return cli_misuse(verb, "--%s needs --out: a checkpoint lies in the folder of its run", option);
+        return cli_misuse(verb, "--%s needs --out: a checkpoint is in the folder of its run", option);
     if (request->realtime)
         return cli_misuse(verb, "--%s does not go with --realtime, whose steps depend on the clock", option);
     return CLI_GO_ON;

@@ -143,7 +143,7 @@ typedef struct run {
     double start; /* [s] of the clock */
 } run;
 
-/* By the number of simulations: a search takes several. */
+/* Progress counts simulations, as the search of a threshold takes several. */
 static void show_progress(run *r, size_t next)
 {
     double done = 0, left = 0;
@@ -188,8 +188,8 @@ static int conclude(const run *r, const validate_request *request, drape_status 
         done += counts[k];
     if (status == DRAPE_E_STOPPED) {
         fprintf(stderr, "interrupted: %d of %zu cases are done%s\n", done, r->count,
-                request->out ? "; the same command goes on"
-                             : "; with --out DIR the same command would go on");
+                request->out ? "; the same command resumes"
+                             : "; with --out DIR the same command would resume");
         return CLI_INTERRUPTED;
     }
     if (status)

@@ -361,7 +361,7 @@ static void on_key(window_view *w, int key, bool back)
     }
 }
 
-/* Of the nodes near the pointer that are not pinned, the one nearest to the eye; -1: none. */
+/* The node nearest to the eye of those near the pointer that are not pinned; -1: none. */
 static int32_t node_at(const window_view *w, double x, double y, float *depth)
 {
     const drape_view view = view_of(w);
@@ -533,7 +533,7 @@ static int show(window_view *w)
     if (w->request->size &&
         (sscanf(w->request->size, "%5dx%5d%c", &width, &height, &end) != 2 || width < 160 || height < 120 ||
          width > DRAPE_MAX_PICTURE || height > DRAPE_MAX_PICTURE))
-        return cli_misuse("view", "--size \"%.60s\": it is WIDTHxHEIGHT, from 160x120 to %d a side",
+        return cli_misuse("view", "--size \"%.60s\": must be WIDTHxHEIGHT, from 160x120 to %d a side",
                           w->request->size, DRAPE_MAX_PICTURE);
     int code = read_shade(w);
     if (code == CLI_GO_ON)
@@ -575,7 +575,8 @@ static const cli_option options[] = {
 };
 
 const drape_verb drape_verb_view = {
-    .entry = {.name = "view", .summary = "a window on a scene that runs: turn it, pull at it, change it"},
+    .entry = {.name = "view",
+              .summary = "a window on a running scene: turn the camera, drag nodes, change values"},
     .operand = "SCENE",
     .takes_scene = true,
     .details = "Opens a window, paused. Space runs and pauses, N makes one step, R starts again, Esc quits, "

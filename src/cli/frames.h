@@ -21,7 +21,7 @@ bool cli_is_folder(const char *path);
 
 typedef struct cli_source {
     const char *operand;
-    char label[80]; /* for the picture */
+    char label[80]; /* name shown in the picture */
     cli_scene in;
     drape_record run; /* of a folder; without frames: the scene is simulated */
     drape_reel reel;  /* filled by cli_source_fill */

@@ -33,7 +33,7 @@ typedef struct cli_info {
     cli_collider_info *colliders; /* likewise */
 } cli_info;
 
-/* What was chosen by name, an integrator or a controller, or contact. */
+/* A choice of the scene: an integrator, a controller, or contact. */
 typedef struct cli_chosen {
     const char *title, *name, *summary; /* "integrator", "be" */
     const drape_param *params;
@@ -46,7 +46,7 @@ typedef struct cli_chosen {
 #define CLI_CHOSEN 2
 void cli_chosen_entries(const drape_sim *sim, cli_chosen entries[CLI_CHOSEN]);
 
-/* Contact and self-contact as far as they are modelled, likewise. */
+/* Contact and self-contact, if they are modelled, in the same form. */
 typedef struct cli_contact_entries {
     int count;
     cli_chosen entries[2];
@@ -57,20 +57,20 @@ void cli_contact(const drape_sim *sim, cli_contact_entries *out);
 /* Whether the scene gave the parameter. */
 bool cli_is_given(const drape_choice *choice, const char *name);
 
-/* The text that the scene gave for a parameter; "" for none. */
+/* The text that the scene gave for a parameter; "" if none. */
 const char *cli_text_of(const drape_choice *choice, const char *name);
 
 /* A share of the residual, Jacobian, factor and solve of one Newton iteration [1]. */
 double cli_share(const cli_info *info, double seconds);
 
-/* What assembling takes beside the terms: clearing, masses. */
+/* The time of assembling besides the terms: clearing, masses. */
 double cli_other_residual_seconds(const cli_info *info);
 double cli_other_jacobian_seconds(const cli_info *info);
 
 void cli_info_text(const cli_info *info);    /* on stdout */
 json_t *cli_info_json(const cli_info *info); /* a new reference; NULL: out of memory */
 
-/* The grid of a cloth, with its values; NULL where its mesh is not a grid. */
+/* The grid of a cloth, with its values; NULL if its mesh is not a grid. */
 const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values);
 
 #endif

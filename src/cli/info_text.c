@@ -1,16 +1,16 @@
-/* info_text.c: `drape info` for people. Nothing is mentioned that the scene does not model: every mesh has
- * pairs of neighbouring triangles, for instance, but only the term that uses them names them. */
+/* info_text.c: `drape info` as text. It does not mention what the scene does not model: every mesh has pairs
+ * of neighbouring triangles, for instance, but only a term that uses them names them. */
 #include "cli/info.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_LISTED 12 /* that are listed by number */
+#define MAX_LISTED 12 /* nodes that are listed by number */
 
 /* ---- Scene and cloths ---- */
 
-/* Keys that have values of their own; a name stands where it is used. */
+/* Prints the keys that have a value, except names, which are printed where they are used. */
 static void print_keys(const char *indent, int width, const drape_scene_object *object, const void *def)
 {
     char value[256], usual[256];
@@ -228,7 +228,7 @@ static void print_terms(const cli_info *info)
     for (int32_t i = 0; i < info->model->term_count; i++)
         print_term(info, i);
     if (info->model->term_count == 0)
-        puts("  none: the nodes fly on as they began");
+        puts("  none: the nodes keep their velocities");
 }
 
 /* ---- Costs ---- */
@@ -273,10 +273,10 @@ static void print_solver(const cli_info *info)
     if (p->linear_why[0])
         printf("  linear_solver %s picks %s: %s\n", p->linear_solver, p->linear_picked, p->linear_why);
     if (p->linear_fallback[0])
-        printf("  the Jacobian there is not one for %s: %s factors it\n", p->linear_picked,
+        printf("  the Jacobian of the measured state is not suited to %s: %s factors it\n", p->linear_picked,
                p->linear_fallback);
     if (p->factor_status)
-        puts("  the Jacobian could not be factored there: what a step costs is not known");
+        puts("  the Jacobian of the measured state could not be factored: the cost of a step is not known");
 }
 
 static void print_costs(const cli_info *info)

@@ -31,7 +31,7 @@ static int read_shard(const cli_lab_request *request, drape_lab_def *def)
         return CLI_GO_ON;
     if (sscanf(text, "%d/%d%n", &def->shard, &def->shards, &used) != 2 || text[used] || def->shard < 1 ||
         def->shard > def->shards)
-        return cli_misuse(request->command.verb, "--shard \"%.60s\": it is I/N, with I from 1 to N, as 1/4",
+        return cli_misuse(request->command.verb, "--shard \"%.60s\": must be I/N, with I from 1 to N, as 1/4",
                           text);
     return CLI_GO_ON;
 }
@@ -45,12 +45,12 @@ static int read_levels(const cli_lab_request *request, drape_lab_def *def)
         return CLI_GO_ON;
     long number = strtol(text, &end, 10);
     if (end == text || *end || number < INT_MIN || number > INT_MAX)
-        return cli_misuse(request->command.verb, "--levels \"%.60s\": it is an integer, 3 to 12", text);
+        return cli_misuse(request->command.verb, "--levels \"%.60s\": must be an integer, 3 to 12", text);
     def->levels = (int)number;
     return CLI_GO_ON;
 }
 
-/* Fills the def; its texts and arrays are the request's or in the arena. */
+/* Fills the def; its texts and arrays are those of the request or in the arena. */
 static int make_def(const cli_lab_request *request, int default_jobs, drape_arena *arena, drape_lab_def *def)
 {
     const cli_command *command = &request->command;

@@ -20,7 +20,7 @@ typedef struct cli_lab_request {
         name, kind, argument, help, offsetof(cli_lab_request, member), max, NULL                             \
     }
 
-/* The options that all of them have. */
+/* The options that all experiments have. */
 #define CLI_LAB_OPTIONS                                                                                      \
     CLI_LAB_OPTION("out", CLI_TEXT, "DIR",                                                                   \
                    "folder for cases.jsonl, results.csv, pictures, report.html (default SCENE.VERB)", out,   \

@@ -9,8 +9,8 @@
 #include <stdio.h>
 #include <string.h>
 
-/* If the program is started with a standard descriptor closed, a file that is opened later would become the
- * standard output. The substitutes refuse what the descriptor is for, so that writing to it still fails. */
+/* If the program is started with a standard descriptor closed, a file that is opened later would become, say,
+ * the standard output. The substitutes that are opened here fail on use, as the closed descriptor does. */
 static void fill_descriptors(void)
 {
     static const int modes[] = {O_WRONLY, O_RDONLY, O_RDONLY};

@@ -12,7 +12,7 @@
 #include <string.h>
 
 #define MAX_OPTIONS 40
-#define FIRST_VALUE 256 /* what getopt_long returns for option 0: beyond all letters */
+#define FIRST_VALUE 256 /* the value that getopt_long returns for option 0: above all characters */
 #define HELP_VALUE  'h'
 
 /* The options of every verb that takes a scene. Those with a pointer are short forms of --set. */
@@ -120,7 +120,7 @@ static int add_pointer_and_value(cli_command *command, const cli_option *option,
 {
     const char *equals = strchr(argument, '=');
     if (*argument != '/' || !equals)
-        return cli_misuse(command->verb, "--%s \"%.60s\": it is /pointer=value, as /integrator/dt=0.001",
+        return cli_misuse(command->verb, "--%s \"%.60s\": must be /pointer=value, as /integrator/dt=0.001",
                           option->name, argument);
     char *pointer = drape_arena_text(command->arena, argument);
     if (pointer)
@@ -142,7 +142,7 @@ static int add_list(cli_command *command, const cli_option *option, const char *
     char *text = good ? json_dumps(array, JSON_COMPACT) : NULL;
     json_decref(array);
     if (!text)
-        return cli_misuse(command->verb, "--%s \"%.60s\": it is names separated by commas, in UTF-8",
+        return cli_misuse(command->verb, "--%s \"%.60s\": must be names separated by commas, in UTF-8",
                           option->name, argument);
     int code = add_setting(command, option, option->pointer, drape_arena_text(command->arena, text));
     free(text);
@@ -155,8 +155,8 @@ static int set_number(const cli_command *command, const cli_option *option, cons
     errno = 0;
     long number = strtol(argument, &end, 10);
     if (end == argument || *end || errno || number < 1 || number > option->max)
-        return cli_misuse(command->verb, "--%s \"%.60s\": it is an integer, 1 to %d", option->name, argument,
-                          option->max);
+        return cli_misuse(command->verb, "--%s \"%.60s\": must be an integer, 1 to %d", option->name,
+                          argument, option->max);
     *value = (int)number;
     return CLI_GO_ON;
 }
@@ -166,7 +166,7 @@ static int set_real(const cli_command *command, const cli_option *option, const 
     char *end;
     double number = strtod(argument, &end);
     if (end == argument || *end || !(number > 0 && number < 1e300))
-        return cli_misuse(command->verb, "--%s \"%.60s\": it is a number above 0", option->name, argument);
+        return cli_misuse(command->verb, "--%s \"%.60s\": must be a number above 0", option->name, argument);
     *value = number;
     return CLI_GO_ON;
 }
@@ -210,8 +210,8 @@ static int set_option(cli_command *command, const cli_option *option, const char
 
 /* ---- Command lines ---- */
 
-/* Handles what getopt_long returned. Only a repeatable option may be given twice: else the first value would
- * be lost silently. */
+/* Handles one result of getopt_long. Only a repeatable option may be given twice: otherwise the first value
+ * would be lost silently. */
 static int handle(const drape_verb *verb, option_list *list, int code, char **argv, cli_command *request)
 {
     if (code == HELP_VALUE) {

@@ -1,10 +1,7 @@
 /*
- * schema.c: see schema.h. As strict as the reader wherever a schema can say it. What it cannot say: that
- * times of a track increase, that names of cloths or colliders differ, that a term is named once, what one
- * parameter of a collider demands of another, and all that depends on a mesh.
- *
- * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere below ends
- * as a NULL at the top.
+ * schema.c: see schema.h. As strict as the reader, except where a schema cannot express a rule: that times of
+ * a track increase, that names of cloths or colliders differ, that a term is named once, how parameters of a
+ * collider depend on each other, and all rules that depend on a mesh.
  */
 #include "cli/schema.h"
 
@@ -12,6 +9,7 @@
 #include "compile/compile.h"
 #include "control/control.h"
 #include "io/export.h"
+#include "io/json.h"
 #include "model/scene.h"
 #include "terms/terms.h"
 
@@ -21,73 +19,56 @@
 
 /* ---- Small pieces ---- */
 
-/* Takes both references. The container, or NULL if it or the value is not there. */
-static json_t *with(json_t *object, const char *key, json_t *value)
-{
-    if (json_object_set_new(object, key, value) == 0)
-        return object;
-    json_decref(object);
-    return NULL;
-}
-
-static json_t *and_also(json_t *array, json_t *value)
-{
-    if (json_array_append_new(array, value) == 0)
-        return array;
-    json_decref(array);
-    return NULL;
-}
-
 static json_t *typed(const char *type)
 {
-    return with(json_object(), "type", json_string(type));
+    return drape_json_with(json_object(), "type", json_string(type));
 }
 
-/* 3 rather than 3.0 where it is the same. */
+/* An integer if the value is one: 3 rather than 3.0. */
 static json_t *number(double value)
 {
     return value == floor(value) && fabs(value) < 1e15 ? json_integer((json_int_t)value) : json_real(value);
 }
 
-static json_t *array_of(json_t *items, size_t least, size_t most)
+static json_t *array_of(json_t *items, size_t min, size_t max)
 {
-    json_t *array = with(typed("array"), "items", items);
-    if (least)
-        array = with(array, "minItems", json_integer((json_int_t)least));
-    return most ? with(array, "maxItems", json_integer((json_int_t)most)) : array;
+    json_t *array = drape_json_with(typed("array"), "items", items);
+    if (min)
+        array = drape_json_with(array, "minItems", json_integer((json_int_t)min));
+    return max ? drape_json_with(array, "maxItems", json_integer((json_int_t)max)) : array;
 }
 
-static json_t *numbers(size_t least, size_t most)
+static json_t *numbers(size_t min, size_t max)
 {
-    return array_of(typed("number"), least, most);
+    return array_of(typed("number"), min, max);
 }
 
 static json_t *any_of(json_t *a, json_t *b)
 {
-    return with(json_object(), "anyOf", and_also(and_also(json_array(), a), b));
+    return drape_json_with(json_object(), "anyOf", drape_json_append(drape_json_append(json_array(), a), b));
 }
 
 static json_t *word(void)
 {
-    return with(typed("string"), "minLength", json_integer(1));
+    return drape_json_with(typed("string"), "minLength", json_integer(1));
 }
 
 static json_t *words(const char *const *names)
 {
     json_t *array = json_array();
     for (int i = 0; names[i]; i++)
-        array = and_also(array, json_string(names[i]));
+        array = drape_json_append(array, json_string(names[i]));
     return array;
 }
 
 static json_t *one_of_words(const char *const *names)
 {
-    return with(json_object(), "enum", words(names));
+    return drape_json_with(json_object(), "enum", words(names));
 }
 
 static json_t *that_requires(json_t *names)
 {
-    return with(json_object(), "required", names);
+    return drape_json_with(json_object(), "required", names);
 }
 
 /* { "required": [name] } for each name. */
@@ -95,19 +76,21 @@ static json_t *each_required(const char *const *names)
 {
     json_t *cases = json_array();
     for (int i = 0; names[i]; i++)
-        cases = and_also(cases, that_requires(and_also(json_array(), json_string(names[i]))));
+        cases =
+            drape_json_append(cases, that_requires(drape_json_append(json_array(), json_string(names[i]))));
     return cases;
 }
 
 static json_t *exactly_one(json_t *object, const char *const *names)
 {
-    return with(object, "oneOf", each_required(names));
+    return drape_json_with(object, "oneOf", each_required(names));
 }
 
 static json_t *at_most_one(json_t *object, const char *const *names)
 {
-    json_t *none = with(json_object(), "not", with(json_object(), "anyOf", each_required(names)));
-    return with(object, "oneOf", and_also(each_required(names), none));
+    json_t *none =
+        drape_json_with(json_object(), "not", drape_json_with(json_object(), "anyOf", each_required(names)));
+    return drape_json_with(object, "oneOf", drape_json_append(each_required(names), none));
 }
 
 /* All of the keys, or none. */
@@ -115,16 +98,17 @@ static json_t *all_or_none(json_t *object, const char *const *names)
 {
     json_t *dependents = json_object();
     for (int i = 0; names[i]; i++)
-        dependents = with(dependents, names[i], words(names));
-    return with(object, "dependentRequired", dependents);
+        dependents = drape_json_with(dependents, names[i], words(names));
+    return drape_json_with(object, "dependentRequired", dependents);
 }
 
 /* ---- Parameters and keys ---- */
 
 static json_t *three(const double *values)
 {
-    return and_also(and_also(and_also(json_array(), number(values[0])), number(values[1])),
-                    number(values[2]));
+    return drape_json_append(
+        drape_json_append(drape_json_append(json_array(), number(values[0])), number(values[1])),
+        number(values[2]));
 }
 
 static json_t *default_of(const drape_param *p, const double *values)
@@ -150,9 +134,10 @@ static json_t *bounded(const char *type, const drape_param *p)
 {
     json_t *value = typed(type);
     if (isfinite(p->min))
-        value = with(value, p->open_min ? "exclusiveMinimum" : "minimum", number(p->min));
-    return isfinite(p->max) ? with(value, p->open_max ? "exclusiveMaximum" : "maximum", number(p->max))
-                            : value;
+        value = drape_json_with(value, p->open_min ? "exclusiveMinimum" : "minimum", number(p->min));
+    return isfinite(p->max)
+               ? drape_json_with(value, p->open_max ? "exclusiveMaximum" : "maximum", number(p->max))
+               : value;
 }
 
 static json_t *vector_of(const drape_param *p)
@@ -165,7 +150,7 @@ static json_t *value_of(const drape_param *p)
 {
     switch (p->kind) {
     case DRAPE_PARAM_BOOLEAN: /* the reader takes numbers too */
-        return with(json_object(), "enum", json_pack("[bbii]", 1, 0, 1, 0));
+        return drape_json_with(json_object(), "enum", json_pack("[bbii]", 1, 0, 1, 0));
     case DRAPE_PARAM_CHOICE:
         return one_of_words(p->choices);
     case DRAPE_PARAM_TEXT:
@@ -190,12 +175,13 @@ static json_t *described(json_t *value, const drape_scene_key *key)
     const bool has_unit = strcmp(p->unit, "1") != 0;
     snprintf(text, sizeof text, "%s%s%s%s", p->help, has_unit ? " [" : "", has_unit ? p->unit : "",
              has_unit ? "]" : "");
-    value = with(value, "description", json_string(text));
+    value = drape_json_with(value, "description", json_string(text));
     drape_param_default(p, defaults);
     if (isnan(*defaults) && !key->literal)
         return value;
     json_t *one = default_of(p, key->vector ? key->vector : defaults);
-    return with(value, "default", key->shape == DRAPE_SCENE_LIST ? and_also(json_array(), one) : one);
+    return drape_json_with(value, "default",
+                           key->shape == DRAPE_SCENE_LIST ? drape_json_append(json_array(), one) : one);
 }
 
 static json_t *param(const drape_param *p)
@@ -209,13 +195,13 @@ static json_t *with_param(json_t *properties, const drape_param *p)
 {
     json_t *schema = param(p), *before = json_object_get(properties, p->name);
     if (!before)
-        return with(properties, p->name, schema);
+        return drape_json_with(properties, p->name, schema);
     if (json_equal(before, schema)) {
         json_decref(schema);
         return properties;
     }
-    json_t *both = and_also(and_also(json_array(), json_incref(before)), schema);
-    return with(properties, p->name, with(json_object(), "allOf", both));
+    json_t *both = drape_json_append(drape_json_append(json_array(), json_incref(before)), schema);
+    return drape_json_with(properties, p->name, drape_json_with(json_object(), "allOf", both));
 }
 
 static json_t *with_params(json_t *properties, const drape_entry *entry)
@@ -237,7 +223,7 @@ static json_t *with_required(json_t *required, const drape_entry *entry)
 {
     for (int i = 0; i < entry->param_count; i++)
         if (drape_param_is_required(&entry->params[i]))
-            required = and_also(required, json_string(entry->params[i].name));
+            required = drape_json_append(required, json_string(entry->params[i].name));
     return required;
 }
 
@@ -254,11 +240,11 @@ static json_t *entry_names(const drape_registry *table, bool alone)
     const drape_entry *entry;
     for (int i = 0; (entry = table->entries[i]) != NULL; i++)
         if (!is_implied(table, i) && !(alone && needs_params(entry)))
-            names = and_also(names, json_string(entry->name));
-    return with(json_object(), "enum", names);
+            names = drape_json_append(names, json_string(entry->name));
+    return drape_json_with(json_object(), "enum", names);
 }
 
-/* ---- Which tables stand where in a scene ---- */
+/* ---- Where a scene names entries of tables ---- */
 
 typedef enum opening_kind {
     ENTRY_PARAMS, /* the parameters of the named entry, and no others */
@@ -322,15 +308,16 @@ static json_t *key_value(const drape_scene_object *object, const drape_scene_key
     case DRAPE_SCENE_LIST:
         return array_of(names_of(object, key), key->at_least, key->at_most);
     case DRAPE_SCENE_VERSION:
-        return with(json_object(), "const", json_integer(DRAPE_SCENE_FORM));
+        return drape_json_with(json_object(), "const", json_integer(DRAPE_SCENE_FORM));
     case DRAPE_SCENE_REMARK:
         return typed("string");
     case DRAPE_SCENE_BOX:
         return array_of(numbers(3, 3), 2, 2);
     case DRAPE_SCENE_TRACK: {
-        json_t *pair = and_also(and_also(json_array(), typed("number")), numbers(3, 3));
-        json_t *item = with(with(typed("array"), "prefixItems", pair), "minItems", json_integer(2));
-        return array_of(with(item, "maxItems", json_integer(2)), key->at_least, key->at_most);
+        json_t *pair = drape_json_append(drape_json_append(json_array(), typed("number")), numbers(3, 3));
+        json_t *item = drape_json_with(drape_json_with(typed("array"), "prefixItems", pair), "minItems",
+                                       json_integer(2));
+        return array_of(drape_json_with(item, "maxItems", json_integer(2)), key->at_least, key->at_most);
     }
     case DRAPE_SCENE_OBJECT:
         return object_schema(key->child);
@@ -354,7 +341,7 @@ static bool key_is_required(const drape_scene_key *key)
 
 /* ---- Objects ---- */
 
-/* Whether a key is an alternative to another one, which was chosen. */
+/* Whether a key is excluded because an alternative to it was chosen. */
 static bool is_excluded(const drape_scene_object *object, const char *name, const char *chosen)
 {
     for (int i = 0; chosen && object->one_of && object->one_of[i]; i++)
@@ -369,7 +356,7 @@ static json_t *properties_of(const drape_scene_object *object, const char *chose
     for (size_t i = 0; i < object->key_count; i++) {
         const drape_scene_key *key = &object->keys[i];
         if (!is_excluded(object, key->param.name, chosen))
-            properties = with(properties, key->param.name, described(key_value(object, key), key));
+            properties = drape_json_with(properties, key->param.name, described(key_value(object, key), key));
     }
     return properties;
 }
@@ -379,43 +366,44 @@ static json_t *required_of(const drape_scene_object *object)
     json_t *required = json_array();
     for (size_t i = 0; i < object->key_count; i++)
         if (key_is_required(&object->keys[i]))
-            required = and_also(required, json_string(object->keys[i].param.name));
+            required = drape_json_append(required, json_string(object->keys[i].param.name));
     return required;
 }
 
 /* Takes both references. */
 static json_t *closed(json_t *properties, json_t *required)
 {
-    json_t *object = with(typed("object"), "properties", properties);
+    json_t *object = drape_json_with(typed("object"), "properties", properties);
     if (json_array_size(required) > 0)
-        object = with(object, "required", json_incref(required));
+        object = drape_json_with(object, "required", json_incref(required));
     json_decref(required);
-    return with(object, "additionalProperties", json_false());
+    return drape_json_with(object, "additionalProperties", json_false());
 }
 
 /* An object in which `key` names the entry. */
 static json_t *entry_schema(const drape_scene_object *object, const char *key, const drape_entry *entry)
 {
-    json_t *name = with(with(json_object(), "const", json_string(entry->name)), "description",
-                        json_string(entry->summary));
-    json_t *properties = with(properties_of(object, key), key, name);
+    json_t *name = drape_json_with(drape_json_with(json_object(), "const", json_string(entry->name)),
+                                   "description", json_string(entry->summary));
+    json_t *properties = drape_json_with(properties_of(object, key), key, name);
     json_t *required = required_of(object);
     bool named = false;
     for (size_t i = 0; i < json_array_size(required); i++)
         named = named || strcmp(json_string_value(json_array_get(required, i)), key) == 0;
     if (!named)
-        required = and_also(required, json_string(key));
+        required = drape_json_append(required, json_string(key));
     return closed(with_params(properties, entry), with_required(required, entry));
 }
 
-/* Without the key that opens the object: one of its alternatives. */
+/* Adds the forms that have, instead of the key that opens the object, one of its alternatives. */
 static json_t *with_closed_forms(json_t *forms, const drape_scene_object *object)
 {
     for (int i = 0; object->open_with && object->one_of && object->one_of[i]; i++) {
         const char *name = object->one_of[i];
         if (strcmp(name, object->open_with) != 0)
-            forms = and_also(
-                forms, closed(properties_of(object, name), and_also(required_of(object), json_string(name))));
+            forms =
+                drape_json_append(forms, closed(properties_of(object, name),
+                                                drape_json_append(required_of(object), json_string(name))));
     }
     return forms;
 }
@@ -426,8 +414,8 @@ static json_t *entries_schema(const drape_scene_object *object, const struct ope
     const drape_entry *entry;
     for (int i = 0; (entry = opening->table->entries[i]) != NULL; i++)
         if (!is_implied(opening->table, i))
-            forms = and_also(forms, entry_schema(object, opening->key, entry));
-    return with(json_object(), "anyOf", with_closed_forms(forms, object));
+            forms = drape_json_append(forms, entry_schema(object, opening->key, entry));
+    return drape_json_with(json_object(), "anyOf", with_closed_forms(forms, object));
 }
 
 /* Parameters of all entries of the table; for a table of one entry without a name, its own. */
@@ -443,16 +431,19 @@ static json_t *table_schema(const drape_scene_object *object, const struct openi
     return closed(properties, required);
 }
 
-/* The first choice of the preset says that there is none. */
+/* The first choice of the preset, "none", means that no preset is used. */
 static json_t *with_preset(json_t *schema, const struct opening *opening)
 {
-    json_t *none = with(json_object(), "const", json_string("none"));
-    json_t *word = with(json_object(), opening->preset, with(json_object(), "not", none));
-    json_t *named =
-        with(that_requires(and_also(json_array(), json_string(opening->preset))), "properties", word);
-    schema = with(schema, "if", named);
-    schema = with(schema, "then", all_or_none(at_most_one(json_object(), opening->one_of), opening->all_of));
-    return with(schema, "else", exactly_one(that_requires(words(opening->all_of)), opening->one_of));
+    json_t *none = drape_json_with(json_object(), "const", json_string("none"));
+    json_t *word =
+        drape_json_with(json_object(), opening->preset, drape_json_with(json_object(), "not", none));
+    json_t *named = drape_json_with(
+        that_requires(drape_json_append(json_array(), json_string(opening->preset))), "properties", word);
+    schema = drape_json_with(schema, "if", named);
+    schema = drape_json_with(schema, "then",
+                             all_or_none(at_most_one(json_object(), opening->one_of), opening->all_of));
+    return drape_json_with(schema, "else",
+                           exactly_one(that_requires(words(opening->all_of)), opening->one_of));
 }
 
 static json_t *object_schema(const drape_scene_object *object)
@@ -471,8 +462,8 @@ static json_t *object_schema(const drape_scene_object *object)
 json_t *cli_schema(void)
 {
     json_t *schema = json_object();
-    schema = with(schema, "$schema", json_string("https://json-schema.org/draft/2020-12/schema"));
-    schema = with(schema, "title", json_string("A scene of Drape"));
+    schema = drape_json_with(schema, "$schema", json_string("https://json-schema.org/draft/2020-12/schema"));
+    schema = drape_json_with(schema, "title", json_string("A scene of Drape"));
     json_t *form = object_schema(&drape_form_scene);
     if (form && schema)
         json_object_update(schema, form);

@@ -1,4 +1,4 @@
-/* signals.h: Ctrl-C, SIGTERM and SIGHUP as a request to stop, which all stages of a verb check. */
+/* signals.h: Ctrl-C, SIGTERM and SIGHUP request a stop, which all stages of a verb check for. */
 #ifndef DRAPE_CLI_SIGNALS_H
 #define DRAPE_CLI_SIGNALS_H
 
@@ -15,8 +15,8 @@ bool cli_interrupted(void);
  * completes. */
 void cli_signals_cancel(drape_sim *sim);
 
-/* Whether a signal interrupts a waiting open or read, as of a scene from a pipe. Writes must not be
- * interrupted. */
+/* Sets whether a signal interrupts a blocking open or read, as when a scene comes from a pipe. Writes must
+ * not be interrupted. */
 void cli_signals_end_waits(bool end);
 
 /* Prints the line "drape run: interrupted" on stderr. Returns CLI_INTERRUPTED. */

@@ -18,7 +18,8 @@
 
 #define MAX_FABRICS 64
 
-/* What was published, as drape_fabric has it, and what is derived where nothing was. */
+/* The published values of a fabric, as drape_fabric has them, and derived ones in place of those not
+ * published. */
 static void describe(const drape_fabric *f, char *text, size_t size)
 {
     drape_woven tension, bending;
@@ -33,7 +34,7 @@ static void describe(const drape_fabric *f, char *text, size_t size)
     snprintf(text + used, size - (size_t)used, isnan(f->drape) ? "" : "; drape coefficient %.3g", f->drape);
 }
 
-/* Their summaries are made of numbers, so cli_tables fills in the entries. */
+/* The summaries of fabrics are made from numbers, so cli_tables fills in the entries. */
 static const drape_entry *fabrics[MAX_FABRICS + 1];
 static const drape_registry fabric_registry = {
     "fabric", "fabrics", "Measured fabrics", "\"fabric\" of a material", fabrics, NULL};
@@ -51,7 +52,7 @@ const drape_registry *const *cli_tables(void)
 {
     static char summaries[MAX_FABRICS][256];
     static drape_entry entries[MAX_FABRICS];
-    for (int i = 0; i < MAX_FABRICS && drape_fabrics[i + 1].name; i++) { /* the first is none */
+    for (int i = 0; i < MAX_FABRICS && drape_fabrics[i + 1].name; i++) { /* the first fabric is "none" */
         const drape_fabric *f = &drape_fabrics[i + 1];
         describe(f, summaries[i], sizeof summaries[i]);
         entries[i] = (drape_entry){.name = f->name, .summary = summaries[i], .reference = f->source};

@@ -285,7 +285,7 @@ bool view_move(cli_view *v, const double by[3])
     double to[3];
     if (v->movable_count == 0)
         return commit(v, DRAPE_OK, 0, "colliders and pins");
-    list_movables(v); /* where their tracks have them now: they may be moving */
+    list_movables(v); /* where their tracks have them now, as they may be moving */
     const view_movable m = v->movables[v->moved];
     for (int k = 0; k < 3; k++)
         to[k] = m.displacement[k] + by[k];

@@ -7,7 +7,7 @@
 
 #define VIEW_MOVABLES 64
 
-/* A collider, or one of the pins of the scene. */
+/* A collider or a pin of the scene that keys can move. */
 typedef struct view_movable {
     char pointer[64]; /* of its track */
     char name[64];

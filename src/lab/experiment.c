@@ -142,9 +142,9 @@ static drape_status plan(lab *l)
     return l->experiment->plan(l);
 }
 
-/* Refuses settings that no case takes from the scene: who sets dt for a tradeoff expects runs at that dt, and
- * would get a grid of dt. A case takes no setting that it has a value of its own for, or that its integrator
- * ignores. */
+/* Refuses settings that no case takes from the scene: a user who sets dt for a tradeoff expects runs at that
+ * dt, but would get a grid of dt. A case ignores a setting for which it has its own value or which its
+ * integrator ignores. */
 static drape_status check_settings(lab *l)
 {
     for (size_t i = 0; i < l->def->setting_count; i++) {
@@ -206,8 +206,8 @@ static drape_status parse_about(lab *l, const char *folder, json_t **about)
                                fault.column, fault.text);
 }
 
-/* Gives the folder this experiment, or goes on with it where the folder has it. Shards that begin at once in
- * one folder all write the same: each under a name of its own, renamed when it is complete. */
+/* Writes the experiment into the folder, or resumes it if the folder has it. Shards that begin in one folder
+ * at the same time write the same content, each to a file of its own that is renamed when complete. */
 static drape_status claim_folder(lab *l)
 {
     char own[64], from[4200], to[4200];
@@ -238,7 +238,7 @@ static drape_status claim_folder(lab *l)
     return !status && rename(from, to) ? drape_file_fail(l->ctx, "write", to, errno) : status;
 }
 
-/* Reads earlier results, and makes what cases are compared with. */
+/* Reads earlier results, and makes the reference that cases are compared with. */
 static drape_status prepare(lab *l)
 {
     l->input_is_good = false;
@@ -246,11 +246,11 @@ static drape_status prepare(lab *l)
     l->input_is_good = !status;
     if (!status && l->experiment->prepare)
         status = l->experiment->prepare(l);
-    if (status && status != DRAPE_E_STOPPED && l->claimed) { /* no case will run: the folder is given back */
+    if (status && status != DRAPE_E_STOPPED && l->claimed) { /* no case will run: removes the folder */
         char path[4200];
         snprintf(path, sizeof path, "%s/" ABOUT, l->folder);
         remove(path);
-        rmdir(l->folder); /* fails where there is anything else in it */
+        rmdir(l->folder); /* fails if there is anything else in it */
     }
     return status;
 }
@@ -307,7 +307,7 @@ static drape_status begin(drape_context *ctx, const drape_lab_def *def, const ch
     return l->folder && l->summary && l->page ? DRAPE_OK : drape_fail(ctx, DRAPE_E_MEMORY, "no memory");
 }
 
-/* The summary becomes the outcome's. */
+/* The outcome takes over the summary. */
 static void end(lab *l)
 {
     if (l->summary)
@@ -339,13 +339,13 @@ static drape_status check_def(drape_context *ctx, const drape_lab_def *def)
     if (!def->scene || !def->folder || !*def->folder)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "an experiment needs a scene and a folder");
     if (def->shards < 1 || def->shard < 1 || def->shard > def->shards)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "shard %d of %d: it is 1 to the number of shards",
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "shard %d of %d: must be 1 to the number of shards",
                           def->shard, def->shards);
     if (def->jobs < 1 || def->jobs > 256)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "jobs = %d; it is 1 to 256", def->jobs);
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "jobs = %d; must be 1 to 256", def->jobs);
     if (!(def->case_seconds > 0) || def->repeats < 1 || !(def->strain_limit > 0))
         return drape_fail(ctx, DRAPE_E_ARGUMENT,
-                          "case_seconds, repeats and strain_limit are more than 0: %g, %d, %g",
+                          "case_seconds, repeats and strain_limit must be above 0: %g, %d, %g",
                           def->case_seconds, def->repeats, def->strain_limit);
     return DRAPE_OK;
 }

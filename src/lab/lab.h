@@ -3,9 +3,10 @@
  * and reports. Cases and results are JSON from the start, as in the files: a report is a function of
  * experiment.json and of the lines, so results of other machines or earlier runs need no exception.
  *
- *     experiment.json   {"experiment", "drape", "scene", "scene_hash", "settings", "arguments", "cases": [case...]}
- *     case              {"tags": {what it is called}, "settings": {pointer: value}}, and "same_as": N where the
- *                       integrator ignores what distinguishes it from case N
+ *     experiment.json   {"experiment", "drape", "scene", "scene_hash", "settings", "arguments",
+ *                        "cases": [case...]}
+ *     case              {"tags": {names and values that identify it}, "settings": {pointer: value}}, and
+ *                       "same_as": N if the integrator ignores all that distinguishes it from case N
  *     cases.jsonl       a result a line: {"case": N, "tags": {...}, "status": ..., what was measured}
  */
 #ifndef DRAPE_LAB_LAB_H
@@ -53,7 +54,7 @@ struct lab {
     json_t *cases, *arguments; /* borrowed from it */
     json_t **results;          /* one a case, owned; NULL: not there yet */
     size_t count;              /* of cases */
-    lab_trace reference;       /* what cases are compared with; no frames: nothing */
+    lab_trace reference;       /* the motion that cases are compared with; no frames: none */
     double reference_error;    /* [m] RMS at the end: its distance from the next less accurate one */
     lab_probe probe;           /* where final positions are taken; no points: nowhere */
     FILE *summary;             /* sentences for the terminal and the head of the page, one a line */
@@ -70,16 +71,16 @@ drape_status lab_add_case(lab *l, json_t *tags, json_t *settings, int64_t same_a
 /* A number or text of an object; NaN and "" where there is none. */
 double lab_number(const json_t *object, const char *key);
 const char *lab_text(const json_t *object, const char *key);
-/* The same of its tags. */
+/* The same for its tags. */
 double lab_tag_number(const json_t *result, const char *key);
 const char *lab_tag_text(const json_t *result, const char *key);
 json_t *lab_real(double value); /* null where it is not finite: JSON has no NaN and no infinity */
 
-bool lab_is_good(const json_t *result); /* it completed */
+bool lab_is_good(const json_t *result); /* whether the run completed */
 
 const drape_integrator_ops *lab_find_integrator(const char *name); /* NULL: there is none */
 
-/* Whether the integrators that the def names contain it; where it names none, fallback. */
+/* Whether the integrators that the def names include this one; fallback if it names none. */
 bool lab_wants_integrator(const lab *l, const char *name, bool fallback);
 
 /* Faults of the def: an integrator that does not exist, or that has no steps in time. */

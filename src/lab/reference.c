@@ -82,7 +82,7 @@ static drape_status save(lab *l, const sequence *s, bool chosen, const level *la
     json_t *about = json_pack("{s:s, s:s, s:f, s:o, s:I, s:I, s:s, s:i, s:f, s:f}", "method", s->method,
                               "knob", s->knob, "value", last->knob, "error_m", lab_real(last->error),
                               "frames", (json_int_t)trace->frames, "size", (json_int_t)trace->size, "format",
-                              FORMAT, "rungs", last->count, "took_s", last->took, "spent_s", last->spent);
+                              FORMAT, "levels", last->count, "took_s", last->took, "spent_s", last->spent);
     char *text = about ? json_dumps(about, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;
     name_file(l, chosen ? NULL : s, "json", name);
     if (!status)
@@ -111,7 +111,7 @@ static bool read_saved(lab *l, const sequence *s, level *last)
         *last = (level){.trace = {size, frames, frames, (double *)(void *)data},
                         .error = isnan(error) ? INFINITY : error,
                         .knob = lab_number(about, "value"),
-                        .count = (int)json_integer_value(json_object_get(about, "rungs")),
+                        .count = (int)json_integer_value(json_object_get(about, "levels")),
                         .took = lab_number(about, "took_s"),
                         .spent = lab_number(about, "spent_s")};
     }

@@ -10,7 +10,9 @@
 
 #define UNSTABLE .unit = "1", .measure = lab_unstable_modes
 
-/* ---- An upright strip, clamped at its foot, under its weight: here it lies along x, and gravity is along -x ---- */
+/* ---- An upright strip clamped at its foot, under its weight ---- */
+
+/* The scene has it along x, with gravity along -x. */
 
 /* theta'' + G t theta = 0: Greenhill 1881. */
 static double greenhill(double unused)
@@ -101,13 +103,16 @@ DRAPE_REFERENCE(lateral_buckling_hinges, .entry.summary = "rho g L^3/D at which 
                 .scene = hinges_scene, .low = 0.85, .high = 1.15);
 
 /* ---- A pushed strip ----
- * A strip clamped upright above a table is pushed down on it by a share of its length. It buckles; its end stays below the
- * clamp as long as friction holds it there, and slips if the coefficient of friction is below the ratio of the forces at the
- * end (Sano, Yamaguchi & Wada 2017, Slip morphology of elastic strips on frictional rigid substrates). With s from the
- * clamp, the angle theta from the vertical, and N and f the forces of the table times L^2/B,
- *     theta'' = -(N sin theta + f cos theta),  theta(0) = theta'(1) = 0,  int cos theta = 1 - share,  int sin theta = 0
- * and the threshold is f/N. The strip has no weight and, except during the push, no inertia; a sideways pull of 1e-3 of the
- * buckling load determines to which side it goes. */
+ *
+ * A strip clamped upright above a table is pushed down on it by a share of its length. It buckles; its end
+ * stays below the clamp as long as friction holds it there, and slips if the coefficient of friction is below
+ * the ratio of the forces at the end (Sano, Yamaguchi & Wada 2017, Slip morphology of elastic strips on
+ * frictional rigid substrates). With s from the clamp, the angle theta from the vertical, and N and f the
+ * forces of the table times L^2/B,
+ *     theta'' = -(N sin theta + f cos theta),  theta(0) = theta'(1) = 0,
+ *     int cos theta = 1 - share,  int sin theta = 0
+ * and the threshold is f/N. The strip has no weight and, except during the push, no inertia; a sideways pull
+ * of 1e-3 of the buckling load determines to which side it goes. */
 
 #define RIGIDITY  1.0 /* B [N m] */
 #define THICKNESS 0.02

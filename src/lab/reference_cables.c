@@ -9,7 +9,9 @@
 #define GRAVITY 9.81
 #define PI      3.14159265358979323846
 
-/* ---- The sag of a strip of length 1.2 m between two ends 1 m apart; the right end is brought from 1.2 m ---- */
+/* ---- The sag of a strip of length 1.2 m between ends 1 m apart ---- */
+
+/* The right end starts at 1.2 m and is moved to 1 m. */
 
 #define SPAN   1.0
 #define LENGTH 1.2
@@ -62,9 +64,10 @@ DRAPE_REFERENCE(catenary, .entry.summary = "sag of 1.2 m over a span of 1 m", .u
                 .expected = sag, .scene = catenary_scene, .measure = measure_sag);
 
 /* ---- Frequencies of a hanging chain of 1 m ----
- * From equilibrium the strip is started with the velocity of a mode; how long two of its periods take is read off the
- * crossings of the mode. Steps are 1/200 of a period: the implicit midpoint rule is slow by (2 pi/200)^2/12 = 8e-5; the
- * strip is 0.05 % longer than at rest. */
+ *
+ * The strip starts from equilibrium with the velocity of a mode; the zero crossings of the mode's amplitude
+ * give the time of two periods. Steps are 1/200 of a period: the implicit midpoint rule is slow by (2
+ * pi/200)^2/12 = 8e-5. The strip is 0.05 % longer than at rest. */
 
 #define STEPS 200  /* of a period */
 #define SPEED 1e-2 /* [m/s] of the free end */

@@ -13,9 +13,10 @@
 #define OUTER   0.15
 #define GRAVITY 9.81
 
-/* ---- So stiff that it hardly bends ----
- * A plate between two circles, clamped at the inner, free at the outer, under its weight q. With r over the outer radius a,
- * and b the inner radius over a,
+/* ---- A specimen so stiff that it hardly bends ----
+ *
+ * A plate between two circles, clamped at the inner one, free at the outer one, under its weight q. With r in
+ * units of the outer radius a, and b the inner radius over a,
  *     w D/(q a^4) = r^4/64 + c1 + c2 ln r + c3 r^2 + c4 r^2 ln r,
  *     w = w' = 0 at b;  w'' + nu w'/r = 0 and (w'' + w'/r)' = 0 at 1
  * (Timoshenko & Woinowsky-Krieger 1959, Theory of Plates and Shells, 3). */

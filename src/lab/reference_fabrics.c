@@ -25,8 +25,9 @@ static drape_woven tension_of(double place)
 }
 
 /* ---- ASTM D1388: the angle of the chord to the end of a strip pushed over an edge ----
- * A strip of twice the bending length (B/(rho g))^(1/3), that is G = rho g L^3/B = 8, has its chord at 41.5 degrees; by the
- * rod at 41.487. */
+ *
+ * A strip of twice the bending length (B/(rho g))^(1/3), that is G = rho g L^3/B = 8, has its chord at 41.5
+ * degrees; the rod gives 41.487. */
 
 static double chord(double unused)
 {
@@ -72,6 +73,7 @@ DRAPE_REFERENCE(fabric_weft, CANTILEVER, .entry.summary = "angle of the chord of
                 .scene = weft_cantilever);
 
 /* ---- The lengthening of a strip of 1 m that hangs from its upper edge, under its weight or a pull ----
+ *
  * By stretch.cst a stretch l is S = K (l^2 - 1)/2, so the force per width is K l (l^2 - 1)/2. */
 
 #define WIDTH   0.02 /* [m]: the fixed edge keeps some widths of the strip from narrowing */
@@ -168,9 +170,11 @@ DRAPE_REFERENCE(hanging, HUNG, .entry.summary = "lengthening of a strip of 1 m, 
                 .entry.reference = "K l (l^2 - 1)/2 = rho g s; the fabric's own", .expected = hanging,
                 .scene = hanging_scene);
 
-/* ---- The shear stiffness of a square whose lower edge is moved along the upper one by gamma ----
- * Its energy is A (shear gamma^2/2 + C22 gamma^4/8), C22 of the direction across, so 2 E/(A gamma^2) is the shear stiffness
- * and C22 gamma^2/4, a quarter of 1e4 N/m times 1e-6 at most: 7e-5 of the softest shear beside it. */
+/* ---- The shear stiffness of a square whose lower edge is moved parallel to the upper one by gamma ----
+ *
+ * The energy is A (shear gamma^2/2 + C22 gamma^4/8), with the tension stiffness C22 of the direction across,
+ * so 2 E/(A gamma^2) is the shear stiffness plus an error of C22 gamma^2/4: at most a quarter of 1e4 N/m
+ * times 1e-6, which is 7e-5 of the softest shear stiffness beside it. */
 
 #define GAMMA 1e-3
 

@@ -17,7 +17,9 @@
     "'gravity': [%.17g, %.17g, 0], 'colliders': [{'type': 'plane', 'point': [0, 0, 0], "                     \
     "'normal': [0, 1, 0], 'friction': %.17g}],\n "
 
-/* ---- The friction above which a sheet stays on a slope: the slope is gravity's, the table is horizontal ---- */
+/* ---- The friction above which a sheet stays on a slope ---- */
+
+/* The table is horizontal, and gravity is tilted. */
 
 #define CREEP 1e-4 /* [m/s] friction_velocity: a sheet that stays creeps more slowly */
 
@@ -55,8 +57,9 @@ DRAPE_REFERENCE(friction_slope, .entry.summary = "friction above which a sheet s
                 .scene = slope_scene, .measure = measure_stays, .low = 0.9, .high = 1.1);
 
 /* ---- A pushed sheet slides until friction has stopped it, after v0^2/(2 mu g) ----
- * Below friction_velocity, 1e-3 of v0, friction is smoothed: that adds about (1e-3)^2 of the distance. At the start the
- * barrier of the table is in equilibrium with the weight. */
+ *
+ * Below friction_velocity, 1e-3 of v0, friction is smoothed, which adds about (1e-3)^2 of the distance. At
+ * the start the barrier of the table is in equilibrium with the weight. */
 
 #define SPEED 1.0 /* [m/s] v0 */
 
@@ -98,8 +101,8 @@ static drape_status measure_slide(drape_reference_run *run, double *value)
     return status;
 }
 
-DRAPE_REFERENCE(friction_slide, .entry.summary = "way of a pushed sheet until it stands", .unit = "m",
-                .parameter = "mu", DRAPE_CASES(0.1, 0.3, 0.8),
+DRAPE_REFERENCE(friction_slide, .entry.summary = "distance that a pushed sheet slides until it stops",
+                .unit = "m", .parameter = "mu", DRAPE_CASES(0.1, 0.3, 0.8),
                 .model = "stretch.cst, bend.midedge; irregular; plane; trbdf2",
                 .entry.reference = "v0^2/(2 mu g)", .tolerance = 0.005, .expected = stopping_distance,
                 .scene = slide_scene, .measure = measure_slide);

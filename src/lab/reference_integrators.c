@@ -1,5 +1,5 @@
-/* reference_integrators.c: what time integrators make of free fall and of a linear oscillation, step by
- * step. */
+/* reference_integrators.c: the solutions of time integrators for free fall and for a linear oscillation, step
+ * by step. */
 #include "lab/strip.h"
 
 #include <complex.h>
@@ -30,15 +30,16 @@ static int fall_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
         -GRAVITY, TIME / c->parameter, TIME);
 }
 
-/* The tolerance is what Newton's tolerance and rounding leave. */
-DRAPE_REFERENCE(free_fall, .entry.summary = "way fallen in 0.5 s", .unit = "m", .parameter = "steps",
+/* The limit allows for Newton's tolerance and rounding. */
+DRAPE_REFERENCE(free_fall, .entry.summary = "distance fallen in 0.5 s", .unit = "m", .parameter = "steps",
                 DRAPE_CASES(10, 100), .model = "stretch.cst, bend.midedge; irregular; be",
                 .entry.reference = "sum of backward Euler's steps", .tolerance = 1e-9, .expected = fallen,
                 .scene = fall_scene, .measure = lab_sinking);
 
 /* ---- An oscillator ----
- * Two nodes on an elastic sheet whose other side is fixed: k = E h w/L = 1 N/m, half of 1 kg moves: omega^2 = 2. It starts
- * at rest length; at strains of 1e-5 the sheet is linear to 1e-5. */
+ *
+ * Two nodes on an elastic sheet whose other side is fixed: k = E h w/L = 1 N/m, and half of the mass of 1 kg
+ * moves, so omega^2 = 2. The sheet starts at rest length; at strains of 1e-5 it is linear to 1e-5. */
 
 #define SPEED           1e-5 /* [m/s] at the start */
 #define OMEGA           1.41421356237309504880
@@ -136,8 +137,8 @@ DRAPE_REFERENCE(oscillator, OSCILLATOR, .entry.summary = "share of energy left b
                 .expected = euler, .measure = measure_energy);
 
 /* On z' = i omega z the formula 3/2 z1 - 2 z0 + 1/2 z_ = i omega h z1 has the roots (2 +- sqrt(1 + 2 i omega
- * h))/(3 - 2 i omega h); the larger is what a step leaves of the amplitude once the other has died: below
- * 0.35^15 after the steps that are not measured. */
+ * h))/(3 - 2 i omega h). The larger is the factor of the amplitude per step once the other has decayed, to
+ * less than 0.35^15 after the steps that are not measured. */
 static double bdf2(double angle)
 {
     const double complex z = I * angle;
@@ -188,9 +189,9 @@ DRAPE_REFERENCE(oscillator_verlet, PHASE, DRAPE_CASES(0.1, 0.5, 1), .model = "st
                 .entry.reference = "2 asin(omega h/2)", .members = "'method': 'verlet', 'substeps': 1",
                 .expected = verlet);
 
-/* What variable order and steps leave after one, or ten, and an eighth oscillations: the velocity over that
- * at the start, where errors of amplitude and of phase both show. Tolerances of 1e-8 a step, of what
- * moves. */
+/* Variable order and steps: the velocity after one, or ten, and an eighth oscillations over that at the
+ * start, which shows errors of amplitude and of phase. The tolerance is 1e-8 per step, relative to the
+ * motion. */
 static double turned(double turns)
 {
     return cos(2 * PI * turns);

@@ -26,8 +26,8 @@ typedef struct axis {
 
 static drape_status wrong_axis(lab *l, const char *text, const char *why)
 {
-    return drape_fail(l->ctx, DRAPE_E_ARGUMENT, "--axis \"%.100s\": %s; it is /pointer=from:to:n or ...:nlog",
-                      text, why);
+    return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
+                      "--axis \"%.100s\": %s; must be /pointer=from:to:n or ...:nlog", text, why);
 }
 
 static drape_status read_axis(lab *l, const char *text, axis *a)
@@ -43,13 +43,13 @@ static drape_status read_axis(lab *l, const char *text, axis *a)
         return wrong_axis(l, text, "there are no three numbers");
     a->log = strcmp(rest, "log") == 0;
     if (*rest && !a->log)
-        return wrong_axis(l, text, "after the count comes log, or nothing");
+        return wrong_axis(l, text, "only log may follow the count");
     if (!isfinite(a->from) || !isfinite(a->to) || a->from == a->to)
-        return wrong_axis(l, text, "from and to are different numbers");
+        return wrong_axis(l, text, "from and to must be different numbers");
     if (a->log && !(a->from > 0 && a->to > 0))
-        return wrong_axis(l, text, "a logarithmic axis is of positive numbers");
+        return wrong_axis(l, text, "a logarithmic axis needs positive numbers");
     if (a->count < 2 || a->count > LONGEST)
-        return wrong_axis(l, text, "n is 2 to 1024");
+        return wrong_axis(l, text, "n must be 2 to 1024");
     return DRAPE_OK;
 }
 
@@ -92,15 +92,15 @@ static json_t *setting_value(const axis *a, int k)
     return is_integer_axis(a) ? json_integer((json_int_t)llround(value)) : json_real(value);
 }
 
-/* Refuses an axis of integers with other values: they would be rounded, and the map would show the wrong
- * ones. */
+/* Refuses an axis of an integer value with fractions: they would be rounded, and the map would show wrong
+ * values. */
 static drape_status check_integers(lab *l, const axis *a)
 {
     for (int k = 0; is_integer_axis(a) && k < a->count; k++) {
         double value = axis_value(a, k);
         if (!(fabs(value) < 1e15) || fabs(value - round(value)) > 1e-9 * fmax(1, fabs(value)))
             return drape_fail(l->ctx, DRAPE_E_ARGUMENT,
-                              "--axis \"%.100s\": its value %d would be %.6g, and it takes integers",
+                              "--axis \"%.100s\": its value %d would be %.6g, but must be an integer",
                               a->pointer, k + 1, value);
     }
     return DRAPE_OK;
@@ -200,8 +200,8 @@ static drape_status add_cell(lab *l, const space *s, const drape_integrator_ops 
     return lab_add_case(l, tags, settings, repeated ? (int64_t)same : -1);
 }
 
-/* The scene must compile at both ends of every axis, before hours are spent, and one step inside: an axis
- * with integer ends may have other numbers between. */
+/* Before hours are spent, checks that the scene compiles at both ends of every axis and one step inside, as
+ * an axis with integer ends may have fractions between. */
 static drape_status try_ends(lab *l, size_t first, const space *s)
 {
     size_t inside = 0, stride = 1;
@@ -281,7 +281,7 @@ static verdict judge(const lab *l, const json_t *result)
     return lab_number(result, "rejected") > 0 ? REJECTIONS : CLEAN;
 }
 
-/* From green to sand by the logarithm of the rejected steps for one that is accepted, 1e-3 to 1. */
+/* From green to sand, by the logarithm of the rejected steps per accepted one, 1e-3 to 1. */
 static int colour_of_share(double share)
 {
     const double fewest = 1e-3, most = 1, pale = fmin(1, fmax(0, log(share / fewest) / log(most / fewest)));

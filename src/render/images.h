@@ -23,8 +23,8 @@ drape_status drape_texture_heights(drape_context *ctx, const char *path, GLuint 
 drape_status drape_texture_environment(drape_context *ctx, const char *path, GLuint *out);
 
 /* The colours of fields, for s from 0 (low) to 1 (high), in linear RGB: even steps of lightness in OKLab
- * (Ottosson 2020) from a dark violet over blue and green to a light yellow, which can be told apart without
- * seeing colours. */
+ * (Ottosson 2020) from a dark violet over blue and green to a light yellow, which differ in brightness
+ * for readers who do not see colours. */
 void drape_ramp(double s, float rgb[3]);
 GLuint drape_texture_ramp(void);
 

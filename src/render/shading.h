@@ -1,5 +1,5 @@
 /*
- * shading.h: the shadings, ways to colour cloth. A shading is the constant drape_shading_<name> of
+ * shading.h: the shadings, which colour cloth. A shading is the constant drape_shading_<name> of
  * shade_<name>.c with a function `vec3 shade(Surface s)` in GLSL that returns linear RGB; shading.c has the
  * functions that all of them share.
  */

@@ -1,60 +1,13 @@
-/* json.c: numbers and texts of the page. jansson passes NULL on: a failed allocation anywhere makes the whole
- * NULL. */
-#include <math.h>
+/* json.c: the numbers and texts of the page as JSON (io/json.h). */
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/param.h"
 #include "colliders/colliders.h"
+#include "io/json.h"
 #include "report/data.h"
 
 #define MAX_ROWS 20000 /* of a table in the page */
-
-static json_t *with(json_t *object, const char *key, json_t *value)
-{
-    if (json_object_set_new(object, key, value) == 0)
-        return object;
-    json_decref(object);
-    return NULL;
-}
-
-static json_t *append(json_t *array, json_t *value)
-{
-    if (json_array_append_new(array, value) == 0)
-        return array;
-    json_decref(array);
-    return NULL;
-}
-
-static json_t *number(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
-
-static json_t *numbers(const double *values, size_t count)
-{
-    json_t *array = json_array();
-    for (size_t i = 0; i < count; i++)
-        array = append(array, number(values[i]));
-    return array;
-}
-
-/* A name may be in any encoding: if it is not UTF-8, bytes beyond ASCII become question marks. */
-static json_t *text(const char *bytes)
-{
-    json_t *string = json_string(bytes);
-    if (string)
-        return string;
-    char copy[256];
-    size_t i = 0;
-    for (; bytes[i] && i + 1 < sizeof copy; i++)
-        copy[i] = bytes[i];
-    copy[i] = 0;
-    for (char *c = copy; *c; c++)
-        if ((unsigned char)*c > 127)
-            *c = '?';
-    return json_string(copy);
-}
 
 /* ---- Tables ---- */
 
@@ -80,7 +33,8 @@ static void take_row(void *user, int64_t row, char *const *cells)
         return;
     for (size_t i = 0; i < c->count; i++)
         c->arrays[i] =
-            append(c->arrays[i], i < c->text_from ? number(strtod(cells[i], NULL)) : text(cells[i]));
+            drape_json_append(c->arrays[i], i < c->text_from ? drape_json_number(strtod(cells[i], NULL))
+                                                             : drape_json_text(cells[i]));
 }
 
 /* {"rows": number in the file, "every": n, "columns": {name: [...]}} */
@@ -96,7 +50,7 @@ static drape_status read_columns(const drape_report_source *run, const char *nam
     status = drape_record_rows(&run->record, name, c->names, c->count, take_row, c, &rows);
     json_t *object = json_object();
     for (size_t i = 0; i < c->count; i++)
-        object = with(object, c->names[i], c->arrays[i]);
+        object = drape_json_with(object, c->names[i], c->arrays[i]);
     *out = json_pack("{s:I, s:I, s:o}", "rows", (json_int_t)rows, "every", (json_int_t)c->every, "columns",
                      object);
     return status;
@@ -126,9 +80,10 @@ static json_t *parameters(const drape_collider *collider)
     for (int i = 0; i < collider->ops->entry.param_count; i++) {
         const drape_param *param = &collider->ops->entry.params[i];
         const double *value = collider->values + drape_param_place(collider->ops->entry.params, i);
-        object = with(object, param->name,
-                      drape_param_width(param) > 1 ? numbers(value, (size_t)drape_param_width(param))
-                                                   : number(*value));
+        object = drape_json_with(object, param->name,
+                                 drape_param_width(param) > 1
+                                     ? drape_json_numbers(value, (size_t)drape_param_width(param))
+                                     : drape_json_number(*value));
     }
     return object;
 }
@@ -138,32 +93,32 @@ static json_t *shape(const drape_collider_shape *shape)
 {
     json_t *corners = json_array();
     for (size_t i = 0; i < 3 * (size_t)shape->triangle_count; i++)
-        corners = append(corners, json_integer(shape->triangle[i]));
-    return json_pack("{s:o, s:o}", "points", numbers(shape->point, 3 * (size_t)shape->point_count),
+        corners = drape_json_append(corners, json_integer(shape->triangle[i]));
+    return json_pack("{s:o, s:o}", "points", drape_json_numbers(shape->point, 3 * (size_t)shape->point_count),
                      "triangles", corners);
 }
 
 static json_t *collider(const drape_report_data *data, const drape_collider *c)
 {
-    json_t *object = json_pack("{s:o, s:o, s:o}", "type", text(c->ops->entry.name), "name", text(c->name),
-                               "parameters", parameters(c));
+    json_t *object = json_pack("{s:o, s:o, s:o}", "type", drape_json_text(c->ops->entry.name), "name",
+                               drape_json_text(c->name), "parameters", parameters(c));
     if (c->shape.triangle_count > 0)
-        object = with(object, "shape", shape(&c->shape));
+        object = drape_json_with(object, "shape", shape(&c->shape));
     if (c->track.key_count == 0)
         return object;
     json_t *displacements = json_array();
     for (int64_t k = 0; k < data->kept; k++) {
         drape_collider_pose pose = drape_collider_pose_at(c, data->run->record.times[data->frame[k]]);
-        displacements = append(displacements, numbers(pose.displacement, 3));
+        displacements = drape_json_append(displacements, drape_json_numbers(pose.displacement, 3));
     }
-    return with(object, "displacements", displacements);
+    return drape_json_with(object, "displacements", displacements);
 }
 
 static json_t *colliders(const drape_report_data *data)
 {
     json_t *array = json_array();
     for (int32_t i = 0; i < data->run->model->collider_count; i++)
-        array = append(array, collider(data, &data->run->model->colliders[i]));
+        array = drape_json_append(array, collider(data, &data->run->model->colliders[i]));
     return array;
 }
 
@@ -172,7 +127,7 @@ static json_t *pinned(const drape_model *model)
     json_t *array = json_array();
     for (int32_t i = 0; i < model->node_count; i++)
         if (model->pinned[i])
-            array = append(array, json_integer(i));
+            array = drape_json_append(array, json_integer(i));
     return array;
 }
 
@@ -181,9 +136,10 @@ static json_t *fields(const drape_report_data *data)
     json_t *array = json_array();
     for (int f = 0; f < DRAPE_REPORT_FIELDS; f++) {
         const drape_report_field *field = &data->fields[f];
-        array = append(array, json_pack("{s:s, s:s, s:o, s:o}", "name", field->name, "unit", field->unit,
-                                        "low", numbers(field->low, (size_t)field->width), "step",
-                                        numbers(field->step, (size_t)field->width)));
+        array = drape_json_append(array,
+                                  json_pack("{s:s, s:s, s:o, s:o}", "name", field->name, "unit", field->unit,
+                                            "low", drape_json_numbers(field->low, (size_t)field->width),
+                                            "step", drape_json_numbers(field->step, (size_t)field->width)));
     }
     return array;
 }
@@ -192,8 +148,8 @@ static json_t *frames(const drape_report_data *data)
 {
     json_t *times = json_array(), *kept = json_array();
     for (int64_t k = 0; k < data->kept; k++) {
-        times = append(times, number(data->run->record.times[data->frame[k]]));
-        kept = append(kept, json_integer((json_int_t)data->frame[k]));
+        times = drape_json_append(times, drape_json_number(data->run->record.times[data->frame[k]]));
+        kept = drape_json_append(kept, json_integer((json_int_t)data->frame[k]));
     }
     return json_pack("{s:I, s:o, s:o}", "all", (json_int_t)data->run->record.frames, "times", times,
                      "numbers", kept);
@@ -225,11 +181,11 @@ drape_status drape_report_put_json(const drape_report_data *data, drape_file *fi
     const char *slash = strrchr(run->record.folder, '/');
     json_t *json = json_pack(
         "{s:s, s:o, s:o, s:o, s:i, s:i, s:o, s:o, s:o, s:o, s:o, s:o, s:o}", "version", drape_version(),
-        "name", text(slash && slash[1] ? slash + 1 : run->record.folder), "scene", text(run->scene_text),
-        "summary", run->summary ? json_incref(run->summary) : json_null(), "nodes",
-        (int)run->model->node_count, "triangles", (int)run->model->triangle_count, "length",
-        number(run->model->length), "pinned", pinned(run->model), "colliders", colliders(data), "frames",
-        frames(data), "fields", fields(data), "steps", steps, "energies", energies);
+        "name", drape_json_text(slash && slash[1] ? slash + 1 : run->record.folder), "scene",
+        drape_json_text(run->scene_text), "summary", run->summary ? json_incref(run->summary) : json_null(),
+        "nodes", (int)run->model->node_count, "triangles", (int)run->model->triangle_count, "length",
+        drape_json_number(run->model->length), "pinned", pinned(run->model), "colliders", colliders(data),
+        "frames", frames(data), "fields", fields(data), "steps", steps, "energies", energies);
     if (!status &&
         (!json || json_dump_callback(json, put_escaped, file, JSON_COMPACT | JSON_REAL_PRECISION(9))))
         status = drape_fail_memory(run->ctx, 1);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""test_abi.py: the library keeps the interface of the last release (tools/abi), and tools/abi sees what breaks one: dumps of interfaces that
-this library would break, or only extend. Speaks TAP; skipped without libabigail."""
+"""test_abi.py: the library keeps the interface of the last release (tools/abi), and tools/abi detects breaks: it is tried on altered dumps, which
+this library breaks or only extends. Output is TAP; skipped without libabigail."""
 import os
 import re
 import subprocess
@@ -14,14 +14,14 @@ with open(os.path.join(SOURCE, "tests", "abi", "drape-1.abi")) as file:
 
 
 def struct(name, change):
-    """LAST with `change` done to the lines of a struct."""
+    """LAST with `change` applied to the lines of a struct."""
     start = LAST.index(f"<class-decl name='{name}'")
     end = LAST.index("</class-decl>", start)
     return LAST[:start] + change(LAST[start:end]) + LAST[end:]
 
 
 def shorter(text):
-    """A struct of 64 bits less, without its last member."""
+    """A struct without its last member, 64 bits smaller."""
     text = re.sub(r"size-in-bits='(\d+)'", lambda match: f"size-in-bits='{int(match[1]) - 64}'", text, count=1)
     return text[:text.rindex("<data-member")]
 
@@ -31,8 +31,8 @@ def without_function(name):
     return re.sub(rf" *<function-decl name='{name}'.*?</function-decl>\n", "", text, flags=re.S)
 
 
-def parameter_of_pull(text):
-    """The type of the argument `node` of drape_sim_set_drag_spring is another one."""
+def argument_of_another_type(text):
+    """The argument `node` of drape_sim_set_drag_spring has another type."""
     start = text.index("<function-decl name='drape_sim_set_drag_spring'")
     end = text.index("</function-decl>", start)
     kinds = re.findall(r"<parameter type-id='([^']+)'", text[start:end])
@@ -46,7 +46,7 @@ CASES = [
     ("a_function_may_not_go", 1, LAST.replace("drape_sim_cancel", "drape_sim_interrupt")),
     ("a_result_may_not_grow", 1, struct("drape_statistics", shorter)),
     ("a_member_may_not_move", 1, struct("drape_energy", lambda text: text.replace("layout-offset-in-bits='64'", "layout-offset-in-bits='128'"))),
-    ("an_argument_may_not_change", 1, parameter_of_pull(LAST)),
+    ("an_argument_may_not_change", 1, argument_of_another_type(LAST)),
 ]
 
 

@@ -1,4 +1,4 @@
-/* test_api.c: the library as a host sees it: the public headers alone. */
+/* test_api.c: the library as a host sees it, through the public headers only. */
 #include <math.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -10,8 +10,7 @@
 #include "support/failing_allocator.h"
 #include "support/suite.h"
 
-/* ---- Helpers
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- Helpers ---- */
 
 static drape_context *make_context(void)
 {
@@ -28,7 +27,7 @@ static void check_message(const drape_context *ctx, const char *part)
         ck_assert_msg((unsigned char)*p >= ' ' && *p != 127, "not one line: %s", message);
 }
 
-/* Texts of tests are written with ' for ". */
+/* In the scene texts of these tests ' stands for ". */
 static drape_status compile_text(drape_context *ctx, const char *text, drape_model **model)
 {
     char quoted[4096];
@@ -70,7 +69,7 @@ static drape_sim *make_sim(drape_context *ctx, const drape_model *model)
     return sim;
 }
 
-/* The scene above as a host says it. */
+/* The scene above as structs. */
 typedef struct host_scene {
     drape_setting grid[2], material[4], stiffness, beta, integrator[2], controller;
     drape_entry_def terms[3];
@@ -135,8 +134,7 @@ static uint64_t hash_after(drape_context *ctx, const drape_model *model, double 
     return hash;
 }
 
-/* ---- Arguments
- * ---------------------------------------------------------------------------------------------------- */
+/* ---- Arguments ---- */
 
 START_TEST(destroying_nothing_is_fine)
 {
@@ -166,7 +164,7 @@ START_TEST(destroy_writes_null)
 }
 END_TEST
 
-START_TEST(null_arguments_are_told)
+START_TEST(null_arguments_are_reported)
 {
     drape_context *ctx = make_context(), *none = NULL;
     drape_scene *scene = NULL;
@@ -183,7 +181,8 @@ START_TEST(null_arguments_are_told)
     ck_assert_int_eq(drape_scene_parse(ctx, "{}", "x", NULL), DRAPE_E_ARGUMENT);
     ck_assert_int_eq(drape_scene_set(NULL, "/a", "1"), DRAPE_E_ARGUMENT);
     ck_assert_int_eq(drape_scene_compile(NULL, &model), DRAPE_E_ARGUMENT);
-    ck_assert_int_eq(drape_scene_parse(ctx, "{}", NULL, &scene), DRAPE_OK); /* a name for messages only */
+    ck_assert_int_eq(drape_scene_parse(ctx, "{}", NULL, &scene),
+                     DRAPE_OK); /* the name is only used in messages */
     ck_assert_int_eq(drape_scene_set(scene, NULL, "1"), DRAPE_E_ARGUMENT);
     ck_assert_int_eq(drape_scene_set(scene, "/a", NULL), DRAPE_E_ARGUMENT);
     ck_assert_int_eq(drape_scene_compile(scene, NULL), DRAPE_E_ARGUMENT);
@@ -230,8 +229,7 @@ START_TEST(no_model_has_nothing)
 }
 END_TEST
 
-/* ---- Defs
- * --------------------------------------------------------------------------------------------------------- */
+/* ---- Defs ---- */
 
 START_TEST(defs_that_were_not_initialised_are_refused)
 {
@@ -257,7 +255,7 @@ START_TEST(defs_that_were_not_initialised_are_refused)
 }
 END_TEST
 
-/* A caller built against a header whose structs ended earlier. */
+/* A caller compiled with older headers, whose structs are shorter. */
 START_TEST(shorter_defs_of_older_callers_are_read)
 {
     drape_context *ctx = make_context(), *other = NULL;
@@ -293,8 +291,8 @@ START_TEST(shorter_defs_of_older_callers_are_read)
 }
 END_TEST
 
-/* The def of which only the first `size` bytes were known, count of them one after another, as an older
- * caller's array has them; behind the last there is nothing. */
+/* An array of `count` defs as an older caller has them: only their first `size` bytes, without gaps. The
+ * memory after the last one is not readable. */
 static void *as_older(const void *defs, size_t count, size_t full, size_t size)
 {
     char *older = malloc(count * size);
@@ -306,8 +304,8 @@ static void *as_older(const void *defs, size_t count, size_t full, size_t size)
     return older;
 }
 
-/* Of each def, every shorter version: one that ends before each of its members. What a caller left at its
- * default is what it would have been. */
+/* Every def in every shorter version, one for each of its members to end before. Members that an older caller
+ * does not have get their defaults. */
 START_TEST(every_older_def_is_read)
 {
     static const size_t sims[] = {offsetof(drape_sim_def, controller),
@@ -366,7 +364,7 @@ START_TEST(every_older_def_is_read)
 }
 END_TEST
 
-/* A collider of an older caller, and parts that were zeroed, too long, or of two sizes in one array. */
+/* A collider of an older caller; defs in arrays that are zeroed, too long, or of two sizes in one array. */
 START_TEST(defs_in_arrays_are_checked)
 {
     drape_context *ctx = make_context();
@@ -428,7 +426,7 @@ START_TEST(half_an_allocator_is_refused)
 }
 END_TEST
 
-/* Values of a sim's def: what each message says. */
+/* Wrong values in a sim's def, and the message for each. */
 START_TEST(sim_defs_are_checked)
 {
     static const struct {
@@ -497,8 +495,8 @@ START_TEST(an_end_that_is_no_time_is_refused)
 }
 END_TEST
 
-/* Whether a scene whose defs hold a NULL or a zeroed row is refused; in a process of its own, because the
- * mistake of a host must not be a crash of the host. */
+/* Whether a scene is refused whose defs contain NULL or a zeroed element. Runs in its own process, as this
+ * mistake of a host must not crash it. */
 static int zeroed(int which)
 {
     host_scene s;
@@ -587,8 +585,7 @@ START_TEST(zeroed_parts_of_a_scene_are_refused)
 }
 END_TEST
 
-/* ---- Scenes
- * -------------------------------------------------------------------------------------------------------- */
+/* ---- Scenes ---- */
 
 START_TEST(a_scene_in_memory_is_the_same_as_in_a_file)
 {
@@ -597,7 +594,7 @@ START_TEST(a_scene_in_memory_is_the_same_as_in_a_file)
     drape_model *text = make_sheet(ctx), *memory = NULL;
     fill_scene(&s);
     ck_assert_msg(drape_model_create(ctx, &s.scene, &memory) == DRAPE_OK, "%s", drape_context_message(ctx));
-    memset(&s, 0xee, sizeof s); /* nothing of it is needed any more */
+    memset(&s, 0xee, sizeof s); /* the model keeps no pointer into the defs */
     ck_assert_int_eq(drape_model_node_count(memory), 36);
     ck_assert_int_eq(drape_model_dof_count(memory), 3 * 34);
     ck_assert_int_eq(drape_model_nonzero_count(memory), drape_model_nonzero_count(text));
@@ -611,7 +608,7 @@ START_TEST(a_scene_in_memory_is_the_same_as_in_a_file)
 }
 END_TEST
 
-/* The hash is of time, positions and velocities: each alone changes it. */
+/* The hash covers time, positions and velocities: a change of any one of them changes it. */
 START_TEST(the_hash_sees_all_of_the_state)
 {
     drape_context *ctx = make_context();
@@ -632,7 +629,7 @@ START_TEST(the_hash_sees_all_of_the_state)
     }
     for (int i = 0; i < 3; i++)
         drape_model_destroy(&models[i]);
-    fill_scene(&s); /* nothing moves but the time */
+    fill_scene(&s); /* only the time changes */
     memset(s.scene.gravity, 0, sizeof s.scene.gravity);
     memset(s.cloth.velocity, 0, sizeof s.cloth.velocity);
     s.cloth.pin_count = 0;
@@ -708,8 +705,7 @@ START_TEST(an_override_is_a_value_of_the_scene)
 }
 END_TEST
 
-/* ---- Terms of the host
- * -------------------------------------------------------------------------------------------- */
+/* ---- Terms of the host ---- */
 
 /* E = 1/2 k |x - c|^2 of every node. */
 static const drape_param attract_params[] = {
@@ -766,9 +762,9 @@ static const drape_term_ops attract = {.struct_size = sizeof(drape_term_ops),
     " 'terms': [" term "]}], 'gravity': [0,0,0], 'integrator': {'dt': 0.001, 'tolerance': 1e-10}, "          \
     "'duration': 1}"
 
-/* Four nodes of 0.1 kg on springs of 10 N/m without any between them: w = 10 rad/s, y = 1 - cos(10 t), but
- * for the decay of backward Euler, exp(-w^2 h t/2), and its phase of the same order. */
-START_TEST(a_term_of_the_host_works)
+/* Four nodes of 0.1 kg, each on a spring of 10 N/m and not connected: w = 10 rad/s, y = 1 - cos(10 t), except
+ * for the decay of backward Euler, exp(-w^2 h t/2), and its phase error of the same order. */
+START_TEST(a_user_defined_term_works)
 {
     drape_context *ctx = make_context();
     drape_model *model;
@@ -786,7 +782,7 @@ START_TEST(a_term_of_the_host_works)
 }
 END_TEST
 
-START_TEST(faults_of_a_term_of_the_host_are_told_at_its_place)
+START_TEST(faults_of_a_user_defined_term_are_reported_at_its_place)
 {
     static const struct {
         const char *scene, *says;
@@ -810,7 +806,7 @@ START_TEST(faults_of_a_term_of_the_host_are_told_at_its_place)
         check_message(ctx, cases[i].says);
         check_message(ctx, "s.json:1:");
     }
-    /* a context that it was not given to does not know it */
+    /* another context does not have the term */
     ck_assert_int_eq(compile_text(other, ATTRACTED("{'type': 'host.attract', 'stiffness': 1}"), &model),
                      DRAPE_E_ARGUMENT);
     check_message(other, "there is no term \"host.attract\"");
@@ -854,7 +850,7 @@ static drape_status says_nothing(const drape_cloth_view *cloth, const double *pa
     return DRAPE_E_FILE;
 }
 
-START_TEST(elements_of_a_term_of_the_host_are_checked)
+START_TEST(elements_of_a_user_defined_term_are_checked)
 {
     static const struct {
         drape_status (*build)(const drape_cloth_view *, const double *, drape_term_builder *);
@@ -880,14 +876,14 @@ START_TEST(elements_of_a_term_of_the_host_are_checked)
 }
 END_TEST
 
-/* ---- Colliders: of scenes, of hosts ---- */
+/* ---- Colliders, built in and user-defined ---- */
 
 #define WITH_COLLIDERS(text)                                                                                 \
     "{'drape': 1, 'cloth': [{'mesh': {'grid': 'equilateral', 'edges': 1, 'edge_length': 0.1},"               \
     " 'material': {'young_modulus': 1e5, 'thickness': 1e-3, 'density': 200}}], 'colliders': [" text "],"     \
     " 'duration': 1}"
 
-/* A ball about the host's own center: of two vectors and a number, the values are 7. */
+/* A user-defined ball; its parameters, two vectors and a number, have 7 values. */
 static const drape_param blob_params[] = {
     DRAPE_TURN("tilt", 0, -360, 360, "what it is turned by"),
     DRAPE_VECTOR("middle", "m", 0.25, -1, 1, "its center"),
@@ -995,7 +991,7 @@ START_TEST(a_collider_in_memory_is_the_same_as_in_a_file)
 }
 END_TEST
 
-START_TEST(a_collider_of_the_host_works)
+START_TEST(a_user_defined_collider_works)
 {
     static const struct {
         const char *scene, *says;
@@ -1025,7 +1021,7 @@ START_TEST(a_collider_of_the_host_works)
 }
 END_TEST
 
-/* Ops that an older caller has, shorter and gone after they were registered: the library has its own. */
+/* The shorter ops of an older caller, freed after they were registered: the library has copied them. */
 START_TEST(ops_are_copied_and_may_be_older)
 {
     drape_context *ctx = make_context(), *other = make_context();
@@ -1100,7 +1096,7 @@ static void some_law(const double *params, int32_t count, const double *k, const
     (void)force, (void)dforce_dstrain, (void)dforce_drate, (void)energy;
 }
 
-/* Lists that would be read past their end, or by a pointer to nothing. */
+/* Parameter lists that would be read past their end, or through a NULL pointer. */
 START_TEST(malformed_parameters_are_refused)
 {
     static const char *const none[] = {NULL};
@@ -1199,10 +1195,10 @@ START_TEST(malformed_ops_are_refused)
             says = "there is a term \"stretch.edge\" already";
             break;
         case 13:
-            ops.damped = true; /* its dashpots would be on a measure, which it has not */
+            ops.damped = true; /* dashpots act on a measure, and it has none */
             break;
         case 14:
-            ops.in_medium = true; /* an energy has no velocity */
+            ops.in_medium = true; /* an energy does not depend on the velocity */
             break;
         case 15:
             ops.struct_size = offsetof(drape_term_ops, in_medium) - 1;
@@ -1236,14 +1232,13 @@ START_TEST(a_context_holds_32_terms)
 }
 END_TEST
 
-/* ---- Observers, statistics
- * ---------------------------------------------------------------------------------------- */
+/* ---- Observers, statistics ---- */
 
 typedef struct record {
     int64_t frames, attempts, accepted, iterations;
     double sum, h_min, h_max;
-    double time[128], height[128]; /* of frames: of node 35 */
-    double t[128], y[128], v[128]; /* of states, from the start */
+    double time[128], height[128]; /* of frames; height of node 35 */
+    double t[128], y[128], v[128]; /* of all states from the start; of node 35 */
 } record;
 
 static drape_status observe(void *user, const drape_event *event)
@@ -1319,7 +1314,7 @@ START_TEST(frames_come_in_time)
 }
 END_TEST
 
-/* Frames and final state do not depend on how an advance is cut up at steps' ends. */
+/* Frames and final state are the same if an advance is split at the ends of steps. */
 START_TEST(advances_may_be_cut_up)
 {
     drape_context *ctx = make_context();
@@ -1338,14 +1333,14 @@ START_TEST(advances_may_be_cut_up)
 }
 END_TEST
 
-START_TEST(statistics_agree_with_what_was_told)
+START_TEST(statistics_agree_with_the_events)
 {
     drape_context *ctx = make_context();
     drape_model *model = make_sheet(ctx);
     drape_sim *sim = NULL;
     drape_sim_def def;
     record r = {0};
-    const drape_setting few = {"max_iterations", 2, NULL}; /* so that some are rejected */
+    const drape_setting few = {"max_iterations", 2, NULL}; /* so that some steps are rejected */
     int64_t rejected = 0, count;
     drape_sim_def_init(&def, sizeof def);
     def.integrator_settings = &few;
@@ -1382,8 +1377,7 @@ START_TEST(statistics_agree_with_what_was_told)
 }
 END_TEST
 
-/* ---- States of the host's own
- * ------------------------------------------------------------------------------------- */
+/* ---- States set by the host ---- */
 
 #define MAX_NODES 36
 
@@ -1418,14 +1412,15 @@ static drape_sim *make_sim_of(drape_context *ctx, const drape_model *model, cons
     return sim;
 }
 
-/* Backward Euler without forces but gravity: n steps of h from v0 move by n h v0 + g h^2 n (n + 1)/2, and h
- * and the sums are exact in binary but for rounding of g. */
+/* Backward Euler under gravity alone: n steps of h from v0 move by n h v0 + g h^2 n (n + 1)/2. h and the sums
+ * are exact in binary, except for the rounding of g. */
 typedef struct meddler {
     drape_context *ctx;
     drape_sim *sim;
 } meddler;
 
-/* What an observer tries that is not for it; the sim is where it was, and the advance goes on. */
+/* Calls that an observer must not make: each is refused, the sim does not change, and the advance
+ * continues. */
 static drape_status meddle(void *user, const drape_event *event)
 {
     const meddler *m = user;
@@ -1449,7 +1444,7 @@ static drape_status meddle(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* Both go on to the same bits. */
+/* Both advance to the same bits. */
 static void end_alike(drape_sim *sim, drape_sim *alone, double t)
 {
     ck_assert_int_eq(drape_sim_advance(sim, t), DRAPE_OK);
@@ -1472,7 +1467,8 @@ START_TEST(observers_cannot_change_the_sim)
 }
 END_TEST
 
-/* All nodes in one point have no angles; the next state that has some counts alone. */
+/* With all nodes in one point there are no angles; the next state that has angles does not depend on the
+ * past. */
 START_TEST(a_collapsed_state_leaves_nothing_behind)
 {
     const double zero[3 * MAX_NODES] = {0};
@@ -1528,16 +1524,16 @@ START_TEST(a_state_of_the_host_is_where_a_run_starts)
 }
 END_TEST
 
-/* One sim's state given to another, with hinges, dashpots and a moving pin: both go on alike, to the bit, and
- * the other's energies are counted from there. */
+/* The state of one sim set in another, with hinges, dashpots and a moving pin: both advance to the same bits,
+ * and the energy account of the second begins there. */
 START_TEST(a_state_of_another_sim_is_taken_to_the_bit)
 {
-    static const char *const rows[] = {"be", "midpoint", "trbdf2"};
+    static const char *const integrators[] = {"be", "midpoint", "trbdf2"};
     drape_context *ctx = make_context();
     drape_model *model = make_sheet(ctx);
     for (int i = 0; i < 3; i++) {
-        drape_sim *one = make_sim_of(ctx, model, rows[i], "fixed"),
-                  *other = make_sim_of(ctx, model, rows[i], "fixed");
+        drape_sim *one = make_sim_of(ctx, model, integrators[i], "fixed"),
+                  *other = make_sim_of(ctx, model, integrators[i], "fixed");
         ck_assert_int_eq(drape_sim_advance(one, 0.25), DRAPE_OK);
         const state middle = state_of(one);
         const drape_energy before = drape_sim_energy(one);
@@ -1553,7 +1549,8 @@ START_TEST(a_state_of_another_sim_is_taken_to_the_bit)
         ck_assert_uint_eq(drape_sim_hash(other), drape_sim_hash(one));
         const drape_energy a = drape_sim_energy(one), b = drape_sim_energy(other);
         ck_assert_double_gt(b.dissipated, 0);
-        ck_assert_double_eq_tol(b.dissipated, a.dissipated - before.dissipated, 1e-12); /* of sums of 1 J */
+        ck_assert_double_eq_tol(b.dissipated, a.dissipated - before.dissipated,
+                                1e-12); /* rounding of sums of 1 J */
         ck_assert_double_eq_tol(b.numerical, a.numerical - before.numerical, 1e-12);
         drape_sim_destroy(&one);
         drape_sim_destroy(&other);
@@ -1563,22 +1560,22 @@ START_TEST(a_state_of_another_sim_is_taken_to_the_bit)
 }
 END_TEST
 
-/* What a sim did before leaves no trace: it goes on from a state as a new sim does, to the bit, forwards and
- * back in time, under every integrator and controller. */
+/* The past of a sim leaves no trace: from a state that is set, it advances with the same bits as a new sim,
+ * forwards and backwards in time, under every integrator and controller. */
 START_TEST(the_past_does_not_count_after_a_state_was_set)
 {
-    static const char *const rows[][2] = {{"be", "halving"},     {"bdf2", "halving"}, {"midpoint", "strain"},
-                                          {"ida", "halving"},    {"be", "error"},     {"bdf2", "error"},
-                                          {"midpoint", "error"}, {"ida", "fixed"},    {"trbdf2", "halving"},
-                                          {"trbdf2", "error"}};
+    static const char *const integrators[][2] = {
+        {"be", "halving"},     {"bdf2", "halving"}, {"midpoint", "strain"}, {"ida", "halving"},
+        {"be", "error"},       {"bdf2", "error"},   {"midpoint", "error"},  {"ida", "fixed"},
+        {"trbdf2", "halving"}, {"trbdf2", "error"}};
     drape_context *ctx = make_context();
     drape_model *model = make_sheet(ctx);
     drape_sim *source = make_sim_of(ctx, model, "be", "halving");
     ck_assert_int_eq(drape_sim_advance(source, 0.125), DRAPE_OK);
     const state s = state_of(source);
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        drape_sim *used = make_sim_of(ctx, model, rows[i][0], rows[i][1]),
-                  *fresh = make_sim_of(ctx, model, rows[i][0], rows[i][1]);
+    for (size_t i = 0; i < sizeof integrators / sizeof *integrators; i++) {
+        drape_sim *used = make_sim_of(ctx, model, integrators[i][0], integrators[i][1]),
+                  *fresh = make_sim_of(ctx, model, integrators[i][0], integrators[i][1]);
         ck_assert_msg(drape_sim_advance(used, 0.3) == DRAPE_OK, "%s", drape_context_message(ctx));
         ck_assert_int_eq(set_state(used, &s), DRAPE_OK);
         ck_assert_int_eq(set_state(fresh, &s), DRAPE_OK);
@@ -1587,8 +1584,8 @@ START_TEST(the_past_does_not_count_after_a_state_was_set)
                           drape_context_message(ctx));
             ck_assert_msg(drape_sim_advance(fresh, 0.125 + 0.05 * k) == DRAPE_OK, "%s",
                           drape_context_message(ctx));
-            ck_assert_msg(drape_sim_hash(used) == drape_sim_hash(fresh), "%s, %s, %g s later", rows[i][0],
-                          rows[i][1], 0.05 * k);
+            ck_assert_msg(drape_sim_hash(used) == drape_sim_hash(fresh), "%s, %s, %g s later",
+                          integrators[i][0], integrators[i][1], 0.05 * k);
         }
         drape_sim_destroy(&used);
         drape_sim_destroy(&fresh);
@@ -1636,9 +1633,9 @@ START_TEST(states_of_the_host_are_checked)
     bad.x[0] += 1e-6; /* node 0 is fixed */
     refuse_state(ctx, sim, &bad, "node 0 of sheet is at (");
     bad = good;
-    bad.t = 0.2; /* the other pin has gone on by 5 cm */
+    bad.t = 0.2; /* by then the other pin has moved by 5 cm */
     refuse_state(ctx, sim, &bad, "its pin has it at (");
-    bad = good; /* rounding is not refused, nor kept; nor is a velocity of a fixed node */
+    bad = good; /* rounding, and the velocity of a fixed node, are accepted and ignored */
     bad.x[0] += 1e-12;
     bad.v[0] = 3;
     ck_assert_int_eq(set_state(sim, &bad), DRAPE_OK);
@@ -1664,7 +1661,8 @@ static drape_status note_frame_time(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* Frames of 1/30 s: the first at or after the new time; none twice where the time stays. */
+/* Frames of 1/30 s: the first is at or after the new time; no frame comes twice if the time does not
+ * change. */
 START_TEST(frames_follow_the_time_of_a_state)
 {
     static const struct {
@@ -1673,7 +1671,7 @@ START_TEST(frames_follow_the_time_of_a_state)
         double first;
     } jumps[] = {{0.3, 0.35, 2, 0.3}, /* frames 9, 10 */
                  {0.41, 0.45, 1, 13 / 30.0},
-                 {0.1, 0.15, 2, 0.1},       /* back, to frame 3 and 4 */
+                 {0.1, 0.15, 2, 0.1},       /* back in time: frames 3, 4 */
                  {0.15, 0.19, 1, 5 / 30.0}, /* the present time */
                  {0, 0.01, 1, 0}};
     drape_context *ctx = make_context();
@@ -1702,7 +1700,7 @@ START_TEST(frames_follow_the_time_of_a_state)
 }
 END_TEST
 
-/* A push between two advances at a frame's time: that frame is not told again. */
+/* A push between two advances, at the time of a frame, does not repeat that frame. */
 START_TEST(a_push_repeats_no_frame)
 {
     drape_context *ctx = make_context();
@@ -1724,10 +1722,9 @@ START_TEST(a_push_repeats_no_frame)
 }
 END_TEST
 
-/* ---- Reasons and explanations
- * ------------------------------------------------------------------------------------- */
+/* ---- Reasons and explanations ---- */
 
-/* A term that finds another fault in every step. */
+/* A term that reports a different fault in every step. */
 static int faults_found;
 
 static drape_status fussy_check(const drape_elements *el, const double *x, const double *before,
@@ -1774,8 +1771,9 @@ START_TEST(more_reasons_than_there_is_room_for_are_other)
 }
 END_TEST
 
-/* One Newton iteration is not enough: the residual's worst node is named, and if the sheet has lost its shape
- * somewhere, what is there: edges of 3 m that were of 0.1 m, a triangle at 2 % of its altitude. */
+/* One Newton iteration is not enough. The message names the node with the largest residual and, if the sheet
+ * is distorted, the most distorted element: an edge of 3 m that was 0.1 m long, a triangle at 2 % of its
+ * altitude. */
 START_TEST(a_failure_names_what_is_distorted)
 {
     drape_context *ctx = make_context();
@@ -1798,7 +1796,7 @@ START_TEST(a_failure_names_what_is_distorted)
     ck_assert_int_eq(drape_sim_advance(sim, 0.1), DRAPE_E_SOLVER);
     check_message(ctx, "; most distorted: edge (nodes 13 14 of sheet): length / rest length = 30.");
     const int32_t *corner = drape_model_triangles(model) + 3 * 20;
-    s = rest; /* an apex to the middle of the side across but for 2 % */
+    s = rest; /* an apex moved 98 % of the distance to the middle of the opposite side */
     for (int k = 0; k < 3; k++) {
         const double middle = 0.5 * (rest.x[3 * corner[1] + k] + rest.x[3 * corner[2] + k]);
         s.x[3 * corner[0] + k] = middle + 0.02 * (rest.x[3 * corner[0] + k] - middle);
@@ -1832,8 +1830,7 @@ START_TEST(a_sim_has_at_most_8_observers)
 }
 END_TEST
 
-/* ---- Threads, names
- * ----------------------------------------------------------------------------------------------- */
+/* ---- Threads, names ---- */
 
 typedef struct job {
     const drape_model *model;
@@ -1942,7 +1939,7 @@ START_TEST(messages_are_one_line)
 }
 END_TEST
 
-/* All memory is the context's own, and all of it comes back. */
+/* All memory comes from the allocator of the context, and all of it is released. */
 START_TEST(nothing_leaks)
 {
     failing_allocator memory = {.fail_at = 0};
@@ -1966,9 +1963,9 @@ static void count_line(void *user, drape_log_level level, const char *text)
     ++*(int *)user;
 }
 
-/* One iteration does not bring the fall of a hung sheet to a millionth of its tolerance, at any step that is
+/* One iteration cannot meet this tight tolerance for the fall of a hung sheet, at any step that is
  * allowed. */
-START_TEST(the_log_of_a_host_is_told_of_rejections)
+START_TEST(the_log_of_a_host_gets_rejections)
 {
     int lines = 0;
     drape_context_def def;
@@ -1998,20 +1995,21 @@ START_TEST(the_log_of_a_host_is_told_of_rejections)
 }
 END_TEST
 
-SUITE("api", destroying_nothing_is_fine, destroy_writes_null, null_arguments_are_told, no_model_has_nothing,
-      defs_that_were_not_initialised_are_refused, shorter_defs_of_older_callers_are_read,
-      every_older_def_is_read, defs_in_arrays_are_checked, half_an_allocator_is_refused, sim_defs_are_checked,
-      an_end_that_is_no_time_is_refused, zeroed_parts_of_a_scene_are_refused,
-      a_scene_in_memory_is_the_same_as_in_a_file, the_hash_sees_all_of_the_state, a_model_can_be_read,
-      an_override_is_a_value_of_the_scene, a_term_of_the_host_works, ops_are_copied_and_may_be_older,
-      faults_of_a_term_of_the_host_are_told_at_its_place, elements_of_a_term_of_the_host_are_checked,
+SUITE("api", destroying_nothing_is_fine, destroy_writes_null, null_arguments_are_reported,
+      no_model_has_nothing, defs_that_were_not_initialised_are_refused,
+      shorter_defs_of_older_callers_are_read, every_older_def_is_read, defs_in_arrays_are_checked,
+      half_an_allocator_is_refused, sim_defs_are_checked, an_end_that_is_no_time_is_refused,
+      zeroed_parts_of_a_scene_are_refused, a_scene_in_memory_is_the_same_as_in_a_file,
+      the_hash_sees_all_of_the_state, a_model_can_be_read, an_override_is_a_value_of_the_scene,
+      a_user_defined_term_works, ops_are_copied_and_may_be_older,
+      faults_of_a_user_defined_term_are_reported_at_its_place, elements_of_a_user_defined_term_are_checked,
       malformed_parameters_are_refused, malformed_ops_are_refused, a_context_holds_32_terms,
       colliders_of_a_scene_can_be_asked, a_collider_in_memory_is_the_same_as_in_a_file,
-      a_collider_of_the_host_works, malformed_colliders_are_refused, frames_come_in_time,
-      advances_may_be_cut_up, statistics_agree_with_what_was_told, observers_cannot_change_the_sim,
+      a_user_defined_collider_works, malformed_colliders_are_refused, frames_come_in_time,
+      advances_may_be_cut_up, statistics_agree_with_the_events, observers_cannot_change_the_sim,
       a_collapsed_state_leaves_nothing_behind, a_state_of_the_host_is_where_a_run_starts,
       a_state_of_another_sim_is_taken_to_the_bit, the_past_does_not_count_after_a_state_was_set,
       states_of_the_host_are_checked, frames_follow_the_time_of_a_state, a_push_repeats_no_frame,
       more_reasons_than_there_is_room_for_are_other, a_failure_names_what_is_distorted,
       a_sim_has_at_most_8_observers, threads_share_a_model, element_threads_change_no_bit,
-      statuses_have_names, messages_are_one_line, nothing_leaks, the_log_of_a_host_is_told_of_rejections)
+      statuses_have_names, messages_are_one_line, nothing_leaks, the_log_of_a_host_gets_rejections)

@@ -1,4 +1,4 @@
-/* test_checkpoint.c: a host that saves a sim and restores it: the public header alone. */
+/* test_checkpoint.c: a host saves a sim and restores it, through the public header only. */
 #include <pthread.h>
 #include <stdio.h>
 #include <string.h>
@@ -51,18 +51,18 @@ static drape_status count_frames(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* To a file and back, in another sim of another model of the same scene, with other threads; observers
- * stay. */
+/* Saves to a file and restores in another sim, of another model of the same scene, with a different number of
+ * threads; observers stay registered. */
 START_TEST(a_file_is_taken_by_another_sim)
 {
-    static const char *const rows[] = {"be", "bdf2", "ida", "verlet"};
+    static const char *const integrators[] = {"be", "bdf2", "ida", "verlet"};
     for (int k = 0; k < 4; k++) {
         char path[] = "/tmp/drape-api-XXXXXX";
         int fd = mkstemp(path), frames[2] = {0};
         ck_assert_int_ge(fd, 0);
         close(fd);
         drape_context *ctx = make_context(), *second = make_context();
-        drape_model *model = make_model(ctx, rows[k]), *same = make_model(second, rows[k]);
+        drape_model *model = make_model(ctx, integrators[k]), *same = make_model(second, integrators[k]);
         drape_sim *sim = make_sim(ctx, model, 1), *other = make_sim(second, same, 2);
         ck_assert_int_eq(drape_sim_observe(sim, count_frames, &frames[0]), DRAPE_OK);
         ck_assert_int_eq(drape_sim_observe(other, count_frames, &frames[1]), DRAPE_OK);
@@ -88,7 +88,7 @@ START_TEST(a_file_is_taken_by_another_sim)
 }
 END_TEST
 
-/* Back in time and on again, as often as one likes. */
+/* Restores an earlier time and advances again, several times. */
 START_TEST(a_sim_is_taken_back)
 {
     drape_context *ctx = make_context();
@@ -112,7 +112,7 @@ START_TEST(a_sim_is_taken_back)
 }
 END_TEST
 
-/* One model, a sim and a context of its own in each thread, all restored from the same bytes. */
+/* One model; in each thread a context and a sim, all restored from the same bytes. */
 typedef struct worker {
     const drape_model *model;
     const bytes *from;

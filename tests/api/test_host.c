@@ -1,5 +1,5 @@
-/* test_host.c: what a host does while a sim runs, by the public header alone: it moves pins and colliders,
- * pushes, blows, cancels, and reads forces. */
+/* test_host.c: what a host can do while a sim runs, through the public header only: move pins and colliders,
+ * push nodes, set the wind, cancel, and read forces. */
 #include <float.h>
 #include <math.h>
 #include <pthread.h>
@@ -22,7 +22,7 @@ typedef struct host {
     drape_sim *sim;
 } host;
 
-/* A scene in which apostrophes stand for quotation marks, with memory of its own. */
+/* Compiles a scene and makes a sim, in a context on the given allocator; in the format ' stands for ". */
 static host open_scene(failing_allocator *memory, const char *format, ...)
 {
     char text[4096];
@@ -70,14 +70,15 @@ static double distance(const double *a, const double *b)
     return hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
 }
 
-/* A square sheet of 5 x 4 nodes, the top row pinned; more of the cloth, and the rest of the scene. */
+/* A square sheet of 5 x 4 nodes with the top row pinned; more members of the cloth, and the rest of the
+ * scene. */
 #define SHEET                                                                                                \
     "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 5, 'rows': 4, 'width': 0.5, 'height': "   \
     "0.375, 'orientation': 'vertical'}, 'material': {'young_modulus': 1e4, 'thickness': 1e-3, 'density': "   \
     "200}, 'terms': ['stretch.edge', 'bend.hinge'%s], 'pins': [%s]}], 'integrator': {%s}, 'frame_rate': "    \
     "64, %s 'duration': 1}"
 
-/* The integrators that have time. */
+/* The integrators that have steps in time. */
 static const char *const methods[] = {"be", "bdf2", "midpoint", "trbdf2", "newton_k", "verlet", "ida"};
 enum { METHODS = sizeof methods / sizeof *methods };
 
@@ -91,7 +92,7 @@ typedef struct watch {
     int frames;
 } watch;
 
-/* Node 0 goes from `from` at `speed`: at each frame between, too. */
+/* Node 0 moves from `from` at `speed`, also at each frame between. */
 static drape_status watch_pin(void *user, const drape_event *event)
 {
     watch *w = user;
@@ -105,8 +106,8 @@ static drape_status watch_pin(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* A fixed pin and one on a track, sent straight: where they are to be at the end, to the bit, and on the line
- * between to rounding (1 m, some ten operations); and where they rest afterwards. */
+/* A fixed pin and one on a track, moved along a straight line by the host: at the end they are at the target
+ * to the bit, in between on the line up to rounding (1 m, some ten operations), and afterwards they stay. */
 START_TEST(pins_go_where_they_are_sent)
 {
     for (int i = 0; i < METHODS; i++) {
@@ -146,9 +147,9 @@ START_TEST(pins_go_where_they_are_sent)
 }
 END_TEST
 
-/* A pin that the host sends along the pieces of a track, from key to key, is that track: the same steps, but
- * for the rounding of positions, which Newton's tolerance of 1e-9 N on springs of some 10 N/m makes up to
- * 1e-10 m of. */
+/* A pin that the host moves along the pieces of a track, from key to key, gives the same steps as the track,
+ * up to the rounding of positions, which Newton's tolerance of 1e-9 N on springs of some 10 N/m amplifies to
+ * at most 1e-10 m. */
 START_TEST(a_host_is_as_good_as_a_track)
 {
     static const char track[] =
@@ -184,7 +185,7 @@ START_TEST(a_host_is_as_good_as_a_track)
 END_TEST
 
 /* A cubic through positions and velocities of x = a sin(w t) is off by at most (a w^4 h^4)/384 inside, and
- * starts no integrator anew: ida, which does at every kink, takes fewer steps than with straight ways. */
+ * restarts no integrator: ida, which restarts at every kink, takes fewer steps than with straight paths. */
 START_TEST(velocities_make_a_motion_smooth)
 {
     const double a = 0.05, w = 9;
@@ -215,7 +216,7 @@ START_TEST(velocities_make_a_motion_smooth)
 }
 END_TEST
 
-/* Where the host has put a pin, a state of the host's own may have it anywhere. */
+/* After the host has moved a pin, a state that the host sets may have it anywhere. */
 START_TEST(a_state_takes_moved_pins_along)
 {
     failing_allocator memory = {0};
@@ -240,7 +241,7 @@ END_TEST
 #define BALL                                                                                                 \
     "'colliders': [{'type': 'sphere', 'center': [0.25, -0.3, 0.16], 'radius': 0.1, 'friction': 0.3%s}], "
 
-/* As with pins: a ball that is sent from key to key is one on the track. */
+/* As with pins: a ball that the host moves from key to key behaves as one on the track. */
 START_TEST(a_collider_goes_where_it_is_sent)
 {
     static const char *const settings[] = {"'method': 'be', 'dt': 0.0078125, 'tolerance': 1e-9",
@@ -267,7 +268,7 @@ START_TEST(a_collider_goes_where_it_is_sent)
             ck_assert(memcmp(at.displacement, keys[k], sizeof at.displacement) == 0);
             ck_assert_str_eq(at.type, "sphere");
         }
-        ck_assert_double_gt(fabs(drape_sim_positions(by.sim)[3 * 17 + 2]), 0.01); /* it was met */
+        ck_assert_double_gt(fabs(drape_sim_positions(by.sim)[3 * 17 + 2]), 0.01); /* the sheet touched it */
         close_scene(&on, &memory[0]);
         close_scene(&by, &memory[1]);
     }
@@ -276,8 +277,8 @@ END_TEST
 
 /* ---- Forces ---- */
 
-/* Reactions carry what hangs from pins, and what is pushed: the sum over pins is the weight of all nodes less
- * the push, but for the residuals of 16 free nodes at 1e-8 N. */
+/* Reactions of the pins balance the weight and the push: their sum is the weight of all nodes less the push,
+ * up to the residuals of 16 free nodes at 1e-8 N. */
 START_TEST(reactions_carry_the_weight)
 {
     failing_allocator memory = {0};
@@ -300,15 +301,15 @@ START_TEST(reactions_carry_the_weight)
             }
         for (int k = 0; k < 3; k++)
             ck_assert_msg(fabs(sum[k] - expected[k]) <= 18e-8, "%d: %g for %g N", k, sum[k], expected[k]);
-        if (!pushed) /* the sheet's diagonals alternate, so that it is its own mirror image */
+        if (!pushed) /* the diagonals alternate, so the sheet is its own mirror image */
             ck_assert_double_eq_tol(forces[1], forces[13], 1e-6);
     }
     close_scene(&h, &memory);
 }
 END_TEST
 
-/* A triangle without forces of its own, pushed by F on each node: backward Euler's v_n = n h F/m, x_n - x_0 =
- * h^2 F/m n (n + 1)/2, so that F (x_n - x_0) - m v_n^2/2 = h^2 F^2/m n/2 is lost. Rounding: some 100
+/* A triangle without inner forces, pushed by F on each node: backward Euler gives v_n = n h F/m and x_n - x_0
+ * = h^2 F/m n (n + 1)/2, so the energy F (x_n - x_0) - m v_n^2/2 = h^2 F^2/m n/2 is lost. Rounding: some 100
  * operations on 1 m, 1 J. */
 START_TEST(a_push_does_its_work)
 {
@@ -341,7 +342,7 @@ START_TEST(a_push_does_its_work)
 }
 END_TEST
 
-/* Every integrator is pushed: what lies in 1 g and is pushed up by 1 g floats. */
+/* Pushes act in every integrator: a sheet under 1 g that is pushed up with 1 g floats. */
 START_TEST(every_integrator_is_pushed)
 {
     for (int i = 0; i < METHODS; i++) {
@@ -370,7 +371,8 @@ START_TEST(every_integrator_is_pushed)
 }
 END_TEST
 
-/* Springs alone are summed by verlet itself, past the system: pushes and pulls act there, too. */
+/* With springs only, verlet sums the forces itself and not through the system: pushes and drag springs act
+ * there too. */
 START_TEST(springs_of_verlet_are_pushed_and_pulled)
 {
     failing_allocator memory = {0};
@@ -394,8 +396,8 @@ START_TEST(springs_of_verlet_are_pushed_and_pulled)
 }
 END_TEST
 
-/* What lies on a table is carried by it, within the residuals of 20 nodes at 1e-8 N; what pushes it along is
- * friction. */
+/* A sheet on a table is carried by the table, up to the residuals of 20 nodes at 1e-8 N; the force along the
+ * table is friction. */
 START_TEST(contact_carries_the_weight)
 {
     failing_allocator memory = {0};
@@ -431,7 +433,7 @@ END_TEST
 /* w = w0 + w1 t + G x */
 typedef struct field {
     double w0[3], w1[3], g[9];
-    bool lagged; /* it does not tell its gradient */
+    bool lagged; /* it does not give its gradient */
     long calls;
 } field;
 
@@ -454,9 +456,10 @@ static void blow(void *user, double t, int32_t count, const double *x, double *w
     "{'young_modulus': 1e2, 'thickness': 1e-3, 'density': 200}, 'terms': ['stretch.edge', %s]}], "           \
     "'gravity': [0,0,0], 'integrator': {'method': '%s', 'dt': 0.015625%s}, 'duration': 1}"
 
-/* A viscous medium that moves as a whole, ever faster: k = c/sigma, and every node has backward Euler's
+/* A viscous medium that accelerates as a whole: with k = c/sigma, backward Euler gives every node
  *     v1 = (v0 + h k w(t1))/(1 + h k).
- * Tolerance: a residual of 1e-12 N on at least 0.03 kg moves v by h r/m < 1e-12 m/s a step, 16 of them. */
+ * Tolerance: a residual of 1e-12 N on at least 0.03 kg changes v by h r/m < 1e-12 m/s per step, in 16
+ * steps. */
 START_TEST(wind_takes_cloth_along)
 {
     failing_allocator memory = {0};
@@ -478,9 +481,10 @@ START_TEST(wind_takes_cloth_along)
 }
 END_TEST
 
-/* A host's steady wind is that of the row: the same equations, and the same states but for rounding; the
- * inner solves of newton_k, which end at a share of what they began with, make some 1e-8 m of it. */
-START_TEST(a_steady_wind_is_that_of_the_row)
+/* A steady wind set by the host is added to the parameter "wind" of drag.wind: the same equations as with the
+ * sum as parameter, and the same states up to rounding. In newton_k, whose inner solves end at a share of
+ * their first residual, the difference is some 1e-8 m. */
+START_TEST(a_steady_wind_is_that_of_the_term)
 {
     for (int i = 0; i < METHODS; i++) {
         failing_allocator memory[2] = {{0}, {0}};
@@ -507,8 +511,8 @@ START_TEST(a_steady_wind_is_that_of_the_row)
 }
 END_TEST
 
-/* A field that tells its gradient is solved by Newton's method; one that does not comes to the same state,
- * later. */
+/* With the gradient of the wind field Newton's method converges fast; without it, it reaches the same state
+ * in more iterations. */
 START_TEST(a_field_without_gradient_takes_longer)
 {
     double x[2][3];
@@ -533,7 +537,7 @@ END_TEST
 
 static const char pins[] = "{'corner': 'top-left'}, {'corner': 'top-right'}";
 
-/* Before an advance, it returns at once; and goes on the next time, to the same bits. */
+/* Cancelled before an advance: it returns at once, and the next advance gives the same bits as without. */
 START_TEST(a_cancelled_advance_can_go_on)
 {
     for (int i = 0; i < METHODS; i++) {
@@ -570,7 +574,7 @@ typedef struct trigger {
     int at, calls;
 } trigger;
 
-/* Cancels in the middle of a step: when the wind is asked for the n-th time. */
+/* Cancels in the middle of a step: at the n-th evaluation of the wind. */
 static void still_air(void *user, double t, int32_t count, const double *x, double *wind, double *gradient)
 {
     trigger *now = user;
@@ -579,7 +583,8 @@ static void still_air(void *user, double t, int32_t count, const double *x, doub
         drape_sim_cancel(now->sim);
 }
 
-/* In a step it is forgotten: the state is the one before, and the same step is made again. */
+/* A cancelled step is rolled back: the state is the one before it, and the next advance repeats the same
+ * step. */
 START_TEST(a_step_can_be_cancelled)
 {
     for (int i = 0; i < METHODS; i++) {
@@ -597,7 +602,7 @@ START_TEST(a_step_can_be_cancelled)
         t.at = t.calls + 1;
         says(&h, drape_sim_advance(h.sim, 0.25), DRAPE_E_STOPPED, "cancelled");
         if (drape_sim_statistics(h.sim).steps_accepted ==
-            accepted) { /* else it was done when it was noticed */
+            accepted) { /* otherwise the step completed before the cancellation was noticed */
             ck_assert_double_eq(drape_sim_time(h.sim), time);
             ck_assert_uint_eq(drape_sim_hash(h.sim), before);
             for (int k = 0; drape_sim_reason(h.sim, k, &count); k++)
@@ -620,7 +625,7 @@ static void on_alarm(int number)
     drape_sim_cancel(signalled);
 }
 
-/* From a signal handler, and from another thread, while an advance runs that would take hours. */
+/* Cancels an advance that would take hours, from a signal handler and from another thread. */
 START_TEST(a_signal_and_a_thread_can_cancel)
 {
     failing_allocator memory = {0};
@@ -637,8 +642,8 @@ END_TEST
 
 /* ---- Reading ---- */
 
-/* Of a sheet in the plane z = 0, rows downwards, they are its normal; of a bent one, unit vectors; of a
- * point, none. */
+/* Normals of a sheet in the plane z = 0, rows downwards, are its normal; those of a bent sheet are unit
+ * vectors; a sheet collapsed to a point has none. */
 START_TEST(normals_are_of_length_one)
 {
     failing_allocator memory = {0};
@@ -651,7 +656,7 @@ START_TEST(normals_are_of_length_one)
         ck_assert_double_eq_tol(n[3 * i], 0, 4 * DBL_EPSILON);
         ck_assert_double_eq_tol(n[3 * i + 2], first, 4 * DBL_EPSILON);
     }
-    /* as the first triangle turns: its corners counterclockwise as seen from where it points to */
+    /* like the first triangle: seen from the tip of the normal, its corners run counterclockwise */
     const int32_t *t = drape_model_triangles(h.model);
     const double *a = drape_model_rest_positions(h.model) + 3 * t[0],
                  *b = drape_model_rest_positions(h.model) + 3 * t[1],
@@ -672,7 +677,7 @@ END_TEST
 
 /* ---- Checkpoints ---- */
 
-/* Ways that begin in one frame and end in another. */
+/* Paths that begin in one frame and end in another. */
 static void send_all(host *h, field *f, double sign)
 {
     const int32_t nodes[2] = {0, 3};
@@ -687,9 +692,9 @@ static void send_all(host *h, field *f, double sign)
     good(h, drape_sim_set_wind(h->sim, blow, f));
 }
 
-/* Saved while pins and colliders are on their ways, restored into a sim that sent them elsewhere: the same
- * bits to the end, under its own wind; and the restored one is cancelled by its own flag, raised before or
- * after. */
+/* Saved while the host moves pins and colliders, and restored into a sim that moves them elsewhere: the same
+ * bits to the end, with the wind that the restored sim was given. Restoring does not change whether a sim is
+ * cancelled. */
 START_TEST(a_checkpoint_keeps_what_the_host_moves)
 {
     for (int i = 0; i < METHODS; i++) {
@@ -720,27 +725,27 @@ START_TEST(a_checkpoint_keeps_what_the_host_moves)
 }
 END_TEST
 
-/* ---- All of it ---- */
+/* ---- Together ---- */
 
 typedef struct job {
     const drape_model *model;
-    int way;
+    int index;
     uint64_t hash;
 } job;
 
-/* One sim with a host of its own. */
+/* One sim and the host that drives it. */
 static void *run_job(void *user)
 {
     job *j = user;
     drape_context *ctx = NULL;
     drape_sim *sim = NULL;
-    field f = {.w0 = {j->way, 0, 1}};
+    field f = {.w0 = {j->index, 0, 1}};
     double forces[60];
     const int32_t node = 2;
     bool bad = drape_context_create(NULL, &ctx) || drape_sim_create(ctx, j->model, NULL, &sim) ||
                drape_sim_set_wind(sim, blow, &f);
     for (int i = 1; !bad && i <= 16; i++) {
-        double to[3] = {0.25 + 0.01 * j->way * i, 0.01 * i, 0}, by[3] = {0, 0, -0.01 * i};
+        double to[3] = {0.25 + 0.01 * j->index * i, 0.01 * i, 0}, by[3] = {0, 0, -0.01 * i};
         bad = drape_sim_move_pins(sim, 1, &node, FRAME, to, NULL) ||
               drape_sim_move_collider(sim, 0, FRAME, by, NULL) || drape_sim_advance(sim, i * FRAME) ||
               drape_sim_reactions(sim, forces) || drape_sim_contact_forces(sim, forces);
@@ -751,7 +756,7 @@ static void *run_job(void *user)
     return NULL;
 }
 
-/* Hosts in threads over one model do not see each other: each comes to what it comes to alone. */
+/* Hosts in several threads on one model do not affect each other: each gets the same result as alone. */
 START_TEST(hosts_in_threads_share_a_model)
 {
     enum { THREADS = 4 };
@@ -762,7 +767,7 @@ START_TEST(hosts_in_threads_share_a_model)
     pthread_t thread[THREADS];
     job jobs[THREADS], alone[THREADS];
     for (int i = 0; i < THREADS; i++) {
-        alone[i] = jobs[i] = (job){.model = h.model, .way = i};
+        alone[i] = jobs[i] = (job){.model = h.model, .index = i};
         run_job(&alone[i]);
         ck_assert_uint_ne(alone[i].hash, 0);
     }
@@ -777,7 +782,7 @@ START_TEST(hosts_in_threads_share_a_model)
 }
 END_TEST
 
-/* Nothing is allocated once a sim is made. */
+/* After a sim is made, nothing is allocated. */
 START_TEST(a_host_needs_no_memory)
 {
     failing_allocator memory = {0};
@@ -804,7 +809,7 @@ START_TEST(a_host_needs_no_memory)
 }
 END_TEST
 
-/* Each refusal says what it wants, and changes nothing. */
+/* Each refusal says what would be right, and changes nothing. */
 START_TEST(wrong_arguments_are_refused)
 {
     failing_allocator memory = {0};
@@ -862,7 +867,7 @@ END_TEST
 SUITE("host", pins_go_where_they_are_sent, a_host_is_as_good_as_a_track, velocities_make_a_motion_smooth,
       a_state_takes_moved_pins_along, a_collider_goes_where_it_is_sent, reactions_carry_the_weight,
       a_push_does_its_work, every_integrator_is_pushed, springs_of_verlet_are_pushed_and_pulled,
-      contact_carries_the_weight, wind_takes_cloth_along, a_steady_wind_is_that_of_the_row,
+      contact_carries_the_weight, wind_takes_cloth_along, a_steady_wind_is_that_of_the_term,
       a_field_without_gradient_takes_longer, a_cancelled_advance_can_go_on, a_step_can_be_cancelled,
       a_signal_and_a_thread_can_cancel, normals_are_of_length_one, a_checkpoint_keeps_what_the_host_moves,
       hosts_in_threads_share_a_model, a_host_needs_no_memory, wrong_arguments_are_refused)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Wrong scenes and meshes: each ends `drape run` with exit code 2 and one line that says where and what; nothing is
-written. The lines are in expected.txt: scene, tab, line; <*> stands for any text (lists of rows grow). --update prints
-the table as it is now, to be read before it is kept. TAP on the standard output."""
+written. The lines are in expected.txt: scene, tab, line; <*> stands for any text (lists of names grow). --update prints
+the present lines, to be read before they are kept. Output is TAP."""
 import os
 import re
 import resource
@@ -10,8 +10,8 @@ import sys
 import tempfile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-CONTROL = 'good.json'  # the same as the wrong ones, but right
-LIMIT = 1 << 30  # bytes: what is refused for its size is refused before it is allocated
+CONTROL = 'good.json'  # as in the wrong scenes, but correct
+LIMIT = 1 << 30  # bytes: a mesh that is too large is refused before it is allocated
 PLACE = re.compile(r'^[\w.]+\.json(:\d+:\d+)?: ')
 
 
@@ -20,14 +20,14 @@ def program():
 
 
 def limit_memory():
-    """Not with the address sanitizer, which reserves terabytes."""
+    """Limits the memory, except with the address sanitizer, which reserves terabytes."""
     with open(program(), 'rb') as file:
         sanitized = b'__asan_init' in file.read()
     return None if sanitized else lambda: resource.setrlimit(resource.RLIMIT_AS, (LIMIT, LIMIT))
 
 
 def run(scene, limit):
-    """Exit code, the two outputs, and what was written."""
+    """Exit code, stdout, stderr, and the files that were written."""
     with tempfile.TemporaryDirectory() as folder:
         command = [program(), 'run', scene, '--out', os.path.join(folder, 'out'),
                    '--summary', os.path.join(folder, 'summary.json')]
@@ -72,7 +72,7 @@ def check_control(limit):
 
 
 def check_files(scenes, table):
-    """Every line has a scene, every mesh is named by one."""
+    """Every line has a scene, and every mesh is named by a scene."""
     for name in sorted(set(table) - set(scenes)):
         yield f'{name} is in expected.txt, and not there'
     texts = [open(os.path.join(HERE, s), 'rb').read() for s in scenes + [CONTROL]]

@@ -1,7 +1,7 @@
-"""The program `drape` as tests call it, scenes and files as they read them, and the loop over a file's tests.
+"""What tests of the program `drape` share: calls of the program, scenes, readers of its files, and the loop over the tests of a file.
 
-DRAPE_BUILD is the folder of the build, DRAPE_SOURCE that of the sources; or: test_x.py PROGRAM [SOURCES]. A test is a function
-test_*; its docstring is its name. Everything is written below a temporary folder. TAP on stdout.
+DRAPE_BUILD is the build folder, DRAPE_SOURCE the source folder; or: test_x.py PROGRAM [SOURCES]. A test is a function test_*; its
+docstring is its name. Everything is written below a temporary folder. Output is TAP.
 """
 import csv
 import json
@@ -24,7 +24,7 @@ class Skip(Exception):
 
 
 def scene(**changes):
-    """16 nodes, one corner free to swing for 0.1 s: a run takes milliseconds."""
+    """Writes a scene of 16 nodes, one corner free to swing for 0.1 s: a run takes milliseconds."""
     cloth = {
         "name": "sheet",
         "mesh": {"grid": "equilateral", "edges": 3, "edge_length": 0.1},
@@ -59,7 +59,7 @@ def good(*args, **options):
 
 
 def refused(*args, says="", **options):
-    """Exit 2, one line, no result, and no file that was not there before."""
+    """Checks that a call ends with exit code 2, one line on stderr, nothing on stdout and no new file."""
     before = sorted(os.listdir("."))
     result = drape(*args, **options)
     equal(result.returncode, 2, " ".join(args) + ": " + result.stderr)
@@ -81,7 +81,7 @@ def read_steps(folder):
 
 
 def read_npy(path):
-    """(frames, nodes, 3) and the numbers, by the format's definition."""
+    """The shape (frames, nodes, 3) and the numbers of a .npy file, read by the definition of the format."""
     with open(path, "rb") as file:
         data = file.read()
     equal(data[:8], b"\x93NUMPY\x01\x00", "magic and version")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""test_checkpoint.py: `drape run --checkpoint-every` and `--resume`: runs that were killed, interrupted, or had no room go on and end with
-the files of one that was left alone; what does not belong together is refused and not touched."""
+"""test_checkpoint.py: `drape run --checkpoint-every` and `--resume`: runs that were killed, interrupted, or out of disk space resume and end
+with the files of an undisturbed run; a checkpoint of another run is refused, and no file is touched."""
 import hashlib
 import json
 import os
@@ -16,7 +16,7 @@ ALL = "npy,obj,ply,vtp,pc2,glb"
 
 
 def contents(folder, but=("checkpoint.drape",)):
-    """{name: hash} of all files; of the summary without the wall clock."""
+    """{name: hash} of all files; the summary without wall clock times."""
     found = {}
     for name in sorted(os.listdir(folder)):
         with open(f"{folder}/{name}", "rb") as file:
@@ -37,7 +37,7 @@ def same(one, other):
 
 
 def stopped(kind, *args):
-    """A run that got a signal after its first checkpoint."""
+    """A run that receives a signal after its first checkpoint."""
     with subprocess.Popen([PROGRAM, "run", "scene.json", "--checkpoint-every", "1", *args], stdout=subprocess.PIPE,
                           stderr=subprocess.PIPE, text=True) as process:
         end = time.monotonic() + LIMIT
@@ -49,7 +49,7 @@ def stopped(kind, *args):
 
 
 def test_kills():
-    """runs of several rows and formats, killed at random times, end bit for bit as if they had not been"""
+    """runs with several integrators and formats that are killed at random times and resumed end with the same bits"""
     command = [sys.executable, SOURCES + "/tools/kills", PROGRAM, "--kills", "12", "--folder", "kills",
                "--cases", "be,bdf2,midpoint,newton_k,ida,error"]
     result = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, check=False)
@@ -58,7 +58,7 @@ def test_kills():
 
 
 def test_interrupted():
-    """Ctrl-C leaves a checkpoint of where it stopped; the last frame of the part is none of the whole"""
+    """Ctrl-C leaves a checkpoint of the moment; the last frame of an interrupted run is not in the resumed one"""
     write_scene(duration=2, frame_rate=50, integrator={"dt": 0.0005})
     good("run", "scene.json", "--out", "whole", "--format", ALL)
     equal(stopped(signal.SIGINT, "--out", "out", "--format", ALL), 130)
@@ -69,7 +69,7 @@ def test_interrupted():
 
 
 def test_no_checkpoint_and_finished():
-    """--resume begins where there is none, and leaves a finished run as it is"""
+    """--resume without a checkpoint starts a run, and leaves a finished run as it is"""
     write_scene(colliders=[{"type": "plane", "point": [0, -0.02, 0], "normal": [0, 1, 0]}])
     good("run", "scene.json", "--out", "whole", "--format", ALL)
     text = good("run", "scene.json", "--out", "out", "--format", ALL, "--resume", "--checkpoint-every", "2")
@@ -89,7 +89,7 @@ def test_no_checkpoint_and_finished():
 
 
 def test_without_output_formats():
-    """the tables alone, an equilibrium, and a new run that takes the checkpoint of the one before away"""
+    """runs without frames, an equilibrium, and a new run, which removes the checkpoint of the run before it"""
     write_scene(integrator={"method": "static"})
     for name in "whole", "out":
         good("run", "scene.json", "--out", name, "--format", "", *(["--checkpoint-every", "1"] if name == "out" else []))
@@ -101,7 +101,7 @@ def test_without_output_formats():
 
 
 def test_refused():
-    """of another scene, damaged, or with other files beside it: exit 2, one line, and nothing is touched"""
+    """a checkpoint of another scene, damaged, or beside other files: exit 2, one line, and nothing is touched"""
     write_scene(duration=1, integrator={"dt": 0.0005})
     equal(stopped(signal.SIGKILL, "--out", "out", "--format", ALL), -signal.SIGKILL)
     shutil.copytree("out", "kept")
@@ -151,7 +151,7 @@ def test_refused():
 
 
 def test_full():
-    """a disk that is full ends the run; the checkpoint before is good, and from there it goes on"""
+    """a full disk ends the run; the last checkpoint is valid, and the run resumes from it"""
     write_scene(duration=5)
     good("run", "scene.json", "--out", "whole", "--format", "npy")
     for blocks in 20, 30, 35:
@@ -166,7 +166,7 @@ def test_full():
 
 
 def test_a_later_failure():
-    """a run that fails after a checkpoint fails in the same way when it goes on"""
+    """a run that fails after a checkpoint fails again with the same message when it is resumed"""
     write_scene(duration=1, integrator={"dt": 0.01, "max_iterations": 4}, controller={"type": "fixed"},
                 pins=[{"corner": "top-left"}, {"corner": "top-right", "track": [[0, [0, 0, 0]], [0.3, [0, 0, 0]], [0.31, [0, 5, 0]]]}])
     found = [drape("run", "scene.json", "--out", "out", "--checkpoint-every", "2")]

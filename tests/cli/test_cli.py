@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The program `drape` as its users meet it: exit codes, messages, files. See program.py."""
+"""The program `drape` as a user sees it: exit codes, messages, files. See program.py."""
 import csv
 import glob
 import json
@@ -17,7 +17,7 @@ from program import LIMIT, PROGRAM, SOURCES, Skip, drape, equal, good, read_json
 
 
 def verbs():
-    """Those that the program has."""
+    """The verbs that this build of the program has."""
     found = re.findall(r"^  (\w+) ", good("help"), re.M)
     return [verb for verb in found if verb != "drape"]
 
@@ -37,13 +37,13 @@ def test_help():
         equal(good(verb, "-h"), text)
         options = re.findall(r"^  (--\S+)(?: [^ ]+)? +(.*)$", text, re.M)
         assert all(len(words) > 8 for _, words in options) and "--help" in [option for option, _ in options], options
-        for option, _ in options:  # the parser knows what the help shows
+        for option, _ in options:  # the parser accepts every option of the help
             assert "there is no option" not in drape(verb, "missing.json", option).stderr, option
     assert re.fullmatch(r"drape \d+\.\d+\.\d+\n", good("--version"))
 
 
 def test_help_needs_no_scene():
-    """help comes before what else is wrong with a command line"""
+    """--help is answered even if something else is wrong with the command line"""
     good("run", "--help", "a", "b", "c")
 
 
@@ -89,7 +89,7 @@ def test_wrong_scenes():
 
 
 def test_wrong_formats():
-    """a wrong format is found before anything is made, by every verb"""
+    """every verb refuses a wrong format before it writes anything"""
     write_scene(output={"formats": ["npy", "nyp"]})
     for verb in "run", "info", "check":
         line = refused(verb, "scene.json", says='/output/formats/1: there is no format "nyp"')
@@ -112,7 +112,7 @@ def test_run_without_out():
 
 
 def test_run_files():
-    """frames, steps.csv and summary.json say what was asked for"""
+    """frames, steps.csv and summary.json have what the scene asks for"""
     write_scene()
     good("run", "scene.json", "--out", "deep/er/out/", "--summary", "s.json", "--format", "npy,obj,ply,npy")
     shape, numbers = read_npy("deep/er/out/positions.npy")
@@ -146,23 +146,23 @@ def test_run_files():
 def test_realtime():
     """frames with a budget: times, misses and levels are reported, late frames are not failures, files as usual"""
     write_scene()
-    for rate, row in (30, "newton_k"), (1e6, "newton_k"), (30, "be"):
-        text = good("run", "scene.json", "--realtime", "--integrator", row, "--frame-rate", str(rate), "--duration",
+    for rate, integrator in (30, "newton_k"), (1e6, "newton_k"), (30, "be"):
+        text = good("run", "scene.json", "--realtime", "--integrator", integrator, "--frame-rate", str(rate), "--duration",
                     "0.1" if rate < 1e6 else "2e-5", "--summary", "s.json", "--out", "out", "--format", "npy")
-        told = re.search(r"^realtime +(\d+) frames of [^:]+: p50 (\S+), p95 (\S+), p99 (\S+), worst (\S+) ms; (\d+) missed$",
+        report = re.search(r"^realtime +(\d+) frames of [^:]+: p50 (\S+), p95 (\S+), p99 (\S+), worst (\S+) ms; (\d+) missed$",
                          text, re.M)
-        assert told, text
-        times = [float(word) for word in told.group(2, 3, 4, 5)]
+        assert report, text
+        times = [float(word) for word in report.group(2, 3, 4, 5)]
         equal(times, sorted(times))
         summary = read_json("s.json")
         realtime = summary["realtime"]
-        equal((realtime["frames"], realtime["missed"]), (int(told.group(1)), int(told.group(6))))
+        equal((realtime["frames"], realtime["missed"]), (int(report.group(1)), int(report.group(6))))
         equal(realtime["full"] + realtime["fewer"] + realtime["larger"], realtime["frames"])
         assert abs(summary["time"] - (0.1 if rate < 1e6 else 2e-5)) < 1e-12, summary
         assert realtime["worst"] >= realtime["p50"] > 0 and realtime["dropped"] >= 0
         equal(realtime["still"], int(re.search(r"; (\d+) without a new state; ", text).group(1)))
         equal(realtime["still"] > 0, rate == 1e6)
-        if rate == 1e6:  # a microsecond a frame is kept by no machine: frames that make a step miss, the others wait
+        if rate == 1e6:  # no machine keeps up with a microsecond a frame: frames that make a step miss their budget, the others wait
             assert realtime["missed"] > 0 and realtime["larger"] > 0, realtime
         shape, _ = read_npy("out/positions.npy")
         assert shape[0] >= 2, shape
@@ -172,14 +172,14 @@ def test_realtime():
 
 
 def test_linear_solver_acts():
-    """a linear solver that the integrator would leave out is refused; others run, and a scene may have the key for other rows"""
+    """a linear solver on the command line is refused if the integrator has none; in a scene it is ignored, and other integrators use it"""
     write_scene()
-    for row in "newton_k", "verlet":
-        refused("run", "scene.json", "--integrator", row, "--linear-solver", "klu", "--out", "none",
-                says=f'--linear-solver "klu": the integrator "{row}" has none to choose')
-        good("run", "scene.json", "--integrator", row, "--set", "/integrator/linear_solver=klu", "--duration", "0.02")
-    for row in "be", "ida", "static":
-        good("run", "scene.json", "--integrator", row, "--linear-solver", "klu", "--duration", "0.02")
+    for integrator in "newton_k", "verlet":
+        refused("run", "scene.json", "--integrator", integrator, "--linear-solver", "klu", "--out", "none",
+                says=f'--linear-solver "klu": the integrator "{integrator}" has none to choose')
+        good("run", "scene.json", "--integrator", integrator, "--set", "/integrator/linear_solver=klu", "--duration", "0.02")
+    for integrator in "be", "ida", "static":
+        good("run", "scene.json", "--integrator", integrator, "--linear-solver", "klu", "--duration", "0.02")
 
 
 def read_summary_without_budget():
@@ -188,7 +188,7 @@ def read_summary_without_budget():
 
 
 def test_scene_copy():
-    """the folder of a run has the scene as it was run, with its meshes, and running that gives the same bits"""
+    """the folder of a run has a copy of the scene as it was run, with its meshes, and running the copy gives the same bits"""
     os.makedirs("scenes/meshes")
     shutil.copy(SOURCES + "/examples/scenes/tube.obj", "scenes/meshes/tube.obj")
     with open("scenes/meshes/wedge.obj", "w", encoding="ascii") as file:
@@ -214,7 +214,7 @@ def test_scene_copy():
 
 
 def test_scene_in_the_folder():
-    """a scene that is itself the scene.json of the folder is never written over"""
+    """a scene that is itself the scene.json of the output folder is never overwritten"""
     write_scene()
     before = open("scene.json", "rb").read()
     good("run", "scene.json", "--out", ".")
@@ -225,7 +225,7 @@ def test_scene_in_the_folder():
 
 
 def test_last_frame():
-    """the last frame is the end, also where no frame is due there"""
+    """the last frame is the end, even if no frame is due then"""
     write_scene(duration=0.05)
     good("run", "scene.json", "--out", "out", "--format", "npy")
     equal(read_npy("out/positions.npy")[0][0], 3)  # 0, 1/30, 0.05
@@ -256,7 +256,7 @@ def test_settings():
 
 
 def test_failure():
-    """a run that fails ends with exit 1, one line, the summary of what was, and its frames"""
+    """a run that fails ends with exit 1, one line, and the summary and frames so far"""
     write_scene(duration=1, integrator={"dt": 0.01, "max_iterations": 1, "tolerance": 1e-12})
     result = drape("run", "scene.json", "--out", "out", "--format", "npy", "--controller", "fixed")
     equal(result.returncode, 1, result.stderr)
@@ -273,7 +273,7 @@ def test_failure():
 
 
 def interrupt(signals, *args):
-    """Signals a run when its step log has begun to fill; the exit code and stderr."""
+    """Signals a run when its step log has begun to fill. Returns the exit code and stderr."""
     with subprocess.Popen([PROGRAM, "run", "scene.json", "--out", "out", *args],
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         end = time.monotonic() + LIMIT
@@ -305,7 +305,7 @@ def test_interrupt():
 
 
 def test_interrupt_in_background():
-    """a job in the background of a shell script can be interrupted, too"""
+    """a background job of a shell script can be interrupted"""
     write_scene(duration=1e5)
     script = """"$0" run scene.json --out out --format npy >/dev/null & drape=$!
         until [ -s out/steps.csv ]; do sleep 0.02; done; kill -INT $drape; wait $drape"""
@@ -328,7 +328,7 @@ def test_lost_output():
 
 
 def test_closed_output():
-    """a closed stdout is an error, is not a death by a signal, and gets into no file"""
+    """a closed stdout is an error, not a death by a signal, and results do not end up in a file"""
     write_scene()
     read, write = os.pipe()
     os.close(read)
@@ -365,7 +365,7 @@ def limited(*args):
 
 
 def test_full():
-    """output that stops in the middle is exit 1; the frames before are whole"""
+    """output that fails in the middle is exit 1; earlier frames are whole"""
     write_scene(duration=5)
     result = limited("run", "scene.json", "--out", "out", "--format", "npy")
     equal(result.returncode, 1, result.stderr)
@@ -377,7 +377,7 @@ def test_full():
 
 
 def test_old_summary():
-    """a summary of an earlier run does not outlive the start of a new one"""
+    """a new run removes the summary of an earlier one when it starts"""
     write_scene(duration=1e5)
     os.mkdir("out")
     with open("out/summary.json", "w", encoding="ascii") as file:
@@ -388,7 +388,7 @@ def test_old_summary():
 
 
 def terminal(*args):
-    """What a run shows where stderr is a terminal."""
+    """What a run prints if stderr is a terminal."""
     master, slave = pty.openpty()
     with subprocess.Popen([PROGRAM, *args], stdout=subprocess.DEVNULL, stderr=slave, env={"NO_COLOR": "1"}) as process:
         os.close(slave)
@@ -396,7 +396,7 @@ def terminal(*args):
         try:
             while chunk := os.read(master, 4096):
                 shown += chunk
-        except OSError:  # the other end is closed
+        except OSError:  # the other end was closed
             pass
         code = process.wait(timeout=LIMIT)
     os.close(master)
@@ -454,7 +454,7 @@ def test_info_names_nothing_absent():
 
 
 def test_info_of_odd_scenes():
-    """info and check take scenes without terms, without gravity, with nothing free, of several cloths"""
+    """info and check work on scenes without terms, without gravity, without free nodes, and with several cloths"""
     for changes in ({"terms": []}, {"terms": [], "gravity": [0, 0, 0]}, {"pins": [{"box": [[-9, -9, -9], [9, 9, 9]]}]},
                     {"cloth": [scene(name=name)["cloth"][0] for name in ("a", "b")]},
                     {"pins": [{"row": 0, "track": [[0, [0, 0, 0]], [1, [0, 1, 0]]]}]}):
@@ -495,7 +495,7 @@ def test_scene_of_springs():
 
 
 def test_list():
-    """list shows every row; a table or a row narrows; Markdown has as many cells in every line of a table"""
+    """list shows every entry, one table or one entry; every line of a Markdown table has the same number of cells"""
     text = good("list")
     for word in ("equilateral", "stretch.edge", "be", "halving", "klu", "dense", "npy", "young_modulus", "required"):
         assert word in text, word
@@ -508,7 +508,7 @@ def test_list():
 
 
 def test_list_of_keys():
-    """list shows the keys of a scene, object by object, with what each takes; every key of the schema is there"""
+    """list shows the keys of a scene, object by object, with the values that each takes; every key of the schema is there"""
     text = good("list", "scene")
     for part in (r"\n  cloth +/cloth/N\n", r"\n  mesh +/cloth/N/mesh; exactly one of grid, file\n", r"\n    duration +simulated time\n"
                  r" +a number in \(0, 1000000000\] s; required\n", r"one of: top-left, top-right", r"\n    row +a row of a grid, from 0\n +an integer in \[0, 2147483647\]\n"):
@@ -530,7 +530,7 @@ def test_list_of_keys():
 
 
 def test_every_key_is_everywhere():
-    """a key of a scene, declared once, is in the list, in the schema and in the info of a scene, with the same default"""
+    """every key of a scene is in list, schema and info, with the same default"""
     def forms(part):
         return [part] + [form for one in part.get("anyOf", []) for form in forms(one)]
 
@@ -561,7 +561,7 @@ def test_every_key_is_everywhere():
 
 
 def test_info_of_contact():
-    """info shows colliders and contact where they are modelled, and how many nodes start inside"""
+    """info shows colliders and contact if they are modelled, and how many nodes start inside"""
     write_scene()
     for words in good("info", "scene.json"), good("info", "scene.json", "--json"):
         assert "collider" not in words and "contact" not in words, words
@@ -589,7 +589,7 @@ def test_info_of_contact():
     equal((found["contact"]["distance"]["default"], found["contact"]["friction"]["value"]), (True, "implicit"))
     equal(found["self_contact"], {"thickness": {"value": 0.002, "unit": "m", "default": False},
                                   "friction": {"value": 0, "unit": "1", "default": True}})
-    found = json.loads(good("info", "scene.json", "--json", "--integrator", "verlet"))  # moves nodes, has no such forces
+    found = json.loads(good("info", "scene.json", "--json", "--integrator", "verlet"))  # verlet moves nodes instead of applying contact forces
     equal(("contact" in found, list(found["self_contact"])), (False, ["thickness"]))
 
 
@@ -607,7 +607,7 @@ def validator():
 
 
 def variants():
-    """Scenes, each with whether it is right in form."""
+    """Scenes, each with whether the schema and the reader accept it."""
     yield True, scene()
     yield True, scene(description="a remark", gravity=[0, 0, 0], controller={"type": "fixed"}, output={"formats": ["ply"]})
     yield True, scene(mesh={"grid": "square", "columns": 3, "rows": 4, "width": 1, "height": 1, "orientation": "vertical",
@@ -694,7 +694,7 @@ def test_schema_and_reader():
 
 
 def test_fabric():
-    """a fabric alone is a material: woven terms take its own numbers, others those of the sheet that comes next to it"""
+    """a fabric is a whole material: woven terms take its measured stiffnesses, other terms those of an isotropic sheet with the mean stiffnesses"""
     rows = good("list", "fabrics")
     names = re.findall(r"^  (\w+) ", rows, re.M)
     assert {"wang2011_denim", "feng2022_1", "matsudaira2015_wool"} <= set(names) and "none" not in names, names
@@ -705,7 +705,7 @@ def test_fabric():
         write_scene(material={"fabric": name})
         found = json.loads(good("info", "scene.json", "--json"))["cloths"][0]["material"]
         equal(found["fabric"], name, "fabric")
-        # E h and E h^3/12 are the means of warp and weft, D = B/(1 - nu^2) with the nu of the lattice, 1/3.
+        # E h and E h^3/12 are the means over warp and weft; D = B/(1 - nu^2) with the nu of the lattice, 1/3.
         assert abs(found["young_modulus"] * found["thickness"] / found["membrane_stiffness"] - 1) < 1e-9, found
         assert 1e-5 < found["thickness"] < 2e-3, found
     write_scene(material={"fabric": "wang2011_pants"})
@@ -718,7 +718,7 @@ def test_fabric():
 
 
 def test_cs184():
-    """a scene of CS184 runs as it is, and with another integrator by the command line"""
+    """a scene of CS184 runs unchanged, and with another integrator from the command line"""
     pinned = json.loads(re.sub(r"//[^\n]*", "", open(SOURCES + "/examples/scenes/cs184_pinned2.json", encoding="utf-8").read()))
     pinned["cloth"].update(num_width_points=12, num_height_points=12, pinned=[[0, 0], [11, 0]])
     with open("pinned.json", "w", encoding="utf-8") as file:
@@ -736,14 +736,14 @@ def test_cs184():
 
 
 def test_schema_and_examples():
-    """the schema takes every example of our form, and describes every value"""
+    """the schema accepts every example in the format of Drape, and describes every value"""
     schema = validator()
     paths = sorted(glob.glob(SOURCES + "/examples/scenes/*.json"))
     for path in paths:
         with open(path, encoding="utf-8") as file:
             text = re.sub(r'("(?:\\.|[^"\\])*")|//[^\n]*|/\*.*?\*/', lambda m: m.group(1) or " ", file.read(), flags=re.S)
         scene = json.loads(text)
-        if "drape" in scene:  # one of another program has another form
+        if "drape" in scene:  # scenes of other programs have other formats
             equal([error.message for error in schema.iter_errors(scene)], [], path)
         good("info", path)
     def walk(node):

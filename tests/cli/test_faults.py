@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""test_faults.py: verbs that write, on a disk that is full after any number of bytes, and where a folder cannot be: exit code 1 and one
-line that names the file, or the work of a verb that had room; whole files or none. `drape run` is in test_cli.py. TAP on stdout.
+"""test_faults.py: verbs that write, on a disk that is full after any number of bytes, and with a folder that cannot be made: either exit code 1
+and one line that names the file, or the verb completes; files are whole or not there. For `drape run` see test_cli.py. Output is TAP.
 """
 import os
 import re
@@ -9,11 +9,11 @@ import shutil
 
 from program import Skip, drape, equal, good, read_json, run_tests, write_scene
 
-SIZES = 0, 1, 100, 700, 3000, 9000  # [bytes] that a file may have: none, a part of the first, of later ones
+SIZES = 0, 1, 100, 700, 3000, 9000  # [bytes] largest size of a file: none, part of the first file, part of later ones
 
 
 def on_full_disk(size, *args):
-    """The program ignores SIGXFSZ, so that a write is cut short and the next one fails, as on a disk that is full."""
+    """The program ignores SIGXFSZ, so a write is cut short and the next one fails, as on a full disk."""
     def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
     return drape(*args, preexec_fn=limit)
@@ -25,7 +25,7 @@ def files_below(folder):
 
 
 def fill(args, out, whole_of, sizes=SIZES):
-    """whole_of: name -> whether that file is whole, for those that are there."""
+    """whole_of: name -> whether that file is whole, for the files that exist."""
     failed = 0
     for size in sizes:
         for path in (out,) if isinstance(out, str) else out:
@@ -65,7 +65,7 @@ def test_report():
 
 
 def test_experiments():
-    """tradeoff, stability, converge: the lines that are kept are whole, and the same command goes on when there is room"""
+    """tradeoff, stability, converge: saved lines are whole, and the same command resumes when there is space"""
     if not re.search(r"^ +tradeoff ", good("--help"), re.M):
         raise Skip("this build has no experiments")
     write_scene()

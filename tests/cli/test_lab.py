@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Experiments by the program: tradeoff, stability, converge, merge. See program.py."""
+"""The experiments of the program: tradeoff, stability, converge, merge; and validate. See program.py."""
 import csv
 import glob
 import os
@@ -18,7 +18,7 @@ AXES = ["--axis", "/integrator/dt=1e-3:1e-1:3log", "--axis", "/cloth/0/material/
 
 
 def lines(folder):
-    """{case: result} of all lines of a folder, without what differs between two runs."""
+    """{case: result} of all lines of a folder, without values that differ between two runs."""
     results = {}
     for path in glob.glob(folder + "/cases*.jsonl"):
         with open(path, encoding="utf-8") as file:
@@ -31,7 +31,7 @@ def lines(folder):
 
 
 def page_is_alone(path):
-    """A page with pictures, which asks nobody for anything."""
+    """Checks that the page has pictures and loads nothing from elsewhere."""
     with open(path, encoding="utf-8") as file:
         text = file.read()
     assert "<figure><img" in text, "no picture"
@@ -45,8 +45,8 @@ def test_tradeoff():
     out = good("tradeoff", "scene.json", "--out", "t", "--repeats", "1")
     results = lines("t")
     series = {result["tags"]["series"] for result in results.values()}
-    for row in ("be", "bdf2", "midpoint", "trbdf2", "verlet"):
-        assert row in series, row
+    for integrator in ("be", "bdf2", "midpoint", "trbdf2", "verlet"):
+        assert integrator in series, integrator
     assert {"ida, order 2", "ida, order 5", "be, error control", "be, linear solver klu"} <= series, series
     about = read_json("t/reference.json")
     for result in results.values():
@@ -63,7 +63,7 @@ def test_tradeoff():
     page_is_alone("t/report.html")
     for result in results.values():
         assert result["status"] == "ok" or result["tags"]["series"] in open("t/report.html", encoding="utf-8").read()
-    # An explicit integrator has no Jacobians: there is nothing to draw over them.
+    # An explicit integrator has no Jacobians, so there is nothing to plot over them.
     out = good("tradeoff", "scene.json", "--integrators", "verlet", "--out", "v", "--repeats", "1")
     equal(sorted(glob.glob("v/error_jacobians*")), [], "pictures without a point")
     assert "error_jacobians" not in out and "inf times" not in out, out
@@ -71,7 +71,7 @@ def test_tradeoff():
 
 
 def test_stability():
-    """stability tells clean from exploded cases, where the explicit limit says so"""
+    """stability separates clean from exploded cases at the explicit stability limit"""
     write_scene(duration=0.5)
     good("stability", "scene.json", *AXES, "--integrators", "be,verlet", "--out", "s")
     by_row = {}
@@ -89,7 +89,7 @@ def test_stability():
 
 
 def test_ignored_axis():
-    """an integrator that ignores an axis is run once along it"""
+    """an integrator that ignores an axis runs once along it"""
     write_scene()
     good("stability", "scene.json", *AXES, "--integrators", "ida", "--out", "s")
     equal(len(lines("s")), 2, "cases that were run")
@@ -103,26 +103,26 @@ def test_converge():
     out = good("converge", "scene.json", "--integrators", "be,bdf2,trbdf2", "--levels", "7", "--out", "c")
     orders = dict(re.findall(r"^(\w+): order .*, ([\d.]+) at the last refinement", out, re.M))
     # At the last of 7 refinements (dt 1/3840 s) the next term of the error is about dt / 0.01 s of the leading one.
-    for row, order in (("be", 1), ("bdf2", 2), ("trbdf2", 2)):
-        assert abs(float(orders[row]) - order) < 0.1, out
+    for integrator, order in (("be", 1), ("bdf2", 2), ("trbdf2", 2)):
+        assert abs(float(orders[integrator]) - order) < 0.1, out
     page_is_alone("c/report.html")
-    # verlet takes as many substeps as its limit asks for, which dt does not refine, unless they are fixed.
+    # Unless they are fixed, verlet takes as many substeps as its stability limit needs, and dt does not refine them.
     out = good("converge", "scene.json", "--integrators", "verlet", "--levels", "4", "--out", "v")
     assert "verlet: no order, as it chooses its own substeps" in out, out
     out = good("converge", "scene.json", "--integrators", "verlet", "--levels", "4", "--set", "/integrator/substeps=64", "--out", "w")
     assert re.search(r"^verlet: order (1\.9|2)", out, re.M), out
     out = good("converge", "scene.json", "--integrators", "verlet", "--levels", "4", "--set", "/integrator/substeps=1", "--out", "x")
     assert "steps were rejected and cut, so dt was not halved everywhere" in out, out
-    # In a second folds grow: refinements do not fall, and the words say so, and only then.
-    for duration, told in ((0.3, False), (1, True)):
+    # Within a second folds grow and the refinements do not converge: the output says so, and only then.
+    for duration, uncertain in ((0.3, False), (1, True)):
         write_scene(duration=duration)
         out = good("converge", "scene.json", "--integrators", "midpoint", "--levels", "4", "--out", f"i{duration}")
         low = re.search(r"^midpoint: order .*confidence (\S+) to", out, re.M).group(1)
-        equal((float(low) <= 0, "so these do not tell the order" in out), (told, told), out)
+        equal((float(low) <= 0, "so these do not determine the order" in out), (uncertain, uncertain), out)
 
 
 def test_converge_in_space():
-    """converge refines the grids, and says where there is none"""
+    """converge refines grids, and refuses meshes that are not grids"""
     write_scene()
     out = good("converge", "scene.json", "--integrators", "be", "--levels", "3", "--space", "--out", "c")
     assert re.search(r"^space: order", out, re.M), out
@@ -135,7 +135,7 @@ def test_converge_in_space():
 
 
 def test_shards():
-    """shards together are what one run gives"""
+    """merged shards give the result of a single run"""
     write_scene()
     command = ["stability", "scene.json", *AXES, "--integrators", "be,bdf2,verlet"]
     good(*command, "--out", "whole")
@@ -152,7 +152,7 @@ def test_shards():
 
 
 def merged_is(whole, folder, merged):
-    """The lines and the table of the parts are those of one run."""
+    """Checks that the lines and the table of the shards are those of a single run."""
     good("merge", folder, "--out", merged)
     equal(lines(merged), lines(whole), "results of " + folder)
     numbers = ("cpu_s", "wall_s")
@@ -164,7 +164,7 @@ def merged_is(whole, folder, merged):
 
 
 def test_recipes():
-    """the recipes for GNU parallel, xargs and an array of Slurm give what one run gives"""
+    """the recipes for GNU parallel, xargs and a Slurm array give the result of a single run"""
     write_scene()
     command = ["stability", "scene.json", *AXES, "--integrators", "be,verlet"]
     recipes = SOURCES + "/examples/sweep/"
@@ -173,13 +173,13 @@ def test_recipes():
         subprocess.run([recipes + "parallel", "5", PROGRAM, *command, "--out", "by_parallel"], check=True, capture_output=True)
         equal(len(glob.glob("by_parallel/cases-*-of-5.jsonl")), 5, "shards")
         merged_is("whole", "by_parallel", "merged_parallel")
-    os.mkdir("bin")  # all programs but parallel that the recipe wants
+    os.mkdir("bin")  # all programs that the recipe needs, except parallel
     for name in ("bash", "seq", "nproc", "xargs", "sed"):
         os.symlink(shutil.which(name), "bin/" + name)
     subprocess.run([recipes + "parallel", "5", PROGRAM, *command, "--out", "by_xargs"], check=True, capture_output=True,
                    env={**os.environ, "PATH": os.path.abspath("bin")})
     merged_is("whole", "by_xargs", "merged_xargs")
-    # What Slurm sets in each task of an array; the tasks run in any order.
+    # The variable that Slurm sets in each task of an array; tasks run in any order.
     for task in (3, 1, 2):
         subprocess.run(["bash", recipes + "array.sbatch", PROGRAM, *command, "--out", "by_array"], check=True, capture_output=True,
                        env={**os.environ, "SLURM_ARRAY_TASK_ID": str(task), "SLURM_ARRAY_TASK_COUNT": "3", "SLURM_CPUS_PER_TASK": "2"})
@@ -199,9 +199,9 @@ def test_validate_goes_on():
         table, message = (text.decode() for text in child.communicate())
     equal(child.returncode, 130, "exit code")
     kept = [json.loads(line) for line in lines_there("v")]
-    equal(message, f"interrupted: {len(kept)} of {cases} cases are done; the same command goes on\n", "message")
+    equal(message, f"interrupted: {len(kept)} of {cases} cases are done; the same command resumes\n", "message")
     assert table.count("pass") == len(kept) + 1, table  # and "passed" in the last line
-    # The lines are of these cases: what is changed in them shows in the table, a case of another name is left out.
+    # Saved lines are used: a changed line shows in the table, a line of an unknown case is ignored.
     kept[0]["obtained"] = 2 * kept[0]["expected"]
     with open("v/cases.jsonl", "w", encoding="utf-8") as file:
         file.write(json.dumps(kept[0]) + "\n" + json.dumps({**kept[0], "scene_hash": "0"}) + "\n{\"name")
@@ -224,7 +224,7 @@ def test_reference_goes_on():
         child.kill()
     assert os.path.exists("t/reference-ida.json") or os.path.exists("t/reference.json"), os.listdir("t")
     if not os.path.exists("t/reference.json"):
-        # A saved level is taken as it is: with an error that is small enough there are no further levels.
+        # A saved level is used unchanged: if its error is small enough there are no further levels.
         about = read_json("t/reference-ida.json")
         about["error_m"] = 1e-12
         with open("t/reference-ida.json", "w", encoding="utf-8") as file:
@@ -261,13 +261,13 @@ def test_resume():
 
 
 def lines_there(folder):
-    """Whole lines of a file that may be growing."""
+    """The whole lines of a file that may be growing."""
     with open(folder + "/cases.jsonl", encoding="utf-8") as file:
         return [line for line in file if line.endswith("\n")]
 
 
 def test_torn_line():
-    """a case whose line was cut short is run again; a line that is no result is reported"""
+    """a case whose line was cut short runs again; a line that is not a result is reported"""
     write_scene()
     command = ["stability", "scene.json", *AXES, "--integrators", "be", "--out", "s"]
     good(*command)
@@ -303,7 +303,7 @@ def test_wrong_words():
     write_scene()
     two = ["--axis", "/integrator/dt=1e-3:1e-2:2log"]
     refused("stability", "scene.json", "--out", "s", says="2 or 3 axes")
-    for axis, says in (("dt=1:2:3", "no pointer"), ("/integrator/dt=1:2", "three numbers"), ("/integrator/dt=1:2:3lin", "log, or nothing"),
+    for axis, says in (("dt=1:2:3", "no pointer"), ("/integrator/dt=1:2", "three numbers"), ("/integrator/dt=1:2:3lin", "only log may follow the count"),
                        ("/integrator/dt=0:2:3log", "positive"), ("/integrator/dt=1:1:3", "different"), ("/integrator/dt=1:2:1", "2 to 1024")):
         refused("stability", "scene.json", *two, "--axis", axis, "--out", "s", says=says)
     refused("stability", "scene.json", *two, "--axis", "/integrator/dt=1e-4:1e-3:3", "--out", "s", says="/integrator/dt\" is given twice")
@@ -330,7 +330,7 @@ def test_wrong_words():
 
 
 def test_settings_without_effect():
-    """what no case takes from the command line is refused, not ignored; what some take acts"""
+    """a setting that no case uses is refused, not ignored; one that some cases use takes effect"""
     write_scene()
     for verb, option in ((["tradeoff"], ["--dt", "0.01"]), (["tradeoff"], ["--integrator", "ida"]), (["tradeoff"], ["--format", "obj"]),
                          (["tradeoff"], ["--set", "/integrator/rtol=1e-3"]), (["converge"], ["--dt", "0.01"]),
@@ -345,11 +345,11 @@ def test_settings_without_effect():
 
 
 def test_folder_that_cannot_be_made():
-    """an --out that cannot be made is one line and exit code 1 in every verb; the input is good"""
+    """an --out that cannot be created is one line and exit code 1 in every verb, with correct input"""
     write_scene()
     good("run", "scene.json", "--out", "run")
     with open("file", "w", encoding="utf-8") as file:
-        file.write("in the way\n")
+        file.write("a file\n")
     verbs = [["run", "scene.json"], ["report", "run"], ["tradeoff", "scene.json"], ["stability", "scene.json", *AXES],
              ["converge", "scene.json"], ["validate", "free_fall"]]
     for verb in verbs:
@@ -363,7 +363,7 @@ def test_folder_that_cannot_be_made():
 
 
 def test_no_reference():
-    """a tradeoff whose reference does not complete leaves no folder to an experiment that has no case"""
+    """a tradeoff whose reference does not complete leaves no folder behind"""
     write_scene()
     command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
     result = drape(*command, "--case-seconds", "1e-9")
@@ -379,14 +379,14 @@ def test_no_reference():
 
 
 def test_map_is_labelled():
-    """axes of a map have units, and rejections a scale where there are some"""
+    """axes of a map have units, and rejections, if any, have a scale"""
     write_scene()
     good("stability", "scene.json", *AXES, "--integrators", "be,verlet", "--out", "s")
     with open("s/map_verlet.gp", encoding="utf-8") as file:
         script = file.read()
     assert "set xlabel 'dt [s]'" in script and "set ylabel 'young_modulus [Pa]'" in script, script
     assert "1 in 100" not in script, "a scale of rejections on a map without any"
-    # The lines say that cases were rejected: the report is made of them alone.
+    # The lines are changed to have rejections: the report is made from the lines alone.
     with open("s/cases.jsonl", encoding="utf-8") as file:
         text = file.read()
     with open("s/cases.jsonl", "w", encoding="utf-8") as file:

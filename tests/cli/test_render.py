@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""`drape render` and `drape view`: pictures that are looked at by numbers. TAP on stdout.
+"""`drape render` and `drape view`: checks of the pixels of pictures. Output is TAP.
 
-DRAPE_BUILD is the folder of the build; or: test_render.py PROGRAM. A test is a function test_*; its docstring is its name. What
-a machine lacks (a driver, ffmpeg, Xvfb, numpy) skips what needs it. With GOLDEN=write the golden pictures are made anew.
+DRAPE_BUILD is the build folder; or: test_render.py PROGRAM. A test is a function test_*; its docstring is its name. Tests are skipped if
+the machine lacks what they need (an OpenGL driver, ffmpeg, Xvfb, numpy). With GOLDEN=write the golden pictures are written anew.
 """
 import json
 import os
@@ -163,15 +163,15 @@ def shadings():
 
 
 def test_shadings():
-    """every shading draws the cloth: it differs from the floor, has light and shade, and nothing in it is black; twice the same bytes"""
+    """every shading draws the cloth: it differs from the floor, has light and shade, and no black pixels; drawn twice the bytes are the same"""
     need_pictures()
     good("run", write_scene(), "--out", "ball", "--format", "npy")
-    empty = render("ball", "--camera", "30,89.9,0.02", out="empty.png")  # from far above: floor alone
+    empty = render("ball", "--camera", "30,89.9,0.02", out="empty.png")  # from far above: only floor
     for shade in shadings():
         source = "ball.json" if shade == "residual" else "ball"
         image = render(source, "--shade", shade, out="a.png")
         equal(image.shape, (SIZE[1], SIZE[0], 3), shade)
-        middle = image[90:110, 150:170].astype(float)  # the camera frames the cloth: that is its middle
+        middle = image[90:110, 150:170].astype(float)  # the camera frames the cloth: the middle of the picture is cloth
         assert abs(middle.mean(axis=(0, 1)) - empty.mean(axis=(0, 1))).max() > 8, f"{shade}: the middle looks like the floor"
         cloth = image[60:140, 100:220]
         assert cloth.sum(axis=2).min() > 24, f"{shade}: black at {cloth.sum(axis=2).min()}"
@@ -183,11 +183,11 @@ def test_shadings():
 
 
 def test_golden():
-    """pictures are those that were looked at: drivers may differ by rounding and at edges, 2 of 255 in the mean"""
+    """pictures equal the golden ones, up to a mean difference of 2 of 255: drivers may differ by rounding and at edges"""
     need_pictures()
     good("run", write_scene(), "--out", "ball", "--format", "npy")
     for shade in shadings():
-        if shade == "residual":  # what is left at convergence is rounding: of each machine its own
+        if shade == "residual":  # a converged residual is rounding, which differs between machines
             continue
         image = render("ball", "--shade", shade, size=(160, 100))
         path = os.path.join(GOLDEN, shade + ".png")
@@ -199,7 +199,7 @@ def test_golden():
 
 
 def test_run_and_scene():
-    """a scene and its finished run give the same picture, byte for byte, and so does the scene that the run keeps"""
+    """a scene, its finished run, and the copy of the scene in the run give the same picture, byte for byte"""
     need_pictures()
     good("run", write_scene(), "--out", "ball", "--format", "npy", "--dt", "0.0125")
     render("ball", out="a.png")
@@ -210,7 +210,7 @@ def test_run_and_scene():
 
 
 def test_texture():
-    """a texture lies on the cloth as it lies in its file, seen from the front; from below it is mirrored"""
+    """seen from the front, a texture has the orientation of its file; from below it is mirrored"""
     need_pictures()
     picture = numpy.zeros((64, 64, 3), int)
     picture[:32, :32], picture[:32, 32:] = (255, 0, 0), (0, 255, 0)  # red, green above
@@ -225,7 +225,7 @@ def test_texture():
                 for y, x in ((75, 135), (75, 185), (125, 135), (125, 185))]
     equal(corners(top), ["R", "G", "B", "RG"], "from above")
     equal(corners(below), ["B", "RG", "R", "G"], "from below, turned over its left to right axis")
-    for turn in (0, 180):  # what hangs has its texture upright, whichever row is the upper one
+    for turn in (0, 180):  # hanging cloth has its texture upright, whichever row is on top
         write_scene(colliders=None, contact=None,
                     mesh={"grid": "square", "columns": 13, "rows": 13, "width": 1, "height": 1, "orientation": "vertical",
                           "transform": {"rotate": [0, 0, 1, turn]}})
@@ -235,7 +235,7 @@ def test_texture():
 
 
 def test_light():
-    """the side to the lamp is lit and the other is not, from the front as from the back"""
+    """the side towards the lamp is lit and the other is not, seen from the front and from the back"""
     need_pictures()
     write_scene(colliders=None, contact=None,
                 mesh={"grid": "square", "columns": 13, "rows": 13, "width": 1, "height": 1, "orientation": "vertical"})
@@ -244,7 +244,7 @@ def test_light():
 
 
 def test_lamp_stands():
-    """the lamp stands in the room: what casts its shadow to the right casts it to the left for who looks from behind"""
+    """the lamp does not move with the camera: a shadow to the right is to the left when seen from behind"""
     need_pictures()
     plane = {"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0]}
     write_scene(colliders=[plane])
@@ -259,7 +259,7 @@ def test_lamp_stands():
 
 
 def test_glass():
-    """refraction shows what is behind the cloth: a ball below it, and not a room alone"""
+    """refraction shows the ball behind the cloth, and not only the room"""
     need_pictures()
     write_scene()
     with_ball = render("ball.json", "--frame", "0", "--shade", "refraction", "--camera", "0,89.9,2")
@@ -269,18 +269,18 @@ def test_glass():
 
 
 def test_legend_has_its_place():
-    """the legend lies beside what the panels frame: below its numbers there is no cloth"""
+    """the legend lies beside the framed part of the panels: there is no cloth behind its numbers"""
     need_pictures()
     good("run", write_scene(), "--out", "ball", "--format", "npy")
     for runs in (["ball"], ["--compare", "ball", "ball", "ball"]):
         image = render(*runs, "--shade", "strain", "--range", "0,1000", out="legend.png", size=(960, 200))
-        beside = image[:, 873:893]  # within the legend, left of its ramp; cloth, at the low end of it, is violet, also below a veil
+        beside = image[:, 873:893]  # within the legend, left of its ramp; cloth at the low end of the ramp is violet, even behind a translucent ground
         violet = (beside[:, :, 0] + beside[:, :, 2]) / 2 - beside[:, :, 1]
         assert violet.max() < 12, f"{len(runs)} operands: cloth lies below the legend"
 
 
 def test_legend():
-    """a field has its ramp in the picture, with the range that was asked for"""
+    """the picture of a field has a ramp, with the range that was asked for"""
     need_pictures()
     good("run", write_scene(), "--out", "ball", "--format", "npy")
     low = render("ball", "--shade", "strain", "--range", "0,1000", out="low.png", size=(640, 400))
@@ -300,7 +300,7 @@ def frames_of(path):
 
 
 def test_films():
-    """films have the frames of the run, each Nth of them, at even sizes where the format wants that"""
+    """films have every Nth frame of the run, at even sizes if the format needs that"""
     need_pictures()
     need("ffmpeg")
     need("ffprobe")
@@ -315,7 +315,7 @@ def test_films():
 
 
 def test_folder():
-    """a folder gets a picture for each frame; they move; those of an earlier run go, and nothing else does"""
+    """a folder gets a picture for each frame; the pictures differ; those of an earlier run are removed, other files are not"""
     need_pictures()
     good("render", write_scene(), "--out", "frames", "--size", "160x100")
     equal(sorted(os.listdir("frames")), [f"frame_{k:05}.png" for k in range(6)])
@@ -324,12 +324,12 @@ def test_folder():
     for name in others:
         with open("frames/" + name, "w", encoding="utf-8") as file:
             file.write("mine")
-    good("render", "ball.json", "--out", "frames", "--size", "160x100", "--every", "2")  # as of a run: 0, 2, 4
+    good("render", "ball.json", "--out", "frames", "--size", "160x100", "--every", "2")  # as from a longer run: 0, 2, 4
     equal(sorted(os.listdir("frames")), sorted(others + [f"frame_{k:05}.png" for k in range(3)]))
 
 
 def test_endings():
-    """the ending of a name counts in letters of any size; a folder has none, or a slash behind it, or is there already"""
+    """the ending of a name may be in upper or lower case; a folder has no ending, or a slash at its end, or exists already"""
     need_pictures()
     render(write_scene(), out="x.PNG")
     good("render", "ball.json", "--out", "v1.2/", "--size", "64x64", "--every", "5")
@@ -339,7 +339,7 @@ def test_endings():
 
 
 def test_compare():
-    """runs stand side by side under one camera, by time"""
+    """runs are drawn side by side with one camera, at the same times"""
     need_pictures()
     write_scene()
     good("run", "ball.json", "--out", "be", "--format", "npy")
@@ -352,7 +352,7 @@ def test_compare():
     one_line(drape("render", "be", "fine", "--out", "x.png"), 2, "--compare")
 
 
-# ---- What goes wrong
+# ---- Failures
 
 
 def test_refused():
@@ -391,7 +391,7 @@ def test_refused():
 
 
 def test_no_driver():
-    """without a driver of EGL it is one line and exit 2, and the program runs scenes as ever"""
+    """without an EGL driver, drawing is one line and exit 2, and the program still runs scenes"""
     need_pictures()
     env = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent", "__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}
     one_line(drape("render", write_scene(), "--out", "x.png", env=env), 2, "libgl1-mesa-dri")
@@ -400,7 +400,7 @@ def test_no_driver():
 
 
 def test_no_ffmpeg():
-    """without ffmpeg a film is one line and exit 2; an ffmpeg that dies is one line with its last words, exit 1, no file"""
+    """without ffmpeg a film is one line and exit 2; if ffmpeg dies: one line with its last message, exit 1, no file"""
     need_pictures()
     os.mkdir("bin")
     one_line(drape("render", write_scene(), "--out", "x.mp4", env={"PATH": os.path.abspath("bin")}), 2, "ffmpeg")
@@ -415,7 +415,7 @@ def test_no_ffmpeg():
 
 
 def test_broken_run():
-    """a run whose frames are cut off, or of another scene, says so"""
+    """a run with truncated frames, or with those of another scene, is refused with a message"""
     need_pictures()
     good("run", write_scene(), "--out", "ball", "--format", "npy")
     size = os.path.getsize("ball/positions.npy")
@@ -437,7 +437,7 @@ def test_broken_run():
 
 
 class Screen:
-    """A display without a screen, whose picture is a file."""
+    """A virtual display whose picture is a file (Xvfb)."""
 
     def __enter__(self):
         need("Xvfb")
@@ -461,7 +461,7 @@ class Screen:
         subprocess.run(["xdotool", *words], env=self.env, check=True, timeout=LIMIT, capture_output=True)
 
     def look(self):
-        """(480, 640, 3): the format of xwd, 25 numbers, a name, colours of 12 bytes, rows of blue, green, red, 0."""
+        """The picture (480, 640, 3), from the format of xwd: 25 numbers, a name, colours of 12 bytes, rows of blue, green, red, 0."""
         with open("Xvfb_screen0", "rb") as file:
             data = file.read()
         head = struct.unpack(">25I", data[:100])
@@ -487,7 +487,7 @@ def reds(image):
 
 
 def test_view():
-    """a window starts paused, runs, steps, is dragged at, changes its integrator, step and shading, and quits"""
+    """a window starts paused, runs, steps, drags a node, changes integrator, step and shading, and quits"""
     need_pictures()
     write_scene(colliders=None, contact=None, duration=5, frame_rate=60, pins=[{"corner": "top-left"}, {"corner": "top-right"}])
     with open("ball.json", encoding="utf-8") as file:
@@ -504,9 +504,9 @@ def test_view():
                 return reds(image).sum() > 4000
             first = screen.wait("no cloth is seen", shown)
             time.sleep(0.5)
-            lower = slice(300, 460)  # below the state
+            lower = slice(300, 460)  # below the text of the state
             assert (screen.look()[lower] == first[lower]).all(), "it moves though it is paused"
-            screen.do("key", "h", "key", "h")  # keys, nothing
+            screen.do("key", "h", "key", "h")  # first the list of keys, then nothing
             bare = screen.wait("H does not hide the state", lambda image: (image[20:160, 20:200] != first[20:160, 20:200]).any(axis=2).mean() > 0.5)
             assert bare[20:120, 20:150].std(axis=(0, 1)).max() < 8, "something is left at the upper left"
             screen.do("key", "h")
@@ -538,7 +538,7 @@ def test_view():
 
 
 def test_view_interrupted():
-    """a window ends by Ctrl-C at any moment with one line, paused or not, before it is open or after"""
+    """Ctrl-C ends a window at any moment with one line, paused or not, before it is open or after"""
     need_driver()
     write_scene(duration=5, frame_rate=60)
     with Screen() as screen:
@@ -560,14 +560,14 @@ def test_view_interrupted():
 
 
 def catches_signals(pid):
-    """SIGHUP, the last that the program asks for."""
+    """Waits until the program catches SIGHUP, the last signal for which it installs a handler."""
     with open(f"/proc/{pid}/status", encoding="ascii") as file:
         caught = next(line for line in file if line.startswith("SigCgt:"))
     return int(caught.split()[1], 16) >> (signal.SIGHUP - 1) & 1
 
 
 def test_no_display():
-    """without a display the window is one line and exit 2"""
+    """without a display, view is one line and exit 2"""
     need_pictures()
     env = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
     result = subprocess.run([PROGRAM, "view", write_scene()], capture_output=True, text=True, timeout=LIMIT, env=env)

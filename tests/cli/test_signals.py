@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""test_signals.py: SIGINT, SIGTERM and SIGHUP at any moment of any verb: one line, exit code 130, and whole files or none; or the
-verb was done before. TAP on stdout.
+"""test_signals.py: SIGINT, SIGTERM and SIGHUP at any moment of any verb: one line, exit code 130, and whole files or none, unless the verb
+had already completed. Output is TAP.
 
-The moments are random; the seed is printed, and DRAPE_SEED=N takes another. A child is signalled once it catches signals, which is the
-first thing that the program does: /proc tells (Linux).
+The moments are random; the seed is printed, and DRAPE_SEED=N sets it. A child is signalled once it catches signals, as /proc shows (Linux):
+the program installs its handlers first.
 """
 import os
 import random
@@ -22,7 +22,7 @@ chance = random.Random(SEED)
 
 
 def large(**changes):
-    """961 nodes in layers over a ball: setting up takes a share of the whole."""
+    """961 nodes in layers over a ball: the setup takes a noticeable share of the run."""
     changes.setdefault("duration", 0.05)
     return write_scene(
         mesh={"grid": "square", "columns": 31, "rows": 31, "width": 1, "height": 1},
@@ -36,11 +36,11 @@ def catches(pid):
             mask = int(re.search(r"^SigCgt:\s*(\w+)", file.read(), re.M).group(1), 16)
     except (OSError, AttributeError):
         return False
-    return mask >> (signal.SIGHUP - 1) & 1  # the last that is caught
+    return mask >> (signal.SIGHUP - 1) & 1  # the last signal that the program catches
 
 
 def struck(delay, one, *args, **options):
-    """A verb that is signalled so long after it began: exit code, stdout, stderr."""
+    """Runs a verb and signals it after a delay. Returns exit code, stdout, stderr."""
     with subprocess.Popen([PROGRAM, *args], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                           **options) as child:
         end = time.monotonic() + LIMIT
@@ -58,7 +58,7 @@ def struck(delay, one, *args, **options):
 
 
 def check_files(folder, what):
-    """Nothing under a name on the way, and what is there can be read."""
+    """Checks that there are no temporary files and that all others can be read."""
     for path, _, names in os.walk(folder):
         for name in names:
             full = os.path.join(path, name)
@@ -76,7 +76,7 @@ def check_files(folder, what):
 
 
 def check_end(code, err, what):
-    """Whether it was cut short."""
+    """Whether the verb was interrupted."""
     if code == 0:
         equal(err, "", what)
         return False
@@ -85,8 +85,8 @@ def check_end(code, err, what):
 
 
 def strike(args, folder=None, moments=4):
-    """The verb alone, for its time, and then signalled at its very beginning and at random moments. What it is signalled in the middle
-    of may be done before on a machine that is now less busy, not at the beginning."""
+    """Runs the verb once to measure its time, then signals it at its very beginning and at random moments. On a machine that is less busy than
+    before it may complete before a random moment, but not before the beginning."""
     if folder:
         shutil.rmtree(folder, ignore_errors=True)
     start = time.monotonic()
@@ -108,7 +108,7 @@ def strike(args, folder=None, moments=4):
 
 
 def test_run():
-    """run, with files and checkpoints: interrupted at its beginning nothing is there; what was cut goes on and ends as if it had not been"""
+    """run, with files and checkpoints: interrupted at its beginning it leaves nothing; later, it resumes and ends as if it had not been interrupted"""
     large()
     command = ["run", "scene.json", "--out", "out", "--format", "npy,obj", "--checkpoint-every", "1"]
     code, _, err = struck(0, signal.SIGINT, *command)
@@ -124,7 +124,7 @@ def test_run():
 
 
 def test_static():
-    """static has one step, which may take minutes: a signal ends it there"""
+    """static has one step, which may take minutes: a signal ends it during the step"""
     write_scene(
         mesh={"grid": "irregular", "columns": 81, "rows": 4, "width": 1, "height": 0.02, "orientation": "horizontal"},
         material={"young_modulus": 1200, "poisson_ratio": 0, "thickness": 0.01, "areal_density": 0.1},
@@ -157,7 +157,7 @@ def test_resume():
 
 
 def test_reading():
-    """a scene from a pipe that nobody writes, and one that is begun and not ended, can be given up"""
+    """waiting for a scene from a pipe that has no writer, or whose writer stops in the middle, can be interrupted"""
     os.mkfifo("pipe.json")
     for begun in False, True:
         writer = os.open("pipe.json", os.O_RDWR) if begun else None
@@ -205,7 +205,7 @@ def test_validate():
 
 def test_render():
     """render, of a scene and of a run: a picture, a folder"""
-    # A driver of OpenGL is unloaded before the sanitizer looks for leaks: what it keeps has no name that could be left out.
+    # An OpenGL driver is unloaded before the sanitizer looks for leaks, so its leaks have no names that could be suppressed.
     os.environ["ASAN_OPTIONS"] = "abort_on_error=1:detect_leaks=0"
     large()
     if drape("render", "scene.json", "--out", "x.png", "--size", "64x48").returncode:

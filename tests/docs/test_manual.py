@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""test_manual.py: the manual pages, which docs/make/manual.py makes of the program and the headers, against both, and against man and mandoc. See
-tests/cli/program.py."""
+"""test_manual.py: checks the manual pages, which docs/make/manual.py makes from the program and the headers, against both, and with man and
+mandoc. See tests/cli/program.py."""
 import glob
 import os
 import re
@@ -22,7 +22,7 @@ def pages():
 
 
 def words(name):
-    """A page without what is roff's."""
+    """The text of a page, without roff requests and escapes."""
     with open(os.path.join(PAGES, name), encoding="utf-8") as file:
         return re.sub(r"\\f[BIR]|\\&", "", file.read()).replace("\\-", "-").replace("\\e", "\\")
 
@@ -43,7 +43,7 @@ def test_pages():
 
 
 def test_man():
-    """man has nothing to warn of in any page"""
+    """man prints no warnings for any page"""
     if not shutil.which("man"):
         raise Skip("no man")
     for page in pages():
@@ -51,7 +51,7 @@ def test_man():
 
 
 def test_mandoc():
-    """mandoc has neither"""
+    """mandoc prints no warnings for any page"""
     if not shutil.which("mandoc"):
         raise Skip("no mandoc")
     result = subprocess.run(["mandoc", "-Tlint", "-W", "warning", *pages()], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -59,13 +59,13 @@ def test_mandoc():
 
 
 def test_verbs():
-    """a page of a verb has every option of its help, with the same words; that of the program every verb and exit code"""
+    """the page of a verb has every option of its help, with the same text; that of the program every verb and exit code"""
     pages()
     overview = words("drape.1")
     for verb in verbs():
         options = re.findall(r"^  (--\S+(?: \S+)?) +(.*)$", good("help", verb), re.M)
         page = " ".join(words(f"drape-{verb}.1").split())
-        assert f"drape-{verb}(1)" in overview and "--help" in [option for option, _ in options], verb  # alone: drawing is not in this build
+        assert f"drape-{verb}(1)" in overview and "--help" in [option for option, _ in options], verb  # only this line: the build has no drawing
         for option, text in options:
             assert f".TP {option} {text.replace('`', '')}" in page, (verb, option)
     for code, text in ("0", "done"), ("1", "failed"), ("2", "bad input"), ("130", "interrupted"):
@@ -73,7 +73,7 @@ def test_verbs():
 
 
 def test_scene():
-    """the page of scenes has every key, every row and every parameter of the tables"""
+    """the page of scenes has every key, every entry and every parameter of the tables"""
     pages()
     page = words("drape-scene.5")
     shown = re.findall(r"^\| `([^`]*)` \|(?: `([^`]*)` \|)?", good("list", "--markdown"), re.M)

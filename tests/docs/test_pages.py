@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""test_pages.py: what the pages say, done: README.md, CONTRIBUTING.md, docs/*.md. Every block of code is run, and every link leads somewhere. See
+"""test_pages.py: tries the pages README.md, CONTRIBUTING.md and docs/*.md. Every block of code is run, and every link has a target. See
 tests/cli/program.py.
 
 A block is fenced and names its language. `sh` runs in a folder with a scene (SCENE, scene.json), a finished run of it (RUN), the examples, and the
-program on its path; what one block of a page leaves, the next one finds. `json` is a scene, or members of one. `c` is a program, or functions and
-statements of one with a context ctx, a model and a sim. `python` runs. `text` is what a command prints. What stands before a block may say more:
+program on its path; a block finds the files that earlier blocks of its page left. `json` is a scene, or members of one. `c` is a program, or functions
+and statements of one with a context ctx, a model and a sim. `python` runs. `text` is the output of a command. A comment before a block may say more:
 
-    <!-- not run: WHY -->           it cannot be
-    <!-- printed by: COMMAND -->    a text is what that prints, to the letter
-    <!-- from: FILE -->             it stands in that file
+    <!-- not run: WHY -->           the block cannot be run
+    <!-- printed by: COMMAND -->    the text is exactly what this command prints
+    <!-- from: FILE -->             the block is an excerpt of this file
 """
 import glob
 import json
@@ -28,10 +28,10 @@ LANGUAGES = ("sh", "json", "c", "python", "text")
 FENCE = re.compile(r"^(?: *<!-- (?P<kind>[a-z ]+): (?P<said>.*?) -->\n)?(?P<indent> *)```(?P<language>\w*)\n(?P<text>.*?)^ *```$", re.S | re.M)
 HEADS = {"scene": ("cloth",), "cloth": ("mesh", "material", "terms", "pins", "velocity")}
 
-# What a page's C programs print: that they did what it says.
+# Output of the C programs of a page that shows that they work.
 PRINTS = {"README.md": ["node 0 is at"], "docs/embedding.md": ["my scene:1:", "node 0 at"]}
 
-# Around fragments: a sheet of 30 nodes in the wind, hung by two corners over a ball.
+# The scene of fragments: a sheet of 30 nodes in the wind, hung by two corners over a ball.
 FRAME_SCENE = """{"drape": 1, "cloth": [{"mesh": {"grid": "square", "columns": 6, "rows": 5, "width": 0.5, "height": 0.4},
   "material": {"young_modulus": 1e4, "thickness": 1e-3, "density": 200}, "terms": ["stretch.edge", "bend.hinge", "drag.wind"],
   "pins": [{"corner": "top-left"}, {"corner": "top-right"}]}],
@@ -73,7 +73,7 @@ def blocks(page):
     return [Block(page, match) for match in FENCE.finditer(read(page))]
 
 
-# ---- Doing what they say
+# ---- Running the blocks
 
 
 def done(command, place, **options):
@@ -83,7 +83,7 @@ def done(command, place, **options):
 
 
 def need_programs(text):
-    """What a build or a machine may lack."""
+    """Skips a block that needs a program or a feature that this build or machine does not have."""
     verbs = good("help")
     for verb in re.findall(r"^drape (\w+)", text, re.M):
         if not re.search(rf"^  {verb} ", verbs, re.M):
@@ -128,7 +128,7 @@ def compiled(text, place):
 
 
 def run_c(page, found):
-    """Programs as they are; of fragments, the functions before main and the statements inside, in the order of the page, each in a scope."""
+    """C programs unchanged; from fragments one program, with functions before main and statements inside it, in the order of the page, each in a scope."""
     output = "".join(compiled(block.text, block.place) for block in found if "int main(" in block.text)
     rest = [block for block in found if "int main(" not in block.text]
     if rest:
@@ -165,7 +165,7 @@ RUN = {"sh": run_sh, "json": run_json, "text": run_text, "python": run_python}
 
 
 def prepare():
-    """The folder that a page is tried in."""
+    """Prepares the folder in which the blocks of a page run."""
     for name in "SCENE", "scene.json":
         with open(name, "w", encoding="utf-8") as file:
             json.dump(scene(), file)
@@ -174,7 +174,7 @@ def prepare():
 
 
 def run_page(page):
-    """Returns how many blocks were run, marked, and skipped, and why those were."""
+    """Returns how many blocks were run, marked as not run, and skipped, with the reasons."""
     counts, reasons, programs = {"run": 0, "marked": 0, "skipped": 0}, [], []
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
@@ -211,7 +211,7 @@ def run_page(page):
 
 
 def test_the_net():
-    """what a page could do wrong is seen"""
+    """mistakes in a page are detected"""
     def tried(text):
         matches = [Block("README.md", match) for match in FENCE.finditer(text)]
         return [(block.language, block.kind, block.text) for block in matches]
@@ -259,7 +259,7 @@ def test_no_other_blocks():
 
 
 def slug(heading):
-    """As GitHub makes them."""
+    """The anchors of headings, as GitHub makes them."""
     return re.sub(r" ", "-", re.sub(r"[^\w\- ]", "", re.sub(r"[`*]", "", heading).strip().lower()))
 
 
@@ -281,7 +281,7 @@ def dead_links(page, text):
 
 
 def test_links():
-    """no link leads nowhere, from README, CONTRIBUTING, docs, CHANGELOG, the map of the source"""
+    """every link of README, CONTRIBUTING, docs, CHANGELOG and the map of the source has a target"""
     pages = PAGES + ["CHANGELOG.md", "src/README.md"]
     dead = [line for page in pages for line in dead_links(page, read(page))]
     assert not dead, "\n".join(dead)
@@ -291,7 +291,7 @@ def test_links():
 
 
 def test_paths():
-    """files that the pages name in the tree are there"""
+    """source files that the pages name exist"""
     named = re.compile(r"`((?:src|tests|tools|examples|bench|docs|include)/[\w./*-]+)`")
     for page in PAGES + ["src/README.md"]:
         for path in named.findall(read(page)):
@@ -315,7 +315,7 @@ def test_scene_page():
     printed = good("list", "--markdown")
     if "| `cholmod` |" in printed and "| `wireframe` |" in printed:
         equal(found, printed, "docs/scene.md; tools/tables writes it")
-    choices = re.compile(r"^\| `\w+` \| `linear_solver` |^\| `auto` ")  # they name the solvers of a build
+    choices = re.compile(r"^\| `\w+` \| `linear_solver` |^\| `auto` ")  # they depend on the solvers of the build
     missing = [line for line in printed.splitlines() if line not in found.splitlines() and not choices.match(line)]
     assert not missing, missing
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""test_site.py: the site that tools/site makes: doxygen has nothing to complain of, no link is dead, all pages and functions are there. See
+"""test_site.py: the site that tools/site makes: doxygen prints no warnings, no link is dead, all pages and functions are there. See
 tests/cli/program.py."""
 import glob
 import html
@@ -14,7 +14,7 @@ from program import SOURCES, Skip, run_tests  # noqa: E402  pylint: disable=wron
 
 
 def site(sources):
-    """Makes it in ./site; what was said."""
+    """Makes the site in ./site. Returns the output."""
     if not shutil.which("doxygen"):
         raise Skip("no doxygen")
     return subprocess.run([sources + "/tools/site", os.path.abspath("site")], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
@@ -43,7 +43,7 @@ def dead_links(found):
 
 
 def test_site():
-    """all is documented, every page, function and status is on the site, no link is dead"""
+    """everything is documented, every page, function and status is on the site, and no link is dead"""
     made = site(SOURCES)
     assert made.returncode == 0, made.stdout
     assert not re.search(r"warning|error", made.stdout), made.stdout

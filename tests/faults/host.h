@@ -1,4 +1,4 @@
-/* host.h: a hung sheet with a term of the host's that breaks on demand, and the record of its attempts. */
+/* host.h: a hung sheet with a user-defined term that fails on demand, and the record of its attempts. */
 #ifndef DRAPE_TESTS_FAULTS_HOST_H
 #define DRAPE_TESTS_FAULTS_HOST_H
 
@@ -9,8 +9,7 @@
 #include "drape/extend.h"
 #include "support/suite.h"
 
-/* ---- The term
- * ----------------------------------------------------------------------------------------------------- */
+/* ---- The term ---- */
 
 typedef enum host_fault {
     HOST_NOTHING,
@@ -18,11 +17,12 @@ typedef enum host_fault {
     HOST_INFINITE_FORCE,
     HOST_NAN_HESSIAN,
     HOST_INFINITE_HESSIAN,
-    HOST_SINGULAR /* takes the inertia of a node away where the step is host_step: its rows become 0 */
+    HOST_SINGULAR /* cancels the inertia of a node if the step is host_step: its Jacobian rows are 0 */
 } host_fault;
 
-/* The evaluation, counted from 1, that breaks: of forces for faults of forces, else of Hessians. 0: none;
- * host_always: all from it on. One call is one evaluation while a cloth has at most 32 nodes. */
+/* host_at: the evaluation that fails, counted from 1; of forces for faults of forces, otherwise of Hessians.
+ * 0: none. host_always: all later ones fail too. One call is one evaluation, as a cloth here has at most 32
+ * nodes. */
 static host_fault host_fault_kind;
 static long host_at, host_forces, host_hessians;
 static bool host_always;
@@ -36,7 +36,7 @@ static inline void host_break(host_fault kind, long at, bool always)
     host_forces = host_hessians = 0;
 }
 
-/* Whether the fault is behind. */
+/* Whether the fault has occurred. */
 static inline bool host_has_broken(void)
 {
     bool force = host_fault_kind == HOST_NAN_FORCE || host_fault_kind == HOST_INFINITE_FORCE;
@@ -59,9 +59,9 @@ static inline drape_status host_build(const drape_cloth_view *cloth, const doubl
 }
 
 #define HOST_DT   (1.0 / 64)
-#define HOST_NODE 7 /* the node that is struck */
+#define HOST_NODE 7 /* the node with the fault */
 
-/* E = 0 otherwise. */
+/* Without a fault E = 0. */
 static inline void host_energy(const drape_elements *el, int32_t first, int32_t count, const double *x,
                                const double *internal, double *e, double *g, double *hess)
 {
@@ -104,14 +104,13 @@ static const drape_term_ops host_term = {
     .build = host_build,
     .energy = host_energy};
 
-/* ---- The sim
- * ------------------------------------------------------------------------------------------------------ */
+/* ---- The sim ---- */
 
 typedef struct host_sim {
     drape_context *ctx;
     drape_model *model;
     drape_sim *sim;
-    long attempts, rejected, unconverged, nonfinite; /* unconverged, nonfinite: among the accepted */
+    long attempts, rejected, unconverged, nonfinite; /* unconverged, nonfinite: accepted steps only */
     char last_reason[40];
     double last_h;
 } host_sim;
@@ -143,8 +142,9 @@ static inline drape_status host_observe(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* settings: members of "integrator" beside dt = 1/64 (whose powers are exact), after a comma, and what
- * else the scene has. stretch: whether the cloth has springs; without, its free nodes fall alone. */
+/* settings: members of "integrator" besides dt = 1/64 (whose powers are exact), beginning with a comma, and
+ * further members of the scene. stretch: whether the cloth has springs; without them its free nodes fall
+ * independently. */
 static inline host_sim host_open(const char *integrator, const char *controller, bool stretch)
 {
     char text[1024];
@@ -172,7 +172,7 @@ static inline host_sim host_open(const char *integrator, const char *controller,
     return s;
 }
 
-/* s must stay where it is. */
+/* s must not move in memory afterwards. */
 static inline void host_watch(host_sim *s)
 {
     ck_assert_int_eq(drape_sim_observe(s->sim, host_observe, s), DRAPE_OK);
@@ -185,7 +185,7 @@ static inline void host_close(host_sim *s)
     drape_context_destroy(&s->ctx);
 }
 
-/* A copy of what a sim says its state is. */
+/* A copy of the state of a sim, as its accessors give it. */
 typedef struct host_copy {
     double t, x[96], v[96];
     uint64_t hash;
@@ -210,7 +210,7 @@ static inline void host_check_state(const host_sim *s, const host_copy *expected
     ck_assert_mem_eq(now.v, expected->v, sizeof now.v);
 }
 
-/* One line that begins with the time and has the reason. */
+/* The message is one line that begins with the time and contains the reason. */
 static inline void host_check_message(const host_sim *s, const char *reason)
 {
     char time[40];
@@ -220,8 +220,8 @@ static inline void host_check_message(const host_sim *s, const char *reason)
     ck_assert_msg(strstr(message, reason) && !strchr(message, '\n'), "%s is not in: %s", reason, message);
 }
 
-/* All ways in which the Newton row can be set that its faults depend on. The line search by work is not among
- * them: it asks for another matrix where one is singular or not finite, and gets a good one. */
+/* The settings of Newton's method that its reaction to faults depends on. The line search by work is not
+ * among them: if a matrix is singular or not finite, it asks for another one and gets a good one. */
 static const char *const host_settings[] = {
     ", 'globalization': 'none'",
     ", 'globalization': 'line_search'",
@@ -232,6 +232,6 @@ static const char *const host_settings[] = {
 enum {
     HOST_SETTINGS = 6,
     HOST_UNPROJECTED = 5
-}; /* the last projects: negative Hessians are no fault there */
+}; /* the last one projects: there negative Hessians are not a fault */
 
 #endif

@@ -1,6 +1,6 @@
-/* test_cancel.c: a context's cancel says yes at each of its calls in turn, while a scene is read and
- * compiled, a sim is made and restored: each time a clean DRAPE_E_STOPPED, NULL, no leak; what was there
- * before goes on with the same bits. */
+/* test_cancel.c: the cancel function of a context answers true at each of its calls in turn, while a scene is
+ * read and compiled and a sim is made and restored. Each time: DRAPE_E_STOPPED, NULL, no leak, and an
+ * existing sim continues with the same bits. */
 #include <stdio.h>
 #include <unistd.h>
 
@@ -11,7 +11,7 @@
 #include "support/failing_allocator.h"
 #include "support/suite.h"
 
-#define MOST 1000 /* calls; a life takes some dozens */
+#define MAX_CALLS 1000 /* a whole run makes some dozens */
 
 static const char scene_text[] =
     "{\"drape\": 1, \"cloth\": [\n"
@@ -26,7 +26,7 @@ static const char scene_text[] =
     " \"colliders\": [{\"type\": \"plane\", \"point\": [0, -9, 0], \"normal\": [0, 1, 0]}],\n"
     " \"integrator\": {\"dt\": 0.01}, \"duration\": 1}\n";
 
-/* Says yes at call number `at`, and, if it is to, ever after. */
+/* Answers true at call number `at` and, if `stays`, at all later ones. */
 typedef struct asked {
     failing_allocator memory;
     long calls, at;
@@ -54,13 +54,13 @@ static drape_context *context(asked *a)
     return ctx;
 }
 
-/* Reads, compiles, makes, checks, measures and restores. */
+/* Reads and compiles a scene, makes a sim, checks and measures it, saves and restores it. */
 static drape_status live(drape_context *ctx, const char *path)
 {
     drape_scene *scene = NULL;
     drape_model *model = NULL;
     drape_sim *sim = NULL;
-    int rows;
+    int count;
     drape_status status = drape_scene_load(ctx, path, &scene);
     ck_assert_int_eq(status != DRAPE_OK, scene == NULL);
     if (!status) {
@@ -72,8 +72,8 @@ static drape_status live(drape_context *ctx, const char *path)
         ck_assert_int_eq(status != DRAPE_OK, sim == NULL);
     }
     if (!status) {
-        static drape_check_result row[DRAPE_MAX_CHECK_RESULTS];
-        status = drape_check_derivatives(ctx, sim->system, 1, row, &rows);
+        static drape_check_result results[DRAPE_MAX_CHECK_RESULTS];
+        status = drape_check_derivatives(ctx, sim->system, 1, results, &count);
     }
     if (!status) {
         drape_profile_term terms[16];
@@ -86,7 +86,7 @@ static drape_status live(drape_context *ctx, const char *path)
     return status;
 }
 
-/* How many times a whole life asks. */
+/* The number of calls of the cancel function in a whole run. */
 static long calls_of_a_life(const char *path)
 {
     asked a = {.at = 0};
@@ -110,7 +110,7 @@ START_TEST(it_may_be_at_any_stage)
         drape_context *ctx = context(&a);
         ck_assert_msg(live(ctx, path) == DRAPE_E_STOPPED, "call %ld: %s", a.at, drape_context_message(ctx));
         ck_assert_ptr_nonnull(strstr(drape_context_message(ctx), "cancelled"));
-        ck_assert_int_eq(a.calls, a.at); /* whoever was told to end does not ask again */
+        ck_assert_int_eq(a.calls, a.at); /* it is not called again after it answered true */
         drape_context_destroy(&ctx);
         ck_assert_msg(a.memory.live == 0, "call %ld: %ld leaks", a.at, a.memory.live);
     }
@@ -118,7 +118,7 @@ START_TEST(it_may_be_at_any_stage)
 }
 END_TEST
 
-/* The restored sim is made beside the present one. */
+/* Restoring makes a new sim beside the present one, so cancelling it leaves the present one intact. */
 START_TEST(a_cancelled_restore_leaves_the_sim)
 {
     asked a = {.at = 0};
@@ -138,7 +138,7 @@ START_TEST(a_cancelled_restore_leaves_the_sim)
     while (status) {
         a.calls = 0;
         a.at = ++n;
-        ck_assert_int_lt(n, MOST);
+        ck_assert_int_lt(n, MAX_CALLS);
         status = drape_sim_restore_from(sim, there.data, there.size);
         ck_assert(status == DRAPE_OK || status == DRAPE_E_STOPPED);
         ck_assert_int_eq(status == DRAPE_OK, drape_sim_hash(sim) != hash);
@@ -156,7 +156,7 @@ START_TEST(a_cancelled_restore_leaves_the_sim)
 }
 END_TEST
 
-/* A context of a host that knew no cancel asks nobody. */
+/* The context of an older host, whose def has no cancel function, calls none. */
 START_TEST(an_older_host_has_none)
 {
     drape_context_def def;

@@ -1,6 +1,6 @@
 /*
- * test_checkpoint.c: checkpoints that are cut short, damaged, of something else, or that find no room, no
- * memory, no folder: each is refused with one line, and the sim goes on as if nothing had been.
+ * test_checkpoint.c: checkpoints that are truncated, damaged, of another scene, or written without disk
+ * space, memory or a folder: each is refused with one line, and the sim continues as if nothing had happened.
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -33,11 +33,11 @@ static scene open_sheet(const char *integrator, const char *settings)
     return scene_open(SHEET, 2, 1e5, integrator, 0.01, settings, "halving", 60);
 }
 
-/* One that goes on where a sheet is in the middle: what restoring must not change. */
+/* A sim in the middle of a run, which a refused restore must not change. */
 typedef struct victim {
     scene s;
-    bytes good;      /* of a sim like it, in the middle */
-    uint64_t before; /* hash of its state */
+    bytes good;      /* a valid checkpoint of a sim like it, at MIDDLE */
+    uint64_t before; /* hash of the state of s */
 } victim;
 
 static victim make_victim(const char *integrator, const char *settings)
@@ -60,7 +60,7 @@ static void refused(victim *v, drape_status status, const char *what)
     ck_assert_msg(drape_sim_hash(v->s.sim) == v->before, "%s: the sim changed", what);
 }
 
-/* After all that it goes on as one that nobody tried anything with, and takes the good one. */
+/* After all refusals it advances as an untouched sim does, and restores from the valid checkpoint. */
 static void close_victim(victim *v, const char *integrator, const char *settings)
 {
     scene other = open_sheet(integrator, settings);
@@ -95,7 +95,7 @@ START_TEST(cut_anywhere_it_is_refused)
 }
 END_TEST
 
-/* The checksum tells any byte that differs; each is tried with one of its bits. */
+/* The checksum detects any changed byte: each is tried with one bit flipped. */
 START_TEST(a_flipped_bit_is_refused)
 {
     victim v = make_victim("bdf2", "");
@@ -139,8 +139,8 @@ static drape_status stop_soon(void *user, const drape_event *event)
     return --*left < 0 ? DRAPE_E_STOPPED : DRAPE_OK;
 }
 
-/* What no disk does but somebody might: other bytes under a good checksum. Whatever it is taken for, nothing
- * crashes, and what is refused changes nothing. */
+/* Changed bytes under a valid checksum, as no disk but a person might make them. Nothing crashes, and a
+ * refused checkpoint changes nothing. */
 static void forge(const char *integrator, const char *settings, uint64_t seed)
 {
     victim v = make_victim(integrator, settings);
@@ -175,14 +175,15 @@ static void forge(const char *integrator, const char *settings, uint64_t seed)
 
 START_TEST(forged_ones_crash_nothing)
 {
-    static const char *const rows[] = {"be", "bdf2", "midpoint", "ida", "verlet", "trbdf2", "newton_k"};
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
-        forge(rows[i], "", i + 1);
+    static const char *const integrators[] = {"be",     "bdf2",   "midpoint", "ida",
+                                              "verlet", "trbdf2", "newton_k"};
+    for (size_t i = 0; i < sizeof integrators / sizeof *integrators; i++)
+        forge(integrators[i], "", i + 1);
     forge("be", ", 'newton': 'modified', 'linear_solver': 'klu'", 99);
 }
 END_TEST
 
-/* ---- Of something else ---- */
+/* ---- Of another scene ---- */
 
 static void other_is_refused(victim *v, scene other, drape_status expected, const char *word)
 {
@@ -245,7 +246,7 @@ END_TEST
 
 /* ---- Memory ---- */
 
-/* Each allocation of a restoration fails once, and of a save to a file. */
+/* Each allocation of restoring, and of saving to a file, fails once. */
 START_TEST(without_memory_it_is_as_before)
 {
     const char *const settings = ", 'newton': 'modified', 'linear_solver': 'pcg'";
@@ -294,7 +295,7 @@ static off_t size_of(const char *path)
     return stat(path, &info) ? -1 : info.st_size;
 }
 
-/* Files may not grow beyond so many bytes: a write ends short, then fails. */
+/* Limits files to this many bytes: a write is short, then the next one fails. */
 static drape_status save_within(drape_sim *sim, const char *path, rlim_t most)
 {
     struct rlimit old;
@@ -327,7 +328,7 @@ START_TEST(a_full_disk_leaves_the_one_before)
     }
     printf("# %ld disks full between 0 and %lld bytes\n", tries, (long long)whole);
     scene other = open_sheet("be", "");
-    ck_assert_int_eq(drape_sim_restore(other.sim, path), DRAPE_OK); /* the one of before */
+    ck_assert_int_eq(drape_sim_restore(other.sim, path), DRAPE_OK); /* the previous one */
     ck_assert(drape_sim_time(other.sim) == 0.02);
     ck_assert_int_eq(drape_sim_save(v.s.sim, path), DRAPE_OK);
     ck_assert_int_eq(drape_sim_restore(other.sim, path), DRAPE_OK);
@@ -358,7 +359,7 @@ START_TEST(no_folder_no_file_no_right)
 }
 END_TEST
 
-/* A host that cannot take them says so, at each of its calls. */
+/* A host that cannot store the bytes refuses, at each of its calls in turn. */
 typedef struct picky {
     long calls, fail_at;
 } picky;

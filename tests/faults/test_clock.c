@@ -1,7 +1,7 @@
 /*
- * test_clock.c: the clock jumps, forwards and back, as that of a machine which sleeps or is moved, though
- * CLOCK_MONOTONIC should not: steps have the same bits, a budget ends a call and no call hangs, and what is
- * told of time is finite. clock_gettime is taken from under the library.
+ * test_clock.c: the clock jumps forwards and backwards, as on a machine that sleeps or migrates, although
+ * CLOCK_MONOTONIC should not. Steps have the same bits, a budget ends a call, no call hangs, and all reported
+ * times are finite. This file replaces clock_gettime for the library.
  */
 #define _GNU_SOURCE
 #include "support/scene.h"
@@ -18,11 +18,11 @@ static const char hung[] =
     "'terms': ['stretch.edge', 'bend.hinge'], 'pins': [{'corner': 'top-left'}, {'corner': 'top-right'}]}],"
     "'integrator': {'method': '%s'}, 'duration': 4}";
 
-static const char *const rows[] = {"newton_k", "be", "ida", "verlet"};
-#define ROWS (sizeof rows / sizeof *rows)
+static const char *const integrators[] = {"newton_k", "be", "ida", "verlet"};
+#define ROWS (sizeof integrators / sizeof *integrators)
 
-static long jump_each, reads; /* jump_each: calls between two jumps; 0: the clock is good */
-static double away;           /* [s] that it is off */
+static long jump_each, reads; /* jump_each: calls between two jumps; 0: none */
+static double away;           /* [s] error of the clock */
 
 int clock_gettime(clockid_t id, struct timespec *t)
 {
@@ -45,12 +45,12 @@ static void jump(long each)
 START_TEST(steps_do_not_depend_on_the_clock)
 {
     for (size_t i = 0; i < ROWS; i++) {
-        scene good = scene_open(hung, rows[i]);
+        scene good = scene_open(hung, integrators[i]);
         scene_advance(&good, 20 * FRAME);
         jump(3);
-        scene bad = scene_open(hung, rows[i]);
+        scene bad = scene_open(hung, integrators[i]);
         scene_advance(&bad, 20 * FRAME);
-        ck_assert_int_gt(reads, 0); /* it was asked */
+        ck_assert_int_gt(reads, 0); /* the clock was read */
         jump(0);
         ck_assert_uint_eq(drape_sim_hash(good.sim), drape_sim_hash(bad.sim));
         const drape_statistics s = drape_sim_statistics(bad.sim);
@@ -61,19 +61,19 @@ START_TEST(steps_do_not_depend_on_the_clock)
 }
 END_TEST
 
-/* Whatever it believes of the time that is left, a call makes no more steps than the frame and the debt ask
- * for at the row's own step, and the state is good. */
+/* However much time the clock says is left, a call makes no more steps than the frame and the debt need at
+ * the integrator's own step, and the state is finite. */
 START_TEST(a_budget_on_a_jumping_clock_ends)
 {
     for (size_t i = 0; i < ROWS; i++)
         for (long each = 1; each < 8; each++) {
-            scene s = scene_open(hung, rows[i]);
+            scene s = scene_open(hung, integrators[i]);
             double before = 0;
             jump(each);
             for (int k = 0; k < 20; k++) {
                 drape_realtime report;
                 drape_status status = drape_sim_advance_realtime(s.sim, FRAME, 1e-3, &report);
-                ck_assert_msg(status == DRAPE_OK, "%s: %s", rows[i], drape_context_message(s.ctx));
+                ck_assert_msg(status == DRAPE_OK, "%s: %s", integrators[i], drape_context_message(s.ctx));
                 ck_assert(report.time >= before && report.time <= (k + 1) * FRAME * (1 + 1e-9));
                 ck_assert(isfinite(report.debt) && report.debt >= 0 && isfinite(report.seconds));
                 ck_assert(isfinite(report.dropped_total) && report.dropped_total >= 0);

@@ -1,7 +1,7 @@
 /*
- * test_heap.c: from the second step on no heap call is made in a step, by Drape or by KINSOL or KLU; a linear
- * solver that borrows heap gives it back. The heap calls of the whole process are counted: malloc and
- * its family are defined here, in front of glibc's.
+ * test_heap.c: from the second step on a step makes no heap call, neither in Drape nor in KINSOL or KLU; a
+ * linear solver that uses the heap during a step releases it. All heap calls of the process are counted:
+ * malloc and its family are defined here and call those of glibc.
  */
 #include <errno.h>
 #include <malloc.h>
@@ -14,7 +14,7 @@
 #include "support/scene.h"
 
 #if defined(__SANITIZE_ADDRESS__) || !defined(__GLIBC__)
-#define COUNTS_HEAP 0 /* the sanitizer has a heap of its own */
+#define COUNTS_HEAP 0 /* a sanitizer replaces the heap */
 #else
 #define COUNTS_HEAP 1
 
@@ -26,7 +26,7 @@ void __libc_free(void *memory);
 #endif
 
 static volatile bool counting;
-static volatile long calls, live; /* live: pieces taken and not given back */
+static volatile long calls, live; /* live: allocations not yet freed */
 
 #if COUNTS_HEAP
 static void count_call(long pieces)
@@ -130,8 +130,8 @@ START_TEST(the_counter_counts)
 }
 END_TEST
 
-/* A row that falls back has the other's analysis and factors from its first fallback on: 25 pieces with klu,
- * once. A piece lost a factorisation would be at least 49. */
+/* A solver that falls back to another one keeps the analysis and factors of that one from the first fallback
+ * on: 25 allocations with klu, once. One leaked allocation per factorization would be at least 49. */
 #define FALLBACK_PIECES 30
 
 static void check_heap(const drape_linear_ops *linear, int i)
@@ -162,7 +162,7 @@ START_TEST(no_heap_call_from_the_second_step_on)
 }
 END_TEST
 
-/* Explicit substeps with everything that moves nodes, and the lists of near points made anew. */
+/* Explicit substeps with everything that moves nodes, and lists of near points that are rebuilt. */
 START_TEST(no_heap_call_of_verlet)
 {
     static const char *const forms[] = {"position", "velocity"};
@@ -186,7 +186,7 @@ START_TEST(no_heap_call_of_verlet)
 }
 END_TEST
 
-/* Rejected steps too: one iteration is not enough at 0.01 s. */
+/* Rejected steps make no heap calls either. */
 START_TEST(no_heap_call_in_rejected_steps)
 {
     scene s = open_scene("'max_iterations': 2, 'globalization': 'none'", true);
@@ -197,12 +197,12 @@ START_TEST(no_heap_call_in_rejected_steps)
 }
 END_TEST
 
-/* With colliders: once the lists of contacts have grown, here in the same run before, nothing is taken any
- * more. */
+/* With colliders: after the lists of contacts have grown, here in an earlier part of the run, nothing is
+ * allocated. */
 START_TEST(no_heap_call_in_contact)
 {
-    static const char *const rows[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};
-    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+    static const char *const integrators[] = {"be", "bdf2", "midpoint", "trbdf2", "ida"};
+    for (size_t k = 0; k < sizeof integrators / sizeof *integrators; k++) {
         scene s = scene_open(
             "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 6, 'rows': 6, 'width': 0.3, "
             "'height': 0.3,"
@@ -214,7 +214,7 @@ START_TEST(no_heap_call_in_contact)
             "'normal':"
             " [0,1,0]}], 'contact': {'distance': 4e-3, 'friction': '%s'},"
             " 'integrator': {'method': '%s', 'dt': 0.01, 'linear_solver': 'klu'}, 'duration': 1}",
-            k % 2 ? "lagged" : "implicit", rows[k]);
+            k % 2 ? "lagged" : "implicit", integrators[k]);
         const size_t n = 3 * (size_t)s.model->node_count;
         double *x = malloc(n * sizeof *x), *v = calloc(n, sizeof *v), gap;
         memcpy(x, drape_sim_positions(s.sim), n * sizeof *x);
@@ -226,7 +226,7 @@ START_TEST(no_heap_call_in_contact)
         drape_status status = drape_sim_advance(s.sim, 0.15);
         counting = false;
         ck_assert_int_eq(status, DRAPE_OK);
-        ck_assert_msg(calls == 0, "%s: %ld heap calls", rows[k], calls);
+        ck_assert_msg(calls == 0, "%s: %ld heap calls", integrators[k], calls);
         free(x);
         free(v);
         scene_close(&s);
@@ -234,16 +234,16 @@ START_TEST(no_heap_call_in_contact)
 }
 END_TEST
 
-/* Frames, step log and checkpoints are written through buffers that were taken before. */
+/* Frames, step log and checkpoints are written through buffers allocated earlier. */
 START_TEST(no_heap_call_for_output)
 {
     static const char *const formats[] = {"npy", "obj", "ply", "vtp", "pc2", "glb"};
-    static const char *const rows[] = {"be", "ida", "bdf2"};
+    static const char *const integrators[] = {"be", "ida", "bdf2"};
     for (int k = 0; k < 6; k++) {
         char folder[] = "/tmp/drape-heap-XXXXXX", command[64], integrator[100];
         ck_assert_ptr_nonnull(mkdtemp(folder));
         snprintf(integrator, sizeof integrator,
-                 "'method': '%s', 'linear_solver': 'klu', 'newton': 'modified'", rows[k / 2]);
+                 "'method': '%s', 'linear_solver': 'klu', 'newton': 'modified'", integrators[k / 2]);
         scene s = open_scene(integrator, true);
         drape_recorder *recorder = NULL;
         const drape_recorder_def def = {.folder = folder,
@@ -262,7 +262,7 @@ START_TEST(no_heap_call_for_output)
 }
 END_TEST
 
-/* Nor with several threads, by whatever allocator. */
+/* The same with several threads; the calls of the context's allocator are counted too. */
 static long own_calls;
 
 static void *own_allocate(void *user, size_t size)

@@ -1,5 +1,5 @@
-/* test_memory.c: every allocation of a whole life fails once: parse, compile, sim, frames, summary. Each
- * failure is reported as one, leaves NULL, and leaks nothing. */
+/* test_memory.c: every allocation of a whole run fails once: parsing, compiling, the sim, frames, summary.
+ * Each failure is reported as such, leaves NULL, and leaks nothing. */
 #include <stdio.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -146,7 +146,7 @@ static drape_status run(drape_context *ctx, const drape_model *model, const char
     return status;
 }
 
-/* All of a program's life; by text, set and defs. */
+/* A whole run of a program, with a scene from text, with settings, and from defs. */
 static drape_status live(drape_context *ctx, const char *linear_solver)
 {
     drape_scene *scene = (drape_scene *)(uintptr_t)1;
@@ -168,7 +168,7 @@ static drape_status live(drape_context *ctx, const char *linear_solver)
     return status;
 }
 
-/* The number of allocations of a life in which none fails. */
+/* The number of allocations of a run in which none fails. */
 static long sweep(const char *linear_solver, bool stay_broken)
 {
     long n = 0;
@@ -180,7 +180,7 @@ static long sweep(const char *linear_solver, bool stay_broken)
                       drape_status_name(status), drape_context_message(ctx));
         ck_assert_msg(status == DRAPE_OK || strstr(drape_context_message(ctx), "out of memory"),
                       "allocation %ld: %s", n, drape_context_message(ctx));
-        ck_assert_msg(status == DRAPE_E_MEMORY || memory.calls < n, "failure %ld of %ld was not told", n,
+        ck_assert_msg(status == DRAPE_E_MEMORY || memory.calls < n, "failure %ld of %ld was not reported", n,
                       memory.calls);
         drape_context_destroy(&ctx);
         ck_assert_msg(memory.live == 0, "allocation %ld: %ld leaks", n, memory.live);
@@ -207,7 +207,7 @@ START_TEST(memory_ends_and_stays_away)
 }
 END_TEST
 
-/* ---- Lists of contacts that grow, and the pattern that widens ---- */
+/* ---- Lists of contacts that grow, and the pattern that is extended ---- */
 
 static drape_model *folding_model(drape_context *ctx)
 {
@@ -237,14 +237,14 @@ static drape_status note_accepted(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* Every allocation of a run fails once, from the n-th on after all was made. It is told; the state is the
- * last that was accepted, and the run goes on from there. */
-static long grow_lists(const drape_model *model, const char *row)
+/* After the sim is made, every allocation of its run fails once. The failure is reported, the state is the
+ * last accepted one, and the run continues from there. */
+static long grow_lists(const drape_model *model, const char *integrator)
 {
     const double t = 0.08;
     drape_sim_def def;
     drape_sim_def_init(&def, sizeof def);
-    def.integrator = row;
+    def.integrator = integrator;
     long n = 0;
     for (drape_status status = DRAPE_E_MEMORY; status; n++) {
         failing_allocator memory = {0};
@@ -256,13 +256,13 @@ static long grow_lists(const drape_model *model, const char *row)
         memory.fail_at = memory.calls + n + 1;
         status = drape_sim_advance(sim, t);
         ck_assert_msg(status == DRAPE_E_MEMORY || (status == DRAPE_OK && memory.calls < memory.fail_at),
-                      "%s %ld of %ld: %s: %s", row, n, memory.calls, drape_status_name(status),
+                      "%s %ld of %ld: %s: %s", integrator, n, memory.calls, drape_status_name(status),
                       drape_context_message(ctx));
         ck_assert_uint_eq(drape_sim_hash(sim), accepted);
         if (status) {
             ck_assert_msg(strstr(drape_context_message(ctx), "out of memory") && drape_sim_time(sim) < t,
                           "%ld: %s", n, drape_context_message(ctx));
-            ck_assert_msg(drape_sim_advance(sim, t) == DRAPE_OK, "%s %ld: %s", row, n,
+            ck_assert_msg(drape_sim_advance(sim, t) == DRAPE_OK, "%s %ld: %s", integrator, n,
                           drape_context_message(ctx));
         }
         drape_sim_destroy(&sim);
@@ -274,13 +274,13 @@ static long grow_lists(const drape_model *model, const char *row)
 
 START_TEST(contacts_without_memory)
 {
-    static const char *const rows[] = {"be", "ida"};
+    static const char *const integrators[] = {"be", "ida"};
     drape_context *ctx = NULL;
     ck_assert_int_eq(drape_context_create(NULL, &ctx), DRAPE_OK);
     drape_model *model = folding_model(ctx);
-    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
-        const long failures = grow_lists(model, rows[k]);
-        printf("# %s: %ld allocations in the run\n", rows[k], failures);
+    for (size_t k = 0; k < sizeof integrators / sizeof *integrators; k++) {
+        const long failures = grow_lists(model, integrators[k]);
+        printf("# %s: %ld allocations in the run\n", integrators[k], failures);
         ck_assert_int_gt(failures, 5);
     }
     drape_model_destroy(&model);

@@ -1,16 +1,17 @@
-/* test_nonfinite.c: the nth evaluation of a force or of a Hessian is not finite, for every n. No such
- * number comes into a state; a fixed step fails and says so, a halved one recovers. */
+/* test_nonfinite.c: the nth evaluation of a force or of a Hessian is not finite, for every n. No such number
+ * enters a state; with fixed steps the run fails and reports it, with halved steps it recovers. */
 #include "host.h"
 
 enum { EVALUATIONS = 60 };
 
-/* Modified Newton needs few Jacobians: not all of them come within this time. */
-enum { MOST_STEPS = 14 };
+/* Modified Newton evaluates so few Jacobians that some n are not reached in these steps. */
+enum { MAX_STEPS = 14 };
 
-/* Steps one by one until one fails or the fault is behind; the state of a failed step is the one before. */
+/* Makes steps until one fails or the fault has occurred. After a failed step the state is the one before
+ * it. */
 static bool fails_cleanly(host_sim *s, const char *reason)
 {
-    for (int k = 1; k <= MOST_STEPS && !host_has_broken(); k++) {
+    for (int k = 1; k <= MAX_STEPS && !host_has_broken(); k++) {
         host_copy before = host_copy_state(s);
         drape_status status = drape_sim_advance(s->sim, HOST_DT * k);
         ck_assert_int_eq(s->nonfinite, 0);
@@ -20,7 +21,7 @@ static bool fails_cleanly(host_sim *s, const char *reason)
         ck_assert_int_lt(status, 0);
         host_check_state(s, &before);
         ck_assert_int_eq(drape_sim_statistics(s->sim).steps_rejected, 1);
-        if (!host_has_broken()) /* modified Newton without a controller may fail by itself */
+        if (!host_has_broken()) /* modified Newton with fixed steps may fail without a fault */
             return false;
         host_check_message(s, reason);
         return true;
@@ -28,8 +29,8 @@ static bool fails_cleanly(host_sim *s, const char *reason)
     return false;
 }
 
-/* Controller fixed. KINSOL recovers from some by itself (it takes a shorter step of Newton): then the step is
- * converged; others end the run with e_solver. */
+/* With the controller "fixed". KINSOL recovers from some faults by a shorter Newton step, and the step
+ * converges; the others end the run with e_solver. */
 static void check_fixed(host_fault kind, const char *reason)
 {
     for (int setting = 0; setting < HOST_SETTINGS; setting++) {
@@ -90,8 +91,8 @@ START_TEST(halving_recovers)
 }
 END_TEST
 
-/* A fault that stays ends the run, after as many attempts as there are halves down to dt_min, in the state
- * before. */
+/* A persistent fault ends the run, after as many attempts as there are halvings down to dt_min, in the state
+ * before the step. */
 START_TEST(a_fault_that_stays_ends_the_run)
 {
     static const host_fault kinds[] = {HOST_NAN_FORCE, HOST_INFINITE_FORCE, HOST_NAN_HESSIAN,
@@ -107,8 +108,7 @@ START_TEST(a_fault_that_stays_ends_the_run)
                 long attempts = s.attempts;
                 host_break(kinds[k], 1, true);
                 ck_assert_int_eq(drape_sim_advance(s.sim, 1), DRAPE_E_STEP_TOO_SMALL);
-                if (drape_sim_time(s.sim) ==
-                    before.t) /* modified Newton may live on old factors for a while */
+                if (drape_sim_time(s.sim) == before.t) /* modified Newton may use old factors for a while */
                     host_check_state(&s, &before);
                 else
                     ck_assert(strstr(host_settings[setting], "modified") && kinds[k] >= HOST_NAN_HESSIAN);
@@ -123,7 +123,7 @@ START_TEST(a_fault_that_stays_ends_the_run)
 }
 END_TEST
 
-/* on_failure "accept" takes what is not converged, never what is no number. */
+/* on_failure "accept" accepts an unconverged step, but never one that is not finite. */
 START_TEST(accept_takes_no_nan)
 {
     for (long n = 1; n <= EVALUATIONS; n++) {
@@ -140,8 +140,8 @@ START_TEST(accept_takes_no_nan)
 }
 END_TEST
 
-/* The smallest allowed dt_min: any number above 0. The run still ends, at t = 0 too, where every step
- * moves the time. */
+/* The smallest allowed dt_min, as any number above 0 is allowed. The run still ends, even at t = 0, where a
+ * step of any length changes the time. */
 START_TEST(a_tiny_dt_min_ends_too)
 {
     host_sim s = host_open("", "'type': 'halving', 'dt_min': 1e-30", true);

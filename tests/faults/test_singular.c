@@ -1,8 +1,8 @@
-/* test_singular.c: a Jacobian that has no inverse: the step fails with "singular" and is rolled back; a
- * smaller step, whose inertia is another, succeeds. */
+/* test_singular.c: a singular Jacobian: the step fails with "singular" and is rolled back; a smaller step,
+ * with another inertia, succeeds. */
 #include "host.h"
 
-/* Without springs the Jacobian is M/h^2 alone, and the host's Hessian takes just that away. */
+/* Without springs the Jacobian is M/h^2, and the Hessian of the user-defined term cancels exactly that. */
 static host_sim open_singular(const char *integrator, const char *controller)
 {
     host_sim s = host_open(integrator, controller, false);
@@ -20,7 +20,7 @@ START_TEST(fixed_stops_and_keeps_the_state)
         drape_statistics work = drape_sim_statistics(s.sim);
         host_break(HOST_SINGULAR, 1, true);
         drape_status status = drape_sim_advance(s.sim, 4 * HOST_DT);
-        if (strstr(host_settings[setting], "modified")) { /* its factors are from before */
+        if (strstr(host_settings[setting], "modified")) { /* modified Newton uses earlier factors */
             ck_assert_int_eq(status, DRAPE_OK);
         } else {
             int64_t count = 0;
@@ -30,7 +30,7 @@ START_TEST(fixed_stops_and_keeps_the_state)
             ck_assert_str_eq(drape_sim_reason(s.sim, 0, &count), "singular");
             ck_assert_int_eq(count, 1);
             ck_assert_int_gt(drape_sim_statistics(s.sim).factorizations, work.factorizations);
-            host_break(HOST_NOTHING, 0, false); /* and the sim is as good as before */
+            host_break(HOST_NOTHING, 0, false); /* and the sim can continue */
             ck_assert_int_eq(drape_sim_advance(s.sim, 5 * HOST_DT), DRAPE_OK);
             ck_assert_double_eq(drape_sim_time(s.sim), 5 * HOST_DT);
         }
@@ -72,7 +72,8 @@ START_TEST(halving_finds_a_regular_one)
 }
 END_TEST
 
-/* A sheet under tension has a regular Jacobian; without springs nothing holds the NaN of the Hessian back. */
+/* A sheet under tension has a regular Jacobian; without springs the NaN of the Hessian reaches the
+ * factors. */
 START_TEST(hessians_that_are_not_finite_count_as_singular)
 {
     for (int setting = 0; setting < HOST_SETTINGS; setting++)

@@ -1,5 +1,5 @@
-/* test_stop.c: an observer stops an advance, at a step or at a frame; the state is that of the last
- * accepted step, the sim goes on where it was, and no frame is lost, told twice or out of place. */
+/* test_stop.c: an observer stops an advance at a step or at a frame. The state is that of the last accepted
+ * step, the sim continues from there, and no frame is lost, repeated or out of order. */
 #include "support/scene.h"
 
 #define STEPS 40
@@ -10,16 +10,16 @@ static const char falling[] =
     " 'pins': [{'corner': 'top-left'}]}],"
     " 'integrator': {'dt': %g%s}, 'controller': {'type': '%s'}, 'frame_rate': %g, 'duration': 1}";
 
-/* What an observer has seen, and when it is to say stop. */
+/* What an observer has seen, and when it stops the advance. */
 typedef struct watcher {
     drape_event_kind kind;
-    long at, events; /* stops at the event of that kind and number, from 1 */
+    long at, events; /* stops at the event of this kind and number, counted from 1 */
     drape_status answer;
     const char *message;
     drape_context *ctx;
     long attempts, frames;
-    double frame_time[256], frame_x[256]; /* of the last node's height */
-    uint64_t hash;                        /* of the state at the last attempt */
+    double frame_time[256], frame_y[256]; /* frame_y: height of the last node */
+    uint64_t hash;                        /* hash of the state at the last attempt */
 } watcher;
 
 static drape_status watch(void *user, const drape_event *event)
@@ -29,7 +29,7 @@ static drape_status watch(void *user, const drape_event *event)
         ck_assert_int_eq(event->frame, w->frames);
         ck_assert_int_lt(w->frames, 256);
         w->frame_time[w->frames] = event->time;
-        w->frame_x[w->frames++] = event->positions[3 * 15 + 1];
+        w->frame_y[w->frames++] = event->positions[3 * 15 + 1];
     } else {
         w->attempts++;
         w->hash = drape_sim_hash(event->sim);
@@ -49,7 +49,7 @@ static scene open_watched(double dt, double rate, watcher *w)
     return s;
 }
 
-/* The run without any stop. */
+/* The run without a stop. */
 static watcher reference(double dt, double rate, uint64_t *hash)
 {
     watcher w = {.at = -1};
@@ -60,7 +60,7 @@ static watcher reference(double dt, double rate, uint64_t *hash)
     return w;
 }
 
-/* Stops at every event of a kind in turn and goes on. */
+/* Stops at every event of a kind in turn, and continues. */
 static void check_stops(drape_event_kind kind, double dt, double rate)
 {
     uint64_t hash;
@@ -73,7 +73,7 @@ static void check_stops(drape_event_kind kind, double dt, double rate)
         ck_assert_int_eq(drape_sim_advance(s.sim, STEPS * dt), DRAPE_E_STOPPED);
         ck_assert_msg(strstr(drape_context_message(s.ctx), "an observer asked to stop"), "%s",
                       drape_context_message(s.ctx));
-        ck_assert_int_ge(w.events, at); /* the frames of the step that it stopped in may still come */
+        ck_assert_int_ge(w.events, at); /* further frames of the step in which it stopped may follow */
         if (w.attempts > 0)
             ck_assert_uint_eq(drape_sim_hash(s.sim), w.hash);
         ck_assert_int_eq(drape_sim_statistics(s.sim).steps_accepted, w.attempts);
@@ -83,10 +83,10 @@ static void check_stops(drape_event_kind kind, double dt, double rate)
         ck_assert_int_eq(w.frames, whole.frames);
         for (long f = 0; f < w.frames; f++) {
             ck_assert_double_eq(w.frame_time[f], whole.frame_time[f]);
-            ck_assert_msg(w.frame_x[f] == whole.frame_x[f],
+            ck_assert_msg(w.frame_y[f] == whole.frame_y[f],
                           "stopped at %s %ld: frame %ld (t=%g) is at %.17g, without a stop at %.17g",
                           kind == DRAPE_EVENT_ATTEMPT ? "attempt" : "frame", at, f, w.frame_time[f],
-                          w.frame_x[f], whole.frame_x[f]);
+                          w.frame_y[f], whole.frame_y[f]);
         }
         scene_close(&s);
     }
@@ -127,7 +127,7 @@ START_TEST(a_negative_answer_is_returned_with_its_message)
 }
 END_TEST
 
-/* A stop at a rejected attempt: the state is the one before it. */
+/* A stop at a rejected attempt leaves the state before it. */
 START_TEST(stops_at_a_rejected_step)
 {
     watcher w = {.kind = DRAPE_EVENT_ATTEMPT, .at = 1, .answer = DRAPE_RETRY_REJECTED};
@@ -144,8 +144,8 @@ START_TEST(stops_at_a_rejected_step)
 }
 END_TEST
 
-/* The observers before the one that stops are told, those after it are not. */
-START_TEST(observers_are_told_in_order)
+/* Observers registered before the one that stops are notified, later ones are not. */
+START_TEST(observers_are_notified_in_order)
 {
     watcher before = {.at = -1},
             stops = {.kind = DRAPE_EVENT_ATTEMPT, .at = 4, .answer = DRAPE_RETRY_REJECTED},
@@ -162,14 +162,14 @@ START_TEST(observers_are_told_in_order)
 }
 END_TEST
 
-/* ---- Stops at a time, in every row ---- */
+/* ---- Stops at a time, in every integrator ---- */
 
 #define END 0.4 /* [s] */
 
 typedef struct timer {
     double stop;   /* [s] stops after the first accepted step that ends at it or later; NaN: never */
     double before; /* [s] end of the step before that */
-    uint64_t hash; /* of the state there */
+    uint64_t hash; /* hash of the state where it stopped */
     bool stopped;
 } timer;
 
@@ -187,40 +187,40 @@ static drape_status stop_at_time(void *user, const drape_event *event)
     return DRAPE_RETRY_REJECTED;
 }
 
-static scene open_row(const char *row, const char *controller, const char *more, timer *w)
+static scene open_integrator(const char *integrator, const char *controller, const char *more, timer *w)
 {
     scene s = scene_model(falling, 0.025, more, controller, 60.0);
     drape_sim_def def;
     drape_sim_def_init(&def, sizeof def);
-    def.integrator = row;
+    def.integrator = integrator;
     scene_start(&s, &def);
     ck_assert_int_eq(drape_sim_observe(s.sim, stop_at_time, w), DRAPE_OK);
     return s;
 }
 
-/* Stopped at a time the state is that of the last accepted step and stays it; going on to the same end gives
- * the bits of the run without a stop, also where it was stopped between two halves of an interval. */
-static void check_time_stops(const char *row, const char *controller, const char *more)
+/* After a stop at a time the state is that of the last accepted step and does not change. Advancing to the
+ * same end gives the bits of the run without a stop, even if it stopped between two halves of an interval. */
+static void check_time_stops(const char *integrator, const char *controller, const char *more)
 {
     timer never = {.stop = NAN};
-    scene whole = open_row(row, controller, more, &never);
+    scene whole = open_integrator(integrator, controller, more, &never);
     scene_advance(&whole, END);
     const uint64_t end = drape_sim_hash(whole.sim);
     const int64_t rejected = drape_sim_statistics(whole.sim).steps_rejected;
     for (double t = 0.01; t < END; t += 0.013) {
         timer w = {.stop = t};
-        scene s = open_row(row, controller, more, &w);
+        scene s = open_integrator(integrator, controller, more, &w);
         ck_assert_int_eq(drape_sim_advance(s.sim, END), DRAPE_E_STOPPED);
         ck_assert(w.before < t && drape_sim_time(s.sim) >= t);
         ck_assert_uint_eq(drape_sim_hash(s.sim), w.hash);
-        scene_advance(&s, drape_sim_time(s.sim)); /* no way to go */
+        scene_advance(&s, drape_sim_time(s.sim)); /* no time to advance */
         ck_assert_uint_eq(drape_sim_hash(s.sim), w.hash);
         scene_close(&s);
         w = (timer){.stop = t};
-        s = open_row(row, controller, more, &w);
+        s = open_integrator(integrator, controller, more, &w);
         ck_assert_int_eq(drape_sim_advance(s.sim, END), DRAPE_E_STOPPED);
         scene_advance(&s, END);
-        ck_assert_msg(drape_sim_hash(s.sim) == end, "%s, %s, stopped at %g s", row, controller, t);
+        ck_assert_msg(drape_sim_hash(s.sim) == end, "%s, %s, stopped at %g s", integrator, controller, t);
         ck_assert_int_eq(drape_sim_statistics(s.sim).steps_rejected, rejected);
         scene_close(&s);
     }
@@ -228,29 +228,29 @@ static void check_time_stops(const char *row, const char *controller, const char
     scene_close(&whole);
 }
 
-START_TEST(every_row_stops_at_a_time_and_goes_on)
+START_TEST(every_integrator_stops_at_a_time_and_continues)
 {
     for (int i = 0; drape_integrators[i]; i++) {
-        const drape_integrator_ops *row = drape_integrators[i];
-        if (row->steady_state)
+        const drape_integrator_ops *ops = drape_integrators[i];
+        if (ops->steady_state)
             continue;
-        check_time_stops(row->entry.name, "halving", "");
-        if (row->own_steps)
+        check_time_stops(ops->entry.name, "halving", "");
+        if (ops->own_steps)
             continue;
-        if (drape_param_find(row->entry.params, row->entry.param_count, "max_iterations") >=
+        if (drape_param_find(ops->entry.params, ops->entry.param_count, "max_iterations") >=
             0) /* so that steps are rejected */
-            check_time_stops(row->entry.name, "halving", ", 'max_iterations': 3, 'globalization': 'none'");
-        check_time_stops(row->entry.name, "error", "");
+            check_time_stops(ops->entry.name, "halving", ", 'max_iterations': 3, 'globalization': 'none'");
+        check_time_stops(ops->entry.name, "error", "");
     }
 }
 END_TEST
 
-/* A host stops at a time by ending its advance there: every row is there, exactly. */
+/* A host stops at a time by ending its advance there: every integrator ends at exactly that time. */
 START_TEST(an_advance_ends_at_its_time_exactly)
 {
     for (int i = 0; drape_integrators[i]; i++) {
         timer never = {.stop = NAN};
-        scene s = open_row(drape_integrators[i]->entry.name, "halving", "", &never);
+        scene s = open_integrator(drape_integrators[i]->entry.name, "halving", "", &never);
         for (double t = 0.0123; t < 0.2; t *= 1.7) {
             scene_advance(&s, t);
             ck_assert_double_eq(drape_sim_time(s.sim), t);
@@ -260,11 +260,11 @@ START_TEST(an_advance_ends_at_its_time_exactly)
 }
 END_TEST
 
-/* The equilibrium is one step: stopped there, there is nothing left to do. */
+/* The equilibrium is a single step: after a stop there, nothing is left to do. */
 START_TEST(a_row_without_time_stops_at_its_equilibrium)
 {
     timer w = {.stop = 0.1};
-    scene s = open_row("static", "halving", "", &w);
+    scene s = open_integrator("static", "halving", "", &w);
     ck_assert_int_eq(drape_sim_advance(s.sim, END), DRAPE_E_STOPPED);
     ck_assert_double_eq(drape_sim_time(s.sim), END);
     ck_assert_uint_eq(drape_sim_hash(s.sim), w.hash);
@@ -276,5 +276,5 @@ END_TEST
 
 SUITE("stop", stops_at_a_step_and_goes_on, stops_at_a_step_between_frames_and_goes_on,
       stops_at_a_frame_and_goes_on, a_negative_answer_is_returned_with_its_message, stops_at_a_rejected_step,
-      observers_are_told_in_order, every_row_stops_at_a_time_and_goes_on, an_advance_ends_at_its_time_exactly,
-      a_row_without_time_stops_at_its_equilibrium)
+      observers_are_notified_in_order, every_integrator_stops_at_a_time_and_continues,
+      an_advance_ends_at_its_time_exactly, a_row_without_time_stops_at_its_equilibrium)

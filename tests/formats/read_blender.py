@@ -1,4 +1,4 @@
-"""blender -b --python read_blender.py -- FOLDER: the mesh with its Mesh Cache at every frame, and the binary glTF as it plays.
+"""blender -b --python read_blender.py -- FOLDER: checks the mesh with its Mesh Cache at every frame, and the animation of the binary glTF.
 
 Prints "read_blender: good" at its end. Written for Blender 3.4.
 """
@@ -9,11 +9,11 @@ import numpy as np
 
 folder = sys.argv[sys.argv.index("--") + 1]
 x = np.load(folder + "/positions.npy")
-RATE = 30  # frames a second, of the run and of Blender's scene
+RATE = 30  # frames per second of the run and of Blender's scene
 
 
 def evaluated(thing):
-    """Its vertices as its modifiers and shape keys put them, in the object's own axes."""
+    """The vertices of an object after its modifiers and shape keys, in the object's own axes."""
     mesh = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     found = np.empty(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", found)
@@ -38,17 +38,17 @@ for k in range(len(x)):
     bpy.context.scene.frame_set(k)
     assert (evaluated(cloth) == x[k].astype(np.float32)).all(), (k, np.abs(evaluated(cloth) - x[k]).max())
 
-# The importer turns y up into z up. Debian 12's uses np.bool, which its numpy has no more.
+# The importer converts y up to z up. That of Debian 12 uses np.bool, which its numpy no longer has.
 np.bool = bool
 empty_scene()
 bpy.ops.import_scene.gltf(filepath=folder + "/positions.glb")
 cloth, = [thing for thing in bpy.context.scene.objects if thing.type == "MESH"]
 assert len(cloth.data.vertices) == x.shape[1]
 assert len(cloth.data.shape_keys.key_blocks) == len(x)
-for k in range(len(x) - 1):  # the last one lies between two of Blender's frames
+for k in range(len(x) - 1):  # the last one is between two of Blender's frames
     bpy.context.scene.frame_set(k)
     turned = np.stack([x[k][:, 0], -x[k][:, 2], x[k][:, 1]], axis=-1)
-    # Base and displacement in float32, and keys on frames: times k / 30 in float32 times 30 are k to 1e-6 of a frame.
+    # Rounding of base and displacement to float32, and of keys: times k / 30 in float32, times 30, are k to 1e-6 of a frame.
     error = np.abs(evaluated(cloth) - turned).max()
     assert error < 1e-5 * np.abs(x).max(), (k, error)
 print("read_blender: good")

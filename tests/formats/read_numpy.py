@@ -1,4 +1,4 @@
-"""read_numpy.py FOLDER [y|z [killed]]: all formats of a run against its positions.npy. Exit 77: no numpy.
+"""read_numpy.py FOLDER [y|z [killed]]: compares all formats of a run with its positions.npy. Exit 77: no numpy.
 
 z: frames have z up. killed: formats may be one frame apart, as they are written one after another.
 """
@@ -82,11 +82,12 @@ targets = [accessor(target["POSITION"]) for target in primitive["targets"]]
 count = frames_of(len(targets) + 1)
 assert (base == x[0].astype(np.float32)).all()
 assert (accessor(primitive["indices"]).reshape(-1, 3) == triangles).all()
-# Rounding of the displacement to float32; its sum with the base has none here.
+# Rounding of the displacement to float32; the sum with the base is exact here.
 for k in range(1, count):
     error = np.abs(base.astype(float) + targets[k - 1] - x[k])
     assert (error <= 2.0**-24 * np.abs(targets[k - 1]) + 1e-30).all(), (k, error.max())
-# Normals: of the triangles around a node, by area; a morph target has the difference to the first. Three roundings to float32.
+# Normals are means over the triangles around a node, weighted by area; a morph target has the difference from the first frame. Three roundings
+    # to float32.
 upright = accessor(primitive["attributes"]["NORMAL"])
 leaning = [accessor(target["NORMAL"]) for target in primitive["targets"]]
 assert len(leaning) == len(targets)

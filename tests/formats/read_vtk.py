@@ -1,6 +1,6 @@
-"""read_vtk.py FOLDER [y|z [killed|alone]]: frames by VTK's own readers. Exit 77: no VTK.
+"""read_vtk.py FOLDER [y|z [killed|alone]]: checks frames with VTK's own readers. Exit 77: no VTK.
 
-z: frames have z up. killed: the collection may have a frame more than positions.npy or less. alone: there is no other format.
+z: frames have z up. killed: the collection may have one frame more or less than positions.npy. alone: there is no other format.
 """
 import csv
 import glob
@@ -22,7 +22,7 @@ files = sorted(glob.glob(folder + "/frame_*.vtp"))
 
 
 class Errors:
-    """VTK writes what is wrong to stderr and goes on."""
+    """Counts the errors and warnings of a reader: VTK only prints them on stderr and continues."""
     def __init__(self, reader):
         self.count = 0
         for event in "ErrorEvent", "WarningEvent":
@@ -68,16 +68,16 @@ for k, name in enumerate(names):
     if x is not None and k < len(x):
         assert (back == x[k]).all(), name
 
-    # Strain from its definition: F'F in the basis of the triangle's own edges at rest, which the first frame is.
+    # Strain from its definition: F'F in the basis of the triangle's edges at rest; the first frame is at rest.
     def edges(p):
         return np.stack([p[triangles[:, 1]] - p[triangles[:, 0]], p[triangles[:, 2]] - p[triangles[:, 0]]], axis=-1)
     rest, now = edges(first), edges(back)
     metric = np.linalg.solve(rest.transpose(0, 2, 1) @ rest, now.transpose(0, 2, 1) @ now)
     stretch = np.sqrt(np.sort(np.linalg.eigvals(metric).real, axis=1))
-    assert np.abs(at_cells["strain_max"] - (stretch[:, 1] - 1)).max() < 1e-6, name  # of float32
+    assert np.abs(at_cells["strain_max"] - (stretch[:, 1] - 1)).max() < 1e-6, name  # rounding to float32
     assert np.abs(at_cells["strain_min"] - (stretch[:, 0] - 1)).max() < 1e-6, name
 
-    # The energy of the whole is that of the row of the frame.
+    # The total energy is that in the row of energy.csv for the frame.
     area = np.linalg.norm(np.cross(rest[..., 0], rest[..., 1]), axis=1) / 2
     node_area = np.zeros(len(points))
     for corner in range(3):

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Frames as other programs read them. TAP on stdout.
+"""Frames as other programs read them. Output is TAP.
 
-DRAPE_BUILD is the folder of the build; or: test_formats.py PROGRAM. Each reader is a script beside this one, run by the program
-that it is for: Debian's python3 (numpy, VTK), Blender, node (the Khronos validator of glTF). What is not installed is skipped,
-with the word how to get it. Readers print nothing where all is well, else what is wrong, with exit code 1.
+DRAPE_BUILD is the build folder; or: test_formats.py PROGRAM. Each reader is a script beside this one, run by the program that it is for:
+Debian's python3 (numpy, VTK), Blender, node (the Khronos validator of glTF). If one is not installed its tests are skipped, and say how to
+get it. Readers print nothing if all is correct, otherwise the errors, with exit code 1.
 """
 import json
 import os
@@ -17,7 +17,7 @@ import traceback
 
 PROGRAM = os.path.abspath(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRAPE_BUILD"] + "/drape")
 HERE = os.path.dirname(os.path.abspath(__file__))
-PYTHON = "/usr/bin/python3"  # Debian's, for which its packages are
+PYTHON = "/usr/bin/python3"  # Debian's python3, for which its packages are made
 LIMIT = 300  # [s]
 FORMATS = "npy,obj,ply,vtp,pc2,glb"
 
@@ -68,7 +68,7 @@ def validate_gltf(folder):
 def read_blender(folder, *args):
     blender = shutil.which("blender")
     need(blender, "no Blender: apt-get install blender")
-    # Its Python looks for its library beside the first python3 on the path, which may be another one.
+    # Blender's Python looks for its library beside the first python3 on the path, which may be a different version.
     path = {**os.environ, "PATH": "/usr/bin:/bin:" + os.environ.get("PATH", "")}
     result = subprocess.run([blender, "-b", "--factory-startup", "--python-exit-code", "1", "--python", HERE + "/read_blender.py",
                              "--", folder, *args], capture_output=True, text=True, timeout=LIMIT, check=False, env=path)
@@ -98,7 +98,7 @@ def test_vtk():
 
 
 def test_gltf():
-    """the Khronos validator finds nothing in the binary glTF"""
+    """the Khronos validator finds no errors in the binary glTF"""
     validate_gltf(run("out"))
 
 
@@ -108,7 +108,7 @@ def test_blender():
 
 
 def test_z_up():
-    """with z up frames are turned, but not those of npy and of glTF, which has y up by definition"""
+    """with z up frames are rotated, except those of npy and of glTF, which has y up by definition"""
     read_numpy(run("out", "--set", "/output/up=z"), "z")
     try:
         read_vtk("out", "z")
@@ -117,7 +117,7 @@ def test_z_up():
 
 
 def kill_after(frames, *args):
-    """A run that is killed when it has written so many frames."""
+    """A run that is killed after a number of frames."""
     with open("scene.json", "w", encoding="utf-8") as file:
         json.dump(SCENE, file)
     with subprocess.Popen([PROGRAM, "run", "scene.json", "--out", "out", "--format", FORMATS, "--duration", "200", *args],
@@ -130,7 +130,7 @@ def kill_after(frames, *args):
 
 
 def test_killed():
-    """a run that is killed leaves files that their programs read, with all frames so far"""
+    """a killed run leaves readable files with all frames so far"""
     kill_after(12)
     done = 0
     for check in (lambda: read_numpy("out", "y", "killed"), lambda: read_vtk("out", "y", "killed"), lambda: validate_gltf("out")):
@@ -144,7 +144,7 @@ def test_killed():
 
 
 def test_full_disk():
-    """so does one whose disk is full: no file is longer than 300 kB"""
+    """a run on a full disk does too: no file is longer than 300 kB"""
     with open("scene.json", "w", encoding="utf-8") as file:
         json.dump(SCENE, file)
     for one in FORMATS.split(","):

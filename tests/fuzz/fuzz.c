@@ -15,10 +15,10 @@
 #include "mesh/mesh.h"
 #include "model/scene.h"
 
-#define MOST_MEMORY ((size_t)16 << 20)
-/* [s] of CPU. Between two looks at the cancellation lie some passes over elements and contacts, and a
- * factorisation: milliseconds for the few nodes of a target, under the sanitizers and with other programs'
- * caches ten times as much. */
+#define MAX_MEMORY ((size_t)16 << 20)
+/* [s] of CPU. Between two checks for cancellation are some passes over elements and contacts and a
+ * factorization: milliseconds for the few nodes of a target, ten times as much under sanitizers on a busy
+ * machine. */
 #define SOON 5
 
 void fuzz_die(const char *file, int line, const char *promise, const char *format, ...)
@@ -34,17 +34,17 @@ void fuzz_die(const char *file, int line, const char *promise, const char *forma
 
 /* ---- Contexts ---- */
 
-typedef struct purse {
+typedef struct memory_limit {
     size_t left;
-    int64_t pieces;
-} purse;
+    int64_t allocations;
+} memory_limit;
 
-/* In front of each piece: its size, and the alignment of any type. */
+/* In front of each allocation: its size, with the alignment of any type. */
 #define FRONT 16
 
 static void *take(void *user, size_t size)
 {
-    purse *p = user;
+    memory_limit *p = user;
     if (size > p->left)
         return NULL;
     unsigned char *piece = malloc(FRONT + size);
@@ -52,41 +52,41 @@ static void *take(void *user, size_t size)
         return NULL;
     memcpy(piece, &size, sizeof size);
     p->left -= size;
-    p->pieces++;
+    p->allocations++;
     return piece + FRONT;
 }
 
 static void give(void *user, void *memory)
 {
-    purse *p = user;
+    memory_limit *p = user;
     unsigned char *piece = (unsigned char *)memory - FRONT;
     size_t size;
     memcpy(&size, piece, sizeof size);
     p->left += size;
-    p->pieces--;
+    p->allocations--;
     free(piece);
 }
 
-/* One at a time: a target has no two at once. */
-static purse money;
+/* There is one context at a time. */
+static memory_limit limit;
 
-drape_context *fuzz_open(size_t most)
+drape_context *fuzz_open(size_t max_bytes)
 {
     drape_context *ctx = NULL;
     drape_context_def def;
-    money = (purse){.left = most};
+    limit = (memory_limit){.left = max_bytes};
     drape_context_def_init(&def, sizeof def);
     def.allocate = take;
     def.release = give;
-    def.allocator_user = &money;
-    FUZZ_REQUIRE(drape_context_create(&def, &ctx) == DRAPE_OK, "no context in %zu bytes", most);
+    def.allocator_user = &limit;
+    FUZZ_REQUIRE(drape_context_create(&def, &ctx) == DRAPE_OK, "no context in %zu bytes", max_bytes);
     return ctx;
 }
 
 void fuzz_close(drape_context **ctx)
 {
     drape_context_destroy(ctx);
-    FUZZ_REQUIRE(money.pieces == 0, "%lld pieces of memory are left", (long long)money.pieces);
+    FUZZ_REQUIRE(limit.allocations == 0, "%lld allocations are left", (long long)limit.allocations);
 }
 
 void fuzz_check(const drape_context *ctx, drape_status status, const char *call)
@@ -109,22 +109,22 @@ unsigned fuzz_below(fuzz_bytes *bytes, unsigned count)
     return count > 1 ? fuzz_byte(bytes) % count : 0;
 }
 
-double fuzz_between(fuzz_bytes *bytes, double least, double most)
+double fuzz_between(fuzz_bytes *bytes, double low, double high)
 {
-    const unsigned high = fuzz_byte(bytes);
-    return least + (most - least) * (256 * high + fuzz_byte(bytes)) / 65535.0;
+    const unsigned upper = fuzz_byte(bytes);
+    return low + (high - low) * (256 * upper + fuzz_byte(bytes)) / 65535.0;
 }
 
-double fuzz_magnitude(fuzz_bytes *bytes, double least, double most)
+double fuzz_magnitude(fuzz_bytes *bytes, double low, double high)
 {
-    return pow(10, fuzz_between(bytes, log10(least), log10(most)));
+    return pow(10, fuzz_between(bytes, log10(low), log10(high)));
 }
 
 /* ---- Sims ---- */
 
 typedef struct watch {
     uint64_t accepted; /* hash of the last accepted state */
-    int attempts, most;
+    int attempts, max_attempts;
 } watch;
 
 static void check_finite(const drape_sim *sim, const char *when)
@@ -152,7 +152,7 @@ static drape_status look(void *user, const drape_event *event)
     watch *w = user;
     if (event->kind == DRAPE_EVENT_ATTEMPT) {
         check_attempt(w, event);
-        return w->attempts < w->most ? DRAPE_OK : 1;
+        return w->attempts < w->max_attempts ? DRAPE_OK : 1;
     }
     const size_t n = 3 * (size_t)drape_model_node_count(drape_sim_model(event->sim));
     FUZZ_REQUIRE(drape_all_finite(event->positions, n) && drape_all_finite(event->velocities, n),
@@ -160,15 +160,15 @@ static drape_status look(void *user, const drape_event *event)
     return DRAPE_OK;
 }
 
-/* The one that advances, and how much CPU it may take; when it was told to stop, 0: it was not. */
+/* The sim that advances, and the CPU time at which it was cancelled; 0: it was not. */
 static drape_sim *volatile running;
-static volatile double told;
+static volatile double cancelled_at;
 
 static void stop(int number)
 {
     (void)number;
     drape_sim_cancel(running);
-    told = drape_clock_cpu_seconds(); /* clock_gettime may be called in a handler */
+    cancelled_at = drape_clock_cpu_seconds(); /* clock_gettime may be called in a handler */
 }
 
 static void allow(drape_sim *sim, double seconds)
@@ -178,22 +178,22 @@ static void allow(drape_sim *sim, double seconds)
         .it_value = {.tv_sec = whole, .tv_usec = (long)(1e6 * (seconds - (double)whole))}};
     const struct sigaction action = {.sa_handler = stop};
     running = sim;
-    told = 0;
+    cancelled_at = 0;
     sigaction(SIGVTALRM, &action, NULL);
     setitimer(ITIMER_VIRTUAL, &left, NULL);
 }
 
-/* Observers cannot be taken off again: a sim is advanced by this once. */
+/* Observers cannot be removed, so this is called once for each sim. */
 drape_status fuzz_advance(drape_context *ctx, drape_sim *sim, double t, int attempts, double seconds)
 {
-    watch w = {.accepted = drape_sim_hash(sim), .most = attempts};
+    watch w = {.accepted = drape_sim_hash(sim), .max_attempts = attempts};
     check_finite(sim, "before");
     FUZZ_REQUIRE(drape_sim_observe(sim, look, &w) == DRAPE_OK, "%s", drape_context_message(ctx));
     allow(sim, seconds);
     const drape_status status = drape_sim_advance(sim, t);
-    const double heeded = told > 0 ? drape_clock_cpu_seconds() - told : 0;
+    const double delay = cancelled_at > 0 ? drape_clock_cpu_seconds() - cancelled_at : 0;
     allow(NULL, 0);
-    FUZZ_REQUIRE(heeded <= SOON, "a cancelled advance went on for %g s of CPU", heeded);
+    FUZZ_REQUIRE(delay <= SOON, "a cancelled advance continued for %g s of CPU", delay);
     fuzz_check(ctx, status, "drape_sim_advance");
     check_finite(sim, drape_status_name(status));
     FUZZ_REQUIRE(drape_sim_hash(sim) == w.accepted, "after %d attempts: %s: %s", w.attempts,
@@ -238,12 +238,12 @@ static drape_status compile(drape_context *ctx, const char *data, drape_model **
     return status;
 }
 
-/* The same nodes, masses and unknowns, of the text that the scene is printed as. */
+/* Checks that the printed text of the scene compiles to the same nodes, masses and unknowns. */
 static void check_printed(drape_context *ctx, const drape_model *model, const char *printed)
 {
     drape_model *again = NULL;
     const drape_status status = compile(ctx, printed, &again, NULL);
-    if (status == DRAPE_E_MEMORY) /* there are two of them now */
+    if (status == DRAPE_E_MEMORY) /* there are two models now */
         return;
     FUZZ_REQUIRE(status == DRAPE_OK, "%s\n%s", drape_context_message(ctx), printed);
     FUZZ_REQUIRE(drape_model_node_count(again) == drape_model_node_count(model) &&
@@ -295,9 +295,9 @@ static void check_measures(const drape_mesh *mesh)
 void fuzz_mesh(const char *format, const uint8_t *data, size_t size)
 {
     const drape_mesh_source source = {.pointer = "/cloth/0/mesh/file", .file = format};
-    drape_context *ctx = fuzz_open(MOST_MEMORY);
+    drape_context *ctx = fuzz_open(MAX_MEMORY);
     drape_mesh mesh = {0};
-    char *ended = malloc(size + 1); /* a copy of its own: a sanitizer sees what is read past its end */
+    char *ended = malloc(size + 1); /* an exact copy: a sanitizer detects reads past its end */
     FUZZ_REQUIRE(ended, "no memory for %zu bytes", size);
     if (size > 0)
         memcpy(ended, data, size);

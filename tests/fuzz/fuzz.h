@@ -1,7 +1,7 @@
 /*
- * fuzz.h: what the fuzz targets share. A target is one file with drape_fuzz_one, which tries the library on
- * some bytes and dies where it breaks a promise. With libFuzzer (tools/fuzz) it looks for such bytes; linked
- * to replay.c it goes over files that are given.
+ * fuzz.h: what the fuzz targets share. A target is one file with LLVMFuzzerTestOneInput, which runs the
+ * library on some bytes and aborts if the library breaks a promise. libFuzzer (tools/fuzz) searches for such
+ * bytes; linked with replay.c, a target runs on given files.
  */
 #ifndef DRAPE_TESTS_FUZZ_H
 #define DRAPE_TESTS_FUZZ_H
@@ -11,10 +11,10 @@
 
 #include "drape/drape.h"
 
-/* libFuzzer's name for it; 0: always. */
+/* The function that libFuzzer calls. Returns 0. */
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-/* Says why and aborts: asserts may be off. */
+/* Prints the reason and aborts, also if asserts are off. */
 #define FUZZ_REQUIRE(promise, ...)                                                                           \
     do {                                                                                                     \
         if (!(promise))                                                                                      \
@@ -25,42 +25,42 @@ _Noreturn void fuzz_die(const char *file, int line, const char *promise, const c
 
 /* ---- Contexts ---- */
 
-/* A context whose allocator gives at most `most` bytes at a time: a scene may ask for a mesh of any size, and
- * is then refused as on a machine that has no more. */
-drape_context *fuzz_open(size_t most);
+/* A context whose allocator has at most max_bytes in use at a time: a scene may ask for a mesh of any size,
+ * and is then refused as on a machine without more memory. */
+drape_context *fuzz_open(size_t max_bytes);
 
-/* Destroys it. Nothing that was made with it may be left. */
+/* Destroys the context. All that was made with it must have been destroyed. */
 void fuzz_close(drape_context **ctx);
 
-/* A status that a call from outside may end with: none that only a step has; with a failure one line. */
+/* Checks a status that a public call returned: not one of those > 0 that only a step has; a failure has a
+ * message of one line. */
 void fuzz_check(const drape_context *ctx, drape_status status, const char *call);
 
-/* ---- Bytes as choices; where they end, zeros follow ---- */
+/* ---- Bytes as choices; zeros follow their end ---- */
 
 typedef struct fuzz_bytes {
     const uint8_t *at, *end;
 } fuzz_bytes;
 
 unsigned fuzz_byte(fuzz_bytes *bytes);
-unsigned fuzz_below(fuzz_bytes *bytes, unsigned count);              /* 0 to count - 1; count at most 256 */
-double fuzz_between(fuzz_bytes *bytes, double least, double most);   /* in 65 536 equal steps */
-double fuzz_magnitude(fuzz_bytes *bytes, double least, double most); /* the same of its logarithm */
+unsigned fuzz_below(fuzz_bytes *bytes, unsigned count);            /* 0 to count - 1; count at most 256 */
+double fuzz_between(fuzz_bytes *bytes, double low, double high);   /* one of 65 536 equally spaced values */
+double fuzz_magnitude(fuzz_bytes *bytes, double low, double high); /* the same in its logarithm */
 
 /* ---- Sims ---- */
 
-/* Advances to t in at most `attempts` attempts, and cancels what takes more than `seconds` of CPU: the work
- * of a single attempt has bounds of its own, which may be high ("static" follows a thousand steps of pseudo
- * time). What does not heed the cancellation soon, by CPU and not by the clock of a busy machine, breaks a
- * promise; a loop that never does hangs, which libFuzzer and the timeout of the tests tell. Along the way and
- * after it: numbers are finite, a rejected attempt or a failure leaves the last accepted state to the bit.
- * Once for each sim. */
+/* Advances to t in at most `attempts` attempts, and cancels the advance after `seconds` of CPU, as a single
+ * attempt may take much work ("static" makes a thousand steps of pseudo time). An advance must end soon after
+ * it is cancelled, measured in CPU time and not by the clock of a busy machine. A loop that never ends hangs,
+ * which libFuzzer and the timeout of the tests report. Checks during and after the advance that all numbers
+ * are finite and that a rejected attempt or a failure leaves the last accepted state to the bit. Call it once
+ * for each sim. */
 drape_status fuzz_advance(drape_context *ctx, drape_sim *sim, double t, int attempts, double seconds);
 
-/* Parses and compiles a text; NULL where it was refused. What it is printed as compiles, too. */
+/* Parses and compiles a text; NULL if it was refused. Checks that the printed scene compiles too. */
 drape_model *fuzz_scene(drape_context *ctx, const uint8_t *data, size_t size);
 
-/* Reads a mesh of the format of this row of the imports, and brings what was read through all stages of a
- * mesh. */
+/* Reads a mesh with this importer and takes it through all stages of a mesh. */
 void fuzz_mesh(const char *format, const uint8_t *data, size_t size);
 
 #endif

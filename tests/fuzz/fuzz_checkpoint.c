@@ -1,8 +1,8 @@
 /*
- * fuzz_checkpoint.c: a checkpoint of a small sim, changed in places, its length and checksum made right
- * again: what a checksum cannot tell must be told by what is read. The first byte chooses the integrator;
- * each 4 bytes after it are a change. What is refused leaves the sim as it is; what is taken goes on for some
- * steps.
+ * fuzz_checkpoint.c: a checkpoint of a small sim with some bytes changed and its length and checksum
+ * corrected, so that the reader itself must find the errors. The first byte chooses the integrator; every 4
+ * bytes after it are one change. A refused checkpoint leaves the sim as it is; a sim restored from an
+ * accepted one makes some steps.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -12,13 +12,13 @@
 #include "fuzz/fuzz.h"
 #include "integrators/integrator.h"
 
-#define MOST_MEMORY ((size_t)64 << 20)
-#define TAIL        (2 * sizeof(uint64_t)) /* of an archive: its length and its checksum */
-#define CHANGES     16
-#define STEP        0.01 /* [s] */
+#define MAX_MEMORY ((size_t)64 << 20)
+#define TAIL       (2 * sizeof(uint64_t)) /* length and checksum at the end of an archive */
+#define CHANGES    16
+#define STEP       0.01 /* [s] */
 
-/* Every part that has something to keep: contact, friction, an internal variable, a moving pin, the past of
- * the steps. */
+/* A scene in which every part has a state to save: contact, friction, an internal variable, a moving pin, the
+ * history of steps. */
 static const char sheet[] =
     "{\"drape\": 1, \"cloth\": [{\"mesh\": {\"grid\": \"equilateral\", \"edges\": 2, \"edge_length\": 0.1},"
     "\"material\": {\"young_modulus\": 1e5, \"thickness\": 1e-3, \"density\": 200},"
@@ -51,7 +51,7 @@ static void change(bytes *b, fuzz_bytes *in)
     const unsigned kind = fuzz_byte(in), high = fuzz_byte(in);
     const size_t body = b->size - TAIL, at = (256 * high + fuzz_byte(in)) % (body + !body);
     const unsigned value = fuzz_byte(in);
-    if (body == 0) /* nothing is left after a cut */
+    if (body == 0) /* a cut left nothing */
         return;
     const size_t room = body - at, eight = room < 8 ? room : 8, four = room < 4 ? room : 4;
     if (kind % 6 == 0)
@@ -86,12 +86,12 @@ static void restore(drape_context *ctx, drape_sim *sim, const bytes *b)
     fuzz_advance(ctx, sim, drape_sim_time(sim) + 2 * STEP, 20, 3);
 }
 
-/* ---- What is changed, made once: the model, and a checkpoint after three steps for each integrator ---- */
+/* ---- The input, made once: the model, and for each integrator a checkpoint after three steps ---- */
 
-#define MOST_INTEGRATORS 32
+#define MAX_INTEGRATORS 32
 
 static drape_model *model_made;
-static bytes checkpoint_of[MOST_INTEGRATORS];
+static bytes checkpoint_of[MAX_INTEGRATORS];
 static unsigned integrator_count;
 
 static drape_sim *open_sim(drape_context *ctx, unsigned integrator)
@@ -104,7 +104,7 @@ static drape_sim *open_sim(drape_context *ctx, unsigned integrator)
     return sim;
 }
 
-/* By a context of its own, which stays. */
+/* In a separate context that is never destroyed. */
 static void make_checkpoints(void)
 {
     static drape_context *ctx;
@@ -114,7 +114,7 @@ static void make_checkpoints(void)
     model_made = fuzz_scene(ctx, (const uint8_t *)sheet, sizeof sheet - 1);
     FUZZ_REQUIRE(model_made, "%s", drape_context_message(ctx));
     for (; drape_integrators[integrator_count]; integrator_count++) {
-        FUZZ_REQUIRE(integrator_count < MOST_INTEGRATORS, "%u integrators", integrator_count);
+        FUZZ_REQUIRE(integrator_count < MAX_INTEGRATORS, "%u integrators", integrator_count);
         drape_sim *sim = open_sim(ctx, integrator_count);
         FUZZ_REQUIRE(drape_sim_advance(sim, 3 * STEP) == DRAPE_OK, "%s", drape_context_message(ctx));
         FUZZ_REQUIRE(drape_sim_save_to(sim, keep, &checkpoint_of[integrator_count]) == DRAPE_OK, "%s",
@@ -134,7 +134,7 @@ static bytes copy(const bytes *from)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     make_checkpoints();
-    drape_context *ctx = fuzz_open(MOST_MEMORY);
+    drape_context *ctx = fuzz_open(MAX_MEMORY);
     fuzz_bytes in = {.at = data, .end = data + size};
     const unsigned integrator = fuzz_below(&in, integrator_count);
     bytes b = copy(&checkpoint_of[integrator]);

@@ -1,9 +1,10 @@
-/* fuzz_cs184.c: the text of a scene of the CS184 cloth simulator. What compiles and is small takes a step. */
+/* fuzz_cs184.c: the bytes are the text of a scene of the CS184 cloth simulator. If it compiles and is small,
+ * it makes a step. */
 #include "fuzz/fuzz.h"
 
-#define MOST_MEMORY ((size_t)32 << 20)
-#define MOST_NODES  64
-#define STEP        1e-3 /* [s] */
+#define MAX_MEMORY ((size_t)32 << 20)
+#define MAX_NODES  64
+#define STEP       1e-3 /* [s] */
 
 static void step(drape_context *ctx, const drape_model *model)
 {
@@ -17,9 +18,9 @@ static void step(drape_context *ctx, const drape_model *model)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    drape_context *ctx = fuzz_open(MOST_MEMORY);
+    drape_context *ctx = fuzz_open(MAX_MEMORY);
     drape_model *model = fuzz_scene(ctx, data, size);
-    if (model && drape_model_node_count(model) <= MOST_NODES)
+    if (model && drape_model_node_count(model) <= MAX_NODES)
         step(ctx, model);
     drape_model_destroy(&model);
     fuzz_close(&ctx);

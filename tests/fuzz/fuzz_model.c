@@ -1,8 +1,8 @@
 /*
- * fuzz_model.c: a scene out of the bytes, in memory, and some steps of it. Meshes are small and may be all
- * but degenerate; materials go to the ends of their ranges; terms, colliders, contact, controllers and
- * integrators are what the tables have, with settings drawn out of their own ranges. What a scene is refused
- * for, with one line, is left out of it.
+ * fuzz_model.c: a scene made from the bytes, as structs, and some steps of it. Meshes are small and may be
+ * nearly degenerate; materials reach the ends of their ranges; terms, colliders, contact, controllers and
+ * integrators come from the tables, with settings drawn from the ranges of their parameters. If the scene is
+ * refused, with one line, the refused part is removed.
  */
 #include <math.h>
 #include <stdio.h>
@@ -15,22 +15,22 @@
 #include "integrators/integrator.h"
 #include "terms/terms.h"
 
-#define MOST_MEMORY    ((size_t)64 << 20)
-#define MOST_SIDE      4 /* cells of a lattice */
-#define MOST_NODES     ((MOST_SIDE + 1) * (MOST_SIDE + 1))
-#define MOST_TRIANGLES (2 * MOST_SIDE * MOST_SIDE)
-#define MOST_CLOTHS    2
-#define MOST_PINS      3
-#define MOST_TERMS     8
-#define MOST_COLLIDERS 3
-#define MOST_ROWS      32 /* with settings, in a scene */
-#define ATTEMPTS       6
-#define STEPS          3
-#define ALONE          0.4 /* [s] of CPU for an integrator that is the only one, and for each of all */
-#define EACH           0.1
-#define MOST_COUNT     40 /* of integers: iterations, substeps; what bounds the work of a step */
+#define MAX_MEMORY    ((size_t)64 << 20)
+#define MAX_SIDE      4 /* cells of a lattice */
+#define MAX_NODES     ((MAX_SIDE + 1) * (MAX_SIDE + 1))
+#define MAX_TRIANGLES (2 * MAX_SIDE * MAX_SIDE)
+#define MAX_CLOTHS    2
+#define MAX_PINS      3
+#define MAX_TERMS     8
+#define MAX_COLLIDERS 3
+#define MAX_ROWS      32 /* parts with settings in a scene */
+#define ATTEMPTS      6
+#define STEPS         3
+#define ALONE         0.4 /* [s] of CPU for a single integrator, and for each when all of them run */
+#define EACH          0.1
+#define MAX_COUNT     40 /* for integers such as iterations and substeps: bounds the work of a step */
 
-/* ---- Settings, drawn from the parameters of a row ---- */
+/* ---- Settings, drawn from the parameters of an entry ---- */
 
 typedef struct drawn {
     drape_setting setting[DRAPE_MAX_PARAMS];
@@ -38,22 +38,22 @@ typedef struct drawn {
     size_t count;
 } drawn;
 
-/* Within the range, by magnitude where it spans some; at its ends now and then. */
+/* A value within the range, logarithmic if it spans several magnitudes; sometimes one of its ends. */
 static double draw_number(fuzz_bytes *in, const drape_param *p)
 {
-    const double most = fmin(p->open_max ? p->max * (1 - 1e-9) : p->max, 1e12),
-                 least = fmax(p->open_min ? p->min + 1e-9 : p->min, -1e12);
+    const double max = fmin(p->open_max ? p->max * (1 - 1e-9) : p->max, 1e12),
+                 min = fmax(p->open_min ? p->min + 1e-9 : p->min, -1e12);
     const unsigned how = fuzz_below(in, 8);
     if (how == 0)
-        return least;
+        return min;
     if (how == 1)
-        return most;
-    if (how < 4 || most <= 0)
-        return fuzz_between(in, fmax(least, -2), fmin(most, 2));
-    return fuzz_magnitude(in, fmax(least, most * 1e-12), most);
+        return max;
+    if (how < 4 || max <= 0)
+        return fuzz_between(in, fmax(min, -2), fmin(max, 2));
+    return fuzz_magnitude(in, fmax(min, max * 1e-12), max);
 }
 
-static void draw_value(fuzz_bytes *in, const drape_param *p, int most, drape_setting *s, double *vector)
+static void draw_value(fuzz_bytes *in, const drape_param *p, int span, drape_setting *s, double *vector)
 {
     unsigned choices = 0;
     while (p->choices && p->choices[choices])
@@ -63,7 +63,7 @@ static void draw_value(fuzz_bytes *in, const drape_param *p, int most, drape_set
     else if (p->kind == DRAPE_PARAM_BOOLEAN)
         s->number = fuzz_below(in, 2);
     else if (p->kind == DRAPE_PARAM_INTEGER)
-        s->number = floor(fuzz_between(in, p->min, fmin(p->max, p->min + most)));
+        s->number = floor(fuzz_between(in, p->min, fmin(p->max, p->min + span)));
     else if (p->kind == DRAPE_PARAM_NUMBER)
         s->number = draw_number(in, p);
     else if (p->kind == DRAPE_PARAM_TEXT)
@@ -76,9 +76,9 @@ static void draw_value(fuzz_bytes *in, const drape_param *p, int most, drape_set
     }
 }
 
-/* Those that are required, and each other one where a bit says so. most: integers lie at most so far above
- * their least. */
-static void draw(fuzz_bytes *in, const drape_param *params, int count, int most, drawn *d)
+/* Draws the required settings, and each other one if a bit is set. span: integers lie at most this far above
+ * their minimum. */
+static void draw(fuzz_bytes *in, const drape_param *params, int count, int span, drawn *d)
 {
     unsigned bits = 0;
     d->count = 0;
@@ -91,42 +91,42 @@ static void draw(fuzz_bytes *in, const drape_param *params, int count, int most,
             continue;
         drape_setting *s = &d->setting[d->count];
         *s = (drape_setting){.name = p->name};
-        draw_value(in, p, most, s, d->vector[d->count++]);
+        draw_value(in, p, span, s, d->vector[d->count++]);
     }
 }
 
 /* ---- The scene ---- */
 
 typedef struct mesh {
-    double x[3 * MOST_NODES];
-    int32_t triangle[3 * MOST_TRIANGLES];
+    double x[3 * MAX_NODES];
+    int32_t triangle[3 * MAX_TRIANGLES];
     int32_t nodes, triangles;
 } mesh;
 
 typedef struct cloth {
     mesh mesh;
-    drape_entry_def terms[MOST_TERMS];
-    drape_pin_def pins[MOST_PINS];
-    int32_t pinned[MOST_PINS];
-    drape_track_key keys[MOST_PINS][2];
+    drape_entry_def terms[MAX_TERMS];
+    drape_pin_def pins[MAX_PINS];
+    int32_t pinned[MAX_PINS];
+    drape_track_key keys[MAX_PINS][2];
     drape_setting material[DRAPE_MAX_PARAMS];
 } cloth;
 
 typedef struct scene {
     drape_scene_def def;
-    drape_cloth_def cloths[MOST_CLOTHS];
-    drape_collider_def colliders[MOST_COLLIDERS];
-    drape_track_key collider_keys[MOST_COLLIDERS][2];
-    cloth parts[MOST_CLOTHS];
-    drawn rows[MOST_ROWS];
+    drape_cloth_def cloths[MAX_CLOTHS];
+    drape_collider_def colliders[MAX_COLLIDERS];
+    drape_track_key collider_keys[MAX_COLLIDERS][2];
+    cloth parts[MAX_CLOTHS];
+    drawn integrators[MAX_ROWS];
     int row_count;
 } scene;
 
 static drape_entry_def row(scene *s, fuzz_bytes *in, const char *name, const drape_param *params, int count)
 {
-    FUZZ_REQUIRE(s->row_count < MOST_ROWS, "row %s", name);
-    drawn *d = &s->rows[s->row_count++];
-    draw(in, params, count, MOST_COUNT, d);
+    FUZZ_REQUIRE(s->row_count < MAX_ROWS, "row %s", name);
+    drawn *d = &s->integrators[s->row_count++];
+    draw(in, params, count, MAX_COUNT, d);
     return (drape_entry_def){.type = name, .settings = d->setting, .setting_count = d->count};
 }
 
@@ -142,11 +142,10 @@ static void draw_triangles(mesh *m, int columns, int rows, unsigned flips)
         }
 }
 
-/* A lattice of some size whose cells are as flat as `squeeze` says, each node out of its place by some of a
- * cell. */
+/* A lattice whose cells are flattened by `squeeze`, with each node displaced by part of a cell. */
 static void draw_mesh(mesh *m, drape_mesh_def *def, fuzz_bytes *in)
 {
-    const int columns = 1 + (int)fuzz_below(in, MOST_SIDE), rows = 1 + (int)fuzz_below(in, MOST_SIDE);
+    const int columns = 1 + (int)fuzz_below(in, MAX_SIDE), rows = 1 + (int)fuzz_below(in, MAX_SIDE);
     const double size = fuzz_magnitude(in, 1e-5, 1e4);
     const double squeeze = fuzz_below(in, 2) ? 1 : fuzz_magnitude(in, 1e-11, 1);
     const double stir = fuzz_below(in, 3) ? 0 : 1.5, height = fuzz_between(in, -1, 1);
@@ -170,13 +169,13 @@ static void draw_grid(scene *s, drape_cloth_def *def, fuzz_bytes *in)
     while (drape_grids[count])
         count++;
     const drape_grid_ops *ops = drape_grids[fuzz_below(in, count)];
-    drawn *d = &s->rows[s->row_count++];
-    draw(in, ops->entry.params, ops->entry.param_count, MOST_SIDE, d);
+    drawn *d = &s->integrators[s->row_count++];
+    draw(in, ops->entry.params, ops->entry.param_count, MAX_SIDE, d);
     def->mesh.grid =
         (drape_entry_def){.type = ops->entry.name, .settings = d->setting, .setting_count = d->count};
 }
 
-/* To where it goes, in a time that may be shorter than any step. */
+/* A displacement, in a time that may be shorter than any step. */
 static void draw_track(fuzz_bytes *in, drape_track_key keys[2])
 {
     const double far = fuzz_magnitude(in, 1e-6, 1e3);
@@ -189,7 +188,7 @@ static void draw_track(fuzz_bytes *in, drape_track_key keys[2])
 static void draw_pins(cloth *c, drape_cloth_def *def, fuzz_bytes *in)
 {
     def->pins = c->pins;
-    def->pin_count = fuzz_below(in, MOST_PINS + 1);
+    def->pin_count = fuzz_below(in, MAX_PINS + 1);
     for (size_t i = 0; i < def->pin_count; i++) {
         drape_pin_def *pin = &c->pins[i];
         drape_pin_def_init(pin, sizeof *pin);
@@ -221,7 +220,7 @@ static void draw_terms(scene *s, cloth *c, drape_cloth_def *def, fuzz_bytes *in)
     while (drape_terms[count])
         count++;
     def->terms = c->terms;
-    def->term_count = fuzz_below(in, MOST_TERMS + 1);
+    def->term_count = fuzz_below(in, MAX_TERMS + 1);
     const unsigned first = fuzz_below(in, count);
     for (size_t i = 0; i < def->term_count; i++) {
         const drape_term_ops *ops = drape_terms[(first + i * (i + 1) / 2) % count];
@@ -232,7 +231,7 @@ static void draw_terms(scene *s, cloth *c, drape_cloth_def *def, fuzz_bytes *in)
 static void draw_cloths(scene *s, fuzz_bytes *in)
 {
     s->def.cloths = s->cloths;
-    s->def.cloth_count = 1 + fuzz_below(in, MOST_CLOTHS);
+    s->def.cloth_count = 1 + fuzz_below(in, MAX_CLOTHS);
     for (size_t i = 0; i < s->def.cloth_count; i++) {
         drape_cloth_def *def = &s->cloths[i];
         cloth *c = &s->parts[i];
@@ -255,7 +254,7 @@ static void draw_colliders(scene *s, fuzz_bytes *in)
     while (drape_colliders[count])
         count++;
     s->def.colliders = s->colliders;
-    s->def.collider_count = fuzz_below(in, MOST_COLLIDERS + 1);
+    s->def.collider_count = fuzz_below(in, MAX_COLLIDERS + 1);
     for (size_t i = 0; i < s->def.collider_count; i++) {
         const drape_collider_ops *ops = drape_colliders[fuzz_below(in, count)];
         drape_collider_def *def = &s->colliders[i];
@@ -297,7 +296,7 @@ static void draw_scene(scene *s, fuzz_bytes *in)
         s->def.gravity[1] = fuzz_between(in, -1e4, 1e4);
 }
 
-/* ---- What was refused is left out ---- */
+/* ---- Removing what was refused ---- */
 
 static void drop(void *items, size_t size, size_t *count, unsigned index, const char *pointer)
 {
@@ -307,7 +306,7 @@ static void drop(void *items, size_t size, size_t *count, unsigned index, const 
     --*count;
 }
 
-/* By the place that the message names; false: it is of what a scene cannot do without. */
+/* Removes the part that the message points to; false: the scene cannot do without it. */
 static bool leave_out(scene *s, const char *pointer)
 {
     unsigned i, j;
@@ -351,8 +350,8 @@ static void run(drape_context *ctx, const drape_model *model, const drape_integr
         count++;
     const drape_controller_ops *controller = drape_controllers[fuzz_below(in, count)];
     drape_sim_def_init(&def, sizeof def);
-    draw(in, integrator->entry.params, integrator->entry.param_count, MOST_COUNT, &settings[0]);
-    draw(in, controller->entry.params, controller->entry.param_count, MOST_COUNT, &settings[1]);
+    draw(in, integrator->entry.params, integrator->entry.param_count, MAX_COUNT, &settings[0]);
+    draw(in, controller->entry.params, controller->entry.param_count, MAX_COUNT, &settings[1]);
     def.integrator = integrator->entry.name;
     def.integrator_settings = settings[0].setting;
     def.integrator_setting_count = settings[0].count;
@@ -372,15 +371,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     static scene s; /* large */
     fuzz_bytes in = {.at = data, .end = data + size};
-    drape_context *ctx = fuzz_open(MOST_MEMORY);
-    const unsigned chosen = fuzz_below(&in, 16); /* an integrator; past the last: all of them */
+    drape_context *ctx = fuzz_open(MAX_MEMORY);
+    const unsigned chosen = fuzz_below(&in, 16); /* index of an integrator; past the last: all of them */
     unsigned count = 0;
     while (drape_integrators[count])
         count++;
     draw_scene(&s, &in);
     drape_model *model = make_model(ctx, &s);
     for (unsigned i = 0; model && i < count; i++) {
-        fuzz_bytes own = in; /* each with the same bytes */
+        fuzz_bytes own = in; /* each reads the same bytes */
         if (chosen == i || chosen >= count)
             run(ctx, model, drape_integrators[i], &own, chosen == i ? ALONE : EACH);
     }

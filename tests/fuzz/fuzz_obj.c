@@ -1,4 +1,4 @@
-/* fuzz_obj.c: the bytes of an OBJ file. */
+/* fuzz_obj.c: the bytes are an OBJ file. */
 #include "fuzz/fuzz.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -1,4 +1,4 @@
-/* fuzz_ply.c: the bytes of a PLY file. */
+/* fuzz_ply.c: the bytes are a PLY file. */
 #include "fuzz/fuzz.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

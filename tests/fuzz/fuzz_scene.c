@@ -1,11 +1,11 @@
-/* fuzz_scene.c: the text of a scene in our form: it is refused with one line, or compiles. */
+/* fuzz_scene.c: the bytes are the text of a Drape scene, which is refused with one line or compiles. */
 #include "fuzz/fuzz.h"
 
-#define MOST_MEMORY ((size_t)32 << 20)
+#define MAX_MEMORY ((size_t)32 << 20)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    drape_context *ctx = fuzz_open(MOST_MEMORY);
+    drape_context *ctx = fuzz_open(MAX_MEMORY);
     drape_model *model = fuzz_scene(ctx, data, size);
     drape_model_destroy(&model);
     fuzz_close(&ctx);

@@ -1,12 +1,12 @@
-/* replay.c: `fuzz_<target> FOLDER` without libFuzzer: each file of a folder once, by name, which it says
- * before so that a crash has one. TAP. */
+/* replay.c: `fuzz_<target> FOLDER` without libFuzzer: runs the target on each file of a folder, in order of
+ * their names. It prints each name first, so that a crash can be assigned. Output is TAP. */
 #include <dirent.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "fuzz/fuzz.h"
 
-/* size bytes, no more: a sanitizer sees what is read past them. NULL: cannot be read. */
+/* Exactly size bytes, so that a sanitizer detects reads past them. NULL: the file cannot be read. */
 static uint8_t *read_open(FILE *file, size_t *size)
 {
     if (fseek(file, 0, SEEK_END) != 0)
@@ -37,7 +37,7 @@ static int is_seed(const struct dirent *entry)
     return entry->d_name[0] != '.';
 }
 
-/* 1: it could not be read. */
+/* Returns 1 if the file could not be read. */
 static int try_file(int number, const char *folder, const char *name)
 {
     char path[4096];

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""test_install.py: the installed tree, as a host meets it. `meson install` into a folder of its own; what is in it and what the libraries
-show; the hosts of examples/ built against it by pkg-config, by CMake, against the static library, and run by Python. Speaks TAP. What needs a
-program that is not here, or a library that this build does not make, is skipped."""
+"""test_install.py: the installed tree, as a host uses it. Runs `meson install` into a temporary folder; checks the files and the exported symbols;
+builds the hosts of examples/ against it with pkg-config, with CMake and against the static library, and runs the Python host. Output is TAP. Tests
+that need a program that is not installed, or a library that this build does not make, are skipped."""
 import os
 import re
 import shutil
@@ -15,7 +15,7 @@ EXAMPLES = os.path.join(SOURCE, "examples")
 FRAMES = "45"
 
 
-os.environ["CMAKE_GENERATOR"] = "Ninja"  # which builds us: a bare system has no make
+os.environ["CMAKE_GENERATOR"] = "Ninja"  # the program that builds Drape: a bare system has no make
 
 
 class Skip(Exception):

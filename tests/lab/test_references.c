@@ -1,5 +1,6 @@
-/* test_references.c: the references of drape validate that take a second or two; what GSL says of them
- * against the digits of other sources; a reference can fail. All of them are run by `drape validate`. */
+/* test_references.c: the references of `drape validate` that take a second or two; expected values, computed
+ * with GSL, against digits from other sources; and that a reference can fail. `drape validate` runs all of
+ * them. */
 #include "compile/fabrics.h"
 #include "lab/rod.h"
 #include "lab/validate.h"
@@ -28,7 +29,7 @@ static drape_validation run(const drape_reference *reference, int index)
     return v;
 }
 
-/* A case by name and number. */
+/* Runs a case, by the name of its reference and its number, and checks the verdict. */
 static void check(const char *name, int index, drape_outcome outcome)
 {
     const drape_validation v = run(find(name), index);
@@ -36,7 +37,7 @@ static void check(const char *name, int index, drape_outcome outcome)
                   drape_outcome_name(v.verdict), v.obtained, v.expected, v.message);
 }
 
-/* Digits of physics texts and of independent programs; they were computed to all that are here. */
+/* Digits from physics texts and from independent programs; all digits listed are correct. */
 START_TEST(expected_values_are_those_of_other_sources)
 {
     static const struct {
@@ -53,11 +54,11 @@ START_TEST(expected_values_are_those_of_other_sources)
         const drape_reference *r = find(known[i].name);
         ck_assert_double_eq_tol(r->expected(r->parameters[known[i].index]), known[i].value, known[i].digits);
     }
-    /* q L^3 = 12.8538 sqrt(E I G J), which is B w sqrt(2/(1 + nu)), of hinges 19.79 D w. */
+    /* q L^3 = 12.8538 sqrt(E I G J), where the root is B w sqrt(2/(1 + nu)); with hinges it is 19.79 D w. */
     ck_assert_double_eq_tol(find("lateral_buckling")->expected(0) / sqrt(2), 12.8538, 5e-5);
     ck_assert_double_eq_tol(find("lateral_buckling_hinges")->documented(0), 19.79, 5e-3);
-    /* A lone strip of the overhang, clamped at one end, sinks by q l^4/(8 D), l = 0.4 of the radius: a plate
-     * that goes round is near that, the less it contracts the more. */
+    /* A single strip of the overhang, clamped at one end, sinks by q l^4/(8 D), with l = 0.4 of the radius.
+     * The ring is close to that. */
     ck_assert_double_eq_tol(find("cusick_stiff")->expected(0), pow(0.4, 4) / 8, 0.25 * pow(0.4, 4) / 8);
 }
 END_TEST
@@ -105,7 +106,8 @@ START_TEST(every_fabric_gives_back_its_published_values)
 }
 END_TEST
 
-/* What a law takes from a row: published numbers, and those that stand for what was not. */
+/* The stiffnesses that terms get from a fabric: published numbers, and substitutes for those not
+ * published. */
 START_TEST(a_fabric_has_what_was_published)
 {
     const drape_fabric *jeans = NULL, *feng = &drape_fabrics[1];
@@ -124,7 +126,7 @@ START_TEST(a_fabric_has_what_was_published)
     ck_assert_ptr_nonnull(jeans);
     drape_fabric_tension(jeans, &tension);
     drape_fabric_bending(jeans, &bending);
-    /* C12^2 = nu^2 C11 C22, strips have C11 - C12^2/C22. */
+    /* C12^2 = nu^2 C11 C22; the stiffness of a strip is C11 - C12^2/C22. */
     ck_assert_double_eq_tol(tension.warp, 2 * (1013.88629 - 10.234077 * 10.234077 / 205.352005), 1e-9);
     ck_assert_double_eq_tol(tension.poisson, 10.234077 / sqrt(205.352005 * 1013.88629), 1e-12);
     ck_assert_double_eq_tol(tension.shear, 53.387184, 1e-12);

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""`drape report`: what the page holds, and what a browser makes of it. TAP on stdout.
+"""`drape report`: the contents of the page, and its behaviour in a browser. Output is TAP.
 
-DRAPE_BUILD is the folder of the build; or: test_report.py PROGRAM. The tests with a browser need Debian's chromium, and are
+DRAPE_BUILD is the build folder; or: test_report.py PROGRAM. The tests with a browser need Debian's chromium, and are
 skipped without it.
 """
 import base64
@@ -85,7 +85,7 @@ def read_npy(path):
 
 
 def test_contents():
-    """the page has the run's positions to half a step of 16 bits, its tables, summary and scene"""
+    """the page has the positions of the run to half a step of 16 bits, its tables, summary and scene"""
     make_run()
     said = good("report", "out")
     assert re.fullmatch(r"report    out/report.html, [\d.]+ MB, 21 of 21 frames\n", said), said
@@ -113,7 +113,7 @@ def test_contents():
 
 
 def test_strain_and_speed():
-    """strain and speed are those of the definition, at one frame by hand"""
+    """strain and speed follow their definitions, computed here for one frame"""
     make_run()
     good("report", "out")
     page = read("out/report.html")
@@ -121,8 +121,8 @@ def test_strain_and_speed():
     frames, nodes, x = read_npy("out/positions.npy")
     speed, levels, k = data["fields"][2], numbers(page, "speed", "H"), 7
     for node in range(nodes):
-        way = [x[(((k + 1) * nodes) + node) * 3 + i] - x[((k - 1) * nodes + node) * 3 + i] for i in range(3)]
-        wanted = sum(w * w for w in way) ** 0.5 * 20  # centred differences at 40 frames a second
+        displacement = [x[(((k + 1) * nodes) + node) * 3 + i] - x[((k - 1) * nodes + node) * 3 + i] for i in range(3)]
+        wanted = sum(w * w for w in displacement) ** 0.5 * 20  # centred differences at 40 frames a second
         assert abs(speed["low"][0] + speed["step"][0] * levels[k * nodes + node] - wanted) < speed["step"][0] + 1e-9
     strain = numbers(page, "strain", "H")
     field = data["fields"][1]
@@ -131,7 +131,7 @@ def test_strain_and_speed():
 
 
 def test_one_file():
-    """nothing in the page leads out of it, and a text of the scene cannot end its block"""
+    """the page loads nothing from elsewhere, and a text in the scene cannot end its script element"""
     make_run()
     good("report", "out")
     page = read("out/report.html")
@@ -144,7 +144,7 @@ def test_one_file():
 
 
 def test_small():
-    """with less room frames are left out evenly, the first and the last kept"""
+    """with less room, frames are left out evenly; the first and the last are kept"""
     make_run("--frame-rate", "4000", "--duration", "0.5")
     said = good("report", "out", "--megabytes", "1", "--out", "small.html")
     kept, frames = (int(n) for n in re.search(r"(\d+) of (\d+) frames", said).groups())
@@ -156,7 +156,7 @@ def test_small():
 
 
 def test_unfinished():
-    """a run that was killed has a report: no summary, and one frame more than rows at most"""
+    """a killed run has a report, without a summary and with at most one frame more than rows"""
     make_run()
     os.remove("out/summary.json")
     rows = read("out/energy.csv").splitlines(keepends=True)
@@ -167,7 +167,7 @@ def test_unfinished():
 
 
 def test_refused():
-    """what is no run is one line, exit 2, and no page"""
+    """a folder that is not a run is one line, exit 2, and no page"""
     make_run()
     refused("report", says="RUN is missing")
     refused("report", "nowhere", says="no scene.json")
@@ -199,7 +199,7 @@ def test_refused():
 
 
 class Browser:
-    """A page in a headless chromium, spoken to through pipes (the DevTools protocol, messages that end with a zero byte)."""
+    """A page in a headless chromium, controlled through pipes (the DevTools protocol; messages end with a zero byte)."""
 
     def __init__(self, path, width=1200, height=900):
         program = shutil.which("chromium")
@@ -269,7 +269,7 @@ class Browser:
         return answer["result"].get("value")
 
     def settle(self, frames=3):
-        """Until the page has drawn so many times again."""
+        """Waits until the page has drawn this many more times."""
         self.evaluate(f"new Promise((done) => {{ let n = {frames}; const next = () => (n-- ? requestAnimationFrame(next) : done()); next(); }})")
 
     def press(self, key):
@@ -293,7 +293,7 @@ def address(name, fragment=""):
 
 
 def png(path):
-    """Width and rows of RGB of a PNG, by its definition: 8 bits, no interlace."""
+    """Width and rows of RGB of a PNG with 8 bits and no interlace, read by the definition of the format."""
     with open(path, "rb") as file:
         data = file.read()
     at, packed = 8, b""
@@ -338,7 +338,7 @@ LOOK = """({ time: state.time, shown: element('time').textContent, scrub: Number
 
 
 def test_drawn():
-    """the view shows the cloth, which moves, shaded by strain too; the page works by file:, and its console is silent"""
+    """the view shows the moving cloth, also coloured by strain; the page works as a local file, and its console has no messages"""
     make_run()
     good("report", "out")
     with Browser(address("out/report.html", "t=0.1")) as page:
@@ -382,7 +382,7 @@ def test_moves():
         strain = page.evaluate(LOOK)
         assert (strain["shade"], strain["legend"], strain["edges"]) == ("strain", True, True), strain
 
-        # Slowly: on a busy machine ten frames at full speed go beyond the end, and begin again.
+        # Slowly: on a busy machine ten frames at full speed pass the end and start again.
         page.evaluate("element('rate').value = '0.1'; element('rate').dispatchEvent(new Event('change'))")
         page.press("Home")
         page.press(" ")

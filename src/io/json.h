@@ -1,0 +1,63 @@
+/*
+ * json.h: building JSON with jansson.
+ *
+ * jansson refuses to set a value that is NULL and passes NULL on, so a failed allocation anywhere ends as
+ * NULL at the top: only the finished value needs a check.
+ */
+#ifndef DRAPE_IO_JSON_H
+#define DRAPE_IO_JSON_H
+
+#include "base/context.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+
+/* Adds a member to an object. Takes both references; returns the object, or NULL if either is NULL. */
+static inline json_t *drape_json_with(json_t *object, const char *key, json_t *value)
+{
+    if (json_object_set_new(object, key, value) == 0)
+        return object;
+    json_decref(object);
+    return NULL;
+}
+
+/* Adds an item to an array. Takes both references; returns the array, or NULL if either is NULL. */
+static inline json_t *drape_json_append(json_t *array, json_t *value)
+{
+    if (json_array_append_new(array, value) == 0)
+        return array;
+    json_decref(array);
+    return NULL;
+}
+
+/* JSON has no NaN and no infinity: null stands for both. */
+static inline json_t *drape_json_number(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
+static inline json_t *drape_json_numbers(const double *values, size_t count)
+{
+    json_t *array = json_array();
+    for (size_t i = 0; i < count; i++)
+        array = drape_json_append(array, drape_json_number(values[i]));
+    return array;
+}
+
+/* A path may be in any encoding, and a message may be cut within a character: a text that is not UTF-8 gets
+ * question marks for all bytes beyond ASCII. */
+static inline json_t *drape_json_text(const char *bytes)
+{
+    char copy[DRAPE_MESSAGE_SIZE];
+    json_t *string = json_string(bytes);
+    if (string)
+        return string;
+    snprintf(copy, sizeof copy, "%s", bytes);
+    for (char *c = copy; *c; c++)
+        if ((unsigned char)*c > 127)
+            *c = '?';
+    return json_string(copy);
+}
+
+#endif
