@@ -179,7 +179,7 @@ static void markdown_table(const drape_registry *table)
 {
     printf("### %s\n", table->title);
     if (*table->place)
-        printf("\nIn a scene: %s.\n", table->place);
+        printf("\nWhere: %s.\n", table->place);
 }
 
 static void markdown_entries_begin(void)

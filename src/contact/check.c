@@ -2,6 +2,7 @@
 #include "contact/parts.h"
 
 #include "base/clock.h"
+#include "base/reason.h"
 #include "base/vec3.h"
 #include "contact/depth.h"
 
@@ -45,7 +46,7 @@ static drape_status check_depth(drape_contact *c, const char **reason, drape_dia
         excess = least - gap->value;
         *diagnostic = diagnostic_of(c, pair, "gap [m]", gap->value, least);
     }
-    *reason = excess > 0 ? "penetration" : *reason;
+    *reason = excess > 0 ? drape_reason_name(DRAPE_REASON_PENETRATION) : *reason;
     return excess > 0 ? DRAPE_RETRY_REJECTED : DRAPE_OK;
 }
 
@@ -82,7 +83,7 @@ static drape_status check_surfaces(drape_contact *c, const char **reason, drape_
             if (!dips(&c->model->colliders[k], x, y))
                 continue;
             const drape_pair pair = drape_broad_phase_surface(&c->broad, node, k);
-            *reason = "collision";
+            *reason = drape_reason_name(DRAPE_REASON_COLLISION);
             *diagnostic = diagnostic_of(c, &pair, "node through collider", 1, 0);
             return DRAPE_RETRY_REJECTED;
         }
@@ -117,7 +118,7 @@ static drape_status check_inscribed(drape_contact *c, const int32_t *node, int n
             if (depth >= least)
                 continue;
             const drape_pair pair = {.collider = k, .node = {n[0], n[1], nodes > 2 ? n[2] : -1, -1}};
-            *reason = "penetration";
+            *reason = drape_reason_name(DRAPE_REASON_PENETRATION);
             *diagnostic = diagnostic_of(c, &pair, "gap [m]", depth, least);
             return DRAPE_RETRY_REJECTED;
         }
@@ -132,7 +133,7 @@ static drape_status check_path(drape_contact *c, const char **reason, drape_diag
         drape_contact_free_fraction(c, c->start, c->x, c->pose, DRAPE_KEEP_STEP, true, &limiting);
     if (fraction >= 1)
         return DRAPE_OK;
-    *reason = "collision";
+    *reason = drape_reason_name(DRAPE_REASON_COLLISION);
     *diagnostic = diagnostic_of(c, &limiting, "fraction of the step before passing through", fraction, 1);
     return DRAPE_RETRY_REJECTED;
 }

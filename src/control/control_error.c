@@ -12,6 +12,7 @@
  * rule (Gustafsson 1991; Hairer & Wanner 1996, IV.2):
  *     h_next = h safety e^(-0.7/(p+1)) e_before^(0.4/(p+1)).
  */
+#include "base/reason.h"
 #include "control/halve.h"
 #include "integrators/tolerance.h"
 
@@ -125,7 +126,7 @@ static drape_verdict reject(const double *values, drape_trial *trial, double err
     double factor =
         isnan(error) ? 0.5 : fmin(0.9, bounded(values[PARAM_SAFETY] * pow(error, -1.0 / (trial->order + 1))));
     trial->status = DRAPE_RETRY_REJECTED;
-    trial->info->reason = "error_test";
+    trial->info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
     trial->info->diagnostic =
         (drape_diagnostic){.what = "local error / tolerance",
                            .term = "",

@@ -6,6 +6,7 @@
  *
  * A step of verlet is as many substeps as the scene says, so that it is the substeps that keep below 2/omega.
  */
+#include "base/reason.h"
 #include "control/halve.h"
 
 #include <math.h>
@@ -49,7 +50,7 @@ static double limit_of(const double *values, drape_trial *trial)
 static drape_verdict reject(const double *values, drape_trial *trial, double limit)
 {
     trial->status = DRAPE_RETRY_REJECTED;
-    trial->info->reason = "unstable";
+    trial->info->reason = drape_reason_name(DRAPE_REASON_UNSTABLE);
     trial->info->diagnostic = (drape_diagnostic){.what = "step / stable step",
                                                  .term = "",
                                                  .element = -1,

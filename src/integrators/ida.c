@@ -28,6 +28,7 @@
  * which it calls them, then the stages of our step around IDASolve.
  */
 #include "base/finite.h"
+#include "base/reason.h"
 #include "integrators/ida_newton.h"
 #include "integrators/integrator.h"
 #include "integrators/tolerance.h"
@@ -371,7 +372,7 @@ static bool exhausted(ida_state *s, const drape_state *in, drape_step_info *info
     if (s->steps++ < (int64_t)s->values[PARAM_MAX_STEPS])
         return false;
     s->steps = 0;
-    info->reason = "max_steps";
+    info->reason = drape_reason_name(DRAPE_REASON_MAX_STEPS);
     IDAGetLastStep(s->ida, &info->h);
     diagnose(s, info);
     return true;
@@ -392,10 +393,10 @@ static drape_status start(ida_state *s, const drape_state *in, drape_step_info *
         rate[s->n + i] = -s->g[node_at(s, i)] / mass_of(s, i);
     s->counted = 0;
     s->failures = 0;
-    info->reason = "nonfinite";
+    info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
     if (!drape_all_finite(rate + s->n, (size_t)s->n)) /* IDA would cut its step ten times over it */
         return DRAPE_RETRY_NONFINITE;
-    info->reason = "solver";
+    info->reason = drape_reason_name(DRAPE_REASON_SOLVER);
     return IDAReInit(s->ida, in->t, s->y, s->rate) ? DRAPE_E_SOLVER : DRAPE_OK;
 }
 
@@ -433,33 +434,33 @@ static drape_status prepare(ida_state *s, const drape_state *in, double end, dou
 /* Every return code of IDASolve, as what it means for the step. */
 static drape_status status_of(int code, bool nonfinite, const char **reason)
 {
-    *reason = nonfinite ? "nonfinite" : "converged";
+    *reason = drape_reason_name(nonfinite ? DRAPE_REASON_NONFINITE : DRAPE_REASON_CONVERGED);
     switch (code) {
     case IDA_SUCCESS:
     case IDA_TSTOP_RETURN:
-        *reason = "converged";
+        *reason = drape_reason_name(DRAPE_REASON_CONVERGED);
         return DRAPE_OK;
     case IDA_ERR_FAIL:
-        *reason = "error_test";
+        *reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
         return DRAPE_RETRY_REJECTED;
     case IDA_TOO_MUCH_ACC:
-        *reason = "round_off";
+        *reason = drape_reason_name(DRAPE_REASON_ROUND_OFF);
         return DRAPE_RETRY_REJECTED;
     case IDA_CONV_FAIL:
     case IDA_NLS_FAIL:
-        *reason = nonfinite ? "nonfinite" : "newton";
+        *reason = drape_reason_name(nonfinite ? DRAPE_REASON_NONFINITE : DRAPE_REASON_NEWTON);
         return nonfinite ? DRAPE_RETRY_NONFINITE : DRAPE_RETRY_NONLINEAR;
     case IDA_LSETUP_FAIL:
     case IDA_LSOLVE_FAIL:
-        *reason = "singular";
+        *reason = drape_reason_name(DRAPE_REASON_SINGULAR);
         return DRAPE_RETRY_LINEAR;
     case IDA_RES_FAIL:
     case IDA_REP_RES_ERR:
     case IDA_FIRST_RES_FAIL:
-        *reason = "nonfinite";
+        *reason = drape_reason_name(DRAPE_REASON_NONFINITE);
         return DRAPE_RETRY_NONFINITE;
     default: /* IDA_MEM_NULL, IDA_ILL_INPUT, IDA_LINIT_FAIL, IDA_VECTOROP_ERR ...: no smaller step helps */
-        *reason = "solver";
+        *reason = drape_reason_name(DRAPE_REASON_SOLVER);
         return DRAPE_E_SOLVER;
     }
 }
@@ -473,7 +474,7 @@ static drape_status solve(ida_state *s, double end, double h, double *t, drape_s
     int code = IDASolve(s->ida, end, t, s->y, s->rate, IDA_ONE_STEP);
     drape_status status = status_of(code, s->nonfinite, &info->reason);
     if (status > 0 && s->crossing)
-        info->reason = "collision";
+        info->reason = drape_reason_name(DRAPE_REASON_COLLISION);
     if (drape_system_status(s->system))
         status = drape_system_status(s->system);
     if (s->failure < 0 || s->linear->status < 0)
@@ -502,7 +503,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         s->from) /* the sim rejected the last step, with which IDA was content: mostly for its energy */
         s->newton.strict = true;
     s->from = NAN;
-    info->reason = "solver";
+    info->reason = drape_reason_name(DRAPE_REASON_SOLVER);
     drape_status status = prepare(s, in, end, h, &t, info);
     if (!status && s->n > 0)
         status = solve(s, end, h, &t, info);
@@ -516,7 +517,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     memcpy(out->v, s->v, nodes * sizeof *out->v);
     out->t = t;
     info->h = t - in->t;
-    info->reason = "converged";
+    info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
     audit(s, in, out, info);
     s->from = in->t;
     s->reached = t;

@@ -10,6 +10,7 @@
  * Whether the equilibrium is stable is seen from the signs of D in K = L D L': it is stable if none is
  * negative.
  */
+#include "base/reason.h"
 #include "integrators/implicit.h"
 #include "solvers/inertia.h"
 
@@ -124,7 +125,7 @@ static drape_status follow(static_state *s, double mass_weight, double tolerance
         last = info->residual;
     }
     if (fails == 0)
-        info->reason = "stalled";
+        info->reason = drape_reason_name(DRAPE_REASON_STALLED);
     report_residual(s, out, tolerance, info);
     return DRAPE_E_SOLVER;
 }
@@ -162,7 +163,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         return status;
     memcpy(out->internal, s->internal, internal_bytes);
     info->committed = true;
-    info->reason = "converged";
+    info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
     return judge_stability(s, out);
 }
 

@@ -27,6 +27,7 @@
 #include "base/clock.h"
 #include "base/finite.h"
 #include "base/lanes.h"
+#include "base/reason.h"
 #include "base/vec3.h"
 #include "integrators/stability.h"
 
@@ -409,7 +410,7 @@ static bool blew_up(const verlet_state *s, const drape_state *out, drape_step_in
     double speed = vec3_norm(out->v + 3 * (size_t)node);
     if (speed <= s->values[PARAM_MAX_SPEED] && drape_all_finite(out->x + 3 * (size_t)node, 3))
         return false;
-    info->reason = "blow_up";
+    info->reason = drape_reason_name(DRAPE_REASON_BLOW_UP);
     info->diagnostic = (drape_diagnostic){.what = "speed [m/s]",
                                           .term = "",
                                           .element = -1,
@@ -422,7 +423,7 @@ static bool blew_up(const verlet_state *s, const drape_state *out, drape_step_in
 
 static drape_status refuse(drape_step_info *info, int64_t max)
 {
-    info->reason = "max_substeps";
+    info->reason = drape_reason_name(DRAPE_REASON_MAX_SUBSTEPS);
     info->diagnostic.what = "substeps";
     info->diagnostic.value = (double)max + 1;
     info->diagnostic.limit = (double)max;
@@ -441,7 +442,7 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
         return refuse(info, (int64_t)s->values[PARAM_MAX_SUBSTEPS]);
     memcpy(out->x, in->x, nodes * sizeof *out->x);
     memcpy(out->v, in->v, nodes * sizeof *out->v);
-    info->reason = "converged";
+    info->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
     for (int64_t k = 0; k < n; k++) {
         if (drape_system_cancelled(s->system))
             return drape_system_status(s->system);

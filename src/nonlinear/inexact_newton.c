@@ -7,6 +7,7 @@
 #include "nonlinear/inexact_newton.h"
 
 #include "base/clock.h"
+#include "base/reason.h"
 #include "nonlinear/approx_jacobian.h"
 
 #include <math.h>
@@ -84,17 +85,17 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
     const double first = drape_step_equation_dot(e, e->f, e->f);
     for (;; report->iterations++) {
         bool converged = drape_step_equation_norm(e, DRAPE_NORM_MAX) <= settings->tolerance;
-        report->reason = converged ? "converged" : "iterations";
+        report->reason = drape_reason_name(converged ? DRAPE_REASON_CONVERGED : DRAPE_REASON_ITERATIONS);
         if (converged ||
             (report->iterations >= settings->iterations && drape_step_equation_dot(e, e->f, e->f) < first))
             return DRAPE_OK;
         if (report->iterations >= settings->iterations + settings->rescue_iterations) {
-            report->reason = "residual";
+            report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
             return DRAPE_RETRY_NONLINEAR;
         }
         drape_status status = correct(s, settings);
         if (status) {
-            report->reason = status < 0 ? "memory" : "singular";
+            report->reason = drape_reason_name(status < 0 ? DRAPE_REASON_MEMORY : DRAPE_REASON_SINGULAR);
             return status;
         }
         drape_step_equation_make_feasible(e, s->p);
@@ -113,7 +114,7 @@ drape_status drape_inexact_newton_solve(drape_inexact_newton *s, const drape_ine
     report->residual = drape_step_equation_norm(e, DRAPE_NORM_MAX);
     drape_step_equation_diagnose(e, settings->tolerance, report);
     if (status == DRAPE_RETRY_NONFINITE) {
-        report->reason = "nonfinite";
+        report->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
         return drape_step_equation_find_cause(e, status, report);
     }
     return status ? status : drape_system_status(e->system);

@@ -25,6 +25,7 @@
 #include "nonlinear/newton.h"
 
 #include "base/finite.h"
+#include "base/reason.h"
 #include "nonlinear/stress_predictor.h"
 #include "solvers/sun_linear.h"
 #include "solvers/sundials_memory.h"
@@ -343,34 +344,34 @@ static drape_status status_of(int code, const char **reason)
     switch (code) {
     case KIN_SUCCESS:
     case KIN_INITIAL_GUESS_OK:
-        *reason = "converged";
+        *reason = drape_reason_name(DRAPE_REASON_CONVERGED);
         return DRAPE_OK;
     case KIN_STEP_LT_STPTOL: /* positive, but not converged */
-        *reason = "stagnation";
+        *reason = drape_reason_name(DRAPE_REASON_STAGNATION);
         return DRAPE_RETRY_NONLINEAR;
     case KIN_MAXITER_REACHED:
-        *reason = "max_iterations";
+        *reason = drape_reason_name(DRAPE_REASON_MAX_ITERATIONS);
         return DRAPE_RETRY_NONLINEAR;
     case KIN_LINESEARCH_NONCONV:
     case KIN_LINESEARCH_BCFAIL:
-        *reason = "line_search";
+        *reason = drape_reason_name(DRAPE_REASON_LINE_SEARCH);
         return DRAPE_RETRY_NONLINEAR;
     case KIN_MXNEWT_5X_EXCEEDED:
-        *reason = "newton_step";
+        *reason = drape_reason_name(DRAPE_REASON_NEWTON_STEP);
         return DRAPE_RETRY_NONLINEAR;
     case KIN_LINSOLV_NO_RECOVERY:
     case KIN_LSETUP_FAIL:
     case KIN_LSOLVE_FAIL:
-        *reason = "singular";
+        *reason = drape_reason_name(DRAPE_REASON_SINGULAR);
         return DRAPE_RETRY_LINEAR;
     case KIN_SYSFUNC_FAIL:
     case KIN_FIRST_SYSFUNC_ERR:
     case KIN_REPTD_SYSFUNC_ERR:
-        *reason = "nonfinite";
+        *reason = drape_reason_name(DRAPE_REASON_NONFINITE);
         return DRAPE_RETRY_NONFINITE;
     default: /* KIN_MEM_NULL, KIN_ILL_INPUT, KIN_NO_MALLOC, KIN_MEM_FAIL, KIN_LINIT_FAIL, KIN_VECTOROP_ERR
                 ...: no smaller step helps */
-        *reason = "solver";
+        *reason = drape_reason_name(DRAPE_REASON_SOLVER);
         return DRAPE_E_SOLVER;
     }
 }
@@ -387,17 +388,17 @@ static drape_status judge(drape_newton *s, drape_status status, const double *d,
     report->residual = finite ? drape_step_equation_norm(e, norm) : NAN;
     drape_step_equation_diagnose(e, tolerance, report);
     if (report->residual <= tolerance) {
-        report->reason = "converged";
+        report->reason = drape_reason_name(DRAPE_REASON_CONVERGED);
         return DRAPE_OK;
     }
     double rounding = finite ? drape_step_equation_rounding(e, d, norm) : NAN;
     if (report->residual <= rounding) {
-        report->reason = "rounding";
+        report->reason = drape_reason_name(DRAPE_REASON_ROUNDING);
         report->tolerance = rounding;
         return DRAPE_OK;
     }
     if (!status) { /* unreachable as long as KINSOL tests what its documentation says */
-        report->reason = "residual";
+        report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
         status = DRAPE_RETRY_NONLINEAR;
     }
     report->usable = report->lenient && finite && status > 0;
@@ -415,7 +416,7 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
     if (drape_system_status(e->system))
         return drape_system_status(e->system);
     if (s->failure) {
-        report->reason = "memory";
+        report->reason = drape_reason_name(DRAPE_REASON_MEMORY);
         return s->failure;
     }
     if (status)
@@ -428,8 +429,9 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
 drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *report)
 {
     drape_step_equation *e = s->equation;
-    *report = (drape_solve_report){
-        .reason = "converged", .lenient = s->values[DRAPE_NEWTON_ON_FAILURE] == DRAPE_NEWTON_FAILURE_ACCEPT};
+    *report =
+        (drape_solve_report){.reason = drape_reason_name(DRAPE_REASON_CONVERGED),
+                             .lenient = s->values[DRAPE_NEWTON_ON_FAILURE] == DRAPE_NEWTON_FAILURE_ACCEPT};
     begin(s);
     if (e->dofs == 0) {
         drape_step_equation_evaluate(e, d);

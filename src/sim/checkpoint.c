@@ -105,7 +105,7 @@ static void archive_audit(drape_sim *sim, drape_archive *a)
 }
 
 /* A reason is static text where it was counted; where it is read, the sim keeps it. */
-static void archive_reason(drape_sim *sim, drape_reason *reason, drape_archive *a)
+static void archive_reason(drape_sim *sim, drape_reason_total *reason, drape_archive *a)
 {
     char text[REASON_ROOM];
     snprintf(text, sizeof text, "%s", a->reading ? "" : reason->reason);

@@ -104,13 +104,15 @@ drape_status drape_choose(drape_context *ctx, const drape_model *model, const dr
                         d->controller_setting_count, chosen->controller_values, &c);
     if (!status)
         status = apply_number(ctx, &controllers, c, "dt_min", d->dt_min, chosen->controller_values);
+    if (status)
+        return status;
     chosen->integrator = drape_integrators[i];
     chosen->controller = drape_controllers[c];
-    if (!status && chosen->integrator->own_steps && chosen->controller->own_steps)
-        status = drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/controller/type",
-                               "\"%s\" chooses steps, and so does the integrator \"%s\"; take \"halving\"",
-                               chosen->controller->entry.name, chosen->integrator->entry.name);
-    return status;
+    if (chosen->integrator->own_steps && chosen->controller->own_steps)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/controller/type",
+                             "\"%s\" chooses steps, and so does the integrator \"%s\"; take \"halving\"",
+                             chosen->controller->entry.name, chosen->integrator->entry.name);
+    return DRAPE_OK;
 }
 
 double drape_chosen_integrator_value(const drape_chosen *chosen, const char *name, double fallback)

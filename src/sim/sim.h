@@ -10,10 +10,10 @@
 #define DRAPE_MAX_OBSERVERS 8
 #define DRAPE_MAX_REASONS   32 /* of which the last is "other" where there are more */
 
-typedef struct drape_reason {
+typedef struct drape_reason_total {
     const char *reason; /* static text */
     int64_t count;
-} drape_reason;
+} drape_reason_total;
 
 /* The energy account of a run [J]. */
 typedef struct drape_audit {
@@ -60,7 +60,7 @@ struct drape_sim {
     double *read;                   /* (node_count x 3) scratch of queries between steps */
     int64_t attempts;
     drape_statistics statistics; /* counted by the driver; the integrator has the rest */
-    drape_reason reasons[DRAPE_MAX_REASONS];
+    drape_reason_total reasons[DRAPE_MAX_REASONS];
     int reason_count;
     drape_audit audit;
     drape_realtime_memory realtime;

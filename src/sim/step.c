@@ -5,6 +5,7 @@
  */
 #include "base/clock.h"
 #include "base/finite.h"
+#include "base/reason.h"
 #include "sim/sim.h"
 
 #include <inttypes.h>
@@ -24,13 +25,13 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
     const drape_state *next = next_state(sim);
     size_t n = 3 * (size_t)sim->model->node_count;
     if (!drape_all_finite(next->x, n) || !drape_all_finite(next->v, n)) {
-        info->reason = "nonfinite";
+        info->reason = drape_reason_name(DRAPE_REASON_NONFINITE);
         return DRAPE_RETRY_NONFINITE;
     }
     if (info->committed)
         return DRAPE_OK;
     if (!info->lenient && drape_sim_ran_away(sim, next, info)) {
-        info->reason = "energy";
+        info->reason = drape_reason_name(DRAPE_REASON_ENERGY);
         return DRAPE_RETRY_REJECTED;
     }
     const drape_state *before = drape_sim_state(sim);
@@ -55,7 +56,7 @@ static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info
     if (!status)
         status = sim->chosen.integrator->step(sim->integrator, drape_sim_state(sim), next, h, info);
     if (status == DRAPE_E_STOPPED)
-        info->reason = "cancelled";
+        info->reason = drape_reason_name(DRAPE_REASON_CANCELLED);
     if (status && !info->usable)
         return status;
     info->pin_work += drape_system_push_work(sim->system, drape_sim_state(sim)->x, next->x);
@@ -124,10 +125,10 @@ static void count_reason(drape_sim *sim, const char *reason)
         i++;
     if (i == sim->reason_count && i >= DRAPE_MAX_REASONS - 1) {
         i = DRAPE_MAX_REASONS - 1;
-        reason = "other";
+        reason = drape_reason_name(DRAPE_REASON_OTHER);
     }
     if (i == sim->reason_count)
-        sim->reasons[sim->reason_count++] = (drape_reason){.reason = reason};
+        sim->reasons[sim->reason_count++] = (drape_reason_total){.reason = reason};
     sim->reasons[i].count++;
 }
 
@@ -265,7 +266,7 @@ static drape_attempt record_of(drape_sim *sim, double t, const drape_step_info *
 /* One attempt from proposal to verdict. *stop: the negative status that ends the advance, 0 to go on. */
 static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status *stop)
 {
-    drape_step_info info = {.reason = "converged", .h = h};
+    drape_step_info info = {.reason = drape_reason_name(DRAPE_REASON_CONVERGED), .h = h};
     drape_trial trial;
     double t = drape_sim_state(sim)->t;
     drape_status status = attempt(sim, t1, h, &info);

@@ -1,6 +1,7 @@
 /* spring.c: see spring.h. With n n' and P = (I - n n')/l: dq = (-n, n), ddq = [P -P; -P P]. */
 #include "terms/spring.h"
 
+#include "base/reason.h"
 #include "base/vec3.h"
 
 #include <math.h>
@@ -176,7 +177,7 @@ drape_status drape_spring_check(const drape_elements *el, const double *x, const
                                 const double *internal, drape_fault *fault)
 {
     (void)internal;
-    *fault = (drape_fault){.reason = "spring_collapse",
+    *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_SPRING_COLLAPSE),
                            .what = "spring length / rest length",
                            .limit = el->params[DRAPE_SPRING_MIN_LENGTH]};
     return drape_check_ratios(el, x, before, 1, ratio_of, fault);

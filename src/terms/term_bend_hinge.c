@@ -14,6 +14,7 @@
  * pi.
  */
 #include "base/lanes.h"
+#include "base/reason.h"
 #include "terms/dihedral.h"
 #include "terms/terms.h"
 
@@ -158,10 +159,10 @@ static bool altitude_fell(const drape_elements *el, int32_t element, double rati
 static drape_status check(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault)
 {
-    drape_fault low = {"altitude_collapse", "altitude / rest altitude", -1, INFINITY,
-                       el->params[PARAM_MIN_ALTITUDE]};
-    drape_fault turned = {"hinge_branch", "turn of a hinge in one step [rad]", -1, -INFINITY,
-                          el->params[PARAM_MAX_TURN]};
+    drape_fault low = {drape_reason_name(DRAPE_REASON_ALTITUDE_COLLAPSE), "altitude / rest altitude", -1,
+                       INFINITY, el->params[PARAM_MIN_ALTITUDE]};
+    drape_fault turned = {drape_reason_name(DRAPE_REASON_HINGE_BRANCH), "turn of a hinge in one step [rad]",
+                          -1, -INFINITY, el->params[PARAM_MAX_TURN]};
     shapes s;
     for (int32_t i = 0; i < el->count; i++) {
         int l = i % LANES;

@@ -13,6 +13,7 @@
  * The internal variables are the nine angles in the last accepted state: each angle is taken on the branch
  * nearest to it.
  */
+#include "base/reason.h"
 #include "base/vec3.h"
 #include "terms/dihedral.h"
 #include "terms/midedge.h"
@@ -314,10 +315,10 @@ static double largest_turn(const drape_elements *el, int32_t element, const doub
 static drape_status check(const drape_elements *el, const double *x, const double *before,
                           const double *internal, drape_fault *fault)
 {
-    drape_fault low = {"altitude_collapse", "altitude / least rest altitude", -1, INFINITY,
-                       el->params[PARAM_MIN_ALTITUDE]};
-    drape_fault turned = {"hinge_branch", "turn of a hinge in one step [rad]", -1, 0,
-                          el->params[PARAM_MAX_TURN]};
+    drape_fault low = {drape_reason_name(DRAPE_REASON_ALTITUDE_COLLAPSE), "altitude / least rest altitude",
+                       -1, INFINITY, el->params[PARAM_MIN_ALTITUDE]};
+    drape_fault turned = {drape_reason_name(DRAPE_REASON_HINGE_BRANCH), "turn of a hinge in one step [rad]",
+                          -1, 0, el->params[PARAM_MAX_TURN]};
     for (int32_t e = 0; e < el->count; e++) {
         const double ratio = altitude_ratio(el, e, x),
                      turn = largest_turn(el, e, x, internal + MIDEDGE_HINGES * (size_t)e);

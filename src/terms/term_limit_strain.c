@@ -15,6 +15,7 @@
  *
  * Compressed springs are not limited, as in CS184.
  */
+#include "base/reason.h"
 #include "base/vec3.h"
 #include "terms/spring.h"
 
@@ -172,7 +173,7 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
                           const double *internal, drape_fault *fault)
 {
     (void)internal;
-    *fault = (drape_fault){.reason = "strain_limit",
+    *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_STRAIN_LIMIT),
                            .what = "strain of a limited edge",
                            .element = -1,
                            .value = -INFINITY,

@@ -13,6 +13,7 @@
  * Without it, Newton's matrix of a sheet under tension would be as soft sideways as without tension, and
  * steps too long by the ratio of the two.
  */
+#include "base/reason.h"
 #include "base/vec3.h"
 #include "terms/orthotropic.h"
 #include "terms/terms.h"
@@ -171,8 +172,9 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
                           const double *internal, drape_fault *fault)
 {
     (void)internal;
-    *fault = (drape_fault){
-        .reason = "area_collapse", .what = "area / rest area", .limit = el->params[PARAM_MIN_AREA]};
+    *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_AREA_COLLAPSE),
+                           .what = "area / rest area",
+                           .limit = el->params[PARAM_MIN_AREA]};
     return drape_check_ratios(el, x, before, 3, ratio_of, fault);
 }
 

@@ -11,6 +11,7 @@
  *     It is there
  *     to reproduce the trajectories of the report.
  */
+#include "base/reason.h"
 #include "base/vec3.h"
 #include "terms/terms.h"
 
@@ -111,8 +112,9 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
                           const double *internal, drape_fault *fault)
 {
     (void)internal;
-    *fault = (drape_fault){
-        .reason = "edge_collapse", .what = "edge length / rest length", .limit = el->params[PARAM_COLLAPSE]};
+    *fault = (drape_fault){.reason = drape_reason_name(DRAPE_REASON_EDGE_COLLAPSE),
+                           .what = "edge length / rest length",
+                           .limit = el->params[PARAM_COLLAPSE]};
     return drape_check_ratios(el, x, before, 1, ratio_of, fault);
 }
 
