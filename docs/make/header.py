@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""header.py HEADER: a public header as doxygen reads it, on stdout: the comments stay as they are written, /* ... */, and this marks them.
+"""header.py HEADER: prints a public header as doxygen reads it. In the header comments are plain, /* ... */; this script marks them for doxygen.
 
-- A comment on lines of its own documents the declaration below it, and those that follow without a blank line and a comment of their own.
-- A comment behind a declaration documents that one.
-- /* ---- Title ---- */ begins a group, and what it says below the title is said of the group. Other comments with a blank line below belong to
+- A comment on separate lines documents the declaration below it, and further declarations that follow without a blank line or another comment.
+- A comment behind a declaration documents that declaration.
+- /* ---- Title ---- */ begins a group, and the text below the title describes the group. Other comments with a blank line below belong to
   their group.
 
-Lines keep their numbers, so that complaints of doxygen name the right ones. `sections` gives manual.py the same, in pieces.
+Lines keep their numbers, so that messages of doxygen name the right ones. `sections` gives manual.py the same content, in pieces.
 """
 import re
 import sys
@@ -15,7 +15,7 @@ SECTION = re.compile(r"-{4,} *(.*?)[ \n]*-{4,}\s*(.*)", re.S)
 
 
 class Piece:
-    """A comment and the code below it, up to the next one; behind: it stands behind code, on its line."""
+    """A comment and the code between it and the next one. behind: the comment follows code on the same line."""
 
     def __init__(self, comment, code, behind, first):
         self.comment, self.code, self.behind, self.first = comment, code, behind, first
@@ -28,7 +28,7 @@ def words(comment):
 
 
 def pieces(text):
-    """Of a header, which begins with a comment."""
+    """The pieces of a header, which begins with a comment."""
     found, place = [], 0
     for match in re.finditer(r"/\*.*?\*/", text, re.S):
         if found:
@@ -41,20 +41,20 @@ def pieces(text):
 
 
 def section_of(comment):
-    """(title, text) of a comment that begins a section; None of others."""
+    """(title, text) of a comment that begins a section; None for other comments."""
     match = SECTION.match(words(comment)) if comment else None
     return (match[1].strip(), match[2].strip()) if match else None
 
 
 def safe(text):
-    """Without what doxygen would take for its own."""
+    """Escapes characters that mean something to doxygen."""
     for letter, code in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ("#", "\\#"), ("@", "\\@"), ("*", "\\*")):
         text = text.replace(letter, code)
     return text
 
 
 def marked(comment, begin):
-    """The comment with its beginning changed, line by line as it was."""
+    """The comment with another beginning and the same lines."""
     first, *others = comment[2:-2].split("\n")
     lines = [safe(first)]
     for line in others:
@@ -64,12 +64,13 @@ def marked(comment, begin):
 
 
 def is_above_code(piece):
-    """Documents the declaration on the next line."""
+    """Whether the comment documents the declaration on the next line."""
     return re.match(r"\n[ \t]*([^\s#}]|#define)", piece.code) is not None and not piece.code.lstrip().startswith("DRAPE_C_")
 
 
 def repeated(piece):
-    """Its code, where what follows without a blank line has the same comment; the line before the next comment may have that one."""
+    """The code of a piece, with its comment repeated before each further declaration that follows without a blank line, except one on the line of the
+    next comment."""
     block, rest = re.match(r"\n(.*?)(\n\s*\n.*|\n[^\n]*\Z|\Z)", piece.code, re.S).groups()
     if block.startswith(("typedef struct", "typedef enum")):
         return piece.code
@@ -82,7 +83,7 @@ FIELDS = re.compile(r"( *)((?:const )?\w+(?: \w+)*) (\*?\w+(?:\[\w+\])?(?:, \*?\
 
 
 def each_field(code, comment):
-    """`double a, b;` as `double a; double b;`, each with the comment that stands behind them; None of other code. As many lines as before."""
+    """`double a, b;` as `double a; double b;`, each with the comment that follows both; None for other code. Keeps the number of lines."""
     place = code.rfind("\n") + 1
     fields = FIELDS.match(code[place:])
     if not fields:
@@ -118,7 +119,7 @@ def for_doxygen(text, name):
 
 
 def sections(text):
-    """[(title, said, [(comment, [declaration])])] of what a header declares: what a manual page shows."""
+    """The declarations of a header, for manual pages: [(title, text, [(comment, declaration)])]."""
     found = [("", "", [])]
     for piece in pieces(text):
         section = section_of(piece.comment)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""manual.py PROGRAM CHANGELOG HEADER... FOLDER: the manual pages of Drape, made of what the program says of itself and of the public headers.
+"""manual.py PROGRAM CHANGELOG HEADER... FOLDER: generates the manual pages of Drape from the output of the program and the public headers.
 
-drape.1 and drape-VERB.1 are `drape help`, drape-scene.5 is `drape list --markdown`, drape.3 the comments of the headers. CHANGELOG, of the Debian
-package, has the date. Nothing about an option, a key or a function is written here.
+drape.1 and drape-VERB.1 come from `drape help`, drape-scene.5 from `drape list --markdown`, drape.3 from the comments of the headers, the date from
+the CHANGELOG of the Debian package. This file itself describes no option, key or function.
 """
 import os
 import re
@@ -16,7 +16,7 @@ SEE = {"run": ["drape-scene(5)", "drape-render(1)", "drape-report(1)"], "list": 
        "view": ["drape-render(1)"], "merge": ["drape-tradeoff(1)", "drape-stability(1)", "drape-converge(1)"]}
 
 
-def said(*arguments):
+def output_of(*arguments):
     return subprocess.run([PROGRAM, *arguments], check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
@@ -24,19 +24,19 @@ def said(*arguments):
 
 
 def plain(text):
-    """Text as roff takes it: `code` in bold, options with real minuses."""
+    """Escapes text for roff: `code` in bold, options with real minuses."""
     text = text.replace("\\", "\\e").replace("-", "\\-")
     text = re.sub(r"`([^`\n]+)`", r"\\fB\1\\fR", text)
     return "\n".join("\\&" + line if line.startswith((".", "'")) else line for line in text.split("\n"))
 
 
 def filled(text):
-    """A paragraph, a sentence a line."""
+    """A paragraph, with one line for each sentence."""
     return plain(re.sub(r"(?<=[.:;]) (?=[A-Z`])", "\n", " ".join(text.split())))
 
 
 def paragraphs(text):
-    """Lines that are indented stay as they are, the others are filled."""
+    """Keeps indented lines and fills the others."""
     out = []
     for part in re.split(r"\n\s*\n", text.strip("\n")):
         lines = part.split("\n")
@@ -54,7 +54,7 @@ def item(term, text, more=""):
 
 def page(name, section, brief, *parts):
     """parts: (heading, roff)."""
-    title = f'.TH {name.upper()} {section} "{DATE}" "{said("--version").strip()}"'
+    title = f'.TH {name.upper()} {section} "{DATE}" "{output_of("--version").strip()}"'
     body = "".join(f".SH {heading}\n{text}\n" for heading, text in parts if text)
     return f"{title}\n.SH NAME\n{plain(name)} \\- {plain(brief)}\n{body}"
 
@@ -63,7 +63,7 @@ def page(name, section, brief, *parts):
 
 
 def options(text):
-    """[(--name, ARGUMENT, what)] of the help of a verb."""
+    """The options in the help of a verb: [(--name, ARGUMENT, description)]."""
     return re.findall(r"^  (--[\w-]+)(?: (\S+))? +(.*)$", text, re.M)
 
 
@@ -99,7 +99,7 @@ def overview_page(overview):
 
 
 def verb_page(overview, verb, brief):
-    text = said("help", verb)
+    text = output_of("help", verb)
     usage, details = re.match(r"usage: (.*)\n\n(.*?)\n\n(?=  --)", text, re.S).groups()
     program, name, operand, rest = re.match(r"(drape) (\w+) (.*) (\[options\])$", usage).groups()
     return page(f"drape-{verb}", 1, brief,
@@ -116,7 +116,7 @@ def cells(line):
 
 
 def rows_of(lines):
-    """Of each table of a part: its head, and its lines."""
+    """The tables of a part: [(cells of the head, [cells of a line])]."""
     found = []
     for line in lines:
         if line.startswith("|---"):
@@ -131,7 +131,7 @@ def rows_of(lines):
 
 
 def parameter(name, unit, default, takes, what):
-    """One of an entry, or a key of a scene."""
+    """A parameter of an entry, or a key of a scene."""
     usual = default if default == "required" else f"default {default}" if default else ""
     return item(name, what, f"{takes}{' ' + unit if unit else ''}{'; ' + usual if usual else ''}")
 
@@ -146,8 +146,8 @@ def keys(table):
     return "\n".join(out)
 
 
-def rows(tables):
-    """The parameters of a row below it."""
+def entries(tables):
+    """Each entry, with its parameters below it."""
     out = []
     for name, what, reference in tables[0][1]:
         out.append(item(plain(name), what, f"Source: {reference}" if reference else ""))
@@ -162,15 +162,15 @@ def rows(tables):
 
 def scene_page():
     parts = []
-    for part in re.split(r"^### ", said("list", "--markdown"), flags=re.M)[1:]:
+    for part in re.split(r"^### ", output_of("list", "--markdown"), flags=re.M)[1:]:
         title, *lines = part.split("\n")
         tables = rows_of(lines)
         place = "".join(line for line in lines if line.startswith("In a scene: "))
-        roff = keys(tables[0]) if tables[0][0][0] == "in" else (filled(place) + "\n" if place else "") + rows(tables)
+        roff = keys(tables[0]) if tables[0][0][0] == "in" else (filled(place) + "\n" if place else "") + entries(tables)
         parts.append((plain(title.upper()), roff))
-    about = ("A scene is JSON, with comments. Units are SI, y is up. What a scene does not name is not modelled and costs nothing. Unknown keys are errors. "
-             "`drape info` shows every value that is in force, `drape list --schema` is the JSON Schema. A scene of the CS184 cloth simulator is known by its "
-             "shape and taken as it is.")
+    about = ("A scene is JSON, with comments. Units are SI, y is up. Drape models only what a scene names. Unknown keys are errors. "
+             "`drape info` shows every value that is used, `drape list --schema` prints the JSON Schema. A scene of the CS184 cloth simulator is recognised "
+             "by its form and runs unchanged.")
     example = ('{"drape": 1,\n "cloth": [{"mesh": {"grid": "equilateral", "edges": 22, "edge_length": 0.05},\n'
                '            "material": {"young_modulus": 1e6, "thickness": 1e-3, "density": 200},\n'
                '            "terms": ["stretch.edge", "bend.hinge"],\n            "pins": [{"corner": "top-left"}]}],\n "duration": 2}')
@@ -222,7 +222,7 @@ def library_page(headers):
 
 
 def pages(headers):
-    overview = said("help")
+    overview = output_of("help")
     yield "drape.1", overview_page(overview)
     for verb, _, brief in verbs(overview):
         if verb != "drape":
@@ -232,7 +232,7 @@ def pages(headers):
 
 
 def date(changelog):
-    """2026-11-21, of the newest entry."""
+    """The date of the newest entry: 2026-11-21."""
     with open(changelog, encoding="utf-8") as file:
         day, month, year = re.search(r"^ -- .*>  \w+, (\d+) (\w+) (\d+)", file.read(), re.M).groups()
     months = "Jan Feb Mar Apr May Jun Jul Aug Sep Oct Nov Dec".split()

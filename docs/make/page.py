@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""page.py ROOT PAGE: a page as doxygen reads it, on stdout: links between pages, to headings, to headers and to files of the tree become those of the
-site, which lies in one folder: pictures in images/, files of the tree in files/.
+"""page.py ROOT PAGE: prints a page as doxygen reads it. Links to pages, headings, headers and files of the tree become links within the site, which is
+one folder with pictures in images/ and files of the tree in files/.
 """
 import os
 import re
@@ -11,7 +11,7 @@ CODE = re.compile(r"(^ *```.*?^ *```$|`[^`\n]+`)", re.S | re.M)
 
 
 def label(path):
-    """Of a page; None: it is no page."""
+    """The label of a page; None for other files."""
     if path in PAGES:
         return "page_" + PAGES[path]
     return "page_" + os.path.basename(path)[:-3] if re.fullmatch(r"docs/\w+\.md", path) else None
@@ -43,14 +43,14 @@ def prose(page, text):
 
 
 def headings(page, text):
-    """Each with a label: GitHub's are not known to doxygen."""
+    """Gives each heading a label, as doxygen does not have those of GitHub."""
     text = re.sub(r"^# (.*)$", lambda m: f"# {m[1]} {{#{label(page)}}}", text, count=1, flags=re.M)
     return re.sub(r"^(##+) (.*)$", lambda m: f"{m[1]} {m[2]} {{#{anchor(page, m[2])}}}", text, flags=re.M)
 
 
 def for_doxygen(page, text):
     parts = CODE.split(re.sub(r"^ *<!--.*?-->\n", "", text, flags=re.S | re.M))
-    # Code keeps its letters; a link whose words are code is split, so its parts are joined by a mark that no page has.
+    # Code stays unchanged: a mark that no page contains replaces it, also inside the text of a link.
     kept = parts[1::2]
     marked = "".join(part if n % 2 == 0 else f"\0{n // 2}\0" for n, part in enumerate(parts))
     marked = prose(page, marked)
