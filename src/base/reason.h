@@ -1,6 +1,6 @@
-/* reason.h: why an attempt at a step was accepted or rejected: the reasons in steps.csv, in summary.json and in drape_attempt.
- * One table has all of those that Drape itself reports, each with its meaning; `drape list reasons` prints it. User-defined
- * terms report reasons of their own. */
+/* reason.h: why an attempt at a step was accepted or rejected: the reasons in steps.csv, in summary.json and
+ * in drape_attempt. One table has all of those that Drape itself reports, each with its meaning; `drape list
+ * reasons` prints it. User-defined terms report reasons of their own. */
 #ifndef DRAPE_BASE_REASON_H
 #define DRAPE_BASE_REASON_H
 
