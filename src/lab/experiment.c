@@ -59,11 +59,6 @@ const char *lab_tag_text(const json_t *result, const char *key)
     return lab_text(json_object_get(result, "tags"), key);
 }
 
-json_t *lab_real(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
-
 bool lab_is_good(const json_t *result)
 {
     return strcmp(lab_text(result, "status"), drape_status_name(DRAPE_OK)) == 0;

@@ -17,6 +17,7 @@
 #include "drape/lab.h"
 #include "integrators/integrator.h"
 #include "io/file.h"
+#include "io/json.h"
 #include "lab/trace.h"
 
 #include <jansson.h>
@@ -74,7 +75,6 @@ const char *lab_text(const json_t *object, const char *key);
 /* The same for its tags. */
 double lab_tag_number(const json_t *result, const char *key);
 const char *lab_tag_text(const json_t *result, const char *key);
-json_t *lab_real(double value); /* null where it is not finite: JSON has no NaN and no infinity */
 
 bool lab_is_good(const json_t *result); /* whether the run completed */
 

@@ -42,10 +42,10 @@ json_t *lab_record_json(const lab_record *record)
     return json_pack("{s:s, s:s, s:s, s:s*, s:s, s:s, s:f, s:o, s:o, s:o, s:o, s:f, s:s, s:s, s:f}", "name",
                      r->entry.name, "quantity", r->entry.summary, "unit", r->unit, "parameter", r->parameter,
                      "model", r->model, "source", r->entry.reference, "value", v->parameter, "expected",
-                     lab_real(v->expected), "documented", lab_real(v->documented), "obtained",
-                     lab_real(v->obtained), "error", lab_real(v->obtained / v->expected - 1), "tolerance",
-                     r->tolerance, "verdict", verdicts[v->verdict], "message", v->message, "cpu_s",
-                     v->seconds);
+                     drape_json_number(v->expected), "documented", drape_json_number(v->documented),
+                     "obtained", drape_json_number(v->obtained), "error",
+                     drape_json_number(v->obtained / v->expected - 1), "tolerance", r->tolerance, "verdict",
+                     verdicts[v->verdict], "message", v->message, "cpu_s", v->seconds);
 }
 
 static void put_line(drape_file *file, const lab_record *record)

@@ -80,7 +80,7 @@ static drape_status save(lab *l, const sequence *s, bool chosen, const level *la
     drape_status status = lab_write_text(l, name, (const char *)trace->x,
                                          trace->size * (size_t)trace->frames * sizeof *trace->x);
     json_t *about = json_pack("{s:s, s:s, s:f, s:o, s:I, s:I, s:s, s:i, s:f, s:f}", "method", s->method,
-                              "knob", s->knob, "value", last->knob, "error_m", lab_real(last->error),
+                              "knob", s->knob, "value", last->knob, "error_m", drape_json_number(last->error),
                               "frames", (json_int_t)trace->frames, "size", (json_int_t)trace->size, "format",
                               FORMAT, "levels", last->count, "took_s", last->took, "spent_s", last->spent);
     char *text = about ? json_dumps(about, JSON_INDENT(1) | JSON_REAL_PRECISION(17)) : NULL;

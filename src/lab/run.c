@@ -161,7 +161,7 @@ static json_t *describe(const run *r, drape_sim *sim)
     for (int i = 0; (reason = drape_sim_reason(sim, i, &count)); i++)
         json_object_set_new(reasons, reason, json_integer(count));
     for (size_t i = 0; i < sizeof reals / sizeof *reals; i++)
-        json_object_set_new(result, reals[i].key, lab_real(reals[i].value));
+        json_object_set_new(result, reals[i].key, drape_json_number(reals[i].value));
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
         json_object_set_new(result, counts[i].key, json_integer(counts[i].value));
     json_object_set_new(result, "reasons", reasons);
@@ -170,7 +170,7 @@ static json_t *describe(const run *r, drape_sim *sim)
         double point[3];
         lab_probe_take(request->probe, i, r->model, x, point);
         for (int k = 0; k < 3; k++)
-            json_array_append_new(positions, lab_real(point[k]));
+            json_array_append_new(positions, drape_json_number(point[k]));
     }
     if (positions)
         json_object_set_new(result, "positions", positions);

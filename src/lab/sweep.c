@@ -139,7 +139,7 @@ static void keep(sweep *s, size_t i, json_t *result)
     json_object_set_new(result, "case", json_integer((json_int_t)i));
     json_object_set_new(result, "tags", json_deep_copy(json_object_get(json_array_get(l->cases, i), "tags")));
     if (l->reference.frames)
-        json_object_set_new(result, "reference_error_m", lab_real(l->reference_error));
+        json_object_set_new(result, "reference_error_m", drape_json_number(l->reference_error));
     l->results[i] = result;
     s->done++;
     lab_put_line(&s->file, result);
