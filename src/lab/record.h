@@ -16,11 +16,11 @@ typedef struct lab_record {
     drape_validation v;
 } lab_record;
 
-/* All cases of all references, or of one, in the order of the table. NULL, and a message, where there is no
- * memory; freed by drape_free. */
+/* All cases of all references, or of one, in the order of the table, to be freed by drape_free. NULL, with a
+ * message, if out of memory. */
 lab_record *lab_records_make(drape_context *ctx, const drape_reference *only, size_t *count);
 
-/* What is reported of a case that is done; NULL: no memory. */
+/* The JSON that is reported of a completed case; NULL: out of memory. */
 json_t *lab_record_json(const lab_record *record);
 
 /* Takes the lines of folder/cases.jsonl that belong to these cases: of the same scene and this version of

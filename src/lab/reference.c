@@ -21,7 +21,7 @@
 typedef struct sequence {
     const char *method, *knob; /* knob: pointer of the value that changes */
     double first, ratio;       /* its values */
-    const char *also;          /* pointer that is set too; NULL: none */
+    const char *also;          /* pointer of another value that is set; NULL: none */
     double also_value;
 } sequence;
 
@@ -34,7 +34,7 @@ static const sequence sequences[] = {
 /* The last refinement level of a sequence. Every level is saved in the folder; interrupted runs resume. */
 typedef struct level {
     lab_trace trace;
-    double error; /* distance of its end from that of the level before; INFINITY: there is none */
+    double error; /* distance of its end from that of the level before; INFINITY: first level */
     double knob;
     int count;          /* levels so far; 0: none */
     double took, spent; /* CPU [s] of this level, of all */
@@ -93,7 +93,7 @@ static drape_status save(lab *l, const sequence *s, bool chosen, const level *la
     return status;
 }
 
-/* Whether both files are there and belong together: an earlier run's. s: as of name_file. */
+/* Reads the saved level of an earlier run, if both files exist and belong together. s: as in name_file. */
 static bool read_saved(lab *l, const sequence *s, level *last)
 {
     char name[64], *text = NULL, *data = NULL;

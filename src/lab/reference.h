@@ -7,10 +7,10 @@
 
 #include "lab/lab.h"
 
-/* Makes l->reference and l->reference_error, or reads them where the folder has them (reference.json,
+/* Makes l->reference and l->reference_error, or reads them if the folder has them (reference.json,
  * reference.f64). There are two sequences of refinements: ida over rtol at order 5, and trbdf2 over dt; the
  * one with the smaller distance between its last two levels is taken. Errors: those of lab_run;
- * DRAPE_E_SOLVER where neither has two levels that complete. */
+ * DRAPE_E_SOLVER if neither has two levels that complete. */
 drape_status lab_make_reference(lab *l);
 
 /* Whether the scene compiles for every sequence, before anything is written. Errors: those of loading. */

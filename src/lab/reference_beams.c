@@ -17,8 +17,8 @@ static double slope(double weight)
     return drop / reach;
 }
 
-/* At small G the membrane is soft, so that forces are far above the rounding of its own; at large G thin, so
- * that its stretch stays below 1e-4. */
+/* At small G the membrane is soft, so that forces are far above the rounding of membrane forces; at large G
+ * the sheet is thin, so that its stretch stays below 1e-4. */
 static int heavy_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     const double tolerance = c->parameter * 1e-13; /* at most a thousandth of the weight of a node */
@@ -36,8 +36,8 @@ static drape_status measure_slope(drape_reference_run *run, double *value)
 }
 
 DRAPE_REFERENCE(
-    cantilever, .entry.summary = "drop over reach of the end", .unit = "1", .parameter = "G = rho g L^3/B",
-    DRAPE_CASES(0.01, 0.1, 1, 10, 100, 1000), BEAM,
+    cantilever, .entry.summary = "drop of the end over its reach", .unit = "1",
+    .parameter = "G = rho g L^3/B", DRAPE_CASES(0.01, 0.1, 1, 10, 100, 1000), BEAM,
     .entry.reference = "theta'' + G (1 - s) cos theta = 0; Romero et al. 2021, the cantilever test",
     .tolerance = 0.01, .expected = slope, .scene = heavy_scene, .measure = measure_slope);
 
@@ -75,13 +75,13 @@ static int force_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 }
 
 DRAPE_REFERENCE(
-    end_load, .entry.summary = "sinking of the end w/L", .unit = "1", .parameter = "P L^2/B",
+    end_load, .entry.summary = "deflection of the end w/L", .unit = "1", .parameter = "P L^2/B",
     DRAPE_CASES(1, 2, 4), .model = "stretch.cst, bend.midedge, load.line; irregular",
     .entry.reference =
         "theta'' + P cos theta = 0; Bisshopp & Drucker 1945, Large deflection of cantilever beams",
     .tolerance = 0.005, .expected = sinking, .scene = force_scene, .measure = lab_sinking);
 
-/* ---- Strips that become arcs: by a moment at the end, M/B, or since that is their shape at rest ---- */
+/* ---- Strips that become arcs: by a moment at the end, M/B, or by their rest shape ---- */
 
 static double arc_rise(double curvature)
 {
@@ -112,7 +112,7 @@ DRAPE_REFERENCE(end_moment, .entry.summary = "rise of the end w/L", .unit = "1",
                 .entry.reference = "an arc of curvature M/B", .tolerance = 0.005, .expected = arc_rise,
                 .scene = moment_scene, .measure = measure_rise);
 
-/* It starts flat. */
+/* The strip starts flat. */
 static int curved_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     char terms[100];

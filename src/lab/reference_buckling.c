@@ -32,7 +32,7 @@ DRAPE_REFERENCE(self_buckling, .entry.summary = "G = rho g L^3/B at which an upr
                 .entry.reference = "theta'' + G t theta = 0; Greenhill 1881", .tolerance = 0.02,
                 .expected = greenhill, .scene = upright_scene, .low = 0.9, .high = 1.1);
 
-/* ---- A strip clamped at one end with its width upright turns aside ---- */
+/* ---- A strip clamped at one end with its width upright buckles sideways ---- */
 
 /* beta'' + q^2 t^4/(4 E I G J) beta = 0 (Prandtl 1899, Michell 1899): q L^3 = 12.8538 sqrt(E I G J). */
 static double prandtl(double bend, double twist)
@@ -47,7 +47,7 @@ static double lateral(double nu)
     return prandtl(1, 2 / (1 + nu));
 }
 
-/* The sag in the strip's own plane is (h/w)^2 of what it would be sideways. */
+/* The sag in the plane of the strip is (h/w)^2 times that of a strip bent about its thin side. */
 static int lateral_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
 {
     return STRIP_SCENE(text, .columns = 121, .rows = 5, .width = 0.03, .thickness = 0.001,
@@ -56,7 +56,7 @@ static int lateral_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT
 }
 
 DRAPE_REFERENCE(
-    lateral_buckling, .entry.summary = "rho g L^3/B at which a strip on edge turns aside", UNSTABLE,
+    lateral_buckling, .entry.summary = "rho g L^3/B at which a strip on edge buckles sideways", UNSTABLE,
     .parameter = "nu", DRAPE_CASES(0.35, 0), .model = "stretch.cst, bend.midedge; irregular",
     .entry.reference = "q L^3 = 12.8538 sqrt(E I G J); Prandtl 1899, Michell 1899; Romero et al. 2021",
     .tolerance = 0.05, .expected = lateral, .scene = lateral_scene, .low = 0.85, .high = 1.15);
@@ -81,7 +81,8 @@ static int hinges_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]
 {
     enum { EDGES = 8, STRIPS = 240 }; /* across and along the strip */
     const double edge = 0.035 / EDGES, thickness = 1e-3, poisson = 1.0 / 3, gravity = 9.81;
-    const double length = (STRIPS - 0.5) * sqrt(3) / 2 * edge; /* pins of two rows clamp in between */
+    const double length =
+        (STRIPS - 0.5) * sqrt(3) / 2 * edge; /* two pinned rows clamp the strip between them */
     const double modulus =
         12 * (1 - poisson * poisson) * STRIP_RIGIDITY / (thickness * thickness * thickness);
     return snprintf(
@@ -96,8 +97,9 @@ static int hinges_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]
         c->load * STRIP_RIGIDITY / (gravity * pow(length, 3)), -gravity);
 }
 
-DRAPE_REFERENCE(lateral_buckling_hinges, .entry.summary = "rho g L^3/D at which a strip on edge turns aside",
-                UNSTABLE, DRAPE_CASES(0), .model = "stretch.edge, bend.hinge; equilateral",
+DRAPE_REFERENCE(lateral_buckling_hinges,
+                .entry.summary = "rho g L^3/D at which a strip on edge buckles sideways", UNSTABLE,
+                DRAPE_CASES(0), .model = "stretch.edge, bend.hinge; equilateral",
                 .entry.reference = "q L^3 = 12.8538 sqrt(E I G J); the hinges' limit: docs/validate.md",
                 .tolerance = 0.05, .expected = lateral_plate, .documented = lateral_hinges,
                 .scene = hinges_scene, .low = 0.85, .high = 1.15);
@@ -120,7 +122,7 @@ DRAPE_REFERENCE(lateral_buckling_hinges, .entry.summary = "rho g L^3/D at which 
 #define DISTANCE  2e-3         /* [m] of the table's barrier: the uncertainty of the push */
 #define STIFFNESS 1e4          /* [Pa] of it: 20 N/m on half a cell of 25 mm are 1600 Pa */
 #define ASIDE     0.2          /* [m/s2]: 0.02 of the 20.19 N/m that buckle it */
-#define SLIPPED   0.05         /* [m]: the end of a strip that slips moves 0.2 m or more */
+#define SLIPPED   0.05         /* [m]: an end that slips moves 0.2 m or more */
 #define EULER     4.4934094579 /* tan k = k */
 
 static int elastica(double s, const double y[], double dy[], void *forces)
@@ -134,7 +136,7 @@ static int elastica(double s, const double y[], double dy[], void *forces)
     return GSL_SUCCESS;
 }
 
-/* u: theta'(0), N, f. out: theta'(1), and how far the end is from its place. */
+/* u: theta'(0), N, f. out: theta'(1), and the distances of the end from its position. */
 static int miss(const gsl_vector *u, void *share, gsl_vector *out)
 {
     double forces[] = {gsl_vector_get(u, 1), gsl_vector_get(u, 2)}, y[4] = {0, gsl_vector_get(u, 0), 0, 0};
@@ -159,7 +161,7 @@ static void guess(double share, double u[3])
     u[1] = EULER * EULER;
 }
 
-/* f/N: the share grows in steps from a small one, where the guess is good. */
+/* f/N: the share grows in steps from a small one, for which the initial guess is good. */
 static double slip_friction(double share)
 {
     enum { STEPS = 10 };
@@ -203,7 +205,7 @@ static int pushed_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT]
         -1 - DISTANCE / 2, c->load, DISTANCE, STIFFNESS);
 }
 
-/* 1 where the end stays. */
+/* Returns 1 if the end stays, 0 if it slips. */
 static drape_status measure_stays(drape_reference_run *run, double *value)
 {
     drape_status status = lab_advance(run);

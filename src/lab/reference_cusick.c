@@ -77,7 +77,8 @@ static drape_status measure_rim(drape_reference_run *run, double *value)
     return status;
 }
 
-DRAPE_REFERENCE(cusick_stiff, .entry.summary = "sinking of the rim of a drape tester's overhang w D/(q a^4)",
+DRAPE_REFERENCE(cusick_stiff,
+                .entry.summary = "deflection of the rim of a drape tester's overhang w D/(q a^4)",
                 .unit = "1", .parameter = "nu", DRAPE_CASES(0.3, 0),
                 .model = "stretch.cst, bend.midedge; annulus",
                 .entry.reference = "plate between two circles; Timoshenko & Woinowsky-Krieger 1959, 3",
@@ -121,13 +122,13 @@ static drape_status measure_drape(drape_reference_run *run, double *value)
     return status;
 }
 
-/* Cases are places in the table of fabrics. Folds that begin differently end differently: the tolerance
- * covers the effect of another order of the sums, or another processor. */
+/* A case is the index of a fabric in its table. Folds that begin differently end differently: the tolerance
+ * covers the effect of another order of sums or another processor. */
 #define DRAPED                                                                                               \
     .unit = "1", .parameter = "fabric, by its place", .model = "stretch.cst, bend.midedge; annulus; be",     \
     .tolerance = 0.05, .scene = drape_scene_of, .measure = measure_drape
 
-/* There is no closed form: this is what finer meshes converge to, 0.4464, 0.4784 and 0.4875 with 9, 13 and 17
+/* There is no closed form: this is the limit of finer meshes, 0.4464, 0.4784 and 0.4875 with 9, 13 and 17
  * circles of 80, 112 and 144 nodes. The squares of the mesh sizes are in the ratio of 2.9, the steps in that
  * of 3.5, so the remaining difference is 0.008 to 0.012 (docs/validate.md). */
 static double mesh_limit(double unused)

@@ -37,8 +37,8 @@ static int slope_scene(const drape_reference_case *c, char text[DRAPE_LAB_TEXT])
                     CREEP);
 }
 
-/* 1 where it stays. 1e-3 less friction than needed is a speed of 1e-3 g sin a after a second, 17 times CREEP
- * or more. */
+/* Returns 1 if the sheet stays. With 1e-3 less friction than needed its speed after a second is 1e-3 g sin a,
+ * at least 17 times CREEP. */
 static drape_status measure_stays(drape_reference_run *run, double *value)
 {
     const int32_t nodes = drape_model_node_count(run->model);
@@ -86,7 +86,7 @@ static double mean_x(const drape_reference_run *run)
     return sum / nodes;
 }
 
-/* It advances twice as long as it takes to stop. */
+/* Advances twice as long as the sheet takes to stop. */
 static drape_status measure_slide(drape_reference_run *run, double *value)
 {
     const size_t n = 3 * (size_t)drape_model_node_count(run->model);

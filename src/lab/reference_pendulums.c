@@ -64,10 +64,10 @@ DRAPE_REFERENCE(pendulum, PENDULUM, .model = "stretch.cst, bend.midedge; square;
 DRAPE_REFERENCE(pendulum_bdf2, PENDULUM, .model = "stretch.cst, bend.midedge; square; bdf2",
                 .members = "'method': 'bdf2', 'tolerance': 1e-9");
 
-/* Its error is a fraction of bdf2's. */
+/* The error is a fraction of that of bdf2. */
 DRAPE_REFERENCE(pendulum_trbdf2, PENDULUM, .model = "stretch.cst, bend.midedge; square; trbdf2",
                 .members = "'method': 'trbdf2', 'tolerance': 1e-9");
 
-/* It chooses its steps; dt is how often it is observed. */
+/* ida chooses its steps; dt is the interval of observation. */
 DRAPE_REFERENCE(pendulum_ida, PENDULUM, .model = "stretch.cst, bend.midedge; square; ida, order 5",
                 .members = "'method': 'ida', 'rtol': 1e-6, 'max_order': 5");

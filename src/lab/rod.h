@@ -11,7 +11,7 @@ void drape_rod_tip(double weight, double force, double *drop, double *reach);
 /* The angle [degree] below the horizontal of the chord to the tip, without a force. */
 double drape_rod_chord(double weight);
 
-/* The least k > 0 with y(1) = 0 for y'' + k t^power y = 0, y(0) = 1, y'(0) = 0; it lies between low and
+/* The smallest k > 0 with y(1) = 0 for y'' + k t^power y = 0, y(0) = 1, y'(0) = 0; it lies between low and
  * high. */
 double drape_rod_threshold(double power, double low, double high);
 

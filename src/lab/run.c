@@ -151,7 +151,7 @@ static json_t *describe(const run *r, drape_sim *sim)
                   {"jacobians", s.jacobians},
                   {"factorizations", s.factorizations},
                   {"linear_iterations", s.linear_iterations}};
-    /* A case that took too long is no failure of the simulation. */
+    /* A case that took too long is not a failure of the simulation. */
     json_t *result = json_pack("{s:s, s:s}", "status",
                                r->over_budget ? "over_budget" : drape_status_name(r->status), "message",
                                r->message),

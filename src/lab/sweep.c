@@ -22,8 +22,8 @@ static drape_status take_line(lab *l, const char *path, int64_t number, const ch
         !json_equal(json_object_get(line, "tags"),
                     json_object_get(json_array_get(l->cases, (size_t)i), "tags"))) {
         json_decref(line);
-        return drape_fail(l->ctx, DRAPE_E_PARSE, "%.500s:%lld: no result of a case of this experiment", path,
-                          (long long)number);
+        return drape_fail(l->ctx, DRAPE_E_PARSE, "%.500s:%lld: not a result of a case of this experiment",
+                          path, (long long)number);
     }
     if (l->results[i]) {
         json_decref(line);

@@ -8,8 +8,8 @@
 #include "lab/lab.h"
 
 /* Takes the results of all cases*.jsonl of a folder into l->results; those that are there already stay.
- * *found counts the new ones. Errors: DRAPE_E_FILE, DRAPE_E_PARSE (a whole line that is no result, or of
- * another experiment), DRAPE_E_MEMORY. */
+ * *found counts the new ones. Errors: DRAPE_E_FILE, DRAPE_E_PARSE (a whole line that is not a result of
+ * this experiment), DRAPE_E_MEMORY. */
 drape_status lab_read_lines(lab *l, const char *folder, int64_t *found);
 
 /* Adds an object as a line. */

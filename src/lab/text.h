@@ -28,11 +28,11 @@ typedef struct lab_plot {
 drape_status lab_plot_begin(lab *l, lab_plot *plot, const char *name, int width, int height);
 
 /* Ends the script. draws: keeps it as name.gp in the folder, runs gnuplot on it and adds the picture name.svg
- * with its caption to the page. Where gnuplot is missing or fails, only the summary says so. */
+ * with its caption to the page. If gnuplot is missing or fails, only the summary says so. */
 drape_status lab_plot_end(lab *l, lab_plot *plot, bool draws, const char *caption);
 
-/* The unit of a scene's value at a JSON pointer, as "Pa"; "" where it has none, or where it depends on what
- * else the scene says (units.c). */
+/* The unit of a scene's value at a JSON pointer, as "Pa"; "" if it has none, or if it depends on other values
+ * of the scene (units.c). */
 const char *lab_unit(const char *pointer);
 
 void lab_page_heading(lab *l, const char *text);

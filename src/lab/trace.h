@@ -12,7 +12,7 @@ typedef struct lab_trace {
 } lab_trace;
 
 drape_status lab_trace_create(drape_arena *arena, size_t size, int64_t room, lab_trace *trace);
-void lab_trace_add(lab_trace *trace, const double *x); /* ignored where there is no room */
+void lab_trace_add(lab_trace *trace, const double *x); /* ignored if the trace is full */
 const double *lab_trace_end(const lab_trace *trace);   /* the last frame; there is one */
 
 /* Root of the mean, over the free nodes, of the square of the distance between two arrays of positions. */

@@ -109,7 +109,7 @@ static bool is_linear_case(const json_t *result)
     return strstr(lab_tag_text(result, "series"), "linear solver") != NULL;
 }
 
-/* The error of a case where it can be distinguished from the reference's; otherwise NaN. */
+/* The error of a case if it can be distinguished from that of the reference; otherwise NaN. */
 static double resolved_error(const json_t *result)
 {
     double error = lab_number(result, "error_end_m");

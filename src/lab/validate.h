@@ -26,11 +26,11 @@ typedef struct drape_reference_run {
 typedef enum drape_outcome {
     DRAPE_OUTCOME_PASS,
     DRAPE_OUTCOME_FAIL,
-    DRAPE_OUTCOME_DOCUMENTED, /* differs from the reference as this model is known to */
+    DRAPE_OUTCOME_DOCUMENTED, /* differs from the reference by the documented model error */
     DRAPE_OUTCOME_STOPPED     /* the simulation failed */
 } drape_outcome;
 
-/* What a scene is made for. */
+/* The case and load that a scene is made for. */
 typedef struct drape_reference_case {
     const struct drape_reference *reference;
     double parameter;

@@ -282,7 +282,7 @@ def test_torn_line():
         file.write("{\n" + text)
     result = drape(*command)
     equal((result.returncode, result.stdout), (2, ""), result.stderr)
-    assert "cases.jsonl:1: no result" in result.stderr, result.stderr
+    assert "cases.jsonl:1: not a result" in result.stderr, result.stderr
 
 
 def test_other_experiment():
