@@ -1,18 +1,14 @@
 /*
  * summary.c: see summary.h. The keys are a contract with readers of summaries: add keys, do not rename any.
- *
- * jansson refuses to set a value that is NULL and returns NULL for it, so a failed allocation anywhere
- * below ends as a NULL at the top.
  */
 #include "io/summary.h"
 
-#include <inttypes.h>
-#include <jansson.h>
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
-
 #include "io/file.h"
+#include "io/json.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
 
 typedef struct real_item {
     const char *key;
@@ -26,48 +22,18 @@ typedef struct count_item {
 
 #define LENGTH(array) (sizeof(array) / sizeof *(array))
 
-/* Consumes both references. Returns the object, or NULL if it or the value is NULL. */
-static json_t *with(json_t *object, const char *key, json_t *value)
-{
-    if (json_object_set_new(object, key, value) == 0)
-        return object;
-    json_decref(object);
-    return NULL;
-}
-
-/* NaN and infinity become null, as JSON has neither. */
-static json_t *number(double value)
-{
-    return isfinite(value) ? json_real(value) : json_null();
-}
-
 static json_t *with_reals(json_t *object, const real_item *items, size_t count)
 {
     for (size_t i = 0; i < count; i++)
-        object = with(object, items[i].key, number(items[i].value));
+        object = drape_json_with(object, items[i].key, drape_json_number(items[i].value));
     return object;
 }
 
 static json_t *with_counts(json_t *object, const count_item *items, size_t count)
 {
     for (size_t i = 0; i < count; i++)
-        object = with(object, items[i].key, json_integer((json_int_t)items[i].value));
+        object = drape_json_with(object, items[i].key, json_integer((json_int_t)items[i].value));
     return object;
-}
-
-/* A message may contain the name of a file in any encoding, or be cut inside a character: if it is not
- * valid UTF-8, all bytes that are not ASCII become question marks. */
-static json_t *text(const char *bytes)
-{
-    char copy[DRAPE_MESSAGE_SIZE];
-    json_t *string = json_string(bytes);
-    if (string)
-        return string;
-    snprintf(copy, sizeof copy, "%s", bytes);
-    for (char *c = copy; *c; c++)
-        if ((unsigned char)*c > 127)
-            *c = '?';
-    return json_string(copy);
 }
 
 static json_t *reasons(const drape_sim *sim)
@@ -76,7 +42,7 @@ static json_t *reasons(const drape_sim *sim)
     int64_t count = 0;
     const char *reason;
     for (int i = 0; (reason = drape_sim_reason(sim, i, &count)); i++)
-        object = with(object, reason, json_integer((json_int_t)count));
+        object = drape_json_with(object, reason, json_integer((json_int_t)count));
     return object;
 }
 
@@ -87,7 +53,7 @@ static json_t *steps(const drape_sim *sim, const drape_statistics *s)
                                  {"unconverged", s->steps_unconverged}};
     const real_item sizes[] = {{"h_min", s->h_min}, {"h_max", s->h_max}};
     json_t *object = with_counts(json_object(), counts, LENGTH(counts));
-    return with(with_reals(object, sizes, LENGTH(sizes)), "reasons", reasons(sim));
+    return drape_json_with(with_reals(object, sizes, LENGTH(sizes)), "reasons", reasons(sim));
 }
 
 static json_t *newton(const drape_statistics *s)
@@ -121,8 +87,8 @@ static json_t *energy(drape_sim *sim)
 /* For an equilibrium: whether it is stable, and the number of negative eigenvalues of its Hessian. */
 static json_t *stability(const drape_statistics *s)
 {
-    json_t *object = with(json_object(), "stable", json_boolean(s->unstable_modes == 0));
-    return with(object, "unstable_modes", json_integer(s->unstable_modes));
+    json_t *object = drape_json_with(json_object(), "stable", json_boolean(s->unstable_modes == 0));
+    return drape_json_with(object, "unstable_modes", json_integer(s->unstable_modes));
 }
 
 static json_t *strain(const drape_statistics *s)
@@ -149,8 +115,8 @@ static json_t *with_inside(json_t *object, const drape_sim *sim)
     double deepest;
     int32_t triangles;
     for (int32_t c = 0; (triangles = drape_sim_inside(sim, c, &deepest)) >= 0; c++) {
-        json_t *one = with(json_object(), "triangles", json_integer(triangles));
-        one = with(one, "deepest", number(deepest));
+        json_t *one = drape_json_with(json_object(), "triangles", json_integer(triangles));
+        one = drape_json_with(one, "deepest", drape_json_number(deepest));
         if (json_array_append_new(list, one)) {
             json_decref(list);
             list = NULL; /* then object becomes NULL, too */
@@ -161,7 +127,7 @@ static json_t *with_inside(json_t *object, const drape_sim *sim)
         json_decref(list);
         return object;
     }
-    return with(object, "inside", list);
+    return drape_json_with(object, "inside", list);
 }
 
 static json_t *hash(const drape_sim *sim)
@@ -179,22 +145,22 @@ static json_t *summary(drape_sim *sim, const drape_summary_def *def)
                                 {"dofs", drape_model_dof_count(model)},
                                 {"nnz", drape_model_nonzero_count(model)},
                                 {"frames", def->frames}};
-    json_t *object = with(json_object(), "status", json_string(drape_status_name(def->status)));
-    object = with(object, "message", text(def->message ? def->message : ""));
-    object = with(object, "version", json_string(drape_version()));
+    json_t *object = drape_json_with(json_object(), "status", json_string(drape_status_name(def->status)));
+    object = drape_json_with(object, "message", drape_json_text(def->message ? def->message : ""));
+    object = drape_json_with(object, "version", json_string(drape_version()));
     object = with_counts(object, sizes, LENGTH(sizes));
-    object = with(object, "time", number(drape_sim_time(sim)));
-    object = with(object, "steps", steps(sim, &s));
-    object = with(object, "newton", newton(&s));
-    object = with(object, "wall_s", wall(def, &s));
-    object = with(object, "energy", energy(sim));
-    object = with(object, "strain", strain(&s));
+    object = drape_json_with(object, "time", drape_json_number(drape_sim_time(sim)));
+    object = drape_json_with(object, "steps", steps(sim, &s));
+    object = drape_json_with(object, "newton", newton(&s));
+    object = drape_json_with(object, "wall_s", wall(def, &s));
+    object = drape_json_with(object, "energy", energy(sim));
+    object = drape_json_with(object, "strain", strain(&s));
     if (s.stability_known)
-        object = with(object, "equilibrium", stability(&s));
+        object = drape_json_with(object, "equilibrium", stability(&s));
     object = with_inside(object, sim);
     if (def->realtime)
-        object = with(object, "realtime", realtime(def->realtime));
-    return with(object, "hash", hash(sim));
+        object = drape_json_with(object, "realtime", realtime(def->realtime));
+    return drape_json_with(object, "hash", hash(sim));
 }
 
 static int put(const char *bytes, size_t size, void *file)

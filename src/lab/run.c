@@ -114,6 +114,20 @@ static drape_status run_once(drape_context *ctx, drape_sim *sim, run *r)
     return r->cancelled ? drape_fail(ctx, DRAPE_E_STOPPED, "interrupted") : DRAPE_OK;
 }
 
+/* Positions of the points that the request probes; NULL: it probes none. */
+static json_t *probed_positions(const run *r, const double *x)
+{
+    const lab_request *request = r->request;
+    json_t *positions = request->probe && request->probe->count ? json_array() : NULL;
+    for (size_t i = 0; positions && i < request->probe->count; i++) {
+        double point[3];
+        lab_probe_take(request->probe, i, r->model, x, point);
+        for (int k = 0; k < 3; k++)
+            json_array_append_new(positions, drape_json_number(point[k]));
+    }
+    return positions;
+}
+
 /* ---- The result ---- */
 
 static json_t *describe(const run *r, drape_sim *sim)
@@ -165,13 +179,7 @@ static json_t *describe(const run *r, drape_sim *sim)
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
         json_object_set_new(result, counts[i].key, json_integer(counts[i].value));
     json_object_set_new(result, "reasons", reasons);
-    json_t *positions = request->probe && request->probe->count ? json_array() : NULL;
-    for (size_t i = 0; positions && i < request->probe->count; i++) {
-        double point[3];
-        lab_probe_take(request->probe, i, r->model, x, point);
-        for (int k = 0; k < 3; k++)
-            json_array_append_new(positions, drape_json_number(point[k]));
-    }
+    json_t *positions = probed_positions(r, x);
     if (positions)
         json_object_set_new(result, "positions", positions);
     return result;
