@@ -248,20 +248,17 @@ static drape_status place_terms(drape_system *system)
     return drape_arena_status(arena);
 }
 
-/* Builds the extended pattern: of all terms and these pairs of contact (pairs x 4 nodes). */
+/* Builds the extended pattern: that of the model and these pairs of contact (pairs x 4 nodes). */
 static drape_status extend(drape_system *system, int32_t pairs, const int32_t *nodes)
 {
     const drape_model *model = system->model;
     drape_context *ctx = system->arena->ctx;
-    drape_coupling *couplings = drape_alloc(ctx, (size_t)model->term_count + 1, sizeof *couplings);
-    int count = 0;
+    drape_coupling *couplings = drape_alloc(ctx, (size_t)model->term_count + 2, sizeof *couplings);
     if (pairs < 0 || !couplings) {
         drape_free(ctx, couplings);
         return DRAPE_E_MEMORY;
     }
-    for (int32_t i = 0; i < model->term_count; i++)
-        if (drape_term_couples(&model->terms[i]))
-            couplings[count++] = drape_term_coupling(&model->terms[i]);
+    int count = drape_model_couplings(model, couplings);
     couplings[count++] = (drape_coupling){.count = pairs, .nodes = 4, .node = nodes};
     forget_extension(system);
     drape_status status = drape_pattern_build(&system->extension, model->free_count, model->free_of_node,

@@ -106,7 +106,8 @@ void drape_contact_add_jacobian(drape_contact *c, double weight, bool velocity_o
 
 /* ---- The pattern ---- */
 
-/* Contacts with colliders need only the diagonal and the edges of triangles of the cloth. */
+/* The blocks of contacts with colliders, the diagonal and the edges of triangles of the cloth, are in every
+ * pattern: see drape_model_couplings. */
 static bool has_blocks(const drape_contact *c, const drape_active_contact *contact,
                        const drape_pattern *pattern)
 {
