@@ -295,7 +295,7 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     drape_status stop = DRAPE_OK;
     double start = drape_clock_seconds(), contact = contact_seconds(sim);
     *attempt = try_step(sim, t1, h, &stop);
-    drape_system_rest(sim->system);
+    drape_system_end_step(sim->system);
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     sim->statistics.wall_contact += contact_seconds(sim) - contact;
     log_rejection(sim, attempt);
