@@ -36,8 +36,8 @@ drape_status drape_contact_begin(drape_contact *contact, const double *x, const 
  * not depend on queries. */
 void drape_contact_end(drape_contact *contact);
 
-/* Finds the active contacts at a point, where the functions below then evaluate forces, energy and derivatives.
- * Errors: DRAPE_E_MEMORY. */
+/* Finds the active contacts at a point, where the functions below then evaluate forces, energy and
+ * derivatives. Errors: DRAPE_E_MEMORY. */
 drape_status drape_contact_evaluate_at(drape_contact *contact, const drape_contact_at *at);
 
 /* Adds the normal forces, friction, or both, to g (node_count x 3). */
@@ -50,17 +50,17 @@ const double *drape_contact_on_colliders(const drape_contact *contact);
 double drape_contact_potential(const drape_contact *contact); /* [J] */
 
 /* Adds dg/dx + weight dg/dv, or dg/dv alone, of pairs of free nodes to values in the pattern, which must
- * have their blocks. gauss_newton: a positive semidefinite approximation, the Gauss-Newton part of the
- * Hessians of the energy (contact/force.h), and instead of the derivatives of friction a symmetric upper bound
- * of its dg/dv (contact/friction.h). */
+ * have their blocks. gauss_newton: adds a positive semidefinite approximation, the Gauss-Newton part of the
+ * Hessians of the energy (contact/force.h), and instead of the derivatives of friction a symmetric upper
+ * bound of its dg/dv (contact/friction.h). */
 void drape_contact_add_jacobian(drape_contact *contact, double weight, bool velocity_only, bool gauss_newton,
                                 const drape_pattern *pattern, double *values);
 
 /* Whether the pattern has the blocks of all active contacts. */
 bool drape_contact_fits(const drape_contact *contact, const drape_pattern *pattern);
 
-/* Lists the pairs of cloth with cloth that are near each other, for a pattern that will hold for a while: four
- * nodes each, valid until the next call. Returns their number; -1: out of memory. */
+/* Lists the pairs of cloth with cloth that are near each other, for a pattern that will hold for a while:
+ * four nodes each, valid until the next call. Returns their number; -1: out of memory. */
 int32_t drape_contact_list_couplings(drape_contact *contact, const int32_t **nodes);
 
 /* The list made by the last drape_contact_list_couplings, or read from an archive. */

@@ -75,8 +75,8 @@ void drape_friction_bound(const drape_gap *gap, const drape_contact_law *law, do
 
 /* With F = a u_t: dg_i = mu (lambda F dc_i + c_i F dlambda + c_i lambda dF), and
  * du_t = P du - (n.u) dn - n (u.dn),  du = sum v_i dc_i. */
-void drape_friction_add_position_derivative(const drape_gap *gap, const drape_gap_derivatives *derivatives,
-                                            const drape_contact_law *law, double v[4][3], double *dgdx)
+void drape_friction_add_dgdx(const drape_gap *gap, const drape_gap_derivatives *derivatives,
+                             const drape_contact_law *law, double v[4][3], double *dgdx)
 {
     int d = 3 * gap->closest.points;
     slip s = slip_of(gap, law, v);

@@ -80,7 +80,7 @@ static void differentiate(const drape_contact *c, const request *want, const dra
     add_friction(c, want, contact, &law, drape_contact_normal_force(&contact->gap, &law), h);
     if (exact) {
         drape_contact_velocities(c, contact, v);
-        drape_friction_add_position_derivative(&contact->gap, &derivatives, &law, v, h);
+        drape_friction_add_dgdx(&contact->gap, &derivatives, &law, v, h);
     }
 }
 

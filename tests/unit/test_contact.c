@@ -91,7 +91,7 @@ static void check_derivatives(setting *s, double e, double limit)
     drape_contact_gradient(&gap, &s->law, g);
     drape_contact_hessian(&gap, &derivatives, &s->law, h);
     drape_friction_force(&gap, &s->law, drape_contact_normal_force(&gap, &s->law), v, f, dgdv);
-    drape_friction_add_position_derivative(&gap, &derivatives, &s->law, v, dgdx);
+    drape_friction_add_dgdx(&gap, &derivatives, &s->law, v, dgdx);
     for (int j = 0; j < D; j++) {
         double g_[2][D], f_[2][D], energy[2], w_[2][D], unused[D], x = s->x[j], u = s->v[j];
         for (int side = 0; side < 2; side++) {
