@@ -34,8 +34,8 @@ void drape_implicit_archive(void *state, drape_archive *a);
 size_t drape_implicit_bytes(const void *state);
 void drape_implicit_destroy(void **state);
 
-/* The nodes for a step or stage that begins at `in`: free nodes at in->x with zero
- * velocity; pinned nodes where their tracks are at time t, with their mean velocity over span. */
+/* The nodes for a step or stage that begins at `in`: free nodes at in->x with zero velocity;
+ * pinned nodes where their tracks are at time t, with their mean velocity over span. */
 void drape_implicit_place(const drape_implicit *implicit, const drape_state *in, double t, double span,
                           double *x, double *v);
 
