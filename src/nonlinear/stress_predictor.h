@@ -8,8 +8,8 @@
  * correction p, f + df/dq dq' p. Residual, pattern and solution are unchanged; only the f before ddq
  * differs, until both agree at the end. Magisano, Leonetti & Garcea 2017, "How to improve efficiency and
  * robustness of the Newton method in geometrically non-linear structural problem discretized via
- * displacement-based finite elements", CMAME 313, section 4. It needs 40 to 90 % as many iterations as
- * Newton's method for sheets that hang, fly and buckle.
+ * displacement-based finite elements", CMAME 313, section 4. The mixed iteration needs 40 to 90 % as many
+ * iterations as Newton's method for sheets that hang, fly and buckle.
  */
 #ifndef DRAPE_NONLINEAR_STRESS_PREDICTOR_H
 #define DRAPE_NONLINEAR_STRESS_PREDICTOR_H
