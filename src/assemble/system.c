@@ -152,7 +152,7 @@ drape_status drape_system_begin(drape_system *system, const drape_state *in)
     return system->contact ? drape_contact_begin(system->contact, in->x, in->v, in->t) : DRAPE_OK;
 }
 
-void drape_system_rest(drape_system *system)
+void drape_system_end_step(drape_system *system)
 {
     if (system->contact)
         drape_contact_end(system->contact);
@@ -182,11 +182,11 @@ double drape_system_clock(const drape_system *system)
 
 /* Finds the contacts at the point. False if the model has no contact, or if it fails: see
  * drape_system_status. */
-static bool place_contact(drape_system *system, const drape_point *point)
+static bool evaluate_contact(drape_system *system, const drape_point *point)
 {
     if (!system->contact)
         return false;
-    drape_status status = drape_contact_place(
+    drape_status status = drape_contact_evaluate_at(
         system->contact,
         &(drape_contact_at){
             .x = point->x, .v = point->v, .t = point->t, .span = {point->span[0], point->span[1]}});
@@ -248,20 +248,17 @@ static drape_status place_terms(drape_system *system)
     return drape_arena_status(arena);
 }
 
-/* Builds the extended pattern: of all terms and these pairs of contact (pairs x 4 nodes). */
+/* Builds the extended pattern: that of the model and these pairs of contact (pairs x 4 nodes). */
 static drape_status extend(drape_system *system, int32_t pairs, const int32_t *nodes)
 {
     const drape_model *model = system->model;
     drape_context *ctx = system->arena->ctx;
-    drape_coupling *couplings = drape_alloc(ctx, (size_t)model->term_count + 1, sizeof *couplings);
-    int count = 0;
+    drape_coupling *couplings = drape_alloc(ctx, (size_t)model->term_count + 2, sizeof *couplings);
     if (pairs < 0 || !couplings) {
         drape_free(ctx, couplings);
         return DRAPE_E_MEMORY;
     }
-    for (int32_t i = 0; i < model->term_count; i++)
-        if (drape_term_couples(&model->terms[i]))
-            couplings[count++] = drape_term_coupling(&model->terms[i]);
+    int count = drape_model_couplings(model, couplings);
     couplings[count++] = (drape_coupling){.count = pairs, .nodes = 4, .node = nodes};
     forget_extension(system);
     drape_status status = drape_pattern_build(&system->extension, model->free_count, model->free_of_node,
@@ -279,13 +276,13 @@ static drape_status extend(drape_system *system, int32_t pairs, const int32_t *n
 drape_status drape_system_extend_pattern(drape_system *system, const drape_point *point, bool *changed)
 {
     *changed = false;
-    if (!place_contact(system, point))
+    if (!evaluate_contact(system, point))
         return system->status;
     if (drape_contact_fits(system->contact, system->pattern))
         return DRAPE_OK;
     *changed = true;
     const int32_t *nodes = NULL;
-    int32_t pairs = drape_contact_couplings(system->contact, &nodes);
+    int32_t pairs = drape_contact_list_couplings(system->contact, &nodes);
     return extend(system, pairs, nodes);
 }
 
@@ -316,7 +313,7 @@ void drape_system_force_without(drape_system *system, const drape_point *point, 
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
     drape_system_add_loads(system, point->x, g);
-    if (place_contact(system, point))
+    if (evaluate_contact(system, point))
         drape_contact_add_forces(system->contact, true, true, g);
 }
 
@@ -325,7 +322,7 @@ void drape_system_dissipation(drape_system *system, const drape_point *point, do
     drape_request want = {.point = point, .dissipative = true};
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &(drape_sums){.g = g});
-    if (place_contact(system, point))
+    if (evaluate_contact(system, point))
         drape_contact_add_forces(system->contact, false, true, g);
 }
 
@@ -359,7 +356,7 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
     const drape_sums to = into_values(system, values);
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
-    if (place_contact(system, point))
+    if (evaluate_contact(system, point))
         drape_contact_add_jacobian(system->contact, point->weight, false, positive_share > 0, system->pattern,
                                    values);
     drape_drag_spring_add_hessian(&system->drag, system->model, system->pattern, values);
@@ -384,7 +381,7 @@ void drape_system_remainder(drape_system *system, const drape_point *point, doub
     const drape_sums to = into_values(system, values);
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
-    if (place_contact(system, point))
+    if (evaluate_contact(system, point))
         drape_contact_add_jacobian(system->contact, point->weight, false, true, system->pattern, values);
 }
 
@@ -405,7 +402,7 @@ void drape_system_damping(drape_system *system, const drape_point *point, double
     const drape_sums to = into_values(system, values);
     evaluate_wind(system, &want);
     drape_summer_add(system->summer, &want, &to);
-    if (place_contact(system, point))
+    if (evaluate_contact(system, point))
         drape_contact_add_jacobian(system->contact, 0, true, false, system->pattern, values);
 }
 
@@ -444,7 +441,7 @@ void drape_system_node_energy(drape_system *system, const drape_point *point, do
 
 double drape_system_contact_energy(drape_system *system, const drape_point *point)
 {
-    return place_contact(system, point) ? drape_contact_potential(system->contact) : 0;
+    return evaluate_contact(system, point) ? drape_contact_potential(system->contact) : 0;
 }
 
 /* ---- One part alone ---- */
@@ -456,7 +453,7 @@ void drape_system_contact_part(drape_system *system, const drape_point *point, b
         memset(g, 0, 3 * (size_t)system->model->node_count * sizeof *g);
     if (values)
         memset(values, 0, (size_t)system->pattern->nonzeros * sizeof *values);
-    if (!place_contact(system, point))
+    if (!evaluate_contact(system, point))
         return;
     if (g)
         drape_contact_add_forces(system->contact, true, friction, g);
@@ -553,22 +550,22 @@ drape_diagnostic drape_system_diagnose_dof(const drape_system *system, const dou
                                            const char *what, double limit)
 {
     const drape_model *model = system->model;
-    int64_t diagnostic = 0;
+    int64_t largest = 0;
     for (int64_t i = 0; i < 3 * (int64_t)model->free_count; i++) {
         if (!isfinite(free_vector[i])) {
-            diagnostic = i;
+            largest = i;
             break;
         }
-        if (fabs(free_vector[i]) > fabs(free_vector[diagnostic]))
-            diagnostic = i;
+        if (fabs(free_vector[i]) > fabs(free_vector[largest]))
+            largest = i;
     }
-    int32_t node = model->free_count > 0 ? model->node_of_free[diagnostic / 3] : -1;
+    int32_t node = model->free_count > 0 ? model->node_of_free[largest / 3] : -1;
     return (drape_diagnostic){.what = what,
                               .term = "",
                               .element = -1,
                               .node = {node, -1, -1, -1},
                               .cloth = node >= 0 ? drape_model_cloth_of(model, node) : -1,
-                              .value = model->free_count > 0 ? fabs(free_vector[diagnostic]) : 0,
+                              .value = model->free_count > 0 ? fabs(free_vector[largest]) : 0,
                               .limit = limit};
 }
 
@@ -613,6 +610,6 @@ void drape_system_archive(drape_system *system, drape_archive *a)
     drape_archive_bool(a, &extended);
     if (!drape_archive_is_reading(a) || !contact || !extended)
         return;
-    int32_t pairs = drape_contact_coupled(system->contact, &nodes);
+    int32_t pairs = drape_contact_last_couplings(system->contact, &nodes);
     drape_archive_note(a, extend(system, pairs, nodes));
 }

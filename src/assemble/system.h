@@ -91,7 +91,7 @@ void drape_system_archive(drape_system *system, drape_archive *a);
 drape_status drape_system_begin(drape_system *system, const drape_state *in);
 
 /* Ends the step, so that queries between steps leave no trace in the next one. */
-void drape_system_rest(drape_system *system);
+void drape_system_end_step(drape_system *system);
 
 /* The sparsity of the assembled matrices. Contact between cloths changes it: drape_system_extend_pattern
  * makes it include every pair that acts at the point. *changed: the pattern was rebuilt,
@@ -112,7 +112,8 @@ void drape_system_force_without(drape_system *system, const drape_point *point, 
 
 /* values (pattern.nonzeros) = mass_weight M + J over the free nodes. With positive_share from 0 to 1, each
  * element's Hessian H becomes H + positive_share (H+ - H), where H+ is its positive semidefinite part: 0 is
- * exact, 1 is positive semidefinite. Contact uses H+ for any share above 0. */
+ * exact, 1 is positive semidefinite. Contact has no such shares: for any share above 0 its matrix is the
+ * positive semidefinite approximation of drape_contact_add_jacobian. */
 void drape_system_jacobian(drape_system *system, const drape_point *point, double mass_weight,
                            double positive_share, double *values);
 
@@ -121,8 +122,8 @@ void drape_system_jacobian(drape_system *system, const drape_point *point, doubl
  * drape_system_pairs, for a term of pairs: the symmetric 3 x 3 block H of each element, xx xy xz yy yz zz,
  * as (6 x element count), such that [H -H; -H H] is the positive semidefinite part of its Hessian.
  * drape_system_remainder: values (pattern.nonzeros) = the part of J that belongs to no strain measure:
- * contact, and the other terms, energies with their positive semidefinite part. drape_system_has_remainder:
- * whether there is such a part. */
+ * contact, by its positive semidefinite approximation, and the other terms, energies with their positive
+ * semidefinite part. drape_system_has_remainder: whether there is such a part. */
 void drape_system_pairs(const drape_system *system, int32_t term, const drape_point *point, double *h);
 void drape_system_remainder(drape_system *system, const drape_point *point, double *values);
 bool drape_system_has_remainder(const drape_system *system);
@@ -185,8 +186,8 @@ bool drape_system_crosses(drape_system *system, const double *y, double t);
 drape_status drape_system_check_contact(drape_system *system, const double *x, double t, const char **reason,
                                         drape_diagnostic *diagnostic);
 
-/* For a message about a vector over free DOFs: the node of the first entry that is not finite or else of
- * the largest one, and its cloth. */
+/* For a message about a vector over free DOFs: the node of its first entry that is not finite or, if all are
+ * finite, of its largest one, and the cloth of that node. */
 drape_diagnostic drape_system_diagnose_dof(const drape_system *system, const double *free_vector,
                                            const char *what, double limit);
 

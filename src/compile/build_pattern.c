@@ -1,5 +1,5 @@
-/* build_pattern.c: the sparsity of the Jacobian from the elements that have a Hessian, and the place of each
- * element in it. */
+/* build_pattern.c: the sparsity of the Jacobian from the elements that have a Hessian and from contact with
+ * colliders, and the place of each element in it. */
 #include "compile/stages.h"
 
 static drape_status place_term(drape_model *model, drape_term *term)
@@ -15,13 +15,10 @@ static drape_status place_term(drape_model *model, drape_term *term)
 
 drape_status drape_compile_pattern(drape_model *model)
 {
-    drape_coupling *couplings = drape_alloc(model->ctx, (size_t)model->term_count, sizeof *couplings);
+    drape_coupling *couplings = drape_alloc(model->ctx, (size_t)model->term_count + 1, sizeof *couplings);
     if (!couplings)
         return DRAPE_E_MEMORY;
-    int count = 0;
-    for (int32_t i = 0; i < model->term_count; i++)
-        if (drape_term_couples(&model->terms[i]))
-            couplings[count++] = drape_term_coupling(&model->terms[i]);
+    const int count = drape_model_couplings(model, couplings);
     const size_t before = model->arena.bytes;
     drape_status status = drape_pattern_build(&model->arena, model->free_count, model->free_of_node,
                                               couplings, count, &model->pattern);

@@ -33,8 +33,8 @@ drape_status drape_compile_colliders(drape_model *model, const drape_scene_def *
 /* Builds the terms of all cloths and assigns indices to measures and internal variables. */
 drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def);
 
-/* Builds the pattern of the Jacobian from all terms, and finds the block of each node pair of each
- * element. */
+/* Builds the pattern of the Jacobian from all terms and contact with colliders, and finds the block of each
+ * node pair of each element. */
 drape_status drape_compile_pattern(drape_model *model);
 
 #endif

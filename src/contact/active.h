@@ -1,7 +1,7 @@
 /*
  * active.h: the active set: the candidates whose gap is below the activation distance, each with its
- * geometry. Several pairs of larger pieces may be the same contact of smaller ones (for an edge that is
- * closest at its end, that end): such a contact is listed once, with the sum of their areas.
+ * geometry. The closest point of an edge or face may lie on its vertex or edge, which other pairs may share:
+ * such pairs are merged into one contact, with the sum of their areas.
  */
 #ifndef DRAPE_CONTACT_ACTIVE_H
 #define DRAPE_CONTACT_ACTIVE_H

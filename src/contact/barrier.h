@@ -2,9 +2,10 @@
  * barrier.h: the energy of a gap, b(s) with s = gap / activation distance: the logarithmic barrier of Li et
  * al. 2020 (Incremental Potential Contact, eq. 6) scaled to length one,
  *     b = -(s - 1)^2 ln s   for s < 1,  0 beyond,
- * C2 at s = 1. Below s = DRAPE_BARRIER_LOW it continues as its osculating parabola and is finite
- * everywhere, so that a Newton iterate, or a start without a gap, is pushed out again. No step is accepted
- * there.
+ * C2 at s = 1. Below s = DRAPE_BARRIER_LOW it continues as its osculating parabola, also for s < 0. So it is
+ * finite everywhere, and a Newton iterate, or a start without a gap, is pushed out again. Small gaps are not
+ * rejected: an accepted step may end below DRAPE_BARRIER_LOW, and with a gap below 0 as far as
+ * drape_contact_check allows.
  */
 #ifndef DRAPE_CONTACT_BARRIER_H
 #define DRAPE_CONTACT_BARRIER_H

@@ -48,11 +48,11 @@ static void consider(void *user, const drape_pair *found)
     drape_pair pair = *found;
     if (s->status || drape_pair_is_apart(&pair, &s->at, pair.distance + reach))
         return;
-    pair.found = drape_pair_gap_value(&pair, &s->at);
-    if (pair.found - reach >= pair.distance)
+    pair.gap_at_search = drape_pair_gap_value(&pair, &s->at);
+    if (pair.gap_at_search - reach >= pair.distance)
         return;
     pair.distance = activation_distance(s, &pair);
-    if (pair.found - reach < pair.distance)
+    if (pair.gap_at_search - reach < pair.distance)
         add(s->candidates, &pair, &s->status);
 }
 

@@ -33,9 +33,9 @@ double drape_candidates_moved(const drape_candidates *candidates, const drape_co
 
 /* Whether the gap of a candidate can fall below `gap` while no point is farther than moved from the
  * positions of the search. */
-static inline bool drape_candidate_may(const drape_pair *pair, double moved, double gap)
+static inline bool drape_candidate_may_fall_below(const drape_pair *pair, double moved, double gap)
 {
-    return pair->found - 2 * moved < gap;
+    return pair->gap_at_search - 2 * moved < gap;
 }
 
 #endif

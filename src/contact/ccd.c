@@ -51,12 +51,12 @@ double drape_contact_free_fraction(drape_contact *c, const double *x, const doub
                               to = {.model = c->model, .x = y, .pose = pose};
     path p = {.x = x, .y = y, .keep = keep, .fraction = 1, .core = core};
     double moved;
-    const drape_candidates *candidates = drape_contact_covering(c, &from, &moved);
+    const drape_candidates *candidates = drape_contact_valid_candidates(c, &from, &moved);
     if (candidates && drape_candidates_moved(candidates, &to) <= candidates->margin) {
         const double reach = 2 * longest_move(c, &p);
         for (int32_t i = 0; i < candidates->count; i++)
             if (drape_pair_points(&candidates->pairs[i]) > 1 &&
-                drape_candidate_may(&candidates->pairs[i], moved, reach))
+                drape_candidate_may_fall_below(&candidates->pairs[i], moved, reach))
                 follow(&p, &candidates->pairs[i]);
     } else {
         const double start = drape_clock_seconds();

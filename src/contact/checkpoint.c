@@ -29,8 +29,9 @@ static void archive_couplings(drape_contact *c, drape_archive *a)
 static bool is_valid(const drape_contact *c)
 {
     const size_t n = 3 * (size_t)c->broad.points;
-    return drape_all_finite(c->steps.x, n) && drape_all_finite(c->start, n) && c->steps.margin >= 0 &&
-           c->steps.margin <= c->model->length && c->next_margin >= 0 && c->next_margin <= c->model->length;
+    return drape_all_finite(c->step_candidates.x, n) && drape_all_finite(c->start, n) &&
+           c->step_candidates.margin >= 0 && c->step_candidates.margin <= c->model->length &&
+           c->next_margin >= 0 && c->next_margin <= c->model->length;
 }
 
 /* The active set at the beginning of the step depends on the positions alone, so a new search finds the
@@ -38,9 +39,9 @@ static bool is_valid(const drape_contact *c)
 static drape_status restore_start(drape_contact *c)
 {
     const drape_configuration start = {.model = c->model, .x = c->start, .pose = c->start_pose};
-    drape_status status = drape_candidates_search(&c->queries, &start, c->next_margin);
+    drape_status status = drape_candidates_search(&c->query_candidates, &start, c->next_margin);
     if (!status)
-        status = drape_active_set_list(&c->active, &c->queries, 0, &start);
+        status = drape_active_set_list(&c->active, &c->query_candidates, 0, &start);
     if (!status)
         status = drape_contact_lag(c);
     if (!status)
@@ -52,10 +53,11 @@ static drape_status restore_start(drape_contact *c)
  * of their last search. */
 static drape_status restore(drape_contact *c)
 {
-    const drape_configuration at = {.model = c->model, .x = c->steps.x, .pose = c->steps.pose};
+    const drape_configuration at = {
+        .model = c->model, .x = c->step_candidates.x, .pose = c->step_candidates.pose};
     drape_status status = c->begun ? restore_start(c) : DRAPE_OK;
-    if (!status && c->steps.known)
-        status = drape_candidates_search(&c->steps, &at, c->steps.margin);
+    if (!status && c->step_candidates.known)
+        status = drape_candidates_search(&c->step_candidates, &at, c->step_candidates.margin);
     c->listed = NULL;
     c->between_steps = c->begun;
     return status;
@@ -65,12 +67,12 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
 {
     const size_t points = 3 * (size_t)c->broad.points, colliders = (size_t)c->model->collider_count;
     drape_archive_mark(a, "contact");
-    drape_archive_bool(a, &c->steps.known);
+    drape_archive_bool(a, &c->step_candidates.known);
     drape_archive_bool(a, &c->begun);
-    drape_archive_double(a, &c->steps.margin);
+    drape_archive_double(a, &c->step_candidates.margin);
     drape_archive_double(a, &c->next_margin);
-    drape_archive_doubles(a, c->steps.x, points);
-    drape_archive_bytes(a, c->steps.pose, colliders * sizeof *c->steps.pose);
+    drape_archive_doubles(a, c->step_candidates.x, points);
+    drape_archive_bytes(a, c->step_candidates.pose, colliders * sizeof *c->step_candidates.pose);
     drape_archive_doubles(a, c->start, points);
     drape_archive_bytes(a, c->start_pose, colliders * sizeof *c->start_pose);
     archive_couplings(c, a);

@@ -59,10 +59,10 @@ drape_status drape_contact_create(drape_arena *arena, const drape_motion *motion
     c->next_margin = MIN_MARGIN * c->mean_edge;
     drape_status status = drape_broad_phase_create(arena, model, &c->broad);
     if (!status)
-        status = drape_candidates_create(arena, &c->broad, &c->steps);
+        status = drape_candidates_create(arena, &c->broad, &c->step_candidates);
     if (!status)
-        status = drape_candidates_create(arena, &c->broad, &c->queries);
-    c->steps.margin = c->queries.margin = c->next_margin;
+        status = drape_candidates_create(arena, &c->broad, &c->query_candidates);
+    c->step_candidates.margin = c->query_candidates.margin = c->next_margin;
     if (!status)
         status = take_arrays(arena, c);
     *out = status ? NULL : c;
@@ -139,16 +139,16 @@ static bool move_colliders(drape_contact *c, double t, const double span[2])
 
 /* ---- Candidates and active set ---- */
 
-const drape_candidates *drape_contact_covering(const drape_contact *c, const drape_configuration *at,
-                                               double *moved)
+const drape_candidates *drape_contact_valid_candidates(const drape_contact *c, const drape_configuration *at,
+                                                       double *moved)
 {
-    *moved = drape_candidates_moved(&c->steps, at);
-    if (*moved <= c->steps.margin)
-        return &c->steps;
+    *moved = drape_candidates_moved(&c->step_candidates, at);
+    if (*moved <= c->step_candidates.margin)
+        return &c->step_candidates;
     if (!c->between_steps)
         return NULL;
-    *moved = drape_candidates_moved(&c->queries, at);
-    return *moved <= c->queries.margin ? &c->queries : NULL;
+    *moved = drape_candidates_moved(&c->query_candidates, at);
+    return *moved <= c->query_candidates.margin ? &c->query_candidates : NULL;
 }
 
 /* The largest displacement of a node since the beginning of the step; before the first step, from the
@@ -185,20 +185,20 @@ double drape_contact_lead(const drape_contact *c)
     return c->begun ? LEAD_WITHIN : 0;
 }
 
-drape_status drape_contact_go(drape_contact *c, const drape_contact_at *at, double lead)
+drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at, double lead)
 {
     const bool moved = move_colliders(c, at->t, at->span);
     fill_velocities(c, at->v, c->v);
-    const bool listed = c->listed == &c->steps || (c->listed && c->between_steps);
+    const bool listed = c->listed == &c->step_candidates || (c->listed && c->between_steps);
     if (listed && !moved && memcmp(at->x, c->x, 3 * (size_t)c->model->node_count * sizeof *c->x) == 0)
         return DRAPE_OK; /* forces, energy and derivatives are often evaluated at the same point */
     c->listed = NULL;
     drape_contact_fill(c, at->x, c->pose, c->x);
     const drape_configuration now = drape_contact_configuration(c);
-    const drape_candidates *candidates = drape_contact_covering(c, &now, &c->moved);
+    const drape_candidates *candidates = drape_contact_valid_candidates(c, &now, &c->moved);
     drape_status status = DRAPE_OK;
     if (!candidates) {
-        drape_candidates *outdated = c->between_steps ? &c->queries : &c->steps;
+        drape_candidates *outdated = c->between_steps ? &c->query_candidates : &c->step_candidates;
         status = search(c, outdated, c->between_steps ? 0 : lead);
         c->moved = drape_candidates_moved(outdated, &now);
         candidates = outdated;
@@ -209,10 +209,10 @@ drape_status drape_contact_go(drape_contact *c, const drape_contact_at *at, doub
     return status;
 }
 
-drape_status drape_contact_place(drape_contact *c, const drape_contact_at *at)
+drape_status drape_contact_evaluate_at(drape_contact *c, const drape_contact_at *at)
 {
     const double start = drape_clock_seconds();
-    const drape_status status = drape_contact_go(c, at, drape_contact_lead(c));
+    const drape_status status = drape_contact_update(c, at, drape_contact_lead(c));
     c->seconds += drape_clock_seconds() - start;
     return status;
 }
@@ -264,11 +264,11 @@ void drape_contact_measure_start(drape_contact *c)
  * instead of at every trial. */
 drape_status drape_contact_begin(drape_contact *c, const double *x, const double *v, double t)
 {
-    const double start = drape_clock_seconds(), last = c->steps.known ? displacement(c, x) : 0;
+    const double start = drape_clock_seconds(), last = c->step_candidates.known ? displacement(c, x) : 0;
     c->between_steps = false;
     c->next_margin = fmin(fmax(MIN_MARGIN * c->mean_edge, MARGIN_STEPS * last), MAX_MARGIN * c->mean_edge);
     drape_status status =
-        drape_contact_go(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}}, LEAD_BEGIN);
+        drape_contact_update(c, &(drape_contact_at){.x = x, .v = v, .t = t, .span = {t, t}}, LEAD_BEGIN);
     if (!status)
         status = drape_contact_lag(c);
     if (!status) {

@@ -36,8 +36,9 @@ drape_status drape_contact_begin(drape_contact *contact, const double *x, const 
  * not depend on queries. */
 void drape_contact_end(drape_contact *contact);
 
-/* Finds the active contacts at a point, at which the functions below evaluate. Errors: DRAPE_E_MEMORY. */
-drape_status drape_contact_place(drape_contact *contact, const drape_contact_at *at);
+/* Finds the active contacts at a point, where the functions below then evaluate forces, energy and
+ * derivatives. Errors: DRAPE_E_MEMORY. */
+drape_status drape_contact_evaluate_at(drape_contact *contact, const drape_contact_at *at);
 
 /* Adds the normal forces, friction, or both, to g (node_count x 3). */
 void drape_contact_add_forces(drape_contact *contact, bool normal, bool friction, double *g);
@@ -49,20 +50,21 @@ const double *drape_contact_on_colliders(const drape_contact *contact);
 double drape_contact_potential(const drape_contact *contact); /* [J] */
 
 /* Adds dg/dx + weight dg/dv, or dg/dv alone, of pairs of free nodes to values in the pattern, which must
- * have their blocks. positive: takes the positive semidefinite part of the Hessians of the energy, and
- * instead of the derivatives of friction a symmetric matrix that bounds its dg/dv from above. */
-void drape_contact_add_jacobian(drape_contact *contact, double weight, bool velocity_only, bool positive,
+ * have their blocks. gauss_newton: adds a positive semidefinite approximation, the Gauss-Newton part of the
+ * Hessians of the energy (contact/force.h), and instead of the derivatives of friction a symmetric upper
+ * bound of its dg/dv (contact/friction.h). */
+void drape_contact_add_jacobian(drape_contact *contact, double weight, bool velocity_only, bool gauss_newton,
                                 const drape_pattern *pattern, double *values);
 
 /* Whether the pattern has the blocks of all active contacts. */
 bool drape_contact_fits(const drape_contact *contact, const drape_pattern *pattern);
 
-/* The pairs of cloth with cloth that are near each other, for a pattern that will hold for a while: four
- * nodes each, valid until the next call. Returns their number; -1: out of memory. */
-int32_t drape_contact_couplings(drape_contact *contact, const int32_t **nodes);
+/* Lists the pairs of cloth with cloth that are near each other, for a pattern that will hold for a while:
+ * four nodes each, valid until the next call. Returns their number; -1: out of memory. */
+int32_t drape_contact_list_couplings(drape_contact *contact, const int32_t **nodes);
 
-/* the list of the last drape_contact_couplings */
-int32_t drape_contact_coupled(const drape_contact *contact, const int32_t **nodes);
+/* The list made by the last drape_contact_list_couplings, or read from an archive. */
+int32_t drape_contact_last_couplings(const drape_contact *contact, const int32_t **nodes);
 
 /* Archives the last search of the steps and the beginning of the step, from which everything else follows. */
 void drape_contact_archive(drape_contact *contact, drape_archive *a);

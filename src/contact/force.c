@@ -24,8 +24,8 @@ void drape_contact_gradient(const drape_gap *gap, const drape_contact_law *law, 
                (gap->mollified ? e * gap->dm[i] : 0);
 }
 
-void drape_contact_hessian(const drape_gap *gap, const drape_gap_slopes *slopes, const drape_contact_law *law,
-                           double *h)
+void drape_contact_hessian(const drape_gap *gap, const drape_gap_derivatives *derivatives,
+                           const drape_contact_law *law, double *h)
 {
     const int d = 3 * gap->closest.points;
     const drape_barrier b = drape_barrier_at(gap->value / law->distance);
@@ -36,22 +36,22 @@ void drape_contact_hessian(const drape_gap *gap, const drape_gap_slopes *slopes,
         dgap[i] = c[i / 3] * n[i % 3];
     for (int i = 0; i < d; i++)
         for (int j = 0; j < d; j++) {
-            double ddgap =
-                c[i / 3] * slopes->closest.normal[i % 3][j] + slopes->closest.c[i / 3][j] * n[i % 3];
+            double ddgap = c[i / 3] * derivatives->closest.normal[i % 3][j] +
+                           derivatives->closest.c[i / 3][j] * n[i % 3];
             double sum = m * (dde * dgap[i] * dgap[j] + de * ddgap);
             if (gap->mollified)
-                sum += de * (dgap[i] * gap->dm[j] + gap->dm[i] * dgap[j]) + e * slopes->ddm[i][j];
+                sum += de * (dgap[i] * gap->dm[j] + gap->dm[i] * dgap[j]) + e * derivatives->ddm[i][j];
             h[D * i + j] = sum;
         }
 }
 
-void drape_contact_positive(const drape_gap *gap, const drape_contact_law *law, double *h)
+void drape_contact_gauss_newton(const drape_gap *gap, const drape_contact_law *law, double *h)
 {
     const int d = 3 * gap->closest.points;
-    const double bend =
+    const double second = /* m K/d b'' */
         gap->m * law->stiffness / law->distance * drape_barrier_at(gap->value / law->distance).ddb;
     const double *c = gap->closest.c, *n = gap->closest.normal;
     for (int i = 0; i < d; i++)
         for (int j = 0; j < d; j++)
-            h[D * i + j] = bend * c[i / 3] * n[i % 3] * c[j / 3] * n[j % 3];
+            h[D * i + j] = second * c[i / 3] * n[i % 3] * c[j / 3] * n[j % 3];
 }

@@ -22,10 +22,11 @@ double drape_contact_normal_force(const drape_gap *gap, const drape_contact_law 
 
 /* g = dE/dx (12) and h = dg/dx (12 x 12), both overwritten. */
 void drape_contact_gradient(const drape_gap *gap, const drape_contact_law *law, double *g);
-void drape_contact_hessian(const drape_gap *gap, const drape_gap_slopes *slopes, const drape_contact_law *law,
-                           double *h);
+void drape_contact_hessian(const drape_gap *gap, const drape_gap_derivatives *derivatives,
+                           const drape_contact_law *law, double *h);
 
-/* The positive semidefinite part of h that is known without eigenvalues: m K/d b'' dgap dgap'. */
-void drape_contact_positive(const drape_gap *gap, const drape_contact_law *law, double *h);
+/* The Gauss-Newton part of h, m K/d b'' dgap dgap', which is positive semidefinite because b'' > 0: without
+ * the curvature of the gap, m K b' ddgap, and the derivatives of the mollifier. */
+void drape_contact_gauss_newton(const drape_gap *gap, const drape_contact_law *law, double *h);
 
 #endif

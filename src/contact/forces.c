@@ -6,7 +6,8 @@
 
 #include <string.h>
 
-/* The stiffness is such that pairs with a shorter activation distance can absorb the same energy. */
+/* The energy of a gap that closes is proportional to K d (force.h). K is proportional to 1/d, so that pairs
+ * of equal area absorb the same energy, whatever their activation distance. */
 drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_pair *pair)
 {
     const drape_contact_def *def = &c->model->contact;

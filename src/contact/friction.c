@@ -75,8 +75,8 @@ void drape_friction_bound(const drape_gap *gap, const drape_contact_law *law, do
 
 /* With F = a u_t: dg_i = mu (lambda F dc_i + c_i F dlambda + c_i lambda dF), and
  * du_t = P du - (n.u) dn - n (u.dn),  du = sum v_i dc_i. */
-void drape_friction_slope(const drape_gap *gap, const drape_gap_slopes *slopes, const drape_contact_law *law,
-                          double v[4][3], double *dgdx)
+void drape_friction_add_dgdx(const drape_gap *gap, const drape_gap_derivatives *derivatives,
+                             const drape_contact_law *law, double v[4][3], double *dgdx)
 {
     int d = 3 * gap->closest.points;
     slip s = slip_of(gap, law, v);
@@ -90,16 +90,16 @@ void drape_friction_slope(const drape_gap *gap, const drape_gap_slopes *slopes, 
         if (gap->mollified)
             dlambda -= law->stiffness * b.db * gap->dm[j];
         for (int i = 0; i < gap->closest.points; i++)
-            vec3_add_scaled(slopes->closest.c[i][j], v[i], du);
+            vec3_add_scaled(derivatives->closest.c[i][j], v[i], du);
         for (int k = 0; k < 3; k++)
-            dn[k] = slopes->closest.normal[k][j];
+            dn[k] = derivatives->closest.normal[k][j];
         project_out(gap->closest.normal, du);
         vec3_add_scaled(-normal_speed, dn, du);
         vec3_add_scaled(-vec3_dot(s.u, dn), gap->closest.normal, du);
         turn(&s, du, df);
         for (int i = 0; i < d; i++)
             dgdx[D * i + j] +=
-                mu * (lambda * s.a * s.tangent[i % 3] * slopes->closest.c[i / 3][j] +
+                mu * (lambda * s.a * s.tangent[i % 3] * derivatives->closest.c[i / 3][j] +
                       gap->closest.c[i / 3] * (dlambda * s.a * s.tangent[i % 3] + lambda * df[i % 3]));
     }
 }

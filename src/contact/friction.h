@@ -15,13 +15,14 @@
 void drape_friction_force(const drape_gap *gap, const drape_contact_law *law, double lambda, double v[4][3],
                           double *g, double *dgdv);
 
-/* A symmetric upper bound of dg/dv: c_i c_j mu lambda f(y)/|u_t| (I - n n'). Unlike dg/dv it is as stiff
- * along the sliding velocity as across it, so that a step computed with it does not reverse the friction. */
+/* A symmetric upper bound of dg/dv (in the Loewner order): c_i c_j mu lambda f(y)/|u_t| (I - n n'). Unlike
+ * dg/dv it is as stiff along the sliding velocity as across it, so that a step computed with it does not
+ * reverse the friction. */
 void drape_friction_bound(const drape_gap *gap, const drape_contact_law *law, double lambda, double v[4][3],
                           double *dgdv);
 
-/* Adds to dgdx (12 x 12) the change of friction that is not lagged with lambda, c and the normal. */
-void drape_friction_slope(const drape_gap *gap, const drape_gap_slopes *slopes, const drape_contact_law *law,
-                          double v[4][3], double *dgdx);
+/* Adds dg/dx of friction that is not lagged to dgdx (12 x 12): its change with lambda, c and the normal. */
+void drape_friction_add_dgdx(const drape_gap *gap, const drape_gap_derivatives *derivatives,
+                             const drape_contact_law *law, double v[4][3], double *dgdx);
 
 #endif

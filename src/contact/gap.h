@@ -11,7 +11,7 @@
 
 typedef struct drape_gap {
     double value;          /* [m] */
-    drape_closest closest; /* d gap / dx_i = c_i normal, of its points; 1 point: c is 1, params and slope 0 */
+    drape_closest closest; /* d gap / dx_i = c_i normal, of its points; 1 point: c is 1, params and dcdt 0 */
     bool fixed_normal;     /* the normal and c do not change with the points: a sharp feature is touched */
     bool mollified;        /* m and dm are set; else m = 1 and dm = 0 */
     double m, dm[12];      /* mollifier of nearly parallel edges, and its derivative */
@@ -19,10 +19,10 @@ typedef struct drape_gap {
 } drape_gap;
 
 /* How the geometry changes with the points. Column 3 i + k belongs to coordinate k of point i. */
-typedef struct drape_gap_slopes {
-    drape_closest_slopes closest; /* dc/dx and dn/dx */
-    double ddm[12][12];           /* of the mollifier, if there is one */
-} drape_gap_slopes;
+typedef struct drape_gap_derivatives {
+    drape_closest_derivatives closest; /* dc/dx and dn/dx */
+    double ddm[12][12];                /* of the mollifier, if there is one */
+} drape_gap_derivatives;
 
 /* The mollifier of edges 0 1 and 2 3 (Li et al. 2020, eq. 24), a function of q = |e1 x e2|^2: m = q/w (2 -
  * q/w) below w, 1 above. Sets mollified, m and dm. */

@@ -38,7 +38,7 @@ static void add_blocks(const drape_contact *c, const drape_active_contact *conta
 /* The requested derivatives: dg/dx + weight dg/dv, or weight dg/dv alone. */
 typedef struct request {
     double weight;
-    bool velocity_only, positive;
+    bool velocity_only, gauss_newton;
 } request;
 
 /* Adds weight dg/dv of friction with the normal force lambda. */
@@ -48,7 +48,7 @@ static void add_friction(const drape_contact *c, const request *want, const drap
     const int d = 3 * contact->gap.closest.points;
     double v[4][3], g[D], dgdv[D * D];
     drape_contact_velocities(c, contact, v);
-    if (want->positive)
+    if (want->gauss_newton)
         drape_friction_bound(&contact->gap, law, lambda, v, dgdv);
     else
         drape_friction_force(&contact->gap, law, lambda, v, g, dgdv);
@@ -64,31 +64,31 @@ static void differentiate(const drape_contact *c, const request *want, const dra
     const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
     const drape_configuration now = drape_contact_configuration(c);
     const bool friction = law.friction > 0 && !c->model->contact.lagged;
-    const bool exact = !want->velocity_only && !want->positive;
-    drape_gap_slopes slopes;
+    const bool exact = !want->velocity_only && !want->gauss_newton;
+    drape_gap_derivatives derivatives;
     double v[4][3];
     if (exact) {
-        drape_pair_slopes(&contact->pair, &contact->gap, &now, c->broad.rest, &slopes);
-        drape_contact_hessian(&contact->gap, &slopes, &law, h);
+        drape_pair_derivatives(&contact->pair, &contact->gap, &now, c->broad.rest, &derivatives);
+        drape_contact_hessian(&contact->gap, &derivatives, &law, h);
     } else if (want->velocity_only) {
         memset(h, 0, D * 3 * (size_t)contact->gap.closest.points * sizeof *h);
     } else {
-        drape_contact_positive(&contact->gap, &law, h);
+        drape_contact_gauss_newton(&contact->gap, &law, h);
     }
     if (!friction)
         return;
     add_friction(c, want, contact, &law, drape_contact_normal_force(&contact->gap, &law), h);
     if (exact) {
         drape_contact_velocities(c, contact, v);
-        drape_friction_slope(&contact->gap, &slopes, &law, v, h);
+        drape_friction_add_dgdx(&contact->gap, &derivatives, &law, v, h);
     }
 }
 
-void drape_contact_add_jacobian(drape_contact *c, double weight, bool velocity_only, bool positive,
+void drape_contact_add_jacobian(drape_contact *c, double weight, bool velocity_only, bool gauss_newton,
                                 const drape_pattern *pattern, double *values)
 {
     const double start = drape_clock_seconds();
-    const request want = {velocity_only ? 1 : weight, velocity_only, positive};
+    const request want = {velocity_only ? 1 : weight, velocity_only, gauss_newton};
     double h[D * D];
     for (int32_t i = 0; i < c->active.count; i++) {
         differentiate(c, &want, &c->active.contacts[i], h);
@@ -106,7 +106,8 @@ void drape_contact_add_jacobian(drape_contact *c, double weight, bool velocity_o
 
 /* ---- The pattern ---- */
 
-/* Contacts with colliders need only the diagonal and the edges of triangles of the cloth. */
+/* The blocks of contacts with colliders, the diagonal and the edges of triangles of the cloth, are in every
+ * pattern: see drape_model_couplings. */
 static bool has_blocks(const drape_contact *c, const drape_active_contact *contact,
                        const drape_pattern *pattern)
 {
@@ -150,10 +151,10 @@ static bool is_near(const drape_contact *c, const drape_pair *pair)
 {
     const drape_configuration now = drape_contact_configuration(c);
     const double near = pair->distance + PATTERN_MARGIN * c->mean_edge;
-    return drape_candidate_may(pair, c->moved, near) && drape_pair_gap_value(pair, &now) < near;
+    return drape_candidate_may_fall_below(pair, c->moved, near) && drape_pair_gap_value(pair, &now) < near;
 }
 
-int32_t drape_contact_couplings(drape_contact *c, const int32_t **nodes)
+int32_t drape_contact_list_couplings(drape_contact *c, const int32_t **nodes)
 {
     c->coupling_count = 0;
     for (int32_t i = 0; i < c->listed->count; i++) {
@@ -166,10 +167,10 @@ int32_t drape_contact_couplings(drape_contact *c, const int32_t **nodes)
         if (contact->pair.collider < 0 && !add_coupling(c, &contact->pair, contact->gap.closest.points))
             return -1;
     }
-    return drape_contact_coupled(c, nodes);
+    return drape_contact_last_couplings(c, nodes);
 }
 
-int32_t drape_contact_coupled(const drape_contact *c, const int32_t **nodes)
+int32_t drape_contact_last_couplings(const drape_contact *c, const int32_t **nodes)
 {
     *nodes = c->coupling;
     return c->coupling_count;

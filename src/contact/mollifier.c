@@ -61,8 +61,8 @@ void drape_mollify(double x[4][3], double w, drape_gap *gap)
 void drape_mollify_twice(double x[4][3], double w, double ddm[D][D])
 {
     const cross_square s = cross_square_of(x);
-    const double slope = 2 * (1 - s.q / w) / w, bend = -2 / (w * w);
+    const double dmdq = 2 * (1 - s.q / w) / w, ddmdq = -2 / (w * w);
     for (int i = 0; i < D; i++)
         for (int j = 0; j < D; j++)
-            ddm[i][j] = slope * ddq_of(&s, i, j) + bend * dq_of(&s, i) * dq_of(&s, j);
+            ddm[i][j] = dmdq * ddq_of(&s, i, j) + ddmdq * dq_of(&s, i) * dq_of(&s, j);
 }

@@ -141,21 +141,21 @@ bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const
     return true;
 }
 
-void drape_pair_slopes(const drape_pair *pair, const drape_gap *gap, const drape_configuration *at,
-                       const double *rest, drape_gap_slopes *slopes)
+void drape_pair_derivatives(const drape_pair *pair, const drape_gap *gap, const drape_configuration *at,
+                            const double *rest, drape_gap_derivatives *derivatives)
 {
     double x[4][3];
-    memset(&slopes->closest, 0, sizeof slopes->closest);
+    memset(&derivatives->closest, 0, sizeof derivatives->closest);
     if (gap->closest.points == 1) {
         for (int k = 0; k < 3; k++)
-            memcpy(slopes->closest.normal[k], gap->curvature + 3 * k, 3 * sizeof *gap->curvature);
+            memcpy(derivatives->closest.normal[k], gap->curvature + 3 * k, 3 * sizeof *gap->curvature);
         return;
     }
     gather(pair, gap->closest.points, at->x, x);
     if (!gap->fixed_normal)
-        drape_closest_derive(x, &gap->closest, &slopes->closest);
+        drape_closest_derive(x, &gap->closest, &derivatives->closest);
     if (gap->mollified)
-        drape_mollify_twice(x, mollifier_width(pair, rest), slopes->ddm);
+        drape_mollify_twice(x, mollifier_width(pair, rest), derivatives->ddm);
 }
 
 /* ---- Continuous collision detection ---- */

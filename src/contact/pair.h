@@ -18,11 +18,11 @@ typedef enum drape_pair_kind {
 typedef struct drape_pair {
     drape_pair_kind kind;
     int32_t node[4];
-    int32_t collider; /* -1: cloth and cloth */
-    double radius;    /* the gap is the distance less this [m] */
-    double area;      /* area on which its force acts [m2] */
-    double distance;  /* activation distance [m] */
-    double found;     /* for a candidate: its gap at the search [m] */
+    int32_t collider;     /* -1: cloth and cloth */
+    double radius;        /* the gap is the distance less this [m] */
+    double area;          /* area on which its force acts [m2] */
+    double distance;      /* activation distance [m] */
+    double gap_at_search; /* of a candidate [m] */
 } drape_pair;
 
 /* All points at one instant. */
@@ -47,8 +47,8 @@ bool drape_pair_gap(const drape_pair *pair, const drape_configuration *at, const
 
 /* Computes how the gap changes with the points. The nodes of the pair must be those of the points of the
  * gap. */
-void drape_pair_slopes(const drape_pair *pair, const drape_gap *gap, const drape_configuration *at,
-                       const double *rest, drape_gap_slopes *slopes);
+void drape_pair_derivatives(const drape_pair *pair, const drape_gap *gap, const drape_configuration *at,
+                            const double *rest, drape_gap_derivatives *derivatives);
 
 /* Continuous collision detection: the largest step fraction on the straight path from x to y, the same for
  * all points, without contact of the pair (additive continuous collision detection, Li et al. 2021,

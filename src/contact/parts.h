@@ -25,10 +25,10 @@ struct drape_contact {
     double mean_edge;           /* [m] */
     drape_broad_phase broad;
 
-    drape_candidates steps;   /* for steps, whose results depend on no other candidates */
-    drape_candidates queries; /* for queries between steps, if the candidates of steps do not cover them */
-    double next_margin;       /* of the next search [m] */
-    bool between_steps;       /* evaluated for frames, energies or the user, not for a step */
+    drape_candidates step_candidates;  /* for steps, whose results depend on no other candidates */
+    drape_candidates query_candidates; /* for queries between steps where step_candidates are not valid */
+    double next_margin;                /* of the next search [m] */
+    bool between_steps;                /* evaluated for frames, energies or the user, not for a step */
 
     double *x, *v;                  /* (points x 3) where contact is evaluated */
     drape_collider_pose *pose;      /* (collider_count) */
@@ -60,8 +60,8 @@ void drape_contact_poses(const drape_contact *c, double t, const double span[2],
 void drape_contact_fill(const drape_contact *c, const double *nodes, const drape_collider_pose *pose,
                         double *x);
 
-/* drape_contact_place without its clock. A search, if necessary, is made at x + lead (x - start). */
-drape_status drape_contact_go(drape_contact *c, const drape_contact_at *at, double lead);
+/* drape_contact_evaluate_at without its timing. A search, if necessary, is made at x + lead (x - start). */
+drape_status drape_contact_update(drape_contact *c, const drape_contact_at *at, double lead);
 
 /* The lead within a step. */
 double drape_contact_lead(const drape_contact *c);
@@ -72,8 +72,8 @@ void drape_contact_measure_start(drape_contact *c);
 
 /* The candidates that are valid at a configuration, and how far points have moved since their search; NULL:
  * a search is needed. */
-const drape_candidates *drape_contact_covering(const drape_contact *c, const drape_configuration *at,
-                                               double *moved);
+const drape_candidates *drape_contact_valid_candidates(const drape_contact *c, const drape_configuration *at,
+                                                       double *moved);
 
 /* The constants of a pair. */
 drape_contact_law drape_contact_law_of(const drape_contact *c, const drape_pair *pair);

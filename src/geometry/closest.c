@@ -43,8 +43,8 @@ static void on_edge(int a, int b, double t, drape_closest *at)
     at->params = 1;
     at->c[a] = -(1 - t);
     at->c[b] = -t;
-    at->slope[0][a] = 1;
-    at->slope[0][b] = -1;
+    at->dcdt[0][a] = 1;
+    at->dcdt[0][b] = -1;
 }
 
 static void on_face(double v, double w, drape_closest *at)
@@ -53,8 +53,8 @@ static void on_face(double v, double w, drape_closest *at)
     at->c[1] = -(1 - v - w);
     at->c[2] = -v;
     at->c[3] = -w;
-    at->slope[0][1] = at->slope[1][1] = 1;
-    at->slope[0][2] = at->slope[1][3] = -1;
+    at->dcdt[0][1] = at->dcdt[1][1] = 1;
+    at->dcdt[0][2] = at->dcdt[1][3] = -1;
 }
 
 static void classify_triangle(double x[4][3], drape_closest *at)
@@ -99,12 +99,12 @@ static void between(double s, double t, bool s_moves, bool t_moves, drape_closes
     const double c[4] = {1 - s, s, -(1 - t), -t};
     memcpy(at->c, c, sizeof c);
     if (s_moves) {
-        at->slope[at->params][0] = -1;
-        at->slope[at->params++][1] = 1;
+        at->dcdt[at->params][0] = -1;
+        at->dcdt[at->params++][1] = 1;
     }
     if (t_moves) {
-        at->slope[at->params][2] = 1;
-        at->slope[at->params++][3] = -1;
+        at->dcdt[at->params][2] = 1;
+        at->dcdt[at->params++][3] = -1;
     }
 }
 
@@ -139,12 +139,12 @@ void drape_closest_reduce(drape_closest *at, int which[4])
 {
     int kept = 0;
     for (int i = 0; i < at->points; i++) {
-        if (at->c[i] == 0 && at->slope[0][i] == 0 && at->slope[1][i] == 0)
+        if (at->c[i] == 0 && at->dcdt[0][i] == 0 && at->dcdt[1][i] == 0)
             continue;
         which[kept] = i;
         at->c[kept] = at->c[i];
-        at->slope[0][kept] = at->slope[0][i];
-        at->slope[1][kept++] = at->slope[1][i];
+        at->dcdt[0][kept] = at->dcdt[0][i];
+        at->dcdt[1][kept++] = at->dcdt[1][i];
     }
     at->points = kept;
 }
@@ -175,19 +175,19 @@ static void derive_params(double t[2][3], const drape_closest *at, double shift[
     for (int k = 0; k < at->params; k++)
         for (int l = 0; l < at->params; l++)
             for (int i = 0; i < 3 * at->points; i++)
-                shift[k][i] -= inverse[k][l] * (at->slope[l][i / 3] * at->distance * at->normal[i % 3] +
+                shift[k][i] -= inverse[k][l] * (at->dcdt[l][i / 3] * at->distance * at->normal[i % 3] +
                                                 at->c[i / 3] * t[l][i % 3]);
 }
 
-void drape_closest_derive(double x[4][3], const drape_closest *at, drape_closest_slopes *slopes)
+void drape_closest_derive(double x[4][3], const drape_closest *at, drape_closest_derivatives *derivatives)
 {
     double t[2][3] = {{0}}, shift[2][12] = {{0}}, scale = at->distance > 0 ? 1 / at->distance : 0;
-    memset(slopes, 0, sizeof *slopes);
+    memset(derivatives, 0, sizeof *derivatives);
     for (int k = 0; k < at->params; k++)
         for (int i = 1; i < at->points; i++) {
             double e[3];
             vec3_sub(x[i], x[0], e);
-            vec3_add_scaled(at->slope[k][i], e, t[k]);
+            vec3_add_scaled(at->dcdt[k][i], e, t[k]);
         }
     derive_params(t, at, shift);
     for (int i = 0; i < 3 * at->points; i++) {
@@ -196,10 +196,10 @@ void drape_closest_derive(double x[4][3], const drape_closest *at, drape_closest
         for (int k = 0; k < at->params; k++) {
             vec3_add_scaled(shift[k][i], t[k], dp);
             for (int j = 0; j < at->points; j++)
-                slopes->c[j][i] += at->slope[k][j] * shift[k][i];
+                derivatives->c[j][i] += at->dcdt[k][j] * shift[k][i];
         }
         along = vec3_dot(dp, at->normal);
         for (int k = 0; k < 3; k++)
-            slopes->normal[k][i] = scale * (dp[k] - along * at->normal[k]);
+            derivatives->normal[k][i] = scale * (dp[k] - along * at->normal[k]);
     }
 }

@@ -11,20 +11,20 @@
 #define DRAPE_GEOMETRY_CLOSEST_H
 
 typedef struct drape_closest {
-    int points;         /* 4, or fewer after drape_closest_reduce */
-    int params;         /* number of parameters t: 2 inside a face or between two edges, 0 between two
+    int points;        /* 4, or fewer after drape_closest_reduce */
+    int params;        /* number of parameters t: 2 inside a face or between two edges, 0 between two
                            points */
-    double c[4];        /* weights of points 0 1 2 3 */
-    double slope[2][4]; /* dc/dt */
-    double distance;    /* |p| [m] */
-    double normal[3];   /* n; 0 where the primitives touch */
+    double c[4];       /* weights of points 0 1 2 3 */
+    double dcdt[2][4]; /* dc/dt */
+    double distance;   /* |p| [m] */
+    double normal[3];  /* n; 0 where the primitives touch */
 } drape_closest;
 
 /* Derivatives: column 3 i + k is for coordinate k of point i. */
-typedef struct drape_closest_slopes {
+typedef struct drape_closest_derivatives {
     double c[4][12];      /* dc/dx [1/m] */
     double normal[3][12]; /* dn/dx [1/m] */
-} drape_closest_slopes;
+} drape_closest_derivatives;
 
 /* Point 0 and the triangle 1 2 3 (Ericson 2005, 5.1.5). x: the four points. */
 void drape_closest_point_triangle(double x[4][3], drape_closest *at);
@@ -36,6 +36,6 @@ void drape_closest_segments(double x[4][3], drape_closest *at);
  * the former number of each remaining point. */
 void drape_closest_reduce(drape_closest *at, int which[4]);
 
-void drape_closest_derive(double x[4][3], const drape_closest *at, drape_closest_slopes *slopes);
+void drape_closest_derive(double x[4][3], const drape_closest *at, drape_closest_derivatives *derivatives);
 
 #endif

@@ -151,6 +151,7 @@ void drape_implicit_audit(drape_implicit *s, const drape_state *in, const drape_
     info->pin_work += pin_work + drape_implicit_collider_work(s, in->t, out->t);
     if (!s->dissipated)
         return;
+    /* From here on the forces on colliders, whose work was added above, are their dissipative part. */
     drape_system_dissipation(e->system, &e->point, s->dissipated);
     for (size_t i = 0; i < e->nodes; i++)
         info->dissipated += s->dissipated[i] * (out->x[i] - in->x[i]);

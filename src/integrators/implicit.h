@@ -34,8 +34,8 @@ void drape_implicit_archive(void *state, drape_archive *a);
 size_t drape_implicit_bytes(const void *state);
 void drape_implicit_destroy(void **state);
 
-/* The nodes for a step or stage that begins at `in`: free nodes at their positions there, with zero
- * velocity; pinned nodes where their tracks are at time t, with their mean velocity over span. */
+/* The nodes for a step or stage that begins at `in`: free nodes at in->x with zero velocity;
+ * pinned nodes where their tracks are at time t, with their mean velocity over span. */
 void drape_implicit_place(const drape_implicit *implicit, const drape_state *in, double t, double span,
                           double *x, double *v);
 
@@ -58,7 +58,8 @@ drape_status drape_implicit_solve_from(drape_implicit *implicit, drape_step_info
 /* Copies the report of a solve to info. */
 void drape_implicit_report(const drape_solve_report *report, drape_step_info *info);
 
-/* Work from t0 to t1 of the forces on moving colliders at the system's last evaluation; 0 without contact. */
+/* Work from t0 to t1 of the forces on moving colliders that drape_system_on_colliders returns: after
+ * drape_system_force all forces, after drape_system_dissipation their dissipative part. 0 without contact. */
 double drape_implicit_collider_work(const drape_implicit *implicit, double t0, double t1);
 
 /* Work over a step of dissipative forces on all nodes, and of moved pins against g, where the equation was

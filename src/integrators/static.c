@@ -52,7 +52,7 @@ static void set_equation(static_state *s, const double *x, double mass_weight)
     e->point.weight = 0;
     e->point.span[0] = e->point.t;
     e->mass_weight = mass_weight;
-    e->x_start = NULL;
+    e->x_start = NULL; /* corrections are too large for forces to first order in them */
     memcpy(e->x_base, x, e->nodes * sizeof *e->x_base);
     memset(e->v_base, 0, e->nodes * sizeof *e->v_base);
     memset(e->inertia, 0, e->dofs * sizeof *e->inertia);

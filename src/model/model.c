@@ -113,6 +113,21 @@ void drape_model_place_pins(const drape_model *model, double t, double *x)
     }
 }
 
+int drape_model_couplings(const drape_model *model, drape_coupling *couplings)
+{
+    bool features = false;
+    int count = 0;
+    for (int32_t i = 0; i < model->term_count; i++)
+        if (drape_term_couples(&model->terms[i]))
+            couplings[count++] = drape_term_coupling(&model->terms[i]);
+    for (int32_t i = 0; i < model->collider_count; i++)
+        features = features || model->colliders[i].shape.point_count > 0;
+    if (features)
+        couplings[count++] =
+            (drape_coupling){.count = model->triangle_count, .nodes = 3, .node = model->triangle};
+    return count;
+}
+
 int32_t drape_model_cloth_of(const drape_model *model, int32_t node)
 {
     int32_t c = 0;

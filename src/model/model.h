@@ -135,6 +135,10 @@ struct drape_model {
  * unchanged. */
 void drape_model_place_pins(const drape_model *model, double t, double *x);
 
+/* Lists what couples nodes of the model in every state: the terms and, if a collider has features that the
+ * faces and edges of cloth can touch, the triangles. couplings: of term_count + 1. Returns their number. */
+int drape_model_couplings(const drape_model *model, drape_coupling *couplings);
+
 /* Returns the cloth that a node belongs to. */
 int32_t drape_model_cloth_of(const drape_model *model, int32_t node);
 

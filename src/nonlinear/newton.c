@@ -21,6 +21,11 @@
  * KINSOL gets from its linear solver is the step to be taken. KINSOL's own line search can neither stop at
  * contact nor ask for another matrix, and it measures progress by the sum of squares of F, in which stiff
  * stretching outweighs all other forces.
+ *
+ * Two parts of `correct` are off in some models. With contact, a correction is neither lengthened nor
+ * completed by chord steps: only p itself, up to its feasible fraction, is known to pass through nothing. Nor
+ * are there chord steps in a solve without stress prediction (of a model without measures, or of an equation
+ * without x_start).
  */
 #include "nonlinear/newton.h"
 
@@ -43,11 +48,11 @@
 #define MAX_NEWTON_STEP 1e3
 #define MAX_BETA_FAIL   1000 /* failures of its line search's curvature condition: in effect unlimited */
 
-#define WORK_FRACTION  0.5  /* of the initial work along a correction, at which the line search ends */
+#define WORK_FRACTION  0.5  /* a is accepted where |F(d + a p) . p| is at most this fraction of its start */
 #define MAX_TRIALS     8    /* of the line search */
 #define SHORT_STEP     0.5  /* after a shorter step the next matrix is positive semidefinite */
-#define MIN_SHARE      1e-3 /* of the positive parts: the smallest share tried on an indefinite matrix */
-#define SHARE_GROWTH   4    /* from one try to the next */
+#define MIN_SHARE      1e-3 /* of the positive parts: floor of the first share tried, half of the last one */
+#define SHARE_GROWTH   4    /* from one share tried to the next */
 #define MAX_PREDICTION 8    /* corrections in a solve, after which stress is no longer predicted */
 #define MAX_CHORDS     2    /* chord steps for each correction */
 
@@ -69,8 +74,8 @@ struct drape_newton {
 
     /* Kept between the iterations of one solve. */
     int corrections;
-    double positive_share; /* of the positive parts in the present matrix; after a line search, in the next
-                              one */
+    double positive_share; /* of the positive parts, requested for the present matrix; after a line search,
+                              for the next one; with `project` every matrix has all of them */
     bool trial_evaluated;  /* the last evaluation was at `trial`, and F is finite there */
     drape_status failure;  /* < 0: why a callback ended the solve, of which KINSOL keeps only the sign */
 };
@@ -174,7 +179,6 @@ static drape_status assemble(drape_newton *s, const double *d, double positive_s
     drape_step_equation_jacobian(e, drape_stress_predictor_stress(&s->predictor),
                                  s->values[DRAPE_NEWTON_PROJECT] != 0 ? 1 : positive_share,
                                  s->linear->values);
-    s->factored_mass_weight = e->mass_weight;
     e->work.jacobian_seconds += jacobian_clock(s) - start;
     return DRAPE_OK;
 }
@@ -189,12 +193,20 @@ static int jacobian(N_Vector d, N_Vector f, SUNMatrix matrix, void *user, N_Vect
 
 /* ---- Factor ---- */
 
+/* Factors the assembled matrix; definite: only if it is positive definite, else DRAPE_RETRY_LINEAR. */
+static drape_status factor_matrix(drape_newton *s, bool definite)
+{
+    drape_status status = drape_sun_linear_factor(s->linear, definite);
+    s->factored_mass_weight = status ? 0 : s->equation->mass_weight;
+    return status;
+}
+
 /* Assembles and factors J at the present iterate with a share of the positive parts. With share 1 it is
  * factored in any case, with less only if it is positive definite, else the result is DRAPE_RETRY_LINEAR. */
 static drape_status factor_with_share(drape_newton *s, double share)
 {
     drape_status status = assemble(s, N_VGetArrayPointer(s->unknown), share);
-    return status ? status : drape_sun_linear_factor(s->linear, share < 1);
+    return status ? status : factor_matrix(s, share < 1);
 }
 
 /* An indefinite matrix gives useless directions. With the whole positive parts they are descent directions,
@@ -205,7 +217,7 @@ static int factor(SUNLinearSolver solver, SUNMatrix matrix)
     (void)matrix;
     drape_newton *s = ((drape_sun_linear *)solver->content)->owner;
     bool repairs = s->searches && s->positive_share == 0;
-    drape_status status = drape_sun_linear_factor(s->linear, repairs);
+    drape_status status = factor_matrix(s, repairs);
     if (status != DRAPE_RETRY_LINEAR || !repairs)
         return return_status(s, status);
     double share = fmax(s->repair_share / 2, MIN_SHARE);
@@ -217,8 +229,8 @@ static int factor(SUNLinearSolver solver, SUNMatrix matrix)
 
 /* ---- Correct ---- */
 
-/* If p is not a descent direction, the matrix is indefinite, which the linear solver could not tell:
- * factors the one with the positive semidefinite parts, which gives a descent direction. */
+/* Not a descent direction: the matrix is indefinite, which the linear solver did not detect. The one with the
+ * whole positive parts is factored instead, and gives p. */
 static drape_status ensure_descent(drape_newton *s, const double *minus_f, double *p)
 {
     if (drape_step_equation_dot(s->equation, minus_f, p) > 0 || s->positive_share == 1)
@@ -228,7 +240,7 @@ static drape_status ensure_descent(drape_newton *s, const double *minus_f, doubl
 }
 
 /* If many corrections have not led to a solution, the sheet is buckling: then forces extrapolated along the
- * last correction are meaningless, and the iteration may cycle. */
+ * last correction are meaningless, the iteration may cycle, and stress is no longer predicted. */
 static void predict_stress(drape_newton *s, const double *p)
 {
     drape_step_equation *e = s->equation;
@@ -245,8 +257,8 @@ static void predict_stress(drape_newton *s, const double *p)
  * is found by doubling and bisection. This is the line search of Matthies & Strang 1979: it needs no
  * energy, so it applies to friction and damping, too. A matrix with positive parts is far too stiff along
  * unstable directions: its corrections are lengthened until the work is small enough, because otherwise a
- * buckling sheet takes a hundred of them. Other corrections are taken whole if they stop short of the
- * minimum. */
+ * buckling sheet takes a hundred of them; but not in models with contact, where only p itself is known to be
+ * feasible. Other corrections are taken whole if they stop short of the minimum. */
 static double search_along(drape_newton *s, const double *d, const double *p, double start)
 {
     drape_step_equation *e = s->equation;
@@ -277,7 +289,7 @@ static double largest(const double *f, size_t n)
 /* Chord steps: if p lowered the residual so far that lowering it by the same factor once or twice more
  * would end the solve, the rest is corrected with the factors that gave p, at a tenth of the cost of an
  * iteration. F is known at d + p; minus_f is -F at d. A chord step that does not lower the residual is
- * undone. */
+ * undone. Chord steps are not tested for contact. */
 static drape_status add_chords(drape_newton *s, const double *d, double *p, const double *minus_f)
 {
     drape_step_equation *e = s->equation;
@@ -322,10 +334,10 @@ static drape_status make_step(drape_newton *s, const double *minus_f, double *p)
         return DRAPE_OK;
     predict_stress(s, p);
     double a = search_along(s, d, p, start);
-    s->positive_share = a < SHORT_STEP ? 1 : 0; /* of the next matrix */
+    s->positive_share = a < SHORT_STEP ? 1 : 0;             /* of the next matrix */
+    const bool chords = !e->x_ahead && s->predictor.active; /* not with contact, nor without prediction */
     if (a == 1)
-        return s->trial_evaluated && !e->x_ahead && s->predictor.active ? add_chords(s, d, p, minus_f)
-                                                                        : DRAPE_OK;
+        return chords && s->trial_evaluated ? add_chords(s, d, p, minus_f) : DRAPE_OK;
     for (size_t i = 0; i < e->dofs; i++)
         p[i] *= a;
     drape_stress_predictor_forget(&s->predictor);
@@ -421,6 +433,7 @@ static drape_status conclude(drape_newton *s, int code, const double *d, drape_s
         return drape_system_status(e->system);
     if (s->failure) {
         report->reason = drape_reason_name(DRAPE_REASON_MEMORY);
+        drape_newton_forget_factors(s); /* the linear solver may have lost them */
         return s->failure;
     }
     if (status)

@@ -8,8 +8,8 @@
 #include "base/param.h"
 #include "nonlinear/step_equation.h"
 
-/* The parameters of integrators that use Newton's method, in the order in which they begin the integrators'
- * lists. */
+/* Indices of the parameters of integrators that use Newton's method, in drape_newton_params and in arrays of
+ * their values. */
 enum {
     DRAPE_NEWTON_DT,
     DRAPE_NEWTON_TOLERANCE,

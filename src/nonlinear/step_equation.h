@@ -31,8 +31,7 @@ typedef struct drape_step_equation {
     double *inertia;         /* free DOFs: p [m] */
     double mass_weight;      /* m_w [1/s2] */
     drape_point point;       /* w, history, internal variables, time; its x and v are those below */
-    const double *x_start;   /* nodes: the beginning of the step or stage; NULL: no stress is predicted,
-                                because corrections are too large for forces to first order in them
+    const double *x_start;   /* nodes: the beginning of the step or stage; NULL: no stress prediction
                                 (stress_predictor.h) */
 
     /* Where it was evaluated last: after a solve that returned a state, at the solution. */

@@ -1,6 +1,6 @@
 /*
- * step.c: the driver. An advance is a loop of propose, attempt, check, judge, accept or reject, each a
- * function here. A step is made in the state `next`: rejecting it discards that state, accepting it
+ * step.c: the driver. An advance is a loop of attempts, each a call of try_step: compute_next, check,
+ * judge, accept or reject. A step is made in the state `next`: rejecting it discards that state, accepting it
  * exchanges `now` and `next`.
  */
 #include "base/clock.h"
@@ -13,7 +13,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* ---- Attempt and check ---- */
+/* ---- Compute and check ---- */
 
 static drape_state *next_state(drape_sim *sim)
 {
@@ -43,7 +43,7 @@ static drape_status check(drape_sim *sim, drape_step_info *info)
                               &info->diagnostic);
 }
 
-static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info *info)
+static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step_info *info)
 {
     drape_state *next = next_state(sim);
     next->t = t1;
@@ -58,10 +58,10 @@ static drape_status attempt(drape_sim *sim, double t1, double h, drape_step_info
     if (status && !info->usable)
         return status;
     info->pin_work += drape_system_push_work(sim->system, drape_sim_state(sim)->x, next->x);
-    drape_status degenerate = check(sim, info);
-    if (degenerate)
+    drape_status refused = check(sim, info);
+    if (refused)
         info->usable = false;
-    return degenerate ? degenerate : status;
+    return refused ? refused : status;
 }
 
 /* ---- Judge ---- */
@@ -269,7 +269,7 @@ static drape_attempt try_step(drape_sim *sim, double t1, double h, drape_status 
     drape_step_info info = {.reason = drape_reason_name(DRAPE_REASON_CONVERGED), .h = h};
     drape_trial trial;
     double t = drape_sim_state(sim)->t;
-    drape_status status = attempt(sim, t1, h, &info);
+    drape_status status = compute_next(sim, t1, h, &info);
     drape_verdict verdict = judge(sim, &info, status, &trial);
     bool refused = status == DRAPE_OK && verdict != DRAPE_ACCEPT; /* by the controller alone */
     *stop = verdict == DRAPE_STOP ? trial.status : DRAPE_OK;
@@ -295,7 +295,7 @@ drape_status drape_sim_step(drape_sim *sim, double t1, double h, drape_attempt *
     drape_status stop = DRAPE_OK;
     double start = drape_clock_seconds(), contact = contact_seconds(sim);
     *attempt = try_step(sim, t1, h, &stop);
-    drape_system_rest(sim->system);
+    drape_system_end_step(sim->system);
     sim->statistics.wall_steps += drape_clock_seconds() - start;
     sim->statistics.wall_contact += contact_seconds(sim) - contact;
     log_rejection(sim, attempt);

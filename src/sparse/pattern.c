@@ -2,6 +2,7 @@
  * sorted and repeats are removed. */
 #include "sparse/pattern.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -142,10 +143,9 @@ drape_status drape_pattern_build(drape_arena *arena, int32_t block_count, const 
     return status;
 }
 
-int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t column)
+/* The block at (row, column) or, if the pattern does not have it, another one of that column. */
+static int32_t search_column(const drape_pattern *pattern, int32_t row, int32_t column)
 {
-    if (row < 0 || column < 0)
-        return -1;
     int32_t low = pattern->block_start[column], high = pattern->block_start[column + 1];
     while (high - low > 1) {
         int32_t middle = low + (high - low) / 2;
@@ -157,9 +157,18 @@ int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t co
     return low;
 }
 
+int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t column)
+{
+    if (row < 0 || column < 0)
+        return -1;
+    const int32_t block = search_column(pattern, row, column);
+    assert(pattern->block_row[block] == row);
+    return block;
+}
+
 bool drape_pattern_has(const drape_pattern *pattern, int32_t row, int32_t column)
 {
-    return pattern->block_row[drape_pattern_find(pattern, row, column)] == row;
+    return pattern->block_row[search_column(pattern, row, column)] == row;
 }
 
 void drape_pattern_place(const drape_pattern *pattern, const int32_t *block_of_node,

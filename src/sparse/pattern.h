@@ -34,7 +34,7 @@ typedef struct drape_coupling {
 drape_status drape_pattern_build(drape_arena *arena, int32_t block_count, const int32_t *block_of_node,
                                  const drape_coupling *couplings, int coupling_count, drape_pattern *pattern);
 
-/* Returns the block at (row, column), which must be in the pattern; -1 if either is -1. */
+/* Returns the number of the block at (row, column), or -1 if either is -1. It must be in the pattern. */
 int32_t drape_pattern_find(const drape_pattern *pattern, int32_t row, int32_t column);
 bool drape_pattern_has(const drape_pattern *pattern, int32_t row, int32_t column); /* both must be >= 0 */
 

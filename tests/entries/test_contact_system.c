@@ -184,6 +184,39 @@ START_TEST(every_collider)
 }
 END_TEST
 
+/* Contact couples the nodes of a triangle even where no term does: all terms here act on single nodes. A
+ * second layer makes contact extend the pattern. */
+START_TEST(colliders_without_terms)
+{
+    static const char *const terms[] = {"[]", "[{'type': 'drag.viscous', 'coefficient': 0.1}]"};
+    enter_folder();
+    for (size_t i = 0; i < SETTINGS; i++)
+        for (int k = 0; k < 8; k++) {
+            char layer[600] = "";
+            if (k / 4)
+                snprintf(
+                    layer, sizeof layer,
+                    ", {'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 0.3, 'height': 0.3,"
+                    " 'transform': {'translate': [-0.14, %g, 0.15]}},"
+                    " 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, 'terms': []}",
+                    settings[i].top + 5e-3);
+            scene s = scene_model(
+                "{'drape': 1, 'cloth': [{'mesh': {'grid': 'square', 'columns': 9, 'rows': 9, 'width': 0.3,"
+                " 'height': 0.3, 'transform': {'translate': [-0.147, %g, 0.155]}}, 'pins': [{'nodes': [3]}],"
+                " 'material': {'young_modulus': 1e3, 'thickness': 1e-3, 'density': 200}, 'terms': %s}%s],"
+                " 'colliders': [{%s, 'friction': 0.4}]%s,"
+                " 'contact': {'distance': 4e-3, 'stiffness': 1e5, 'friction': '%s'}, 'duration': 1}",
+                settings[i].top + 2e-3, terms[k % 2], layer, settings[i].text,
+                k / 4 ? ", 'self_contact': {'thickness': 2e-3, 'friction': 0.4}" : "",
+                k / 2 % 2 ? "lagged" : "implicit");
+            probe t = open_probe(s, 0, 11 + i);
+            check(&t, settings[i].text, 0.02);
+            close_probe(&t);
+        }
+    leave_folder();
+}
+END_TEST
+
 START_TEST(cloth_on_cloth)
 {
     for (int k = 0; k < 2; k++) {
@@ -458,6 +491,6 @@ START_TEST(queries_change_nothing)
 }
 END_TEST
 
-SUITE("contact_system", every_collider, cloth_on_cloth, nan_is_forgotten,
+SUITE("contact_system", every_collider, colliders_without_terms, cloth_on_cloth, nan_is_forgotten,
       only_scenes_with_contact_have_it_checked, scenes_without_contact_pay_nothing, all_bytes_are_counted,
       active_contacts_are_all_pairs, queries_change_nothing)

@@ -83,15 +83,15 @@ static void check_derivatives(setting *s, double e, double limit)
 {
     const drape_gap gap = gap_of(s);
     const drape_configuration at = {.x = s->x};
-    drape_gap_slopes slopes;
+    drape_gap_derivatives derivatives;
     double g[D], h[D * D], f[D], dgdv[D * D] = {0}, dgdx[D * D] = {0}, v[4][3];
     double by_x[D], h_by_x[D * D], f_by_x[D * D], f_by_v[D * D];
-    drape_pair_slopes(&s->pair, &gap, &at, s->rest, &slopes);
+    drape_pair_derivatives(&s->pair, &gap, &at, s->rest, &derivatives);
     memcpy(v, s->v, sizeof v);
     drape_contact_gradient(&gap, &s->law, g);
-    drape_contact_hessian(&gap, &slopes, &s->law, h);
+    drape_contact_hessian(&gap, &derivatives, &s->law, h);
     drape_friction_force(&gap, &s->law, drape_contact_normal_force(&gap, &s->law), v, f, dgdv);
-    drape_friction_slope(&gap, &slopes, &s->law, v, dgdx);
+    drape_friction_add_dgdx(&gap, &derivatives, &s->law, v, dgdx);
     for (int j = 0; j < D; j++) {
         double g_[2][D], f_[2][D], energy[2], w_[2][D], unused[D], x = s->x[j], u = s->v[j];
         for (int side = 0; side < 2; side++) {
