@@ -425,7 +425,7 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
         double energy = 0;
         if (has_energy(system, term))
             drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
-        *(term->ops->potential_of_gravity ? gravity : elastic) += energy;
+        *(term->ops->external ? gravity : elastic) += energy;
     }
     *elastic += drape_drag_spring_energy(&system->drag, point->x);
 }
@@ -437,7 +437,7 @@ void drape_system_node_energy(drape_system *system, const drape_point *point, do
     memset(energy, 0, (size_t)system->model->node_count * sizeof *energy);
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
-        if (!term->ops->potential_of_gravity && has_energy(system, term))
+        if (!term->ops->external && has_energy(system, term))
             drape_summer_add_term(system->summer, term, &want, &to, NULL);
     }
 }

@@ -858,8 +858,9 @@ START_TEST(elements_of_a_user_defined_term_are_checked)
         const char *says;
     } cases[] = {
         {forgets, DRAPE_E_ARGUMENT, "host.attract announced 2 elements and did not set element 1"},
-        {strays, DRAPE_E_ARGUMENT, "host.attract set an element beyond the 1 that it announced"},
-        {announces_nothing, DRAPE_E_ARGUMENT, "host.attract set an element beyond the 0 that it announced"},
+        {strays, DRAPE_E_ARGUMENT, "host.attract set an element outside of the 1 that it announced"},
+        {announces_nothing, DRAPE_E_ARGUMENT,
+         "host.attract set an element outside of the 0 that it announced"},
         {says_nothing, DRAPE_E_FILE, "/cloth/0/terms/0: build() of \"host.attract\" returned e_file"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
