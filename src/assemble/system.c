@@ -581,7 +581,7 @@ static void archive_drag_spring(drape_system *system, drape_archive *a)
     drape_archive_int32(a, &spring->node);
     drape_archive_double(a, &spring->stiffness);
     drape_archive_doubles(a, spring->target, 3);
-    if (drape_archive_is_reading(a) && spring->stiffness > 0 &&
+    if (drape_archive_has_read(a) && spring->stiffness > 0 &&
         (spring->node < 0 || spring->node >= m->node_count || m->pinned[spring->node]))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pulls node %d, which is not free",
                            (int)spring->node);
@@ -593,7 +593,7 @@ static void archive_push(drape_system *system, drape_archive *a)
     drape_archive_bool(a, &system->pushed);
     if (system->pushed)
         drape_archive_doubles(a, system->push, n);
-    if (drape_archive_is_reading(a) && !drape_all_finite(system->push, n))
+    if (drape_archive_has_read(a) && !drape_all_finite(system->push, n))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pushes with a force that is not finite");
 }
 
@@ -611,7 +611,7 @@ void drape_system_archive(drape_system *system, drape_archive *a)
     if (contact)
         drape_contact_archive(system->contact, a);
     drape_archive_bool(a, &extended);
-    if (!drape_archive_is_reading(a) || !contact || !extended)
+    if (!drape_archive_has_read(a) || !contact || !extended)
         return;
     int32_t pairs = drape_contact_coupled(system->contact, &nodes);
     drape_archive_note(a, extend(system, pairs, nodes));
