@@ -139,7 +139,8 @@ typedef struct drape_entry {
 
 /* ---- The data that a term is built from ---- */
 
-/* Resolved stiffness and mass of a sheet, in SI units. */
+/* Resolved stiffness and mass of a sheet, in SI units. Allocated by the library alone: it may grow at its
+ * end. */
 typedef struct drape_material {
     double young_modulus, poisson_ratio, thickness; /* [Pa], [1], [m] */
     double areal_density;      /* [kg/m2]; the total mass divided by the area if the mass is uniform over
@@ -177,8 +178,8 @@ typedef struct drape_cloth_view {
     const double *node_mass;      /* (node_count) lumped [kg] */
     int32_t rows, columns;        /* of a grid, in nodes: node r * columns + c; 0 for other meshes */
     bool rectangular;             /* the mesh is a grid whose cells are rectangles before its transform */
-    drape_material material;      /* of the sheet */
-    double gravity[3];            /* [m/s2] */
+    const drape_material *material;       /* of the sheet */
+    double gravity[3];                    /* [m/s2] */
     const drape_woven *tension, *bending; /* of a measured fabric; NULL: use material */
 } drape_cloth_view;
 
@@ -247,15 +248,16 @@ typedef struct drape_fault {
  * output pointer may be NULL: that output is not needed.
  */
 typedef struct drape_term_ops {
-    size_t struct_size;        /* the author's sizeof(drape_term_ops) */
-    drape_entry entry;         /* its reference is the paper and equation of the formula */
-    const char *element_name;  /* "edge", "hinge", "node": for messages */
-    int nodes;                 /* nodes per element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
-    bool linear;               /* energy: its Hessian is zero and needs no sparsity */
-    bool potential_of_gravity; /* energy: an external force that counts as gravity, not as elastic */
-    bool convex;               /* measure: its Hessian ddq is positive semidefinite, as that of a length is */
-    bool has_internal;         /* each element has internal variables */
-    int internal_count;        /* internal variables per element, stored consecutively; 0 means 1 */
+    size_t struct_size;       /* the author's sizeof(drape_term_ops) */
+    drape_entry entry;        /* its reference is the paper and equation of the formula */
+    const char *element_name; /* "edge", "hinge", "node": for messages */
+    int nodes;                /* nodes per element, 1 to DRAPE_MAX_ELEMENT_NODES; 0 for a law */
+    bool linear;              /* energy: its Hessian is zero and needs no sparsity */
+    bool external;     /* energy: the potential of an external load. It is counted under the energy of gravity
+                      instead of the elastic energy, and its forces may have a resultant and a torque */
+    bool convex;       /* measure: its Hessian ddq is positive semidefinite, as that of a length is */
+    bool has_internal; /* each element has internal variables */
+    int internal_count; /* internal variables per element, stored consecutively; 0 means 1 */
     bool constraint; /* an energy that enforces a limit; integrators that enforce limits by moving nodes omit
                         it */
     bool damped;     /* measure: each element has a dashpot of its own, with force c q' on q */
@@ -324,6 +326,10 @@ typedef struct drape_term_ops {
      * omits force ddq, and with it the stiffness that tension causes. */
     void (*positive)(const drape_elements *el, int32_t first, int32_t count, const double *x,
                      const double *internal, const double *force, double *ddq);
+
+    /* The gravity of the scene adds this term to every cloth unless it is zero. A scene must not name the
+     * term, which has no required parameters. */
+    bool from_scene_gravity;
 } drape_term_ops;
 
 /* Registers a user-defined term, which scenes compiled with this context may then use by name. *ops is

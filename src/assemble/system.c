@@ -422,7 +422,7 @@ void drape_system_energy(drape_system *system, const drape_point *point, double 
         double energy = 0;
         if (has_energy(system, term))
             drape_summer_add_term(system->summer, term, &want, &(drape_sums){0}, &energy);
-        *(term->ops->potential_of_gravity ? gravity : elastic) += energy;
+        *(term->ops->external ? gravity : elastic) += energy;
     }
     *elastic += drape_drag_spring_energy(&system->drag, point->x);
 }
@@ -434,7 +434,7 @@ void drape_system_node_energy(drape_system *system, const drape_point *point, do
     memset(energy, 0, (size_t)system->model->node_count * sizeof *energy);
     for (int32_t i = 0; i < system->model->term_count; i++) {
         const drape_term *term = &system->model->terms[i];
-        if (!term->ops->potential_of_gravity && has_energy(system, term))
+        if (!term->ops->external && has_energy(system, term))
             drape_summer_add_term(system->summer, term, &want, &to, NULL);
     }
 }
@@ -578,7 +578,7 @@ static void archive_drag_spring(drape_system *system, drape_archive *a)
     drape_archive_int32(a, &spring->node);
     drape_archive_double(a, &spring->stiffness);
     drape_archive_doubles(a, spring->target, 3);
-    if (drape_archive_is_reading(a) && spring->stiffness > 0 &&
+    if (drape_archive_has_read(a) && spring->stiffness > 0 &&
         (spring->node < 0 || spring->node >= m->node_count || m->pinned[spring->node]))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pulls node %d, which is not free",
                            (int)spring->node);
@@ -590,7 +590,7 @@ static void archive_push(drape_system *system, drape_archive *a)
     drape_archive_bool(a, &system->pushed);
     if (system->pushed)
         drape_archive_doubles(a, system->push, n);
-    if (drape_archive_is_reading(a) && !drape_all_finite(system->push, n))
+    if (drape_archive_has_read(a) && !drape_all_finite(system->push, n))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pushes with a force that is not finite");
 }
 
@@ -608,7 +608,7 @@ void drape_system_archive(drape_system *system, drape_archive *a)
     if (contact)
         drape_contact_archive(system->contact, a);
     drape_archive_bool(a, &extended);
-    if (!drape_archive_is_reading(a) || !contact || !extended)
+    if (!drape_archive_has_read(a) || !contact || !extended)
         return;
     int32_t pairs = drape_contact_last_couplings(system->contact, &nodes);
     drape_archive_note(a, extend(system, pairs, nodes));

@@ -70,8 +70,10 @@ static inline bool drape_archive_good(const drape_archive *a)
     return a->status == DRAPE_OK;
 }
 
-/* Whether the archive is reading and no failure has occurred. */
-static inline bool drape_archive_is_reading(const drape_archive *a)
+/* Whether the archive is reading and no failure has occurred, so that the values named so far were read and
+ * can be checked and used. The member `reading` is only the direction: it is also true after a failure, when
+ * values are left as they were. */
+static inline bool drape_archive_has_read(const drape_archive *a)
 {
     return a->reading && a->status == DRAPE_OK;
 }

@@ -23,21 +23,21 @@ drape_arena *drape_arena_create(drape_context *ctx);
 void drape_arena_destroy(drape_arena **arena); /* frees everything and sets *arena to NULL; a NULL arena is
                                                   allowed */
 
-/* Returns an empty arena for a part of its owner that is rebuilt while the owner lives. It is freed
- * separately, before the owner, whose byte count includes it. The owner must keep its address. */
+/* Returns a sub-arena that can be emptied alone, for a part of the owner that is rebuilt while the owner
+ * lives. Its bytes count in the owner, whose address must not change. It must be freed before the owner. */
 drape_arena drape_arena_within(drape_arena *owner);
 
-/* As drape_alloc: count x size bytes, zeroed, valid until drape_arena_free. Returns NULL with a message if
- * memory is out. */
+/* Allocates count x size bytes, zeroed, valid until drape_arena_free. Returns NULL with a message if memory
+ * is out. */
 void *drape_arena_take(drape_arena *arena, size_t count, size_t size);
 char *drape_arena_text(drape_arena *arena, const char *text); /* a copy of text */
 
-/* Resizes memory (from this arena, or NULL) to count x size bytes. Contents are kept as far as they fit;
- * bytes beyond the former size are zero. Returns NULL with a message if memory is out; memory is then
- * unchanged. */
+/* Resizes memory of this arena to count x size bytes and returns its new address; NULL is resized like 0
+ * bytes. Contents are kept as far as they fit; added bytes are zero. Returns NULL with a message if memory is
+ * out; the old memory is then unchanged. */
 void *drape_arena_resize(drape_arena *arena, void *memory, size_t count, size_t size);
 
-/* Frees memory of this arena before the rest. NULL is allowed. */
+/* Frees one allocation early. NULL is allowed. */
 void drape_arena_release(drape_arena *arena, void *memory);
 
 /* Returns DRAPE_E_MEMORY if any allocation failed: a caller can make several and check once. */

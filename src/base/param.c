@@ -283,7 +283,7 @@ static drape_status text_value(drape_context *ctx, const char *pointer, const dr
     drape_param_takes_text(param, takes, sizeof takes);
     const char *meant = drape_did_you_mean(text, param->choices, count);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "%s is not allowed; %s is %s%s%s%s", given,
-                         param->name, takes, DRAPE_MEANT(meant));
+                         param->name, takes, DRAPE_DID_YOU_MEAN(meant));
 }
 
 drape_status drape_param_value(drape_context *ctx, const char *pointer, const drape_param *param,
@@ -304,7 +304,7 @@ static drape_status unknown_name(drape_context *ctx, const char *pointer, const 
         names[i] = params[i].name;
     const char *meant = drape_did_you_mean(name, names, (size_t)param_count);
     return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown key \"%.60s\"%s%s%s", name,
-                         DRAPE_MEANT(meant));
+                         DRAPE_DID_YOU_MEAN(meant));
 }
 
 drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param)

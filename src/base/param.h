@@ -60,7 +60,8 @@ void drape_number_text(double number, char *text, size_t size);
  * misspelling. */
 const char *drape_did_you_mean(const char *word, const char *const *candidates, size_t count);
 
-/* Arguments for three %s at the end of a message: `; did you mean "x"?`, or nothing if meant is NULL. */
-#define DRAPE_MEANT(meant) (meant) ? "; did you mean \"" : "", (meant) ? (meant) : "", (meant) ? "\"?" : ""
+/* Arguments for three %s at the end of a message, which say `; did you mean "x"?` for a result of
+ * drape_did_you_mean, and nothing if that is NULL. */
+#define DRAPE_DID_YOU_MEAN(name) (name) ? "; did you mean \"" : "", (name) ? (name) : "", (name) ? "\"?" : ""
 
 #endif

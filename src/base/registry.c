@@ -6,8 +6,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAX_NAMES  128 /* names that a message lists */
-#define NAMES_SIZE 800 /* bytes of that list; leaves room for the suggestion after it */
+#define MAX_NAMES 128 /* maximum number of names that a message lists */
+#define NAMES_SIZE                                                                                           \
+    800 /* [bytes] of their list; in DRAPE_UNKNOWN_SIZE it leaves room for a suggestion after it */
 
 int drape_registry_count(const drape_registry *registry)
 {
@@ -48,7 +49,7 @@ void drape_registry_unknown(const drape_registry *registry, const drape_context 
     }
     const char *meant = drape_did_you_mean(name, names, count);
     snprintf(text, DRAPE_UNKNOWN_SIZE, "there is no %s \"%.60s\"; there are %s%s%s%s", registry->noun, name,
-             list, DRAPE_MEANT(meant));
+             list, DRAPE_DID_YOU_MEAN(meant));
 }
 
 drape_status drape_registry_choose(drape_context *ctx, const drape_registry *registry, const char *pointer,

@@ -295,7 +295,7 @@ static int unknown_name(const char *name)
     }
     const char *meant = drape_did_you_mean(name, names, count);
     return cli_misuse("list", "there is no table and no entry \"%.60s\"%s%s%s; `drape list` shows all", name,
-                      DRAPE_MEANT(meant));
+                      DRAPE_DID_YOU_MEAN(meant));
 }
 
 /* name: of a table, of an entry or of an object of a scene; NULL: all tables, the keys of a scene first. */

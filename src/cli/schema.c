@@ -227,10 +227,10 @@ static json_t *with_required(json_t *required, const drape_entry *entry)
     return required;
 }
 
-/* Gravity is a term where the scene's gravity is not zero: scenes do not name it. */
+/* Whether the scene's gravity adds the entry, a term, so that scenes do not name it. */
 static bool is_implied(const drape_registry *table, int index)
 {
-    return table == &drape_term_registry && drape_terms[index]->potential_of_gravity;
+    return table == &drape_term_registry && drape_terms[index]->from_scene_gravity;
 }
 
 /* The entries that a scene may name; `alone`: without parameters beside the name. */

@@ -26,9 +26,12 @@ drape_status drape_shape_reserve(drape_collider_shape *shape, int32_t points, in
                                  int32_t triangles)
 {
     struct drape_shape_builder *builder = shape->builder;
-    if (points < 0 || segments < 0 || triangles < 0 || builder->reserved)
+    if (builder->reserved)
         return drape_fail_at(builder->ctx, DRAPE_E_ARGUMENT, builder->pointer,
-                             "the shape announced %d points, %d segments, %d triangles, or twice",
+                             "the shape announced its parts twice");
+    if (points < 0 || segments < 0 || triangles < 0)
+        return drape_fail_at(builder->ctx, DRAPE_E_ARGUMENT, builder->pointer,
+                             "the shape announced %d points, %d segments, %d triangles; none may be negative",
                              (int)points, (int)segments, (int)triangles);
     builder->reserved = true;
     shape->point_count = points;

@@ -1,5 +1,5 @@
-/* build_terms.c: terms by name, their parameters and elements; connects laws to the measures of their
- * cloth. */
+/* build_terms.c: finds the terms of each cloth by name, resolves their parameters, has them build their
+ * elements, and connects laws to the measures of their cloth. */
 #include "compile/stages.h"
 #include "terms/terms.h"
 
@@ -12,9 +12,10 @@ struct drape_term_builder {
     drape_term *term;
     const char *pointer;
     int32_t first_node, node_count;
-    int32_t *node; /* the arrays of the elements while they are filled; node -1: not set yet */
+    bool reserved; /* the term has announced its elements */
+    int32_t *node; /* the arrays of elements.node and elements.rest, writable; node -1: not set yet */
     double *rest;
-    bool beyond; /* the term set an element that it had not announced */
+    bool strayed; /* the term set an element outside the range that it announced */
 };
 
 drape_status drape_term_reserve(drape_term_builder *builder, int32_t element_count, int rest_count)
@@ -27,10 +28,15 @@ drape_status drape_term_reserve_nodes(drape_term_builder *builder, int32_t eleme
 {
     drape_elements *el = &builder->term->elements;
     drape_arena *arena = &builder->model->arena;
-    if (element_count < 0 || rest_count < 0 || nodes < 1 || nodes > builder->term->ops->nodes || el->node)
-        return drape_term_refuse(
-            builder, "the term announced %d elements of %d nodes with %d numbers of rest data, or twice",
-            (int)element_count, nodes, rest_count);
+    if (builder->reserved)
+        return drape_term_refuse(builder, "%s announced its elements twice", builder->term->ops->entry.name);
+    if (element_count < 0 || rest_count < 0 || nodes < 1 || nodes > builder->term->ops->nodes)
+        return drape_term_refuse(builder,
+                                 "%s announced %d elements of %d nodes with %d numbers of rest data; nodes "
+                                 "are 1 to %d, and no count is negative",
+                                 builder->term->ops->entry.name, (int)element_count, nodes, rest_count,
+                                 builder->term->ops->nodes);
+    builder->reserved = true;
     el->count = element_count;
     el->nodes = nodes;
     el->rest_count = rest_count;
@@ -53,7 +59,7 @@ void drape_term_set(drape_term_builder *builder, int32_t element, const int32_t 
 {
     const drape_elements *el = &builder->term->elements;
     if (!builder->node || !builder->rest || element < 0 || element >= el->count) {
-        builder->beyond = true;
+        builder->strayed = true;
         return;
     }
     for (int a = 0; a < el->nodes; a++)
@@ -105,7 +111,7 @@ static drape_cloth_view view_of(const drape_model *model, const drape_cloth *clo
                               .rows = m->rows,
                               .columns = m->columns,
                               .rectangular = m->rectangular,
-                              .material = cloth->material,
+                              .material = &cloth->material,
                               .gravity = {model->gravity[0], model->gravity[1], model->gravity[2]},
                               .tension = cloth->tension.warp > 0 ? &cloth->tension : NULL,
                               .bending = cloth->bending.warp > 0 ? &cloth->bending : NULL};
@@ -120,8 +126,8 @@ static drape_status check_elements(drape_term_builder *builder)
         return drape_term_refuse(builder, "%s has %d numbers of rest data an element; its kind needs %d",
                                  ops->entry.name, el->rest_count, needed);
     int32_t first = builder->first_node, last = first + builder->node_count - 1;
-    if (builder->beyond)
-        return drape_term_refuse(builder, "%s set an element beyond the %d that it announced",
+    if (builder->strayed)
+        return drape_term_refuse(builder, "%s set an element outside of the %d that it announced",
                                  ops->entry.name, (int)el->count);
     for (size_t i = 0; i < (size_t)el->count; i++)
         if (el->node[i * (size_t)el->nodes] == -1)
@@ -135,13 +141,13 @@ static drape_status check_elements(drape_term_builder *builder)
     return DRAPE_OK;
 }
 
-static drape_status build_term(drape_model *model, int32_t c, const char *pointer, const drape_entry_def *def)
+static drape_status build_term(drape_model *model, int32_t c, const char *pointer, const drape_term_ops *ops,
+                               const drape_entry_def *def)
 {
     drape_term *term = &model->terms[model->term_count];
     drape_cloth *cloth = &model->cloths[c];
     drape_status status = drape_check_cancel(model->ctx);
-    if (!status)
-        status = find_term(model->ctx, pointer, def->type, &term->ops);
+    term->ops = ops;
     for (int32_t i = 0; !status && i < model->term_count; i++)
         if (model->terms[i].cloth == c && model->terms[i].ops == term->ops)
             status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer, "the term \"%s\" is named twice",
@@ -173,26 +179,60 @@ static drape_status build_term(drape_model *model, int32_t c, const char *pointe
     return status ? status : check_elements(&builder);
 }
 
-/* Builds the terms that the scene names, then gravity if it is not zero. */
+/* The term number i, first the built-in ones, then those of the context's user; NULL after the last. */
+static const drape_term_ops *term_at(const drape_context *ctx, int i)
+{
+    const int built_in = drape_registry_count(&drape_term_registry), user_defined = i - built_in;
+    if (i < built_in)
+        return drape_terms[i];
+    return user_defined < ctx->host_term_count ? &ctx->host_terms[user_defined] : NULL;
+}
+
+/* The number of terms that the scene's gravity adds to every cloth. */
+static size_t count_implied(const drape_context *ctx)
+{
+    const drape_term_ops *ops;
+    size_t count = 0;
+    for (int i = 0; (ops = term_at(ctx, i)) != NULL; i++)
+        count += ops->from_scene_gravity;
+    return count;
+}
+
+/* Builds a term that the scene names. */
+static drape_status build_named(drape_model *model, int32_t c, const char *pointer,
+                                const drape_entry_def *def)
+{
+    const drape_term_ops *ops;
+    drape_status status = find_term(model->ctx, pointer, def->type, &ops);
+    if (status)
+        return status;
+    if (ops->from_scene_gravity)
+        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
+                             "%s is modelled where the scene's \"gravity\" is not zero; "
+                             "leave it out of the terms",
+                             ops->entry.name);
+    return build_term(model, c, pointer, ops, def);
+}
+
+/* Builds the terms that the scene names, then those that its gravity adds if it is not zero. */
 static drape_status build_cloth(drape_model *model, int32_t c, const drape_cloth_def *def)
 {
     const double *g = model->gravity;
+    const bool has_gravity = g[0] != 0 || g[1] != 0 || g[2] != 0;
+    const drape_term_ops *ops;
     drape_status status = DRAPE_OK;
     char pointer[128];
-    model->cloths[c].laws = drape_arena_take(&model->arena, def->term_count, sizeof *model->cloths[c].laws);
+    model->cloths[c].laws = drape_arena_take(&model->arena, def->term_count + count_implied(model->ctx),
+                                             sizeof *model->cloths[c].laws);
     if (!model->cloths[c].laws)
         return DRAPE_E_MEMORY;
     for (size_t i = 0; !status && i < def->term_count; i++) {
         snprintf(pointer, sizeof pointer, "/cloth/%d/terms/%zu", (int)c, i);
-        if (strcmp(def->terms[i].type, "gravity") == 0)
-            status = drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                                   "gravity is modelled where the scene's \"gravity\" is not zero; "
-                                   "leave it out of the terms");
-        else
-            status = build_term(model, c, pointer, &def->terms[i]);
+        status = build_named(model, c, pointer, &def->terms[i]);
     }
-    if (!status && (g[0] != 0 || g[1] != 0 || g[2] != 0))
-        status = build_term(model, c, "/gravity", &(drape_entry_def){.type = "gravity"});
+    for (int i = 0; !status && has_gravity && (ops = term_at(model->ctx, i)) != NULL; i++)
+        if (ops->from_scene_gravity)
+            status = build_term(model, c, "/gravity", ops, &(drape_entry_def){.type = ops->entry.name});
     return status;
 }
 
@@ -207,33 +247,37 @@ static const double *own_damping(const drape_term *term)
     return NULL;
 }
 
-/* Assigns indices in the lists of measures and internal variables, and connects laws to the measures of their
- * cloth. */
-static drape_status tie(drape_model *model, int32_t c)
+/* Assigns the indices of internal variables in a state, and of measures in the list of all measures. */
+static void number_elements(drape_model *model, drape_term *term)
+{
+    if (term->ops->has_internal) {
+        term->first_internal = model->internal_count;
+        model->internal_count += (int64_t)term->elements.count * drape_term_internals(term);
+    }
+    if (term->ops->measure) {
+        term->first_measure = model->measure_count;
+        model->measure_count += term->elements.count;
+    }
+}
+
+/* Connects the laws of a cloth to its measures, of which there must be one if there are laws. */
+static drape_status connect_laws(drape_model *model, int32_t c)
 {
     drape_cloth *cloth = &model->cloths[c];
     bool measured = false;
+    char pointer[64];
     for (int32_t i = 0; i < model->term_count; i++) {
         drape_term *term = &model->terms[i];
-        if (term->cloth != c)
+        if (term->cloth != c || !term->ops->measure)
             continue;
-        if (term->ops->has_internal) {
-            term->first_internal = model->internal_count;
-            model->internal_count += (int64_t)term->elements.count * drape_term_internals(term);
-        }
-        if (term->ops->measure) {
-            measured = true;
-            term->first_measure = model->measure_count;
-            model->measure_count += term->elements.count;
-            term->laws = cloth->laws;
-            term->law_count = cloth->law_count;
-            term->damping = own_damping(term);
-            model->has_laws = model->has_laws || term->damping;
-            model->has_dissipation = model->has_dissipation || term->damping;
-        }
+        measured = true;
+        term->laws = cloth->laws;
+        term->law_count = cloth->law_count;
+        term->damping = own_damping(term);
+        model->has_laws = model->has_laws || term->damping;
+        model->has_dissipation = model->has_dissipation || term->damping;
     }
     model->has_laws = model->has_laws || cloth->law_count > 0;
-    char pointer[64];
     snprintf(pointer, sizeof pointer, "/cloth/%d/terms", (int)c);
     if (cloth->law_count > 0 && !measured)
         return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
@@ -247,15 +291,17 @@ drape_status drape_compile_terms(drape_model *model, const drape_scene_def *def)
     size_t count = 0;
     drape_status status = DRAPE_OK;
     for (size_t c = 0; c < def->cloth_count; c++)
-        count += def->cloths[c].term_count + 1; /* + 1 for gravity */
+        count += def->cloths[c].term_count + count_implied(model->ctx);
     model->terms = drape_arena_take(&model->arena, count, sizeof *model->terms);
     if (!model->terms)
         return DRAPE_E_MEMORY;
     for (int32_t c = 0; !status && c < model->cloth_count; c++) {
         status = build_cloth(model, c, &def->cloths[c]);
         if (!status)
-            status = tie(model, c);
+            status = connect_laws(model, c);
     }
+    for (int32_t i = 0; !status && i < model->term_count; i++)
+        number_elements(model, &model->terms[i]);
     return status;
 }
 

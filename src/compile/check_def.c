@@ -1,5 +1,6 @@
-/* check_def.c: checks a scene def filled by a host along the keys of a scene. It may contain NULL where a
- * value is required, or values that no scene file could give; later stages need not check for them again. */
+/* check_def.c: checks a scene def that a host filled, key by key (model/scene_keys.c). Such a def may have
+ * NULL where a value is required, or values that the reader of scene files refuses. Later stages rely on
+ * these checks and do not repeat them. */
 #include "compile/stages.h"
 
 #include <math.h>
@@ -45,7 +46,8 @@ static drape_status check_value(checker *c, const drape_scene_key *key, const ch
 
 static drape_status check_object(checker *c, const drape_scene_object *object, const char *def);
 
-/* Integers of a list and the keys of a track are checked where they are used. */
+/* Checks the length of an array, and its elements if they are objects or texts. Elements of other arrays,
+ * node numbers and the keys of tracks, are checked where they are used. */
 static drape_status check_array(checker *c, const drape_scene_key *key, const char *def)
 {
     const size_t mark = c->at.length;

@@ -25,13 +25,23 @@ static void archive_couplings(drape_contact *c, drape_archive *a)
     }
 }
 
-/* Whether positions are finite, as a search needs. */
+static bool are_finite(const drape_collider_pose *pose, int32_t count)
+{
+    for (int32_t i = 0; i < count; i++)
+        if (!drape_all_finite(pose[i].displacement, 3) || !drape_all_finite(pose[i].velocity, 3))
+            return false;
+    return true;
+}
+
+/* Whether positions and poses are finite, as a search needs. */
 static bool is_valid(const drape_contact *c)
 {
     const size_t n = 3 * (size_t)c->broad.points;
     return drape_all_finite(c->step_candidates.x, n) && drape_all_finite(c->start, n) &&
-           c->step_candidates.margin >= 0 && c->step_candidates.margin <= c->model->length &&
-           c->next_margin >= 0 && c->next_margin <= c->model->length;
+           are_finite(c->step_candidates.pose, c->model->collider_count) &&
+           are_finite(c->start_pose, c->model->collider_count) && c->step_candidates.margin >= 0 &&
+           c->step_candidates.margin <= c->model->length && c->next_margin >= 0 &&
+           c->next_margin <= c->model->length;
 }
 
 /* The active set at the beginning of the step depends on the positions alone, so a new search finds the
@@ -78,10 +88,10 @@ void drape_contact_archive(drape_contact *c, drape_archive *a)
     archive_couplings(c, a);
     drape_archive_double(a, &c->seconds);
     drape_archive_double(a, &c->search_seconds);
-    if (!drape_archive_is_reading(a))
+    if (!drape_archive_has_read(a))
         return;
     if (!is_valid(c))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has positions that are no numbers");
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has positions that are not finite");
     else
         drape_archive_note(a, restore(c));
 }

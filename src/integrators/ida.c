@@ -680,7 +680,7 @@ static drape_work work(const void *state)
 /* Its factors are kept between steps, with c_j and D. */
 static void archive_factors(ida_state *s, drape_archive *a)
 {
-    if (drape_archive_is_reading(a) && drape_system_pattern(s->system) != s->linear->pattern)
+    if (drape_archive_has_read(a) && drape_system_pattern(s->system) != s->linear->pattern)
         drape_archive_note(a, renew_matrices(s));
     drape_archive_double(a, &s->factored_cj);
     drape_archive_bool(a, &s->symmetric);

@@ -48,40 +48,6 @@ static drape_status solve_stage(trbdf2_state *s, double w, double *x, double *v,
     return status;
 }
 
-/* Adds the work over a stage, by the midpoint rule with the mean velocity: of dissipative forces, and of
- * the forces that move pins and colliders along their paths. If powers at the two ends were used, the force
- * of a stiff dashpot at a jump of a pin's velocity would count for a large part of the step. The base and
- * g0 serve as scratch. */
-static void add_work(trbdf2_state *s, const double *from, const double *to, double t, double span,
-                     drape_step_info *info)
-{
-    drape_implicit *c = &s->common;
-    drape_step_equation *e = &c->equation;
-    const drape_point middle = {.x = e->x_base,
-                                .v = e->v_base,
-                                .internal = e->point.internal,
-                                .t = t + span / 2,
-                                .span = {t, t + span}};
-    for (size_t i = 0; i < e->nodes; i++) {
-        e->x_base[i] = (from[i] + to[i]) / 2;
-        e->v_base[i] = (to[i] - from[i]) / span;
-    }
-    if (c->motion->moved_count > 0 || e->model->collider_count > 0)
-        drape_system_force(e->system, &middle, s->g0);
-    info->pin_work += drape_implicit_collider_work(c, t, t + span);
-    for (int32_t i = 0; i < c->motion->moved_count; i++)
-        for (size_t k = 0; k < 3; k++) {
-            size_t at = 3 * (size_t)c->motion->moved_node[i] + k;
-            info->pin_work += s->g0[at] * (to[at] - from[at]);
-        }
-    if (!c->dissipated)
-        return;
-    drape_system_dissipation(e->system, &middle, c->dissipated);
-    for (size_t i = 0; i < e->nodes; i++)
-        info->dissipated += c->dissipated[i] * (to[i] - from[i]);
-    info->dissipated += drape_implicit_collider_work(c, t, t + span);
-}
-
 /* Computes g0, with the mean velocities of pins and colliders in the stage. */
 static void evaluate_start(trbdf2_state *s, const drape_state *in)
 {
@@ -115,7 +81,7 @@ static drape_status trapezoid(trbdf2_state *s, const drape_state *in, double h, 
     }
     drape_status status = solve_stage(s, w, s->xg, s->vg, info);
     if (!status || info->usable)
-        add_work(s, in->x, s->xg, in->t, GAMMA * h, info);
+        drape_implicit_audit_stage(c, in->x, s->xg, in->t, GAMMA * h, s->g0, info);
     return status;
 }
 
@@ -142,7 +108,7 @@ static drape_status differentiate(trbdf2_state *s, const drape_state *in, double
     }
     drape_status status = solve_stage(s, w, out->x, out->v, info);
     if (!status || info->usable)
-        add_work(s, s->xg, out->x, in->t + GAMMA * h, (1 - GAMMA) * h, info);
+        drape_implicit_audit_stage(c, s->xg, out->x, in->t + GAMMA * h, (1 - GAMMA) * h, s->g0, info);
     return status;
 }
 

@@ -60,7 +60,6 @@ typedef struct drape_reference {
 
 extern const drape_reference *const drape_references[]; /* NULL-ended */
 extern const drape_registry drape_reference_registry;
-extern const char *const drape_references_words[]; /* their names */
 
 /* The parameters of the cases, in an initialiser of drape_reference. */
 #define DRAPE_CASES(...)                                                                                     \

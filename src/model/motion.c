@@ -258,7 +258,7 @@ static void archive_path(drape_path *path, drape_archive *a)
         drape_archive_doubles(a, path->x[i], 3);
         drape_archive_doubles(a, path->v[i], 3);
     }
-    if (drape_archive_is_reading(a) && !is_path(path))
+    if (drape_archive_has_read(a) && !is_path(path))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has an invalid path");
 }
 
@@ -268,7 +268,7 @@ static void archive_place(drape_motion *motion, int32_t i, drape_archive *a)
 {
     int32_t node = a->reading ? -1 : motion->moved_node[i];
     drape_archive_int32(a, &node);
-    if (!drape_archive_is_reading(a))
+    if (!drape_archive_has_read(a))
         return;
     bool good = node >= 0 && node < motion->model->node_count && motion->model->pinned[node] &&
                 (i < motion->model->moved_count ? motion->place[node] == i : motion->place[node] < 0);

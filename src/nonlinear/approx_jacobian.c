@@ -349,7 +349,7 @@ void drape_approx_jacobian_destroy(drape_approx_jacobian **out)
 void drape_approx_jacobian_archive(drape_approx_jacobian *s, drape_archive *a)
 {
     drape_archive_mark(a, "approximate jacobian");
-    if (drape_archive_is_reading(a))
+    if (drape_archive_has_read(a))
         drape_archive_note(a, drape_approx_jacobian_extend(s));
     drape_linear_archive(s->coarse.linear, s->coarse.solver, a, NULL);
 }

@@ -586,7 +586,7 @@ void drape_newton_archive(drape_newton *s, drape_archive *a)
     drape_work_archive(&e->work, a);
     if (e->dofs == 0)
         return;
-    if (drape_archive_is_reading(a))
+    if (drape_archive_has_read(a))
         drape_archive_note(a, drape_sun_linear_ensure_pattern(s->linear, drape_system_pattern(e->system)));
     drape_sun_linear_archive(s->linear, a, modified && s->factored_mass_weight != 0);
     if (modified && !drape_kinsol_archive(s->kin, a) && a->reading)

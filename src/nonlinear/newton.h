@@ -7,6 +7,7 @@
 
 #include "base/param.h"
 #include "nonlinear/step_equation.h"
+#include "solvers/linear.h"
 
 /* Indices of the parameters of integrators that use Newton's method, in drape_newton_params and in arrays of
  * their values. */
@@ -24,7 +25,52 @@ enum {
     DRAPE_NEWTON_LINEAR_TOLERANCE,
     DRAPE_NEWTON_PARAM_COUNT
 };
+
+/* Their choices, NULL-ended. */
+extern const char *const drape_newton_norms[];
+extern const char *const drape_newton_failures[];
+extern const char *const drape_newton_methods[];
+extern const char *const drape_newton_globalizations[];
+extern const char *const drape_newton_predictors[];
+
+/* The list of an integrator without parameters of its own. */
 extern const drape_param drape_newton_params[DRAPE_NEWTON_PARAM_COUNT];
+
+/* The beginning of the list of an integrator with further parameters, the first of which has the index
+ * DRAPE_NEWTON_PARAM_COUNT. Each parameter is one value, so these are also the indices of the values. */
+#define DRAPE_NEWTON_PARAMS                                                                                  \
+    [DRAPE_NEWTON_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),              \
+    [DRAPE_NEWTON_TOLERANCE] =                                                                               \
+        DRAPE_NUMBER("tolerance", "N", 1e-6, DRAPE_ABOVE(0), 1e12,                                           \
+                     "bound on the residual of the free nodes of an accepted state, measured by norm"),      \
+    [DRAPE_NEWTON_NORM] =                                                                                    \
+        DRAPE_CHOICE("norm", DRAPE_NORM_MAX, drape_newton_norms,                                             \
+                     "norm of the residual: largest component, sum, or root of the sum of squares"),         \
+    [DRAPE_NEWTON_MAX_ITERATIONS] =                                                                          \
+        DRAPE_INTEGER("max_iterations", "1", 50, 1, 100000, "Newton iterations before the attempt fails"),   \
+    [DRAPE_NEWTON_ON_FAILURE] =                                                                              \
+        DRAPE_CHOICE("on_failure", DRAPE_NEWTON_FAILURE_REJECT, drape_newton_failures,                       \
+                     "accept: continue with an unconverged state, as in the DEP report, and log it"),        \
+    [DRAPE_NEWTON_METHOD] =                                                                                  \
+        DRAPE_CHOICE("newton", DRAPE_NEWTON_METHOD_EXACT, drape_newton_methods,                              \
+                     "exact: a Jacobian in each iteration, except for chord steps at the end with "          \
+                     "globalization work; modified: factors kept for up to 10 iterations and across steps"), \
+    [DRAPE_NEWTON_GLOBALIZATION] = DRAPE_CHOICE(                                                             \
+        "globalization", DRAPE_NEWTON_GLOBAL_AUTO, drape_newton_globalizations,                              \
+        "none: full Newton steps, failures go to the controller; line_search: steps shortened until the "    \
+        "residual falls; work: steps shortened until the work of the residual along them falls, with "       \
+        "positive matrices after short steps and where the exact one is indefinite; auto: work"),            \
+    [DRAPE_NEWTON_PREDICTOR] =                                                                               \
+        DRAPE_CHOICE("predictor", DRAPE_NEWTON_PREDICTOR_INERTIAL, drape_newton_predictors,                  \
+                     "guess; inertial: the nodes keep their velocity; rest: they stay "                      \
+                     "where they are, as in the DEP report"),                                                \
+    [DRAPE_NEWTON_PROJECT] =                                                                                 \
+        DRAPE_BOOLEAN("project", false, "project the Hessian of every element to positive semidefinite"),    \
+    [DRAPE_NEWTON_LINEAR_SOLVER] =                                                                           \
+        DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver"),                    \
+    [DRAPE_NEWTON_LINEAR_TOLERANCE] =                                                                        \
+        DRAPE_NUMBER("linear_tolerance", "1", 1e-3, 1e-14, DRAPE_BELOW(1),                                   \
+                     "relative residual that iterative linear solvers leave in a correction")
 
 /* Values of the choices among these parameters. */
 enum { DRAPE_NEWTON_FAILURE_REJECT, DRAPE_NEWTON_FAILURE_ACCEPT };

@@ -131,23 +131,23 @@ static drape_diagnostic gain_at(const drape_model *m, const double *v, const cha
 }
 
 /* Whether kinetic energy exploded in one step; e is the energy at its beginning. */
-static bool exploded(const drape_energy *e, const drape_energy *made, double gain, double quiet)
+static bool exploded(const drape_energy *e, const drape_energy *attempted, double gain, double quiet)
 {
-    if (!(made->kinetic > JUMP * e->kinetic && gain > SHARE * made->kinetic))
+    if (!(attempted->kinetic > JUMP * e->kinetic && gain > SHARE * attempted->kinetic))
         return false;
-    double size =
-        made->kinetic + fabs(made->elastic) + fabs(made->gravity) + fabs(e->elastic) + fabs(e->gravity);
+    double size = attempted->kinetic + fabs(attempted->elastic) + fabs(attempted->gravity) +
+                  fabs(e->elastic) + fabs(e->gravity);
     return gain > UNNOTICED * size + QUIET * quiet;
 }
 
 /* The energy available to the run so far: the initial energy, the largest fall in gravity, the work of pins
  * and damping (whose sums have errors of their own), and, for starts at rest, the energy of the scene's
  * mass at the scene's speed. */
-static double offered(const drape_audit *audit, const drape_energy *made, const drape_step_info *info,
+static double offered(const drape_audit *audit, const drape_energy *attempted, const drape_step_info *info,
                       double quiet)
 {
     return audit->offered + fabs(info->pin_work) + fabs(info->dissipated) + audit->start_gravity -
-           fmin(audit->lowest, made->gravity) + quiet;
+           fmin(audit->lowest, attempted->gravity) + quiet;
 }
 
 bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info *info)
@@ -155,19 +155,20 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
     const drape_model *m = sim->model;
     const drape_audit *audit = &sim->audit;
     const drape_energy e = drape_sim_energy(sim);
-    const drape_energy made = measure(sim, out, drape_sim_state(sim)->internal,
-                                      audit->dissipated + info->dissipated, audit->pin_work + info->pin_work);
+    const drape_energy attempted =
+        measure(sim, out, drape_sim_state(sim)->internal, audit->dissipated + info->dissipated,
+                audit->pin_work + info->pin_work);
     const double most = sim->chosen.integrator->gain > 0 ? sim->chosen.integrator->gain : RUN_GAIN;
-    double quiet = scene_energy(m), gain = e.numerical - made.numerical,
-           scale = offered(audit, &made, info, quiet), run = audit->best - made.numerical;
-    sim->made = made;
-    sim->made_known = true;
+    double quiet = scene_energy(m), gain = e.numerical - attempted.numerical,
+           scale = offered(audit, &attempted, info, quiet), run = audit->best - attempted.numerical;
+    sim->attempted = attempted;
+    sim->attempted_known = true;
     if (m->free_count == 0) /* all motion is prescribed: a gain is only an error in the sum of the pins'
                                work */
         return false;
-    if (exploded(&e, &made, gain, quiet))
+    if (exploded(&e, &attempted, gain, quiet))
         info->diagnostic =
-            gain_at(m, out->v, "energy from nowhere / kinetic energy", gain / made.kinetic, SHARE);
+            gain_at(m, out->v, "energy from nowhere / kinetic energy", gain / attempted.kinetic, SHARE);
     else if (gain > STEP_GAIN * scale)
         info->diagnostic =
             gain_at(m, out->v, "energy from nowhere / energy of the run", gain / scale, STEP_GAIN);
@@ -186,11 +187,11 @@ void drape_sim_add_work(drape_sim *sim, const drape_step_info *info)
     audit->pin_work += info->pin_work;
     audit->offered += fabs(info->pin_work) + fabs(info->dissipated);
     /* with internal variables, committing the step changes the energy */
-    sim->energy_known = sim->made_known && sim->model->internal_count == 0;
-    if (!sim->made_known)
+    sim->energy_known = sim->attempted_known && sim->model->internal_count == 0;
+    if (!sim->attempted_known)
         return;
-    sim->energy = sim->made;
-    sim->made_known = false;
-    audit->lowest = fmin(audit->lowest, sim->made.gravity);
-    audit->best = fmax(audit->best, sim->made.numerical);
+    sim->energy = sim->attempted;
+    sim->attempted_known = false;
+    audit->lowest = fmin(audit->lowest, sim->attempted.gravity);
+    audit->best = fmax(audit->best, sim->attempted.numerical);
 }

@@ -28,7 +28,7 @@ static void archive_state(const drape_model *m, drape_state *state, drape_archiv
     drape_archive_doubles(a, state->x, n);
     drape_archive_doubles(a, state->v, n);
     drape_archive_doubles(a, state->internal, (size_t)m->internal_count);
-    if (drape_archive_is_reading(a) &&
+    if (drape_archive_has_read(a) &&
         !(isfinite(state->t) && drape_all_finite(state->x, n) && drape_all_finite(state->v, n)))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a state that is not finite");
 }
@@ -152,7 +152,7 @@ static void archive_statistics(drape_sim *sim, drape_archive *a)
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
         drape_archive_double(a, numbers[i]);
     archive_reasons(sim, a);
-    if (drape_archive_is_reading(a) && !is_next_frame(sim))
+    if (drape_archive_has_read(a) && !is_next_frame(sim))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no frame that could come next");
 }
 
@@ -174,7 +174,7 @@ static void archive_realtime(drape_sim *sim, drape_archive *a)
         !(m->dt > 0 && m->longest >= m->dt && m->longest <= MAX_SECONDS && m->debt >= 0 &&
           m->debt <= m->longest && m->cap > 0))
         drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has no step for a budget");
-    if (drape_archive_is_reading(a) && sim->chosen.integrator->set_effort)
+    if (drape_archive_has_read(a) && sim->chosen.integrator->set_effort)
         sim->chosen.integrator->set_effort(sim->integrator, m->effort);
 }
 
@@ -194,31 +194,32 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a)
 
 /* ---- For hosts ---- */
 
-/* Exchanges the contents of two sims, except what belongs to the host: observers, the cancel flag, the
- * wind. */
-static void take_place(drape_sim *sim, drape_sim *made)
+/* Exchanges the contents of two sims, except what belongs to the host and stays with `sim`: observers, the
+ * cancel flag, the wind. Afterwards `other` has the former contents of `sim` and is only fit to be
+ * destroyed. */
+static void exchange(drape_sim *sim, drape_sim *other)
 {
-    drape_sim old;
+    drape_sim former;
     const size_t size = offsetof(drape_sim, cancel);
-    memcpy(&old, sim, size);
-    memcpy(sim, made, size);
-    memcpy(made, &old, size);
+    memcpy(&former, sim, size);
+    memcpy(sim, other, size);
+    memcpy(other, &former, size);
     drape_system_watch(sim->system, &sim->cancel);
-    drape_system_watch(made->system, &made->cancel);
-    drape_system_copy_wind(sim->system, made->system);
+    drape_system_watch(other->system, &other->cancel);
+    drape_system_copy_wind(sim->system, other->system);
 }
 
 drape_status drape_sim_read(drape_sim *sim, drape_archive *a)
 {
-    drape_sim *made = NULL;
+    drape_sim *restored = NULL;
     drape_sim_archive_identity(sim, a);
     if (drape_archive_good(a))
-        drape_archive_note(a, drape_sim_create_like(sim, &made));
+        drape_archive_note(a, drape_sim_create_like(sim, &restored));
     if (drape_archive_good(a))
-        drape_sim_archive(made, a);
+        drape_sim_archive(restored, a);
     if (drape_archive_good(a))
-        take_place(sim, made);
-    drape_sim_destroy(&made);
+        exchange(sim, restored);
+    drape_sim_destroy(&restored);
     return a->status;
 }
 

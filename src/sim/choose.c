@@ -25,7 +25,8 @@ static drape_status unknown_key(drape_context *ctx, const choice *c, const char 
         for (int p = 0; p < entry->param_count && count < MAX_KEYS; p++)
             keys[count++] = entry->params[p].name;
     const char *meant = drape_did_you_mean(name, keys, count);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "unknown key \"%.60s\"%s%s%s", name, DRAPE_MEANT(meant));
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "unknown key \"%.60s\"%s%s%s", name,
+                         DRAPE_DID_YOU_MEAN(meant));
 }
 
 /* Checks a setting against every entry that has a parameter of its name; stores the value if the chosen

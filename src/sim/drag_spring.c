@@ -42,7 +42,7 @@ drape_status drape_sim_set_drag_spring(drape_sim *sim, int32_t node, double stif
     drape_system_set_drag_spring(sim->system, &spring);
     sim->audit.pin_work += work;
     sim->audit.offered += fabs(work);
-    sim->energy_known = sim->made_known = false;
+    sim->energy_known = sim->attempted_known = false;
     sim->chosen.integrator->restart(sim->integrator, drape_sim_state(sim));
     return DRAPE_OK;
 }

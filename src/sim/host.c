@@ -216,7 +216,7 @@ drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double f
         status = place(sim, &point);
     if (status)
         return status;
-    drape_system_contact_part(sim->system, &point, true, sim->read, NULL);
+    drape_system_contact_part(sim->system, &point, true, sim->query_scratch, NULL);
     const double *on = drape_system_on_colliders(sim->system);
     for (int k = 0; k < 3; k++)
         force[k] = on && on[3 * collider + k] != 0 ? -on[3 * collider + k] : 0;

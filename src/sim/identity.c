@@ -1,7 +1,9 @@
 /*
  * identity.c: identifies what a checkpoint belongs to. Two models are the same if they have the same
- * numbers after compile, however their scenes were written: names, comments, files and the run's duration
- * do not count. Two builds are the same if they have the same solvers, on which the bits depend.
+ * numbers after compile, however their scenes were written: names, comments, files, frame formats and the
+ * run's duration do not count. A member of drape_model that results depend on must be hashed here, itself or
+ * by what is computed from it; tests/entries/test_identity.c tries every key of a scene. Two builds are the
+ * same if they have the same solvers, on which the bits depend.
  */
 #include "base/hash.h"
 #include "sim/sim.h"
@@ -13,7 +15,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define ROW_ROOM   64
+#define NAME_ROOM  64
 #define BUILD_ROOM 320
 
 #ifdef DRAPE_METIS
@@ -156,7 +158,7 @@ static void archive_build(drape_archive *a)
 
 static void archive_name(drape_archive *a, const char *what, const char *name)
 {
-    char there[ROW_ROOM];
+    char there[NAME_ROOM];
     snprintf(there, sizeof there, "%s", name);
     drape_archive_text(a, there, sizeof there);
     if (drape_archive_good(a) && strcmp(there, name) != 0)

@@ -252,8 +252,8 @@ static drape_status measure_solver(bench *s, drape_profile *out)
 
 static const drape_linear_ops *linear_of(const drape_chosen *chosen)
 {
-    double row = drape_chosen_integrator_value(chosen, "linear_solver", -1);
-    return row >= 0 ? drape_linears[(int)row] : NULL;
+    double index = drape_chosen_integrator_value(chosen, "linear_solver", -1);
+    return index >= 0 ? drape_linears[(int)index] : NULL;
 }
 
 static drape_status measure(bench *s, drape_profile *out)

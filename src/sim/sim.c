@@ -48,7 +48,7 @@ static drape_status create_states(drape_sim *sim)
     size_t n = 3 * (size_t)sim->model->node_count;
     sim->frame = drape_arena_take(sim->arena, n, sizeof *sim->frame);
     sim->frame_velocity = drape_arena_take(sim->arena, n, sizeof *sim->frame_velocity);
-    sim->read = drape_arena_take(sim->arena, n, sizeof *sim->read);
+    sim->query_scratch = drape_arena_take(sim->arena, n, sizeof *sim->query_scratch);
     sim->state_bytes = sizeof *sim + sim->arena->bytes;
     return drape_arena_status(sim->arena);
 }

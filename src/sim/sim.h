@@ -47,7 +47,7 @@ struct drape_sim {
     drape_system *system;
     void *integrator;      /* state of chosen.integrator */
     drape_state states[4]; /* as many as needed: 2, and the earlier ones that the controller wants */
-    int now, next;         /* states[now] is the last accepted one, states[next] is being made */
+    int now, next;         /* states[now] is the last accepted one, states[next] is computed by attempts */
     int before;        /* the state in which the last step began; -1 before the first step, and after a later
                    attempt overwrote it */
     int past[2];       /* the states before `before`; -1: none */
@@ -57,16 +57,16 @@ struct drape_sim {
     double frame_rate;
     int64_t next_frame;
     double *frame, *frame_velocity; /* (node_count x 3) interpolated positions and velocities */
-    double *read;                   /* (node_count x 3) scratch of queries between steps */
+    double *query_scratch;          /* (node_count x 3) for queries between steps */
     int64_t attempts;
     drape_statistics statistics; /* counted by the driver; the integrator has the others */
     drape_reason_total reasons[DRAPE_MAX_REASONS];
     int reason_count;
     drape_audit audit;
     drape_realtime_memory realtime;
-    drape_energy energy, made;         /* of the present state; of the last attempted one */
-    bool energy_known, made_known;     /* whether these two are valid */
-    uint64_t model_hash, choices_hash; /* identify what a checkpoint belongs to; valid if identity_known */
+    drape_energy energy, attempted;     /* of the present state; of the last attempted one */
+    bool energy_known, attempted_known; /* whether these two are valid */
+    uint64_t model_hash, choices_hash;  /* identify what a checkpoint belongs to; valid if identity_known */
     bool identity_known;
     /* The members from here on stay in place when a restored sim replaces the others (checkpoint.c). */
     atomic_bool cancel; /* stops the running advance, or the next one */

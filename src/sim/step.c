@@ -47,7 +47,7 @@ static drape_status compute_next(drape_sim *sim, double t1, double h, drape_step
 {
     drape_state *next = next_state(sim);
     next->t = t1;
-    sim->made_known = false;
+    sim->attempted_known = false;
     info->diagnostic =
         (drape_diagnostic){.what = "", .term = "", .element = -1, .node = {-1, -1, -1, -1}, .cloth = -1};
     drape_status status = drape_system_begin(sim->system, drape_sim_state(sim));

@@ -38,7 +38,7 @@ void drape_fallback_archive(drape_fallback *f, bool *factored, drape_archive *a,
     drape_archive_bool(a, &f->active);
     drape_archive_bool(a, factored);
     drape_archive_bool(a, &there);
-    if (drape_archive_is_reading(a) && there && !f->solver)
+    if (drape_archive_has_read(a) && there && !f->solver)
         drape_archive_note(a, create(f));
     if (drape_archive_good(a) && there)
         drape_linear_archive(f->ops, f->solver, a, f->active ? values : NULL);

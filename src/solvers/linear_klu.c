@@ -120,7 +120,7 @@ static void archive(void *state, drape_archive *a, const double *values)
     if (!there)
         return;
     drape_archive_doubles(a, s->chosen_for, (size_t)s->pattern->nonzeros);
-    if (!drape_archive_is_reading(a))
+    if (!drape_archive_has_read(a))
         return;
     if (!factor_afresh(s, s->chosen_for) ||
         (values && refactored && !refactor(s, (double *)(uintptr_t)values)))

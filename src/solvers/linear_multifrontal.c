@@ -750,7 +750,7 @@ static void archive(void *state, drape_archive *a, const double *values)
 {
     multifrontal *s = state;
     drape_fallback_archive(&s->fallback, &s->factored, a, values);
-    if (drape_archive_is_reading(a) && values && s->factored && !s->fallback.active &&
+    if (drape_archive_has_read(a) && values && s->factored && !s->fallback.active &&
         factor_any(s, values, false))
         drape_archive_fail(a, DRAPE_E_SOLVER, "a matrix of the checkpoint has no Cholesky factors here");
 }

@@ -320,7 +320,7 @@ static void archive(void *state, drape_archive *a, const double *values)
         drape_archive_doubles(a, s->coarse_values, (size_t)s->coarse.nonzeros);
     bool stands = values && s->factored && !s->fallback.active;
     drape_linear_archive(s->coarse_ops, s->coarse_solver, a, stands ? s->coarse_values : NULL);
-    if (!drape_archive_is_reading(a) || !values)
+    if (!drape_archive_has_read(a) || !values)
         return;
     memcpy(s->values, values, (size_t)s->pattern->nonzeros * sizeof *values);
     if (stands)

@@ -40,7 +40,7 @@ void drape_linear_archive(const drape_linear_ops *ops, void *state, drape_archiv
     drape_archive_bool(a, &factored);
     if (ops->archive)
         ops->archive(state, a, values);
-    else if (drape_archive_is_reading(a) && values && ops->factor(state, values))
+    else if (drape_archive_has_read(a) && values && ops->factor(state, values))
         drape_archive_fail(a, DRAPE_E_SOLVER, "a matrix of the checkpoint has no factors by \"%s\" here",
                            ops->entry.name);
 }

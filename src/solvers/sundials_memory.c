@@ -114,7 +114,7 @@ bool drape_ida_archive(void *ida, drape_archive *a)
     archive_history(s, a);
     archive_steps(s, a);
     check_orders(s, a);
-    if (drape_archive_is_reading(a) && s->ida_SetupDone && !set_up(s))
+    if (drape_archive_has_read(a) && s->ida_SetupDone && !set_up(s))
         drape_archive_fail(a, DRAPE_E_SOLVER, "IDA cannot continue from the checkpoint");
     return true;
 }

@@ -76,7 +76,7 @@ static void measure(const drape_elements *el, int32_t first, int32_t count, cons
 
 static double element_stiffness(const drape_cloth_view *cloth, int32_t hinge_number, double choice)
 {
-    const drape_material *material = &cloth->material;
+    const drape_material *material = cloth->material;
     if (choice == STIFFNESS_REPORT)
         return 2 / sqrt(3.0) * material->young_modulus * pow(material->thickness, 3) / 12;
     int32_t edge = cloth->hinge_edge[hinge_number];

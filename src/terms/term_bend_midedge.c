@@ -234,7 +234,7 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
 {
     const double *bend = values + PARAM_CURVATURE;
     double law[9];
-    const drape_material *m = &cloth->material;
+    const drape_material *m = cloth->material;
     drape_orthotropic_law(values, cloth->bending,
                           m->flexural_rigidity * (1 - m->poisson_ratio * m->poisson_ratio), m->poisson_ratio,
                           law);

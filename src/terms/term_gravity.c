@@ -41,7 +41,8 @@ const drape_term_ops drape_term_gravity = {
     .element_name = "node",
     .nodes = 1,
     .linear = true,
-    .potential_of_gravity = true,
+    .external = true,
+    .from_scene_gravity = true,
     .build = build,
     .energy = energy,
 };

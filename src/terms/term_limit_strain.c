@@ -74,7 +74,7 @@ static double stiffness_of(const drape_spring_set *set, int32_t count, const dou
         return values[PARAM_STIFFNESS];
     for (int32_t i = 0; i < cloth->node_count; i++)
         mass += cloth->node_mass[i];
-    return fmax(cloth->material.membrane_stiffness,
+    return fmax(cloth->material->membrane_stiffness,
                 mass * vec3_norm(cloth->gravity) / (width * mean_length(set, count)));
 }
 

@@ -58,7 +58,7 @@ const drape_term_ops drape_term_load_line = {
     .element_name = "edge",
     .nodes = 2,
     .linear = true,
-    .potential_of_gravity = true,
+    .external = true,
     .build = build,
     .energy = energy,
 };

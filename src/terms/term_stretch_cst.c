@@ -133,8 +133,8 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     if (cloth->triangle_count > INT32_MAX / 3)
         return drape_term_refuse(builder, "the mesh has %d triangles; at most %d", (int)cloth->triangle_count,
                                  INT32_MAX / 3);
-    drape_orthotropic_law(values, cloth->tension, cloth->material.membrane_stiffness,
-                          cloth->material.poisson_ratio, law);
+    drape_orthotropic_law(values, cloth->tension, cloth->material->membrane_stiffness,
+                          cloth->material->poisson_ratio, law);
     drape_orthotropic_squares(law, 3, k, l);
     drape_status status = drape_term_reserve(builder, 3 * cloth->triangle_count, REST_COUNT);
     for (int32_t t = 0; !status && t < cloth->triangle_count; t++) {

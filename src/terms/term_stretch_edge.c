@@ -34,7 +34,7 @@ static const drape_param params[PARAM_COUNT] = {
 
 static double element_stiffness(const drape_cloth_view *cloth, int32_t edge, double choice)
 {
-    double length = cloth->edge_length[edge], membrane = cloth->material.membrane_stiffness;
+    double length = cloth->edge_length[edge], membrane = cloth->material->membrane_stiffness;
     const int32_t *beside = cloth->edge_triangle + 2 * (size_t)edge;
     if (choice == STIFFNESS_REPORT)
         return sqrt(3.0) / 2 * membrane * length * length * length;

@@ -843,6 +843,21 @@ static drape_status announces_nothing(const drape_cloth_view *cloth, const doubl
     return DRAPE_OK;
 }
 
+static drape_status announces_twice(const drape_cloth_view *cloth, const double *params,
+                                    drape_term_builder *builder)
+{
+    (void)cloth, (void)params;
+    const drape_status status = drape_term_reserve(builder, 0, 0);
+    return status ? status : drape_term_reserve(builder, 0, 0);
+}
+
+static drape_status announces_less(const drape_cloth_view *cloth, const double *params,
+                                   drape_term_builder *builder)
+{
+    (void)cloth, (void)params;
+    return drape_term_reserve(builder, -1, 0);
+}
+
 static drape_status says_nothing(const drape_cloth_view *cloth, const double *params,
                                  drape_term_builder *builder)
 {
@@ -858,8 +873,11 @@ START_TEST(elements_of_a_user_defined_term_are_checked)
         const char *says;
     } cases[] = {
         {forgets, DRAPE_E_ARGUMENT, "host.attract announced 2 elements and did not set element 1"},
-        {strays, DRAPE_E_ARGUMENT, "host.attract set an element beyond the 1 that it announced"},
-        {announces_nothing, DRAPE_E_ARGUMENT, "host.attract set an element beyond the 0 that it announced"},
+        {strays, DRAPE_E_ARGUMENT, "host.attract set an element outside of the 1 that it announced"},
+        {announces_twice, DRAPE_E_ARGUMENT, "host.attract announced its elements twice"},
+        {announces_less, DRAPE_E_ARGUMENT, "host.attract announced -1 elements of 1 nodes with 0 numbers"},
+        {announces_nothing, DRAPE_E_ARGUMENT,
+         "host.attract set an element outside of the 0 that it announced"},
         {says_nothing, DRAPE_E_FILE, "/cloth/0/terms/0: build() of \"host.attract\" returned e_file"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -1000,7 +1018,7 @@ START_TEST(a_user_defined_collider_works)
          "/colliders/0: \"size\" is missing: its radius; a number in [0, 2] m"},
         {WITH_COLLIDERS("{'type': 'host.blob', 'size': 2}"), "/colliders/0/size: 2 m is not?to its taste"},
         {WITH_COLLIDERS("{'type': 'host.blob', 'size': 1}"),
-         "/colliders/0: the shape announced 1 points, 0 segments, 0 triangles, or twice"},
+         "/colliders/0: the shape announced its parts twice"},
         {WITH_COLLIDERS("{'type': 'host.blob', 'size': 0.5, 'middle': [0, 0, 2]}"),
          "/colliders/0/middle: 2 is not allowed; middle is [x, y, z], each in [-1, 1] m"},
         {WITH_COLLIDERS("{'type': 'host.blb', 'size': 2}"), "did you mean \"host.blob\"?"},

@@ -648,6 +648,12 @@ def variants():
     yield False, scene(terms=["stretch.egde"])
     yield False, scene(terms=["damp.kelvin_voigt", "stretch.edge"])
     yield False, scene(terms=["gravity"])
+    line = {"type": "load.line", "edge": "bottom", "force": [0, -1, 0]}
+    moment = {"type": "load.moment", "edge": "bottom", "moment": 1e-3}
+    square = {"grid": "square", "columns": 3, "rows": 4, "width": 1, "height": 1}
+    yield True, scene(mesh=square, terms=["stretch.cst", "bend.midedge", line, moment])
+    yield False, scene(mesh=square, terms=["stretch.cst", {**line, "moment": 1}])
+    yield False, scene(mesh=square, terms=["stretch.cst", {**moment, "force": [0, 0, 1]}])
     yield False, scene(terms=[{"type": "stretch.edge", "stiffness": "soft"}])
     yield False, scene(terms=[{"type": "stretch.edge", "max_turn": 1}])
     yield False, scene(mesh={"grid": "equilateral", "edges": 3})

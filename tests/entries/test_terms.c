@@ -42,16 +42,16 @@ static size_t settings_of(const variant *v, const drape_term_ops *ops, drape_set
     return count;
 }
 
-/* Gravity is modelled by the scene's vector, not by its list of terms. */
+/* Whether the scene's gravity adds the term, so that its list of terms must not name it. */
 static bool is_gravity(const drape_term_ops *ops)
 {
-    return strcmp(ops->entry.name, "gravity") == 0;
+    return ops->from_scene_gravity;
 }
 
 /* External forces: rest is not an equilibrium of them, and they depend on directions in space. */
 static bool is_external(const drape_term_ops *ops)
 {
-    return ops->potential_of_gravity;
+    return ops->external;
 }
 
 /* A model of the term only; NULL if the term refuses the mesh, which its message says. All terms accept

@@ -6,6 +6,7 @@
 #include "base/vec3.h"
 #include "mesh/mesh.h"
 #include "support/failing_allocator.h"
+#include "support/message.h"
 #include "support/suite.h"
 
 #define COUNT(array) (sizeof(array) / sizeof *(array))
@@ -69,7 +70,7 @@ static void assert_refused(const drape_mesh_def *def, const char *message)
     drape_context *ctx = new_context();
     drape_mesh mesh;
     ck_assert_int_eq(drape_mesh_make(ctx, "/m", def, NULL, &mesh), DRAPE_E_ARGUMENT);
-    ck_assert_str_eq(drape_context_message(ctx), message);
+    check_matches(drape_context_message(ctx), message);
     assert_empty(&mesh);
     drape_context_destroy(&ctx);
 }
@@ -346,13 +347,10 @@ START_TEST(grid_faults)
     def = equilateral(s, 3, 5e8);
     assert_refused(&def, "/m: node 3 is at (1.5e+09, 0, 0) m; coordinates must be finite and within 1e+09 m");
     def.grid.type = "equilaterale";
-    assert_refused(&def,
-                   "/m/grid: there is no grid \"equilaterale\"; there are equilateral, square, irregular, "
-                   "annulus; did you mean "
-                   "\"equilateral\"?");
-    def.grid.type = "hexagons";
     assert_refused(
-        &def, "/m/grid: there is no grid \"hexagons\"; there are equilateral, square, irregular, annulus");
+        &def, "/m/grid: there is no grid \"equilaterale\"; there are <*>; did you mean \"equilateral\"?");
+    def.grid.type = "hexagons";
+    assert_refused(&def, "/m/grid: there is no grid \"hexagons\"; there are equilateral, <*>");
     def = square(s, 1, 2, "parallel", "vertical");
     assert_refused(&def, "/m/columns: 1 is not allowed; columns is an integer in [2, 134217728]");
     def = square(s, 20000, 20000, "parallel", "vertical");

@@ -11,6 +11,7 @@
 #include "model/scene_text.h"
 #include "support/comma.h"
 #include "support/failing_allocator.h"
+#include "support/message.h"
 #include "support/suite.h"
 
 static drape_context *ctx;
@@ -453,13 +454,9 @@ static const struct {
     {ROOT("'Gravity': [0, 0, 0]"),
      "s.json:2:1: /Gravity: unknown key \"Gravity\"; did you mean \"gravity\"?"},
     {ROOT("'output': {'a/b~c': 1}"),
-     "s.json:2:12: /output/a~1b~0c: unknown key \"a/b~c\"; known: formats, up"},
-    {ROOT("'': 1"), "s.json:2:1: /: unknown key \"\"; known: drape, description, cloth, gravity, colliders, "
-                    "self_contact, contact, integrator, "
-                    "controller, duration, frame_rate, output"},
-    {ROOT("'\xc3\xa9\\n': 1"),
-     "s.json:1:1: /é?: unknown key \"é?\"; known: drape, description, cloth, "
-     "gravity, colliders, self_contact, contact, integrator, controller, duration, frame_rate, output"},
+     "s.json:2:12: /output/a~1b~0c: unknown key \"a/b~c\"; known: formats<*>"},
+    {ROOT("'': 1"), "s.json:2:1: /: unknown key \"\"; known: drape, <*>"},
+    {ROOT("'\xc3\xa9\\n': 1"), "s.json:1:1: /é?: unknown key \"é?\"; known: drape, <*>"},
     {ROOT("'description': 1"), "s.json:2:1: /description: 1 is not allowed; description is a string"},
     {ROOT("'gravity': 9.81"), "s.json:2:1: /gravity: 9.81 is not allowed; gravity is [x, y, z], each in "
                               "[-1000000000, 1000000000] m/s2"},
@@ -536,13 +533,13 @@ static const struct {
     {MESH("[]"), "s.json:1:40: /cloth/0/mesh: an empty array is not allowed; mesh is an object"},
     {MESH("{}"), "s.json:1:40: /cloth/0/mesh: exactly one of grid, file is needed; given: none"},
     {MESH("{'edges': 22}"),
-     "s.json:2:2: /cloth/0/mesh/edges: unknown key \"edges\" without \"grid\"; known: grid, file, transform"},
+     "s.json:2:2: /cloth/0/mesh/edges: unknown key \"edges\" without \"grid\"; known: grid, <*>"},
     {MESH("{'gird': 'square', 'rows': 3}"),
      "s.json:2:2: /cloth/0/mesh/gird: unknown key \"gird\"; did you mean \"grid\"?"},
     {MESH("{'grid': 'square', 'file': 'x.obj'}"),
      "s.json:1:40: /cloth/0/mesh: exactly one of grid, file is needed; given: grid, file"},
     {MESH("{'file': 'x.obj', 'rows': 3}"),
-     "s.json:2:19: /cloth/0/mesh/rows: unknown key \"rows\" without \"grid\"; known: grid, file, transform"},
+     "s.json:2:19: /cloth/0/mesh/rows: unknown key \"rows\" without \"grid\"; known: grid, <*>"},
     {MESH("{'grid': 5}"), "s.json:2:2: /cloth/0/mesh/grid: 5 is not allowed; grid is a non-empty string"},
     {MESH("{'file': ''}"), "s.json:2:2: /cloth/0/mesh/file: \"\" is not allowed; file is a non-empty string"},
     {MESH("{'grid': 'g', 'rows': ['3']}"),
@@ -695,7 +692,7 @@ START_TEST(test_wrong_scenes)
     for (size_t i = 0; i < sizeof wrong_scenes / sizeof *wrong_scenes; i++) {
         drape_status status = read_quoted(wrong_scenes[i].text);
         ck_assert_msg(status < 0, "accepted: %s", wrong_scenes[i].text);
-        ck_assert_str_eq(message(), wrong_scenes[i].message);
+        check_matches(message(), wrong_scenes[i].message);
         check_one_line(message());
     }
     ck_assert_int_eq(read_quoted("{'drape': 2}"), DRAPE_E_VERSION);
@@ -788,7 +785,7 @@ static const struct {
     {"/integrator/dt", "0.5", NULL},
     {"/integrator/method", "verlet", NULL},
     {"/integrator/method", "'verlet'", NULL},
-    {"/output/self", "1", "--set /output/self=1: /output/self: unknown key \"self\"; known: formats, up"},
+    {"/output/self", "1", "--set /output/self=1: /output/self: unknown key \"self\"; known: formats<*>"},
     {"/cloth/0/pins/-", "{'edge': 'top'}", NULL},
     {"/cloth/0/pins/-/edge", "top", NULL},
     {"/cloth/0/pins", "[]", NULL},
@@ -867,7 +864,7 @@ START_TEST(test_sets)
             continue;
         }
         ck_assert_int_eq(status, DRAPE_E_ARGUMENT);
-        ck_assert_str_eq(message(), sets[i].message);
+        check_matches(message(), sets[i].message);
     }
     close_context();
 }
@@ -920,8 +917,8 @@ START_TEST(test_set_order)
     ck_assert_int_eq(drape_scene_set(scene, "/cloth/0/new/0/x/-", "1"), DRAPE_OK);
     ck_assert_int_eq(drape_scene_set(scene, "/cloth/0/new/0/x/7/y", "1"), DRAPE_E_ARGUMENT);
     ck_assert_int_eq(drape_scene_to_def(scene, &def), DRAPE_E_ARGUMENT);
-    ck_assert_str_eq(message(), "--set /cloth/0/new/0/x/-=1: /cloth/0/new: unknown key \"new\"; known: name, "
-                                "mesh, material, terms, pins, velocity");
+    check_matches(message(),
+                  "--set /cloth/0/new/0/x/-=1: /cloth/0/new: unknown key \"new\"; known: name, <*>");
     ck_assert_int_eq(read_quoted(example), DRAPE_OK);
     ck_assert_int_eq(drape_scene_set(scene, "/output/formats/0", "1"), DRAPE_OK);
     ck_assert_int_eq(drape_scene_set(scene, "/output", "{\"formats\": [2]}"), DRAPE_OK);
