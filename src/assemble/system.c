@@ -266,7 +266,7 @@ static drape_status extend(drape_system *system, int32_t pairs, const int32_t *n
     drape_free(ctx, couplings);
     if (!status)
         status = place_terms(system);
-    if (status) /* back to the model's pattern: it, too, differs from the previous one */
+    if (status) /* back to the model's pattern, which also differs from the one before this call */
         forget_extension(system);
     else
         system->pattern = &system->extended;
@@ -278,7 +278,7 @@ drape_status drape_system_extend_pattern(drape_system *system, const drape_point
     *changed = false;
     if (!evaluate_contact(system, point))
         return system->status;
-    if (drape_contact_fits(system->contact, system->pattern))
+    if (drape_contact_is_in_pattern(system->contact, system->pattern))
         return DRAPE_OK;
     *changed = true;
     const int32_t *nodes = NULL;
@@ -580,7 +580,7 @@ static void archive_drag_spring(drape_system *system, drape_archive *a)
     drape_archive_doubles(a, spring->target, 3);
     if (drape_archive_has_read(a) && spring->stiffness > 0 &&
         (spring->node < 0 || spring->node >= m->node_count || m->pinned[spring->node]))
-        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint pulls node %d, which is not free",
+        drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has a drag spring on node %d, which is not free",
                            (int)spring->node);
 }
 

@@ -18,7 +18,7 @@
 #define DEFAULT_HEIGHT 720
 #define MIN_SIDE       16
 #define MIN_RANGE      1e-9 /* of a field whose values are all the same */
-#define PICTURE_DIGITS 5    /* least number of digits in the name of a frame */
+#define PICTURE_DIGITS 5    /* smallest number of digits in the name of a frame */
 #define PICTURE_NAME   32   /* upper bound of the bytes of "/frame_00000.png" */
 
 typedef struct render_request {

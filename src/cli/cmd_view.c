@@ -183,9 +183,9 @@ static void put_lines(const window_view *w, char lines[LINES][LINE])
     snprintf(lines[n++], LINE, "shading\t%s", shading_of(w)->entry.name);
     if (v->movable_count > 0)
         snprintf(lines[n++], LINE, "arrows\tmove %s", v->movables[v->moved].name);
-    if (v->pulled >= 0)
-        snprintf(lines[n++], LINE, "pull\t%.3g N on node %d",
-                 sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]), (int)v->pulled);
+    if (v->dragged >= 0)
+        snprintf(lines[n++], LINE, "drag\t%.3g N on node %d",
+                 sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]), (int)v->dragged);
     if (v->message[0])
         snprintf(lines[n++], LINE, "! %.100s", v->message);
     lines[n][0] = 0;
@@ -195,7 +195,7 @@ static const char *const help_lines[] = {"space, P\trun or pause",
                                          "N\tone step",
                                          "R\tstart again",
                                          "Esc, Q\tquit",
-                                         "left drag\tpull a node; elsewhere: turn",
+                                         "left drag\tmove a node; elsewhere: turn",
                                          "right drag\tpan",
                                          "wheel\tzoom",
                                          "C\tfirst view again",
@@ -222,14 +222,14 @@ static bool project(const window_view *w, const drape_view *view, const float *p
     return q[3] > 0;
 }
 
-/* Draws the drag spring, from the node to the point that it is pulled to. */
-static void mark_pull(window_view *w)
+/* Draws the drag spring, from its node to its target. */
+static void mark_drag_spring(window_view *w)
 {
     static const float blue[4] = {0.05f, 0.30f, 0.75f, 0.95f};
     drape_overlay *o = drape_painter_overlay(w->painter);
     const drape_view view = view_of(w);
-    const float *from = drape_reel_positions(&w->reel, 0) + 3 * (size_t)w->v.pulled;
-    const float to[3] = {(float)w->v.pull[0], (float)w->v.pull[1], (float)w->v.pull[2]};
+    const float *from = drape_reel_positions(&w->reel, 0) + 3 * (size_t)w->v.dragged;
+    const float to[3] = {(float)w->v.drag_target[0], (float)w->v.drag_target[1], (float)w->v.drag_target[2]};
     float a[3], b[3], size = 3 * o->unit;
     if (!project(w, &view, from, &a[0], &a[1], &a[2]) || !project(w, &view, to, &b[0], &b[1], &b[2]))
         return;
@@ -257,8 +257,8 @@ static drape_status draw(window_view *w)
     drape_picture picture = picture_of(w, &panel);
     picture.lines = panels[w->shown];
     picture.caption = w->shown == PANEL_KEYS ? NULL : "H: keys";
-    if (w->v.pulled >= 0)
-        mark_pull(w);
+    if (w->v.dragged >= 0)
+        mark_drag_spring(w);
     drape_status status = drape_painter_draw(w->painter, &picture);
     int width, height;
     drape_window_size(w->window, &width, &height);
@@ -409,7 +409,7 @@ static void on_press(window_view *w, const drape_input *in)
         return;
     double target[3];
     point_at(w, in->x, in->y, w->depth, target);
-    view_pull(&w->v, node, target);
+    view_drag(&w->v, node, target);
 }
 
 static void on_move(window_view *w, const drape_input *in)
@@ -426,9 +426,9 @@ static void on_move(window_view *w, const drape_input *in)
     } else if (w->drag == DRAG_PAN) {
         for (int k = 0; k < 3; k++)
             w->camera.target[k] += metre * (dy * view.axes[1][k] - dx * view.axes[0][k]);
-    } else if (w->drag == DRAG_NODE && w->v.pulled >= 0) {
+    } else if (w->drag == DRAG_NODE && w->v.dragged >= 0) {
         point_at(w, in->x, in->y, w->depth, target);
-        view_pull(&w->v, w->v.pulled, target);
+        view_drag(&w->v, w->v.dragged, target);
     }
     w->changed |= w->drag != DRAG_NONE;
 }
@@ -436,7 +436,7 @@ static void on_move(window_view *w, const drape_input *in)
 static void on_release(window_view *w)
 {
     if (w->drag == DRAG_NODE)
-        view_pull(&w->v, -1, NULL);
+        view_drag(&w->v, -1, NULL);
     w->drag = DRAG_NONE;
     w->changed = true;
 }

@@ -10,7 +10,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#define PERIOD        0.1 /* least time between two updates [s] */
+#define PERIOD        0.1 /* shortest time between two updates [s] */
 #define DEFAULT_WIDTH 80
 #define MAX_WIDTH     120
 #define BAR           24 /* cells */

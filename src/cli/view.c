@@ -14,8 +14,8 @@
 #include <string.h>
 
 #define MOVE_TIME  0.1  /* duration of a displacement by a key [s] */
-#define PULL_RATE  60.0 /* angular frequency of PULL_NODES nodes on the drag spring [1/s] */
-#define PULL_NODES 40.0 /* number of nodes that the drag spring is meant to move */
+#define DRAG_RATE  60.0 /* angular frequency of DRAG_NODES nodes on the drag spring [1/s] */
+#define DRAG_NODES 40.0 /* number of nodes that the drag spring is meant to move */
 
 /* ---- Opening ---- */
 
@@ -59,7 +59,7 @@ static void list_movables(cli_view *v)
 int view_open(const cli_command *command, cli_view *v)
 {
     *v = (cli_view){
-        .command = command, .stiffness = 1, .damping = 1, .gravity = 1, .pulled = -1, .paused = true};
+        .command = command, .stiffness = 1, .damping = 1, .gravity = 1, .dragged = -1, .paused = true};
     int code = cli_scene_load(command, command->operand, &v->in);
     if (code == CLI_GO_ON)
         list_movables(v);
@@ -84,13 +84,13 @@ void view_advance(cli_view *v, bool one_step)
     v->paused = true;
 }
 
-static drape_status set_pull(cli_view *v, drape_sim *sim)
+static drape_status set_drag_spring(cli_view *v, drape_sim *sim)
 {
     const drape_model *m = v->in.model;
-    double mass = v->pulled >= 0 ? m->mass[v->pulled] : 0;
-    return v->pulled < 0 ? DRAPE_OK
-                         : drape_sim_set_drag_spring(sim, v->pulled,
-                                                     PULL_NODES * mass * PULL_RATE * PULL_RATE, v->pull);
+    double mass = v->dragged >= 0 ? m->mass[v->dragged] : 0;
+    return v->dragged < 0 ? DRAPE_OK
+                          : drape_sim_set_drag_spring(
+                                sim, v->dragged, DRAG_NODES * mass * DRAG_RATE * DRAG_RATE, v->drag_target);
 }
 
 /* Compiles the scene as it is now and makes a sim, in the former state or at the start. */
@@ -116,12 +116,12 @@ static drape_status rebuild(cli_view *v, bool keep_state)
     drape_model_destroy(&v->in.model);
     v->in.model = model;
     v->in.sim = sim;
-    return set_pull(v, sim);
+    return set_drag_spring(v, sim);
 }
 
 void view_reset(cli_view *v)
 {
-    v->pulled = -1;
+    v->dragged = -1;
     v->message[0] = 0;
     if (rebuild(v, false))
         note(v, drape_context_message(v->in.ctx));
@@ -295,17 +295,17 @@ bool view_move(cli_view *v, const double by[3])
     return good;
 }
 
-void view_pull(cli_view *v, int32_t node, const double target[3])
+void view_drag(cli_view *v, int32_t node, const double target[3])
 {
     const double nowhere[3] = {0};
-    if (v->pulled >= 0 && v->pulled != node)
-        drape_sim_set_drag_spring(v->in.sim, v->pulled, 0, nowhere);
-    v->pulled = node;
+    if (v->dragged >= 0 && v->dragged != node)
+        drape_sim_set_drag_spring(v->in.sim, v->dragged, 0, nowhere);
+    v->dragged = node;
     if (node < 0)
         return;
-    memcpy(v->pull, target, sizeof v->pull);
-    if (set_pull(v, v->in.sim)) {
+    memcpy(v->drag_target, target, sizeof v->drag_target);
+    if (set_drag_spring(v, v->in.sim)) {
         note(v, drape_context_message(v->in.ctx));
-        v->pulled = -1;
+        v->dragged = -1;
     }
 }

@@ -20,8 +20,8 @@ typedef struct cli_view {
     double stiffness, damping, gravity; /* factors on the values of the scene */
     view_movable movables[VIEW_MOVABLES];
     int movable_count, moved; /* moved: the one that keys move */
-    int32_t pulled;           /* node; -1: none */
-    double pull[3];           /* [m] target */
+    int32_t dragged;          /* node on the drag spring; -1: none */
+    double drag_target[3];    /* [m] of the drag spring */
     bool paused;
     int64_t iterations; /* of the last advance */
     double step_seconds;
@@ -48,7 +48,7 @@ bool view_next_integrator(cli_view *v, int step);
 bool view_move(cli_view *v, const double by[3]); /* the chosen movable [m], over a tenth of a second */
 
 /* Drags a node towards a point. node -1 releases it. */
-void view_pull(cli_view *v, int32_t node, const double target[3]);
+void view_drag(cli_view *v, int32_t node, const double target[3]);
 
 double view_dt(const cli_view *v);
 const char *view_integrator(const cli_view *v);

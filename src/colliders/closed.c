@@ -96,13 +96,13 @@ drape_status drape_shape_read_mesh(drape_collider_shape *shape, const char *para
         return drape_shape_refuse(shape, parameter, "the name of a mesh file is needed");
     snprintf(at, sizeof at, "%s/%s", builder->pointer, parameter);
     const drape_mesh_source source = {.pointer = at, .file = file};
-    const drape_mesh_source placed = {.pointer = builder->pointer};
+    const drape_mesh_source transformed = {.pointer = builder->pointer};
     drape_status status = drape_mesh_from_file(builder->ctx, builder->pointer, builder->folder, file, &mesh);
     if (!status)
         status = drape_mesh_validate_positions(builder->ctx, &source, &mesh);
     if (!status) {
         drape_mesh_transform(&mesh, scale, rotate, translate);
-        status = drape_mesh_validate_positions(builder->ctx, &placed, &mesh);
+        status = drape_mesh_validate_positions(builder->ctx, &transformed, &mesh);
     }
     if (!status)
         status = check_mesh(builder->ctx, &source, &mesh);

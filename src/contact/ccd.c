@@ -72,18 +72,18 @@ double drape_contact_free_fraction(drape_contact *c, const double *x, const doub
 static double march(const drape_collider *collider, const drape_collider_pose *pose, const double *x,
                     const double *y, double keep)
 {
-    double gap = drape_collider_distance(collider, pose, x, NULL, NULL), least = keep * gap, t = 0, p[3],
+    double gap = drape_collider_distance(collider, pose, x, NULL, NULL), min_gap = keep * gap, t = 0, p[3],
            at[3];
     vec3_sub(y, x, p);
     const double length = vec3_norm(p);
-    for (int i = 0; gap > least && length > gap - least && i < MAX_MARCHES; i++) {
-        t += MARCH_SHARE * (gap - least) / length;
+    for (int i = 0; gap > min_gap && length > gap - min_gap && i < MAX_MARCHES; i++) {
+        t += MARCH_SHARE * (gap - min_gap) / length;
         if (t >= 1)
             return 1;
         memcpy(at, x, sizeof at);
         vec3_add_scaled(t, p, at);
         gap = drape_collider_distance(collider, pose, at, NULL, NULL);
-        if (gap < least + (1 - MARCH_SHARE) * least)
+        if (gap < min_gap + (1 - MARCH_SHARE) * min_gap)
             return t;
     }
     return 1;

@@ -40,11 +40,11 @@ static drape_status check_depth(drape_contact *c, const char **reason, drape_dia
         if (pair->collider < 0)
             continue;
         const double before = gap->closest.points == 1 ? c->start_gaps[pair->node[0]] : c->start_least;
-        const double least = fmin(before, -TOUCH);
-        if (gap->value >= least || least - gap->value < excess)
+        const double min_gap = fmin(before, -TOUCH);
+        if (gap->value >= min_gap || min_gap - gap->value < excess)
             continue;
-        excess = least - gap->value;
-        *diagnostic = diagnostic_of(c, pair, "gap [m]", gap->value, least);
+        excess = min_gap - gap->value;
+        *diagnostic = diagnostic_of(c, pair, "gap [m]", gap->value, min_gap);
     }
     *reason = excess > 0 ? drape_reason_name(DRAPE_REASON_PENETRATION) : *reason;
     return excess > 0 ? DRAPE_RETRY_REJECTED : DRAPE_OK;
@@ -115,12 +115,12 @@ static drape_status check_inscribed(drape_contact *c, const int32_t *node, int n
             if (depth >= -TOUCH)
                 continue;
             const double before = depth_of(collider, &c->start_pose[k], c->start, n, nodes, INFINITY);
-            const double least = fmin(before, -TOUCH);
-            if (depth >= least)
+            const double min_gap = fmin(before, -TOUCH);
+            if (depth >= min_gap)
                 continue;
             const drape_pair pair = {.collider = k, .node = {n[0], n[1], nodes > 2 ? n[2] : -1, -1}};
             *reason = drape_reason_name(DRAPE_REASON_PENETRATION);
-            *diagnostic = diagnostic_of(c, &pair, "gap [m]", depth, least);
+            *diagnostic = diagnostic_of(c, &pair, "gap [m]", depth, min_gap);
             return DRAPE_RETRY_REJECTED;
         }
     }

@@ -57,7 +57,7 @@ void drape_contact_add_jacobian(drape_contact *contact, double weight, bool velo
                                 const drape_pattern *pattern, double *values);
 
 /* Whether the pattern has the blocks of all active contacts. */
-bool drape_contact_fits(const drape_contact *contact, const drape_pattern *pattern);
+bool drape_contact_is_in_pattern(const drape_contact *contact, const drape_pattern *pattern);
 
 /* Lists the pairs of cloth with cloth that are near each other, for a pattern that will hold for a while:
  * four nodes each, valid until the next call. Returns their number; -1: out of memory. */

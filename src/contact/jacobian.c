@@ -122,7 +122,7 @@ static bool has_blocks(const drape_contact *c, const drape_active_contact *conta
     return true;
 }
 
-bool drape_contact_fits(const drape_contact *c, const drape_pattern *pattern)
+bool drape_contact_is_in_pattern(const drape_contact *c, const drape_pattern *pattern)
 {
     for (int32_t i = 0; i < c->active.count; i++)
         if (!has_blocks(c, &c->active.contacts[i], pattern))

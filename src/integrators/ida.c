@@ -78,9 +78,10 @@ static const drape_param params[PARAM_COUNT] = {
                                       "highest order of the BDF"),
     [PARAM_MAX_STEP] =
         DRAPE_NUMBER("max_step", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),
-    [PARAM_MAX_STEPS] = DRAPE_INTEGER("max_steps", "1/s", 100000, 1, 1e9,
-                                      "most steps within one second of simulated time, not counting those "
-                                      "that end an advance; one more ends the run"),
+    [PARAM_MAX_STEPS] =
+        DRAPE_INTEGER("max_steps", "1/s", 100000, 1, 1e9,
+                      "largest number of steps within one second of simulated time, not counting those "
+                      "that end an advance; one more ends the run"),
     [PARAM_LINEAR_SOLVER] = DRAPE_CHOICE("linear_solver", 0, drape_linears_names, "name of a linear solver"),
     [PARAM_MATRIX] = DRAPE_CHOICE(
         "matrix", MATRIX_AUTO, matrix_choices,
@@ -486,8 +487,8 @@ static drape_status solve(ida_state *s, double end, double h, double *t, drape_s
     s->counted = iterations;
     if (status)
         IDAGetCurrentStep(s->ida, &info->h);
-    info->h = fmin(info->h, h); /* IDA's step may belong to an earlier attempt: half of that would not be a
-                             smaller step */
+    /* IDA's step may belong to an earlier attempt: half of that would not be a smaller step. */
+    info->h = fmin(info->h, h);
     return status;
 }
 
@@ -500,8 +501,8 @@ static drape_status step(void *state, const drape_state *in, drape_state *out, d
     info->tolerance = info->residual = NAN; /* IDA bounds errors, not residuals */
     if (exhausted(s, in, info))
         return DRAPE_E_STEP_TOO_SMALL;
-    if (in->t ==
-        s->from) /* the sim rejected the last step, which IDA had accepted: mostly because of its energy */
+    /* The sim rejected the last step, which IDA had accepted: mostly because of its energy. */
+    if (in->t == s->from)
         s->newton.strict = true;
     s->from = NAN;
     info->reason = drape_reason_name(DRAPE_REASON_SOLVER);

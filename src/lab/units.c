@@ -1,7 +1,7 @@
 /*
  * units.c: lab_unit of text.h. A pointer says in which table a name is to be looked for,
  * "/cloth/0/terms/2/stiffness" in that of the terms, but not in which entry: that is in the scene. If
- * entries give the name different units, the result is none.
+ * entries give the name different units, lab_unit returns "".
  */
 #include "lab/text.h"
 

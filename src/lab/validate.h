@@ -67,8 +67,7 @@ extern const drape_registry drape_reference_registry;
     .case_count = sizeof((const double[]){__VA_ARGS__}) / sizeof(double)
 
 /* Defines the reference of that name; meson.build puts it into the table. */
-#define DRAPE_REFERENCE(word, ...)                                                                           \
-    const drape_reference drape_reference_##word = {.entry.name = #word, __VA_ARGS__}
+#define DRAPE_REFERENCE(id, ...) const drape_reference drape_reference_##id = {.entry.name = #id, __VA_ARGS__}
 
 typedef struct drape_validation {
     double parameter, expected, documented, obtained;

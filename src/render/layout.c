@@ -8,7 +8,7 @@
 #define STRIP  0.25f /* largest share of the picture's width for the legend */
 #define MARGIN 20    /* [pixels at 720 rows], as all below */
 #define LINE   21    /* height of a line */
-#define LEGEND 120   /* least height of the legend's ramp */
+#define LEGEND 120   /* smallest height of the legend's ramp */
 #define TAB    112   /* from the beginning of a line to the text after its tab */
 
 static const float veil[4] = {1, 1, 1, 0.62f};

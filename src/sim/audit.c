@@ -105,12 +105,12 @@ static double scene_energy(const drape_model *m)
 static int32_t hottest(const drape_model *m, const double *v)
 {
     int32_t node = 0;
-    double most = -1;
+    double max = -1;
     for (int32_t i = 0; i < m->node_count; i++) {
         const double *u = v + 3 * (size_t)i;
         double energy = m->mass[i] * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
-        if (energy > most) {
-            most = energy;
+        if (energy > max) {
+            max = energy;
             node = i;
         }
     }
@@ -158,7 +158,7 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
     const drape_energy attempted =
         measure(sim, out, drape_sim_state(sim)->internal, audit->dissipated + info->dissipated,
                 audit->pin_work + info->pin_work);
-    const double most = sim->chosen.integrator->gain > 0 ? sim->chosen.integrator->gain : RUN_GAIN;
+    const double max_gain = sim->chosen.integrator->gain > 0 ? sim->chosen.integrator->gain : RUN_GAIN;
     double quiet = scene_energy(m), gain = e.numerical - attempted.numerical,
            scale = offered(audit, &attempted, info, quiet), run = audit->best - attempted.numerical;
     sim->attempted = attempted;
@@ -172,9 +172,9 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
     else if (gain > STEP_GAIN * scale)
         info->diagnostic =
             gain_at(m, out->v, "energy from nowhere / energy of the run", gain / scale, STEP_GAIN);
-    else if (gain > ROUNDED * scale && run > most * scale)
-        info->diagnostic =
-            gain_at(m, out->v, "energy from nowhere since its least / energy of the run", run / scale, most);
+    else if (gain > ROUNDED * scale && run > max_gain * scale)
+        info->diagnostic = gain_at(m, out->v, "energy from nowhere since its least / energy of the run",
+                                   run / scale, max_gain);
     else
         return false;
     return true;

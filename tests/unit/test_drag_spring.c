@@ -158,5 +158,5 @@ START_TEST(wrong_arguments_change_nothing)
 }
 END_TEST
 
-SUITE("pull", force_and_jacobian_are_those_of_a_spring, a_free_sheet_takes_the_spring_s_momentum,
+SUITE("drag spring", force_and_jacobian_are_those_of_a_spring, a_free_sheet_takes_the_spring_s_momentum,
       its_work_is_accounted, every_integrator_follows, wrong_arguments_change_nothing)
