@@ -20,12 +20,14 @@
 
 #include <string.h>
 
-#define MIN_MARGIN   0.25 /* of a mean edge: smallest margin, by which points may move before a new search, */
-#define MAX_MARGIN   0.4  /* and largest one; */
-#define MARGIN_STEPS 1.5  /* between them it is the displacement of this many steps like the last one */
-#define LEAD_BEGIN   1.0  /* displacements by which a search at the beginning of a step is made ahead; */
-#define LEAD_WITHIN  -0.5 /* within a step it is made half back, as the next trial may start there; */
-#define MAX_LEAD     0.8  /* the largest such distance, as a share of the margin */
+/* The margin is the distance by which points may move before a new search. */
+#define MIN_MARGIN   0.25 /* smallest margin, in mean edges */
+#define MAX_MARGIN   0.4  /* largest margin, in mean edges */
+#define MARGIN_STEPS 1.5  /* margin between these limits, in displacements of the last step */
+/* The lead is the distance by which a search is made ahead of the points. */
+#define LEAD_BEGIN  1.0  /* lead at the beginning of a step, in displacements */
+#define LEAD_WITHIN -0.5 /* lead within a step: half back, as the next trial may start there */
+#define MAX_LEAD    0.8  /* largest lead, as a share of the margin */
 
 static drape_status take_arrays(drape_arena *arena, drape_contact *c)
 {
@@ -230,7 +232,9 @@ int32_t drape_contact_active(const drape_contact *c, double *least_gap)
 drape_status drape_contact_lag(drape_contact *c)
 {
     c->lagged_count = 0;
-    for (int32_t i = 0; c->model->contact.lagged && i < c->active.count; i++) {
+    if (!c->model->contact.lagged)
+        return DRAPE_OK;
+    for (int32_t i = 0; i < c->active.count; i++) {
         const drape_active_contact *contact = &c->active.contacts[i];
         const drape_contact_law law = drape_contact_law_of(c, &contact->pair);
         if (!(law.friction > 0))

@@ -12,14 +12,16 @@
 
 #include <math.h>
 
-#define JUMP  4.0 /* an explosion is a kinetic energy that grew by more than this factor in one step, */
-#define SHARE 0.5 /* and of which more than this share is unaccounted for */
-/* of the compared energies: smaller gains are below what adaptive integrators resolve */
+/* In an explosion, kinetic energy grows by more than JUMP, and more than SHARE of it has no known source. */
+#define JUMP  4.0 /* factor of the kinetic energy in one step */
+#define SHARE 0.5 /* fraction of the kinetic energy at the end of the step */
+/* Fraction of the compared energies: smaller gains are below what adaptive integrators resolve. */
 #define UNNOTICED 1e-6
-/* of the same energies: smaller gains are rounding errors. Not a share of the step size: small steps gain
- * little each */
+/* Fraction of the energy available to the run: smaller gains are rounding errors. Not proportional to the
+ * step size: small steps gain little each. */
 #define ROUNDED 1e-12
-#define QUIET   1e-16 /* of the scene's own energy: motion at 1e-8 of the scene's speed is rounding error */
+#define QUIET                                                                                                \
+    1e-16 /* fraction of the scene's own energy: motion at 1e-8 of the scene's speed is rounding error */
 
 /* Limits relative to the energy available to the run so far. Integrators that conserve energy, or bound an
  * error, let it oscillate by some per cent. */
