@@ -66,11 +66,14 @@ drape_status drape_candidates_search(drape_candidates *c, const drape_configurat
     memmove(c->pose, at->pose, (size_t)m->collider_count * sizeof *c->pose);
     c->margin = margin;
     c->count = 0;
-    for (int32_t k = 0; k < m->collider_count; k++)
-        for (int32_t i = 0; m->colliders[k].ops->smooth && i < m->free_count; i++) {
+    for (int32_t k = 0; k < m->collider_count; k++) {
+        if (!m->colliders[k].ops->smooth)
+            continue;
+        for (int32_t i = 0; i < m->free_count; i++) {
             const drape_pair pair = drape_broad_phase_surface(c->broad, m->node_of_free[i], k);
             consider(&s, &pair);
         }
+    }
     drape_broad_phase_pairs(c->broad, c->x, NULL, 2 * margin, consider, &s);
     c->known = s.status == DRAPE_OK;
     return s.status;

@@ -100,7 +100,9 @@ double drape_contact_step_fraction(drape_contact *c, const double *x, const doub
         drape_contact_free_fraction(c, c->from, c->to, c->path_pose, KEEP_ITERATE, false, &limiting);
     for (int32_t k = 0; k < c->model->collider_count; k++) {
         const drape_collider *collider = &c->model->colliders[k];
-        for (int32_t i = 0; collider->ops->smooth && i < c->model->free_count; i++) {
+        if (!collider->ops->smooth)
+            continue;
+        for (int32_t i = 0; i < c->model->free_count; i++) {
             const size_t at = 3 * (size_t)c->model->node_of_free[i];
             fraction = fmin(fraction, march(collider, &c->path_pose[k], x + at, y + at, KEEP_ITERATE));
         }

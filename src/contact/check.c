@@ -75,8 +75,10 @@ static bool dips(const drape_collider *collider, const double *x, const double *
 
 static drape_status check_surfaces(drape_contact *c, const char **reason, drape_diagnostic *diagnostic)
 {
-    for (int32_t k = 0; k < c->model->collider_count; k++)
-        for (int32_t i = 0; c->model->colliders[k].ops->smooth && i < c->model->free_count; i++) {
+    for (int32_t k = 0; k < c->model->collider_count; k++) {
+        if (!c->model->colliders[k].ops->smooth)
+            continue;
+        for (int32_t i = 0; i < c->model->free_count; i++) {
             const int32_t node = c->model->node_of_free[i];
             double x[3], y[3];
             vec3_sub(c->start + 3 * (size_t)node, c->start_pose[k].displacement, x);
@@ -88,6 +90,7 @@ static drape_status check_surfaces(drape_contact *c, const char **reason, drape_
             *diagnostic = diagnostic_of(c, &pair, "node through collider", 1, 0);
             return DRAPE_RETRY_REJECTED;
         }
+    }
     return DRAPE_OK;
 }
 

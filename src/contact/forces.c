@@ -66,7 +66,8 @@ void drape_contact_add_forces(drape_contact *c, bool normal, bool friction, doub
         if (friction && !c->model->contact.lagged && law.friction > 0)
             add_friction(c, contact, &law, drape_contact_normal_force(&contact->gap, &law), g);
     }
-    for (int32_t i = 0; friction && i < c->lagged_count; i++) {
+    const int32_t lagged_count = friction ? c->lagged_count : 0;
+    for (int32_t i = 0; i < lagged_count; i++) {
         const drape_lagged *lagged = &c->lagged[i];
         const drape_contact_law law = drape_contact_law_of(c, &lagged->contact.pair);
         add_friction(c, &lagged->contact, &law, lagged->lambda, g);

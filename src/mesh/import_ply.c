@@ -463,8 +463,10 @@ static drape_status read_items(ply_reader *reader, bool counting)
         reader->element = &reader->elements[i];
         if (reader->element->property_count == 0) /* items without properties take no byte and no line */
             continue;
-        for (reader->item = 0; reader->item < reader->element->count && !status; reader->item++)
+        for (int64_t item = 0; item < reader->element->count && !status; item++) {
+            reader->item = item;
             status = read_item(reader);
+        }
     }
     return status;
 }

@@ -13,9 +13,9 @@
 #include <math.h>
 #include <string.h>
 
-/* of the initial work along a correction, which the residual may do beyond the minimum */
+/* Fraction of the initial work along a correction that the residual may do beyond the minimum. */
 #define WORK_FRACTION 0.5
-#define MAX_HALVINGS  6 /* of a correction; the last one is taken if F is finite there */
+#define MAX_HALVINGS  6 /* halvings of a correction; the last one is taken if F is finite there */
 
 struct drape_inexact_newton {
     drape_step_equation *equation;
@@ -84,13 +84,13 @@ static drape_status iterate(drape_inexact_newton *s, const drape_inexact_setting
     if (!drape_step_equation_evaluate(e, d))
         return DRAPE_RETRY_NONFINITE;
     const double first = drape_step_equation_dot(e, e->f, e->f);
-    for (;; report->iterations++) {
+    for (int i = 0;; i++) {
+        report->iterations = i;
         bool converged = drape_step_equation_norm(e, DRAPE_NORM_MAX) <= settings->tolerance;
         report->reason = drape_reason_name(converged ? DRAPE_REASON_CONVERGED : DRAPE_REASON_ITERATIONS);
-        if (converged ||
-            (report->iterations >= settings->iterations && drape_step_equation_dot(e, e->f, e->f) < first))
+        if (converged || (i >= settings->iterations && drape_step_equation_dot(e, e->f, e->f) < first))
             return DRAPE_OK;
-        if (report->iterations >= settings->iterations + settings->rescue_iterations) {
+        if (i >= settings->iterations + settings->rescue_iterations) {
             report->reason = drape_reason_name(DRAPE_REASON_RESIDUAL);
             return DRAPE_RETRY_NONLINEAR;
         }

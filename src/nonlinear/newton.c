@@ -42,17 +42,17 @@
 
 /* KINSOL's settings that no user should need. All are set; none is left to a default. */
 #define SETUPS_EXACT    1     /* iterations between Jacobians: exact Newton */
-#define SETUPS_MODIFIED 10    /* and modified Newton */
-#define STEP_TOLERANCE  1e-15 /* of the scene's size: a shorter correction changes nothing */
-/* of the scene's size, for each node: KINSOL's own limit is 1 for the guess d = 0 */
+#define SETUPS_MODIFIED 10    /* iterations between Jacobians: modified Newton */
+#define STEP_TOLERANCE  1e-15 /* fraction of the scene's size: a shorter correction changes nothing */
+/* Largest correction, in sizes of the scene, for each node: KINSOL's own limit is 1 for the guess d = 0 */
 #define MAX_NEWTON_STEP 1e3
-#define MAX_BETA_FAIL   1000 /* failures of its line search's curvature condition: in effect unlimited */
+#define MAX_BETA_FAIL   1000 /* failures of KINSOL's curvature condition: in effect unlimited */
 
 #define WORK_FRACTION  0.5  /* a is accepted where |F(d + a p) . p| is at most this fraction of its start */
-#define MAX_TRIALS     8    /* of the line search */
+#define MAX_TRIALS     8    /* trial points of the line search */
 #define SHORT_STEP     0.5  /* after a shorter step the next matrix is positive semidefinite */
-#define MIN_SHARE      1e-3 /* of the positive parts: floor of the first share tried, half of the last one */
-#define SHARE_GROWTH   4    /* from one share tried to the next */
+#define MIN_SHARE      1e-3 /* smallest first share of the positive parts; otherwise half of the last one */
+#define SHARE_GROWTH   4    /* factor from one share tried to the next */
 #define MAX_PREDICTION 8    /* corrections in a solve, after which stress is no longer predicted */
 #define MAX_CHORDS     2    /* chord steps for each correction */
 
@@ -70,7 +70,8 @@ struct drape_newton {
 
     /* Kept between solves. */
     double repair_share;         /* the share that made the last indefinite matrix definite */
-    double factored_mass_weight; /* of the factors that modified Newton may keep; 0: none */
+    bool factored;               /* there are factors, which modified Newton may keep */
+    double factored_mass_weight; /* mass weight of these factors */
 
     /* Kept between the iterations of one solve. */
     int corrections;
@@ -197,7 +198,8 @@ static int jacobian(N_Vector d, N_Vector f, SUNMatrix matrix, void *user, N_Vect
 static drape_status factor_matrix(drape_newton *s, bool definite)
 {
     drape_status status = drape_sun_linear_factor(s->linear, definite);
-    s->factored_mass_weight = status ? 0 : s->equation->mass_weight;
+    s->factored = !status;
+    s->factored_mass_weight = s->equation->mass_weight;
     return status;
 }
 
@@ -455,7 +457,7 @@ drape_status drape_newton_solve(drape_newton *s, double *d, drape_solve_report *
         return DRAPE_OK;
     }
     improve_guess(s, d);
-    bool keeps_factors = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_MODIFIED &&
+    bool keeps_factors = s->values[DRAPE_NEWTON_METHOD] == DRAPE_NEWTON_METHOD_MODIFIED && s->factored &&
                          s->factored_mass_weight == e->mass_weight;
     KINSetNoInitSetup(s->kin, keeps_factors);
     N_VSetArrayPointer(d, s->unknown);
@@ -571,7 +573,7 @@ const double *drape_newton_values(const drape_newton *s)
 
 void drape_newton_forget_factors(drape_newton *s)
 {
-    s->factored_mass_weight = 0;
+    s->factored = false;
 }
 
 /* Modified Newton keeps its factors, and monitors the residual relative to that of the previous solve. */
@@ -582,13 +584,14 @@ void drape_newton_archive(drape_newton *s, drape_archive *a)
     drape_archive_mark(a, "newton");
     drape_archive_doubles(a, e->f, e->dofs);
     drape_archive_double(a, &s->repair_share);
+    drape_archive_bool(a, &s->factored);
     drape_archive_double(a, &s->factored_mass_weight);
     drape_work_archive(&e->work, a);
     if (e->dofs == 0)
         return;
     if (drape_archive_has_read(a))
         drape_archive_note(a, drape_sun_linear_ensure_pattern(s->linear, drape_system_pattern(e->system)));
-    drape_sun_linear_archive(s->linear, a, modified && s->factored_mass_weight != 0);
+    drape_sun_linear_archive(s->linear, a, modified && s->factored);
     if (modified && !drape_kinsol_archive(s->kin, a) && a->reading)
         drape_newton_forget_factors(s);
 }

@@ -186,12 +186,13 @@ static drape_status measure_terms(bench *s, bool implicit, drape_profile_term *t
     unsigned char *seen = drape_arena_take(&s->arena, blocks, 1);
     if (!seen)
         return DRAPE_E_MEMORY;
-    for (s->term = 0; s->term < model->term_count; s->term++) {
+    for (int32_t i = 0; i < model->term_count; i++) {
+        s->term = i;
         drape_status status = drape_check_cancel(s->ctx);
         if (status)
             return status;
-        const drape_term *term = &model->terms[s->term];
-        drape_profile_term *p = &terms[s->term];
+        const drape_term *term = &model->terms[i];
+        drape_profile_term *p = &terms[i];
         *p = (drape_profile_term){.nonzeros = count_nonzeros(term, seen, blocks), .bytes = term_bytes(term)};
         if (term->ops->law)
             p->acts_on = count_measures(model, term->cloth);
