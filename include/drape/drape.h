@@ -357,7 +357,7 @@ DRAPE_API void drape_sim_destroy(drape_sim **sim);
  * diagnostic. */
 DRAPE_API drape_status drape_sim_advance(drape_sim *sim, double t_end);
 
-/* What a call of drape_sim_advance_realtime did. */
+/* The results of a call of drape_sim_advance_realtime. */
 typedef struct drape_realtime {
     double time;    /* [s] simulated time that was reached */
     double debt;    /* [s] simulated time, of this frame and earlier ones, that is owed to the next call; 0:
@@ -639,13 +639,13 @@ typedef struct drape_attempt {
     drape_diagnostic diagnostic; /* the element or node to report */
 } drape_attempt;
 
-/* What an event reports. */
+/* The kind of an event. */
 typedef enum drape_event_kind {
     DRAPE_EVENT_ATTEMPT, /* an attempt was judged; the sim's state is the one that is kept */
     DRAPE_EVENT_FRAME    /* a frame time was reached: t = 0 at the first advance, then k / frame_rate */
 } drape_event_kind;
 
-/* What an observer receives. Valid during the call. */
+/* An event as an observer receives it. Valid during the call. */
 typedef struct drape_event {
     drape_event_kind kind;        /* what happened */
     drape_sim *sim;               /* the sim that the event belongs to */

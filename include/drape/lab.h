@@ -29,7 +29,7 @@ typedef void drape_lab_progress(void *user, int64_t done, int64_t total, double 
  * kept. Called by all threads at any time, so it must be thread-safe. */
 typedef bool drape_lab_cancel(void *user);
 
-/* What to run. Initialise with drape_lab_def_init. Strings need only live during the call. */
+/* The definition of a run. Initialise with drape_lab_def_init. Strings need only live during the call. */
 typedef struct drape_lab_def {
     size_t struct_size;                /* set by drape_lab_def_init */
     const char *scene;                 /* name of a scene file */

@@ -13,7 +13,7 @@
 
 #define DRAPE_BLOCK 32 /* elements; few enough that their Hessians stay in the cache */
 
-/* What a sum over a term is to contain, and where. */
+/* Selects the parts of a sum over a term, and where it is evaluated. */
 typedef struct drape_request {
     const drape_point *point;
     bool energy, hessian;

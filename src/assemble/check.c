@@ -123,7 +123,7 @@ static double mean_edge(const drape_model *m)
 
 /* ---- One term, element by element ---- */
 
-/* What an author's function returns for one element: a value, its gradient and Hessian. */
+/* The results of a user-defined or built-in function for one element: a value, its gradient and Hessian. */
 typedef struct local {
     double scalar, gradient[D], hessian[D * D], velocity[D * D];
 } local;

@@ -28,14 +28,14 @@ typedef struct cli_source {
     bool incomplete;  /* the simulation stopped early: the reel has the frames up to then */
 } cli_source;
 
-/* Opens a scene or a run. CLI_GO_ON, or CLI_BAD_INPUT after the error was printed. cli_source_free in any
- * case. */
+/* Opens a scene or a run. Returns CLI_GO_ON, or CLI_BAD_INPUT after the error was printed. The caller calls
+ * cli_source_free in either case. */
 int cli_source_open(const cli_command *command, const char *operand, const cli_frames_def *def,
                     cli_source *out);
 void cli_source_free(cli_source *source);
 
-/* Reads or simulates the frames. CLI_GO_ON, also if the simulation stopped after the first frame, which is
- * reported on stderr; or an exit code. */
+/* Reads or simulates the frames. Returns an exit code, or CLI_GO_ON, also if the simulation stopped after the
+ * first frame, which is reported on stderr. */
 int cli_source_fill(const cli_frames_def *def, cli_source *source);
 
 #endif

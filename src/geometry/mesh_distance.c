@@ -16,7 +16,7 @@
 #include <string.h>
 
 struct drape_mesh_distance {
-    drape_bvh boxes;      /* of the shape's triangles */
+    drape_bvh boxes;      /* tree of boxes over the shape's triangles */
     int32_t *edge_of;     /* (triangle_count x 3) number of the segment between corners k and k + 1 */
     double *face_normal;  /* (triangle_count x 3) unit vectors */
     double *edge_normal;  /* (segment_count x 3) not normalised */

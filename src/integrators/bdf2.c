@@ -13,7 +13,7 @@
 
 #include <string.h>
 
-/* What the formula needs to know of the past: differences between a state and the one before it. */
+/* The history that the formula needs: differences between a state and the one before it. */
 typedef struct past {
     double t, h;          /* [s] time of the state; size of the step that led to it */
     double *dx, *dv, *dq; /* x0 - x_, v0 - v_ (nodes), q0 - q_ (measures) */

@@ -10,7 +10,7 @@
 #include "base/registry.h"
 #include "nonlinear/report.h"
 
-/* What a step reports. */
+/* The report of a step. */
 typedef struct drape_step_info {
     const char *reason; /* "converged", or why not; static text */
     double h;           /* [s] the step taken; set by integrators that choose their own steps */

@@ -12,7 +12,7 @@ typedef struct drape_summary_realtime {
     double debt, dropped; /* [s] simulated time still owed after the last frame; dropped in total */
 } drape_summary_realtime;
 
-/* What the sim itself does not know. All members may be 0. */
+/* The results that the sim itself does not know. All members may be 0. */
 typedef struct drape_summary_def {
     drape_status status;                    /* the status with which the run ended */
     const char *message;                    /* NULL: none */

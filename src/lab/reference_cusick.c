@@ -31,7 +31,7 @@
 static double rim_sinking(double nu)
 {
     const double b = INNER / OUTER, l = log(b);
-    /* What 1, ln r, r^2, r^2 ln r and -r^4/64 give in each. */
+    /* The value of 1, ln r, r^2, r^2 ln r and -r^4/64 in each boundary condition. */
     double conditions[4][5] = {{1, l, b * b, b * b * l, -pow(b, 4) / 64},
                                {0, 1 / b, 2 * b, b * (2 * l + 1), -pow(b, 3) / 16},
                                {0, nu - 1, 2 * (1 + nu), 3 + nu, -(3 + nu) / 16},
@@ -149,8 +149,8 @@ static double measured(double place)
     return drape_fabrics[(int)place].drape;
 }
 
-/* What the model gives after 1 s, when the sheet no longer moves (0.7666, 0.7664 and 0.7664 after 1, 1.25 and
- * 1.5 s). */
+/* The result of the model after 1 s, when the sheet no longer moves (0.7666, 0.7664 and 0.7664 after 1, 1.25
+ * and 1.5 s). */
 static double elastic(double place)
 {
     static const double values[] = {0.7666, 0.5409, 0.6822, 0.3854};

@@ -11,7 +11,7 @@
 #define PRESSURE  0.01 /* [Pa] */
 #define PI        3.14159265358979323846
 
-/* Of a plate supported on all sides, by Navier's double series; it does not depend on nu. */
+/* The deflection of a plate supported on all sides, by Navier's double series; it does not depend on nu. */
 static double navier(double nu)
 {
     (void)nu;

@@ -8,7 +8,7 @@
 #include <jansson.h>
 #include <stdatomic.h>
 
-/* What is simulated, and what is measured. */
+/* A case to simulate, and the measurements to make. */
 typedef struct lab_request {
     const drape_lab_def *def;    /* scene, settings of all cases, cancel */
     const json_t *settings;      /* {pointer: value} of the case; NULL: none */

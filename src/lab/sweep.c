@@ -92,7 +92,7 @@ drape_status lab_begin_lines(lab *l, const char *name, int shard, int shards, dr
 
 /* ---- Cases ---- */
 
-/* What the threads of a sweep share. All but the flag is read and written under the lock. */
+/* The state that the threads of a sweep share. All but the flag is read and written under the lock. */
 typedef struct sweep {
     lab *l;
     drape_file file;

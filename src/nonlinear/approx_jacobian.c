@@ -345,7 +345,8 @@ void drape_approx_jacobian_destroy(drape_approx_jacobian **out)
     *out = NULL;
 }
 
-/* Each step begins with an update, so of the factors only what later ones depend on is archived. */
+/* Each step begins with an update, so the factors themselves are not archived, only the state that later
+ * ones depend on. */
 void drape_approx_jacobian_archive(drape_approx_jacobian *s, drape_archive *a)
 {
     drape_archive_mark(a, "approximate jacobian");

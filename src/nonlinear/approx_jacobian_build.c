@@ -140,8 +140,8 @@ static int differences(const drape_approx_jacobian *s, int32_t pair, int32_t col
     return count;
 }
 
-/* What one pair adds to the coarse matrix, from entry `at` of the list on; returns the next entry. Without
- * store it only counts the entries. */
+/* Adds the entries of one pair to the coarse matrix, from entry `at` of the list on; returns the next entry.
+ * Without store it only counts the entries. */
 static int64_t add_pair(drape_approx_jacobian *s, int32_t pair, int64_t at, bool store)
 {
     coarse_matrix *c = &s->coarse;

@@ -15,12 +15,12 @@
 
 #include <math.h>
 
-#define KEEP    0.9  /* of the budget: a level of effort that is expected to take more is left */
-#define RECOVER 0.6  /* of the budget: a better level is resumed if it is expected to take less */
-#define LEARN   0.3  /* weight of the last attempt in the expected cost */
-#define CHEAPER 0.7  /* assumed cost relative to the next better level, until it is measured */
-#define STRETCH 4    /* longest step, in dt, unless the def sets it */
-#define SAME    1e-9 /* of dt: allowance for rounding in the host's sum of frames */
+#define KEEP    0.9 /* fraction of the budget: a level of effort that is expected to take more is abandoned */
+#define RECOVER 0.6 /* fraction of the budget: a better level that is expected to take less is resumed */
+#define LEARN   0.3 /* weight of the last attempt in the expected cost */
+#define CHEAPER 0.7 /* assumed cost relative to the next better level, until it is measured */
+#define STRETCH 4   /* longest step, in dt, unless the def sets it */
+#define SAME    1e-9 /* fraction of dt: allowance for rounding in the host's sum of frames */
 
 static int effort_count(const drape_sim *sim)
 {

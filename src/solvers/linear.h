@@ -15,7 +15,7 @@
 
 typedef struct drape_linear_ops drape_linear_ops;
 
-/* What a solver did. */
+/* The choice of a solver and its fallbacks. */
 typedef struct drape_linear_report {
     const drape_linear_ops *ops;      /* the solver: the requested one, or the one that it picked */
     char why[96];                     /* why it was picked; "" if nothing was picked */

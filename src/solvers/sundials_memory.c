@@ -99,7 +99,7 @@ static void check_orders(const struct IDAMemRec *s, drape_archive *a)
             drape_archive_fail(a, DRAPE_E_PARSE, "the checkpoint has the order %d of %d", orders[i], most);
 }
 
-/* What the first IDASolve does before its first step, and no later one does. False if it fails. */
+/* Does what only the first IDASolve does, before its first step. False if it fails. */
 static bool set_up(IDAMem s)
 {
     s->ida_edata = s;

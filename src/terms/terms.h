@@ -38,9 +38,9 @@ static inline bool drape_fell(double ratio, double before)
     return ratio < before - 1e-12;
 }
 
-/* For the check of a term: finds the lowest ratio of the elements 0, every, 2 every ..., ignoring those below
- * the limit that the step did not lower. fault has reason, what and limit on entry. before may be NULL: none
- * is ignored. */
+/* For the check of a term: finds the lowest ratio of the elements 0, every, 2 every ... An element below the
+ * limit is ignored if the step did not lower its ratio; with before = NULL no element is ignored. fault has
+ * reason, what and limit on entry. */
 typedef double drape_ratio(const drape_elements *el, int32_t element, const double *x);
 drape_status drape_check_ratios(const drape_elements *el, const double *x, const double *before,
                                 int32_t every, drape_ratio *ratio_of, drape_fault *fault);
