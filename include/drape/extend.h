@@ -129,7 +129,7 @@ typedef struct drape_param {
 typedef struct drape_entry {
     const char *name;          /* as in scenes: "bend.hinge" */
     const char *summary;       /* one line for `drape list` */
-    const char *reference;     /* source of the method: paper and equation; NULL: none */
+    const char *reference;     /* source of the method: paper and equation; terms and colliders need one */
     const drape_param *params; /* param_count parameters; NULL: none */
     int param_count;           /* length of params */
 } drape_entry;

@@ -3,6 +3,7 @@
 #include "compile/compile.h"
 
 #include "compile/stages.h"
+#include "model/scene.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -50,15 +51,23 @@ static drape_status copy_formats(drape_model *model, const drape_scene_def *def)
     return drape_arena_status(&model->arena);
 }
 
+/* The default of a key whose value is a text. */
+static const char *default_text(const char *pointer)
+{
+    return drape_scene_key_at(pointer)->param.derived;
+}
+
 static drape_status copy_scene(drape_model *model, const drape_scene_def *def)
 {
     memcpy(model->gravity, def->gravity, sizeof model->gravity);
     model->duration = def->duration;
     model->frame_rate = def->frame_rate;
     model->z_up = def->up && strcmp(def->up, "z") == 0;
-    drape_status status = drape_compile_choice(model, &def->integrator, "be", &model->integrator);
+    drape_status status =
+        drape_compile_choice(model, &def->integrator, default_text("/integrator/method"), &model->integrator);
     if (!status)
-        status = drape_compile_choice(model, &def->controller, "halving", &model->controller);
+        status = drape_compile_choice(model, &def->controller, default_text("/controller/type"),
+                                      &model->controller);
     return status ? status : copy_formats(model, def);
 }
 

@@ -158,8 +158,9 @@ static void give(void *def, size_t struct_size, bool sized, const void *defaults
         memcpy(def, &struct_size, struct_size < sizeof struct_size ? struct_size : sizeof struct_size);
 }
 
-/* Two defaults apply only to hosts: the text of a scene must give a duration, and its frames are written by
- * default. */
+/* Two defaults of hosts differ from the table of keys. A text must give a duration, so its key has no
+ * default; a host need not, as it may step for as long as it likes. `drape run` writes the frames of a text
+ * to files by default; a host reads the states itself, so it starts without formats. */
 void drape_scene_def_init(drape_scene_def *def, size_t struct_size)
 {
     drape_scene_def defaults = {.struct_size = struct_size};

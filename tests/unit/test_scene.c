@@ -220,6 +220,35 @@ START_TEST(test_defaults)
 }
 END_TEST
 
+/* Docstrings of drape/drape.h name these numbers for readers: whoever changes one changes it there too. */
+START_TEST(test_host_defaults)
+{
+    drape_mesh_def mesh;
+    drape_collider_def collider;
+    drape_pin_def pin;
+    drape_scene_def_init(&def, sizeof def);
+    drape_mesh_def_init(&mesh, sizeof mesh);
+    drape_collider_def_init(&collider, sizeof collider);
+    drape_pin_def_init(&pin, sizeof pin);
+    check_vector(def.gravity, 0, -9.81, 0);
+    ck_assert_str_eq(def.integrator.type, "be");
+    ck_assert_str_eq(def.controller.type, "halving");
+    ck_assert_double_eq(def.duration, 1);
+    ck_assert_double_eq(def.frame_rate, 60);
+    ck_assert_uint_eq(def.format_count, 0);
+    ck_assert_str_eq(def.up, "y");
+    check_vector(mesh.scale, 1, 1, 1);
+    check_vector(mesh.translate, 0, 0, 0);
+    ck_assert_double_eq(mesh.rotate[3], 0);
+    ck_assert_int_eq(pin.row, -1);
+    ck_assert_double_eq(collider.friction, 0);
+    const drape_param *friction = &drape_scene_key_at("/colliders/0/friction")->param;
+    ck_assert_double_eq(friction->min, 0);
+    ck_assert_double_eq(friction->max, 1000);
+    ck_assert_uint_eq(drape_scene_key_at("/colliders")->at_most, 4096);
+}
+END_TEST
+
 START_TEST(test_numbers)
 {
     open_context();
@@ -1328,8 +1357,8 @@ START_TEST(test_every_key)
 END_TEST
 
 SUITE("scene", test_example_scene, test_example_cloth, test_example_pins, test_transforms, test_defaults,
-      test_numbers, test_def_sizes, test_comments, test_places, test_mend_end, test_colliders_and_contact,
-      test_wrong_scenes, test_long_texts, test_deep_nesting, test_truncations, test_mutations, test_sets,
-      test_set_values, test_set_loose_numbers, test_set_order, test_locate_fault, test_files, test_pipe,
-      test_arguments, test_many_nodes, test_locale, test_no_memory, test_no_memory_for_json, test_form,
-      test_every_key)
+      test_host_defaults, test_numbers, test_def_sizes, test_comments, test_places, test_mend_end,
+      test_colliders_and_contact, test_wrong_scenes, test_long_texts, test_deep_nesting, test_truncations,
+      test_mutations, test_sets, test_set_values, test_set_loose_numbers, test_set_order, test_locate_fault,
+      test_files, test_pipe, test_arguments, test_many_nodes, test_locale, test_no_memory,
+      test_no_memory_for_json, test_form, test_every_key)
