@@ -35,8 +35,8 @@ drape_status drape_param_refuse(drape_context *ctx, const char *pointer, const d
                                 const char *given);
 drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param);
 
-/* Sets the message for a setting whose name is not among the known parameters. It names the likely one, or all
- * of them. Returns DRAPE_E_ARGUMENT. */
+/* Sets the message for a setting whose name is not among the known parameters. It names the likely one, or
+ * all of them. Returns DRAPE_E_ARGUMENT. */
 drape_status drape_param_unknown(drape_context *ctx, const char *pointer, const char *name,
                                  const char *const *known, size_t count);
 
