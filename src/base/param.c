@@ -296,15 +296,29 @@ drape_status drape_param_value(drape_context *ctx, const char *pointer, const dr
     return number_value(ctx, pointer, param, setting->number, value);
 }
 
+drape_status drape_param_unknown(drape_context *ctx, const char *pointer, const char *name,
+                                 const char *const *known, size_t count)
+{
+    char list[RANGE_SIZE] = "";
+    size_t used = 0;
+    const char *meant = drape_did_you_mean(name, known, count);
+    if (meant)
+        return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown key \"%.60s\"; did you mean \"%s\"?",
+                             name, meant);
+    for (size_t i = 0; i < count && used < sizeof list; i++)
+        used +=
+            (size_t)snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "; parameters: ", known[i]);
+    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown key \"%.60s\"%s", name,
+                         count ? list : "; there are no parameters");
+}
+
 static drape_status unknown_name(drape_context *ctx, const char *pointer, const drape_param *params,
                                  int param_count, const char *name)
 {
     const char *names[DRAPE_MAX_PARAMS];
     for (int i = 0; i < param_count; i++)
         names[i] = params[i].name;
-    const char *meant = drape_did_you_mean(name, names, (size_t)param_count);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "unknown key \"%.60s\"%s%s%s", name,
-                         DRAPE_DID_YOU_MEAN(meant));
+    return drape_param_unknown(ctx, pointer, name, names, (size_t)param_count);
 }
 
 drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param)

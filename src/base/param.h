@@ -19,7 +19,7 @@ bool drape_param_is_required(const drape_param *param);
 
 /* Resolves the values of params, in their order: the default if no setting names the parameter (NaN if the
  * default is derived). Faults are reported at "pointer/name". A setting whose name is not in the list is a
- * fault, with a "did you mean". */
+ * fault. */
 drape_status drape_params_resolve(drape_context *ctx, const char *pointer, const drape_param *params,
                                   int param_count, const drape_setting *settings, size_t setting_count,
                                   double *values);
@@ -34,6 +34,11 @@ drape_status drape_param_value(drape_context *ctx, const char *pointer, const dr
 drape_status drape_param_refuse(drape_context *ctx, const char *pointer, const drape_param *param,
                                 const char *given);
 drape_status drape_param_missing(drape_context *ctx, const char *pointer, const drape_param *param);
+
+/* Sets the message for a setting whose name is not among the known parameters. It names the likely one, or
+ * all of them. Returns DRAPE_E_ARGUMENT. */
+drape_status drape_param_unknown(drape_context *ctx, const char *pointer, const char *name,
+                                 const char *const *known, size_t count);
 
 /* Whether a user-defined list is well formed: at most DRAPE_MAX_PARAMS values; each parameter has a name and
  * a unit, and a choice has choices. */

@@ -80,7 +80,7 @@ static void text_scene(void)
 static void text_object(const cli_object *object)
 {
     char one_of[256];
-    cli_one_of_text(object->form, one_of, sizeof one_of);
+    drape_scene_one_of_text(object->form, one_of, sizeof one_of);
     printf("\n  %-20s %s%s%s\n", object->form->name, *object->pointer ? object->pointer : "at the top",
            *one_of ? "; " : "", one_of);
 }
@@ -165,7 +165,7 @@ static void markdown_key(const cli_object *object, const drape_scene_key *key)
     const size_t length = strlen(text.takes);
     if (cli_is_one_of(object->form, key)) {
         snprintf(text.takes + length, sizeof text.takes - length, "; ");
-        cli_one_of_text(object->form, text.takes + length + 2, sizeof text.takes - length - 2);
+        drape_scene_one_of_text(object->form, text.takes + length + 2, sizeof text.takes - length - 2);
     }
     markdown_cells(*object->pointer ? object->pointer : "/", key->param.name, key->param.help, &text);
 }
@@ -294,7 +294,11 @@ static int unknown_name(const char *name)
             names[count++] = tables[t]->entries[i]->name;
     }
     const char *meant = drape_did_you_mean(name, names, count);
-    return cli_misuse("list", "there is no table and no entry \"%.60s\"%s%s%s; `drape list` shows all", name,
+    char known[512] = SCENE_NAME;
+    size_t used = strlen(known);
+    for (int t = 0; tables[t] && used < sizeof known; t++)
+        used += (size_t)snprintf(known + used, sizeof known - used, ", %s", tables[t]->key);
+    return cli_misuse("list", "there is no table or entry \"%.60s\"; the tables are %s%s%s%s", name, known,
                       DRAPE_DID_YOU_MEAN(meant));
 }
 

@@ -10,8 +10,10 @@
 
 /* ---- Scene and cloths ---- */
 
-/* Prints the keys that have a value, except names, which are printed where they are used. */
-static void print_keys(const char *indent, int width, const drape_scene_object *object, const void *def)
+/* Prints the keys that have a value, except names, which are printed where they are used. defaults: a def
+ * with the default values. */
+static void print_keys(const char *indent, int width, const drape_scene_object *object, const void *def,
+                       const void *defaults)
 {
     char value[256], usual[256];
     for (size_t i = 0; i < object->key_count; i++) {
@@ -20,7 +22,7 @@ static void print_keys(const char *indent, int width, const drape_scene_object *
         if (key->shape > DRAPE_SCENE_LIST || named)
             continue;
         drape_scene_value_text(key, def, value, sizeof value);
-        drape_scene_default_text(key, usual, sizeof usual);
+        drape_scene_value_text(key, defaults, usual, sizeof usual);
         const bool has_unit = strcmp(key->param.unit, "1") != 0;
         printf("%s%-*s %s%s%s%s\n", indent, width, key->param.name, *value ? value : "none",
                has_unit ? " " : "", has_unit ? key->param.unit : "",
@@ -31,9 +33,11 @@ static void print_keys(const char *indent, int width, const drape_scene_object *
 static void print_scene(const cli_info *info)
 {
     const drape_model *m = info->model;
+    drape_scene_def defaults = {.struct_size = sizeof defaults};
+    drape_scene_set_defaults(&drape_form_scene, &defaults);
     printf("scene       %s\n", info->path);
-    print_keys("", 11, &drape_form_scene, &info->def);
-    print_keys("", 11, &drape_form_output, &info->def);
+    print_keys("", 11, &drape_form_scene, &info->def, &defaults);
+    print_keys("", 11, &drape_form_output, &info->def, &defaults);
     printf("frames      %lld\n", (long long)info->frames);
     printf("nodes       %d, %d of them free\n", (int)m->node_count, (int)m->free_count);
     printf("unknowns    %lld degrees of freedom, %lld nonzeros in their Jacobian\n", (long long)m->pattern.n,
@@ -81,6 +85,8 @@ static void print_params(const char *indent, const drape_param *params, int coun
 static void print_source(const drape_cloth *cloth, const drape_mesh_def *def)
 {
     double values[DRAPE_MAX_PARAMS];
+    drape_mesh_def defaults = {.file = NULL};
+    drape_scene_set_defaults(&drape_form_mesh, &defaults);
     const drape_grid_ops *grid = cli_grid_of(cloth, values);
     if (cloth->file)
         printf("  file      %s\n", cloth->file);
@@ -89,7 +95,7 @@ static void print_source(const drape_cloth *cloth, const drape_mesh_def *def)
         print_params("    ", grid->entry.params, grid->entry.param_count, values);
     }
     puts("  transform");
-    print_keys("    ", 16, &drape_form_transform, def);
+    print_keys("    ", 16, &drape_form_transform, def, &defaults);
 }
 
 /* A stiffness of a measured fabric; nothing for other materials. */
@@ -122,6 +128,8 @@ static void print_cloth(const cli_info *info, int32_t c)
 {
     const drape_cloth *cloth = &info->model->cloths[c];
     const drape_mesh *mesh = &cloth->mesh;
+    drape_cloth_def defaults = {.name = NULL};
+    drape_scene_set_defaults(&drape_form_cloth, &defaults);
     printf("\ncloth %s\n", cloth->name);
     printf("  mesh      %d nodes, %d triangles, %d edges", (int)mesh->node_count, (int)mesh->triangle_count,
            (int)mesh->edge_count);
@@ -130,7 +138,7 @@ static void print_cloth(const cli_info *info, int32_t c)
     putchar('\n');
     print_source(cloth, &info->def.cloths[c].mesh);
     printf("  mass      %.9g kg on %.9g m2\n", info->cloths[c].mass, info->cloths[c].area);
-    print_keys("  ", 9, &drape_form_cloth, &info->def.cloths[c]);
+    print_keys("  ", 9, &drape_form_cloth, &info->def.cloths[c], &defaults);
     print_pins(info->model, cloth, &info->cloths[c]);
     print_material(cloth);
 }
@@ -175,11 +183,13 @@ static void print_collider(const drape_collider *collider, const drape_collider_
                            const cli_collider_info *info)
 {
     const drape_collider_shape *shape = &collider->shape;
+    drape_collider_def defaults = {.name = NULL};
+    drape_scene_set_defaults(&drape_form_collider, &defaults);
     printf("\ncollider %s: %s, %s\n", collider->name, collider->ops->entry.name,
            collider->ops->entry.summary);
     print_given(collider->ops->entry.params, collider->ops->entry.param_count, collider->values,
                 &collider->choice);
-    print_keys("  ", 16, &drape_form_collider, def);
+    print_keys("  ", 16, &drape_form_collider, def, &defaults);
     if (collider->track.key_count > 0)
         printf("  %-16s %zu keys, %.9g s to %.9g s\n", "track", collider->track.key_count,
                collider->track.keys[0].time, collider->track.keys[collider->track.key_count - 1].time);

@@ -31,14 +31,6 @@ int cli_objects(cli_object objects[CLI_MAX_OBJECTS])
     return add_objects(objects, 0, &drape_form_scene, "");
 }
 
-void cli_one_of_text(const drape_scene_object *form, char *text, size_t size)
-{
-    size_t used = 0;
-    *text = 0;
-    for (int i = 0; form->one_of && form->one_of[i] && used < size; i++)
-        used += (size_t)snprintf(text + used, size - used, i ? ", %s" : "exactly one of %s", form->one_of[i]);
-}
-
 bool cli_is_one_of(const drape_scene_object *form, const drape_scene_key *key)
 {
     for (int i = 0; form->one_of && form->one_of[i]; i++)

@@ -16,9 +16,7 @@ typedef struct cli_object {
 /* The objects of a scene, each before those inside it, in the order of their keys. Returns their number. */
 int cli_objects(cli_object objects[CLI_MAX_OBJECTS]);
 
-/* Which keys of an object are alternatives: "exactly one of grid, file"; "" for none. */
-void cli_one_of_text(const drape_scene_object *form, char *text, size_t size);
-
+/* Whether a key is one of the alternatives of its object. */
 bool cli_is_one_of(const drape_scene_object *form, const drape_scene_key *key);
 
 #endif

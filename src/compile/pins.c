@@ -1,6 +1,7 @@
 /* pins.c: which nodes are pinned, along which track; numbers the free nodes. Pinned nodes are eliminated from
  * the system. */
 #include "compile/stages.h"
+#include "model/scene.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -133,8 +134,12 @@ static drape_status take_selection(pin_place *pin)
     const char *on_grid = def->corner ? "/corner" : def->edge ? "/edge" : def->row >= 0 ? "/row" : NULL;
     int given =
         (def->nodes != NULL) + (def->corner != NULL) + (def->edge != NULL) + (def->row >= 0) + def->has_box;
-    if (given != 1)
-        return refuse(pin, "", "exactly one of \"nodes\", \"corner\", \"edge\", \"row\", \"box\" is needed");
+    if (given != 1) {
+        char wanted[128];
+        drape_scene_one_of_text(&drape_form_pin, wanted, sizeof wanted);
+        strncat(wanted, " is needed", sizeof wanted - strlen(wanted) - 1);
+        return refuse(pin, "", wanted);
+    }
     if (on_grid && pin->cloth->mesh.rows == 0)
         return refuse(pin, on_grid,
                       "only a grid has rows, corners and edges; use \"nodes\" or \"box\" for this mesh");

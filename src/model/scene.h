@@ -109,6 +109,9 @@ void drape_scene_set_defaults(const drape_scene_object *object, void *def);
 /* Describes what a key accepts: "a number in (0, 1e6] s", "an array of objects, at least one". */
 void drape_scene_takes_text(const drape_scene_key *key, char *text, size_t size);
 
+/* Names the keys of which one must be given: "exactly one of grid, file"; "" without such a rule. */
+void drape_scene_one_of_text(const drape_scene_object *object, char *text, size_t size);
+
 /* Writes the value of a key in a def as text, also for a list of texts: "[0, 1, 0]", "npy, glb"; "" if none
  * is given. */
 void drape_scene_value_text(const drape_scene_key *key, const void *def, char *text, size_t size);

@@ -229,6 +229,14 @@ static size_t append(char *text, size_t size, size_t used, const char *separator
     return used < size ? used + (size_t)snprintf(text + used, size - used, "%s%s", separator, word) : used;
 }
 
+void drape_scene_one_of_text(const drape_scene_object *object, char *text, size_t size)
+{
+    size_t used = 0;
+    *text = 0;
+    for (int i = 0; object->one_of && object->one_of[i]; i++)
+        used = append(text, size, used, i ? ", " : "exactly one of ", object->one_of[i]);
+}
+
 void drape_scene_value_text(const drape_scene_key *key, const void *def, char *text, size_t size)
 {
     const bool is_list = key->shape == DRAPE_SCENE_LIST;

@@ -369,11 +369,10 @@ static drape_status check_one_of(reader *r, const drape_scene_object *object, js
     if (count == 0 || given_count == 1)
         return DRAPE_OK;
     char wanted[200], found[200] = "none";
-    list_names(object->one_of, count, wanted, sizeof wanted);
+    drape_scene_one_of_text(object, wanted, sizeof wanted);
     if (given_count)
         list_names(given, given_count, found, sizeof found);
-    return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "exactly one of %s is needed; given: %s",
-                         wanted, found);
+    return drape_fail_at(r->ctx, DRAPE_E_ARGUMENT, r->at.text, "%s is needed; given: %s", wanted, found);
 }
 
 static drape_status read_members(reader *r, const drape_scene_object *object, json_t *value, char *def)

@@ -16,6 +16,14 @@ typedef struct choice {
 static const choice integrators = {"/integrator", "method", &drape_integrator_registry};
 static const choice controllers = {"/controller", "type", &drape_controller_registry};
 
+static bool is_listed(const char *const *names, size_t count, const char *name)
+{
+    for (size_t i = 0; i < count; i++)
+        if (strcmp(names[i], name) == 0)
+            return true;
+    return false;
+}
+
 static drape_status unknown_key(drape_context *ctx, const choice *c, const char *at, const char *name)
 {
     const char *keys[MAX_KEYS];
@@ -23,10 +31,9 @@ static drape_status unknown_key(drape_context *ctx, const choice *c, const char 
     size_t count = 0;
     for (int i = 0; (entry = c->registry->entries[i]) != NULL; i++)
         for (int p = 0; p < entry->param_count && count < MAX_KEYS; p++)
-            keys[count++] = entry->params[p].name;
-    const char *meant = drape_did_you_mean(name, keys, count);
-    return drape_fail_at(ctx, DRAPE_E_ARGUMENT, at, "unknown key \"%.60s\"%s%s%s", name,
-                         DRAPE_DID_YOU_MEAN(meant));
+            if (!is_listed(keys, count, entry->params[p].name))
+                keys[count++] = entry->params[p].name;
+    return drape_param_unknown(ctx, at, name, keys, count);
 }
 
 /* Checks a setting against every entry that has a parameter of its name; stores the value if the chosen

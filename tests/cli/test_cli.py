@@ -516,6 +516,7 @@ def test_list_of_keys():
     equal(re.findall(r"^  (\S+)", good("list", "pin"), re.M), ["pin"])
     assert text == good("list")[:len(text)]
     refused("list", "clot", says='did you mean "cloth"?')
+    refused("list", "NOSUCH", says='there is no table or entry "NOSUCH"; the tables are scene, ')
     shown = set(re.findall(r"^\| `[^`]*` \| `([^`]*)`", good("list", "--markdown"), re.M))
     wanted = set()
 
