@@ -323,14 +323,7 @@ drape_status drape_approx_jacobian_create(drape_arena *arena, drape_system *syst
     s->nodes = s->model->free_count;
     const size_t n = 3 * (size_t)s->nodes;
     s->inverse = drape_arena_take(arena, 2 * n, sizeof *s->inverse);
-    s->pcg = (drape_pcg){.n = (int64_t)n,
-                         .owner = s,
-                         .multiply = multiply,
-                         .precondition = precondition,
-                         .r = drape_arena_take(arena, n, sizeof(double)),
-                         .z = drape_arena_take(arena, n, sizeof(double)),
-                         .p = drape_arena_take(arena, n, sizeof(double)),
-                         .q = drape_arena_take(arena, n, sizeof(double))};
+    s->pcg = drape_pcg_of(arena, (int64_t)n, s, multiply, precondition);
     drape_status status = drape_approx_jacobian_build(s, spacing);
     return status ? status : drape_arena_status(arena);
 }

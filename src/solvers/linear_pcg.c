@@ -182,14 +182,7 @@ static drape_status create(drape_arena *arena, const drape_pattern *pattern, voi
     s->fallback = drape_fallback_of(arena, pattern);
     s->values = drape_arena_take(arena, (size_t)pattern->nonzeros, sizeof *s->values);
     s->inverse = drape_arena_take(arena, 3 * n, sizeof *s->inverse);
-    s->pcg = (drape_pcg){.n = pattern->n,
-                         .owner = s,
-                         .multiply = multiply,
-                         .precondition = precondition,
-                         .r = drape_arena_take(arena, n, sizeof(double)),
-                         .z = drape_arena_take(arena, n, sizeof(double)),
-                         .p = drape_arena_take(arena, n, sizeof(double)),
-                         .q = drape_arena_take(arena, n, sizeof(double))};
+    s->pcg = drape_pcg_of(arena, pattern->n, s, multiply, precondition);
     drape_status status = drape_arena_status(arena);
     if (!status)
         status = build_coarse(s);

@@ -3,6 +3,19 @@
 
 #include <string.h>
 
+drape_pcg drape_pcg_of(drape_arena *arena, int64_t n, const void *owner, drape_pcg_map *multiply,
+                       drape_pcg_map *precondition)
+{
+    return (drape_pcg){.n = n,
+                       .owner = owner,
+                       .multiply = multiply,
+                       .precondition = precondition,
+                       .r = drape_arena_take(arena, (size_t)n, sizeof(double)),
+                       .z = drape_arena_take(arena, (size_t)n, sizeof(double)),
+                       .p = drape_arena_take(arena, (size_t)n, sizeof(double)),
+                       .q = drape_arena_take(arena, (size_t)n, sizeof(double))};
+}
+
 static double dot(const double *a, const double *b, int64_t n)
 {
     double sum = 0;

@@ -6,18 +6,24 @@
 #ifndef DRAPE_SOLVERS_PCG_H
 #define DRAPE_SOLVERS_PCG_H
 
-#include "base/context.h"
+#include "base/arena.h"
+
+typedef void drape_pcg_map(const void *owner, const double *from, double *to); /* (n) each */
 
 typedef struct drape_pcg {
     int64_t n;
     const void *owner;
-    void (*multiply)(const void *owner, const double *x, double *y);     /* y = A x */
-    void (*precondition)(const void *owner, const double *r, double *z); /* z = P^-1 r */
-    double *r, *z, *p, *q;                                               /* (n) workspace */
-    int iterations;                                                      /* of the last solve */
-    bool definite;  /* no direction without positive curvature was met */
-    bool converged; /* the tolerance was reached */
+    drape_pcg_map *multiply;     /* A x */
+    drape_pcg_map *precondition; /* P^-1 r */
+    double *r, *z, *p, *q;       /* (n) workspace */
+    int iterations;              /* of the last solve */
+    bool definite;               /* no direction without positive curvature was met */
+    bool converged;              /* the tolerance was reached */
 } drape_pcg;
+
+/* Takes the workspace, which lives as long as the arena: drape_arena_status says whether there was memory. */
+drape_pcg drape_pcg_of(drape_arena *arena, int64_t n, const void *owner, drape_pcg_map *multiply,
+                       drape_pcg_map *precondition);
 
 /* Solves for x, starting at 0, until the norm of the residual, weighted by P^-1, falls to `tolerance` times
  * its initial value. Every iterate is a descent direction of x'Ax/2 - b'x. */
