@@ -1,5 +1,5 @@
 /*
- * cs184.cpp: the loops of the CS184 cloth simulator, written anew from docs/seed_systems.md, the course's
+ * cs184.cpp: the loops of the CS184 cloth simulator, written anew from docs/springs.md, the course's
  * published skeleton and public versions of the finished program. The reference of the benchmark `verlet`.
  *
  * These parts of the original are kept, because they take its time:

@@ -1,7 +1,7 @@
 /*
  * explicit: the part of the stability map that explicit steps reach. The scenes of the programs CS184 and
  * Boson are stepped as those programs do it, over substeps, dt, stiffness and mass, and compared with what a
- * build of each program did (docs/seed_systems.md). A run has blown up in the first frame in which a node is
+ * build of each program did (docs/springs.md). A run has blown up in the first frame in which a node is
  * faster than 1e4 lengths of the scene per second.
  *
  *     explicit [--csv FILE] [SCENES]      SCENES: the folder of cs184_pinned2.json and verlet_100.json

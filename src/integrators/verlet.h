@@ -15,7 +15,7 @@
  *                 their rest length are shortened                             verlet_limit.c
  *
  * The rules are stated where they are applied: those of contact and friction in verlet_rules.c, the limit of
- * strains in verlet_limit.c. docs/seed_systems.md compares both systems with this one, model/scene_cs184.c
+ * strains in verlet_limit.c. docs/springs.md compares both systems with this one, model/scene_cs184.c
  * reads scenes of CS184.
  *
  * Each stage after the forces moves nodes: x is where the substep has put them so far, x0 where they were

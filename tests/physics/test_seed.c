@@ -1,6 +1,6 @@
 /*
  * test_seed.c: the scenes of CS184 and Boson as their programs run them: the headline figures of a build of
- * each (docs/seed_systems.md), and where they fail.
+ * each (docs/springs.md), and where they fail.
  *
  * Some properties of that build are not reproduced and affect the figures: its order of springs in the pass
  * of the limit, the points that its hash of boxes collects besides those of a point's own box, float or
