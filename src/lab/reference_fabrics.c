@@ -1,5 +1,5 @@
 /* reference_fabrics.c: virtual tests of measured fabrics: each uses one entry of their table, and must give
- * back the published values. A case is a fabric, by its place in the table. */
+ * back the published values. A case is a fabric number in the table. */
 #include "compile/fabrics.h"
 #include "compile/fabrics_table.h"
 #include "lab/rod.h"
@@ -15,7 +15,7 @@ static const double places[] = {1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 
                                 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32};
 _Static_assert(DRAPE_FABRIC_COUNT <= sizeof places / sizeof *places, "a place for every fabric");
 
-#define FABRIC .parameter = "fabric, by its place", .parameters = places, .case_count = DRAPE_FABRIC_COUNT
+#define FABRIC .parameter = "fabric number", .parameters = places, .case_count = DRAPE_FABRIC_COUNT
 
 static drape_woven tension_of(double place)
 {
