@@ -151,7 +151,7 @@ def entries(tables):
     out = []
     for name, what, reference in tables[0][1]:
         out.append(item(plain(name), what, f"Source: {reference}" if reference else ""))
-        own = [line for table in tables[1:] for line in table[1] if line[0] == name]
+        own = [line for table in tables[1:] for line in table[1] if name in line[0].split(", ")]
         if own:
             out.append(".RS")
             for _, name_of, unit, default, takes, what_it_is in own:
@@ -165,7 +165,7 @@ def scene_page():
     for part in re.split(r"^### ", output_of("list", "--markdown"), flags=re.M)[1:]:
         title, *lines = part.split("\n")
         tables = rows_of(lines)
-        place = "".join(line for line in lines if line.startswith("In a scene: "))
+        place = "".join(line for line in lines if line.startswith("Where: "))
         roff = keys(tables[0]) if tables[0][0][0] == "in" else (filled(place) + "\n" if place else "") + entries(tables)
         parts.append((plain(title.upper()), roff))
     about = ("A scene is JSON, with comments. Units are SI, y is up. Drape models only what a scene names. Unknown keys are errors. "

@@ -117,7 +117,7 @@ void drape_param_range_text(const drape_param *param, char *text, size_t size)
         snprintf(several, sizeof several, "%s%s, each in ", param->uniform ? "a number or " : "", numbers);
         break;
     case DRAPE_PARAM_TURN:
-        snprintf(several, sizeof several, "[x, y, z, angle], or %s as long as the angle, which is in ",
+        snprintf(several, sizeof several, "[x, y, z, angle], or %s whose length is the angle, which is in ",
                  numbers);
         break;
     case DRAPE_PARAM_NUMBER:

@@ -17,7 +17,8 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
         REASON("residual", "Newton, newton_k", "the residual is too large after all iterations"),
     [DRAPE_REASON_STAGNATION] = REASON(
         "stagnation", "KINSOL", "corrections became too small to change the state, short of the tolerance"),
-    [DRAPE_REASON_MAX_ITERATIONS] = REASON("max_iterations", "KINSOL", "`max_iterations` were not enough"),
+    [DRAPE_REASON_MAX_ITERATIONS] =
+        REASON("max_iterations", "KINSOL", "not converged after `max_iterations`"),
     [DRAPE_REASON_LINE_SEARCH] =
         REASON("line_search", "KINSOL", "no step along the correction makes the residual smaller"),
     [DRAPE_REASON_NEWTON_STEP] =
@@ -25,7 +26,7 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
     [DRAPE_REASON_NEWTON] = REASON("newton", "ida", "Newton's corrections do not converge at this step size"),
     [DRAPE_REASON_SINGULAR] =
         REASON("singular", "KINSOL, IDA, newton_k", "a factorisation or a linear solve failed"),
-    [DRAPE_REASON_SOLVER] = REASON("solver", "KINSOL, IDA", "any other failure that these libraries return"),
+    [DRAPE_REASON_SOLVER] = REASON("solver", "KINSOL, IDA", "any other failure that these libraries report"),
     [DRAPE_REASON_MEMORY] = REASON("memory", "Newton, newton_k", "memory for the factors ran out"),
     [DRAPE_REASON_NONFINITE] = REASON("nonfinite", "all integrators",
                                       "an infinity or NaN in the residual, the Jacobian or the new state"),
@@ -39,8 +40,9 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
         REASON("max_substeps", "verlet", "more substeps in a step than `max_substeps`"),
     [DRAPE_REASON_MOVE] =
         REASON("move", "the controller strain", "a node moved further in one step than `max_move` allows"),
-    [DRAPE_REASON_STRETCH] = REASON("stretch", "the controller strain",
-                                    "the strain of an edge changed more in one step than it allows"),
+    [DRAPE_REASON_STRETCH] =
+        REASON("stretch", "the controller strain",
+               "the strain of an edge changed more in one step than `max_stretch` allows"),
     [DRAPE_REASON_UNSTABLE] =
         REASON("unstable", "the controller stable", "the step is beyond the explicit stability limit"),
     [DRAPE_REASON_BLOW_UP] = REASON("blow_up", "verlet", "a node is faster than `max_speed`"),
@@ -61,8 +63,8 @@ static const drape_entry *const reasons[DRAPE_REASON_COUNT + 1] = {
     [DRAPE_REASON_STRAIN_LIMIT] = REASON("strain_limit", "limit.strain", "an edge is beyond `limit`"),
     [DRAPE_REASON_PENETRATION] =
         REASON("penetration", "contact", "cloth is deeper in a collider than allowed"),
-    [DRAPE_REASON_COLLISION] = REASON("collision", "contact",
-                                      "something passed through something else between the ends of the step"),
+    [DRAPE_REASON_COLLISION] = REASON(
+        "collision", "contact", "a piece passed through another between the start and the end of the step"),
     [DRAPE_REASON_CANCELLED] =
         REASON("cancelled", "the host", "`drape_sim_cancel` was called during the attempt"),
     [DRAPE_REASON_OTHER] = REASON("other", "statistics", "all reasons beyond the 31st"),

@@ -73,13 +73,15 @@ static int run(const void *command)
 }
 
 static const cli_option options[] = {
-    {"seed", CLI_NUMBER, "N", "another deformation, rotation and motion (default 1)",
+    {"seed", CLI_NUMBER, "N", "seed of the deformation, rotation and motion (default 1)",
      offsetof(check_request, seed), MAX_SEED, NULL},
 };
 
 const drape_verb drape_verb_check = {
-    .entry = {.name = "check",
-              .summary = "differences against every analytic derivative of a scene; edge-face intersections"},
+    .entry =
+        {.name = "check",
+         .summary =
+             "compare a scene's analytic derivatives with finite differences; count edges through faces"},
     .operand = "SCENE",
     .takes_scene = true,
     .details =

@@ -13,13 +13,12 @@ static int run(const void *request)
 }
 
 const drape_verb drape_verb_converge = {
-    .entry = {.name = "converge", .summary = "orders of convergence in time, and in space"},
+    .entry = {.name = "converge", .summary = "measure orders of convergence in time, and in space"},
     .operand = "SCENE",
     .takes_scene = true,
-    .details =
-        "Halves the step of every integrator again and again (ida: divides rtol by 10), and the edges of "
-        "the\n"
-        "grids with --space; the distances between successive ends give the order, with its confidence.",
+    .details = "Halves the step of every integrator repeatedly (ida: divides rtol by 10), and with --space "
+               "the edges of\nthe grids. The distances between successive final states give the order and "
+               "its confidence interval.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(cli_lab_request),

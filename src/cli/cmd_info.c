@@ -1,4 +1,4 @@
-/* cmd_info.c: `drape info`: what a scene models and what it costs. */
+/* cmd_info.c: `drape info`: show what a scene models and what it costs. */
 #include "cli/info.h"
 #include "cli/signals.h"
 
@@ -187,7 +187,7 @@ static int run(const void *command)
 }
 
 static const cli_option options[] = {
-    {"json", CLI_FLAG, NULL, "the same as JSON", offsetof(info_request, json), 0, NULL},
+    {"json", CLI_FLAG, NULL, "print the same as JSON", offsetof(info_request, json), 0, NULL},
 };
 
 /* The settings were valid when the model was compiled, so they are valid now. */
@@ -205,7 +205,7 @@ const drape_grid_ops *cli_grid_of(const drape_cloth *cloth, double *values)
 }
 
 const drape_verb drape_verb_info = {
-    .entry = {.name = "info", .summary = "what a scene models and what it costs"},
+    .entry = {.name = "info", .summary = "show what a scene models and what it costs"},
     .operand = "SCENE",
     .takes_scene = true,
     .details =

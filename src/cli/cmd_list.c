@@ -29,9 +29,9 @@ typedef struct list_style {
     void (*table)(const drape_registry *table);
     void (*entries_begin)(void);
     void (*entry)(const drape_entry *entry);
-    void (*params_begin)(const drape_registry *table);
-    void (*param)(const drape_entry *entry, const drape_param *param);
-    bool params_apart; /* in a table of their own, after all entries */
+    void (*param)(const drape_param *param);
+    void (*params)(const drape_registry *table, const char *only); /* all, after the entries; NULL: each entry
+                                                                      has its own below it */
 } list_style;
 
 /* What a parameter, or a key of a scene, takes and has by default, in words; the unit has a place of its
@@ -66,11 +66,6 @@ static param_text text_of_key(const drape_scene_key *key)
 /* ---- As text ---- */
 
 static void nothing(void) {}
-
-static void no_params(const drape_registry *table)
-{
-    (void)table;
-}
 
 static void text_scene(void)
 {
@@ -113,9 +108,8 @@ static void text_entry(const drape_entry *entry)
         printf("  %-20s [%s]\n", "", entry->reference);
 }
 
-static void text_param(const drape_entry *entry, const drape_param *param)
+static void text_param(const drape_param *param)
 {
-    (void)entry;
     const param_text text = text_of(param);
     print_param(param->name, param->help, &text, isnan(param->default_value) ? "" : "default ");
 }
@@ -141,15 +135,24 @@ static void code_cell(const char *text)
     cell(code);
 }
 
+static void names_cell(const char *const *names, int count)
+{
+    fputs(" ", stdout);
+    for (int i = 0; i < count; i++)
+        printf("%s`%s`", i ? ", " : "", names[i]);
+    fputs(" |", stdout);
+}
+
 static void markdown_scene(void)
 {
     puts("### " SCENE_TITLE "\n\n| in | key | unit | default | takes | what |\n|---|---|---|---|---|---|");
 }
 
-static void markdown_cells(const char *of, const char *name, const char *help, const param_text *text)
+static void markdown_cells(const char *const *of, int count, const char *name, const char *help,
+                           const param_text *text)
 {
     fputs("|", stdout);
-    code_cell(of);
+    names_cell(of, count);
     code_cell(name);
     cell(text->unit);
     cell(text->value);
@@ -167,7 +170,8 @@ static void markdown_key(const cli_object *object, const drape_scene_key *key)
         snprintf(text.takes + length, sizeof text.takes - length, "; ");
         drape_scene_one_of_text(object->form, text.takes + length + 2, sizeof text.takes - length - 2);
     }
-    markdown_cells(*object->pointer ? object->pointer : "/", key->param.name, key->param.help, &text);
+    const char *place = *object->pointer ? object->pointer : "/";
+    markdown_cells(&place, 1, key->param.name, key->param.help, &text);
 }
 
 static void markdown_object(const cli_object *object)
@@ -196,16 +200,53 @@ static void markdown_entry(const drape_entry *entry)
     fputc('\n', stdout);
 }
 
-static void markdown_params_begin(const drape_registry *table)
+static bool is_shown(const drape_entry *entry, const char *only)
 {
-    (void)table;
-    puts("\n| of | parameter | unit | default | range | what |\n|---|---|---|---|---|---|");
+    return !only || strcmp(only, entry->name) == 0;
 }
 
-static void markdown_param(const drape_entry *entry, const drape_param *param)
+static bool is_same_param(const drape_param *a, const drape_param *b)
 {
+    const param_text x = text_of(a), y = text_of(b);
+    return strcmp(a->name, b->name) == 0 && strcmp(a->help, b->help) == 0 && strcmp(x.takes, y.takes) == 0 &&
+           strcmp(x.value, y.value) == 0 && strcmp(x.unit, y.unit) == 0;
+}
+
+static bool has_same_param(const drape_entry *entry, const drape_param *param)
+{
+    for (int p = 0; p < entry->param_count; p++)
+        if (is_same_param(&entry->params[p], param))
+            return true;
+    return false;
+}
+
+/* One line for all entries that have the same parameter, at the first of them. */
+static void markdown_param(const drape_registry *table, const char *only, int first, const drape_param *param)
+{
+    const char *names[MAX_NAMES];
+    int count = 0;
+    const drape_entry *entry;
+    for (int i = 0; (entry = table->entries[i]) != NULL && count < MAX_NAMES; i++)
+        if (is_shown(entry, only) && has_same_param(entry, param)) {
+            if (i < first)
+                return;
+            names[count++] = entry->name;
+        }
     const param_text text = text_of(param);
-    markdown_cells(entry->name, param->name, param->help, &text);
+    markdown_cells(names, count, param->name, param->help, &text);
+}
+
+static void markdown_params(const drape_registry *table, const char *only)
+{
+    bool begun = false;
+    const drape_entry *entry;
+    for (int i = 0; (entry = table->entries[i]) != NULL; i++)
+        for (int p = 0; is_shown(entry, only) && p < entry->param_count; p++) {
+            if (!begun)
+                puts("\n| of | parameter | unit | default | range | what |\n|---|---|---|---|---|---|");
+            begun = true;
+            markdown_param(table, only, i, &entry->params[p]);
+        }
 }
 
 static const list_style text_style = {.scene = text_scene,
@@ -214,7 +255,6 @@ static const list_style text_style = {.scene = text_scene,
                                       .table = text_table,
                                       .entries_begin = nothing,
                                       .entry = text_entry,
-                                      .params_begin = no_params,
                                       .param = text_param};
 static const list_style markdown_style = {.scene = markdown_scene,
                                           .object = markdown_object,
@@ -222,43 +262,24 @@ static const list_style markdown_style = {.scene = markdown_scene,
                                           .table = markdown_table,
                                           .entries_begin = markdown_entries_begin,
                                           .entry = markdown_entry,
-                                          .params_begin = markdown_params_begin,
-                                          .param = markdown_param,
-                                          .params_apart = true};
+                                          .params = markdown_params};
 
 /* ---- What is printed ---- */
-
-static bool is_shown(const drape_entry *entry, const char *only)
-{
-    return !only || strcmp(only, entry->name) == 0;
-}
-
-static void print_params(const list_style *style, const drape_entry *entry)
-{
-    for (int p = 0; p < entry->param_count; p++)
-        style->param(entry, &entry->params[p]);
-}
 
 /* only: the name of one entry; NULL: all. */
 static void print_table(const list_style *style, const drape_registry *table, const char *only)
 {
     const drape_entry *entry;
-    bool params = false;
     style->table(table);
     style->entries_begin();
     for (int i = 0; (entry = table->entries[i]) != NULL; i++)
         if (is_shown(entry, only)) {
             style->entry(entry);
-            if (!style->params_apart)
-                print_params(style, entry);
-            params = params || entry->param_count > 0;
+            for (int p = 0; !style->params && p < entry->param_count; p++)
+                style->param(&entry->params[p]);
         }
-    if (style->params_apart && params) {
-        style->params_begin(table);
-        for (int i = 0; (entry = table->entries[i]) != NULL; i++)
-            if (is_shown(entry, only))
-                print_params(style, entry);
-    }
+    if (style->params)
+        style->params(table, only);
 }
 
 /* only: the name of one object; NULL: all. Returns how many were printed. */
@@ -339,19 +360,19 @@ static int print_request(const void *command)
 }
 
 static const cli_option options[] = {
-    {"markdown", CLI_FLAG, NULL, "tables for a README", offsetof(list_request, markdown), 0, NULL},
-    {"schema", CLI_FLAG, NULL, "the JSON Schema of a scene", offsetof(list_request, schema), 0, NULL},
+    {"markdown", CLI_FLAG, NULL, "print Markdown tables", offsetof(list_request, markdown), 0, NULL},
+    {"schema", CLI_FLAG, NULL, "print the JSON Schema of a scene", offsetof(list_request, schema), 0, NULL},
 };
 
 const drape_verb drape_verb_list = {
     .entry = {.name = "list",
-              .summary =
-                  "the keys of a scene, every entry of every table: parameters, units, defaults, references"},
+              .summary = "show the keys of a scene and all that it can choose from: parameters, units, "
+                         "defaults, references"},
     .operand = "TABLE|ENTRY",
     .operand_optional = true,
-    .details =
-        "Prints the keys of a scene and all that it can choose from, or one table, or one entry. The table\n"
-        "`scene` is the keys of all objects of a scene; one of its objects, as `pin`, is the keys of one.",
+    .details = "Prints the keys of a scene and all that it can choose from, or one table, or one entry. The "
+               "table\n`scene` has the keys of all objects of a scene; the name of an object, such as `pin`, "
+               "shows its keys.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(list_request),

@@ -11,7 +11,8 @@ typedef struct merge_request {
 } merge_request;
 
 static const cli_option options[] = {
-    {"out", CLI_TEXT, "DIR", "folder for all lines and the report", offsetof(merge_request, out), 0, NULL},
+    {"out", CLI_TEXT, "DIR", "folder for the merged results and the report", offsetof(merge_request, out), 0,
+     NULL},
 };
 
 static int merge(const void *command)
@@ -29,12 +30,11 @@ static int merge(const void *command)
 }
 
 const drape_verb drape_verb_merge = {
-    .entry = {.name = "merge", .summary = "the shards of a sweep into one, with its report"},
+    .entry = {.name = "merge", .summary = "merge the shards of a sweep, and make its report"},
     .operand = "DIR...",
     .max_operands = 100000,
-    .details =
-        "Takes the results of the folders of an experiment that ran in parts (--shard I/N), and makes the\n"
-        "report once all cases are done. Says how many are missing otherwise.",
+    .details = "Merges the results of an experiment that ran in parts (--shard I/N), and makes the report "
+               "once all\ncases are done. If some are missing, it says how many.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(merge_request),

@@ -139,7 +139,7 @@ static int read_images(render *r)
             if (drape_shadings[k]->reads & images[i].reads)
                 used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", used ? ", " : "",
                                          drape_shadings[k]->entry.name);
-        return cli_misuse("render", "--%s: the shading \"%s\" does not show it; --shade may be %s",
+        return cli_misuse("render", "--%s: the shading \"%s\" does not use it; these do: %s",
                           images[i].option, r->shading->entry.name, names);
     }
     return CLI_GO_ON;
@@ -194,7 +194,7 @@ static int read_out(render *r)
     if (q->every && r->picture)
         return cli_misuse("render", "--every is for films and folders; --frame N is for a picture");
     if (!q->compare && q->command.operand_count > 1)
-        return cli_misuse("render", "%d operands are given; --compare puts them side by side",
+        return cli_misuse("render", "%d scenes or runs are given; --compare draws them side by side",
                           q->command.operand_count);
     if (r->film && drape_film_check(r->ctx))
         return cli_misuse("render", "%s", drape_context_message(r->ctx));
@@ -458,22 +458,24 @@ static const cli_option options[] = {
      "azimuth and elevation in degrees, zoom (default 32,24,1, which shows all)", AT(camera), 0, NULL},
     {"range", CLI_TEXT, "LOW,HIGH",
      "range of a field's colours, in the legend's unit (default: that of its values)", AT(range), 0, NULL},
-    {"compare", CLI_FLAG, NULL, "several scenes or runs side by side, by time", AT(compare), 0, NULL},
+    {"compare", CLI_FLAG, NULL, "draw several scenes or runs side by side, at equal times", AT(compare), 0,
+     NULL},
     {"texture", CLI_TEXT, "PNG", "picture on the cloth", AT(texture), 0, NULL},
     {"height", CLI_TEXT, "PNG",
-     "height map for bump, displacement and pbr, in red; its alpha is metal in pbr", AT(height), 0, NULL},
-    {"environment", CLI_TEXT, "PNG", "surroundings for mirror, refraction and pbr, by longitude and latitude",
+     "height map for bump, displacement and pbr: red is the height, alpha the metal of pbr", AT(height), 0,
+     NULL},
+    {"environment", CLI_TEXT, "PNG", "surroundings for mirror, refraction and pbr, longitude by latitude",
      AT(environment), 0, NULL},
     {"small", CLI_FLAG, NULL, "smaller PNG files, slower", AT(small), 0, NULL},
 };
 
 const drape_verb drape_verb_render = {
-    .entry = {.name = "render", .summary = "pictures and films of a scene or a finished run"},
+    .entry = {.name = "render", .summary = "draw pictures and films of a scene or a finished run"},
     .operand = "SCENE|RUN",
     .max_operands = DRAPE_MAX_PANELS,
     .takes_scene = true,
     .details =
-        "Draws a scene, which is simulated, or a folder that drape run --out wrote. It needs no display.\n"
+        "Draws a scene, which it simulates, or a run, which `drape run --out` wrote. No display is needed.\n"
         "With --compare, several are drawn side by side in one picture or film.",
     .options = options,
     .option_count = sizeof options / sizeof *options,

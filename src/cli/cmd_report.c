@@ -1,4 +1,4 @@
-/* cmd_report.c: `drape report`: a finished run as one animated HTML file. */
+/* cmd_report.c: `drape report`: make one animated HTML page of a finished run. */
 #include "cli/cli.h"
 #include "cli/signals.h"
 
@@ -19,7 +19,7 @@ static const cli_option options[] = {
     {"out", CLI_TEXT, "FILE", "the page; default report.html in the folder of the run",
      offsetof(report_request, out), 0, NULL},
     {"megabytes", CLI_NUMBER, "N",
-     "room for the frames in the page, 48 by default; if they need more, some are left out, evenly",
+     "room for frames in the page (default 48); if they need more, some are left out at equal intervals",
      offsetof(report_request, megabytes), MAX_MEGABYTES, NULL},
 };
 
@@ -43,11 +43,10 @@ static int run(const void *command)
 }
 
 const drape_verb drape_verb_report = {
-    .entry = {.name = "report", .summary = "a finished run as one animated HTML file"},
+    .entry = {.name = "report", .summary = "make one animated HTML page of a finished run"},
     .operand = "RUN",
-    .details = "Writes one HTML file of a run, the folder that `drape run SCENE --out RUN` wrote: the cloth "
-               "in motion, plots of\n"
-               "energies and steps under the same time, the summary and the scene. A browser shows it "
+    .details = "Writes one HTML file from RUN, the folder that `drape run SCENE --out RUN` wrote: the cloth "
+               "in motion, plots of\nenergies and steps, the summary and the scene. A browser shows it "
                "without a network.",
     .options = options,
     .option_count = sizeof options / sizeof *options,

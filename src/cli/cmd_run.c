@@ -329,9 +329,10 @@ static int check_checkpoints(const run_request *request)
         return CLI_GO_ON;
     const char *option = request->resume ? "resume" : "checkpoint-every";
     if (!request->out)
-        return cli_misuse(verb, "--%s needs --out: a checkpoint is in the folder of its run", option);
+        return cli_misuse(verb, "--%s needs --out: the checkpoint is in the folder of the run", option);
     if (request->realtime)
-        return cli_misuse(verb, "--%s does not go with --realtime, whose steps depend on the clock", option);
+        return cli_misuse(verb, "--%s cannot be combined with --realtime, whose steps depend on the clock",
+                          option);
     return CLI_GO_ON;
 }
 
@@ -341,13 +342,13 @@ static int check_integrator(const run *r)
     const cli_command *command = &r->request->command;
     const drape_chosen *chosen = &r->in.sim->chosen;
     if (r->request->realtime && chosen->integrator->steady_state)
-        return cli_misuse(command->verb, "--realtime: the integrator \"%s\" has no time to keep",
+        return cli_misuse(command->verb, "--realtime: the integrator \"%s\" makes no steps in time",
                           chosen->integrator->entry.name);
     for (size_t i = 0; i < command->setting_count; i++) {
         const cli_setting *s = &command->settings[i];
         if (s->must_act && drape_chosen_ignores_integrator(chosen, strrchr(s->pointer, '/') + 1))
             return cli_misuse(command->verb,
-                              "--%s \"%.60s\": the integrator \"%s\" has none to choose; leave it out",
+                              "--%s \"%.60s\": the integrator \"%s\" does not use it; leave it out",
                               s->option, s->value, chosen->integrator->entry.name);
     }
     return CLI_GO_ON;
@@ -387,10 +388,10 @@ static const cli_option options[] = {
     {"checkpoint-every", CLI_NUMBER, "N", "save the run in DIR/checkpoint.drape with every N-th frame",
      offsetof(run_request, checkpoint_every), INT_MAX, NULL},
     {"resume", CLI_FLAG, NULL,
-     "continue from the checkpoint in DIR, of the same scene; start if there is none",
+     "resume from the checkpoint in DIR, of the same scene; without one, start from the beginning",
      offsetof(run_request, resume), 0, NULL},
     {"realtime", CLI_FLAG, NULL,
-     "frames of 1/frame_rate with that time as budget; reports how long they took",
+     "give each frame its duration, 1/frame_rate, as time budget; report how long frames took",
      offsetof(run_request, realtime), 0, NULL},
 };
 
@@ -398,12 +399,10 @@ const drape_verb drape_verb_run = {
     .entry = {.name = "run", .summary = "simulate a scene; write frames, step log and summary into a folder"},
     .operand = "SCENE",
     .takes_scene = true,
-    .details =
-        "Simulates a scene. Without --out, only the results on the standard output are written.\n"
-        "Ctrl-C ends the run after the step in progress (or during it if it is the only one: static) and\n"
-        "keeps what was written; before the first step, nothing is written.\n"
-        "A run with --checkpoint-every that was killed continues with --resume, with the same results as\n"
-        "if it had not been killed.",
+    .details = "Simulates a scene. Without --out, it prints the results and writes no files.\nCtrl-C ends "
+               "the run after the step in progress (static: during it) and keeps what was written; "
+               "before\nthe first step, nothing is written. A run with --checkpoint-every that was killed "
+               "resumes with --resume,\nand ends with the same results as a run that was not killed.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(run_request),

@@ -4,10 +4,10 @@
 #include <unistd.h>
 
 static const cli_option options[] = {
-    CLI_LAB_OPTION("axis", CLI_TEXTS, "/POINTER=FROM:TO:N[log]", "2 or 3 values of the scene, and where",
-                   axes, 0),
+    CLI_LAB_OPTION("axis", CLI_TEXTS, "/POINTER=FROM:TO:N[log]", "an axis of the map; give 2 or 3", axes, 0),
     CLI_LAB_OPTIONS,
-    CLI_LAB_OPTION("strain-limit", CLI_REAL, "E", "strain of an edge that no cloth has (default 0.2)",
+    CLI_LAB_OPTION("strain-limit", CLI_REAL, "E",
+                   "a run with a larger strain of an edge counts as overstretched (default 0.2)",
                    strain_limit, 0),
 };
 
@@ -18,18 +18,17 @@ static int run(const void *request)
 }
 
 const drape_verb drape_verb_stability = {
-    .entry = {.name = "stability",
-              .summary =
-                  "maps over dt, stiffness, mass, resolution: what completes, rejects, stops or explodes"},
+    .entry =
+        {.name = "stability",
+         .summary =
+             "map where runs complete, reject steps, stop or explode, over dt, stiffness, mass, resolution"},
     .operand = "SCENE",
     .takes_scene = true,
     .details = "Runs a scene at every point of a grid of its values with several integrators (be, bdf2, ida, "
-               "verlet\n"
-               "unless --integrators says which), as\n"
-               "  drape stability scene.json --axis /integrator/dt=1e-4:1e-1:32log \\\n"
-               "      --axis /cloth/0/material/young_modulus=1e4:1e8:32log --out maps\n"
-               "Uses all cores unless --jobs says how many. After Ctrl-C, the same command resumes where it "
-               "stopped.",
+               "verlet,\nunless --integrators names others), for example\n  drape stability scene.json "
+               "--axis /integrator/dt=1e-4:1e-1:32log \\\n      --axis "
+               "/cloth/0/material/young_modulus=1e4:1e8:32log --out maps\nUses all cores unless --jobs says "
+               "how many. After Ctrl-C, the same command resumes where it stopped.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(cli_lab_request),

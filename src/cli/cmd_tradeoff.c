@@ -14,7 +14,7 @@ static int run(const void *request)
 
 const drape_verb drape_verb_tradeoff = {
     .entry = {.name = "tradeoff",
-              .summary = "work against accuracy of every integrator, against a tight reference"},
+              .summary = "compare the cost and the accuracy of all integrators, against a precise reference"},
     .operand = "SCENE",
     .takes_scene = true,
     .details = "Runs a scene with every integrator over its dt or rtol, and compares with a reference "

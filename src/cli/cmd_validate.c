@@ -246,11 +246,12 @@ static int validate(const validate_request *request, drape_context *ctx)
 }
 
 static const cli_option options[] = {
-    {"json", CLI_FLAG, NULL, "one array of objects, one a case", offsetof(validate_request, json), 0, NULL},
-    {"markdown", CLI_FLAG, NULL, "a table for a page", offsetof(validate_request, markdown), 0, NULL},
-    {"out", CLI_TEXT, "DIR", "save a line of JSON a case; the same command resumes where it stopped",
+    {"json", CLI_FLAG, NULL, "print one array, an object for each case", offsetof(validate_request, json), 0,
+     NULL},
+    {"markdown", CLI_FLAG, NULL, "print a Markdown table", offsetof(validate_request, markdown), 0, NULL},
+    {"out", CLI_TEXT, "DIR", "save a line of JSON for each case; the same command resumes where it stopped",
      offsetof(validate_request, out), 0, NULL},
-    {"scenes", CLI_TEXT, "DIR", "run nothing: write the scene of every case into DIR",
+    {"scenes", CLI_TEXT, "DIR", "only write the scene of every case into DIR",
      offsetof(validate_request, scenes), 0, NULL},
 };
 
@@ -261,15 +262,14 @@ static int main_validate(const void *command)
 }
 
 const drape_verb drape_verb_validate = {
-    .entry = {.name = "validate", .summary = "the physics references: obtained against expected"},
+    .entry = {.name = "validate",
+              .summary = "run the physical references, and compare obtained with expected values"},
     .operand = "REFERENCE",
     .operand_optional = true,
-    .details =
-        "Runs the scene of every reference, or of one, and compares a measured quantity with its closed "
-        "form,\n"
-        "series or differential equation. Terms that are known to converge to something else are reported "
-        "as\n"
-        "a documented model error. Exit code 0: none failed. All of them take four minutes of CPU time.",
+    .details = "Runs the scene of every reference, or of one, and compares a measured quantity with a closed "
+               "form, a\nseries or a differential equation. Terms that are known to converge to another "
+               "value are reported as a\ndocumented model error. Exit code 0: none failed. All references "
+               "take four minutes of CPU time.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(validate_request),

@@ -195,10 +195,10 @@ static const char *const help_lines[] = {"space, P\trun or pause",
                                          "N\tone step",
                                          "R\tstart again",
                                          "Esc, Q\tquit",
-                                         "left drag\tmove a node; elsewhere: turn",
+                                         "left drag\ta node; elsewhere: rotate",
                                          "right drag\tpan",
                                          "wheel\tzoom",
-                                         "C\tfirst view again",
+                                         "C\treset the camera",
                                          "S\tnext shading",
                                          "I\tnext integrator",
                                          "D K B G\ttime step, stiffness, damping, gravity: less",
@@ -571,17 +571,17 @@ static const cli_option options[] = {
      offsetof(view_request, shade), 0, NULL},
     {"size", CLI_TEXT, "WxH", "pixels of the window (default 1280x720)", offsetof(view_request, size), 0,
      NULL},
-    {"running", CLI_FLAG, NULL, "start at once, not paused", offsetof(view_request, running), 0, NULL},
+    {"running", CLI_FLAG, NULL, "start running, not paused", offsetof(view_request, running), 0, NULL},
 };
 
 const drape_verb drape_verb_view = {
     .entry = {.name = "view",
-              .summary = "a window on a running scene: turn the camera, drag nodes, change values"},
+              .summary = "open a window on a running scene: rotate the camera, drag nodes, change values"},
     .operand = "SCENE",
     .takes_scene = true,
     .details = "Opens a window, paused. Space runs and pauses, N makes one step, R starts again, Esc quits, "
                "H shows all\n"
-               "keys. Drag a node with the left button; dragging elsewhere turns the camera.",
+               "keys. Drag a node with the left button; dragging elsewhere rotates the camera.",
     .options = options,
     .option_count = sizeof options / sizeof *options,
     .request_size = sizeof(view_request),

@@ -31,8 +31,8 @@ static int read_shard(const cli_lab_request *request, drape_lab_def *def)
         return CLI_GO_ON;
     if (sscanf(text, "%d/%d%n", &def->shard, &def->shards, &used) != 2 || text[used] || def->shard < 1 ||
         def->shard > def->shards)
-        return cli_misuse(request->command.verb, "--shard \"%.60s\": must be I/N, with I from 1 to N, as 1/4",
-                          text);
+        return cli_misuse(request->command.verb,
+                          "--shard \"%.60s\": must be I/N, with I from 1 to N, such as 1/4", text);
     return CLI_GO_ON;
 }
 
@@ -88,8 +88,9 @@ static int make_def(const cli_lab_request *request, int default_jobs, drape_aren
     if (code == CLI_GO_ON)
         code = read_shard(request, def);
     if (code == CLI_GO_ON && command->threads)
-        code = cli_misuse(command->verb,
-                          "--threads has no effect: a case takes one; --jobs runs cases at a time");
+        code = cli_misuse(
+            command->verb,
+            "--threads has no effect: each case takes one thread; --jobs runs several cases at a time");
     return code;
 }
 

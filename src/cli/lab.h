@@ -26,11 +26,11 @@ typedef struct cli_lab_request {
                    "folder for cases.jsonl, results.csv, pictures, report.html (default SCENE.VERB)", out,   \
                    0),                                                                                       \
         CLI_LAB_OPTION("integrators", CLI_TEXT, "A,B", "only these integrators", integrators, 0),            \
-        CLI_LAB_OPTION("jobs", CLI_NUMBER, "N", "cases at a time, each in a thread", jobs, 256),             \
+        CLI_LAB_OPTION("jobs", CLI_NUMBER, "N", "number of cases at a time, each in a thread", jobs, 256),   \
         CLI_LAB_OPTION("case-seconds", CLI_REAL, "S", "CPU time after which a case is stopped (default 30)", \
                        case_seconds, 0),                                                                     \
         CLI_LAB_OPTION("shard", CLI_TEXT, "I/N",                                                             \
-                       "only the cases of part I of N; `drape merge` brings them together", shard, 0)
+                       "run only part I of N of the cases; `drape merge` merges the parts", shard, 0)
 
 /* Runs the experiment of the request's verb. Returns the exit code. */
 int cli_lab_run(const cli_lab_request *request, int default_jobs);

@@ -49,9 +49,9 @@ static void print_overview(void)
         cli_operand_text(drape_verbs[i], operand, sizeof operand);
         printf("  %-10s %-15s %s\n", drape_verbs[i]->entry.name, operand, drape_verbs[i]->entry.summary);
     }
-    puts("\n  drape VERB --help   what a verb takes\n"
-         "  drape --version     the version\n\n"
-         "Exit codes: 0 done, 1 the simulation, a check or the output failed, 2 bad input, 130 interrupted.");
+    puts("\n  drape VERB --help   show the arguments of a verb\n  drape --version     show the "
+         "version\n\nExit codes: 0 done, 1 the simulation, a check or the output failed, 2 bad input, 130 "
+         "interrupted.");
 }
 
 /* `drape help`, `drape help VERB` */

@@ -3,18 +3,18 @@
 
 #define MISSING                                                                                              \
     "this drape was built without drawing: install Debian's libepoxy-dev, libpng-dev and libglfw3-dev, and " \
-    "build anew with -Drender=enabled"
+    "rebuild with -Drender=enabled"
 
 extern const drape_verb drape_verb_render, drape_verb_view;
 
 const drape_verb drape_verb_render = {
-    .entry = {.name = "render", .summary = "pictures and films: not in this build"},
+    .entry = {.name = "render", .summary = "draw pictures and films: not in this build"},
     .operand = "SCENE|RUN",
     .missing = MISSING,
     .details = "This drape was built without drawing.",
     .request_size = sizeof(cli_command)};
 
-const drape_verb drape_verb_view = {.entry = {.name = "view", .summary = "a window: not in this build"},
+const drape_verb drape_verb_view = {.entry = {.name = "view", .summary = "open a window: not in this build"},
                                     .operand = "SCENE",
                                     .missing = MISSING,
                                     .details = "This drape was built without drawing.",

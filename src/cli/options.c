@@ -17,17 +17,17 @@
 
 /* The options of every verb that takes a scene. Those with a pointer are short forms of --set. */
 static const cli_option scene_options[] = {
-    {"set", CLI_SET, "/POINTER=VALUE", "a value of the scene, by its JSON pointer; may be repeated", 0, 0,
+    {"set", CLI_SET, "/POINTER=VALUE", "set a value of the scene by its JSON pointer; may be repeated", 0, 0,
      NULL},
     {"duration", CLI_VALUE, "SECONDS", "simulated time", 0, 0, "/duration"},
     {"frame-rate", CLI_VALUE, "RATE", "frames per simulated second", 0, 0, "/frame_rate"},
-    {"format", CLI_LIST, "A,B", "formats of the frames, instead of the scene's", 0, 0, "/output/formats"},
+    {"format", CLI_LIST, "A,B", "frame formats, instead of the scene's", 0, 0, "/output/formats"},
     {"integrator", CLI_VALUE, "NAME", "time integrator", 0, 0, "/integrator/method"},
     {"dt", CLI_VALUE, "SECONDS", "nominal step", 0, 0, "/integrator/dt"},
     {"tolerance", CLI_VALUE, "NEWTONS", "bound on the residual of a step", 0, 0, "/integrator/tolerance"},
     {"linear-solver", CLI_VALUE, "NAME", "linear solver", 0, 0, "/integrator/linear_solver", true},
     {"controller", CLI_VALUE, "NAME", "step controller", 0, 0, "/controller/type"},
-    {"threads", CLI_NUMBER, "N", "threads that evaluate elements; the result does not depend on it",
+    {"threads", CLI_NUMBER, "N", "number of threads; the result does not depend on it",
      offsetof(cli_command, threads), 256, NULL},
 };
 
@@ -120,7 +120,8 @@ static int add_pointer_and_value(cli_command *command, const cli_option *option,
 {
     const char *equals = strchr(argument, '=');
     if (*argument != '/' || !equals)
-        return cli_misuse(command->verb, "--%s \"%.60s\": must be /pointer=value, as /integrator/dt=0.001",
+        return cli_misuse(command->verb,
+                          "--%s \"%.60s\": must be /pointer=value, such as /integrator/dt=0.001",
                           option->name, argument);
     char *pointer = drape_arena_text(command->arena, argument);
     if (pointer)
@@ -242,9 +243,9 @@ static int take_operands(const drape_verb *verb, int argc, char **argv, cli_comm
 {
     int count = argc - optind, max = verb->max_operands ? verb->max_operands : 1;
     if (count > max && max > 1)
-        return cli_misuse(verb->entry.name, "at most %d operands are taken, %d are given", max, count);
+        return cli_misuse(verb->entry.name, "at most %d arguments are allowed, %d are given", max, count);
     if (count > max)
-        return cli_misuse(verb->entry.name, "one %s is taken, %d are given: \"%.60s\", \"%.60s\"%s",
+        return cli_misuse(verb->entry.name, "one %s is allowed, %d are given: \"%.60s\", \"%.60s\"%s",
                           verb->operand, count, argv[optind], argv[optind + 1], count > 2 ? " ..." : "");
     if (count < 1 && !verb->operand_optional)
         return cli_misuse(verb->entry.name, "%s is missing; `drape %s --help` shows all", verb->operand,

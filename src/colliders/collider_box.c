@@ -12,10 +12,11 @@ static const drape_param params[PARAM_COUNT] = {
     DRAPE_VECTOR("size", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9,
                  "full lengths of its edges along x, y, z before the rotation; one number: a cube",
                  .uniform = true),
-    DRAPE_TURN("rotate", 0, -1e6, 1e6,
-               "rotation about the center: axis and angle, or a vector along the axis as long as the angle"),
+    DRAPE_TURN(
+        "rotate", 0, -1e6, 1e6,
+        "rotation about the center: axis and angle, or a vector along the axis whose length is the angle"),
     DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
-                 "radius of its edges and corners, below half of its smallest size, which does not change"),
+                 "radius of its edges and corners, below half of its smallest size; the size includes them"),
 };
 
 /* Rows are the axes of the box: y = frame (x - center). */

@@ -18,7 +18,7 @@ static const drape_param params[PARAM_COUNT] = {
     END("b", "center of the other one"),
     DRAPE_NUMBER("radius", "m", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "radius around the axis from a to b"),
     DRAPE_NUMBER("rounding", "m", 0, 0, 1e9,
-                 "radius of its rims, below its radius and half of its length, which do not change"),
+                 "radius of its rims, below its radius and half of its length, which include them"),
 };
 
 typedef struct axis {

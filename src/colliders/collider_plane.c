@@ -11,7 +11,7 @@ enum { POINT = 0, NORMAL = 3, PARAM_COUNT = 2 }; /* places of the values */
 static const drape_param params[PARAM_COUNT] = {
     DRAPE_VECTOR("point", "m", DRAPE_REQUIRED, -1e9, 1e9, "a point on the plane"),
     DRAPE_VECTOR("normal", "1", DRAPE_REQUIRED, -1e9, 1e9,
-                 "direction of the side that cloth is on, of any length but 0"),
+                 "normal towards the side that cloth is on, of any length but 0"),
 };
 
 static drape_status make_shape(const double *values, double tolerance, drape_collider_shape *shape)
@@ -20,8 +20,7 @@ static drape_status make_shape(const double *values, double tolerance, drape_col
     (void)tolerance;
     double largest = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
     if (!(largest > 0))
-        return drape_shape_refuse(shape, "normal",
-                                  "0 0 0 has no direction; it is a vector of any other length");
+        return drape_shape_refuse(shape, "normal", "0 0 0 has no direction; any other length is allowed");
     double *unit = drape_shape_take(shape, 3, sizeof *unit);
     if (!unit)
         return DRAPE_E_MEMORY;

@@ -207,10 +207,10 @@ static drape_status build_named(drape_model *model, int32_t c, const char *point
     if (status)
         return status;
     if (ops->from_scene_gravity)
-        return drape_fail_at(model->ctx, DRAPE_E_ARGUMENT, pointer,
-                             "%s is modelled where the scene's \"gravity\" is not zero; "
-                             "leave it out of the terms",
-                             ops->entry.name);
+        return drape_fail_at(
+            model->ctx, DRAPE_E_ARGUMENT, pointer,
+            "%s acts whenever the scene's \"gravity\" is not zero; leave it out of the terms",
+            ops->entry.name);
     return build_term(model, c, pointer, ops, def);
 }
 

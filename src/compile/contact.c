@@ -19,9 +19,9 @@ const drape_param drape_contact_params[DRAPE_CONTACT_PARAM_COUNT] = {
     [DRAPE_CONTACT_FRICTION_VELOCITY] =
         DRAPE_NUMBER("friction_velocity", "m/s", 1e-3, DRAPE_ABOVE(0), 1e3,
                      "sliding speed below which friction falls smoothly to zero"),
-    [DRAPE_CONTACT_FRICTION] =
-        DRAPE_CHOICE("friction", IMPLICIT, frictions,
-                     "implicit: with the normal force at the end of the step; lagged: at its start"),
+    [DRAPE_CONTACT_FRICTION] = DRAPE_CHOICE("friction", IMPLICIT, frictions,
+                                            "implicit: of the normal force at the end of the step; lagged: "
+                                            "at its start, which keeps matrices symmetric"),
 };
 
 const drape_param drape_self_contact_params[DRAPE_SELF_PARAM_COUNT] = {

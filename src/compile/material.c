@@ -49,7 +49,7 @@ static const drape_param params[] = {
 
 const drape_entry drape_material_entry = {
     .name = "material",
-    .summary = "a sheet; exactly one of density, areal_density, total_mass is given",
+    .summary = "a sheet; give exactly one of density, areal_density, total_mass",
     DRAPE_PARAMS(params)};
 const drape_registry drape_material_registry = {"material",
                                                 "materials",

@@ -2,7 +2,8 @@
 #include "compile/compile.h"
 
 static const drape_entry contact = {.name = "contact",
-                                    .summary = "how contact with colliders and between layers of cloth acts",
+                                    .summary =
+                                        "settings of contact with colliders and between layers of cloth",
                                     DRAPE_PARAMS(drape_contact_params)};
 static const drape_entry self_contact = {
     .name = "self_contact",

@@ -44,8 +44,8 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_ATOL_X] = DRAPE_ATOL_X_PARAM,
     [PARAM_ATOL_V] = DRAPE_ATOL_V_PARAM,
     [PARAM_DT_MAX] = DRAPE_NUMBER("dt_max", "s", DRAPE_DERIVED("none"), DRAPE_ABOVE(0), 1e9, "largest step"),
-    [PARAM_SAFETY] =
-        DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1, "fraction of the step that the estimate allows"),
+    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1,
+                                  "fraction that is taken of the step that the estimate allows"),
 };
 
 /* A prediction: the weights of the states in, past[0] and past[1], and the factor from the difference to the
@@ -166,7 +166,7 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 
 const drape_controller_ops drape_controller_error = {
     .entry = {.name = "error",
-              .summary = "step size from the local error, estimated by a predictor, with a PI rule",
+              .summary = "step size by the local error, estimated with a predictor; PI control",
               .reference = "Gustafsson 1991; Hairer & Wanner 1996, IV.2",
               DRAPE_PARAMS(params)},
     .own_steps = true,

@@ -22,9 +22,11 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 }
 
 const drape_controller_ops drape_controller_halving = {
-    .entry = {.name = "halving",
-              .summary = "a failed step is rolled back and halved; the size grows back after successes",
-              .reference = "as DisMech halves unconverged steps, with rollback and filled intervals",
-              DRAPE_PARAMS(params)},
+    .entry =
+        {.name = "halving",
+         .summary =
+             "a failed step is rolled back and retried at half the size; the size grows back after successes",
+         .reference = "as DisMech halves unconverged steps, with rollback and filled intervals",
+         DRAPE_PARAMS(params)},
     .judge = judge,
 };

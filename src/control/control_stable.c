@@ -22,8 +22,8 @@ enum { SCRATCH_LIMIT, SCRATCH_LEFT };
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT_MIN] = DRAPE_DT_MIN_PARAM,
     [PARAM_MAX_ATTEMPTS] = DRAPE_MAX_ATTEMPTS_PARAM(1000000),
-    [PARAM_SAFETY] =
-        DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1, "fraction of the step that the estimate allows"),
+    [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.9, 0.1, 1,
+                                  "fraction that is taken of the step that the estimate allows"),
     [PARAM_EVERY] =
         DRAPE_INTEGER("every", "1", 10, 1, 1e6, "steps between two estimates of the stability limit"),
 };

@@ -84,7 +84,7 @@ static drape_verdict judge(const double *values, drape_trial *trial)
 
 const drape_controller_ops drape_controller_strain = {
     .entry = {.name = "strain",
-              .summary = "halving that also rejects steps in which an edge or a node moves too far",
+              .summary = "as halving; also rejects steps in which an edge stretches or a node moves too far",
               .reference = "-",
               DRAPE_PARAMS(params)},
     .judge = judge,

@@ -12,9 +12,10 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
     (void)x; /* forces this stiff are meaningful only at the end of a step */
     memset(values, 0, (size_t)m->node_count * sizeof *values);
     if (sim->chosen.integrator->projects_contact && (m->collider_count || m->contact.self))
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                          "contact: the integrator \"%s\" moves nodes out of what they meet and has no force",
-                          sim->chosen.integrator->entry.name);
+        return drape_fail(
+            sim->ctx, DRAPE_E_ARGUMENT,
+            "contact: the integrator \"%s\" resolves contact by moving nodes and has no contact force",
+            sim->chosen.integrator->entry.name);
     if (!drape_system_contact(sim->system))
         return DRAPE_OK;
     drape_status status =

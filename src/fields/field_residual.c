@@ -14,7 +14,7 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
     memset(values, 0, (size_t)m->node_count * sizeof *values);
     if (!ops->residual)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                          "residual: the integrator \"%s\" solves no equations of a step by Newton",
+                          "residual: the integrator \"%s\" does not solve its steps by Newton's method",
                           ops->entry.name);
     const double *f = ops->residual(sim->integrator);
     for (int32_t i = 0; sim->statistics.steps_accepted > 0 && i < m->free_count; i++)
@@ -23,7 +23,8 @@ static drape_status measure(drape_sim *sim, const double *x, double *values)
 }
 
 const drape_field_ops drape_field_residual = {
-    .entry = {.name = "residual", .summary = "residual of a node's equation of motion after the last step"},
+    .entry = {.name = "residual",
+              .summary = "residual of the equation of motion of a node at the end of the last step"},
     .unit = "N",
     .shown = 1,
     .shown_unit = "N",

@@ -34,15 +34,15 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_TOLERANCE] = DRAPE_NUMBER("tolerance", "N", 1e-6, DRAPE_ABOVE(0), 1e12,
                                      "residual of the free nodes, largest component, below which no "
                                      "iteration is made; not a bound on an accepted state"),
-    [PARAM_RESCUE_ITERATIONS] =
-        DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
-                      "further iterations if the residual is not below that of the guess after the first "
-                      "ones; if it still is not, the step is rejected"),
-    [PARAM_EXTRAPOLATION] = DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
-                                         "share of the last change of velocity that the guess extrapolates"),
+    [PARAM_RESCUE_ITERATIONS] = DRAPE_INTEGER("rescue_iterations", "1", 8, 0, 100000,
+                                              "up to so many further iterations while the residual is not "
+                                              "below that of the guess; then the step is rejected"),
+    [PARAM_EXTRAPOLATION] =
+        DRAPE_NUMBER("extrapolation", "1", 0.5, 0, 1,
+                     "fraction of the last change of velocity that is added to the guess"),
     [PARAM_LINEAR_TOLERANCE] = DRAPE_NUMBER("linear_tolerance", "1", 0.1, 1e-14, DRAPE_BELOW(1),
                                             "conjugate gradients reduce the residual of a correction to this "
-                                            "share at 1/60 s, in proportion to the step at others"),
+                                            "fraction at steps of 1/60 s; proportional to the step"),
     [PARAM_LINEAR_ITERATIONS] = DRAPE_INTEGER("max_linear_iterations", "1", 60, 1, 100000,
                                               "iterations of conjugate gradients for each correction"),
     [PARAM_COARSE_SPACING] =
@@ -190,8 +190,8 @@ static size_t bytes(const void *state)
 
 const drape_integrator_ops drape_integrator_newton_k = {
     .entry = {.name = "newton_k",
-              .summary =
-                  "backward Euler by k inexact Newton iterations: for real time, checked, not to a tolerance",
+              .summary = "backward Euler by a fixed number of inexact Newton iterations, for real time; "
+                         "checked, but not converged",
               .reference = "Dembo, Eisenstat & Steihaug 1982; Baraff & Witkin 1998 for k = 1",
               DRAPE_PARAMS(params)},
     .order = 1,

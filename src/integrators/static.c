@@ -188,7 +188,7 @@ static void archive(void *state, drape_archive *a)
 const drape_integrator_ops drape_integrator_static = {
     .entry = {.name = "static",
               .summary =
-                  "equilibrium by Newton with pseudo-transient continuation; says whether it is stable",
+                  "equilibrium by Newton with pseudo-transient continuation; reports whether it is stable",
               .reference = "Kelley & Keyes 1998, Convergence analysis of pseudo-transient continuation",
               DRAPE_PARAMS(drape_newton_params)},
     .order = 0,

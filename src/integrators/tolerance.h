@@ -12,7 +12,7 @@
 #define DRAPE_RTOL_PARAM                                                                                     \
     DRAPE_NUMBER(                                                                                            \
         "rtol", "1", 1e-3, 1e-12, 1,                                                                         \
-        "local error over the size of the scene; sets the defaults of atol_x and atol_v, nothing else")
+        "local error relative to the size of the scene; only sets the defaults of atol_x and atol_v")
 #define DRAPE_ATOL_X_PARAM                                                                                   \
     DRAPE_NUMBER("atol_x", "m", DRAPE_DERIVED("rtol times the diagonal of the rest bounding box"),           \
                  DRAPE_ABOVE(0), 1e9, "local error of positions")

@@ -63,7 +63,7 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_DT] = DRAPE_NUMBER("dt", "s", 1.0 / 60, DRAPE_ABOVE(0), 1e6, "nominal step"),
     [PARAM_SUBSTEPS] = DRAPE_INTEGER(
         "substeps", "1", 0, 0, 1e6,
-        "number of substeps of a step; 0: as many as the stability limit at its start requires"),
+        "substeps in a step; 0: as many as the stability limit at the start of the step requires"),
     [PARAM_FORM] =
         DRAPE_CHOICE("form", FORM_VELOCITY, form_choices,
                      "velocity: second order; position: x' = x + (x - x_before) + a h^2 as CS184 and Boson"),
@@ -71,7 +71,7 @@ static const drape_param params[PARAM_COUNT] = {
                                    "velocity lost in each substep: more substeps damp more, as in CS184"),
     [PARAM_CONTACT] =
         DRAPE_CHOICE("contact", DRAPE_VERLET_CS184, contact_choices,
-                     "how nodes are moved out of colliders; cs184: friction is the share of a correction "
+                     "how nodes are moved out of colliders; cs184: friction is the fraction of a correction "
                      "that is left out; boson: nodes stop on flat surfaces, friction changes forces"),
     [PARAM_SURFACE_OFFSET] = DRAPE_NUMBER("surface_offset", "m", 1e-4, 0, 1e9,
                                           "cs184: distance from a flat surface at which a node is placed"),
@@ -82,25 +82,24 @@ static const drape_param params[PARAM_COUNT] = {
         DRAPE_NUMBER("friction_drag", "N s/m", 0.5, 0, 1e9, "boson: drag of a node under friction"),
     [PARAM_SELF_BOXES] = DRAPE_CHOICE(
         "self_boxes", BOXES_ALL, boxes_choices,
-        "where to search for cloth near a point of cloth; own: only in its own box, as in CS184"),
-    [PARAM_STRAIN_LIMIT] =
-        DRAPE_NUMBER("strain_limit", "1", DRAPE_DERIVED("none"), 0, 1e6,
-                     "no spring is longer than 1 + this times its rest length; 0.1 in CS184"),
+        "boxes in which points near a point of cloth are searched; own: only its own box, as in CS184"),
+    [PARAM_STRAIN_LIMIT] = DRAPE_NUMBER("strain_limit", "1", DRAPE_DERIVED("none"), 0, 1e6,
+                                        "largest strain of a spring, kept by moving its nodes; 0.1 in CS184"),
     [PARAM_STRAIN_LIMIT_ITERATIONS] = DRAPE_INTEGER(
         "strain_limit_iterations", "1", 1, 1, 1e6,
         "maximum number of passes over all springs; one, as in CS184, does not reach the limit"),
     [PARAM_STRAIN_LIMIT_TOLERANCE] =
         DRAPE_NUMBER("strain_limit_tolerance", "1", 1e-3, 0, 1,
-                     "passes end when no spring is longer than (1 + this) times its limit"),
+                     "passes end when no spring exceeds its largest length by more than this fraction"),
     [PARAM_SAFETY] = DRAPE_NUMBER("safety", "1", 0.8, 0.01, 1,
-                                  "substeps 0: share of the stability limit that a substep takes"),
-    [PARAM_MAX_SUBSTEPS] =
-        DRAPE_INTEGER("max_substeps", "1", 10000, 1, 1e6, "substeps 0: a step that needs more is rejected"),
+                                  "with substeps 0: fraction of the stability limit that a substep takes"),
+    [PARAM_MAX_SUBSTEPS] = DRAPE_INTEGER("max_substeps", "1", 10000, 1, 1e6,
+                                         "with substeps 0: a step that needs more is rejected"),
     [PARAM_MAX_SPEED] = DRAPE_NUMBER("max_speed", "m/s", 1e6, DRAPE_ABOVE(0), 1e100,
-                                     "a step in which a node is faster is rejected, because it has blown up"),
+                                     "a step in which a node is faster has blown up, and is rejected"),
     [PARAM_GUARD] = DRAPE_BOOLEAN("guard", true,
-                                  "energy from nowhere and collapsed elements reject a step; false, as in "
-                                  "CS184 and Boson: only max_speed does"),
+                                  "reject steps that create energy or collapse an element; false, as in "
+                                  "CS184 and Boson: only those above max_speed"),
 };
 
 #define STABILITY_ITERATIONS 30 /* finds omega of a sheet to 1 % */

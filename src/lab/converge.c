@@ -192,8 +192,8 @@ static void report_order(const sequence *s, FILE *out)
             fprintf(out, " (95 %% confidence %.3g to %.3g)", s->line.low, s->line.high);
         fprintf(out, ", %.3g at the last refinement", local_order(s, s->count - 1));
         if (s->line.low <= 0)
-            fprintf(out, ": that is not all above 0, so these do not determine the order; more --levels "
-                         "may, or a shorter --duration, before small differences grow");
+            fprintf(out, ": not wholly above 0, so the order is not determined; try more --levels, or a "
+                         "shorter --duration, before small differences grow");
     }
     if (s->rejected && strcmp(s->knob, "dt") == 0)
         fprintf(out, "; %lld of its steps were rejected and cut, so dt was not halved everywhere",

@@ -279,7 +279,8 @@ static drape_status report(lab *l)
             (long long)outcome->rejected);
     drape_status status = shard ? DRAPE_OK : lab_write_csv(l);
     if (status || shard || outcome->done < outcome->cases) {
-        fprintf(l->summary, "the report is made when all cases are done: other shards, `drape merge`\n");
+        fprintf(l->summary,
+                "the report is made once all cases are done: run the other shards, or `drape merge`\n");
         return status;
     }
     status = l->experiment->report(l);

@@ -184,8 +184,8 @@ static drape_status choose(lab *l, const drape_model *model, level *best)
     }
     if (!status && !chosen)
         status = drape_fail(l->ctx, DRAPE_E_SOLVER,
-                            "no reference: neither ida nor trbdf2 completes twice within %g s; give more by "
-                            "--case-seconds, or a shorter duration",
+                            "no reference: neither ida nor trbdf2 completes two levels within %g s; raise "
+                            "--case-seconds, or shorten the duration",
                             budget);
     else if (!status)
         status = save(l, chosen, true, best);

@@ -125,7 +125,7 @@ static drape_status measure_drape(drape_reference_run *run, double *value)
 /* A case is the index of a fabric in its table. Folds that begin differently end differently: the tolerance
  * covers the effect of another order of sums or another processor. */
 #define DRAPED                                                                                               \
-    .unit = "1", .parameter = "fabric number", .model = "stretch.cst, bend.midedge; annulus; be",     \
+    .unit = "1", .parameter = "fabric number", .model = "stretch.cst, bend.midedge; annulus; be",            \
     .tolerance = 0.05, .scene = drape_scene_of, .measure = measure_drape
 
 /* There is no closed form: this is the limit of finer meshes, 0.4464, 0.4784 and 0.4875 with 9, 13 and 17

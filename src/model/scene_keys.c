@@ -46,7 +46,7 @@ static const drape_scene_key pin_keys[] = {
                   "displacement from rest, linear between the times"),
      .shape = DRAPE_SCENE_TRACK, ARRAY(drape_pin_def, track, key_count), .at_least = 1},
     {DRAPE_BOOLEAN("clamp", false,
-                   "edges between these nodes keep the direction of the sheet across them, in bend.midedge"),
+                   "edges between these nodes keep the direction of the sheet across them; for bend.midedge"),
      IN(drape_pin_def, clamp)},
 };
 static const char *const pin_selectors[] = {"nodes", "corner", "edge", "row", "box", NULL};
@@ -85,7 +85,7 @@ static const drape_scene_object material = {.name = "material",
 static const drape_scene_key transform_keys[] = {
     {DRAPE_VECTOR("translate", "m", 0, LOWEST, HIGHEST, "applied last"), IN(drape_mesh_def, translate)},
     {DRAPE_TURN("rotate", 0, LOWEST, HIGHEST,
-                "axis and angle, or a vector along the axis as long as the angle"),
+                "axis and angle, or a vector along the axis whose length is the angle"),
      IN(drape_mesh_def, rotate)},
     {DRAPE_VECTOR("scale", "1", 1, DRAPE_ABOVE(0), HIGHEST, "applied first", .uniform = true),
      IN(drape_mesh_def, scale)},
@@ -93,7 +93,7 @@ static const drape_scene_key transform_keys[] = {
 const drape_scene_object drape_form_transform = {.name = "transform", KEYS(transform_keys)};
 
 static const drape_scene_key mesh_keys[] = {
-    {DRAPE_TEXT("grid", "name of a grid; its parameters stand beside it", .derived = ""),
+    {DRAPE_TEXT("grid", "name of a grid; its parameters are keys beside it", .derived = ""),
      IN(drape_mesh_def, grid.type)},
     {DRAPE_TEXT("file", "an OBJ or PLY file, relative to the scene", .derived = ""),
      IN(drape_mesh_def, file)},
@@ -115,7 +115,7 @@ static const drape_scene_key cloth_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECT, "mesh", DRAPE_REQUIRED, "a grid or a file"), IN(drape_cloth_def, mesh),
      .child = &drape_form_mesh},
     {SHAPED(DRAPE_SCENE_OBJECT, "material", UNSAID, "parameters of the material"), .child = &material},
-    {SHAPED(DRAPE_SCENE_ENTRIES, "terms", NONE, "the energies and dampings that are modelled"),
+    {SHAPED(DRAPE_SCENE_ENTRIES, "terms", NONE, "energies, dampings and loads; only those listed act"),
      ARRAY(drape_cloth_def, terms, term_count), .child = &term},
     {SHAPED(DRAPE_SCENE_OBJECTS, "pins", NONE, "nodes held fixed or moved"),
      ARRAY(drape_cloth_def, pins, pin_count), .child = &drape_form_pin},
@@ -129,13 +129,13 @@ const drape_scene_object drape_form_cloth = {
 /* ---- Colliders and contact ---- */
 
 static const drape_scene_key collider_keys[] = {
-    {DRAPE_TEXT("type", "name of a collider; its parameters stand beside it"),
+    {DRAPE_TEXT("type", "name of a collider; its parameters are keys beside it"),
      IN(drape_collider_def, entry.type)},
     {DRAPE_TEXT("name", "unique name", .derived = "\"collider0\", \"collider1\" ..."),
      IN(drape_collider_def, name)},
     {DRAPE_NUMBER("friction", "1", 0, 0, 1e3, "Coulomb's mu between collider and cloth"),
      IN(drape_collider_def, friction)},
-    {DRAPE_VECTOR("track", "s and m", DRAPE_DERIVED("none: it rests"), LOWEST, HIGHEST,
+    {DRAPE_VECTOR("track", "s and m", DRAPE_DERIVED("none: it does not move"), LOWEST, HIGHEST,
                   "displacement from the position that its parameters define, linear between the times"),
      .shape = DRAPE_SCENE_TRACK, ARRAY(drape_collider_def, track, key_count), .at_least = 1},
 };
@@ -182,7 +182,7 @@ static const drape_scene_key scene_keys[] = {
     {SHAPED(DRAPE_SCENE_OBJECT, "self_contact", DRAPE_DERIVED("none: cloth passes through itself"),
             "cloth against cloth"),
      .optional = true, .child = &self_contact},
-    {SHAPED(DRAPE_SCENE_OBJECT, "contact", UNSAID, "how contact with colliders and between layers acts"),
+    {SHAPED(DRAPE_SCENE_OBJECT, "contact", UNSAID, "settings of contact with colliders and between layers"),
      .child = &contact},
     {SHAPED(DRAPE_SCENE_OBJECT, "integrator", UNSAID, "method and its settings"),
      IN(drape_scene_def, integrator), .child = &integrator},
@@ -190,7 +190,7 @@ static const drape_scene_key scene_keys[] = {
      IN(drape_scene_def, controller), .child = &controller},
     {DRAPE_NUMBER("duration", "s", DRAPE_REQUIRED, DRAPE_ABOVE(0), 1e9, "simulated time"),
      IN(drape_scene_def, duration)},
-    {DRAPE_NUMBER("frame_rate", "1/s", 60, DRAPE_ABOVE(0), 1e6, "frames a second"),
+    {DRAPE_NUMBER("frame_rate", "1/s", 60, DRAPE_ABOVE(0), 1e6, "frames per second of simulated time"),
      IN(drape_scene_def, frame_rate)},
     {SHAPED(DRAPE_SCENE_OBJECT, "output", UNSAID, "what a run writes"), .child = &drape_form_output},
 };

@@ -170,12 +170,12 @@ bool drape_sim_ran_away(drape_sim *sim, const drape_state *out, drape_step_info 
         return false;
     if (exploded(&e, &attempted, gain, quiet))
         info->diagnostic =
-            gain_at(m, out->v, "energy from nowhere / kinetic energy", gain / attempted.kinetic, SHARE);
+            gain_at(m, out->v, "energy gained / kinetic energy", gain / attempted.kinetic, SHARE);
     else if (gain > STEP_GAIN * scale)
         info->diagnostic =
-            gain_at(m, out->v, "energy from nowhere / energy of the run", gain / scale, STEP_GAIN);
+            gain_at(m, out->v, "energy gained / energy available to the run", gain / scale, STEP_GAIN);
     else if (gain > ROUNDED * scale && run > max_gain * scale)
-        info->diagnostic = gain_at(m, out->v, "energy from nowhere since its least / energy of the run",
+        info->diagnostic = gain_at(m, out->v, "energy gained since its minimum / energy available to the run",
                                    run / scale, max_gain);
     else
         return false;

@@ -229,13 +229,13 @@ drape_status drape_sim_save_to(drape_sim *sim, drape_write *write, void *user)
     if (!sim)
         return DRAPE_E_ARGUMENT;
     if (!write)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_save_to: there is no function to write");
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_save_to: the function is NULL");
     sim->ctx->message[0] = 0;
     drape_archive_write_to(&a, sim->ctx, MEMORY_NAME, write, user);
     drape_sim_archive_identity(sim, &a);
     drape_sim_archive(sim, &a);
     const drape_status status = drape_archive_end(&a);
-    return drape_fail_unsaid(sim->ctx, status, "", "drape_sim_save_to: the function to write returned %s",
+    return drape_fail_unsaid(sim->ctx, status, "", "drape_sim_save_to: the function returned %s",
                              drape_status_name(status));
 }
 
@@ -247,7 +247,7 @@ drape_status drape_sim_restore_from(drape_sim *sim, const void *bytes, size_t si
     if (guarded)
         return guarded;
     if (!bytes)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_restore_from: there are no bytes");
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_restore_from: the bytes are NULL");
     if (!drape_archive_read_from(&a, sim->ctx, MEMORY_NAME, bytes, size))
         drape_sim_read(sim, &a);
     return a.status;

@@ -119,7 +119,8 @@ drape_status drape_choose(drape_context *ctx, const drape_model *model, const dr
     chosen->controller = drape_controllers[c];
     if (chosen->integrator->own_steps && chosen->controller->own_steps)
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, "/controller/type",
-                             "\"%s\" chooses steps, and so does the integrator \"%s\"; take \"halving\"",
+                             "\"%s\" chooses the step size, but so does the integrator \"%s\"; choose the "
+                             "controller \"halving\"",
                              chosen->controller->entry.name, chosen->integrator->entry.name);
     return DRAPE_OK;
 }

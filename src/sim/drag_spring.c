@@ -12,7 +12,7 @@ static drape_status check(const drape_sim *sim, int32_t node, double stiffness, 
                           (int)node, (int)m->node_count - 1);
     if (m->pinned[node])
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                          "drape_sim_set_drag_spring: node %d is pinned; only free ones are pulled",
+                          "drape_sim_set_drag_spring: node %d is pinned; only free nodes can be dragged",
                           (int)node);
     if (!(stiffness >= 0 && isfinite(stiffness)))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,

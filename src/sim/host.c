@@ -21,8 +21,9 @@ static drape_status check_seconds(const drape_sim *sim, const char *function, do
     double t = drape_sim_state(sim)->t;
     if (seconds > 0 && seconds <= MAX_SECONDS && t + seconds > t)
         return DRAPE_OK;
-    return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: seconds = %g; it is in (0, %g], and moves the time",
-                      function, seconds, MAX_SECONDS);
+    return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                      "%s: seconds = %g; it is in (0, %g], and large enough to change the time", function,
+                      seconds, MAX_SECONDS);
 }
 
 /* ---- Pins ---- */
@@ -35,7 +36,7 @@ static drape_status check_pin(const drape_sim *sim, int32_t node, const double *
                           (int)node, (int)m->node_count - 1);
     if (!m->pinned[node])
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                          "drape_sim_move_pins: node %d is free; only pinned ones are moved", (int)node);
+                          "drape_sim_move_pins: node %d is free; only pinned nodes can be moved", (int)node);
     if (!is_within_limits(x, v))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                           "drape_sim_move_pins: position and velocity of node %d must be within %g m and m/s",
@@ -131,7 +132,7 @@ drape_status drape_sim_set_wind(drape_sim *sim, drape_wind_field *field, void *u
         return guarded;
     if (field && !drape_wind_is_felt(sim->model))
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                          "drape_sim_set_wind: no term of the model is in a medium, as drag.wind is");
+                          "drape_sim_set_wind: the model has no term that feels the wind, such as drag.wind");
     drape_system_set_wind(sim->system, field, user);
     announce_new_forces(sim);
     return DRAPE_OK;
@@ -163,7 +164,7 @@ drape_status drape_sim_reactions(drape_sim *sim, double *forces)
     if (!sim)
         return DRAPE_E_ARGUMENT;
     if (!forces)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_reactions: there is no array");
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_reactions: the array is NULL");
     drape_status status = place(sim, &point);
     if (status)
         return status;
@@ -180,7 +181,7 @@ static drape_status check_has_contact(const drape_sim *sim, const char *function
     if (!sim->chosen.integrator->projects_contact || (m->collider_count == 0 && !m->contact.self))
         return DRAPE_OK;
     return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                      "%s: the integrator \"%s\" moves nodes out of what they meet and has no force",
+                      "%s: the integrator \"%s\" resolves contact by moving nodes and has no contact force",
                       function, sim->chosen.integrator->entry.name);
 }
 
@@ -190,7 +191,7 @@ drape_status drape_sim_contact_forces(drape_sim *sim, double *forces)
     if (!sim)
         return DRAPE_E_ARGUMENT;
     if (!forces)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_contact_forces: there is no array");
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_contact_forces: the array is NULL");
     drape_status status = check_has_contact(sim, "drape_sim_contact_forces");
     if (!status)
         status = place(sim, &point);
@@ -208,7 +209,7 @@ drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double f
     if (!sim)
         return DRAPE_E_ARGUMENT;
     if (!force)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_force: there is no array");
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_collider_force: the array is NULL");
     drape_status status = check_collider(sim, "drape_sim_collider_force", collider);
     if (!status)
         status = check_has_contact(sim, "drape_sim_collider_force");

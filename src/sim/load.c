@@ -21,7 +21,7 @@ drape_status drape_model_create(drape_context *ctx, const drape_scene_def *given
     if (!ctx)
         return DRAPE_E_ARGUMENT;
     if (!out)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_model_create: there is no place for the model");
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_model_create: out is NULL");
     *out = NULL;
     drape_status status = drape_compile_read_def(ctx, &arena, given, &def);
     if (!status)

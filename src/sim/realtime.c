@@ -184,7 +184,7 @@ static drape_status check_arguments(drape_sim *sim, double frame_dt, double budg
                           "drape_sim_advance_realtime: budget = %g s; it is 0 to 1e9", budget);
     if (sim->chosen.integrator->steady_state)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
-                          "drape_sim_advance_realtime: the integrator \"%s\" has no time",
+                          "drape_sim_advance_realtime: the integrator \"%s\" makes no steps in time",
                           sim->chosen.integrator->entry.name);
     return DRAPE_OK;
 }

@@ -143,10 +143,10 @@ drape_status drape_sim_create(drape_context *ctx, const drape_model *model, cons
     if (!ctx)
         return DRAPE_E_ARGUMENT;
     if (!out)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_sim_create: there is no place for the sim");
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_sim_create: out is NULL");
     *out = NULL;
     if (!model)
-        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_sim_create: there is no model");
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "drape_sim_create: the model is NULL");
     drape_status status = read_def(ctx, given, &def);
     if (!status)
         status = open_sim(ctx, model, def.frame_rate > 0 ? def.frame_rate : model->frame_rate,
@@ -253,7 +253,7 @@ drape_status drape_sim_observe(drape_sim *sim, drape_observer *observer, void *u
     if (!sim)
         return DRAPE_E_ARGUMENT;
     if (!observer)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_observe: there is no function");
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "drape_sim_observe: the function is NULL");
     if (sim->observer_count == DRAPE_MAX_OBSERVERS)
         return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "a sim has at most %d observers", DRAPE_MAX_OBSERVERS);
     sim->observers[sim->observer_count] = observer;
@@ -266,8 +266,8 @@ drape_status drape_sim_guard(drape_sim *sim, const char *function)
     if (!sim)
         return DRAPE_E_ARGUMENT;
     if (sim->notifying)
-        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT, "%s: not from an observer, while the sim advances",
-                          function);
+        return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
+                          "%s: an observer must not call it while the sim advances", function);
     return DRAPE_OK;
 }
 

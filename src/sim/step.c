@@ -231,11 +231,12 @@ drape_status drape_sim_check_attempts(drape_sim *sim, const drape_attempt *last)
     if (!(s->dt > 0) || (double)s->tries < sim->max_attempts)
         return DRAPE_OK;
     describe_diagnostic(sim->model, &last->diagnostic, diagnostic, sizeof diagnostic);
-    return drape_fail(sim->ctx, DRAPE_E_STEP_TOO_SMALL,
-                      "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64 " attempts since t=%.9g did not "
-                      "come as far as one dt, %.4g s, and the controller's max_attempts is %.15g%s",
-                      drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status),
-                      last->iterations, s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic);
+    return drape_fail(
+        sim->ctx, DRAPE_E_STEP_TOO_SMALL,
+        "t=%.9g h=%.4g: %s (%s) after %d iterations; %" PRId64
+        " attempts since t=%.9g advanced less than one dt, %.4g s; the controller's max_attempts is %.15g%s",
+        drape_sim_state(sim)->t, last->h, last->reason, drape_status_name(last->status), last->iterations,
+        s->tries, s->tries_from, s->dt, sim->max_attempts, diagnostic);
 }
 
 /* ---- One step, and an advance ---- */

@@ -28,7 +28,8 @@ bool drape_load_takes(const drape_cloth_view *cloth, const double *values, int32
     [DRAPE_LOAD_LIST_EDGE] =                                                                                 \
         DRAPE_CHOICE("edge", 0, drape_load_edges, "a side of a grid, or all of the boundary"),               \
     [DRAPE_LOAD_LIST_BOX_MIN] =                                                                              \
-        DRAPE_VECTOR("box_min", "m", -1e9, -1e9, 1e9, "only edges with both ends in this box, at rest"),     \
-    [DRAPE_LOAD_LIST_BOX_MAX] = DRAPE_VECTOR("box_max", "m", 1e9, -1e9, 1e9, "its other corner")
+        DRAPE_VECTOR("box_min", "m", -1e9, -1e9, 1e9,                                                        \
+                     "corner of a box; only edges with both ends in it, at rest, are loaded"),               \
+    [DRAPE_LOAD_LIST_BOX_MAX] = DRAPE_VECTOR("box_max", "m", 1e9, -1e9, 1e9, "opposite corner of the box")
 
 #endif

@@ -54,8 +54,8 @@ void drape_orthotropic_release(double c[9], const double *f, int count);
                      DRAPE_ABOVE(0), 1e15, shear_of),                                                        \
     [DRAPE_ORTHOTROPIC_POISSON] =                                                                            \
         DRAPE_NUMBER("poisson", "1", DRAPE_DERIVED("of the fabric, or poisson_ratio"), DRAPE_ABOVE(-1),      \
-                     DRAPE_BELOW(1), "sqrt(nu12 nu21), of warp and weft"),                                   \
+                     DRAPE_BELOW(1), "Poisson's ratio sqrt(nu12 nu21) of warp and weft"),                    \
     [DRAPE_ORTHOTROPIC_DIRECTION] =                                                                          \
-        DRAPE_VECTOR("warp_direction", "1", 0, -1e9, 1e9, "along the warp, at rest; 0 0 0: x")
+        DRAPE_VECTOR("warp_direction", "1", 0, -1e9, 1e9, "direction of the warp at rest; 0 0 0: x")
 
 #endif

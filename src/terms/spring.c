@@ -21,19 +21,19 @@ const drape_param drape_spring_params[DRAPE_SPRING_PARAM_COUNT] = {
                      "spring constant of each spring, whatever its length and the mesh"),
     [DRAPE_SPRING_FACTOR] = DRAPE_NUMBER(
         "factor", "1", 1, 0, 1e6,
-        "multiplies stiffness, so that all kinds may share one: 0.2 for the bend springs of CS184"),
+        "multiplies stiffness, so that all kinds can have the same one: 0.2 for the bend springs of CS184"),
     [DRAPE_SPRING_DAMPING] =
         DRAPE_NUMBER("damping", "N s/m", 0, 0, 1e12,
-                     "dashpot beside each spring: force on the rate of its length, none on rigid motion"),
+                     "dashpot of each spring: force over the rate of its length, zero on rigid motion"),
     [DRAPE_SPRING_GRADIENT] =
         DRAPE_NUMBER("gradient", "1", 0, -1, 1e6,
                      "stiffness times 1 + gradient (1 - row/rows), the mean of both ends: stiffer at row 0"),
     [DRAPE_SPRING_REST_SCALE] =
         DRAPE_NUMBER("rest_scale", "1", 1, DRAPE_ABOVE(0), 1e3,
-                     "rest length over the distance in the mesh: below 1 the springs begin stretched"),
+                     "rest length over the distance in the mesh: below 1 the springs start stretched"),
     [DRAPE_SPRING_MIN_LENGTH] =
         DRAPE_NUMBER("min_length", "1", 1e-6, 0, DRAPE_BELOW(1),
-                     "a step that leaves a spring shorter than this share of its rest length is rejected"),
+                     "a step that leaves a spring shorter than this fraction of its rest length is rejected"),
 };
 
 /* ---- Pairs of nodes ---- */
@@ -121,8 +121,8 @@ drape_status drape_spring_build_kind(const drape_cloth_view *cloth, int kind, co
     const drape_spring_set set = {
         .cloth = cloth, .offset = drape_spring_offsets + kind, .offset_count = KIND_OFFSETS};
     if (!cloth->rectangular)
-        return drape_term_refuse(builder, "these springs join rows and columns of the grid \"square\"; on "
-                                          "other meshes there is spring.structural, along the edges");
+        return drape_term_refuse(builder, "these springs join rows and columns of the grid \"square\"; other "
+                                          "meshes have only spring.structural, along edges");
     return drape_spring_build(&set, values, builder);
 }
 

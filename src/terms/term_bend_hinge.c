@@ -35,10 +35,10 @@ static const drape_param params[PARAM_COUNT] = {
     [PARAM_REST] = DRAPE_CHOICE("rest", REST_MESH, rest_choices, "rest angles: those of the mesh, or flat"),
     [PARAM_MIN_ALTITUDE] = DRAPE_NUMBER(
         "min_altitude", "1", 1e-6, 0, DRAPE_BELOW(1),
-        "a step that takes an altitude over a hinge below this share of its rest value is rejected"),
-    [PARAM_MAX_TURN] = DRAPE_NUMBER(
-        "max_turn", "rad", 2.8, DRAPE_ABOVE(0), 3.14159265358979,
-        "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"),
+        "a step that takes an altitude over a hinge below this fraction of its rest value is rejected"),
+    [PARAM_MAX_TURN] =
+        DRAPE_NUMBER("max_turn", "rad", 2.8, DRAPE_ABOVE(0), 3.14159265358979,
+                     "a step that turns a hinge by more is rejected: near pi its angle is ambiguous"),
 };
 
 /* The hinges of LANES elements. */

@@ -53,18 +53,18 @@ static const char *const rest_choices[] = {"mesh", "flat", NULL};
 /* As a list the direction is one entry; among the values it takes three. */
 static const drape_param params[LIST_COUNT] = {
     DRAPE_ORTHOTROPIC_PARAMS("N m", "of the material: its fabric, or E h^3/12", "twist",
-                             "torsional rigidity: a twist of curvature K12 takes 2 twist K12^2 per area"),
+                             "torsional rigidity: the curvature K12 stores 2 twist K12^2 per area"),
     [LIST_REST] = DRAPE_CHOICE("rest", REST_MESH, rest_choices, "rest curvature: that of the mesh, or flat"),
     [LIST_CURVATURE] = DRAPE_VECTOR("curvature", "1/m", 0, -1e9, 1e9,
                                     "added to the rest curvature: along the warp, along the weft, twist; "
                                     "positive towards the side from which triangles turn counterclockwise",
                                     .numbers = "[k11, k22, k12]"),
     [LIST_MIN_ALTITUDE] = DRAPE_NUMBER("min_altitude", "1", 1e-6, 0, DRAPE_BELOW(1),
-                                       "a step that takes an altitude of a triangle below this share of its "
-                                       "smallest one at rest is rejected"),
-    [LIST_MAX_TURN] = DRAPE_NUMBER(
-        "max_turn", "rad", 2.8, DRAPE_ABOVE(0), 3.14159265358979,
-        "a step that turns a hinge by more is rejected: near pi the branch of the angle is a guess"),
+                                       "a step that takes an altitude of a triangle below this fraction of "
+                                       "its smallest one at rest is rejected"),
+    [LIST_MAX_TURN] =
+        DRAPE_NUMBER("max_turn", "rad", 2.8, DRAPE_ABOVE(0), 3.14159265358979,
+                     "a step that turns a hinge by more is rejected: near pi its angle is ambiguous"),
 };
 
 /* r of an own edge; false if it is not clamped. */

@@ -36,7 +36,7 @@ static void energy(const drape_elements *el, int32_t first, int32_t count, const
 const drape_term_ops drape_term_gravity = {
     .struct_size = sizeof(drape_term_ops),
     .entry = {.name = "gravity",
-              .summary = "weight of every node: E = -m g . x; modelled when the scene's gravity is not zero",
+              .summary = "weight of every node: E = -m g . x; acts whenever the scene's gravity is not zero",
               .reference = "lumped masses: a third of each triangle to each of its nodes"},
     .element_name = "node",
     .nodes = 1,

@@ -38,13 +38,13 @@ static const drape_param params[PARAM_COUNT] = {
         DRAPE_DERIVED(
             "the larger of E h and the cloth's weight over its mean rest length times limit - onset"),
         DRAPE_ABOVE(0), 1e15,
-        "scale of the resistance: a spring of this constant, 6.4 times it halfway from onset to limit"),
+        "scale of the resistance: halfway from onset to limit its tangent stiffness is 6.4 times this value"),
     [PARAM_OVER] =
         DRAPE_CHOICE("over", OVER_EDGES, over_choices,
                      "edges: of the mesh; springs: all structural, shear and bend pairs of a square grid"),
     [PARAM_CAP] = DRAPE_NUMBER("cap", "1", 0.01, 1e-9, 0.5,
-                               "share of limit - onset, next to the limit, where the barrier continues as a "
-                               "parabola: forces at the limit are about 2/cap stiffness L (limit - onset)"),
+                               "fraction of limit - onset, next to the limit, where a parabola continues the "
+                               "barrier: the force at the limit is about 2/cap stiffness L (limit - onset)"),
 };
 
 static double onset_of(const double *values)
@@ -84,8 +84,8 @@ static drape_status build(const drape_cloth_view *cloth, const double *values, d
     const drape_spring_set set = {
         .cloth = cloth, .offset = drape_spring_offsets, .offset_count = springs ? DRAPE_SPRING_OFFSETS : 0};
     if (springs && !cloth->rectangular)
-        return drape_term_refuse(builder, "\"over\" = \"springs\" needs the grid \"square\"; this mesh has "
-                                          "edges alone");
+        return drape_term_refuse(
+            builder, "\"over\" = \"springs\" needs the grid \"square\"; this mesh has only edges");
     if (!(onset_of(values) < values[PARAM_LIMIT]))
         return drape_term_refuse(builder, "\"onset\" = %g is not below \"limit\" = %g", values[PARAM_ONSET],
                                  values[PARAM_LIMIT]);
@@ -192,13 +192,13 @@ static drape_status check(const drape_elements *el, const double *x, const doubl
 
 const drape_term_ops drape_term_limit_strain = {
     .struct_size = sizeof(drape_term_ops),
-    .entry = {.name = "limit.strain",
-              .summary =
-                  "keeps edges or springs from stretching beyond a limit, by a barrier that is zero below an "
-                  "onset",
-              .reference = "barrier of Li et al. 2020, Incremental Potential Contact, eq. 6; CS184 "
-                           "clothsim's limit of 10 %",
-              DRAPE_PARAMS(params)},
+    .entry =
+        {.name = "limit.strain",
+         .summary =
+             "keeps edges or springs from stretching beyond a limit, by a barrier that begins at an onset",
+         .reference = "barrier of Li et al. 2020, Incremental Potential Contact, eq. 6; CS184 "
+                      "clothsim's limit of 10 %",
+         DRAPE_PARAMS(params)},
     .element_name = "edge",
     .nodes = 2,
     .constraint = true,

@@ -39,10 +39,10 @@ enum {
 /* As a list the direction is one entry; among the values it takes three. */
 static const drape_param params[LIST_COUNT] = {
     DRAPE_ORTHOTROPIC_PARAMS("N/m", "of the material: its fabric, or E h", "shear",
-                             "resistance to shear, force per length"),
+                             "shear stiffness, a force per length"),
     [LIST_MIN_AREA] = DRAPE_NUMBER(
         "min_area", "1", 1e-6, 0, DRAPE_BELOW(1),
-        "a step that takes the area of a triangle below this share of its area at rest is rejected"),
+        "a step that takes the area of a triangle below this fraction of its area at rest is rejected"),
 };
 
 static void sides(const drape_elements *el, int32_t element, const double *x, double d1[3], double d2[3])

@@ -25,11 +25,11 @@ static const char *const stiffness_choices[] = {"consistent", "report", NULL};
 
 static const drape_param params[PARAM_COUNT] = {
     [PARAM_STIFFNESS] = DRAPE_CHOICE("stiffness", STIFFNESS_CONSISTENT, stiffness_choices,
-                                     "consistent: E h (A1 + A2)/L^2 as a spring constant; report: as the DEP "
-                                     "report's code, one edge length too soft"),
+                                     "consistent: a spring constant of E h (A1 + A2)/L^2; report: that of "
+                                     "the DEP report's code, too soft by the factor of one edge length"),
     [PARAM_COLLAPSE] =
         DRAPE_NUMBER("min_length", "1", 1e-6, 0, DRAPE_BELOW(1),
-                     "a step that makes an edge shorter than this share of its rest length is rejected"),
+                     "a step that makes an edge shorter than this fraction of its rest length is rejected"),
 };
 
 static double element_stiffness(const drape_cloth_view *cloth, int32_t edge, double choice)

@@ -1458,7 +1458,7 @@ static drape_status meddle(void *user, const drape_event *event)
                                 drape_sim_move_collider(sim, 0, 1, x, NULL)};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++)
         ck_assert_int_eq(all[i], DRAPE_E_ARGUMENT);
-    check_message(m->ctx, "drape_sim_move_collider: not from an observer, while the sim advances");
+    check_message(m->ctx, "drape_sim_move_collider: an observer must not call it while the sim advances");
     return DRAPE_OK;
 }
 

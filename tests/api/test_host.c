@@ -841,7 +841,7 @@ START_TEST(wrong_arguments_are_refused)
     says(&h, drape_sim_move_collider(h.sim, 0, 1, none, NULL), e, "displacement");
     says(&h, drape_sim_move_collider(h.sim, 0, 1, NULL, NULL), e, "displacement");
     says(&h, drape_sim_push(h.sim, bad), e, "not finite");
-    says(&h, drape_sim_set_wind(h.sim, blow, NULL), e, "no term of the model is in a medium");
+    says(&h, drape_sim_set_wind(h.sim, blow, NULL), e, "no term that feels the wind");
     says(&h, drape_sim_reactions(h.sim, NULL), e, "no array");
     says(&h, drape_sim_contact_forces(h.sim, NULL), e, "no array");
     says(&h, drape_sim_collider_force(h.sim, 0, NULL), e, "no array");
@@ -858,7 +858,7 @@ START_TEST(wrong_arguments_are_refused)
     close_scene(&h, &memory);
 
     h = open_scene(&memory, SHEET, "", "", "'method': 'verlet'", ball);
-    says(&h, drape_sim_contact_forces(h.sim, bad), e, "moves nodes out of what they meet");
+    says(&h, drape_sim_contact_forces(h.sim, bad), e, "resolves contact by moving nodes");
     says(&h, drape_sim_collider_force(h.sim, 0, force), e, "has no force");
     close_scene(&h, &memory);
 }

@@ -118,7 +118,7 @@ def test_converge():
         write_scene(duration=duration)
         out = good("converge", "scene.json", "--integrators", "midpoint", "--levels", "4", "--out", f"i{duration}")
         low = re.search(r"^midpoint: order .*confidence (\S+) to", out, re.M).group(1)
-        equal((float(low) <= 0, "so these do not determine the order" in out), (uncertain, uncertain), out)
+        equal((float(low) <= 0, "so the order is not determined" in out), (uncertain, uncertain), out)
 
 
 def test_converge_in_space():
@@ -141,7 +141,7 @@ def test_shards():
     good(*command, "--out", "whole")
     for i in (1, 2, 3):
         out = good(*command, "--shard", f"{i}/3", "--out", f"part{i}")
-    assert "when all cases are done" in out, out
+    assert "once all cases are done" in out, out
     equal(sorted(os.listdir("part1")), ["cases-1-of-3.jsonl", "experiment.json"], "what a shard writes: others may write beside it")
     missing = drape("merge", "part1", "part3", "--out", "some")
     equal(missing.returncode, 1, "exit code of a merge that lacks cases")

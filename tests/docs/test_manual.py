@@ -76,7 +76,7 @@ def test_scene():
     """the page of scenes has every key, every entry and every parameter of the tables"""
     pages()
     page = words("drape-scene.5")
-    shown = re.findall(r"^\| `([^`]*)` \|(?: `([^`]*)` \|)?", good("list", "--markdown"), re.M)
+    shown = re.findall(r"^\| `([^|]*)` \|(?: `([^`]*)` \|)?", good("list", "--markdown"), re.M)
     assert len(shown) > 150, shown
     for first, second in shown:
         wanted = second or first

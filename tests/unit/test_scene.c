@@ -463,7 +463,7 @@ static const struct {
     {ROOT("'colliders': ['plane']"),
      "s.json:2:15: /colliders/0: \"plane\" is not allowed; an element is an object"},
     {ROOT("'colliders': [{}]"), "s.json:2:15: /colliders/0/type: \"type\" is missing: name of a "
-                                "collider; its parameters stand beside "
+                                "collider; its parameters are keys beside "
                                 "it; a non-empty string"},
     {ROOT("'colliders': [{'type': 's', 'friction': -0.1}]"),
      "s.json:2:29: /colliders/0/friction: -0.1 is not allowed; friction is a number in [0, 1000]"},
@@ -583,10 +583,10 @@ static const struct {
      "(-inf, inf) m"},
     {MESH("{'grid': 'g', 'transform': {'rotate': 90}}"),
      "s.json:2:29: /cloth/0/mesh/transform/rotate: 90 is not allowed; rotate is [x, y, z, angle], or [x, y, "
-     "z] as long as the angle, which is in (-inf, inf) degrees"},
+     "z] whose length is the angle, which is in (-inf, inf) degrees"},
     {MESH("{'grid': 'g', 'transform': {'rotate': [0, 90]}}"),
      "s.json:2:29: /cloth/0/mesh/transform/rotate: an array of 2 is not allowed; rotate is [x, y, z, angle], "
-     "or [x, y, z] as long as the angle, which is in (-inf, inf) degrees"},
+     "or [x, y, z] whose length is the angle, which is in (-inf, inf) degrees"},
     {MESH("{'grid': 'g', 'transform': {'rotate': [0, 1, 0, '90']}}"),
      "s.json:2:49: /cloth/0/mesh/transform/rotate/3: \"90\" is not allowed; an element is a number"},
     {MESH("{'grid': 'g', 'transform': {'rotate': [1e308, 1e308, 1e308]}}"),
