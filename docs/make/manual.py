@@ -168,7 +168,7 @@ def scene_page():
         place = "".join(line for line in lines if line.startswith("Where: "))
         roff = keys(tables[0]) if tables[0][0][0] == "in" else (filled(place) + "\n" if place else "") + entries(tables)
         parts.append((plain(title.upper()), roff))
-    about = ("A scene is JSON, with comments. Units are SI, y is up. Drape models only what a scene names. Unknown keys are errors. "
+    about = ("A scene is JSON, with comments. Units are SI, y is up. Forces are opt-in: a scene lists the ones it wants. Unknown keys are errors. "
              "`drape info` shows every value that is used, `drape list --schema` prints the JSON Schema. A scene of the CS184 cloth simulator is recognised "
              "by its form and runs unchanged.")
     example = ('{"drape": 1,\n "cloth": [{"mesh": {"grid": "equilateral", "edges": 22, "edge_length": 0.05},\n'

@@ -219,7 +219,7 @@ static void print_term(const cli_info *info, int32_t i)
     const drape_profile_term *cost = &info->profile.terms[i];
     printf("  %-20s of %s: ", term->ops->entry.name, info->model->cloths[term->cloth].name);
     if (term->ops->law)
-        printf("acts on %lld strain measures, its time is in theirs", (long long)cost->acts_on);
+        printf("acts on %lld strain measures; its time is counted with theirs", (long long)cost->acts_on);
     else
         printf("%d %s elements of %d node%s", (int)term->elements.count, term->ops->element_name,
                term->elements.nodes, term->elements.nodes == 1 ? "" : "s");

@@ -115,7 +115,7 @@ static drape_status measure_phase(drape_reference_run *run, double *value)
 
 /* members: of the integrator, besides dt and tolerance. */
 #define OSCILLATOR .unit = "1", .parameter = "omega h", .tolerance = 1e-4, .scene = oscillator_scene
-#define AMPLITUDE  OSCILLATOR, .entry.summary = "share of the amplitude left by a step"
+#define AMPLITUDE  OSCILLATOR, .entry.summary = "fraction of the amplitude that a step leaves"
 #define PHASE      OSCILLATOR, .entry.summary = "angle of a step over omega h", .measure = measure_phase
 
 /* Backward Euler leaves this factor of the energy in each step. */
@@ -131,7 +131,7 @@ static drape_status measure_energy(drape_reference_run *run, double *value)
     return status;
 }
 
-DRAPE_REFERENCE(oscillator, OSCILLATOR, .entry.summary = "share of energy left by a step",
+DRAPE_REFERENCE(oscillator, OSCILLATOR, .entry.summary = "fraction of the energy that a step leaves",
                 DRAPE_CASES(0.1, 0.5, 2), .model = "stretch.cst; square; be",
                 .entry.reference = "1/(1 + omega^2 h^2), of 1/(1 - i omega h)", .members = "'method': 'be'",
                 .expected = euler, .measure = measure_energy);

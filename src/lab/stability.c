@@ -36,11 +36,11 @@ static drape_status read_axis(lab *l, const char *text, axis *a)
     int used = 0;
     char rest[8] = "";
     if (*text != '/' || !equals || (size_t)(equals - text) >= sizeof a->pointer)
-        return wrong_axis(l, text, "there is no pointer");
+        return wrong_axis(l, text, "a pointer is needed");
     memcpy(a->pointer, text, (size_t)(equals - text));
     a->pointer[equals - text] = 0;
     if (sscanf(equals + 1, "%lf:%lf:%d%n%7s", &a->from, &a->to, &a->count, &used, rest) < 3 || used == 0)
-        return wrong_axis(l, text, "there are no three numbers");
+        return wrong_axis(l, text, "three numbers are needed");
     a->log = strcmp(rest, "log") == 0;
     if (*rest && !a->log)
         return wrong_axis(l, text, "only log may follow the count");

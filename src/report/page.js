@@ -97,7 +97,7 @@ function shares(wall) {
   const inner = ['residual', 'jacobian', 'factor', 'solve', 'contact'].map((name) => [name, wall[name] || 0]);
   const sum = (pairs) => pairs.reduce((total, [, x]) => total + x, 0);
   const all = [...inner, ['rest of the steps', Math.max(wall.steps - sum(inner), 0)], ['setup', wall.setup || 0], ['output', wall.output || 0]];
-  all.push(['start and end', Math.max(wall.total - sum(all), 0)]);
+  all.push(['other', Math.max(wall.total - sum(all), 0)]);
   const share = (x) => `${format(x, 3)} s, ${(100 * x / (wall.total || 1)).toFixed(1)} %`;
   return [['total', `${format(wall.total, 3)} s`], ...all.filter(([, x]) => x > 0).map(([name, x]) => [name, share(x)])];
 }
@@ -106,9 +106,9 @@ function summarize(s) {
   const percent = (x) => `${format(100 * x, 3)} %`;
   const numbers = (object, unit) => Object.entries(object).map(([name, value]) => [name, `${format(value)}${unit}`]);
   return [
-    lines('Model', [['nodes', s.nodes], ['triangles', run.triangles], ['unknowns', s.dofs], ['nonzeros', s.nnz], ['least strain', percent(s.strain.min)], ['largest strain', percent(s.strain.max)]]),
+    lines('Model', [['nodes', s.nodes], ['triangles', run.triangles], ['unknowns', s.dofs], ['nonzeros', s.nnz], ['smallest strain', percent(s.strain.min)], ['largest strain', percent(s.strain.max)]]),
     lines('Steps', [['simulated', `${format(s.time)} s`], ['accepted', s.steps.accepted], ['rejected', s.steps.rejected],
-      ...Object.entries(s.steps.reasons || {}), ['unconverged', s.steps.unconverged || null], ['shortest', `${format(s.steps.h_min, 3)} s`], ['longest', `${format(s.steps.h_max, 3)} s`]]),
+      ...Object.entries(s.steps.reasons || {}), ['unconverged', s.steps.unconverged || null], ['shortest step', `${format(s.steps.h_min, 3)} s`], ['longest step', `${format(s.steps.h_max, 3)} s`]]),
     lines('Newton', Object.entries(s.newton).map(([name, value]) => [name.replace('_', ' '), value])),
     lines('Wall time', shares(s.wall_s)),
     lines('Energy at the end', numbers(s.energy, ' J')),
@@ -125,19 +125,19 @@ function describe() {
   element('description').textContent = scene.description || '';
   element('scene').textContent = run.scene;
   const status = element('status');
-  status.textContent = !s ? 'did not end' : s.status === 'ok' ? 'done' : s.status.replace(/^e_/, '').replaceAll('_', ' ');
+  status.textContent = !s ? 'not finished' : s.status === 'ok' ? 'done' : s.status.replace(/^e_/, '').replaceAll('_', ' ');
   status.classList.toggle('failed', !s || s.status !== 'ok');
-  if (!s) notes.push('The folder of the run has no summary: it was ended from outside, or goes on.');
+  if (!s) notes.push('The run has no summary: it was killed, or is still running.');
   else if (s.message) notes.push(s.message);
   if (run.frames.numbers.length < run.frames.all) {
-    notes.push(`The page has ${run.frames.numbers.length} of ${run.frames.all} frames, evenly spread, to stay small; drape report --megabytes N makes room for more.`);
+    notes.push(`The page has ${run.frames.numbers.length} of ${run.frames.all} frames, at equal intervals; drape report --megabytes N makes room for more.`);
   }
   if (run.steps.every > 1) notes.push(`Of ${run.steps.rows} attempts every ${run.steps.every}th accepted one and all rejected ones are plotted.`);
   element('note').textContent = notes.join(' ');
   element('note').hidden = notes.length === 0;
   if (s) element('summary').append(...summarize(s));
   const p = run.field.positions.step, precision = Math.max(...p) / 2;
-  element('footer').textContent = `Drape ${run.version}. Positions in this page are exact to ${format(precision, 2)} m; positions.npy has all digits.`;
+  element('footer').textContent = `Drape ${run.version}. Positions in this page are accurate to ${format(precision, 2)} m; positions.npy has all digits.`;
 }
 
 // ---- Input

@@ -197,8 +197,8 @@ function energyPlot() {
   const c = run.energies.columns;
   const change = (values) => values.map((x) => (x === null || values[0] === null ? null : x - values[0]));
   const series = [
-    ['kinetic', c.kinetic], ['elastic', c.elastic], ['gravity, change', change(c.gravity)], ['contact', c.contact],
-    ['dissipated', c.dissipated], ['numerical', c.numerical], ['total, change', change(c.total)]]
+    ['kinetic', c.kinetic], ['elastic', c.elastic], ['gravity (change)', change(c.gravity)], ['contact', c.contact],
+    ['dissipated', c.dissipated], ['numerical', c.numerical], ['total (change)', change(c.total)]]
     .map(([name, y], i) => ({ name, y, t: c.t_state, color: `var(--c${i})` }))
     .filter(({ y }) => y.some((x) => x));
   return new Plot({ title: 'Energy', unit: 'J', series });
@@ -230,7 +230,7 @@ function rejectionPlot({ c, bad }) {
     const mine = bad.filter((i) => c.reason[i] === reason);
     return { name: reason, color: `var(--c${k % 7})`, steps: true, t: [run.begin, ...mine.map((i) => c.t[i])], y: [0, ...mine.map((_, n) => n + 1)] };
   });
-  if (series.length) return new Plot({ title: 'Rejected attempts, so far', unit: '', series, size: 'low', zero: true, note: 'by reason' });
+  if (series.length) return new Plot({ title: 'Rejected attempts so far', unit: '', series, size: 'low', zero: true, note: 'by reason' });
   const figure = document.createElement('figure');
   figure.innerHTML = '<figcaption>Rejected attempts</figcaption><p class="nothing">None was rejected.</p>';
   return { figure, render() {}, point() {} };

@@ -842,9 +842,9 @@ START_TEST(wrong_arguments_are_refused)
     says(&h, drape_sim_move_collider(h.sim, 0, 1, NULL, NULL), e, "displacement");
     says(&h, drape_sim_push(h.sim, bad), e, "not finite");
     says(&h, drape_sim_set_wind(h.sim, blow, NULL), e, "no term that feels the wind");
-    says(&h, drape_sim_reactions(h.sim, NULL), e, "no array");
-    says(&h, drape_sim_contact_forces(h.sim, NULL), e, "no array");
-    says(&h, drape_sim_collider_force(h.sim, 0, NULL), e, "no array");
+    says(&h, drape_sim_reactions(h.sim, NULL), e, "the array is NULL");
+    says(&h, drape_sim_contact_forces(h.sim, NULL), e, "the array is NULL");
+    says(&h, drape_sim_collider_force(h.sim, 0, NULL), e, "the array is NULL");
     says(&h, drape_sim_collider_force(h.sim, 3, force), e, "collider 3");
     ck_assert_str_eq(drape_sim_collider(h.sim, 3).name, "");
     ck_assert_uint_eq(drape_sim_hash(h.sim), before);

@@ -368,7 +368,7 @@ def test_no_reference():
     command = ["tradeoff", "scene.json", "--integrators", "be", "--repeats", "1", "--out", "t"]
     result = drape(*command, "--case-seconds", "1e-9")
     equal(result.returncode, 1, "exit code")
-    assert "give more by --case-seconds" in result.stderr, result.stderr
+    assert "raise --case-seconds" in result.stderr, result.stderr
     assert not os.path.exists("t"), os.listdir("t")
     os.mkdir("t")
     with open("t/mine", "w", encoding="utf-8") as file:

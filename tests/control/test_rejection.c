@@ -684,8 +684,8 @@ START_TEST(a_slow_gain_ends_the_run_when_it_is_large)
     for (int i = 0; i < r->count; i++)
         ck_assert(r->attempt[i].accepted || strcmp(r->attempt[i].reason, "energy") == 0);
     const char *message = drape_context_message(s.ctx);
-    ck_assert_msg(strstr(message, "energy gained since its minimum / energy available to the run = 0.1"), "%s",
-                  message);
+    ck_assert_msg(strstr(message, "energy gained since its minimum / energy available to the run = 0.1"),
+                  "%s", message);
     scene_close(&s);
 }
 END_TEST
