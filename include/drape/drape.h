@@ -512,9 +512,9 @@ DRAPE_API void drape_model_normals(const drape_model *model, const double *x, do
  * drape_sim_contact_forces: contact and friction on every node, with colliders and between layers of cloth.
  * drape_sim_collider_force: the total force of the cloth on one collider. Colliders have the mean velocity of
  * the last step, so call these before moving them on. Under "newton_k", which does not bring the residual of
- * a step to zero, all of these forces are far off (docs/integrators.md). An integrator that resolves contact by
- * moving nodes ("verlet") has no such forces and returns an error. Errors: DRAPE_E_ARGUMENT, DRAPE_E_MEMORY.
- * Thread-safety: as the sim. Must not be called by an observer. */
+ * a step to zero, all of these forces are far off (docs/integrators.md). An integrator that resolves contact
+ * by moving nodes ("verlet") has no such forces and returns an error. Errors: DRAPE_E_ARGUMENT,
+ * DRAPE_E_MEMORY. Thread-safety: as the sim. Must not be called by an observer. */
 DRAPE_API drape_status drape_sim_reactions(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_contact_forces(drape_sim *sim, double *forces);
 DRAPE_API drape_status drape_sim_collider_force(drape_sim *sim, int32_t collider, double force[3]);

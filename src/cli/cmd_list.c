@@ -366,8 +366,7 @@ static const cli_option options[] = {
 
 const drape_verb drape_verb_list = {
     .entry = {.name = "list",
-              .summary = "show the keys of a scene and all that it can choose from: parameters, units, "
-                         "defaults, references"},
+              .summary = "show the keys of a scene and all that it can choose from, with units and defaults"},
     .operand = "TABLE|ENTRY",
     .operand_optional = true,
     .details = "Prints the keys of a scene and all that it can choose from, or one table, or one entry. The "

@@ -859,7 +859,7 @@ START_TEST(wrong_arguments_are_refused)
 
     h = open_scene(&memory, SHEET, "", "", "'method': 'verlet'", ball);
     says(&h, drape_sim_contact_forces(h.sim, bad), e, "resolves contact by moving nodes");
-    says(&h, drape_sim_collider_force(h.sim, 0, force), e, "has no force");
+    says(&h, drape_sim_collider_force(h.sim, 0, force), e, "no contact force");
     close_scene(&h, &memory);
 }
 END_TEST
