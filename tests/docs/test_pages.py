@@ -356,4 +356,13 @@ def test_summary():
     assert not missing, missing
 
 
+def test_citation():
+    """CITATION.cff has the keys that its schema requires, and the version of the project"""
+    text = read("CITATION.cff")
+    for key in "cff-version", "message", "title", "authors":
+        assert re.search(rf"^{key}:", text, re.M), key
+    version = re.search(r"^project\('drape'.*? version: '([^']*)'", read("meson.build"), re.M)[1]
+    equal(re.search(r"^version: (.*)$", text, re.M)[1], version)
+
+
 sys.exit(run_tests(globals()))
