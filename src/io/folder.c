@@ -473,7 +473,7 @@ drape_status drape_folder_note(drape_folder *f, const char *name, const drape_ch
 {
     char line[400];
     snprintf(line, sizeof line,
-             "{\"file\": \"%.255s\", \"size\": %" PRIu64 ", \"checksum\": \"%016" PRIx64 "\"}", name,
+             "{\"file\":\"%.255s\",\"size\":%" PRIu64 ",\"checksum\":\"%016" PRIx64 "\"}", name,
              sum->size, sum->sum);
     return add_line(f, line, durable);
 }
@@ -485,7 +485,7 @@ drape_status drape_folder_note_growing(drape_folder *f, const char *name, int fd
     if (!identity_of(fd, &inode, &born))
         return fail(f, "write", name, errno);
     snprintf(line, sizeof line,
-             "{\"file\": \"%.255s\", \"inode\": \"%" PRIx64 "\", \"born\": \"%" PRIx64 "\"}", name, inode,
+             "{\"file\":\"%.255s\",\"inode\":\"%" PRIx64 "\",\"born\":\"%" PRIx64 "\"}", name, inode,
              born);
     return add_line(f, line, durable);
 }
@@ -493,7 +493,7 @@ drape_status drape_folder_note_growing(drape_folder *f, const char *name, int fd
 static drape_status put_head(drape_folder *f)
 {
     char line[200];
-    snprintf(line, sizeof line, "{\"manifest\": 1, \"drape\": \"%.100s\", \"token\": \"%016" PRIx64 "\"}",
+    snprintf(line, sizeof line, "{\"manifest\":1,\"drape\":\"%.100s\",\"token\":\"%016" PRIx64 "\"}",
              drape_version(), f->token);
     return add_line(f, line, false);
 }
@@ -510,11 +510,11 @@ static drape_status put_entries(drape_folder *f)
             continue;
         if (e->growing)
             snprintf(line, sizeof line,
-                     "{\"file\": \"%.255s\", \"inode\": \"%" PRIx64 "\", \"born\": \"%" PRIx64 "\"}", e->name,
+                     "{\"file\":\"%.255s\",\"inode\":\"%" PRIx64 "\",\"born\":\"%" PRIx64 "\"}", e->name,
                      e->inode, e->born);
         else
             snprintf(line, sizeof line,
-                     "{\"file\": \"%.255s\", \"size\": %" PRIu64 ", \"checksum\": \"%016" PRIx64 "\"}",
+                     "{\"file\":\"%.255s\",\"size\":%" PRIu64 ",\"checksum\":\"%016" PRIx64 "\"}",
                      e->name, e->size, e->sum);
         status = add_line(f, line, false);
     }

@@ -874,7 +874,7 @@ static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
     fill_disk(size, &old);
     for (; !status && frames < 1000; frames++) {
         const drape_frame frame = {.index = frames,
-                                   .time = frames / 3.0,
+                                   .time = frames + 1 / 3.0, /* with 17 digits: a line in the collection is longer than one in the manifest */
                                    .positions = drape_model_rest_positions(w->model),
                                    .velocities = field,
                                    .strain = strain,
@@ -904,7 +904,8 @@ START_TEST(full_disk_leaves_a_valid_collection)
         ck_assert_int_eq(mkdir(in_folder(w.folder, "a"), 0777), 0);
         ck_assert_int_eq(mkdir(w.out, 0777), 0);
         int frames = write_frames(&w, vtp, room), named = 0;
-        ck_assert_ptr_nonnull(strstr(drape_context_message(w.ctx), "frames.pvd"));
+        ck_assert_msg(strstr(drape_context_message(w.ctx), "frames.pvd") != NULL, "%s",
+                      drape_context_message(w.ctx));
         char *data = slurp(in_folder(w.out, "frames.pvd"), &size);
         ck_assert_uint_le(size, room);
         ck_assert_str_eq(data + size - strlen("</Collection></VTKFile>\n"), "</Collection></VTKFile>\n");
