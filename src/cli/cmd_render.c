@@ -220,6 +220,8 @@ static int read_request(render *r)
 
 static int report(const render *r, int code)
 {
+    if (cli_interrupted())
+        return cli_report_interrupted("render");
     fprintf(stderr, "drape render: %s\n", drape_context_message(r->ctx));
     return code;
 }
@@ -449,7 +451,7 @@ static int make(render *r)
         return cli_report_interrupted("render");
     for (int i = 0; i < r->source_count; i++)
         incomplete |= r->sources[i].incomplete;
-    printf("%s: %zu frame%s, %d x %d, %s\n", r->request->out, r->sources[0].reel.count,
+    printf("%s: %zu frame%s, %d x %d, %s\n", CLI_SHOWN(r->request->out), r->sources[0].reel.count,
            r->sources[0].reel.count == 1 ? "" : "s", r->width, r->height, r->shading->entry.name);
     return incomplete ? CLI_FAILED : CLI_DONE;
 }

@@ -249,7 +249,8 @@ static void print_inside(const run *r)
     for (int32_t c = 0; (faces = drape_sim_inside(r->in.sim, c, &deepest)) >= 0; c++)
         if (faces > 0)
             printf("inside    %d triangle%s of the cloth reach%s into %s, up to %.3g m deep\n", (int)faces,
-                   faces == 1 ? "" : "s", faces == 1 ? "es" : "", r->in.model->colliders[c].name, deepest);
+                   faces == 1 ? "" : "s", faces == 1 ? "es" : "", CLI_SHOWN(r->in.model->colliders[c].name),
+                   deepest);
 }
 
 static void print_results(const run *r)
@@ -273,7 +274,7 @@ static void print_results(const run *r)
         cli_realtime_print(&r->realtime);
     if (r->recorder)
         printf("output    %lld frames, steps.csv, energy.csv, summary.json and scene.json in %s\n",
-               (long long)drape_recorder_frames(r->recorder), r->request->out);
+               (long long)drape_recorder_frames(r->recorder), CLI_SHOWN(r->request->out));
 }
 
 /* ---- The run ---- */

@@ -472,9 +472,8 @@ static drape_status add_line(drape_folder *f, const char *line, bool durable)
 drape_status drape_folder_note(drape_folder *f, const char *name, const drape_checksum *sum, bool durable)
 {
     char line[400];
-    snprintf(line, sizeof line,
-             "{\"file\":\"%.255s\",\"size\":%" PRIu64 ",\"checksum\":\"%016" PRIx64 "\"}", name,
-             sum->size, sum->sum);
+    snprintf(line, sizeof line, "{\"file\":\"%.255s\",\"size\":%" PRIu64 ",\"checksum\":\"%016" PRIx64 "\"}",
+             name, sum->size, sum->sum);
     return add_line(f, line, durable);
 }
 
@@ -484,9 +483,8 @@ drape_status drape_folder_note_growing(drape_folder *f, const char *name, int fd
     uint64_t inode = 0, born = 0;
     if (!identity_of(fd, &inode, &born))
         return fail(f, "write", name, errno);
-    snprintf(line, sizeof line,
-             "{\"file\":\"%.255s\",\"inode\":\"%" PRIx64 "\",\"born\":\"%" PRIx64 "\"}", name, inode,
-             born);
+    snprintf(line, sizeof line, "{\"file\":\"%.255s\",\"inode\":\"%" PRIx64 "\",\"born\":\"%" PRIx64 "\"}",
+             name, inode, born);
     return add_line(f, line, durable);
 }
 
@@ -514,8 +512,8 @@ static drape_status put_entries(drape_folder *f)
                      e->inode, e->born);
         else
             snprintf(line, sizeof line,
-                     "{\"file\":\"%.255s\",\"size\":%" PRIu64 ",\"checksum\":\"%016" PRIx64 "\"}",
-                     e->name, e->size, e->sum);
+                     "{\"file\":\"%.255s\",\"size\":%" PRIu64 ",\"checksum\":\"%016" PRIx64 "\"}", e->name,
+                     e->size, e->sum);
         status = add_line(f, line, false);
     }
     return status;

@@ -321,7 +321,10 @@ static drape_status report(lab *l)
     snprintf(title, sizeof title, "drape %s: %s", l->experiment->entry.name, lab_text(l->about, "scene"));
     if (!status)
         status = lab_write_page(l, title);
-    fprintf(l->summary, "report    %s/report.html\n", l->folder);
+    char path[512];
+    snprintf(path, sizeof path, "%.490s/report.html", l->folder);
+    drape_make_printable(path);
+    fprintf(l->summary, "report    %s\n", path);
     return status;
 }
 

@@ -296,6 +296,6 @@ drape_status lab_plot_end(lab *l, lab_plot *plot, bool draws, const char *captio
     status = draw(l, plot, path, &drawn);
     if (status || drawn)
         return status ? status : put_picture(l, plot->name, caption);
-    fprintf(l->summary, "gnuplot is missing or failed on %s: this report has no pictures\n", path);
+    fprintf(l->summary, "gnuplot is missing or failed on %s: this report has no pictures\n", file);
     return DRAPE_OK;
 }

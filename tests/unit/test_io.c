@@ -873,12 +873,14 @@ static int write_frames(world *w, const drape_exporter_ops *ops, size_t size)
     ck_assert_int_eq(ops->open(w->ctx, &def, state), DRAPE_OK);
     fill_disk(size, &old);
     for (; !status && frames < 1000; frames++) {
-        const drape_frame frame = {.index = frames,
-                                   .time = frames + 1 / 3.0, /* with 17 digits: a line in the collection is longer than one in the manifest */
-                                   .positions = drape_model_rest_positions(w->model),
-                                   .velocities = field,
-                                   .strain = strain,
-                                   .energy_density = field};
+        const drape_frame frame = {
+            .index = frames,
+            .time = frames +
+                    1 / 3.0, /* with 17 digits: a line in the collection is longer than one in the manifest */
+            .positions = drape_model_rest_positions(w->model),
+            .velocities = field,
+            .strain = strain,
+            .energy_density = field};
         status = ops->write(w->ctx, state, &frame);
     }
     snprintf(message, sizeof message, "%s", drape_context_message(w->ctx));
