@@ -95,13 +95,25 @@ char *drape_copy_text(drape_context *ctx, const char *text)
     return copy;
 }
 
-/* Messages are one line, but text quoted from files and arguments may contain line breaks and control
- * characters. */
-static void make_one_line(char *text)
+/* The number of bytes at text that are not to be printed. */
+static size_t unprintable(const unsigned char *text)
 {
-    for (; *text; text++)
-        if ((unsigned char)*text < ' ' || *text == 127)
-            *text = '?';
+    if (*text < ' ' || *text == 127)
+        return 1;
+    if (text[0] == 0xc2 && text[1] >= 0x80 && text[1] <= 0x9f)
+        return 2;
+    if (text[0] == 0xe2 && text[1] == 0x80 && text[2] >= 0xaa && text[2] <= 0xae)
+        return 3;
+    return text[0] == 0xe2 && text[1] == 0x81 && text[2] >= 0xa6 && text[2] <= 0xa9 ? 3 : 0;
+}
+
+void drape_make_printable(char *text)
+{
+    while (*text) {
+        const size_t count = unprintable((const unsigned char *)text);
+        memset(text, '?', count);
+        text += count ? count : 1;
+    }
 }
 
 static drape_status fail(drape_context *ctx, drape_status status, const char *pointer, const char *format,
@@ -109,9 +121,9 @@ static drape_status fail(drape_context *ctx, drape_status status, const char *po
 {
     locale_t old = drape_locale_enter();
     vsnprintf(ctx->text, sizeof ctx->text, format, args);
-    make_one_line(ctx->text);
+    drape_make_printable(ctx->text);
     snprintf(ctx->pointer, sizeof ctx->pointer, "%s", pointer);
-    make_one_line(ctx->pointer);
+    drape_make_printable(ctx->pointer);
     snprintf(ctx->message, sizeof ctx->message, "%s%s%.700s", ctx->pointer, *pointer ? ": " : "", ctx->text);
     drape_locale_leave(old);
     return status;
@@ -188,6 +200,7 @@ void drape_log(drape_context *ctx, drape_log_level level, const char *format, ..
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
+    drape_make_printable(text);
     drape_locale_leave(old);
     ctx->def.log(ctx->def.log_user, level, text);
 }

@@ -100,6 +100,10 @@ int cli_parse(const drape_verb *verb, int argc, char **argv, cli_command *reques
 /* Prints one line "drape run: text" on stderr. Returns CLI_BAD_INPUT. */
 int cli_misuse(const char *verb, const char *format, ...) DRAPE_PRINTF(2, 3);
 
+/* A text of the user's as it may be printed, shortened to 255 bytes: in printf("%s", CLI_SHOWN(name)). */
+#define CLI_SHOWN(text) cli_shown((char[256]){0}, text)
+const char *cli_shown(char room[256], const char *text);
+
 /* Prints the message of the context on stderr. Returns the exit code that it is given. */
 int cli_report(drape_context *ctx, int code);
 

@@ -3,6 +3,7 @@
 #include "cli/signals.h"
 
 #include "io/export.h"
+#include "io/scene_copy.h"
 #include "render/film.h"
 #include "render/images.h"
 #include "render/offscreen.h"
@@ -19,7 +20,7 @@
 #define MIN_SIDE       16
 #define MIN_RANGE      1e-9 /* of a field whose values are all the same */
 #define PICTURE_DIGITS 5    /* smallest number of digits in the name of a frame */
-#define PICTURE_NAME   32   /* upper bound of the bytes of "/frame_00000.png" */
+#define PICTURE_NAME   32   /* upper bound of the bytes of "frame_00000.png" */
 
 typedef struct render_request {
     cli_command command;
@@ -35,7 +36,8 @@ typedef struct render {
     double azimuth, elevation, zoom; /* of the camera */
     double low, high;                /* range of the field; NaN: that of its values */
     const drape_shading *shading;
-    bool film, picture; /* to be made; neither: a folder of pictures */
+    bool film, picture;   /* to be made; neither: a folder of pictures */
+    drape_folder *folder; /* of pictures */
     cli_source *sources;
     int source_count;
     drape_context *ctx;
@@ -218,6 +220,8 @@ static int read_request(render *r)
 
 static int report(const render *r, int code)
 {
+    if (cli_interrupted())
+        return cli_report_interrupted("render");
     fprintf(stderr, "drape render: %s\n", drape_context_message(r->ctx));
     return code;
 }
@@ -325,9 +329,9 @@ static drape_status draw(render *r, size_t k)
     return drape_painter_draw(r->painter, &picture);
 }
 
-static drape_status write_png(render *r, const char *path)
+static drape_status write_png(render *r, drape_folder *folder, const char *path)
 {
-    return drape_png_write(r->ctx, path, r->pixels, r->width, r->height, r->request->small);
+    return drape_png_write(r->ctx, folder, path, r->pixels, r->width, r->height, r->request->small);
 }
 
 /* Writes frame k, which is in r->pixels. */
@@ -352,7 +356,7 @@ static drape_status write_picture(render *r, size_t k, void *user)
 {
     (void)k;
     (void)user;
-    return write_png(r, r->request->out);
+    return write_png(r, NULL, r->request->out);
 }
 
 static drape_status add_to_film(render *r, size_t k, void *film)
@@ -377,29 +381,62 @@ static drape_status make_film(render *r)
     return status ? drape_fail(r->ctx, status, "%s", message) : DRAPE_OK;
 }
 
-/* folder: its path, with room for the name of a picture. */
 static drape_status write_into_folder(render *r, size_t k, void *folder)
 {
-    char *path = folder, *end = path + strlen(path);
-    snprintf(end, PICTURE_NAME, "/frame_%0*zu.png", PICTURE_DIGITS, k);
-    drape_status status = write_png(r, path);
-    *end = 0;
+    char name[PICTURE_NAME];
+    snprintf(name, sizeof name, "frame_%0*zu.png", PICTURE_DIGITS, k);
+    return write_png(r, folder, name);
+}
+
+static bool is_picture(const void *user, const char *name)
+{
+    (void)user;
+    return drape_frame_files_name(name, PICTURE_DIGITS, "png", NULL);
+}
+
+/* Pictures of an earlier call are removed, so that those of two runs do not mix. */
+static drape_status make_folder(render *r)
+{
+    drape_status status = drape_folder_begin(r->folder, is_picture, NULL);
+    return status ? status : draw_frames(r, write_into_folder, r->folder);
+}
+
+/* ---- What must not be replaced ---- */
+
+static drape_status check_input(void *user, const char *path, const char *pointer)
+{
+    render *r = user;
+    (void)pointer;
+    return r->folder ? drape_folder_protect(r->folder, path)
+                     : drape_file_check_named(r->ctx, r->request->out, path);
+}
+
+static drape_status check_inputs(render *r)
+{
+    const render_request *q = r->request;
+    const char *const images[] = {q->texture, q->height, q->environment};
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; i < sizeof images / sizeof *images && !status; i++)
+        status = images[i] ? check_input(r, images[i], "") : DRAPE_OK;
+    for (int i = 0; i < r->source_count && !status; i++) {
+        const char *path = q->command.operands[i];
+        status = check_input(r, path, "");
+        if (!status)
+            status = drape_scene_files(r->ctx, r->sources[i].in.model, path, check_input, r);
+    }
     return status;
 }
 
-static drape_status make_folder(render *r)
+/* Before anything is simulated: whether the output may be written where it should be. */
+static int open_output(render *r)
 {
-    size_t size = strlen(r->request->out) + PICTURE_NAME;
-    char *folder = drape_arena_take(r->request->command.arena, size, 1);
-    if (!folder)
-        return DRAPE_E_MEMORY;
-    snprintf(folder, size, "%s", r->request->out);
-    drape_status status = drape_folder_make(r->ctx, folder);
-    if (!status) /* so that frames of two runs do not mix */
-        status = drape_frame_files_clean(r->ctx, folder, PICTURE_DIGITS, "png");
+    const bool folder = !r->film && !r->picture;
+    drape_status status = folder ? drape_folder_open(r->ctx, r->request->out, false, &r->folder) : DRAPE_OK;
     if (!status)
-        status = draw_frames(r, write_into_folder, folder);
-    return status;
+        status = check_inputs(r);
+    if (!status && folder)
+        status = drape_folder_check(r->folder, is_picture, is_picture, NULL);
+    return status ? report(r, status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED) : CLI_GO_ON;
 }
 
 static int make(render *r)
@@ -414,15 +451,15 @@ static int make(render *r)
         return cli_report_interrupted("render");
     for (int i = 0; i < r->source_count; i++)
         incomplete |= r->sources[i].incomplete;
-    printf("%s: %zu frame%s, %d x %d, %s\n", r->request->out, r->sources[0].reel.count,
+    printf("%s: %zu frame%s, %d x %d, %s\n", CLI_SHOWN(r->request->out), r->sources[0].reel.count,
            r->sources[0].reel.count == 1 ? "" : "s", r->width, r->height, r->shading->entry.name);
     return incomplete ? CLI_FAILED : CLI_DONE;
 }
 
 static int run(const void *command)
 {
-    static int (*const stages[])(render *) = {read_request, open_sources, open_painter, fill_sources,
-                                              set_stages};
+    static int (*const stages[])(render *) = {read_request, open_sources, open_painter,
+                                              open_output,  fill_sources, set_stages};
     const render_request *request = command;
     render r = {.request = request, .ctx = request->command.ctx};
     int code = CLI_GO_ON;
@@ -439,6 +476,7 @@ static int run(const void *command)
             drape_stage_free(&r.stages[i]);
         cli_source_free(&r.sources[i]);
     }
+    drape_folder_close(&r.folder);
     drape_painter_destroy(&r.painter);
     drape_offscreen_destroy(&r.offscreen);
     return code;

@@ -37,7 +37,7 @@ static int run(const void *command)
         return cli_report_interrupted(request->command.verb);
     if (status)
         return cli_report(request->command.ctx, input ? CLI_BAD_INPUT : CLI_FAILED);
-    printf("report    %s, %.3g MB, %lld of %lld frames\n", result.path, (double)result.bytes / 1e6,
+    printf("report    %s, %.3g MB, %lld of %lld frames\n", CLI_SHOWN(result.path), (double)result.bytes / 1e6,
            (long long)result.kept, (long long)result.frames);
     return CLI_DONE;
 }

@@ -6,6 +6,7 @@
 
 #include "base/clock.h"
 #include "io/checkpoint.h"
+#include "io/file.h"
 #include "io/record.h"
 #include "io/recorder.h"
 #include "io/scene_copy.h"
@@ -17,7 +18,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 typedef struct run_request {
     cli_command command;
@@ -30,14 +30,12 @@ typedef struct run {
     const run_request *request;
     cli_scene in;
     drape_recorder *recorder; /* NULL without --out */
-    char *summary_path;       /* in the folder of --out; NULL without --out */
     void *checkpoint;         /* contents of the checkpoint that the run resumes from; NULL: it starts anew */
     drape_archive archive;    /* reads the contents */
     cli_progress progress;
     cli_realtime realtime; /* of --realtime */
     double start;          /* clock at the start minus the run time before the checkpoint [s] */
     double wall;           /* duration of the run [s] */
-    bool begun;            /* the output could be created */
     drape_status status;
     char message[DRAPE_MESSAGE_SIZE];
 } run;
@@ -58,9 +56,18 @@ static bool keeps_checkpoints(const run *r)
     return r->request->resume || r->request->checkpoint_every > 0;
 }
 
+/* The files that a run writes beside those of the recorder. */
+static const char *const also[] = {DRAPE_SUMMARY_NAME, DRAPE_SCENE_COPY, DRAPE_SCENE_MESHES};
+
+/* A scene that lies in the folder as scene.json stays as it is, and so do its meshes. */
 static drape_recorder_def recorder_def(const run *r)
 {
+    const char *scene = r->request->command.operand;
+    const bool copies = !drape_scene_copy_is(scene, r->request->out);
     return (drape_recorder_def){.folder = r->request->out,
+                                .scene = scene,
+                                .also = also,
+                                .also_count = copies ? sizeof also / sizeof *also : 1,
                                 .formats = (const char *const *)r->in.model->formats,
                                 .format_count = r->in.model->format_count,
                                 .checkpoints = keeps_checkpoints(r),
@@ -68,30 +75,27 @@ static drape_recorder_def recorder_def(const run *r)
                                 .start = r->start};
 }
 
-/* When a run is resumed, the recorder and the copy of the scene exist already. Removes an old summary, as a
- * killed run must not leave the summary of the run before it; a summary that is not a regular file, such as a
- * pipe, stays. */
+static bool is_summary(const void *user, const char *name)
+{
+    (void)user;
+    return strcmp(name, DRAPE_SUMMARY_NAME) == 0;
+}
+
+/* When a run is resumed, the recorder and the copy of the scene exist already; its old summary is removed, as
+ * that of an earlier run is when a run starts, since a killed run must not leave it. */
 static drape_status begin_output(run *r)
 {
-    if (!r->request->out)
+    if (!r->request->out || drape_recorder_is_finished(r->recorder))
         return DRAPE_OK;
-    r->summary_path = drape_record_path(r->in.ctx, r->request->out, "summary.json");
-    if (!r->summary_path)
-        return DRAPE_E_MEMORY;
-    if (drape_recorder_is_finished(r->recorder))
-        return DRAPE_OK;
-    const bool starts = !r->recorder;
-    const char *path = r->request->command.operand, *folder = r->request->out;
+    if (r->recorder)
+        return drape_folder_remove(drape_recorder_folder(r->recorder), is_summary, r);
+    const char *path = r->request->command.operand;
+    const bool copies = !drape_scene_copy_is(path, r->request->out);
     const drape_recorder_def def = recorder_def(r);
-    struct stat info;
-    drape_status status = starts ? drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder) : DRAPE_OK;
-    if (status)
+    drape_status status = drape_recorder_create(r->in.ctx, r->in.sim, &def, &r->recorder);
+    if (status || !copies)
         return status;
-    if (lstat(r->summary_path, &info) == 0 && S_ISREG(info.st_mode))
-        remove(r->summary_path); /* if this fails, writing the summary reports it */
-    if (!starts || drape_scene_copy_is(path, folder))
-        return DRAPE_OK;
-    return drape_scene_copy(r->in.ctx, r->in.scene, r->in.model, path, folder);
+    return drape_scene_copy(r->in.ctx, r->in.scene, r->in.model, path, drape_recorder_folder(r->recorder));
 }
 
 /* ---- Resuming ---- */
@@ -127,17 +131,54 @@ static int resume(run *r)
     return status ? cli_report(r->in.ctx, CLI_BAD_INPUT) : CLI_GO_ON;
 }
 
-static void write_summary(run *r, const char *path)
+static drape_status check_input(void *user, const char *path, const char *pointer)
 {
-    if (!path)
-        return;
+    const run *r = user;
+    (void)pointer;
+    return drape_file_check_named(r->in.ctx, r->request->summary, path);
+}
+
+/* --summary must not replace the scene, a mesh, or a file in the folder of the run. */
+static int check_summary(run *r)
+{
+    const run_request *request = r->request;
+    if (!request->summary)
+        return CLI_GO_ON;
+    drape_status status = check_input(r, request->command.operand, "");
+    if (!status)
+        status = drape_scene_files(r->in.ctx, r->in.model, request->command.operand, check_input, r);
+    if (status)
+        return cli_report(r->in.ctx, CLI_BAD_INPUT);
+    if (request->out && drape_folder_has(request->out, request->summary))
+        return cli_misuse(request->command.verb,
+                          "--summary \"%.300s\" is in the folder of --out, which has its own summary.json",
+                          request->summary);
+    return CLI_GO_ON;
+}
+
+static void write_summary(run *r, drape_folder *folder, const char *path)
+{
     const drape_summary_def def = {.status = r->status,
                                    .message = r->message,
                                    .frames = drape_recorder_frames(r->recorder),
                                    .wall_total = r->wall,
                                    .wall_output = drape_recorder_seconds(r->recorder),
                                    .realtime = r->request->realtime ? &r->realtime.result : NULL};
-    note(r, drape_summary_write(r->in.ctx, r->in.sim, &def, path));
+    note(r, drape_summary_write(r->in.ctx, r->in.sim, &def, folder, path));
+}
+
+/* A folder that would lose a file of somebody else's is refused as bad input, before anything is touched. A
+ * folder that cannot be written is the failure of the run. */
+static int open_output(run *r)
+{
+    drape_status status = begin_output(r);
+    if (!status)
+        return CLI_GO_ON;
+    note(r, status);
+    if (status != DRAPE_E_ARGUMENT && r->request->summary)
+        write_summary(r, NULL, r->request->summary);
+    fprintf(stderr, "%s\n", r->message);
+    return status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED;
 }
 
 /* ---- Results on stdout ---- */
@@ -208,7 +249,8 @@ static void print_inside(const run *r)
     for (int32_t c = 0; (faces = drape_sim_inside(r->in.sim, c, &deepest)) >= 0; c++)
         if (faces > 0)
             printf("inside    %d triangle%s of the cloth reach%s into %s, up to %.3g m deep\n", (int)faces,
-                   faces == 1 ? "" : "s", faces == 1 ? "es" : "", r->in.model->colliders[c].name, deepest);
+                   faces == 1 ? "" : "s", faces == 1 ? "es" : "", CLI_SHOWN(r->in.model->colliders[c].name),
+                   deepest);
 }
 
 static void print_results(const run *r)
@@ -232,7 +274,7 @@ static void print_results(const run *r)
         cli_realtime_print(&r->realtime);
     if (r->recorder)
         printf("output    %lld frames, steps.csv, energy.csv, summary.json and scene.json in %s\n",
-               (long long)drape_recorder_frames(r->recorder), r->request->out);
+               (long long)drape_recorder_frames(r->recorder), CLI_SHOWN(r->request->out));
 }
 
 /* ---- The run ---- */
@@ -284,23 +326,22 @@ static void finish(run *r)
 static void simulate(run *r)
 {
     const bool done = drape_recorder_is_finished(r->recorder);
-    note(r, begin_output(r));
-    r->begun = !r->status;
-    if (r->begun && !done)
+    if (!done)
         advance(r);
     if (done)
         r->wall = drape_recorder_wall(r->recorder);
     else
         finish(r);
-    write_summary(r, r->summary_path);
-    write_summary(r, r->request->summary);
+    if (r->recorder)
+        write_summary(r, drape_recorder_folder(r->recorder), DRAPE_SUMMARY_NAME);
+    if (r->request->summary)
+        write_summary(r, NULL, r->request->summary);
 }
 
 /* A signal after the last step does not interrupt the run. */
 static int conclude(const run *r)
 {
-    if (r->begun)
-        print_results(r);
+    print_results(r);
     if (!r->status)
         return CLI_DONE;
     fflush(stdout);
@@ -367,13 +408,16 @@ static int load_and_run(const void *command)
     if (code == CLI_GO_ON)
         code = check_folder(request);
     if (code == CLI_GO_ON)
+        code = check_summary(&r);
+    if (code == CLI_GO_ON)
         code = resume(&r);
+    if (code == CLI_GO_ON)
+        code = open_output(&r);
     if (code == CLI_GO_ON) {
         simulate(&r);
         code = conclude(&r);
     }
     drape_recorder_destroy(&r.recorder);
-    drape_free(r.in.ctx, r.summary_path);
     drape_free(r.in.ctx, r.checkpoint);
     cli_scene_free(&r.in);
     return code;

@@ -5,13 +5,14 @@
 #include "lab/record.h"
 
 #include "base/clock.h"
+#include "io/export.h"
 
-#include <errno.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
+
+#define SCENE_NAME "%s_%d.json"
 
 typedef struct validate_request {
     cli_command command;
@@ -97,22 +98,53 @@ static const validate_style
 
 /* ---- Running ---- */
 
-static int write_scenes(const drape_reference *reference, const char *folder)
+static drape_status write_scene(drape_context *ctx, drape_folder *folder, const drape_reference *reference,
+                                int index)
 {
-    for (int i = 0; i < reference->case_count; i++) {
-        char path[1024], text[DRAPE_LAB_TEXT];
-        const double p = reference->parameters[i];
-        const drape_reference_case one = {reference, p, reference->high > 0 ? reference->expected(p) : 0};
-        reference->scene(&one, text);
-        drape_reference_quote(text);
-        snprintf(path, sizeof path, "%s/%s_%d.json", folder, reference->entry.name, i);
-        FILE *file = fopen(path, "w");
-        if (!file || fprintf(file, "%s\n", text) < 0 || fclose(file)) {
-            fprintf(stderr, "drape validate: %s: %s\n", path, strerror(errno));
-            return CLI_FAILED;
-        }
+    char name[128], text[DRAPE_LAB_TEXT];
+    const double p = reference->parameters[index];
+    const drape_reference_case one = {reference, p, reference->high > 0 ? reference->expected(p) : 0};
+    drape_file file = {0};
+    reference->scene(&one, text);
+    drape_reference_quote(text);
+    snprintf(name, sizeof name, SCENE_NAME, reference->entry.name, index);
+    drape_status status = drape_export_begin(ctx, folder, name, &file);
+    if (!status) {
+        drape_file_put_text(&file, text);
+        drape_file_put_text(&file, "\n");
+        status = drape_file_finish(&file);
     }
-    return CLI_DONE;
+    drape_file_destroy(&file);
+    return status;
+}
+
+/* Whether a file has the name of a scene of the references to be written: `user`, or all of them if NULL. */
+static bool is_scene(const void *user, const char *name)
+{
+    for (int r = 0; drape_references[r]; r++)
+        for (int i = 0; (!user || user == drape_references[r]) && i < drape_references[r]->case_count; i++) {
+            char known[128];
+            snprintf(known, sizeof known, SCENE_NAME, drape_references[r]->entry.name, i);
+            if (strcmp(name, known) == 0)
+                return true;
+        }
+    return false;
+}
+
+static int write_scenes(drape_context *ctx, const char *path, const drape_reference *only)
+{
+    drape_folder *folder = NULL;
+    drape_status status = drape_folder_open(ctx, path, false, &folder);
+    if (!status)
+        status = drape_folder_check(folder, is_scene, NULL, only);
+    if (!status)
+        status = drape_folder_begin(folder, NULL, NULL);
+    for (int r = 0; drape_references[r]; r++)
+        for (int i = 0;
+             !status && (!only || only == drape_references[r]) && i < drape_references[r]->case_count; i++)
+            status = write_scene(ctx, folder, drape_references[r], i);
+    drape_folder_close(&folder);
+    return !status ? CLI_DONE : cli_report(ctx, status == DRAPE_E_ARGUMENT ? CLI_BAD_INPUT : CLI_FAILED);
 }
 
 static int find(const char *name, const drape_reference **only)
@@ -138,7 +170,8 @@ typedef struct run {
     drape_context *ctx;
     lab_record *records;
     size_t count;
-    drape_file file; /* of their lines; closed without --out */
+    drape_folder *folder; /* NULL without --out */
+    drape_file file;      /* of their lines; closed without --out */
     cli_progress progress;
     double start; /* [s] of the clock */
 } run;
@@ -175,7 +208,8 @@ static drape_status run_cases(run *r, const validate_style *style, int counts[4]
         counts[record->v.verdict]++;
         cli_progress_hide(&r->progress);
         style->record(record, i == 0);
-        fflush(stdout);
+        if (fflush(stdout)) /* nobody reads it */
+            break;
     }
     cli_progress_clear(&r->progress);
     return status;
@@ -207,7 +241,7 @@ static int run_references(drape_context *ctx, const validate_request *request, c
     r.records = lab_records_make(ctx, only, &r.count);
     drape_status status = r.records ? DRAPE_OK : DRAPE_E_MEMORY;
     if (!status && request->out)
-        status = lab_records_open(ctx, request->out, r.records, r.count, &r.file);
+        status = lab_records_open(ctx, request->out, r.records, r.count, &r.folder, &r.file);
     if (!status) {
         fputs(style->begin, stdout);
         cli_progress_begin(&r.progress, 0, 0);
@@ -216,8 +250,10 @@ static int run_references(drape_context *ctx, const validate_request *request, c
         fflush(stdout);
     }
     const drape_status closed = drape_file_close(&r.file);
-    const int code = conclude(&r, request, status ? status : closed, counts);
+    const int code = status == DRAPE_E_ARGUMENT ? cli_report(ctx, CLI_BAD_INPUT)
+                                                : conclude(&r, request, status ? status : closed, counts);
     drape_file_destroy(&r.file);
+    drape_folder_close(&r.folder);
     drape_free(ctx, r.records);
     return code;
 }
@@ -234,15 +270,7 @@ static int validate(const validate_request *request, drape_context *ctx)
         return code;
     if (!request->scenes)
         return run_references(ctx, request, only);
-    if (mkdir(request->scenes, 0777) && errno != EEXIST) {
-        fprintf(stderr, "drape validate: %s: %s\n", request->scenes, strerror(errno));
-        return CLI_FAILED;
-    }
-    code = CLI_DONE;
-    for (int i = 0; drape_references[i] && code == CLI_DONE; i++)
-        if (!only || only == drape_references[i])
-            code = write_scenes(drape_references[i], request->scenes);
-    return code;
+    return write_scenes(ctx, request->scenes, only);
 }
 
 static const cli_option options[] = {

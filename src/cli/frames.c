@@ -179,7 +179,7 @@ static int simulate(const cli_frames_def *def, cli_source *s)
         return cli_report(s->in.ctx, CLI_FAILED);
     if (s->reel.count > 0)
         return CLI_GO_ON;
-    fprintf(stderr, "--frame %d: %s has fewer frames\n", def->one, s->operand);
+    fprintf(stderr, "--frame %d: %s has fewer frames\n", def->one, CLI_SHOWN(s->operand));
     return CLI_BAD_INPUT;
 }
 

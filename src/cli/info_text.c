@@ -22,6 +22,7 @@ static void print_keys(const char *indent, int width, const drape_scene_object *
         if (key->shape > DRAPE_SCENE_LIST || named)
             continue;
         drape_scene_value_text(key, def, value, sizeof value);
+        drape_make_printable(value);
         drape_scene_value_text(key, defaults, usual, sizeof usual);
         const bool has_unit = strcmp(key->param.unit, "1") != 0;
         printf("%s%-*s %s%s%s%s\n", indent, width, key->param.name, *value ? value : "none",
@@ -35,7 +36,7 @@ static void print_scene(const cli_info *info)
     const drape_model *m = info->model;
     drape_scene_def defaults = {.struct_size = sizeof defaults};
     drape_scene_set_defaults(&drape_form_scene, &defaults);
-    printf("scene       %s\n", info->path);
+    printf("scene       %s\n", CLI_SHOWN(info->path));
     print_keys("", 11, &drape_form_scene, &info->def, &defaults);
     print_keys("", 11, &drape_form_output, &info->def, &defaults);
     printf("frames      %lld\n", (long long)info->frames);
@@ -89,7 +90,7 @@ static void print_source(const drape_cloth *cloth, const drape_mesh_def *def)
     drape_scene_set_defaults(&drape_form_mesh, &defaults);
     const drape_grid_ops *grid = cli_grid_of(cloth, values);
     if (cloth->file)
-        printf("  file      %s\n", cloth->file);
+        printf("  file      %s\n", CLI_SHOWN(cloth->file));
     if (grid) {
         printf("  grid      %s\n", grid->entry.name);
         print_params("    ", grid->entry.params, grid->entry.param_count, values);
@@ -130,7 +131,7 @@ static void print_cloth(const cli_info *info, int32_t c)
     const drape_mesh *mesh = &cloth->mesh;
     drape_cloth_def defaults = {.name = NULL};
     drape_scene_set_defaults(&drape_form_cloth, &defaults);
-    printf("\ncloth %s\n", cloth->name);
+    printf("\ncloth %s\n", CLI_SHOWN(cloth->name));
     printf("  mesh      %d nodes, %d triangles, %d edges", (int)mesh->node_count, (int)mesh->triangle_count,
            (int)mesh->edge_count);
     if (mesh->rows)
@@ -163,7 +164,7 @@ static void print_given(const drape_param *params, int count, const double *valu
     for (int p = 0; p < count; p++) {
         printf("  %-16s ", params[p].name);
         if (params[p].kind == DRAPE_PARAM_TEXT)
-            fputs(cli_text_of(choice, params[p].name), stdout);
+            fputs(CLI_SHOWN(cli_text_of(choice, params[p].name)), stdout);
         else
             print_value(&params[p], values + drape_param_place(params, p));
         puts(cli_is_given(choice, params[p].name) ? "" : " (default)");
@@ -185,7 +186,7 @@ static void print_collider(const drape_collider *collider, const drape_collider_
     const drape_collider_shape *shape = &collider->shape;
     drape_collider_def defaults = {.name = NULL};
     drape_scene_set_defaults(&drape_form_collider, &defaults);
-    printf("\ncollider %s: %s, %s\n", collider->name, collider->ops->entry.name,
+    printf("\ncollider %s: %s, %s\n", CLI_SHOWN(collider->name), collider->ops->entry.name,
            collider->ops->entry.summary);
     print_given(collider->ops->entry.params, collider->ops->entry.param_count, collider->values,
                 &collider->choice);
@@ -217,7 +218,7 @@ static void print_term(const cli_info *info, int32_t i)
 {
     const drape_term *term = &info->model->terms[i];
     const drape_profile_term *cost = &info->profile.terms[i];
-    printf("  %-20s of %s: ", term->ops->entry.name, info->model->cloths[term->cloth].name);
+    printf("  %-20s of %s: ", term->ops->entry.name, CLI_SHOWN(info->model->cloths[term->cloth].name));
     if (term->ops->law)
         printf("acts on %lld strain measures; its time is counted with theirs", (long long)cost->acts_on);
     else
@@ -262,7 +263,7 @@ static void print_time(double seconds)
 static void print_cost(const cli_info *info, const char *name, const char *cloth, long long nonzeros,
                        long long bytes, double residual, double jacobian)
 {
-    printf("  %-20s %-10.10s", name, cloth);
+    printf("  %-20s %-10.10s", name, CLI_SHOWN(cloth));
     print_count(nonzeros);
     print_count(bytes);
     print_time(residual);

@@ -5,9 +5,11 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 /* If the program is started with a standard descriptor closed, a file that is opened later would become, say,
  * the standard output. The substitutes that are opened here fail on use, as the closed descriptor does. */
@@ -113,14 +115,23 @@ static int run(int argc, char **argv)
     return verb ? run_verb(verb, argc - 1, argv + 1) : unknown_verb(argv[1]);
 }
 
+/* Whether whoever reads the standard output has closed it, as `head` does: nobody misses the rest. */
+static bool reader_is_gone(void)
+{
+    struct pollfd out = {.fd = STDOUT_FILENO, .events = POLLOUT};
+    return errno == EPIPE || (poll(&out, 1, 0) == 1 && out.revents & POLLERR);
+}
+
 /* Results that could not be written are a failure, whatever the verb returned. */
 static int finish_output(int code)
 {
     bool lost = ferror(stdout);
     errno = 0;
     lost = fflush(stdout) != 0 || lost;
-    if (!lost)
+    if (!lost || reader_is_gone())
         return code;
+    if (cli_interrupted())
+        return code == CLI_INTERRUPTED ? code : cli_report_interrupted("");
     fprintf(stderr, "drape: cannot write to the standard output%s%s\n", errno ? ": " : "",
             errno ? strerror(errno) : "");
     return code == CLI_DONE ? CLI_FAILED : code;

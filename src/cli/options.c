@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 
 #include "base/param.h"
+#include "cli/signals.h"
 
 #include <errno.h>
 #include <getopt.h>
@@ -73,19 +74,30 @@ void cli_print_help(const drape_verb *verb)
     print_option("help", NULL, "this text");
 }
 
+const char *cli_shown(char room[256], const char *text)
+{
+    snprintf(room, 256, "%s", text);
+    drape_make_printable(room);
+    return room;
+}
+
 int cli_misuse(const char *verb, const char *format, ...)
 {
+    char text[DRAPE_MESSAGE_SIZE];
     va_list args;
-    fprintf(stderr, "drape %s: ", verb);
     va_start(args, format);
-    vfprintf(stderr, format, args);
+    vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    fputc('\n', stderr);
+    drape_make_printable(text);
+    fprintf(stderr, "drape %s: %s\n", verb, text);
     return CLI_BAD_INPUT;
 }
 
+/* What failed because a signal ended its wait is not what is wrong. */
 int cli_report(drape_context *ctx, int code)
 {
+    if (cli_interrupted() && code != CLI_INTERRUPTED)
+        return cli_report_interrupted("");
     fprintf(stderr, "%s\n", drape_context_message(ctx));
     return code;
 }

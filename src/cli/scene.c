@@ -55,9 +55,7 @@ drape_status cli_context_create(drape_context **out)
 int cli_scene_load(const cli_command *command, const char *path, cli_scene *out)
 {
     *out = (cli_scene){.ctx = command->ctx};
-    cli_signals_end_waits(true);
     drape_status status = load(command, path, out);
-    cli_signals_end_waits(false);
     if (cli_interrupted()) /* even if loading did not notice it */
         return cli_report_interrupted(command->verb);
     return status ? cli_report(command->ctx, CLI_BAD_INPUT) : CLI_GO_ON;

@@ -6,6 +6,9 @@
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
+#include <sys/time.h>
+
+#define PERIOD 100000 /* [us] */
 
 static volatile sig_atomic_t interrupted; /* set by the handler */
 static const int caught[] = {SIGINT, SIGTERM, SIGHUP};
@@ -13,11 +16,20 @@ static const int caught[] = {SIGINT, SIGTERM, SIGHUP};
 static _Atomic(drape_sim *) cancelled;
 _Static_assert(ATOMIC_POINTER_LOCK_FREE == 2, "a signal handler reads it");
 
+/* A call that waits ends with EINTR; a write that went on after a part of its bytes waits again, so the timer
+ * keeps interrupting until the program ends. */
 static void on_signal(int signal)
 {
+    const struct itimerval again = {.it_interval = {.tv_usec = PERIOD}, .it_value = {.tv_usec = PERIOD}};
     (void)signal;
     interrupted = 1;
     drape_sim_cancel(atomic_load(&cancelled));
+    setitimer(ITIMER_REAL, &again, NULL);
+}
+
+static void on_timer(int signal)
+{
+    (void)signal;
 }
 
 void cli_signals_cancel(drape_sim *sim)
@@ -31,21 +43,11 @@ void cli_signals_cancel(drape_sim *sim)
  * such a job is intended. */
 void cli_catch_signals(void)
 {
-    const struct sigaction action = {.sa_handler = on_signal, .sa_flags = (int)SA_RESETHAND | SA_RESTART};
+    const struct sigaction action = {.sa_handler = on_signal, .sa_flags = (int)SA_RESETHAND},
+                           timer = {.sa_handler = on_timer};
+    sigaction(SIGALRM, &timer, NULL);
     for (size_t i = 0; i < sizeof caught / sizeof *caught; i++)
         sigaction(caught[i], &action, NULL);
-}
-
-/* A handler that the first signal has reset is not installed again. */
-void cli_signals_end_waits(bool end)
-{
-    struct sigaction action;
-    for (size_t i = 0; i < sizeof caught / sizeof *caught; i++) {
-        if (sigaction(caught[i], NULL, &action) || action.sa_handler != on_signal)
-            continue;
-        action.sa_flags = end ? action.sa_flags & ~SA_RESTART : action.sa_flags | SA_RESTART;
-        sigaction(caught[i], &action, NULL);
-    }
 }
 
 bool cli_interrupted(void)
@@ -56,6 +58,6 @@ bool cli_interrupted(void)
 int cli_report_interrupted(const char *verb)
 {
     fflush(stdout);
-    fprintf(stderr, "drape %s: interrupted\n", verb);
+    fprintf(stderr, "drape%s%s: interrupted\n", *verb ? " " : "", verb);
     return CLI_INTERRUPTED;
 }

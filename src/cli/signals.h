@@ -6,7 +6,9 @@
 
 #include <stdbool.h>
 
-/* After this call the first signal is recorded; a second one ends the program at once. */
+/* After this call the first signal is recorded, and from then on no call of the system waits for longer than a
+ * tenth of a second, such as a read of a scene from a pipe or a write to one; a second signal ends the program
+ * at once. */
 void cli_catch_signals(void);
 
 bool cli_interrupted(void);
@@ -14,10 +16,6 @@ bool cli_interrupted(void);
 /* Sets the sim whose step a signal cancels, for runs of a single long step. NULL: none; a step in progress
  * completes. */
 void cli_signals_cancel(drape_sim *sim);
-
-/* Sets whether a signal interrupts a blocking open or read, as when a scene comes from a pipe. Writes must
- * not be interrupted. */
-void cli_signals_end_waits(bool end);
 
 /* Prints the line "drape run: interrupted" on stderr. Returns CLI_INTERRUPTED. */
 int cli_report_interrupted(const char *verb);

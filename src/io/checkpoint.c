@@ -83,7 +83,7 @@ drape_status drape_checkpoint_end(drape_archive *a, drape_file *file)
         drape_file_abandon(file);
     else
         status = drape_file_finish(file);
-    return status ? status : drape_folder_sync(a->ctx, file->path);
+    return status ? status : drape_file_sync_names(file);
 }
 
 /* ---- For hosts ---- */

@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "io/export.h"
+
 void drape_csv_put_integer(drape_file *file, int64_t value)
 {
     drape_file_print(file, ",%" PRId64, value);
@@ -35,16 +37,12 @@ void drape_csv_put_text(drape_file *file, const char *text)
     drape_file_put_text(file, "\"");
 }
 
-drape_status drape_csv_open(drape_context *ctx, const char *folder, const char *name, const char *columns,
-                            off_t kept, drape_file *file)
+drape_status drape_csv_open(drape_context *ctx, drape_folder *folder, const char *name, const char *columns,
+                            bool resumes, drape_file *file)
 {
-    drape_status status = drape_file_create(ctx, strlen(folder) + strlen(name) + 2, file);
-    if (status)
-        return status;
-    drape_file_name(file, "%s/%s", folder, name);
-    if (kept >= 0)
-        return drape_file_reopen(file, kept);
-    status = drape_file_begin(file);
+    if (resumes)
+        return drape_export_reopen(ctx, folder, name, file);
+    drape_status status = drape_export_begin(ctx, folder, name, file);
     if (status)
         return status;
     drape_file_put_text(file, columns);

@@ -11,10 +11,9 @@ void drape_csv_put_number(drape_file *file, double value);
 /* In quotes if necessary; NULL is an empty field. */
 void drape_csv_put_text(drape_file *file, const char *text);
 
-/* Takes the memory for the table folder/NAME and opens it. kept < 0: replaces any such file by one with the
- * line of column names; otherwise continues the existing file after its first `kept` bytes, once
- * drape_file_trim is called. Destroy the file even after a failure. Errors: DRAPE_E_MEMORY, DRAPE_E_FILE. */
-drape_status drape_csv_open(drape_context *ctx, const char *folder, const char *name, const char *columns,
-                            off_t kept, drape_file *file);
+/* Takes the memory for the table folder/NAME and opens it, with the line of column names. resumes: continues
+ * the file as drape_export_reopen does. Destroy the file even after a failure. Errors: DRAPE_E_MEMORY, DRAPE_E_FILE. */
+drape_status drape_csv_open(drape_context *ctx, drape_folder *folder, const char *name, const char *columns,
+                            bool resumes, drape_file *file);
 
 #endif

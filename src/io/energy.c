@@ -11,13 +11,13 @@
 
 #include "io/csv.h"
 
-#define FILE_NAME "energy.csv"
+#define FILE_NAME DRAPE_ENERGY_NAME
 
 static const char columns[] = "frame,t,t_state,kinetic,elastic,gravity,contact,dissipated,numerical,total\n";
 
-drape_status drape_energy_open(drape_context *ctx, const char *folder, off_t kept, drape_file *file)
+drape_status drape_energy_open(drape_context *ctx, drape_folder *folder, bool resumes, drape_file *file)
 {
-    return drape_csv_open(ctx, folder, FILE_NAME, columns, kept, file);
+    return drape_csv_open(ctx, folder, FILE_NAME, columns, resumes, file);
 }
 
 drape_status drape_energy_write(drape_file *file, const drape_energy_row *row)

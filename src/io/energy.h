@@ -4,6 +4,8 @@
 
 #include "io/file.h"
 
+#define DRAPE_ENERGY_NAME "energy.csv" /* in the folder of a run */
+
 /* One frame. Its positions may lie between two states; the energies are those of the first state at or
  * after it. */
 typedef struct drape_energy_row {
@@ -13,7 +15,7 @@ typedef struct drape_energy_row {
 } drape_energy_row;
 
 /* As drape_csv_open. */
-drape_status drape_energy_open(drape_context *ctx, const char *folder, off_t kept, drape_file *file);
+drape_status drape_energy_open(drape_context *ctx, drape_folder *folder, bool resumes, drape_file *file);
 
 /* Adds a row; call it in the C locale. After a failure the file ends with the row before. Errors:
  * DRAPE_E_FILE. */

@@ -11,7 +11,7 @@
 typedef struct drape_export_def {
     drape_arena *arena; /* holds the memory that open takes */
     const drape_model *model;
-    const char *folder;  /* without a slash at its end */
+    drape_folder *folder;
     double frame_rate;   /* [1/s] */
     int64_t most_frames; /* frames that a run of the scene's duration writes, including the one at its end */
     bool durable;        /* a checkpoint may claim that each frame is on the disk */
@@ -45,9 +45,8 @@ typedef struct drape_exporter_ops {
 
     /* Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
     drape_status (*open)(drape_context *ctx, const drape_export_def *def, void *state);
-    /* Removes the files that an earlier run left in folder in this format, and no others. It is called for
-     * every format, whatever is written now, because frames of two runs must not be mixed. */
-    drape_status (*clean)(drape_context *ctx, const char *folder);
+    /* Whether the format writes a file of this name. */
+    bool (*names)(const char *name);
 
     /* Errors: DRAPE_E_FILE. */
     drape_status (*write)(drape_context *ctx, void *state, const drape_frame *frame);
@@ -71,20 +70,17 @@ extern const drape_registry drape_exporter_registry;
 
 /* ---- For formats with one file, folder/NAME ---- */
 
-/* Removes the file, unless it is not a regular file: such a file is written through. Errors: DRAPE_E_FILE,
- * DRAPE_E_MEMORY. */
-drape_status drape_export_clean(drape_context *ctx, const char *folder, const char *name);
 /* Takes the memory and begins the file; call drape_file_destroy in any case. Errors: DRAPE_E_FILE,
  * DRAPE_E_MEMORY. */
-drape_status drape_export_begin(drape_context *ctx, const char *folder, const char *name, drape_file *file);
+drape_status drape_export_begin(drape_context *ctx, drape_folder *folder, const char *name, drape_file *file);
 
-/* Takes the memory and reopens the file that an earlier run left, to continue it after its first size
- * bytes, as drape_file_reopen does. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
-drape_status drape_export_reopen(drape_context *ctx, const char *folder, const char *name, off_t size,
+/* Archives the number of bytes to keep of a file, and their checksum. */
+void drape_export_archive_file(drape_archive *a, drape_file *file);
+
+/* Takes the memory and reopens the file that an earlier run left, as drape_file_reopen does, after
+ * drape_export_archive_file has read it. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status drape_export_reopen(drape_context *ctx, drape_folder *folder, const char *name,
                                  drape_file *file);
-
-/* Archives the number of bytes to keep of a file. */
-void drape_export_archive_size(drape_archive *a, off_t *size);
 
 /* ---- For formats with one file for each frame, folder/frame_000000.ENDING ---- */
 
@@ -92,20 +88,20 @@ void drape_export_archive_size(drape_archive *a, off_t *size);
 
 typedef struct drape_frame_files {
     const drape_model *model;
-    const char *folder, *ending; /* "obj" */
+    drape_folder *folder;
+    const char *ending; /* "obj" */
     drape_file file;
 } drape_frame_files;
 
 #define DRAPE_FRAME_DIGITS 6 /* minimum number of digits in these names */
 
-/* Removes the files named by this pattern, with at least that many digits, and no others, from the folder.
- * Errors: DRAPE_E_FILE. */
-drape_status drape_frame_files_clean(drape_context *ctx, const char *folder, size_t digits,
-                                     const char *ending);
+/* Whether a file is named by this pattern, with at least that many digits. *frame (may be NULL): its number. */
+bool drape_frame_files_name(const char *name, size_t digits, const char *ending, int64_t *frame);
 /* Takes the memory. Errors: DRAPE_E_MEMORY. */
 drape_status drape_frame_files_open(drape_context *ctx, const drape_export_def *def, const char *ending,
                                     drape_frame_files *frames);
-/* The same if `count` frames exist already. Errors: DRAPE_E_FILE (a frame is missing), DRAPE_E_MEMORY. */
+/* The same if `count` frames exist already, with the bytes that were written. Errors: DRAPE_E_FILE (a frame is
+ * missing), DRAPE_E_PARSE (a frame is damaged), DRAPE_E_MEMORY. */
 drape_status drape_frame_files_resume(drape_context *ctx, const drape_export_def *def, const char *ending,
                                       int64_t count, drape_frame_files *frames);
 /* archive and cut for a state that begins with a drape_frame_files. The first archives nothing, because the

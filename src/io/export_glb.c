@@ -171,9 +171,9 @@ static drape_status glb_check(drape_context *ctx, const char *pointer, const dra
         frames, nodes, bytes, MAX_FRAMES);
 }
 
-static drape_status glb_clean(drape_context *ctx, const char *folder)
+static bool glb_names(const char *name)
 {
-    return drape_export_clean(ctx, folder, FILE_NAME);
+    return strcmp(name, FILE_NAME) == 0;
 }
 
 static drape_status allocate(const drape_export_def *def, glb_state *glb)
@@ -386,8 +386,8 @@ static drape_status glb_write(drape_context *ctx, void *state, const drape_frame
     glb_state *glb = state;
     if (glb->frames == glb->room)
         return drape_fail(ctx, DRAPE_E_FILE,
-                          "\"%.500s\" has room for %" PRIu32 " frames, those of the scene's duration",
-                          glb->file.path, glb->room);
+                          "\"%.300s/%.200s\" has room for %" PRIu32 " frames, those of the scene's duration",
+                          drape_folder_path(glb->file.folder), glb->file.path, glb->room);
     glb->times[glb->frames] = time_of(glb, frame);
     drape_status status = glb->frames == 0 ? write_first(glb, frame) : write_next(glb, frame);
     if (!status)
@@ -458,7 +458,7 @@ static void glb_archive(void *state, drape_archive *a)
     if (a->status)
         return;
     glb->frames = (uint32_t)frames;
-    drape_export_archive_size(a, &glb->file.kept);
+    drape_export_archive_file(a, &glb->file);
     drape_archive_bytes(a, glb->base, node_bytes(glb));
     drape_archive_bytes(a, glb->upright, node_bytes(glb));
     drape_archive_bytes(a, glb->times, glb->frames * sizeof *glb->times);
@@ -476,7 +476,7 @@ static drape_status glb_resume(drape_context *ctx, const drape_export_def *def, 
     glb_archive(glb, a);
     if (a->status || glb->frames == 0)
         return a->status;
-    return drape_export_reopen(ctx, def->folder, FILE_NAME, glb->file.kept, &glb->file);
+    return drape_export_reopen(ctx, def->folder, FILE_NAME, &glb->file);
 }
 
 /* Blanks a list from item `from` on. */
@@ -527,14 +527,15 @@ static drape_status glb_cut(drape_context *ctx, void *state, int64_t frames)
 {
     glb_state *glb = state;
     (void)frames;
+    const bool rehearses = drape_folder_rehearses(glb->def->folder);
     if (glb->frames == 0)
-        return drape_export_begin(ctx, glb->def->folder, FILE_NAME, &glb->file);
+        return rehearses ? DRAPE_OK : drape_export_begin(ctx, glb->def->folder, FILE_NAME, &glb->file);
     drape_status status = blank_rest(glb);
     if (!status)
         status = write_lengths(glb, glb->frames * frame_bytes(glb));
     if (!status)
         status = drape_file_trim(&glb->file);
-    glb->live = !status;
+    glb->live = !status && !rehearses;
     return status;
 }
 
@@ -553,7 +554,7 @@ const drape_exporter_ops drape_exporter_glb = {
     .y_up = true,
     .check = glb_check,
     .open = glb_open,
-    .clean = glb_clean,
+    .names = glb_names,
     .write = glb_write,
     .archive = glb_archive,
     .resume = glb_resume,

@@ -37,9 +37,9 @@ static void make_header(int64_t frames, int32_t node_count, char header[HEADER_S
     header[HEADER_SIZE - 1] = '\n';
 }
 
-static drape_status npy_clean(drape_context *ctx, const char *folder)
+static bool npy_names(const char *name)
 {
-    return drape_export_clean(ctx, folder, FILE_NAME);
+    return strcmp(name, FILE_NAME) == 0;
 }
 
 static drape_status npy_open(drape_context *ctx, const drape_export_def *def, void *state)
@@ -83,7 +83,7 @@ static void npy_archive(void *state, drape_archive *a)
 {
     npy_state *npy = state;
     drape_archive_int64(a, &npy->frames);
-    drape_export_archive_size(a, &npy->file.kept);
+    drape_export_archive_file(a, &npy->file);
 }
 
 static drape_status npy_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
@@ -96,8 +96,7 @@ static drape_status npy_resume(drape_context *ctx, const drape_export_def *def, 
         drape_archive_fail(a, DRAPE_E_PARSE,
                            "the checkpoint has %lld frames and another number in " FILE_NAME,
                            (long long)frames);
-    return a->status ? a->status
-                     : drape_export_reopen(ctx, def->folder, FILE_NAME, npy->file.kept, &npy->file);
+    return a->status ? a->status : drape_export_reopen(ctx, def->folder, FILE_NAME, &npy->file);
 }
 
 /* First lowers the count: at any moment the file contains at least what its header says. */
@@ -130,7 +129,7 @@ const drape_exporter_ops drape_exporter_npy = {
     .state_size = sizeof(npy_state),
     .y_up = true,
     .open = npy_open,
-    .clean = npy_clean,
+    .names = npy_names,
     .write = npy_write,
     .archive = npy_archive,
     .resume = npy_resume,

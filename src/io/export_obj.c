@@ -7,9 +7,9 @@
 
 #include "io/export.h"
 
-static drape_status obj_clean(drape_context *ctx, const char *folder)
+static bool obj_names(const char *name)
 {
-    return drape_frame_files_clean(ctx, folder, DRAPE_FRAME_DIGITS, "obj");
+    return drape_frame_files_name(name, DRAPE_FRAME_DIGITS, "obj", NULL);
 }
 
 static drape_status obj_open(drape_context *ctx, const drape_export_def *def, void *state)
@@ -72,7 +72,7 @@ const drape_exporter_ops drape_exporter_obj = {
          .reference = "Wavefront Advanced Visualizer manual, appendix B1"},
     .state_size = sizeof(drape_frame_files),
     .open = obj_open,
-    .clean = obj_clean,
+    .names = obj_names,
     .write = obj_write,
     .archive = drape_frame_files_archive,
     .resume = obj_resume,

@@ -21,10 +21,9 @@ typedef struct pc2_state {
     int32_t samples; /* complete samples in the file */
 } pc2_state;
 
-static drape_status pc2_clean(drape_context *ctx, const char *folder)
+static bool pc2_names(const char *name)
 {
-    drape_status status = drape_export_clean(ctx, folder, FILE_NAME);
-    return status ? status : drape_export_clean(ctx, folder, MESH_NAME);
+    return strcmp(name, FILE_NAME) == 0 || strcmp(name, MESH_NAME) == 0;
 }
 
 static void put_header(pc2_state *pc2)
@@ -94,14 +93,7 @@ static void pc2_archive(void *state, drape_archive *a)
 {
     pc2_state *pc2 = state;
     drape_archive_int32(a, &pc2->samples);
-    drape_export_archive_size(a, &pc2->file.kept);
-}
-
-/* Checks that the mesh exists: it was written and closed with the first frame. */
-static drape_status check_mesh(drape_context *ctx, const drape_export_def *def, pc2_state *pc2)
-{
-    drape_status status = drape_export_reopen(ctx, def->folder, MESH_NAME, 1, &pc2->mesh);
-    return status ? status : drape_file_close(&pc2->mesh);
+    drape_export_archive_file(a, &pc2->file);
 }
 
 static drape_status pc2_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
@@ -114,8 +106,8 @@ static drape_status pc2_resume(drape_context *ctx, const drape_export_def *def, 
         drape_archive_fail(a, DRAPE_E_PARSE,
                            "the checkpoint has %lld frames and another number in " FILE_NAME,
                            (long long)frames);
-    drape_status status = a->status ? a->status : check_mesh(ctx, def, pc2);
-    return status ? status : drape_export_reopen(ctx, def->folder, FILE_NAME, pc2->file.kept, &pc2->file);
+    drape_status status = a->status ? a->status : drape_folder_verify(def->folder, MESH_NAME);
+    return status ? status : drape_export_reopen(ctx, def->folder, FILE_NAME, &pc2->file);
 }
 
 /* First lowers the count: at any moment the file contains at least what its header says. */
@@ -152,7 +144,7 @@ const drape_exporter_ops drape_exporter_pc2 = {
                   "PC2 format version 1, Autodesk 3ds Max SDK, Point Cache; Blender, MOD_meshcache_pc2.c"},
     .state_size = sizeof(pc2_state),
     .open = pc2_open,
-    .clean = pc2_clean,
+    .names = pc2_names,
     .write = pc2_write,
     .archive = pc2_archive,
     .resume = pc2_resume,

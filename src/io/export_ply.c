@@ -9,9 +9,9 @@
 
 #define FACE_SIZE 13 /* the count 3 in one byte, three nodes in four bytes each */
 
-static drape_status ply_clean(drape_context *ctx, const char *folder)
+static bool ply_names(const char *name)
 {
-    return drape_frame_files_clean(ctx, folder, DRAPE_FRAME_DIGITS, "ply");
+    return drape_frame_files_name(name, DRAPE_FRAME_DIGITS, "ply", NULL);
 }
 
 static drape_status ply_open(drape_context *ctx, const drape_export_def *def, void *state)
@@ -76,7 +76,7 @@ const drape_exporter_ops drape_exporter_ply = {
               .reference = "G. Turk, The PLY Polygon File Format, 1994"},
     .state_size = sizeof(drape_frame_files),
     .open = ply_open,
-    .clean = ply_clean,
+    .names = ply_names,
     .write = ply_write,
     .archive = drape_frame_files_archive,
     .resume = ply_resume,

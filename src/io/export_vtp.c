@@ -30,7 +30,7 @@ typedef struct vtp_state {
 
 /* ---- The collection ---- */
 
-static drape_status pvd_open(drape_context *ctx, const char *folder, vtp_state *vtp)
+static drape_status pvd_open(drape_context *ctx, drape_folder *folder, vtp_state *vtp)
 {
     drape_status status = drape_export_begin(ctx, folder, PVD_NAME, &vtp->pvd);
     if (status)
@@ -215,10 +215,9 @@ static void put_data(drape_file *file, const drape_model *model, const drape_fra
     drape_file_put_text(file, "\n</AppendedData>\n</VTKFile>\n");
 }
 
-static drape_status vtp_clean(drape_context *ctx, const char *folder)
+static bool vtp_names(const char *name)
 {
-    drape_status status = drape_frame_files_clean(ctx, folder, DRAPE_FRAME_DIGITS, "vtp");
-    return status ? status : drape_export_clean(ctx, folder, PVD_NAME);
+    return strcmp(name, PVD_NAME) == 0 || drape_frame_files_name(name, DRAPE_FRAME_DIGITS, "vtp", NULL);
 }
 
 static drape_status vtp_open(drape_context *ctx, const drape_export_def *def, void *state)
@@ -246,7 +245,11 @@ static drape_status vtp_write(drape_context *ctx, void *state, const drape_frame
 
 static void vtp_archive(void *state, drape_archive *a)
 {
-    drape_export_archive_size(a, &((vtp_state *)state)->entries_end);
+    vtp_state *vtp = state;
+    int64_t end = vtp->entries_end;
+    drape_export_archive_file(a, &vtp->pvd);
+    drape_archive_int64(a, &end);
+    vtp->entries_end = (off_t)end;
 }
 
 static drape_status vtp_resume(drape_context *ctx, const drape_export_def *def, void *state, int64_t frames,
@@ -256,9 +259,7 @@ static drape_status vtp_resume(drape_context *ctx, const drape_export_def *def, 
     vtp_archive(vtp, a);
     drape_status status =
         a->status ? a->status : drape_frame_files_resume(ctx, def, "vtp", frames, &vtp->frames);
-    return status ? status
-                  : drape_export_reopen(ctx, def->folder, PVD_NAME,
-                                        vtp->entries_end + (off_t)sizeof pvd_end - 1, &vtp->pvd);
+    return status ? status : drape_export_reopen(ctx, def->folder, PVD_NAME, &vtp->pvd);
 }
 
 /* Writes the last line over the entries to be removed, then trims: at any moment the collection is
@@ -295,7 +296,7 @@ const drape_exporter_ops drape_exporter_vtp = {
     .state_size = sizeof(vtp_state),
     .wants_fields = true,
     .open = vtp_open,
-    .clean = vtp_clean,
+    .names = vtp_names,
     .write = vtp_write,
     .archive = vtp_archive,
     .resume = vtp_resume,

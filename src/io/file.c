@@ -3,14 +3,17 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
+#include <sys/random.h>
 #include <unistd.h>
 
 #define BUFFER_SIZE 65536
 #define MAX_PRINT   1024
+#define MAX_NAME    256
+#define PATCHED     4096 /* bytes that are overwritten at once */
 
 drape_status drape_file_fail(drape_context *ctx, const char *deed, const char *path, int error)
 {
@@ -20,15 +23,32 @@ drape_status drape_file_fail(drape_context *ctx, const char *deed, const char *p
     return drape_fail(ctx, DRAPE_E_FILE, "cannot %s \"%.500s\": %s", deed, path, text);
 }
 
+/* The same for a file, by its whole name. */
+static drape_status fail(const drape_file *file, const char *deed, int error)
+{
+    char path[512];
+    if (!file->folder)
+        return drape_file_fail(file->ctx, deed, file->path, error);
+    snprintf(path, sizeof path, "%.300s/%.200s", drape_folder_path(file->folder), file->path);
+    return drape_file_fail(file->ctx, deed, path, error);
+}
+
 drape_status drape_file_create(drape_context *ctx, size_t path_length, drape_file *file)
 {
-    *file = (drape_file){.ctx = ctx, .path_size = path_length + sizeof DRAPE_FILE_PART};
-    file->path = drape_alloc(ctx, 2 * file->path_size + BUFFER_SIZE, 1);
+    *file = (drape_file){.ctx = ctx, .dir = -1, .path_size = path_length + 1};
+    file->path = drape_alloc(ctx, file->path_size + BUFFER_SIZE, 1);
     if (!file->path)
         return DRAPE_E_MEMORY;
-    file->part = file->path + file->path_size;
-    file->buffer = file->part + file->path_size;
+    file->buffer = file->path + file->path_size;
     return DRAPE_OK;
+}
+
+drape_status drape_file_create_in(drape_context *ctx, drape_folder *folder, drape_file *file)
+{
+    drape_status status = drape_file_create(ctx, MAX_NAME, file);
+    file->folder = folder;
+    file->dir = drape_folder_descriptor(folder);
+    return status;
 }
 
 /* 0 or errno. After EINTR the descriptor is closed, too, and no data were lost. */
@@ -38,16 +58,18 @@ static int close_descriptor(drape_file *file)
     return close(file->fd) && errno != EINTR ? errno : 0;
 }
 
-/* Renames the file to its own name or, after an error, removes it. Returns that error, or that of the
- * rename. */
-static int settle(drape_file *file, int error)
+static const char *name_of(const drape_file *file)
 {
-    if (*file->part && !error && rename(file->part, file->path))
-        error = errno;
-    if (*file->part && error)
-        unlink(file->part);
+    const char *slash = strrchr(file->path, '/');
+    return slash ? slash + 1 : file->path;
+}
+
+/* Removes a file that will not be published. */
+static void drop(drape_file *file)
+{
+    if (*file->part)
+        unlinkat(file->dir, file->part, 0);
     *file->part = 0;
-    return error;
 }
 
 void drape_file_abandon(drape_file *file)
@@ -55,15 +77,26 @@ void drape_file_abandon(drape_file *file)
     if (!file->open)
         return;
     close_descriptor(file);
-    settle(file, ECANCELED);
+    drop(file);
+}
+
+static void leave_folder(drape_file *file)
+{
+    if (!file->folder && file->path && file->dir >= 0)
+        close(file->dir);
+    if (!file->folder)
+        file->dir = -1;
 }
 
 void drape_file_destroy(drape_file *file)
 {
     drape_file_abandon(file);
-    if (file->path)
+    leave_folder(file);
+    if (file->path) {
+        drape_free(file->ctx, file->rehearsed);
         drape_free(file->ctx, file->path);
-    *file = (drape_file){0};
+    }
+    *file = (drape_file){.dir = -1};
 }
 
 void drape_file_name(drape_file *file, const char *format, ...)
@@ -74,24 +107,74 @@ void drape_file_name(drape_file *file, const char *format, ...)
     va_end(args);
 }
 
-drape_status drape_file_begin(drape_file *file)
+drape_status drape_file_check_named(drape_context *ctx, const char *path, const char *input)
+{
+    struct stat named, read;
+    const bool link = lstat(path, &named) == 0 && S_ISLNK(named.st_mode);
+    if (stat(path, &named))
+        return link ? drape_fail(ctx, DRAPE_E_ARGUMENT, "\"%.500s\" is a link to nothing; name a file", path)
+                    : DRAPE_OK;
+    if (S_ISREG(named.st_mode) && stat(input, &read) == 0 && read.st_dev == named.st_dev &&
+        read.st_ino == named.st_ino)
+        return drape_fail(ctx, DRAPE_E_ARGUMENT,
+                          "\"%.500s\" would be replaced, but it is an input; name another file", path);
+    if (link && S_ISREG(named.st_mode))
+        return drape_fail(ctx, DRAPE_E_ARGUMENT, "\"%.500s\" is a link; name the file that it leads to",
+                          path);
+    return DRAPE_OK;
+}
+
+/* ---- Opening ---- */
+
+/* A pipe that nobody reads is an error at once. What is then written to it blocks as usual. */
+static int open_device(const char *path)
+{
+    int fd = open(path, O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (fd >= 0)
+        fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) & ~O_NONBLOCK);
+    return fd;
+}
+
+static int open_part(drape_file *file)
+{
+    uint64_t token;
+    if (file->folder)
+        drape_folder_part(file->folder, file->part);
+    else if (getrandom(&token, sizeof token, 0) == (ssize_t)sizeof token)
+        snprintf(file->part, sizeof file->part, ".drape-%016" PRIx64 DRAPE_FILE_PART, token);
+    else
+        return -1;
+    int fd = openat(file->dir, file->part, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, (mode_t)0666);
+    if (fd < 0)
+        *file->part = 0;
+    return fd;
+}
+
+static int open_named(drape_file *file)
 {
     struct stat info;
-    bool in_place = lstat(file->path, &info) == 0 && !S_ISREG(info.st_mode);
-    snprintf(file->part, file->path_size, "%s%s", in_place ? "" : file->path,
-             in_place ? "" : DRAPE_FILE_PART);
-    file->fd =
-        open(in_place ? file->path : file->part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, (mode_t)0666);
-    if (file->fd < 0) {
-        *file->part = 0;
-        return drape_file_fail(file->ctx, "write", file->path, errno);
-    }
+    *file->part = 0;
+    if (stat(file->path, &info) == 0 && !S_ISREG(info.st_mode))
+        return open_device(file->path);
+    leave_folder(file);
+    file->dir = drape_folder_enter(file->path);
+    return file->dir < 0 ? -1 : open_part(file);
+}
+
+drape_status drape_file_begin(drape_file *file)
+{
+    file->fd = file->folder ? open_part(file) : open_named(file);
+    if (file->fd < 0)
+        return fail(file, "write", errno);
     file->open = true;
     file->used = 0;
     file->error = 0;
     file->size = file->kept = 0;
+    file->sum = file->kept_sum = (drape_checksum){0};
     return DRAPE_OK;
 }
+
+/* ---- Writing ---- */
 
 /* Writes the buffer to the file. After a failure all further bytes are dropped until the record ends. */
 static void flush(drape_file *file)
@@ -106,6 +189,7 @@ static void flush(drape_file *file)
         else if (errno != EINTR)
             file->error = errno;
     }
+    drape_checksum_add(&file->sum, file->buffer, done);
     file->size += (off_t)done;
     file->used = 0;
 }
@@ -146,14 +230,16 @@ void drape_file_put_text(drape_file *file, const char *text)
 
 void drape_file_put_doubles(drape_file *file, const double *values, size_t count)
 {
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+    drape_file_put(file, values, count * sizeof *values);
+#else
     for (size_t i = 0; i < count; i++) {
-        unsigned char bytes[8];
         uint64_t bits;
         memcpy(&bits, &values[i], sizeof bits);
-        for (int b = 0; b < 8; b++)
-            bytes[b] = (unsigned char)(bits >> 8 * b);
-        drape_file_put(file, bytes, sizeof bytes);
+        bits = __builtin_bswap64(bits);
+        drape_file_put(file, &bits, sizeof bits);
     }
+#endif
 }
 
 void drape_file_print(drape_file *file, const char *format, ...)
@@ -166,16 +252,42 @@ void drape_file_print(drape_file *file, const char *format, ...)
     drape_file_put_text(file, text);
 }
 
+/* ---- Ending ---- */
+
+/* Records the file in its manifest, then gives it its name. Returns 0, or the status of a failure, with its
+ * message. */
+static drape_status give_name(drape_file *file, bool growing)
+{
+    drape_status status = DRAPE_OK;
+    if (!*file->part)
+        return DRAPE_OK;
+    if (!file->folder) {
+        if (renameat(file->dir, file->part, file->dir, name_of(file)))
+            status = fail(file, "write", errno);
+    } else {
+        status = growing ? drape_folder_note_growing(file->folder, file->path, file->fd, file->durable)
+                         : drape_folder_note(file->folder, file->path, &file->sum, file->durable);
+        if (!status)
+            status = drape_folder_publish(file->folder, file->part, file->path,
+                                          file->last.st_ino ? &file->last : NULL);
+    }
+    if (status)
+        drop(file);
+    *file->part = 0;
+    return status;
+}
+
 drape_status drape_file_publish(drape_file *file)
 {
     flush(file);
-    int error = settle(file, file->error);
-    if (error) {
-        close_descriptor(file);
-        return drape_file_fail(file->ctx, "write", file->path, error);
-    }
+    drape_status status = file->error ? fail(file, "write", file->error) : give_name(file, true);
+    if (status)
+        drape_file_abandon(file);
+    else if (fstat(file->fd, &file->last))
+        file->last = (struct stat){0};
     file->kept = file->size;
-    return DRAPE_OK;
+    file->kept_sum = file->sum;
+    return status;
 }
 
 /* 0 or errno. A file that cannot be synced, such as a pipe, has no disk to wait for. */
@@ -191,20 +303,49 @@ static int sync_descriptor(int fd)
 /* Closes the file before the rename: some file systems report a full disk only on closing. */
 drape_status drape_file_finish(drape_file *file)
 {
+    struct stat info = {0};
     flush(file);
     if (file->durable && !file->error)
         file->error = sync_descriptor(file->fd);
-    int closing = close_descriptor(file);
-    int error = settle(file, file->error ? file->error : closing);
-    return error ? drape_file_fail(file->ctx, "write", file->path, error) : DRAPE_OK;
+    if (fstat(file->fd, &info))
+        info = (struct stat){0};
+    int closing = close_descriptor(file), error = file->error ? file->error : closing;
+    if (error) {
+        drop(file);
+        return fail(file, "write", error);
+    }
+    drape_status status = give_name(file, false);
+    if (!status)
+        file->last = info;
+    return status;
+}
+
+/* Reads the first bytes of the file for their checksum; 0 or errno. */
+static int sum_up(drape_file *file, off_t size)
+{
+    unsigned char bytes[PATCHED];
+    drape_checksum sum = {0};
+    while (sum.size < (uint64_t)size) {
+        const uint64_t left = (uint64_t)size - sum.size;
+        ssize_t n = pread(file->fd, bytes, left < PATCHED ? (size_t)left : PATCHED, (off_t)sum.size);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            return n < 0 ? errno : EIO;
+        drape_checksum_add(&sum, bytes, (size_t)n);
+    }
+    file->sum = file->kept_sum = sum;
+    return 0;
 }
 
 /* A file that cannot be cut, such as a pipe, stays as it is; the failure that led here is the one to
  * report. */
 void drape_file_cut(drape_file *file, off_t size)
 {
-    if (ftruncate(file->fd, size) == 0 && lseek(file->fd, size, SEEK_SET) == size)
-        file->size = file->kept = size;
+    if (ftruncate(file->fd, size) || lseek(file->fd, size, SEEK_SET) != size)
+        return;
+    file->size = file->kept = size;
+    sum_up(file, size);
 }
 
 drape_status drape_file_keep(drape_file *file)
@@ -214,26 +355,128 @@ drape_status drape_file_keep(drape_file *file)
     file->error = 0;
     if (!error) {
         file->kept = file->size;
+        file->kept_sum = file->sum;
         return DRAPE_OK;
     }
     drape_file_cut(file, file->kept);
-    return drape_file_fail(file->ctx, "write", file->path, error);
+    return fail(file, "write", error);
 }
 
-drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size)
+/* Accounts for at most PATCHED bytes that are about to be overwritten; 0 or errno. */
+static int patch(drape_file *file, off_t offset, const void *data, size_t size)
 {
-    const char *from = data;
+    unsigned char words[PATCHED + 16] = {0};
+    const off_t begin = offset / 8 * 8, end = offset + (off_t)size;
+    const off_t last = (end + 7) / 8 * 8, was = file->size < last ? file->size : last;
+    for (off_t at = begin; at < was;) {
+        ssize_t n = pread(file->fd, words + (at - begin), (size_t)(was - at), at);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            return n < 0 ? errno : EIO;
+        at += n;
+    }
+    drape_checksum *sum = &file->sum;
+    if (was > begin)
+        sum->sum -= drape_checksum_bytes((uint64_t)begin, words, (size_t)(was - begin));
+    memcpy(words + (offset - begin), data, size);
+    const off_t becomes = was > end ? was : end;
+    sum->sum += drape_checksum_bytes((uint64_t)begin, words, (size_t)(becomes - begin));
+    if (becomes >= file->size) {
+        sum->size = (uint64_t)becomes;
+        memcpy(sum->tail, words + (becomes / 8 * 8 - begin), (size_t)(becomes % 8));
+    }
+    return 0;
+}
+
+/* Reads the beginning of the file as far as `size`, and takes it out of the checksum: it is added again when it
+ * is known how it would be. */
+static drape_status read_beginning(drape_file *file, size_t size)
+{
+    const size_t had = file->rehearsed_size;
+    unsigned char *grown = drape_alloc(file->ctx, size, 1);
+    if (!grown)
+        return DRAPE_E_MEMORY;
+    if (had)
+        memcpy(grown, file->rehearsed, had);
+    drape_free(file->ctx, file->rehearsed);
+    file->rehearsed = grown;
+    for (size_t at = had; at < size;) {
+        ssize_t n = pread(file->fd, grown + at, size - at, (off_t)at);
+        if (n < 0 && errno == EINTR)
+            continue;
+        if (n <= 0)
+            return fail(file, "continue", n < 0 ? errno : EIO);
+        at += (size_t)n;
+    }
+    file->sum.sum -= drape_checksum_bytes(had, grown + had, size - had);
+    file->rehearsed_size = size;
+    return DRAPE_OK;
+}
+
+/* Overwrites bytes of the file only in memory. */
+static drape_status rehearse(drape_file *file, size_t offset, const void *data, size_t size)
+{
+    const size_t words = (offset + size + 7) / 8 * 8, all = (size_t)file->size;
+    const size_t end = words < all ? words : all;
+    drape_status status = DRAPE_OK;
+    if (offset + size > all)
+        return fail(file, "continue", EINVAL);
+    if (end > file->rehearsed_size)
+        status = read_beginning(file, end);
+    if (!status)
+        memcpy(file->rehearsed + offset, data, size);
+    return status;
+}
+
+/* Before a file is changed that an earlier process completed, the manifest says that it grows again. */
+static drape_status announce(drape_file *file)
+{
+    if (!file->reopened)
+        return DRAPE_OK;
+    file->reopened = false;
+    return drape_folder_note_growing(file->folder, file->path, file->fd, file->durable);
+}
+
+static drape_status write_at(drape_file *file, off_t offset, const char *from, size_t size)
+{
     while (size > 0) {
         ssize_t n = pwrite(file->fd, from, size, offset);
         if (n < 0 && errno == EINTR)
             continue;
         if (n <= 0)
-            return drape_file_fail(file->ctx, "write", file->path, n < 0 ? errno : ENOSPC);
+            return fail(file, "write", n < 0 ? errno : ENOSPC);
         from += n;
         offset += n;
         size -= (size_t)n;
     }
     return DRAPE_OK;
+}
+
+drape_status drape_file_overwrite(drape_file *file, off_t offset, const void *data, size_t size)
+{
+    const char *from = data;
+    drape_status status = DRAPE_OK;
+    for (size_t part; size > 0 && !status; size -= part, from += part, offset += (off_t)part) {
+        part = size < PATCHED ? size : PATCHED;
+        if (file->folder && drape_folder_rehearses(file->folder)) {
+            status = rehearse(file, (size_t)offset, from, part);
+            continue;
+        }
+        const int error = patch(file, offset, from, part);
+        if (error)
+            return fail(file, "write", error);
+        status = announce(file);
+        if (!status)
+            status = write_at(file, offset, from, part);
+        if (status)
+            sum_up(file, file->kept);
+        if (!status && offset + (off_t)part > file->size)
+            file->size = file->kept = offset + (off_t)part;
+    }
+    if (!status && !file->rehearsed)
+        file->kept_sum = file->sum;
+    return status;
 }
 
 /* Its own failures are ignored: the one that led here is the one to report. */
@@ -246,51 +489,93 @@ void drape_file_restore(drape_file *file, off_t offset, const void *data, size_t
 drape_status drape_file_sync(drape_file *file)
 {
     int error = file->open ? sync_descriptor(file->fd) : 0;
-    return error ? drape_file_fail(file->ctx, "write", file->path, error) : DRAPE_OK;
+    return error ? fail(file, "write", error) : DRAPE_OK;
 }
 
-/* Checks that it is a regular file of at least this size, and reports why not. */
-static drape_status check_reopened(drape_file *file, off_t size)
+/* A folder may be writable without being readable. */
+drape_status drape_file_sync_names(drape_file *file)
+{
+    if (file->folder)
+        return drape_folder_sync(file->folder);
+    int fd = file->dir < 0 ? -1 : openat(file->dir, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0)
+        return file->dir < 0 || errno == EACCES ? DRAPE_OK : fail(file, "write the folder of", errno);
+    int error = sync_descriptor(fd);
+    close(fd);
+    return error ? fail(file, "write the folder of", error) : DRAPE_OK;
+}
+
+/* ---- Continuing ---- */
+
+drape_status drape_file_reopen(drape_file *file)
 {
     struct stat info;
-    if (fstat(file->fd, &info))
-        return drape_file_fail(file->ctx, "continue", file->path, errno);
-    if (!S_ISREG(info.st_mode))
-        return drape_fail(file->ctx, DRAPE_E_FILE, "cannot continue \"%.500s\": it is not a regular file",
-                          file->path);
-    if (info.st_size < size)
-        return drape_fail(file->ctx, DRAPE_E_FILE,
-                          "cannot continue \"%.500s\": it has %lld bytes, and had %lld at the checkpoint",
-                          file->path, (long long)info.st_size, (long long)size);
-    return lseek(file->fd, size, SEEK_SET) == size
-               ? DRAPE_OK
-               : drape_file_fail(file->ctx, "continue", file->path, errno);
-}
-
-drape_status drape_file_reopen(drape_file *file, off_t size)
-{
+    char path[512];
+    snprintf(path, sizeof path, "%.300s/%.200s", drape_folder_path(file->folder), file->path);
     *file->part = 0;
-    file->fd = open(file->path, O_WRONLY | O_CLOEXEC | O_NONBLOCK);
-    if (file->fd < 0)
-        return drape_file_fail(file->ctx, "continue", file->path, errno);
-    file->open = true;
+    file->fd = drape_folder_open_file(file->folder, file->path, O_RDWR);
+    if (file->fd < 0 && errno == EINVAL)
+        return drape_fail(file->ctx, DRAPE_E_FILE, "cannot continue \"%.500s\": it is not a regular file",
+                          path);
+    if (file->fd < 0 || fstat(file->fd, &info))
+        return fail(file, "continue", errno);
+    file->open = file->reopened = true;
     file->used = 0;
     file->error = 0;
-    file->size = file->kept = size;
-    return check_reopened(file, size);
+    file->size = file->kept;
+    file->last = info;
+    if (info.st_size < file->kept)
+        return drape_fail(file->ctx, DRAPE_E_FILE,
+                          "cannot continue \"%.500s\": it has %lld bytes, and had %lld at the checkpoint",
+                          path, (long long)info.st_size, (long long)file->kept);
+    int error = sum_up(file, file->kept);
+    if (!error && lseek(file->fd, file->kept, SEEK_SET) != file->kept)
+        error = errno;
+    return error ? fail(file, "continue", error) : DRAPE_OK;
+}
+
+/* The rehearsal ends with the checksum of the bytes that are there. */
+static drape_status compare(drape_file *file)
+{
+    const bool same =
+        file->sum.sum + drape_checksum_bytes(0, file->rehearsed, file->rehearsed_size) == file->expected;
+    drape_free(file->ctx, file->rehearsed);
+    file->rehearsed = NULL;
+    file->rehearsed_size = 0;
+    int error = sum_up(file, file->kept);
+    if (error)
+        return fail(file, "continue", error);
+    return same ? DRAPE_OK
+                : drape_fail(
+                      file->ctx, DRAPE_E_PARSE,
+                      "cannot continue \"%.300s/%.200s\": it is damaged: its checksum is not that of the "
+                      "checkpoint",
+                      drape_folder_path(file->folder), file->path);
 }
 
 drape_status drape_file_trim(drape_file *file)
 {
-    return ftruncate(file->fd, file->kept) == 0 ? DRAPE_OK
-                                                : drape_file_fail(file->ctx, "cut", file->path, errno);
+    if (drape_folder_rehearses(file->folder))
+        return compare(file);
+    drape_status status = announce(file);
+    if (!status && ftruncate(file->fd, file->kept))
+        status = fail(file, "cut", errno);
+    return status;
 }
 
 drape_status drape_file_close(drape_file *file)
 {
-    int error = file->open ? close_descriptor(file) : 0;
-    return error ? drape_file_fail(file->ctx, "close", file->path, error) : DRAPE_OK;
+    if (!file->open)
+        return DRAPE_OK;
+    const bool published = !*file->part && file->folder;
+    int error = close_descriptor(file);
+    drop(file);
+    if (error)
+        return fail(file, "close", error);
+    return published ? drape_folder_note(file->folder, file->path, &file->kept_sum, file->durable) : DRAPE_OK;
 }
+
+/* ---- Folders ---- */
 
 /* 0 or errno. An existing folder is a success whatever error mkdir reports, such as EROFS. */
 static int make_one(const char *path)
@@ -315,25 +600,4 @@ drape_status drape_folder_make(drape_context *ctx, char *path)
     if (!error)
         error = make_one(path);
     return error ? drape_file_fail(ctx, "make the folder", path, error) : DRAPE_OK;
-}
-
-static int sync_folder(const char *folder)
-{
-    int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (fd < 0)
-        return errno == EACCES ? 0 : errno; /* a folder may be writable without being readable */
-    int error = sync_descriptor(fd);
-    close(fd);
-    return error;
-}
-
-drape_status drape_folder_sync(drape_context *ctx, char *path)
-{
-    char *slash = strrchr(path, '/');
-    if (slash && slash > path)
-        *slash = 0;
-    int error = sync_folder(!slash ? "." : slash == path ? "/" : path);
-    if (slash)
-        *slash = '/';
-    return error ? drape_file_fail(ctx, "write the folder of", path, error) : DRAPE_OK;
 }

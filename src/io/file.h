@@ -1,7 +1,8 @@
 /*
  * file.h: one output file at a time, written such that nobody sees an incomplete one.
  *
- * A file is begun under a temporary name beside its own, filled through a buffer, and then renamed to its
+ * A file belongs to a folder (folder.h), whose rule says what it may replace, or it was named by the user, who
+ * means to replace a regular file of that name. It is begun under a temporary name beside its own, filled through a buffer, and then renamed to its
  * own name. Some files then grow by records: a record that does not fit on the disk is cut off again. A
  * killed process leaves complete files and complete records. A durable file also survives a power failure,
  * with its content at the time when drape_file_sync or drape_file_finish returned and the folder was
@@ -11,39 +12,54 @@
 #ifndef DRAPE_IO_FILE_H
 #define DRAPE_IO_FILE_H
 
-#include <sys/types.h>
+#include <sys/stat.h>
 
+#include "base/checksum.h"
 #include "base/context.h"
+#include "io/folder.h"
 
 #define DRAPE_FILE_PART ".part" /* suffix of temporary names */
 
 /* A file with all members zero does not exist: closing and destroying it does nothing. */
 typedef struct drape_file {
     drape_context *ctx;
-    char *path;       /* the file's own name */
-    char *part;       /* its name until it is published; "" if it is written in place */
-    size_t path_size; /* of each of the two buffers */
+    drape_folder *folder; /* NULL: the user named the file */
+    int dir;              /* descriptor of the folder that it is in; -1: none */
+    char *path;           /* its own name */
+    size_t path_size;
+    char part[DRAPE_PART_SIZE]; /* its name in dir until it is published; "" if it is written in place */
     char *buffer;
     size_t used; /* bytes in the buffer */
     int fd;
     bool open;
-    bool durable;     /* finishing it waits until it is on the disk */
-    int error;        /* errno of the first failed write since the last record; 0: none */
-    off_t size, kept; /* bytes written; bytes of complete records */
+    bool durable;                 /* finishing it waits until it is on the disk */
+    int error;                    /* errno of the first failed write since the last record; 0: none */
+    off_t size, kept;             /* bytes written; bytes of complete records */
+    drape_checksum sum, kept_sum; /* of these bytes */
+    bool reopened;                /* nothing was changed since it was reopened */
+    uint64_t expected;            /* checksum that the file must have when it is continued */
+    unsigned char *rehearsed;     /* (rehearsed_size) how the file would begin; NULL: as it does */
+    size_t rehearsed_size;
+    struct stat last; /* the file that was last published; st_ino 0: none */
 } drape_file;
 
-/* Takes all memory for files whose names have at most path_length bytes. Errors: DRAPE_E_MEMORY. */
+/* Takes all memory for files that the user names, with paths of at most path_length bytes; or for the file of
+ * a folder. Errors: DRAPE_E_MEMORY. */
 drape_status drape_file_create(drape_context *ctx, size_t path_length, drape_file *file);
+drape_status drape_file_create_in(drape_context *ctx, drape_folder *folder, drape_file *file);
+
+/* Refuses a file that the user names if it is this input of the command, or a link to a regular file. Errors:
+ * DRAPE_E_ARGUMENT. */
+drape_status drape_file_check_named(drape_context *ctx, const char *path, const char *input);
 /* Closes the file without reporting failures and frees its memory; an unpublished file is removed. */
 void drape_file_destroy(drape_file *file);
 void drape_file_abandon(drape_file *file); /* the same, but it may be named and begun again */
 
-/* Sets the name for the next drape_file_begin, printf style. */
+/* Sets the name for the next drape_file_begin, printf style: a name in the folder, or a path. */
 void drape_file_name(drape_file *file, const char *format, ...) DRAPE_PRINTF(2, 3);
 
-/* Opens the file. An existing file of that name stays until drape_file_publish, unless it is not a regular
- * file: a link, a device or a pipe is written through, because a rename would replace it. Errors:
- * DRAPE_E_FILE. */
+/* Opens the file. An existing file of that name stays until drape_file_publish. A device or a pipe that the
+ * user named is written through. Errors: DRAPE_E_FILE. */
 drape_status drape_file_begin(drape_file *file);
 
 /* These add to the end. A failure is reported by the next call that returns a status. */
@@ -76,20 +92,22 @@ void drape_file_restore(drape_file *file, off_t offset, const void *data, size_t
 /* Cuts a published file to its first size bytes, as far as possible. */
 void drape_file_cut(drape_file *file, off_t size);
 
-/* Reopens a published file that an earlier process left, to continue it after its first size bytes; it must
- * have at least that many. drape_file_trim then cuts it to that size; call drape_file_overwrite before if
- * necessary. Errors: DRAPE_E_FILE. */
-drape_status drape_file_reopen(drape_file *file, off_t size);
+/* Reopens a published file of a folder that an earlier process left, to continue it after its first `kept`
+ * bytes; it must have at least that many. drape_file_trim then cuts it to that size; call
+ * drape_file_overwrite before if necessary. While the folder rehearses, these two change nothing, and
+ * drape_file_trim compares the checksum that the file would have with the one in `expected`. Errors:
+ * DRAPE_E_FILE, DRAPE_E_PARSE (the file is damaged). */
+drape_status drape_file_reopen(drape_file *file);
 drape_status drape_file_trim(drape_file *file);
 
 /* Waits until everything that a growing file keeps is on the disk. Errors: DRAPE_E_FILE. */
 drape_status drape_file_sync(drape_file *file);
 
-/* Waits until the names of the files beside path are on the disk. path is modified during the call. Errors:
- * DRAPE_E_FILE. */
-drape_status drape_folder_sync(drape_context *ctx, char *path);
+/* Waits until the names in the folder of the file are on the disk. Errors: DRAPE_E_FILE. */
+drape_status drape_file_sync_names(drape_file *file);
 
-/* Closes a file that grew; does nothing if it is not open. Errors: DRAPE_E_FILE. */
+/* Closes a file that grew, whose manifest then has its checksum; does nothing if it is not open. Errors:
+ * DRAPE_E_FILE. */
 drape_status drape_file_close(drape_file *file);
 
 /* Sets the message `cannot DEED "PATH": strerror(error)` and returns DRAPE_E_FILE. */

@@ -9,6 +9,7 @@
 #include "io/checkpoint.h"
 #include "io/energy.h"
 #include "io/export.h"
+#include "io/scene_copy.h"
 #include "io/steps.h"
 #include "sim/sim.h"
 
@@ -27,7 +28,9 @@ struct drape_recorder {
     drape_context *ctx;
     drape_arena arena;
     drape_sim *sim;
-    char *folder;         /* without a slash at its end */
+    drape_folder *folder;
+    const char *const *also; /* of the def, until the recorder is made */
+    size_t also_count;
     drape_export_def def; /* for the formats */
     output *outputs;
     size_t output_count;
@@ -181,8 +184,8 @@ static void archive_progress(drape_recorder *r, drape_archive *a)
     drape_archive_bool(a, &r->moved);
     drape_archive_double(a, &r->seconds);
     drape_archive_double(a, &r->wall);
-    drape_export_archive_size(a, &r->steps.kept);
-    drape_export_archive_size(a, &r->energies.kept);
+    drape_export_archive_file(a, &r->steps);
+    drape_export_archive_file(a, &r->energies);
 }
 
 /* All frames that a checkpoint counts must be on the disk before the checkpoint is. */
@@ -194,7 +197,7 @@ static drape_status sync_files(drape_recorder *r)
     for (size_t i = 0; i < r->output_count && !status; i++)
         if (r->outputs[i].ops->sync && r->outputs[i].open)
             status = r->outputs[i].ops->sync(r->outputs[i].state);
-    return status ? status : drape_folder_sync(r->ctx, r->checkpoint.path);
+    return status ? status : drape_folder_sync(r->folder);
 }
 
 static drape_status write_checkpoint(drape_recorder *r)
@@ -329,14 +332,65 @@ static drape_status allocate_arrays(drape_recorder *r)
 
 /* ---- Files ---- */
 
-static drape_status make_folder(drape_recorder *r, const char *folder)
+static bool is_also(const drape_recorder *r, const char *name)
 {
-    r->folder = drape_arena_text(&r->arena, folder);
-    if (!r->folder)
-        return DRAPE_E_MEMORY;
-    for (size_t n = strlen(r->folder); n > 1 && r->folder[n - 1] == '/'; n--)
-        r->folder[n - 1] = 0;
-    return drape_folder_make(r->ctx, r->folder);
+    for (size_t i = 0; i < r->also_count; i++) {
+        const char *star = strchr(r->also[i], '*');
+        if (star ? strncmp(name, r->also[i], (size_t)(star - r->also[i])) == 0 : !strcmp(name, r->also[i]))
+            return true;
+    }
+    return false;
+}
+
+static bool is_own_name(const drape_recorder *r, const char *name)
+{
+    return strcmp(name, DRAPE_STEPS_NAME) == 0 || strcmp(name, DRAPE_ENERGY_NAME) == 0 ||
+           strcmp(name, DRAPE_CHECKPOINT_NAME) == 0 || is_also(r, name);
+}
+
+/* What this run writes. */
+static bool writes(const void *user, const char *name)
+{
+    const drape_recorder *r = user;
+    for (size_t i = 0; i < r->output_count; i++)
+        if (r->outputs[i].ops->names(name))
+            return true;
+    return is_own_name(r, name);
+}
+
+/* What an earlier run may have written, in any format: frames of two runs must not be mixed. */
+static bool clears(const void *user, const char *name)
+{
+    for (int i = 0; drape_exporters[i]; i++)
+        if (drape_exporters[i]->names(name))
+            return true;
+    return is_own_name(user, name);
+}
+
+/* A run that is resumed finds its own files, and checks each by itself. */
+static bool nothing(const void *user, const char *name)
+{
+    (void)user, (void)name;
+    return false;
+}
+
+static drape_status protect(void *user, const char *path, const char *pointer)
+{
+    (void)pointer;
+    return drape_folder_protect(user, path);
+}
+
+/* Nothing is touched by a refusal; only the folder may be new. */
+static drape_status open_folder(drape_recorder *r, const drape_recorder_def *def, bool resumes)
+{
+    r->also = def->also;
+    r->also_count = def->also_count;
+    drape_status status = drape_folder_open(r->ctx, def->folder, false, &r->folder);
+    if (!status && def->scene)
+        status = drape_folder_protect(r->folder, def->scene);
+    if (!status)
+        status = drape_scene_files(r->ctx, r->sim->model, def->scene ? def->scene : "", protect, r->folder);
+    return status ? status : drape_folder_check(r->folder, resumes ? nothing : writes, clears, r);
 }
 
 static drape_status prepare_checkpoints(drape_recorder *r, const drape_recorder_def *def)
@@ -349,32 +403,35 @@ static drape_status prepare_checkpoints(drape_recorder *r, const drape_recorder_
     r->def.durable = def->checkpoints;
     if (!def->checkpoints)
         return DRAPE_OK;
-    drape_status status =
-        drape_file_create(r->ctx, strlen(r->folder) + sizeof DRAPE_CHECKPOINT_NAME, &r->checkpoint);
+    drape_status status = drape_file_create_in(r->ctx, r->folder, &r->checkpoint);
     if (!status)
-        drape_file_name(&r->checkpoint, "%s/" DRAPE_CHECKPOINT_NAME, r->folder);
+        drape_file_name(&r->checkpoint, DRAPE_CHECKPOINT_NAME);
     return status;
+}
+
+static bool is_checkpoint(const void *user, const char *name)
+{
+    (void)user;
+    return strcmp(name, DRAPE_CHECKPOINT_NAME) == 0;
 }
 
 /* Removes a checkpoint of an earlier run first, because it counts frames that are removed next. */
 static drape_status open_files(drape_recorder *r)
 {
-    drape_status status = drape_export_clean(r->ctx, r->folder, DRAPE_CHECKPOINT_NAME);
+    drape_status status = drape_folder_remove(r->folder, is_checkpoint, r);
     if (!status)
-        status = drape_export_clean(r->ctx, r->folder, DRAPE_CHECKPOINT_NAME DRAPE_FILE_PART);
-    for (int i = 0; drape_exporters[i] && !status; i++) /* all formats, not only those written now */
-        status = drape_exporters[i]->clean(r->ctx, r->folder);
+        status = drape_folder_begin(r->folder, clears, r);
     for (size_t i = 0; i < r->output_count && !status; i++) {
         output *o = &r->outputs[i];
         o->open = true; /* close must also follow an open that failed */
         status = o->ops->open(r->ctx, &r->def, o->state);
     }
     if (!status)
-        status = drape_steps_open(r->ctx, r->folder, -1, &r->steps);
-    return status ? status : drape_energy_open(r->ctx, r->folder, -1, &r->energies);
+        status = drape_steps_open(r->ctx, r->folder, false, &r->steps);
+    return status ? status : drape_energy_open(r->ctx, r->folder, false, &r->energies);
 }
 
-/* Removes what follows the frames of the checkpoint, after all files were found to contain these. */
+/* Removes what follows the frames of the checkpoint, or rehearses that. */
 static drape_status cut_files(drape_recorder *r)
 {
     drape_status status = drape_file_trim(&r->steps);
@@ -390,9 +447,10 @@ static drape_status resume_files(drape_recorder *r, drape_archive *a)
 {
     archive_progress(r, a);
     drape_status status = a->status;
-    off_t steps = r->steps.kept, energies = r->energies.kept;
+    if (!status && r->finished)
+        status = drape_archive_end(a);
     if (status || r->finished)
-        return status ? status : drape_archive_end(a);
+        return status ? status : drape_folder_begin(r->folder, NULL, r);
     for (size_t i = 0; i < r->output_count && !status; i++) {
         output *o = &r->outputs[i];
         o->open = true;
@@ -401,9 +459,15 @@ static drape_status resume_files(drape_recorder *r, drape_archive *a)
     if (!status)
         status = drape_archive_end(a);
     if (!status)
-        status = drape_steps_open(r->ctx, r->folder, steps, &r->steps);
+        status = drape_steps_open(r->ctx, r->folder, true, &r->steps);
     if (!status)
-        status = drape_energy_open(r->ctx, r->folder, energies, &r->energies);
+        status = drape_energy_open(r->ctx, r->folder, true, &r->energies);
+    drape_folder_rehearse(r->folder, true); /* whether all files have the checksums of the checkpoint */
+    if (!status)
+        status = cut_files(r);
+    drape_folder_rehearse(r->folder, false);
+    if (!status)
+        status = drape_folder_begin(r->folder, NULL, r);
     return status ? status : cut_files(r);
 }
 
@@ -438,7 +502,7 @@ static drape_status set_up(drape_recorder *r, const drape_recorder_def *def, dra
     if (!status)
         status = allocate_arrays(r);
     if (!status)
-        status = make_folder(r, def->folder);
+        status = open_folder(r, def, a != NULL);
     if (!status)
         status = prepare_checkpoints(r, def);
     if (!status)
@@ -467,6 +531,7 @@ static drape_status create(drape_context *ctx, drape_sim *sim, const drape_recor
     scope s = scope_enter();
     note(r, set_up(r, def, a));
     scope_leave(r, s);
+    r->also_count = 0;
     if (r->failure) {
         close_files(r);
         status = report(r); /* the first failure, not one of closing */
@@ -518,12 +583,18 @@ void drape_recorder_destroy(drape_recorder **recorder)
     drape_file_destroy(&r->steps);
     drape_file_destroy(&r->energies);
     drape_file_destroy(&r->checkpoint);
+    drape_folder_close(&r->folder);
     drape_arena_free(&r->arena);
     drape_free(r->ctx, r);
     *recorder = NULL;
 }
 
 /* ---- Queries ---- */
+
+drape_folder *drape_recorder_folder(const drape_recorder *recorder)
+{
+    return recorder->folder;
+}
 
 bool drape_recorder_is_finished(const drape_recorder *recorder)
 {

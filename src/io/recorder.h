@@ -3,10 +3,15 @@
 #define DRAPE_IO_RECORDER_H
 
 #include "base/archive.h"
+#include "io/folder.h"
 
 /* Where to write what. It is needed only until drape_recorder_create returns. */
 typedef struct drape_recorder_def {
-    const char *folder;         /* created, with its parents, if it does not exist */
+    const char *folder;      /* created, with its parents, if it does not exist; see folder.h */
+    const char *scene;       /* path of the scene; NULL: it was not read from a file */
+    const char *const *also; /* (also_count) other files that the caller will write into the folder: names, or
+                                   "scene_mesh_*" for all that begin so */
+    size_t also_count;
     const char *const *formats; /* format_count names of formats; a repeated name counts once */
     size_t format_count;        /* 0: only the step log and the energies are written */
     /* Checkpoints, folder/checkpoint.drape: one at every checkpoint_every-th frame, and one at each call of
@@ -23,17 +28,18 @@ typedef struct drape_recorder drape_recorder;
 drape_status drape_recorder_check(drape_context *ctx, const drape_sim *sim, const char *pointer,
                                   const char *format);
 
-/* Opens all files, replacing those of an earlier run, and begins to observe the sim. All memory is taken
+/* Opens all files, replacing those that an earlier run wrote, and begins to observe the sim. All memory is taken
  * here. A failed write stops the advance of the sim with DRAPE_E_FILE; its message is set on ctx, which
  * should be the sim's. An observer cannot be removed from a sim, so the sim must not advance after the
- * recorder is destroyed. Errors: DRAPE_E_ARGUMENT (unknown format, no folder, too many observers),
- * DRAPE_E_FILE, DRAPE_E_MEMORY; an unknown format is found before anything is written. */
+ * recorder is destroyed. Errors: DRAPE_E_ARGUMENT (unknown format, no folder, another process writes into it, it
+ * has a file of a name to be written that is not ours or is an input of the model, too many observers),
+ * DRAPE_E_FILE, DRAPE_E_MEMORY; those of the first kind are found before anything is written. */
 drape_status drape_recorder_create(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
                                    drape_recorder **out);
 
 /* Continues an earlier run in its folder: reads the recorder's part of a checkpoint, after the sim's part
- * was read; checks that the files still contain what they did at the checkpoint, and removes what came
- * later. If the run had finished (drape_recorder_is_finished) no file is changed. Errors: those of create;
+ * was read; checks by their checksums that the files still contain what they did at the checkpoint, and then
+ * removes what came later. If the run had finished (drape_recorder_is_finished) no file is changed. Errors: those of create;
  * those of the archive, such as other formats. */
 drape_status drape_recorder_resume(drape_context *ctx, drape_sim *sim, const drape_recorder_def *def,
                                    drape_archive *a, drape_recorder **out);
@@ -43,6 +49,9 @@ bool drape_recorder_is_finished(const drape_recorder *recorder);
  * too. What the checkpoint claims about files is on the disk before it. Nothing is allocated. Errors:
  * DRAPE_E_FILE; then the previous checkpoint is unchanged. */
 drape_status drape_recorder_checkpoint(drape_recorder *recorder);
+
+/* The folder, in which the caller may write the files of def->also; open until drape_recorder_destroy. */
+drape_folder *drape_recorder_folder(const drape_recorder *recorder);
 
 /* [s] Wall time of the run until the last checkpoint, written or read; 0: there was none. */
 double drape_recorder_wall(const drape_recorder *recorder);

@@ -19,7 +19,6 @@
 typedef struct copier {
     drape_context *ctx;
     drape_scene *scene;
-    const char *path, *folder;
     int files; /* number of files copied so far */
     drape_file out;
 } copier;
@@ -33,20 +32,70 @@ bool drape_scene_copy_is(const char *path, const char *folder)
            scene.st_dev == there.st_dev && scene.st_ino == there.st_ino;
 }
 
-/* ---- Meshes ---- */
+/* ---- The files that a scene names ---- */
 
-/* The path of a mesh as it is opened here: relative to the folder of the scene. NULL: out of memory. */
-static char *whole_path(const copier *c, const char *file)
+typedef struct visitor {
+    drape_context *ctx;
+    const char *scene;
+    drape_file_visit *visit;
+    void *user;
+} visitor;
+
+/* Files are relative to the folder of the scene. */
+static drape_status visit_file(const visitor *v, const char *file, const char *pointer)
 {
-    const char *slash = strrchr(c->path, '/');
-    size_t size = strlen(c->path) + strlen(file) + 2;
-    char *whole = drape_alloc(c->ctx, size, 1);
-    if (whole && slash && *file != '/')
-        snprintf(whole, size, "%.*s/%s", (int)(slash - c->path), c->path, file);
-    else if (whole)
+    const char *slash = strrchr(v->scene, '/');
+    size_t size = strlen(v->scene) + strlen(file) + 2;
+    char *whole = drape_alloc(v->ctx, size, 1);
+    if (!whole)
+        return DRAPE_E_MEMORY;
+    if (slash && *file != '/')
+        snprintf(whole, size, "%.*s/%s", (int)(slash - v->scene), v->scene, file);
+    else
         snprintf(whole, size, "%s", file);
-    return whole;
+    drape_status status = v->visit(v->user, whole, pointer);
+    drape_free(v->ctx, whole);
+    return status;
 }
+
+static bool is_text(const drape_collider *collider, const char *name)
+{
+    for (int i = 0; i < collider->ops->entry.param_count; i++)
+        if (strcmp(collider->ops->entry.params[i].name, name) == 0)
+            return collider->ops->entry.params[i].kind == DRAPE_PARAM_TEXT;
+    return false;
+}
+
+static drape_status visit_collider(const visitor *v, const drape_collider *collider, int index)
+{
+    drape_status status = DRAPE_OK;
+    for (size_t i = 0; !status && i < collider->choice.setting_count; i++) {
+        const drape_setting *setting = &collider->choice.settings[i];
+        char pointer[DRAPE_POINTER_SIZE];
+        snprintf(pointer, sizeof pointer, "/colliders/%d/%s", index, setting->name);
+        if (setting->text && is_text(collider, setting->name))
+            status = visit_file(v, setting->text, pointer);
+    }
+    return status;
+}
+
+drape_status drape_scene_files(drape_context *ctx, const drape_model *model, const char *scene,
+                               drape_file_visit *visit, void *user)
+{
+    const visitor v = {ctx, scene, visit, user};
+    drape_status status = DRAPE_OK;
+    for (int32_t i = 0; !status && i < model->cloth_count; i++) {
+        char pointer[DRAPE_POINTER_SIZE];
+        snprintf(pointer, sizeof pointer, "/cloth/%d/mesh/file", (int)i);
+        if (model->cloths[i].file)
+            status = visit_file(&v, model->cloths[i].file, pointer);
+    }
+    for (int32_t i = 0; !status && i < model->collider_count; i++)
+        status = visit_collider(&v, &model->colliders[i], (int)i);
+    return status;
+}
+
+/* ---- Meshes ---- */
 
 static drape_status copy_bytes(copier *c, int from, const char *source)
 {
@@ -65,66 +114,22 @@ static drape_status copy_bytes(copier *c, int from, const char *source)
 }
 
 /* A file that cannot be read twice, such as a pipe, is not copied. */
-static drape_status copy_file(copier *c, const char *source, const char *pointer)
+static drape_status copy_file(void *user, const char *source, const char *pointer)
 {
+    copier *c = user;
     struct stat info;
     char name[MESH_ROOM];
     const char *ending = strrchr(source, '.');
     if (stat(source, &info) || !S_ISREG(info.st_mode))
         return DRAPE_OK;
-    int from = open(source, O_RDONLY | O_CLOEXEC);
+    int from = open(source, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
     if (from < 0)
         return drape_file_fail(c->ctx, "read the mesh", source, errno);
     snprintf(name, sizeof name, MESH_NAME, c->files++, ending ? ending : "");
-    drape_file_name(&c->out, "%s/%s", c->folder, name);
+    drape_file_name(&c->out, "%s", name);
     drape_status status = copy_bytes(c, from, source);
     close(from);
     return status ? status : drape_scene_set(c->scene, pointer, name);
-}
-
-static drape_status keep_file(copier *c, const char *file, const char *pointer)
-{
-    char *source = whole_path(c, file);
-    if (!source)
-        return DRAPE_E_MEMORY;
-    drape_status status = copy_file(c, source, pointer);
-    drape_free(c->ctx, source);
-    return status;
-}
-
-static bool is_text(const drape_collider *collider, const char *name)
-{
-    for (int i = 0; i < collider->ops->entry.param_count; i++)
-        if (strcmp(collider->ops->entry.params[i].name, name) == 0)
-            return collider->ops->entry.params[i].kind == DRAPE_PARAM_TEXT;
-    return false;
-}
-
-static drape_status keep_collider(copier *c, const drape_collider *collider, int index)
-{
-    drape_status status = DRAPE_OK;
-    for (size_t i = 0; !status && i < collider->choice.setting_count; i++) {
-        const drape_setting *setting = &collider->choice.settings[i];
-        char pointer[DRAPE_POINTER_SIZE];
-        snprintf(pointer, sizeof pointer, "/colliders/%d/%s", index, setting->name);
-        if (setting->text && is_text(collider, setting->name))
-            status = keep_file(c, setting->text, pointer);
-    }
-    return status;
-}
-
-static drape_status keep_meshes(copier *c, const drape_model *model)
-{
-    drape_status status = DRAPE_OK;
-    for (int32_t i = 0; !status && i < model->cloth_count; i++) {
-        char pointer[DRAPE_POINTER_SIZE];
-        snprintf(pointer, sizeof pointer, "/cloth/%d/mesh/file", (int)i);
-        if (model->cloths[i].file)
-            status = keep_file(c, model->cloths[i].file, pointer);
-    }
-    for (int32_t i = 0; !status && i < model->collider_count; i++)
-        status = keep_collider(c, &model->colliders[i], (int)i);
-    return status;
 }
 
 /* ---- The scene ---- */
@@ -136,7 +141,7 @@ static void put(void *user, const char *text, size_t size)
 
 static drape_status keep_scene(copier *c)
 {
-    drape_file_name(&c->out, "%s/" DRAPE_SCENE_COPY, c->folder);
+    drape_file_name(&c->out, DRAPE_SCENE_COPY);
     drape_status status = drape_file_begin(&c->out);
     if (status)
         return status;
@@ -145,12 +150,12 @@ static drape_status keep_scene(copier *c)
 }
 
 drape_status drape_scene_copy(drape_context *ctx, drape_scene *scene, const drape_model *model,
-                              const char *path, const char *folder)
+                              const char *path, drape_folder *folder)
 {
-    copier c = {.ctx = ctx, .scene = scene, .path = path, .folder = folder};
-    drape_status status = drape_file_create(ctx, strlen(folder) + MESH_ROOM, &c.out);
+    copier c = {.ctx = ctx, .scene = scene};
+    drape_status status = drape_file_create_in(ctx, folder, &c.out);
     if (!status)
-        status = keep_meshes(&c, model);
+        status = drape_scene_files(ctx, model, path, copy_file, &c);
     if (!status)
         status = keep_scene(&c);
     drape_file_destroy(&c.out);

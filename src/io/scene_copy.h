@@ -2,10 +2,20 @@
 #ifndef DRAPE_IO_SCENE_COPY_H
 #define DRAPE_IO_SCENE_COPY_H
 
+#include "io/folder.h"
 #include "model/model.h"
 #include "model/scene.h"
 
-#define DRAPE_SCENE_COPY "scene.json" /* its name in the folder of a run */
+#define DRAPE_SCENE_COPY   "scene.json" /* its name in the folder of a run */
+#define DRAPE_SCENE_MESHES "scene_mesh_*"
+
+/* Called for each file that a scene names, with its path and the JSON pointer of its name. */
+typedef drape_status drape_file_visit(void *user, const char *path, const char *pointer);
+
+/* Visits the meshes of cloths and colliders of a scene, whose file is at `scene`; "": in the working
+ * directory. Errors: those of visit, DRAPE_E_MEMORY. */
+drape_status drape_scene_files(drape_context *ctx, const drape_model *model, const char *scene,
+                               drape_file_visit *visit, void *user);
 
 /* Whether the scene file at path is itself folder/scene.json, and so must not be overwritten. */
 bool drape_scene_copy_is(const char *path, const char *folder);
@@ -15,6 +25,6 @@ bool drape_scene_copy_is(const char *path, const char *folder);
  * file of the scene, to which its meshes are relative. A mesh that is not a regular file is not copied.
  * Afterwards the scene names the copies. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_scene_copy(drape_context *ctx, drape_scene *scene, const drape_model *model,
-                              const char *path, const char *folder);
+                              const char *path, drape_folder *folder);
 
 #endif

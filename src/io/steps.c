@@ -8,15 +8,15 @@
 
 #include "io/csv.h"
 
-#define FILE_NAME "steps.csv"
+#define FILE_NAME DRAPE_STEPS_NAME
 
 static const char columns[] = "attempt,t,h,accepted,status,reason,iterations,residual,tolerance,"
                               "kinetic,elastic,gravity,contact,dissipated,numerical,"
                               "worst_what,worst_term,worst_element,worst_nodes,worst_value,worst_limit\n";
 
-drape_status drape_steps_open(drape_context *ctx, const char *folder, off_t kept, drape_file *file)
+drape_status drape_steps_open(drape_context *ctx, drape_folder *folder, bool resumes, drape_file *file)
 {
-    return drape_csv_open(ctx, folder, FILE_NAME, columns, kept, file);
+    return drape_csv_open(ctx, folder, FILE_NAME, columns, resumes, file);
 }
 
 static void put_energy(drape_file *file, const drape_energy *energy)

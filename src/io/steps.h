@@ -4,8 +4,10 @@
 
 #include "io/file.h"
 
+#define DRAPE_STEPS_NAME "steps.csv" /* in the folder of a run */
+
 /* As drape_csv_open. */
-drape_status drape_steps_open(drape_context *ctx, const char *folder, off_t kept, drape_file *file);
+drape_status drape_steps_open(drape_context *ctx, drape_folder *folder, bool resumes, drape_file *file);
 
 /* Adds a row; call it in the C locale. energy: of the state after the attempt. After a failure the file
  * ends with the row before. Errors: DRAPE_E_FILE. */

@@ -169,9 +169,11 @@ static int put(const char *bytes, size_t size, void *file)
     return 0; /* the file keeps its first failure */
 }
 
-static drape_status write_json(drape_context *ctx, const json_t *json, const char *path, drape_file *file)
+static drape_status write_json(drape_context *ctx, const json_t *json, drape_folder *folder, const char *path,
+                               drape_file *file)
 {
-    drape_status status = drape_file_create(ctx, strlen(path), file);
+    drape_status status =
+        folder ? drape_file_create_in(ctx, folder, file) : drape_file_create(ctx, strlen(path), file);
     if (status)
         return status;
     drape_file_name(file, "%s", path);
@@ -185,7 +187,7 @@ static drape_status write_json(drape_context *ctx, const json_t *json, const cha
 }
 
 drape_status drape_summary_write(drape_context *ctx, drape_sim *sim, const drape_summary_def *def,
-                                 const char *path)
+                                 drape_folder *folder, const char *path)
 {
     if (!sim || !def || !path)
         return drape_fail(ctx, DRAPE_E_ARGUMENT, "a summary needs a sim, a def and a path");
@@ -193,7 +195,7 @@ drape_status drape_summary_write(drape_context *ctx, drape_sim *sim, const drape
     locale_t old = drape_locale_enter();
     json_t *json = summary(sim, def);
     drape_status status =
-        json ? write_json(ctx, json, path, &file)
+        json ? write_json(ctx, json, folder, path, &file)
              : drape_fail(ctx, DRAPE_E_MEMORY, "out of memory for the summary \"%.500s\"", path);
     json_decref(json);
     drape_file_destroy(&file);

@@ -2,7 +2,9 @@
 #ifndef DRAPE_IO_SUMMARY_H
 #define DRAPE_IO_SUMMARY_H
 
-#include "base/context.h"
+#include "io/folder.h"
+
+#define DRAPE_SUMMARY_NAME "summary.json" /* in the folder of a run */
 
 /* Frames with a budget: how long they took, and how many ended at each level. */
 typedef struct drape_summary_realtime {
@@ -22,9 +24,9 @@ typedef struct drape_summary_def {
     const drape_summary_realtime *realtime; /* NULL: there was no budget */
 } drape_summary_def;
 
-/* Writes the file at path completely or not at all (a link, a device or a pipe is written through). Numbers
- * that are not finite become null. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+/* Writes the file of this name in a folder, or with folder NULL the file at a path that the user named,
+ * completely or not at all. Numbers that are not finite become null. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
 drape_status drape_summary_write(drape_context *ctx, drape_sim *sim, const drape_summary_def *def,
-                                 const char *path);
+                                 drape_folder *folder, const char *name);
 
 #endif

@@ -201,17 +201,45 @@ static drape_status parse_about(lab *l, const char *folder, json_t **about)
                                fault.column, fault.text);
 }
 
+static bool ends_in(const char *name, const char *ending)
+{
+    const size_t length = strlen(name), end = strlen(ending);
+    return length > end && strcmp(name + length - end, ending) == 0;
+}
+
+/* The files that an experiment writes. */
+static bool writes(const void *user, const char *name)
+{
+    char cases[64];
+    lab_cases_name(user, cases);
+    return strcmp(name, ABOUT) == 0 || strcmp(name, cases) == 0 || strcmp(name, "results.csv") == 0 ||
+           strcmp(name, "report.html") == 0 || strncmp(name, "reference", 9) == 0 || ends_in(name, ".svg") ||
+           ends_in(name, ".gp");
+}
+
+/* Shards may write into one folder at the same time. */
+static drape_status open_folder(lab *l)
+{
+    drape_status status = drape_folder_open(l->ctx, l->folder, l->def->shards > 1, &l->out);
+    if (!status && l->def->scene)
+        status = drape_folder_protect(l->out, l->def->scene);
+    if (!status)
+        status = drape_folder_check(l->out, writes, writes, l);
+    l->input_is_good = status != DRAPE_E_ARGUMENT;
+    return status;
+}
+
 /* Writes the experiment into the folder, or resumes it if the folder has it. Shards that begin in one folder
- * at the same time write the same content, each to a file of its own that is renamed when complete. */
+ * at the same time write the same content. */
 static drape_status claim_folder(lab *l)
 {
-    char own[64], from[4200], to[4200];
+    char path[4200];
     l->input_is_good = true;
-    drape_status status = drape_folder_make(l->ctx, l->folder);
+    drape_status status = open_folder(l);
     if (status)
         return status;
-    snprintf(to, sizeof to, "%s/" ABOUT, l->folder);
-    if (access(to, F_OK) == 0) {
+    snprintf(path, sizeof path, "%s/" ABOUT, l->folder);
+    if (access(path, F_OK) == 0) {
         json_t *there = NULL;
         status = parse_about(l, l->folder, &there);
         if (!status && !json_equal(there, l->about))
@@ -221,16 +249,22 @@ static drape_status claim_folder(lab *l)
                                 l->folder);
         json_decref(there);
         l->input_is_good = !status;
-        return status;
+        return status ? status : drape_folder_begin(l->out, NULL, NULL);
     }
     l->claimed = true;
-    snprintf(own, sizeof own, "experiment-%d-of-%d.json", l->def->shard, l->def->shards);
-    snprintf(from, sizeof from, "%s/%s", l->folder, own);
     char *text = json_dumps(l->about, JSON_INDENT(1) | JSON_REAL_PRECISION(17));
-    status = text ? lab_write_text(l, own, text, strlen(text))
+    status = text ? drape_folder_begin(l->out, NULL, NULL)
                   : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for " ABOUT);
+    if (!status)
+        status = lab_write_text(l, ABOUT, text, strlen(text));
     free(text);
-    return !status && rename(from, to) ? drape_file_fail(l->ctx, "write", to, errno) : status;
+    return status;
+}
+
+static bool is_about(const void *user, const char *name)
+{
+    (void)user;
+    return strcmp(name, ABOUT) == 0;
 }
 
 /* Reads earlier results, and makes the reference that cases are compared with. */
@@ -242,10 +276,11 @@ static drape_status prepare(lab *l)
     if (!status && l->experiment->prepare)
         status = l->experiment->prepare(l);
     if (status && status != DRAPE_E_STOPPED && l->claimed) { /* no case will run: removes the folder */
-        char path[4200];
-        snprintf(path, sizeof path, "%s/" ABOUT, l->folder);
-        remove(path);
-        rmdir(l->folder); /* fails if there is anything else in it */
+        char message[DRAPE_MESSAGE_SIZE];
+        snprintf(message, sizeof message, "%s", drape_context_message(l->ctx));
+        drape_folder_remove(l->out, is_about, NULL);
+        drape_folder_discard(&l->out);
+        drape_context_set_message(l->ctx, "%s", message);
     }
     return status;
 }
@@ -287,7 +322,10 @@ static drape_status report(lab *l)
     snprintf(title, sizeof title, "drape %s: %s", l->experiment->entry.name, lab_text(l->about, "scene"));
     if (!status)
         status = lab_write_page(l, title);
-    fprintf(l->summary, "report    %s/report.html\n", l->folder);
+    char path[512];
+    snprintf(path, sizeof path, "%.490s/report.html", l->folder);
+    drape_make_printable(path);
+    fprintf(l->summary, "report    %s\n", path);
     return status;
 }
 
@@ -316,6 +354,7 @@ static void end(lab *l)
     for (size_t i = 0; l->results && i < l->count; i++)
         json_decref(l->results[i]);
     json_decref(l->about);
+    drape_folder_close(&l->out);
     drape_arena_free(&l->arena);
 }
 

@@ -15,8 +15,10 @@
 #include "base/arena.h"
 #include "base/registry.h"
 #include "drape/lab.h"
+
 #include "integrators/integrator.h"
 #include "io/file.h"
+#include "io/folder.h"
 #include "io/json.h"
 #include "lab/trace.h"
 
@@ -49,6 +51,7 @@ struct lab {
     drape_lab_outcome *outcome; /* the caller's */
     const lab_experiment_ops *experiment;
     char *folder;
+    drape_folder *out;  /* the same, open; NULL before its experiment is there */
     bool input_is_good; /* all input has been read and checked: a failure now is of the output folder */
     bool claimed;       /* the folder had no experiment before */
     json_t *about;      /* experiment.json; owned, and owns: */

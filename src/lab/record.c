@@ -93,18 +93,28 @@ static void take_lines(char *text, lab_record *records, size_t count)
     }
 }
 
-drape_status lab_records_open(drape_context *ctx, const char *folder, lab_record *records, size_t count,
-                              drape_file *file)
+static bool is_cases(const void *user, const char *name)
+{
+    (void)user;
+    return strcmp(name, NAME) == 0;
+}
+
+drape_status lab_records_open(drape_context *ctx, const char *path, lab_record *records, size_t count,
+                              drape_folder **folder, drape_file *file)
 {
     drape_arena arena = drape_arena_of(ctx);
-    char *text, *path = drape_arena_text(&arena, folder);
+    char *text;
     size_t size;
-    drape_status status = path ? drape_folder_make(ctx, path) : DRAPE_E_MEMORY;
-    if (!status && !lab_read_text(&arena, folder, NAME, &text, &size))
+    drape_status status = drape_folder_open(ctx, path, false, folder);
+    if (!status)
+        status = drape_folder_check(*folder, is_cases, NULL, NULL);
+    if (!status && !lab_read_text(&arena, path, NAME, &text, &size))
         take_lines(text, records, count);
     drape_arena_free(&arena);
     if (!status)
-        status = drape_export_begin(ctx, folder, NAME, file);
+        status = drape_folder_begin(*folder, NULL, NULL);
+    if (!status)
+        status = drape_export_begin(ctx, *folder, NAME, file);
     for (size_t i = 0; !status && i < count; i++)
         if (records[i].done)
             put_line(file, &records[i]);

@@ -25,9 +25,9 @@ json_t *lab_record_json(const lab_record *record);
 
 /* Takes the lines of folder/cases.jsonl that belong to these cases: of the same scene and this version of
  * Drape; they are judged again. The file is then written again with the lines taken, open for more; the
- * caller closes and destroys it. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
-drape_status lab_records_open(drape_context *ctx, const char *folder, lab_record *records, size_t count,
-                              drape_file *file);
+ * caller closes and destroys it, then closes the folder. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
+drape_status lab_records_open(drape_context *ctx, const char *path, lab_record *records, size_t count,
+                              drape_folder **folder, drape_file *file);
 
 /* Adds the line of a case that is done. Errors: DRAPE_E_FILE. */
 drape_status lab_record_keep(drape_file *file, const lab_record *record);

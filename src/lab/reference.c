@@ -119,15 +119,16 @@ static bool read_saved(lab *l, const sequence *s, level *last)
     return fits;
 }
 
-static void remove_sequences(const lab *l)
+static bool is_sequence(const void *user, const char *name)
 {
     static const char *const endings[] = {"json", "f64"};
     for (int i = 0; i < 2 * SEQUENCES; i++) {
-        char name[64], path[4200];
-        name_file(l, &sequences[i / 2], endings[i % 2], name);
-        snprintf(path, sizeof path, "%s/%s", l->folder, name);
-        remove(path);
+        char known[64];
+        name_file(user, &sequences[i / 2], endings[i % 2], known);
+        if (strcmp(name, known) == 0)
+            return true;
     }
+    return false;
 }
 
 /* ---- Runs ---- */
@@ -189,9 +190,10 @@ static drape_status choose(lab *l, const drape_model *model, level *best)
                             budget);
     else if (!status)
         status = save(l, chosen, true, best);
-    if (!status || status == DRAPE_E_SOLVER)
-        remove_sequences(l);
-    return status;
+    if (status && status != DRAPE_E_SOLVER)
+        return status;
+    drape_status removed = drape_folder_remove(l->out, is_sequence, l);
+    return status ? status : removed;
 }
 
 drape_status lab_make_reference(lab *l)

@@ -83,7 +83,7 @@ void lab_put_line(drape_file *file, const json_t *object)
 
 drape_status lab_begin_lines(lab *l, const char *name, int shard, int shards, drape_file *file)
 {
-    drape_status status = drape_export_begin(l->ctx, l->folder, name, file);
+    drape_status status = drape_export_begin(l->ctx, l->out, name, file);
     for (size_t i = 0; !status && i < l->count; i++)
         if (l->results[i] && i % (size_t)shards == (size_t)(shard - 1))
             lab_put_line(file, l->results[i]);
@@ -187,14 +187,21 @@ static void *work(void *user)
     return NULL;
 }
 
+void lab_cases_name(const lab *l, char name[64])
+{
+    if (l->def->shards > 1)
+        snprintf(name, 64, "cases-%d-of-%d.jsonl", l->def->shard, l->def->shards);
+    else
+        snprintf(name, 64, "cases.jsonl");
+}
+
 drape_status lab_sweep(lab *l)
 {
-    char name[64] = "cases.jsonl";
+    char name[64];
     pthread_t threads[256];
     int started = 0;
     sweep s = {.l = l, .start = drape_clock_seconds()};
-    if (l->def->shards > 1)
-        snprintf(name, sizeof name, "cases-%d-of-%d.jsonl", l->def->shard, l->def->shards);
+    lab_cases_name(l, name);
     pthread_mutex_init(&s.lock, NULL);
     atomic_init(&s.given_up, false);
     for (size_t i = 0; i < l->count; i++)

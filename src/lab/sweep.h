@@ -15,6 +15,9 @@ drape_status lab_read_lines(lab *l, const char *folder, int64_t *found);
 /* Adds an object as a line. */
 void lab_put_line(drape_file *file, const json_t *object);
 
+/* The name of the file of lines that this process writes. */
+void lab_cases_name(const lab *l, char name[64]);
+
 /* Begins a file of the folder with the lines of a shard's results, not yet under its name. The caller
  * destroys it in any case. */
 drape_status lab_begin_lines(lab *l, const char *name, int shard, int shards, drape_file *file);

@@ -5,11 +5,13 @@
 #include "io/export.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <spawn.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 extern char **environ;
 
@@ -18,7 +20,7 @@ extern char **environ;
 drape_status lab_write_text(lab *l, const char *name, const char *text, size_t size)
 {
     drape_file file = {0};
-    drape_status status = drape_export_begin(l->ctx, l->folder, name, &file);
+    drape_status status = drape_export_begin(l->ctx, l->out, name, &file);
     if (!status) {
         drape_file_put(&file, text, size);
         status = drape_file_finish(&file);
@@ -33,11 +35,14 @@ drape_status lab_read_text(drape_arena *arena, const char *folder, const char *n
     char path[4096];
     struct stat info = {0};
     snprintf(path, sizeof path, "%s%s%s", folder ? folder : "", folder ? "/" : "", name);
-    FILE *file = fopen(path, "r");
-    if (!file || fstat(fileno(file), &info)) {
-        const int error = errno;
+    const int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    FILE *file = fd < 0 ? NULL : fdopen(fd, "r");
+    if (!file || fstat(fd, &info) || !S_ISREG(info.st_mode)) {
+        const int error = fd < 0 ? errno : EINVAL;
         if (file)
             fclose(file);
+        else if (fd >= 0)
+            close(fd);
         return drape_file_fail(arena->ctx, "read", path, error);
     }
     *text = drape_arena_take(arena, (size_t)info.st_size + 1, 1);
@@ -79,7 +84,7 @@ drape_status lab_write_csv(lab *l)
         add_columns(columns, l->results[i]);
     }
     json_object_del(columns, "case");
-    drape_status status = tags && columns ? drape_export_begin(l->ctx, l->folder, "results.csv", &file)
+    drape_status status = tags && columns ? drape_export_begin(l->ctx, l->out, "results.csv", &file)
                                           : drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for results.csv");
     if (!status) {
         drape_file_put_text(&file, "case");
@@ -217,9 +222,9 @@ drape_status lab_write_page(lab *l, const char *title)
 
 /* ---- Pictures ---- */
 
-/* Runs a program and waits for it; returns its exit code, -1 where it did not run. Its output is
- * discarded. */
-static int run_program(char *const *arguments)
+/* Runs a program and waits for it; returns its exit code, -1 where it did not run. Its standard output goes to
+ * `to`; its messages are discarded. */
+static int run_program(char *const *arguments, int to)
 {
     posix_spawn_file_actions_t actions;
     pid_t child;
@@ -227,7 +232,7 @@ static int run_program(char *const *arguments)
     if (posix_spawn_file_actions_init(&actions))
         return -1;
     posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", 0, 0);
-    posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", 1, 0);
+    posix_spawn_file_actions_adddup2(&actions, to, 1);
     posix_spawn_file_actions_addopen(&actions, 2, "/dev/null", 1, 0);
     bool started = posix_spawnp(&child, arguments[0], &actions, NULL, arguments, environ) == 0;
     posix_spawn_file_actions_destroy(&actions);
@@ -248,24 +253,49 @@ drape_status lab_plot_begin(lab *l, lab_plot *plot, const char *name, int width,
         return drape_fail(l->ctx, DRAPE_E_MEMORY, "no memory for a picture");
     fprintf(plot->script,
             "set terminal svg size %d,%d dynamic font 'sans-serif,13' background '#ffffff' name '%s'\n"
-            "cd '%s'\nset output '%s.svg'\n",
-            width, height, name, l->folder, name);
+            "# gnuplot %s.gp > %s.svg\n",
+            width, height, name, name, name);
     return DRAPE_OK;
+}
+
+/* gnuplot writes into a file without a name, which then becomes NAME.svg: it opens nothing in the folder. */
+static drape_status draw(lab *l, const lab_plot *plot, const char *script, bool *drawn)
+{
+    char file[128], *const arguments[] = {(char[]){"gnuplot"}, (char *)script, NULL};
+    FILE *picture = tmpfile();
+    struct stat info;
+    char *text = NULL;
+    drape_status status = DRAPE_OK;
+    snprintf(file, sizeof file, "%s.svg", plot->name);
+    *drawn = picture && run_program(arguments, fileno(picture)) == 0 && fstat(fileno(picture), &info) == 0;
+    if (*drawn) {
+        const size_t size = (size_t)info.st_size;
+        text = drape_alloc(l->ctx, size, 1);
+        status = !text ? DRAPE_E_MEMORY
+                 : pread(fileno(picture), text, size, 0) != (ssize_t)size
+                     ? drape_file_fail(l->ctx, "read", file, EIO)
+                     : lab_write_text(l, file, text, size);
+        drape_free(l->ctx, text);
+    }
+    if (picture)
+        fclose(picture);
+    return status;
 }
 
 drape_status lab_plot_end(lab *l, lab_plot *plot, bool draws, const char *caption)
 {
     char file[128], path[4096];
+    bool drawn = false;
     snprintf(file, sizeof file, "%s.gp", plot->name);
     snprintf(path, sizeof path, "%s/%s", l->folder, file);
-    char *const arguments[] = {(char[]){"gnuplot"}, path, NULL};
     fclose(plot->script);
     drape_status status = draws ? lab_write_text(l, file, plot->text, plot->size) : DRAPE_OK;
     free(plot->text);
     if (status || !draws)
         return status;
-    if (run_program(arguments) == 0)
-        return put_picture(l, plot->name, caption);
-    fprintf(l->summary, "gnuplot is missing or failed on %s: this report has no pictures\n", path);
+    status = draw(l, plot, path, &drawn);
+    if (status || drawn)
+        return status ? status : put_picture(l, plot->name, caption);
+    fprintf(l->summary, "gnuplot is missing or failed on %s: this report has no pictures\n", file);
     return DRAPE_OK;
 }

@@ -70,9 +70,7 @@ static char *shown_name(drape_scene *scene, const char *name)
     while (end > name && ((unsigned char)*end & 0xC0) == 0x80)
         end++;
     snprintf(text, sizeof text, "%s%s", end > name ? "..." : "", end);
-    for (char *p = text; *p; p++)
-        if ((unsigned char)*p < ' ' || *p == 127)
-            *p = '?';
+    drape_make_printable(text);
     return drape_arena_text(&scene->kept, text);
 }
 

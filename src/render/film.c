@@ -12,10 +12,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#define PROGRAM   "ffmpeg"
-#define MAX_ARGS  48
-#define LAST_LINE 240
-#define PROTOCOL  "file:" /* so that no name is taken for an option or a URL */
+#define PROGRAM    "ffmpeg"
+#define MAX_ARGS   48
+#define CHILD_FILE 9 /* descriptor of the film in the child: above those that the spawning dup2 use */
+#define LAST_LINE  240
+#define PROTOCOL   "file:"
 
 extern char **environ;
 
@@ -37,8 +38,8 @@ static const kind kinds[] = {
 
 struct drape_film {
     drape_context *ctx;
-    drape_arena arena;
-    char *path, *part; /* the film's name, and "file:" with the name that it has until it is complete */
+    drape_file file; /* the film: ffmpeg opens it again, by its descriptor */
+    char output[40];
     pid_t child;
     int pipe, errors; /* to ffmpeg; a file without a name for its output */
     size_t bytes;     /* of a picture */
@@ -105,6 +106,8 @@ static drape_status spawn(drape_film *film, char **args, int reading)
     if (!error)
         error = posix_spawn_file_actions_adddup2(&actions, film->errors, STDERR_FILENO);
     if (!error)
+        error = posix_spawn_file_actions_adddup2(&actions, film->file.fd, CHILD_FILE);
+    if (!error)
         error = posix_spawnp(&film->child, PROGRAM, &actions, NULL, args, environ);
     posix_spawn_file_actions_destroy(&actions);
     if (!error)
@@ -121,8 +124,9 @@ static drape_status start(drape_film *film, int width, int height, double rate)
         input, sizeof input,
         "-hide_banner -loglevel error -nostdin -y -f rawvideo -pix_fmt rgba -s %dx%d -r %.10g -i pipe:0 -an",
         width, height, rate);
-    snprintf(output, sizeof output, "%s", kind_of(film->path)->args);
-    args[add_args(output, args, add_args(input, args, 1))] = film->part;
+    snprintf(output, sizeof output, "%s", kind_of(film->file.path)->args);
+    snprintf(film->output, sizeof film->output, PROTOCOL "/proc/self/fd/%d", CHILD_FILE);
+    args[add_args(output, args, add_args(input, args, 1))] = film->output;
     FILE *file = tmpfile();
     film->errors = file ? fcntl(fileno(file), F_DUPFD_CLOEXEC, 3) : -1;
     if (file)
@@ -140,22 +144,17 @@ static drape_status start(drape_film *film, int width, int height, double rate)
 drape_status drape_film_begin(drape_context *ctx, const char *path, int width, int height, double rate,
                               drape_film **out)
 {
-    size_t size = strlen(path) + sizeof PROTOCOL ".part";
     drape_film *film = *out = drape_alloc(ctx, 1, sizeof *film);
     if (!film)
         return DRAPE_E_MEMORY;
-    *film = (drape_film){.ctx = ctx,
-                         .arena = drape_arena_of(ctx),
-                         .pipe = -1,
-                         .errors = -1,
-                         .bytes = 4 * (size_t)width * (size_t)height};
-    film->path = drape_arena_text(&film->arena, path);
-    film->part = drape_arena_take(&film->arena, size, 1);
-    drape_status status = drape_arena_status(&film->arena);
+    *film = (drape_film){.ctx = ctx, .pipe = -1, .errors = -1, .bytes = 4 * (size_t)width * (size_t)height};
+    drape_status status = drape_file_create(ctx, strlen(path), &film->file);
     if (!status) {
-        snprintf(film->part, size, PROTOCOL "%s.part", path);
-        status = start(film, width, height, rate);
+        drape_file_name(&film->file, "%s", path);
+        status = drape_file_begin(&film->file);
     }
+    if (!status)
+        status = start(film, width, height, rate);
     if (status)
         drape_film_abandon(out);
     return status;
@@ -198,16 +197,11 @@ drape_status drape_film_add(drape_film *film, const uint8_t *pixels)
         if (wrote < 0 && errno != EINTR) {
             char text[LAST_LINE + 40];
             last_line(film, wait_for(film), text, sizeof text);
-            return drape_fail(film->ctx, DRAPE_E_FILE, "%s: " PROGRAM " gave up: %s", film->path, text);
+            return drape_fail(film->ctx, DRAPE_E_FILE, "%s: " PROGRAM " gave up: %s", film->file.path, text);
         }
         done += wrote > 0 ? (size_t)wrote : 0;
     }
     return DRAPE_OK;
-}
-
-static const char *part_of(const drape_film *film)
-{
-    return film->part + strlen(PROTOCOL);
 }
 
 static void release(drape_film **out)
@@ -215,7 +209,7 @@ static void release(drape_film **out)
     drape_film *film = *out;
     if (film->errors >= 0)
         close(film->errors);
-    drape_arena_free(&film->arena);
+    drape_file_destroy(&film->file);
     drape_free(film->ctx, film);
     *out = NULL;
 }
@@ -228,13 +222,10 @@ drape_status drape_film_end(drape_film **out)
     drape_status status = DRAPE_OK;
     if (!WIFEXITED(result) || WEXITSTATUS(result) != 0) {
         last_line(film, result, text, sizeof text);
-        status = drape_fail(film->ctx, DRAPE_E_FILE, "%s: " PROGRAM " failed: %s", film->path, text);
-    } else if (rename(part_of(film), film->path) != 0) {
-        status = drape_fail(film->ctx, DRAPE_E_FILE, "cannot name the film \"%s\": %s", film->path,
-                            strerror(errno));
+        status = drape_fail(film->ctx, DRAPE_E_FILE, "%s: " PROGRAM " failed: %s", film->file.path, text);
+    } else {
+        status = drape_file_finish(&film->file);
     }
-    if (status)
-        remove(part_of(film));
     release(out);
     return status;
 }
@@ -246,7 +237,5 @@ void drape_film_abandon(drape_film **out)
     if ((*out)->child > 0)
         kill((*out)->child, SIGTERM);
     wait_for(*out);
-    if ((*out)->part)
-        remove(part_of(*out));
     release(out);
 }

@@ -3,7 +3,7 @@
 #ifndef DRAPE_RENDER_FILM_H
 #define DRAPE_RENDER_FILM_H
 
-#include "base/arena.h"
+#include "io/file.h"
 
 typedef struct drape_film drape_film;
 

@@ -19,8 +19,8 @@
 
 /* ---- Files ---- */
 
-drape_status drape_png_write(drape_context *ctx, const char *path, const uint8_t *pixels, int width,
-                             int height, bool small)
+drape_status drape_png_write(drape_context *ctx, drape_folder *folder, const char *path,
+                             const uint8_t *pixels, int width, int height, bool small)
 {
     png_image image = {.version = PNG_IMAGE_VERSION,
                        .width = (png_uint_32)width,
@@ -38,7 +38,8 @@ drape_status drape_png_write(drape_context *ctx, const char *path, const uint8_t
     if (!status && !png_image_write_to_memory(&image, data, &size, 0, rgb, 0, NULL))
         status = drape_fail(ctx, DRAPE_E_FILE, "cannot write \"%s\": %s", path, image.message);
     if (!status)
-        status = drape_file_create(ctx, strlen(path), &file);
+        status =
+            folder ? drape_file_create_in(ctx, folder, &file) : drape_file_create(ctx, strlen(path), &file);
     if (!status) {
         drape_file_name(&file, "%s", path);
         status = drape_file_begin(&file);

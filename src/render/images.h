@@ -2,12 +2,14 @@
 #ifndef DRAPE_RENDER_IMAGES_H
 #define DRAPE_RENDER_IMAGES_H
 
+#include "io/folder.h"
 #include "render/gl.h"
 
-/* Writes pixels (width x height x 4, top row first) to a PNG, completely or not at all. small: compresses as
+/* Writes pixels (width x height x 4, top row first) to a PNG, completely or not at all: into a folder, or with
+ * folder NULL to a path that the user named. small: compresses as
  * well as zlib can instead of fast. Errors: DRAPE_E_FILE, DRAPE_E_MEMORY. */
-drape_status drape_png_write(drape_context *ctx, const char *path, const uint8_t *pixels, int width,
-                             int height, bool small);
+drape_status drape_png_write(drape_context *ctx, drape_folder *folder, const char *path,
+                             const uint8_t *pixels, int width, int height, bool small);
 
 /* Reads a PNG of any kind as RGBA; *pixels is freed with drape_free. Errors: DRAPE_E_FILE (also if the file
  * is not a PNG), DRAPE_E_MEMORY. */

@@ -5,6 +5,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "io/energy.h"
+#include "io/steps.h"
+#include "io/summary.h"
 #include "report/data.h"
 #include "report/page.h"
 
@@ -38,23 +41,59 @@ static drape_status put_page(const drape_report_data *data, drape_file *file)
     return status;
 }
 
+static bool is_page(const void *user, const char *name)
+{
+    (void)user;
+    return strcmp(name, DEFAULT_NAME) == 0;
+}
+
+/* A page that was not named goes into the folder of the run. One that was must not be a file of the run. */
+static drape_status create_file(const drape_report_source *run, const drape_report_def *def,
+                                drape_folder **folder, drape_file *file)
+{
+    static const char *const inputs[] = {"scene.json", "positions.npy", DRAPE_ENERGY_NAME, DRAPE_STEPS_NAME,
+                                         DRAPE_SUMMARY_NAME};
+    drape_status status = DRAPE_OK;
+    if (def->out) {
+        for (size_t i = 0; i < sizeof inputs / sizeof *inputs && !status; i++) {
+            char path[4096];
+            snprintf(path, sizeof path, "%s/%s", def->run, inputs[i]);
+            status = drape_file_check_named(run->ctx, def->out, path);
+        }
+        if (!status)
+            status = drape_file_create(run->ctx, strlen(def->out), file);
+        if (!status)
+            drape_file_name(file, "%s", def->out);
+        return status;
+    }
+    status = drape_folder_open(run->ctx, def->run, false, folder);
+    if (!status)
+        status = drape_folder_check(*folder, is_page, NULL, NULL);
+    if (!status)
+        status = drape_folder_begin(*folder, NULL, NULL);
+    if (!status)
+        status = drape_file_create_in(run->ctx, *folder, file);
+    if (!status)
+        drape_file_name(file, DEFAULT_NAME);
+    return status;
+}
+
 /* Reads all of the run before the file is created. */
 static drape_status write_page(const drape_report_source *run, const drape_report_def *def,
                                drape_report_result *result, bool *input)
 {
+    drape_folder *folder = NULL;
     drape_report_data data;
     drape_file file = {0};
     drape_status status = drape_report_data_make(run, def->max_bytes, &data);
     result->frames = run->record.frames;
     result->kept = data.kept;
     if (!status) {
-        *input = false;
-        status = drape_file_create(run->ctx, strlen(result->path), &file);
+        status = create_file(run, def, &folder, &file);
+        *input = status == DRAPE_E_ARGUMENT;
     }
-    if (!status) {
-        drape_file_name(&file, "%s", result->path);
+    if (!status)
         status = drape_file_begin(&file);
-    }
     if (!status) {
         status = put_page(&data, &file);
         *input = status == DRAPE_E_PARSE || status == DRAPE_E_FILE;
@@ -63,6 +102,7 @@ static drape_status write_page(const drape_report_source *run, const drape_repor
         status = drape_file_finish(&file);
     result->bytes = (int64_t)file.size;
     drape_file_destroy(&file);
+    drape_folder_close(&folder);
     drape_arena_free(&data.arena);
     return status;
 }

@@ -14,7 +14,7 @@
 static drape_status read_text(drape_context *ctx, const char *path, char **out)
 {
     struct stat info;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0 || fstat(fd, &info) || !S_ISREG(info.st_mode) || info.st_size > SCENE_LIMIT) {
         int error = fd < 0 ? errno : EFBIG;
         if (fd >= 0)

@@ -378,10 +378,10 @@ def test_full():
 
 def test_old_summary():
     """a new run removes the summary of an earlier one when it starts"""
+    write_scene()
+    good("run", "scene.json", "--out", "out")
+    assert os.path.exists("out/summary.json")
     write_scene(duration=1e5)
-    os.mkdir("out")
-    with open("out/summary.json", "w", encoding="ascii") as file:
-        file.write("old")
     code, _, _ = interrupt([signal.SIGKILL])
     equal(code, -signal.SIGKILL)
     assert not os.path.exists("out/summary.json")

@@ -848,7 +848,7 @@ START_TEST(every_attempt_is_one_row_one_call_and_one_reason)
         ck_assert_int_eq(drape_recorder_create(s.ctx, s.sim, &def, &recorder), DRAPE_OK);
         scene_advance(&s, 1);
         ck_assert_int_eq(drape_recorder_finish(recorder), DRAPE_OK);
-        ck_assert_int_eq(drape_summary_write(s.ctx, s.sim, &(drape_summary_def){.status = DRAPE_OK},
+        ck_assert_int_eq(drape_summary_write(s.ctx, s.sim, &(drape_summary_def){.status = DRAPE_OK}, NULL,
                                              file_in(folder, "summary.json")),
                          DRAPE_OK);
         ck_assert_int_gt(r->rejected, 0);

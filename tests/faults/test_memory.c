@@ -138,7 +138,7 @@ static drape_status run(drape_context *ctx, const drape_model *model, const char
     if (!status) {
         ck_assert_int_ge(drape_recorder_frames(recorder), 5);
         ck_assert_int_eq(drape_sim_statistics(sim).steps_accepted, 3);
-        status = drape_summary_write(ctx, sim, &(drape_summary_def){.frames = 5}, summary_path);
+        status = drape_summary_write(ctx, sim, &(drape_summary_def){.frames = 5}, NULL, summary_path);
     }
     drape_recorder_destroy(&recorder);
     drape_sim_destroy(&sim);
