@@ -28,6 +28,7 @@
  * without x_start).
  */
 #include "nonlinear/newton.h"
+#include "base/elementary.h"
 
 #include "base/finite.h"
 #include "base/reason.h"
@@ -297,7 +298,8 @@ static drape_status add_chords(drape_newton *s, const double *d, double *p, cons
     drape_step_equation *e = s->equation;
     double bound = max_norm_bound(s), before = largest(e->f, e->dofs),
            rate = before / largest(minus_f, e->dofs);
-    for (int left = MAX_CHORDS; left > 0 && before > bound && before * pow(rate, left) <= bound; left--) {
+    for (int left = MAX_CHORDS; left > 0 && before > bound && before * drape_pow(rate, left) <= bound;
+         left--) {
         for (size_t i = 0; i < e->dofs; i++)
             s->chord_minus_f[i] = -e->f[i];
         drape_status status = drape_sun_linear_solve(s->linear, s->chord_minus_f, s->chord);
