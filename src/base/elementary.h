@@ -1,8 +1,8 @@
 /*
  * elementary.h: elementary functions with the same bits on every machine with IEEE doubles. The C library
  * chooses its own by the processor and changes them from version to version, so code whose results reach a
- * state calls these. They use additions, products, quotients and square roots only, which IEEE 754 rounds
- * in one way, in a fixed order; the compiler must not contract a product and a sum into one operation
+ * state calls these. They use additions, products, quotients and square roots only, whose rounding IEEE 754
+ * defines, in a fixed order; the compiler must not contract a product and a sum into one operation
  * (-ffp-contract=off in meson.build).
  *
  * Every function is faithful: its error is below one unit in the last place. tests/unit/test_elementary.c

@@ -1,12 +1,12 @@
 /*
  * lanes_atan2.h: atan2 of four lanes, with the bits of drape_atan2 in each.
  *
- * With q = min(|y|, |x|) / max(|y|, |x|), atan q = atan t for t = q up to tan(pi/8), and pi/4 + atan t for t =
- * (q - 1)/(q + 1) above; symmetries give the other octants, so that the result is k pi/4 +- atan t. The error
- * of the quotient t is computed from its remainder, which is exact (Dekker 1971, A floating-point technique
- * for extending the available precision; Muller et al. 2018, Handbook of Floating-Point Arithmetic, 4.4 and
- * 11.5). atan t = t + t^3 A(t^2), where A interpolates the function at the Chebyshev nodes; its error is 2^-58
- * of t.
+ * With q = min(|y|, |x|) / max(|y|, |x|), atan q = atan t for t = q up to tan(pi/8), and pi/4 + atan t for
+ * t = (q - 1)/(q + 1) above; symmetries give the other octants, so that the result is k pi/4 +- atan t. The
+ * error of the quotient t is computed from its remainder, which is exact (Dekker 1971, A floating-point
+ * technique for extending the available precision; Muller et al. 2018, Handbook of Floating-Point Arithmetic,
+ * ch. 4). atan t = t + t^3 A(t^2), where A interpolates the function at 12 Chebyshev nodes; its error is
+ * below 2^-58 of t.
  */
 #ifndef DRAPE_BASE_LANES_ATAN2_H
 #define DRAPE_BASE_LANES_ATAN2_H
