@@ -54,7 +54,7 @@ def item(term, text, more=""):
 
 def page(name, section, brief, *parts):
     """parts: (heading, roff)."""
-    title = f'.TH {name.upper()} {section} "{DATE}" "{output_of("--version").strip()}"'
+    title = f'.TH {name.upper()} {section} "{DATE}" "{output_of("--version").splitlines()[0]}"'
     body = "".join(f".SH {heading}\n{text}\n" for heading, text in parts if text)
     return f"{title}\n.SH NAME\n{plain(name)} \\- {plain(brief)}\n{body}"
 

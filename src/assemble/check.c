@@ -15,6 +15,7 @@
  */
 #include "assemble/check.h"
 
+#include "base/elementary.h"
 #include "colliders/colliders.h"
 
 #include <math.h>
@@ -90,7 +91,9 @@ static double ratio(double difference, double scale)
 /* Rotation by 0.7 rad about (1, 2, 3)/sqrt(14), Rodrigues' formula. */
 static void rotate(const double a[3], double out[3])
 {
-    const double k[3] = {1 / sqrt(14.0), 2 / sqrt(14.0), 3 / sqrt(14.0)}, cosine = cos(0.7), sine = sin(0.7);
+    const double k[3] = {1 / sqrt(14.0), 2 / sqrt(14.0), 3 / sqrt(14.0)};
+    double sine, cosine;
+    drape_sin_cos(0.7, &sine, &cosine);
     double along = k[0] * a[0] + k[1] * a[1] + k[2] * a[2];
     const double cross[3] = {k[1] * a[2] - k[2] * a[1], k[2] * a[0] - k[0] * a[2], k[0] * a[1] - k[1] * a[0]};
     for (int i = 0; i < 3; i++)

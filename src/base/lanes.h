@@ -10,6 +10,7 @@
 #define DRAPE_BASE_LANES_H
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
 

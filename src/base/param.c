@@ -1,5 +1,6 @@
 /* param.c: see param.h. */
 #include "base/param.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -231,7 +232,8 @@ static drape_status turn_value(drape_context *ctx, const char *pointer, const dr
                                const drape_setting *setting, double *value)
 {
     const double *v = setting->vector;
-    double axis = hypot(hypot(v[0], v[1]), v[2]), angle = setting->vector_count == 4 ? v[3] : axis;
+    double axis = drape_hypot(drape_hypot(v[0], v[1]), v[2]),
+           angle = setting->vector_count == 4 ? v[3] : axis;
     if (setting->vector_count == 3 && !isfinite(axis * axis)) /* later code takes the square */
         return drape_fail_at(ctx, DRAPE_E_ARGUMENT, pointer, "the rotation vector is too long");
     if (!in_range(param, angle) || !isfinite(axis))

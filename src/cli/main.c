@@ -2,6 +2,7 @@
  * was written. */
 #include "cli/cli.h"
 #include "cli/signals.h"
+#include "sim/reproducible.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -51,9 +52,9 @@ static void print_overview(void)
         cli_operand_text(drape_verbs[i], operand, sizeof operand);
         printf("  %-10s %-15s %s\n", drape_verbs[i]->entry.name, operand, drape_verbs[i]->entry.summary);
     }
-    puts("\n  drape VERB --help   show the arguments of a verb\n  drape --version     show the "
-         "version\n\nExit codes: 0 done, 1 the simulation, a check or the output failed, 2 bad input, 130 "
-         "interrupted.");
+    puts("\n  drape VERB --help   show the arguments of a verb\n"
+         "  drape --version     show the version, and whether results have the same bits on any processor\n\n"
+         "Exit codes: 0 done, 1 the simulation, a check or the output failed, 2 bad input, 130 interrupted.");
 }
 
 /* `drape help`, `drape help VERB` */
@@ -72,7 +73,9 @@ static int help(int argc, char **argv)
 static int version(int argc, char **argv)
 {
     (void)argc, (void)argv;
-    printf("drape %s\n", drape_version());
+    char why[320];
+    const bool reproducible = drape_reproducible(why, sizeof why);
+    printf("drape %s\nreproducible: %s%s\n", drape_version(), reproducible ? "yes" : "no: ", why);
     return CLI_DONE;
 }
 

@@ -2,6 +2,7 @@
  * and from the middle, q = (rho - (radius - rounding), |z| - (half length - rounding)) and
  * d = |max(q, 0)| + min(max(q_0, q_1), 0) - rounding: exact inside and outside. The Hessian of f(rho, z) is
  * f_rr e e + f_rz (e u + u e) + f_zz u u + f_r / rho (I - e e - u u), u along the axis, e away from it. */
+#include "base/elementary.h"
 #include "colliders/colliders.h"
 
 #include "geometry/round.h"
@@ -52,7 +53,8 @@ static drape_status keep_axis(const double *values, drape_collider_shape *shape)
 static int32_t sides_of(double radius, double tolerance)
 {
     const double pi = 3.14159265358979323846;
-    double cosine = 1 - tolerance / radius, sides = cosine > 0 ? ceil(pi / acos(cosine)) : MIN_SIDES;
+    const double sag = tolerance / radius, cosine = 1 - sag;
+    const double sides = cosine > 0 ? ceil(pi / drape_atan2(sqrt(sag * (2 - sag)), cosine)) : MIN_SIDES;
     return (int32_t)fmin(fmax(sides, MIN_SIDES), MAX_SIDES); /* infinite for a tolerance of 0 */
 }
 
@@ -65,15 +67,16 @@ static void fill_prism(const axis *c, double radius, int32_t sides, drape_collid
     round_across(c->u, e);
     vec3_cross(c->u, e, f);
     for (int32_t s = 0; s < sides; s++) {
-        double angle = turn * s / sides;
+        double sine, cosine;
+        drape_sin_cos(turn * s / sides, &sine, &cosine);
         int32_t next = (s + 1) % sides;
         for (int32_t end = 0; end < 2; end++) {
             double *point = shape->point + 3 * (2 * s + end);
             for (int k = 0; k < 3; k++)
                 point[k] = c->middle[k];
             vec3_add_scaled(end ? c->half : -c->half, c->u, point);
-            vec3_add_scaled(radius * cos(angle), e, point);
-            vec3_add_scaled(radius * sin(angle), f, point);
+            vec3_add_scaled(radius * cosine, e, point);
+            vec3_add_scaled(radius * sine, f, point);
             *segment++ = 2 * s + end;
             *segment++ = 2 * next + end;
         }
@@ -107,7 +110,7 @@ static profile profile_of(double rho, double z, double radius, double half)
     double q[2] = {rho - radius, fabs(z) - half}, sign = z < 0 ? -1 : 1;
     profile p = {0};
     if (q[0] > 0 && q[1] > 0) {
-        p.f = hypot(q[0], q[1]);
+        p.f = drape_hypot(q[0], q[1]);
         p.f_r = q[0] / p.f;
         p.f_z = sign * q[1] / p.f;
         p.f_rr = p.f_z * p.f_z / p.f;

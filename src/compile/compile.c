@@ -162,7 +162,9 @@ static double bounding_diagonal(const double *x, int32_t node_count)
         low[i % 3] = fmin(low[i % 3], x[i]);
         high[i % 3] = fmax(high[i % 3], x[i]);
     }
-    return sqrt(pow(high[0] - low[0], 2) + pow(high[1] - low[1], 2) + pow(high[2] - low[2], 2));
+    for (int k = 0; k < 3; k++)
+        high[k] -= low[k];
+    return sqrt(high[0] * high[0] + high[1] * high[1] + high[2] * high[2]);
 }
 
 /* Concatenates the arrays of all cloths. */

@@ -1,5 +1,6 @@
 /* contact.c: the parameters of contact, from the scene's "contact" and "self_contact", with defaults derived
  * from the scales of the scene. */
+#include "base/elementary.h"
 #include "compile/stages.h"
 
 #include <math.h>
@@ -54,7 +55,7 @@ static double largest_thickness(const drape_model *model)
 
 static double norm(const double *a)
 {
-    return hypot(hypot(a[0], a[1]), a[2]);
+    return drape_hypot(drape_hypot(a[0], a[1]), a[2]);
 }
 
 static double track_speed(const drape_track *track)

@@ -144,8 +144,8 @@ static drape_material resolve(const double *values, const drape_woven *bending, 
                         .thickness = values[THICKNESS],
                         .areal_density = mass / area};
     m.membrane_stiffness = m.young_modulus * m.thickness;
-    m.flexural_rigidity =
-        m.young_modulus * pow(m.thickness, 3) / (12 * (1 - m.poisson_ratio * m.poisson_ratio));
+    m.flexural_rigidity = m.young_modulus * m.thickness * m.thickness * m.thickness /
+                          (12 * (1 - m.poisson_ratio * m.poisson_ratio));
     return m;
 }
 

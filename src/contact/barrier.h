@@ -10,7 +10,7 @@
 #ifndef DRAPE_CONTACT_BARRIER_H
 #define DRAPE_CONTACT_BARRIER_H
 
-#include <math.h>
+#include "base/elementary.h"
 
 #define DRAPE_BARRIER_LOW 0.1
 
@@ -20,7 +20,7 @@ typedef struct drape_barrier {
 
 static inline drape_barrier drape_barrier_log(double s)
 {
-    double log_s = log(s), u = s - 1;
+    double log_s = drape_ln(s), u = s - 1;
     return (drape_barrier){.b = -u * u * log_s,
                            .db = -2 * u * log_s - u * u / s,
                            .ddb = -2 * log_s - 4 * u / s + u * u / (s * s)};

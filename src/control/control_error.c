@@ -12,6 +12,7 @@
  * last one by a PI rule (Gustafsson 1991; Hairer & Wanner 1996, IV.2):
  *     h_next = h safety e^(-0.7/(p+1)) e_before^(0.4/(p+1)).
  */
+#include "base/elementary.h"
 #include "base/reason.h"
 #include "control/halve.h"
 #include "integrators/tolerance.h"
@@ -127,7 +128,8 @@ static double bounded(double factor)
 static drape_verdict reject(const double *values, drape_trial *trial, double error, int32_t node)
 {
     double factor =
-        isnan(error) ? 0.5 : fmin(0.9, bounded(values[PARAM_SAFETY] * pow(error, -1.0 / (trial->order + 1))));
+        isnan(error) ? 0.5
+                     : fmin(0.9, bounded(values[PARAM_SAFETY] * drape_pow(error, -1.0 / (trial->order + 1))));
     trial->status = DRAPE_RETRY_REJECTED;
     trial->info->reason = drape_reason_name(DRAPE_REASON_ERROR_TEST);
     trial->info->diagnostic =
@@ -156,8 +158,8 @@ static drape_verdict judge(const double *values, drape_trial *trial)
         return reject(values, trial, error, node);
     double e = fmax(error, MIN_ERROR), before = last > 0 ? last : e, p = trial->order + 1;
     trial->scratch[SCRATCH_LAST_ERROR] = e;
-    trial->h_next =
-        trial->h * bounded(values[PARAM_SAFETY] * pow(e, -INTEGRAL / p) * pow(before, PROPORTIONAL / p));
+    trial->h_next = trial->h * bounded(values[PARAM_SAFETY] * drape_pow(e, -INTEGRAL / p) *
+                                       drape_pow(before, PROPORTIONAL / p));
     trial->h_next = fmax(values[PARAM_DT_MIN], trial->h_next);
     if (trial->h_next > values[PARAM_DT_MAX])
         trial->h_next = values[PARAM_DT_MAX];

@@ -9,6 +9,7 @@
  * weighted pseudonormal", theorem 1). This holds for every closed mesh without self-intersections.
  */
 #include "geometry/mesh_distance.h"
+#include "base/elementary.h"
 
 #include "geometry/bvh.h"
 #include "geometry/round.h"
@@ -34,7 +35,7 @@ static double angle_between(const double *a, const double *b)
 {
     double cross[3];
     vec3_cross(a, b, cross);
-    return atan2(vec3_norm(cross), vec3_dot(a, b));
+    return drape_atan2(vec3_norm(cross), vec3_dot(a, b));
 }
 
 static void add_normals(const drape_collider_shape *s, int32_t t, drape_mesh_distance *mesh)

@@ -1,5 +1,6 @@
 /* ida_newton.c: see ida_newton.h. */
 #include "integrators/ida_newton.h"
+#include "base/elementary.h"
 
 #include <ida/ida.h>
 #include <math.h>
@@ -27,7 +28,7 @@ static int converged(SUNNonlinearSolver solver, N_Vector y, N_Vector correction,
         if (norm <= ROUNDING * max)
             return 0;
     } else {
-        double rate = pow(norm / newton->first, 1.0 / done);
+        double rate = drape_pow(norm / newton->first, 1.0 / done);
         if (!(rate <= SLOWEST))
             return SUN_NLS_CONV_RECVR;
         newton->left = rate / (1 - rate);

@@ -10,6 +10,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "base/elementary.h"
 #include "mesh/grid.h"
 
 enum { CIRCLES, SPOKES, INNER, OUTER, PARAM_COUNT };
@@ -30,9 +31,11 @@ static void place_nodes(const double *values, drape_mesh *mesh)
     for (int32_t r = 0; r < mesh->rows; r++)
         for (int32_t c = 0; c < mesh->columns; c++, x += 3) {
             const double angle = two_pi * (c + (r % 2 ? 0.5 : 0)) / mesh->columns, radius = inner + r * step;
-            x[0] = radius * cos(angle);
+            double sine, cosine;
+            drape_sin_cos(angle, &sine, &cosine);
+            x[0] = radius * cosine;
             x[1] = 0;
-            x[2] = -radius * sin(angle);
+            x[2] = -radius * sine;
         }
 }
 

@@ -6,6 +6,7 @@
  */
 #include <math.h>
 
+#include "base/elementary.h"
 #include "mesh/grid.h"
 
 enum { JITTER = GRID_RECTANGLE_COUNT, SEED, ORIENTATION, PARAM_COUNT };
@@ -37,7 +38,7 @@ static void place_nodes(const double *values, bool vertical, drape_mesh *mesh)
 static double distance(const drape_mesh *mesh, int32_t a, int32_t b)
 {
     const double *p = mesh->x + 3 * (size_t)a, *q = mesh->x + 3 * (size_t)b;
-    return hypot(hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
+    return drape_hypot(drape_hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
 }
 
 /* Triangles are counterclockwise as seen from +y or +z. */

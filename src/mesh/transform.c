@@ -1,5 +1,6 @@
 /* transform.c: transforms a mesh: x' = R (s x) + t, with componentwise scale s, rotation R by an angle about
  * an axis, and translation t. */
+#include "base/elementary.h"
 #include "mesh/mesh.h"
 
 #include <math.h>
@@ -47,7 +48,8 @@ static void sine_and_cosine(double degrees, double *sine, double *cosine)
     const double pi = 3.14159265358979323846;
     const double turn = fmod(degrees, 360), quarters = round(turn / 90);
     const double rest = (turn - 90 * quarters) * (pi / 180);
-    const double s = sin(rest), c = cos(rest);
+    double s, c;
+    drape_sin_cos(rest, &s, &c);
     switch (((int)quarters + 4) % 4) {
     case 0:
         *sine = s, *cosine = c;

@@ -5,6 +5,7 @@
  */
 #include <math.h>
 
+#include "base/elementary.h"
 #include "base/vec3.h"
 #include "model/model.h"
 
@@ -28,7 +29,7 @@ static void strain_of(const double *rest, const double *x, const int32_t *node, 
         f[1][k] = (v[k] - p * f[0][k]) / h;
     }
     double c00 = vec3_dot(f[0], f[0]), c01 = vec3_dot(f[0], f[1]), c11 = vec3_dot(f[1], f[1]);
-    double mean = 0.5 * (c00 + c11), spread = hypot(0.5 * (c00 - c11), c01);
+    double mean = 0.5 * (c00 + c11), spread = drape_hypot(0.5 * (c00 - c11), c01);
     strain[0] = sqrt(mean + spread) - 1;
     strain[1] = sqrt(fmax(0, mean - spread)) - 1;
 }

@@ -28,6 +28,7 @@
  * without x_start).
  */
 #include "nonlinear/newton.h"
+#include "base/elementary.h"
 
 #include "base/finite.h"
 #include "base/reason.h"
@@ -47,6 +48,9 @@
 /* Largest correction, in sizes of the scene, for each node: KINSOL's own limit is 1 for the guess d = 0 */
 #define MAX_NEWTON_STEP 1e3
 #define MAX_BETA_FAIL   1000 /* failures of KINSOL's curvature condition: in effect unlimited */
+/* Ratio of two successive residuals above which modified Newton makes a new Jacobian: the largest of those
+ * that KINSOL would compute itself, by exp of the C library, whose bits depend on the processor */
+#define MAX_RESIDUAL_RATIO 0.9
 
 #define WORK_FRACTION  0.5  /* a is accepted where |F(d + a p) . p| is at most this fraction of its start */
 #define MAX_TRIALS     8    /* trial points of the line search */
@@ -297,7 +301,8 @@ static drape_status add_chords(drape_newton *s, const double *d, double *p, cons
     drape_step_equation *e = s->equation;
     double bound = max_norm_bound(s), before = largest(e->f, e->dofs),
            rate = before / largest(minus_f, e->dofs);
-    for (int left = MAX_CHORDS; left > 0 && before > bound && before * pow(rate, left) <= bound; left--) {
+    for (int left = MAX_CHORDS; left > 0 && before > bound && before * drape_pow(rate, left) <= bound;
+         left--) {
         for (size_t i = 0; i < e->dofs; i++)
             s->chord_minus_f[i] = -e->f[i];
         drape_status status = drape_sun_linear_solve(s->linear, s->chord_minus_f, s->chord);
@@ -480,7 +485,8 @@ static bool configure(drape_newton *s)
            !KINSetMaxNewtonStep(s->kin, MAX_NEWTON_STEP * length * sqrt(n)) &&
            !KINSetNumMaxIters(s->kin, (long)s->values[DRAPE_NEWTON_MAX_ITERATIONS]) &&
            !KINSetMaxSetupCalls(s->kin, exact ? SETUPS_EXACT : SETUPS_MODIFIED) &&
-           !KINSetNoResMon(s->kin, exact) && !KINSetMaxBetaFails(s->kin, MAX_BETA_FAIL);
+           !KINSetNoResMon(s->kin, exact) && !KINSetResMonConstValue(s->kin, MAX_RESIDUAL_RATIO) &&
+           !KINSetMaxBetaFails(s->kin, MAX_BETA_FAIL);
 }
 
 static drape_status create_search(drape_arena *arena, drape_newton *s)

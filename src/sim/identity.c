@@ -3,12 +3,14 @@
  * numbers after compile, however their scenes were written: names, comments, files, frame formats and the
  * run's duration do not count. A member of drape_model that results depend on must be hashed here, itself or
  * by what is computed from it; tests/entries/test_identity.c tries every key of a scene. Two builds are the
- * same if they have the same solvers, on which the bits depend.
+ * same if they have the same solvers and compiler, and compute the same bits (sim/reproducible.h).
  */
 #include "base/hash.h"
+#include "sim/reproducible.h"
 #include "sim/sim.h"
 #include "solvers/linear.h"
 #include "solvers/sundials_compat.h"
+#include "solvers/sundials_power.h"
 
 #include <inttypes.h>
 #include <klu.h>
@@ -136,19 +138,27 @@ static uint64_t choices_hash(const drape_sim *sim)
 
 /* ---- The build ---- */
 
-void drape_sim_describe_build(char *text, size_t size)
+void drape_sim_describe_libraries(char *text, size_t size)
 {
-    size_t used = (size_t)snprintf(text, size, "Drape %s, compiler %s, SUNDIALS %s, KLU %d.%d.%d%s, solvers",
-                                   drape_version(), __VERSION__, SUNDIALS_VERSION, KLU_MAIN_VERSION,
+    size_t used = (size_t)snprintf(text, size, "SUNDIALS %s%s, KLU %d.%d.%d%s, solvers", SUNDIALS_VERSION,
+                                   drape_sundials_power_is_ours() ? "" : " shared", KLU_MAIN_VERSION,
                                    KLU_SUB_VERSION, KLU_SUBSUB_VERSION, METIS);
     for (int i = 0; drape_linears_names[i] && used < size; i++)
         used += (size_t)snprintf(text + used, size - used, " %s", drape_linears_names[i]);
 }
 
+static void describe_build(char *text, size_t size)
+{
+    char libraries[BUILD_ROOM / 2];
+    drape_sim_describe_libraries(libraries, sizeof libraries);
+    snprintf(text, size, "Drape %s, arithmetic %016" PRIx64 ", compiler %s, %s", drape_version(),
+             drape_arithmetic_hash(), __VERSION__, libraries);
+}
+
 static void archive_build(drape_archive *a)
 {
     char here[BUILD_ROOM], there[BUILD_ROOM];
-    drape_sim_describe_build(here, sizeof here);
+    describe_build(here, sizeof here);
     memcpy(there, here, sizeof there);
     drape_archive_text(a, there, sizeof there);
     if (drape_archive_good(a) && strcmp(there, here) != 0)

@@ -2,6 +2,7 @@
  * place.c: a user-defined state. It is built in the state that the next attempt would overwrite, so that a
  * refused one changes nothing; the history that led to the present state is discarded.
  */
+#include "base/elementary.h"
 #include "base/finite.h"
 #include "sim/sim.h"
 
@@ -74,7 +75,7 @@ static drape_status check_pinned(const drape_sim *sim, const double *given, cons
         const double *x = given + 3 * (size_t)i, *pin = state->x + 3 * (size_t)i;
         const drape_cloth *cloth = &m->cloths[drape_model_cloth_of(m, i)];
         if (m->pinned[i] &&
-            !(hypot(hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <= PIN_SLIP * m->length))
+            !(drape_hypot(drape_hypot(x[0] - pin[0], x[1] - pin[1]), x[2] - pin[2]) <= PIN_SLIP * m->length))
             return drape_fail(sim->ctx, DRAPE_E_ARGUMENT,
                               "drape_sim_set_state: node %d of %s is at (%g %g %g); its pin has it at (%g %g "
                               "%g) m at t = %g s",

@@ -11,6 +11,7 @@
  * between show the state before it.
  */
 #include "base/clock.h"
+#include "base/elementary.h"
 #include "sim/sim.h"
 
 #include <math.h>
@@ -44,7 +45,7 @@ static double expected(const drape_sim *sim, int effort)
     int known = effort;
     while (known > 0 && cost[known] == 0)
         known--;
-    return cost[known] * pow(CHEAPER, effort - known);
+    return cost[known] * drape_pow(CHEAPER, effort - known);
 }
 
 /* The machine makes all levels of effort slower or faster alike: their ratios are kept. */

@@ -91,8 +91,8 @@ void drape_sim_archive(drape_sim *sim, drape_archive *a);
  * if they differ. */
 void drape_sim_archive_identity(drape_sim *sim, drape_archive *a);
 
-/* Describes what the bits of results depend on in a build: compiler, solvers and their versions. */
-void drape_sim_describe_build(char *text, size_t size);
+/* The solvers and the versions of libraries that the bits of results depend on. */
+void drape_sim_describe_libraries(char *text, size_t size);
 
 /* Reads a sim from a checkpoint in memory into *sim, by creating it beside *sim, so that a failure leaves
  * *sim unchanged. The rest of the archive is the caller's. */

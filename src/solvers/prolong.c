@@ -1,5 +1,6 @@
 /* prolong.c: see prolong.h. */
 #include "solvers/prolong.h"
+#include "base/elementary.h"
 
 #include <limits.h>
 #include <math.h>
@@ -14,7 +15,7 @@
 
 int drape_prolong_spacing(int32_t nodes)
 {
-    int spacing = (int)lround(WIDENING * pow(nodes, 1.0 / 6));
+    int spacing = (int)lround(WIDENING * drape_pow(nodes, 1.0 / 6));
     return spacing < 2 ? 2 : spacing;
 }
 

@@ -22,7 +22,7 @@
 #ifndef DRAPE_TERMS_DIHEDRAL_H
 #define DRAPE_TERMS_DIHEDRAL_H
 
-#include "base/lanes.h"
+#include "base/lanes_atan2.h"
 
 /* For hinges that are not in lanes: x (count x 12), theta (count), g (count x 12), h (count x 12 x 12,
  * symmetric); g and h may be NULL. count: 1 to LANES. */
@@ -82,9 +82,8 @@ LANES_INLINE void drape_dihedral_measure(lanes corner[4][3], drape_dihedral_lane
     drape_dihedral_measure_side(corner[0], corner[2], h, 1, &h->side[0]);
     drape_dihedral_measure_side(corner[0], corner[3], h, -1, &h->side[1]);
     lanes_cross(h->side[1].n, h->side[0].n, cross);
-    lanes sine = lanes_dot(h->direction, cross), cosine = lanes_dot(h->side[0].n, h->side[1].n);
-    for (int l = 0; l < LANES; l++)
-        h->theta[l] = atan2(sine[l], cosine[l]);
+    const lanes sine = lanes_dot(h->direction, cross), cosine = lanes_dot(h->side[0].n, h->side[1].n);
+    h->theta = lanes_atan2(sine, cosine);
 }
 
 /* dq: g_0 g_1 g_2 g_3 */

@@ -20,6 +20,7 @@
  * Every bending has energy: K = 0 on both sides of an edge implies theta/2 + phi = theta/2 - phi = 0.
  */
 #include "terms/midedge.h"
+#include "base/elementary.h"
 
 #include "base/vec3.h"
 #include "terms/orthotropic.h"
@@ -110,7 +111,7 @@ static void find_neighbours(patch *p)
 static double outward(const patch *p, int h, double nu[2])
 {
     const double *a = p->flat + 2 * drape_midedge_hinge[h][0], *b = p->flat + 2 * drape_midedge_hinge[h][1];
-    const double x = b[0] - a[0], y = b[1] - a[1], length = hypot(x, y);
+    const double x = b[0] - a[0], y = b[1] - a[1], length = drape_hypot(x, y);
     nu[0] = y / length;
     nu[1] = -x / length;
     return length;
@@ -158,7 +159,8 @@ static void diagonalize(double a[9], double v[9])
         if (a[3 * p + q] == 0)
             continue;
         const double tau = (a[4 * q] - a[4 * p]) / (2 * a[3 * p + q]);
-        const double t = (tau >= 0 ? 1 : -1) / (fabs(tau) + hypot(1, tau)), c = 1 / hypot(1, t), s = t * c;
+        const double t = (tau >= 0 ? 1 : -1) / (fabs(tau) + drape_hypot(1, tau)), c = 1 / drape_hypot(1, t),
+                     s = t * c;
         for (int i = 0; i < 3; i++) {
             const double ap = a[3 * i + p], aq = a[3 * i + q], vp = v[3 * i + p], vq = v[3 * i + q];
             a[3 * i + p] = c * ap - s * aq, a[3 * i + q] = s * ap + c * aq;

@@ -78,7 +78,8 @@ static double element_stiffness(const drape_cloth_view *cloth, int32_t hinge_num
 {
     const drape_material *material = cloth->material;
     if (choice == STIFFNESS_REPORT)
-        return 2 / sqrt(3.0) * material->young_modulus * pow(material->thickness, 3) / 12;
+        return 2 / sqrt(3.0) * material->young_modulus * material->thickness * material->thickness *
+               material->thickness / 12;
     int32_t edge = cloth->hinge_edge[hinge_number];
     const int32_t *beside = cloth->edge_triangle + 2 * (size_t)edge;
     double length = cloth->edge_length[edge];

@@ -15,6 +15,7 @@
  *
  * Compressed springs are not limited, as in CS184.
  */
+#include "base/elementary.h"
 #include "base/reason.h"
 #include "base/vec3.h"
 #include "terms/spring.h"
@@ -110,7 +111,7 @@ typedef struct barrier {
 
 static barrier barrier_below_cap(double y)
 {
-    double log_gap = log1p(-y), ratio = y / (1 - y);
+    double log_gap = drape_ln1p(-y), ratio = y / (1 - y);
     return (barrier){.value = -y * y * log_gap,
                      .slope = y * (ratio - 2 * log_gap),
                      .curve = ratio * (4 + ratio) - 2 * log_gap};

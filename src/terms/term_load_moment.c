@@ -14,6 +14,7 @@
  * The internal variable is the angle in the last accepted state: angles are taken on the branch nearest to
  * it.
  */
+#include "base/elementary.h"
 #include "base/vec3.h"
 #include "terms/dihedral.h"
 #include "terms/load.h"
@@ -175,7 +176,7 @@ static double measure_twist(const drape_elements *el, int32_t element, const dou
     w->sine = vec3_dot(w->n0, w->t.unit) - vec3_dot(w->t0, w->n.unit);
     w->cosine = vec3_dot(w->t0, w->t.unit) + vec3_dot(w->n0, w->n.unit);
     w->square = w->sine * w->sine + w->cosine * w->cosine;
-    return atan2(w->sine, w->cosine);
+    return drape_atan2(w->sine, w->cosine);
 }
 
 /* p and q such that p . t + q . n, with p and q constant, has the derivatives C S' - S C'. */

@@ -13,6 +13,7 @@
  * Without it, Newton's matrix of a sheet under tension would be as soft sideways as without tension, and
  * steps too long by the ratio of the two.
  */
+#include "base/elementary.h"
 #include "base/reason.h"
 #include "base/vec3.h"
 #include "terms/orthotropic.h"
@@ -109,7 +110,7 @@ static void positive(const drape_elements *el, int32_t first, int32_t count, con
  * the identity. */
 static void tension_part(const double l[3], double plus[3])
 {
-    const double mean = (l[0] + l[1]) / 2, radius = hypot((l[0] - l[1]) / 2, l[2]);
+    const double mean = (l[0] + l[1]) / 2, radius = drape_hypot((l[0] - l[1]) / 2, l[2]);
     const double high = fmax(0, mean + radius), low = fmax(0, mean - radius);
     const double share = radius > 0 ? (high - low) / (2 * radius) : 0, rest = (high + low) / 2 - share * mean;
     plus[0] = share * l[0] + rest;

@@ -39,7 +39,7 @@ def test_help():
         assert all(len(words) > 8 for _, words in options) and "--help" in [option for option, _ in options], options
         for option, _ in options:  # the parser accepts every option of the help
             assert "there is no option" not in drape(verb, "missing.json", option).stderr, option
-    assert re.fullmatch(r"drape \d+\.\d+\.\d+\n", good("--version"))
+    assert re.fullmatch(r"drape \d+\.\d+\.\d+\nreproducible: (yes|no: \S.*)\n", good("--version"))
 
 
 def test_help_needs_no_scene():

@@ -227,15 +227,16 @@ static size_t find(const bytes *b, const char *text)
 START_TEST(of_another_version_or_build_it_is_refused)
 {
     victim v = make_victim("be", "");
-    size_t version = find(&v.good, "Drape ") + 6, solvers = find(&v.good, " klu"), format = 8;
-    const size_t places[] = {version, solvers + 1, format};
-    for (int i = 0; i < 3; i++) {
+    size_t version = find(&v.good, "Drape ") + 6, arithmetic = find(&v.good, "arithmetic ") + 11,
+           solvers = find(&v.good, " klu") + 1, format = 8;
+    const size_t places[] = {version, arithmetic, solvers, format};
+    for (int i = 0; i < 4; i++) {
         v.good.data[places[i]]++;
         seal(v.good.data, v.good.size);
         drape_status status = drape_sim_restore_from(v.s.sim, v.good.data, v.good.size);
         ck_assert_int_eq(status, DRAPE_E_VERSION);
         refused(&v, status, "another version");
-        ck_assert_msg(strstr(drape_context_message(v.s.ctx), i < 2 ? "another build" : "format 2"), "%s",
+        ck_assert_msg(strstr(drape_context_message(v.s.ctx), i < 3 ? "another build" : "format 2"), "%s",
                       drape_context_message(v.s.ctx));
         v.good.data[places[i]]--;
         seal(v.good.data, v.good.size);

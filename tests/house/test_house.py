@@ -123,6 +123,25 @@ def library_is_silent(files):
     return complaints
 
 
+# Functions of the C library that IEEE 754 does not define: each library has its own bits, and some choose by the processor. `pow` and `log` of a
+# struct are no calls of them.
+OF_THE_LIBRARY = re.compile(r"(?<![\w.>])(?:sin|cos|sincos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|asinh|acosh|atanh|exp|exp2|exp10|expm1|log|log2"
+                            r"|log10|log1p|pow|hypot|cbrt|erf|erfc|lgamma|tgamma|j0|j1|y0|y1|fma|rand|random|drand48)[fl]?[ \t]*\(")
+DRAWS_OR_PRINTS = ("src/render/", "src/lab/", "src/cli/", "src/report/")
+
+
+def states_are_reproducible(files):
+    """What computes states calls base/elementary.h in place of the C library's functions."""
+    complaints = []
+    for path, text in sources(files, "src", "include").items():
+        if path.startswith(DRAWS_OR_PRINTS):
+            continue
+        code = code_of(text)
+        for match in OF_THE_LIBRARY.finditer(code):
+            complaints.append(f"{path}:{line_of(code, match.start())}: {match.group().rstrip('( ')}: its bits depend on the processor: base/elementary.h")
+    return complaints
+
+
 def private_words(files):
     """The words that the table under "Words" in CONTRIBUTING.md forbids: those in backticks in its first column."""
     section = files.get("CONTRIBUTING.md", "").partition("\n### Words\n")[2].partition("\n#")[0]
@@ -189,6 +208,8 @@ BROKEN = {
         {"src/mesh/a.c": "", "src/mesh/meson.build": "sources = ['b.c']\n"},
         {"tests/unit/test_a.c": "", "tests/meson.build": "'b'\n"}],
     library_is_silent: [{"src/io/a.c": 'printf("x");\n'}, {"src/io/a.c": "fputs(x, stderr);\n"}, {"src/io/a.c": "abort ();\n"}],
+    states_are_reproducible: [
+        {"src/sim/a.c": "x = sin(y);\n"}, {"src/base/a.h": "return -pow (x, 2);\n"}, {"src/terms/a.c": "logf(x)\n"}, {"src/mesh/a.c": "2*atan2(y, x)\n"}],
     one_place_for_cpp: [{"src/io/a.h": "#ifdef __cplusplus\n"}, {"include/drape/drape.h": "visibility\n"}],
     words_are_standard: [
         {"CONTRIBUTING.md": "\n### Words\n| `gizmo` | device |\n", "src/a.h": "the\nGizmos of it"},
@@ -200,7 +221,8 @@ BROKEN = {
 SOUND = {
     **MAP, "CONTRIBUTING.md": "\n### Words\n| `gizmo` | device |\n", "docs/a.md": "agizmo is gizmotic\n",
     "src/sim/b.c": '#include "base/a.h"\n#include "sim/a.h"\n#include "drape/drape.h"\n/* printf(x) */ snprintf(x, "exit(1)");\n',
-    "src/sim/meson.build": "sources = ['b.c']\nentries += {'r': ['halving']}\n", "src/sim/control_halving.c": "", "src/cli/main.c": "exit(1);\n",
+    "src/sim/c.c": "drape_sin_cos(x); log_of(x); a->log(x); b.pow(x); sqrt(x); /* sin(x) */ fmod(x, y);\n",
+    "src/sim/meson.build": "sources = ['b.c', 'c.c']\nentries += {'r': ['halving']}\n", "src/sim/control_halving.c": "", "src/cli/main.c": "exit(1); sin(x);\n",
     "src/cli/meson.build": "'main.c'\n", "src/README.md": "cli -> sim\nsim -> mesh\nmesh -> base\n", "include/drape/drape.h": '#include "export.h"\n',
     "include/drape/export.h": "__cplusplus visibility\n", "tests/unit/test_a.c": "", "tests/meson.build": "'a'\n"}
 

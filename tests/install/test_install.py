@@ -98,7 +98,17 @@ def what_the_shared_library_shows(tree):
 def what_the_static_library_defines(tree):
     defined = symbols(tree.static(), "-g")
     assert declared() <= defined
+    defined.discard("__wrap_SUNRpowerR")  # the linker demands this name: src/solvers/sundials_power.c
     assert all(name.startswith("drape_") for name in defined), sorted(name for name in defined if not name.startswith("drape_"))
+
+
+def what_of_libm_the_static_library_calls(tree):
+    """Only functions that IEEE 754 or their definition leave one result: base/elementary.h has the others."""
+    libm = run(need("cc"), "-print-file-name=libm.so.6").strip()
+    undefined = {line.split()[-1] for line in run(need("nm"), "-u", tree.static()).splitlines() if line.split()[:1] == ["U"]}
+    called = undefined & symbols(libm, "-D")
+    exact = {"ceil", "copysign", "fabs", "floor", "fmax", "fmaxf", "fmin", "fminf", "fmod", "frexp", "ldexp", "lround", "nextafterf", "rint", "round", "sqrt", "trunc"}
+    assert called <= exact and "fmod" in called, sorted(called)
 
 
 def what_comes_along(tree):
@@ -129,6 +139,7 @@ def host_in_c_static(tree):
     flags = [tree.static() if flag == "-ldrape" else flag for flag in tree.flags("--static", "--cflags", "--libs")]
     run(need("cc"), source, *flags, "-lm", "-o", program)
     assert "libdrape" not in run("ldd", program) and "sundials" not in run("ldd", program)
+    assert {"__wrap_SUNRpowerR", "drape_pow"} <= symbols(program)  # IDA and KINSOL call our powers
     check_host(run(program, FRAMES))
 
 
@@ -180,7 +191,8 @@ def the_program_runs(tree):
     assert "stretch.edge" in output
 
 
-TESTS = [what_is_installed, what_the_shared_library_shows, what_the_static_library_defines, what_comes_along, host_in_c, host_in_c_static,
+TESTS = [what_is_installed, what_the_shared_library_shows, what_the_static_library_defines,
+         what_of_libm_the_static_library_calls, what_comes_along, host_in_c, host_in_c_static,
          host_in_cpp, cmake_of_the_static_library, cmake_refuses_another_version, host_in_python, the_program_runs]
 
 
