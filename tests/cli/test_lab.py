@@ -303,7 +303,7 @@ def test_wrong_words():
     write_scene()
     two = ["--axis", "/integrator/dt=1e-3:1e-2:2log"]
     refused("stability", "scene.json", "--out", "s", says="2 or 3 axes")
-    for axis, says in (("dt=1:2:3", "no pointer"), ("/integrator/dt=1:2", "three numbers"), ("/integrator/dt=1:2:3lin", "only log may follow the count"),
+    for axis, says in (("dt=1:2:3", "a pointer is needed"), ("/integrator/dt=1:2", "three numbers"), ("/integrator/dt=1:2:3lin", "only log may follow the count"),
                        ("/integrator/dt=0:2:3log", "positive"), ("/integrator/dt=1:1:3", "different"), ("/integrator/dt=1:2:1", "2 to 1024")):
         refused("stability", "scene.json", *two, "--axis", axis, "--out", "s", says=says)
     refused("stability", "scene.json", *two, "--axis", "/integrator/dt=1e-4:1e-3:3", "--out", "s", says="/integrator/dt\" is given twice")
