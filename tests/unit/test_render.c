@@ -96,7 +96,7 @@ START_TEST(cloth_is_drawn_round_through_its_nodes)
     }
     ck_assert_int_eq(drape_skin_create(&arena, model, &skin), DRAPE_OK);
     ck_assert_int_ge(skin.level, 4);
-    drape_skin_update(&skin, x, NULL);
+    drape_skin_update(&skin, 0, x, NULL);
     double off_normal = 0, off_sphere = 0;
     for (size_t i = 0; i < skin.vertex_count; i++) {
         const drape_skin_vertex *v = &skin.vertex[i];
@@ -133,7 +133,7 @@ START_TEST(texture_is_not_mirrored)
         ck_assert_int_eq(drape_skin_create(&arena, model, &skin), DRAPE_OK);
         for (size_t i = 0; i < 3 * 81; i++)
             x[i] = (float)model->rest[i];
-        drape_skin_update(&skin, x, NULL);
+        drape_skin_update(&skin, 0, x, NULL);
         for (size_t i = 0; i < skin.index_count; i += 3) {
             const drape_skin_vertex *a = &skin.vertex[skin.index[i]], *b = &skin.vertex[skin.index[i + 1]],
                                     *c = &skin.vertex[skin.index[i + 2]];
