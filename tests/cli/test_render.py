@@ -251,11 +251,79 @@ def test_lamp_stands():
 
     def shadow(azimuth):
         image = render("ball.json", "--frame", "0", "--camera", f"{azimuth},50,0.6")
-        dark = (image.max(axis=2) < 125) & (image.max(axis=2) - image.min(axis=2) < 30)  # grey: no cloth
+        dark = (image.max(axis=2) < 160) & (image.max(axis=2) - image.min(axis=2) < 30)  # grey: no cloth
         assert dark.sum() > 500, "no shadow"
         return numpy.nonzero(dark)[1].mean() - SIZE[0] / 2
-    sides = [shadow(azimuth) for azimuth in (74, 254)]  # the lamp, at -16 degrees, to the left and to the right
+    sides = [shadow(azimuth) for azimuth in (76, 256)]  # the lamp, at -14 degrees, to the left and to the right
     assert sides[0] > 5 > -5 > sides[1], f"the shadow lies at {sides}"
+
+
+def test_soft_shadow():
+    """the shadow of a cloth high above the floor has a softer edge than that of one near it"""
+    need_pictures()
+    plane = {"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0]}
+
+    def softness(height):
+        write_scene(colliders=[plane], mesh={"grid": "square", "columns": 13, "rows": 13, "width": 1, "height": 1,
+                                             "transform": {"translate": [-0.5, height, 0.5]}})
+        image = render("ball.json", "--frame", "0", "--camera", "160,35,0.8")
+        grey = image.mean(axis=2)[image.max(axis=2) - image.min(axis=2) < 24]  # the floor, not the cloth
+        light, dark = numpy.percentile(grey, 90), grey.min()
+        share = (grey - dark) / (light - dark)
+        return (abs(share - 0.5) < 0.25).sum() / (share < 0.25).sum()  # half shade over shade
+    near, far = softness(0.05), softness(0.5)
+    assert far > 2 * near, f"half shade over shade: {near:.3f} near the floor, {far:.3f} high above it"
+
+
+def test_ambient_occlusion():
+    """the floor is darker at the foot of a cloth that stands on it, on the side of the lamp, where no shadow falls"""
+    need_pictures()
+    write_scene(colliders=[{"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0]}],
+                mesh={"grid": "square", "columns": 13, "rows": 13, "width": 1, "height": 1, "orientation": "vertical",
+                      "transform": {"translate": [-0.5, 1.01, 0]}})
+    image = render("ball.json", "--frame", "0", "--shade", "normals", "--camera", "0,40")
+    column = image[:, 155:165].mean(axis=1)
+    cloth = numpy.nonzero(column.max(axis=1) - column.min(axis=1) > 40)[0]  # the normals are blue, the floor is grey
+    foot = column[cloth.max() + 3:cloth.max() + 8].mean()
+    away = column[-12:].mean()
+    assert foot + 10 < away < 256, f"the floor is {foot:.0f} at the foot and {away:.0f} away from it"
+
+
+def test_colliders_are_hidden():
+    """a box below a wavy cloth is not seen through it: flat triangles clear it by 4 mm, curves that continue the slopes of the waves would cut it"""
+    need_pictures()
+    count, low, high = 17, 0.004, 0.08
+    heights = [low if i % 4 < 2 else high for i in range(count)]
+    xs = [1.4 * i / (count - 1) - 0.7 for i in range(count)]
+    with open("waves.obj", "w", encoding="utf-8") as file:
+        for j in range(count):
+            for i in range(count):
+                file.write(f"v {xs[i]} {heights[i]} {-xs[j]}\n")
+        for j in range(count - 1):
+            for i in range(count - 1):
+                a = j * count + i + 1
+                file.write(f"f {a} {a + 1} {a + count + 1}\nf {a} {a + count + 1} {a + count}\n")
+    write_png("red.png", numpy.full((8, 8, 3), (220, 30, 30)))
+    write_scene(mesh={"file": "waves.obj"}, colliders=[{"type": "box", "center": [0, -0.2, 0], "size": [1, 0.4, 1]}])
+    for camera in ("0,89.9", "0,60", "90,70"):
+        image = render("ball.json", "--frame", "0", "--shade", "texture", "--texture", "red.png", "--camera", camera)
+        middle = image[70:130, 120:200]  # cloth covers the box there
+        seen = (middle[:, :, 0] < 1.5 * middle[:, :, 2]).sum()
+        equal(seen, 0, f"--camera {camera}: pixels of the box in front of the cloth")
+
+
+def test_turntable():
+    """a turntable begins at --camera, turns by equal angles and would come back after its last frame"""
+    need_pictures()
+    write_scene(colliders=None, contact=None, gravity=[0, 0, 0])  # nothing moves: only the camera does
+
+    def frames(azimuth):
+        good("render", "ball.json", "--turntable", "--camera", f"{azimuth},24", "--out", "turn", "--size", "160x100")
+        return [read_png(f"turn/frame_{k:05}.png")[:80] for k in range(6)]  # above the time in the corner
+    begun, later = frames(32), frames(92)
+    for k in range(6):
+        assert abs(begun[k] - begun[(k + 1) % 6]).mean() > 1, f"frames {k} and {k + 1} are the same"
+        assert abs(begun[(k + 1) % 6] - later[k]).mean() < 0.2, f"frame {k} of a turntable that begins 60 degrees later"
 
 
 def test_glass():
@@ -311,6 +379,8 @@ def test_films():
     equal(frames_of("a.gif"), (161, 101, 3), "gif")
     good("render", "ball.json", "--out", "a.webm", "--size", "160x100")
     equal(frames_of("a.webm"), (160, 100, 6), "webm")
+    good("render", "ball", "--out", "a.apng", "--size", "161x101", "--every", "3")
+    equal(frames_of("a.apng"), (161, 101, 2), "apng")
     equal([name for name in os.listdir(".") if name.endswith(".part")], [], "leftovers")
 
 
@@ -373,12 +443,14 @@ def test_refused():
              (["ball.json", "--out", "x.png", "--shade", "strain", "--range", "1,0"], "low,high"),
              (["ball.json", "--out", "x.png", "--shade", "texture", "--texture", "none.png"], "none.png"),
              (["ball.json", "--out", "x.png", "--shade", "texture", "--texture", "ball.json"], "as a PNG"),
-             (["ball.json", "--out", "x.png", "--texture", "x.png"], '"diffuse" does not show it; --shade may be texture'),
+             (["ball.json", "--out", "x.png", "--texture", "x.png"], '"linen" does not show it; --shade may be texture'),
              (["ball.json", "--out", "x.png", "--shade", "texture", "--height", "x.png"], "--shade may be bump, displacement, pbr"),
              (["ball.json", "--out", "x.png", "--shade", "strain", "--environment", "x.png"], "mirror, refraction, pbr"),
-             (["ball.json", "--out", "x.bmp"], 'there is no ".bmp"; .png is a picture, .mp4, .webm, .gif are films'),
+             (["ball.json", "--out", "x.bmp"], 'there is no ".bmp"; .png is a picture, .mp4, .webm, .gif, .apng are films'),
              (["ball.json", "--out", "./a.b/x.jpeg"], 'there is no ".jpeg"'),
              (["ball.json", "--out", "x.PNG", "--every", "2"], "--every is for films"),
+             (["ball.json", "--out", "x.png", "--turntable"], "--turntable is for films"),
+             (["ball.json", "--out", "x.png", "--fine", "5"], "--fine"),
              (["ball.json", "--out", "x.png", "--out", "y.png"], "--out is given twice"),
              (["ball.json", "--out", "x.png", "--dt", "0.01", "--dt", "0.02"], "--dt is given twice"),
              (["ball", "--out", "x.png", "--dt", "0.01"], "--dt changes a simulation, and ball is a finished run"),
