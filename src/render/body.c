@@ -12,7 +12,7 @@
 #define ENDLESS      2.0  /* half the side of the box of an endless body, in reaches */
 #define NORMAL_SHIFT 0.15 /* shift of a corner to the middle of its face, to find the side it is on */
 #define NORMAL_RISE  0.05 /* height above the corner on that side where its normal is taken, in cells */
-#define CREASE       0.8 /* cosine between two faces of a mesh above which their common edge is drawn smooth */
+#define CREASE       0.8 /* cosine between two faces of a mesh above which their edge is drawn smooth */
 #define CUT_STEPS    24  /* bisections that find where the surface cuts an edge of the grid */
 #define MEAN_WEIGHT  1e-2 /* of the mean, for directions that the planes leave free */
 #define NEWTON_STEPS 4    /* that move a point onto the surface */
@@ -221,9 +221,9 @@ static drape_status make_point(grid *g, int i, int j, int k)
 
 /* ---- Faces: one for each edge of the grid that is cut ---- */
 
-/* The normal of a corner is taken a little above it, on the side of the face: where the body is round it is that of
- * the body, and at an edge that of the side on which the face lies. Which side that is, the normal a little towards
- * the middle of the face tells. */
+/* The normal of a corner is taken a little above it, on the side of the face: where the body is round it is
+ * that of the body, and at an edge that of the side on which the face lies. Which side that is, the normal
+ * a little towards the middle of the face tells. */
 static void put_triangle(const grid *g, const int32_t *corner, drape_body *body)
 {
     double middle[3] = {0}, normal[3], x[3];
@@ -294,8 +294,8 @@ static drape_status contour(drape_arena *arena, const drape_collider *collider, 
 
 /* ---- Colliders that have triangles ---- */
 
-/* Normals of points, the mean of those of their triangles weighted by area, for triangles that differ little from
- * it; others stay crisp. */
+/* Normals of points, the mean of those of their triangles weighted by area, for triangles that differ
+ * little from it; others stay crisp. */
 static drape_status smooth_normals(drape_context *ctx, const drape_collider_shape *shape, drape_body *body)
 {
     double *sum = drape_alloc(ctx, 3 * (size_t)shape->point_count, sizeof *sum);

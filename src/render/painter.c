@@ -3,7 +3,7 @@
 
 #include "render/images.h"
 #include "render/layout.h"
-#include "render/visibility.h"
+#include "render/lighting.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -63,7 +63,7 @@ static const char surface_main[] =
     "    s.at = at;\n"
     "    s.value = value;\n"
     "    s.piece = piece;\n"
-    "    vec2 reached = visibility(place);\n"
+    "    vec2 reached = lighting(place);\n"
     "    s.sun = mix(reached.x, 1.0, clear);\n"
     "    s.open = reached.y;\n"
     "    colour = vec4(encoded(shade(s)), 1.0);\n"
@@ -89,7 +89,7 @@ static const char ground_source[] =
     "    float fade = 1.0 - smoothstep(1.3, 3.3, sqrt(dot(far, far))), facing = dot(normal, light) / "
     "max(light.y, 0.1);\n"
     "    if (fade > 0.0) {\n"
-    "        vec2 reached = visibility(place);\n"
+    "        vec2 reached = lighting(place);\n"
     "        float slope = 1.0 - smoothstep(0.97, 1.0, normal.y);\n"
     "        float sun = mix(reached.x, 1.0, clear) * clamp(facing, 0.0, 1.2), held = (1.0 - sun) * (0.45 + "
     "0.55 * max(normal.y, 0.0));\n"
@@ -165,7 +165,7 @@ struct drape_painter {
     drape_canvas canvas;
     drape_overlay overlay;
     GLuint textures[3], ramp; /* that shadings read, in the order of DRAPE_READS_*; 0: not made yet */
-    drape_visibility visibility;
+    drape_lighting lighting;
     GLuint empty; /* vertex array without attributes */
     GLuint depth, seen, body, ground, wall, wire, pin;
     GLuint shadings[MAX_SHADINGS]; /* 0: not made yet */
@@ -178,7 +178,7 @@ static GLuint surface_program(drape_context *ctx, const char *name, const char *
 {
     const char *const *p = drape_shading_prelude;
     return drape_gl_program(ctx, name, (const char *const[]){surface_vertex, NULL},
-                            (const char *const[]){p[0], p[1], p[2], drape_visibility_lookup_source, source[0],
+                            (const char *const[]){p[0], p[1], p[2], drape_lighting_lookup_source, source[0],
                                                   source[1], source[2], NULL});
 }
 
@@ -194,7 +194,7 @@ static bool create_programs(drape_painter *p)
     static const char *const body[] = {body_source, surface_main, NULL};
     static const char *const ground[] = {wall_source, ground_source, NULL};
     return (p->depth = program(p->ctx, "depth", surface_vertex, depth_fragment, NULL)) &&
-           (p->seen = program(p->ctx, "seen", surface_vertex, drape_visibility_seen_source, NULL)) &&
+           (p->seen = program(p->ctx, "seen", surface_vertex, drape_lighting_seen_source, NULL)) &&
            (p->body = surface_program(p->ctx, "body", body)) &&
            (p->ground = surface_program(p->ctx, "ground", ground)) &&
            (p->wall = program(p->ctx, "wall", wall_vertex, wall_source, wall_main)) &&
@@ -219,7 +219,7 @@ static drape_status create_all(drape_painter *p, const drape_painter_def *def)
     if (!status)
         status = drape_overlay_create(&p->arena, def->width, def->height, &p->overlay);
     if (!status)
-        status = drape_visibility_create(p->ctx, def->width, def->height, &p->visibility);
+        status = drape_lighting_create(p->ctx, def->width, def->height, &p->lighting);
     for (int i = 0; i < 3 && !status; i++)
         if (paths[i])
             status = make_texture(p, i, paths[i]);
@@ -260,7 +260,7 @@ void drape_painter_destroy(drape_painter **painter)
     for (int i = 0; i < MAX_SHADINGS; i++)
         glDeleteProgram(p->shadings[i]);
     glDeleteVertexArrays(1, &p->empty);
-    drape_visibility_free(&p->visibility);
+    drape_lighting_free(&p->lighting);
     drape_gl_mesh_free(&p->floor);
     drape_overlay_free(&p->overlay);
     drape_arena_free(&p->arena);
@@ -315,7 +315,7 @@ drape_view drape_painter_view(const drape_painter *painter, const drape_picture 
 /* The quantities common to everything drawn in a panel. */
 typedef struct panel_view {
     drape_view view;
-    drape_visibility_view light;     /* of the lamp */
+    drape_lighting_view light;       /* of the lamp */
     float window[3];                 /* direction to a window opposite it */
     int left, bottom, width, height; /* pixels */
     bool first;                      /* of the picture */
@@ -327,7 +327,7 @@ static void set_lamp(const drape_stage *stage, panel_view *v)
 {
     const drape_camera camera = {.azimuth = LAMP_AZIMUTH, .elevation = LAMP_HEIGHT};
     drape_view lamp = drape_camera_view(&camera, 1, 1);
-    drape_visibility_view *l = &v->light;
+    drape_lighting_view *l = &v->light;
     float reach = stage->radius, near = 0.1f * reach, far = 4 * DEEP * reach, eye[3];
     memcpy(l->right, lamp.axes[0], sizeof l->right);
     memcpy(l->up, lamp.axes[1], sizeof l->up);
@@ -362,8 +362,8 @@ static void use_surface(const drape_painter *p, GLuint program, const panel_view
     const struct {
         const char *name;
         GLuint texture;
-    } units[] = {{"visible", p->visibility.result}, {"picture", p->textures[0]}, {"heights", p->textures[1]},
-                 {"environment", p->textures[2]},   {"ramp", p->ramp},           {"behind", v->behind}};
+    } units[] = {{"visible", p->lighting.result}, {"picture", p->textures[0]}, {"heights", p->textures[1]},
+                 {"environment", p->textures[2]}, {"ramp", p->ramp},           {"behind", v->behind}};
     glUseProgram(program);
     for (int i = 0; i < 6; i++) {
         glActiveTexture(GL_TEXTURE0 + (GLenum)i);
@@ -454,19 +454,19 @@ static void draw_bounded(const drape_painter *p, const drape_stage *stage, GLuin
 static void light_panel(const drape_painter *p, const drape_stage *stage, const drape_shading *shading,
                         const panel_view *v, bool with_cloth)
 {
-    drape_visibility_begin_shadow(&p->visibility);
+    drape_lighting_begin_shadow(&p->lighting);
     use_surface(p, p->depth, v, &v->light.lamp);
     draw_bodies(stage, p->depth, false);
     drape_gl_set_vec3(p->depth, "offset", (const float[3]){0});
     draw_cloth(p->depth, stage, shading);
-    drape_visibility_begin_seen(&p->visibility, &v->light);
+    drape_lighting_begin_seen(&p->lighting, &v->light);
     if (with_cloth) {
         use_surface(p, p->seen, v, &v->view.matrix);
         draw_cloth(p->seen, stage, shading);
     }
     draw_bounded(p, stage, p->seen, v);
     draw_ground(p, stage, p->seen, v);
-    drape_visibility_find(&p->visibility, &v->light);
+    drape_lighting_find(&p->lighting, &v->light);
 }
 
 static void use_canvas(const drape_painter *p, const panel_view *v)

@@ -577,8 +577,8 @@ static void add_outward(drape_skin *s, const int32_t *corner, int side)
     }
 }
 
-/* A ring of the hem around a point of the border: its upper half as part of the front, and its lower one as part of
- * the back. */
+/* A ring of the hem around a point of the border: its upper half as part of the front, and its lower one as
+ * part of the back. */
 static drape_skin_vertex *put_ring(const drape_skin *s, const drape_skin_vertex *point, const float *outward,
                                    drape_skin_vertex *to)
 {

@@ -1,9 +1,9 @@
 /*
  * skin.h: the surface of all cloth of a model as it is drawn: smooth normals and tangents weighted by area,
- * texture coordinates, and curved point-normal triangles (Vlachos, Peters, Boyd & Mitchell 2001) through the
- * nodes, so that a coarse mesh has a smooth outline and enough points to be displaced. Nodes are drawn where
- * they are. Where a curved triangle would cut a collider that the flat one clears, it is flattened. The border
- * of a cloth has a hem: a tube just inside it, so that cloth is seen to have a thickness.
+ * texture coordinates, and curved point-normal triangles (Vlachos, Peters, Boyd & Mitchell 2001) through
+ * the nodes, so that a coarse mesh has a smooth outline and enough points to be displaced. Nodes are drawn
+ * where they are. Where a curved triangle would cut a collider that the flat one clears, it is flattened.
+ * The border of a cloth has a hem: a tube just inside it, so that cloth is seen to have a thickness.
  */
 #ifndef DRAPE_RENDER_SKIN_H
 #define DRAPE_RENDER_SKIN_H

@@ -45,7 +45,8 @@ void drape_stage_free(drape_stage *stage); /* may be empty; the model may be gon
 void drape_stage_add(drape_stage *stage, const float *positions);
 void drape_stage_finish(drape_stage *stage);
 
-/* Adds the cloth and the bounded colliders at a time, moved by `offset` (3) [m], to what the camera has to show. */
+/* Adds the cloth and the bounded colliders at a time, moved by `offset` (3) [m], to what the camera has to
+ * show. */
 void drape_stage_frame(drape_stage *stage, drape_framing *framing, double t, const float *positions,
                        const float *offset);
 

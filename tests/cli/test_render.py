@@ -263,16 +263,17 @@ def test_soft_shadow():
     need_pictures()
     plane = {"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0]}
 
-    def softness(height):
+    def steepest(height):
         write_scene(colliders=[plane], mesh={"grid": "square", "columns": 13, "rows": 13, "width": 1, "height": 1,
                                              "transform": {"translate": [-0.5, height, 0.5]}})
-        image = render("ball.json", "--frame", "0", "--camera", "160,35,0.8")
-        grey = image.mean(axis=2)[image.max(axis=2) - image.min(axis=2) < 24]  # the floor, not the cloth
-        light, dark = numpy.percentile(grey, 90), grey.min()
-        share = (grey - dark) / (light - dark)
-        return (abs(share - 0.5) < 0.25).sum() / (share < 0.25).sum()  # half shade over shade
-    near, far = softness(0.05), softness(0.5)
-    assert far > 2 * near, f"half shade over shade: {near:.3f} near the floor, {far:.3f} high above it"
+        image = render("ball.json", "--frame", "0", "--shade", "normals", "--camera", "160,35,0.8")
+        floor = image.max(axis=2) - image.min(axis=2) < 24  # grey: not the cloth, whose upper side is green
+        for _ in range(2):  # nor pixels next to it
+            floor[1:-1, 1:-1] = floor[1:-1, 1:-1] & floor[:-2, 1:-1] & floor[2:, 1:-1] & floor[1:-1, :-2] & floor[1:-1, 2:]
+        steps = abs(numpy.diff(image.mean(axis=2), axis=0))[floor[1:] & floor[:-1]]
+        return numpy.sort(steps)[-20:].mean()
+    near, far = steepest(0.1), steepest(0.8)
+    assert near > 1.5 * far > 0, f"the steepest edges of the shadow: {near:.1f} of 255 a pixel near the floor, {far:.1f} high above it"
 
 
 def test_ambient_occlusion():
@@ -281,7 +282,7 @@ def test_ambient_occlusion():
     write_scene(colliders=[{"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0]}],
                 mesh={"grid": "square", "columns": 13, "rows": 13, "width": 1, "height": 1, "orientation": "vertical",
                       "transform": {"translate": [-0.5, 1.01, 0]}})
-    image = render("ball.json", "--frame", "0", "--shade", "normals", "--camera", "0,40")
+    image = render("ball.json", "--frame", "0", "--shade", "normals", "--camera", "0,40,0.6")
     column = image[:, 155:165].mean(axis=1)
     cloth = numpy.nonzero(column.max(axis=1) - column.min(axis=1) > 40)[0]  # the normals are blue, the floor is grey
     foot = column[cloth.max() + 3:cloth.max() + 8].mean()
@@ -319,7 +320,7 @@ def test_turntable():
 
     def frames(azimuth):
         good("render", "ball.json", "--turntable", "--camera", f"{azimuth},24", "--out", "turn", "--size", "160x100")
-        return [read_png(f"turn/frame_{k:05}.png")[:80] for k in range(6)]  # above the time in the corner
+        return [read_png(f"turn/frame_{k:05}.png")[:70] for k in range(6)]  # above the time in the corner
     begun, later = frames(32), frames(92)
     for k in range(6):
         assert abs(begun[k] - begun[(k + 1) % 6]).mean() > 1, f"frames {k} and {k + 1} are the same"
@@ -333,7 +334,7 @@ def test_glass():
     with_ball = render("ball.json", "--frame", "0", "--shade", "refraction", "--camera", "0,89.9,2")
     write_scene(colliders=[{"type": "plane", "point": [0, 0, 0], "normal": [0, 1, 0]}])
     without = render("ball.json", "--frame", "0", "--shade", "refraction", "--camera", "0,89.9,2")
-    assert abs(with_ball - without)[90:110, 150:170].mean() > 15, "the ball is not seen"
+    assert abs(with_ball - without)[130:165, 130:190].mean() > 15, "the ball is not seen"  # beside the shadow, which is as grey as the ball
 
 
 def test_legend_has_its_place():

@@ -76,9 +76,9 @@ START_TEST(corners_of_a_box_are_sharp)
 }
 END_TEST
 
-/* On a sphere every normal is that of the sphere: it is taken a twentieth of a cell above, which changes its
- * direction by less than that over the radius times the angle of a face, 1e-3. On a box every normal is that of
- * one of its sides. */
+/* On a sphere every normal is that of the sphere: it is taken a twentieth of a cell above, which changes
+ * its direction by less than that over the radius times the angle of a face, 1e-3. On a box every normal is
+ * that of one of its sides. */
 START_TEST(bodies_are_round_or_crisp)
 {
     scene h = scene_model(CLOTH, "",
@@ -106,9 +106,10 @@ END_TEST
 
 /* ---- Cloth ---- */
 
-/* Rows of nodes lie 2 mm above a plane in pairs, between rows 60 mm higher. Slopes of 60 mm over 125 mm are those
- * of the normals at the pairs by half; a curve between them would sink by about a quarter of that times the edge,
- * 7 mm, into the plane, and does so without a collider. With the plane no point is below it. */
+/* Rows of nodes lie 2 mm above a plane in pairs, between rows 60 mm higher. Slopes of 60 mm over 125 mm are
+ * those of the normals at the pairs by half; a curve between them would sink by about a quarter of that
+ * times the edge, 7 mm, into the plane, and does so without a collider. With the plane no point is below
+ * it. */
 START_TEST(curved_cloth_clears_colliders)
 {
     static const char *const planes[] = {
@@ -137,8 +138,8 @@ START_TEST(curved_cloth_clears_colliders)
 }
 END_TEST
 
-/* A flat sheet has 32 edges at its border. Its hem lies on both sides of it, no farther than its radius, and not
- * outside of it, up to the rounding of floats. */
+/* A flat sheet has 32 edges at its border. Its hem lies on both sides of it, no farther than its radius,
+ * and not outside of it, up to the rounding of floats. */
 START_TEST(hem_lies_inside_the_border)
 {
     drape_skin skin;

@@ -1,5 +1,5 @@
-/* visibility.c: see visibility.h. */
-#include "render/visibility.h"
+/* lighting.c: see lighting.h. */
+#include "render/lighting.h"
 
 #define SHADOW       1024  /* texels along a side of the shadow map */
 #define SHARE        2     /* pixels of the picture along a side of one here */
@@ -10,21 +10,21 @@
 #define SIDES(x)     #x
 #define TEXT(x)      SIDES(x)
 
-const char drape_visibility_seen_source[] = "in vec3 place, normal;\n"
-                                            "uniform vec3 eye;\n"
-                                            "layout(location = 0) out vec4 point;\n"
-                                            "layout(location = 1) out vec4 facing;\n"
-                                            "void main() {\n"
-                                            "    vec3 n = normalize(normal), v = eye - place;\n"
-                                            "    point = vec4(place, length(v));\n"
-                                            "    facing = vec4(dot(n, v) < 0.0 ? -n : n, 0.0);\n"
-                                            "}\n";
+const char drape_lighting_seen_source[] = "in vec3 place, normal;\n"
+                                          "uniform vec3 eye;\n"
+                                          "layout(location = 0) out vec4 point;\n"
+                                          "layout(location = 1) out vec4 facing;\n"
+                                          "void main() {\n"
+                                          "    vec3 n = normalize(normal), v = eye - place;\n"
+                                          "    point = vec4(place, length(v));\n"
+                                          "    facing = vec4(dot(n, v) < 0.0 ? -n : n, 0.0);\n"
+                                          "}\n";
 
-const char drape_visibility_lookup_source[] =
+const char drape_lighting_lookup_source[] =
     "uniform sampler2D visible;\n"
     "// Between the four nearest pixels of the result, by how near they are and whether they show the same "
     "surface.\n"
-    "vec2 visibility(vec3 place) {\n"
+    "vec2 lighting(vec3 place) {\n"
     "    float d = length(eye - place);\n"
     "    vec2 at = gl_FragCoord.xy / " TEXT(
         SHARE) ".0 - 0.5, low = floor(at), f = at - low;\n"
@@ -163,7 +163,7 @@ static GLuint framebuffer(void)
     return name;
 }
 
-static bool create_buffers(drape_visibility *v)
+static bool create_buffers(drape_lighting *v)
 {
     const int w = v->width, h = v->height;
     bool complete = true;
@@ -189,10 +189,10 @@ static bool create_buffers(drape_visibility *v)
     return complete && glCheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE;
 }
 
-drape_status drape_visibility_create(drape_context *ctx, int width, int height, drape_visibility *v)
+drape_status drape_lighting_create(drape_context *ctx, int width, int height, drape_lighting *v)
 {
     const char *const vertex[] = {screen_vertex, NULL};
-    *v = (drape_visibility){.width = (width + SHARE - 1) / SHARE, .height = (height + SHARE - 1) / SHARE};
+    *v = (drape_lighting){.width = (width + SHARE - 1) / SHARE, .height = (height + SHARE - 1) / SHARE};
     bool complete = create_buffers(v);
     glGenVertexArrays(1, &v->empty);
     drape_status status = drape_gl_check(ctx, "make the buffers of light");
@@ -204,11 +204,11 @@ drape_status drape_visibility_create(drape_context *ctx, int width, int height, 
                drape_gl_program(ctx, "average", vertex, (const char *const[]){average_source, NULL}))))
         status = DRAPE_E_FILE;
     if (status)
-        drape_visibility_free(v);
+        drape_lighting_free(v);
     return status;
 }
 
-void drape_visibility_free(drape_visibility *v)
+void drape_lighting_free(drape_lighting *v)
 {
     if (!v->width)
         return;
@@ -220,12 +220,12 @@ void drape_visibility_free(drape_visibility *v)
     glDeleteProgram(v->find);
     glDeleteProgram(v->average);
     glDeleteVertexArrays(1, &v->empty);
-    *v = (drape_visibility){.width = 0};
+    *v = (drape_lighting){.width = 0};
 }
 
 /* ---- Drawing ---- */
 
-void drape_visibility_begin_shadow(const drape_visibility *v)
+void drape_lighting_begin_shadow(const drape_lighting *v)
 {
     glBindFramebuffer(GL_FRAMEBUFFER, v->shadow_buffer);
     glViewport(0, 0, SHADOW, SHADOW);
@@ -237,7 +237,7 @@ void drape_visibility_begin_shadow(const drape_visibility *v)
 }
 
 /* The panel in pixels of the buffers: left, bottom, right, top. */
-static void set_panel(const drape_visibility_view *view, const drape_visibility *v, int *panel)
+static void set_panel(const drape_lighting_view *view, const drape_lighting *v, int *panel)
 {
     panel[0] = view->left / SHARE;
     panel[1] = view->bottom / SHARE;
@@ -254,7 +254,7 @@ static void clip(const int *panel)
     glEnable(GL_SCISSOR_TEST);
 }
 
-void drape_visibility_begin_seen(const drape_visibility *v, const drape_visibility_view *view)
+void drape_lighting_begin_seen(const drape_lighting *v, const drape_lighting_view *view)
 {
     int panel[4];
     glBindFramebuffer(GL_FRAMEBUFFER, v->seen);
@@ -278,7 +278,7 @@ static void use(GLuint program, const GLuint *textures, const char *const *names
     glActiveTexture(GL_TEXTURE0);
 }
 
-void drape_visibility_find(const drape_visibility *v, const drape_visibility_view *view)
+void drape_lighting_find(const drape_lighting *v, const drape_lighting_view *view)
 {
     static const char *const find_names[] = {"places", "normals", "depths"}, *const average_names[] = {
                                                                                  "places", "normals", "raw"};
