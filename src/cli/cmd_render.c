@@ -17,6 +17,7 @@
 #define DEFAULT_WIDTH  1280
 #define DEFAULT_HEIGHT 720
 #define DEFAULT_SHADE  "linen"
+#define MAX_SLOW       1000
 #define MAX_FINE       4  /* largest --fine */
 #define TURN_ANGLES    24 /* at which a turntable is framed */
 #define MIN_SIDE       16
@@ -27,7 +28,7 @@
 typedef struct render_request {
     cli_command command;
     const char *out, *shade, *size, *camera, *range, *frame, *texture, *height, *environment;
-    int every, fine;
+    int every, slow, fine;
     bool compare, small, turntable;
 } render_request;
 
@@ -197,6 +198,8 @@ static int read_out(render *r)
         return cli_misuse("render", "--frame is for a picture: --out NAME.png");
     if (q->every && r->picture)
         return cli_misuse("render", "--every is for films and folders; --frame N is for a picture");
+    if (q->slow && !r->film)
+        return cli_misuse("render", "--slow is for films: pictures have no speed");
     if (q->turntable && r->picture)
         return cli_misuse("render", "--turntable is for films and folders: a picture has one view");
     if (!q->compare && q->command.operand_count > 1)
@@ -251,6 +254,7 @@ static int open_painter(render *r)
     const size_t size = (size_t)r->width * (size_t)r->height, finer = (size_t)(r->fine * r->fine);
     const drape_painter_def def = {.width = r->fine * r->width,
                                    .height = r->fine * r->height,
+                                   .fine = r->fine,
                                    .pattern = r->request->texture,
                                    .heights = r->request->height,
                                    .environment = r->request->environment};
@@ -425,7 +429,8 @@ static drape_status add_to_film(render *r, size_t k, void *film)
 static drape_status make_film(render *r)
 {
     drape_film *film = NULL;
-    double rate = drape_model_frame_rate(r->sources[0].in.model) / r->frames.every;
+    double rate = drape_model_frame_rate(r->sources[0].in.model) / r->frames.every /
+                  (r->request->slow ? r->request->slow : 1);
     drape_status status = drape_film_begin(r->ctx, r->request->out, r->width, r->height, rate, &film);
     if (!status)
         status = draw_frames(r, add_to_film, film);
@@ -518,6 +523,7 @@ static const cli_option options[] = {
      "azimuth and elevation in degrees, zoom (default 32,24,1, which shows all)", AT(camera), 0, NULL},
     {"range", CLI_TEXT, "LOW,HIGH",
      "range of a field's colours, in the legend's unit (default: that of its values)", AT(range), 0, NULL},
+    {"slow", CLI_NUMBER, "N", "a film that runs N times slower than the scene", AT(slow), MAX_SLOW, NULL},
     {"turntable", CLI_FLAG, NULL, "the camera turns once around during a film", AT(turntable), 0, NULL},
     {"fine", CLI_NUMBER, "N",
      "draws N x N pixels for each and averages them (default 2 for a picture, 1 for films and folders)",

@@ -68,7 +68,7 @@ static int report(const window_view *w, int code)
 
 static drape_status make_painter(window_view *w)
 {
-    drape_painter_def def = {.width = WIDTH, .height = HEIGHT};
+    drape_painter_def def = {.width = WIDTH, .height = HEIGHT, .fine = 1};
     drape_window_size(w->window, &def.width, &def.height);
     drape_painter_destroy(&w->painter);
     return drape_painter_create(w->ctx, &def, &w->painter);

@@ -12,8 +12,8 @@
 #define ENDLESS      2.0  /* half the side of the box of an endless body, in reaches */
 #define NORMAL_SHIFT 0.15 /* shift of a corner to the middle of its face, to find the side it is on */
 #define NORMAL_RISE  0.05 /* height above the corner on that side where its normal is taken, in cells */
-#define CREASE       0.8 /* cosine between two faces of a mesh above which their edge is drawn smooth */
-#define CUT_STEPS    24  /* bisections that find where the surface cuts an edge of the grid */
+#define CREASE       0.8  /* cosine between two faces of a mesh above which their edge is drawn smooth */
+#define CUT_STEPS    24   /* bisections that find where the surface cuts an edge of the grid */
 #define MEAN_WEIGHT  1e-2 /* of the mean, for directions that the planes leave free */
 #define NEWTON_STEPS 4    /* that move a point onto the surface */
 

@@ -217,7 +217,7 @@ static drape_status create_all(drape_painter *p, const drape_painter_def *def)
     const char *const paths[] = {def->pattern, def->heights, def->environment};
     drape_status status = drape_canvas_create(p->ctx, def->width, def->height, &p->canvas);
     if (!status)
-        status = drape_overlay_create(&p->arena, def->width, def->height, &p->overlay);
+        status = drape_overlay_create(&p->arena, def->width, def->height, def->fine, &p->overlay);
     if (!status)
         status = drape_lighting_create(p->ctx, def->width, def->height, &p->lighting);
     for (int i = 0; i < 3 && !status; i++)

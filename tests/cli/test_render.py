@@ -368,6 +368,11 @@ def frames_of(path):
     return tuple(int(n) for n in out.strip().split(",")[:3])
 
 
+def rate_of(path):
+    return subprocess.run(["ffprobe", "-v", "error", "-show_entries", "stream=r_frame_rate", "-of", "csv=p=0", path],
+                          capture_output=True, text=True, timeout=LIMIT, check=True).stdout.strip()
+
+
 def test_films():
     """films have every Nth frame of the run, at even sizes if the format needs that"""
     need_pictures()
@@ -376,6 +381,9 @@ def test_films():
     good("run", write_scene(), "--out", "ball", "--format", "npy")
     good("render", "ball", "--out", "a.mp4", "--size", "161x101")
     equal(frames_of("a.mp4"), (160, 100, 6), "mp4")
+    equal(rate_of("a.mp4"), "20/1", "20 frames a second")
+    good("render", "ball", "--out", "b.mp4", "--size", "64x64", "--every", "2", "--slow", "5")
+    equal(rate_of("b.mp4"), "2/1", "every other frame, five times slower")
     good("render", "ball", "--out", "a.gif", "--size", "161x101", "--every", "2")
     equal(frames_of("a.gif"), (161, 101, 3), "gif")
     good("render", "ball.json", "--out", "a.webm", "--size", "160x100")
@@ -450,6 +458,7 @@ def test_refused():
              (["ball.json", "--out", "x.bmp"], 'there is no ".bmp"; .png is a picture, .mp4, .webm, .gif, .apng are films'),
              (["ball.json", "--out", "./a.b/x.jpeg"], 'there is no ".jpeg"'),
              (["ball.json", "--out", "x.PNG", "--every", "2"], "--every is for films"),
+             (["ball.json", "--out", "frames", "--slow", "2"], "--slow is for films"),
              (["ball.json", "--out", "x.png", "--turntable"], "--turntable is for films"),
              (["ball.json", "--out", "x.png", "--fine", "5"], "--fine"),
              (["ball.json", "--out", "x.png", "--out", "y.png"], "--out is given twice"),
